@@ -1,0 +1,111 @@
+//! The numbers by which a rig is judged, as named profiles.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::MemoryRules;
+use crate::vocabulary::{Invalid, UnknownWord, in_range};
+
+/// A named set of [`Settings`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Profile {
+    /// Debounced, gated, noise-aware: for real rigs.
+    #[default]
+    Default,
+    /// The chapter's rule to the letter: enable at 0.08 rad or 0.5 m/s²,
+    /// fault at 0.01 m/s², every 0.1 s, no debounce. For teaching.
+    Textbook,
+}
+
+impl Profile {
+    pub const ALL: [Self; 2] = [Self::Default, Self::Textbook];
+
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Default => "default",
+            Self::Textbook => "textbook",
+        }
+    }
+}
+
+impl fmt::Display for Profile {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.as_str())
+    }
+}
+
+impl FromStr for Profile {
+    type Err = UnknownWord;
+    fn from_str(word: &str) -> Result<Self, UnknownWord> {
+        Self::ALL.into_iter().find(|p| p.as_str() == word).ok_or_else(|| UnknownWord {
+            word: word.to_owned(),
+            expected: "default, textbook".to_owned(),
+        })
+    }
+}
+
+/// How a rig is judged; immutable while a session runs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    pub profile: Profile,
+    /// Length of the acceleration filter, s.
+    pub window_s: f64,
+    /// Least time between two judgements, s; 0 judges every sample.
+    pub period_s: f64,
+    /// Missing time beyond which nothing is differenced across, s.
+    pub gap_s: f64,
+    /// How long a sample may wait for an earlier one, s.
+    pub reorder_s: f64,
+    /// Continuous failure before the test fails (pending), s.
+    pub fail_s: f64,
+    /// Continuous agreement before the test passes, s.
+    pub pass_s: f64,
+    /// Further failure before it counts as a trip (confirmed), s.
+    pub confirm_s: f64,
+    pub memory: MemoryRules,
+}
+
+impl Settings {
+    /// The numbers of `profile`.
+    #[must_use]
+    pub fn of(profile: Profile) -> Self {
+        let default = Self {
+            profile,
+            window_s: 0.5,
+            period_s: 0.0,
+            gap_s: 0.3,
+            reorder_s: 0.1,
+            fail_s: 0.7,
+            pass_s: 1.0,
+            confirm_s: 0.6,
+            memory: MemoryRules::default(),
+        };
+        match profile {
+            Profile::Default => default,
+            Profile::Textbook => Self {
+                window_s: 0.3,
+                period_s: 0.1,
+                fail_s: 0.0,
+                pass_s: 0.0,
+                confirm_s: 0.0,
+                ..default
+            },
+        }
+    }
+
+    /// The same with the debounce before a failure set to `fail_s` in [0, 60] s.
+    ///
+    /// # Errors
+    /// [`Invalid`] naming `/diagnostics/debounce_s`.
+    pub fn with_debounce(self, fail_s: f64) -> Result<Self, Invalid> {
+        let fail_s = in_range("/diagnostics/debounce_s", fail_s, 0.0..=60.0)?;
+        Ok(Self { fail_s, ..self })
+    }
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self::of(Profile::Default)
+    }
+}

@@ -1,0 +1,168 @@
+//! A rig as its owner describes it, and the set-up that an engine runs on.
+
+use crate::diagnosis::{Calibration, Profile, Settings};
+use crate::plant::{Ball, Plate, ServoModel, TwinAxis, TwinModel};
+use crate::vocabulary::{Axis, Invalid, PerAxis, in_range, positive};
+
+/// How a device's numbers relate to the plate frame. Applied when a sample is
+/// judged; the recording keeps what was sent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisMapping {
+    /// Whether the device's x is the plate's y and the reverse.
+    pub swap: bool,
+    /// Sign of the readings along each plate axis, +1 or −1.
+    pub sign: PerAxis<f64>,
+    /// Metres per unit of the readings.
+    pub position_unit_m: f64,
+    /// Radians per unit of the commands.
+    pub command_unit_rad: f64,
+}
+
+impl Default for AxisMapping {
+    fn default() -> Self {
+        let sign = PerAxis { x: 1.0, y: 1.0 };
+        Self { swap: false, sign, position_unit_m: 1.0, command_unit_rad: 1.0 }
+    }
+}
+
+/// What the owner knows of the servos; both are of one kind.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ServoSpec {
+    pub angle_limit_rad: f64,
+    pub dead_time_s: f64,
+    pub lag_s: f64,
+    pub rate_limit_rad_s: f64,
+}
+
+impl Default for ServoSpec {
+    /// ±0.2 rad as in the chapter; a dead time of 40 ms and a lag of 60 ms are
+    /// the middle of the 80–300 ms seen on real rigs' low side; 10 rad/s is a
+    /// standard hobby servo (0.1 s per 60°).
+    fn default() -> Self {
+        Self { angle_limit_rad: 0.2, dead_time_s: 0.04, lag_s: 0.06, rate_limit_rad_s: 10.0 }
+    }
+}
+
+/// What the owner asks of the diagnosis.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DiagnosticsSpec {
+    pub profile: Profile,
+    /// Wanted false alarms per rig and year, above zero.
+    pub false_alarms_per_rig_year: Option<f64>,
+    /// Continuous failure before a test fails, s.
+    pub debounce_s: Option<f64>,
+}
+
+/// A rig as described by its asset file, checked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rig {
+    pub name: String,
+    pub sample_rate_hz: f64,
+    pub ball: Ball,
+    pub plate: Plate,
+    pub servo: ServoSpec,
+    pub mapping: AxisMapping,
+    pub diagnostics: DiagnosticsSpec,
+    pub calibration: Option<Calibration>,
+}
+
+/// Longest name of a rig, bytes.
+pub const MAX_NAME: usize = 128;
+
+impl Rig {
+    /// The chapter's rig under another name.
+    #[must_use]
+    pub fn chapter(name: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            sample_rate_hz: 100.0,
+            ball: Ball::default(),
+            plate: Plate::default(),
+            servo: ServoSpec::default(),
+            mapping: AxisMapping::default(),
+            diagnostics: DiagnosticsSpec::default(),
+            calibration: None,
+        }
+    }
+
+    /// Checks what the parts' own constructors have not.
+    ///
+    /// # Errors
+    /// [`Invalid`] naming the element.
+    pub fn check(&self) -> Result<(), Invalid> {
+        let plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+        if self.name.is_empty() || self.name.len() > MAX_NAME || !self.name.chars().all(plain) {
+            let reason = format!("must be 1 to {MAX_NAME} letters, digits, `-`, `_` or `.`");
+            return Err(Invalid::new("/name", reason));
+        }
+        positive("/sample_rate_hz", self.sample_rate_hz, 100_000.0)?;
+        in_range("/servo/dead_time_s", self.servo.dead_time_s, 0.0..=5.0)?;
+        self.servo_model()?;
+        positive("/axes/position_unit_m", self.mapping.position_unit_m, 1000.0)?;
+        positive("/axes/command_unit_rad", self.mapping.command_unit_rad, 1000.0)?;
+        if let Some(rate) = self.diagnostics.false_alarms_per_rig_year {
+            positive("/diagnostics/false_alarms_per_rig_year", rate, 1e6)?;
+        }
+        self.settings(self.diagnostics.profile)?;
+        Ok(())
+    }
+
+    fn servo_model(&self) -> Result<ServoModel, Invalid> {
+        ServoModel::new(self.servo.angle_limit_rad, self.servo.lag_s, self.servo.rate_limit_rad_s)
+    }
+
+    /// The settings of `profile` with what this rig's owner asks for.
+    ///
+    /// # Errors
+    /// [`Invalid`] naming the element under `/diagnostics`.
+    pub fn settings(&self, profile: Profile) -> Result<Settings, Invalid> {
+        let settings = Settings::of(profile);
+        match (profile, self.diagnostics.debounce_s) {
+            (Profile::Default, Some(debounce_s)) => settings.with_debounce(debounce_s),
+            _ => Ok(settings),
+        }
+    }
+}
+
+/// Everything an engine needs to judge one rig; immutable.
+#[derive(Clone, Debug)]
+pub struct Setup {
+    pub rig: Rig,
+    pub settings: Settings,
+    pub twin: TwinModel,
+}
+
+impl Setup {
+    /// The set-up for `rig`, judged by `profile` or, without one, by the
+    /// profile that its owner chose.
+    ///
+    /// # Errors
+    /// [`Invalid`] naming the first element of the rig that cannot be.
+    pub fn new(rig: Rig, profile: Option<Profile>) -> Result<Self, Invalid> {
+        rig.check()?;
+        let settings = rig.settings(profile.unwrap_or(rig.diagnostics.profile))?;
+        let mut twin = TwinModel::new(&rig.ball, &rig.plate, nominal_axis(&rig)?);
+        for axis in Axis::ALL {
+            let learnt = rig.calibration.as_ref().and_then(|c| c.axes[axis]);
+            if let Some(learnt) = learnt {
+                twin.axes[axis] = TwinAxis {
+                    servo: ServoModel::new(
+                        rig.servo.angle_limit_rad,
+                        learnt.lag_s,
+                        rig.servo.rate_limit_rad_s,
+                    )?,
+                    dead_time_s: learnt.dead_time_s,
+                    gain: learnt.gain,
+                    level_rad: learnt.level_rad,
+                };
+            }
+        }
+        Ok(Self { rig, settings, twin })
+    }
+}
+
+/// Both axes before anything is learnt.
+fn nominal_axis(rig: &Rig) -> Result<TwinAxis, Invalid> {
+    let (servo, dead_time_s) = (rig.servo_model()?, rig.servo.dead_time_s);
+    Ok(TwinAxis { servo, dead_time_s, gain: 1.0, level_rad: 0.0 })
+}

@@ -1,0 +1,42 @@
+//! Checked numbers: a range check that NaN does not pass.
+
+use std::ops::RangeInclusive;
+
+/// A value that cannot be, with the element that holds it.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{element}: {reason}")]
+pub struct Invalid {
+    /// JSON pointer (RFC 6901) of the offending element, `/ball/radius_m`.
+    pub element: String,
+    /// What is wrong with it, with the admissible range.
+    pub reason: String,
+}
+
+impl Invalid {
+    /// An error for `element` because of `reason`.
+    pub fn new(element: impl Into<String>, reason: impl Into<String>) -> Self {
+        Self { element: element.into(), reason: reason.into() }
+    }
+}
+
+/// `value` if it lies in `range`; NaN never does.
+///
+/// # Errors
+/// [`Invalid`] naming `element` and the range.
+pub fn in_range(element: &str, value: f64, range: RangeInclusive<f64>) -> Result<f64, Invalid> {
+    if range.contains(&value) {
+        return Ok(value);
+    }
+    Err(Invalid::new(element, format!("{value} is outside {} to {}", range.start(), range.end())))
+}
+
+/// `value` if it is above zero and at most `most`.
+///
+/// # Errors
+/// [`Invalid`] naming `element` and the range.
+pub fn positive(element: &str, value: f64, most: f64) -> Result<f64, Invalid> {
+    if value > 0.0 && value <= most {
+        return Ok(value);
+    }
+    Err(Invalid::new(element, format!("{value} is not above 0 and at most {most}")))
+}
