@@ -15,3 +15,5 @@ pub mod diagnosis;
 pub mod engine;
 pub mod plant;
 pub mod vocabulary;
+#[cfg(feature = "service")]
+pub mod wire;

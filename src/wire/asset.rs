@@ -1,0 +1,461 @@
+//! The asset file: a rig as JSON.
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use utoipa::ToSchema;
+
+use crate::diagnosis::{AxisCalibration, Calibration, Profile};
+use crate::engine::{AxisMapping, DiagnosticsSpec, Rig, ServoSpec};
+use crate::plant::{Ball, Plate, PlateShape};
+use crate::vocabulary::{Axis, Invalid, PerAxis, in_range, positive};
+
+/// A rig as its owner describes it. Everything but `name` has a default: the
+/// rig of the book chapter.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AssetView {
+    /// 1 to 128 letters, digits, `-`, `_` or `.`.
+    pub name: String,
+    /// Samples a second that the device sends, about.
+    #[serde(default = "default_rate")]
+    pub sample_rate_hz: f64,
+    #[serde(default)]
+    pub ball: BallView,
+    #[serde(default)]
+    pub plate: PlateView,
+    #[serde(default)]
+    pub servo: ServoView,
+    /// How the device's numbers relate to the plate frame.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub axes: Option<AxesView>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub diagnostics: Option<DiagnosticsView>,
+    /// Written by `calibrate`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<CalibrationView>,
+}
+
+fn default_rate() -> f64 {
+    100.0
+}
+
+/// The ball.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct BallView {
+    /// In (0, 1] m.
+    pub radius_m: f64,
+    /// In (0, 100] kg.
+    pub mass_kg: f64,
+    /// κ of I = κ m r², in [0, 1]: 0.4 solid, 0.667 hollow.
+    pub inertia_factor: f64,
+}
+
+impl Default for BallView {
+    fn default() -> Self {
+        let ball = Ball::default();
+        Self {
+            radius_m: ball.radius_m(),
+            mass_kg: ball.mass_kg(),
+            inertia_factor: ball.inertia_factor(),
+        }
+    }
+}
+
+/// The plate: `length_m` and `width_m`, or `diameter_m` for a round one.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PlateView {
+    /// Along x, in (0, 10] m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub length_m: Option<f64>,
+    /// Along y, in (0, 10] m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub width_m: Option<f64>,
+    /// Of a round plate, in (0, 10] m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub diameter_m: Option<f64>,
+    /// In [0, 1] m.
+    #[serde(default = "default_thickness")]
+    pub thickness_m: f64,
+    /// Whether a rim stops the ball at the edge.
+    #[serde(default = "default_rim")]
+    pub rim: bool,
+}
+
+fn default_thickness() -> f64 {
+    Plate::default().thickness_m()
+}
+
+fn default_rim() -> bool {
+    Plate::default().rim()
+}
+
+impl Default for PlateView {
+    fn default() -> Self {
+        plate_view(&Plate::default())
+    }
+}
+
+/// The servos, both of one kind.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ServoView {
+    /// Largest plate angle, in (0, π/2] rad.
+    pub angle_limit_rad: f64,
+    /// From a command to the first movement, in [0, 5] s.
+    pub dead_time_s: f64,
+    /// First-order lag, in [0, 10] s.
+    pub lag_s: f64,
+    /// Fastest turn, in (0, 1000] rad/s.
+    pub rate_limit_rad_s: f64,
+}
+
+impl Default for ServoView {
+    fn default() -> Self {
+        servo_view(&ServoSpec::default())
+    }
+}
+
+/// How the device's numbers relate to the plate frame.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct AxesView {
+    /// Whether the device's x is the plate's y and the reverse.
+    pub swap: bool,
+    /// Sign of the readings along the plate's x, 1 or −1.
+    pub x_sign: f64,
+    /// Sign of the readings along the plate's y, 1 or −1.
+    pub y_sign: f64,
+    /// Metres per unit of the readings, 0.001 for millimetres.
+    pub position_unit_m: f64,
+    /// Radians per unit of the commands, 0.01745 for degrees.
+    pub command_unit_rad: f64,
+}
+
+impl Default for AxesView {
+    fn default() -> Self {
+        Self { swap: false, x_sign: 1.0, y_sign: 1.0, position_unit_m: 1.0, command_unit_rad: 1.0 }
+    }
+}
+
+/// What the owner asks of the diagnosis.
+#[derive(Clone, Debug, Default, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DiagnosticsView {
+    /// `default` or `textbook`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub profile: Option<String>,
+    /// Wanted false alarms per rig and year, above 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub false_alarms_per_rig_year: Option<f64>,
+    /// Continuous failure before a test fails, in [0, 60] s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub debounce_s: Option<f64>,
+}
+
+/// What was learnt of a rig, from which data, when.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CalibrationView {
+    /// Derived from the rest; every fault carries it. Ignored when read.
+    #[serde(default)]
+    pub id: String,
+    /// RFC 3339.
+    pub made_at: String,
+    /// SHA-256 of the data.
+    pub data_sha256: String,
+    pub samples: u64,
+    pub duration_s: f64,
+    /// None where the rig has no such servo.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub x: Option<AxisCalibrationView>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub y: Option<AxisCalibrationView>,
+}
+
+/// One axis as learnt.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AxisCalibrationView {
+    /// Measured over modelled acceleration, in [−100, 100].
+    pub gain: f64,
+    pub dead_time_s: f64,
+    pub lag_s: f64,
+    pub level_rad: f64,
+    pub noise_m: f64,
+    pub breakaway_rad: f64,
+    pub residual_m_s2: f64,
+}
+
+/// Parses and checks an asset file.
+///
+/// # Errors
+/// [`Invalid`] with the JSON pointer of the offending element; the empty
+/// pointer stands for the document, with line and column in the reason.
+pub fn parse(document: &[u8]) -> Result<Rig, Invalid> {
+    let mut json = serde_json::Deserializer::from_slice(document);
+    let view: AssetView = serde_path_to_error::deserialize(&mut json)
+        .map_err(|e| Invalid::new(pointer(e.path()), e.inner().to_string()))?;
+    json.end().map_err(|e| Invalid::new("", e.to_string()))?;
+    rig(&view)
+}
+
+/// JSON pointer (RFC 6901) of a path inside a document.
+#[must_use]
+pub fn pointer(path: &serde_path_to_error::Path) -> String {
+    use serde_path_to_error::Segment;
+    let token = |segment: &Segment| match segment {
+        Segment::Seq { index } => Some(format!("/{index}")),
+        Segment::Map { key } => Some(format!("/{}", key.replace('~', "~0").replace('/', "~1"))),
+        Segment::Enum { .. } | Segment::Unknown => None,
+    };
+    path.iter().filter_map(token).collect()
+}
+
+/// The rig that a view describes.
+///
+/// # Errors
+/// [`Invalid`] with the JSON pointer of the first element that cannot be.
+pub fn rig(view: &AssetView) -> Result<Rig, Invalid> {
+    let rig = Rig {
+        name: view.name.clone(),
+        sample_rate_hz: view.sample_rate_hz,
+        ball: Ball::new(view.ball.radius_m, view.ball.mass_kg, view.ball.inertia_factor)?,
+        plate: plate(&view.plate)?,
+        servo: ServoSpec {
+            angle_limit_rad: view.servo.angle_limit_rad,
+            dead_time_s: view.servo.dead_time_s,
+            lag_s: view.servo.lag_s,
+            rate_limit_rad_s: view.servo.rate_limit_rad_s,
+        },
+        mapping: mapping(&view.axes.clone().unwrap_or_default())?,
+        diagnostics: diagnostics(&view.diagnostics.clone().unwrap_or_default())?,
+        calibration: view.calibration.as_ref().map(calibration).transpose()?,
+    };
+    rig.check()?;
+    Ok(rig)
+}
+
+fn plate(view: &PlateView) -> Result<Plate, Invalid> {
+    let shape = match (view.diameter_m, view.length_m, view.width_m) {
+        (Some(diameter_m), None, None) => PlateShape::Round { diameter_m },
+        (Some(_), ..) => {
+            return Err(Invalid::new(
+                "/plate/diameter_m",
+                "a round plate has neither length_m nor width_m",
+            ));
+        }
+        (None, length_m, width_m) => {
+            let PlateShape::Rectangle { length_m: l, width_m: w } = Plate::default().shape() else {
+                unreachable!("the default plate is a rectangle")
+            };
+            PlateShape::Rectangle { length_m: length_m.unwrap_or(l), width_m: width_m.unwrap_or(w) }
+        }
+    };
+    Plate::new(shape, view.thickness_m, view.rim)
+}
+
+fn mapping(view: &AxesView) -> Result<AxisMapping, Invalid> {
+    for (element, sign) in [("/axes/x_sign", view.x_sign), ("/axes/y_sign", view.y_sign)] {
+        if sign.abs() != 1.0 {
+            return Err(Invalid::new(element, format!("{sign} is neither 1 nor -1")));
+        }
+    }
+    Ok(AxisMapping {
+        swap: view.swap,
+        sign: PerAxis { x: view.x_sign, y: view.y_sign },
+        position_unit_m: view.position_unit_m,
+        command_unit_rad: view.command_unit_rad,
+    })
+}
+
+fn diagnostics(view: &DiagnosticsView) -> Result<DiagnosticsSpec, Invalid> {
+    let profile = match &view.profile {
+        None => Profile::default(),
+        Some(word) => word.parse().map_err(|e: crate::vocabulary::UnknownWord| {
+            Invalid::new("/diagnostics/profile", e.to_string())
+        })?,
+    };
+    Ok(DiagnosticsSpec {
+        profile,
+        false_alarms_per_rig_year: view.false_alarms_per_rig_year,
+        debounce_s: view.debounce_s,
+    })
+}
+
+fn calibration(view: &CalibrationView) -> Result<Calibration, Invalid> {
+    let learn = |axis: Axis, view: &Option<AxisCalibrationView>| {
+        view.as_ref().map(|v| axis_calibration(axis, v)).transpose()
+    };
+    Ok(Calibration {
+        axes: PerAxis { x: learn(Axis::X, &view.x)?, y: learn(Axis::Y, &view.y)? },
+        data_sha256: view.data_sha256.clone(),
+        n_samples: view.samples,
+        duration_s: view.duration_s,
+        made_at: view.made_at.clone(),
+    })
+}
+
+fn axis_calibration(axis: Axis, view: &AxisCalibrationView) -> Result<AxisCalibration, Invalid> {
+    let at = |field: &str| format!("/calibration/{}/{field}", axis.as_str());
+    Ok(AxisCalibration {
+        gain: in_range(&at("gain"), view.gain, -100.0..=100.0)?,
+        dead_time_s: in_range(&at("dead_time_s"), view.dead_time_s, 0.0..=5.0)?,
+        lag_s: in_range(&at("lag_s"), view.lag_s, 0.0..=10.0)?,
+        level_rad: in_range(&at("level_rad"), view.level_rad, -1.0..=1.0)?,
+        noise_m: positive(&at("noise_m"), view.noise_m, 1.0)?,
+        breakaway_rad: in_range(&at("breakaway_rad"), view.breakaway_rad, 0.0..=1.0)?,
+        residual_m_s2: positive(&at("residual_m_s2"), view.residual_m_s2, 100.0)?,
+    })
+}
+
+/// The view of a rig, as `calibrate` writes it and the registry returns it.
+#[must_use]
+pub fn view(rig: &Rig) -> AssetView {
+    AssetView {
+        name: rig.name.clone(),
+        sample_rate_hz: rig.sample_rate_hz,
+        ball: BallView {
+            radius_m: rig.ball.radius_m(),
+            mass_kg: rig.ball.mass_kg(),
+            inertia_factor: rig.ball.inertia_factor(),
+        },
+        plate: plate_view(&rig.plate),
+        servo: servo_view(&rig.servo),
+        axes: (rig.mapping != AxisMapping::default()).then(|| AxesView {
+            swap: rig.mapping.swap,
+            x_sign: rig.mapping.sign.x,
+            y_sign: rig.mapping.sign.y,
+            position_unit_m: rig.mapping.position_unit_m,
+            command_unit_rad: rig.mapping.command_unit_rad,
+        }),
+        diagnostics: (rig.diagnostics != DiagnosticsSpec::default()).then(|| DiagnosticsView {
+            profile: Some(rig.diagnostics.profile.to_string()),
+            false_alarms_per_rig_year: rig.diagnostics.false_alarms_per_rig_year,
+            debounce_s: rig.diagnostics.debounce_s,
+        }),
+        calibration: rig.calibration.as_ref().map(calibration_view),
+    }
+}
+
+fn plate_view(plate: &Plate) -> PlateView {
+    let (length_m, width_m, diameter_m) = match plate.shape() {
+        PlateShape::Rectangle { length_m, width_m } => (Some(length_m), Some(width_m), None),
+        PlateShape::Round { diameter_m } => (None, None, Some(diameter_m)),
+    };
+    let (thickness_m, rim) = (plate.thickness_m(), plate.rim());
+    PlateView { length_m, width_m, diameter_m, thickness_m, rim }
+}
+
+fn servo_view(servo: &ServoSpec) -> ServoView {
+    ServoView {
+        angle_limit_rad: servo.angle_limit_rad,
+        dead_time_s: servo.dead_time_s,
+        lag_s: servo.lag_s,
+        rate_limit_rad_s: servo.rate_limit_rad_s,
+    }
+}
+
+/// The view of a calibration.
+#[must_use]
+pub fn calibration_view(calibration: &Calibration) -> CalibrationView {
+    let axis = |c: &AxisCalibration| AxisCalibrationView {
+        gain: c.gain,
+        dead_time_s: c.dead_time_s,
+        lag_s: c.lag_s,
+        level_rad: c.level_rad,
+        noise_m: c.noise_m,
+        breakaway_rad: c.breakaway_rad,
+        residual_m_s2: c.residual_m_s2,
+    };
+    CalibrationView {
+        id: calibration_id(calibration),
+        made_at: calibration.made_at.clone(),
+        data_sha256: calibration.data_sha256.clone(),
+        samples: calibration.n_samples,
+        duration_s: calibration.duration_s,
+        x: calibration.axes.x.as_ref().map(axis),
+        y: calibration.axes.y.as_ref().map(axis),
+    }
+}
+
+/// The id by which faults name the calibration that judged them: the first 16
+/// hexadecimal digits of the SHA-256 of what was learnt and from what.
+#[must_use]
+pub fn calibration_id(calibration: &Calibration) -> String {
+    let mut hash = Sha256::new();
+    hash.update(calibration.data_sha256.as_bytes());
+    for learnt in Axis::ALL.into_iter().filter_map(|axis| calibration.axes[axis]) {
+        for number in [
+            learnt.gain,
+            learnt.dead_time_s,
+            learnt.lag_s,
+            learnt.level_rad,
+            learnt.noise_m,
+            learnt.breakaway_rad,
+            learnt.residual_m_s2,
+        ] {
+            hash.update(number.to_bits().to_le_bytes());
+        }
+    }
+    super::verdict::hex(&hash.finalize()[..8])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_is_enough() {
+        assert_eq!(parse(br#"{"name":"a"}"#).unwrap(), Rig::chapter("a"));
+    }
+
+    #[test]
+    fn a_rig_survives_the_round_trip() {
+        let learnt = AxisCalibration {
+            gain: 0.9,
+            dead_time_s: 0.03,
+            lag_s: 0.07,
+            level_rad: -0.01,
+            noise_m: 4e-4,
+            breakaway_rad: 0.005,
+            residual_m_s2: 0.02,
+        };
+        let mut rig = Rig::chapter("b");
+        rig.plate = Plate::new(PlateShape::Round { diameter_m: 0.3 }, 0.005, false).unwrap();
+        rig.mapping.swap = true;
+        rig.diagnostics.debounce_s = Some(2.0);
+        rig.calibration = Some(Calibration {
+            axes: PerAxis { x: Some(learnt), y: None },
+            data_sha256: "00".to_owned(),
+            n_samples: 12,
+            duration_s: 1.5,
+            made_at: "2026-01-01T00:00:00Z".to_owned(),
+        });
+        let json = serde_json::to_vec(&view(&rig)).unwrap();
+        assert_eq!(parse(&json).unwrap(), rig);
+    }
+
+    #[test]
+    fn what_is_wrong_is_named() {
+        let cases = [
+            (r#"{"name":"a","ball":{"radius_m":-1}}"#, "/ball/radius_m", "not above 0"),
+            (r#"{"name":"a","ball":{"radius_m":"x"}}"#, "/ball/radius_m", "invalid type"),
+            (r#"{"name":"a","bal":{}}"#, "/bal", "unknown field"),
+            (r#"{"name":"a b"}"#, "/name", "letters"),
+            (r#"{"ball":{}}"#, "", "missing field `name`"),
+            (r#"{"name":"a","plate":{"diameter_m":1,"width_m":1}}"#, "/plate/diameter_m", "round"),
+            (r#"{"name":"a","axes":{"x_sign":2}}"#, "/axes/x_sign", "neither"),
+            (r#"{"name":"a","diagnostics":{"profile":"best"}}"#, "/diagnostics/profile", "best"),
+            (r#"{"name":"a","servo":{"lag_s":-0.1}}"#, "/servo/lag_s", "outside"),
+            (r#"{"name":"a","sample_rate_hz":1e999}"#, "/sample_rate_hz", "number out of range"),
+            (r#"{"name":"a"} x"#, "", "trailing"),
+        ];
+        for (document, element, reason) in cases {
+            let error = parse(document.as_bytes()).unwrap_err();
+            assert_eq!(error.element, element, "{document}: {error}");
+            assert!(error.reason.contains(reason), "{document}: {error}");
+        }
+    }
+}

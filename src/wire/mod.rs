@@ -1,0 +1,10 @@
+//! What crosses the boundary: asset files, session files, verdict lines.
+//!
+//! One idea: parse in two stages, a syntactic view that judges nothing, then a
+//! domain value that cannot be wrong. Views are `Serialize`, domain types are
+//! not; they are converted by hand. Knows no sockets and no SQL.
+
+pub mod asset;
+pub mod memory;
+pub mod session_csv;
+pub mod verdict;

@@ -1,0 +1,236 @@
+//! The session file: CSV with the header `t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m`
+//! in any order, more columns ignored, `seq` taken where present.
+//!
+//! An empty field is a value that is not there. One bad row is an error for
+//! that row, with its line, and the next row is read all the same.
+
+use std::io::{self, Read, Write};
+
+use crate::vocabulary::Sample;
+
+/// The columns of a session file, in the order in which they are written.
+pub const COLUMNS: [&str; 5] = ["t_s", "cmd_qx_rad", "cmd_qy_rad", "x_m", "y_m"];
+
+/// Why a file is no session.
+#[derive(Debug, thiserror::Error)]
+pub enum CsvError {
+    #[error("the header lacks the column `{0}`; wanted: t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m")]
+    MissingColumn(&'static str),
+    #[error("the header names the column `{0}` twice")]
+    DoubleColumn(&'static str),
+    #[error("cannot read the header: {0}")]
+    Header(#[from] csv::Error),
+}
+
+/// Why a row is no sample.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("line {line}: {reason}")]
+pub struct RowError {
+    /// Line in the file, from 1, the header included.
+    pub line: u64,
+    pub reason: String,
+}
+
+/// Where each column stands in the file.
+#[derive(Clone, Copy, Debug)]
+struct Layout {
+    columns: [usize; COLUMNS.len()],
+    seq: Option<usize>,
+}
+
+impl Layout {
+    fn of(header: &csv::ByteRecord) -> Result<Self, CsvError> {
+        let at = |name: &'static str| {
+            let mut found =
+                (0..header.len()).filter(|&i| header[i].trim_ascii() == name.as_bytes());
+            match (found.next(), found.next()) {
+                (Some(_), Some(_)) => Err(CsvError::DoubleColumn(name)),
+                (first, _) => Ok(first),
+            }
+        };
+        let mut columns = [0; COLUMNS.len()];
+        for (slot, name) in columns.iter_mut().zip(COLUMNS) {
+            *slot = at(name)?.ok_or(CsvError::MissingColumn(name))?;
+        }
+        Ok(Self { columns, seq: at("seq")? })
+    }
+}
+
+/// Reads samples row by row, in the order of the file.
+pub struct Reader<R> {
+    csv: csv::Reader<R>,
+    layout: Layout,
+    record: csv::ByteRecord,
+}
+
+impl<R: Read> Reader<R> {
+    /// Reads the header.
+    ///
+    /// # Errors
+    /// [`CsvError`] when a column is missing or doubled, or the bytes cannot
+    /// be read.
+    pub fn new(source: R) -> Result<Self, CsvError> {
+        let mut csv = csv::ReaderBuilder::new().flexible(true).from_reader(source);
+        let mut header = csv.byte_headers()?.clone();
+        if let Some(first) = header.get(0)
+            && let Some(rest) = first.strip_prefix(b"\xef\xbb\xbf")
+        {
+            let fields = std::iter::once(rest).chain(header.iter().skip(1));
+            header = fields.collect();
+        }
+        let layout = Layout::of(&header)?;
+        Ok(Self { csv, layout, record: csv::ByteRecord::new() })
+    }
+
+    fn sample(&self) -> Result<Sample, RowError> {
+        let line = self.record.position().map_or(0, csv::Position::line);
+        let fail = |reason: String| RowError { line, reason };
+        let field = |column: usize| {
+            let bytes = self.record.get(self.layout.columns[column]);
+            let bytes = bytes.ok_or_else(|| fail(format!("no field `{}`", COLUMNS[column])))?;
+            number(bytes).map_err(|e| fail(format!("`{}`: {e}", COLUMNS[column])))
+        };
+        let seq = match self.layout.seq.and_then(|i| self.record.get(i)).map(<[u8]>::trim_ascii) {
+            None | Some(b"") => None,
+            Some(bytes) => Some(
+                std::str::from_utf8(bytes)
+                    .ok()
+                    .and_then(|s| s.parse().ok())
+                    .ok_or_else(|| fail("`seq` is not a whole number".to_owned()))?,
+            ),
+        };
+        Ok(Sample {
+            seq,
+            t_s: field(0)?.ok_or_else(|| fail("`t_s` is empty".to_owned()))?,
+            cmd_qx_rad: field(1)?,
+            cmd_qy_rad: field(2)?,
+            x_m: field(3)?,
+            y_m: field(4)?,
+        })
+    }
+}
+
+/// The number in a field; none when it is empty.
+fn number(field: &[u8]) -> Result<Option<f64>, String> {
+    let field = field.trim_ascii();
+    if field.is_empty() {
+        return Ok(None);
+    }
+    let text = std::str::from_utf8(field).map_err(|_| "not UTF-8".to_owned())?;
+    let value: f64 = text.parse().map_err(|_| format!("`{text}` is not a number"))?;
+    if value.is_finite() { Ok(Some(value)) } else { Err(format!("`{text}` is not finite")) }
+}
+
+impl<R: Read> Iterator for Reader<R> {
+    type Item = Result<Sample, RowError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        match self.csv.read_byte_record(&mut self.record) {
+            Ok(true) => Some(self.sample()),
+            Ok(false) => None,
+            Err(e) => {
+                let line = self.csv.position().line();
+                Some(Err(RowError { line, reason: e.to_string() }))
+            }
+        }
+    }
+}
+
+/// Writes samples with a header, `seq` only where any has one. Numbers are
+/// written so that they read back to the bit.
+///
+/// # Errors
+/// Whatever the sink says.
+pub fn write<W: Write>(mut sink: W, samples: &[Sample]) -> io::Result<()> {
+    let with_seq = samples.iter().any(|s| s.seq.is_some());
+    if with_seq {
+        write!(sink, "seq,")?;
+    }
+    writeln!(sink, "{}", COLUMNS.join(","))?;
+    for sample in samples {
+        if with_seq {
+            write!(sink, "{},", sample.seq.map(|s| s.to_string()).unwrap_or_default())?;
+        }
+        write!(sink, "{}", sample.t_s)?;
+        for value in [sample.cmd_qx_rad, sample.cmd_qy_rad, sample.x_m, sample.y_m] {
+            match value {
+                Some(value) => write!(sink, ",{value}")?,
+                None => write!(sink, ",")?,
+            }
+        }
+        writeln!(sink)?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn read(text: &str) -> Vec<Result<Sample, RowError>> {
+        Reader::new(text.as_bytes()).unwrap().collect()
+    }
+
+    #[test]
+    fn columns_in_any_order_and_more_of_them() {
+        let rows = read("y_m,note,t_s,cmd_qy_rad,x_m,cmd_qx_rad\n,hello,1.5,,0.25,-0.1\n");
+        let wanted =
+            Sample { t_s: 1.5, cmd_qx_rad: Some(-0.1), x_m: Some(0.25), ..Sample::default() };
+        assert_eq!(rows, [Ok(wanted)]);
+    }
+
+    #[test]
+    fn a_bad_row_is_named_and_the_next_one_read() {
+        let rows = read(
+            "t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n0,0,0,abc,0\n1,0\n2,0,0,NaN,0\n,0,0,0,0\n4,0,0,0,0\n",
+        );
+        let errors: Vec<String> =
+            rows.iter().filter_map(|r| r.as_ref().err()).map(ToString::to_string).collect();
+        assert_eq!(
+            errors,
+            [
+                "line 2: `x_m`: `abc` is not a number",
+                "line 3: no field `cmd_qy_rad`",
+                "line 4: `x_m`: `NaN` is not finite",
+                "line 5: `t_s` is empty",
+            ]
+        );
+        assert_eq!(rows[4].as_ref().unwrap().t_s, 4.0);
+    }
+
+    #[test]
+    fn a_header_that_lacks_a_column_is_no_session() {
+        let error = Reader::new("t_s,x_m,y_m,cmd_qx_rad\n".as_bytes()).err().unwrap();
+        assert!(error.to_string().contains("`cmd_qy_rad`"), "{error}");
+        let error =
+            Reader::new("t_s,t_s,x_m,y_m,cmd_qx_rad,cmd_qy_rad\n".as_bytes()).err().unwrap();
+        assert!(error.to_string().contains("twice"), "{error}");
+        assert!(Reader::new(&b""[..]).is_err());
+    }
+
+    fn finite() -> impl Strategy<Value = f64> {
+        proptest::num::f64::NORMAL | proptest::num::f64::SUBNORMAL | proptest::num::f64::ZERO
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_written_reads_back_to_the_bit(
+            rows in proptest::collection::vec(
+                (proptest::option::of(0..u64::MAX), finite(), proptest::array::uniform4(proptest::option::of(finite()))),
+                0..20,
+            )
+        ) {
+            let samples: Vec<Sample> = rows.into_iter().map(|(seq, t_s, [a, b, c, d])| Sample {
+                seq, t_s, cmd_qx_rad: a, cmd_qy_rad: b, x_m: c, y_m: d,
+            }).collect();
+            let mut text = Vec::new();
+            write(&mut text, &samples).unwrap();
+            let back: Vec<Sample> = Reader::new(text.as_slice()).unwrap().map(Result::unwrap).collect();
+            prop_assert_eq!(back.len(), samples.len());
+            for (a, b) in back.iter().zip(&samples) {
+                prop_assert_eq!(format!("{:?}", a), format!("{:?}", b));
+            }
+        }
+    }
+}

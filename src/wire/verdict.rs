@@ -1,0 +1,280 @@
+//! The lines of a verdict: faults as they change, a summary, and a hash that
+//! is the same for the same recording however it was delivered.
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use utoipa::ToSchema;
+
+use crate::diagnosis::{AxisEvidence, Candidate, Evidence, Transition};
+use crate::engine::Output;
+use crate::vocabulary::{Axis, FaultCode, FaultStatus};
+
+/// A change of a fault's status.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct FaultView {
+    /// Always `fault`.
+    #[serde(rename = "type")]
+    pub line: String,
+    /// The session's name.
+    pub session: String,
+    /// The sample at which the status changed, s on the device's clock.
+    pub t_s: f64,
+    /// `x_servo`, `y_servo`, `stuck_ball` or `sensor`.
+    pub code: String,
+    /// `dead`, `held`, `gain`, …; null where the evidence does not say.
+    pub kind: Option<String>,
+    /// `pending`, `confirmed`, `healed` or `cleared`.
+    pub status: String,
+    /// ISO 14229 status byte, two hexadecimal digits.
+    pub status_byte: String,
+    /// When the deviation began, as far as the evidence says.
+    pub onset_s: Option<f64>,
+    /// Ball axis of a servo fault.
+    pub axis: Option<String>,
+    /// Plate angle that the servo turns: `qy` for x, `qx` for y.
+    pub command: Option<String>,
+    /// Causes that read alike; empty where only one does.
+    pub candidates: Vec<CandidateView>,
+    /// The numbers at that moment, in one sentence and one by one.
+    pub summary: String,
+    pub evidence: EvidenceView,
+}
+
+/// One possible cause.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct CandidateView {
+    pub code: String,
+    pub kind: Option<String>,
+    /// In (0, 1]; the weights sum to one.
+    pub weight: f64,
+}
+
+/// The numbers at one moment.
+#[derive(Clone, Debug, Default, Serialize, Deserialize, ToSchema)]
+pub struct EvidenceView {
+    pub t_s: Option<f64>,
+    /// Estimation window that was available, s.
+    pub window_s: f64,
+    pub x: AxisEvidenceView,
+    pub y: AxisEvidenceView,
+    /// Seconds without a ball seen.
+    pub unseen_s: f64,
+    /// Seconds of bit-identical readings.
+    pub identical_s: f64,
+    /// Seconds for which the ball has stood still.
+    pub still_s: f64,
+    /// Lone readings set aside in the last ten seconds.
+    pub outliers: u32,
+    /// Standard deviation of the readings about their fit, m.
+    pub scatter_m: Option<f64>,
+}
+
+/// One axis at one moment.
+#[derive(Clone, Debug, Default, Serialize, Deserialize, ToSchema)]
+pub struct AxisEvidenceView {
+    pub command_rad: Option<f64>,
+    pub position_m: Option<f64>,
+    pub velocity_m_s: Option<f64>,
+    /// Measured acceleration over the window, m/s².
+    pub measured_m_s2: Option<f64>,
+    /// The twin's through the same filter, m/s².
+    pub twin_m_s2: Option<f64>,
+    /// Measured − twin, m/s².
+    pub residual_m_s2: Option<f64>,
+    pub limit_m_s2: f64,
+    /// Whether the enable condition (the gate) holds.
+    pub enabled: bool,
+}
+
+/// The last line of a verdict.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct SummaryView {
+    /// Always `summary`.
+    #[serde(rename = "type")]
+    pub line: String,
+    pub session: String,
+    /// Samples taken, duplicates and rejected ones not counted.
+    pub samples: u64,
+    pub rejected: u64,
+    /// From the first to the last sample, s.
+    pub duration_s: f64,
+    /// Codes confirmed in this session, in the order of confirmation.
+    pub faults: Vec<String>,
+    pub verdict_hash: String,
+}
+
+/// The view of the transition of a status byte.
+#[must_use]
+pub fn fault_view(session: &str, transition: &Transition) -> FaultView {
+    let axis = transition.axis();
+    FaultView {
+        line: "fault".to_owned(),
+        session: session.to_owned(),
+        t_s: transition.at.seconds(),
+        code: transition.code.to_string(),
+        kind: transition.suspicion.kind.map(|k| k.to_string()),
+        status: transition.status.to_string(),
+        status_byte: transition.byte.to_string(),
+        onset_s: transition.suspicion.onset.map(|t| t.seconds()),
+        axis: axis.map(|a| a.as_str().to_owned()),
+        command: axis.map(|a| a.command().to_owned()),
+        candidates: transition.suspicion.candidates.iter().map(candidate_view).collect(),
+        summary: sentence(transition),
+        evidence: evidence_view(&transition.evidence),
+    }
+}
+
+/// The view of a candidate.
+#[must_use]
+pub fn candidate_view(candidate: &Candidate) -> CandidateView {
+    CandidateView {
+        code: candidate.code.to_string(),
+        kind: candidate.kind.map(|k| k.to_string()),
+        weight: candidate.weight,
+    }
+}
+
+/// The view of the numbers at one moment.
+#[must_use]
+pub fn evidence_view(evidence: &Evidence) -> EvidenceView {
+    EvidenceView {
+        t_s: evidence.at.map(|t| t.seconds()),
+        window_s: evidence.window_s,
+        x: axis_evidence_view(&evidence.axes.x),
+        y: axis_evidence_view(&evidence.axes.y),
+        unseen_s: evidence.unseen_s,
+        identical_s: evidence.identical_s,
+        still_s: evidence.still_s,
+        outliers: evidence.outliers,
+        scatter_m: evidence.scatter_m,
+    }
+}
+
+fn axis_evidence_view(axis: &AxisEvidence) -> AxisEvidenceView {
+    AxisEvidenceView {
+        command_rad: axis.command_rad,
+        position_m: axis.position_m,
+        velocity_m_s: axis.velocity_m_s,
+        measured_m_s2: axis.measured_m_s2,
+        twin_m_s2: axis.twin_m_s2,
+        residual_m_s2: axis.residual_m_s2(),
+        limit_m_s2: axis.limit_m_s2,
+        enabled: axis.enabled,
+    }
+}
+
+/// What was seen, in one sentence.
+#[must_use]
+pub fn sentence(transition: &Transition) -> String {
+    let evidence = &transition.evidence;
+    let kind = transition.suspicion.kind.map(|k| format!(" ({k})")).unwrap_or_default();
+    let since = transition
+        .suspicion
+        .onset
+        .map(|t| format!(" since {:.2} s", t.seconds()))
+        .unwrap_or_default();
+    let what = match transition.code.axis() {
+        Some(axis) => servo_sentence(axis, evidence),
+        None if transition.code == FaultCode::StuckBall => {
+            format!(
+                "the ball has stood still for {:.1} s while the plate asks it to move",
+                evidence.still_s
+            )
+        }
+        None => sensor_sentence(evidence),
+    };
+    format!("{}{kind} {}{since}: {what}", transition.code, transition.status)
+}
+
+fn servo_sentence(axis: Axis, evidence: &Evidence) -> String {
+    let e = &evidence.axes[axis];
+    match (e.measured_m_s2, e.twin_m_s2) {
+        (Some(measured), Some(twin)) => format!(
+            "the ball accelerates by {measured:.2} m/s² along {} where {} asks for {twin:.2} m/s² (limit {:.2})",
+            axis.as_str(),
+            axis.command(),
+            e.limit_m_s2,
+        ),
+        _ => format!("the ball's acceleration along {} is not testable now", axis.as_str()),
+    }
+}
+
+fn sensor_sentence(evidence: &Evidence) -> String {
+    if evidence.unseen_s > 0.0 {
+        return format!("no ball seen for {:.1} s", evidence.unseen_s);
+    }
+    let scatter = evidence.scatter_m.map_or("unknown".to_owned(), |s| format!("{:.2} mm", s * 1e3));
+    format!(
+        "readings identical for {:.1} s, {} set aside in 10 s, scatter {scatter}",
+        evidence.identical_s, evidence.outliers,
+    )
+}
+
+/// A verdict as it grows: which codes were confirmed, and the hash.
+///
+/// The hash covers every transition that the data caused (time, code, kind,
+/// status, byte, onset), so it tells two verdicts apart where anything that
+/// matters differs.
+#[derive(Clone, Debug, Default)]
+pub struct Verdict {
+    hash: Sha256,
+    confirmed: Vec<FaultCode>,
+}
+
+impl Verdict {
+    /// Takes note of one output of the engine.
+    pub fn take(&mut self, output: &Output) {
+        let Output::Transition(transition) = output else { return };
+        let time = |t: f64| t.to_bits().to_le_bytes();
+        self.hash.update(time(transition.at.seconds()));
+        self.hash.update([
+            transition.code as u8,
+            transition.suspicion.kind.map_or(u8::MAX, |k| k as u8),
+            transition.status as u8,
+            transition.byte.bits(),
+        ]);
+        self.hash.update(transition.suspicion.onset.map_or([0xff; 8], |t| time(t.seconds())));
+        if transition.status == FaultStatus::Confirmed && !self.confirmed.contains(&transition.code)
+        {
+            self.confirmed.push(transition.code);
+        }
+    }
+
+    /// Codes confirmed so far, in the order of confirmation.
+    #[must_use]
+    pub fn confirmed(&self) -> &[FaultCode] {
+        &self.confirmed
+    }
+
+    /// Lower-case hexadecimal SHA-256 of the transitions so far.
+    #[must_use]
+    pub fn hash(&self) -> String {
+        hex(&self.hash.clone().finalize())
+    }
+
+    /// The summary line of a session.
+    #[must_use]
+    pub fn summary(
+        &self,
+        session: &str,
+        samples: u64,
+        rejected: u64,
+        duration_s: f64,
+    ) -> SummaryView {
+        SummaryView {
+            line: "summary".to_owned(),
+            session: session.to_owned(),
+            samples,
+            rejected,
+            duration_s,
+            faults: self.confirmed.iter().map(ToString::to_string).collect(),
+            verdict_hash: self.hash(),
+        }
+    }
+}
+
+/// Lower-case hexadecimal digits of `bytes`.
+#[must_use]
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}
