@@ -13,6 +13,7 @@
 
 pub mod diagnosis;
 pub mod engine;
+pub mod maths;
 pub mod plant;
 pub mod vocabulary;
 #[cfg(feature = "service")]

@@ -3,14 +3,26 @@
 //! Sees what was measured, what the twin predicts and what was commanded, and
 //! decides. Does not know which plant it watches, nor where samples come from.
 
+mod answer;
 mod calibration;
+mod debounce;
+mod evaluator;
 mod evidence;
+mod limits;
 mod memory;
+mod outlier;
 mod settings;
 mod status;
+mod stillness;
 
+pub use answer::Answer;
 pub use calibration::{AxisCalibration, Calibration};
+pub use debounce::{Debounce, Qualified, Test};
+pub use evaluator::{Evaluator, Finding, Surroundings};
 pub use evidence::{AxisEvidence, Candidate, Evidence, MAX_CANDIDATES, Suspicion, Transition};
+pub use limits::Limits;
 pub use memory::{FaultMemory, FaultRecord, MemoryRules};
+pub use outlier::{Gated, OutlierGate};
 pub use settings::{Profile, Settings};
 pub use status::StatusByte;
+pub use stillness::{AxisStillness, Reading, Stillness};

@@ -6,19 +6,31 @@
 //! batching. Never fails on data: a bad sample is an output that says so.
 //! Knows no files, sockets, clocks or formats.
 
+mod admit;
+mod align;
+mod pipeline;
 mod rig;
 mod types;
+mod watch;
 
 pub use rig::{AxisMapping, DiagnosticsSpec, MAX_NAME, Rig, ServoSpec, Setup};
 pub use types::{Admission, Input, MonitorState, Output, Readiness, Rejection, State};
 
+use admit::Admit;
+use align::Align;
+use pipeline::Pipeline;
+
 use crate::diagnosis::FaultMemory;
+use crate::vocabulary::{FaultCode, Sample};
 
 /// One rig's pipeline for the length of one session (one operation cycle).
 #[derive(Clone, Debug)]
 pub struct Engine {
     setup: Setup,
     memory: FaultMemory,
+    admit: Admit,
+    align: Align,
+    pipeline: Pipeline,
 }
 
 impl Engine {
@@ -27,7 +39,13 @@ impl Engine {
     #[must_use]
     pub fn new(setup: Setup, mut memory: FaultMemory) -> Self {
         memory.start_cycle();
-        Self { setup, memory }
+        Self {
+            admit: Admit::new(&setup.rig.mapping),
+            align: Align::default(),
+            pipeline: Pipeline::new(&setup),
+            memory,
+            setup,
+        }
     }
 
     /// What the engine runs on.
@@ -45,12 +63,55 @@ impl Engine {
     /// Takes one input and appends what follows from it to `outputs`: exactly
     /// one [`Output::Admitted`] for a sample, then the transitions it caused.
     pub fn handle(&mut self, input: Input, outputs: &mut Vec<Output>) {
-        let _ = (input, outputs);
+        match input {
+            Input::Sample(sample) => self.sample(sample, outputs),
+            Input::Clear(code) => self.clear(code, outputs),
+            Input::Acknowledge(code) => {
+                self.memory.acknowledge(code);
+            }
+            Input::End => self.end(outputs),
+        }
+    }
+
+    fn sample(&mut self, sample: Sample, outputs: &mut Vec<Output>) {
+        let admission = self.admit.take(&sample, self.align.released_s());
+        outputs.push(Output::Admitted(admission));
+        if admission == Admission::Accepted {
+            self.align.push(sample);
+            while let Some(next) = self.align.pop(self.setup.settings.reorder_s) {
+                self.pipeline.judge(&self.setup, &next, &mut self.memory, outputs);
+            }
+        }
+    }
+
+    fn clear(&mut self, code: FaultCode, outputs: &mut Vec<Output>) {
+        let was_cleared = self.memory.record(code).word();
+        self.memory.clear(code);
+        self.pipeline.reset_monitor(code);
+        let (now, evidence) = (self.pipeline.now(), self.pipeline.evidence());
+        if let (Some(at), true) = (now, was_cleared != self.memory.record(code).word()) {
+            outputs.push(watch::transition(code, at, evidence, &self.memory));
+        }
+    }
+
+    fn end(&mut self, outputs: &mut Vec<Output>) {
+        while let Some(next) = self.align.flush() {
+            self.pipeline.judge(&self.setup, &next, &mut self.memory, outputs);
+        }
+        let before = self.memory.clone();
+        self.memory.end_cycle(&self.setup.settings.memory);
+        let Some(at) = self.pipeline.now() else { return };
+        for &code in FaultCode::ALL {
+            if before.record(code).word() != self.memory.record(code).word() {
+                let evidence = self.pipeline.evidence();
+                outputs.push(watch::transition(code, at, evidence, &self.memory));
+            }
+        }
     }
 
     /// Where the engine stands after the last judged sample.
     #[must_use]
     pub fn state(&self) -> State {
-        State::default()
+        self.pipeline.state(&self.memory, self.align.n_waiting())
     }
 }

@@ -1,0 +1,125 @@
+//! Debouncing by time: a fault detection counter from −128 to 127.
+//!
+//! Prefailed raises it (jumping up to zero first), prepassed lowers it
+//! (jumping down to zero first), at rates that take `fail_s` and `pass_s` from
+//! zero to an end. While the enable condition is lost it freezes. A silent rig
+//! is judged by time, not by counts, so the rates are per second.
+
+/// What a monitor says of one moment.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Test {
+    /// The enable condition does not hold: neither passed nor failed.
+    #[default]
+    NotTested,
+    Prepassed,
+    Prefailed,
+}
+
+/// What the counter came to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Qualified {
+    /// Still on its way, or nothing new.
+    No,
+    /// At −128: PASSED.
+    Passed,
+    /// At +127: FAILED.
+    Failed,
+    /// Failed, and has been failing long enough to count as a trip.
+    Tripped,
+}
+
+/// The debounce of one monitor.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Debounce {
+    /// In [−1, 1]; −1 is passed, +1 is failed.
+    level: f64,
+    /// Seconds of failure since the counter reached its upper end.
+    failing_s: f64,
+}
+
+impl Debounce {
+    /// The ISO 14229 fault detection counter, −128 to 127.
+    #[must_use]
+    pub fn counter(&self) -> i8 {
+        let scale = if self.level < 0.0 { 128.0 } else { 127.0 };
+        // In range by construction: |level| ≤ 1.
+        (self.level * scale) as i8
+    }
+
+    /// Whether it is on its way up: something is suspected.
+    #[must_use]
+    pub fn suspicious(&self) -> bool {
+        self.level > 0.0
+    }
+
+    /// Takes `test`, which held for the `dt` seconds before this sample. A
+    /// time of zero qualifies at once.
+    pub fn update(
+        &mut self,
+        test: Test,
+        dt: f64,
+        fail_s: f64,
+        pass_s: f64,
+        trip_s: f64,
+    ) -> Qualified {
+        let share = |full: f64| if full > 0.0 { dt / full } else { 1.0 };
+        match test {
+            Test::NotTested => Qualified::No,
+            Test::Prefailed => {
+                if self.level >= 1.0 {
+                    self.failing_s += dt;
+                }
+                self.level = (self.level.max(0.0) + share(fail_s)).min(1.0);
+                match self.level >= 1.0 {
+                    true if self.failing_s >= trip_s => Qualified::Tripped,
+                    true => Qualified::Failed,
+                    false => Qualified::No,
+                }
+            }
+            Test::Prepassed => {
+                self.failing_s = 0.0;
+                self.level = (self.level.min(0.0) - share(pass_s)).max(-1.0);
+                if self.level <= -1.0 { Qualified::Passed } else { Qualified::No }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run(debounce: &mut Debounce, test: Test, n: usize) -> Vec<Qualified> {
+        (0..n).map(|_| debounce.update(test, 0.125, 0.5, 1.0, 0.25)).collect()
+    }
+
+    #[test]
+    fn failing_takes_its_time_and_tripping_longer() {
+        use Qualified::{Failed, No, Tripped};
+        let found = run(&mut Debounce::default(), Test::Prefailed, 7);
+        assert_eq!(found, [No, No, No, Failed, Failed, Tripped, Tripped]);
+    }
+
+    #[test]
+    fn a_lost_enable_condition_freezes_and_a_pass_starts_again_from_zero() {
+        let mut debounce = Debounce::default();
+        run(&mut debounce, Test::Prefailed, 3);
+        let before = debounce.counter();
+        assert_eq!(before, 95);
+        run(&mut debounce, Test::NotTested, 100);
+        assert_eq!(debounce.counter(), before);
+        run(&mut debounce, Test::Prepassed, 1);
+        assert_eq!(debounce.counter(), -16);
+        assert_eq!(run(&mut debounce, Test::Prepassed, 7).last(), Some(&Qualified::Passed));
+        assert_eq!(debounce.counter(), -128);
+        run(&mut debounce, Test::Prefailed, 1);
+        assert_eq!(debounce.counter(), 31, "jumps up to zero first");
+    }
+
+    #[test]
+    fn no_debounce_means_at_once() {
+        let mut debounce = Debounce::default();
+        assert_eq!(debounce.update(Test::Prefailed, 0.0, 0.0, 0.0, 0.0), Qualified::Tripped);
+        assert_eq!(debounce.counter(), 127);
+    }
+}

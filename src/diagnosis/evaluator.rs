@@ -1,0 +1,219 @@
+//! The monitors: one moment of evidence in, one test per code out.
+//!
+//! Order matters and is the isolation: readings that cannot be trusted say
+//! nothing about the ball, a ball that cannot move says nothing about the
+//! servos. A monitor that is out of its depth is *not tested*, never *passed*.
+
+use super::stillness::Stillness;
+use super::{Answer, Candidate, Evidence, Limits, Profile, Test};
+use crate::vocabulary::{Axis, FaultCode, FaultKind, PerAxis};
+
+/// The chapter's enable condition: command, rad, or measured acceleration,
+/// m/s² (application 3).
+const TEXTBOOK_ENABLE_RAD: f64 = 0.08;
+const TEXTBOOK_ENABLE_M_S2: f64 = 0.5;
+
+/// Seconds of identical readings, while asked to move, that no living sensor
+/// on a rolling ball gives: longer than any refresh seen (0.2 s).
+const FROZEN_S: f64 = 0.3;
+
+/// Seconds in which a ball asked to move must have begun to.
+const PRESSED_S: f64 = 0.3;
+
+/// Seconds without a ball that a healthy tracker does not lose it for.
+const UNSEEN_S: f64 = 0.3;
+
+/// Share of samples without a ball that is too many.
+const MISSING_SHARE: f64 = 0.5;
+
+/// Outliers in ten seconds that are too many.
+const MANY_OUTLIERS: u32 = 6;
+
+/// Scatter over the healthy one that is noise.
+const NOISY: f64 = 4.0;
+
+/// Seconds for which a jump of the readings counts as evidence.
+const JUMP_S: f64 = 2.0;
+
+/// What the monitors look at besides the evidence.
+#[derive(Clone, Copy, Debug)]
+pub struct Surroundings {
+    /// Seconds since the sample judged before, s.
+    pub dt: f64,
+    /// Seconds for which the ball has been clear of the edge.
+    pub clear_s: f64,
+    /// Whether the ball was last seen at the edge.
+    pub at_edge: bool,
+    /// Seconds since readings stepped as no ball can; infinite if never.
+    pub since_jump_s: f64,
+}
+
+/// What one monitor says of one moment.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Finding {
+    pub test: Test,
+    pub kind: Option<FaultKind>,
+    /// Another cause that reads alike.
+    pub rival: Option<Candidate>,
+}
+
+impl Finding {
+    const PASS: Self = Self { test: Test::Prepassed, kind: None, rival: None };
+
+    const fn fail(kind: Option<FaultKind>) -> Self {
+        Self { test: Test::Prefailed, kind, rival: None }
+    }
+}
+
+/// The monitors of one rig.
+#[derive(Clone, Debug)]
+pub struct Evaluator {
+    profile: Profile,
+    limits: PerAxis<Limits>,
+    answers: PerAxis<Answer>,
+}
+
+impl Evaluator {
+    #[must_use]
+    pub fn new(profile: Profile, limits: PerAxis<Limits>) -> Self {
+        Self { profile, limits, answers: PerAxis::default() }
+    }
+
+    /// The limits in force.
+    #[must_use]
+    pub const fn limits(&self) -> &PerAxis<Limits> {
+        &self.limits
+    }
+
+    /// Forgets what was followed over time, as after a gap.
+    pub fn restart(&mut self) {
+        self.answers = PerAxis::default();
+    }
+
+    /// Whether the residual of `axis` may be judged: the enable condition.
+    #[must_use]
+    pub fn enabled(
+        &self,
+        axis: Axis,
+        evidence: &Evidence,
+        readings: &Stillness,
+        around: &Surroundings,
+    ) -> bool {
+        let e = &evidence.axes[axis];
+        let (Some(measured), Some(twin), Some(command)) =
+            (e.measured_m_s2, e.twin_m_s2, e.command_rad)
+        else {
+            return false;
+        };
+        if self.profile == Profile::Textbook {
+            return command.abs() >= TEXTBOOK_ENABLE_RAD || measured.abs() >= TEXTBOOK_ENABLE_M_S2;
+        }
+        let resting = readings.axes[axis].still_s > PRESSED_S
+            && twin.abs() < self.limits[axis].breakaway_m_s2;
+        around.clear_s >= evidence.window_s && readings.unseen_s == 0.0 && !resting
+    }
+
+    /// What every monitor says, in the order of [`FaultCode::ALL`].
+    pub fn evaluate(
+        &mut self,
+        evidence: &Evidence,
+        readings: &Stillness,
+        around: &Surroundings,
+    ) -> [Finding; FaultCode::COUNT] {
+        if self.profile == Profile::Textbook {
+            let servo = |axis| textbook(axis, evidence);
+            return [servo(Axis::X), servo(Axis::Y), Finding::default(), Finding::default()];
+        }
+        let sensor = self.sensor(evidence, readings, around);
+        let stuck = match sensor.test {
+            Test::Prefailed => Finding::default(),
+            _ => stuck_ball(readings, around),
+        };
+        let blind = [sensor, stuck].iter().any(|f| f.test == Test::Prefailed);
+        let mut servo = |axis| match blind {
+            true => Finding::default(),
+            false => self.servo(axis, evidence, around),
+        };
+        [servo(Axis::X), servo(Axis::Y), stuck, sensor]
+    }
+
+    fn servo(&mut self, axis: Axis, evidence: &Evidence, around: &Surroundings) -> Finding {
+        let e = &evidence.axes[axis];
+        let (true, Some(measured), Some(twin)) = (e.enabled, e.measured_m_s2, e.twin_m_s2) else {
+            return Finding::default();
+        };
+        if !e.violates() {
+            self.answers[axis].update(measured, twin, around.dt);
+            return Finding::PASS;
+        }
+        self.answers[axis].update(measured, twin, around.dt);
+        Finding::fail(self.answers[axis].kind(e.limit_m_s2))
+    }
+
+    fn sensor(&self, evidence: &Evidence, readings: &Stillness, around: &Surroundings) -> Finding {
+        if readings.unseen_s >= UNSEEN_S || readings.missing >= MISSING_SHARE {
+            return match around.at_edge {
+                true => Finding::default(),
+                false => Finding::fail(Some(FaultKind::Dropout)),
+            };
+        }
+        if readings.unseen_s > 0.0 {
+            return Finding::default();
+        }
+        if around.since_jump_s < JUMP_S {
+            return Finding::fail(Some(FaultKind::Jump));
+        }
+        if readings.outliers() >= MANY_OUTLIERS {
+            return Finding::fail(Some(FaultKind::Spikes));
+        }
+        let noise = self.limits.x.noise_m.max(self.limits.y.noise_m);
+        if evidence.scatter_m.is_some_and(|s| s > NOISY * noise) {
+            return Finding::fail(Some(FaultKind::Noise));
+        }
+        frozen(readings, around).unwrap_or(Finding::PASS)
+    }
+}
+
+/// The chapter's rule: enabled and the residual at least 0.01 m/s².
+fn textbook(axis: Axis, evidence: &Evidence) -> Finding {
+    let e = &evidence.axes[axis];
+    match (e.enabled, e.violates()) {
+        (false, _) => Finding::default(),
+        (true, true) => Finding::fail(None),
+        (true, false) => Finding::PASS,
+    }
+}
+
+/// Bit-identical readings although the ball is asked to move.
+fn frozen(readings: &Stillness, around: &Surroundings) -> Option<Finding> {
+    if around.at_edge {
+        return None;
+    }
+    let axes = &readings.axes;
+    let dead = |axis: Axis| axes[axis].identical_s >= FROZEN_S && axes[axis].pressed_s >= FROZEN_S;
+    if readings.identical_s() >= FROZEN_S && Axis::ALL.into_iter().any(dead) {
+        let rival = Candidate { code: FaultCode::StuckBall, kind: None, weight: 0.3 };
+        return Some(Finding { rival: Some(rival), ..Finding::fail(Some(FaultKind::Frozen)) });
+    }
+    let alone = |axis: Axis| dead(axis) && axes[axis.other()].still_s == 0.0;
+    Axis::ALL.into_iter().any(alone).then(|| Finding::fail(Some(FaultKind::Frozen)))
+}
+
+/// The ball stands still although it is asked to move.
+fn stuck_ball(readings: &Stillness, around: &Surroundings) -> Finding {
+    if around.at_edge || readings.unseen_s > 0.0 {
+        return Finding::default();
+    }
+    let pressed = |axis: Axis| readings.axes[axis].pressed_s >= PRESSED_S;
+    match (pressed(Axis::X), pressed(Axis::Y)) {
+        _ if readings.still_s() < PRESSED_S => Finding::PASS,
+        (true, true) => Finding::fail(None),
+        (false, false) => Finding::default(),
+        (x_pressed, _) => {
+            let axis = if x_pressed { Axis::X } else { Axis::Y };
+            let kind = Some(FaultKind::Dead);
+            let rival = Candidate { code: FaultCode::servo(axis), kind, weight: 0.4 };
+            Finding { rival: Some(rival), ..Finding::fail(None) }
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! What the readings themselves say: seen or not, repeating, standing still,
+//! thrown about.
+//!
+//! A ball at rest is not a fault and neither are repeated readings; they turn
+//! into evidence only while the commands ask the ball to move (*pressed*).
+
+use crate::vocabulary::{Axis, PerAxis, SimTime};
+
+/// Half-life of the count of outliers and of the share of missing readings, s.
+const MEMORY_S: f64 = 2.0;
+
+/// Longest that outliers are counted back, s.
+const OUTLIER_MEMORY_S: f64 = 10.0;
+
+/// One sample as this watch sees it.
+#[derive(Clone, Copy, Debug)]
+pub struct Reading {
+    pub at: SimTime,
+    /// Seconds since the sample before.
+    pub dt: f64,
+    pub position_m: PerAxis<Option<f64>>,
+    /// Whether the commands ask the ball to move along each axis.
+    pub pressed: PerAxis<bool>,
+    /// How far a ball at rest may seem to move, m.
+    pub still_m: f64,
+    /// Whether the outlier gate refused the reading.
+    pub outlier: bool,
+}
+
+/// Stillness of one axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AxisStillness {
+    anchor_m: Option<f64>,
+    last_m: Option<f64>,
+    /// Seconds since the reading left its surroundings.
+    pub still_s: f64,
+    /// Seconds of those in which the ball was asked to move, in a row.
+    pub pressed_s: f64,
+    /// Seconds for which every bit has been the same.
+    pub identical_s: f64,
+}
+
+impl AxisStillness {
+    fn update(&mut self, position_m: f64, pressed: bool, reading: &Reading) {
+        let moved = self.anchor_m.is_none_or(|a| (position_m - a).abs() > reading.still_m);
+        if moved {
+            self.anchor_m = Some(position_m);
+            self.still_s = 0.0;
+        } else {
+            self.still_s += reading.dt;
+        }
+        self.pressed_s = if pressed && !moved { self.pressed_s + reading.dt } else { 0.0 };
+        let identical = self.last_m.is_some_and(|l| l.to_bits() == position_m.to_bits());
+        self.identical_s = if identical { self.identical_s + reading.dt } else { 0.0 };
+        self.last_m = Some(position_m);
+    }
+}
+
+/// The watch over the readings.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Stillness {
+    pub axes: PerAxis<AxisStillness>,
+    /// Seconds since a ball was last seen.
+    pub unseen_s: f64,
+    /// Share of samples without a ball, over the last seconds, in [0, 1].
+    pub missing: f64,
+    /// Outliers in the last ten seconds, each fading linearly in weight.
+    outliers: f64,
+}
+
+impl Stillness {
+    /// Takes one sample.
+    pub fn update(&mut self, reading: &Reading) {
+        let seen = Axis::ALL.iter().any(|&a| reading.position_m[a].is_some());
+        self.unseen_s = if seen { 0.0 } else { self.unseen_s + reading.dt };
+        let fade = (-reading.dt / MEMORY_S).exp();
+        self.missing = self.missing * fade + if seen { 0.0 } else { 1.0 - fade };
+        self.outliers *= (-reading.dt / OUTLIER_MEMORY_S).exp();
+        if reading.outlier {
+            self.outliers += 1.0;
+            return;
+        }
+        for axis in Axis::ALL {
+            if let Some(position_m) = reading.position_m[axis] {
+                self.axes[axis].update(position_m, reading.pressed[axis], reading);
+            }
+        }
+    }
+
+    /// Outliers of late, each fading over ten seconds.
+    #[must_use]
+    pub fn outliers(&self) -> u32 {
+        // Non-negative and far below u32::MAX: one a sample at most.
+        self.outliers.round() as u32
+    }
+
+    /// Seconds for which the ball has stood still in every direction seen.
+    #[must_use]
+    pub fn still_s(&self) -> f64 {
+        self.least(|a| a.still_s)
+    }
+
+    /// Seconds for which every reading has been the same to the bit.
+    #[must_use]
+    pub fn identical_s(&self) -> f64 {
+        self.least(|a| a.identical_s)
+    }
+
+    fn least(&self, of: impl Fn(&AxisStillness) -> f64) -> f64 {
+        Axis::ALL
+            .iter()
+            .map(|&a| &self.axes[a])
+            .filter(|a| a.last_m.is_some())
+            .map(of)
+            .reduce(f64::min)
+            .unwrap_or(0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn reading(t: f64, x: Option<f64>, pressed: bool) -> Reading {
+        Reading {
+            at: SimTime::new(t).unwrap(),
+            dt: 0.01,
+            position_m: PerAxis { x, y: None },
+            pressed: PerAxis { x: pressed, y: false },
+            still_m: 0.002,
+            outlier: false,
+        }
+    }
+
+    #[test]
+    fn rest_is_told_from_being_held_against_the_command() {
+        let mut watch = Stillness::default();
+        for i in 0..100 {
+            let noise = if i % 2 == 0 { 0.0 } else { 1e-3 };
+            watch.update(&reading(f64::from(i) * 0.01, Some(noise), i >= 50));
+        }
+        assert!((watch.still_s() - 0.99).abs() < 1e-9);
+        assert!((watch.axes.x.pressed_s - 0.50).abs() < 1e-9);
+        assert_eq!(watch.identical_s(), 0.0);
+    }
+
+    #[test]
+    fn a_ball_not_seen_is_counted_in_seconds_and_in_share() {
+        let mut watch = Stillness::default();
+        for i in 0..200 {
+            watch.update(&reading(f64::from(i) * 0.01, None, true));
+        }
+        assert!((watch.unseen_s - 2.0).abs() < 1e-9);
+        assert!((watch.missing - (1.0 - (-1.0_f64).exp())).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,387 @@
+//! The stages from the twin to the fault memory, for samples in order.
+//!
+//! Immutable: settings, geometry, limits. Mutable: twin, windows, watches.
+//! [`Pipeline::judge`] reads as the list of its stages.
+
+use nalgebra::Vector2;
+
+use super::watch::Watch;
+use super::{MonitorState, Output, Readiness, Setup, State};
+use crate::diagnosis::{
+    AxisEvidence, Evaluator, Evidence, FaultMemory, Finding, Gated, Limits, OutlierGate, Reading,
+    Settings, Stillness, Surroundings, Test,
+};
+use crate::maths::{Fit, SlidingQuadratic};
+use crate::plant::{RollingState, Twin};
+use crate::vocabulary::{Axis, FaultCode, PerAxis, Sample, SimTime};
+
+/// Samples that a window holds at least: a filter over fewer is all noise.
+const LEAST_SAMPLES: f64 = 8.0;
+/// Periods without a sample that make a gap, where that is longer than the
+/// settings' gap.
+const GAP_PERIODS: f64 = 4.0;
+/// Longest period assumed before a second one has been seen, s.
+const LONGEST_FIRST_PERIOD_S: f64 = 0.25;
+/// How fast the period is followed, share per sample.
+const PERIOD_GAIN: f64 = 0.02;
+/// Share of the window that must be covered before it is judged.
+const FULL_WINDOW: f64 = 0.8;
+/// Room between a ball and the edge where contact may begin, m.
+const EDGE_MARGIN_M: f64 = 0.006;
+/// Distance of the twin's free path from the ball at which it is re-anchored, m.
+const REBASE_M: f64 = 1.0;
+/// A ball at rest seems to move by less than this many noise deviations.
+const STILL_FACTOR: f64 = 6.0;
+
+/// A sample in the plate frame.
+#[derive(Clone, Copy)]
+struct Moment {
+    at: SimTime,
+    dt: f64,
+    command: PerAxis<Option<f64>>,
+    position: PerAxis<Option<f64>>,
+}
+
+/// The stages' state.
+#[derive(Clone, Debug)]
+pub struct Pipeline {
+    settings: Settings,
+    twin: Twin,
+    evaluator: Evaluator,
+    now: Option<SimTime>,
+    period_s: Option<f64>,
+    gates: PerAxis<OutlierGate>,
+    windows: PerAxis<SlidingQuadratic>,
+    fits: PerAxis<Option<Fit>>,
+    readings: Stillness,
+    clear_s: f64,
+    at_edge: bool,
+    since_jump_s: f64,
+    unjudged_s: f64,
+    evidence: Evidence,
+    watches: [Watch; FaultCode::COUNT],
+    n_judged: u64,
+}
+
+impl Pipeline {
+    pub fn new(setup: &Setup) -> Self {
+        let (rig, settings) = (&setup.rig, setup.settings);
+        let limits = PerAxis::from_fn(|axis| {
+            let learnt = rig.calibration.as_ref().and_then(|c| c.axes[axis].as_ref());
+            let gain = setup.twin.axes[axis].gain.abs();
+            Limits::new(settings.profile, learnt, gain * rig.ball.rolling_gravity())
+        });
+        Self {
+            settings,
+            twin: Twin::new(setup.twin),
+            evaluator: Evaluator::new(settings.profile, limits),
+            now: None,
+            period_s: None,
+            gates: PerAxis::default(),
+            windows: PerAxis::default(),
+            fits: PerAxis::default(),
+            readings: Stillness::default(),
+            clear_s: 0.0,
+            at_edge: false,
+            since_jump_s: f64::INFINITY,
+            unjudged_s: f64::INFINITY,
+            evidence: Evidence::default(),
+            watches: Default::default(),
+            n_judged: 0,
+        }
+    }
+
+    /// Takes one sample, in order, through every stage.
+    pub fn judge(
+        &mut self,
+        setup: &Setup,
+        sample: &Sample,
+        memory: &mut FaultMemory,
+        outputs: &mut Vec<Output>,
+    ) {
+        let Some(moment) = self.moment(setup, sample) else { return };
+        self.n_judged += 1;
+        self.step_twin(&moment);
+        let outlier = self.estimate(&moment);
+        self.locate(setup, &moment);
+        self.watch_readings(&moment, outlier);
+        self.collect_evidence(&moment);
+        self.unjudged_s += moment.dt;
+        if self.unjudged_s >= self.settings.period_s {
+            let dt = self.unjudged_s.min(self.settings.period_s.max(moment.dt));
+            self.unjudged_s = 0.0;
+            let findings = self.evaluate(dt);
+            self.remember(&moment, dt, &findings, memory, outputs);
+        }
+    }
+
+    /// The sample in the plate frame, or none if no time has passed. A gap in
+    /// time, and a clock that went on elsewhere, start afresh.
+    fn moment(&mut self, setup: &Setup, sample: &Sample) -> Option<Moment> {
+        let at = SimTime::new(sample.t_s)?;
+        let dt = match self.now {
+            Some(now) if at <= now => return None,
+            Some(now) if at - now > self.gap_s() => {
+                self.restart();
+                0.0
+            }
+            Some(now) => at - now,
+            None => 0.0,
+        };
+        if dt > 0.0 {
+            let period = self.period_s.get_or_insert(dt.min(LONGEST_FIRST_PERIOD_S));
+            *period += PERIOD_GAIN * (dt - *period).clamp(-*period, *period);
+        }
+        self.now = Some(at);
+        let mapping = &setup.rig.mapping;
+        let read = |axis: Axis| if mapping.swap { axis.other() } else { axis };
+        let scale = mapping.position_unit_m;
+        Some(Moment {
+            at,
+            dt,
+            command: PerAxis::from_fn(|a| sample.command(a).map(|c| c * mapping.command_unit_rad)),
+            position: PerAxis::from_fn(|a| {
+                sample.position(read(a)).map(|p| p * scale * mapping.sign[a])
+            }),
+        })
+    }
+
+    fn gap_s(&self) -> f64 {
+        self.settings.gap_s.max(GAP_PERIODS * self.period_s.unwrap_or(0.0))
+    }
+
+    fn window_s(&self) -> f64 {
+        self.settings.window_s.max(LEAST_SAMPLES * self.period_s.unwrap_or(0.0))
+    }
+
+    /// Forgets the past motion; what the debounce has gathered stays.
+    fn restart(&mut self) {
+        self.twin.restart();
+        self.evaluator.restart();
+        self.readings = Stillness::default();
+        self.clear_s = 0.0;
+        for axis in Axis::ALL {
+            self.forget(axis);
+        }
+    }
+
+    fn forget(&mut self, axis: Axis) {
+        self.gates[axis].restart();
+        self.windows[axis].clear();
+        self.fits[axis] = None;
+    }
+
+    /// Stage: the twin follows the commands, in lockstep.
+    fn step_twin(&mut self, moment: &Moment) {
+        let of = |axis: Axis| {
+            let fit = self.fits[axis].map(|f| (f.measured.position, f.measured.velocity));
+            fit.unwrap_or((moment.position[axis].unwrap_or(0.0), 0.0))
+        };
+        let (x, y) = (of(Axis::X), of(Axis::Y));
+        let observed = RollingState {
+            position: Vector2::new(x.0, y.0),
+            velocity: Vector2::new(x.1, y.1),
+            spin: 0.0,
+        };
+        self.twin.advance(moment.at, moment.command, &observed);
+        let away = self.twin.motion().position - observed.position;
+        if away.amax() > REBASE_M {
+            let shift = self.twin.rebase(observed.position, observed.velocity);
+            for (i, axis) in Axis::ALL.into_iter().enumerate() {
+                self.windows[axis].rebase(
+                    moment.at.seconds(),
+                    shift.position[i],
+                    shift.velocity[i],
+                );
+            }
+        }
+    }
+
+    /// Stage: outlier gate, then measured and twin's path through one filter.
+    /// Returns whether a reading was refused.
+    fn estimate(&mut self, moment: &Moment) -> bool {
+        let (t, window_s) = (moment.at.seconds(), self.window_s());
+        let (predicted, gap_s) = (self.twin.motion().position, self.gap_s());
+        let mut refused = false;
+        self.since_jump_s += moment.dt;
+        for (i, axis) in Axis::ALL.into_iter().enumerate() {
+            let stale = self.windows[axis].newest().is_some_and(|newest| t - newest > gap_s);
+            if stale {
+                self.forget(axis);
+            }
+            let Some(position) = moment.position[axis] else { continue };
+            match self.gates[axis].take(t, position, self.evaluator.limits()[axis].noise_m) {
+                Gated::Refused => {
+                    refused = true;
+                    continue;
+                }
+                Gated::Stepped(_) => {
+                    self.windows[axis].clear();
+                    self.since_jump_s = 0.0;
+                }
+                Gated::Accepted => {}
+            }
+            self.windows[axis].push(t, position, predicted[i], window_s);
+            self.fits[axis] = self.windows[axis].fit();
+        }
+        refused
+    }
+
+    /// Stage: how far the ball is from the edge, and for how long it has been
+    /// clear of it. An axis that is not measured does not count.
+    fn locate(&mut self, setup: &Setup, moment: &Moment) {
+        let seen = |a: Axis| moment.position[a];
+        if Axis::ALL.into_iter().any(|a| seen(a).is_some()) {
+            let plate = &setup.rig.plate;
+            let room =
+                plate.edge_distance_m(seen(Axis::X).unwrap_or(0.0), seen(Axis::Y).unwrap_or(0.0));
+            self.at_edge = room < setup.rig.ball.radius_m() + EDGE_MARGIN_M;
+        }
+        self.clear_s = if self.at_edge { 0.0 } else { self.clear_s + moment.dt };
+    }
+
+    /// Stage: stillness, missing and identical readings.
+    fn watch_readings(&mut self, moment: &Moment, outlier: bool) {
+        let limits = *self.evaluator.limits();
+        let pressed = PerAxis::from_fn(|a| {
+            let breakaway = limits[a].breakaway_m_s2.max(LEAST_PRESS_M_S2);
+            self.twin.motion().acceleration[a as usize].abs() > breakaway
+        });
+        let noise = limits.x.noise_m.max(limits.y.noise_m);
+        self.readings.update(&Reading {
+            at: moment.at,
+            dt: moment.dt,
+            position_m: moment.position,
+            pressed,
+            still_m: STILL_FACTOR * noise,
+            outlier,
+        });
+    }
+
+    /// Stage: residual, limit and gate of this moment.
+    fn collect_evidence(&mut self, moment: &Moment) {
+        let full_s = FULL_WINDOW * self.window_s();
+        let axis_evidence = |axis: Axis| {
+            let fit = self.fits[axis].filter(|f| {
+                moment.position[axis].is_some()
+                    && f.span_s >= full_s
+                    && f.n as f64 >= LEAST_SAMPLES / 2.0
+            });
+            let measured = fit.map(|f| f.measured.acceleration);
+            let twin = fit.map(|f| f.measured.acceleration - f.deviation.acceleration);
+            let error = fit.map_or(0.0, |f| f.acceleration_error);
+            AxisEvidence {
+                command_rad: moment.command[axis],
+                position_m: self.fits[axis].map(|f| f.measured.position),
+                velocity_m_s: self.fits[axis].map(|f| f.measured.velocity),
+                measured_m_s2: measured,
+                twin_m_s2: twin,
+                limit_m_s2: self.evaluator.limits()[axis].at(twin.unwrap_or(0.0), error),
+                enabled: false,
+            }
+        };
+        let scatter = Axis::ALL.into_iter().filter_map(|a| self.fits[a]).map(|f| f.scatter);
+        let mut evidence = Evidence {
+            at: Some(moment.at),
+            window_s: self.window_s(),
+            axes: PerAxis::from_fn(axis_evidence),
+            unseen_s: self.readings.unseen_s,
+            identical_s: self.readings.identical_s(),
+            still_s: self.readings.still_s(),
+            outliers: self.readings.outliers(),
+            scatter_m: scatter.reduce(f64::max),
+        };
+        let around = self.surroundings(moment.dt);
+        for axis in Axis::ALL {
+            evidence.axes[axis].enabled =
+                self.evaluator.enabled(axis, &evidence, &self.readings, &around);
+        }
+        self.evidence = evidence;
+    }
+
+    const fn surroundings(&self, dt: f64) -> Surroundings {
+        Surroundings {
+            dt,
+            clear_s: self.clear_s,
+            at_edge: self.at_edge,
+            since_jump_s: self.since_jump_s,
+        }
+    }
+
+    /// Stage: the monitors.
+    fn evaluate(&mut self, dt: f64) -> [Finding; FaultCode::COUNT] {
+        let around = self.surroundings(dt);
+        self.evaluator.evaluate(&self.evidence, &self.readings, &around)
+    }
+
+    /// Stage: debounce and fault memory.
+    fn remember(
+        &mut self,
+        moment: &Moment,
+        dt: f64,
+        findings: &[Finding; FaultCode::COUNT],
+        memory: &mut FaultMemory,
+        outputs: &mut Vec<Output>,
+    ) {
+        for (&code, finding) in FaultCode::ALL.iter().zip(findings) {
+            let watch = &mut self.watches[code as usize];
+            let qualified = watch.update(code, finding, moment.at, dt, &self.settings);
+            watch.apply(code, qualified, &self.settings, &self.evidence, memory, outputs);
+        }
+    }
+
+    /// Starts the monitor of `code` again, as after a clear.
+    pub fn reset_monitor(&mut self, code: FaultCode) {
+        self.watches[code as usize] = Watch::default();
+    }
+
+    /// The evidence of the last sample.
+    pub const fn evidence(&self) -> &Evidence {
+        &self.evidence
+    }
+
+    /// Time of the last sample judged.
+    pub const fn now(&self) -> Option<SimTime> {
+        self.now
+    }
+
+    pub fn state(&self, memory: &FaultMemory, n_waiting: usize) -> State {
+        let monitors = std::array::from_fn(|i| {
+            let (watch, status) = (&self.watches[i], memory.record(FaultCode::ALL[i]).status);
+            MonitorState {
+                counter: watch.counter(),
+                readiness: Readiness {
+                    enabled: watch.test() != Test::NotTested,
+                    complete_this_cycle: status.completed_this_cycle(),
+                    complete_since_clear: status.completed_since_clear(),
+                },
+                enabled_s: watch.enabled_s(),
+            }
+        });
+        let ghost = |a: Axis| {
+            self.fits[a].map_or((0.0, 0.0), |f| {
+                let (residual, span) = (f.deviation.acceleration, f.span_s);
+                (
+                    f.measured.position - residual * span * span / 2.0,
+                    f.measured.velocity - residual * span,
+                )
+            })
+        };
+        State {
+            at: self.now,
+            n_judged: self.n_judged,
+            n_waiting,
+            twin_position_m: PerAxis::from_fn(|a| ghost(a).0),
+            twin_velocity_m_s: PerAxis::from_fn(|a| ghost(a).1),
+            plate_angle_rad: self.twin.plate_angle(),
+            evidence: self.evidence.clone(),
+            monitors,
+            fidelity: "rolling",
+            fidelity_reason: "the only model there is",
+        }
+    }
+}
+
+/// Acceleration that counts as asking a ball to move on any rig, m/s²: one
+/// degree of tilt.
+const LEAST_PRESS_M_S2: f64 = 0.12;
