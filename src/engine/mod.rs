@@ -8,11 +8,14 @@
 
 mod admit;
 mod align;
+mod calibrate;
+mod frame;
 mod pipeline;
 mod rig;
 mod types;
 mod watch;
 
+pub use calibrate::{CannotCalibrate, calibrate};
 pub use rig::{AxisMapping, DiagnosticsSpec, MAX_NAME, Rig, ServoSpec, Setup};
 pub use types::{Admission, Input, MonitorState, Output, Readiness, Rejection, State};
 

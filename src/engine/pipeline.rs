@@ -5,6 +5,7 @@
 
 use nalgebra::Vector2;
 
+use super::frame::{self, Moment};
 use super::watch::Watch;
 use super::{MonitorState, Output, Readiness, Setup, State};
 use crate::diagnosis::{
@@ -32,15 +33,6 @@ const EDGE_MARGIN_M: f64 = 0.006;
 const REBASE_M: f64 = 1.0;
 /// A ball at rest seems to move by less than this many noise deviations.
 const STILL_FACTOR: f64 = 6.0;
-
-/// A sample in the plate frame.
-#[derive(Clone, Copy)]
-struct Moment {
-    at: SimTime,
-    dt: f64,
-    command: PerAxis<Option<f64>>,
-    position: PerAxis<Option<f64>>,
-}
 
 /// The stages' state.
 #[derive(Clone, Debug)]
@@ -99,26 +91,26 @@ impl Pipeline {
         memory: &mut FaultMemory,
         outputs: &mut Vec<Output>,
     ) {
-        let Some(moment) = self.moment(setup, sample) else { return };
+        let Some(moment) = frame::moment(&setup.rig.mapping, sample) else { return };
+        let Some(dt) = self.tick(moment.at) else { return };
         self.n_judged += 1;
         self.step_twin(&moment);
-        let outlier = self.estimate(&moment);
-        self.locate(setup, &moment);
-        self.watch_readings(&moment, outlier);
-        self.collect_evidence(&moment);
-        self.unjudged_s += moment.dt;
+        let outlier = self.estimate(&moment, dt);
+        self.locate(setup, &moment, dt);
+        self.watch_readings(&moment, dt, outlier);
+        self.collect_evidence(&moment, dt);
+        self.unjudged_s += dt;
         if self.unjudged_s >= self.settings.period_s {
-            let dt = self.unjudged_s.min(self.settings.period_s.max(moment.dt));
+            let dt = self.unjudged_s.min(self.settings.period_s.max(dt));
             self.unjudged_s = 0.0;
             let findings = self.evaluate(dt);
             self.remember(&moment, dt, &findings, memory, outputs);
         }
     }
 
-    /// The sample in the plate frame, or none if no time has passed. A gap in
-    /// time, and a clock that went on elsewhere, start afresh.
-    fn moment(&mut self, setup: &Setup, sample: &Sample) -> Option<Moment> {
-        let at = SimTime::new(sample.t_s)?;
+    /// Seconds since the sample before; none if no time has passed. A gap, and
+    /// a clock that went on elsewhere, start afresh.
+    fn tick(&mut self, at: SimTime) -> Option<f64> {
         let dt = match self.now {
             Some(now) if at <= now => return None,
             Some(now) if at - now > self.gap_s() => {
@@ -133,17 +125,7 @@ impl Pipeline {
             *period += PERIOD_GAIN * (dt - *period).clamp(-*period, *period);
         }
         self.now = Some(at);
-        let mapping = &setup.rig.mapping;
-        let read = |axis: Axis| if mapping.swap { axis.other() } else { axis };
-        let scale = mapping.position_unit_m;
-        Some(Moment {
-            at,
-            dt,
-            command: PerAxis::from_fn(|a| sample.command(a).map(|c| c * mapping.command_unit_rad)),
-            position: PerAxis::from_fn(|a| {
-                sample.position(read(a)).map(|p| p * scale * mapping.sign[a])
-            }),
-        })
+        Some(dt)
     }
 
     fn gap_s(&self) -> f64 {
@@ -199,11 +181,11 @@ impl Pipeline {
 
     /// Stage: outlier gate, then measured and twin's path through one filter.
     /// Returns whether a reading was refused.
-    fn estimate(&mut self, moment: &Moment) -> bool {
+    fn estimate(&mut self, moment: &Moment, dt: f64) -> bool {
         let (t, window_s) = (moment.at.seconds(), self.window_s());
         let (predicted, gap_s) = (self.twin.motion().position, self.gap_s());
         let mut refused = false;
-        self.since_jump_s += moment.dt;
+        self.since_jump_s += dt;
         for (i, axis) in Axis::ALL.into_iter().enumerate() {
             let stale = self.windows[axis].newest().is_some_and(|newest| t - newest > gap_s);
             if stale {
@@ -229,7 +211,7 @@ impl Pipeline {
 
     /// Stage: how far the ball is from the edge, and for how long it has been
     /// clear of it. An axis that is not measured does not count.
-    fn locate(&mut self, setup: &Setup, moment: &Moment) {
+    fn locate(&mut self, setup: &Setup, moment: &Moment, dt: f64) {
         let seen = |a: Axis| moment.position[a];
         if Axis::ALL.into_iter().any(|a| seen(a).is_some()) {
             let plate = &setup.rig.plate;
@@ -237,11 +219,11 @@ impl Pipeline {
                 plate.edge_distance_m(seen(Axis::X).unwrap_or(0.0), seen(Axis::Y).unwrap_or(0.0));
             self.at_edge = room < setup.rig.ball.radius_m() + EDGE_MARGIN_M;
         }
-        self.clear_s = if self.at_edge { 0.0 } else { self.clear_s + moment.dt };
+        self.clear_s = if self.at_edge { 0.0 } else { self.clear_s + dt };
     }
 
     /// Stage: stillness, missing and identical readings.
-    fn watch_readings(&mut self, moment: &Moment, outlier: bool) {
+    fn watch_readings(&mut self, moment: &Moment, dt: f64, outlier: bool) {
         let limits = *self.evaluator.limits();
         let pressed = PerAxis::from_fn(|a| {
             let breakaway = limits[a].breakaway_m_s2.max(LEAST_PRESS_M_S2);
@@ -250,7 +232,7 @@ impl Pipeline {
         let noise = limits.x.noise_m.max(limits.y.noise_m);
         self.readings.update(&Reading {
             at: moment.at,
-            dt: moment.dt,
+            dt,
             position_m: moment.position,
             pressed,
             still_m: STILL_FACTOR * noise,
@@ -259,7 +241,7 @@ impl Pipeline {
     }
 
     /// Stage: residual, limit and gate of this moment.
-    fn collect_evidence(&mut self, moment: &Moment) {
+    fn collect_evidence(&mut self, moment: &Moment, dt: f64) {
         let full_s = FULL_WINDOW * self.window_s();
         let axis_evidence = |axis: Axis| {
             let fit = self.fits[axis].filter(|f| {
@@ -291,7 +273,7 @@ impl Pipeline {
             outliers: self.readings.outliers(),
             scatter_m: scatter.reduce(f64::max),
         };
-        let around = self.surroundings(moment.dt);
+        let around = self.surroundings(dt);
         for axis in Axis::ALL {
             evidence.axes[axis].enabled =
                 self.evaluator.enabled(axis, &evidence, &self.readings, &around);
