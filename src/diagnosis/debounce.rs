@@ -1,9 +1,10 @@
 //! Debouncing by time: a fault detection counter from −128 to 127.
 //!
-//! Prefailed raises it (jumping up to zero first), prepassed lowers it
-//! (jumping down to zero first), at rates that take `fail_s` and `pass_s` from
-//! zero to an end. While the enable condition is lost it freezes. A silent rig
-//! is judged by time, not by counts, so the rates are per second.
+//! Prefailed raises it (jumping up to zero first), prepassed lowers it, at
+//! rates that take `fail_s` and `pass_s` from zero to an end. It does not jump
+//! down first: the residual of a ball that a sick servo swings to and fro
+//! crosses zero twice a swing. While the enable condition is lost it freezes.
+//! A silent rig is judged by time, not by counts, so the rates are per second.
 
 /// What a monitor says of one moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -77,8 +78,10 @@ impl Debounce {
                 }
             }
             Test::Prepassed => {
-                self.failing_s = 0.0;
-                self.level = (self.level.min(0.0) - share(pass_s)).max(-1.0);
+                self.level = (self.level - share(pass_s)).max(-1.0);
+                if self.level <= 0.0 {
+                    self.failing_s = 0.0;
+                }
                 if self.level <= -1.0 { Qualified::Passed } else { Qualified::No }
             }
         }
@@ -101,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lost_enable_condition_freezes_and_a_pass_starts_again_from_zero() {
+    fn a_lost_enable_condition_freezes_and_a_pass_lowers() {
         let mut debounce = Debounce::default();
         run(&mut debounce, Test::Prefailed, 3);
         let before = debounce.counter();
@@ -109,8 +112,8 @@ mod tests {
         run(&mut debounce, Test::NotTested, 100);
         assert_eq!(debounce.counter(), before);
         run(&mut debounce, Test::Prepassed, 1);
-        assert_eq!(debounce.counter(), -16);
-        assert_eq!(run(&mut debounce, Test::Prepassed, 7).last(), Some(&Qualified::Passed));
+        assert_eq!(debounce.counter(), 79);
+        assert_eq!(run(&mut debounce, Test::Prepassed, 13).last(), Some(&Qualified::Passed));
         assert_eq!(debounce.counter(), -128);
         run(&mut debounce, Test::Prefailed, 1);
         assert_eq!(debounce.counter(), 31, "jumps up to zero first");

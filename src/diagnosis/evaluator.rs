@@ -32,6 +32,9 @@ const MANY_OUTLIERS: u32 = 6;
 /// Scatter over the healthy one that is noise.
 const NOISY: f64 = 4.0;
 
+/// Scatter that no sensor is blamed for, m: a tracker good to a pixel.
+const QUIET_M: f64 = 1e-3;
+
 /// Seconds for which a jump of the readings counts as evidence.
 const JUMP_S: f64 = 2.0;
 
@@ -167,7 +170,7 @@ impl Evaluator {
             return Finding::fail(Some(FaultKind::Spikes));
         }
         let noise = self.limits.x.noise_m.max(self.limits.y.noise_m);
-        if evidence.scatter_m.is_some_and(|s| s > NOISY * noise) {
+        if evidence.scatter_m.is_some_and(|s| s > (NOISY * noise).max(QUIET_M)) {
             return Finding::fail(Some(FaultKind::Noise));
         }
         frozen(readings, around).unwrap_or(Finding::PASS)
@@ -195,7 +198,7 @@ fn frozen(readings: &Stillness, around: &Surroundings) -> Option<Finding> {
         let rival = Candidate { code: FaultCode::StuckBall, kind: None, weight: 0.3 };
         return Some(Finding { rival: Some(rival), ..Finding::fail(Some(FaultKind::Frozen)) });
     }
-    let alone = |axis: Axis| dead(axis) && axes[axis.other()].still_s == 0.0;
+    let alone = |axis: Axis| dead(axis) && axes[axis.other()].identical_s < FROZEN_S / 2.0;
     Axis::ALL.into_iter().any(alone).then(|| Finding::fail(Some(FaultKind::Frozen)))
 }
 

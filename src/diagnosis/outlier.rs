@@ -1,65 +1,161 @@
-//! The outlier gate of one axis: is this reading where a ball can be?
+//! The outlier gate: is this reading where a ball can be?
 //!
-//! A lone reading far off is refused. When readings stay there they are
-//! believed, and the step is reported: no ball moves like that.
+//! A lone reading far off is refused. When readings stay on another path they
+//! are believed. Where the two paths meet, the ball was pushed; where they do
+//! not, the readings stepped, as no ball can.
 
-/// Fastest that a ball crosses a plate, m/s: a rim-to-rim roll over 0.4 m at
-/// 10° ends at 1 m/s; hands push at less.
-const FASTEST_M_S: f64 = 1.5;
+use nalgebra::Vector2;
+
+use crate::vocabulary::PerAxis;
+
+/// Most by which a ball's velocity changes between two readings, m/s: a push
+/// by hand. Gravity adds less than 0.1 m/s even at 30 Hz.
+const PUSH_M_S: f64 = 0.7;
+
+/// Memory of the velocity, s: two or three readings of a camera.
+const VELOCITY_MEMORY_S: f64 = 0.06;
 
 /// Standard deviations of the noise that are always allowed.
 const NOISE_FACTOR: f64 = 8.0;
 
+/// Distance between the old and the new path that is a step, m, beyond noise:
+/// what the velocity found from a few readings may be off by.
+const STEP_M: f64 = 0.012;
+
 /// Readings in a row, and seconds, that make a new place believable.
-const BELIEVED_AFTER: u32 = 3;
-const BELIEVED_AFTER_S: f64 = 0.06;
+const BELIEVED_AFTER: u32 = 4;
+const BELIEVED_AFTER_S: f64 = 0.12;
 
 /// What became of a reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Gated {
-    Accepted,
-    /// An outlier: not to be used.
+    /// Where a ball can be; and how many readings before it were outliers, as
+    /// is known now that they have not stayed where they were.
+    Accepted { outliers: u32 },
+    /// Not to be used: an outlier, or the first of a new path.
     Refused,
-    /// Accepted after all, a step of this size, m, away from the last one.
-    Stepped(f64),
+    /// Accepted after all, on a path that does not meet the old one.
+    Stepped,
 }
 
+impl Gated {
+    /// Whether the reading may be used.
+    #[must_use]
+    pub const fn usable(self) -> bool {
+        !matches!(self, Self::Refused)
+    }
+}
+
+/// A place off the path where readings have stayed.
 #[derive(Clone, Copy, Debug)]
 struct Elsewhere {
     since_s: f64,
+    first_m: Vector2<f64>,
     at_s: f64,
-    position_m: f64,
+    position_m: Vector2<f64>,
     n: u32,
 }
 
-/// The gate.
+/// Where the ball was and how it moved.
+#[derive(Clone, Copy, Debug)]
+struct Track {
+    at_s: f64,
+    position_m: Vector2<f64>,
+    velocity_m_s: Vector2<f64>,
+}
+
+impl Track {
+    fn start(at_s: f64, position_m: Vector2<f64>) -> Self {
+        Self { at_s, position_m, velocity_m_s: Vector2::zeros() }
+    }
+
+    /// Distance of a reading from where the ball is expected, m.
+    fn off_m(&self, t_s: f64, position_m: Vector2<f64>) -> f64 {
+        (position_m - self.position_m - self.velocity_m_s * (t_s - self.at_s)).amax()
+    }
+
+    fn followed_by(&self, t_s: f64, position_m: Vector2<f64>) -> Self {
+        let dt = t_s - self.at_s;
+        if dt <= 0.0 {
+            return Self { at_s: t_s, position_m, ..*self };
+        }
+        let now = (position_m - self.position_m) / dt;
+        let gain = 1.0 - (-dt / VELOCITY_MEMORY_S).exp();
+        let velocity_m_s = self.velocity_m_s + gain * (now - self.velocity_m_s);
+        Self { at_s: t_s, position_m, velocity_m_s }
+    }
+}
+
+/// The gate. Both axes come from one look at the ball and are judged as one.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct OutlierGate {
-    last: Option<(f64, f64)>,
+    track: Option<Track>,
+    /// The track before its last reading, where that one was far off: if the
+    /// next falls back to it, that one was an outlier.
+    before: Option<Track>,
+    /// Outliers not yet told.
+    outliers: u32,
     elsewhere: Option<Elsewhere>,
 }
 
 impl OutlierGate {
-    /// Judges the reading `position_m` at `t_s` on a sensor with `noise_m`.
-    pub fn take(&mut self, t_s: f64, position_m: f64, noise_m: f64) -> Gated {
-        let reach = |from_s: f64| NOISE_FACTOR * noise_m + FASTEST_M_S * (t_s - from_s);
-        let Some((last_s, last_m)) = self.last else {
-            return self.accept(t_s, position_m);
+    /// Judges the reading `position_m` at `t_s` on a sensor with `noise_m`. An
+    /// axis without a reading counts as unmoved.
+    pub fn take(&mut self, t_s: f64, position_m: PerAxis<Option<f64>>, noise_m: f64) -> Gated {
+        let held = self.track.map_or(Vector2::zeros(), |t| t.position_m);
+        let position_m =
+            Vector2::new(position_m.x.unwrap_or(held.x), position_m.y.unwrap_or(held.y));
+        let Some(track) = self.track else {
+            return self.accept(Track::start(t_s, position_m));
         };
-        if (position_m - last_m).abs() <= reach(last_s) {
-            return self.accept(t_s, position_m);
-        }
-        let stays = |e: &Elsewhere| (position_m - e.position_m).abs() <= reach(e.at_s);
-        let (since_s, n) = match self.elsewhere.filter(stays) {
-            Some(e) => (e.since_s, e.n + 1),
-            None => (t_s, 1),
+        let reach = |from_s: f64| NOISE_FACTOR * noise_m + PUSH_M_S * (t_s - from_s);
+        let off_m = track.off_m(t_s, position_m);
+        // The longer the old place has not been read, the farther the ball may
+        // have come; readings that stay at a new one still speak for a step.
+        let stays = |e: &Elsewhere| {
+            let away_m = (position_m - e.position_m).amax();
+            away_m <= reach(e.at_s) && away_m < off_m
         };
-        if n >= BELIEVED_AFTER && t_s - since_s >= BELIEVED_AFTER_S {
-            self.accept(t_s, position_m);
-            return Gated::Stepped(position_m - last_m);
+        let staying = self.elsewhere.filter(stays);
+        if staying.is_none() && off_m <= reach(track.at_s) {
+            let doubtful = off_m > reach(track.at_s) / 2.0;
+            self.before = doubtful.then_some(track);
+            return self.accept(track.followed_by(t_s, position_m));
         }
-        self.elsewhere = Some(Elsewhere { since_s, at_s: t_s, position_m, n });
-        Gated::Refused
+        if let Some(before) = self.before.take()
+            && before.off_m(t_s, position_m) <= reach(before.at_s)
+        {
+            self.outliers += 1;
+            return self.accept(before.followed_by(t_s, position_m));
+        }
+        self.refuse(t_s, position_m, staying, &track, noise_m)
+    }
+
+    /// A reading off the track: refused, until enough of them have stayed.
+    fn refuse(
+        &mut self,
+        t_s: f64,
+        position_m: Vector2<f64>,
+        staying: Option<Elsewhere>,
+        track: &Track,
+        noise_m: f64,
+    ) -> Gated {
+        let (since_s, first_m, n) = match staying {
+            Some(e) => (e.since_s, e.first_m, e.n + 1),
+            None => {
+                self.outliers += self.elsewhere.map_or(0, |e| e.n);
+                (t_s, position_m, 1)
+            }
+        };
+        let there = Elsewhere { since_s, first_m, at_s: t_s, position_m, n };
+        if n < BELIEVED_AFTER || t_s - since_s < BELIEVED_AFTER_S {
+            self.elsewhere = Some(there);
+            return Gated::Refused;
+        }
+        self.elsewhere = None;
+        let accepted = self.accept(Track::start(t_s, position_m));
+        let stepped = step_m(track, &there) > NOISE_FACTOR * noise_m + STEP_M;
+        if stepped { Gated::Stepped } else { accepted }
     }
 
     /// Forgets where the ball was, as after a gap.
@@ -67,28 +163,55 @@ impl OutlierGate {
         *self = Self::default();
     }
 
-    fn accept(&mut self, t_s: f64, position_m: f64) -> Gated {
-        self.last = Some((t_s, position_m));
-        self.elsewhere = None;
-        Gated::Accepted
+    fn accept(&mut self, track: Track) -> Gated {
+        self.track = Some(track);
+        let outliers = self.outliers + self.elsewhere.map_or(0, |e| e.n);
+        (self.outliers, self.elsewhere) = (0, None);
+        Gated::Accepted { outliers }
     }
+}
+
+/// Least distance between the old path, carried on, and the new one, carried
+/// back, over the time between them: zero for a push.
+fn step_m(track: &Track, there: &Elsewhere) -> f64 {
+    let velocity = (there.position_m - there.first_m) / (there.at_s - there.since_s);
+    let between_s = there.since_s - track.at_s;
+    let early = there.first_m - velocity * between_s - track.position_m;
+    let late = there.first_m - (track.position_m + track.velocity_m_s * between_s);
+    let apart = |e: f64, l: f64| if e * l <= 0.0 { 0.0 } else { e.abs().min(l.abs()) };
+    early.zip_map(&late, apart).amax()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn along_x(x: f64) -> PerAxis<Option<f64>> {
+        PerAxis { x: Some(x), y: None }
+    }
+
     #[test]
     fn lone_readings_are_refused_and_steps_believed_later() {
         let mut gate = OutlierGate::default();
-        let mut take = |i: u32, x: f64| gate.take(f64::from(i) * 0.02, x, 1e-3);
-        assert_eq!(take(0, 0.0), Gated::Accepted);
+        let mut take = |i: u32, x: f64| gate.take(f64::from(i) * 0.02, along_x(x), 1e-3);
+        assert_eq!(take(0, 0.0), Gated::Accepted { outliers: 0 });
         assert_eq!(take(1, 0.1), Gated::Refused);
-        assert_eq!(take(2, 0.001), Gated::Accepted);
-        for i in 3..6 {
-            assert_eq!(take(i, 0.2), Gated::Refused);
+        assert_eq!(take(2, 0.001), Gated::Accepted { outliers: 1 });
+        for i in 3..9 {
+            assert_eq!(take(i, 0.2), Gated::Refused, "{i}");
         }
-        assert_eq!(take(6, 0.2), Gated::Stepped(0.199));
-        assert_eq!(take(7, 0.2), Gated::Accepted);
+        assert_eq!(take(9, 0.2), Gated::Stepped);
+        assert_eq!(take(10, 0.2), Gated::Accepted { outliers: 0 });
+    }
+
+    #[test]
+    fn a_hard_push_is_no_step() {
+        let mut gate = OutlierGate::default();
+        for i in 0..100 {
+            let t = f64::from(i) * 0.01;
+            // From rest to 1.2 m/s at once, between two readings.
+            let gated = gate.take(t, along_x(1.2 * (t - 0.504).max(0.0)), 1e-4);
+            assert_ne!(gated, Gated::Stepped, "{t}");
+        }
     }
 }

@@ -23,8 +23,10 @@ pub struct Reading {
     pub pressed: PerAxis<bool>,
     /// How far a ball at rest may seem to move, m.
     pub still_m: f64,
-    /// Whether the outlier gate refused the reading.
-    pub outlier: bool,
+    /// Whether the outlier gate let the reading through.
+    pub usable: bool,
+    /// Outliers that the gate has found since the sample before.
+    pub outliers: u32,
 }
 
 /// Stillness of one axis.
@@ -76,8 +78,8 @@ impl Stillness {
         let fade = (-reading.dt / MEMORY_S).exp();
         self.missing = self.missing * fade + if seen { 0.0 } else { 1.0 - fade };
         self.outliers *= (-reading.dt / OUTLIER_MEMORY_S).exp();
-        if reading.outlier {
-            self.outliers += 1.0;
+        self.outliers += f64::from(reading.outliers);
+        if !reading.usable {
             return;
         }
         for axis in Axis::ALL {
@@ -128,7 +130,8 @@ mod tests {
             position_m: PerAxis { x, y: None },
             pressed: PerAxis { x: pressed, y: false },
             still_m: 0.002,
-            outlier: false,
+            usable: true,
+            outliers: 0,
         }
     }
 

@@ -42,7 +42,7 @@ pub struct Pipeline {
     evaluator: Evaluator,
     now: Option<SimTime>,
     period_s: Option<f64>,
-    gates: PerAxis<OutlierGate>,
+    gate: OutlierGate,
     windows: PerAxis<SlidingQuadratic>,
     fits: PerAxis<Option<Fit>>,
     readings: Stillness,
@@ -69,7 +69,7 @@ impl Pipeline {
             evaluator: Evaluator::new(settings.profile, limits),
             now: None,
             period_s: None,
-            gates: PerAxis::default(),
+            gate: OutlierGate::default(),
             windows: PerAxis::default(),
             fits: PerAxis::default(),
             readings: Stillness::default(),
@@ -95,9 +95,9 @@ impl Pipeline {
         let Some(dt) = self.tick(moment.at) else { return };
         self.n_judged += 1;
         self.step_twin(&moment);
-        let outlier = self.estimate(&moment, dt);
+        let (usable, outliers) = self.estimate(&moment, dt);
         self.locate(setup, &moment, dt);
-        self.watch_readings(&moment, dt, outlier);
+        self.watch_readings(&moment, dt, usable, outliers);
         self.collect_evidence(&moment, dt);
         self.unjudged_s += dt;
         if self.unjudged_s >= self.settings.period_s {
@@ -142,13 +142,13 @@ impl Pipeline {
         self.evaluator.restart();
         self.readings = Stillness::default();
         self.clear_s = 0.0;
+        self.gate.restart();
         for axis in Axis::ALL {
             self.forget(axis);
         }
     }
 
     fn forget(&mut self, axis: Axis) {
-        self.gates[axis].restart();
         self.windows[axis].clear();
         self.fits[axis] = None;
     }
@@ -180,33 +180,42 @@ impl Pipeline {
     }
 
     /// Stage: outlier gate, then measured and twin's path through one filter.
-    /// Returns whether a reading was refused.
-    fn estimate(&mut self, moment: &Moment, dt: f64) -> bool {
+    /// Returns whether the readings are usable and how many earlier ones have
+    /// turned out to be outliers.
+    fn estimate(&mut self, moment: &Moment, dt: f64) -> (bool, u32) {
         let (t, window_s) = (moment.at.seconds(), self.window_s());
         let (predicted, gap_s) = (self.twin.motion().position, self.gap_s());
-        let mut refused = false;
         self.since_jump_s += dt;
-        for (i, axis) in Axis::ALL.into_iter().enumerate() {
-            let stale = self.windows[axis].newest().is_some_and(|newest| t - newest > gap_s);
-            if stale {
-                self.forget(axis);
-            }
-            let Some(position) = moment.position[axis] else { continue };
-            match self.gates[axis].take(t, position, self.evaluator.limits()[axis].noise_m) {
-                Gated::Refused => {
-                    refused = true;
-                    continue;
-                }
-                Gated::Stepped(_) => {
-                    self.windows[axis].clear();
-                    self.since_jump_s = 0.0;
-                }
-                Gated::Accepted => {}
-            }
-            self.windows[axis].push(t, position, predicted[i], window_s);
-            self.fits[axis] = self.windows[axis].fit();
+        if Axis::ALL.iter().any(|&a| self.windows[a].newest().is_some_and(|n| t - n > gap_s)) {
+            self.gate.restart();
+            self.forget(Axis::X);
+            self.forget(Axis::Y);
         }
-        refused
+        if Axis::ALL.iter().all(|&a| moment.position[a].is_none()) {
+            return (true, 0);
+        }
+        let gated = self.gate.take(t, moment.position, self.noise_m());
+        if gated == Gated::Stepped {
+            self.windows.x.clear();
+            self.windows.y.clear();
+            self.since_jump_s = 0.0;
+        }
+        for (i, axis) in Axis::ALL.into_iter().enumerate() {
+            if let (true, Some(position)) = (gated.usable(), moment.position[axis]) {
+                self.windows[axis].push(t, position, predicted[i], window_s);
+                self.fits[axis] = self.windows[axis].fit();
+            }
+        }
+        match gated {
+            Gated::Accepted { outliers } => (true, outliers),
+            other => (other.usable(), 0),
+        }
+    }
+
+    /// Standard deviation of healthy readings, the worse of both axes, m.
+    fn noise_m(&self) -> f64 {
+        let limits = self.evaluator.limits();
+        limits.x.noise_m.max(limits.y.noise_m)
     }
 
     /// Stage: how far the ball is from the edge, and for how long it has been
@@ -223,20 +232,20 @@ impl Pipeline {
     }
 
     /// Stage: stillness, missing and identical readings.
-    fn watch_readings(&mut self, moment: &Moment, dt: f64, outlier: bool) {
+    fn watch_readings(&mut self, moment: &Moment, dt: f64, usable: bool, outliers: u32) {
         let limits = *self.evaluator.limits();
         let pressed = PerAxis::from_fn(|a| {
             let breakaway = limits[a].breakaway_m_s2.max(LEAST_PRESS_M_S2);
             self.twin.motion().acceleration[a as usize].abs() > breakaway
         });
-        let noise = limits.x.noise_m.max(limits.y.noise_m);
         self.readings.update(&Reading {
             at: moment.at,
             dt,
             position_m: moment.position,
             pressed,
-            still_m: STILL_FACTOR * noise,
-            outlier,
+            still_m: STILL_FACTOR * self.noise_m(),
+            usable,
+            outliers,
         });
     }
 

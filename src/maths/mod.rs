@@ -6,4 +6,4 @@ mod sliding_quadratic;
 mod statistics;
 
 pub use sliding_quadratic::{Fit, Path, SlidingQuadratic};
-pub use statistics::{median, robust_deviation};
+pub use statistics::{median, quantile, robust_deviation};

@@ -14,6 +14,14 @@ pub fn median(values: &mut [f64]) -> Option<f64> {
     Some(lower.midpoint(upper))
 }
 
+/// The value that the share `share`, in [0, 1], of `values` does not exceed
+/// (nearest rank), reordering them; none when there are none.
+pub fn quantile(values: &mut [f64], share: f64) -> Option<f64> {
+    let last = values.len().checked_sub(1)?;
+    let rank = ((values.len() as f64 * share).ceil() as usize).clamp(1, last + 1) - 1;
+    Some(*values.select_nth_unstable_by(rank, f64::total_cmp).1)
+}
+
 /// 1.4826 × the median absolute deviation from the median: the standard
 /// deviation of a normal distribution (Rousseeuw & Croux 1993, eq. 1.1).
 pub fn robust_deviation(values: &mut [f64]) -> Option<f64> {
@@ -33,6 +41,15 @@ mod tests {
         assert_eq!(median(&mut [3.0, 1.0, 2.0]), Some(2.0));
         assert_eq!(median(&mut [4.0, 1.0, 3.0, 2.0]), Some(2.5));
         assert_eq!(median(&mut []), None);
+    }
+
+    #[test]
+    fn quantile_is_the_nearest_rank() {
+        let values = [5.0, 1.0, 4.0, 2.0, 3.0];
+        for (share, wanted) in [(0.0, 1.0), (0.2, 1.0), (0.21, 2.0), (0.9, 5.0), (1.0, 5.0)] {
+            assert_eq!(quantile(&mut values.clone(), share), Some(wanted), "{share}");
+        }
+        assert_eq!(quantile(&mut [], 0.5), None);
     }
 
     #[test]
