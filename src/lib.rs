@@ -15,6 +15,8 @@ pub mod diagnosis;
 pub mod engine;
 pub mod maths;
 pub mod plant;
+#[cfg(feature = "service")]
+pub mod simulation;
 pub mod vocabulary;
 #[cfg(feature = "service")]
 pub mod wire;
