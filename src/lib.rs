@@ -11,6 +11,8 @@
 //! - [`diagnosis`]: residuals, monitors, fault memory (floor 2);
 //! - [`engine`]: one rig's pipeline (floor 3).
 
+#[cfg(feature = "service")]
+pub mod cli;
 pub mod diagnosis;
 pub mod engine;
 pub mod maths;
