@@ -11,10 +11,14 @@
 //! - [`diagnosis`]: residuals, monitors, fault memory (floor 2);
 //! - [`engine`]: one rig's pipeline (floor 3).
 
+#[cfg(feature = "service")]
+pub mod cli;
 pub mod diagnosis;
 pub mod engine;
 pub mod maths;
 pub mod plant;
+#[cfg(feature = "service")]
+pub mod simulation;
 pub mod vocabulary;
 #[cfg(feature = "service")]
 pub mod wire;

@@ -1,1 +1,5 @@
-fn main() {}
+//! The binary: all of it is in [`offbd::cli`].
+
+fn main() -> std::process::ExitCode {
+    offbd::cli::main()
+}

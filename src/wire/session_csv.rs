@@ -82,8 +82,14 @@ impl<R: Read> Reader<R> {
         Ok(Self { csv, layout, record: csv::ByteRecord::new() })
     }
 
+    /// Line of the row that was read last, from 1, the header included.
+    #[must_use]
+    pub fn line(&self) -> u64 {
+        self.record.position().map_or(0, csv::Position::line)
+    }
+
     fn sample(&self) -> Result<Sample, RowError> {
-        let line = self.record.position().map_or(0, csv::Position::line);
+        let line = self.line();
         let fail = |reason: String| RowError { line, reason };
         let field = |column: usize| {
             let bytes = self.record.get(self.layout.columns[column]);

@@ -1,0 +1,161 @@
+//! Judging one session file: rows in, verdict out. Shared by `replay` and
+//! `score`; the service judges the same way, sample by sample.
+
+use std::fs::File;
+use std::path::Path;
+
+use super::unusable::{Unusable, read};
+use crate::diagnosis::{FaultMemory, Profile};
+use crate::engine::{Admission, Engine, Input, Output, Rig, Setup};
+use crate::vocabulary::Sample;
+use crate::wire::asset;
+use crate::wire::session_csv::{Reader, RowError};
+use crate::wire::verdict::{FaultView, SummaryView, Verdict, fault_view};
+
+/// Most bad rows of a file that are named one by one; more are counted.
+pub(super) const MAX_NAMED_ROWS: usize = 100;
+
+/// What a session came to.
+#[derive(Debug)]
+pub(super) struct Judged {
+    pub faults: Vec<FaultView>,
+    pub summary: SummaryView,
+    /// The first [`MAX_NAMED_ROWS`] rejected rows.
+    pub bad_rows: Vec<RowError>,
+    /// Rows that came too late, or too far ahead, to be judged.
+    pub n_set_aside: u64,
+}
+
+/// The rig of an asset file; without one the chapter's.
+pub(super) fn load_rig(path: Option<&Path>) -> Result<Rig, Unusable> {
+    let Some(path) = path else { return Ok(Rig::chapter("chapter")) };
+    asset::parse(&read(path)?).map_err(|e| Unusable::file(path, e))
+}
+
+/// What an engine needs to judge `rig` by `profile`.
+pub(super) fn set_up(rig: Rig, profile: Option<Profile>) -> Result<Setup, Unusable> {
+    let name = rig.name.clone();
+    Setup::new(rig, profile).map_err(|e| Unusable::new(name, e))
+}
+
+/// The session's name: the file's.
+pub(super) fn session_name(path: &Path) -> String {
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
+}
+
+/// Judges the session file at `path`.
+pub(super) fn judge_file(setup: &Setup, path: &Path) -> Result<Judged, Unusable> {
+    let mut rows = open(path)?;
+    let mut bench = Bench::new(setup.clone(), session_name(path));
+    while let Some(row) = rows.next() {
+        match row {
+            Ok(sample) => bench.sample(sample, rows.line()),
+            Err(error) => bench.reject(error),
+        }
+    }
+    bench.end().ok_or_else(|| Unusable::file(path, "no usable row"))
+}
+
+/// The samples of the session file at `path`, bad rows left out and counted.
+pub(super) fn read_samples(path: &Path) -> Result<(Vec<Sample>, Vec<RowError>), Unusable> {
+    let (mut samples, mut bad_rows) = (Vec::new(), Vec::new());
+    for row in open(path)? {
+        match row {
+            Ok(sample) => samples.push(sample),
+            Err(error) => bad_rows.push(error),
+        }
+    }
+    Ok((samples, bad_rows))
+}
+
+fn open(path: &Path) -> Result<Reader<File>, Unusable> {
+    let file = File::open(path).map_err(|e| Unusable::file(path, e))?;
+    Reader::new(file).map_err(|e| Unusable::file(path, e))
+}
+
+/// An engine with what comes out of it for one session.
+struct Bench {
+    session: String,
+    engine: Engine,
+    outputs: Vec<Output>,
+    verdict: Verdict,
+    faults: Vec<FaultView>,
+    bad_rows: Vec<RowError>,
+    n_samples: u64,
+    n_rejected: u64,
+    n_set_aside: u64,
+    span_s: Option<(f64, f64)>,
+}
+
+impl Bench {
+    fn new(setup: Setup, session: String) -> Self {
+        Self {
+            session,
+            engine: Engine::new(setup, FaultMemory::default()),
+            outputs: Vec::new(),
+            verdict: Verdict::default(),
+            faults: Vec::new(),
+            bad_rows: Vec::new(),
+            n_samples: 0,
+            n_rejected: 0,
+            n_set_aside: 0,
+            span_s: None,
+        }
+    }
+
+    fn reject(&mut self, error: RowError) {
+        self.n_rejected += 1;
+        if self.bad_rows.len() < MAX_NAMED_ROWS {
+            self.bad_rows.push(error);
+        }
+    }
+
+    fn sample(&mut self, sample: Sample, line: u64) {
+        self.engine.handle(Input::Sample(sample), &mut self.outputs);
+        for output in std::mem::take(&mut self.outputs) {
+            if let Output::Admitted(admission) = output {
+                self.admitted(admission, sample.t_s, line);
+            } else {
+                self.transition(&output);
+            }
+        }
+    }
+
+    fn admitted(&mut self, admission: Admission, t_s: f64, line: u64) {
+        match admission {
+            Admission::Accepted => {
+                let (first, last) = self.span_s.unwrap_or((t_s, t_s));
+                self.span_s = Some((first.min(t_s), last.max(t_s)));
+                self.n_samples += 1;
+            }
+            Admission::SetAside(_) => {
+                self.n_samples += 1;
+                self.n_set_aside += 1;
+            }
+            Admission::Duplicate => {}
+            Admission::Rejected(reason) => {
+                self.reject(RowError { line, reason: reason.to_string() });
+            }
+        }
+    }
+
+    fn transition(&mut self, output: &Output) {
+        self.verdict.take(output);
+        if let Output::Transition(transition) = output {
+            self.faults.push(fault_view(&self.session, transition));
+        }
+    }
+
+    /// The verdict; none when there was nothing to judge.
+    fn end(mut self) -> Option<Judged> {
+        self.engine.handle(Input::End, &mut self.outputs);
+        for output in std::mem::take(&mut self.outputs) {
+            self.transition(&output);
+        }
+        let (first, last) = self.span_s?;
+        let summary =
+            self.verdict.summary(&self.session, self.n_samples, self.n_rejected, last - first);
+        let Self { faults, bad_rows, n_set_aside, .. } = self;
+        Some(Judged { faults, summary, bad_rows, n_set_aside })
+    }
+}

@@ -1,0 +1,195 @@
+//! `offbd replay`: judges recordings.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use indicatif::ProgressBar;
+use rayon::prelude::*;
+
+use super::judge::{self, Judged};
+use super::output::{self, Format, words};
+use super::table;
+use super::unusable::Unusable;
+use crate::diagnosis::Profile;
+use crate::vocabulary::FaultStatus;
+use crate::wire::verdict::FaultView;
+
+/// Judges recorded sessions: which faults, when, on what evidence.
+///
+/// The same recording gives the same lines and the same verdict hash, whatever
+/// the number of threads or the load of the machine.
+#[derive(Clone, Debug, Args)]
+#[command(
+    after_help = "A session is CSV with the header t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m: seconds, \
+    radians, metres. An empty position means that no ball was seen.\n\n\
+    Examples:\n  \
+    offbd replay --asset learnt.json monday.csv tuesday.csv\n  \
+    offbd replay --format json sick.csv | jq 'select(.status == \"confirmed\")'\n  \
+    offbd replay --profile textbook sick.csv\n\n\
+    A bad row is rejected by line number on stderr and counted. Exit status: 0 all\n\
+    judged (faults or not), 3 a file could not be used; the others are judged."
+)]
+pub(super) struct ReplayArgs {
+    /// The rig's asset file, better a calibrated one [default: the chapter's rig]
+    #[arg(long, value_name = "ASSET.json")]
+    asset: Option<PathBuf>,
+    /// Recorded sessions
+    #[arg(required = true, value_name = "SESSION.csv")]
+    sessions: Vec<PathBuf>,
+    /// A table for people, or one JSON object per line
+    #[arg(long, value_enum, default_value = "table")]
+    format: Format,
+    /// Judge by this profile instead of the asset's
+    #[arg(long, value_parser = words::<Profile>(Profile::ALL.map(Profile::as_str)))]
+    profile: Option<Profile>,
+    /// Files judged at a time [default: one per core]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    jobs: Option<u16>,
+}
+
+pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
+    let setup = judge::set_up(judge::load_rig(args.asset.as_deref())?, args.profile)?;
+    let bar = progress(args.sessions.len());
+    let judge_all = || -> Vec<Result<Judged, Unusable>> {
+        let judge = |path: &PathBuf| {
+            let result = judge::judge_file(&setup, path);
+            bar.inc(1);
+            result
+        };
+        args.sessions.par_iter().map(judge).collect()
+    };
+    let results = in_threads(args.jobs, judge_all)?;
+    bar.finish_and_clear();
+    for (path, result) in args.sessions.iter().zip(&results) {
+        report_rows(path, result);
+    }
+    let judged: Vec<&Judged> = results.iter().flatten().collect();
+    match args.format {
+        Format::Json => write_json(&judged)?,
+        Format::Table => write_table(&judged)?,
+    }
+    outcome(results)
+}
+
+/// A progress bar on stderr, hidden where that is no terminal or there is one
+/// piece of work only.
+pub(super) fn progress(n: usize) -> ProgressBar {
+    if n < 2 { ProgressBar::hidden() } else { ProgressBar::new(n as u64) }
+}
+
+/// Runs `work` on `jobs` threads, or on as many as there are cores.
+pub(super) fn in_threads<T: Send>(
+    jobs: Option<u16>,
+    work: impl FnOnce() -> T + Send,
+) -> anyhow::Result<T> {
+    let n = jobs.map_or(0, usize::from);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build()?;
+    Ok(pool.install(work))
+}
+
+/// Says on stderr what was not taken.
+fn report_rows(path: &Path, result: &Result<Judged, Unusable>) {
+    let name = path.display();
+    let Ok(judged) = result else { return };
+    for row in &judged.bad_rows {
+        anstream::eprintln!("{name}: {row}; row rejected");
+    }
+    let n_more = judged.summary.rejected - judged.bad_rows.len() as u64;
+    if n_more > 0 {
+        anstream::eprintln!("{name}: {n_more} more rows rejected");
+    }
+    if judged.n_set_aside > 0 {
+        anstream::eprintln!(
+            "{name}: {} rows kept but not judged: too late, or too far ahead in time",
+            judged.n_set_aside
+        );
+    }
+}
+
+fn write_json(judged: &[&Judged]) -> anyhow::Result<()> {
+    let mut out = output::stdout();
+    for session in judged {
+        for fault in &session.faults {
+            serde_json::to_writer(&mut out, fault)?;
+            writeln!(out)?;
+        }
+        serde_json::to_writer(&mut out, &session.summary)?;
+        writeln!(out)?;
+    }
+    Ok(out.flush()?)
+}
+
+fn write_table(judged: &[&Judged]) -> anyhow::Result<()> {
+    let mut out = output::stdout();
+    if judged.is_empty() {
+        return Ok(());
+    }
+    let heading = ["session", "samples", "rejected", "seconds", "verdict"];
+    let mut summaries = table::table(&heading, &[1, 2, 3]);
+    for session in judged {
+        let s = &session.summary;
+        summaries.add_row([
+            s.session.clone(),
+            s.samples.to_string(),
+            s.rejected.to_string(),
+            format!("{:.1}", s.duration_s),
+            verdict(session),
+        ]);
+    }
+    for line in table::lines(&summaries) {
+        writeln!(out, "{line}")?;
+    }
+    for session in judged {
+        write_sentences(&mut out, session, judged.len() > 1)?;
+    }
+    Ok(out.flush()?)
+}
+
+/// The verdict on a session in a few words.
+fn verdict(session: &Judged) -> String {
+    let confirmed = FaultStatus::Confirmed.as_str();
+    let mut words: Vec<String> = Vec::new();
+    for code in &session.summary.faults {
+        let is_first = |f: &&FaultView| f.code == *code && f.status == confirmed;
+        let Some(fault) = session.faults.iter().find(is_first) else { continue };
+        words.push(format!("{} at {:.2} s", named(fault), fault.t_s));
+    }
+    match (words.is_empty(), session.faults.is_empty()) {
+        (false, _) => words.join(", "),
+        (true, false) => "pending only".to_owned(),
+        (true, true) => "no fault".to_owned(),
+    }
+}
+
+fn named(fault: &FaultView) -> String {
+    fault
+        .kind
+        .as_ref()
+        .map_or_else(|| fault.code.clone(), |kind| format!("{} ({kind})", fault.code))
+}
+
+/// A sentence for every change of a fault's status, under the session's name
+/// where there are several.
+fn write_sentences(out: &mut impl Write, session: &Judged, several: bool) -> anyhow::Result<()> {
+    if session.faults.is_empty() {
+        return Ok(());
+    }
+    let name = if several { session.summary.session.as_str() } else { "" };
+    writeln!(out, "\n{name}{}", if several { ":" } else { "what was seen:" })?;
+    for fault in &session.faults {
+        let at = format!("  {:>8.2} s  ", fault.t_s);
+        writeln!(out, "{}", table::wrapped(&at, &fault.summary))?;
+    }
+    Ok(())
+}
+
+/// All were judged, or else the files that were not.
+fn outcome(results: Vec<Result<Judged, Unusable>>) -> anyhow::Result<()> {
+    let mut unusable: Vec<Unusable> = results.into_iter().filter_map(Result::err).collect();
+    let Some(last) = unusable.pop() else { return Ok(()) };
+    for error in unusable {
+        anstream::eprintln!("offbd: {error}");
+    }
+    Err(last.into())
+}

@@ -1,0 +1,242 @@
+//! `offbd simulate`: a session of the simulated rig, or a labelled corpus.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::calibrate::write_asset;
+use super::labels::{Label, class, labelled};
+use super::output::{self, words};
+use super::{corpus, judge};
+use crate::simulation::{
+    Disturbances, Fault, Preset, Reference, RigModel, SimulatedRig, Transport, TransportFaults,
+};
+use crate::vocabulary::{Invalid, Sample};
+use crate::wire::session_csv;
+
+/// Records a session of the simulated rig: PID control, servos, noise, faults.
+///
+/// Equal seeds give equal bytes. A fault is CODE:KIND[=SIZE]@START[-END] with
+/// times in seconds.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "Faults (sizes have defaults):\n  \
+    x_servo, y_servo  hold, dead, gain=FACTOR, reversed, offset=RAD,\n                    \
+    slow=FACTOR, intermittent\n  \
+    stuck_ball        glued, sticky=RAD\n  \
+    sensor            freeze, freeze_axis=x|y, dropout=SHARE, noise=FACTOR,\n                    \
+    spikes=SHARE, jump=X_M[,Y_M]\n\n\
+    Examples:\n  \
+    offbd simulate --rig rig.json --seconds 120 -o healthy.csv\n  \
+    offbd simulate --fault y_servo:gain=0.5@20 --truth truth.json -o weak.csv\n  \
+    offbd simulate --preset touch --fault sensor:freeze@15-25 -o frozen.csv\n  \
+    offbd simulate --late 0.1 --duplicates 0.05 --gap 12-14 --seq -o bad-line.csv\n  \
+    offbd simulate --corpus mycorpus && offbd score mycorpus")]
+pub(super) struct SimulateArgs {
+    /// Kind of rig: its servos, surface, sensor and controller
+    #[arg(long, default_value = "chapter",
+          value_parser = words::<Preset>(Preset::ALL.map(Preset::as_str)))]
+    preset: Preset,
+    /// Ball, plate, angle limit and sample rate from this asset file
+    #[arg(long, value_name = "ASSET.json")]
+    asset: Option<PathBuf>,
+    /// Where the ball is asked to go
+    #[arg(long, default_value = "steps",
+          value_parser = words::<Reference>(Reference::ALL.map(Reference::as_str)))]
+    reference: Reference,
+    /// Length of the session, s
+    #[arg(long, default_value_t = 60.0, value_name = "S", value_parser = seconds)]
+    seconds: f64,
+    /// Seed of all that is random
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// A fault: CODE:KIND[=SIZE]@START[-END]; may be given again
+    #[arg(long, value_name = "FAULT")]
+    fault: Vec<Fault>,
+    /// Where the session goes; - is stdout
+    #[arg(short, long, default_value = "-", value_name = "SESSION.csv")]
+    output: PathBuf,
+    /// Write what is true of the session here, as in a corpus' labels
+    #[arg(long, value_name = "FILE.json")]
+    truth: Option<PathBuf>,
+    /// Write what the rig's owner knows here: its asset file
+    #[arg(long, value_name = "ASSET.json")]
+    rig: Option<PathBuf>,
+    /// Number the rows in a column `seq`
+    #[arg(long)]
+    seq: bool,
+    /// Write a labelled corpus here instead: every preset, healthy and faulty
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["output", "truth", "fault", "rig"])]
+    corpus: Option<PathBuf>,
+    #[command(flatten)]
+    sensor: SensorArgs,
+    #[command(flatten)]
+    line: LineArgs,
+}
+
+/// What the rig's sensor and surroundings are like, instead of the preset's.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Sensor and surroundings [default: the preset's]")]
+struct SensorArgs {
+    /// Standard deviation of a reading, m
+    #[arg(long, value_name = "M")]
+    noise_m: Option<f64>,
+    /// Step of the readings (pixel, count), m
+    #[arg(long, value_name = "M")]
+    quantum_m: Option<f64>,
+    /// New readings per second; between them rows repeat the last
+    #[arg(long, value_name = "HZ")]
+    refresh_hz: Option<f64>,
+    /// Standard deviation of the log's period, as a share of it
+    #[arg(long, value_name = "SHARE")]
+    jitter: Option<f64>,
+    /// Share of readings without a ball
+    #[arg(long, value_name = "SHARE")]
+    missing: Option<f64>,
+    /// Share of lone readings far off
+    #[arg(long, value_name = "SHARE")]
+    outliers: Option<f64>,
+    /// Hands pushing the ball, per minute
+    #[arg(long, value_name = "N", default_value_t = 0.0)]
+    pushes: f64,
+    /// Gusts of one to three seconds, per minute
+    #[arg(long, value_name = "N", default_value_t = 0.0)]
+    gusts: f64,
+}
+
+/// What happens to rows on the way.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Transport")]
+struct LineArgs {
+    /// Share of rows sent twice
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    duplicates: f64,
+    /// Share of rows held up, so that they come out of order
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    late: f64,
+    /// How long a row may be held up, s
+    #[arg(long, value_name = "S", default_value_t = 0.05)]
+    late_window_s: f64,
+    /// Share of rows lost
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    lost: f64,
+    /// A span of time in which every row is lost; may be given again
+    #[arg(long, value_name = "FROM-TO", value_parser = span)]
+    gap: Vec<(f64, f64)>,
+}
+
+/// Longest session that is simulated at once, s: a day.
+const MAX_SECONDS: f64 = 86_400.0;
+
+/// A length in seconds, in (0, 86400].
+pub(super) fn seconds(word: &str) -> Result<f64, String> {
+    let value: Option<f64> = word.parse().ok();
+    let in_range = |v: &f64| *v > 0.0 && *v <= MAX_SECONDS;
+    value.filter(in_range).ok_or_else(|| format!("not above 0 and at most {MAX_SECONDS} seconds"))
+}
+
+fn span(word: &str) -> Result<(f64, f64), String> {
+    let wrong = || "not a span of seconds as in 12-14".to_owned();
+    let (from, to) = word.split_once('-').ok_or_else(wrong)?;
+    let (from, to): (f64, f64) =
+        (from.parse().map_err(|_| wrong())?, to.parse().map_err(|_| wrong())?);
+    if from < to { Ok((from, to)) } else { Err(wrong()) }
+}
+
+pub(super) fn run(args: &SimulateArgs) -> anyhow::Result<()> {
+    if let Some(dir) = &args.corpus {
+        return corpus::write(dir, args.seconds, args.seed);
+    }
+    let model = args.model()?;
+    if let Some(path) = &args.rig {
+        write_asset(&model.rig, path)?;
+    }
+    let name = model.rig.name.clone();
+    let disturbances = args.disturbances();
+    let mut rig =
+        SimulatedRig::new(model, args.reference, disturbances, args.seed).map_err(bad_argument)?;
+    args.fault.iter().for_each(|fault| rig.inject(*fault));
+    let samples = record(&mut rig, args.seconds);
+    let rows = args.transported(&samples)?;
+    write_session(&args.output, &rows, args.seq)?;
+    if let Some(path) = &args.truth {
+        write_truth(path, &args.label(&rig, &name, rows.len()))?;
+    }
+    Ok(())
+}
+
+/// The rows that `rig` logs in the next `seconds`.
+pub(super) fn record(rig: &mut SimulatedRig, seconds: f64) -> Vec<Sample> {
+    let end_s = rig.truth().t_s + seconds;
+    std::iter::from_fn(|| Some(rig.next_sample())).take_while(|s| s.t_s <= end_s).collect()
+}
+
+/// Writes a session, with the column `seq` only if wanted.
+pub(super) fn write_session(path: &Path, samples: &[Sample], seq: bool) -> anyhow::Result<()> {
+    let mut out = output::create(path)?;
+    let unnumbered = |s: &Sample| Sample { seq: s.seq.filter(|_| seq), ..*s };
+    session_csv::write(&mut out, &samples.iter().map(unnumbered).collect::<Vec<_>>())?;
+    Ok(out.flush()?)
+}
+
+fn write_truth(path: &Path, label: &Label) -> anyhow::Result<()> {
+    let mut out = output::create(path)?;
+    serde_json::to_writer_pretty(&mut out, label)?;
+    writeln!(out)?;
+    Ok(out.flush()?)
+}
+
+/// A number on the command line that cannot be.
+fn bad_argument(error: Invalid) -> anyhow::Error {
+    super::unusable::Unusable::new("cannot simulate", error).into()
+}
+
+impl SimulateArgs {
+    fn model(&self) -> anyhow::Result<RigModel> {
+        let mut model = self.preset.model().map_err(bad_argument)?;
+        if self.asset.is_some() {
+            model = model.owned_as(judge::load_rig(self.asset.as_deref())?);
+        }
+        let sensor = &mut model.sensor;
+        let SensorArgs { noise_m, quantum_m, refresh_hz, jitter, missing, outliers, .. } =
+            &self.sensor;
+        let set = |to: &mut f64, from: &Option<f64>| *to = from.unwrap_or(*to);
+        set(&mut sensor.noise_m, noise_m);
+        set(&mut sensor.quantum_m, quantum_m);
+        set(&mut sensor.jitter, jitter);
+        set(&mut sensor.missing, missing);
+        set(&mut sensor.outliers, outliers);
+        sensor.refresh_hz = refresh_hz.or(sensor.refresh_hz);
+        Ok(model)
+    }
+
+    fn disturbances(&self) -> Disturbances {
+        let SensorArgs { pushes, gusts, .. } = self.sensor;
+        Disturbances { pushes_per_minute: pushes, gusts_per_minute: gusts }
+    }
+
+    fn transported(&self, samples: &[Sample]) -> anyhow::Result<Vec<Sample>> {
+        let LineArgs { duplicates, late, late_window_s, lost, ref gap } = self.line;
+        let gaps = gap.clone();
+        let faults = TransportFaults { duplicates, late, window_s: late_window_s, lost, gaps };
+        let mut line = Transport::new(faults, self.seed).map_err(bad_argument)?;
+        let mut rows = Vec::with_capacity(samples.len());
+        samples.iter().for_each(|sample| line.send(*sample, &mut rows));
+        line.finish(&mut rows);
+        Ok(rows)
+    }
+
+    fn label(&self, rig: &SimulatedRig, name: &str, rows: usize) -> Label {
+        let first = rig.faults().next();
+        Label {
+            file: judge::session_name(&self.output),
+            rig: name.to_owned(),
+            motion: self.reference.to_string(),
+            seconds: self.seconds,
+            rows: rows as u64,
+            class: class(first),
+            also: Vec::new(),
+            fault: first.map(labelled),
+        }
+    }
+}

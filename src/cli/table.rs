@@ -1,0 +1,60 @@
+//! Tables for people: columns without rules, at most 80 characters wide.
+
+use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
+
+/// Width of a table, characters: what every terminal has.
+const WIDTH: u16 = 80;
+
+/// A table with this heading, in which the columns of `right` are numbers.
+pub(super) fn table(heading: &[&str], right: &[usize]) -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::NOTHING);
+    table.set_content_arrangement(ContentArrangement::Dynamic).set_width(WIDTH);
+    table.set_header(heading.iter().copied());
+    for (i, column) in table.column_iter_mut().enumerate() {
+        let padding = (if i == 0 { 0 } else { 1 }, 1);
+        column.set_padding(padding);
+        if right.contains(&i) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    table
+}
+
+/// The table as lines without trailing blanks.
+pub(super) fn lines(table: &Table) -> impl Iterator<Item = String> {
+    table.lines().map(|line| line.trim_end().to_owned())
+}
+
+/// `text` broken at blanks to follow `lead`: later lines are indented by as
+/// many blanks.
+pub(super) fn wrapped(lead: &str, text: &str) -> String {
+    let indent = lead.chars().count();
+    let room = usize::from(WIDTH).saturating_sub(indent);
+    let mut lines = vec![String::new()];
+    for word in text.split(' ') {
+        let last = lines.len() - 1;
+        let used = lines[last].chars().count();
+        if used > 0 && used + 1 + word.chars().count() > room {
+            lines.push(word.to_owned());
+        } else {
+            let blank = if used > 0 { " " } else { "" };
+            lines[last] += &format!("{blank}{word}");
+        }
+    }
+    format!("{lead}{}", lines.join(&format!("\n{}", " ".repeat(indent))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_sentences_break_at_blanks_within_eighty_characters() {
+        let text = wrapped("  - ", &"abcdefg ".repeat(30));
+        assert!(text.lines().count() > 2);
+        assert!(text.lines().all(|l| l.chars().count() <= 80));
+        assert!(text.starts_with("  - a"));
+        assert!(text.lines().skip(1).all(|l| l.starts_with("    a")));
+    }
+}

@@ -1,0 +1,35 @@
+//! The simulated rig: a plate on two servos, a ball, a sensor, a controller,
+//! and everything that can go wrong with them.
+//!
+//! One idea: an immutable [`RigModel`], a mutable [`SimulatedRig`] that moves
+//! from event to event (sensor, controller, log) by an explicit time, and one
+//! seed from which separate random streams are drawn, so that equal seeds give
+//! equal bytes and a fault does not move the noise. Knows the plant; does not
+//! know how a rig is judged, and reads no clock.
+
+mod ball;
+mod controller;
+mod disturbance;
+mod fault;
+mod model;
+mod noise;
+mod presets;
+mod reference;
+mod rig;
+mod sensor;
+mod servo;
+mod transport;
+mod truth;
+
+pub use ball::Surface;
+pub use controller::ControllerModel;
+pub use disturbance::Disturbances;
+pub use fault::{BallFault, Fault, FaultEffect, FaultSyntax, SensorFault, ServoFault};
+pub use model::RigModel;
+pub use presets::Preset;
+pub use reference::Reference;
+pub use rig::SimulatedRig;
+pub use sensor::SensorModel;
+pub use servo::ServoTruth;
+pub use transport::{Transport, TransportFaults};
+pub use truth::{FaultTruth, Truth};

@@ -1,0 +1,55 @@
+//! All that is true of one simulated rig, beside what its owner knows of it.
+
+use super::ball::Surface;
+use super::controller::ControllerModel;
+use super::sensor::SensorModel;
+use super::servo::ServoTruth;
+use crate::engine::Rig;
+use crate::vocabulary::{Axis, Invalid, PerAxis, in_range, positive};
+
+/// A rig to be simulated; immutable.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RigModel {
+    /// What the owner knows: the asset file.
+    pub rig: Rig,
+    pub servos: PerAxis<ServoTruth>,
+    pub surface: Surface,
+    pub sensor: SensorModel,
+    pub controller: ControllerModel,
+}
+
+/// Fastest log that is simulated, rows per second: the plant's step is 1 ms.
+pub const MAX_LOG_HZ: f64 = 1000.0;
+
+impl RigModel {
+    /// The same sensor, servos and surface under another owner's ball, plate,
+    /// angle limit and sample rate.
+    #[must_use]
+    pub fn owned_as(mut self, rig: Rig) -> Self {
+        self.controller.limit_rad = rig.servo.angle_limit_rad;
+        self.rig = rig;
+        self
+    }
+
+    /// Checks every number.
+    ///
+    /// # Errors
+    /// [`Invalid`] naming the element.
+    pub fn check(&self) -> Result<(), Invalid> {
+        self.rig.check()?;
+        positive("/sample_rate_hz", self.rig.sample_rate_hz, MAX_LOG_HZ)?;
+        self.surface.check()?;
+        self.sensor.check()?;
+        let controller = &self.controller;
+        in_range("/controller/period_s", controller.period_s, 0.001..=1.0)?;
+        positive("/controller/limit_rad", controller.limit_rad, 1.5)?;
+        for axis in Axis::ALL {
+            let servo = &self.servos[axis];
+            in_range("/servo/dead_time_s", servo.dead_time_s, 0.0..=1.0)?;
+            in_range("/servo/play_rad", servo.play_rad, 0.0..=0.5)?;
+            in_range("/servo/gain", servo.gain, -10.0..=10.0)?;
+            in_range("/servo/level_rad", servo.level_rad, -0.5..=0.5)?;
+        }
+        Ok(())
+    }
+}

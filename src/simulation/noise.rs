@@ -1,0 +1,58 @@
+//! Random numbers: one ChaCha stream per purpose, all from one seed.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+/// What a stream is drawn for. A new purpose goes to the end: the number is
+/// part of what a seed reproduces.
+#[derive(Clone, Copy)]
+pub(super) enum Purpose {
+    Start,
+    Reference,
+    Sensor,
+    Clock,
+    Disturbance,
+    ServoX,
+    ServoY,
+    SensorFault,
+    Transport,
+}
+
+/// A seeded source of random numbers.
+#[derive(Clone, Debug)]
+pub(super) struct Noise(ChaCha8Rng);
+
+impl Noise {
+    pub(super) fn new(seed: u64, purpose: Purpose) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(purpose as u64);
+        Self(rng)
+    }
+
+    /// Standard normal.
+    pub(super) fn normal(&mut self) -> f64 {
+        self.0.sample(StandardNormal)
+    }
+
+    /// Uniform in [low, high); `low` where the range is empty.
+    pub(super) fn uniform(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.0.random::<f64>()
+    }
+
+    /// Whether an event of probability `p` happens.
+    pub(super) fn happens(&mut self, p: f64) -> bool {
+        self.0.random::<f64>() < p
+    }
+
+    /// +1 or −1.
+    pub(super) fn sign(&mut self) -> f64 {
+        if self.happens(0.5) { 1.0 } else { -1.0 }
+    }
+
+    /// Time to the next event of a Poisson process, s; infinite at rate zero.
+    pub(super) fn waiting_s(&mut self, per_minute: f64) -> f64 {
+        let uniform = 1.0 - self.0.random::<f64>();
+        if per_minute > 0.0 { -uniform.ln() * 60.0 / per_minute } else { f64::INFINITY }
+    }
+}

@@ -1,0 +1,299 @@
+//! The simulated rig in motion.
+//!
+//! It goes from event to event (the sensor looks, the controller commands, the
+//! device logs a row); between two events the plant advances in steps of at
+//! most 1 ms, each a row of stages: faults in force → servos → ball → truth.
+
+use nalgebra::Vector2;
+
+use super::ball::{BallState, Table};
+use super::controller::Controller;
+use super::disturbance::{DisturbanceState, Disturbances};
+use super::fault::{BallFault, Fault, FaultEffect, SensorFault, ServoFault};
+use super::model::RigModel;
+use super::noise::{Noise, Purpose};
+use super::reference::{Reference, ReferenceState};
+use super::sensor::{Reading, Sensor};
+use super::servo::{PlateAngle, SimulatedServo};
+use super::truth::{FaultTruth, Truth, Watch};
+use crate::plant::{RollingState, Tilt};
+use crate::vocabulary::{Axis, FaultCode, Invalid, PerAxis, Sample};
+
+/// Longest step of the plant, s: a fiftieth of the fastest servo lag.
+const STEP_S: f64 = 1e-3;
+/// The log's jitter is cut here, as a share of the period, so that its times
+/// never go back.
+const MAX_JITTER: f64 = 0.4;
+/// The log's resolutions, as a device prints them: 0.1 ms, 10 µrad, 10 µm.
+const LOGGED_PER_S: f64 = 1e4;
+const LOGGED_PER_RAD: f64 = 1e5;
+const LOGGED_PER_M: f64 = 1e5;
+
+/// The faults in force at one moment.
+#[derive(Clone, Copy, Debug, Default)]
+struct InForce {
+    servos: PerAxis<Option<ServoFault>>,
+    ball: Option<BallFault>,
+    sensor: Option<SensorFault>,
+}
+
+/// What happens next.
+#[derive(Clone, Copy)]
+enum Event {
+    Look,
+    Control,
+    Log,
+}
+
+/// When things happen next, s.
+#[derive(Clone, Debug)]
+struct Schedule {
+    n_looks: u64,
+    n_controls: u64,
+    n_rows: u64,
+    next_row_s: f64,
+    clock: Noise,
+}
+
+/// A simulated rig; advances by [`next_sample`](Self::next_sample) alone.
+#[derive(Clone, Debug)]
+pub struct SimulatedRig {
+    model: RigModel,
+    table: Table,
+    now_s: f64,
+    schedule: Schedule,
+    servos: PerAxis<SimulatedServo>,
+    healthy_servos: PerAxis<SimulatedServo>,
+    plate: PerAxis<PlateAngle>,
+    healthy_rad: PerAxis<f64>,
+    ball: BallState,
+    sensor: Sensor,
+    reading: Reading,
+    controller: Controller,
+    reference: ReferenceState,
+    disturbances: DisturbanceState,
+    faults: Vec<Watch>,
+}
+
+impl SimulatedRig {
+    /// A rig with its ball somewhere near the centre, at rest, at time zero.
+    ///
+    /// # Errors
+    /// [`Invalid`] naming the element of the model that cannot be.
+    pub fn new(
+        model: RigModel,
+        reference: Reference,
+        disturbances: Disturbances,
+        seed: u64,
+    ) -> Result<Self, Invalid> {
+        model.check()?;
+        let table = Table::new(model.rig.ball, model.rig.plate, model.surface);
+        let limit = model.controller.limit_rad;
+        let servo = |axis: Axis, purpose| {
+            SimulatedServo::new(model.servos[axis], limit, Noise::new(seed, purpose))
+        };
+        let servos =
+            PerAxis { x: servo(Axis::X, Purpose::ServoX)?, y: servo(Axis::Y, Purpose::ServoY)? };
+        let reach = table.reach();
+        let level = |axis: Axis| model.servos[axis].level_rad;
+        Ok(Self {
+            now_s: 0.0,
+            schedule: Schedule::new(seed),
+            healthy_servos: servos.clone(),
+            servos,
+            plate: PerAxis::from_fn(|a| PlateAngle { angle: level(a), ..PlateAngle::default() }),
+            healthy_rad: PerAxis::from_fn(level),
+            ball: start(reach, seed),
+            sensor: Sensor::new(model.sensor, reach, seed),
+            reading: Reading::default(),
+            controller: Controller::new(model.controller, &model.rig.ball),
+            reference: ReferenceState::new(reference, reach, seed),
+            disturbances: DisturbanceState::new(disturbances, seed),
+            faults: Vec::new(),
+            table,
+            model,
+        })
+    }
+
+    /// Adds a fault; it counts from its onset on, at once if that has passed.
+    pub fn inject(&mut self, fault: Fault) {
+        self.faults.push(Watch::new(fault));
+    }
+
+    /// Ends every fault of `code` now.
+    pub fn repair(&mut self, code: FaultCode) {
+        let now_s = self.now_s;
+        let of_code = |w: &&mut Watch| w.fault().effect.code() == code;
+        self.faults.iter_mut().filter(of_code).for_each(|w| w.end(now_s));
+    }
+
+    /// Pushes the ball: an acceleration of the free ball, m/s², for `seconds`.
+    pub fn push(&mut self, acceleration: Vector2<f64>, seconds: f64) {
+        self.disturbances.push(acceleration, self.now_s + seconds);
+    }
+
+    /// All faults injected so far, with their first chances.
+    pub fn faults(&self) -> impl Iterator<Item = &FaultTruth> {
+        self.faults.iter().map(Watch::truth)
+    }
+
+    /// What is really the case.
+    #[must_use]
+    pub fn truth(&self) -> Truth {
+        Truth {
+            t_s: self.now_s,
+            position: self.ball.rolling.position,
+            velocity: self.ball.rolling.velocity,
+            lost: self.ball.lost,
+            plate_rad: self.plate.map(|p| p.angle),
+            healthy_rad: self.healthy_rad,
+        }
+    }
+
+    /// The next row of the device's log. Rows are numbered from 1; their times
+    /// rise strictly.
+    pub fn next_sample(&mut self) -> Sample {
+        loop {
+            let (event, at_s) = self.schedule.next(&self.model);
+            self.advance_to(at_s);
+            match event {
+                Event::Look => self.look(),
+                Event::Control => self.control(),
+                Event::Log => return self.log(),
+            }
+        }
+    }
+
+    fn advance_to(&mut self, until_s: f64) {
+        let span = until_s - self.now_s;
+        let n = (span / STEP_S - 1e-6).ceil().max(1.0);
+        if span > 0.0 {
+            (0..n as u32).for_each(|_| self.step(span / n));
+            self.now_s = until_s;
+        }
+    }
+
+    fn step(&mut self, h: f64) {
+        let faults = self.faults_in_force();
+        let start = tilt(&self.plate);
+        let middle = self.turn_plate(self.now_s, h / 2.0, &faults);
+        let end = self.turn_plate(self.now_s + h / 2.0, h / 2.0, &faults);
+        let push = self.disturbances.at(self.now_s);
+        self.ball = self.table.advance(&self.ball, [&start, &middle, &end], push, faults.ball, h);
+        self.now_s += h;
+        self.watch();
+    }
+
+    fn faults_in_force(&self) -> InForce {
+        let mut in_force = InForce::default();
+        for fault in self.faults.iter().map(Watch::fault).filter(|f| f.active(self.now_s)) {
+            match fault.effect {
+                FaultEffect::Servo(axis, effect) => in_force.servos[axis] = Some(effect),
+                FaultEffect::Ball(effect) => in_force.ball = Some(effect),
+                FaultEffect::Sensor(effect) => in_force.sensor = Some(effect),
+            }
+        }
+        in_force
+    }
+
+    fn turn_plate(&mut self, at_s: f64, h: f64, faults: &InForce) -> Tilt {
+        for axis in Axis::ALL {
+            self.plate[axis] = self.servos[axis].advance(at_s, h, faults.servos[axis]);
+            self.healthy_rad[axis] = self.healthy_servos[axis].advance(at_s, h, None).angle;
+        }
+        tilt(&self.plate)
+    }
+
+    fn watch(&mut self) {
+        let (truth, breakaway_rad) = (self.truth(), self.model.surface.breakaway_rad);
+        for watch in &mut self.faults {
+            watch.observe(&truth, &self.reading, breakaway_rad);
+        }
+    }
+
+    fn look(&mut self) {
+        let fault = self.faults_in_force().sensor;
+        let ball = (!self.ball.lost).then_some(self.ball.rolling.position);
+        self.sensor.look(self.now_s, ball, fault);
+    }
+
+    fn control(&mut self) {
+        let wanted = self.reference.at(self.now_s);
+        self.reading = self.sensor.reading(self.now_s);
+        self.controller.update(PerAxis { x: wanted.x, y: wanted.y }, self.reading);
+        let commands = self.controller.commands();
+        for axis in Axis::ALL {
+            self.servos[axis].command(self.now_s, commands[axis]);
+            self.healthy_servos[axis].command(self.now_s, commands[axis]);
+        }
+    }
+
+    fn log(&mut self) -> Sample {
+        if self.model.sensor.refresh_hz.is_none() {
+            self.look();
+        }
+        self.reading = self.sensor.reading(self.now_s);
+        let commands = self.controller.commands();
+        let metres = |m: Option<f64>| m.map(|m| logged(m, LOGGED_PER_M));
+        Sample {
+            seq: Some(self.schedule.n_rows),
+            t_s: logged(self.now_s, LOGGED_PER_S),
+            cmd_qx_rad: Some(logged(commands.y, LOGGED_PER_RAD)),
+            cmd_qy_rad: Some(logged(commands.x, LOGGED_PER_RAD)),
+            x_m: metres(self.reading.x),
+            y_m: metres(self.reading.y),
+        }
+    }
+}
+
+impl Schedule {
+    fn new(seed: u64) -> Self {
+        let clock = Noise::new(seed, Purpose::Clock);
+        Self { n_looks: 0, n_controls: 0, n_rows: 0, next_row_s: 0.0, clock }
+    }
+
+    /// The next event and its time; at one moment a look comes before a
+    /// command, and a command before a row.
+    fn next(&mut self, model: &RigModel) -> (Event, f64) {
+        let look_s = model.sensor.refresh_hz.map_or(f64::INFINITY, |hz| self.n_looks as f64 / hz);
+        let control_s = self.n_controls as f64 * model.controller.period_s;
+        if look_s <= control_s && look_s <= self.next_row_s {
+            self.n_looks += 1;
+            return (Event::Look, look_s);
+        }
+        if control_s <= self.next_row_s {
+            self.n_controls += 1;
+            return (Event::Control, control_s);
+        }
+        let row_s = self.next_row_s;
+        self.n_rows += 1;
+        let jitter = (self.clock.normal() * model.sensor.jitter).clamp(-MAX_JITTER, MAX_JITTER);
+        self.next_row_s = (self.n_rows as f64 + jitter) / model.rig.sample_rate_hz;
+        (Event::Log, row_s)
+    }
+}
+
+/// The ball at rest within a fifth of its reach of the centre.
+fn start(reach: Vector2<f64>, seed: u64) -> BallState {
+    let mut noise = Noise::new(seed, Purpose::Start);
+    let mut share = || noise.uniform(-0.2, 0.2);
+    let position = Vector2::new(share(), share()).component_mul(&reach);
+    BallState { rolling: RollingState { position, ..RollingState::default() }, lost: false }
+}
+
+/// The plate's tilt about (x, y): the servo of axis x turns it about y.
+fn tilt(plate: &PerAxis<PlateAngle>) -> Tilt {
+    Tilt {
+        angle: Vector2::new(plate.y.angle, plate.x.angle),
+        rate: Vector2::new(plate.y.rate, plate.x.rate),
+        acceleration: Vector2::new(plate.y.acceleration, plate.x.acceleration),
+    }
+}
+
+fn logged(value: f64, per_unit: f64) -> f64 {
+    // Adding zero turns −0 into 0.
+    (value * per_unit).round() / per_unit + 0.0
+}
+
+#[cfg(test)]
+mod tests;
