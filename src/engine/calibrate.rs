@@ -302,6 +302,23 @@ fn explain(windows: &mut [Window]) -> Option<Explained> {
     Some(Explained { gain: c.x, offset_m_s2: c.y, left, share: 1.0 - left / total, gain_error })
 }
 
+/// Step of dead time and lag at which the search ends, s.
+const FINEST_STEP_S: f64 = 0.001;
+/// Where the search looks next: dead time and lag trade off against each
+/// other along a narrow valley, so it also looks across both.
+const DIRECTIONS: [(f64, f64); 10] = [
+    (1.0, 0.0),
+    (-1.0, 0.0),
+    (0.0, 1.0),
+    (0.0, -1.0),
+    (1.0, -1.0),
+    (-1.0, 1.0),
+    (2.0, -1.0),
+    (-2.0, 1.0),
+    (1.0, -2.0),
+    (-1.0, 2.0),
+];
+
 /// The recordings of one axis, ready to be fitted.
 struct Fitter<'a> {
     rig: &'a Rig,
@@ -355,15 +372,15 @@ impl Fitter<'_> {
                 try_at(dead, lag, &mut best);
             }
         }
-        let (mut dead_step, mut lag_step) = (0.02, 0.02);
-        for _ in 0..5 {
-            let (dead, lag, _) = best?;
-            for (d, l) in
-                [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0), (1.0, -1.0), (-1.0, 1.0)]
-            {
-                try_at(dead + d * dead_step, lag + l * lag_step, &mut best);
+        let mut step = 0.02;
+        while step >= FINEST_STEP_S {
+            let (dead, lag, before) = best?;
+            for (d, l) in DIRECTIONS {
+                try_at(dead + d * step, lag + l * step, &mut best);
             }
-            (dead_step, lag_step) = (dead_step / 2.0, lag_step / 2.0);
+            if best.is_some_and(|(.., after)| after.cost() == before.cost()) {
+                step /= 2.0;
+            }
         }
         best
     }
@@ -396,7 +413,7 @@ fn learn_in_windows(
     let still = CannotCalibrate::TooLittleExcitation { axis, percent: f64::INFINITY };
     let (dead_time_s, lag_s, found) = fitter.search().ok_or(still)?;
     let error = found.gain_error / found.gain.abs();
-    if !(error <= WORST_GAIN_ERROR) {
+    if error.is_nan() || error > WORST_GAIN_ERROR {
         return Err(CannotCalibrate::TooLittleExcitation { axis, percent: 100.0 * error });
     }
     if found.gain <= 0.0 {
@@ -437,9 +454,6 @@ struct Healthy {
 const RESIDUAL_WINDOW_S: f64 = 0.5;
 /// Rest after which the plate's tilt counts as withstood, s.
 const REST_S: f64 = 0.5;
-/// Share of the scatters that the noise covers: readings of a ball at rest are
-/// quieter than those of a moving one, and pushes are rarer than a tenth.
-const NOISE_SHARE: f64 = 0.9;
 /// Share of the withstood tilts that the breakaway angle covers.
 const REST_SHARE: f64 = 0.95;
 
@@ -465,13 +479,10 @@ fn healthy_spread(fitter: &Fitter, dead: f64, lag: f64, gain: f64, level: f64) -
         }
         withstood.extend(tilts_at_rest(recording, axis, level, dead + lag));
     }
-    withstood.sort_by(f64::total_cmp);
-    let share =
-        ((withstood.len() as f64 * REST_SHARE) as usize).min(withstood.len().saturating_sub(1));
     Healthy {
         noise_m: median(&mut scatters).unwrap_or(0.0),
         residual_m_s2: robust_deviation(&mut residuals).unwrap_or(0.0),
-        breakaway_rad: withstood.get(share).copied().unwrap_or(0.0),
+        breakaway_rad: quantile(&mut withstood, REST_SHARE).unwrap_or(0.0),
     }
 }
 
@@ -553,7 +564,7 @@ mod tests {
     fn refusals_say_what_is_missing() {
         let rig = Rig::chapter("a");
         let refused = |s: Vec<Sample>| calibrate(&rig, &[s], "", "").unwrap_err();
-        assert!(matches!(refused(session(8.0, 0.03, 1.0)), CannotCalibrate::TooShort { .. }));
+        assert!(matches!(refused(session(4.0, 0.03, 1.0)), CannotCalibrate::TooShort { .. }));
         assert!(matches!(refused(session(60.0, 0.03, -1.0)), CannotCalibrate::Reversed { .. }));
         let mut blind = session(60.0, 0.03, 1.0);
         for s in &mut blind {

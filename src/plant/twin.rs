@@ -80,12 +80,14 @@ impl CommandHistory {
         self.entries.push_back((at, command));
     }
 
-    /// The command in force at `at`; forgets what is older.
-    fn in_force(&mut self, at: SimTime) -> f64 {
+    /// The command in force at `at` and the moment, if known, at which the next
+    /// one takes over; forgets what is older.
+    fn in_force(&mut self, at: SimTime) -> (f64, Option<SimTime>) {
         while self.entries.get(1).is_some_and(|&(from, _)| from <= at) {
             self.entries.pop_front();
         }
-        self.entries.front().map_or(0.0, |&(_, command)| command)
+        let command = self.entries.front().map_or(0.0, |&(_, command)| command);
+        (command, self.entries.get(1).map(|&(from, _)| from))
     }
 }
 
@@ -184,24 +186,33 @@ impl Twin {
         let steps = (span / LONGEST_STEP_S).ceil().max(1.0);
         let h = span / steps;
         for step in 0..steps as u32 {
-            let middle = from + (f64::from(step) + 0.5) * h;
-            let tilt = self.half_step(middle, h / 2.0);
+            let start = from + f64::from(step) * h;
+            let tilt = self.move_servos(start, h / 2.0);
             let (unit, _) = self.model.rolling.acceleration(observed, &tilt, Vector2::zeros());
             let axes = &self.model.axes;
             let a = Vector2::new(unit.x * axes.x.gain, unit.y * axes.y.gain);
             self.motion.position += self.motion.velocity * h + a * (h * h / 2.0);
             self.motion.velocity += a * h;
             self.motion.acceleration = a;
-            self.half_step(middle, h / 2.0);
+            self.move_servos(start + h / 2.0, h / 2.0);
         }
     }
 
-    /// Moves the servos by `h` under the commands in force around `at`.
-    fn half_step(&mut self, at: SimTime, h: f64) -> Tilt {
+    /// Moves the servos from `start` on for `h` seconds, exactly: a command
+    /// that takes over within the step does so at its own moment.
+    fn move_servos(&mut self, start: SimTime, h: f64) -> Tilt {
         for axis in Axis::ALL {
             let model = &self.model.axes[axis];
-            let command = self.commands[axis].in_force(at + -model.dead_time_s);
-            self.servos[axis] = model.servo.advance(&self.servos[axis], command, h);
+            let (mut at, end) = (start + -model.dead_time_s, start + (h - model.dead_time_s));
+            loop {
+                let (command, next) = self.commands[axis].in_force(at);
+                let until = next.filter(|&n| n < end).unwrap_or(end);
+                self.servos[axis] = model.servo.advance(&self.servos[axis], command, until - at);
+                if until == end {
+                    break;
+                }
+                at = until;
+            }
         }
         self.tilt()
     }
