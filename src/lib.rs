@@ -22,3 +22,6 @@ pub mod simulation;
 pub mod vocabulary;
 #[cfg(feature = "service")]
 pub mod wire;
+
+#[cfg(feature = "service")]
+pub mod store;
