@@ -7,4 +7,5 @@
 pub mod asset;
 pub mod memory;
 pub mod session_csv;
+pub mod telemetry;
 pub mod verdict;
