@@ -21,6 +21,7 @@ CREATE TABLE session (
     setup        TEXT   NOT NULL,        -- the asset file as of opening, JSON
     baseline     TEXT   NOT NULL,        -- the fault memory as of opening, JSON
     n_samples    BIGINT NOT NULL,
+    n_rejected   BIGINT NOT NULL,
     first_t_s    DOUBLE PRECISION,
     last_t_s     DOUBLE PRECISION,
     last_seq     BIGINT,

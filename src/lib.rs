@@ -25,3 +25,6 @@ pub mod wire;
 
 #[cfg(feature = "service")]
 pub mod store;
+
+#[cfg(feature = "service")]
+pub mod service;

@@ -43,7 +43,7 @@ pub struct FaultFilter {
 }
 
 const SESSION: &str = "SELECT id, asset, name, state, opened_at, ended_at, setup, baseline,
-    n_samples, first_t_s, last_t_s, last_seq, verdict, verdict_hash FROM session WHERE ";
+    n_samples, n_rejected, first_t_s, last_t_s, last_seq, verdict, verdict_hash FROM session WHERE ";
 
 impl Store {
     /// # Errors
@@ -136,21 +136,22 @@ impl Store {
         row.map(|row| decode(session, row)).transpose()
     }
 
-    /// The chunks of `session` that may hold a sample with this `t_s`, the
-    /// latest first, at most `limit`.
-    pub async fn chunks_at(
+    /// The chunks of `session` that may hold a sample with a `t_s` from `first`
+    /// to `last`, the latest first, at most `limit`.
+    pub async fn chunks_between(
         &self,
         session: &str,
-        t_s: f64,
+        (first, last): (f64, f64),
         limit: u32,
     ) -> Result<Vec<Vec<Sample>>, StoreError> {
         let rows: Vec<(i64, Vec<u8>)> = sqlx::query_as(
             "SELECT first_index, data FROM chunk
-             WHERE session = $1 AND min_t_s <= $2 AND max_t_s >= $2
-             ORDER BY first_index DESC LIMIT $3",
+             WHERE session = $1 AND min_t_s <= $3 AND max_t_s >= $2
+             ORDER BY first_index DESC LIMIT $4",
         )
         .bind(session)
-        .bind(t_s)
+        .bind(first)
+        .bind(last)
         .bind(i64::from(limit))
         .fetch_all(&self.pool)
         .await?;

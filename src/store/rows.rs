@@ -23,6 +23,8 @@ pub struct AssetRow {
 #[derive(Clone, Copy, Debug, Default, PartialEq, sqlx::FromRow)]
 pub struct Progress {
     pub n_samples: i64,
+    /// Rows that were no samples.
+    pub n_rejected: i64,
     /// `t_s` of the first and the last sample in order of arrival.
     pub first_t_s: Option<f64>,
     pub last_t_s: Option<f64>,

@@ -22,7 +22,8 @@ pub enum Write {
         name: String,
     },
     OpenSession(SessionRow),
-    /// Samples at the end of a session's recording.
+    /// Samples at the end of a session's recording, possibly none, and how far
+    /// it has come with them.
     Append {
         session: String,
         first_index: i64,
@@ -201,13 +202,16 @@ impl Group<'_> {
 
     async fn flush(&mut self, db: &mut SqliteConnection) -> Result<(), StoreError> {
         for Pending { session, first_index, samples, progress } in self.pending.drain(..) {
-            self.tails.append(db, &session, first_index, &samples).await?;
+            if !samples.is_empty() {
+                self.tails.append(db, &session, first_index, &samples).await?;
+            }
             sqlx::query(
-                "UPDATE session SET n_samples = $2, first_t_s = $3, last_t_s = $4, last_seq = $5
-                 WHERE id = $1",
+                "UPDATE session SET n_samples = $2, n_rejected = $3, first_t_s = $4,
+                 last_t_s = $5, last_seq = $6 WHERE id = $1",
             )
             .bind(&session)
             .bind(progress.n_samples)
+            .bind(progress.n_rejected)
             .bind(progress.first_t_s)
             .bind(progress.last_t_s)
             .bind(progress.last_seq)
@@ -251,8 +255,8 @@ async fn update_asset(db: &mut SqliteConnection, row: &AssetRow) -> Result<(), S
 
 async fn open_session(db: &mut SqliteConnection, row: &SessionRow) -> Result<(), StoreError> {
     sqlx::query(
-        "INSERT INTO session (id, asset, name, state, opened_at, setup, baseline, n_samples)
-         VALUES ($1, $2, $3, 'open', $4, $5, $6, 0)",
+        "INSERT INTO session (id, asset, name, state, opened_at, setup, baseline, n_samples,
+         n_rejected) VALUES ($1, $2, $3, 'open', $4, $5, $6, 0, 0)",
     )
     .bind(&row.id)
     .bind(&row.asset)

@@ -293,7 +293,11 @@ macro_rules! otherwise {
             Ok($of("a boolean"))
         }
         fn visit_str<E>(self, text: &str) -> Result<Self::Value, E> {
-            Ok($of(if super::lenient::is_mark(text) { super::lenient::MEANING } else { "a string" }))
+            Ok($of(if super::lenient::is_mark(text) {
+                super::lenient::MEANING
+            } else {
+                "a string"
+            }))
         }
         fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Self::Value, A::Error> {
             while seq.next_element::<IgnoredAny>()?.is_some() {}

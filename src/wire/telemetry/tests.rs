@@ -57,7 +57,8 @@ fn numbers_that_json_does_not_have_spoil_their_row_alone() {
         (3, "`y_m` is not finite, not a number"),
     ];
     assert_eq!(reasons(&batch), wanted);
-    let lines = ndjson(b"{\"t_s\":0}\n\n{\"t_s\":NaN}\n{\"t_s\":\n[]\n{\"t_s\":4}\r\n", LIMIT).unwrap();
+    let lines =
+        ndjson(b"{\"t_s\":0}\n\n{\"t_s\":NaN}\n{\"t_s\":\n[]\n{\"t_s\":4}\r\n", LIMIT).unwrap();
     assert_eq!(reasons(&lines).iter().map(|r| r.0).collect::<Vec<_>>(), [1, 2, 3]);
 }
 
