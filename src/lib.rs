@@ -28,3 +28,11 @@ pub mod store;
 
 #[cfg(feature = "service")]
 pub mod service;
+
+#[cfg(feature = "service")]
+pub mod http;
+
+#[cfg(feature = "service")]
+pub mod config;
+#[cfg(feature = "service")]
+pub mod server;

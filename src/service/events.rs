@@ -34,6 +34,16 @@ impl From<TransitionRow> for Event {
     }
 }
 
+impl Event {
+    /// The fault line with `asset` and the session's id, a JSON object.
+    #[must_use]
+    pub fn line(&self) -> String {
+        let rest = self.document.strip_prefix('{').unwrap_or(&self.document);
+        // Names and ids need no escaping: letters, digits, `-`, `_`, `.`.
+        format!(r#"{{"asset":"{}","session_id":"{}",{rest}"#, self.asset, self.session)
+    }
+}
+
 #[derive(Clone, Debug)]
 pub(super) struct Events {
     store: Store,
