@@ -22,3 +22,17 @@ pub mod simulation;
 pub mod vocabulary;
 #[cfg(feature = "service")]
 pub mod wire;
+
+#[cfg(feature = "service")]
+pub mod store;
+
+#[cfg(feature = "service")]
+pub mod service;
+
+#[cfg(feature = "service")]
+pub mod http;
+
+#[cfg(feature = "service")]
+pub mod config;
+#[cfg(feature = "service")]
+pub mod server;

@@ -6,5 +6,7 @@
 
 pub mod asset;
 pub mod memory;
+pub mod service;
 pub mod session_csv;
+pub mod telemetry;
 pub mod verdict;

@@ -149,10 +149,26 @@ impl<R: Read> Iterator for Reader<R> {
 /// Whatever the sink says.
 pub fn write<W: Write>(mut sink: W, samples: &[Sample]) -> io::Result<()> {
     let with_seq = samples.iter().any(|s| s.seq.is_some());
+    write_header(&mut sink, with_seq)?;
+    write_rows(&mut sink, samples, with_seq)
+}
+
+/// Writes the header alone.
+///
+/// # Errors
+/// Whatever the sink says.
+pub fn write_header<W: Write>(mut sink: W, with_seq: bool) -> io::Result<()> {
     if with_seq {
         write!(sink, "seq,")?;
     }
-    writeln!(sink, "{}", COLUMNS.join(","))?;
+    writeln!(sink, "{}", COLUMNS.join(","))
+}
+
+/// Writes the rows alone.
+///
+/// # Errors
+/// Whatever the sink says.
+pub fn write_rows<W: Write>(mut sink: W, samples: &[Sample], with_seq: bool) -> io::Result<()> {
     for sample in samples {
         if with_seq {
             write!(sink, "{},", sample.seq.map(|s| s.to_string()).unwrap_or_default())?;

@@ -1,0 +1,298 @@
+//! The configuration: defaults, below a TOML file, below the environment
+//! (`OFFBD_LISTEN`, `OFFBD_LOG__LEVEL`), below the command line.
+//!
+//! One typed structure, checked as a whole at start; what is wrong is named by
+//! its key. A key that does not exist is an error, wherever it comes from.
+
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use config::{Environment, File, FileFormat};
+use serde::Deserialize;
+
+use crate::service::Limits;
+
+/// Name of the database file in the data directory.
+const DATABASE: &str = "offbd.sqlite";
+
+/// The configuration of the service.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Config {
+    /// Where to listen; port 0 takes any that is free.
+    pub listen: SocketAddr,
+    /// Directory of the embedded store; made if it is not there.
+    pub data: PathBuf,
+    /// `sqlite:FILE`; without it the store is in `data`.
+    pub database: Option<String>,
+    pub log: LogConfig,
+    pub limits: LimitsConfig,
+    pub workers: WorkersConfig,
+}
+
+/// What is logged, to stderr.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LogConfig {
+    pub format: LogFormat,
+    /// A filter of `tracing`: `info`, `offbd=debug,info`, …
+    pub level: String,
+}
+
+/// How a line of the log is written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LogFormat {
+    /// For people.
+    #[default]
+    Text,
+    /// One object a line.
+    Json,
+}
+
+/// How much is taken on; see [`Limits`].
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LimitsConfig {
+    pub batch_samples: usize,
+    pub batch_bytes: usize,
+    pub import_bytes: usize,
+    /// Bytes of request bodies in memory at a time.
+    pub bodies_bytes: usize,
+    pub in_flight_samples: usize,
+    pub assets: usize,
+    pub body_timeout_s: u64,
+    /// Seconds that a stop may take.
+    pub shutdown_s: u64,
+}
+
+/// What works in parallel, and what waits for it.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct WorkersConfig {
+    /// Threads that run engines.
+    pub shards: usize,
+    /// Requests that wait for one of them.
+    pub queue: usize,
+    /// Replays and calibrations at a time.
+    pub jobs: usize,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            listen: SocketAddr::from(([127, 0, 0, 1], 8087)),
+            data: PathBuf::from("offbd-data"),
+            database: None,
+            log: LogConfig::default(),
+            limits: LimitsConfig::default(),
+            workers: WorkersConfig::default(),
+        }
+    }
+}
+
+impl Default for LogConfig {
+    fn default() -> Self {
+        Self { format: LogFormat::default(), level: "info".to_owned() }
+    }
+}
+
+impl Default for LimitsConfig {
+    fn default() -> Self {
+        let limits = Limits::default();
+        Self {
+            batch_samples: limits.batch_samples,
+            batch_bytes: limits.batch_bytes,
+            import_bytes: limits.import_bytes,
+            bodies_bytes: 256 << 20,
+            in_flight_samples: limits.in_flight_samples,
+            assets: limits.assets,
+            body_timeout_s: limits.body_timeout.as_secs(),
+            shutdown_s: 20,
+        }
+    }
+}
+
+impl Default for WorkersConfig {
+    fn default() -> Self {
+        let limits = Limits::default();
+        Self { shards: limits.shards, queue: limits.shard_queue, jobs: 1 }
+    }
+}
+
+/// What the command line says; `None` where it says nothing.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Flags {
+    pub listen: Option<SocketAddr>,
+    pub data: Option<PathBuf>,
+    pub database: Option<String>,
+}
+
+/// Why a configuration cannot be.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// Names the key and, where it is known, the file.
+    #[error("configuration: {0}")]
+    Unreadable(#[from] config::ConfigError),
+    #[error("configuration: `{key}` {reason}")]
+    Invalid { key: &'static str, reason: String },
+}
+
+impl Config {
+    /// The configuration from `file` if there is one, the environment and
+    /// `flags`, each above the one before.
+    ///
+    /// # Errors
+    /// [`ConfigError`] naming the first key that cannot be.
+    pub fn load(file: Option<&Path>, flags: &Flags) -> Result<Self, ConfigError> {
+        Self::from_sources(file, Environment::with_prefix("OFFBD"), flags)
+    }
+
+    fn from_sources(
+        file: Option<&Path>,
+        environment: Environment,
+        flags: &Flags,
+    ) -> Result<Self, ConfigError> {
+        let mut builder = config::Config::builder();
+        if let Some(file) = file {
+            builder = builder.add_source(File::from(file).format(FileFormat::Toml));
+        }
+        let environment = environment.prefix_separator("_").separator("__").try_parsing(true);
+        let mut config: Self = builder.add_source(environment).build()?.try_deserialize()?;
+        config.override_with(flags);
+        config.check()?;
+        Ok(config)
+    }
+
+    fn override_with(&mut self, flags: &Flags) {
+        if let Some(listen) = flags.listen {
+            self.listen = listen;
+        }
+        if let Some(data) = &flags.data {
+            self.data.clone_from(data);
+        }
+        if flags.database.is_some() {
+            self.database.clone_from(&flags.database);
+        }
+    }
+
+    /// Checks what the types do not.
+    ///
+    /// # Errors
+    /// [`ConfigError::Invalid`] naming the key.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        let limits = &self.limits;
+        within("limits.batch_samples", limits.batch_samples, 1, 1_000_000)?;
+        within("limits.batch_bytes", limits.batch_bytes, 1024, 1 << 30)?;
+        within("limits.import_bytes", limits.import_bytes, 1024, 1 << 30)?;
+        within("limits.bodies_bytes", limits.bodies_bytes, 1024, 1 << 34)?;
+        within("limits.assets", limits.assets, 1, 1_000_000)?;
+        let samples = limits.batch_samples;
+        within("limits.in_flight_samples", limits.in_flight_samples, samples, 100_000_000)?;
+        let seconds = usize::try_from(limits.body_timeout_s).unwrap_or(usize::MAX);
+        within("limits.body_timeout_s", seconds, 1, 3600)?;
+        let seconds = usize::try_from(limits.shutdown_s).unwrap_or(usize::MAX);
+        within("limits.shutdown_s", seconds, 1, 3600)?;
+        within("workers.shards", self.workers.shards, 1, 256)?;
+        within("workers.queue", self.workers.queue, 1, 100_000)?;
+        within("workers.jobs", self.workers.jobs, 1, 256)?;
+        if let Err(error) = self.log.level.parse::<tracing_subscriber::EnvFilter>() {
+            return Err(ConfigError::Invalid { key: "log.level", reason: error.to_string() });
+        }
+        self.database_file().map(drop)
+    }
+
+    /// The file of the embedded store.
+    ///
+    /// # Errors
+    /// [`ConfigError::Invalid`] if `database` is none that this version knows.
+    pub fn database_file(&self) -> Result<PathBuf, ConfigError> {
+        let Some(url) = &self.database else { return Ok(self.data.join(DATABASE)) };
+        let file = url.strip_prefix("sqlite://").or_else(|| url.strip_prefix("sqlite:"));
+        match file.filter(|file| !file.is_empty()) {
+            Some(file) => Ok(PathBuf::from(file)),
+            None => {
+                let reason = format!("is `{url}`; this version knows `sqlite:FILE`");
+                Err(ConfigError::Invalid { key: "database", reason })
+            }
+        }
+    }
+
+    /// The service's limits.
+    #[must_use]
+    pub fn service_limits(&self) -> Limits {
+        Limits {
+            shards: self.workers.shards,
+            shard_queue: self.workers.queue,
+            in_flight_samples: self.limits.in_flight_samples,
+            batch_samples: self.limits.batch_samples,
+            batch_bytes: self.limits.batch_bytes,
+            import_bytes: self.limits.import_bytes,
+            assets: self.limits.assets,
+            body_timeout: Duration::from_secs(self.limits.body_timeout_s),
+            ..Limits::default()
+        }
+    }
+}
+
+fn within(key: &'static str, value: usize, least: usize, most: usize) -> Result<(), ConfigError> {
+    if (least..=most).contains(&value) {
+        return Ok(());
+    }
+    let reason = format!("is {value}; it must be from {least} to {most}");
+    Err(ConfigError::Invalid { key, reason })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashMap;
+    use std::io::Write;
+
+    use super::*;
+
+    fn load(toml: &str, environment: &[(&str, &str)], flags: &Flags) -> Result<Config, String> {
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        file.write_all(toml.as_bytes()).unwrap();
+        let pairs = environment.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned()));
+        let source = Environment::with_prefix("OFFBD").source(Some(HashMap::from_iter(pairs)));
+        Config::from_sources(Some(file.path()), source, flags).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn each_source_is_above_the_one_before() {
+        let toml = "listen = '127.0.0.1:1'\ndata = 'file'\n[log]\nlevel = 'debug'\n";
+        let environment = [("OFFBD_DATA", "env"), ("OFFBD_LIMITS__ASSETS", "7")];
+        let flags = Flags { listen: Some(([127, 0, 0, 1], 3).into()), ..Flags::default() };
+        let config = load(toml, &environment, &flags).unwrap();
+        assert_eq!(config.listen.port(), 3);
+        assert_eq!(config.data, PathBuf::from("env"));
+        assert_eq!(config.log.level, "debug");
+        assert_eq!(config.limits.assets, 7);
+        assert_eq!(config.limits.batch_samples, LimitsConfig::default().batch_samples);
+        assert_eq!(config.database_file().unwrap(), PathBuf::from("env/offbd.sqlite"));
+    }
+
+    #[test]
+    fn what_cannot_be_is_named() {
+        let error = |toml: &str, environment: &[(&str, &str)]| {
+            load(toml, environment, &Flags::default()).unwrap_err()
+        };
+        for (toml, key) in [
+            ("lisen = 'x'", "lisen"),
+            ("listen = 'x'", "listen"),
+            ("[limits]\nbatch_samples = 0", "limits.batch_samples"),
+            ("[limits]\nbatch_sample = 0", "batch_sample"),
+            ("[workers]\nshards = -1", "shards"),
+            ("[log]\nformat = 'xml'", "format"),
+            ("[log]\nlevel = 'a=b=c'", "log.level"),
+            ("database = 'mysql://x'", "database"),
+            ("database = 'sqlite:'", "database"),
+        ] {
+            let error = error(toml, &[]);
+            assert!(error.contains(key), "{toml}: {error}");
+        }
+        let error = error("", &[("OFFBD_WORKERS__SHARDS", "many")]);
+        assert!(error.contains("shards"), "{error}");
+    }
+}

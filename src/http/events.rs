@@ -1,0 +1,81 @@
+//! `/events`: fault transitions as Server-Sent Events.
+
+use std::convert::Infallible;
+use std::time::Duration;
+
+use axum::extract::State;
+use axum::http::HeaderMap;
+use axum::response::Sse;
+use axum::response::sse::{Event as Message, KeepAlive};
+use futures_util::Stream;
+use serde::Deserialize;
+use tokio_util::sync::CancellationToken;
+
+use super::{App, Problem, Query};
+use crate::service::EventFeed;
+use crate::vocabulary::Invalid;
+use crate::wire::verdict::FaultView;
+
+/// Silence after which a comment is sent, so that nobody between takes the
+/// connection for dead.
+const KEEP_ALIVE: Duration = Duration::from_secs(15);
+
+#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[into_params(parameter_in = Query)]
+pub(super) struct EventsQuery {
+    /// Events of this asset alone.
+    asset: Option<String>,
+    /// Events after the one with this id, as the header `Last-Event-ID`; 0 for
+    /// all that are stored.
+    after: Option<i64>,
+}
+
+/// Fault transitions as they become durable: events of the type `fault` whose
+/// data is a fault line with the `asset`, each with an id. With the header
+/// `Last-Event-ID` the ones missed come first.
+#[utoipa::path(get, path = "/events", tag = "faults", operation_id = "stream_events",
+    params(EventsQuery),
+    responses((status = 200, body = FaultView, content_type = "text/event-stream"),
+        (status = 400, body = Problem), (status = 404, body = Problem)))]
+pub(super) async fn events(
+    State(app): State<App>,
+    Query(query): Query<EventsQuery>,
+    headers: HeaderMap,
+) -> Result<Sse<impl Stream<Item = Result<Message, Infallible>>>, Problem> {
+    let after = match headers.get("last-event-id") {
+        Some(id) => Some(last_id(id.to_str().unwrap_or_default())?),
+        None => query.after,
+    };
+    let feed = app.service.events(query.asset, after).await?;
+    let keep_alive = KeepAlive::new().interval(KEEP_ALIVE);
+    Ok(Sse::new(messages(feed, app.closing)).keep_alive(keep_alive))
+}
+
+fn last_id(text: &str) -> Result<i64, Problem> {
+    let reason = || Invalid::new("?Last-Event-ID", format!("`{text}` is not the id of an event"));
+    Ok(text.trim().parse().map_err(|_| reason())?)
+}
+
+fn messages(
+    feed: EventFeed,
+    closing: CancellationToken,
+) -> impl Stream<Item = Result<Message, Infallible>> {
+    futures_util::stream::unfold((feed, closing), |(mut feed, closing)| async {
+        let event = tokio::select! {
+            () = closing.cancelled() => return None,
+            event = feed.next() => event,
+        };
+        match event {
+            Ok(Some(event)) => {
+                let data = event.line();
+                let message = Message::default().id(event.id.to_string()).event("fault");
+                Some((Ok(message.data(data)), (feed, closing)))
+            }
+            Ok(None) => None,
+            Err(error) => {
+                tracing::error!(%error, "reading missed events");
+                None
+            }
+        }
+    })
+}

@@ -1,0 +1,129 @@
+//! Fault memory: of one asset and across the fleet.
+
+use axum::Json;
+use axum::extract::{Path, State};
+use axum::http::StatusCode;
+use serde::Deserialize;
+
+use super::layers::about;
+use super::{Problem, Query, page_limit};
+use crate::service::{FaultQuery, Service};
+use crate::wire::service::{FaultEntryView, Page};
+
+#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[into_params(parameter_in = Query)]
+pub(super) struct StatusQuery {
+    /// `active` (pending or confirmed; the default), `pending`, `confirmed`,
+    /// `healed`, `cleared` or `all`.
+    status: Option<String>,
+}
+
+#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[into_params(parameter_in = Query)]
+pub(super) struct FleetQuery {
+    /// `active` (pending or confirmed; the default), `pending`, `confirmed`,
+    /// `healed`, `cleared` or `all`.
+    status: Option<String>,
+    asset: Option<String>,
+    code: Option<String>,
+    acknowledged: Option<bool>,
+    /// `-changed_at` (the default), `changed_at` or `asset`.
+    sort: Option<String>,
+    /// `next` of the page before; with the same `sort`.
+    cursor: Option<String>,
+    /// Items on the page, 1 to 500; 50 without it.
+    limit: Option<u32>,
+}
+
+#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[into_params(parameter_in = Query)]
+pub(super) struct ActorQuery {
+    /// Who does it; kept with the act.
+    by: Option<String>,
+}
+
+/// Longest name of who did it, bytes; a longer one is cut.
+const MAX_ACTOR: usize = 100;
+
+impl ActorQuery {
+    fn actor(self) -> String {
+        let mut actor = self.by.unwrap_or_else(|| "unknown".to_owned());
+        while actor.len() > MAX_ACTOR {
+            actor.pop();
+        }
+        actor
+    }
+}
+
+/// The fault memory of an asset.
+#[utoipa::path(get, path = "/assets/{asset}/faults", tag = "faults",
+    operation_id = "list_asset_faults",
+    params(("asset", description = "Name of the asset"), StatusQuery),
+    responses((status = 200, body = Page<FaultEntryView>), (status = 400, body = Problem),
+        (status = 404, body = Problem)))]
+pub(super) async fn of_asset(
+    State(service): State<Service>,
+    Path(asset): Path<String>,
+    Query(query): Query<StatusQuery>,
+) -> Result<Json<Page<FaultEntryView>>, Problem> {
+    about(&asset);
+    Ok(Json(service.asset_faults(&asset, query.status).await?))
+}
+
+/// What is remembered of one code.
+#[utoipa::path(get, path = "/assets/{asset}/faults/{code}", tag = "faults",
+    operation_id = "get_fault",
+    params(("asset", description = "Name of the asset"), ("code", description = "Fault code")),
+    responses((status = 200, body = FaultEntryView), (status = 404, body = Problem)))]
+pub(super) async fn get(
+    State(service): State<Service>,
+    Path((asset, code)): Path<(String, String)>,
+) -> Result<Json<FaultEntryView>, Problem> {
+    about(&asset);
+    Ok(Json(service.fault(&asset, &code).await?))
+}
+
+/// Clears a code: everything stored of it is erased.
+#[utoipa::path(delete, path = "/assets/{asset}/faults/{code}", tag = "faults",
+    operation_id = "clear_fault",
+    params(("asset", description = "Name of the asset"), ("code", description = "Fault code"),
+        ActorQuery),
+    responses((status = 204), (status = 404, body = Problem)))]
+pub(super) async fn clear(
+    State(service): State<Service>,
+    Path((asset, code)): Path<(String, String)>,
+    Query(query): Query<ActorQuery>,
+) -> Result<StatusCode, Problem> {
+    about(&asset);
+    service.clear(&asset, &code, query.actor()).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// Acknowledges the current occurrence of a code.
+#[utoipa::path(post, path = "/assets/{asset}/faults/{code}/acknowledge", tag = "faults",
+    operation_id = "acknowledge_fault",
+    params(("asset", description = "Name of the asset"), ("code", description = "Fault code"),
+        ActorQuery),
+    responses((status = 200, body = FaultEntryView), (status = 404, body = Problem),
+        (status = 409, body = Problem, description = "There is no occurrence")))]
+pub(super) async fn acknowledge(
+    State(service): State<Service>,
+    Path((asset, code)): Path<(String, String)>,
+    Query(query): Query<ActorQuery>,
+) -> Result<Json<FaultEntryView>, Problem> {
+    about(&asset);
+    Ok(Json(service.acknowledge(&asset, &code, query.actor()).await?))
+}
+
+/// Faults across the fleet.
+#[utoipa::path(get, path = "/faults", tag = "faults", operation_id = "list_faults",
+    params(FleetQuery),
+    responses((status = 200, body = Page<FaultEntryView>), (status = 400, body = Problem)))]
+pub(super) async fn of_fleet(
+    State(service): State<Service>,
+    Query(query): Query<FleetQuery>,
+) -> Result<Json<Page<FaultEntryView>>, Problem> {
+    let FleetQuery { status, asset, code, acknowledged, sort, cursor, limit } = query;
+    let query = FaultQuery { status, asset, code, acknowledged, sort, cursor };
+    Ok(Json(service.faults(query, page_limit(limit)).await?))
+}

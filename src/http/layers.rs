@@ -1,0 +1,107 @@
+//! What is around every handler: request ids, spans, metrics, time limits,
+//! panics, compression.
+
+use std::any::Any;
+use std::time::{Duration, Instant};
+
+use axum::Router;
+use axum::body::Body;
+use axum::extract::{MatchedPath, Request};
+use axum::http::{HeaderName, StatusCode};
+use axum::middleware::{Next, from_fn};
+use axum::response::{IntoResponse, Response};
+use tower_http::catch_panic::CatchPanicLayer;
+use tower_http::compression::CompressionLayer;
+use tower_http::request_id::{
+    MakeRequestUuid, PropagateRequestIdLayer, RequestId, SetRequestIdLayer,
+};
+use tower_http::trace::TraceLayer;
+use tracing::Span;
+use tracing::field::Empty;
+
+use super::Problem;
+
+/// Longest time until an answer begins; only an import may take longer.
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(60);
+
+/// Longest time for an import, whose file is judged before the answer.
+const IMPORT_TIMEOUT: Duration = Duration::from_secs(900);
+
+const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
+
+pub(super) fn around(router: Router) -> Router {
+    router
+        .layer(from_fn(limit_time))
+        .layer(from_fn(count))
+        .layer(CatchPanicLayer::custom(panicked))
+        .layer(from_fn(name_instance))
+        .layer(CompressionLayer::new())
+        .layer(TraceLayer::new_for_http().make_span_with(span))
+        .layer(PropagateRequestIdLayer::new(REQUEST_ID))
+        .layer(SetRequestIdLayer::new(REQUEST_ID, MakeRequestUuid))
+}
+
+fn span(request: &Request<Body>) -> Span {
+    let id = request_id(request).unwrap_or_default();
+    let (method, path) = (request.method(), request.uri().path());
+    tracing::info_span!("request", %method, path, request_id = id, asset = Empty)
+}
+
+/// Says in the request's span which asset it is about.
+pub(super) fn about(asset: &str) {
+    Span::current().record("asset", asset);
+}
+
+fn request_id(request: &Request<Body>) -> Option<String> {
+    let id = request.extensions().get::<RequestId>()?;
+    id.header_value().to_str().ok().map(str::to_owned)
+}
+
+async fn limit_time(request: Request, next: Next) -> Response {
+    let import = request.uri().path().ends_with("/sessions/import");
+    let limit = if import { IMPORT_TIMEOUT } else { ANSWER_TIMEOUT };
+    tokio::time::timeout(limit, next.run(request)).await.unwrap_or_else(|_| {
+        let detail = format!("no answer within {} s; ask again", limit.as_secs());
+        Problem::new(StatusCode::SERVICE_UNAVAILABLE, "slow", "No answer in time", detail)
+            .into_response()
+    })
+}
+
+async fn count(request: Request, next: Next) -> Response {
+    let path = request.extensions().get::<MatchedPath>().map(|path| path.as_str().to_owned());
+    let path = path.unwrap_or_else(|| "unmatched".to_owned());
+    let begun = Instant::now();
+    let response = next.run(request).await;
+    let status = response.status().as_str().to_owned();
+    metrics::counter!("offbd_http_requests_total", "path" => path.clone(), "status" => status)
+        .increment(1);
+    metrics::histogram!("offbd_http_request_seconds", "path" => path)
+        .record(begun.elapsed().as_secs_f64());
+    response
+}
+
+/// Gives problems the id of their request.
+async fn name_instance(request: Request, next: Next) -> Response {
+    let id = request_id(&request);
+    let mut response = next.run(request).await;
+    match response.extensions_mut().remove::<Problem>() {
+        Some(problem) => {
+            let instance = id.map(|id| format!("urn:uuid:{id}").into());
+            let headers = std::mem::take(response.headers_mut());
+            let mut named = Problem { instance, ..problem }.into_response();
+            let allow = headers.get(axum::http::header::ALLOW).cloned();
+            allow.map(|allow| named.headers_mut().insert(axum::http::header::ALLOW, allow));
+            named
+        }
+        None => response,
+    }
+}
+
+fn panicked(panic: Box<dyn Any + Send>) -> Response {
+    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+    let text = text.or_else(|| panic.downcast_ref::<String>().cloned());
+    tracing::error!(panic = text.unwrap_or_default(), "a handler failed");
+    let detail = "the service failed on this request; the log has more under the request's id";
+    Problem::new(StatusCode::INTERNAL_SERVER_ERROR, "failed", "The service failed", detail)
+        .into_response()
+}

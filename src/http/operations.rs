@@ -1,0 +1,72 @@
+//! Health, readiness, metrics and the description of the interface.
+
+use std::sync::{Arc, OnceLock};
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::header::CONTENT_TYPE;
+use axum::response::IntoResponse;
+use metrics_exporter_prometheus::{PrometheusBuilder, PrometheusHandle};
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use super::{App, Problem};
+
+/// That the process lives.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct HealthView {
+    /// Always `ok`.
+    status: &'static str,
+    version: &'static str,
+}
+
+const HEALTHY: HealthView = HealthView { status: "ok", version: env!("CARGO_PKG_VERSION") };
+
+/// Whether the process lives.
+#[utoipa::path(get, path = "/healthz", tag = "operation",
+    responses((status = 200, body = HealthView)))]
+pub(super) async fn healthz() -> Json<HealthView> {
+    Json(HEALTHY)
+}
+
+/// Whether it can take telemetry now; if not, why.
+#[utoipa::path(get, path = "/readyz", tag = "operation",
+    responses((status = 200, body = HealthView),
+        (status = 503, body = Problem, description = "`detail` says why")))]
+pub(super) async fn readyz(State(app): State<App>) -> Result<Json<HealthView>, Problem> {
+    if app.closing.is_cancelled() {
+        let what = "the service is closing";
+        return Err(crate::service::ServiceError::Unavailable { what }.into());
+    }
+    app.service.ready().await?;
+    Ok(Json(HEALTHY))
+}
+
+static METRICS: OnceLock<Option<PrometheusHandle>> = OnceLock::new();
+
+/// Begins to gather metrics, once for the process.
+pub fn gather_metrics() {
+    METRICS.get_or_init(|| match PrometheusBuilder::new().install_recorder() {
+        Ok(handle) => Some(handle),
+        Err(error) => {
+            tracing::error!(%error, "no metrics");
+            None
+        }
+    });
+}
+
+/// Metrics in the text format of Prometheus.
+#[utoipa::path(get, path = "/metrics", tag = "operation",
+    responses((status = 200, body = String, content_type = "text/plain")))]
+pub(super) async fn metrics() -> impl IntoResponse {
+    let handle = METRICS.get().and_then(Option::as_ref);
+    let text = handle.map(|handle| {
+        handle.run_upkeep();
+        handle.render()
+    });
+    ([(CONTENT_TYPE, "text/plain; version=0.0.4")], text.unwrap_or_default())
+}
+
+pub(super) async fn openapi(yaml: Arc<str>) -> impl IntoResponse {
+    ([(CONTENT_TYPE, "application/yaml")], yaml.to_string())
+}

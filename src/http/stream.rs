@@ -1,0 +1,318 @@
+//! `/assets/{asset}/stream`: batches up; acknowledgements, faults and state
+//! down, over one WebSocket.
+//!
+//! Back-pressure is not reading: while `MAX_PENDING` batches wait for their
+//! commit, or the asset's shard has no room, the next frame stays in the
+//! socket. A client that does not read its answers is cut off.
+
+use std::collections::VecDeque;
+use std::pin::Pin;
+use std::time::Duration;
+
+use axum::extract::ws::rejection::WebSocketUpgradeRejection;
+use axum::extract::ws::{CloseFrame, Message, WebSocket, WebSocketUpgrade, close_code};
+use axum::extract::{Path, State};
+use axum::http::StatusCode;
+use axum::response::Response;
+use serde::Deserialize;
+use serde_json::json;
+use tokio::time::{Instant, Interval, MissedTickBehavior, interval, timeout};
+use utoipa::ToSchema;
+
+use super::layers::about;
+use super::{App, Problem, Query};
+use crate::service::{Event, EventFeed, Pending, Service, ServiceError};
+use crate::vocabulary::Invalid;
+use crate::wire::telemetry::{self, AckView};
+
+/// Batches whose acknowledgement is owed; then nothing more is read.
+const MAX_PENDING: usize = 32;
+
+/// Longest time to send one frame; a client slower than that is cut off.
+const SEND_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// Bytes that may wait in the socket's buffer for a client that reads slowly.
+const MAX_WRITE_BUFFER: usize = 1 << 20;
+
+/// Silence after which the client is asked whether it is there; after twice as
+/// long it is cut off.
+const PING_EVERY: Duration = Duration::from_secs(20);
+
+/// Most states a second; a higher wish gets this many.
+const MAX_STATE_HZ: f64 = 50.0;
+
+#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[into_params(parameter_in = Query)]
+pub(super) struct StreamQuery {
+    /// States per second wanted, at most 50; none without it.
+    state: Option<f64>,
+    /// Fault events after the one with this id come first; 0 for all.
+    after: Option<i64>,
+}
+
+/// Frames from the service: `ack` answers a batch (with its `id`), `error` says
+/// why one was not taken, `fault` is a fault line, `state` where the twin is.
+#[derive(Debug, ToSchema)]
+#[allow(dead_code, reason = "describes the frames for the interface's document")]
+pub(super) struct FrameView {
+    /// `ack`, `error`, `fault` or `state`.
+    #[schema(rename = "type")]
+    kind: String,
+    /// The `id` of the batch, for `ack` and `error`.
+    id: Option<String>,
+    #[schema(inline)]
+    ack: Option<AckView>,
+}
+
+/// A WebSocket: batches up, as JSON rows or columns in text frames, each with
+/// an optional `id`; down come `ack` (once durable), `error` (with a
+/// `problem`), `fault` and, if asked for, `state` frames, all JSON objects
+/// with a `type`.
+#[utoipa::path(get, path = "/assets/{asset}/stream", tag = "telemetry",
+    operation_id = "stream_telemetry",
+    params(("asset", description = "Name of the asset"), StreamQuery),
+    responses((status = 101, body = FrameView, description = "Frames from the service"),
+        (status = 404, body = Problem), (status = 426, body = Problem)))]
+pub(super) async fn stream(
+    State(app): State<App>,
+    Path(asset): Path<String>,
+    Query(query): Query<StreamQuery>,
+    upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
+) -> Result<Response, Problem> {
+    about(&asset);
+    let upgrade = upgrade.map_err(|rejection| {
+        let detail = format!("this address takes WebSockets: {}", rejection.body_text());
+        Problem::new(StatusCode::UPGRADE_REQUIRED, "websocket", "Not a WebSocket", detail)
+    })?;
+    let period = query.state.map(period).transpose()?;
+    let events = app.service.events(Some(asset.clone()), query.after).await?;
+    let frame = app.service.limits().batch_bytes;
+    let upgrade = upgrade
+        .max_frame_size(frame)
+        .max_message_size(frame)
+        .max_write_buffer_size(MAX_WRITE_BUFFER);
+    Ok(upgrade.on_upgrade(move |socket| async move {
+        metrics::gauge!("offbd_streams").increment(1.0);
+        let session = Session::new(socket, app, asset, events, period);
+        session.run().await;
+        metrics::gauge!("offbd_streams").decrement(1.0);
+    }))
+}
+
+fn period(hz: f64) -> Result<Duration, Problem> {
+    if hz > 0.0 && hz.is_finite() {
+        return Ok(Duration::from_secs_f64(1.0 / hz.clamp(0.01, MAX_STATE_HZ)));
+    }
+    Err(Invalid::new("?state", format!("{hz} is not a rate above 0")).into())
+}
+
+/// Why a connection ends.
+enum End {
+    /// The other side is gone, or did not keep up.
+    Gone,
+    /// We say why.
+    Close(u16, &'static str),
+}
+
+/// A batch whose acknowledgement is owed.
+struct Owed {
+    id: Option<String>,
+    answer: Pin<Box<dyn Future<Output = Result<AckView, ServiceError>> + Send>>,
+}
+
+struct Session {
+    socket: WebSocket,
+    app: App,
+    asset: String,
+    events: EventFeed,
+    states: Option<Interval>,
+    pings: Interval,
+    heard: Instant,
+    owed: VecDeque<Owed>,
+}
+
+/// What happens next on a connection.
+enum Next {
+    Closing,
+    Answer(Result<AckView, ServiceError>),
+    Frame(Option<Result<Message, axum::Error>>),
+    Event(Result<Option<std::sync::Arc<Event>>, ServiceError>),
+    State,
+    Ping,
+}
+
+impl Session {
+    fn new(
+        socket: WebSocket,
+        app: App,
+        asset: String,
+        events: EventFeed,
+        period: Option<Duration>,
+    ) -> Self {
+        let ticks = |period| {
+            let mut ticks = interval(period);
+            ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
+            ticks
+        };
+        let (states, pings) = (period.map(ticks), ticks(PING_EVERY));
+        let owed = VecDeque::new();
+        Self { socket, app, asset, events, states, pings, heard: Instant::now(), owed }
+    }
+
+    async fn run(mut self) {
+        let end = loop {
+            let next = self.next().await;
+            if let Err(end) = self.follow(next).await {
+                break end;
+            }
+        };
+        if let End::Close(code, reason) = end {
+            let frame = CloseFrame { code, reason: reason.into() };
+            let _ = timeout(SEND_TIMEOUT, self.socket.send(Message::Close(Some(frame)))).await;
+        }
+    }
+
+    async fn next(&mut self) -> Next {
+        let full = self.owed.len() >= MAX_PENDING;
+        let Self { socket, app, events, states, pings, owed, .. } = self;
+        let answer = async {
+            match owed.front_mut() {
+                Some(owed) => owed.answer.as_mut().await,
+                None => std::future::pending().await,
+            }
+        };
+        let state = async {
+            match states {
+                Some(states) => states.tick().await,
+                None => std::future::pending().await,
+            }
+        };
+        tokio::select! {
+            biased;
+            () = app.closing.cancelled() => Next::Closing,
+            answer = answer => Next::Answer(answer),
+            event = events.next() => Next::Event(event),
+            _ = pings.tick() => Next::Ping,
+            _ = state => Next::State,
+            frame = socket.recv(), if !full => Next::Frame(frame),
+        }
+    }
+
+    async fn follow(&mut self, next: Next) -> Result<(), End> {
+        match next {
+            Next::Closing => self.close().await,
+            Next::Answer(answer) => {
+                let id = self.owed.pop_front().and_then(|owed| owed.id);
+                self.answer(id, answer).await
+            }
+            Next::Event(Ok(Some(event))) => self.fault(&event).await,
+            Next::Event(Ok(None)) => Err(End::Close(close_code::AWAY, "the service is closing")),
+            Next::Event(Err(_)) => Err(End::Close(close_code::ERROR, "the store failed")),
+            Next::Ping => self.ping().await,
+            Next::State => self.state().await,
+            Next::Frame(Some(Ok(message))) => self.message(message).await,
+            Next::Frame(Some(Err(error))) => {
+                tracing::debug!(%error, asset = self.asset, "stream broke off");
+                Err(End::Close(close_code::SIZE, "a frame that is broken or too long"))
+            }
+            Next::Frame(None) => Err(End::Gone),
+        }
+    }
+
+    /// The service stops: what was taken is still acknowledged.
+    async fn close(&mut self) -> Result<(), End> {
+        while let Some(owed) = self.owed.pop_front() {
+            let answer = owed.answer.await;
+            self.answer(owed.id, answer).await?;
+        }
+        Err(End::Close(close_code::AWAY, "the service is closing"))
+    }
+
+    async fn message(&mut self, message: Message) -> Result<(), End> {
+        self.heard = Instant::now();
+        match message {
+            Message::Text(text) => self.batch(text.as_bytes()).await,
+            Message::Binary(bytes) => self.batch(&bytes).await,
+            Message::Close(_) => Err(End::Gone),
+            Message::Ping(_) | Message::Pong(_) => Ok(()),
+        }
+    }
+
+    async fn batch(&mut self, document: &[u8]) -> Result<(), End> {
+        let parsed = telemetry::json(document, self.app.service.limits().batch_samples);
+        let mut batch = match parsed {
+            Ok(batch) => batch,
+            Err(error) => return self.answer(None, Err(error.into())).await,
+        };
+        let id = batch.id.take();
+        let submitted = self.app.service.submit_in_turn(&self.asset, batch, false).await;
+        let answer: Pin<Box<dyn Future<Output = _> + Send>> = match submitted {
+            Ok(pending) => Box::pin(Pending::acknowledged(pending)),
+            Err(error) => Box::pin(std::future::ready(Err(error))),
+        };
+        self.owed.push_back(Owed { id, answer });
+        Ok(())
+    }
+
+    async fn answer(
+        &mut self,
+        id: Option<String>,
+        answer: Result<AckView, ServiceError>,
+    ) -> Result<(), End> {
+        let mut frame = match answer {
+            Ok(ack) => {
+                let mut frame = serde_json::to_value(&ack).unwrap_or_default();
+                frame["type"] = "ack".into();
+                frame
+            }
+            Err(error) => json!({ "type": "error", "problem": Problem::from(error) }),
+        };
+        if let Some(id) = id {
+            frame["id"] = id.into();
+        }
+        self.send(frame.to_string()).await
+    }
+
+    async fn fault(&mut self, event: &Event) -> Result<(), End> {
+        // A fault line has the type `fault` already.
+        let line = event.line();
+        let rest = line.strip_prefix('{').unwrap_or(&line);
+        self.send(format!(r#"{{"event":{},{rest}"#, event.id)).await
+    }
+
+    async fn state(&mut self) -> Result<(), End> {
+        let service: &Service = &self.app.service;
+        match service.state(&self.asset).await {
+            Ok(state) => {
+                let mut frame = serde_json::to_value(&state).unwrap_or_default();
+                frame["type"] = "state".into();
+                self.send(frame.to_string()).await
+            }
+            // Telemetry goes first; the next state comes when there is room.
+            Err(ServiceError::Busy { .. }) => Ok(()),
+            Err(error) => self.answer(None, Err(error)).await,
+        }
+    }
+
+    async fn ping(&mut self) -> Result<(), End> {
+        if self.heard.elapsed() > 2 * PING_EVERY {
+            return Err(End::Close(close_code::POLICY, "nothing heard for too long"));
+        }
+        self.send_message(Message::Ping(axum::body::Bytes::new())).await
+    }
+
+    async fn send(&mut self, text: String) -> Result<(), End> {
+        self.send_message(Message::Text(text.into())).await
+    }
+
+    async fn send_message(&mut self, message: Message) -> Result<(), End> {
+        match timeout(SEND_TIMEOUT, self.socket.send(message)).await {
+            Ok(Ok(())) => Ok(()),
+            Ok(Err(_)) => Err(End::Gone),
+            Err(_) => {
+                metrics::counter!("offbd_streams_cut_off_total").increment(1);
+                Err(End::Gone)
+            }
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! The server: configuration, store, service and sockets put together, from
+//! start to a graceful stop. Also what stands behind `migrate` and `check`.
+
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use anyhow::{Context, Result, bail};
+use tokio::net::TcpListener;
+use tokio::task::JoinHandle;
+use tokio_util::sync::CancellationToken;
+
+use crate::config::Config;
+use crate::http::{self, App, Budget};
+use crate::service::{Service, Workers};
+use crate::store::Store;
+
+/// A running server.
+pub struct Server {
+    /// Where it listens, the real port included.
+    pub address: SocketAddr,
+    closing: CancellationToken,
+    deadline: Duration,
+    serving: JoinHandle<std::io::Result<()>>,
+    store: Store,
+    workers: Workers,
+}
+
+/// Opens the store, resumes open sessions, and listens.
+///
+/// # Errors
+/// If the configuration cannot be, the store cannot be opened, or the address
+/// is taken.
+pub async fn start(config: Config) -> Result<Server> {
+    config.check()?;
+    http::gather_metrics();
+    let (store, writer) = open(&config).await?;
+    let listener = TcpListener::bind(config.listen)
+        .await
+        .with_context(|| format!("`listen`: cannot listen on {}", config.listen))?;
+    let address = listener.local_addr()?;
+    let (service, workers) = Service::start(store.clone(), writer, config.service_limits()).await?;
+    let resumed = service.resume().await?;
+    let closing = CancellationToken::new();
+    let budget = Budget::new(config.limits.bodies_bytes);
+    let router = http::router(App { service, budget, closing: closing.clone() });
+    let stop = closing.clone().cancelled_owned();
+    let serving =
+        tokio::spawn(
+            async move { axum::serve(listener, router).with_graceful_shutdown(stop).await },
+        );
+    tracing::info!(%address, resumed, store = %store.path().display(), "serving");
+    let deadline = Duration::from_secs(config.limits.shutdown_s);
+    Ok(Server { address, closing, deadline, serving, store, workers })
+}
+
+async fn open(config: &Config) -> Result<(Store, crate::store::Writer)> {
+    let file = config.database_file()?;
+    if let Some(directory) = file.parent() {
+        std::fs::create_dir_all(directory)
+            .with_context(|| format!("`data`: cannot make {}", directory.display()))?;
+    }
+    Store::open(&file).await.with_context(|| format!("cannot open the store {}", file.display()))
+}
+
+impl Server {
+    /// Stops: takes no new connection, ends long answers, finishes what is in
+    /// flight, commits it, and closes the store.
+    ///
+    /// # Errors
+    /// If that takes longer than `limits.shutdown_s`; everything acknowledged
+    /// is durable all the same.
+    pub async fn shutdown(self) -> Result<()> {
+        let Self { closing, deadline, serving, store, workers, .. } = self;
+        closing.cancel();
+        let finish = async {
+            let served = serving.await;
+            workers.finish().await;
+            store.close().await;
+            served
+        };
+        match tokio::time::timeout(deadline, finish).await {
+            Ok(served) => Ok(served??),
+            Err(_) => bail!("the stop took longer than {} s", deadline.as_secs()),
+        }
+    }
+}
+
+/// Serves until SIGINT or SIGTERM, then stops gracefully.
+///
+/// # Errors
+/// As for [`start`] and [`Server::shutdown`].
+pub async fn serve(config: Config) -> Result<()> {
+    let server = start(config).await?;
+    stop_signal().await?;
+    tracing::info!("stopping");
+    server.shutdown().await
+}
+
+#[cfg(unix)]
+async fn stop_signal() -> Result<()> {
+    use tokio::signal::unix::{SignalKind, signal};
+    let mut terminate = signal(SignalKind::terminate())?;
+    tokio::select! {
+        interrupted = tokio::signal::ctrl_c() => interrupted?,
+        _ = terminate.recv() => {}
+    }
+    Ok(())
+}
+
+#[cfg(not(unix))]
+async fn stop_signal() -> Result<()> {
+    Ok(tokio::signal::ctrl_c().await?)
+}
+
+/// Brings the store to this version's schema; says which file and how many
+/// migrations it has.
+///
+/// # Errors
+/// If the store cannot be opened or is newer than this version.
+pub async fn migrate(config: &Config) -> Result<String> {
+    config.check()?;
+    let file = config.database_file()?;
+    if let Some(directory) = file.parent() {
+        std::fs::create_dir_all(directory)
+            .with_context(|| format!("`data`: cannot make {}", directory.display()))?;
+    }
+    let n = Store::migrate(&file)
+        .await
+        .with_context(|| format!("cannot migrate the store {}", file.display()))?;
+    Ok(format!("{}: {n} migrations applied", file.display()))
+}
+
+/// Checks the configuration; says in a few lines what it comes to.
+///
+/// # Errors
+/// Names the first key that cannot be.
+pub fn check(config: &Config) -> Result<String> {
+    config.check()?;
+    Ok(format!(
+        "listen   {}\nstore    {}\nlog      {:?}, {}\nworkers  {} shards",
+        config.listen,
+        config.database_file()?.display(),
+        config.log.format,
+        config.log.level,
+        config.workers.shards,
+    ))
+}

@@ -1,0 +1,141 @@
+//! The registry of assets.
+
+use tokio::sync::oneshot;
+
+use super::shard::Job;
+use super::{Service, ServiceError, settled, views};
+use crate::engine::Rig;
+use crate::store::{AssetRow, Write};
+use crate::vocabulary::Invalid;
+use crate::wire::asset::{self, AssetView};
+use crate::wire::service::{Page, StateView, state_view};
+
+impl Service {
+    /// # Errors
+    /// [`ServiceError::UnknownAsset`].
+    pub async fn asset(&self, name: &str) -> Result<AssetView, ServiceError> {
+        let row = self.inner.store.asset(name).await?;
+        let row = row.ok_or_else(|| ServiceError::UnknownAsset { name: name.to_owned() })?;
+        views::from_json(&row.document)
+    }
+
+    /// Assets in the order of their names.
+    ///
+    /// # Errors
+    /// [`ServiceError::Invalid`] for a cursor that is none.
+    pub async fn assets(
+        &self,
+        cursor: Option<&str>,
+        limit: u32,
+    ) -> Result<Page<AssetView>, ServiceError> {
+        let after = cursor.map(views::cursor::<String>).transpose()?.unwrap_or_default();
+        let rows = self.inner.store.assets(&after, limit + 1).await?;
+        views::page(rows, limit, |row| row.name.clone(), |row| views::from_json(&row.document))
+    }
+
+    /// Registers an asset.
+    ///
+    /// # Errors
+    /// [`ServiceError::Invalid`] naming the element of the asset file;
+    /// [`ServiceError::AssetExists`]; [`ServiceError::RegistryFull`].
+    pub async fn create_asset(&self, document: &[u8]) -> Result<AssetView, ServiceError> {
+        let rig = asset::parse(document)?;
+        self.create(&rig).await?;
+        Ok(asset::view(&rig))
+    }
+
+    async fn create(&self, rig: &Rig) -> Result<(), ServiceError> {
+        let limit = self.inner.limits.assets;
+        let n_assets = self.inner.store.n_assets().await?;
+        if usize::try_from(n_assets).is_ok_and(|n| n >= limit) {
+            return Err(ServiceError::RegistryFull { limit });
+        }
+        let (reply, answer) = oneshot::channel();
+        let (name, document) = (rig.name.clone(), views::to_json(&asset::view(rig))?);
+        let job: Job = Box::new(move |shard| {
+            let row = |at| AssetRow {
+                name: name.clone(),
+                document,
+                revision: 1,
+                created_at: at,
+                updated_at: at,
+            };
+            let make = |context: &super::Context| Ok(Write::CreateAsset(row(context.clock.now())));
+            shard.create(&name, make, reply);
+        });
+        self.shard(&rig.name).try_send(job).map_err(ServiceError::from_full)?;
+        settled(answer.await)
+    }
+
+    /// Replaces the asset file of `name`, or registers it; returns it and
+    /// whether it is new. An open session goes on with what it began with; the
+    /// next one uses the new file.
+    ///
+    /// # Errors
+    /// [`ServiceError::Invalid`] naming the element, `/name` if it is another.
+    pub async fn put_asset(
+        &self,
+        name: &str,
+        document: &[u8],
+    ) -> Result<(AssetView, bool), ServiceError> {
+        let rig = asset::parse(document)?;
+        if rig.name != name {
+            let reason = format!("is `{}`, but the address says `{name}`", rig.name);
+            return Err(Invalid::new("/name", reason).into());
+        }
+        let view = asset::view(&rig);
+        match self.replace(rig.clone()).await {
+            Ok(()) => Ok((view, false)),
+            Err(ServiceError::UnknownAsset { .. }) => {
+                self.create(&rig).await?;
+                Ok((view, true))
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    async fn replace(&self, rig: Rig) -> Result<(), ServiceError> {
+        let name = rig.name.clone();
+        self.call(&name, move |_, running, work| {
+            let document = views::to_json(&asset::view(&rig))?;
+            running.row.document = document;
+            running.row.revision += 1;
+            running.row.updated_at = work.at;
+            running.rig = rig;
+            work.writes.push(Write::UpdateAsset(running.row.clone()));
+            Ok(())
+        })
+        .await
+    }
+
+    /// Deletes an asset with its sessions, recordings and faults.
+    ///
+    /// # Errors
+    /// [`ServiceError::UnknownAsset`].
+    pub async fn delete_asset(&self, name: &str) -> Result<(), ServiceError> {
+        let asset = name.to_owned();
+        self.call(name, move |_, running, work| {
+            running.deleted = true;
+            work.writes.push(Write::DeleteAsset { name: asset });
+            Ok(())
+        })
+        .await
+    }
+
+    /// Where the twin of `name` stands.
+    ///
+    /// # Errors
+    /// [`ServiceError::UnknownAsset`].
+    pub async fn state(&self, name: &str) -> Result<StateView, ServiceError> {
+        let asset = name.to_owned();
+        self.call(name, move |_, running, _| {
+            let Some(open) = &running.open else {
+                return Ok(state_view(&asset, None, &crate::engine::State::default()));
+            };
+            let samples = u64::try_from(open.progress.n_samples).unwrap_or_default();
+            let session = (open.id.as_str(), open.name.as_str(), samples);
+            Ok(state_view(&asset, Some(session), &open.engine.state()))
+        })
+        .await
+    }
+}

@@ -1,0 +1,24 @@
+//! The wall clock, the only place that reads it.
+
+use crate::store::Micros;
+
+/// Reads the wall clock.
+#[derive(Clone, Copy, Debug)]
+pub struct Clock;
+
+impl Clock {
+    /// Now.
+    #[must_use]
+    pub fn now(self) -> Micros {
+        jiff::Timestamp::now().as_microsecond()
+    }
+}
+
+/// A moment as RFC 3339, UTC, to the microsecond: always of one length, so that
+/// text sorts as time does.
+#[must_use]
+pub fn rfc3339(moment: Micros) -> String {
+    jiff::Timestamp::from_microsecond(moment)
+        .map(|timestamp| format!("{timestamp:.6}"))
+        .unwrap_or_default()
+}

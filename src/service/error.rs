@@ -1,0 +1,74 @@
+//! Why the service will not or cannot.
+
+use std::sync::Arc;
+
+use tokio::sync::mpsc::error::TrySendError;
+
+use crate::store::StoreError;
+use crate::vocabulary::{Invalid, UnknownWord};
+use crate::wire::telemetry::BatchError;
+
+/// Why the service will not or cannot. Knows no status codes.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum ServiceError {
+    #[error("there is no asset `{name}`; register it with POST /api/v1/assets")]
+    UnknownAsset { name: String },
+    #[error("there is no session `{id}`")]
+    UnknownSession { id: String },
+    #[error("there is no replay `{id}`")]
+    UnknownReplay { id: String },
+    #[error("asset `{asset}` has no calibration `{id}`")]
+    UnknownCalibration { asset: String, id: String },
+    #[error("no such fault code: {0}")]
+    UnknownCode(UnknownWord),
+    #[error("there is an asset `{name}` already; replace it with PUT /api/v1/assets/{name}")]
+    AssetExists { name: String },
+    #[error("asset `{asset}` has a session `{name}` already")]
+    SessionExists { asset: String, name: String },
+    #[error("session `{name}` of asset `{asset}` has ended; new samples need another session")]
+    SessionEnded { asset: String, name: String },
+    #[error("{code} of asset `{asset}` has no occurrence to acknowledge")]
+    NothingToAcknowledge { asset: String, code: String },
+    #[error("calibration `{id}` is not done: {state}")]
+    NotDone { id: String, state: String },
+    #[error(transparent)]
+    Invalid(#[from] Invalid),
+    #[error(transparent)]
+    Batch(#[from] BatchError),
+    #[error("{what}: at most {limit}")]
+    TooMany { what: &'static str, limit: usize },
+    #[error("there are {limit} assets, and no more are taken")]
+    RegistryFull { limit: usize },
+    /// Come again after `limits::RETRY_AFTER_S`; nothing was taken.
+    #[error("{what}; nothing was taken, send it again")]
+    Busy { what: &'static str },
+    /// The store failed, or what runs behind the service; come again.
+    #[error("{what}; what was not acknowledged was not taken, send it again")]
+    Unavailable { what: &'static str },
+    #[error("the store: {0}")]
+    Store(Arc<StoreError>),
+    #[error("the store holds what this version cannot read: {what}")]
+    Corrupt { what: String },
+}
+
+impl ServiceError {
+    pub(super) fn from_full<T>(error: TrySendError<T>) -> Self {
+        match error {
+            TrySendError::Full(_) => {
+                metrics::counter!("offbd_turned_away_total", "queue" => "shard").increment(1);
+                Self::Busy { what: "too many requests wait for this asset" }
+            }
+            TrySendError::Closed(_) => Self::Unavailable { what: "the service is closing" },
+        }
+    }
+
+    pub(super) fn corrupt(what: impl std::fmt::Display) -> Self {
+        Self::Corrupt { what: what.to_string() }
+    }
+}
+
+impl From<StoreError> for ServiceError {
+    fn from(error: StoreError) -> Self {
+        Self::Store(Arc::new(error))
+    }
+}

@@ -1,0 +1,97 @@
+//! A recording becomes a session, by the path that live samples take.
+
+use std::collections::VecDeque;
+
+use super::telemetry::Pending;
+use super::{Service, ServiceError};
+use crate::wire::service::{ImportView, SessionView};
+use crate::wire::telemetry::{AckView, Batch, RowView};
+
+/// Batches of an import under way at a time.
+const MAX_PENDING: usize = 4;
+
+/// Rejected rows that are listed; more are counted.
+const MAX_LISTED: usize = 100;
+
+/// Samples in one batch of an import.
+const BATCH: usize = 2048;
+
+impl Service {
+    /// Imports `recording` as the session `name`, which is ended with it. Ends
+    /// the asset's open session; until the import is done, live telemetry of
+    /// the asset is told to come again. Goes on when the caller goes away.
+    ///
+    /// # Errors
+    /// [`ServiceError::SessionExists`]; [`ServiceError::Invalid`] for the name.
+    pub async fn import(
+        &self,
+        asset: &str,
+        name: Option<String>,
+        recording: Batch,
+    ) -> Result<ImportView, ServiceError> {
+        let (this, asset) = (self.clone(), asset.to_owned());
+        let task = tokio::spawn(async move {
+            let session = this.open_as(&asset, name, true).await?;
+            let imported = this.run_import(&asset, session.clone(), recording).await;
+            let session = this.end_session(&session.id).await?;
+            Ok(ImportView { session, ..imported? })
+        });
+        task.await.unwrap_or(Err(ServiceError::Unavailable { what: "the import has failed" }))
+    }
+
+    async fn run_import(
+        &self,
+        asset: &str,
+        session: SessionView,
+        recording: Batch,
+    ) -> Result<ImportView, ServiceError> {
+        let name = session.name.clone();
+        let mut tally = Tally { view: empty(session), pending: VecDeque::new() };
+        let mut rows = recording.rows.into_iter().peekable();
+        let mut first = 0;
+        while rows.peek().is_some() {
+            let rows: Vec<_> = rows.by_ref().take(BATCH).collect();
+            let n = rows.len();
+            let batch = Batch { session: Some(name.clone()), id: None, rows };
+            if tally.pending.len() >= MAX_PENDING {
+                tally.settle().await?;
+            }
+            tally.pending.push_back((first, self.submit_in_turn(asset, batch, true).await?));
+            first += n;
+        }
+        while !tally.pending.is_empty() {
+            tally.settle().await?;
+        }
+        Ok(tally.view)
+    }
+}
+
+const fn empty(session: SessionView) -> ImportView {
+    ImportView { session, accepted: 0, duplicate: 0, late: 0, rejected: 0, rejections: Vec::new() }
+}
+
+struct Tally {
+    view: ImportView,
+    pending: VecDeque<(usize, Pending)>,
+}
+
+impl Tally {
+    async fn settle(&mut self) -> Result<(), ServiceError> {
+        if let Some((first, pending)) = self.pending.pop_front() {
+            self.add(first, pending.acknowledged().await?);
+        }
+        Ok(())
+    }
+
+    fn add(&mut self, first: usize, ack: AckView) {
+        let view = &mut self.view;
+        view.accepted += ack.accepted as u64;
+        view.duplicate += ack.duplicate as u64;
+        view.late += ack.late.len() as u64;
+        view.rejected += ack.rejected.len() as u64;
+        let room = MAX_LISTED.saturating_sub(view.rejections.len());
+        let rows = ack.rejected.into_iter().take(room);
+        let place = |row: RowView| RowView { index: first + row.index, ..row };
+        view.rejections.extend(rows.map(place));
+    }
+}

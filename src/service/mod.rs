@@ -1,0 +1,184 @@
+//! The service: many assets, each with its running engine, over one store.
+//!
+//! Every asset belongs to one *shard*, a thread that owns its engine and does
+//! one thing after the other for it. What follows from it goes to the one
+//! *writer*, which commits everything that waits in one transaction; only then
+//! is the answer given and the events sent out. So an acknowledgement means
+//! durable, and many small batches share one commit. When a commit fails, the
+//! engines concerned are thrown away and rebuilt from the store on next touch:
+//! the rebuild replays the recording and comes to the same state.
+//!
+//! Knows no HTTP and no SQL. Reads the clock for what is stored beside the
+//! samples (arrival, opening, actions); no judgement depends on it.
+
+mod assets;
+mod clock;
+mod commit;
+mod error;
+mod events;
+mod faults;
+mod import;
+mod limits;
+mod rebuild;
+mod running;
+mod sessions;
+mod shard;
+mod telemetry;
+mod views;
+
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::sync::Arc;
+
+use tokio::sync::{Semaphore, mpsc, oneshot};
+use tokio::task::JoinHandle;
+
+pub use clock::Clock;
+pub use error::ServiceError;
+pub use events::{Event, EventFeed};
+pub use faults::FaultQuery;
+pub use limits::{Limits, RETRY_AFTER_S};
+pub use sessions::Recording;
+pub use telemetry::Pending;
+
+use self::commit::{Committer, WriteSet};
+use self::events::Events;
+use self::running::{Running, Work};
+use self::shard::{Context, Job, Shard};
+use crate::store::{Store, Writer};
+
+/// Cheap to clone; all clones are one service.
+#[derive(Clone)]
+pub struct Service {
+    inner: Arc<Inner>,
+}
+
+struct Inner {
+    store: Store,
+    limits: Limits,
+    events: Events,
+    shards: Vec<mpsc::Sender<Job>>,
+    writer: mpsc::Sender<WriteSet>,
+    /// One permit for each sample between arrival and commit.
+    in_flight: Arc<Semaphore>,
+}
+
+/// What runs behind a [`Service`]; ends when all its clones are dropped.
+pub struct Workers {
+    shards: Vec<std::thread::JoinHandle<()>>,
+    committer: JoinHandle<Writer>,
+}
+
+impl Workers {
+    /// Waits until everything queued is judged and committed, and closes the
+    /// store's writer. All clones of the service must be dropped before.
+    pub async fn finish(self) {
+        for shard in self.shards {
+            let joined = tokio::task::spawn_blocking(move || shard.join()).await;
+            if !matches!(joined, Ok(Ok(()))) {
+                tracing::error!("a shard ended by panic");
+            }
+        }
+        match self.committer.await {
+            Ok(writer) => {
+                if let Err(error) = writer.close().await {
+                    tracing::error!(%error, "closing the store");
+                }
+            }
+            Err(error) => tracing::error!(%error, "the writer ended by panic"),
+        }
+    }
+}
+
+impl Service {
+    /// Starts the shards and the writer on the current tokio runtime.
+    ///
+    /// # Errors
+    /// [`ServiceError`] if the store cannot be read or no thread can be started.
+    pub async fn start(
+        store: Store,
+        writer: Writer,
+        limits: Limits,
+    ) -> Result<(Self, Workers), ServiceError> {
+        let clock = Clock;
+        let events = Events::new(store.clone());
+        let (sets, queue) = mpsc::channel(limits.commit_queue);
+        let committer = Committer::new(writer, queue, events.clone());
+        let committer = tokio::spawn(committer.run());
+        let mut shards = Vec::new();
+        let mut threads = Vec::new();
+        for number in 0..limits.shards {
+            let (jobs, queue) = mpsc::channel(limits.shard_queue);
+            let context = Context::new(store.clone(), clock, sets.clone());
+            threads.push(Shard::spawn(number, context, queue)?);
+            shards.push(jobs);
+        }
+        let in_flight = Arc::new(Semaphore::new(limits.in_flight_samples));
+        let inner = Inner { store, limits, events, shards, writer: sets, in_flight };
+        Ok((Self { inner: Arc::new(inner) }, Workers { shards: threads, committer }))
+    }
+
+    /// Rebuilds the assets that have an open session, so that the first batch
+    /// after a restart need not wait. Returns how many there are.
+    ///
+    /// # Errors
+    /// [`ServiceError::Unavailable`] if the store cannot be read.
+    pub async fn resume(&self) -> Result<usize, ServiceError> {
+        let assets = self.inner.store.assets_in_session().await?;
+        for asset in &assets {
+            let touched = self.call(asset, |_, _, _| Ok(())).await;
+            if let Err(error) = touched {
+                tracing::error!(asset, %error, "cannot resume");
+            }
+        }
+        Ok(assets.len())
+    }
+
+    #[must_use]
+    pub fn limits(&self) -> &Limits {
+        &self.inner.limits
+    }
+
+    /// Whether the store answers and the shards and the writer run.
+    ///
+    /// # Errors
+    /// [`ServiceError::Unavailable`] naming what does not.
+    pub async fn ready(&self) -> Result<(), ServiceError> {
+        if self.inner.writer.is_closed() {
+            return Err(ServiceError::Unavailable { what: "the writer has stopped" });
+        }
+        if self.inner.shards.iter().any(mpsc::Sender::is_closed) {
+            return Err(ServiceError::Unavailable { what: "a shard has stopped" });
+        }
+        self.inner.store.ping().await?;
+        Ok(())
+    }
+
+    fn shard(&self, asset: &str) -> &mpsc::Sender<Job> {
+        let mut hasher = DefaultHasher::new();
+        asset.hash(&mut hasher);
+        let shards = &self.inner.shards;
+        let number = hasher.finish() % shards.len().max(1) as u64;
+        &shards[usize::try_from(number).unwrap_or_default()]
+    }
+
+    /// Does `act` on the shard of `asset` and gives its answer once what
+    /// follows from it is durable.
+    async fn call<T: Send + 'static>(
+        &self,
+        asset: &str,
+        act: impl FnOnce(&Context, &mut Running, &mut Work) -> Result<T, ServiceError> + Send + 'static,
+    ) -> Result<T, ServiceError> {
+        let (reply, answer) = oneshot::channel();
+        let name = asset.to_owned();
+        let job: Job = Box::new(move |shard| shard.act(&name, act, reply));
+        self.shard(asset).try_send(job).map_err(ServiceError::from_full)?;
+        settled(answer.await)
+    }
+}
+
+/// The answer, or that whoever was to give it is gone.
+fn settled<T>(
+    answer: Result<Result<T, ServiceError>, oneshot::error::RecvError>,
+) -> Result<T, ServiceError> {
+    answer.unwrap_or(Err(ServiceError::Unavailable { what: "the asset's engine has failed" }))
+}

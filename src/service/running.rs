@@ -1,0 +1,336 @@
+//! A running asset: its rig, its fault memory and the engine of its open
+//! session. Says what is to be written; writes nothing.
+
+use uuid::Uuid;
+
+use super::clock::rfc3339;
+use super::commit::Life;
+use super::{ServiceError, views};
+use crate::diagnosis::FaultMemory;
+use crate::engine::{Admission, Engine, Input, Output, Rig, Setup};
+use crate::store::{
+    ActionKind, ActionRow, AssetRow, FaultRow, Micros, Progress, SessionRow, TransitionRow, Write,
+};
+use crate::vocabulary::{FaultCode, Sample};
+use crate::wire::telemetry::{AckView, RowView};
+use crate::wire::verdict::{SummaryView, Verdict, fault_view};
+use crate::wire::{asset, memory};
+
+/// How far a nameless device's clock must fall back to mean that it started
+/// anew, s. Below, samples are late.
+pub(super) const RESTART_S: f64 = 10.0;
+
+/// What follows from one thing done, and when it was done.
+pub(super) struct Work {
+    pub(super) at: Micros,
+    pub(super) writes: Vec<Write>,
+}
+
+impl Work {
+    pub(super) const fn at(at: Micros) -> Self {
+        Self { at, writes: Vec::new() }
+    }
+}
+
+/// An asset in the hands of its shard.
+pub(super) struct Running {
+    pub(super) row: AssetRow,
+    pub(super) rig: Rig,
+    /// The fault memory as last written.
+    pub(super) memory: FaultMemory,
+    pub(super) open: Option<OpenSession>,
+    pub(super) life: Life,
+    pub(super) deleted: bool,
+}
+
+/// An open session and its engine.
+pub(super) struct OpenSession {
+    pub(super) id: String,
+    pub(super) name: String,
+    pub(super) engine: Engine,
+    pub(super) progress: Progress,
+    pub(super) n_transitions: i64,
+    /// Whether a recording is being imported into it: no live telemetry then.
+    pub(super) importing: bool,
+    verdict: Verdict,
+    outputs: Vec<Output>,
+    /// The latest time among the samples that were taken as they should be.
+    latest_t_s: f64,
+    /// Whether the last sample was far behind the latest.
+    fell_back: bool,
+}
+
+impl OpenSession {
+    pub(super) fn new(id: String, name: String, setup: Setup, baseline: FaultMemory) -> Self {
+        Self {
+            id,
+            name,
+            engine: Engine::new(setup, baseline),
+            progress: Progress::default(),
+            n_transitions: 0,
+            importing: false,
+            verdict: Verdict::default(),
+            outputs: Vec::new(),
+            latest_t_s: f64::NEG_INFINITY,
+            fell_back: false,
+        }
+    }
+
+    /// Puts one sample into the engine. Afterwards `outputs` is what followed.
+    pub(super) fn take(&mut self, sample: &Sample) -> Option<Admission> {
+        self.outputs.clear();
+        self.engine.handle(Input::Sample(*sample), &mut self.outputs);
+        self.outputs.iter().for_each(|output| self.verdict.take(output));
+        let admission = self.outputs.iter().find_map(|output| match output {
+            Output::Admitted(admission) => Some(*admission),
+            Output::Transition(_) => None,
+        });
+        if matches!(admission, Some(Admission::Accepted | Admission::SetAside(_))) {
+            self.note(sample, admission == Some(Admission::Accepted));
+        }
+        admission
+    }
+
+    fn note(&mut self, sample: &Sample, in_time: bool) {
+        self.fell_back = self.behind(sample);
+        if in_time {
+            self.latest_t_s = self.latest_t_s.max(sample.t_s);
+        }
+        let progress = &mut self.progress;
+        progress.n_samples += 1;
+        progress.first_t_s.get_or_insert(sample.t_s);
+        progress.last_t_s = Some(sample.t_s);
+        let seq = sample.seq.and_then(|seq| i64::try_from(seq).ok());
+        progress.last_seq = progress.last_seq.max(seq);
+    }
+
+    fn behind(&self, sample: &Sample) -> bool {
+        sample.t_s < self.latest_t_s - RESTART_S
+    }
+
+    /// Whether `sample` looks like the first one, or the second, after the
+    /// device started anew: its clock is far behind and, where it counts, its
+    /// count is not ahead. One sample without a count may be a slip of the
+    /// clock, so it takes two.
+    pub(super) fn seems_restarted(&self, sample: &Sample) -> bool {
+        let count = sample.seq.and_then(|seq| i64::try_from(seq).ok());
+        self.behind(sample)
+            && match (count, self.progress.last_seq) {
+                (Some(count), Some(last)) => count <= last,
+                _ => self.fell_back,
+            }
+    }
+
+    /// Puts in what is no sample.
+    pub(super) fn input(&mut self, input: Input) {
+        self.outputs.clear();
+        self.engine.handle(input, &mut self.outputs);
+        self.outputs.iter().for_each(|output| self.verdict.take(output));
+    }
+
+    /// Appends what followed from the last input to `work`.
+    fn report(&mut self, asset: &str, work: &mut Work) -> Result<(), ServiceError> {
+        for output in &self.outputs {
+            let Output::Transition(transition) = output else { continue };
+            let view = fault_view(&self.name, transition);
+            work.writes.push(Write::Transition(TransitionRow {
+                id: 0,
+                asset: asset.to_owned(),
+                session: self.id.clone(),
+                ordinal: self.n_transitions,
+                t_s: view.t_s,
+                code: view.code.clone(),
+                status: view.status.clone(),
+                at: work.at,
+                document: views::to_json(&view)?,
+            }));
+            self.n_transitions += 1;
+        }
+        Ok(())
+    }
+
+    fn summary(&self) -> SummaryView {
+        let Progress { n_samples, n_rejected, first_t_s, last_t_s, .. } = self.progress;
+        let duration_s = last_t_s.zip(first_t_s).map_or(0.0, |(last, first)| last - first);
+        let count = |n: i64| u64::try_from(n).unwrap_or_default();
+        self.verdict.summary(&self.name, count(n_samples), count(n_rejected), duration_s)
+    }
+}
+
+impl Running {
+    /// Opens a session; the one that was open must have been ended.
+    pub(super) fn open(&mut self, name: String, work: &mut Work) -> Result<(), ServiceError> {
+        let id = Uuid::now_v7().to_string();
+        let setup = Setup::new(self.rig.clone(), None)?;
+        work.writes.push(Write::OpenSession(SessionRow {
+            id: id.clone(),
+            asset: self.row.name.clone(),
+            name: name.clone(),
+            state: "open".to_owned(),
+            opened_at: work.at,
+            ended_at: None,
+            setup: views::to_json(&asset::view(&self.rig))?,
+            baseline: views::to_json(&memory::view(&self.memory))?,
+            progress: Progress::default(),
+            verdict: None,
+            verdict_hash: None,
+        }));
+        self.open = Some(OpenSession::new(id, name, setup, self.memory.clone()));
+        self.remember(work)
+    }
+
+    /// Opens a session named by this moment.
+    pub(super) fn open_nameless(&mut self, work: &mut Work) -> Result<(), ServiceError> {
+        self.open(rfc3339(work.at), work)
+    }
+
+    /// Ends the open session, if there is one.
+    pub(super) fn end(&mut self, work: &mut Work) -> Result<(), ServiceError> {
+        let Some(mut open) = self.open.take() else { return Ok(()) };
+        open.input(Input::End);
+        open.report(&self.row.name, work)?;
+        let summary = open.summary();
+        work.writes.push(Write::EndSession {
+            session: open.id.clone(),
+            ended_at: work.at,
+            verdict: views::to_json(&summary)?,
+            hash: summary.verdict_hash,
+        });
+        let memory = open.engine.memory().clone();
+        self.remember_as(memory, work)
+    }
+
+    /// Puts `samples`, each with its index in the batch, into the open session;
+    /// with `watch` only those before the device seems to have started anew.
+    /// Returns how many were put in.
+    pub(super) fn ingest(
+        &mut self,
+        samples: &[(usize, Sample)],
+        watch: bool,
+        work: &mut Work,
+        ack: &mut AckView,
+    ) -> Result<usize, ServiceError> {
+        let Some(open) = &mut self.open else { return Ok(samples.len()) };
+        let first_index = open.progress.n_samples;
+        let mut recorded = Vec::with_capacity(samples.len());
+        let mut transitions = Work::at(work.at);
+        let mut n_taken = 0;
+        for (index, sample) in samples {
+            if watch && open.seems_restarted(sample) {
+                break;
+            }
+            n_taken += 1;
+            let row = |reason: String| RowView { index: *index, reason };
+            match open.take(sample) {
+                Some(Admission::Accepted) => recorded.push(*sample),
+                Some(Admission::SetAside(why)) => {
+                    recorded.push(*sample);
+                    ack.late.push(row(why.to_string()));
+                }
+                Some(Admission::Duplicate) => ack.duplicate += 1,
+                Some(Admission::Rejected(why)) => ack.rejected.push(row(why.to_string())),
+                None => ack.rejected.push(row("the engine did not take it".to_owned())),
+            }
+            open.report(&self.row.name, &mut transitions)?;
+        }
+        ack.accepted += recorded.len();
+        ack.session = Some(open.name.clone());
+        ack.session_id = Some(open.id.clone());
+        ack.last_seq = open.progress.last_seq.and_then(|seq| u64::try_from(seq).ok());
+        self.append(first_index, recorded, work);
+        work.writes.append(&mut transitions.writes);
+        self.remember(work)?;
+        Ok(n_taken)
+    }
+
+    fn append(&mut self, first_index: i64, samples: Vec<Sample>, work: &mut Work) {
+        let Some(open) = &self.open else { return };
+        if !samples.is_empty() {
+            let (session, progress) = (open.id.clone(), open.progress);
+            work.writes.push(Write::Append { session, first_index, samples, progress });
+        }
+    }
+
+    /// Counts rows that were no samples.
+    pub(super) fn count_rejected(&mut self, n: usize, work: &mut Work) {
+        let Some(open) = self.open.as_mut().filter(|_| n > 0) else { return };
+        open.progress.n_rejected += i64::try_from(n).unwrap_or(i64::MAX);
+        let (session, progress) = (open.id.clone(), open.progress);
+        let first_index = progress.n_samples;
+        work.writes.push(Write::Append { session, first_index, samples: Vec::new(), progress });
+    }
+
+    /// A person clears or acknowledges `code`.
+    pub(super) fn action(
+        &mut self,
+        kind: ActionKind,
+        code: FaultCode,
+        actor: String,
+        work: &mut Work,
+    ) -> Result<(), ServiceError> {
+        work.writes.push(Write::Act(ActionRow {
+            id: 0,
+            asset: self.row.name.clone(),
+            session: self.open.as_ref().map(|open| open.id.clone()),
+            after_index: self.open.as_ref().map_or(0, |open| open.progress.n_samples),
+            kind: kind.as_str().to_owned(),
+            code: code.to_string(),
+            actor,
+            at: work.at,
+        }));
+        if let Some(open) = &mut self.open {
+            open.input(input(kind, code));
+            open.report(&self.row.name, work)?;
+            return self.remember(work);
+        }
+        let mut memory = self.memory.clone();
+        match kind {
+            ActionKind::Clear => memory.clear(code),
+            ActionKind::Acknowledge => drop(memory.acknowledge(code)),
+        }
+        self.remember_as(memory, work)
+    }
+
+    /// The fault memory as the engine has it, or as last written.
+    pub(super) fn current_memory(&self) -> &FaultMemory {
+        self.open.as_ref().map_or(&self.memory, |open| open.engine.memory())
+    }
+
+    /// Writes what has changed in the engine's fault memory.
+    fn remember(&mut self, work: &mut Work) -> Result<(), ServiceError> {
+        let Some(open) = &self.open else { return Ok(()) };
+        if *open.engine.memory() == self.memory {
+            return Ok(());
+        }
+        let memory = open.engine.memory().clone();
+        self.remember_as(memory, work)
+    }
+
+    fn remember_as(&mut self, memory: FaultMemory, work: &mut Work) -> Result<(), ServiceError> {
+        for &code in FaultCode::ALL {
+            let record = memory.record(code);
+            if record == self.memory.record(code) {
+                continue;
+            }
+            let view = memory::record_view(code, record);
+            work.writes.push(Write::Fault(FaultRow {
+                asset: self.row.name.clone(),
+                code: code.to_string(),
+                status: view.status.clone(),
+                acknowledged: i64::from(view.acknowledged),
+                changed_at: work.at,
+                record: views::to_json(&view)?,
+            }));
+        }
+        self.memory = memory;
+        Ok(())
+    }
+}
+
+/// The engine's input for an action.
+pub(super) const fn input(kind: ActionKind, code: FaultCode) -> Input {
+    match kind {
+        ActionKind::Clear => Input::Clear(code),
+        ActionKind::Acknowledge => Input::Acknowledge(code),
+    }
+}

@@ -1,0 +1,171 @@
+//! A shard: the thread that owns the running engines of its assets.
+
+use std::collections::BTreeMap;
+use std::future::Future;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use tokio::runtime::Handle;
+use tokio::sync::{mpsc, oneshot};
+
+use super::commit::{Life, WriteSet};
+use super::running::{Running, Work};
+use super::{Clock, ServiceError, rebuild};
+use crate::store::{Store, Write};
+
+/// Something to do on a shard.
+pub(super) type Job = Box<dyn FnOnce(&mut Shard) + Send>;
+
+/// What a shard works with, apart from the engines.
+pub(super) struct Context {
+    pub(super) store: Store,
+    pub(super) clock: Clock,
+    runtime: Handle,
+    writer: mpsc::Sender<WriteSet>,
+}
+
+impl Context {
+    pub(super) fn new(store: Store, clock: Clock, writer: mpsc::Sender<WriteSet>) -> Self {
+        Self { store, clock, runtime: Handle::current(), writer }
+    }
+
+    /// Waits for a question to the store; only on a shard's thread.
+    pub(super) fn wait<T>(&self, question: impl Future<Output = T>) -> T {
+        self.runtime.block_on(question)
+    }
+
+    /// Waits until everything sent to the writer so far is settled, so that
+    /// what is read next is what was written last.
+    pub(super) fn fence(&self) -> Result<(), ServiceError> {
+        let (settled, wait) = oneshot::channel();
+        let done = Box::new(move |_| {
+            let _ = settled.send(());
+        });
+        self.write(WriteSet { writes: Vec::new(), life: Life::default(), done });
+        wait.blocking_recv().map_err(|_| ServiceError::Unavailable { what: "the writer is gone" })
+    }
+
+    /// Hands `set` to the writer; waits while its queue is full. If the writer
+    /// is gone, dropping the set tells those who wait.
+    fn write(&self, set: WriteSet) {
+        if self.writer.blocking_send(set).is_err() {
+            tracing::error!("the writer is gone");
+        }
+    }
+
+    /// Hands over `writes`; `reply` gets `answer` once they are durable.
+    fn settle<T: Send + 'static>(
+        &self,
+        writes: Vec<Write>,
+        life: Life,
+        answer: T,
+        reply: oneshot::Sender<Result<T, ServiceError>>,
+    ) {
+        let done = Box::new(move |durable| {
+            let failed = ServiceError::Unavailable { what: "the store did not take it" };
+            // The one who asked may be gone; what is durable stays so.
+            let _ = reply.send(if durable { Ok(answer) } else { Err(failed) });
+        });
+        self.write(WriteSet { writes, life, done });
+    }
+}
+
+pub(super) struct Shard {
+    context: Context,
+    running: BTreeMap<String, Running>,
+}
+
+impl Shard {
+    pub(super) fn spawn(
+        number: usize,
+        context: Context,
+        mut queue: mpsc::Receiver<Job>,
+    ) -> Result<std::thread::JoinHandle<()>, ServiceError> {
+        let work = move || {
+            let mut shard = Self { context, running: BTreeMap::new() };
+            while let Some(job) = queue.blocking_recv() {
+                job(&mut shard);
+            }
+        };
+        let thread = std::thread::Builder::new().name(format!("shard-{number}"));
+        thread.spawn(work).map_err(|error| {
+            tracing::error!(%error, "no thread for a shard");
+            ServiceError::Unavailable { what: "no thread for a shard" }
+        })
+    }
+
+    /// Does `act` with the running asset `name`, loaded if need be; the answer
+    /// is given once what follows is durable. An engine that panics or that
+    /// has gone ahead of an error is thrown away.
+    pub(super) fn act<T: Send + 'static>(
+        &mut self,
+        name: &str,
+        act: impl FnOnce(&Context, &mut Running, &mut Work) -> Result<T, ServiceError>,
+        reply: oneshot::Sender<Result<T, ServiceError>>,
+    ) {
+        let mut running = match self.take(name) {
+            Ok(running) => running,
+            Err(error) => return drop(reply.send(Err(error))),
+        };
+        let life = running.life.clone();
+        let mut work = Work::at(self.context.clock.now());
+        let outcome =
+            catch_unwind(AssertUnwindSafe(|| act(&self.context, &mut running, &mut work)));
+        match outcome {
+            Ok(Ok(answer)) => {
+                self.context.settle(work.writes, life, answer, reply);
+                if !running.deleted {
+                    self.running.insert(name.to_owned(), running);
+                }
+            }
+            Ok(Err(error)) => {
+                if work.writes.is_empty() {
+                    self.running.insert(name.to_owned(), running);
+                } else {
+                    life.break_off();
+                }
+                drop(reply.send(Err(error)));
+            }
+            Err(_) => {
+                tracing::error!(asset = name, "an engine failed; it is rebuilt from the store");
+                life.break_off();
+            }
+        }
+    }
+
+    /// Writes what `make` says if there is no asset `name`.
+    pub(super) fn create(
+        &mut self,
+        name: &str,
+        make: impl FnOnce(&Context) -> Result<Write, ServiceError>,
+        reply: oneshot::Sender<Result<(), ServiceError>>,
+    ) {
+        let absent = match self.take(name) {
+            Ok(running) => {
+                self.running.insert(name.to_owned(), running);
+                Err(ServiceError::AssetExists { name: name.to_owned() })
+            }
+            Err(ServiceError::UnknownAsset { .. }) => make(&self.context),
+            Err(error) => Err(error),
+        };
+        match absent {
+            Ok(write) => self.context.settle(vec![write], Life::default(), (), reply),
+            Err(error) => drop(reply.send(Err(error))),
+        }
+    }
+
+    /// The running asset, out of the shard's hands, rebuilt from the store if
+    /// it is not running or has gone ahead of it.
+    fn take(&mut self, name: &str) -> Result<Running, ServiceError> {
+        match self.running.remove(name) {
+            Some(running) if !running.life.is_broken() => Ok(running),
+            _ => {
+                self.context.fence()?;
+                let load = || rebuild::load(&self.context, name);
+                catch_unwind(AssertUnwindSafe(load)).unwrap_or_else(|_| {
+                    tracing::error!(asset = name, "rebuilding the engine failed");
+                    Err(ServiceError::Unavailable { what: "the asset's engine cannot be rebuilt" })
+                })
+            }
+        }
+    }
+}

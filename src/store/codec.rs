@@ -1,0 +1,313 @@
+//! A run of samples as bytes: columns, compressed, bit-exact.
+//!
+//! A chunk is a format byte, the number of samples, then one column after the
+//! other (`seq`, `t_s`, the two commands, the two positions). A column says
+//! which samples have it (none, all, or a bitmap), and holds their values as
+//! plain little-endian words or packed by `pco`, whichever is shorter. Every
+//! bit of a number survives, also of −0.0, subnormals and NaN.
+
+use pco::ChunkConfig;
+use pco::data_types::Number;
+use pco::standalone::{simple_compress, simple_decompress};
+
+use crate::vocabulary::Sample;
+
+/// Most samples in one chunk; a longer run is a caller's mistake and is cut by
+/// nobody: [`encode`] takes it, [`decode`] refuses it.
+pub const MAX_CHUNK_SAMPLES: usize = 65_536;
+
+/// Fewest values worth packing; fewer are stored plain.
+const MIN_PACKED: usize = 16;
+
+const FORMAT: u8 = 1;
+const HEADER: usize = 5;
+const NONE: u8 = 0;
+const ALL: u8 = 1;
+const SOME: u8 = 2;
+const PLAIN: u8 = 0;
+const PACKED: u8 = 1;
+
+/// Bytes that are no chunk.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum CodecError {
+    #[error("the chunk ends at byte {at}, in the middle of its {what}")]
+    Short { at: usize, what: &'static str },
+    #[error("format {found} is unknown; this version reads format {FORMAT}")]
+    Format { found: u8 },
+    #[error("{found} samples in one chunk, at most {MAX_CHUNK_SAMPLES} are allowed")]
+    TooMany { found: usize },
+    #[error("a column's {what} has the unknown tag {found}")]
+    Tag { what: &'static str, found: u8 },
+    #[error("a packed column cannot be read: {0}")]
+    Packed(String),
+    #[error("a column holds {found} values where {expected} are announced")]
+    Count { found: usize, expected: usize },
+    #[error("a sample has no t_s")]
+    NoTime,
+    #[error("{0} bytes follow the last column")]
+    Trailing(usize),
+}
+
+/// A value of eight bytes.
+trait Word: Number + Copy {
+    fn word(self) -> [u8; 8];
+    fn from_word(word: [u8; 8]) -> Self;
+}
+
+impl Word for u64 {
+    fn word(self) -> [u8; 8] {
+        self.to_le_bytes()
+    }
+    fn from_word(word: [u8; 8]) -> Self {
+        Self::from_le_bytes(word)
+    }
+}
+
+impl Word for f64 {
+    fn word(self) -> [u8; 8] {
+        self.to_bits().to_le_bytes()
+    }
+    fn from_word(word: [u8; 8]) -> Self {
+        Self::from_bits(u64::from_le_bytes(word))
+    }
+}
+
+/// The chunk of `samples`, at most [`MAX_CHUNK_SAMPLES`].
+#[must_use]
+pub fn encode(samples: &[Sample]) -> Vec<u8> {
+    let mut bytes = vec![FORMAT];
+    let n = u32::try_from(samples.len()).unwrap_or(u32::MAX);
+    bytes.extend_from_slice(&n.to_le_bytes());
+    put_column(&mut bytes, samples, |s| s.seq);
+    put_column(&mut bytes, samples, |s| Some(s.t_s));
+    put_column(&mut bytes, samples, |s| s.cmd_qx_rad);
+    put_column(&mut bytes, samples, |s| s.cmd_qy_rad);
+    put_column(&mut bytes, samples, |s| s.x_m);
+    put_column(&mut bytes, samples, |s| s.y_m);
+    bytes
+}
+
+/// The samples of a chunk.
+///
+/// # Errors
+/// [`CodecError`] if `bytes` is not what [`encode`] makes.
+pub fn decode(bytes: &[u8]) -> Result<Vec<Sample>, CodecError> {
+    let mut reader = Reader { bytes, at: 0 };
+    let n = header(&mut reader)?;
+    let seq = column::<u64>(&mut reader, n)?;
+    let t_s = column::<f64>(&mut reader, n)?;
+    let cmd_qx_rad = column::<f64>(&mut reader, n)?;
+    let cmd_qy_rad = column::<f64>(&mut reader, n)?;
+    let x_m = column::<f64>(&mut reader, n)?;
+    let y_m = column::<f64>(&mut reader, n)?;
+    if reader.at != bytes.len() {
+        return Err(CodecError::Trailing(bytes.len() - reader.at));
+    }
+    let sample = |i: usize| {
+        Some(Sample {
+            seq: seq[i],
+            t_s: t_s[i]?,
+            cmd_qx_rad: cmd_qx_rad[i],
+            cmd_qy_rad: cmd_qy_rad[i],
+            x_m: x_m[i],
+            y_m: y_m[i],
+        })
+    };
+    (0..n).map(|i| sample(i).ok_or(CodecError::NoTime)).collect()
+}
+
+fn header(reader: &mut Reader<'_>) -> Result<usize, CodecError> {
+    let header = reader.take(HEADER, "header")?;
+    if header[0] != FORMAT {
+        return Err(CodecError::Format { found: header[0] });
+    }
+    let n = u32::from_le_bytes([header[1], header[2], header[3], header[4]]) as usize;
+    if n > MAX_CHUNK_SAMPLES {
+        return Err(CodecError::TooMany { found: n });
+    }
+    Ok(n)
+}
+
+fn put_column<T: Word>(
+    bytes: &mut Vec<u8>,
+    samples: &[Sample],
+    get: impl Fn(&Sample) -> Option<T>,
+) {
+    let values: Vec<T> = samples.iter().filter_map(&get).collect();
+    if values.is_empty() {
+        bytes.push(NONE);
+        return;
+    }
+    if values.len() == samples.len() {
+        bytes.push(ALL);
+    } else {
+        bytes.push(SOME);
+        put_bitmap(bytes, samples.iter().map(|s| get(s).is_some()));
+    }
+    put_values(bytes, &values);
+}
+
+fn put_bitmap(bytes: &mut Vec<u8>, present: impl Iterator<Item = bool>) {
+    let first = bytes.len();
+    for (i, present) in present.enumerate() {
+        if i % 8 == 0 {
+            bytes.push(0);
+        }
+        bytes[first + i / 8] |= u8::from(present) << (i % 8);
+    }
+}
+
+fn put_values<T: Word>(bytes: &mut Vec<u8>, values: &[T]) {
+    let plain = values.len() * 8;
+    if let Some(packed) = pack(values).filter(|packed| packed.len() + 4 < plain) {
+        bytes.push(PACKED);
+        let length = u32::try_from(packed.len()).unwrap_or(u32::MAX);
+        bytes.extend_from_slice(&length.to_le_bytes());
+        bytes.extend_from_slice(&packed);
+        return;
+    }
+    bytes.push(PLAIN);
+    bytes.extend(values.iter().flat_map(|v| v.word()));
+}
+
+/// The values packed, where there are enough of them.
+fn pack<T: Word>(values: &[T]) -> Option<Vec<u8>> {
+    if values.len() < MIN_PACKED {
+        return None;
+    }
+    simple_compress(values, &ChunkConfig::default()).ok()
+}
+
+fn column<T: Word>(reader: &mut Reader<'_>, n: usize) -> Result<Vec<Option<T>>, CodecError> {
+    match reader.take(1, "column")?[0] {
+        NONE => Ok(vec![None; n]),
+        ALL => Ok(values(reader, n)?.into_iter().map(Some).collect()),
+        SOME => {
+            let bitmap = reader.take(n.div_ceil(8), "bitmap")?;
+            let present: Vec<bool> = (0..n).map(|i| bitmap[i / 8] >> (i % 8) & 1 == 1).collect();
+            let n_present = present.iter().filter(|p| **p).count();
+            let mut values = values::<T>(reader, n_present)?.into_iter();
+            Ok(present.into_iter().map(|p| if p { values.next() } else { None }).collect())
+        }
+        found => Err(CodecError::Tag { what: "presence", found }),
+    }
+}
+
+fn values<T: Word>(reader: &mut Reader<'_>, expected: usize) -> Result<Vec<T>, CodecError> {
+    match reader.take(1, "column")?[0] {
+        PLAIN => {
+            let words = reader.take(expected * 8, "values")?.as_chunks::<8>().0;
+            Ok(words.iter().map(|word| T::from_word(*word)).collect())
+        }
+        PACKED => {
+            let length = reader.take(4, "length")?;
+            let length = u32::from_le_bytes([length[0], length[1], length[2], length[3]]) as usize;
+            let packed = reader.take(length, "values")?;
+            let values: Vec<T> =
+                simple_decompress(packed).map_err(|e| CodecError::Packed(e.to_string()))?;
+            if values.len() != expected {
+                return Err(CodecError::Count { found: values.len(), expected });
+            }
+            Ok(values)
+        }
+        found => Err(CodecError::Tag { what: "values", found }),
+    }
+}
+
+struct Reader<'a> {
+    bytes: &'a [u8],
+    at: usize,
+}
+
+impl<'a> Reader<'a> {
+    fn take(&mut self, n: usize, what: &'static str) -> Result<&'a [u8], CodecError> {
+        let short = CodecError::Short { at: self.bytes.len(), what };
+        let end = self.at.checked_add(n).ok_or(short.clone())?;
+        let taken = self.bytes.get(self.at..end).ok_or(short)?;
+        self.at = end;
+        Ok(taken)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn awkward() -> impl Strategy<Value = f64> {
+        prop_oneof![
+            any::<u64>().prop_map(f64::from_bits),
+            Just(-0.0),
+            Just(f64::MIN_POSITIVE / 8.0),
+            Just(f64::MAX),
+            (-1000i32..1000).prop_map(|i| f64::from(i) * 0.01),
+        ]
+    }
+
+    fn sample() -> impl Strategy<Value = Sample> {
+        let reading = || proptest::option::of(awkward());
+        (proptest::option::of(any::<u64>()), awkward(), reading(), reading(), reading(), reading())
+            .prop_map(|(seq, t_s, cmd_qx_rad, cmd_qy_rad, x_m, y_m)| Sample {
+                seq,
+                t_s,
+                cmd_qx_rad,
+                cmd_qy_rad,
+                x_m,
+                y_m,
+            })
+    }
+
+    type Bits = (Option<u64>, u64, [Option<u64>; 4]);
+
+    fn bits(samples: &[Sample]) -> Vec<Bits> {
+        let reading = |v: Option<f64>| v.map(f64::to_bits);
+        let of = |s: &Sample| {
+            let readings = [s.cmd_qx_rad, s.cmd_qy_rad, s.x_m, s.y_m].map(reading);
+            (s.seq, s.t_s.to_bits(), readings)
+        };
+        samples.iter().map(of).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn every_bit_survives(samples in proptest::collection::vec(sample(), 0..200)) {
+            let back = decode(&encode(&samples)).expect("own bytes");
+            prop_assert_eq!(bits(&back), bits(&samples));
+        }
+
+        #[test]
+        fn any_bytes_are_read_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..300)) {
+            let _ = decode(&bytes);
+        }
+
+        #[test]
+        fn a_cut_chunk_is_refused(
+            samples in proptest::collection::vec(sample(), 1..40),
+            cut in 0.0..1.0f64,
+        ) {
+            let bytes = encode(&samples);
+            let keep = (bytes.len() as f64 * cut) as usize;
+            prop_assert!(decode(&bytes[..keep]).is_err());
+        }
+    }
+
+    #[test]
+    fn a_usual_recording_shrinks_to_a_third() {
+        let samples: Vec<Sample> = (0..4096u32)
+            .map(|i| {
+                let t = f64::from(i) * 0.01;
+                let round = |v: f64| (v * 1e4).round() / 1e4;
+                Sample {
+                    seq: Some(u64::from(i)),
+                    t_s: t,
+                    cmd_qx_rad: Some(round(0.05 * (t * 0.7).sin())),
+                    cmd_qy_rad: Some(round(0.05 * (t * 0.9).cos())),
+                    x_m: (i % 97 != 0).then(|| round(0.1 * t.sin())),
+                    y_m: (i % 97 != 0).then(|| round(0.1 * t.cos())),
+                }
+            })
+            .collect();
+        let bytes = encode(&samples);
+        assert!(bytes.len() * 3 < samples.len() * 48, "{} bytes", bytes.len());
+    }
+}

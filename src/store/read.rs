@@ -1,0 +1,329 @@
+//! What can be asked of the store.
+
+use sqlx::{QueryBuilder, Sqlite};
+
+use super::{
+    ActionRow, AssetRow, CalibrationRow, FaultRow, Micros, ReplayRow, SessionRow, Store,
+    StoreError, TransitionRow, codec,
+};
+use crate::vocabulary::Sample;
+
+/// Which sessions; newest first, `before` excluded.
+#[derive(Clone, Debug, Default)]
+pub struct SessionFilter {
+    pub asset: Option<String>,
+    /// `open` or `ended`.
+    pub state: Option<String>,
+    /// The last one of the page before: its opening and id.
+    pub before: Option<(Micros, String)>,
+}
+
+/// In which order faults are listed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum FaultOrder {
+    /// The latest change first.
+    #[default]
+    Newest,
+    Oldest,
+    /// By asset, then code.
+    Asset,
+}
+
+/// Which faults of the fleet.
+#[derive(Clone, Debug, Default)]
+pub struct FaultFilter {
+    /// The words of the statuses wanted; empty: all.
+    pub statuses: Vec<&'static str>,
+    pub asset: Option<String>,
+    pub code: Option<&'static str>,
+    pub acknowledged: Option<bool>,
+    pub order: FaultOrder,
+    /// The last one of the page before: its change, asset and code.
+    pub after: Option<(Micros, String, String)>,
+}
+
+const SESSION: &str = "SELECT id, asset, name, state, opened_at, ended_at, setup, baseline,
+    n_samples, n_rejected, first_t_s, last_t_s, last_seq, verdict, verdict_hash FROM session WHERE ";
+
+impl Store {
+    /// # Errors
+    /// [`StoreError`], as for every question here, if the database fails.
+    pub async fn asset(&self, name: &str) -> Result<Option<AssetRow>, StoreError> {
+        Ok(sqlx::query_as("SELECT * FROM asset WHERE name = $1")
+            .bind(name)
+            .fetch_optional(&self.pool)
+            .await?)
+    }
+
+    /// Assets in the order of their names, from the one after `after`.
+    pub async fn assets(&self, after: &str, limit: u32) -> Result<Vec<AssetRow>, StoreError> {
+        Ok(sqlx::query_as("SELECT * FROM asset WHERE name > $1 ORDER BY name LIMIT $2")
+            .bind(after)
+            .bind(i64::from(limit))
+            .fetch_all(&self.pool)
+            .await?)
+    }
+
+    pub async fn n_assets(&self) -> Result<i64, StoreError> {
+        Ok(sqlx::query_scalar("SELECT COUNT(*) FROM asset").fetch_one(&self.pool).await?)
+    }
+
+    /// The names of the assets that have an open session.
+    pub async fn assets_in_session(&self) -> Result<Vec<String>, StoreError> {
+        Ok(sqlx::query_scalar("SELECT asset FROM session WHERE state = 'open' ORDER BY asset")
+            .fetch_all(&self.pool)
+            .await?)
+    }
+
+    pub async fn session(&self, id: &str) -> Result<Option<SessionRow>, StoreError> {
+        let mut query = QueryBuilder::<Sqlite>::new(SESSION);
+        query.push("id = ").push_bind(id);
+        Ok(query.build_query_as().fetch_optional(&self.pool).await?)
+    }
+
+    pub async fn open_session(&self, asset: &str) -> Result<Option<SessionRow>, StoreError> {
+        let mut query = QueryBuilder::<Sqlite>::new(SESSION);
+        query.push("state = 'open' AND asset = ").push_bind(asset);
+        Ok(query.build_query_as().fetch_optional(&self.pool).await?)
+    }
+
+    pub async fn session_named(
+        &self,
+        asset: &str,
+        name: &str,
+    ) -> Result<Option<SessionRow>, StoreError> {
+        let mut query = QueryBuilder::<Sqlite>::new(SESSION);
+        query.push("asset = ").push_bind(asset).push(" AND name = ").push_bind(name);
+        Ok(query.build_query_as().fetch_optional(&self.pool).await?)
+    }
+
+    pub async fn sessions(
+        &self,
+        filter: &SessionFilter,
+        limit: u32,
+    ) -> Result<Vec<SessionRow>, StoreError> {
+        let mut query = QueryBuilder::<Sqlite>::new(SESSION);
+        query.push("1 = 1");
+        if let Some(asset) = &filter.asset {
+            query.push(" AND asset = ").push_bind(asset);
+        }
+        if let Some(state) = &filter.state {
+            query.push(" AND state = ").push_bind(state);
+        }
+        if let Some((opened_at, id)) = &filter.before {
+            query.push(" AND (opened_at, id) < (").push_bind(opened_at);
+            query.push(", ").push_bind(id).push(")");
+        }
+        query.push(" ORDER BY opened_at DESC, id DESC LIMIT ").push_bind(i64::from(limit));
+        Ok(query.build_query_as().fetch_all(&self.pool).await?)
+    }
+
+    /// The first chunk of `session` that begins at `index` or later: where it
+    /// begins and its samples.
+    pub async fn chunk_from(
+        &self,
+        session: &str,
+        index: i64,
+    ) -> Result<Option<(i64, Vec<Sample>)>, StoreError> {
+        let row: Option<(i64, Vec<u8>)> = sqlx::query_as(
+            "SELECT first_index, data FROM chunk WHERE session = $1 AND first_index >= $2
+             ORDER BY first_index LIMIT 1",
+        )
+        .bind(session)
+        .bind(index)
+        .fetch_optional(&self.pool)
+        .await?;
+        row.map(|row| decode(session, row)).transpose()
+    }
+
+    /// The chunks of `session` that may hold a sample with a `t_s` from `first`
+    /// to `last`, the latest first, at most `limit`.
+    pub async fn chunks_between(
+        &self,
+        session: &str,
+        (first, last): (f64, f64),
+        limit: u32,
+    ) -> Result<Vec<Vec<Sample>>, StoreError> {
+        let rows: Vec<(i64, Vec<u8>)> = sqlx::query_as(
+            "SELECT first_index, data FROM chunk
+             WHERE session = $1 AND min_t_s <= $3 AND max_t_s >= $2
+             ORDER BY first_index DESC LIMIT $4",
+        )
+        .bind(session)
+        .bind(first)
+        .bind(last)
+        .bind(i64::from(limit))
+        .fetch_all(&self.pool)
+        .await?;
+        rows.into_iter().map(|row| decode(session, row).map(|(_, samples)| samples)).collect()
+    }
+
+    /// What people did in `session`, in order.
+    pub async fn actions(&self, session: &str) -> Result<Vec<ActionRow>, StoreError> {
+        Ok(sqlx::query_as("SELECT * FROM action WHERE session = $1 ORDER BY after_index, id")
+            .bind(session)
+            .fetch_all(&self.pool)
+            .await?)
+    }
+
+    /// The transitions of `session`, in order, from ordinal `from`.
+    pub async fn transitions(
+        &self,
+        session: &str,
+        from: i64,
+        limit: u32,
+    ) -> Result<Vec<TransitionRow>, StoreError> {
+        Ok(sqlx::query_as(
+            "SELECT * FROM transition WHERE session = $1 AND ordinal >= $2
+             ORDER BY ordinal LIMIT $3",
+        )
+        .bind(session)
+        .bind(from)
+        .bind(i64::from(limit))
+        .fetch_all(&self.pool)
+        .await?)
+    }
+
+    pub async fn n_transitions(&self, session: &str) -> Result<i64, StoreError> {
+        Ok(sqlx::query_scalar("SELECT COUNT(*) FROM transition WHERE session = $1")
+            .bind(session)
+            .fetch_one(&self.pool)
+            .await?)
+    }
+
+    /// Transitions of `asset`, or of all, with an id above `after`.
+    pub async fn events(
+        &self,
+        asset: Option<&str>,
+        after: i64,
+        limit: u32,
+    ) -> Result<Vec<TransitionRow>, StoreError> {
+        let mut query = QueryBuilder::<Sqlite>::new("SELECT * FROM transition WHERE id > ");
+        query.push_bind(after);
+        if let Some(asset) = asset {
+            query.push(" AND asset = ").push_bind(asset);
+        }
+        query.push(" ORDER BY id LIMIT ").push_bind(i64::from(limit));
+        Ok(query.build_query_as().fetch_all(&self.pool).await?)
+    }
+
+    /// The id of the latest event.
+    pub async fn last_event(&self) -> Result<i64, StoreError> {
+        Ok(sqlx::query_scalar("SELECT value FROM counter WHERE name = 'event'")
+            .fetch_one(&self.pool)
+            .await?)
+    }
+
+    pub async fn faults(
+        &self,
+        filter: &FaultFilter,
+        limit: u32,
+    ) -> Result<Vec<FaultRow>, StoreError> {
+        let mut query = QueryBuilder::<Sqlite>::new("SELECT * FROM fault WHERE 1 = 1");
+        if !filter.statuses.is_empty() {
+            query.push(" AND status IN (");
+            let mut words = query.separated(", ");
+            for status in &filter.statuses {
+                words.push_bind(*status);
+            }
+            query.push(")");
+        }
+        if let Some(asset) = &filter.asset {
+            query.push(" AND asset = ").push_bind(asset);
+        }
+        if let Some(code) = filter.code {
+            query.push(" AND code = ").push_bind(code);
+        }
+        if let Some(acknowledged) = filter.acknowledged {
+            query.push(" AND acknowledged = ").push_bind(i64::from(acknowledged));
+        }
+        page(&mut query, filter);
+        query.push(" LIMIT ").push_bind(i64::from(limit));
+        Ok(query.build_query_as().fetch_all(&self.pool).await?)
+    }
+
+    pub async fn fault(&self, asset: &str, code: &str) -> Result<Option<FaultRow>, StoreError> {
+        Ok(sqlx::query_as("SELECT * FROM fault WHERE asset = $1 AND code = $2")
+            .bind(asset)
+            .bind(code)
+            .fetch_optional(&self.pool)
+            .await?)
+    }
+
+    pub async fn replay(&self, id: &str) -> Result<Option<ReplayRow>, StoreError> {
+        Ok(sqlx::query_as("SELECT * FROM replay WHERE id = $1")
+            .bind(id)
+            .fetch_optional(&self.pool)
+            .await?)
+    }
+
+    /// Jobs that a former process left unfinished.
+    pub async fn unfinished_replays(&self) -> Result<Vec<ReplayRow>, StoreError> {
+        Ok(sqlx::query_as("SELECT * FROM replay WHERE state IN ('queued', 'running')")
+            .fetch_all(&self.pool)
+            .await?)
+    }
+
+    pub async fn calibration(&self, id: &str) -> Result<Option<CalibrationRow>, StoreError> {
+        Ok(sqlx::query_as("SELECT * FROM calibration WHERE id = $1")
+            .bind(id)
+            .fetch_optional(&self.pool)
+            .await?)
+    }
+
+    /// The calibrations of `asset`, newest first, `before` excluded.
+    pub async fn calibrations(
+        &self,
+        asset: &str,
+        before: Option<(Micros, &str)>,
+        limit: u32,
+    ) -> Result<Vec<CalibrationRow>, StoreError> {
+        let mut query = QueryBuilder::<Sqlite>::new("SELECT * FROM calibration WHERE asset = ");
+        query.push_bind(asset);
+        if let Some((made_at, id)) = before {
+            query.push(" AND (made_at, id) < (").push_bind(made_at);
+            query.push(", ").push_bind(id).push(")");
+        }
+        query.push(" ORDER BY made_at DESC, id DESC LIMIT ").push_bind(i64::from(limit));
+        Ok(query.build_query_as().fetch_all(&self.pool).await?)
+    }
+
+    /// Jobs that a former process left unfinished.
+    pub async fn unfinished_calibrations(&self) -> Result<Vec<CalibrationRow>, StoreError> {
+        Ok(sqlx::query_as("SELECT * FROM calibration WHERE state IN ('queued', 'running')")
+            .fetch_all(&self.pool)
+            .await?)
+    }
+}
+
+/// The page's beginning and order.
+fn page(query: &mut QueryBuilder<Sqlite>, filter: &FaultFilter) {
+    if let Some((changed_at, asset, code)) = &filter.after {
+        match filter.order {
+            FaultOrder::Newest => query.push(" AND (changed_at, asset, code) < ("),
+            FaultOrder::Oldest => query.push(" AND (changed_at, asset, code) > ("),
+            FaultOrder::Asset => query.push(" AND (asset, code) > ("),
+        };
+        if filter.order != FaultOrder::Asset {
+            query.push_bind(*changed_at).push(", ");
+        }
+        query.push_bind(asset.clone()).push(", ").push_bind(code.clone()).push(")");
+    }
+    query.push(match filter.order {
+        FaultOrder::Newest => " ORDER BY changed_at DESC, asset DESC, code DESC",
+        FaultOrder::Oldest => " ORDER BY changed_at, asset, code",
+        FaultOrder::Asset => " ORDER BY asset, code",
+    });
+}
+
+fn decode(
+    session: &str,
+    (first_index, data): (i64, Vec<u8>),
+) -> Result<(i64, Vec<Sample>), StoreError> {
+    let samples = codec::decode(&data).map_err(|source| StoreError::Chunk {
+        session: session.to_owned(),
+        first_index,
+        source,
+    })?;
+    Ok((first_index, samples))
+}

@@ -1,0 +1,184 @@
+//! The rows, as the tables have them. Documents are JSON text.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::StoreError;
+
+/// A moment: microseconds since 1970-01-01 UTC.
+pub type Micros = i64;
+
+#[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
+pub struct AssetRow {
+    pub name: String,
+    /// The asset file.
+    pub document: String,
+    /// Counts the changes of the document, from 1.
+    pub revision: i64,
+    pub created_at: Micros,
+    pub updated_at: Micros,
+}
+
+/// How far a session's recording has come.
+#[derive(Clone, Copy, Debug, Default, PartialEq, sqlx::FromRow)]
+pub struct Progress {
+    pub n_samples: i64,
+    /// Rows that were no samples.
+    pub n_rejected: i64,
+    /// `t_s` of the first and the last sample in order of arrival.
+    pub first_t_s: Option<f64>,
+    pub last_t_s: Option<f64>,
+    /// The highest `seq`.
+    pub last_seq: Option<i64>,
+}
+
+#[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
+pub struct SessionRow {
+    pub id: String,
+    pub asset: String,
+    pub name: String,
+    /// `open` or `ended`.
+    pub state: String,
+    pub opened_at: Micros,
+    pub ended_at: Option<Micros>,
+    /// The asset file as of opening.
+    pub setup: String,
+    /// The fault memory as of opening.
+    pub baseline: String,
+    #[sqlx(flatten)]
+    pub progress: Progress,
+    /// Once ended.
+    pub verdict: Option<String>,
+    pub verdict_hash: Option<String>,
+}
+
+impl SessionRow {
+    #[must_use]
+    pub fn is_open(&self) -> bool {
+        self.state == "open"
+    }
+}
+
+/// What a person did about a code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ActionKind {
+    Clear,
+    Acknowledge,
+}
+
+impl ActionKind {
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Clear => "clear",
+            Self::Acknowledge => "acknowledge",
+        }
+    }
+}
+
+impl FromStr for ActionKind {
+    type Err = StoreError;
+    fn from_str(word: &str) -> Result<Self, StoreError> {
+        match word {
+            "clear" => Ok(Self::Clear),
+            "acknowledge" => Ok(Self::Acknowledge),
+            _ => Err(StoreError::Word { column: "action.kind", found: word.to_owned() }),
+        }
+    }
+}
+
+#[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
+pub struct ActionRow {
+    /// Given by the writer.
+    pub id: i64,
+    pub asset: String,
+    pub session: Option<String>,
+    /// Samples of the session recorded by then.
+    pub after_index: i64,
+    pub kind: String,
+    pub code: String,
+    pub actor: String,
+    pub at: Micros,
+}
+
+#[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
+pub struct TransitionRow {
+    /// Given by the writer; the id of the event.
+    pub id: i64,
+    pub asset: String,
+    pub session: String,
+    /// Counts the session's transitions from 0.
+    pub ordinal: i64,
+    pub t_s: f64,
+    pub code: String,
+    pub status: String,
+    pub at: Micros,
+    /// The fault line.
+    pub document: String,
+}
+
+#[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
+pub struct FaultRow {
+    pub asset: String,
+    pub code: String,
+    pub status: String,
+    /// 1 once the current occurrence is acknowledged.
+    pub acknowledged: i64,
+    pub changed_at: Micros,
+    pub record: String,
+}
+
+/// Where a background job stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JobState {
+    Queued,
+    Running,
+    Done,
+    Failed,
+}
+
+impl JobState {
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Queued => "queued",
+            Self::Running => "running",
+            Self::Done => "done",
+            Self::Failed => "failed",
+        }
+    }
+}
+
+impl fmt::Display for JobState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.as_str())
+    }
+}
+
+#[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
+pub struct ReplayRow {
+    pub id: String,
+    pub session: String,
+    pub state: String,
+    pub settings: String,
+    pub created_at: Micros,
+    pub finished_at: Option<Micros>,
+    /// Once done.
+    pub result: Option<String>,
+    /// Once failed.
+    pub error: Option<String>,
+}
+
+#[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
+pub struct CalibrationRow {
+    pub id: String,
+    pub asset: String,
+    pub state: String,
+    /// JSON array of the sessions it learns from.
+    pub sessions: String,
+    pub made_at: Micros,
+    /// 1 for the one in force.
+    pub active: i64,
+    pub document: Option<String>,
+    pub error: Option<String>,
+}

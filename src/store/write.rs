@@ -1,0 +1,403 @@
+//! The one writer: groups of changes, one transaction each, durable on return.
+
+use std::path::{Path, PathBuf};
+
+use sqlx::{ConnectOptions, Connection, SqliteConnection};
+
+use super::tail::Tails;
+use super::{
+    ActionRow, AssetRow, CalibrationRow, FaultRow, MIGRATIONS, Micros, Progress, ReplayRow,
+    SessionRow, StoreError, TransitionRow, options,
+};
+use crate::vocabulary::Sample;
+
+/// One change.
+#[derive(Clone, Debug)]
+pub enum Write {
+    /// A new asset; a conflict if its name is taken.
+    CreateAsset(AssetRow),
+    /// The document of an asset that is there.
+    UpdateAsset(AssetRow),
+    DeleteAsset {
+        name: String,
+    },
+    OpenSession(SessionRow),
+    /// Samples at the end of a session's recording, possibly none, and how far
+    /// it has come with them.
+    Append {
+        session: String,
+        first_index: i64,
+        samples: Vec<Sample>,
+        progress: Progress,
+    },
+    EndSession {
+        session: String,
+        ended_at: Micros,
+        verdict: String,
+        hash: String,
+    },
+    DeleteSession {
+        session: String,
+    },
+    Act(ActionRow),
+    Transition(TransitionRow),
+    Fault(FaultRow),
+    PutReplay(ReplayRow),
+    PutCalibration(CalibrationRow),
+    ActivateCalibration {
+        asset: String,
+        id: String,
+    },
+}
+
+/// The only connection that changes anything.
+#[derive(Debug)]
+pub struct Writer {
+    path: PathBuf,
+    connection: SqliteConnection,
+    last_id: i64,
+    tails: Tails,
+}
+
+/// Samples that wait for the end of the group, so that consecutive batches of
+/// a session become one chunk.
+struct Pending {
+    session: String,
+    first_index: i64,
+    samples: Vec<Sample>,
+    progress: Progress,
+}
+
+impl Writer {
+    pub(super) async fn open(path: &Path) -> Result<Self, StoreError> {
+        let mut connection = options(path).connect().await?;
+        MIGRATIONS.run_direct(None, &mut connection, false).await?;
+        let last_id = last_id(&mut connection).await?;
+        Ok(Self { path: path.to_owned(), connection, last_id, tails: Tails::default() })
+    }
+
+    /// Applies the sets, in order, in one transaction that is durable on
+    /// return; gives ids to their actions and transitions.
+    ///
+    /// # Errors
+    /// [`StoreError`]; then nothing of any set has been applied.
+    pub async fn commit(&mut self, sets: &mut [&mut Vec<Write>]) -> Result<(), StoreError> {
+        let last_id = self.last_id;
+        let result = self.try_commit(sets).await;
+        if result.is_err() {
+            self.last_id = last_id;
+            self.tails.forget();
+            self.reconnect().await;
+        }
+        result
+    }
+
+    /// Closes the connection, its journal folded into the database file.
+    ///
+    /// # Errors
+    /// [`StoreError`] if the last checkpoint fails; all commits stay durable.
+    pub async fn close(self) -> Result<(), StoreError> {
+        Ok(self.connection.close().await?)
+    }
+
+    /// A connection that failed may be in any state: a new one is not. If it
+    /// cannot be had, the next commit fails too.
+    async fn reconnect(&mut self) {
+        if let Ok(connection) = options(&self.path).connect().await {
+            self.connection = connection;
+        }
+    }
+
+    async fn try_commit(&mut self, sets: &mut [&mut Vec<Write>]) -> Result<(), StoreError> {
+        let first_id = self.last_id;
+        let mut transaction = self.connection.begin_with("BEGIN IMMEDIATE").await?;
+        let mut group =
+            Group { last_id: &mut self.last_id, tails: &mut self.tails, pending: Vec::new() };
+        for write in sets.iter_mut().flat_map(|set| set.iter_mut()) {
+            group.apply(&mut transaction, write).await?;
+        }
+        group.flush(&mut transaction).await?;
+        if self.last_id != first_id {
+            sqlx::query("UPDATE counter SET value = $1 WHERE name = 'event'")
+                .bind(self.last_id)
+                .execute(&mut *transaction)
+                .await?;
+        }
+        Ok(transaction.commit().await?)
+    }
+}
+
+async fn last_id(connection: &mut SqliteConnection) -> Result<i64, StoreError> {
+    Ok(sqlx::query_scalar("SELECT value FROM counter WHERE name = 'event'")
+        .fetch_one(connection)
+        .await?)
+}
+
+/// The transaction at hand.
+struct Group<'a> {
+    last_id: &'a mut i64,
+    tails: &'a mut Tails,
+    pending: Vec<Pending>,
+}
+
+impl Group<'_> {
+    const fn next_id(&mut self) -> i64 {
+        *self.last_id += 1;
+        *self.last_id
+    }
+
+    async fn apply(
+        &mut self,
+        db: &mut SqliteConnection,
+        write: &mut Write,
+    ) -> Result<(), StoreError> {
+        match write {
+            Write::Append { session, first_index, samples, progress } => {
+                self.defer(session, *first_index, samples, *progress);
+                Ok(())
+            }
+            Write::Transition(row) => {
+                row.id = self.next_id();
+                insert_transition(db, row).await
+            }
+            Write::Act(row) => {
+                row.id = self.next_id();
+                insert_action(db, row).await
+            }
+            Write::Fault(row) => put_fault(db, row).await,
+            Write::PutReplay(row) => put_replay(db, row).await,
+            Write::PutCalibration(row) => put_calibration(db, row).await,
+            Write::ActivateCalibration { asset, id } => activate(db, asset, id).await,
+            Write::CreateAsset(row) => create_asset(db, row).await,
+            Write::UpdateAsset(row) => update_asset(db, row).await,
+            Write::OpenSession(row) => open_session(db, row).await,
+            Write::EndSession { session, ended_at, verdict, hash } => {
+                self.flush(db).await?;
+                self.tails.finish(db, session).await?;
+                end_session(db, session, *ended_at, verdict, hash).await
+            }
+            Write::DeleteSession { session } => {
+                self.flush(db).await?;
+                self.tails.forget();
+                delete(db, "DELETE FROM session WHERE id = $1", session).await
+            }
+            Write::DeleteAsset { name } => {
+                self.flush(db).await?;
+                self.tails.forget();
+                delete(db, "DELETE FROM asset WHERE name = $1", name).await
+            }
+        }
+    }
+
+    fn defer(&mut self, session: &str, first_index: i64, samples: &[Sample], progress: Progress) {
+        let known = self.pending.iter_mut().find(|p| p.session == session);
+        if let Some(pending) = known {
+            pending.samples.extend_from_slice(samples);
+            pending.progress = progress;
+            return;
+        }
+        let (session, samples) = (session.to_owned(), samples.to_vec());
+        self.pending.push(Pending { session, first_index, samples, progress });
+    }
+
+    async fn flush(&mut self, db: &mut SqliteConnection) -> Result<(), StoreError> {
+        for Pending { session, first_index, samples, progress } in self.pending.drain(..) {
+            if !samples.is_empty() {
+                self.tails.append(db, &session, first_index, &samples).await?;
+            }
+            sqlx::query(
+                "UPDATE session SET n_samples = $2, n_rejected = $3, first_t_s = $4,
+                 last_t_s = $5, last_seq = $6 WHERE id = $1",
+            )
+            .bind(&session)
+            .bind(progress.n_samples)
+            .bind(progress.n_rejected)
+            .bind(progress.first_t_s)
+            .bind(progress.last_t_s)
+            .bind(progress.last_seq)
+            .execute(&mut *db)
+            .await?;
+        }
+        Ok(())
+    }
+}
+
+async fn delete(db: &mut SqliteConnection, sql: &'static str, key: &str) -> Result<(), StoreError> {
+    sqlx::query(sql).bind(key).execute(db).await?;
+    Ok(())
+}
+
+async fn create_asset(db: &mut SqliteConnection, row: &AssetRow) -> Result<(), StoreError> {
+    sqlx::query(
+        "INSERT INTO asset (name, document, revision, created_at, updated_at)
+         VALUES ($1, $2, $3, $4, $5)",
+    )
+    .bind(&row.name)
+    .bind(&row.document)
+    .bind(row.revision)
+    .bind(row.created_at)
+    .bind(row.updated_at)
+    .execute(db)
+    .await?;
+    Ok(())
+}
+
+async fn update_asset(db: &mut SqliteConnection, row: &AssetRow) -> Result<(), StoreError> {
+    sqlx::query("UPDATE asset SET document = $2, revision = $3, updated_at = $4 WHERE name = $1")
+        .bind(&row.name)
+        .bind(&row.document)
+        .bind(row.revision)
+        .bind(row.updated_at)
+        .execute(db)
+        .await?;
+    Ok(())
+}
+
+async fn open_session(db: &mut SqliteConnection, row: &SessionRow) -> Result<(), StoreError> {
+    sqlx::query(
+        "INSERT INTO session (id, asset, name, state, opened_at, setup, baseline, n_samples,
+         n_rejected) VALUES ($1, $2, $3, 'open', $4, $5, $6, 0, 0)",
+    )
+    .bind(&row.id)
+    .bind(&row.asset)
+    .bind(&row.name)
+    .bind(row.opened_at)
+    .bind(&row.setup)
+    .bind(&row.baseline)
+    .execute(db)
+    .await?;
+    Ok(())
+}
+
+async fn end_session(
+    db: &mut SqliteConnection,
+    session: &str,
+    ended_at: Micros,
+    verdict: &str,
+    hash: &str,
+) -> Result<(), StoreError> {
+    sqlx::query(
+        "UPDATE session SET state = 'ended', ended_at = $2, verdict = $3, verdict_hash = $4
+         WHERE id = $1",
+    )
+    .bind(session)
+    .bind(ended_at)
+    .bind(verdict)
+    .bind(hash)
+    .execute(db)
+    .await?;
+    Ok(())
+}
+
+async fn insert_action(db: &mut SqliteConnection, row: &ActionRow) -> Result<(), StoreError> {
+    sqlx::query(
+        "INSERT INTO action (id, asset, session, after_index, kind, code, actor, at)
+         VALUES ($1, $2, $3, $4, $5, $6, $7, $8)",
+    )
+    .bind(row.id)
+    .bind(&row.asset)
+    .bind(&row.session)
+    .bind(row.after_index)
+    .bind(&row.kind)
+    .bind(&row.code)
+    .bind(&row.actor)
+    .bind(row.at)
+    .execute(db)
+    .await?;
+    Ok(())
+}
+
+async fn insert_transition(
+    db: &mut SqliteConnection,
+    row: &TransitionRow,
+) -> Result<(), StoreError> {
+    sqlx::query(
+        "INSERT INTO transition (id, asset, session, ordinal, t_s, code, status, at, document)
+         VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9)",
+    )
+    .bind(row.id)
+    .bind(&row.asset)
+    .bind(&row.session)
+    .bind(row.ordinal)
+    .bind(row.t_s)
+    .bind(&row.code)
+    .bind(&row.status)
+    .bind(row.at)
+    .bind(&row.document)
+    .execute(db)
+    .await?;
+    Ok(())
+}
+
+async fn put_fault(db: &mut SqliteConnection, row: &FaultRow) -> Result<(), StoreError> {
+    sqlx::query(
+        "INSERT INTO fault (asset, code, status, acknowledged, changed_at, record)
+         VALUES ($1, $2, $3, $4, $5, $6)
+         ON CONFLICT (asset, code) DO UPDATE SET status = excluded.status,
+         acknowledged = excluded.acknowledged, changed_at = excluded.changed_at,
+         record = excluded.record",
+    )
+    .bind(&row.asset)
+    .bind(&row.code)
+    .bind(&row.status)
+    .bind(row.acknowledged)
+    .bind(row.changed_at)
+    .bind(&row.record)
+    .execute(db)
+    .await?;
+    Ok(())
+}
+
+async fn put_replay(db: &mut SqliteConnection, row: &ReplayRow) -> Result<(), StoreError> {
+    sqlx::query(
+        "INSERT INTO replay (id, session, state, settings, created_at, finished_at, result, error)
+         VALUES ($1, $2, $3, $4, $5, $6, $7, $8)
+         ON CONFLICT (id) DO UPDATE SET state = excluded.state,
+         finished_at = excluded.finished_at, result = excluded.result, error = excluded.error",
+    )
+    .bind(&row.id)
+    .bind(&row.session)
+    .bind(&row.state)
+    .bind(&row.settings)
+    .bind(row.created_at)
+    .bind(row.finished_at)
+    .bind(&row.result)
+    .bind(&row.error)
+    .execute(db)
+    .await?;
+    Ok(())
+}
+
+async fn put_calibration(
+    db: &mut SqliteConnection,
+    row: &CalibrationRow,
+) -> Result<(), StoreError> {
+    sqlx::query(
+        "INSERT INTO calibration (id, asset, state, sessions, made_at, active, document, error)
+         VALUES ($1, $2, $3, $4, $5, $6, $7, $8)
+         ON CONFLICT (id) DO UPDATE SET state = excluded.state, document = excluded.document,
+         error = excluded.error",
+    )
+    .bind(&row.id)
+    .bind(&row.asset)
+    .bind(&row.state)
+    .bind(&row.sessions)
+    .bind(row.made_at)
+    .bind(row.active)
+    .bind(&row.document)
+    .bind(&row.error)
+    .execute(db)
+    .await?;
+    Ok(())
+}
+
+async fn activate(db: &mut SqliteConnection, asset: &str, id: &str) -> Result<(), StoreError> {
+    sqlx::query(
+        "UPDATE calibration SET active = CASE WHEN id = $2 THEN 1 ELSE 0 END WHERE asset = $1",
+    )
+    .bind(asset)
+    .bind(id)
+    .execute(db)
+    .await?;
+    Ok(())
+}

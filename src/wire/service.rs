@@ -1,0 +1,204 @@
+//! What the service says of itself: sessions, faults of the fleet, the state
+//! of a twin, replays, calibrations.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::memory::FaultRecordView;
+use super::verdict::{EvidenceView, FaultView, SummaryView, evidence_view};
+use crate::engine::{MonitorState, State};
+use crate::vocabulary::{Axis, FaultCode, PerAxis};
+
+/// A page of a list.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct Page<T> {
+    pub items: Vec<T>,
+    /// Opaque; give it as `cursor` for the next page. Null on the last one.
+    pub next: Option<String>,
+}
+
+/// A session.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct SessionView {
+    /// The service's id.
+    pub id: String,
+    pub asset: String,
+    /// The device's name of it, or the moment of its opening.
+    pub name: String,
+    /// `open` or `ended`.
+    pub state: String,
+    /// RFC 3339.
+    pub opened_at: String,
+    pub ended_at: Option<String>,
+    /// Samples recorded.
+    pub samples: u64,
+    /// Rows that were no samples.
+    pub rejected: u64,
+    pub first_t_s: Option<f64>,
+    pub last_t_s: Option<f64>,
+    /// The highest `seq`.
+    pub last_seq: Option<u64>,
+    /// Once ended.
+    pub verdict: Option<SummaryView>,
+}
+
+/// A fault of the fleet: what is remembered of one code of one asset.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct FaultEntryView {
+    pub asset: String,
+    /// RFC 3339: when the record last changed.
+    pub changed_at: String,
+    #[serde(flatten)]
+    pub record: FaultRecordView,
+}
+
+/// One monitor at one moment.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct MonitorView {
+    pub code: String,
+    /// Fault detection counter, −128 (passed) to 127 (failed).
+    pub counter: i8,
+    /// Whether it may judge right now.
+    pub enabled: bool,
+    /// Whether it has come to a result in this session.
+    pub complete_this_cycle: bool,
+    /// Whether it has come to a result since the code was last cleared.
+    pub complete_since_clear: bool,
+    /// Seconds of this session in which it could judge.
+    pub enabled_s: f64,
+}
+
+/// A number for each direction of ball motion.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize, ToSchema)]
+pub struct XyView {
+    pub x: f64,
+    pub y: f64,
+}
+
+/// The twin beside the rig, after the last judged sample.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct StateView {
+    pub asset: String,
+    /// The open session; null if there is none, and then all is at rest.
+    pub session: Option<String>,
+    pub session_id: Option<String>,
+    /// Time of the last judged sample.
+    pub t_s: Option<f64>,
+    /// Samples recorded in this session.
+    pub samples: u64,
+    /// Samples judged in this session.
+    pub judged: u64,
+    /// Samples waiting for an earlier one.
+    pub waiting: usize,
+    pub twin_position_m: XyView,
+    pub twin_velocity_m_s: XyView,
+    /// The twin's plate angle behind each axis.
+    pub plate_angle_rad: XyView,
+    /// Measured and twin acceleration, residual, limit and gate, per axis.
+    pub evidence: EvidenceView,
+    pub monitors: Vec<MonitorView>,
+    /// The plant model in use, and why that one.
+    pub fidelity: String,
+    pub fidelity_reason: String,
+}
+
+/// The view of an engine's state.
+#[must_use]
+pub fn state_view(asset: &str, session: Option<(&str, &str, u64)>, state: &State) -> StateView {
+    StateView {
+        asset: asset.to_owned(),
+        session: session.map(|(_, name, _)| name.to_owned()),
+        session_id: session.map(|(id, ..)| id.to_owned()),
+        t_s: state.at.map(|t| t.seconds()),
+        samples: session.map_or(0, |(_, _, samples)| samples),
+        judged: state.n_judged,
+        waiting: state.n_waiting,
+        twin_position_m: xy(&state.twin_position_m),
+        twin_velocity_m_s: xy(&state.twin_velocity_m_s),
+        plate_angle_rad: xy(&state.plate_angle_rad),
+        evidence: evidence_view(&state.evidence),
+        monitors: FaultCode::ALL.iter().zip(&state.monitors).map(monitor_view).collect(),
+        fidelity: state.fidelity.to_owned(),
+        fidelity_reason: state.fidelity_reason.to_owned(),
+    }
+}
+
+fn xy(pair: &PerAxis<f64>) -> XyView {
+    XyView { x: pair[Axis::X], y: pair[Axis::Y] }
+}
+
+fn monitor_view((code, monitor): (&FaultCode, &MonitorState)) -> MonitorView {
+    MonitorView {
+        code: code.to_string(),
+        counter: monitor.counter,
+        enabled: monitor.readiness.enabled,
+        complete_this_cycle: monitor.readiness.complete_this_cycle,
+        complete_since_clear: monitor.readiness.complete_since_clear,
+        enabled_s: monitor.enabled_s,
+    }
+}
+
+/// What came of an import.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct ImportView {
+    pub session: SessionView,
+    pub accepted: u64,
+    pub duplicate: u64,
+    /// Samples recorded but not judged.
+    pub late: u64,
+    pub rejected: u64,
+    /// The first rows rejected, with their reasons.
+    pub rejections: Vec<super::telemetry::RowView>,
+}
+
+/// With which settings a session is judged again.
+#[derive(Clone, Debug, Default, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ReplaySettingsView {
+    /// `default` or `textbook`; without it the one of the asset file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub profile: Option<String>,
+    /// An asset file, or the parts of it that are to be different (JSON merge
+    /// patch, RFC 7396), over the one in force when the session was opened.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub asset: Option<serde_json::Value>,
+}
+
+/// A place where the verdict of a replay and the recorded one differ.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct DifferenceView {
+    /// Null where only the replay has it.
+    pub recorded: Option<FaultView>,
+    /// Null where only the record has it.
+    pub replayed: Option<FaultView>,
+}
+
+/// What a replay found.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct ReplayResultView {
+    pub faults: Vec<FaultView>,
+    pub summary: SummaryView,
+    /// Hash of the recorded verdict; null while the session is open.
+    pub recorded_hash: Option<String>,
+    /// Whether the two verdicts are the same, transition by transition.
+    pub same: bool,
+    pub differences: Vec<DifferenceView>,
+    /// Whether `faults` or `differences` were cut at their limit.
+    pub truncated: bool,
+}
+
+/// A replay.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct ReplayView {
+    pub id: String,
+    pub session_id: String,
+    /// `queued`, `running`, `done` or `failed`.
+    pub state: String,
+    /// Share of the samples judged, 0 to 1.
+    pub progress: f64,
+    pub settings: ReplaySettingsView,
+    pub created_at: String,
+    pub finished_at: Option<String>,
+    pub result: Option<ReplayResultView>,
+    pub error: Option<String>,
+}

@@ -1,0 +1,148 @@
+use proptest::prelude::*;
+
+use super::*;
+
+const LIMIT: usize = 100;
+
+fn reasons(batch: &Batch) -> Vec<(usize, &str)> {
+    let reason = |(i, row): (usize, &'static Result<Sample, String>)| {
+        row.as_ref().err().map(|reason| (i, reason.as_str()))
+    };
+    let rows: &'static [Result<Sample, String>] = Box::leak(batch.rows.clone().into_boxed_slice());
+    rows.iter().enumerate().filter_map(reason).collect()
+}
+
+#[test]
+fn rows_and_columns_say_the_same() {
+    let rows = br#"{"session":"a","id":7,"samples":[
+        {"seq":1,"t_s":0.5,"cmd_qx_rad":0.1,"x_m":null,"note":[1,{}]},{"t_s":1,"y_m":-2}]}"#;
+    let columns = br#"{"session":"a","id":"7","t_s":[0.5,1],"seq":[1,null],
+        "cmd_qx_rad":[0.1,null],"y_m":[null,-2]}"#;
+    let batch = json(rows, LIMIT).unwrap();
+    assert_eq!(batch, json(columns, LIMIT).unwrap());
+    assert_eq!(batch.id.as_deref(), Some("7"));
+    let first = Sample { seq: Some(1), t_s: 0.5, cmd_qx_rad: Some(0.1), ..Sample::default() };
+    assert_eq!(batch.rows[0], Ok(first));
+    assert_eq!(batch.rows[1], Ok(Sample { t_s: 1.0, y_m: Some(-2.0), ..Sample::default() }));
+}
+
+#[test]
+fn a_bad_row_is_named_and_the_others_are_taken() {
+    let document = br#"{"samples":[{"t_s":0},{"t_s":"1"},{"t_s":null},{},3,{"t_s":1,"x_m":[]},
+        {"t_s":2,"seq":-1},{"t_s":2,"seq":1.5},{"t_s":2,"seq":18446744073709551615},null,{"t_s":9}]}"#;
+    let batch = json(document, LIMIT).unwrap();
+    let wanted = [
+        (1, "`t_s` is a string, not a number"),
+        (2, "`t_s` is null"),
+        (3, "`t_s` is missing"),
+        (4, "the row is a number, not an object"),
+        (5, "`x_m` is an array, not a number"),
+        (6, "`seq` is -1, not a whole number from 0"),
+        (7, "`seq` is 1.5, not a whole number from 0"),
+        (8, "`seq` is 18446744073709551615, beyond 9223372036854775807"),
+        (9, "the row is null, not an object"),
+    ];
+    assert_eq!(reasons(&batch), wanted);
+}
+
+#[test]
+fn numbers_that_json_does_not_have_spoil_their_row_alone() {
+    let document = br#"{"session":"NaN \" NaN","samples":[{"t_s":0,"x_m":NaN},{"t_s":1},
+        {"t_s":-Infinity},{"t_s":2,"y_m":1e999}]}"#;
+    let batch = json(document, LIMIT).unwrap();
+    assert_eq!(batch.session.as_deref(), Some("NaN \" NaN"));
+    let wanted = [
+        (0, "`x_m` is not finite, not a number"),
+        (2, "`t_s` is not finite, not a number"),
+        (3, "`y_m` is not finite, not a number"),
+    ];
+    assert_eq!(reasons(&batch), wanted);
+    let lines =
+        ndjson(b"{\"t_s\":0}\n\n{\"t_s\":NaN}\n{\"t_s\":\n[]\n{\"t_s\":4}\r\n", LIMIT).unwrap();
+    assert_eq!(reasons(&lines).iter().map(|r| r.0).collect::<Vec<_>>(), [1, 2, 3]);
+}
+
+#[test]
+fn a_malformed_document_is_refused_with_the_place() {
+    let refused = |document: &str| match json(document.as_bytes(), LIMIT) {
+        Err(BatchError::Malformed { pointer, reason }) => (pointer, reason),
+        other => panic!("{document}: {other:?}"),
+    };
+    let (pointer, reason) = refused(r#"{"samples":[{"t_s":0}"#);
+    assert_eq!(pointer, "/samples");
+    assert!(reason.contains("line 1"), "{reason}");
+    assert_eq!(refused(r#"{"samples":3}"#).0, "/samples");
+    assert_eq!(refused(r#"{"session":3,"samples":[]}"#).0, "/session");
+    assert_eq!(refused(r#"{"t_s":[1,2],"x_m":[1]}"#).0, "/x_m");
+    assert_eq!(refused(r#"{"x_m":[1]}"#).0, "/t_s");
+    assert_eq!(refused("[]").0, "");
+    assert_eq!(refused("{}").0, "/t_s");
+    assert_eq!(refused(r#"{"samples":[],"t_s":[]}"#).0, "/samples");
+    assert!(refused(r#"{"samples":[]} x"#).1.contains("trailing"));
+    assert!(refused("").1.contains("EOF"));
+}
+
+#[test]
+fn a_batch_that_is_too_long_is_refused_whole() {
+    let rows: Vec<_> = (0..=LIMIT).map(|i| format!(r#"{{"t_s":{i}}}"#)).collect();
+    let too_many = BatchError::TooMany { found: LIMIT + 1, limit: LIMIT };
+    let document = format!(r#"{{"samples":[{}]}}"#, rows.join(","));
+    assert_eq!(json(document.as_bytes(), LIMIT), Err(too_many.clone()));
+    assert_eq!(ndjson(rows.join("\n").as_bytes(), LIMIT), Err(too_many));
+    let header = "t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n";
+    let csv_rows = "0,,,,\n".repeat(LIMIT + 1);
+    assert!(csv(format!("{header}{csv_rows}").as_bytes(), LIMIT).is_err());
+}
+
+#[test]
+fn csv_keeps_the_good_rows() {
+    let text = b"t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n0,0,0,0,0\nx,0,0,0,0\n2,,,,\n";
+    let batch = csv(text, LIMIT).unwrap();
+    assert_eq!(reasons(&batch), [(1, "line 3: `t_s`: `x` is not a number")]);
+    assert_eq!(batch.rows.len(), 3);
+}
+
+fn finite() -> impl Strategy<Value = f64> {
+    proptest::num::f64::NORMAL | proptest::num::f64::SUBNORMAL | proptest::num::f64::ZERO
+}
+
+fn sample() -> impl Strategy<Value = Sample> {
+    let reading = || proptest::option::of(finite());
+    (proptest::option::of(0..=MAX_SEQ), finite(), reading(), reading(), reading(), reading())
+        .prop_map(|(seq, t_s, cmd_qx_rad, cmd_qy_rad, x_m, y_m)| Sample {
+            seq,
+            t_s,
+            cmd_qx_rad,
+            cmd_qy_rad,
+            x_m,
+            y_m,
+        })
+}
+
+proptest! {
+    #[test]
+    fn every_format_carries_every_bit(samples in proptest::collection::vec(sample(), 0..LIMIT)) {
+        let views: Vec<_> = samples.iter().map(sample_view).collect();
+        let wanted: Vec<String> = samples.iter().map(|s| format!("{:?}", Ok::<_, String>(s))).collect();
+        let said = |batch: Batch| batch.rows.iter().map(|r| format!("{r:?}")).collect::<Vec<_>>();
+        let rows = serde_json::to_vec(&RowsView { session: None, samples: views.clone() }).unwrap();
+        prop_assert_eq!(&said(json(&rows, LIMIT).unwrap()), &wanted);
+        let lines: Vec<_> = views.iter().map(|v| serde_json::to_string(v).unwrap()).collect();
+        prop_assert_eq!(&said(ndjson(lines.join("\n").as_bytes(), LIMIT).unwrap()), &wanted);
+        let mut text = Vec::new();
+        crate::wire::session_csv::write(&mut text, &samples).unwrap();
+        prop_assert_eq!(&said(csv(&text, LIMIT).unwrap()), &wanted);
+    }
+
+    #[test]
+    fn any_bytes_are_read_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
+        let _ = json(&bytes, LIMIT);
+        let _ = ndjson(&bytes, LIMIT);
+        let _ = csv(&bytes, LIMIT);
+    }
+
+    #[test]
+    fn any_text_like_json_is_read_or_refused(text in r#"[\{\}\[\]:,"a-z_0-9.eE+\- ]{0,80}"#) {
+        let _ = json(text.as_bytes(), LIMIT);
+    }
+}

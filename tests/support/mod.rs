@@ -1,0 +1,263 @@
+//! A server in the test's process, a client for it, and a small rig.
+
+#![allow(dead_code, reason = "each test uses a part")]
+
+use std::future::Future;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use offbd::config::Config;
+use offbd::server::{self, Server};
+use offbd::vocabulary::Sample;
+use reqwest::header::CONTENT_TYPE;
+use reqwest::{Method, StatusCode};
+use serde_json::{Value, json};
+
+/// Longest time to wait for anything; far more than it takes.
+pub const DEADLINE: Duration = Duration::from_secs(60);
+
+/// A server with a data directory of its own.
+pub struct Bench {
+    pub server: Option<Server>,
+    pub client: Client,
+    pub data: tempfile::TempDir,
+}
+
+/// A configuration that uses `data` and any free port.
+pub fn config(data: &Path) -> Config {
+    let mut config = Config { data: data.to_owned(), ..Config::default() };
+    config.listen.set_port(0);
+    config.workers.shards = 2;
+    config
+}
+
+impl Bench {
+    pub async fn start() -> Self {
+        Self::start_with(|_| {}).await
+    }
+
+    pub async fn start_with(change: impl FnOnce(&mut Config)) -> Self {
+        let data = tempfile::tempdir().unwrap();
+        let mut config = config(data.path());
+        change(&mut config);
+        let server = server::start(config).await.unwrap();
+        let client = Client::new(server.address.to_string());
+        Self { server: Some(server), client, data }
+    }
+
+    /// Stops gracefully and starts again on the same data.
+    pub async fn restart(&mut self) {
+        self.server.take().unwrap().shutdown().await.unwrap();
+        let server = server::start(config(self.data.path())).await.unwrap();
+        self.client = Client::new(server.address.to_string());
+        self.server = Some(server);
+    }
+}
+
+/// Asks the interface.
+#[derive(Clone)]
+pub struct Client {
+    pub address: String,
+    http: reqwest::Client,
+}
+
+/// An answer.
+#[derive(Debug)]
+pub struct Answer {
+    pub status: StatusCode,
+    pub headers: reqwest::header::HeaderMap,
+    pub text: String,
+}
+
+impl Answer {
+    pub fn json(&self) -> Value {
+        serde_json::from_str(&self.text).unwrap_or_else(|e| panic!("{e}: {}", self.text))
+    }
+
+    /// The JSON of an answer that must have `status`.
+    #[track_caller]
+    pub fn expect(&self, status: u16) -> Value {
+        assert_eq!(self.status.as_u16(), status, "{}", self.text);
+        if self.text.is_empty() { Value::Null } else { self.json() }
+    }
+
+    /// The problem of an answer that must have `status`.
+    #[track_caller]
+    pub fn problem(&self, status: u16) -> Value {
+        let problem = self.expect(status);
+        assert_eq!(self.headers[CONTENT_TYPE], "application/problem+json");
+        assert_eq!(problem["status"], status);
+        for field in ["type", "title", "detail", "instance"] {
+            assert!(problem[field].is_string(), "{field}: {problem}");
+        }
+        problem
+    }
+}
+
+impl Client {
+    pub fn new(address: String) -> Self {
+        Self { address, http: reqwest::Client::new() }
+    }
+
+    pub fn url(&self, path: &str) -> String {
+        let base = if path.starts_with('/') { "" } else { "/api/v1/" };
+        format!("http://{}{base}{path}", self.address)
+    }
+
+    pub fn request(&self, method: Method, path: &str) -> reqwest::RequestBuilder {
+        self.http.request(method, self.url(path))
+    }
+
+    pub async fn send(&self, request: reqwest::RequestBuilder) -> Answer {
+        let response = request.send().await.unwrap();
+        let (status, headers) = (response.status(), response.headers().clone());
+        Answer { status, headers, text: response.text().await.unwrap() }
+    }
+
+    pub async fn get(&self, path: &str) -> Answer {
+        self.send(self.request(Method::GET, path)).await
+    }
+
+    pub async fn delete(&self, path: &str) -> Answer {
+        self.send(self.request(Method::DELETE, path)).await
+    }
+
+    pub async fn post(&self, path: &str, body: &Value) -> Answer {
+        self.send(self.request(Method::POST, path).json(body)).await
+    }
+
+    pub async fn put(&self, path: &str, body: &Value) -> Answer {
+        self.send(self.request(Method::PUT, path).json(body)).await
+    }
+
+    pub async fn post_text(&self, path: &str, kind: &str, body: impl Into<String>) -> Answer {
+        let request = self.request(Method::POST, path).header(CONTENT_TYPE, kind);
+        self.send(request.body(body.into())).await
+    }
+
+    pub async fn asset(&self, name: &str) {
+        self.post("assets", &json!({ "name": name })).await.expect(201);
+    }
+
+    /// Sends a batch that must be taken.
+    pub async fn telemetry(&self, asset: &str, session: Option<&str>, samples: &[Sample]) -> Value {
+        let body = batch(session, samples);
+        self.post(&format!("assets/{asset}/telemetry"), &body).await.expect(200)
+    }
+
+    /// The asset's session of this name.
+    pub async fn session(&self, asset: &str, name: &str) -> Value {
+        let page = self.get(&format!("sessions?asset={asset}&limit=500")).await.expect(200);
+        let items = page["items"].as_array().unwrap();
+        items.iter().find(|s| s["name"] == name).unwrap_or_else(|| panic!("{page}")).clone()
+    }
+
+    /// Ends the session of this name and returns it.
+    pub async fn end(&self, asset: &str, name: &str) -> Value {
+        let session = self.session(asset, name).await;
+        let id = session["id"].as_str().unwrap();
+        self.post(&format!("sessions/{id}/end"), &Value::Null).await.expect(200)
+    }
+
+    /// The recording of the session of this name.
+    pub async fn recording(&self, asset: &str, name: &str) -> Vec<Sample> {
+        let session = self.session(asset, name).await;
+        let id = session["id"].as_str().unwrap();
+        let csv = self.get(&format!("sessions/{id}/telemetry")).await;
+        assert_eq!(csv.status, 200);
+        let reader = offbd::wire::session_csv::Reader::new(csv.text.as_bytes()).unwrap();
+        reader.map(Result::unwrap).collect()
+    }
+}
+
+/// A batch as JSON rows.
+pub fn batch(session: Option<&str>, samples: &[Sample]) -> Value {
+    let rows: Vec<_> = samples.iter().map(offbd::wire::telemetry::sample_view).collect();
+    json!({ "session": session, "samples": rows })
+}
+
+/// Samples as a session file.
+pub fn csv(samples: &[Sample]) -> String {
+    let mut text = Vec::new();
+    offbd::wire::session_csv::write(&mut text, samples).unwrap();
+    String::from_utf8(text).unwrap()
+}
+
+/// A servo of the small rig: dead time 40 ms, lag 60 ms, at 100 Hz.
+struct Servo {
+    waiting: [f64; 4],
+    angle: f64,
+    dead: bool,
+}
+
+impl Servo {
+    fn turn(&mut self, command: f64) -> f64 {
+        self.waiting.rotate_left(1);
+        let due = std::mem::replace(&mut self.waiting[3], command);
+        if !self.dead {
+            self.angle += (due - self.angle) * 0.01 / 0.06;
+        }
+        self.angle
+    }
+}
+
+/// `n` samples at 100 Hz of a ball that is to follow a circle; the x servo is
+/// dead from sample `dead_from` on.
+pub fn rig(n: usize, dead_from: usize) -> Vec<Sample> {
+    const STEP: f64 = 0.01;
+    let servo = || Servo { waiting: [0.0; 4], angle: 0.0, dead: false };
+    let (mut servos, mut at, mut v) = ([servo(), servo()], [0.0f64; 2], [0.0f64; 2]);
+    let mut noise = 1u64;
+    let mut samples = Vec::new();
+    for i in 0..n {
+        let t = i as f64 * STEP;
+        servos[0].dead = i >= dead_from;
+        let wanted = [0.05 * (1.3 * t).sin(), 0.05 * (0.9 * t).cos()];
+        let mut command = [0.0; 2];
+        for axis in 0..2 {
+            command[axis] = (1.2 * (wanted[axis] - at[axis]) - 0.7 * v[axis]).clamp(-0.15, 0.15);
+            v[axis] += 5.0 / 7.0 * 9.81 * servos[axis].turn(command[axis]).sin() * STEP;
+            at[axis] = (at[axis] + v[axis] * STEP).clamp(-0.11, 0.11);
+        }
+        let mut reading = |x: f64| {
+            noise = noise.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            Some(x + ((noise >> 40) as f64 / f64::from(1u32 << 24) - 0.5) * 4e-4)
+        };
+        samples.push(Sample {
+            seq: Some(i as u64),
+            t_s: t,
+            cmd_qx_rad: Some(-command[1]),
+            cmd_qy_rad: Some(command[0]),
+            x_m: reading(at[0]),
+            y_m: reading(at[1]),
+        });
+    }
+    samples
+}
+
+/// The verdict that the engine itself gives on `samples`.
+pub fn judged(name: &str, samples: &[Sample]) -> (String, Vec<String>) {
+    use offbd::engine::{Engine, Input, Rig, Setup};
+    let setup = Setup::new(Rig::chapter(name), None).unwrap();
+    let mut engine = Engine::new(setup, Default::default());
+    let mut verdict = offbd::wire::verdict::Verdict::default();
+    let mut outputs = Vec::new();
+    for input in samples.iter().map(|s| Input::Sample(*s)).chain([Input::End]) {
+        outputs.clear();
+        engine.handle(input, &mut outputs);
+        outputs.iter().for_each(|o| verdict.take(o));
+    }
+    (verdict.hash(), verdict.confirmed().iter().map(ToString::to_string).collect())
+}
+
+/// Asks again until `done` gives something; fails after [`DEADLINE`].
+pub async fn eventually<T, F: Future<Output = Option<T>>>(mut done: impl FnMut() -> F) -> T {
+    let begun = Instant::now();
+    loop {
+        if let Some(found) = done().await {
+            return found;
+        }
+        assert!(begun.elapsed() < DEADLINE, "it did not come about in time");
+        tokio::task::yield_now().await;
+    }
+}
