@@ -54,8 +54,14 @@ fn main() -> Result<()> {
         );
     }
     println!("median");
-    for (name, rates) in [("bare", &bare), ("offbd", &whole), ("engine", &engine), ("replay", &replay)] {
-        println!("  {name:8} {:>12.0}  {:.3} of bare", median(rates), median(rates) / median(&bare));
+    for (name, rates) in
+        [("bare", &bare), ("offbd", &whole), ("engine", &engine), ("replay", &replay)]
+    {
+        println!(
+            "  {name:8} {:>12.0}  {:.3} of bare",
+            median(rates),
+            median(rates) / median(&bare)
+        );
     }
     Ok(())
 }
@@ -87,8 +93,10 @@ fn columns(batch: &[Sample]) -> Bytes {
 }
 
 async fn bare_handler(bodies: &[Bytes]) -> Result<f64> {
-    let app = Router::new()
-        .route("/api/v1/assets/{asset}/telemetry", post(|body: Bytes| async move { body.len().to_string() }));
+    let app = Router::new().route(
+        "/api/v1/assets/{asset}/telemetry",
+        post(|body: Bytes| async move { body.len().to_string() }),
+    );
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await?;
     let address = listener.local_addr()?;
     let server = tokio::spawn(async move { axum::serve(listener, app).await });

@@ -13,7 +13,7 @@ const MEMORY_S: f64 = 2.0;
 /// Predicted acceleration below which a command excites nothing, m/s² (rms).
 const LEAST_EXCITATION_M_S2: f64 = 0.1;
 
-/// The answer of one axis since the deviation began.
+/// The answer of one axis over the last seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Answer {
     weight: f64,

@@ -73,6 +73,7 @@ impl Finding {
 pub struct Evaluator {
     profile: Profile,
     limits: PerAxis<Limits>,
+    /// How each servo has answered of late.
     answers: PerAxis<Answer>,
 }
 
@@ -145,12 +146,11 @@ impl Evaluator {
         let (true, Some(measured), Some(twin)) = (e.enabled, e.measured_m_s2, e.twin_m_s2) else {
             return Finding::default();
         };
-        if !e.violates() {
-            self.answers[axis].update(measured, twin, around.dt);
-            return Finding::PASS;
-        }
         self.answers[axis].update(measured, twin, around.dt);
-        Finding::fail(self.answers[axis].kind(e.limit_m_s2))
+        match e.violates() {
+            true => Finding::fail(self.answers[axis].kind(e.limit_m_s2)),
+            false => Finding::PASS,
+        }
     }
 
     fn sensor(&self, evidence: &Evidence, readings: &Stillness, around: &Surroundings) -> Finding {

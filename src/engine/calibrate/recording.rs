@@ -1,0 +1,132 @@
+//! A healthy session, made ready to be learnt from: in the plate frame, in
+//! order, without readings at the edge and outliers, cut into stretches of
+//! motion.
+
+use std::ops::Range;
+
+use nalgebra::Vector2;
+
+use crate::diagnosis::OutlierGate;
+use crate::engine::Rig;
+use crate::engine::frame::{Moment, moment};
+use crate::maths::median;
+use crate::plant::{RollingState, Twin, TwinModel};
+use crate::vocabulary::{Axis, PerAxis, Sample, SimTime};
+
+/// Samples that a window must hold; it grows where that takes longer.
+const WINDOW_SAMPLES: usize = 10;
+/// A longer step between samples ends a window, s; and that many periods.
+const GAP_S: f64 = 0.3;
+const GAP_PERIODS: f64 = 4.0;
+/// A window counts as motion when the readings of each third span this, m: a
+/// ball that sticks for part of it answers no gain.
+const MOVING_M: f64 = 0.002;
+/// Noise assumed by the outlier gate before anything is known, m.
+const ASSUMED_NOISE_M: f64 = 2e-3;
+
+/// A stretch of consecutive samples.
+pub(super) type Stretch = Range<usize>;
+
+/// A session in the plate frame and in order.
+pub(super) struct Recording {
+    pub(super) moments: Vec<Moment>,
+    pub(super) gap_s: f64,
+}
+
+impl Recording {
+    pub(super) fn new(rig: &Rig, samples: &[Sample]) -> Self {
+        let mut moments: Vec<Moment> =
+            samples.iter().filter_map(|s| moment(&rig.mapping, s)).collect();
+        moments.sort_by_key(|m| m.at);
+        moments.dedup_by_key(|m| m.at);
+        let mut steps: Vec<f64> = moments.windows(2).map(|w| w[1].at - w[0].at).collect();
+        let period_s = median(&mut steps).unwrap_or(0.0);
+        let mut recording = Self { moments, gap_s: GAP_S.max(GAP_PERIODS * period_s) };
+        recording.drop_unusable(rig);
+        recording
+    }
+
+    /// Takes away readings at the edge and outliers: no ball rolls there.
+    fn drop_unusable(&mut self, rig: &Rig) {
+        let mut gate = OutlierGate::default();
+        let reach = rig.ball.radius_m() + 0.006;
+        for m in
+            self.moments.iter_mut().filter(|m| Axis::ALL.iter().any(|&a| m.position[a].is_some()))
+        {
+            let (x, y) = (m.position.x.unwrap_or(0.0), m.position.y.unwrap_or(0.0));
+            let at_edge = rig.plate.edge_distance_m(x, y) < reach;
+            let usable = gate.take(m.at.seconds(), m.position, ASSUMED_NOISE_M).usable();
+            if at_edge || !usable {
+                m.position = PerAxis::default();
+            }
+        }
+    }
+
+    pub(super) fn has(&self, axis: Axis) -> bool {
+        self.moments.iter().any(|m| m.position[axis].is_some())
+            && self.moments.iter().any(|m| m.command[axis].is_some())
+    }
+
+    pub(super) fn duration_s(&self) -> f64 {
+        match (self.moments.first(), self.moments.last()) {
+            (Some(first), Some(last)) => last.at - first.at,
+            _ => 0.0,
+        }
+    }
+
+    /// Stretches of one window each in which `axis` is measured and the ball
+    /// moves throughout, found from the left without overlap.
+    pub(super) fn stretches(&self, axis: Axis, window_s: f64) -> Vec<Stretch> {
+        let mut found = Vec::new();
+        let mut start = 0;
+        for i in 0..self.moments.len() {
+            let broken = i > start && self.moments[i].at - self.moments[i - 1].at > self.gap_s;
+            if broken {
+                start = i;
+            }
+            if self.moments[i].position[axis].is_none() {
+                start = i + 1;
+                continue;
+            }
+            let span_s = self.moments[i].at - self.moments[start].at;
+            if span_s >= window_s && i - start >= WINDOW_SAMPLES {
+                let third = (i + 1 - start).div_ceil(3);
+                let moves = |c: &[Moment]| span_m(c, axis) > MOVING_M;
+                if self.moments[start..=i].chunks(third).all(moves) {
+                    found.push(start..i + 1);
+                    start = i + 1;
+                } else {
+                    start += third;
+                }
+            }
+        }
+        found
+    }
+
+    /// The twin's free path along `axis` at every moment.
+    pub(super) fn twin_path(&self, model: &TwinModel, axis: Axis) -> Vec<f64> {
+        let mut twin = Twin::new(*model);
+        let mut before: Option<SimTime> = None;
+        let step = |m: &Moment| {
+            if before.is_some_and(|b| m.at - b > self.gap_s) {
+                twin.restart();
+            }
+            before = Some(m.at);
+            let at = |a: Axis| m.position[a].unwrap_or(0.0);
+            let observed = RollingState {
+                position: Vector2::new(at(Axis::X), at(Axis::Y)),
+                ..RollingState::default()
+            };
+            twin.advance(m.at, m.command, &observed);
+            twin.motion().position[axis as usize]
+        };
+        self.moments.iter().map(step).collect()
+    }
+}
+
+/// From the smallest to the largest reading, m.
+fn span_m(moments: &[Moment], axis: Axis) -> f64 {
+    let readings = moments.iter().filter_map(|m| m.position[axis]);
+    let (low, high) = readings.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
+    high - low
+}
