@@ -76,9 +76,10 @@ impl Settings {
             period_s: 0.0,
             gap_s: 0.3,
             reorder_s: 0.1,
-            fail_s: 0.7,
+            // A push by hand shows in the filter for one window.
+            fail_s: 0.6,
             pass_s: 1.0,
-            confirm_s: 0.6,
+            confirm_s: 0.2,
             memory: MemoryRules::default(),
         };
         match profile {
