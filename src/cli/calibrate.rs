@@ -21,6 +21,7 @@ use crate::wire::{asset, verdict};
 /// data, when. Refuses when the data cannot support it, and says what is missing.
 #[derive(Clone, Debug, Args)]
 #[command(
+    override_usage = "offbd calibrate --asset ASSET.json HEALTHY.csv... -o OUT.json",
     after_help = "A minute or two with the ball rolling about the middle of the plate is enough; \
     steps or circles of a few degrees. Hands may push the ball now and then.\n\n\
     Examples:\n  \

@@ -45,7 +45,8 @@ pub(super) struct SimulateArgs {
           value_parser = words::<Reference>(Reference::ALL.map(Reference::as_str)))]
     reference: Reference,
     /// Length of the session, s
-    #[arg(long, default_value_t = 60.0, value_name = "S", value_parser = seconds)]
+    #[arg(long, default_value_t = 60.0, value_name = "S", allow_negative_numbers = true,
+          value_parser = seconds)]
     seconds: f64,
     /// Seed of all that is random
     #[arg(long, default_value_t = 1)]
