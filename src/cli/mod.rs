@@ -33,7 +33,7 @@ use crate::config::{ConfigError, LogConfig};
 #[command(after_help = "Start here:\n  \
     offbd demo --seconds 60\n\n\
     With files:\n  \
-    offbd simulate --rig rig.json -o healthy.csv\n  \
+    offbd simulate --rig rig.json --reference lissajous -o healthy.csv\n  \
     offbd calibrate --asset rig.json healthy.csv -o learnt.json\n  \
     offbd simulate --fault x_servo:dead@20 --seed 2 -o sick.csv\n  \
     offbd replay --asset learnt.json healthy.csv sick.csv\n\n\

@@ -27,7 +27,7 @@ use crate::wire::session_csv;
     sensor            freeze, freeze_axis=x|y, dropout=SHARE, noise=FACTOR,\n                    \
     spikes=SHARE, jump=X_M[,Y_M]\n\n\
     Examples:\n  \
-    offbd simulate --rig rig.json --seconds 120 -o healthy.csv\n  \
+    offbd simulate --rig rig.json --reference circle -o healthy.csv\n  \
     offbd simulate --fault y_servo:gain=0.5@20 --truth truth.json -o weak.csv\n  \
     offbd simulate --preset touch --fault sensor:freeze@15-25 -o frozen.csv\n  \
     offbd simulate --late 0.1 --duplicates 0.05 --gap 12-14 --seq -o bad-line.csv\n  \

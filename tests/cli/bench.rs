@@ -38,8 +38,9 @@ impl Bench {
     /// Runs `offbd` with the words of `line` and expects the exit code `code`.
     pub fn run(&self, code: i32, line: &str) -> Done {
         let mut command = Command::cargo_bin("offbd").unwrap();
-        let output = command.args(line.split_whitespace()).current_dir(self.dir.path()).output();
-        let output = output.unwrap();
+        command.args(line.split_whitespace()).current_dir(self.dir.path());
+        // What is temporary belongs to the bench too, so that it can be seen.
+        let output = command.env("TMPDIR", self.dir.path()).output().unwrap();
         let done = Done {
             stdout: String::from_utf8(output.stdout).unwrap(),
             stderr: String::from_utf8(output.stderr).unwrap(),
@@ -55,7 +56,9 @@ impl Bench {
 
     /// A calibrated rig in `learnt.json`.
     pub fn calibrated(&self) -> &Self {
-        self.ok("simulate --rig rig.json --seconds 90 --seed 7 -o healthy.csv");
+        self.ok(
+            "simulate --rig rig.json --reference lissajous --seconds 90 --seed 7 -o healthy.csv",
+        );
         self.ok("calibrate --asset rig.json healthy.csv -o learnt.json");
         self
     }

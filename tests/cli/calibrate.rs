@@ -5,18 +5,18 @@ use crate::bench::Bench;
 #[test]
 fn a_rig_is_learnt_near_its_truth() {
     let bench = Bench::new();
-    let told = {
-        bench.ok("simulate --rig rig.json --seconds 90 --seed 7 -o healthy.csv");
-        bench.ok("calibrate --asset rig.json healthy.csv -o learnt.json")
-    };
+    bench.ok("simulate --rig rig.json --reference lissajous --seconds 90 --seed 7 -o healthy.csv");
+    let told = bench.ok("calibrate --asset rig.json healthy.csv -o learnt.json");
     assert!(told.stderr.contains("gain") && told.stdout.is_empty());
     let asset: Value = serde_json::from_str(&bench.read("learnt.json")).unwrap();
     let learnt = &asset["calibration"];
-    // The preset's level is 8 mrad and −5 mrad; play and drag blur the gain.
+    // The preset's truth: gain 1 and 0.96, level 8 mrad and −5 mrad; play and
+    // drag blur the gain.
     let number = |axis: &str, name: &str| learnt[axis][name].as_f64().unwrap();
     assert!((number("x", "level_rad") - 0.008).abs() < 1e-3);
     assert!((number("y", "level_rad") + 0.005).abs() < 1e-3);
-    assert!((number("x", "gain") - 1.0).abs() < 0.1);
+    assert!((number("x", "gain") - 1.0).abs() < 0.05);
+    assert!((number("y", "gain") - 0.96).abs() < 0.05);
     assert_eq!(
         learnt["samples"].as_u64(),
         Some(bench.read("healthy.csv").lines().count() as u64 - 1)

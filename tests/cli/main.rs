@@ -2,7 +2,9 @@
 
 mod bench;
 mod calibrate;
+mod demo;
 mod replay;
 mod score;
+mod service;
 mod simulate;
 mod usage;

@@ -3,7 +3,8 @@ use std::process::{Command, Stdio};
 
 use crate::bench::Bench;
 
-const COMMANDS: [&str; 4] = ["simulate", "calibrate", "replay", "score"];
+const COMMANDS: [&str; 8] =
+    ["simulate", "calibrate", "replay", "score", "demo", "serve", "migrate", "check"];
 
 #[test]
 fn help_teaches_with_examples_within_eighty_columns() {

@@ -13,7 +13,7 @@ mod tally;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 
-use anyhow::bail;
+use anyhow::{Context, bail};
 use clap::Args;
 
 use super::{calibrate, simulate};
@@ -81,7 +81,8 @@ async fn demo(args: &DemoArgs) -> anyhow::Result<()> {
     let store = StoreDirectory::new(args.data.as_ref());
     let listen = SocketAddr::from((Ipv4Addr::LOCALHOST, args.port));
     let data = store.path.clone();
-    let server = server::start(Config { listen, data, ..Config::default() }).await?;
+    let config = Config { listen, data, ..Config::default() };
+    let server = server::start(config).await.context("cannot start; --port 0 takes a free port")?;
     let result = show(args, &server.address.to_string(), &store).await;
     server.shutdown().await?;
     let outcome = result?;
@@ -103,7 +104,10 @@ async fn show(args: &DemoArgs, address: &str, store: &StoreDirectory) -> anyhow:
     let faults = if asked.is_empty() { plan::shown(seconds) } else { asked };
     anstream::println!("dashboard  http://{address}/");
     anstream::println!("interface  http://{address}/docs");
-    anstream::println!("store      {}", store.described());
+    anstream::println!("store      {}", store.path.display());
+    if store.temporary {
+        anstream::println!("           removed at the end; --data DIR keeps one");
+    }
     let rig = learnt_rig(args.seed)?;
     let client = Client::new(address.to_owned(), &rig.name)?;
     client.register(&rig).await?;
@@ -143,11 +147,6 @@ impl StoreDirectory {
         let temporary =
             || std::env::temp_dir().join(format!("offbd-demo-{}", uuid::Uuid::now_v7()));
         Self { path: asked.cloned().unwrap_or_else(temporary), temporary: asked.is_none() }
-    }
-
-    fn described(&self) -> String {
-        let kept = if self.temporary { " (temporary; --data DIR keeps it)" } else { "" };
-        format!("{}{kept}", self.path.display())
     }
 }
 

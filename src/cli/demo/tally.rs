@@ -64,6 +64,9 @@ impl Tally {
 
     /// Writes the comparison as a table.
     pub(super) fn write(&self, out: &mut impl Write) -> std::io::Result<()> {
+        if self.injected.is_empty() && self.found.is_empty() {
+            return writeln!(out, "nothing injected, nothing found");
+        }
         let heading = ["injected", "onset", "found", "confirmed", "delay", "from 1st chance"];
         let mut rows = table::table(&heading, &[1, 3, 4, 5]);
         for injected in &self.injected {
