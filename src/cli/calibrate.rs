@@ -12,7 +12,7 @@ use super::{output, table};
 use crate::diagnosis::{AxisCalibration, Calibration};
 use crate::engine::{Rig, calibrate};
 use crate::vocabulary::{Axis, Sample};
-use crate::wire::{asset, verdict};
+use crate::wire::{asset, session_csv, verdict};
 
 /// Learns a rig from recordings in which it was healthy.
 ///
@@ -21,6 +21,7 @@ use crate::wire::{asset, verdict};
 /// data, when. Refuses when the data cannot support it, and says what is missing.
 #[derive(Clone, Debug, Args)]
 #[command(
+    override_usage = "offbd calibrate --asset ASSET.json HEALTHY.csv... -o OUT.json",
     after_help = "A minute or two with the ball rolling about the middle of the plate is enough; \
     steps or circles of a few degrees. Hands may push the ball now and then.\n\n\
     Examples:\n  \
@@ -82,6 +83,13 @@ pub(super) fn data_hash(paths: &[PathBuf]) -> Result<String, Unusable> {
         hash.update(read(path)?);
     }
     Ok(verdict::hex(&hash.finalize()))
+}
+
+/// SHA-256 of a session that never was a file, as if it were.
+pub(super) fn samples_hash(samples: &[Sample]) -> anyhow::Result<String> {
+    let mut bytes = Vec::new();
+    session_csv::write(&mut bytes, samples)?;
+    Ok(verdict::hex(&Sha256::digest(&bytes)))
 }
 
 /// Writes the asset file of `rig` to `path`.

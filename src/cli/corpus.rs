@@ -83,7 +83,7 @@ fn plans(preset: Preset, seconds: f64, seed: u64) -> Vec<Plan> {
     let plan = |file: String, n: usize, fault: Option<String>, hands: f64| Plan {
         preset,
         file,
-        reference: if n == 0 { Reference::Steps } else { Reference::ALL[(n + 1) % 4] },
+        reference: if n == 0 { Reference::Lissajous } else { Reference::ALL[(n + 1) % 4] },
         seconds: if n == 0 { CALIBRATION_S } else { seconds },
         disturbances: Disturbances { pushes_per_minute: hands, gusts_per_minute: hands / 2.0 },
         fault,

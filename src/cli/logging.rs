@@ -5,36 +5,38 @@ use std::io::IsTerminal;
 use clap::Args;
 use tracing_subscriber::EnvFilter;
 
+use crate::config::{LogConfig, LogFormat};
+
 #[derive(Clone, Debug, Args)]
 pub(super) struct LoggingArgs {
-    /// How logs are written to stderr
-    #[arg(long, global = true, value_enum, default_value = "text", help_heading = "Logs")]
-    log_format: LogFormat,
-    /// Which logs: error, warn, info, debug, trace, or module=level,…
-    #[arg(long, global = true, env = "OFFBD_LOG", default_value = "info", help_heading = "Logs")]
-    log: String,
+    /// How logs are written to stderr [default: text]
+    #[arg(long, global = true, value_enum, value_name = "FORMAT", help_heading = "Logs")]
+    log_format: Option<Format>,
+    /// Which: error, warn, info, debug, trace, or module=level,...
+    #[arg(long, global = true, value_name = "LEVEL", help_heading = "Logs")]
+    log: Option<String>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum LogFormat {
+enum Format {
     Text,
     Json,
 }
 
 impl LoggingArgs {
-    /// Starts logging for this process; a second start is ignored.
-    pub(super) fn start(&self) {
-        let filter = EnvFilter::try_new(&self.log).unwrap_or_else(|_| EnvFilter::new("info"));
+    /// Starts logging for this process: as the command line says, else as
+    /// `config` does. A second start is ignored.
+    pub(super) fn start(&self, config: &LogConfig) {
+        let level = self.log.as_deref().unwrap_or(&config.level);
+        let filter = EnvFilter::try_new(level).unwrap_or_else(|_| EnvFilter::new("info"));
         let colour = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
         let logs = tracing_subscriber::fmt()
             .with_env_filter(filter)
             .with_writer(std::io::stderr)
             .with_ansi(colour)
             .with_target(false);
+        let json = self.log_format.map_or(config.format == LogFormat::Json, |f| f == Format::Json);
         // Only a test that runs two commands in one process starts it twice.
-        let _ = match self.log_format {
-            LogFormat::Text => logs.try_init(),
-            LogFormat::Json => logs.json().flatten_event(true).try_init(),
-        };
+        let _ = if json { logs.json().flatten_event(true).try_init() } else { logs.try_init() };
     }
 }

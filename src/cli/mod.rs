@@ -6,12 +6,14 @@
 
 mod calibrate;
 mod corpus;
+mod demo;
 mod judge;
 mod labels;
 mod logging;
 mod output;
 mod replay;
 mod score;
+mod serve;
 mod simulate;
 mod table;
 mod unusable;
@@ -20,6 +22,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use crate::config::{ConfigError, LogConfig};
+
 /// Off-board diagnostics with a digital twin, for ball-on-plate rigs.
 ///
 /// A device streams commands and measured positions; a twin runs beside it;
@@ -27,7 +31,9 @@ use clap::{Parser, Subcommand};
 #[derive(Debug, Parser)]
 #[command(name = "offbd", version, max_term_width = 80)]
 #[command(after_help = "Start here:\n  \
-    offbd simulate --rig rig.json -o healthy.csv\n  \
+    offbd demo --seconds 60\n\n\
+    With files:\n  \
+    offbd simulate --rig rig.json --reference lissajous -o healthy.csv\n  \
     offbd calibrate --asset rig.json healthy.csv -o learnt.json\n  \
     offbd simulate --fault x_servo:dead@20 --seed 2 -o sick.csv\n  \
     offbd replay --asset learnt.json healthy.csv sick.csv\n\n\
@@ -45,23 +51,47 @@ enum Command {
     Calibrate(calibrate::CalibrateArgs),
     Replay(replay::ReplayArgs),
     Score(score::ScoreArgs),
+    Demo(demo::DemoArgs),
+    Serve(serve::ServeArgs),
+    Migrate(serve::MigrateArgs),
+    Check(serve::CheckArgs),
 }
 
 /// Runs the command line of this process.
 #[must_use]
 pub fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
-        Ok(cli) => cli,
-        Err(error) => return usage(&error),
-    };
-    cli.logging.start();
-    let result = match cli.command {
+    match Cli::try_parse() {
+        Ok(cli) => run(cli).map_or_else(|error| failure(&error), |()| ExitCode::SUCCESS),
+        Err(error) => usage(&error),
+    }
+}
+
+fn run(cli: Cli) -> anyhow::Result<()> {
+    let logging = cli.logging;
+    match &cli.command {
+        // The service's configuration says how it logs.
+        Command::Serve(_) => {}
+        // The service inside the demo speaks up when something is wrong only.
+        Command::Demo(_) => {
+            logging.start(&LogConfig { level: "warn".to_owned(), ..LogConfig::default() })
+        }
+        _ => logging.start(&LogConfig::default()),
+    }
+    match cli.command {
         Command::Simulate(args) => simulate::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Score(args) => score::run(&args),
-    };
-    result.map_or_else(|error| failure(&error), |()| ExitCode::SUCCESS)
+        Command::Demo(args) => demo::run(&args),
+        Command::Serve(args) => serve::serve(&args, &logging),
+        Command::Migrate(args) => serve::migrate(&args),
+        Command::Check(args) => serve::check(&args),
+    }
+}
+
+/// A runtime for the commands that serve or talk to a service.
+fn runtime() -> std::io::Result<tokio::runtime::Runtime> {
+    tokio::runtime::Builder::new_multi_thread().enable_all().build()
 }
 
 /// Help and version are asked for; anything else is a bad argument.
@@ -76,5 +106,6 @@ fn failure(error: &anyhow::Error) -> ExitCode {
         return ExitCode::SUCCESS;
     }
     anstream::eprintln!("offbd: {error:#}");
-    ExitCode::from(if error.is::<unusable::Unusable>() { 3 } else { 1 })
+    let unusable = error.is::<unusable::Unusable>() || error.is::<ConfigError>();
+    ExitCode::from(if unusable { 3 } else { 1 })
 }

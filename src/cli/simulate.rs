@@ -27,7 +27,7 @@ use crate::wire::session_csv;
     sensor            freeze, freeze_axis=x|y, dropout=SHARE, noise=FACTOR,\n                    \
     spikes=SHARE, jump=X_M[,Y_M]\n\n\
     Examples:\n  \
-    offbd simulate --rig rig.json --seconds 120 -o healthy.csv\n  \
+    offbd simulate --rig rig.json --reference circle -o healthy.csv\n  \
     offbd simulate --fault y_servo:gain=0.5@20 --truth truth.json -o weak.csv\n  \
     offbd simulate --preset touch --fault sensor:freeze@15-25 -o frozen.csv\n  \
     offbd simulate --late 0.1 --duplicates 0.05 --gap 12-14 --seq -o bad-line.csv\n  \
@@ -45,7 +45,8 @@ pub(super) struct SimulateArgs {
           value_parser = words::<Reference>(Reference::ALL.map(Reference::as_str)))]
     reference: Reference,
     /// Length of the session, s
-    #[arg(long, default_value_t = 60.0, value_name = "S", value_parser = seconds)]
+    #[arg(long, default_value_t = 60.0, value_name = "S", allow_negative_numbers = true,
+          value_parser = seconds)]
     seconds: f64,
     /// Seed of all that is random
     #[arg(long, default_value_t = 1)]

@@ -1,5 +1,8 @@
-//! The rig's controller: one PID per axis on the measured position, at a fixed
-//! period, with a filtered derivative and a whole number of command steps.
+//! The rig's controller: one PID per axis on the measured position, with a
+//! filtered derivative and a whole number of command steps.
+//!
+//! The device runs one loop: look, command, log a row. At the chapter's 100 rows
+//! a second the loops close every 10 ms, as the chapter's do.
 
 use crate::plant::Ball;
 use crate::vocabulary::{Axis, PerAxis};
@@ -7,8 +10,6 @@ use crate::vocabulary::{Axis, PerAxis};
 /// A controller; immutable. Its gains follow from the loop it is to close.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ControllerModel {
-    /// Seconds between two commands; the chapter's loops run at 10 ms.
-    pub period_s: f64,
     /// Natural frequency of the closed loop without lag, rad/s.
     pub bandwidth_rad_s: f64,
     /// Damping ratio of the same.
@@ -36,9 +37,10 @@ struct Gains {
 }
 
 impl ControllerModel {
-    /// Pole placement on ẍ = g/(1 + κ)·q.
-    fn gains(&self, ball: &Ball) -> Gains {
-        let (w, g) = (self.bandwidth_rad_s, ball.rolling_gravity());
+    /// Pole placement on ẍ = g/(1 + κ)·q. A slow loop gets a bandwidth that it
+    /// can hold: a tenth of a radian per period.
+    fn gains(&self, ball: &Ball, period_s: f64) -> Gains {
+        let (w, g) = (self.bandwidth_rad_s.min(0.1 / period_s), ball.rolling_gravity());
         Gains {
             proportional: w * w / g,
             integral: self.integral * w * w * w / g,
@@ -61,13 +63,14 @@ struct AxisState {
 #[derive(Clone, Debug)]
 pub(super) struct Controller {
     model: ControllerModel,
+    period_s: f64,
     gains: Gains,
     axes: PerAxis<AxisState>,
 }
 
 impl Controller {
-    pub(super) fn new(model: ControllerModel, ball: &Ball) -> Self {
-        Self { model, gains: model.gains(ball), axes: PerAxis::default() }
+    pub(super) fn new(model: ControllerModel, ball: &Ball, period_s: f64) -> Self {
+        Self { model, period_s, gains: model.gains(ball, period_s), axes: PerAxis::default() }
     }
 
     /// The commands in force, rad.
@@ -87,7 +90,7 @@ impl Controller {
     }
 
     fn closed(&self, state: AxisState, axis: Axis, wanted: f64, position: f64) -> AxisState {
-        let (model, h) = (&self.model, self.model.period_s);
+        let (model, h) = (&self.model, self.period_s);
         let change = state.last.map_or(0.0, |last| (position - last) / h);
         let rate = state.rate + (change - state.rate) * h / (model.derivative_filter_s + h);
         let error = wanted - position;
@@ -100,7 +103,7 @@ impl Controller {
     }
 
     fn blind(&self, state: AxisState) -> AxisState {
-        let unseen_s = state.unseen_s + self.model.period_s;
+        let unseen_s = state.unseen_s + self.period_s;
         let command = if unseen_s > BLIND_S { 0.0 } else { state.command };
         AxisState { rate: 0.0, last: None, unseen_s, command, ..state }
     }

@@ -41,7 +41,6 @@ impl RigModel {
         self.surface.check()?;
         self.sensor.check()?;
         let controller = &self.controller;
-        in_range("/controller/period_s", controller.period_s, 0.001..=1.0)?;
         positive("/controller/limit_rad", controller.limit_rad, 1.5)?;
         for axis in Axis::ALL {
             let servo = &self.servos[axis];

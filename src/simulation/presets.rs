@@ -72,7 +72,6 @@ impl FromStr for Preset {
 /// well damped; its derivative is filtered over a few readings.
 fn controller(limit_rad: f64, bandwidth_rad_s: f64, derivative_filter_s: f64) -> ControllerModel {
     ControllerModel {
-        period_s: 0.01,
         bandwidth_rad_s,
         damping: 1.0,
         integral: 0.12,
@@ -99,7 +98,7 @@ fn chapter() -> RigModel {
         surface: Surface { breakaway_rad: 0.004, rolling_rad: 0.001, restitution: 0.5 },
         sensor: SensorModel {
             refresh_hz: None,
-            latency_s: 0.01,
+            latency_s: 0.005,
             noise_m: 2e-4,
             quantum_m: 1e-4,
             missing: 0.001,
@@ -134,7 +133,7 @@ fn pingpong() -> Result<RigModel, Invalid> {
         surface: Surface { breakaway_rad: 0.006, rolling_rad: 0.002, restitution: 0.6 },
         sensor: SensorModel {
             refresh_hz: None,
-            latency_s: 0.03,
+            latency_s: 0.02,
             noise_m: 4e-4,
             quantum_m: 1e-3,
             missing: 0.005,
@@ -168,7 +167,7 @@ fn touch() -> Result<RigModel, Invalid> {
         surface: Surface { breakaway_rad: 0.007, rolling_rad: 0.002, restitution: 0.4 },
         sensor: SensorModel {
             refresh_hz: Some(60.0),
-            latency_s: 0.005,
+            latency_s: 0.004,
             noise_m: 3e-5,
             quantum_m: 3e-5,
             missing: 5e-4,

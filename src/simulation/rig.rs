@@ -1,8 +1,8 @@
 //! The simulated rig in motion.
 //!
-//! It goes from event to event (the sensor looks, the controller commands, the
-//! device logs a row); between two events the plant advances in steps of at
-//! most 1 ms, each a row of stages: faults in force → servos → ball → truth.
+//! It goes from event to event (the sensor looks; the device reads it, commands
+//! and logs a row); between two events the plant advances in steps of at most
+//! 1 ms, each a row of stages: faults in force → servos → ball → truth.
 
 use nalgebra::Vector2;
 
@@ -41,15 +41,13 @@ struct InForce {
 #[derive(Clone, Copy)]
 enum Event {
     Look,
-    Control,
-    Log,
+    Row,
 }
 
 /// When things happen next, s.
 #[derive(Clone, Debug)]
 struct Schedule {
     n_looks: u64,
-    n_controls: u64,
     n_rows: u64,
     next_row_s: f64,
     clock: Noise,
@@ -106,7 +104,11 @@ impl SimulatedRig {
             ball: start(reach, seed),
             sensor: Sensor::new(model.sensor, reach, seed),
             reading: Reading::default(),
-            controller: Controller::new(model.controller, &model.rig.ball),
+            controller: Controller::new(
+                model.controller,
+                &model.rig.ball,
+                1.0 / model.rig.sample_rate_hz,
+            ),
             reference: ReferenceState::new(reference, reach, seed),
             disturbances: DisturbanceState::new(disturbances, seed),
             faults: Vec::new(),
@@ -158,8 +160,7 @@ impl SimulatedRig {
             self.advance_to(at_s);
             match event {
                 Event::Look => self.look(),
-                Event::Control => self.control(),
-                Event::Log => return self.log(),
+                Event::Row => return self.row(),
             }
         }
     }
@@ -217,9 +218,18 @@ impl SimulatedRig {
         self.sensor.look(self.now_s, ball, fault);
     }
 
+    /// One turn of the device's loop.
+    fn row(&mut self) -> Sample {
+        if self.model.sensor.refresh_hz.is_none() {
+            self.look();
+        }
+        self.reading = self.sensor.reading(self.now_s);
+        self.control();
+        self.log()
+    }
+
     fn control(&mut self) {
         let wanted = self.reference.at(self.now_s);
-        self.reading = self.sensor.reading(self.now_s);
         self.controller.update(PerAxis { x: wanted.x, y: wanted.y }, self.reading);
         let commands = self.controller.commands();
         for axis in Axis::ALL {
@@ -228,11 +238,7 @@ impl SimulatedRig {
         }
     }
 
-    fn log(&mut self) -> Sample {
-        if self.model.sensor.refresh_hz.is_none() {
-            self.look();
-        }
-        self.reading = self.sensor.reading(self.now_s);
+    fn log(&self) -> Sample {
         let commands = self.controller.commands();
         let metres = |m: Option<f64>| m.map(|m| logged(m, LOGGED_PER_M));
         Sample {
@@ -249,27 +255,21 @@ impl SimulatedRig {
 impl Schedule {
     fn new(seed: u64) -> Self {
         let clock = Noise::new(seed, Purpose::Clock);
-        Self { n_looks: 0, n_controls: 0, n_rows: 0, next_row_s: 0.0, clock }
+        Self { n_looks: 0, n_rows: 0, next_row_s: 0.0, clock }
     }
 
-    /// The next event and its time; at one moment a look comes before a
-    /// command, and a command before a row.
+    /// The next event and its time; at one moment a look comes before a row.
     fn next(&mut self, model: &RigModel) -> (Event, f64) {
         let look_s = model.sensor.refresh_hz.map_or(f64::INFINITY, |hz| self.n_looks as f64 / hz);
-        let control_s = self.n_controls as f64 * model.controller.period_s;
-        if look_s <= control_s && look_s <= self.next_row_s {
+        if look_s <= self.next_row_s {
             self.n_looks += 1;
             return (Event::Look, look_s);
-        }
-        if control_s <= self.next_row_s {
-            self.n_controls += 1;
-            return (Event::Control, control_s);
         }
         let row_s = self.next_row_s;
         self.n_rows += 1;
         let jitter = (self.clock.normal() * model.sensor.jitter).clamp(-MAX_JITTER, MAX_JITTER);
         self.next_row_s = (self.n_rows as f64 + jitter) / model.rig.sample_rate_hz;
-        (Event::Log, row_s)
+        (Event::Row, row_s)
     }
 }
 

@@ -1,0 +1,10 @@
+//! The command line from outside: a process, its two streams and its exit code.
+
+mod bench;
+mod calibrate;
+mod demo;
+mod replay;
+mod score;
+mod service;
+mod simulate;
+mod usage;

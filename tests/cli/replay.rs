@@ -1,0 +1,129 @@
+use serde_json::Value;
+
+use crate::bench::Bench;
+
+/// Eight sessions, some faulty; their names in order.
+fn sessions(bench: &Bench) -> String {
+    let names: Vec<String> = (0..8).map(|i| format!("s{i}.csv")).collect();
+    for (i, name) in names.iter().enumerate() {
+        let fault = if i % 2 == 1 { "--fault x_servo:dead@8" } else { "" };
+        bench.ok(&format!("simulate --seconds 25 --seed {} {fault} -o {name}", i + 10));
+    }
+    names.join(" ")
+}
+
+fn keys(object: &Value) -> Vec<&str> {
+    object.as_object().unwrap().keys().map(String::as_str).collect()
+}
+
+#[test]
+fn json_lines_have_the_shape_of_the_contract() {
+    let bench = Bench::new();
+    bench.calibrated().ok("simulate --seconds 30 --fault x_servo:dead@10 --seed 2 -o sick.csv");
+    let lines = bench.ok("replay --asset learnt.json --format json sick.csv").json();
+    let (summary, faults) = lines.split_last().unwrap();
+    for fault in faults {
+        for key in [
+            "type",
+            "session",
+            "t_s",
+            "code",
+            "kind",
+            "status",
+            "status_byte",
+            "onset_s",
+            "axis",
+            "command",
+            "candidates",
+            "evidence",
+        ] {
+            assert!(keys(fault).contains(&key), "no {key} in {fault}");
+        }
+        assert_eq!((&fault["type"], &fault["session"]), (&"fault".into(), &"sick.csv".into()));
+    }
+    let confirmed = faults.iter().find(|f| f["status"] == "confirmed").unwrap();
+    assert_eq!(
+        ["code", "axis", "command", "status_byte"].map(|k| confirmed[k].as_str().unwrap()),
+        ["x_servo", "x", "qy", "2F"]
+    );
+    assert!((10.0..16.0).contains(&confirmed["t_s"].as_f64().unwrap()));
+    assert_eq!(summary["faults"], serde_json::json!(["x_servo"]));
+    assert_eq!(
+        summary["samples"].as_u64(),
+        Some(bench.read("sick.csv").lines().count() as u64 - 1)
+    );
+    assert_eq!(summary["rejected"], 0);
+    assert_eq!(summary["verdict_hash"].as_str().unwrap().len(), 64);
+}
+
+#[test]
+fn the_verdict_is_the_same_to_the_byte_on_any_number_of_threads() {
+    let bench = Bench::new();
+    let names = sessions(bench.calibrated());
+    let on = |jobs: u16| {
+        let line = format!("replay --asset learnt.json --format json --jobs {jobs} {names}");
+        bench.ok(&line).stdout
+    };
+    let one = on(1);
+    assert_eq!(one, on(4));
+    assert_eq!(one, on(1));
+    let order: Vec<&str> = one
+        .lines()
+        .filter(|l| l.contains(r#""type":"summary""#))
+        .map(|l| l.split(r#""session":""#).nth(1).unwrap().split('"').next().unwrap())
+        .collect();
+    assert_eq!(order.join(" "), names);
+}
+
+#[test]
+fn a_bad_line_to_the_service_does_not_change_the_verdict() {
+    let bench = Bench::new();
+    let fault = "simulate --seconds 25 --seed 3 --fault y_servo:dead@8 --seq";
+    bench.calibrated().ok(&format!("{fault} -o plain.csv"));
+    bench.ok(&format!("{fault} --late 0.2 --duplicates 0.2 --late-window-s 0.05 -o bad-line.csv"));
+    assert_ne!(bench.read("plain.csv"), bench.read("bad-line.csv"));
+    let done = bench.ok("replay --asset learnt.json --format json plain.csv bad-line.csv");
+    let summaries = done.summaries();
+    assert_eq!(summaries[0]["verdict_hash"], summaries[1]["verdict_hash"]);
+    assert_eq!(summaries[0]["faults"], serde_json::json!(["y_servo"]));
+    assert_eq!(summaries[0]["samples"], summaries[1]["samples"]);
+}
+
+#[test]
+fn bad_rows_are_named_and_counted_and_the_rest_is_judged() {
+    let bench = Bench::new();
+    bench.ok("simulate --seconds 5 -o good.csv");
+    let mut lines: Vec<String> = bench.read("good.csv").lines().map(str::to_owned).collect();
+    lines[10] = "0.09,0,0,abc,0".to_owned();
+    lines[20] = "0.19,0,0,1e300,0".to_owned();
+    lines[30] = "nonsense".to_owned();
+    bench.write("bad.csv", &lines.join("\n"));
+    let done = bench.ok("replay --format json bad.csv");
+    for line in ["line 11", "line 21", "line 31"] {
+        assert!(done.stderr.contains(&format!("bad.csv: {line}: ")), "{}", done.stderr);
+    }
+    let summary = &done.summaries()[0];
+    assert_eq!((&summary["rejected"], &summary["samples"]), (&3.into(), &(lines.len() - 4).into()));
+}
+
+#[test]
+fn one_unusable_file_does_not_keep_the_others_from_being_judged() {
+    let bench = Bench::new();
+    bench.ok("simulate --seconds 3 -o a.csv");
+    bench.ok("simulate --seconds 3 -o c.csv");
+    let done = bench.run(3, "replay --format json a.csv b.csv c.csv");
+    assert!(done.stderr.contains("b.csv"));
+    let judged: Vec<Value> = done.summaries().iter().map(|s| s["session"].clone()).collect();
+    assert_eq!(judged, ["a.csv", "c.csv"]);
+}
+
+#[test]
+fn the_table_says_it_in_words_within_eighty_columns() {
+    let bench = Bench::new();
+    let names = sessions(bench.calibrated());
+    let done = bench.ok(&format!("replay --asset learnt.json {names}"));
+    assert!(done.stdout.lines().all(|line| line.chars().count() <= 80), "{}", done.stdout);
+    assert!(done.stdout.contains("no fault"));
+    assert!(done.stdout.contains("x_servo (dead) confirmed since"));
+    assert_eq!(done.stderr, "");
+}
