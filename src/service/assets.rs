@@ -97,12 +97,13 @@ impl Service {
     async fn replace(&self, rig: Rig) -> Result<(), ServiceError> {
         let name = rig.name.clone();
         self.call(&name, move |_, running, work| {
-            let document = views::to_json(&asset::view(&rig))?;
-            running.row.document = document;
-            running.row.revision += 1;
-            running.row.updated_at = work.at;
+            running.update(views::to_json(&asset::view(&rig))?, work);
+            if running.rig.calibration != rig.calibration {
+                // The file's own calibration is none of those on record.
+                let (asset, id) = (running.row.name.clone(), String::new());
+                work.writes.push(Write::ActivateCalibration { asset, id });
+            }
             running.rig = rig;
-            work.writes.push(Write::UpdateAsset(running.row.clone()));
             Ok(())
         })
         .await

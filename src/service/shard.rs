@@ -19,7 +19,7 @@ pub(super) type Job = Box<dyn FnOnce(&mut Shard) + Send>;
 pub(super) struct Context {
     pub(super) store: Store,
     pub(super) clock: Clock,
-    runtime: Handle,
+    pub(super) runtime: Handle,
     writer: mpsc::Sender<WriteSet>,
 }
 
