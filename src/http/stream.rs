@@ -117,8 +117,10 @@ enum End {
 /// A batch whose acknowledgement is owed.
 struct Owed {
     id: Option<String>,
-    answer: Pin<Box<dyn Future<Output = Result<AckView, ServiceError>> + Send>>,
+    answer: Answer,
 }
+
+type Answer = Pin<Box<dyn Future<Output = Result<AckView, ServiceError>> + Send>>;
 
 struct Session {
     socket: WebSocket,
@@ -238,15 +240,17 @@ impl Session {
         }
     }
 
+    /// Takes a batch; its answer comes after those of the ones before.
     async fn batch(&mut self, document: &[u8]) -> Result<(), End> {
         let parsed = telemetry::json(document, self.app.service.limits().batch_samples);
-        let mut batch = match parsed {
-            Ok(batch) => batch,
-            Err(error) => return self.answer(None, Err(error.into())).await,
+        let (id, submitted) = match parsed {
+            Ok(mut batch) => {
+                let id = batch.id.take();
+                (id, self.app.service.submit_in_turn(&self.asset, batch, false).await)
+            }
+            Err(error) => (None, Err(error.into())),
         };
-        let id = batch.id.take();
-        let submitted = self.app.service.submit_in_turn(&self.asset, batch, false).await;
-        let answer: Pin<Box<dyn Future<Output = _> + Send>> = match submitted {
+        let answer: Answer = match submitted {
             Ok(pending) => Box::pin(Pending::acknowledged(pending)),
             Err(error) => Box::pin(std::future::ready(Err(error))),
         };

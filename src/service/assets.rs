@@ -10,6 +10,14 @@ use crate::vocabulary::Invalid;
 use crate::wire::asset::{self, AssetView};
 use crate::wire::service::{Page, StateView, state_view};
 
+/// The rig of an asset file. What is no JSON at all is wrong as a whole, not in
+/// the element at which reading stopped.
+fn parse(document: &[u8]) -> Result<Rig, Invalid> {
+    let json = serde_json::from_slice::<serde::de::IgnoredAny>(document);
+    json.map_err(|error| Invalid::new("", error.to_string()))?;
+    asset::parse(document)
+}
+
 impl Service {
     /// # Errors
     /// [`ServiceError::UnknownAsset`].
@@ -39,7 +47,7 @@ impl Service {
     /// [`ServiceError::Invalid`] naming the element of the asset file;
     /// [`ServiceError::AssetExists`]; [`ServiceError::RegistryFull`].
     pub async fn create_asset(&self, document: &[u8]) -> Result<AssetView, ServiceError> {
-        let rig = asset::parse(document)?;
+        let rig = parse(document)?;
         self.create(&rig).await?;
         Ok(asset::view(&rig))
     }
@@ -78,7 +86,7 @@ impl Service {
         name: &str,
         document: &[u8],
     ) -> Result<(AssetView, bool), ServiceError> {
-        let rig = asset::parse(document)?;
+        let rig = parse(document)?;
         if rig.name != name {
             let reason = format!("is `{}`, but the address says `{name}`", rig.name);
             return Err(Invalid::new("/name", reason).into());

@@ -39,7 +39,7 @@ impl Service {
         }
         for (i, id) in sessions.iter().enumerate() {
             let row = self.inner.store.session(id).await?;
-            if !row.is_some_and(|row| row.asset == asset) {
+            if row.is_none_or(|row| row.asset != asset) {
                 let reason = format!("asset `{asset}` has no session `{id}`");
                 return Err(Invalid::new(format!("/sessions/{i}"), reason).into());
             }
