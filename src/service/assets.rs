@@ -131,19 +131,19 @@ impl Service {
         .await
     }
 
-    /// Where the twin of `name` stands.
+    /// Where the twin of `name` stands, samples under way included.
     ///
     /// # Errors
     /// [`ServiceError::UnknownAsset`].
     pub async fn state(&self, name: &str) -> Result<StateView, ServiceError> {
         let asset = name.to_owned();
-        self.call(name, move |_, running, _| {
+        self.look(name, move |running| {
             let Some(open) = &running.open else {
-                return Ok(state_view(&asset, None, &crate::engine::State::default()));
+                return state_view(&asset, None, &crate::engine::State::default());
             };
             let samples = u64::try_from(open.progress.n_samples).unwrap_or_default();
             let session = (open.id.as_str(), open.name.as_str(), samples);
-            Ok(state_view(&asset, Some(session), &open.engine.state()))
+            state_view(&asset, Some(session), &open.engine.state())
         })
         .await
     }

@@ -198,6 +198,21 @@ impl Service {
     }
 }
 
+impl Service {
+    /// Looks at `asset` on its shard; what is seen may not be durable yet.
+    async fn look<T: Send + 'static>(
+        &self,
+        asset: &str,
+        look: impl FnOnce(&Running) -> T + Send + 'static,
+    ) -> Result<T, ServiceError> {
+        let (reply, answer) = oneshot::channel();
+        let name = asset.to_owned();
+        let job: Job = Box::new(move |shard| shard.look(&name, look, reply));
+        self.shard(asset).try_send(job).map_err(ServiceError::from_full)?;
+        settled(answer.await)
+    }
+}
+
 /// The answer, or that whoever was to give it is gone.
 fn settled<T>(
     answer: Result<Result<T, ServiceError>, oneshot::error::RecvError>,

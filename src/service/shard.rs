@@ -132,6 +132,21 @@ impl Shard {
         }
     }
 
+    /// Looks at the running asset `name`; what is seen may not be durable yet.
+    pub(super) fn look<T>(
+        &mut self,
+        name: &str,
+        look: impl FnOnce(&Running) -> T,
+        reply: oneshot::Sender<Result<T, ServiceError>>,
+    ) {
+        let seen = self.take(name).map(|running| {
+            let seen = look(&running);
+            self.running.insert(name.to_owned(), running);
+            seen
+        });
+        drop(reply.send(seen));
+    }
+
     /// Writes what `make` says if there is no asset `name`.
     pub(super) fn create(
         &mut self,
