@@ -117,7 +117,7 @@ impl Default for LimitsConfig {
 impl Default for WorkersConfig {
     fn default() -> Self {
         let limits = Limits::default();
-        Self { shards: limits.shards, queue: limits.shard_queue, jobs: 1 }
+        Self { shards: limits.shards, queue: limits.shard_queue, jobs: limits.jobs }
     }
 }
 
@@ -224,6 +224,7 @@ impl Config {
     pub fn service_limits(&self) -> Limits {
         Limits {
             shards: self.workers.shards,
+            jobs: self.workers.jobs,
             shard_queue: self.workers.queue,
             in_flight_samples: self.limits.in_flight_samples,
             batch_samples: self.limits.batch_samples,

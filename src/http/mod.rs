@@ -5,12 +5,14 @@
 
 mod assets;
 mod body;
+mod calibrations;
 mod events;
 mod faults;
 mod layers;
 mod operations;
 mod page;
 mod problem;
+mod replays;
 mod sessions;
 mod stream;
 mod telemetry;
@@ -108,7 +110,12 @@ fn api() -> OpenApiRouter<App> {
         .routes(routes!(sessions::list))
         .routes(routes!(sessions::get, sessions::delete))
         .routes(routes!(sessions::end))
-        .routes(routes!(sessions::telemetry));
+        .routes(routes!(sessions::telemetry))
+        .routes(routes!(replays::create))
+        .routes(routes!(replays::get))
+        .routes(routes!(calibrations::list, calibrations::create))
+        .routes(routes!(calibrations::get))
+        .routes(routes!(calibrations::activate));
     OpenApiRouter::with_openapi(Api::openapi())
         .routes(routes!(operations::healthz))
         .routes(routes!(operations::readyz))

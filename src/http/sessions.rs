@@ -73,7 +73,7 @@ pub(super) async fn open(
     Ok(created(&session.id.clone(), session))
 }
 
-/// A small JSON body, its default if it is empty.
+/// A small JSON body, its default if it is empty or null.
 pub(super) async fn small<T: Default + serde::de::DeserializeOwned>(
     app: &App,
     body: Body,
@@ -84,12 +84,12 @@ pub(super) async fn small<T: Default + serde::de::DeserializeOwned>(
         return Ok(T::default());
     }
     let mut json = serde_json::Deserializer::from_slice(&read.bytes);
-    let parsed = serde_path_to_error::deserialize(&mut json).map_err(|error| {
+    let parsed: Option<T> = serde_path_to_error::deserialize(&mut json).map_err(|error| {
         let pointer = crate::wire::asset::pointer(error.path());
         Problem::from(Invalid::new(pointer, error.inner().to_string()))
     })?;
     json.end().map_err(|error| Problem::from(Invalid::new("", error.to_string())))?;
-    Ok(parsed)
+    Ok(parsed.unwrap_or_default())
 }
 
 /// Imports a recorded CSV as a session, by the path that live samples take. It

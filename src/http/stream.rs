@@ -16,7 +16,7 @@ use axum::http::StatusCode;
 use axum::response::Response;
 use serde::Deserialize;
 use serde_json::json;
-use tokio::time::{Instant, Interval, MissedTickBehavior, interval, timeout};
+use tokio::time::{Instant, Interval, MissedTickBehavior, interval_at, timeout};
 use utoipa::ToSchema;
 
 use super::layers::about;
@@ -117,8 +117,10 @@ enum End {
 /// A batch whose acknowledgement is owed.
 struct Owed {
     id: Option<String>,
-    answer: Pin<Box<dyn Future<Output = Result<AckView, ServiceError>> + Send>>,
+    answer: Answer,
 }
+
+type Answer = Pin<Box<dyn Future<Output = Result<AckView, ServiceError>> + Send>>;
 
 struct Session {
     socket: WebSocket,
@@ -150,7 +152,7 @@ impl Session {
         period: Option<Duration>,
     ) -> Self {
         let ticks = |period| {
-            let mut ticks = interval(period);
+            let mut ticks = interval_at(Instant::now() + period, period);
             ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
             ticks
         };
@@ -238,15 +240,17 @@ impl Session {
         }
     }
 
+    /// Takes a batch; its answer comes after those of the ones before.
     async fn batch(&mut self, document: &[u8]) -> Result<(), End> {
         let parsed = telemetry::json(document, self.app.service.limits().batch_samples);
-        let mut batch = match parsed {
-            Ok(batch) => batch,
-            Err(error) => return self.answer(None, Err(error.into())).await,
+        let (id, submitted) = match parsed {
+            Ok(mut batch) => {
+                let id = batch.id.take();
+                (id, self.app.service.submit_in_turn(&self.asset, batch, false).await)
+            }
+            Err(error) => (None, Err(error.into())),
         };
-        let id = batch.id.take();
-        let submitted = self.app.service.submit_in_turn(&self.asset, batch, false).await;
-        let answer: Pin<Box<dyn Future<Output = _> + Send>> = match submitted {
+        let answer: Answer = match submitted {
             Ok(pending) => Box::pin(Pending::acknowledged(pending)),
             Err(error) => Box::pin(std::future::ready(Err(error))),
         };

@@ -10,6 +10,14 @@ use crate::vocabulary::Invalid;
 use crate::wire::asset::{self, AssetView};
 use crate::wire::service::{Page, StateView, state_view};
 
+/// The rig of an asset file. What is no JSON at all is wrong as a whole, not in
+/// the element at which reading stopped.
+fn parse(document: &[u8]) -> Result<Rig, Invalid> {
+    let json = serde_json::from_slice::<serde::de::IgnoredAny>(document);
+    json.map_err(|error| Invalid::new("", error.to_string()))?;
+    asset::parse(document)
+}
+
 impl Service {
     /// # Errors
     /// [`ServiceError::UnknownAsset`].
@@ -39,7 +47,7 @@ impl Service {
     /// [`ServiceError::Invalid`] naming the element of the asset file;
     /// [`ServiceError::AssetExists`]; [`ServiceError::RegistryFull`].
     pub async fn create_asset(&self, document: &[u8]) -> Result<AssetView, ServiceError> {
-        let rig = asset::parse(document)?;
+        let rig = parse(document)?;
         self.create(&rig).await?;
         Ok(asset::view(&rig))
     }
@@ -78,7 +86,7 @@ impl Service {
         name: &str,
         document: &[u8],
     ) -> Result<(AssetView, bool), ServiceError> {
-        let rig = asset::parse(document)?;
+        let rig = parse(document)?;
         if rig.name != name {
             let reason = format!("is `{}`, but the address says `{name}`", rig.name);
             return Err(Invalid::new("/name", reason).into());
@@ -97,12 +105,13 @@ impl Service {
     async fn replace(&self, rig: Rig) -> Result<(), ServiceError> {
         let name = rig.name.clone();
         self.call(&name, move |_, running, work| {
-            let document = views::to_json(&asset::view(&rig))?;
-            running.row.document = document;
-            running.row.revision += 1;
-            running.row.updated_at = work.at;
+            running.update(views::to_json(&asset::view(&rig))?, work);
+            if running.rig.calibration != rig.calibration {
+                // The file's own calibration is none of those on record.
+                let (asset, id) = (running.row.name.clone(), String::new());
+                work.writes.push(Write::ActivateCalibration { asset, id });
+            }
             running.rig = rig;
-            work.writes.push(Write::UpdateAsset(running.row.clone()));
             Ok(())
         })
         .await
@@ -122,19 +131,19 @@ impl Service {
         .await
     }
 
-    /// Where the twin of `name` stands.
+    /// Where the twin of `name` stands, samples under way included.
     ///
     /// # Errors
     /// [`ServiceError::UnknownAsset`].
     pub async fn state(&self, name: &str) -> Result<StateView, ServiceError> {
         let asset = name.to_owned();
-        self.call(name, move |_, running, _| {
+        self.look(name, move |running| {
             let Some(open) = &running.open else {
-                return Ok(state_view(&asset, None, &crate::engine::State::default()));
+                return state_view(&asset, None, &crate::engine::State::default());
             };
             let samples = u64::try_from(open.progress.n_samples).unwrap_or_default();
             let session = (open.id.as_str(), open.name.as_str(), samples);
-            Ok(state_view(&asset, Some(session), &open.engine.state()))
+            state_view(&asset, Some(session), &open.engine.state())
         })
         .await
     }

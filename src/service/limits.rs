@@ -7,6 +7,8 @@ use std::time::Duration;
 pub struct Limits {
     /// Threads that run engines.
     pub shards: usize,
+    /// Replays and calibrations at a time; others wait.
+    pub jobs: usize,
     /// Requests that wait for one shard; the next is told to come again.
     pub shard_queue: usize,
     /// Write sets that wait for the writer; then the shards wait for it.
@@ -29,6 +31,7 @@ impl Default for Limits {
     fn default() -> Self {
         Self {
             shards: std::thread::available_parallelism().map_or(2, usize::from).clamp(1, 16),
+            jobs: 1,
             shard_queue: 256,
             commit_queue: 1024,
             in_flight_samples: 500_000,

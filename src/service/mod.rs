@@ -12,14 +12,18 @@
 //! samples (arrival, opening, actions); no judgement depends on it.
 
 mod assets;
+mod calibrations;
 mod clock;
 mod commit;
 mod error;
 mod events;
 mod faults;
 mod import;
+mod jobs;
 mod limits;
+mod playback;
 mod rebuild;
+mod replays;
 mod running;
 mod sessions;
 mod shard;
@@ -31,6 +35,7 @@ use std::sync::Arc;
 
 use tokio::sync::{Semaphore, mpsc, oneshot};
 use tokio::task::JoinHandle;
+use tokio_util::sync::CancellationToken;
 
 pub use clock::Clock;
 pub use error::ServiceError;
@@ -58,6 +63,8 @@ struct Inner {
     events: Events,
     shards: Vec<mpsc::Sender<Job>>,
     writer: mpsc::Sender<WriteSet>,
+    jobs: mpsc::Sender<jobs::Job>,
+    bench: jobs::Bench,
     /// One permit for each sample between arrival and commit.
     in_flight: Arc<Semaphore>,
 }
@@ -65,13 +72,22 @@ struct Inner {
 /// What runs behind a [`Service`]; ends when all its clones are dropped.
 pub struct Workers {
     shards: Vec<std::thread::JoinHandle<()>>,
+    jobs: Vec<JoinHandle<()>>,
+    closing: CancellationToken,
     committer: JoinHandle<Writer>,
 }
 
 impl Workers {
-    /// Waits until everything queued is judged and committed, and closes the
-    /// store's writer. All clones of the service must be dropped before.
+    /// Breaks off background jobs (they begin anew with the next start), waits
+    /// until everything queued is judged and committed, and closes the store's
+    /// writer. All clones of the service must be dropped before.
     pub async fn finish(self) {
+        self.closing.cancel();
+        for worker in self.jobs {
+            if worker.await.is_err() {
+                tracing::error!("a worker ended by panic");
+            }
+        }
         for shard in self.shards {
             let joined = tokio::task::spawn_blocking(move || shard.join()).await;
             if !matches!(joined, Ok(Ok(()))) {
@@ -112,13 +128,18 @@ impl Service {
             threads.push(Shard::spawn(number, context, queue)?);
             shards.push(jobs);
         }
+        let closing = CancellationToken::new();
+        let bench = jobs::Bench::new(store.clone(), clock, sets.clone(), closing.clone());
+        let (jobs, queue) = mpsc::channel(jobs::MAX_QUEUED);
+        let workers = jobs::spawn(limits.jobs, &bench, queue);
         let in_flight = Arc::new(Semaphore::new(limits.in_flight_samples));
-        let inner = Inner { store, limits, events, shards, writer: sets, in_flight };
-        Ok((Self { inner: Arc::new(inner) }, Workers { shards: threads, committer }))
+        let inner = Inner { store, limits, events, shards, writer: sets, jobs, bench, in_flight };
+        let workers = Workers { shards: threads, jobs: workers, closing, committer };
+        Ok((Self { inner: Arc::new(inner) }, workers))
     }
 
     /// Rebuilds the assets that have an open session, so that the first batch
-    /// after a restart need not wait. Returns how many there are.
+    /// after a restart need not wait, and takes up unfinished jobs. Returns how many there are.
     ///
     /// # Errors
     /// [`ServiceError::Unavailable`] if the store cannot be read.
@@ -130,6 +151,7 @@ impl Service {
                 tracing::error!(asset, %error, "cannot resume");
             }
         }
+        self.resume_jobs().await?;
         Ok(assets.len())
     }
 
@@ -171,6 +193,21 @@ impl Service {
         let (reply, answer) = oneshot::channel();
         let name = asset.to_owned();
         let job: Job = Box::new(move |shard| shard.act(&name, act, reply));
+        self.shard(asset).try_send(job).map_err(ServiceError::from_full)?;
+        settled(answer.await)
+    }
+}
+
+impl Service {
+    /// Looks at `asset` on its shard; what is seen may not be durable yet.
+    async fn look<T: Send + 'static>(
+        &self,
+        asset: &str,
+        look: impl FnOnce(&Running) -> T + Send + 'static,
+    ) -> Result<T, ServiceError> {
+        let (reply, answer) = oneshot::channel();
+        let name = asset.to_owned();
+        let job: Job = Box::new(move |shard| shard.look(&name, look, reply));
         self.shard(asset).try_send(job).map_err(ServiceError::from_full)?;
         settled(answer.await)
     }

@@ -2,12 +2,12 @@
 //! its recording, and so comes to the state it was in.
 
 use super::commit::Life;
-use super::running::{OpenSession, Running, input};
+use super::playback::{Flow, play};
+use super::running::{OpenSession, Running};
 use super::shard::Context;
 use super::{ServiceError, views};
-use crate::engine::Setup;
-use crate::store::{ActionKind, SessionRow};
-use crate::vocabulary::FaultCode;
+use crate::engine::{Input, Setup};
+use crate::store::SessionRow;
 
 /// The asset `name` as the store has it.
 pub(super) fn load(context: &Context, name: &str) -> Result<Running, ServiceError> {
@@ -24,25 +24,13 @@ fn reopen(context: &Context, row: &SessionRow) -> Result<OpenSession, ServiceErr
     let setup = Setup::new(views::rig(&row.setup)?, None)?;
     let baseline = views::memory(&row.baseline)?;
     let mut open = OpenSession::new(row.id.clone(), row.name.clone(), setup, baseline);
-    let mut actions = context.wait(context.store.actions(&row.id))?.into_iter().peekable();
-    let mut act = |open: &mut OpenSession| -> Result<(), ServiceError> {
-        while let Some(action) = actions.next_if(|a| a.after_index <= open.progress.n_samples) {
-            let kind: ActionKind = action.kind.parse()?;
-            let code: FaultCode = action.code.parse().map_err(ServiceError::corrupt)?;
-            open.input(input(kind, code));
+    play(&context.store, &context.runtime, &row.id, |input| {
+        match input {
+            Input::Sample(sample) => drop(open.take(&sample)),
+            action => open.input(action),
         }
-        Ok(())
-    };
-    while let Some((_, samples)) =
-        context.wait(context.store.chunk_from(&row.id, open.progress.n_samples))?
-    {
-        for sample in &samples {
-            act(&mut open)?;
-            open.take(sample);
-        }
-    }
-    act(&mut open)?;
-    open.progress.n_rejected = row.progress.n_rejected;
+        Flow::More
+    })?;
     open.n_transitions = context.wait(context.store.n_transitions(&row.id))?;
     if open.progress.n_samples != row.progress.n_samples {
         tracing::warn!(
@@ -51,7 +39,7 @@ fn reopen(context: &Context, row: &SessionRow) -> Result<OpenSession, ServiceErr
             taken = open.progress.n_samples,
             "this version takes other samples of the recording than the one that made it"
         );
-        open.progress.n_samples = row.progress.n_samples;
     }
+    open.progress = row.progress;
     Ok(open)
 }

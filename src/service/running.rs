@@ -158,6 +158,14 @@ impl OpenSession {
 }
 
 impl Running {
+    /// Replaces the asset file by `document`.
+    pub(super) fn update(&mut self, document: String, work: &mut Work) {
+        self.row.document = document;
+        self.row.revision += 1;
+        self.row.updated_at = work.at;
+        work.writes.push(Write::UpdateAsset(self.row.clone()));
+    }
+
     /// Opens a session; the one that was open must have been ended.
     pub(super) fn open(&mut self, name: String, work: &mut Work) -> Result<(), ServiceError> {
         let id = Uuid::now_v7().to_string();

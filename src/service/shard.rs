@@ -19,7 +19,7 @@ pub(super) type Job = Box<dyn FnOnce(&mut Shard) + Send>;
 pub(super) struct Context {
     pub(super) store: Store,
     pub(super) clock: Clock,
-    runtime: Handle,
+    pub(super) runtime: Handle,
     writer: mpsc::Sender<WriteSet>,
 }
 
@@ -130,6 +130,21 @@ impl Shard {
                 life.break_off();
             }
         }
+    }
+
+    /// Looks at the running asset `name`; what is seen may not be durable yet.
+    pub(super) fn look<T>(
+        &mut self,
+        name: &str,
+        look: impl FnOnce(&Running) -> T,
+        reply: oneshot::Sender<Result<T, ServiceError>>,
+    ) {
+        let seen = self.take(name).map(|running| {
+            let seen = look(&running);
+            self.running.insert(name.to_owned(), running);
+            seen
+        });
+        drop(reply.send(seen));
     }
 
     /// Writes what `make` says if there is no asset `name`.

@@ -202,3 +202,21 @@ pub struct ReplayView {
     pub result: Option<ReplayResultView>,
     pub error: Option<String>,
 }
+
+/// A calibration of an asset: learning it, and what was learnt.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct CalibrationJobView {
+    pub id: String,
+    pub asset: String,
+    /// `queued`, `running`, `done` or `failed`.
+    pub state: String,
+    /// The sessions it learns from.
+    pub sessions: Vec<String>,
+    pub made_at: String,
+    /// Whether it is in the asset file.
+    pub active: bool,
+    /// Once done.
+    pub calibration: Option<super::asset::CalibrationView>,
+    /// Once failed: what the data lack.
+    pub error: Option<String>,
+}

@@ -1,0 +1,45 @@
+//! Judging a session again.
+
+use axum::Json;
+use axum::body::Body;
+use axum::extract::{Path, State};
+use axum::http::StatusCode;
+use axum::http::header::LOCATION;
+use axum::response::IntoResponse;
+
+use super::sessions::small;
+use super::{App, Problem};
+use crate::service::Service;
+use crate::wire::service::{ReplaySettingsView, ReplayView};
+
+/// Judges a session again in the background, with other settings if the body
+/// has some. Nothing of the session or of the fault memory changes.
+#[utoipa::path(post, path = "/sessions/{id}/replays", tag = "sessions",
+    operation_id = "replay_session",
+    params(("id", description = "The service's id of the session")),
+    request_body = Option<ReplaySettingsView>,
+    responses((status = 202, body = ReplayView, description = "`Location` says where to look"),
+        (status = 400, body = Problem), (status = 404, body = Problem),
+        (status = 422, body = Problem), (status = 429, body = Problem)))]
+pub(super) async fn create(
+    State(app): State<App>,
+    Path(id): Path<String>,
+    body: Body,
+) -> Result<impl IntoResponse, Problem> {
+    let settings: ReplaySettingsView = small(&app, body).await?;
+    let replay = app.service.replay(&id, settings).await?;
+    let location = format!("/api/v1/replays/{}", replay.id);
+    Ok((StatusCode::ACCEPTED, [(LOCATION, location)], Json(replay)))
+}
+
+/// Where a replay stands; once done: its verdict, the hash, and how it differs
+/// from the recorded verdict.
+#[utoipa::path(get, path = "/replays/{id}", tag = "sessions", operation_id = "get_replay",
+    params(("id", description = "Id of the replay")),
+    responses((status = 200, body = ReplayView), (status = 404, body = Problem)))]
+pub(super) async fn get(
+    State(service): State<Service>,
+    Path(id): Path<String>,
+) -> Result<Json<ReplayView>, Problem> {
+    Ok(Json(service.replay_state(&id).await?))
+}

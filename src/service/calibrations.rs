@@ -1,0 +1,205 @@
+//! Learning a rig from sessions that were recorded of it.
+
+use sha2::{Digest, Sha256};
+use uuid::Uuid;
+
+use super::clock::rfc3339;
+use super::jobs::{Bench, Job};
+use super::{Service, ServiceError, views};
+use crate::diagnosis::Calibration;
+use crate::engine::{Rig, Setup, calibrate};
+use crate::store::{CalibrationRow, JobState, Write};
+use crate::vocabulary::{Invalid, Sample};
+use crate::wire::asset::{self, CalibrationView};
+use crate::wire::service::{CalibrationJobView, Page};
+use crate::wire::session_csv;
+use crate::wire::verdict::hex;
+
+/// Sessions that one calibration learns from; more are refused.
+const MAX_SESSIONS: usize = 32;
+
+/// Samples that one calibration learns from; with more it fails, and says so.
+const MAX_SAMPLES: usize = 2_000_000;
+
+impl Service {
+    /// Begins to learn `asset` from `sessions` of it.
+    ///
+    /// # Errors
+    /// [`ServiceError::Invalid`] for a session that is none of the asset's;
+    /// [`ServiceError::Busy`].
+    pub async fn calibrate(
+        &self,
+        asset: &str,
+        sessions: Vec<String>,
+    ) -> Result<CalibrationJobView, ServiceError> {
+        self.asset(asset).await?;
+        if !(1..=MAX_SESSIONS).contains(&sessions.len()) {
+            let reason = format!("must name 1 to {MAX_SESSIONS} sessions");
+            return Err(Invalid::new("/sessions", reason).into());
+        }
+        for (i, id) in sessions.iter().enumerate() {
+            let row = self.inner.store.session(id).await?;
+            if row.is_none_or(|row| row.asset != asset) {
+                let reason = format!("asset `{asset}` has no session `{id}`");
+                return Err(Invalid::new(format!("/sessions/{i}"), reason).into());
+            }
+        }
+        let place = self.job_place()?;
+        let row = CalibrationRow {
+            id: Uuid::now_v7().to_string(),
+            asset: asset.to_owned(),
+            state: JobState::Queued.to_string(),
+            sessions: views::to_json(&sessions)?,
+            made_at: self.inner.bench.clock.now(),
+            active: 0,
+            document: None,
+            error: None,
+        };
+        self.inner.bench.write(Write::PutCalibration(row.clone())).await?;
+        place.send(Job::Calibration(row.id.clone()));
+        view(row)
+    }
+
+    /// # Errors
+    /// [`ServiceError::UnknownCalibration`].
+    pub async fn calibration(
+        &self,
+        asset: &str,
+        id: &str,
+    ) -> Result<CalibrationJobView, ServiceError> {
+        view(self.calibration_row(asset, id).await?)
+    }
+
+    async fn calibration_row(&self, asset: &str, id: &str) -> Result<CalibrationRow, ServiceError> {
+        let row = self.inner.store.calibration(id).await?.filter(|row| row.asset == asset);
+        let (asset, id) = (asset.to_owned(), id.to_owned());
+        row.ok_or(ServiceError::UnknownCalibration { asset, id })
+    }
+
+    /// The calibrations of `asset`, newest first.
+    ///
+    /// # Errors
+    /// [`ServiceError::UnknownAsset`]; [`ServiceError::Invalid`] cursor.
+    pub async fn calibrations(
+        &self,
+        asset: &str,
+        cursor: Option<&str>,
+        limit: u32,
+    ) -> Result<Page<CalibrationJobView>, ServiceError> {
+        self.asset(asset).await?;
+        let before = cursor.map(views::cursor::<(i64, String)>).transpose()?;
+        let before = before.as_ref().map(|(made_at, id)| (*made_at, id.as_str()));
+        let rows = self.inner.store.calibrations(asset, before, limit + 1).await?;
+        views::page(rows, limit, |row| (row.made_at, row.id.clone()), view)
+    }
+
+    /// Puts a calibration into the asset file. An open session goes on with
+    /// what it began with; the next one uses it.
+    ///
+    /// # Errors
+    /// [`ServiceError::UnknownCalibration`]; [`ServiceError::NotDone`].
+    pub async fn activate_calibration(
+        &self,
+        asset: &str,
+        id: &str,
+    ) -> Result<CalibrationJobView, ServiceError> {
+        let row = self.calibration_row(asset, id).await?;
+        let Some(document) = row.document else {
+            return Err(ServiceError::NotDone { id: row.id, state: row.state });
+        };
+        let learnt: CalibrationView = views::from_json(&document)?;
+        let id = row.id.clone();
+        self.call(asset, move |_, running, work| {
+            let mut file = asset::view(&running.rig);
+            file.calibration = Some(learnt);
+            running.rig = asset::rig(&file)?;
+            running.update(views::to_json(&file)?, work);
+            let asset = running.row.name.clone();
+            work.writes.push(Write::ActivateCalibration { asset, id });
+            Ok(())
+        })
+        .await?;
+        self.calibration(asset, &row.id).await
+    }
+}
+
+fn view(row: CalibrationRow) -> Result<CalibrationJobView, ServiceError> {
+    Ok(CalibrationJobView {
+        id: row.id,
+        asset: row.asset,
+        state: row.state,
+        sessions: views::from_json(&row.sessions)?,
+        made_at: rfc3339(row.made_at),
+        active: row.active != 0,
+        calibration: row.document.as_deref().map(views::from_json).transpose()?,
+        error: row.error,
+    })
+}
+
+/// Runs a calibration to its end.
+pub(super) async fn run(bench: &Bench, id: &str) -> Result<(), ServiceError> {
+    let Some(mut row) = bench.store.calibration(id).await? else { return Ok(()) };
+    row.state = JobState::Running.to_string();
+    bench.write(Write::PutCalibration(row.clone())).await?;
+    let (worker, job) = (bench.clone(), row.clone());
+    let learnt = tokio::task::spawn_blocking(move || learn(&worker, &job)).await;
+    match learnt.unwrap_or_else(|_| Err("the calibration has failed".to_owned())) {
+        Ok(calibration) => {
+            row.state = JobState::Done.to_string();
+            row.document = Some(views::to_json(&asset::calibration_view(&calibration))?);
+        }
+        Err(reason) => {
+            row.state = JobState::Failed.to_string();
+            row.error = Some(reason);
+        }
+    }
+    bench.write(Write::PutCalibration(row)).await
+}
+
+/// What is learnt, or the sentence that says what is missing.
+fn learn(bench: &Bench, row: &CalibrationRow) -> Result<Calibration, String> {
+    let say = |error: ServiceError| error.to_string();
+    let rig = bench.runtime.block_on(rig(bench, &row.asset)).map_err(say)?;
+    let ids: Vec<String> = views::from_json(&row.sessions).map_err(say)?;
+    let mut hash = Sha256::new();
+    let mut sessions = Vec::new();
+    let mut room = MAX_SAMPLES;
+    for id in &ids {
+        let samples = bench.runtime.block_on(recording(bench, id, room)).map_err(say)?;
+        room -= samples.len();
+        hash.update(csv(&samples));
+        sessions.push(samples);
+    }
+    let sha256 = hex(&hash.finalize());
+    calibrate(&rig, &sessions, &sha256, &rfc3339(row.made_at)).map_err(|e| e.to_string())
+}
+
+/// The asset's rig, of which the set-up can be made.
+async fn rig(bench: &Bench, asset: &str) -> Result<Rig, ServiceError> {
+    let row = bench.store.asset(asset).await?;
+    let row = row.ok_or_else(|| ServiceError::UnknownAsset { name: asset.to_owned() })?;
+    let rig = views::rig(&row.document)?;
+    Setup::new(rig.clone(), None)?;
+    Ok(rig)
+}
+
+async fn recording(bench: &Bench, id: &str, room: usize) -> Result<Vec<Sample>, ServiceError> {
+    let mut samples: Vec<Sample> = Vec::new();
+    let next = |n: usize| i64::try_from(n).unwrap_or(i64::MAX);
+    while let Some((_, chunk)) = bench.store.chunk_from(id, next(samples.len())).await? {
+        samples.extend(chunk);
+        if samples.len() > room {
+            let (what, limit) = ("samples in the sessions of a calibration", MAX_SAMPLES);
+            return Err(ServiceError::TooMany { what, limit });
+        }
+    }
+    Ok(samples)
+}
+
+/// The session file of `samples`, as it is exported: its hash names the data.
+fn csv(samples: &[Sample]) -> Vec<u8> {
+    let mut text = Vec::new();
+    // A vector takes everything that is written to it.
+    let _ = session_csv::write(&mut text, samples);
+    text
+}

@@ -1,0 +1,50 @@
+//! A recorded session once more: its samples and what people did, in order.
+
+use tokio::runtime::Handle;
+
+use super::ServiceError;
+use super::running::input;
+use crate::engine::Input;
+use crate::store::{ActionKind, Store};
+use crate::vocabulary::FaultCode;
+
+/// Gives the inputs of `session` to `take`, in the order in which they came,
+/// until it says that it is enough. Waits for the store on the calling thread,
+/// which must not be one of the runtime's.
+pub(super) fn play(
+    store: &Store,
+    runtime: &Handle,
+    session: &str,
+    mut take: impl FnMut(Input) -> Flow,
+) -> Result<(), ServiceError> {
+    let mut actions = Vec::new();
+    for row in runtime.block_on(store.actions(session))? {
+        let kind: ActionKind = row.kind.parse()?;
+        let code: FaultCode = row.code.parse().map_err(ServiceError::corrupt)?;
+        actions.push((row.after_index, input(kind, code)));
+    }
+    let mut actions = actions.into_iter().peekable();
+    let mut n_played = 0;
+    while let Some((_, samples)) = runtime.block_on(store.chunk_from(session, n_played))? {
+        for sample in samples {
+            while let Some((_, action)) = actions.next_if(|(after, _)| *after <= n_played) {
+                take(action);
+            }
+            if take(Input::Sample(sample)) == Flow::Enough {
+                return Ok(());
+            }
+            n_played += 1;
+        }
+    }
+    actions.for_each(|(_, action)| {
+        take(action);
+    });
+    Ok(())
+}
+
+/// Whether to go on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Flow {
+    More,
+    Enough,
+}

@@ -1,0 +1,257 @@
+//! Judging a recorded session again, with other settings if wanted.
+
+use uuid::Uuid;
+
+use super::clock::rfc3339;
+use super::jobs::{Bench, Job};
+use super::playback::{Flow, play};
+use super::{Service, ServiceError, views};
+use crate::diagnosis::Profile;
+use crate::engine::{Engine, Input, Output, Rig, Setup};
+use crate::store::{JobState, ReplayRow, SessionRow, Write};
+use crate::vocabulary::Invalid;
+use crate::wire::asset;
+use crate::wire::service::{DifferenceView, ReplayResultView, ReplaySettingsView, ReplayView};
+use crate::wire::verdict::{FaultView, Verdict, fault_view};
+
+/// Fault lines, and differences, in a result; more are left out, and it says so.
+const MAX_LINES: usize = 10_000;
+
+/// Samples between two looks at whether the service is closing.
+const LOOK_EVERY: u64 = 1024;
+
+impl Service {
+    /// Begins to judge a session again.
+    ///
+    /// # Errors
+    /// [`ServiceError::UnknownSession`]; [`ServiceError::Invalid`] for settings
+    /// that cannot be; [`ServiceError::Busy`].
+    pub async fn replay(
+        &self,
+        session: &str,
+        settings: ReplaySettingsView,
+    ) -> Result<ReplayView, ServiceError> {
+        let session = self.session_row(session).await?;
+        setup(&session, &settings)?;
+        let place = self.job_place()?;
+        let row = ReplayRow {
+            id: Uuid::now_v7().to_string(),
+            session: session.id,
+            state: JobState::Queued.to_string(),
+            settings: views::to_json(&settings)?,
+            created_at: self.inner.bench.clock.now(),
+            finished_at: None,
+            result: None,
+            error: None,
+        };
+        self.inner.bench.write(Write::PutReplay(row.clone())).await?;
+        place.send(Job::Replay(row.id.clone()));
+        view(row, 0.0)
+    }
+
+    /// Where a replay stands, and its result.
+    ///
+    /// # Errors
+    /// [`ServiceError::UnknownReplay`].
+    pub async fn replay_state(&self, id: &str) -> Result<ReplayView, ServiceError> {
+        let share = self.inner.bench.progress.of(id);
+        let row = self.inner.store.replay(id).await?;
+        let row = row.ok_or_else(|| ServiceError::UnknownReplay { id: id.to_owned() })?;
+        view(row, share.unwrap_or(0.0))
+    }
+}
+
+fn view(row: ReplayRow, share: f64) -> Result<ReplayView, ServiceError> {
+    let done = row.state == JobState::Done.as_str();
+    Ok(ReplayView {
+        id: row.id,
+        session_id: row.session,
+        progress: if done { 1.0 } else { share },
+        state: row.state,
+        settings: views::from_json(&row.settings)?,
+        created_at: rfc3339(row.created_at),
+        finished_at: row.finished_at.map(rfc3339),
+        result: row.result.as_deref().map(views::from_json).transpose()?,
+        error: row.error,
+    })
+}
+
+/// The set-up for a replay of `session`.
+fn setup(session: &SessionRow, settings: &ReplaySettingsView) -> Result<Setup, ServiceError> {
+    let profile = settings.profile.as_deref().map(str::parse::<Profile>).transpose();
+    let profile = profile.map_err(|e| Invalid::new("/profile", e.to_string()))?;
+    Ok(Setup::new(rig(session, settings)?, profile)?)
+}
+
+fn rig(session: &SessionRow, settings: &ReplaySettingsView) -> Result<Rig, ServiceError> {
+    let Some(patch) = &settings.asset else { return views::rig(&session.setup) };
+    let mut document: serde_json::Value = views::from_json(&session.setup)?;
+    merge(&mut document, patch);
+    let bytes = views::to_json(&document)?.into_bytes();
+    let within = |e: Invalid| Invalid::new(format!("/asset{}", e.element), e.reason);
+    Ok(asset::parse(&bytes).map_err(within)?)
+}
+
+/// JSON merge patch (RFC 7396).
+fn merge(target: &mut serde_json::Value, patch: &serde_json::Value) {
+    use serde_json::Value;
+    let Value::Object(patch) = patch else {
+        *target = patch.clone();
+        return;
+    };
+    if !target.is_object() {
+        *target = Value::Object(serde_json::Map::new());
+    }
+    let Value::Object(target) = target else { return };
+    for (key, value) in patch {
+        if value.is_null() {
+            target.remove(key);
+        } else {
+            merge(target.entry(key.clone()).or_insert(Value::Null), value);
+        }
+    }
+}
+
+/// Runs a replay to its end, or leaves it unfinished when the service closes.
+pub(super) async fn run(bench: &Bench, id: &str) -> Result<(), ServiceError> {
+    let Some(mut row) = bench.store.replay(id).await? else { return Ok(()) };
+    row.state = JobState::Running.to_string();
+    bench.write(Write::PutReplay(row.clone())).await?;
+    let (worker, job) = (bench.clone(), row.clone());
+    let judged = tokio::task::spawn_blocking(move || judge(&worker, &job)).await;
+    let failed = ServiceError::Unavailable { what: "judging the recording has failed" };
+    match judged.unwrap_or(Err(failed)) {
+        Ok(None) => return Ok(()),
+        Ok(Some(result)) => {
+            row.state = JobState::Done.to_string();
+            row.result = Some(views::to_json(&result)?);
+        }
+        Err(error) => {
+            row.state = JobState::Failed.to_string();
+            row.error = Some(error.to_string());
+        }
+    }
+    row.finished_at = Some(bench.clock.now());
+    bench.write(Write::PutReplay(row)).await
+}
+
+/// The result; none if the service closes before.
+fn judge(bench: &Bench, row: &ReplayRow) -> Result<Option<ReplayResultView>, ServiceError> {
+    let session = bench.runtime.block_on(bench.store.session(&row.session))?;
+    let session =
+        session.ok_or_else(|| ServiceError::UnknownSession { id: row.session.clone() })?;
+    let recorded = recorded(bench, &session)?;
+    let setup = setup(&session, &views::from_json(&row.settings)?)?;
+    let mut player = Player {
+        engine: Engine::new(setup, views::memory(&session.baseline)?),
+        session: &session,
+        outputs: Vec::new(),
+        verdict: Verdict::default(),
+        faults: Vec::new(),
+        n_samples: 0,
+        stopped: false,
+    };
+    play(&bench.store, &bench.runtime, &session.id, |input| player.take(bench, &row.id, input))?;
+    if player.stopped {
+        return Ok(None);
+    }
+    if !session.is_open() {
+        player.put(Input::End);
+    }
+    Ok(Some(player.result(recorded)))
+}
+
+/// The transitions that the session's record has.
+fn recorded(bench: &Bench, session: &SessionRow) -> Result<Vec<FaultView>, ServiceError> {
+    let limit = u32::try_from(MAX_LINES + 1).unwrap_or(u32::MAX);
+    let rows = bench.runtime.block_on(bench.store.transitions(&session.id, 0, limit))?;
+    rows.iter().map(|row| views::from_json(&row.document)).collect()
+}
+
+struct Player<'a> {
+    engine: Engine,
+    session: &'a SessionRow,
+    outputs: Vec<Output>,
+    verdict: Verdict,
+    faults: Vec<FaultView>,
+    n_samples: u64,
+    stopped: bool,
+}
+
+impl Player<'_> {
+    fn take(&mut self, bench: &Bench, id: &str, input: Input) -> Flow {
+        let n_recorded = u64::try_from(self.session.progress.n_samples).unwrap_or_default();
+        if self.n_samples >= n_recorded && matches!(input, Input::Sample(_)) {
+            return Flow::Enough;
+        }
+        if self.n_samples.is_multiple_of(LOOK_EVERY) {
+            bench.progress.set(id, self.n_samples as f64 / n_recorded.max(1) as f64);
+            self.stopped = bench.closing.is_cancelled();
+        }
+        if self.stopped {
+            return Flow::Enough;
+        }
+        self.n_samples += u64::from(matches!(input, Input::Sample(_)));
+        self.put(input);
+        Flow::More
+    }
+
+    fn put(&mut self, input: Input) {
+        self.outputs.clear();
+        self.engine.handle(input, &mut self.outputs);
+        for output in &self.outputs {
+            self.verdict.take(output);
+            if let Output::Transition(transition) = output
+                && self.faults.len() <= MAX_LINES
+            {
+                self.faults.push(fault_view(&self.session.name, transition));
+            }
+        }
+    }
+
+    fn result(self, recorded: Vec<FaultView>) -> ReplayResultView {
+        let progress = self.session.progress;
+        let duration_s =
+            progress.last_t_s.zip(progress.first_t_s).map_or(0.0, |(last, first)| last - first);
+        let rejected = u64::try_from(progress.n_rejected).unwrap_or_default();
+        let summary =
+            self.verdict.summary(&self.session.name, self.n_samples, rejected, duration_s);
+        let truncated = self.faults.len() > MAX_LINES || recorded.len() > MAX_LINES;
+        let (mut faults, mut recorded) = (self.faults, recorded);
+        faults.truncate(MAX_LINES);
+        recorded.truncate(MAX_LINES);
+        let recorded_hash = self.session.verdict_hash.clone();
+        let differences = differences(recorded, &faults);
+        let same_hash = recorded_hash.as_ref().is_none_or(|hash| *hash == summary.verdict_hash);
+        let same = differences.is_empty() && same_hash;
+        ReplayResultView { faults, summary, recorded_hash, same, differences, truncated }
+    }
+}
+
+/// Whether two fault lines say the same, apart from the numbers behind them.
+fn agree(a: &FaultView, b: &FaultView) -> bool {
+    a.t_s.to_bits() == b.t_s.to_bits()
+        && (&a.code, &a.kind, &a.status, &a.status_byte)
+            == (&b.code, &b.kind, &b.status, &b.status_byte)
+        && a.onset_s.map(f64::to_bits) == b.onset_s.map(f64::to_bits)
+}
+
+/// Goes through both verdicts in the order of time.
+fn differences(recorded: Vec<FaultView>, replayed: &[FaultView]) -> Vec<DifferenceView> {
+    let mut differences = Vec::new();
+    let mut replayed = replayed.iter().peekable();
+    for recorded in recorded {
+        while let Some(early) = replayed.next_if(|r| r.t_s < recorded.t_s) {
+            differences.push(DifferenceView { recorded: None, replayed: Some(early.clone()) });
+        }
+        let partner = replayed.next_if(|r| r.t_s == recorded.t_s && r.code == recorded.code);
+        if !partner.is_some_and(|partner| agree(&recorded, partner)) {
+            let (recorded, replayed) = (Some(recorded), partner.cloned());
+            differences.push(DifferenceView { recorded, replayed });
+        }
+    }
+    let late = replayed.map(|r| DifferenceView { recorded: None, replayed: Some(r.clone()) });
+    differences.extend(late);
+    differences.truncate(MAX_LINES);
+    differences
+}

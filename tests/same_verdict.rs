@@ -1,0 +1,144 @@
+//! The same session by every way in: the same recording, the same verdict.
+
+mod support;
+
+use futures_util::{SinkExt, StreamExt};
+use offbd::vocabulary::Sample;
+use serde_json::{Value, json};
+use support::{Bench, Client, batch, csv, judged, rig};
+use tokio_tungstenite::connect_async;
+use tokio_tungstenite::tungstenite::Message;
+
+/// The hash of session `s` of `asset`, which is ended, and its recording.
+async fn settled(client: &Client, asset: &str) -> (String, Vec<Sample>) {
+    let session = client.end(asset, "s").await;
+    let hash = session["verdict"]["verdict_hash"].as_str().unwrap().to_owned();
+    (hash, client.recording(asset, "s").await)
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn whatever_the_way_in() {
+    let bench = Bench::start().await;
+    let client = &bench.client;
+    let samples = rig(3000, 1500);
+    let (hash, faults) = judged("a", &samples);
+    assert!(faults.contains(&"x_servo".to_owned()), "{faults:?}");
+    for asset in ["ones", "hundreds", "columns", "lines", "csv", "socket", "imported"] {
+        client.asset(asset).await;
+    }
+    for sample in &samples {
+        client.telemetry("ones", Some("s"), std::slice::from_ref(sample)).await;
+    }
+    for part in samples.chunks(100) {
+        client.telemetry("hundreds", Some("s"), part).await;
+    }
+    for part in samples.chunks(777) {
+        client.post("assets/columns/telemetry", &columns(part)).await.expect(200);
+        let path = "assets/csv/telemetry?session=s";
+        client.post_text(path, "text/csv", csv(part)).await.expect(200);
+        let path = "assets/lines/telemetry?session=s";
+        client.post_text(path, "application/x-ndjson", lines(part)).await.expect(200);
+    }
+    over_websocket(client, "socket", &samples).await;
+    let path = "assets/imported/sessions/import?name=s";
+    let imported = client.post_text(path, "text/csv", csv(&samples)).await.expect(201);
+    assert_eq!(imported["accepted"], 3000);
+    for asset in ["ones", "hundreds", "columns", "lines", "csv", "socket", "imported"] {
+        let (found, recording) = settled(client, asset).await;
+        assert_eq!(found, hash, "{asset}");
+        assert_eq!(recording, samples, "{asset}");
+    }
+}
+
+fn columns(samples: &[Sample]) -> Value {
+    let column = |get: fn(&Sample) -> Value| samples.iter().map(get).collect::<Value>();
+    json!({
+        "session": "s",
+        "seq": column(|s| json!(s.seq)),
+        "t_s": column(|s| json!(s.t_s)),
+        "cmd_qx_rad": column(|s| json!(s.cmd_qx_rad)),
+        "cmd_qy_rad": column(|s| json!(s.cmd_qy_rad)),
+        "x_m": column(|s| json!(s.x_m)),
+        "y_m": column(|s| json!(s.y_m)),
+    })
+}
+
+fn lines(samples: &[Sample]) -> String {
+    let line = |s: &Sample| serde_json::to_string(&offbd::wire::telemetry::sample_view(s)).unwrap();
+    samples.iter().map(line).collect::<Vec<_>>().join("\n")
+}
+
+/// Sends everything before it reads an answer, then reads them all.
+async fn over_websocket(client: &Client, asset: &str, samples: &[Sample]) {
+    let url = format!("ws://{}/api/v1/assets/{asset}/stream?state=20", client.address);
+    let (mut socket, _) = connect_async(url).await.unwrap();
+    let parts: Vec<_> = samples.chunks(50).collect();
+    for (i, part) in parts.iter().enumerate() {
+        let mut frame = batch(Some("s"), part);
+        frame["id"] = json!(i);
+        socket.send(Message::text(frame.to_string())).await.unwrap();
+    }
+    socket.send(Message::text("{\"samples\":[")).await.unwrap();
+    let (mut next, mut faults, mut states) = (0, 0, 0);
+    loop {
+        let frame = tokio::time::timeout(support::DEADLINE, socket.next()).await.unwrap();
+        let Message::Text(text) = frame.unwrap().unwrap() else { continue };
+        let frame: Value = serde_json::from_str(&text).unwrap();
+        match frame["type"].as_str().unwrap() {
+            "ack" => {
+                assert_eq!(frame["id"], next.to_string());
+                assert_eq!(frame["accepted"], 50);
+                next += 1;
+            }
+            "fault" => faults += 1,
+            "state" => states += 1,
+            "error" => {
+                assert_eq!(frame["problem"]["status"], 400);
+                break;
+            }
+            other => panic!("{other}: {frame}"),
+        }
+    }
+    assert_eq!(next, parts.len());
+    assert!(faults > 0 && states > 0, "{faults} faults, {states} states");
+    socket.close(None).await.unwrap();
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_replay_says_the_same_unless_asked_otherwise() {
+    let bench = Bench::start().await;
+    let client = &bench.client;
+    client.asset("a").await;
+    let samples = rig(3000, 1500);
+    client.telemetry("a", Some("s"), &samples[..2500]).await;
+    client.delete("assets/a/faults/x_servo?by=me").await.expect(204);
+    client.telemetry("a", Some("s"), &samples[2500..]).await;
+    let session = client.end("a", "s").await;
+    let path = format!("sessions/{}/replays", session["id"].as_str().unwrap());
+
+    let replay = replayed(client, &path, &Value::Null).await;
+    let result = &replay["result"];
+    assert_eq!(result["same"], true, "{replay}");
+    assert_eq!(result["summary"]["verdict_hash"], session["verdict"]["verdict_hash"]);
+    assert_eq!(result["recorded_hash"], session["verdict"]["verdict_hash"]);
+    assert_eq!(result["differences"], json!([]));
+    assert!(!result["faults"].as_array().unwrap().is_empty());
+
+    let settings = json!({"profile":"textbook","asset":{"ball":{"mass_kg":0.1}}});
+    let replay = replayed(client, &path, &settings).await;
+    assert_eq!(replay["result"]["same"], false);
+    assert!(!replay["result"]["differences"].as_array().unwrap().is_empty());
+    assert_eq!(replay["settings"], settings);
+}
+
+async fn replayed(client: &Client, path: &str, settings: &Value) -> Value {
+    let answer = client.post(path, settings).await;
+    let id = answer.expect(202)["id"].as_str().unwrap().to_owned();
+    assert_eq!(answer.headers["location"], format!("/api/v1/replays/{id}"));
+    support::eventually(|| async {
+        let replay = client.get(&format!("replays/{id}")).await.expect(200);
+        assert_ne!(replay["state"], "failed", "{replay}");
+        (replay["state"] == "done").then_some(replay)
+    })
+    .await
+}
