@@ -323,7 +323,7 @@ pub fn view(rig: &Rig) -> AssetView {
         },
         plate: plate_view(&rig.plate),
         servo: servo_view(&rig.servo),
-        axes: (rig.mapping != AxisMapping::default()).then(|| AxesView {
+        axes: (rig.mapping != AxisMapping::default()).then_some(AxesView {
             swap: rig.mapping.swap,
             x_sign: rig.mapping.sign.x,
             y_sign: rig.mapping.sign.y,

@@ -6,7 +6,7 @@ use sha2::{Digest, Sha256};
 use utoipa::ToSchema;
 
 use crate::diagnosis::{AxisEvidence, Candidate, Evidence, Transition};
-use crate::engine::Output;
+use crate::engine::{Admission, Output};
 use crate::vocabulary::{Axis, FaultCode, FaultStatus};
 
 /// A change of a fault's status.
@@ -212,19 +212,27 @@ fn sensor_sentence(evidence: &Evidence) -> String {
 
 /// A verdict as it grows: which codes were confirmed, and the hash.
 ///
-/// The hash covers every transition that the data caused (time, code, kind,
-/// status, byte, onset), so it tells two verdicts apart where anything that
-/// matters differs.
+/// The hash covers how many samples were judged and every transition that they
+/// caused (time, code, kind, status, byte, onset), so it tells two verdicts
+/// apart where anything that matters differs.
 #[derive(Clone, Debug, Default)]
 pub struct Verdict {
     hash: Sha256,
+    n_accepted: u64,
     confirmed: Vec<FaultCode>,
 }
 
 impl Verdict {
     /// Takes note of one output of the engine.
     pub fn take(&mut self, output: &Output) {
-        let Output::Transition(transition) = output else { return };
+        let transition = match output {
+            Output::Admitted(Admission::Accepted) => {
+                self.n_accepted += 1;
+                return;
+            }
+            Output::Admitted(_) => return,
+            Output::Transition(transition) => transition,
+        };
         let time = |t: f64| t.to_bits().to_le_bytes();
         self.hash.update(time(transition.at.seconds()));
         self.hash.update([
@@ -246,10 +254,11 @@ impl Verdict {
         &self.confirmed
     }
 
-    /// Lower-case hexadecimal SHA-256 of the transitions so far.
+    /// Lower-case hexadecimal SHA-256 of the verdict so far.
     #[must_use]
     pub fn hash(&self) -> String {
-        hex(&self.hash.clone().finalize())
+        let hash = self.hash.clone().chain_update(self.n_accepted.to_le_bytes());
+        hex(&hash.finalize())
     }
 
     /// The summary line of a session.
