@@ -1,0 +1,141 @@
+#!/usr/bin/env python3
+"""Sends telemetry of a rig to offbd, from a CSV file or from a device's output.
+
+    edge_client.py --asset my-rig session.csv
+    my_logger | edge_client.py --asset my-rig --register rig.json -
+
+Python's standard library only. Rows go in numbered batches; a batch is sent
+again, with growing pauses, until the service acknowledges that it is stored.
+Sent twice it counts once, so nothing is lost and nothing is doubled, whatever
+happens to the line. The rows are CSV with the header
+t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m (and `seq`, if the device counts).
+"""
+
+import argparse
+import csv
+import json
+import queue
+import random
+import sys
+import threading
+import time
+import urllib.error
+import urllib.parse
+import urllib.request
+
+COLUMNS = ("t_s", "cmd_qx_rad", "cmd_qy_rad", "x_m", "y_m")
+LONGEST_PAUSE_S = 30.0
+TIMEOUT_S = 30.0
+
+
+def main():
+    args = parse_arguments()
+    base = f"{args.url}/api/v1/assets/{urllib.parse.quote(args.asset)}"
+    if args.register:
+        with open(args.register, "rb") as file:
+            deliver("PUT", base, file.read())
+    session = args.session or time.strftime("edge-%Y%m%dT%H%M%S", time.gmtime())
+    rows = queue.Queue()
+    source = sys.stdin if args.file == "-" else open(args.file, newline="")
+    threading.Thread(target=read, args=(source, rows), daemon=True).start()
+    sent = accepted = 0
+    for batch in batches(rows, args.rows, args.seconds):
+        body = json.dumps({"session": session, "samples": batch}).encode()
+        ack = deliver("POST", base + "/telemetry", body)
+        sent += len(batch)
+        accepted += ack["accepted"] + ack["duplicate"]
+        for row in ack["rejected"]:
+            say(f"seq {batch[row['index']]['seq']} rejected: {row['reason']}")
+    say(f"session {session}: {sent} rows sent, {accepted} stored")
+    return 0 if accepted == sent else 1
+
+
+def parse_arguments():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    parser.add_argument("file", help="CSV file, or - for stdin")
+    parser.add_argument("--asset", required=True, help="the rig's name at the service")
+    parser.add_argument("--url", default="http://127.0.0.1:8087")
+    parser.add_argument("--session", help="name of the session [default: the time]")
+    parser.add_argument("--register", metavar="ASSET.json", help="register this asset file first")
+    parser.add_argument("--rows", type=int, default=100, help="most rows of a batch")
+    parser.add_argument("--seconds", type=float, default=0.5, help="longest a row waits")
+    return parser.parse_args()
+
+
+def read(source, rows):
+    """Puts every row of the source into the queue, then None."""
+    for number, row in enumerate(csv.DictReader(source), start=1):
+        sample = {name: to_number(row.get(name)) for name in COLUMNS}
+        sample["seq"] = int(row.get("seq") or number)
+        rows.put(sample)
+    rows.put(None)
+
+
+def to_number(field):
+    """An empty field is a value that is not there; the service judges the rest."""
+    if field is None or not field.strip():
+        return None
+    try:
+        return float(field)
+    except ValueError:
+        return field
+
+
+def batches(rows, most, longest_s):
+    """Batches of at most `most` rows, none older than `longest_s`."""
+    batch, due = [], 0.0
+    while True:
+        try:
+            wait = max(0.0, due - time.monotonic()) if batch else None
+            row = rows.get(timeout=wait)
+        except queue.Empty:
+            yield batch
+            batch = []
+            continue
+        if row is None:
+            break
+        if not batch:
+            due = time.monotonic() + longest_s
+        batch.append(row)
+        if len(batch) >= most:
+            yield batch
+            batch = []
+    if batch:
+        yield batch
+
+
+def deliver(method, url, body):
+    """Sends until it is acknowledged; returns the answer."""
+    pause = 0.2
+    while True:
+        headers = {"Content-Type": "application/json"}
+        request = urllib.request.Request(url, data=body, method=method, headers=headers)
+        try:
+            with urllib.request.urlopen(request, timeout=TIMEOUT_S) as answer:
+                return json.load(answer)
+        except urllib.error.HTTPError as error:
+            if error.code not in (408, 425, 429) and error.code < 500:
+                sys.exit(f"edge_client: {error.code}: {error.read().decode(errors='replace')}")
+            reason = f"{error.code} {error.reason}"
+            pause = max(pause, retry_after(error))
+        except (OSError, ValueError) as error:
+            reason = str(error)
+        say(f"{reason}; again in {pause:.1f} s")
+        time.sleep(pause * random.uniform(0.8, 1.2))
+        pause = min(2 * pause, LONGEST_PAUSE_S)
+
+
+def retry_after(error):
+    """Seconds that the service asks to wait."""
+    try:
+        return float(error.headers.get("Retry-After", 0))
+    except ValueError:
+        return 0.0
+
+
+def say(text):
+    print(text, file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
