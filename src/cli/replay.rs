@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use indicatif::ProgressBar;
+use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
 use super::judge::{self, Judged};
@@ -75,7 +75,11 @@ pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
 /// A progress bar on stderr, hidden where that is no terminal or there is one
 /// piece of work only.
 pub(super) fn progress(n: usize) -> ProgressBar {
-    if n < 2 { ProgressBar::hidden() } else { ProgressBar::new(n as u64) }
+    if n < 2 {
+        return ProgressBar::hidden();
+    }
+    let style = ProgressStyle::with_template("{bar:40} {pos} of {len}, {eta} left");
+    ProgressBar::new(n as u64).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
 }
 
 /// Runs `work` on `jobs` threads, or on as many as there are cores.
