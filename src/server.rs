@@ -1,6 +1,7 @@
 //! The server: configuration, store, service and sockets put together, from
 //! start to a graceful stop. Also what stands behind `migrate` and `check`.
 
+use std::fs::{File, TryLockError};
 use std::net::SocketAddr;
 use std::time::Duration;
 
@@ -23,6 +24,8 @@ pub struct Server {
     serving: JoinHandle<std::io::Result<()>>,
     store: Store,
     workers: Workers,
+    /// Held until the store is closed.
+    lock: File,
 }
 
 /// Opens the store, resumes open sessions, and listens.
@@ -33,6 +36,7 @@ pub struct Server {
 pub async fn start(config: Config) -> Result<Server> {
     config.check()?;
     http::gather_metrics();
+    let lock = lock(&config)?;
     let (store, writer) = open(&config).await?;
     let listener = TcpListener::bind(config.listen)
         .await
@@ -50,15 +54,31 @@ pub async fn start(config: Config) -> Result<Server> {
         );
     tracing::info!(%address, resumed, store = %store.path().display(), "serving");
     let deadline = Duration::from_secs(config.limits.shutdown_s);
-    Ok(Server { address, closing, deadline, serving, store, workers })
+    Ok(Server { address, closing, deadline, serving, store, workers, lock })
+}
+
+/// Takes the store for this process: two writers would not know of each other.
+/// The lock goes with the process, however it ends.
+fn lock(config: &Config) -> Result<File> {
+    let path = config.database_file()?.with_extension("lock");
+    if let Some(directory) = path.parent() {
+        std::fs::create_dir_all(directory)
+            .with_context(|| format!("`data`: cannot make {}", directory.display()))?;
+    }
+    let lock = File::create(&path).with_context(|| format!("cannot make {}", path.display()))?;
+    match lock.try_lock() {
+        Ok(()) => Ok(lock),
+        Err(TryLockError::WouldBlock) => {
+            bail!("`data`: another process uses this store ({} is locked)", path.display())
+        }
+        Err(TryLockError::Error(error)) => {
+            Err(error).with_context(|| format!("cannot lock {}", path.display()))
+        }
+    }
 }
 
 async fn open(config: &Config) -> Result<(Store, crate::store::Writer)> {
     let file = config.database_file()?;
-    if let Some(directory) = file.parent() {
-        std::fs::create_dir_all(directory)
-            .with_context(|| format!("`data`: cannot make {}", directory.display()))?;
-    }
     Store::open(&file).await.with_context(|| format!("cannot open the store {}", file.display()))
 }
 
@@ -70,12 +90,13 @@ impl Server {
     /// If that takes longer than `limits.shutdown_s`; everything acknowledged
     /// is durable all the same.
     pub async fn shutdown(self) -> Result<()> {
-        let Self { closing, deadline, serving, store, workers, .. } = self;
+        let Self { closing, deadline, serving, store, workers, lock, .. } = self;
         closing.cancel();
         let finish = async {
             let served = serving.await;
             workers.finish().await;
             store.close().await;
+            drop(lock);
             served
         };
         match tokio::time::timeout(deadline, finish).await {
@@ -119,11 +140,8 @@ async fn stop_signal() -> Result<()> {
 /// If the store cannot be opened or is newer than this version.
 pub async fn migrate(config: &Config) -> Result<String> {
     config.check()?;
+    let _lock = lock(config)?;
     let file = config.database_file()?;
-    if let Some(directory) = file.parent() {
-        std::fs::create_dir_all(directory)
-            .with_context(|| format!("`data`: cannot make {}", directory.display()))?;
-    }
     let n = Store::migrate(&file)
         .await
         .with_context(|| format!("cannot migrate the store {}", file.display()))?;

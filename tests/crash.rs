@@ -10,22 +10,6 @@ use std::process::{Child, Command, Stdio};
 use serde_json::json;
 use support::{Client, judged, rig};
 
-const DATA: &str = "OFFBD_TEST_SERVER_DATA";
-
-/// Not a test of its own: the server that the tests here start as a process,
-/// which is this program again.
-#[test]
-fn server_process() {
-    let Some(data) = std::env::var_os(DATA) else { return };
-    let runtime = tokio::runtime::Runtime::new().unwrap();
-    runtime.block_on(async {
-        let config = support::config(Path::new(&data));
-        let server = offbd::server::start(config).await.unwrap();
-        println!("\nlistening {}", server.address);
-        std::future::pending::<()>().await;
-    });
-}
-
 struct Process {
     child: Child,
     client: Client,
@@ -33,18 +17,20 @@ struct Process {
 
 impl Process {
     fn start(data: &Path) -> Self {
-        let mut child = Command::new(std::env::current_exe().unwrap())
-            .args(["--exact", "server_process", "--nocapture"])
-            .env(DATA, data)
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
+        let mut child = Command::new(env!("CARGO_BIN_EXE_offbd"))
+            .args(["serve", "--listen", "127.0.0.1:0", "--log-format", "json", "--data"])
+            .arg(data)
+            .stderr(Stdio::piped())
             .spawn()
             .unwrap();
-        let lines = BufReader::new(child.stdout.take().unwrap()).lines();
-        let address = lines
-            .map_while(Result::ok)
-            .find_map(|line| line.strip_prefix("listening ").map(str::to_owned))
-            .expect("the server says where it listens");
+        let mut log = BufReader::new(child.stderr.take().unwrap()).lines().map_while(Result::ok);
+        let address = log
+            .find_map(|line| {
+                let line: serde_json::Value = serde_json::from_str(&line).ok()?;
+                (line["message"] == "serving").then(|| line["address"].as_str().unwrap().to_owned())
+            })
+            .expect("the log says where it listens");
+        std::thread::spawn(move || log.for_each(drop));
         Self { child, client: Client::new(address) }
     }
 }
@@ -52,7 +38,8 @@ impl Process {
 impl Drop for Process {
     /// SIGKILL: no warning, no last word.
     fn drop(&mut self) {
-        self.child.kill().unwrap();
+        // One that has ended already needs no killing.
+        let _ = self.child.kill();
         self.child.wait().unwrap();
     }
 }
@@ -97,5 +84,25 @@ async fn killed_in_the_middle_and_started_again() {
     let session = process.client.end("a", "s").await;
     assert_eq!(session["verdict"]["verdict_hash"], hash);
     assert_eq!(session["verdict"]["faults"], json!(faults));
+    assert_eq!(process.client.recording("a", "s").await, samples);
+}
+
+#[cfg(unix)]
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn asked_to_stop_it_stops_well() {
+    let data = tempfile::tempdir().unwrap();
+    let mut process = Process::start(data.path());
+    process.client.asset("a").await;
+    let samples = rig(500, 500);
+    process.client.telemetry("a", Some("s"), &samples).await;
+    let pid = process.child.id().to_string();
+    assert!(Command::new("kill").args(["-TERM", &pid]).status().unwrap().success());
+    let status = support::eventually(|| {
+        let status = process.child.try_wait().unwrap();
+        async move { status }
+    })
+    .await;
+    assert!(status.success(), "{status}");
+    process = Process::start(data.path());
     assert_eq!(process.client.recording("a", "s").await, samples);
 }

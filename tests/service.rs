@@ -62,6 +62,34 @@ async fn what_the_store_does_not_take_is_not_acknowledged() {
     assert_eq!(ended["verdict"]["verdict_hash"], support::judged("a", &samples).0);
 }
 
+#[tokio::test]
+async fn small_batches_become_few_chunks() {
+    let bench = Bench::start().await;
+    bench.client.asset("a").await;
+    let samples = rig(9_000, 9_000);
+    for part in samples.chunks(3) {
+        bench.client.telemetry("a", Some("s"), part).await;
+    }
+    let mut store = store(&bench).await;
+    let mut chunks = async || -> i64 {
+        sqlx::query_scalar("SELECT COUNT(*) FROM chunk").fetch_one(&mut store).await.unwrap()
+    };
+    let most = i64::try_from(offbd::store::MAX_TAIL_CHUNKS).unwrap();
+    assert!(chunks().await <= most + 1, "{}", chunks().await);
+    assert_eq!(bench.client.recording("a", "s").await, samples);
+    bench.client.end("a", "s").await;
+    assert_eq!(chunks().await, 2);
+    assert_eq!(bench.client.recording("a", "s").await, samples);
+}
+
+#[tokio::test]
+async fn a_store_has_one_server() {
+    let bench = Bench::start().await;
+    let second = offbd::server::start(support::config(bench.data.path())).await;
+    let error = second.err().expect("the store is taken").to_string();
+    assert!(error.contains("another process"), "{error}");
+}
+
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn too_much_at_once_is_turned_away_and_nothing_is_lost() {
     let bench = Bench::start_with(|config| {

@@ -21,6 +21,9 @@ use crate::wire::telemetry::sample_view;
 /// Most rows of an imported file; a longer one is refused.
 const MAX_IMPORT_ROWS: usize = 2_000_000;
 
+/// How many times as long as a batch a file may take to arrive.
+const FILE_TIMEOUT: u32 = 10;
+
 /// Longest body that opens a session, bytes.
 const MAX_SMALL_BYTES: usize = 16 << 10;
 
@@ -117,7 +120,8 @@ pub(super) async fn import(
     }
     app.service.asset(&asset).await?;
     let limits = app.service.limits();
-    let read = body::read(body, limits.import_bytes, limits.body_timeout, &app.budget).await?;
+    let time = limits.body_timeout * FILE_TIMEOUT;
+    let read = body::read(body, limits.import_bytes, time, &app.budget).await?;
     let parse = move || Format::Csv.parse(&read.bytes, MAX_IMPORT_ROWS);
     let parsed = tokio::task::spawn_blocking(parse).await;
     let failed = |_| ServiceError::Unavailable { what: "reading the file has failed" };

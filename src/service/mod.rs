@@ -33,6 +33,7 @@ mod views;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 
+use futures_util::{StreamExt, stream};
 use tokio::sync::{Semaphore, mpsc, oneshot};
 use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
@@ -145,12 +146,16 @@ impl Service {
     /// [`ServiceError::Unavailable`] if the store cannot be read.
     pub async fn resume(&self) -> Result<usize, ServiceError> {
         let assets = self.inner.store.assets_in_session().await?;
-        for asset in &assets {
-            let touched = self.call(asset, |_, _, _| Ok(())).await;
-            if let Err(error) = touched {
-                tracing::error!(asset, %error, "cannot resume");
+        let touch = |asset: &String| {
+            let (this, asset) = (self.clone(), asset.clone());
+            async move {
+                if let Err(error) = this.look(&asset, |_| ()).await {
+                    tracing::error!(asset, %error, "cannot resume");
+                }
             }
-        }
+        };
+        let at_once = self.inner.limits.shards;
+        stream::iter(&assets).for_each_concurrent(at_once, touch).await;
         self.resume_jobs().await?;
         Ok(assets.len())
     }
