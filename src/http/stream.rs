@@ -144,6 +144,7 @@ enum Next {
 }
 
 impl Session {
+    #[expect(clippy::disallowed_methods, reason = "a silent socket is closed by the clock")]
     fn new(
         socket: WebSocket,
         app: App,
@@ -230,6 +231,7 @@ impl Session {
         Err(End::Close(close_code::AWAY, "the service is closing"))
     }
 
+    #[expect(clippy::disallowed_methods, reason = "a silent socket is closed by the clock")]
     async fn message(&mut self, message: Message) -> Result<(), End> {
         self.heard = Instant::now();
         match message {

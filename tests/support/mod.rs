@@ -251,6 +251,7 @@ pub fn judged(name: &str, samples: &[Sample]) -> (String, Vec<String>) {
 }
 
 /// Asks again until `done` gives something; fails after [`DEADLINE`].
+#[expect(clippy::disallowed_methods, reason = "a test must not wait for ever")]
 pub async fn eventually<T, F: Future<Output = Option<T>>>(mut done: impl FnMut() -> F) -> T {
     let begun = Instant::now();
     loop {

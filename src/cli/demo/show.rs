@@ -78,6 +78,7 @@ fn acts(episode: &Episode) -> Vec<(f64, String)> {
 }
 
 impl Show {
+    #[expect(clippy::disallowed_methods, reason = "the show runs in real time")]
     pub(super) async fn new(
         client: Client,
         mut rig: SimulatedRig,
