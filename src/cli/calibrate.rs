@@ -66,7 +66,10 @@ pub(super) fn load(paths: &[PathBuf]) -> Result<Vec<Vec<Sample>>, Unusable> {
 }
 
 /// Learns `rig` as of now.
-#[expect(clippy::disallowed_methods, reason = "the file says when it was learnt; no verdict depends on it")]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "the file says when it was learnt; no verdict depends on it"
+)]
 pub(super) fn learn(
     rig: &Rig,
     sessions: &[Vec<Sample>],

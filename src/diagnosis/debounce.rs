@@ -53,6 +53,12 @@ impl Debounce {
         self.level > 0.0
     }
 
+    /// Takes suspicion back: another cause accounts for what was seen.
+    pub fn exonerate(&mut self) {
+        self.level = self.level.min(0.0);
+        self.failing_s = 0.0;
+    }
+
     /// Takes `test`, which held for the `dt` seconds before this sample. A
     /// time of zero qualifies at once.
     pub fn update(

@@ -33,6 +33,9 @@ pub struct Reading {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AxisStillness {
     anchor_m: Option<f64>,
+    /// Whether the reading before had left the anchor's surroundings: it takes
+    /// two, for among thousands of readings one strays by chance.
+    strayed: bool,
     last_m: Option<f64>,
     /// Seconds since the reading left its surroundings.
     pub still_s: f64,
@@ -44,7 +47,9 @@ pub struct AxisStillness {
 
 impl AxisStillness {
     fn update(&mut self, position_m: f64, pressed: bool, reading: &Reading) {
-        let moved = self.anchor_m.is_none_or(|a| (position_m - a).abs() > reading.still_m);
+        let strays = self.anchor_m.is_none_or(|a| (position_m - a).abs() > reading.still_m);
+        let moved = strays && (self.strayed || self.anchor_m.is_none());
+        self.strayed = strays;
         if moved {
             self.anchor_m = Some(position_m);
             self.still_s = 0.0;
@@ -145,6 +150,16 @@ mod tests {
         assert!((watch.still_s() - 0.99).abs() < 1e-9);
         assert!((watch.axes.x.pressed_s - 0.50).abs() < 1e-9);
         assert_eq!(watch.identical_s(), 0.0);
+    }
+
+    #[test]
+    fn one_reading_that_strays_is_no_motion_and_two_are() {
+        let mut watch = Stillness::default();
+        for (i, x) in [0.0, 0.0, 0.01, 0.0, 0.0, 0.01, 0.01].into_iter().enumerate() {
+            watch.update(&reading(i as f64 * 0.01, Some(x), true));
+            let wanted = if i < 6 { 0.01 * i as f64 } else { 0.0 };
+            assert!((watch.still_s() - wanted).abs() < 1e-9, "{i}: {}", watch.still_s());
+        }
     }
 
     #[test]

@@ -9,8 +9,8 @@ use super::frame::{self, Moment};
 use super::watch::Watch;
 use super::{MonitorState, Output, Readiness, Setup, State};
 use crate::diagnosis::{
-    AxisEvidence, Evaluator, Evidence, FaultMemory, Finding, Gated, Limits, OutlierGate, Reading,
-    Settings, Stillness, Surroundings, Test,
+    AxisEvidence, Evaluator, Evidence, FaultMemory, Finding, Gated, Limits, OutlierGate, Qualified,
+    Reading, Settings, Stillness, Surroundings, Test,
 };
 use crate::maths::{Fit, SlidingQuadratic};
 use crate::plant::{RollingState, Twin};
@@ -314,10 +314,18 @@ impl Pipeline {
         memory: &mut FaultMemory,
         outputs: &mut Vec<Output>,
     ) {
+        let mut blamed = false;
         for (&code, finding) in FaultCode::ALL.iter().zip(findings) {
             let watch = &mut self.watches[code as usize];
             let qualified = watch.update(code, finding, moment.at, dt, &self.settings);
             watch.apply(code, qualified, &self.settings, &self.evidence, memory, outputs);
+            let failed = matches!(qualified, Qualified::Failed | Qualified::Tripped);
+            blamed |= failed && code.axis().is_none();
+        }
+        if blamed {
+            // What the servos were suspected of before is accounted for.
+            self.watches[FaultCode::XServo as usize].exonerate();
+            self.watches[FaultCode::YServo as usize].exonerate();
         }
     }
 

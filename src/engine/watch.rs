@@ -62,6 +62,12 @@ impl Watch {
         qualified
     }
 
+    /// Another cause accounts for what was seen: the suspicion is taken back.
+    pub fn exonerate(&mut self) {
+        self.debounce.exonerate();
+        (self.since, self.kind, self.candidates) = (None, None, None);
+    }
+
     /// Tells the memory, and the world where the status byte says so.
     pub fn apply(
         &self,
