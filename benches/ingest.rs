@@ -10,6 +10,8 @@
 //! Left out: TLS, tokens, a network. Unfair to all: the clients share the
 //! cores with the server. Quote the ratios; the machine is part of the rest.
 
+#![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
+
 use std::net::SocketAddr;
 use std::time::Instant;
 

@@ -1,0 +1,34 @@
+# Builds with BuildKit (the cache mounts need it): docker build -t offbd .
+# Runs: docker run -p 127.0.0.1:8087:8087 -v offbd:/var/lib/offbd offbd
+# The interface has no log-in of its own; publish the port accordingly.
+
+FROM rust:1-bookworm AS build
+WORKDIR /src
+COPY Cargo.toml Cargo.lock ./
+COPY migrations migrations
+COPY benches benches
+COPY src src
+# Packages and compiled dependencies stay in the cache mounts from build to
+# build; the program is copied out, for a mount is no part of the image.
+RUN --mount=type=cache,target=/usr/local/cargo/registry \
+    --mount=type=cache,target=/src/target \
+    cargo build --release --locked --bin offbd \
+    && cp target/release/offbd /usr/local/bin/offbd
+
+FROM debian:bookworm-slim
+RUN useradd --system --uid 10001 --home-dir /var/lib/offbd --create-home offbd
+COPY --from=build /usr/local/bin/offbd /usr/local/bin/offbd
+USER offbd
+WORKDIR /var/lib/offbd
+VOLUME /var/lib/offbd
+ENV OFFBD_LISTEN=0.0.0.0:8087 \
+    OFFBD_DATA=/var/lib/offbd \
+    OFFBD_LOG__FORMAT=json
+EXPOSE 8087
+# Asks /readyz on port 8087 through bash, which the base image has and which
+# opens sockets by itself; no curl is needed. Another port needs another line.
+HEALTHCHECK --interval=10s --timeout=3s --start-period=10s CMD ["bash", "-c", \
+    "exec 3<>/dev/tcp/127.0.0.1/8087 && printf 'GET /readyz HTTP/1.0\\r\\n\\r\\n' >&3 && read -r answer <&3 && [[ $answer == *' 200 '* ]]"]
+# SIGTERM, which `docker stop` sends, is a graceful stop.
+ENTRYPOINT ["offbd"]
+CMD ["serve"]

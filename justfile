@@ -1,0 +1,42 @@
+# What there is to do; `just` alone lists it.
+
+_list:
+    @just --list
+
+# Everything that must hold before a change goes in
+test:
+    scripts/test
+
+# Quick: compile and lint
+check:
+    cargo clippy --all-targets -- -D warnings
+
+# The floors, and the paths that the documents name
+rules:
+    cargo test --test architecture
+
+# A minute of a simulated rig with faults, against the real service
+demo:
+    cargo run --release -- demo --seconds 60
+
+# The service on the embedded store
+serve *ARGS:
+    cargo run --release -- serve {{ARGS}}
+
+# openapi.yaml as the code has it
+openapi:
+    UPDATE_OPENAPI=1 cargo test --test openapi
+
+# The output that README.md shows, anew
+tour:
+    cargo build --release
+    scripts/tour --update
+
+# The picture in README.md, anew
+picture:
+    cargo build --release
+    scripts/picture
+
+# How fast samples go through
+bench:
+    cargo bench --bench ingest
