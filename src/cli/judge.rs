@@ -7,7 +7,7 @@ use std::path::Path;
 use super::unusable::{Unusable, read};
 use crate::diagnosis::{FaultMemory, Profile};
 use crate::engine::{Admission, Engine, Input, Output, Rig, Setup};
-use crate::vocabulary::{FaultStatus, Sample};
+use crate::vocabulary::Sample;
 use crate::wire::asset;
 use crate::wire::session_csv::{Reader, RowError};
 use crate::wire::verdict::{FaultView, SummaryView, Verdict, fault_view};
@@ -71,20 +71,6 @@ pub(super) fn read_samples(path: &Path) -> Result<(Vec<Sample>, Vec<RowError>), 
 fn open(path: &Path) -> Result<Reader<File>, Unusable> {
     let file = File::open(path).map_err(|e| Unusable::file(path, e))?;
     Reader::new(file).map_err(|e| Unusable::file(path, e))
-}
-
-/// What a fault line says, in one sentence.
-pub(super) fn sentence(fault: &FaultView) -> String {
-    const TEST_FAILED: u8 = 0x01;
-    let byte = u8::from_str_radix(&fault.status_byte, 16).unwrap_or(TEST_FAILED);
-    if byte & TEST_FAILED != 0 {
-        return fault.summary.clone();
-    }
-    let FaultView { code, status, status_byte, .. } = fault;
-    if status == FaultStatus::Cleared.as_str() {
-        return format!("{code} cleared: nothing is on record");
-    }
-    format!("{code} no longer fails its test; it stays on record as {status} ({status_byte})")
 }
 
 /// An engine with what comes out of it for one session.

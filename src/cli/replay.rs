@@ -183,7 +183,7 @@ fn write_sentences(out: &mut impl Write, session: &Judged, several: bool) -> any
     writeln!(out, "\n{name}{}", if several { ":" } else { "what was seen:" })?;
     for fault in &session.faults {
         let at = format!("  {:>8.2} s  ", fault.t_s);
-        writeln!(out, "{}", table::wrapped(&at, &judge::sentence(fault)))?;
+        writeln!(out, "{}", table::wrapped(&at, &fault.summary))?;
     }
     Ok(())
 }

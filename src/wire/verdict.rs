@@ -168,6 +168,16 @@ fn axis_evidence_view(axis: &AxisEvidence) -> AxisEvidenceView {
 pub fn sentence(transition: &Transition) -> String {
     let evidence = &transition.evidence;
     let kind = transition.suspicion.kind.map(|k| format!(" ({k})")).unwrap_or_default();
+    let name = format!("{}{kind}", transition.code);
+    match transition.status {
+        FaultStatus::Cleared => return format!("{name} cleared: nothing of it is on record"),
+        FaultStatus::Healed => return format!("{name} healed: enough good sessions followed"),
+        status if !transition.byte.test_failed() => {
+            let byte = transition.byte;
+            return format!("{name} no longer fails its test; on record as {status} ({byte})");
+        }
+        FaultStatus::Pending | FaultStatus::Confirmed => {}
+    }
     let since = transition
         .suspicion
         .onset
@@ -183,7 +193,7 @@ pub fn sentence(transition: &Transition) -> String {
         }
         None => sensor_sentence(evidence),
     };
-    format!("{}{kind} {}{since}: {what}", transition.code, transition.status)
+    format!("{name} {}{since}: {what}", transition.status)
 }
 
 fn servo_sentence(axis: Axis, evidence: &Evidence) -> String {

@@ -13,7 +13,6 @@ use super::client::{Client, Uplink};
 use super::events;
 use super::plan::Episode;
 use super::tally::Tally;
-use crate::cli::judge::sentence;
 use crate::cli::{output, table};
 use crate::simulation::{Fault, SimulatedRig};
 use crate::vocabulary::{FaultCode, Sample};
@@ -207,7 +206,7 @@ impl Show {
     }
 
     fn heard(&mut self, fault: &FaultView) {
-        say(fault.t_s, &sentence(fault));
+        say(fault.t_s, &fault.summary);
         self.tally.heard(fault);
     }
 }
