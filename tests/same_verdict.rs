@@ -48,6 +48,18 @@ async fn whatever_the_way_in() {
         assert_eq!(found, hash, "{asset}");
         assert_eq!(recording, samples, "{asset}");
     }
+    assert_eq!(replayed_from_a_file(&samples), hash);
+}
+
+/// The hash that the command line gives for the session as a file.
+fn replayed_from_a_file(samples: &[Sample]) -> String {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(file.path(), csv(samples)).unwrap();
+    let mut offbd = assert_cmd::Command::new(env!("CARGO_BIN_EXE_offbd"));
+    let run = offbd.args(["replay", "--format", "json"]).arg(file.path()).assert().success();
+    let printed = String::from_utf8(run.get_output().stdout.clone()).unwrap();
+    let summary: Value = serde_json::from_str(printed.lines().last().unwrap()).unwrap();
+    summary["verdict_hash"].as_str().unwrap().to_owned()
 }
 
 fn columns(samples: &[Sample]) -> Value {

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::path::Path;
 
 use super::unusable::{Unusable, read};
-use crate::diagnosis::{FaultMemory, Profile};
+use crate::diagnosis::{FaultMemory, Profile, Transition};
 use crate::engine::{Admission, Engine, Input, Output, Rig, Setup};
 use crate::vocabulary::Sample;
 use crate::wire::asset;
@@ -112,13 +112,15 @@ impl Bench {
 
     fn sample(&mut self, sample: Sample, line: u64) {
         self.engine.handle(Input::Sample(sample), &mut self.outputs);
-        for output in std::mem::take(&mut self.outputs) {
-            if let Output::Admitted(admission) = output {
-                self.admitted(admission, sample.t_s, line);
-            } else {
-                self.transition(&output);
+        let mut outputs = std::mem::take(&mut self.outputs);
+        for output in outputs.drain(..) {
+            self.verdict.take(&output);
+            match output {
+                Output::Admitted(admission) => self.admitted(admission, sample.t_s, line),
+                Output::Transition(transition) => self.transition(&transition),
             }
         }
+        self.outputs = outputs;
     }
 
     fn admitted(&mut self, admission: Admission, t_s: f64, line: u64) {
@@ -139,18 +141,18 @@ impl Bench {
         }
     }
 
-    fn transition(&mut self, output: &Output) {
-        self.verdict.take(output);
-        if let Output::Transition(transition) = output {
-            self.faults.push(fault_view(&self.session, transition));
-        }
+    fn transition(&mut self, transition: &Transition) {
+        self.faults.push(fault_view(&self.session, transition));
     }
 
     /// The verdict; none when there was nothing to judge.
     fn end(mut self) -> Option<Judged> {
         self.engine.handle(Input::End, &mut self.outputs);
         for output in std::mem::take(&mut self.outputs) {
-            self.transition(&output);
+            self.verdict.take(&output);
+            if let Output::Transition(transition) = output {
+                self.transition(&transition);
+            }
         }
         let (first, last) = self.span_s?;
         let summary =
