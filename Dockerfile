@@ -7,7 +7,9 @@ WORKDIR /src
 COPY Cargo.toml Cargo.lock ./
 COPY migrations migrations
 COPY benches benches
+COPY examples examples
 COPY src src
+# Benchmarks and examples are there because Cargo.toml names them.
 # Packages and compiled dependencies stay in the cache mounts from build to
 # build; the program is copied out, for a mount is no part of the image.
 RUN --mount=type=cache,target=/usr/local/cargo/registry \
