@@ -4,7 +4,7 @@
 //! A ball at rest is not a fault and neither are repeated readings; they turn
 //! into evidence only while the commands ask the ball to move (*pressed*).
 
-use crate::vocabulary::{Axis, PerAxis, SimTime};
+use crate::vocabulary::{Axis, PerAxis};
 
 /// Half-life of the count of outliers and of the share of missing readings, s.
 const MEMORY_S: f64 = 2.0;
@@ -15,7 +15,6 @@ const OUTLIER_MEMORY_S: f64 = 10.0;
 /// One sample as this watch sees it.
 #[derive(Clone, Copy, Debug)]
 pub struct Reading {
-    pub at: SimTime,
     /// Seconds since the sample before.
     pub dt: f64,
     pub position_m: PerAxis<Option<f64>>,
@@ -128,9 +127,8 @@ impl Stillness {
 mod tests {
     use super::*;
 
-    fn reading(t: f64, x: Option<f64>, pressed: bool) -> Reading {
+    fn reading(x: Option<f64>, pressed: bool) -> Reading {
         Reading {
-            at: SimTime::new(t).unwrap(),
             dt: 0.01,
             position_m: PerAxis { x, y: None },
             pressed: PerAxis { x: pressed, y: false },
@@ -145,7 +143,7 @@ mod tests {
         let mut watch = Stillness::default();
         for i in 0..100 {
             let noise = if i % 2 == 0 { 0.0 } else { 1e-3 };
-            watch.update(&reading(f64::from(i) * 0.01, Some(noise), i >= 50));
+            watch.update(&reading(Some(noise), i >= 50));
         }
         assert!((watch.still_s() - 0.99).abs() < 1e-9);
         assert!((watch.axes.x.pressed_s - 0.50).abs() < 1e-9);
@@ -156,7 +154,7 @@ mod tests {
     fn one_reading_that_strays_is_no_motion_and_two_are() {
         let mut watch = Stillness::default();
         for (i, x) in [0.0, 0.0, 0.01, 0.0, 0.0, 0.01, 0.01].into_iter().enumerate() {
-            watch.update(&reading(i as f64 * 0.01, Some(x), true));
+            watch.update(&reading(Some(x), true));
             let wanted = if i < 6 { 0.01 * i as f64 } else { 0.0 };
             assert!((watch.still_s() - wanted).abs() < 1e-9, "{i}: {}", watch.still_s());
         }
@@ -165,8 +163,8 @@ mod tests {
     #[test]
     fn a_ball_not_seen_is_counted_in_seconds_and_in_share() {
         let mut watch = Stillness::default();
-        for i in 0..200 {
-            watch.update(&reading(f64::from(i) * 0.01, None, true));
+        for _ in 0..200 {
+            watch.update(&reading(None, true));
         }
         assert!((watch.unseen_s - 2.0).abs() < 1e-9);
         assert!((watch.missing - (1.0 - (-1.0_f64).exp())).abs() < 1e-9);

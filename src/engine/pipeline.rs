@@ -239,7 +239,6 @@ impl Pipeline {
             self.twin.motion().acceleration[a as usize].abs() > breakaway
         });
         self.readings.update(&Reading {
-            at: moment.at,
             dt,
             position_m: moment.position,
             pressed,
