@@ -57,9 +57,6 @@ pub struct Evidence {
     pub scatter_m: Option<f64>,
 }
 
-/// Most candidates a suspicion names; there are four codes.
-pub const MAX_CANDIDATES: usize = FaultCode::COUNT;
-
 /// One possible cause and how much of the evidence speaks for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Candidate {

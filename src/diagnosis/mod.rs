@@ -19,7 +19,7 @@ pub use answer::Answer;
 pub use calibration::{AxisCalibration, Calibration};
 pub use debounce::{Debounce, Qualified, Test};
 pub use evaluator::{Evaluator, Finding, Surroundings};
-pub use evidence::{AxisEvidence, Candidate, Evidence, MAX_CANDIDATES, Suspicion, Transition};
+pub use evidence::{AxisEvidence, Candidate, Evidence, Suspicion, Transition};
 pub use limits::Limits;
 pub use memory::{FaultMemory, FaultRecord, MemoryRules};
 pub use outlier::{Gated, OutlierGate};
