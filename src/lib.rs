@@ -17,6 +17,7 @@ pub mod diagnosis;
 pub mod engine;
 pub mod maths;
 pub mod plant;
+pub mod scene;
 #[cfg(feature = "service")]
 pub mod simulation;
 pub mod vocabulary;

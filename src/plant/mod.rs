@@ -1,15 +1,29 @@
-//! The rig as physics: ball, plate, servos and the rolling ball's motion.
+//! The rig as physics: ball, plate, servos and a ladder of models of the ball's
+//! motion, each in a file of its own with its equations and where it holds.
 //!
 //! One idea: a model is immutable data, its state is a small copyable value,
 //! and a step is a pure function of both. Knows no faults, no sensors, no
 //! clock. Notation and signs: `ARCHITECTURE.md`, "Frames and signs".
 
 mod body;
+mod compliant;
+mod contact;
+mod contact_step;
+mod creeping;
+mod planar;
 mod rolling;
 mod servo;
+mod sliding;
+mod tilt;
 mod twin;
 
 pub use body::{Ball, GRAVITY_M_S2, Plate, PlateShape};
-pub use rolling::{Rolling, RollingState, Tilt};
+pub use compliant::Compliant;
+pub use contact::{Body, Contact, Ground, Motion};
+pub use creeping::{Creeping, Give};
+pub use planar::Planar;
+pub use rolling::{Grip, Rolling, RollingState};
 pub use servo::{Servo, ServoModel};
+pub use sliding::{Hold, Phase, Sliding};
+pub use tilt::{PlateMotion, Tilt};
 pub use twin::{Twin, TwinAxis, TwinModel, TwinMotion};

@@ -15,50 +15,9 @@
 
 use nalgebra::{Vector2, Vector3};
 
-use super::{Ball, GRAVITY_M_S2, Plate};
-
-/// Plate angles about x and y with their first and second rates.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Tilt {
-    /// (qx, qy), rad.
-    pub angle: Vector2<f64>,
-    /// (q̇x, q̇y), rad/s.
-    pub rate: Vector2<f64>,
-    /// (q̈x, q̈y), rad/s².
-    pub acceleration: Vector2<f64>,
-}
-
-impl Tilt {
-    /// A plate at rest at (qx, qy).
-    #[must_use]
-    pub fn constant(qx_rad: f64, qy_rad: f64) -> Self {
-        Self { angle: Vector2::new(qx_rad, qy_rad), ..Self::default() }
-    }
-
-    /// Ω = (q̇x cos qy, q̇y, q̇x sin qy), plate frame, rad/s.
-    fn omega(&self) -> Vector3<f64> {
-        let (sin_y, cos_y) = self.angle.y.sin_cos();
-        Vector3::new(self.rate.x * cos_y, self.rate.y, self.rate.x * sin_y)
-    }
-
-    /// α = Ω̇, plate frame, rad/s².
-    fn alpha(&self) -> Vector3<f64> {
-        let (sin_y, cos_y) = self.angle.y.sin_cos();
-        let coupling = self.rate.x * self.rate.y;
-        Vector3::new(
-            self.acceleration.x * cos_y - coupling * sin_y,
-            self.acceleration.y,
-            self.acceleration.x * sin_y + coupling * cos_y,
-        )
-    }
-
-    /// Gravity seen from the plate, m/s².
-    fn gravity(&self) -> Vector3<f64> {
-        let (sin_x, cos_x) = self.angle.x.sin_cos();
-        let (sin_y, cos_y) = self.angle.y.sin_cos();
-        Vector3::new(cos_x * sin_y, -sin_x, -cos_x * cos_y) * GRAVITY_M_S2
-    }
-}
+use super::tilt::PlateMotion;
+use super::{Ball, Plate};
+use crate::maths::{MIDPOINT, RK4, System};
 
 /// Where a rolling ball is and how it moves, relative to the plate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -72,21 +31,35 @@ pub struct RollingState {
 }
 
 impl RollingState {
-    fn moved(&self, rate: &Rate, h: f64) -> Self {
-        Self {
-            position: self.position + rate.velocity * h,
-            velocity: self.velocity + rate.acceleration * h,
-            spin: self.spin + rate.spin * h,
-        }
+    /// (x, y, vx, vy, wz) in one row.
+    #[must_use]
+    pub fn to_row(&self) -> [f64; 5] {
+        [self.position.x, self.position.y, self.velocity.x, self.velocity.y, self.spin]
+    }
+
+    #[must_use]
+    pub fn from_row(y: &[f64; 5]) -> Self {
+        Self { position: Vector2::new(y[0], y[1]), velocity: Vector2::new(y[2], y[3]), spin: y[4] }
     }
 }
 
-/// Time derivative of a [`RollingState`].
-#[derive(Clone, Copy)]
-struct Rate {
-    velocity: Vector2<f64>,
-    acceleration: Vector2<f64>,
-    spin: f64,
+/// What the contact has to bear for the ball to roll, per kilogram of ball.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grip {
+    /// Friction force along x and y over mass, m/s².
+    pub friction: [f64; 2],
+    /// Normal force over mass, m/s²; negative where the ball would leave.
+    pub normal: f64,
+}
+
+impl Grip {
+    /// Larger part of the friction limit μ·F_z in use along one axis: up to 1
+    /// the ball rolls. Infinite where the plate would have to pull.
+    #[must_use]
+    pub fn demand(&self, friction: f64) -> f64 {
+        let worst = self.friction[0].abs().max(self.friction[1].abs());
+        if self.normal > 0.0 { worst / (friction * self.normal) } else { f64::INFINITY }
+    }
 }
 
 /// The rolling model of one ball on one plate.
@@ -95,7 +68,6 @@ pub struct Rolling {
     radius: f64,
     kappa: f64,
     centre_gap: f64,
-    mass: f64,
 }
 
 impl Rolling {
@@ -105,84 +77,95 @@ impl Rolling {
             radius: ball.radius_m(),
             kappa: ball.inertia_factor(),
             centre_gap: plate.centre_gap_m(ball),
-            mass: ball.mass_kg(),
         }
     }
 
-    /// Acceleration in the plate frame, m/s², and the rate of the spin, rad/s²,
-    /// under `tilt` and an external force on the ball's centre, N.
+    /// Rates of (x, y, vx, vy, wz).
     #[must_use]
-    pub fn acceleration(
-        &self,
-        state: &RollingState,
-        tilt: &Tilt,
-        force: Vector2<f64>,
-    ) -> (Vector2<f64>, f64) {
-        let (omega, alpha) = (tilt.omega(), tilt.alpha());
-        let p = Vector3::new(state.position.x, state.position.y, self.centre_gap);
-        let v = Vector3::new(state.velocity.x, state.velocity.y, 0.0);
-        let w = Vector3::new(-v.y / self.radius, v.x / self.radius, state.spin);
-        let drive = tilt.gravity()
-            - 2.0 * omega.cross(&v)
-            - omega.cross(&omega.cross(&p))
-            - alpha.cross(&p);
-        let turn = alpha + omega.cross(&w);
-        let spin_term = self.kappa * self.radius;
-        let linear = Vector2::new(
-            drive.x + force.x / self.mass - spin_term * turn.y,
-            drive.y + force.y / self.mass + spin_term * turn.x,
-        ) / (1.0 + self.kappa);
-        (linear, -turn.z)
+    #[inline]
+    pub fn rate(&self, y: &[f64; 5], plate: &PlateMotion) -> [f64; 5] {
+        let (a, _, spin) = self.forced(y, plate);
+        [y[2], y[3], a[0], a[1], spin]
     }
 
-    fn rate(&self, state: &RollingState, tilt: &Tilt, force: Vector2<f64>) -> Rate {
-        let (acceleration, spin) = self.acceleration(state, tilt, force);
-        Rate { velocity: state.velocity, acceleration, spin }
+    /// Acceleration along x and y, that of the free ball, and the rate of the
+    /// spin about the normal.
+    #[inline]
+    fn forced(&self, y: &[f64; 5], plate: &PlateMotion) -> ([f64; 2], Vector3<f64>, f64) {
+        let p = Vector3::new(y[0], y[1], self.centre_gap);
+        let v = Vector3::new(y[2], y[3], 0.0);
+        let w = Vector3::new(-v.y / self.radius, v.x / self.radius, y[4]);
+        let (free, turn) = (plate.free(&p, &v), plate.free_turn(&w));
+        let lever = self.kappa * self.radius;
+        let share = 1.0 / (1.0 + self.kappa);
+        let a = [(free.x + lever * turn.y) * share, (free.y - lever * turn.x) * share];
+        (a, free, turn.z)
     }
 
-    /// One step of `h` seconds by the explicit midpoint rule (order 2); `tilt`
-    /// is the plate at the middle of the step.
+    /// Acceleration in the plate frame, m/s², and the rate of the spin, rad/s².
     #[must_use]
-    pub fn midpoint(
-        &self,
-        state: &RollingState,
-        tilt: [&Tilt; 2],
-        force: Vector2<f64>,
-        h: f64,
-    ) -> RollingState {
-        let half = state.moved(&self.rate(state, tilt[0], force), h / 2.0);
-        state.moved(&self.rate(&half, tilt[1], force), h)
+    pub fn acceleration(&self, state: &RollingState, plate: &PlateMotion) -> (Vector2<f64>, f64) {
+        let (a, _, spin) = self.forced(&state.to_row(), plate);
+        (Vector2::from(a), spin)
+    }
+
+    /// What friction and the normal force have to be for the ball to roll on.
+    #[must_use]
+    pub fn grip(&self, y: &[f64; 5], plate: &PlateMotion) -> Grip {
+        self.grip_and_rate(y, plate).0
+    }
+
+    #[inline]
+    pub(super) fn grip_and_rate(&self, y: &[f64; 5], plate: &PlateMotion) -> (Grip, [f64; 5]) {
+        let (a, free, spin) = self.forced(y, plate);
+        let grip = Grip { friction: [a[0] - free.x, a[1] - free.y], normal: -free.z };
+        (grip, [y[2], y[3], a[0], a[1], spin])
+    }
+
+    /// One step of `h` seconds by the midpoint rule (order 2); `plate` is the
+    /// plate at the start and at the middle of the step.
+    #[must_use]
+    pub fn midpoint(&self, state: &RollingState, plate: [&PlateMotion; 2], h: f64) -> RollingState {
+        let held = Held { rolling: self, plate: [plate[0], plate[1], plate[1]], h };
+        RollingState::from_row(&MIDPOINT.step(&held, 0.0, &state.to_row(), h))
     }
 
     /// One step of `h` seconds by the classical Runge–Kutta method (order 4);
-    /// `tilt` is the plate at the start, the middle and the end of the step.
+    /// `plate` is the plate at the start, the middle and the end of the step.
     #[must_use]
-    pub fn rk4(
-        &self,
-        state: &RollingState,
-        tilt: [&Tilt; 3],
-        force: Vector2<f64>,
-        h: f64,
-    ) -> RollingState {
-        let k1 = self.rate(state, tilt[0], force);
-        let k2 = self.rate(&state.moved(&k1, h / 2.0), tilt[1], force);
-        let k3 = self.rate(&state.moved(&k2, h / 2.0), tilt[1], force);
-        let k4 = self.rate(&state.moved(&k3, h), tilt[2], force);
-        let mean = Rate {
-            velocity: (k1.velocity + 2.0 * (k2.velocity + k3.velocity) + k4.velocity) / 6.0,
-            acceleration: (k1.acceleration
-                + 2.0 * (k2.acceleration + k3.acceleration)
-                + k4.acceleration)
-                / 6.0,
-            spin: (k1.spin + 2.0 * (k2.spin + k3.spin) + k4.spin) / 6.0,
+    pub fn rk4(&self, state: &RollingState, plate: [&PlateMotion; 3], h: f64) -> RollingState {
+        let held = Held { rolling: self, plate, h };
+        RollingState::from_row(&RK4.step(&held, 0.0, &state.to_row(), h))
+    }
+}
+
+/// The rolling ball over one step from 0 to `h`, whose plate is known at the
+/// start, the middle and the end.
+struct Held<'a> {
+    rolling: &'a Rolling,
+    plate: [&'a PlateMotion; 3],
+    h: f64,
+}
+
+impl System<5> for Held<'_> {
+    const POSITIONS: usize = 2;
+
+    fn rate(&self, t: f64, y: &[f64; 5]) -> [f64; 5] {
+        let plate = if t <= 0.0 {
+            0
+        } else if t < self.h {
+            1
+        } else {
+            2
         };
-        state.moved(&mean, h)
+        self.rolling.rate(y, self.plate[plate])
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plant::{GRAVITY_M_S2, Tilt};
     use std::f64::consts::TAU;
 
     fn chapter() -> Rolling {
@@ -207,7 +190,8 @@ mod tests {
         let (model, n) = (chapter(), (seconds / h).round() as usize);
         (0..n).fold(RollingState::default(), |s, i| {
             let t = i as f64 * h;
-            model.rk4(&s, [&sines(t), &sines(t + h / 2.0), &sines(t + h)], Vector2::zeros(), h)
+            let plate = [t, t + h / 2.0, t + h].map(|t| sines(t).motion());
+            model.rk4(&s, plate.each_ref(), h)
         })
     }
 
@@ -215,18 +199,16 @@ mod tests {
         let (model, n) = (chapter(), (seconds / h).round() as usize);
         (0..n).fold(RollingState::default(), |s, i| {
             let t = i as f64 * h;
-            model.midpoint(&s, [&sines(t), &sines(t + h / 2.0)], Vector2::zeros(), h)
+            let plate = [t, t + h / 2.0].map(|t| sines(t).motion());
+            model.midpoint(&s, plate.each_ref(), h)
         })
     }
 
     #[test]
     fn validate_constant_tilt_against_the_closed_form() {
         let (qx, qy) = (std::f64::consts::PI / 20.0, std::f64::consts::PI / 20.0);
-        let (a, _) = chapter().acceleration(
-            &RollingState::default(),
-            &Tilt::constant(qx, qy),
-            Vector2::zeros(),
-        );
+        let (a, _) =
+            chapter().acceleration(&RollingState::default(), &Tilt::constant(qx, qy).motion());
         let g = 5.0 / 7.0 * GRAVITY_M_S2;
         assert!((a.x - g * qx.cos() * qy.sin()).abs() < 1e-14);
         assert!((a.y + g * qx.sin()).abs() < 1e-14);
@@ -238,7 +220,7 @@ mod tests {
     fn validate_centrifugal_and_coriolis_terms() {
         let tilt = Tilt { rate: Vector2::new(0.0, 2.0), ..Tilt::default() };
         let state = RollingState { position: Vector2::new(0.1, 0.0), ..Default::default() };
-        let (a, _) = chapter().acceleration(&state, &tilt, Vector2::zeros());
+        let (a, _) = chapter().acceleration(&state, &tilt.motion());
         assert!((a.x - 4.0 * 0.1 / 1.4).abs() < 1e-14, "ω² p/(1 + κ), got {}", a.x);
     }
 

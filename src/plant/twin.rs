@@ -188,7 +188,7 @@ impl Twin {
         for step in 0..steps as u32 {
             let start = from + f64::from(step) * h;
             let tilt = self.move_servos(start, h / 2.0);
-            let (unit, _) = self.model.rolling.acceleration(observed, &tilt, Vector2::zeros());
+            let (unit, _) = self.model.rolling.acceleration(observed, &tilt.motion());
             let axes = &self.model.axes;
             let a = Vector2::new(unit.x * axes.x.gain, unit.y * axes.y.gain);
             self.motion.position += self.motion.velocity * h + a * (h * h / 2.0);

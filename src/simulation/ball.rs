@@ -70,15 +70,15 @@ impl Table {
         h: f64,
     ) -> BallState {
         let before = &state.rolling;
-        let force = push * self.ball.mass_kg();
         if state.lost {
             return *state;
         }
-        if fault == Some(BallFault::Glued) || self.rests(before, tilt[0], force, fault) {
+        if fault == Some(BallFault::Glued) || self.rests(before, tilt[0], push, fault) {
             return BallState { rolling: at_rest(before), lost: false };
         }
         let drag = self.drag(before, fault);
-        let after = self.rolling.rk4(before, tilt, force + drag, h);
+        let plate = tilt.map(|tilt| tilt.motion().pushed(push + drag));
+        let after = self.rolling.rk4(before, plate.each_ref(), h);
         self.at_the_edge(stopped_by(before, after, drag))
     }
 
@@ -92,21 +92,21 @@ impl Table {
         &self,
         state: &RollingState,
         tilt: &Tilt,
-        force: Vector2<f64>,
+        push: Vector2<f64>,
         fault: Option<BallFault>,
     ) -> bool {
         let hold = self.resistance(self.surface.breakaway_rad, fault);
-        let (drive, _) = self.rolling.acceleration(&at_rest(state), tilt, force);
+        let (drive, _) = self.rolling.acceleration(&at_rest(state), &tilt.motion().pushed(push));
         hold > 0.0 && state.velocity.norm() < REST_M_S && drive.norm() <= hold
     }
 
-    /// The resistance to a moving ball, N on its centre.
+    /// The resistance to a moving ball as a push of the free ball, m/s².
     fn drag(&self, state: &RollingState, fault: Option<BallFault>) -> Vector2<f64> {
         let speed = state.velocity.norm();
         if speed == 0.0 {
             return Vector2::zeros();
         }
-        let inertia = (1.0 + self.ball.inertia_factor()) * self.ball.mass_kg();
+        let inertia = 1.0 + self.ball.inertia_factor();
         let resistance = self.resistance(self.surface.rolling_rad, fault);
         state.velocity * (-resistance * inertia / speed)
     }

@@ -18,10 +18,11 @@ const fn rule(module: &'static str, floor: u8, beside: &'static [&'static str]) 
 }
 
 /// Every top module of `src/`.
-pub const FLOORS: [Rule; 13] = [
+pub const FLOORS: [Rule; 14] = [
     rule("vocabulary", 0, &[]),
     rule("maths", 1, &[]),
-    rule("plant", 1, &[]),
+    rule("plant", 1, &["maths"]),
+    rule("scene", 2, &[]),
     rule("diagnosis", 2, &[]),
     rule("engine", 3, &[]),
     rule("wire", 4, &[]),

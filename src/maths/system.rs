@@ -1,0 +1,23 @@
+//! Differential equations as the integrators see them.
+
+/// y' = f(t, y) in N states, the first `POSITIONS` of which are positions and
+/// the next `POSITIONS` their rates: `y[i]' = y[i + POSITIONS]`.
+pub trait System<const N: usize> {
+    /// Number of leading states that are positions.
+    const POSITIONS: usize;
+
+    /// f(t, y).
+    fn rate(&self, t: f64, y: &[f64; N]) -> [f64; N];
+}
+
+/// A system that knows its Jacobian, for the implicit methods.
+pub trait Stiff<const N: usize>: System<N> {
+    /// `∂f[i]/∂y[j]` at (t, y), as `[i][j]`.
+    fn jacobian(&self, t: f64, y: &[f64; N]) -> [[f64; N]; N];
+}
+
+/// `y + h·k`, element by element.
+#[inline]
+pub(super) fn moved<const N: usize>(y: &[f64; N], k: &[f64; N], h: f64) -> [f64; N] {
+    std::array::from_fn(|i| y[i] + h * k[i])
+}

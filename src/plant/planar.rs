@@ -1,0 +1,134 @@
+//! The planar model: each axis alone, small angles, solved exactly for an angle
+//! that is held over the step.
+//!
+//! The rolling model to first order in the plate's angles and their rates, with
+//! q the angle that drives the axis (qy for x, −qx for y):
+//!
+//! ```text
+//! (1 + κ)·ẍ = g·q − (cgap + κ·r)·q̈
+//! ```
+//!
+//! With ξ = x + c·q, c = (cgap + κ·r)/(1 + κ), this is ξ̈ = g/(1 + κ)·q, a double
+//! integrator whose step under a held q is exact (zero-order hold). So the
+//! plate's angle is all that it needs, not its rates.
+//!
+//! Valid for angles and rates that are small: it leaves out tan q − q, the
+//! centrifugal, Coriolis and Euler terms of second order. Their size is
+//! [`Planar::left_out`].
+
+use nalgebra::Vector2;
+
+use super::tilt::Tilt;
+use super::{Ball, Plate, RollingState};
+
+/// The planar model of one ball on one plate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Planar {
+    gain: f64,
+    offset: f64,
+    reach: f64,
+}
+
+impl Planar {
+    #[must_use]
+    pub fn new(ball: &Ball, plate: &Plate) -> Self {
+        let kappa = ball.inertia_factor();
+        let gap = plate.centre_gap_m(ball);
+        Self {
+            gain: ball.rolling_gravity(),
+            offset: (gap + kappa * ball.radius_m()) / (1.0 + kappa),
+            reach: gap,
+        }
+    }
+
+    /// ξ and its rate for a ball at `state` on a plate that moves with `tilt`.
+    #[must_use]
+    pub fn enter(&self, state: &RollingState, tilt: &Tilt) -> [Vector2<f64>; 2] {
+        let (angle, rate) = (drive(&tilt.angle), drive(&tilt.rate));
+        [state.position + self.offset * angle, state.velocity + self.offset * rate]
+    }
+
+    /// The ball's position and velocity for ξ on a plate that moves with `tilt`.
+    #[must_use]
+    pub fn leave(&self, xi: &[Vector2<f64>; 2], tilt: &Tilt) -> RollingState {
+        RollingState {
+            position: xi[0] - self.offset * drive(&tilt.angle),
+            velocity: xi[1] - self.offset * drive(&tilt.rate),
+            spin: 0.0,
+        }
+    }
+
+    /// ξ after `h` seconds of held plate angles (qx, qy), exactly.
+    #[must_use]
+    #[inline]
+    pub fn hold(&self, xi: &[Vector2<f64>; 2], angle: &Vector2<f64>, h: f64) -> [Vector2<f64>; 2] {
+        let a = drive(angle) * self.gain;
+        [xi[0] + (xi[1] + a * (h / 2.0)) * h, xi[1] + a * h]
+    }
+
+    /// Acceleration of the ball, m/s².
+    #[must_use]
+    pub fn acceleration(&self, tilt: &Tilt) -> Vector2<f64> {
+        drive(&tilt.angle) * self.gain - drive(&tilt.acceleration) * self.offset
+    }
+
+    /// Bound of the acceleration that the model leaves out, m/s²: what is of
+    /// second order in the motion, and q − sin q·cos q of gravity.
+    #[must_use]
+    pub fn left_out(&self, state: &RollingState, tilt: &Tilt) -> f64 {
+        let (angle, rate) = (tilt.angle.norm(), tilt.rate.norm());
+        let away = state.position.norm();
+        let gravity = self.gain * angle * angle * angle;
+        let turning = rate * rate * (away + self.reach)
+            + 2.0 * rate * angle * state.velocity.norm()
+            + tilt.acceleration.norm() * angle * (away + self.reach * angle);
+        gravity + turning
+    }
+}
+
+/// The angles that drive the ball along x and y.
+fn drive(about: &Vector2<f64>) -> Vector2<f64> {
+    Vector2::new(about.y, -about.x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::Rolling;
+    use proptest::prelude::*;
+
+    fn models() -> (Planar, Rolling) {
+        let (ball, plate) = (Ball::default(), Plate::default());
+        (Planar::new(&ball, &plate), Rolling::new(&ball, &plate))
+    }
+
+    #[test]
+    fn validate_a_held_angle_against_the_parabola() {
+        let (planar, _) = models();
+        let start = RollingState { velocity: Vector2::new(0.1, 0.0), ..Default::default() };
+        let tilt = Tilt::constant(0.0, 0.02);
+        let xi = planar.hold(&planar.enter(&start, &tilt), &tilt.angle, 0.5);
+        let end = planar.leave(&xi, &tilt);
+        let a = 5.0 / 7.0 * 9.81 * 0.02;
+        assert!((end.position.x - (0.1 * 0.5 + a * 0.125)).abs() < 1e-16);
+        assert!((end.velocity.x - (0.1 + a * 0.5)).abs() < 1e-16);
+    }
+
+    proptest! {
+        /// What it leaves out is no more than it says.
+        #[test]
+        fn the_bound_holds_against_the_rolling_model(
+            q in prop::array::uniform2(-0.3..0.3_f64), rate in prop::array::uniform2(-3.0..3.0_f64),
+            acceleration in prop::array::uniform2(-30.0..30.0_f64),
+            p in prop::array::uniform2(-0.2..0.2_f64), v in prop::array::uniform2(-1.0..1.0_f64),
+        ) {
+            let (planar, rolling) = models();
+            let tilt = Tilt { angle: q.into(), rate: rate.into(), acceleration: acceleration.into() };
+            let state = RollingState { position: p.into(), velocity: v.into(), spin: 0.0 };
+            let (truth, _) = rolling.acceleration(&state, &tilt.motion());
+            let error = (planar.acceleration(&tilt) - truth).norm();
+            let bound = planar.left_out(&state, &tilt);
+            prop_assert!(error <= bound, "{error} above {bound}");
+        }
+    }
+}

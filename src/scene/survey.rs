@@ -1,0 +1,124 @@
+//! A cheap look at a scene before it is run: what the contact will have to
+//! bear, and what the smaller models leave out.
+//!
+//! The plate is looked at a few times per shortest time of its law, with the
+//! ball where it starts. That costs less than the cheapest run.
+
+use super::drive::{Drive, Seen};
+use super::{Scene, Subject};
+use crate::plant::{Creeping, Grip, Motion, Rolling};
+
+/// Looks per shortest time of the plate's law.
+const LOOKS_PER_TIME: f64 = 4.0;
+
+/// Most looks at one scene; a longer one is looked at more sparsely.
+const MOST_LOOKS: f64 = 64.0;
+
+/// A body that starts within this of the plate starts on it, m.
+const ON_THE_PLATE_M: f64 = 1e-3;
+
+/// What the survey found; errors are estimates of the worst error of position
+/// over the scene against the compliant model, m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Survey {
+    /// Largest part of the friction limit in use; above 1 the ball slips.
+    pub demand: f64,
+    /// Whether the body starts on the plate, not slipping more than it creeps.
+    pub starts_rolling: bool,
+    /// Error of a model without creep and sag, m.
+    pub rolling_error_m: f64,
+    /// Error of the creeping model, m.
+    pub creeping_error_m: f64,
+    /// Depth to which the body sinks, m.
+    pub sag_m: f64,
+}
+
+impl Survey {
+    /// Looks at `scene` under `drive`.
+    pub fn of<D: Drive>(scene: &Scene, drive: &mut D) -> Self {
+        let mut worst = Worst::default();
+        let mut t = 0.0;
+        let time = drive.shortest_time_s();
+        let look = (time / LOOKS_PER_TIME).max(scene.duration_s / MOST_LOOKS).min(scene.duration_s);
+        while t < scene.duration_s {
+            let until = drive.begin(t, &scene.initial).min(scene.duration_s);
+            worst.piece(scene, drive, t, until, look);
+            t = until;
+        }
+        worst.survey(scene, time)
+    }
+}
+
+/// The worst seen so far.
+#[derive(Clone, Copy, Debug, Default)]
+struct Worst {
+    demand: f64,
+    /// v − U of the creeping ball, m/s.
+    trade: f64,
+    sag: f64,
+    settling: f64,
+}
+
+impl Worst {
+    fn piece<D: Drive>(&mut self, scene: &Scene, drive: &D, from: f64, until: f64, look: f64) {
+        let plate = Seen::new(drive, scene.body().mass_kg(), from);
+        let n = ((until - from) / look).ceil().max(1.0) as u32;
+        for i in 0..=n {
+            self.look(scene, &plate.at(from + (until - from) * f64::from(i) / f64::from(n)));
+        }
+    }
+
+    fn look(&mut self, scene: &Scene, plate: &crate::plant::PlateMotion) {
+        let at = &scene.initial;
+        match &scene.subject {
+            Subject::Ball(ball) => {
+                let creeping = Creeping::new(ball, &scene.plate, &scene.contact);
+                let y = creeping.enter(at, plate);
+                let grip = Rolling::new(ball, &scene.plate).grip(&y, plate);
+                let give = creeping.give(&grip, plate);
+                self.note(scene, &grip, give.velocity[0].hypot(give.velocity[1]), give.sag);
+                let [sag, slip] = creeping.settling_s(grip.normal.max(f64::MIN_POSITIVE));
+                self.settling = self.settling.max(sag).max(slip);
+            }
+            Subject::Block(_) => {
+                let free = plate.free(&at.position, &at.velocity);
+                let grip = Grip { friction: [-free.x, -free.y], normal: -free.z };
+                let sag = scene.body().mass_kg() * grip.normal / scene.contact.stiffness_n_per_m();
+                let creep = grip.demand(scene.contact.friction()).min(1.0)
+                    * scene.contact.slip_threshold_m_s();
+                self.note(scene, &grip, creep * std::f64::consts::SQRT_2, sag);
+            }
+        }
+    }
+
+    fn note(&mut self, scene: &Scene, grip: &Grip, trade: f64, sag: f64) {
+        self.demand = self.demand.max(grip.demand(scene.contact.friction()));
+        self.trade = self.trade.max(trade.abs());
+        self.sag = self.sag.max(sag);
+    }
+
+    fn survey(&self, scene: &Scene, shortest_time: f64) -> Survey {
+        // The trade adds up over the scene at worst; what it lags behind by its
+        // settling time is the creeping model's error.
+        let rolling = self.trade * scene.duration_s + self.sag * self.demand;
+        let lag = (std::f64::consts::TAU * self.settling / shortest_time).min(1.0);
+        let creeping = 2.0 * rolling * lag + 4.0 * self.trade * self.settling;
+        Survey {
+            demand: self.demand,
+            starts_rolling: starts_rolling(scene, self.trade),
+            rolling_error_m: rolling,
+            creeping_error_m: creeping,
+            sag_m: self.sag,
+        }
+    }
+}
+
+fn starts_rolling(scene: &Scene, trade: f64) -> bool {
+    let (body, at): (_, &Motion) = (scene.body(), &scene.initial);
+    let depth = body.rest_height_m() - at.position.z;
+    let [x, y] = body.slip(&at.velocity, &at.spin);
+    let threshold = scene.contact.slip_threshold_m_s();
+    (0.0..ON_THE_PLATE_M).contains(&depth)
+        && at.velocity.z == 0.0
+        && x.hypot(y) <= threshold.min(trade.max(threshold))
+}
