@@ -20,6 +20,7 @@ mod twin;
 pub use body::{Ball, GRAVITY_M_S2, Plate, PlateShape};
 pub use compliant::Compliant;
 pub use contact::{Body, Contact, Ground, Motion};
+pub use contact_step::ContactStep;
 pub use creeping::{Creeping, Give};
 pub use planar::Planar;
 pub use rolling::{Grip, Rolling, RollingState};

@@ -144,7 +144,7 @@ impl<const N: usize> Course<'_, '_, N> {
         watch: &mut impl Watch<R, N>,
         step: impl Fn(&R, f64, &[f64; N], f64) -> [f64; N],
     ) -> Result<(), Failure> {
-        let n = ((until - self.t) / h - 1e-9).ceil().max(1.0) as u64;
+        let n = whole_steps(until - self.t, h);
         let h = (until - self.t) / n as f64;
         for i in 1..=n {
             let y = step(rung, self.t, &self.y, h);
@@ -186,6 +186,11 @@ impl<const N: usize> Course<'_, '_, N> {
         }
         Ok(())
     }
+}
+
+/// How many equal steps of at most `h` make up `span`.
+pub(super) fn whole_steps(span: f64, h: f64) -> u64 {
+    (span / h - 1e-9).ceil().max(1.0) as u64
 }
 
 /// The step to try at `t`, and where it ends: the end of the piece is met, and
