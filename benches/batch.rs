@@ -141,7 +141,7 @@ impl Way {
         match self {
             Self::Rolling(models, states) => {
                 for ((model, state), tilt) in models.iter().zip(states).zip(&fleet.tilts) {
-                    *state = model.midpoint(state, [tilt, tilt], Vector2::zeros(), STEP_S);
+                    *state = model.midpoint(state, [&tilt.motion(); 2], STEP_S);
                 }
             }
             Self::Alone(models, states) => {

@@ -6,6 +6,7 @@ mod adaptive;
 mod linear;
 mod rosenbrock;
 mod runge_kutta;
+pub mod sine;
 mod sliding_quadratic;
 mod statistics;
 mod system;

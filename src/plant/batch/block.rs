@@ -4,8 +4,8 @@
 //! another's lane, so the compiler does as many at a time as the machine has
 //! room for. Lanes meet nowhere: a ball that is not a number stays alone.
 
-use super::sine::{reduced, turned};
 use super::step::{Motion, RollingConstants, Turn};
+use crate::maths::sine::{reduced, turned};
 
 /// Balls in a block. Enough that loops of independent turns hide the latency
 /// of the chain within each, few enough that a block with its inputs (5.4 kB)
@@ -67,7 +67,7 @@ impl Block {
     }
 }
 
-/// [`sin_cos`](super::sine::sin_cos) of a row, in two loops: in each, what
+/// [`sin_cos`](crate::maths::sine::sin_cos) of a row, in two loops: in each, what
 /// waits for one another is half as long. `sin` and `cos` hold its middle.
 #[inline(always)]
 fn sines(angle: &[f64; LANES], sin: &mut Row, cos: &mut Row) {

@@ -13,7 +13,6 @@
 
 mod block;
 mod instructions;
-mod sine;
 mod step;
 
 pub use instructions::Instructions;

@@ -17,7 +17,7 @@
 
 use nalgebra::Vector2;
 
-use super::sine::sin_cos;
+use crate::maths::sine::sin_cos;
 use crate::plant::{Ball, GRAVITY_M_S2, Plate, RollingState, Tilt};
 
 /// What a step needs to know of one ball on one plate.

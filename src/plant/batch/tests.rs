@@ -135,8 +135,7 @@ proptest! {
     #[test]
     fn a_step_agrees_with_the_rolling_model(case in case()) {
         let Case { ball, plate, state, tilt, step_s: h } = &case;
-        let none = Vector2::zeros();
-        let expected = Rolling::new(ball, plate).midpoint(state, [tilt, tilt], none, *h);
+        let expected = Rolling::new(ball, plate).midpoint(state, [&tilt.motion(); 2], *h);
         let largest = |v: Vector2<f64>| v.amax();
         let (rate, curvature) = (largest(tilt.rate), 1.0 / ball.radius_m());
         let (angular, speed) =

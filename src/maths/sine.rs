@@ -15,6 +15,9 @@
 
 use std::f64::consts::FRAC_2_PI;
 
+/// Up to this angle either way [`sin_cos`] is as good as it says, rad.
+pub const LIMIT_RAD: f64 = 1000.0;
+
 /// The first 33 bits of π/2: its product with a k below 2²⁰ is exact.
 const HALF_PI_HIGH: f64 = f64::from_bits(0x3FF9_21FB_5440_0000);
 /// π/2 − [`HALF_PI_HIGH`].
@@ -48,7 +51,7 @@ const C: [f64; 6] = [
 /// standard library gives (1.2e-16) for angles up to 1000 rad either way; not
 /// a number where the angle is infinite or none.
 #[inline(always)]
-pub(super) fn sin_cos(angle_rad: f64) -> (f64, f64) {
+pub fn sin_cos(angle_rad: f64) -> (f64, f64) {
     let (x, turns) = reduced(angle_rad);
     turned(x, turns)
 }
@@ -56,7 +59,7 @@ pub(super) fn sin_cos(angle_rad: f64) -> (f64, f64) {
 /// The first half of [`sin_cos`]: x in [−π/4, π/4], and how many quarter turns
 /// were taken away, in the lowest bits of the second number.
 #[inline(always)]
-pub(super) fn reduced(angle_rad: f64) -> (f64, f64) {
+pub fn reduced(angle_rad: f64) -> (f64, f64) {
     let turns = angle_rad * FRAC_2_PI + ROUNDER;
     let k = turns - ROUNDER;
     ((angle_rad - k * HALF_PI_HIGH) - k * HALF_PI_LOW, turns)
@@ -64,7 +67,7 @@ pub(super) fn reduced(angle_rad: f64) -> (f64, f64) {
 
 /// The second half of [`sin_cos`], of what [`reduced`] gave.
 #[inline(always)]
-pub(super) fn turned(x: f64, turns: f64) -> (f64, f64) {
+pub fn turned(x: f64, turns: f64) -> (f64, f64) {
     let (sin, cos) = near_zero(x);
     let (sin, cos, quadrant) = (sin.to_bits(), cos.to_bits(), turns.to_bits());
     let exchange = (sin ^ cos) & (quadrant & 1).wrapping_neg();
