@@ -66,7 +66,8 @@ pub fn suits(scene: &Scene, model: Model) -> Result<(), Invalid> {
 /// longer ones step over what the plate does without seeing it.
 const LONGEST_PART: f64 = 0.2;
 
-/// First step of an adaptive method, s: short enough for any of them.
+/// First step of a stiff method, s: the contact may have to settle. The
+/// explicit one tries its longest and finds out.
 const FIRST_STEP_S: f64 = 1e-4;
 
 /// Smallest share of the tolerance for one step of the stiff methods: through a
@@ -114,7 +115,8 @@ impl<'a> Stage<'a> {
             _ => 4.0,
         };
         let longest = (LONGEST_PART * drive.shortest_time_s()).min(self.scene.duration_s);
-        StepControl::new(power, FIRST_STEP_S, SHORTEST_STEP_S, longest.max(SHORTEST_STEP_S))
+        let first = if self.method == Method::Dopri5 { longest } else { FIRST_STEP_S };
+        StepControl::new(power, first, SHORTEST_STEP_S, longest.max(SHORTEST_STEP_S))
     }
 
     /// Calls `piece` for each smooth piece of the drive.

@@ -7,6 +7,10 @@ use crate::maths::{Estimated, StepControl};
 /// More steps than this end a run: at 50 ns each it has taken a minute.
 pub const MOST_STEPS: u64 = 1_000_000_000;
 
+/// More changes of phase than this end a run: a body on the verge of two would
+/// take the smallest steps for ever.
+pub const MOST_CHANGES: u32 = 100_000;
+
 /// Why a run ended early.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Failure {
@@ -14,6 +18,8 @@ pub enum Failure {
     NotFinite { at_s: f64 },
     #[error("over {MOST_STEPS} steps at {at_s} s")]
     TooManySteps { at_s: f64 },
+    #[error("over {MOST_CHANGES} changes between roll, slip and flight at {at_s} s")]
+    TooManyChanges { at_s: f64 },
     /// The run was to stop where its model is not valid.
     #[error("{why} at {at_s} s")]
     OutOfRange { at_s: f64, why: &'static str },
