@@ -18,7 +18,7 @@ const fn rule(module: &'static str, floor: u8, beside: &'static [&'static str]) 
 }
 
 /// Every top module of `src/`.
-pub const FLOORS: [Rule; 13] = [
+pub const FLOORS: [Rule; 14] = [
     rule("vocabulary", 0, &[]),
     rule("maths", 1, &[]),
     rule("plant", 1, &[]),
@@ -31,7 +31,8 @@ pub const FLOORS: [Rule; 13] = [
     rule("http", 4, &["wire", "service"]),
     rule("config", 5, &[]),
     rule("server", 5, &["config"]),
-    rule("cli", 5, &["config", "server"]),
+    rule("chart", 5, &[]),
+    rule("cli", 5, &["chart", "config", "server"]),
 ];
 
 /// The highest floor that is free of input, output, clocks and chance.
@@ -77,6 +78,7 @@ const TRADES: &[(&str, &[&str])] = &[
     ),
     ("service", &["axum", "sqlx"]),
     ("http", &["sqlx"]),
+    ("chart", &["anyhow", "axum", "sqlx", "tokio"]),
 ];
 
 /// How SQL begins; in capitals, as this code writes it.
