@@ -2,6 +2,7 @@
 //!
 //! Pure and deterministic: numbers in, numbers out. Knows nothing of rigs.
 
+pub mod estimators;
 mod sliding_quadratic;
 mod statistics;
 
