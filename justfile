@@ -40,3 +40,7 @@ picture:
 # How fast samples go through
 bench:
     cargo bench --bench ingest
+
+# Other people's engines and solvers on the scenes of `offbd chart work-precision`
+peers *ARGS:
+    benches/peers/run {{ARGS}}
