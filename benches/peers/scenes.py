@@ -51,6 +51,7 @@ STEPS = (5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4)
 QUICK_STEPS = (2e-3, 1e-3, 5e-4)
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 QUICK_TOLERANCES = (1e-4, 1e-6, 1e-8)
+ABSOLUTE = 1e-2  # absolute over relative tolerance: positions are centimetres
 
 
 def chosen(quick):

@@ -7,9 +7,8 @@ from numba import njit
 
 import measure
 from engines.sundials import NORMAL, Cvode, reinit, set_stop, solve
-from scenes import tolerances
+from scenes import ABSOLUTE, tolerances
 
-ABSOLUTE = 1e-2  # absolute over relative tolerance: positions are centimetres
 TICK = 1e-3  # s between restarts
 
 

@@ -12,9 +12,8 @@ from scipy.integrate import odeint, solve_ivp
 
 import equations
 import measure
-from scenes import tolerances
+from scenes import ABSOLUTE, tolerances
 
-ABSOLUTE = 1e-2  # absolute over relative tolerance: positions are centimetres
 STEPS = 1_000_000
 
 

@@ -7,16 +7,12 @@ use diffsol::{
 };
 
 use crate::equations::{START, compliant, compliant_times, rolling};
-use crate::measure::{Case, Labels};
+use crate::measure::{ABSOLUTE, Case, Labels, tolerances};
 use crate::scene::Scene;
 
 type Matrix = NalgebraMat<f64>;
 type Lu = NalgebraLU<f64>;
 
-const TOLERANCES: [f64; 7] = [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9];
-const QUICK_TOLERANCES: [f64; 3] = [1e-4, 1e-6, 1e-8];
-/// Absolute over relative tolerance: positions are centimetres.
-const ABSOLUTE: f64 = 1e-2;
 /// Seconds between restarts.
 const TICK: f64 = 1e-3;
 
@@ -34,8 +30,7 @@ impl<E> Compliant for E where
 /// All methods and tolerances of one scene.
 pub fn scan(case: &mut Case) {
     let scene = *case.scene;
-    let tolerances = if case.quick { &QUICK_TOLERANCES[..] } else { &TOLERANCES };
-    for &value in tolerances {
+    for &value in tolerances(case.quick) {
         let labels = |model, method: &str| Labels {
             model,
             method: method.into(),

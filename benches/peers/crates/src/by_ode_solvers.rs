@@ -4,15 +4,10 @@ use anyhow::anyhow;
 use ode_solvers::{Dop853, Dopri5, OutputType, SVector, System};
 
 use crate::equations::rolling;
-use crate::measure::{Case, Labels};
+use crate::measure::{ABSOLUTE, Case, Labels, tolerances};
 use crate::scene::{Law, Scene};
 
 type State = SVector<f64, 5>;
-
-const TOLERANCES: [f64; 7] = [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9];
-const QUICK_TOLERANCES: [f64; 3] = [1e-4, 1e-6, 1e-8];
-/// Absolute over relative tolerance: positions are centimetres.
-const ABSOLUTE: f64 = 1e-2;
 
 struct Rolling(Law);
 
@@ -43,8 +38,7 @@ macro_rules! solve {
 /// Both methods with all tolerances on one scene.
 pub fn scan(case: &mut Case) {
     let scene = *case.scene;
-    let tolerances = if case.quick { &QUICK_TOLERANCES[..] } else { &TOLERANCES };
-    for &value in tolerances {
+    for &value in tolerances(case.quick) {
         let labels = |method: &str| Labels {
             model: "rolling",
             method: method.into(),

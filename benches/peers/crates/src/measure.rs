@@ -16,6 +16,14 @@ const SHORTEST: Duration = Duration::from_millis(20);
 const LONGEST: Duration = Duration::from_secs(20);
 const MOST: usize = 1000;
 
+/// Absolute over relative tolerance: positions are centimetres.
+pub const ABSOLUTE: f64 = 1e-2;
+
+/// Relative tolerances to try.
+pub fn tolerances(quick: bool) -> &'static [f64] {
+    if quick { &[1e-4, 1e-6, 1e-8] } else { &[1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9] }
+}
+
 /// One point of a work-precision diagram.
 #[derive(Serialize)]
 pub struct Record {
