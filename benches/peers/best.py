@@ -48,7 +48,7 @@ def main():
     cells = [(scene, limit) for scene in SCENES for limit in LIMITS]
     heads = [f"{scene} ≤ {limit:.0e}".replace("e-0", "e-") for scene, limit in cells]
     print("| peer |", " | ".join(heads), "|")
-    print("| --- |", "--: | " * len(cells))
+    print("| --- |", " | ".join(["--:"] * len(cells)), "|")
     for row in sorted(rows):
         print(f"| {row} |", " | ".join(show(cheapest(rows[row], *cell)) for cell in cells), "|")
 
