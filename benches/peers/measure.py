@@ -57,7 +57,7 @@ class Bench:
         try:
             record["error_m"] = worst_error(trace(), reference.load(scene))
             record |= self._cost(scene, run, prepare)
-        except Exception as failure:  # whatever a peer throws is its result
+        except Exception as failure:  # noqa: BLE001 (whatever a peer throws is its result)
             record["error_m"] = None
             record["note"] = f"did not finish: {failure}".splitlines()[0][:120]
         else:

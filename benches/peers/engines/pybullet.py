@@ -76,11 +76,15 @@ class Run:
         return plate, ball
 
     def advance(self, plate, path):
-        """The loop that is timed."""
+        """The loop itself."""
         for centre, quaternion, velocity, spin in path:
             pybullet.resetBasePositionAndOrientation(plate, centre, quaternion)
             pybullet.resetBaseVelocity(plate, velocity, spin)
             pybullet.stepSimulation()
+
+    def __call__(self, plate, _):
+        """What is timed."""
+        self.advance(plate, self.path)
 
     def trace(self):
         """Positions at the samples, in the plate's frame."""
@@ -100,7 +104,7 @@ def scan(bench, scene, quick):
             for ending, lead in (("", 0.0), (", staggered start", 0.5 * step)):
                 run = Run(scene, tuning, step, lead)
                 bench.add(scene, ("rigid contact", tuning + ending, "step_s", step),
-                          run.trace, lambda plate, _: run.advance(plate, run.path), run.build)
+                          run.trace, run, run.build)
 
 
 if __name__ == "__main__":

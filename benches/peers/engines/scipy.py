@@ -5,6 +5,7 @@ whose loop is Python. The equations are compiled in all of them.
 """
 
 import warnings
+from functools import partial
 
 import numpy as np
 import scipy
@@ -49,13 +50,13 @@ def scan(bench, scene, quick):
     """All methods and tolerances of one scene."""
     ends = np.array([0.0, scene.duration])
     for tolerance in tolerances(quick):
+        solve = partial(lsoda, scene, tolerance)
         bench.add(scene, ("compliant", "lsoda", "tolerance", tolerance),
-                  lambda: lsoda(scene, tolerance, scene.samples),
-                  lambda: lsoda(scene, tolerance, ends))
+                  partial(solve, scene.samples), partial(solve, ends))
         for model, method in (("compliant", "Radau"), ("rolling", "DOP853"), ("rolling", "RK45")):
+            solve = partial(by_solve_ivp, scene, model, method, tolerance)
             bench.add(scene, (model, method.lower(), "tolerance", tolerance),
-                      lambda: by_solve_ivp(scene, model, method, tolerance, scene.samples),
-                      lambda: by_solve_ivp(scene, model, method, tolerance, ends))
+                      partial(solve, scene.samples), partial(solve, ends))
 
 
 if __name__ == "__main__":
