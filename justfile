@@ -41,3 +41,7 @@ picture:
 bench:
     cargo bench --bench ingest
     cargo bench --no-default-features --bench batch
+
+# Other people's engines and solvers on the scenes of `offbd chart work-precision`
+peers *ARGS:
+    benches/peers/run {{ARGS}}

@@ -1,0 +1,1 @@
+"""One module per engine; `python -m engines.NAME` measures it and prints its records."""
