@@ -13,6 +13,12 @@ pub enum ChartError {
     /// The records are no JSON, a number that is not finite say.
     #[error("cannot write the records: {0}")]
     Records(#[from] serde_json::Error),
+    /// A scene cannot be.
+    #[error("{0}")]
+    Scene(#[from] crate::vocabulary::Invalid),
+    /// Somebody else's records could not be read.
+    #[error("{}: {reason}", path.display())]
+    Peers { path: PathBuf, reason: String },
     /// A file could not be written.
     #[error("{}: {source}", path.display())]
     File { path: PathBuf, source: io::Error },

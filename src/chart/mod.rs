@@ -25,6 +25,7 @@ mod scale;
 #[cfg(test)]
 mod tests;
 mod timing;
+pub mod work_precision;
 mod write;
 
 pub use draw::svg;

@@ -14,7 +14,8 @@ use crate::chart::{self, Chart, ChartError, Effort};
 /// CPU time: leave the machine alone meanwhile.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "Examples:\n  \
-    offbd chart estimators\n  \
+    offbd chart work-precision\n  \
+    offbd chart work-precision --with peers.json\n  \
     offbd chart estimators -o measured --quick")]
 pub(super) struct ChartArgs {
     /// Which chart
@@ -23,6 +24,9 @@ pub(super) struct ChartArgs {
     /// Where the files go; made if need be
     #[arg(short, long, value_name = "DIR", default_value = "charts")]
     output: PathBuf,
+    /// Records of other engines to draw beside ours, for work-precision
+    #[arg(long, value_name = "FILE")]
+    with: Vec<PathBuf>,
     /// Measure a few points only
     #[arg(long)]
     quick: bool,
@@ -32,19 +36,30 @@ pub(super) struct ChartArgs {
 enum Name {
     /// Acceleration estimators: error against delay and cost
     Estimators,
+    /// Models and methods: error against CPU time per simulated second
+    WorkPrecision,
 }
 
 impl Name {
-    fn make(self, effort: Effort) -> Result<Chart, ChartError> {
+    fn make(self, effort: Effort, with: &[PathBuf]) -> Result<Chart, ChartError> {
         match self {
             Self::Estimators => chart::estimators::make(effort),
+            Self::WorkPrecision => {
+                let mut peers = (Vec::new(), Vec::new());
+                for path in with {
+                    let (records, versions) = chart::work_precision::read(path)?;
+                    peers.0.extend(records);
+                    peers.1.extend(versions);
+                }
+                chart::work_precision::make(effort, &peers)
+            }
         }
     }
 }
 
 pub(super) fn run(args: &ChartArgs) -> anyhow::Result<()> {
     let effort = if args.quick { Effort::Quick } else { Effort::Full };
-    let chart = args.name.make(effort)?;
+    let chart = args.name.make(effort, &args.with)?;
     let written = chart::write(&chart, &args.output)?;
     write_table(&chart.table)?;
     for path in written {
