@@ -10,6 +10,7 @@
 //! in `src/cli/chart.rs`.
 
 mod draw;
+mod equal;
 mod error;
 pub mod estimators;
 mod figure;
@@ -27,6 +28,7 @@ mod timing;
 mod write;
 
 pub use draw::svg;
+pub use equal::equal_scales;
 pub use error::ChartError;
 pub use figure::{Axis, Figure, Mark, Panel, Series, Stroke};
 pub use front::{Front, front};
@@ -35,5 +37,5 @@ pub use machine::{Document, Machine, versions};
 pub use raster::png;
 pub use regions::{Category, Regions};
 pub use scale::Scale;
-pub use timing::{CpuTime, cpu_time};
+pub use timing::{CpuTime, cpu_once, cpu_time};
 pub use write::{Chart, Effort, Table, write};

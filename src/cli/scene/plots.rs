@@ -1,0 +1,184 @@
+//! Drawings of courses: position over time, the path on the plate, two bodies
+//! side by side.
+
+use super::course::{Course, Sampled};
+use super::words;
+use crate::chart::{Axis, Figure, Look, Mark, Panel, Scale, Series, Stroke, equal_scales};
+use crate::plant::{Plate, PlateShape};
+
+/// Points drawn of one line: more than the drawing has pixels show nothing new.
+const MOST_POINTS: usize = 2000;
+
+/// Height of a panel over time, pixels.
+const PANEL_HEIGHT: u32 = 760;
+
+/// Margin around what is drawn, as a share of it.
+const MARGIN: f64 = 0.06;
+
+/// Of the plate, what is drawn beyond it where the ball falls off: a share of
+/// its half extent.
+const BEYOND: f64 = 0.4;
+
+/// Evenly chosen, the last one too.
+pub(super) fn thinned<T: Copy>(values: &[T]) -> Vec<T> {
+    let stride = values.len().div_ceil(MOST_POINTS).max(1);
+    let last = values.last().filter(|_| (values.len() - 1) % stride != 0);
+    values.iter().step_by(stride).chain(last).copied().collect()
+}
+
+/// Points of a line over time.
+pub(super) fn over_time<T>(values: &[T], of: impl Fn(&T) -> (f64, f64)) -> Vec<(f64, f64)> {
+    thinned(&values.iter().map(of).collect::<Vec<_>>())
+}
+
+pub(super) fn line(name: &str, look: usize, points: Vec<(f64, f64)>) -> Series {
+    Series::new(name, Look::of(look), Stroke::Line, points)
+}
+
+/// Axes around the series, with time along x.
+pub(super) fn time_panel(title: &str, y: &str, series: Vec<Series>) -> Panel {
+    let points = || series.iter().flat_map(|series| series.points.iter());
+    let times = Scale::linear_around(points().map(|p| p.0), 0.0);
+    let values = Scale::linear_around(points().map(|p| p.1), MARGIN);
+    let mut panel = Panel::new(title, Axis::new("time (s)", times), Axis::new(y, values));
+    panel.series = series;
+    panel
+}
+
+pub(super) fn figure(
+    title: String,
+    subtitle: String,
+    columns: usize,
+    panels: Vec<Panel>,
+) -> Figure {
+    Figure { title, subtitle, columns, panel_height: PANEL_HEIGHT, panels }
+}
+
+fn ran(course: &Course) -> String {
+    let configuration = words::configuration(&course.decision.configuration);
+    let mut chars = configuration.chars();
+    let first = chars.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
+    format!("{first}{}.", chars.as_str())
+}
+
+/// x and y over time.
+pub(super) fn position(course: &Course) -> Figure {
+    let of = |name: &str, i: usize| {
+        line(name, i, over_time(&course.samples, |(t, at)| (*t, at.position[i])))
+    };
+    let mut panel = time_panel("", "position on the plate (m)", vec![of("x", 0), of("y", 1)]);
+    for event in course.events.iter().skip(1).take(4) {
+        let Some((_, at)) = course.samples.iter().find(|(t, _)| *t >= event.at_s) else { continue };
+        panel.marks.push(Mark {
+            name: "what happens (sliding model)".to_owned(),
+            text: words::event(event, &course.scene).to_owned(),
+            at: (event.at_s, at.position.y),
+        });
+    }
+    figure(format!("{}: position over time", course.name), ran(course), 1, vec![panel])
+}
+
+/// The path on the plate, with its outline where it has one.
+pub(super) fn path(course: &Course) -> Figure {
+    let points: Vec<(f64, f64)> = course.samples.iter().map(place).collect();
+    let mut series = vec![line("path of the centre", 0, thinned(&points))];
+    let mut ranges = [0, 1].map(|i| range(&points, i));
+    if course.scene.edges {
+        let outline = outline(&course.scene.plate);
+        for (i, range) in ranges.iter_mut().enumerate() {
+            *range = beside_the_plate(*range, self::range(&outline, i));
+        }
+        series.insert(0, Series::new("edge of the plate", Look::BLACK, Stroke::Line, outline));
+    }
+    let [x, y] = with_margin(ranges);
+    let (x, y, panel_height) = equal_scales(x, y);
+    let mut panel = Panel::new("", Axis::new("x (m)", x), Axis::new("y (m)", y));
+    panel.series = series;
+    if let Some(start) = points.first() {
+        panel.marks.push(Mark { name: "start".to_owned(), text: "start".to_owned(), at: *start });
+    }
+    Figure {
+        title: format!("{}: path on the plate", course.name),
+        subtitle: format!("{} Plate frame, {} s.", ran(course), course.scene.duration_s),
+        columns: 1,
+        panel_height,
+        panels: vec![panel],
+    }
+}
+
+fn place((_, at): &Sampled) -> (f64, f64) {
+    (at.position.x, at.position.y)
+}
+
+fn range(points: &[(f64, f64)], i: usize) -> (f64, f64) {
+    let values = points.iter().map(|p| if i == 0 { p.0 } else { p.1 }).filter(|v| v.is_finite());
+    let (low, high) =
+        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+    if low <= high { (low, high) } else { (0.0, 0.0) }
+}
+
+/// The plate's `edge` wholly, and of the path's `range` what is near it.
+fn beside_the_plate(range: (f64, f64), edge: (f64, f64)) -> (f64, f64) {
+    let beyond = BEYOND * (edge.1 - edge.0) / 2.0;
+    (range.0.clamp(edge.0 - beyond, edge.0), range.1.clamp(edge.1, edge.1 + beyond))
+}
+
+/// Both ranges with a margin, neither of them thin against the other.
+fn with_margin(ranges: [(f64, f64); 2]) -> [(f64, f64); 2] {
+    let longest = ranges.iter().map(|(low, high)| high - low).fold(1e-9, f64::max);
+    ranges.map(|(low, high)| {
+        let length = (high - low).max(0.2 * longest);
+        let middle = f64::midpoint(low, high);
+        let half = length / 2.0 + MARGIN * longest;
+        (middle - half, middle + half)
+    })
+}
+
+/// Corners of the plate's edge, or points around it.
+fn outline(plate: &Plate) -> Vec<(f64, f64)> {
+    match plate.shape() {
+        PlateShape::Rectangle { length_m, width_m } => {
+            let (x, y) = (length_m / 2.0, width_m / 2.0);
+            vec![(-x, -y), (x, -y), (x, y), (-x, y), (-x, -y)]
+        }
+        PlateShape::Round { diameter_m } => (0..=180)
+            .map(|i| f64::from(i) * std::f64::consts::TAU / 180.0)
+            .map(|angle| (diameter_m / 2.0 * angle.cos(), diameter_m / 2.0 * angle.sin()))
+            .collect(),
+    }
+}
+
+/// How far each body has come: as it is, and logarithmically, on which a body
+/// that creeps shows beside one that rolls.
+pub(super) fn side_by_side(courses: &[Course]) -> Figure {
+    let ways: Vec<Vec<(f64, f64)>> = courses.iter().map(way).collect();
+    let lines = |keep: fn(&(f64, f64)) -> bool| -> Vec<Series> {
+        let named = courses.iter().zip(&ways).enumerate();
+        named
+            .map(|(i, (course, way))| {
+                line(
+                    body(course),
+                    i,
+                    thinned(&way.iter().filter(|p| keep(p)).copied().collect::<Vec<_>>()),
+                )
+            })
+            .collect()
+    };
+    let plain = time_panel("", "way from the start (m)", lines(|_| true));
+    let mut log = time_panel("", "way from the start (m)", lines(|p| p.1 > 0.0));
+    let above_zero = ways.iter().flatten().map(|p| p.1);
+    log.y.scale = Scale::log_around(above_zero, MARGIN);
+    log.x.scale = plain.x.scale.clone();
+    let names: Vec<&str> = courses.iter().map(body).collect();
+    let subtitle = "The same plate, linear and logarithmic.".to_owned();
+    figure(format!("The {} side by side", names.join(" and the ")), subtitle, 2, vec![plain, log])
+}
+
+fn body(course: &Course) -> &'static str {
+    if course.scene.body().turns() { "ball" } else { "block" }
+}
+
+fn way(course: &Course) -> Vec<(f64, f64)> {
+    let start = course.scene.initial.position.xy();
+    over_time(&course.samples, |(t, at)| (*t, (at.position.xy() - start).norm()))
+}
