@@ -4,6 +4,7 @@ mod bench;
 mod calibrate;
 mod demo;
 mod replay;
+mod scene;
 mod score;
 mod service;
 mod simulate;

@@ -4,12 +4,17 @@ use std::path::Path;
 
 use crate::cli::unusable::{BadArgument, Unusable, read};
 use crate::cli::{output, table};
+use crate::vocabulary::Invalid;
 use crate::wire::scene::{NamedScene, parse};
 
 /// What there is to run.
 pub(super) enum Exercise {
     /// Scenes by laws of time, beside each other; the first is the scene's own.
-    Laws(Vec<NamedScene>),
+    Laws {
+        scenes: Vec<NamedScene>,
+        /// What there is to be seen asks for this accuracy, m, if for any.
+        tolerance_m: Option<f64>,
+    },
     /// The plate in closed loop.
     Control { impulse: bool },
     /// A simulated rig with its twin.
@@ -25,6 +30,8 @@ struct Entry {
 enum What {
     /// Scene files.
     Laws(&'static [&'static str]),
+    /// Scene files, with the accuracy that shows what there is to see, m.
+    Fine(f64, &'static [&'static str]),
     Control(bool),
     Rig(bool),
 }
@@ -54,7 +61,7 @@ const ENTRIES: [Entry; 12] = [
     Entry {
         name: "block",
         about: "application 2: a cube that slides, at pi/20 on both axes, beside the ball",
-        what: What::Laws(&[file!("block"), file!("tilt")]),
+        what: What::Fine(1e-7, &[file!("block"), file!("tilt")]),
     },
     Entry {
         name: "good-asset",
@@ -111,9 +118,10 @@ pub(super) fn list() -> anyhow::Result<()> {
 pub(super) fn find(word: &str) -> anyhow::Result<Exercise> {
     if let Some(entry) = ENTRIES.iter().find(|entry| entry.name == word) {
         return Ok(match entry.what {
-            What::Laws(files) => Exercise::Laws(
-                files.iter().map(|text| parse(text.as_bytes())).collect::<Result<_, _>>()?,
-            ),
+            What::Laws(files) => Exercise::Laws { scenes: parsed(files)?, tolerance_m: None },
+            What::Fine(tolerance, files) => {
+                Exercise::Laws { scenes: parsed(files)?, tolerance_m: Some(tolerance) }
+            }
             What::Control(impulse) => Exercise::Control { impulse },
             What::Rig(bad_x) => Exercise::Rig { bad_x },
         });
@@ -126,7 +134,11 @@ pub(super) fn find(word: &str) -> anyhow::Result<Exercise> {
         return Err(BadArgument(text).into());
     }
     let scene = parse(&read(path)?).map_err(|e| Unusable::file(path, e))?;
-    Ok(Exercise::Laws(vec![scene]))
+    Ok(Exercise::Laws { scenes: vec![scene], tolerance_m: None })
+}
+
+fn parsed(files: &[&str]) -> Result<Vec<NamedScene>, Invalid> {
+    files.iter().map(|text| parse(text.as_bytes())).collect()
 }
 
 #[cfg(test)]
@@ -136,7 +148,7 @@ mod tests {
     #[test]
     fn every_named_scene_can_be_found_and_has_its_files_name() {
         for entry in &ENTRIES {
-            if let Exercise::Laws(scenes) = find(entry.name).unwrap() {
+            if let Exercise::Laws { scenes, .. } = find(entry.name).unwrap() {
                 assert_eq!(scenes[0].name, entry.name);
             }
             assert!(entry.name.len() + entry.about.len() < 160, "{}", entry.name);

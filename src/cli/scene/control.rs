@@ -172,8 +172,8 @@ fn figure(course: &Course, turns: &[Turn]) -> Figure {
             .to_owned(),
         1,
         vec![
-            plots::time_panel("", "error (m)", errors),
-            plots::time_panel("", "output: qy and qx (rad)", outputs),
+            plots::time_panel("error (m)", DURATION_S, errors),
+            plots::time_panel("output: qy and qx (rad)", DURATION_S, outputs),
         ],
     );
     figure.panel_height = 560;

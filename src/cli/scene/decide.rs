@@ -21,11 +21,12 @@ pub(super) struct HowArgs {
     #[arg(long, default_value = "auto", value_parser = or_auto::<Method>(Method::ALL.map(Method::name)))]
     pub method: Asked<Method>,
     /// Fixed steps of this length, s [default for methods of fixed steps: 0.001]
-    #[arg(long, value_name = "S", conflicts_with = "tolerance", value_parser = positive_number)]
+    #[arg(long, value_name = "S", conflicts_with = "tolerance", allow_negative_numbers = true,
+          value_parser = positive_number)]
     pub step: Option<f64>,
     /// Wanted accuracy of the position, m; with a model named, the tolerance of
     /// its method [default: 1e-4]
-    #[arg(long, value_name = "M", value_parser = positive_number)]
+    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = positive_number)]
     pub tolerance: Option<f64>,
 }
 
@@ -91,7 +92,6 @@ impl HowArgs {
         drive: &D,
     ) -> anyhow::Result<Decision> {
         if let Some(model) = self.model.0 {
-            suits(scene, model).map_err(bad)?;
             let configuration = self.configured(scene, model)?;
             return Ok(Decision { configuration, wanted_m: None, choice: None, choosing_s: 0.0 });
         }
@@ -106,10 +106,12 @@ impl HowArgs {
             best_m: none.best_m,
             tried: none.tried,
         })?;
-        let configuration = if self.method.0.is_none() && self.step.is_none() {
-            choice.configuration
+        let chosen = choice.configuration;
+        let fits = self.method.0.is_none_or(|method| method == chosen.method());
+        let configuration = if fits && self.step.is_none() {
+            chosen
         } else {
-            self.configured(scene, self.able(choice.configuration.model()))?
+            self.configured(scene, self.able(chosen.model()))?
         };
         Ok(Decision { configuration, wanted_m: Some(wanted_m), choice: Some(choice), choosing_s })
     }
@@ -117,9 +119,9 @@ impl HowArgs {
     /// The chosen model if the named method and step can run it; else the
     /// truest that they can.
     fn able(&self, chosen: Model) -> Model {
-        let can = |model: Model| match self.method.0 {
-            Some(method) => model.methods().contains(&method),
-            None => self.step.is_none() || model != Model::Sliding,
+        let can = |model: Model| {
+            let stepped = self.step.is_none() || model != Model::Sliding;
+            stepped && self.method.0.is_none_or(|method| model.methods().contains(&method))
         };
         if can(chosen) {
             return chosen;
@@ -128,6 +130,7 @@ impl HowArgs {
     }
 
     fn configured(&self, scene: &Scene, model: Model) -> anyhow::Result<Configuration> {
+        suits(scene, model).map_err(bad)?;
         let fixed = self.step.is_some();
         let usual = if fixed { fixed_method(model) } else { model.usual_method() };
         let method = self.method.0.unwrap_or(usual);

@@ -10,9 +10,18 @@ use super::{plots, report};
 use crate::cli::output::{self, Format};
 use crate::wire::scene::NamedScene;
 
-/// Runs `scenes`, shows and writes what comes of them.
-pub(super) fn run(args: &SceneArgs, scenes: &[NamedScene]) -> anyhow::Result<()> {
-    let plan = Plan { how: &args.how, sample: args.sample, sampled: args.output.is_some() };
+/// Runs `scenes`, shows and writes what comes of them; to within `tolerance_m`
+/// where nothing else is asked for.
+pub(super) fn run(
+    args: &SceneArgs,
+    scenes: &[NamedScene],
+    tolerance_m: Option<f64>,
+) -> anyhow::Result<()> {
+    let mut how = args.how.clone();
+    if how.is_plain() {
+        how.tolerance = tolerance_m;
+    }
+    let plan = Plan { how: &how, sample: args.sample, sampled: args.output.is_some() };
     let mut courses = Vec::new();
     for NamedScene { name, scene, laws } in scenes {
         let course = plan.run(name, scene, &mut laws.clone()).inspect_err(say_tried)?;

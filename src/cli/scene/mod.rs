@@ -7,6 +7,7 @@ mod decide;
 mod files;
 mod laws;
 mod plots;
+mod polyline;
 mod report;
 mod rig;
 mod words;
@@ -49,7 +50,7 @@ pub(super) struct SceneArgs {
     how: HowArgs,
     /// Time between two samples, s [default: 0.01, or a 200th of the scene where
     /// that is shorter]
-    #[arg(long, value_name = "S", value_parser = decide::positive_number)]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = decide::positive_number)]
     sample: Option<f64>,
     /// Writes trajectory.csv and plots here; made if need be
     #[arg(short, long, value_name = "DIR")]
@@ -64,7 +65,7 @@ pub(super) fn run(args: &SceneArgs) -> anyhow::Result<()> {
         return catalogue::list();
     };
     match catalogue::find(word)? {
-        Exercise::Laws(scenes) => laws::run(args, &scenes),
+        Exercise::Laws { scenes, tolerance_m } => laws::run(args, &scenes, tolerance_m),
         Exercise::Control { impulse } => control::run(args, impulse),
         Exercise::Rig { bad_x } => rig::run(args, bad_x),
     }

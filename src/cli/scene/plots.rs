@@ -2,12 +2,16 @@
 //! side by side.
 
 use super::course::{Course, Sampled};
+use super::polyline::simplified;
 use super::words;
 use crate::chart::{Axis, Figure, Look, Mark, Panel, Scale, Series, Stroke, equal_scales};
-use crate::plant::{Plate, PlateShape};
+use crate::plant::{Motion, Plate, PlateShape};
 
-/// Points drawn of one line: more than the drawing has pixels show nothing new.
-const MOST_POINTS: usize = 2000;
+/// Events that are marked; more would hide the line.
+const MOST_MARKS: usize = 4;
+
+/// Events closer than this, as a share of the scene, share their text.
+const CLOSE: f64 = 0.08;
 
 /// Height of a panel over time, pixels.
 const PANEL_HEIGHT: u32 = 760;
@@ -19,30 +23,26 @@ const MARGIN: f64 = 0.06;
 /// its half extent.
 const BEYOND: f64 = 0.4;
 
-/// Evenly chosen, the last one too.
-pub(super) fn thinned<T: Copy>(values: &[T]) -> Vec<T> {
-    let stride = values.len().div_ceil(MOST_POINTS).max(1);
-    let last = values.last().filter(|_| (values.len() - 1) % stride != 0);
-    values.iter().step_by(stride).chain(last).copied().collect()
-}
-
 /// Points of a line over time.
 pub(super) fn over_time<T>(values: &[T], of: impl Fn(&T) -> (f64, f64)) -> Vec<(f64, f64)> {
-    thinned(&values.iter().map(of).collect::<Vec<_>>())
+    simplified(values.iter().map(of).collect())
 }
 
 pub(super) fn line(name: &str, look: usize, points: Vec<(f64, f64)>) -> Series {
     Series::new(name, Look::of(look), Stroke::Line, points)
 }
 
-/// Axes around the series, with time along x.
-pub(super) fn time_panel(title: &str, y: &str, series: Vec<Series>) -> Panel {
-    let points = || series.iter().flat_map(|series| series.points.iter());
-    let times = Scale::linear_around(points().map(|p| p.0), 0.0);
-    let values = Scale::linear_around(points().map(|p| p.1), MARGIN);
-    let mut panel = Panel::new(title, Axis::new("time (s)", times), Axis::new(y, values));
+/// Axes around the series, with time from 0 to `duration_s` along x.
+pub(super) fn time_panel(y: &str, duration_s: f64, series: Vec<Series>) -> Panel {
+    let values = series.iter().flat_map(|series| series.points.iter()).map(|p| p.1);
+    let values = Scale::linear_around(values, MARGIN);
+    let mut panel = Panel::new("", time_axis(duration_s), Axis::new(y, values));
     panel.series = series;
     panel
+}
+
+pub(super) fn time_axis(duration_s: f64) -> Axis {
+    Axis::new("time (s)", Scale::Linear(0.0, duration_s))
 }
 
 pub(super) fn figure(
@@ -66,22 +66,44 @@ pub(super) fn position(course: &Course) -> Figure {
     let of = |name: &str, i: usize| {
         line(name, i, over_time(&course.samples, |(t, at)| (*t, at.position[i])))
     };
-    let mut panel = time_panel("", "position on the plate (m)", vec![of("x", 0), of("y", 1)]);
-    for event in course.events.iter().skip(1).take(4) {
-        let Some((_, at)) = course.samples.iter().find(|(t, _)| *t >= event.at_s) else { continue };
-        panel.marks.push(Mark {
-            name: "what happens (sliding model)".to_owned(),
-            text: words::event(event, &course.scene).to_owned(),
-            at: (event.at_s, at.position.y),
-        });
-    }
+    let series = vec![of("x", 0), of("y", 1)];
+    let mut panel = time_panel("position on the plate (m)", course.scene.duration_s, series);
+    panel.marks = marks(course, |t, at| {
+        let (x, y) = (at.position.x, at.position.y);
+        (t, if x.abs() > y.abs() { x } else { y })
+    });
     figure(format!("{}: position over time", course.name), ran(course), 1, vec![panel])
+}
+
+/// The first events after the start, each where `place` has it. Texts that
+/// would lie on each other become one.
+fn marks(course: &Course, place: impl Fn(f64, &Motion) -> (f64, f64)) -> Vec<Mark> {
+    let mut marks: Vec<Mark> = Vec::new();
+    let mut named: Option<(usize, f64)> = None;
+    for event in course.events.iter().skip(1).take(MOST_MARKS) {
+        let Some((_, at)) = course.samples.iter().find(|(t, _)| *t >= event.at_s) else { break };
+        let what = words::event(event, &course.scene);
+        let near = |t: f64| event.at_s - t < CLOSE * course.scene.duration_s;
+        let text = match named.filter(|&(_, t)| near(t)) {
+            Some((first, _)) => {
+                marks[first].text += &format!(", {what}");
+                String::new()
+            }
+            None => {
+                named = Some((marks.len(), event.at_s));
+                what.to_owned()
+            }
+        };
+        let name = "what happens (sliding model)".to_owned();
+        marks.push(Mark { name, text, at: place(event.at_s, at) });
+    }
+    marks
 }
 
 /// The path on the plate, with its outline where it has one.
 pub(super) fn path(course: &Course) -> Figure {
     let points: Vec<(f64, f64)> = course.samples.iter().map(place).collect();
-    let mut series = vec![line("path of the centre", 0, thinned(&points))];
+    let mut series = vec![line("path of the centre", 0, simplified(points.clone()))];
     let mut ranges = [0, 1].map(|i| range(&points, i));
     if course.scene.edges {
         let outline = outline(&course.scene.plate);
@@ -95,8 +117,10 @@ pub(super) fn path(course: &Course) -> Figure {
     let mut panel = Panel::new("", Axis::new("x (m)", x), Axis::new("y (m)", y));
     panel.series = series;
     if let Some(start) = points.first() {
-        panel.marks.push(Mark { name: "start".to_owned(), text: "start".to_owned(), at: *start });
+        let name = "start".to_owned();
+        panel.marks.push(Mark { text: name.clone(), name, at: *start });
     }
+    panel.marks.extend(edge(course));
     Figure {
         title: format!("{}: path on the plate", course.name),
         subtitle: format!("{} Plate frame, {} s.", ran(course), course.scene.duration_s),
@@ -104,6 +128,14 @@ pub(super) fn path(course: &Course) -> Figure {
         panel_height,
         panels: vec![panel],
     }
+}
+
+/// Where the ball passes the edge.
+fn edge(course: &Course) -> Option<Mark> {
+    let falls = course.events.iter().find(|event| event.what == "falls")?;
+    let sample = course.samples.iter().find(|(t, _)| *t >= falls.at_s)?;
+    let name = "past the edge".to_owned();
+    Some(Mark { text: format!("{:.3} s", falls.at_s), name, at: place(sample) })
 }
 
 fn place((_, at): &Sampled) -> (f64, f64) {
@@ -151,26 +183,17 @@ fn outline(plate: &Plate) -> Vec<(f64, f64)> {
 /// How far each body has come: as it is, and logarithmically, on which a body
 /// that creeps shows beside one that rolls.
 pub(super) fn side_by_side(courses: &[Course]) -> Figure {
-    let ways: Vec<Vec<(f64, f64)>> = courses.iter().map(way).collect();
-    let lines = |keep: fn(&(f64, f64)) -> bool| -> Vec<Series> {
-        let named = courses.iter().zip(&ways).enumerate();
-        named
-            .map(|(i, (course, way))| {
-                line(
-                    body(course),
-                    i,
-                    thinned(&way.iter().filter(|p| keep(p)).copied().collect::<Vec<_>>()),
-                )
-            })
-            .collect()
+    let duration_s = courses.iter().map(|course| course.scene.duration_s).fold(0.0, f64::max);
+    let panel = |points: fn(&Course) -> Vec<(f64, f64)>| {
+        let lines = courses.iter().enumerate();
+        let lines = lines.map(|(i, course)| line(body(course), i, points(course))).collect();
+        time_panel("way from the start (m)", duration_s, lines)
     };
-    let plain = time_panel("", "way from the start (m)", lines(|_| true));
-    let mut log = time_panel("", "way from the start (m)", lines(|p| p.1 > 0.0));
-    let above_zero = ways.iter().flatten().map(|p| p.1);
-    log.y.scale = Scale::log_around(above_zero, MARGIN);
-    log.x.scale = plain.x.scale.clone();
+    let (plain, mut log) = (panel(|course| simplified(way(course))), panel(logarithmic_way));
+    let ways = log.series.iter().flat_map(|series| series.points.iter());
+    log.y.scale = Scale::log_around(ways.map(|p| p.1), MARGIN);
     let names: Vec<&str> = courses.iter().map(body).collect();
-    let subtitle = "The same plate, linear and logarithmic.".to_owned();
+    let subtitle = "On the same plate; linear on the left, logarithmic on the right.".to_owned();
     figure(format!("The {} side by side", names.join(" and the ")), subtitle, 2, vec![plain, log])
 }
 
@@ -180,5 +203,11 @@ fn body(course: &Course) -> &'static str {
 
 fn way(course: &Course) -> Vec<(f64, f64)> {
     let start = course.scene.initial.position.xy();
-    over_time(&course.samples, |(t, at)| (*t, (at.position.xy() - start).norm()))
+    course.samples.iter().map(|(t, at)| (*t, (at.position.xy() - start).norm())).collect()
+}
+
+/// What can be drawn of it on a logarithmic axis.
+fn logarithmic_way(course: &Course) -> Vec<(f64, f64)> {
+    let logs = way(course).into_iter().filter(|p| p.1 > 0.0).map(|(t, way)| (t, way.ln()));
+    simplified(logs.collect()).into_iter().map(|(t, ln)| (t, ln.exp())).collect()
 }

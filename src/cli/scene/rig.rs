@@ -61,7 +61,13 @@ fn lines(name: &str, judged: &[Judged]) -> Vec<String> {
     };
     let mut lines = vec![
         row("scene", &format!("{name}, {} s", bench::DURATION_S)),
-        row("rig", &format!("the chapter's without noise, in closed loop beside its twin; {what}")),
+        row(
+            "rig",
+            &format!(
+                "the chapter's without noise, on a plate of 1 m (its models have no edge), in \
+                 closed loop beside its twin; {what}"
+            ),
+        ),
         String::new(),
     ];
     let mut rows = table::table(&["profile", "reports", "largest deviation x, y"], &[]);

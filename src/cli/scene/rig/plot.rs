@@ -1,6 +1,6 @@
 //! Deviation and enable of both axes, as the chapter plots them.
 
-use super::bench::{Judged, Signal};
+use super::bench::{DURATION_S, Judged, Signal};
 use crate::chart::{Axis, Figure, Look, Panel, Scale, Series, Stroke};
 use crate::cli::scene::plots;
 
@@ -27,15 +27,11 @@ pub(super) fn deviation(name: &str, judged: &Judged) -> Figure {
     figure
 }
 
-fn time(signals: &[Signal]) -> Axis {
-    Axis::new("time (s)", Scale::linear_around(signals.iter().map(|s| s.at_s), 0.0))
-}
-
 fn deviations(signals: &[Signal], i: usize) -> Panel {
     let (low, high) = DEVIATIONS_M_S2;
     let mut panel = Panel::new(
         AXES[i],
-        time(signals),
+        plots::time_axis(DURATION_S),
         Axis::new("|a twin − a measured| (m/s²)", Scale::Log(low, high)),
     );
     let of = |enabled: bool| -> Vec<(f64, f64)> {
@@ -52,8 +48,11 @@ fn deviations(signals: &[Signal], i: usize) -> Panel {
 }
 
 fn enable(signals: &[Signal], i: usize) -> Panel {
-    let mut panel =
-        Panel::new("", time(signals), Axis::new("enable (0 or 1)", Scale::Linear(-0.1, 1.1)));
+    let mut panel = Panel::new(
+        "",
+        plots::time_axis(DURATION_S),
+        Axis::new("enable (0 or 1)", Scale::Linear(-0.1, 1.1)),
+    );
     panel.series = vec![plots::line("enable", 0, steps(signals, i))];
     panel
 }
