@@ -155,6 +155,8 @@ fn the_textbook_rule_finds_the_late_servo_and_no_other() {
     assert_eq!(codes("good-asset"), nothing);
     assert_eq!(codes("bad-x-servo")[0], ["x_servo"]);
     exists(&bench, &["bad-x-servo/deviation.svg", "good-asset/session.csv"]);
+    let line = "replay --asset bad-x-servo/asset.json --profile textbook bad-x-servo/session.csv";
+    assert!(bench.ok(line).stdout.contains("x_servo at"));
 }
 
 #[test]

@@ -20,7 +20,8 @@ pub(super) struct HowArgs {
     /// Method that steps it
     #[arg(long, default_value = "auto", value_parser = or_auto::<Method>(Method::ALL.map(Method::name)))]
     pub method: Asked<Method>,
-    /// Fixed steps of this length, s [default for methods of fixed steps: 0.001]
+    /// Fixed steps of this length, s [default for methods of fixed steps: 0.001,
+    /// or what the method can bear]
     #[arg(long, value_name = "S", conflicts_with = "tolerance", allow_negative_numbers = true,
           value_parser = positive_number)]
     pub step: Option<f64>,

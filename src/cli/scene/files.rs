@@ -7,7 +7,9 @@ use anyhow::Context;
 
 use super::course::Sampled;
 use crate::chart::{Figure, png, svg};
+use crate::cli::calibrate::write_asset;
 use crate::cli::output;
+use crate::engine::Rig;
 use crate::vocabulary::Sample;
 use crate::wire::session_csv;
 
@@ -51,6 +53,11 @@ impl Folder {
         let mut out = output::create(&self.said("session.csv"))?;
         session_csv::write(&mut out, samples)?;
         Ok(out.flush()?)
+    }
+
+    /// What the owner of a rig knows of it, for `offbd replay --asset`.
+    pub(super) fn asset(&self, rig: &Rig) -> anyhow::Result<()> {
+        write_asset(rig, &self.said("asset.json"))
     }
 
     pub(super) fn figure(&self, name: &str, figure: &Figure) -> anyhow::Result<()> {

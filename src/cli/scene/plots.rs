@@ -21,7 +21,7 @@ const MARGIN: f64 = 0.06;
 
 /// Of the plate, what is drawn beyond it where the ball falls off: a share of
 /// its half extent.
-const BEYOND: f64 = 0.4;
+const BEYOND: f64 = 0.8;
 
 /// Points of a line over time.
 pub(super) fn over_time<T>(values: &[T], of: impl Fn(&T) -> (f64, f64)) -> Vec<(f64, f64)> {
@@ -103,16 +103,20 @@ fn marks(course: &Course, place: impl Fn(f64, &Motion) -> (f64, f64)) -> Vec<Mar
 /// The path on the plate, with its outline where it has one.
 pub(super) fn path(course: &Course) -> Figure {
     let points: Vec<(f64, f64)> = course.samples.iter().map(place).collect();
-    let mut series = vec![line("path of the centre", 0, simplified(points.clone()))];
     let mut ranges = [0, 1].map(|i| range(&points, i));
+    let mut series = Vec::new();
     if course.scene.edges {
         let outline = outline(&course.scene.plate);
         for (i, range) in ranges.iter_mut().enumerate() {
             *range = beside_the_plate(*range, self::range(&outline, i));
         }
-        series.insert(0, Series::new("edge of the plate", Look::BLACK, Stroke::Line, outline));
+        series.push(Series::new("edge of the plate", Look::BLACK, Stroke::Line, outline));
     }
     let [x, y] = with_margin(ranges);
+    // The drawing leaves out what lies beyond its axes, whole lines too.
+    let seen = |p: &&(f64, f64)| (x.0..=x.1).contains(&p.0) && (y.0..=y.1).contains(&p.1);
+    let path = simplified(points.iter().take_while(seen).copied().collect());
+    series.push(line("path of the centre", 0, path));
     let (x, y, panel_height) = equal_scales(x, y);
     let mut panel = Panel::new("", Axis::new("x (m)", x), Axis::new("y (m)", y));
     panel.series = series;

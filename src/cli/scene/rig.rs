@@ -31,6 +31,7 @@ pub(super) fn run(args: &SceneArgs, bad_x: bool) -> anyhow::Result<()> {
     if let Some(folder) = Folder::new(args.output.as_deref())? {
         folder.trajectory("trajectory.csv", &recording.truth)?;
         folder.session(&recording.samples)?;
+        folder.asset(&recording.rig)?;
         folder.figure("deviation", &plot::deviation(name, &judged[0]))?;
     }
     show(args.format, name, &judged)

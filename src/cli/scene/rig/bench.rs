@@ -21,6 +21,7 @@ pub(super) const PERIOD_S: f64 = 0.1;
 
 /// What the rig did.
 pub(super) struct Recording {
+    pub rig: Rig,
     pub samples: Vec<Sample>,
     pub truth: Vec<Sampled>,
 }
@@ -106,6 +107,7 @@ fn model(bad_x: bool) -> Result<RigModel, Invalid> {
 /// Half a minute of the rig, sent to a new place every 3 s.
 pub(super) fn record(bad_x: bool) -> Result<Recording, Invalid> {
     let model = model(bad_x)?;
+    let owned = model.rig.clone();
     let (height, radius) =
         (model.rig.plate.centre_gap_m(&model.rig.ball), model.rig.ball.radius_m());
     let mut rig = SimulatedRig::new(model, Reference::Steps, Disturbances::default(), SEED)?;
@@ -113,7 +115,7 @@ pub(super) fn record(bad_x: bool) -> Result<Recording, Invalid> {
     loop {
         let sample = rig.next_sample();
         if sample.t_s > DURATION_S {
-            return Ok(Recording { samples, truth });
+            return Ok(Recording { rig: owned, samples, truth });
         }
         samples.push(sample);
         truth.push((sample.t_s, motion(&rig.truth(), height, radius)));
@@ -132,7 +134,7 @@ fn motion(truth: &Truth, height: f64, radius: f64) -> Motion {
 
 /// The recording before the engine, by `profile`.
 pub(super) fn judge(recording: &Recording, profile: Profile) -> Result<Judged, Invalid> {
-    let setup = Setup::new(rig()?, Some(profile))?;
+    let setup = Setup::new(recording.rig.clone(), Some(profile))?;
     let mut engine = Engine::new(setup, FaultMemory::default());
     let mut judged = Judged { profile, faults: Vec::new(), signals: Vec::new() };
     let mut outputs = Vec::new();
