@@ -3,11 +3,11 @@
 
 use plotters::chart::{ChartBuilder, ChartContext};
 use plotters::coord::Shift;
-use plotters::element::DashedPathElement;
 use plotters::prelude::{Cartesian2d, DrawingArea, IntoDrawingArea, PathElement, SVGBackend};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{BLACK, Color, IntoTextStyle, RGBColor, TextStyle, WHITE};
 
+use super::dash::dashes;
 use super::error::ChartError;
 use super::figure::{Figure, Mark, Panel, Series, Stroke};
 use super::legend::{self, Entry};
@@ -196,14 +196,20 @@ pub(super) fn draw_stroke(
 
 fn draw_line(points: &[(i32, i32)], look: Look, area: &Area<'_>) -> Drawn {
     let style = look.colour().stroke_width(4);
-    let line = points.to_vec();
-    match look.dash {
-        None => area.draw(&PathElement::new(line, style)).map_err(said),
-        Some((on, off)) => area.draw(&DashedPathElement::new(line, on, off, style)).map_err(said),
-    }
+    let strokes = match look.dash {
+        None => vec![points.to_vec()],
+        Some((on, off)) => dashes(points, on, off),
+    };
+    let drawn = strokes.into_iter().filter(|stroke| stroke.len() > 1);
+    drawn
+        .map(|stroke| PathElement::new(stroke, style))
+        .try_for_each(|e| area.draw(&e).map_err(said))
 }
 
 fn draw_front(points: &[(i32, i32)], look: Look, area: &Area<'_>) -> Drawn {
+    if points.len() < 2 {
+        return Ok(());
+    }
     let style = look.colour().mix(0.3).stroke_width(16);
     area.draw(&PathElement::new(points.to_vec(), style)).map_err(said)
 }

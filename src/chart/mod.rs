@@ -9,6 +9,7 @@
 //! To add a chart: a module here whose `make` returns a [`Chart`], and its name
 //! in `src/cli/chart.rs`.
 
+mod dash;
 mod draw;
 mod equal;
 mod error;

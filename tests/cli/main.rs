@@ -2,6 +2,7 @@
 
 mod bench;
 mod calibrate;
+mod chart;
 mod demo;
 mod replay;
 mod scene;

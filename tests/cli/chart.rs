@@ -1,0 +1,37 @@
+use serde_json::Value;
+
+use crate::bench::Bench;
+
+fn records(bench: &Bench, name: &str) -> Vec<Value> {
+    let document: Value = serde_json::from_str(&bench.read(name)).unwrap();
+    assert!(document["machine"]["cores"].as_u64() > Some(0), "{document}");
+    assert_eq!(document["versions"]["offbd"], env!("CARGO_PKG_VERSION"));
+    document["records"].as_array().unwrap().clone()
+}
+
+#[test]
+fn estimators_are_measured_drawn_and_kept() {
+    let bench = Bench::new();
+    let done = bench.ok("chart estimators --quick -o new/charts");
+    let files = ["estimators.json", "estimators.svg", "estimators.png"];
+    for file in files {
+        assert!(done.stderr.contains(file), "{}", done.stderr);
+        assert!(bench.path("new/charts").join(file).is_file(), "{file}");
+    }
+    assert!(done.stdout.starts_with("estimator "), "{}", done.stdout);
+    assert!(done.stdout.lines().all(|line| line.chars().count() <= 80), "{}", done.stdout);
+    let drawing = bench.read("new/charts/estimators.svg");
+    for text in
+        ["quadratic fit", "Kalman", "delay (ms)", "rms error (m/s²)", "100 Hz, noise 0.5 mm"]
+    {
+        assert!(drawing.contains(text), "{text}");
+    }
+    let records = records(&bench, "new/charts/estimators.json");
+    let own: Vec<&Value> = records.iter().filter(|r| r["offbd"] == true).collect();
+    assert_eq!(own.len(), 1);
+    assert_eq!(own[0]["value"], 0.5);
+    // Half of the window.
+    assert!((own[0]["delay_s"].as_f64().unwrap() - 0.25).abs() < 0.01, "{}", own[0]);
+    assert!(records.iter().any(|r| r["front"] == true));
+    assert!(records.iter().all(|r| r["cost_ns"].as_f64() > Some(0.0)));
+}
