@@ -49,6 +49,8 @@ impl FromStr for Profile {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     pub profile: Profile,
+    /// Acceleration that the twin's model may leave out, m/s².
+    pub twin_accuracy_m_s2: f64,
     /// Length of the acceleration filter, s.
     pub window_s: f64,
     /// Least time between two judgements, s; 0 judges every sample.
@@ -72,6 +74,8 @@ impl Settings {
     pub fn of(profile: Profile) -> Self {
         let default = Self {
             profile,
+            // A twentieth of the smallest limit that a learnt rig gets.
+            twin_accuracy_m_s2: 0.0075,
             window_s: 0.5,
             period_s: 0.0,
             gap_s: 0.3,
@@ -87,6 +91,7 @@ impl Settings {
             Profile::Textbook => Self {
                 window_s: 0.3,
                 period_s: 0.1,
+                twin_accuracy_m_s2: 0.0005,
                 fail_s: 0.0,
                 pass_s: 0.0,
                 confirm_s: 0.0,

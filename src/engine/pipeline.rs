@@ -374,8 +374,7 @@ impl Pipeline {
             plate_angle_rad: self.twin.plate_angle(),
             evidence: self.evidence.clone(),
             monitors,
-            fidelity: "rolling",
-            fidelity_reason: "the only model there is",
+            fidelity: *self.twin.fidelity(),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! A rig as its owner describes it, and the set-up that an engine runs on.
 
 use crate::diagnosis::{Calibration, Profile, Settings};
-use crate::plant::{Ball, Plate, ServoModel, TwinAxis, TwinModel};
+use crate::plant::{Ball, Contact, Ladder, Plate, ServoModel, TwinAxis, TwinModel};
 use crate::vocabulary::{Axis, Invalid, PerAxis, in_range, positive};
 
 /// How a device's numbers relate to the plate frame. Applied when a sample is
@@ -60,6 +60,8 @@ pub struct Rig {
     pub sample_rate_hz: f64,
     pub ball: Ball,
     pub plate: Plate,
+    /// How the ball touches the plate; the lockstep twin asks for its friction.
+    pub contact: Contact,
     pub servo: ServoSpec,
     pub mapping: AxisMapping,
     pub diagnostics: DiagnosticsSpec,
@@ -78,6 +80,7 @@ impl Rig {
             sample_rate_hz: 100.0,
             ball: Ball::default(),
             plate: Plate::default(),
+            contact: Contact::default(),
             servo: ServoSpec::default(),
             mapping: AxisMapping::default(),
             diagnostics: DiagnosticsSpec::default(),
@@ -142,6 +145,8 @@ impl Setup {
         rig.check()?;
         let settings = rig.settings(profile.unwrap_or(rig.diagnostics.profile))?;
         let mut twin = TwinModel::new(&rig.ball, &rig.plate, nominal_axis(&rig)?);
+        let (friction, accuracy) = (rig.contact.friction(), settings.twin_accuracy_m_s2);
+        twin.ladder = Ladder::new(&rig.ball, &rig.plate, friction, accuracy);
         for axis in Axis::ALL {
             let learnt = rig.calibration.as_ref().and_then(|c| c.axes[axis]);
             if let Some(learnt) = learnt {

@@ -1,6 +1,7 @@
 //! What goes into the engine and what comes out.
 
 use crate::diagnosis::{Evidence, Transition};
+use crate::plant::Fidelity;
 use crate::vocabulary::{FaultCode, PerAxis, Sample, SimTime};
 
 /// Something that happens to a rig.
@@ -91,7 +92,5 @@ pub struct State {
     /// One per code, in the order of [`FaultCode::ALL`].
     pub monitors: [MonitorState; FaultCode::COUNT],
     /// The plant model in use.
-    pub fidelity: &'static str,
-    /// Why that one.
-    pub fidelity_reason: &'static str,
+    pub fidelity: Fidelity,
 }

@@ -4,8 +4,10 @@
 
 mod adaptive;
 pub mod estimators;
+mod linear;
 mod rosenbrock;
 mod runge_kutta;
+pub mod sine;
 mod sliding_quadratic;
 mod statistics;
 mod system;

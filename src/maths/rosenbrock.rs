@@ -9,10 +9,9 @@
 //! y₁ = y + Σ m[i]·u[i]        error = Σ e[i]·u[i]
 //! ```
 
-use nalgebra::{Const, DimMin, SMatrix, SVector, ToTypenum};
-
+use super::linear::Factors;
 use super::runge_kutta::Estimated;
-use super::system::Stiff;
+use super::system::{Stiff, moved};
 
 /// Coefficients of an S-stage method with an embedded solution.
 #[derive(Clone, Copy, Debug)]
@@ -113,48 +112,50 @@ const TIME_DIFFERENCE: f64 = 1e-4;
 impl<const S: usize> Rosenbrock<S> {
     /// One step of `h` from (t, y); `None` when W is singular.
     #[inline]
-    pub fn step<const N: usize>(
+    pub fn step<const N: usize, F: Stiff<N>>(
         &self,
-        system: &impl Stiff<N>,
+        system: &F,
         t: f64,
         y: &[f64; N],
         h: f64,
-    ) -> Option<Estimated<N>>
-    where
-        Const<N>: DimMin<Const<N>, Output = Const<N>> + ToTypenum,
-    {
-        let first = SVector::from(system.rate(t, y));
-        let later = SVector::from(system.rate(t + TIME_DIFFERENCE * h, y));
-        let by_time = (later - first) / (TIME_DIFFERENCE * h);
-        let jacobian = system.jacobian(t, y);
-        let w = SMatrix::<f64, N, N>::from_fn(|i, j| {
-            if i == j { 1.0 / (h * self.gamma) - jacobian[i][j] } else { -jacobian[i][j] }
-        });
-        let factors = w.lu();
-        let start = SVector::from(*y);
-        let mut u = [SVector::<f64, N>::zeros(); S];
-        let mut f = first;
+    ) -> Option<Estimated<N>> {
+        let factors = Factors::new::<F>(&system.jacobian(t, y), h * self.gamma)?;
+        let mut f = system.rate(t, y);
+        let by_time = by_time(system, t, y, h, &f);
+        let mut u = [[0.0; N]; S];
         for i in 0..S {
-            let mut at = start;
-            let mut right = self.gamma_sum[i] * h * by_time;
-            for (u, (a, c)) in u[..i].iter().zip(self.a[i].iter().zip(self.c[i])) {
-                at += *a * u;
-                right += c / h * u;
-            }
             if i > 0 && (self.alpha[i] != self.alpha[i - 1] || self.a[i] != self.a[i - 1]) {
-                f = SVector::from(system.rate(t + self.alpha[i] * h, &at.into()));
+                let at = sum(y, &u[..i], &self.a[i], 1.0);
+                f = system.rate(t + self.alpha[i] * h, &at);
             }
-            right += f;
-            if !factors.solve_mut(&mut right) {
-                return None;
-            }
-            u[i] = right;
+            let right = sum(&f, &u[..i], &self.c[i], 1.0 / h);
+            u[i] = factors.solve(&moved(&right, &by_time, self.gamma_sum[i] * h));
         }
-        let (mut to, mut error) = (start, SVector::zeros());
-        for (u, (m, e)) in u.iter().zip(self.m.iter().zip(self.e)) {
-            to += *m * u;
-            error += e * u;
-        }
-        Some(Estimated { y: to.into(), error: error.into() })
+        let error = sum(&[0.0; N], &u, &self.e, 1.0);
+        Some(Estimated { y: sum(y, &u, &self.m, 1.0), error })
     }
+}
+
+/// ∂f/∂t, where f(t, y) is `now`.
+#[inline]
+fn by_time<const N: usize>(
+    system: &impl Stiff<N>,
+    t: f64,
+    y: &[f64; N],
+    h: f64,
+    now: &[f64; N],
+) -> [f64; N] {
+    let span = TIME_DIFFERENCE * h;
+    let later = system.rate(t + span, y);
+    std::array::from_fn(|i| (later[i] - now[i]) / span)
+}
+
+/// `start + scale·Σ weights[j]·u[j]`.
+#[inline]
+fn sum<const N: usize>(start: &[f64; N], u: &[[f64; N]], weights: &[f64], scale: f64) -> [f64; N] {
+    let mut to = *start;
+    for (u, weight) in u.iter().zip(weights).filter(|(_, weight)| **weight != 0.0) {
+        to = moved(&to, u, scale * weight);
+    }
+    to
 }

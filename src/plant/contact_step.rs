@@ -12,8 +12,9 @@
 //! ```
 //!
 //! Gravity and the fictitious forces are taken at the middle of the step, with
-//! velocity and spin from a first pass, so that the ball's slow motion is of
-//! second order while the contact cannot blow up at any step.
+//! velocity and spin as rolling or falling makes them by then, so that the slow
+//! motion is of second order while the contact
+//! cannot blow up at any step.
 
 use nalgebra::Vector3;
 
@@ -21,69 +22,124 @@ use super::compliant::Compliant;
 use super::contact::Motion;
 use super::tilt::PlateMotion;
 
-impl Compliant {
-    /// One step of `h` seconds; `plate` is the plate at its middle.
+/// Steps of one length, with all that does not change from step to step. Forces
+/// are per kilogram.
+#[derive(Clone, Copy, Debug)]
+pub struct ContactStep {
+    model: Compliant,
+    h: f64,
+    per_h: f64,
+    /// h·K/m, 1/s.
+    spring: f64,
+    /// 1/(1 + h·D/m + h²·K/m).
+    held: f64,
+    friction: f64,
+    threshold: f64,
+    /// h·(1 + m·r²/I), s.
+    ease: f64,
+    /// m·r/I, 1/m.
+    lever: f64,
+    /// Acceleration while rolling over that of gravity along the plate,
+    /// 1/(1 + κ); 0 for a block.
+    rolls: f64,
+    /// Spin over velocity while rolling, 1/r; 0 for a block.
+    turns: f64,
+    /// κ·r, m; 0 for a block.
+    roll_arm: f64,
+}
+
+impl ContactStep {
+    /// Steps of `h` seconds, above 0, of `model`.
     #[must_use]
-    pub fn contact_step(&self, from: &Motion, plate: &PlateMotion, h: f64) -> Motion {
-        let first = self.pass(from, from, plate, h);
-        let middle = Motion {
-            position: from.position,
-            velocity: (from.velocity + first.velocity) / 2.0,
-            spin: (from.spin + first.spin) / 2.0,
-        };
-        self.pass(from, &middle, plate, h)
+    pub fn new(model: &Compliant, h: f64) -> Self {
+        let (body, contact) = (&model.body, &model.contact);
+        let m = body.mass_kg();
+        let (k, d) = (contact.stiffness_n_per_m() / m, contact.damping_n_s_per_m() / m);
+        Self {
+            model: *model,
+            h,
+            per_h: 1.0 / h,
+            spring: h * k,
+            held: 1.0 / (1.0 + h * d + h * h * k),
+            friction: contact.friction(),
+            threshold: contact.slip_threshold_m_s(),
+            ease: h * body.slip_ease() * m,
+            lever: body.arm_m() * body.inverse_inertia() * m,
+            rolls: 1.0 - 1.0 / (body.slip_ease() * m),
+            turns: if body.turns() { 1.0 / body.arm_m() } else { 0.0 },
+            roll_arm: if body.turns() {
+                1.0 / (m * body.arm_m() * body.inverse_inertia())
+            } else {
+                0.0
+            },
+        }
     }
 
-    /// A step with the slow terms taken at the velocity and spin of `slow`.
+    /// One step; `plate` is the plate at its middle.
+    #[must_use]
     #[inline]
-    fn pass(&self, from: &Motion, slow: &Motion, plate: &PlateMotion, h: f64) -> Motion {
-        let middle = from.position + slow.velocity * (h / 2.0);
-        let a = plate.free(&middle, &slow.velocity);
-        let turn = if self.body.turns() { plate.free_turn(&slow.spin) } else { Vector3::zeros() };
-        let normal = self.normal_force(from, a.z, h);
-        let slip = self.body.slip(&(from.velocity + a * h), &(from.spin + turn * h));
-        let [x, y] = self.friction(slip, normal, h);
-        let lever = self.body.arm_m() * self.body.inverse_inertia();
-        let velocity = from.velocity + (a + Vector3::new(x, y, normal) / self.body.mass_kg()) * h;
+    pub fn step(&self, from: &Motion, plate: &PlateMotion) -> Motion {
+        let (body, h) = (&self.model.body, self.h);
+        let (v, w) = self.half_way(from, plate);
+        let a = plate.free(&(from.position + v * (h / 2.0)), &v);
+        let turn = if body.turns() { plate.free_turn(&w) } else { Vector3::zeros() };
+        let normal = self.normal_force(from, a.z);
+        let slip = body.slip(&(from.velocity + a * h), &(from.spin + turn * h));
+        let [x, y] = self.friction(slip, normal);
+        let velocity = from.velocity + (a + Vector3::new(x, y, normal)) * h;
         let mean = (from.velocity + velocity) / 2.0;
         Motion {
             position: from.position + Vector3::new(mean.x, mean.y, velocity.z) * h,
             velocity,
-            spin: from.spin + (turn + Vector3::new(lever * y, -lever * x, 0.0)) * h,
+            spin: from.spin + (turn + Vector3::new(self.lever * y, -self.lever * x, 0.0)) * h,
         }
     }
 
-    /// F_z over the step, N; 0 where the body is off the plate at the step's end.
+    /// Velocity and spin at the middle of the step, near enough for the slow
+    /// terms: on the plate as if the body rolled (or, a block, stuck), above it
+    /// as if it fell.
     #[inline]
-    fn normal_force(&self, from: &Motion, a_z: f64, h: f64) -> f64 {
-        let (p, v, m) = (&from.position, &from.velocity, self.body.mass_kg());
-        let (k, d) = (self.contact.stiffness_n_per_m(), self.contact.damping_n_s_per_m());
-        if self.ground.margin_m(p.x, p.y) <= 0.0 {
-            return 0.0;
+    fn half_way(&self, from: &Motion, plate: &PlateMotion) -> (Vector3<f64>, Vector3<f64>) {
+        let half = self.h / 2.0;
+        let free = plate.free(&from.position, &from.velocity);
+        if from.position.z > self.model.body.rest_height_m() {
+            return (from.velocity + free * half, from.spin);
         }
-        let depth = p.z - self.body.rest_height_m();
-        let touching = (v.z + h * a_z - h * k / m * depth) / (1.0 + h * d / m + h * h * k / m);
-        let apart = depth >= 0.0 && depth + h * (v.z + h * a_z) >= 0.0;
-        if apart || depth + h * touching >= 0.0 {
-            return 0.0;
-        }
-        let force = m * ((touching - v.z) / h - a_z);
-        if self.pushes_only() { force.max(0.0) } else { force }
+        let turn = plate.free_turn(&from.spin);
+        let x = half * self.rolls * (free.x + self.roll_arm * turn.y);
+        let y = half * self.rolls * (free.y - self.roll_arm * turn.x);
+        let spin = Vector3::new(-y * self.turns, x * self.turns, half * turn.z);
+        (from.velocity + Vector3::new(x, y, 0.0), from.spin + spin)
     }
 
-    /// (F_x, F_y) over a step that ends with the slip `free` without friction, N.
+    /// F_z/m over the step; 0 where the body is off the plate at its end.
     #[inline]
-    fn friction(&self, free: [f64; 2], normal: f64, h: f64) -> [f64; 2] {
-        let limit = self.contact.friction() * normal;
+    fn normal_force(&self, from: &Motion, a_z: f64) -> f64 {
+        let (p, h) = (&from.position, self.h);
+        let depth = p.z - self.model.body.rest_height_m();
+        let free = from.velocity.z + h * a_z;
+        let touching = (free - self.spring * depth) * self.held;
+        let apart = depth >= 0.0 && depth + h * free >= 0.0;
+        if apart || depth + h * touching >= 0.0 || self.model.ground.margin_m(p.x, p.y) <= 0.0 {
+            return 0.0;
+        }
+        let force = (touching - free) * self.per_h;
+        if self.model.pushes_only() { force.max(0.0) } else { force }
+    }
+
+    /// (F_x, F_y)/m over a step that ends with the slip `free` without friction.
+    #[inline]
+    fn friction(&self, free: [f64; 2], normal: f64) -> [f64; 2] {
+        let limit = self.friction * normal;
         // A plate that pulls turns friction round: then it drives the slip, and
         // the explicit step is the stable one.
-        let implicit = h * limit.max(0.0) * self.body.slip_ease();
-        let threshold = self.contact.slip_threshold_m_s();
-        if self.limits_as_a_cone() {
-            let speed = free[0].hypot(free[1]);
-            let scale = limit / (threshold + implicit).max(speed);
+        let sticks = self.threshold + self.ease * limit.max(0.0);
+        if self.model.limits_as_a_cone() {
+            let scale = limit / sticks.max(free[0].hypot(free[1]));
             return free.map(|s| scale * s);
         }
-        free.map(|s| limit * (s / (threshold + implicit)).clamp(-1.0, 1.0))
+        let scale = limit / sticks;
+        let most = limit.abs();
+        free.map(|s| (s * scale).clamp(-most, most))
     }
 }

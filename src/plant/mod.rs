@@ -5,11 +5,13 @@
 //! and a step is a pure function of both. Knows no faults, no sensors, no
 //! clock. Notation and signs: `ARCHITECTURE.md`, "Frames and signs".
 
+mod batch;
 mod body;
 mod compliant;
 mod contact;
 mod contact_step;
 mod creeping;
+mod lockstep;
 mod planar;
 mod rolling;
 mod servo;
@@ -17,10 +19,13 @@ mod sliding;
 mod tilt;
 mod twin;
 
+pub use batch::{Instructions, PlateColumns, RollingBatch, RollingConstants};
 pub use body::{Ball, GRAVITY_M_S2, Plate, PlateShape};
 pub use compliant::Compliant;
 pub use contact::{Body, Contact, Ground, Motion};
+pub use contact_step::ContactStep;
 pub use creeping::{Creeping, Give};
+pub use lockstep::{Fidelity, Ladder, Rung};
 pub use planar::Planar;
 pub use rolling::{Grip, Rolling, RollingState};
 pub use servo::{Servo, ServoModel};

@@ -19,7 +19,7 @@
 use nalgebra::Vector2;
 
 use super::tilt::Tilt;
-use super::{Ball, Plate, RollingState};
+use super::{Ball, GRAVITY_M_S2, Plate, RollingState};
 
 /// The planar model of one ball on one plate.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,16 +72,25 @@ impl Planar {
         drive(&tilt.angle) * self.gain - drive(&tilt.acceleration) * self.offset
     }
 
+    /// Friction that rolling with the acceleration `a` takes, over the ball's
+    /// weight.
+    #[must_use]
+    pub fn friction_part(&self, a: &Vector2<f64>) -> f64 {
+        a.amax() * (1.0 / self.gain - 1.0 / GRAVITY_M_S2)
+    }
+
     /// Bound of the acceleration that the model leaves out, m/s²: what is of
     /// second order in the motion, and q − sin q·cos q of gravity.
     #[must_use]
     pub fn left_out(&self, state: &RollingState, tilt: &Tilt) -> f64 {
-        let (angle, rate) = (tilt.angle.norm(), tilt.rate.norm());
-        let away = state.position.norm();
+        // The sum of a vector's parts bounds its length and costs no root.
+        let length = |v: &Vector2<f64>| v.x.abs() + v.y.abs();
+        let (angle, rate) = (length(&tilt.angle), length(&tilt.rate));
+        let away = length(&state.position);
         let gravity = self.gain * angle * angle * angle;
         let turning = rate * rate * (away + self.reach)
-            + 2.0 * rate * angle * state.velocity.norm()
-            + tilt.acceleration.norm() * angle * (away + self.reach * angle);
+            + 2.0 * rate * angle * length(&state.velocity)
+            + length(&tilt.acceleration) * angle * (away + self.reach * angle);
         gravity + turning
     }
 }

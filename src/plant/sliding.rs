@@ -147,7 +147,7 @@ impl Sliding {
         let normal = Self::normal(&free);
         let held = (0..2).map(|axis| match holds[axis] {
             Hold::Stick => self.friction * normal - sticking[axis].abs(),
-            Hold::Slip(sign) => sign * slip[axis] + NO_SLIP_M_S,
+            Hold::Slip(sign) => sign * slip[axis],
         });
         held.fold(normal, f64::min)
     }

@@ -12,7 +12,7 @@ use std::collections::VecDeque;
 
 use nalgebra::Vector2;
 
-use super::{Ball, Plate, Rolling, RollingState, Servo, ServoModel, Tilt};
+use super::{Ball, Contact, Fidelity, Ladder, Plate, RollingState, Servo, ServoModel, Tilt};
 use crate::vocabulary::{Axis, PerAxis, SimTime};
 
 /// Commands remembered for the dead time. At 1 kHz it holds half a second;
@@ -22,6 +22,10 @@ const COMMAND_HISTORY: usize = 512;
 /// Longest step of the twin between two samples, s: at a servo lag of 20 ms,
 /// the fastest seen, the midpoint rule is off by < 1 % of the acceleration.
 const LONGEST_STEP_S: f64 = 0.01;
+
+/// Acceleration that the twin's model may leave out unless something else is
+/// asked for, m/s²: a twentieth of the smallest limit of a learnt rig.
+pub const ACCURACY_M_S2: f64 = 0.0075;
 
 /// One axis of the twin: how the ball answers the servo that drives it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,15 +43,17 @@ pub struct TwinAxis {
 /// What the twin is made of; immutable.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TwinModel {
-    pub rolling: Rolling,
+    pub ladder: Ladder,
     pub axes: PerAxis<TwinAxis>,
 }
 
 impl TwinModel {
-    /// A twin that answers as the asset file says, before anything is learnt.
+    /// A twin that answers as the asset file says, before anything is learnt,
+    /// with the chapter's friction and an accuracy of [`ACCURACY_M_S2`].
     #[must_use]
     pub fn new(ball: &Ball, plate: &Plate, axis: TwinAxis) -> Self {
-        Self { rolling: Rolling::new(ball, plate), axes: PerAxis { x: axis, y: axis } }
+        let ladder = Ladder::new(ball, plate, Contact::CHAPTER.friction(), ACCURACY_M_S2);
+        Self { ladder, axes: PerAxis { x: axis, y: axis } }
     }
 }
 
@@ -99,6 +105,7 @@ pub struct Twin {
     commands: PerAxis<CommandHistory>,
     servos: PerAxis<Servo>,
     motion: TwinMotion,
+    fidelity: Fidelity,
 }
 
 impl Twin {
@@ -111,7 +118,14 @@ impl Twin {
             commands: PerAxis::from_fn(|_| CommandHistory::new()),
             servos: PerAxis::default(),
             motion: TwinMotion::default(),
+            fidelity: Fidelity::default(),
         }
+    }
+
+    /// The model in use and why.
+    #[must_use]
+    pub const fn fidelity(&self) -> &Fidelity {
+        &self.fidelity
     }
 
     /// The twin's present motion; its position and velocity are relative to
@@ -155,6 +169,7 @@ impl Twin {
     pub fn restart(&mut self) {
         self.now = None;
         self.motion = TwinMotion::default();
+        self.fidelity = Fidelity::default();
         for axis in Axis::ALL {
             self.commands[axis].entries.clear();
         }
@@ -188,7 +203,7 @@ impl Twin {
         for step in 0..steps as u32 {
             let start = from + f64::from(step) * h;
             let tilt = self.move_servos(start, h / 2.0);
-            let (unit, _) = self.model.rolling.acceleration(observed, &tilt.motion());
+            let unit = self.model.ladder.acceleration(&mut self.fidelity, observed, &tilt, h);
             let axes = &self.model.axes;
             let a = Vector2::new(unit.x * axes.x.gain, unit.y * axes.y.gain);
             self.motion.position += self.motion.velocity * h + a * (h * h / 2.0);

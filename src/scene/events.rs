@@ -4,7 +4,7 @@
 use super::drive::Drive;
 use super::rungs::{OnSliding, Rung};
 use super::samples::Span;
-use super::stepping::{Budget, Course, Failure, Watch, next_step};
+use super::stepping::{Budget, Course, Failure, MOST_CHANGES, Watch, next_step};
 use crate::maths::{StepControl, System, dopri5};
 use crate::plant::{Motion, Phase};
 
@@ -33,11 +33,18 @@ pub(super) struct Sequence {
     /// Normal speeds of all landings, added up, m/s.
     pub landing_m_s: f64,
     since_s: f64,
+    changes: u32,
 }
 
 impl Sequence {
     pub(super) const fn new() -> Self {
-        Self { phase: None, events: Vec::new(), landing_m_s: 0.0, since_s: f64::NEG_INFINITY }
+        Self {
+            phase: None,
+            events: Vec::new(),
+            landing_m_s: 0.0,
+            since_s: f64::NEG_INFINITY,
+            changes: 0,
+        }
     }
 
     /// Runs one piece of the drive.
@@ -71,6 +78,10 @@ impl Sequence {
                     let y = dopri5(rung, course.t, &course.y, at - course.t, &mut first).y;
                     course.take(rung, at, y, watch)?;
                     self.enter(rung, course);
+                    self.changes += 1;
+                    if self.changes > MOST_CHANGES {
+                        return Err(Failure::TooManyChanges { at_s: course.t });
+                    }
                     first = rung.rate(course.t, &course.y);
                 }
             }

@@ -7,12 +7,14 @@ use super::drive::{Drive, Seen};
 use super::events::{Event, Sequence};
 use super::rungs::{OnCompliant, OnCreeping, OnRolling, OnSliding, Rung};
 use super::samples::Samples;
-use super::stepping::{Budget, Course, Failure, Tally, Unwatched, Watch};
+use super::stepping::{Budget, Course, Failure, Tally, Unwatched, Watch, whole_steps};
 use super::{Scene, Subject};
 use crate::maths::{
     DOPRI5, EULER, MIDPOINT, RK4, RODAS3, RODAS4, StepControl, dopri5, semi_implicit_euler,
 };
-use crate::plant::{Compliant, Creeping, Motion, Phase, Planar, Rolling, RollingState, Sliding};
+use crate::plant::{
+    Compliant, ContactStep, Creeping, Motion, Phase, Planar, Rolling, RollingState, Sliding,
+};
 use crate::vocabulary::Invalid;
 
 /// What a run came to.
@@ -64,7 +66,8 @@ pub fn suits(scene: &Scene, model: Model) -> Result<(), Invalid> {
 /// longer ones step over what the plate does without seeing it.
 const LONGEST_PART: f64 = 0.2;
 
-/// First step of an adaptive method, s: short enough for any of them.
+/// First step of a stiff method, s: the contact may have to settle. The
+/// explicit one tries its longest and finds out.
 const FIRST_STEP_S: f64 = 1e-4;
 
 /// Smallest share of the tolerance for one step of the stiff methods: through a
@@ -112,7 +115,8 @@ impl<'a> Stage<'a> {
             _ => 4.0,
         };
         let longest = (LONGEST_PART * drive.shortest_time_s()).min(self.scene.duration_s);
-        StepControl::new(power, FIRST_STEP_S, SHORTEST_STEP_S, longest.max(SHORTEST_STEP_S))
+        let first = if self.method == Method::Dopri5 { longest } else { FIRST_STEP_S };
+        StepControl::new(power, first, SHORTEST_STEP_S, longest.max(SHORTEST_STEP_S))
     }
 
     /// Calls `piece` for each smooth piece of the drive.
@@ -304,12 +308,7 @@ impl<'a> Stage<'a> {
         watch: &mut impl Watch<OnCompliant<'p, D>, 9>,
     ) -> Result<(), Failure> {
         match (self.method, self.pace) {
-            (Method::ContactStep, Pace::Step(h)) => {
-                course.fixed(rung, until, h, watch, |r, t, y, h| {
-                    let plate = r.plate.at(t + h / 2.0);
-                    r.model.contact_step(&Motion::from_row(y), &plate, h).to_row()
-                })
-            }
+            (Method::ContactStep, Pace::Step(h)) => contact_steps(rung, course, until, h, watch),
             (Method::Rodas3, Pace::Step(h)) => course.fixed(rung, until, h, watch, |r, t, y, h| {
                 RODAS3.step(r, t, y, h).map_or([f64::NAN; 9], |to| to.y)
             }),
@@ -327,6 +326,21 @@ impl<'a> Stage<'a> {
             _ => self.explicit(rung, course, until, adaptive, watch),
         }
     }
+}
+
+/// One piece by contact steps of at most `h`.
+fn contact_steps<'p, D: Drive>(
+    rung: &OnCompliant<'p, D>,
+    course: &mut Course<'_, '_, 9>,
+    until: f64,
+    h: f64,
+    watch: &mut impl Watch<OnCompliant<'p, D>, 9>,
+) -> Result<(), Failure> {
+    let steps = whole_steps(until - course.t, h);
+    let stepper = ContactStep::new(rung.model, (until - course.t) / steps as f64);
+    course.fixed(rung, until, h, watch, |r, t, y, h| {
+        stepper.step(&Motion::from_row(y), &r.plate.at(t + h / 2.0)).to_row()
+    })
 }
 
 fn xi_of(y: &[f64; 4]) -> [Vector2<f64>; 2] {
@@ -355,7 +369,7 @@ fn planar_piece<D: Drive>(
     h: f64,
     motion: impl Fn(f64, &[f64; 4]) -> Motion,
 ) -> Result<(), Failure> {
-    let n = ((until - course.t) / h - 1e-9).ceil().max(1.0) as u64;
+    let n = whole_steps(until - course.t, h);
     let h = (until - course.t) / n as f64;
     for i in 1..=n {
         let t = if i == n { until } else { course.t + h };

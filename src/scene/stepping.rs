@@ -7,6 +7,10 @@ use crate::maths::{Estimated, StepControl};
 /// More steps than this end a run: at 50 ns each it has taken a minute.
 pub const MOST_STEPS: u64 = 1_000_000_000;
 
+/// More changes of phase than this end a run: a body on the verge of two would
+/// take the smallest steps for ever.
+pub const MOST_CHANGES: u32 = 100_000;
+
 /// Why a run ended early.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Failure {
@@ -14,6 +18,8 @@ pub enum Failure {
     NotFinite { at_s: f64 },
     #[error("over {MOST_STEPS} steps at {at_s} s")]
     TooManySteps { at_s: f64 },
+    #[error("over {MOST_CHANGES} changes between roll, slip and flight at {at_s} s")]
+    TooManyChanges { at_s: f64 },
     /// The run was to stop where its model is not valid.
     #[error("{why} at {at_s} s")]
     OutOfRange { at_s: f64, why: &'static str },
@@ -144,7 +150,7 @@ impl<const N: usize> Course<'_, '_, N> {
         watch: &mut impl Watch<R, N>,
         step: impl Fn(&R, f64, &[f64; N], f64) -> [f64; N],
     ) -> Result<(), Failure> {
-        let n = ((until - self.t) / h - 1e-9).ceil().max(1.0) as u64;
+        let n = whole_steps(until - self.t, h);
         let h = (until - self.t) / n as f64;
         for i in 1..=n {
             let y = step(rung, self.t, &self.y, h);
@@ -186,6 +192,11 @@ impl<const N: usize> Course<'_, '_, N> {
         }
         Ok(())
     }
+}
+
+/// How many equal steps of at most `h` make up `span`.
+pub(super) fn whole_steps(span: f64, h: f64) -> u64 {
+    (span / h - 1e-9).ceil().max(1.0) as u64
 }
 
 /// The step to try at `t`, and where it ends: the end of the piece is met, and

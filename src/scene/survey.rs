@@ -98,11 +98,12 @@ impl Worst {
     }
 
     fn survey(&self, scene: &Scene, shortest_time: f64) -> Survey {
-        // The trade adds up over the scene at worst; what it lags behind by its
-        // settling time is the creeping model's error.
-        let rolling = self.trade * scene.duration_s + self.sag * self.demand;
+        // The trade adds up over the scene at worst, and half again as much
+        // because the ball is looked at where it starts only; what it lags
+        // behind by its settling time is the creeping model's error.
+        let rolling = 1.5 * self.trade * scene.duration_s + self.sag * self.demand;
         let lag = (std::f64::consts::TAU * self.settling / shortest_time).min(1.0);
-        let creeping = 2.0 * rolling * lag + 4.0 * self.trade * self.settling;
+        let creeping = 1.5 * rolling * lag + 4.0 * self.trade * self.settling;
         Survey {
             demand: self.demand,
             starts_rolling: starts_rolling(scene, self.trade),

@@ -6,7 +6,7 @@ use utoipa::ToSchema;
 
 use crate::diagnosis::{AxisCalibration, Calibration, Profile};
 use crate::engine::{AxisMapping, DiagnosticsSpec, Rig, ServoSpec};
-use crate::plant::{Ball, Plate, PlateShape};
+use crate::plant::{Ball, Contact, Plate, PlateShape};
 use crate::vocabulary::{Axis, Invalid, PerAxis, in_range, positive};
 
 /// A rig as its owner describes it. Everything but `name` has a default: the
@@ -23,6 +23,9 @@ pub struct AssetView {
     pub ball: BallView,
     #[serde(default)]
     pub plate: PlateView,
+    /// How the ball touches the plate.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contact: Option<ContactView>,
     #[serde(default)]
     pub servo: ServoView,
     /// How the device's numbers relate to the plate frame.
@@ -94,6 +97,26 @@ fn default_rim() -> bool {
 impl Default for PlateView {
     fn default() -> Self {
         plate_view(&Plate::default())
+    }
+}
+
+/// How a body touches the plate: spring, damper and friction.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ContactView {
+    /// K, in (0, 1e12] N/m.
+    pub stiffness_n_per_m: f64,
+    /// D, in (0, 1e9] N·s/m.
+    pub damping_n_s_per_m: f64,
+    /// μ, in (0, 100].
+    pub friction: f64,
+    /// Slip speed at which friction saturates, in (0, 10] m/s.
+    pub slip_threshold_m_s: f64,
+}
+
+impl Default for ContactView {
+    fn default() -> Self {
+        contact_view(&Contact::default())
     }
 }
 
@@ -225,6 +248,7 @@ pub fn rig(view: &AssetView) -> Result<Rig, Invalid> {
         sample_rate_hz: view.sample_rate_hz,
         ball: Ball::new(view.ball.radius_m, view.ball.mass_kg, view.ball.inertia_factor)?,
         plate: plate(&view.plate)?,
+        contact: contact(&view.contact.clone().unwrap_or_default())?,
         servo: ServoSpec {
             angle_limit_rad: view.servo.angle_limit_rad,
             dead_time_s: view.servo.dead_time_s,
@@ -264,6 +288,19 @@ pub(super) fn outline(
             Ok(PlateShape::Rectangle { length_m, width_m })
         }
     }
+}
+
+/// The contact that a view describes.
+///
+/// # Errors
+/// [`Invalid`] naming the element under `/contact`.
+pub fn contact(view: &ContactView) -> Result<Contact, Invalid> {
+    Contact::new(
+        view.stiffness_n_per_m,
+        view.damping_n_s_per_m,
+        view.friction,
+        view.slip_threshold_m_s,
+    )
 }
 
 fn mapping(view: &AxesView) -> Result<AxisMapping, Invalid> {
@@ -332,6 +369,7 @@ pub fn view(rig: &Rig) -> AssetView {
             inertia_factor: rig.ball.inertia_factor(),
         },
         plate: plate_view(&rig.plate),
+        contact: (rig.contact != Contact::default()).then(|| contact_view(&rig.contact)),
         servo: servo_view(&rig.servo),
         axes: (rig.mapping != AxisMapping::default()).then_some(AxesView {
             swap: rig.mapping.swap,
@@ -356,6 +394,15 @@ fn plate_view(plate: &Plate) -> PlateView {
     };
     let (thickness_m, rim) = (plate.thickness_m(), plate.rim());
     PlateView { length_m, width_m, diameter_m, thickness_m, rim }
+}
+
+fn contact_view(contact: &Contact) -> ContactView {
+    ContactView {
+        stiffness_n_per_m: contact.stiffness_n_per_m(),
+        damping_n_s_per_m: contact.damping_n_s_per_m(),
+        friction: contact.friction(),
+        slip_threshold_m_s: contact.slip_threshold_m_s(),
+    }
 }
 
 fn servo_view(servo: &ServoSpec) -> ServoView {

@@ -118,8 +118,8 @@ pub fn state_view(asset: &str, session: Option<(&str, &str, u64)>, state: &State
         plate_angle_rad: xy(&state.plate_angle_rad),
         evidence: evidence_view(&state.evidence),
         monitors: FaultCode::ALL.iter().zip(&state.monitors).map(monitor_view).collect(),
-        fidelity: state.fidelity.to_owned(),
-        fidelity_reason: state.fidelity_reason.to_owned(),
+        fidelity: state.fidelity.rung.name().to_owned(),
+        fidelity_reason: state.fidelity.to_string(),
     }
 }
 

@@ -211,7 +211,8 @@ mod tests {
         assert_eq!(of("src/http/mod.rs", "use crate::service::Service;").len(), 0);
         assert_eq!(of("src/service/mod.rs", "use crate::http::App;").len(), 1);
         assert_eq!(of("src/http/mod.rs", "use crate::store::Store;").len(), 1);
-        assert_eq!(of("src/plant/twin.rs", "use crate::maths::Fit;").len(), 1);
+        assert_eq!(of("src/plant/rolling.rs", "use crate::maths::RK4;").len(), 0);
+        assert_eq!(of("src/maths/fit.rs", "use crate::plant::Twin;").len(), 1);
     }
 
     #[test]
