@@ -51,7 +51,7 @@ fn error(course: &Course) -> String {
     if let Some(choice) =
         decision.choice.as_ref().filter(|c| c.configuration == decision.configuration)
     {
-        return format!("about {} at most, estimated", words::metres(choice.error_m));
+        return format!("about {}, estimated", words::metres(choice.error_m));
     }
     let model = match decision.configuration.model() {
         Model::Planar | Model::Rolling => Some(course.survey.rolling_error_m),

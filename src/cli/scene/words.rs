@@ -24,13 +24,13 @@ pub(super) fn metres(value: f64) -> String {
     format!("{value:.1e} m")
 }
 
-/// As it was typed: 0.001, 1e-9.
+/// As it was typed: 0.001, 1e-9; at most four digits of what was computed.
 pub(super) fn plain(value: f64) -> String {
-    if (1e-3..1e4).contains(&value.abs()) || value == 0.0 {
-        format!("{value}")
+    let short: f64 = format!("{value:.3e}").parse().unwrap_or(value);
+    if (1e-3..1e4).contains(&short.abs()) || short == 0.0 {
+        format!("{short}")
     } else {
-        let short = format!("{value:.1e}");
-        short.replace(".0e", "e")
+        format!("{short:e}")
     }
 }
 
@@ -48,5 +48,17 @@ pub(super) fn event(event: &Event, scene: &Scene) -> &'static str {
     match (&scene.subject, event.what) {
         (Subject::Block(_), "rolls") => "rests",
         (_, what) => what,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_no_more_digits_than_people_read() {
+        let plains = [0.001, 1e-9, 1.0 / 231.0, 2e-4, 10.0].map(plain);
+        assert_eq!(plains, ["0.001", "1e-9", "0.004329", "2e-4", "10"]);
+        assert_eq!([work(6.54e-6), work(0.0123), work(150.0)], ["6.54 µs", "12.3 ms", "150 s"]);
     }
 }
