@@ -11,6 +11,7 @@
 
 mod dash;
 mod draw;
+mod equal;
 mod error;
 pub mod estimators;
 mod figure;
@@ -29,6 +30,7 @@ pub mod work_precision;
 mod write;
 
 pub use draw::svg;
+pub use equal::equal_scales;
 pub use error::ChartError;
 pub use figure::{Axis, Figure, Mark, Panel, Series, Stroke};
 pub use front::{Front, front};
@@ -37,5 +39,5 @@ pub use machine::{Document, Machine, versions};
 pub use raster::png;
 pub use regions::{Category, Regions};
 pub use scale::Scale;
-pub use timing::{CpuTime, cpu_time};
+pub use timing::{CpuTime, cpu_once, cpu_time};
 pub use write::{Chart, Effort, Table, write};

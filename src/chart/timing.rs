@@ -65,6 +65,13 @@ fn batch(n: u32, run: &mut impl FnMut()) -> f64 {
     now_s() - start_s
 }
 
+/// CPU time that `run` takes once, s, beside what it returns.
+pub fn cpu_once<T>(run: impl FnOnce() -> T) -> (T, f64) {
+    let start_s = now_s();
+    let done = run();
+    (done, now_s() - start_s)
+}
+
 /// CPU time of this thread so far, s.
 #[cfg(unix)]
 #[expect(clippy::disallowed_methods, reason = "charts measure cost; no verdict sees it")]

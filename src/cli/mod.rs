@@ -13,6 +13,7 @@ mod labels;
 mod logging;
 mod output;
 mod replay;
+mod scene;
 mod score;
 mod serve;
 mod simulate;
@@ -38,6 +39,8 @@ use crate::config::{ConfigError, LogConfig};
     offbd calibrate --asset rig.json healthy.csv -o learnt.json\n  \
     offbd simulate --fault x_servo:dead@20 --seed 2 -o sick.csv\n  \
     offbd replay --asset learnt.json healthy.csv sick.csv\n\n\
+    The chapter's exercises:\n  \
+    offbd scene --list\n\n\
     Exit status: 0 done or judged (faults or not), 2 bad arguments, 3 unusable input.")]
 struct Cli {
     #[command(subcommand)]
@@ -52,6 +55,7 @@ enum Command {
     Calibrate(calibrate::CalibrateArgs),
     Replay(replay::ReplayArgs),
     Score(score::ScoreArgs),
+    Scene(scene::SceneArgs),
     Chart(chart::ChartArgs),
     Demo(demo::DemoArgs),
     Serve(serve::ServeArgs),
@@ -84,6 +88,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Score(args) => score::run(&args),
+        Command::Scene(args) => scene::run(&args),
         Command::Chart(args) => chart::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Serve(args) => serve::serve(&args, &logging),
@@ -109,6 +114,9 @@ fn failure(error: &anyhow::Error) -> ExitCode {
         return ExitCode::SUCCESS;
     }
     anstream::eprintln!("offbd: {error:#}");
+    if error.is::<unusable::BadArgument>() {
+        return ExitCode::from(2);
+    }
     let unusable = error.is::<unusable::Unusable>() || error.is::<ConfigError>();
     ExitCode::from(if unusable { 3 } else { 1 })
 }

@@ -1,4 +1,5 @@
-//! Input that cannot be used: the one error with an exit code of its own.
+//! Errors with an exit code of their own: input that cannot be used (3), and
+//! arguments that do not fit together (2).
 
 use std::fmt::Display;
 use std::path::Path;
@@ -21,6 +22,11 @@ impl Unusable {
         Self::new(path.display(), reason)
     }
 }
+
+/// Arguments that can be read but do not fit each other, or the input.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub(super) struct BadArgument(pub String);
 
 /// The bytes of the file at `path`.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, Unusable> {

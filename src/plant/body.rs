@@ -76,6 +76,29 @@ pub struct Plate {
 }
 
 impl Plate {
+    /// The chapter's plate as its hardware and its text have it:
+    /// 0.38 × 0.24 × 0.02 m.
+    pub const CHAPTER: Self = Self::rectangle(0.38, 0.24);
+
+    /// The plate that step 12 of the chapter types in: 0.38 × 0.25 × 0.02 m.
+    pub const STEP_12: Self = Self::rectangle(0.38, 0.25);
+
+    /// The plate of the chapter's section 4.8: 0.35 × 0.24 m; the thickness,
+    /// which it leaves out, is that of the others.
+    pub const SECTION_4_8: Self = Self::rectangle(0.35, 0.24);
+
+    /// The sizes between which the chapter contradicts itself, by name.
+    pub const PRESETS: [(&'static str, Self); 3] = [
+        ("chapter", Self::CHAPTER),
+        ("step-12", Self::STEP_12),
+        ("section-4.8", Self::SECTION_4_8),
+    ];
+
+    const fn rectangle(length_m: f64, width_m: f64) -> Self {
+        let shape = PlateShape::Rectangle { length_m, width_m };
+        Self { shape, thickness_m: 0.02, rim: true }
+    }
+
     /// A plate with sides or diameter in (0, 10] m and a thickness in [0, 1] m.
     ///
     /// # Errors
@@ -141,7 +164,6 @@ impl Plate {
 impl Default for Plate {
     /// The chapter's plate: 0.38 × 0.24 × 0.02 m, with a rim.
     fn default() -> Self {
-        let shape = PlateShape::Rectangle { length_m: 0.38, width_m: 0.24 };
-        Self { shape, thickness_m: 0.02, rim: true }
+        Self::CHAPTER
     }
 }

@@ -29,6 +29,10 @@ impl Contact {
     pub const SOFT: Self =
         Self { stiffness_n_per_m: 1000.0, damping_n_s_per_m: 100.0, ..Self::CHAPTER };
 
+    /// The numbers between which the chapter contradicts itself, by name.
+    pub const PRESETS: [(&'static str, Self); 2] =
+        [("chapter", Self::CHAPTER), ("soft", Self::SOFT)];
+
     /// Stiffness K in (0, 1e12] N/m, damping D in (0, 1e9] N·s/m, friction μ
     /// in (0, 100], and the slip speed at which friction saturates, v_thr in
     /// (0, 10] m/s.

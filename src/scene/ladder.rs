@@ -222,18 +222,16 @@ impl<D: Drive + Clone> Search<'_, D> {
         let run = self.path(&configuration);
         let (steps, path) = match run {
             Ok((outcome, path)) => {
-                let flies = path.iter().any(|at| at.z > self.scene.body().rest_height_m());
-                if method == Method::ContactStep && flies && self.is_soft() {
+                if let (Method::ContactStep, Some(why)) = (method, self.unseen_by_steps(&path)) {
                     refining.work = f64::INFINITY;
-                    let why = "the plate is soft and the ball leaves it".to_owned();
-                    self.note(model, method, None, why);
+                    self.note(model, method, None, why.to_owned());
                     return None;
                 }
                 (outcome.tally.steps + outcome.tally.rejected, path)
             }
             Err(failure) => {
                 self.note(model, method, None, failure.to_string());
-                (0, Vec::new())
+                (0, Path::new())
             }
         };
         let error = refining.compare(path, steps);
@@ -288,6 +286,16 @@ impl<D: Drive + Clone> Search<'_, D> {
         creep + 4.0 * self.survey.sag_m + landing
     }
 
+    /// Why long fixed steps miss what happens on `path`, if they do.
+    fn unseen_by_steps(&self, path: &Path) -> Option<&'static str> {
+        let (ground, height) = (self.scene.ground(), self.scene.body().rest_height_m());
+        if path.iter().any(|at| ground.margin_m(at.x, at.y) <= 0.0) {
+            return Some("the body passes the edge between two steps");
+        }
+        let flies = path.iter().any(|at| at.z > height);
+        (flies && self.is_soft()).then_some("the plate is soft and the ball leaves it")
+    }
+
     /// Whether the contact takes long to settle. Such a plate holds a parting
     /// ball back, and friction, turned round by the pull, drives the slip: which
     /// way is decided by less than a long step sees.
@@ -327,6 +335,9 @@ fn pace_name(configuration: &Configuration) -> String {
     }
 }
 
+/// A finer run has at least so many times the steps.
+const LEAST_GROWTH: f64 = 1.3;
+
 /// One method at ever finer paces.
 struct Refining {
     method: Method,
@@ -341,6 +352,8 @@ struct Refining {
     before: Path,
     /// How far the two runs before were apart, m.
     apart: f64,
+    /// Steps of the run before.
+    steps: u64,
 }
 
 impl Refining {
@@ -355,6 +368,7 @@ impl Refining {
             per_step: WORK_CONTACT_STEP,
             before: Path::new(),
             apart: f64::INFINITY,
+            steps: 0,
         }
     }
 
@@ -370,6 +384,7 @@ impl Refining {
             per_step: WORK_RODAS4,
             before: Path::new(),
             apart: f64::INFINITY,
+            steps: 0,
         }
     }
 
@@ -384,7 +399,10 @@ impl Refining {
     /// The difference from the run before, m, or a third of the one before
     /// that where two runs happen to agree; `None` for the first run.
     fn compare(&mut self, path: Path, steps: u64) -> Option<f64> {
-        let comparable = !self.before.is_empty() && self.before.len() == path.len();
+        // A run with nearly as many steps is the same run, and agrees with
+        // itself: the plate's own pieces were shorter than the step.
+        let refined = steps as f64 > LEAST_GROWTH * self.steps as f64;
+        let comparable = refined && self.steps > 0 && self.before.len() == path.len();
         let pairs = self.before.iter().zip(&path).map(|(a, b)| (a - b).xy().norm());
         let apart = pairs.fold(0.0, f64::max);
         let error = comparable.then(|| match self.method {
@@ -392,7 +410,7 @@ impl Refining {
             _ => apart,
         });
         self.apart = if comparable { apart } else { f64::INFINITY };
-        self.before = path;
+        (self.before, self.steps) = (path, steps);
         self.next *= self.factor;
         self.work = steps.max(1) as f64 * self.per_step * self.growth;
         if self.next < self.finest {

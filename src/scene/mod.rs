@@ -5,6 +5,7 @@
 //! know none of them by name. Knows no files, no clock, no faults.
 
 mod configuration;
+mod controlled;
 mod drive;
 mod events;
 mod ladder;
@@ -16,6 +17,7 @@ mod stepping;
 mod survey;
 
 pub use configuration::{Configuration, LONGEST_STEP_S, Method, Model, Pace, SHORTEST_STEP_S};
+pub use controlled::{Controlled, Loop, Turn};
 pub use drive::{Drive, Laws, Push};
 pub use events::{Event, MOST_EVENTS};
 pub use ladder::{Choice, OutOfReach, Tried, choose};

@@ -14,14 +14,14 @@ pub const MOST_CHANGES: u32 = 100_000;
 /// Why a run ended early.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Failure {
-    #[error("the state is no number any more at {at_s} s: the step is too long for this method")]
+    #[error("the state is no number any more at {at_s:.6} s: the step is too long for this method")]
     NotFinite { at_s: f64 },
-    #[error("over {MOST_STEPS} steps at {at_s} s")]
+    #[error("over {MOST_STEPS} steps at {at_s:.6} s")]
     TooManySteps { at_s: f64 },
-    #[error("over {MOST_CHANGES} changes between roll, slip and flight at {at_s} s")]
+    #[error("over {MOST_CHANGES} changes between roll, slip and flight at {at_s:.6} s")]
     TooManyChanges { at_s: f64 },
     /// The run was to stop where its model is not valid.
-    #[error("{why} at {at_s} s")]
+    #[error("{why} at {at_s:.6} s")]
     OutOfRange { at_s: f64, why: &'static str },
 }
 

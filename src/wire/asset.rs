@@ -231,7 +231,9 @@ pub fn pointer(path: &serde_path_to_error::Path) -> String {
     let token = |segment: &Segment| match segment {
         Segment::Seq { index } => Some(format!("/{index}")),
         Segment::Map { key } => Some(format!("/{}", key.replace('~', "~0").replace('/', "~1"))),
-        Segment::Enum { .. } | Segment::Unknown => None,
+        // The word of a choice is a key in the document.
+        Segment::Enum { variant } => Some(format!("/{variant}")),
+        Segment::Unknown => None,
     };
     path.iter().filter_map(token).collect()
 }
@@ -262,22 +264,30 @@ pub fn rig(view: &AssetView) -> Result<Rig, Invalid> {
 }
 
 fn plate(view: &PlateView) -> Result<Plate, Invalid> {
-    let shape = match (view.diameter_m, view.length_m, view.width_m) {
-        (Some(diameter_m), None, None) => PlateShape::Round { diameter_m },
+    let shape = outline(view.length_m, view.width_m, view.diameter_m)?;
+    Plate::new(shape, view.thickness_m, view.rim)
+}
+
+/// The outline that these sizes stand for; what is missing is the chapter's.
+pub(super) fn outline(
+    length_m: Option<f64>,
+    width_m: Option<f64>,
+    diameter_m: Option<f64>,
+) -> Result<PlateShape, Invalid> {
+    match (diameter_m, length_m, width_m) {
+        (Some(diameter_m), None, None) => Ok(PlateShape::Round { diameter_m }),
         (Some(_), ..) => {
-            return Err(Invalid::new(
-                "/plate/diameter_m",
-                "a round plate has neither length_m nor width_m",
-            ));
+            let reason = "a round plate has neither length_m nor width_m";
+            Err(Invalid::new("/plate/diameter_m", reason))
         }
         (None, length_m, width_m) => {
             let PlateShape::Rectangle { length_m: l, width_m: w } = Plate::default().shape() else {
                 unreachable!("the default plate is a rectangle")
             };
-            PlateShape::Rectangle { length_m: length_m.unwrap_or(l), width_m: width_m.unwrap_or(w) }
+            let (length_m, width_m) = (length_m.unwrap_or(l), width_m.unwrap_or(w));
+            Ok(PlateShape::Rectangle { length_m, width_m })
         }
-    };
-    Plate::new(shape, view.thickness_m, view.rim)
+    }
 }
 
 /// The contact that a view describes.

@@ -1,4 +1,5 @@
-//! What crosses the boundary: asset files, session files, verdict lines.
+//! What crosses the boundary: asset files, scene files, session files,
+//! verdict lines.
 //!
 //! One idea: parse in two stages, a syntactic view that judges nothing, then a
 //! domain value that cannot be wrong. Views are `Serialize`, domain types are
@@ -6,6 +7,8 @@
 
 pub mod asset;
 pub mod memory;
+mod preset;
+pub mod scene;
 pub mod service;
 pub mod session_csv;
 pub mod telemetry;

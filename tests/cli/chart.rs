@@ -35,3 +35,33 @@ fn estimators_are_measured_drawn_and_kept() {
     assert!(records.iter().any(|r| r["front"] == true));
     assert!(records.iter().all(|r| r["cost_ns"].as_f64() > Some(0.0)));
 }
+
+#[test]
+fn work_precision_puts_the_choice_and_peers_beside_what_is_charted() {
+    let bench = Bench::new();
+    let peer = r#"{"chart":"work-precision","machine":{"cpu":"c","cores":1,"features":[],"os":"o"},
+        "versions":{"anvil":"1.2"},"records":[{"scene":"slope","engine":"anvil","model":"rigid",
+        "method":"euler","setting":"step_s","value":0.001,"error_m":1e-4,"cpu_us_per_s":50.0,
+        "spread":1.0,"note":null}]}"#;
+    std::fs::write(bench.path("peers.json"), peer).unwrap();
+    let done = bench.ok("chart work-precision --quick --with peers.json -o charts");
+    assert!(done.stdout.contains("rolling dopri5"), "{}", done.stdout);
+    assert!(bench.read("charts/work-precision.svg").contains("anvil"));
+    let records = records(&bench, "charts/work-precision.json");
+    assert!(records.iter().any(|r| r["engine"] == "anvil"));
+    let own: Vec<&Value> = records.iter().filter(|r| r["engine"] == "offbd").collect();
+    assert!(own.iter().any(|r| r["front"] == true));
+    let chosen: Vec<&Value> = own.iter().copied().filter(|r| r["asked_m"].is_number()).collect();
+    assert_eq!(chosen.len(), 5);
+    for record in chosen {
+        assert!(record["error_m"].as_f64() <= record["asked_m"].as_f64(), "{record}");
+    }
+}
+
+#[test]
+fn records_that_are_none_are_named() {
+    let bench = Bench::new();
+    std::fs::write(bench.path("peers.json"), "{}").unwrap();
+    let done = bench.fails("chart work-precision --quick --with peers.json");
+    assert!(done.stderr.contains("peers.json"), "{}", done.stderr);
+}

@@ -5,6 +5,7 @@ mod calibrate;
 mod chart;
 mod demo;
 mod replay;
+mod scene;
 mod score;
 mod service;
 mod simulate;

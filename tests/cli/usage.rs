@@ -3,8 +3,18 @@ use std::process::{Command, Stdio};
 
 use crate::bench::Bench;
 
-const COMMANDS: [&str; 9] =
-    ["simulate", "calibrate", "replay", "score", "chart", "demo", "serve", "migrate", "check"];
+const COMMANDS: [&str; 10] = [
+    "simulate",
+    "calibrate",
+    "replay",
+    "score",
+    "scene",
+    "chart",
+    "demo",
+    "serve",
+    "migrate",
+    "check",
+];
 
 #[test]
 fn help_teaches_with_examples_within_eighty_columns() {

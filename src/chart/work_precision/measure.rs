@@ -114,8 +114,10 @@ pub(super) fn configurations(quick: bool) -> Vec<Configuration> {
     let mut all = Vec::new();
     for model in Model::ALL {
         for &method in model.methods() {
-            let steps =
-                STEPS_S.iter().enumerate().filter(|(i, h)| thin(*i) && is_charted(model, **h));
+            let steps = STEPS_S
+                .iter()
+                .enumerate()
+                .filter(|(i, h)| thin(*i) && **h >= shortest(model, quick));
             let tolerances = TOLERANCES_M.iter().enumerate().filter(|(i, _)| thin(*i));
             let paces: Vec<Pace> = if method.adapts() && !is_stiffly_explicit(model, method) {
                 tolerances.map(|(_, tolerance)| Pace::Tolerance(*tolerance)).collect()
@@ -128,9 +130,14 @@ pub(super) fn configurations(quick: bool) -> Vec<Configuration> {
     all
 }
 
-/// Steps below a tenth of a millisecond are for the contact alone.
-fn is_charted(model: Model, h: f64) -> bool {
-    model == Model::Compliant || h >= 2e-4
+/// The shortest step charted, s: those below a fifth of a millisecond are for
+/// the contact alone.
+fn shortest(model: Model, quick: bool) -> f64 {
+    match (model, quick) {
+        (_, true) => 1e-3,
+        (Model::Compliant, _) => 0.0,
+        _ => 2e-4,
+    }
 }
 
 /// Left to choose its steps, it creeps along the limit of stability.

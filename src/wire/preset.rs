@@ -1,0 +1,62 @@
+//! A value by its name, or in full.
+
+use std::fmt;
+use std::marker::PhantomData;
+
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{Deserialize, Deserializer, Error, MapAccess, Visitor};
+
+use crate::vocabulary::Invalid;
+
+/// A preset's name, or an object that says all.
+#[derive(Clone, Debug)]
+pub enum PresetOr<T> {
+    Named(String),
+    Given(T),
+}
+
+impl<T> PresetOr<T> {
+    /// The preset of this name among `presets`, or what `full` makes of the
+    /// object.
+    pub(super) fn resolve<V: Copy>(
+        &self,
+        element: &str,
+        presets: &[(&'static str, V)],
+        full: impl Fn(&T) -> Result<V, Invalid>,
+    ) -> Result<V, Invalid> {
+        let name = match self {
+            Self::Given(view) => return full(view),
+            Self::Named(name) => name,
+        };
+        presets.iter().find(|(known, _)| known == name).map(|(_, value)| *value).ok_or_else(|| {
+            let known: Vec<&str> = presets.iter().map(|(known, _)| *known).collect();
+            Invalid::new(element, format!("`{name}` is none of {}", known.join(", ")))
+        })
+    }
+}
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for PresetOr<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(Either(PhantomData))
+    }
+}
+
+/// Looks which of both it is. An untagged choice would lose the path of what is
+/// wrong inside.
+struct Either<T>(PhantomData<T>);
+
+impl<'de, T: Deserialize<'de>> Visitor<'de> for Either<T> {
+    type Value = PresetOr<T>;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("the name of a preset, or an object")
+    }
+
+    fn visit_str<E: Error>(self, name: &str) -> Result<Self::Value, E> {
+        Ok(PresetOr::Named(name.to_owned()))
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
+        T::deserialize(MapAccessDeserializer::new(map)).map(PresetOr::Given)
+    }
+}

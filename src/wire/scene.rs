@@ -1,0 +1,276 @@
+//! The scene file: a body, a plate, and how the plate moves, as JSON.
+
+use nalgebra::{Vector2, Vector3};
+use serde::Deserialize;
+
+use super::asset::{BallView, ContactView, contact, outline, pointer};
+use super::preset::PresetOr;
+use crate::plant::{Ball, Contact, Motion, Plate};
+use crate::scene::{LONGEST_SCENE_S, Law, Laws, Push, Scene, Subject, Term};
+use crate::vocabulary::{Invalid, in_range, positive};
+
+/// A scene as it is written. What is left out is the chapter's.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SceneView {
+    pub name: String,
+    /// In (0, 3600] s.
+    pub duration_s: f64,
+    /// Whether the plate ends at its edges; `false` makes it endless.
+    pub edges: bool,
+    pub ball: Option<BallView>,
+    /// Instead of a ball.
+    pub block: Option<BlockView>,
+    pub plate: PresetOr<ScenePlateView>,
+    pub contact: PresetOr<ContactView>,
+    pub initial: InitialView,
+    /// Terms of the angle about x, at most [`MOST_TERMS`].
+    pub qx: Vec<TermView>,
+    /// Terms of the angle about y, likewise.
+    pub qy: Vec<TermView>,
+    /// Forces on the body's centre, at most [`MOST_PUSHES`].
+    pub pushes: Vec<PushView>,
+}
+
+/// Most terms of one angle: every evaluation adds them all up, a hundred
+/// thousand times a run. More are refused.
+pub const MOST_TERMS: usize = 64;
+
+/// Most pushes of a scene: each makes two breaks, at which every method starts
+/// afresh. More are refused.
+pub const MOST_PUSHES: usize = 64;
+
+/// Longest name, characters. A longer one is refused.
+pub const LONGEST_NAME: usize = 128;
+
+impl Default for SceneView {
+    /// The ball at rest on a level plate for the 0.6 s of the chapter's
+    /// simulation (steps 48–50).
+    fn default() -> Self {
+        Self {
+            name: "scene".to_owned(),
+            duration_s: 0.6,
+            edges: true,
+            ball: None,
+            block: None,
+            plate: PresetOr::Given(ScenePlateView::default()),
+            contact: PresetOr::Given(ContactView::default()),
+            initial: InitialView::default(),
+            qx: Vec::new(),
+            qy: Vec::new(),
+            pushes: Vec::new(),
+        }
+    }
+}
+
+/// A cube that slides and does not turn.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct BlockView {
+    /// In (0, 1] m.
+    pub edge_m: f64,
+    /// In (0, 100] kg.
+    pub mass_kg: f64,
+}
+
+impl Default for BlockView {
+    /// The chapter's cube of 12.7 mm, of which it gives no mass: the ball's.
+    fn default() -> Self {
+        Self { edge_m: 0.0127, mass_kg: Ball::default().mass_kg() }
+    }
+}
+
+/// The plate: `length_m` and `width_m`, or `diameter_m` for a round one.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ScenePlateView {
+    /// Along x, in (0, 10] m.
+    pub length_m: Option<f64>,
+    /// Along y, in (0, 10] m.
+    pub width_m: Option<f64>,
+    /// Of a round plate, in (0, 10] m.
+    pub diameter_m: Option<f64>,
+    /// In [0, 1] m.
+    pub thickness_m: Option<f64>,
+}
+
+/// Where and how the body starts, relative to the plate, in its frame.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct InitialView {
+    /// Each within ±10 m. Left out: where the body just touches the centre.
+    pub position_m: Option<[f64; 3]>,
+    /// Each within ±100 m/s.
+    pub velocity_m_s: [f64; 3],
+    /// Each within ±100 000 rad/s.
+    pub spin_rad_s: [f64; 3],
+}
+
+/// One term of an angle.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "snake_case")]
+pub enum TermView {
+    ConstantRad(f64),
+    Sine(SineView),
+    Smoothstep(SmoothstepView),
+}
+
+/// `amplitude_rad·sin(2π·frequency_hz·t + phase_rad)`.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SineView {
+    pub amplitude_rad: f64,
+    pub frequency_hz: f64,
+    #[serde(default)]
+    pub phase_rad: f64,
+}
+
+/// `to_rad·(3s² − 2s³)`, s going from 0 at `start_s` to 1 after `duration_s`.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SmoothstepView {
+    pub to_rad: f64,
+    #[serde(default)]
+    pub start_s: f64,
+    pub duration_s: f64,
+}
+
+/// A force on the body's centre, for a while.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PushView {
+    /// Along x and y of the plate, each within ±1000 N.
+    pub force_n: [f64; 2],
+    /// In [0, 3600] s.
+    #[serde(default)]
+    pub start_s: f64,
+    /// In (0, 3600] s.
+    pub duration_s: f64,
+}
+
+/// A scene with its name and the laws of its plate.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedScene {
+    pub name: String,
+    pub scene: Scene,
+    pub laws: Laws,
+}
+
+/// Parses and checks a scene file.
+///
+/// # Errors
+/// [`Invalid`] with the JSON pointer of the offending element; the empty
+/// pointer stands for the document, with line and column in the reason.
+pub fn parse(document: &[u8]) -> Result<NamedScene, Invalid> {
+    let mut json = serde_json::Deserializer::from_slice(document);
+    let view: SceneView = serde_path_to_error::deserialize(&mut json)
+        .map_err(|e| Invalid::new(pointer(e.path()), e.inner().to_string()))?;
+    json.end().map_err(|e| Invalid::new("", e.to_string()))?;
+    named_scene(&view)
+}
+
+fn named_scene(view: &SceneView) -> Result<NamedScene, Invalid> {
+    let plate = view.plate.resolve("/plate", &Plate::PRESETS, plate)?;
+    let contact = view.contact.resolve("/contact", &Contact::PRESETS, contact)?;
+    let subject = subject(view, &plate)?;
+    let mut scene = Scene::new(subject, plate, contact, view.duration_s)?;
+    scene.edges = view.edges;
+    scene.initial = initial(&view.initial, &scene)?;
+    let laws = Laws::new(law("/qx", &view.qx)?, law("/qy", &view.qy)?, pushes(&view.pushes)?);
+    Ok(NamedScene { name: name(&view.name)?, scene, laws })
+}
+
+fn name(name: &str) -> Result<String, Invalid> {
+    let fits = (1..=LONGEST_NAME).contains(&name.chars().count());
+    if fits && !name.chars().any(char::is_control) {
+        return Ok(name.to_owned());
+    }
+    let reason = format!("must be 1 to {LONGEST_NAME} characters without control characters");
+    Err(Invalid::new("/name", reason))
+}
+
+fn subject(view: &SceneView, plate: &Plate) -> Result<Subject, Invalid> {
+    match (&view.ball, &view.block) {
+        (Some(_), Some(_)) => {
+            Err(Invalid::new("/block", "there is a ball already: one body is on the plate"))
+        }
+        (_, Some(block)) => Scene::block(block.edge_m, block.mass_kg, plate),
+        (ball, None) => {
+            let ball = ball.clone().unwrap_or_default();
+            Ball::new(ball.radius_m, ball.mass_kg, ball.inertia_factor).map(Subject::Ball)
+        }
+    }
+}
+
+fn plate(view: &ScenePlateView) -> Result<Plate, Invalid> {
+    let shape = outline(view.length_m, view.width_m, view.diameter_m)?;
+    let chapter = Plate::CHAPTER;
+    let thickness_m = view.thickness_m.unwrap_or(chapter.thickness_m());
+    Plate::new(shape, thickness_m, chapter.rim())
+}
+
+fn initial(view: &InitialView, scene: &Scene) -> Result<Motion, Invalid> {
+    let position = match &view.position_m {
+        None => scene.initial.position,
+        Some(position) => vector("/initial/position_m", position, 10.0)?,
+    };
+    Ok(Motion {
+        position,
+        velocity: vector("/initial/velocity_m_s", &view.velocity_m_s, 100.0)?,
+        spin: vector("/initial/spin_rad_s", &view.spin_rad_s, 1e5)?,
+    })
+}
+
+/// Three numbers within ±`most`.
+fn vector(element: &str, values: &[f64; 3], most: f64) -> Result<Vector3<f64>, Invalid> {
+    for (i, value) in values.iter().enumerate() {
+        in_range(&format!("{element}/{i}"), *value, -most..=most)?;
+    }
+    Ok(Vector3::from(*values))
+}
+
+fn law(element: &str, views: &[TermView]) -> Result<Law, Invalid> {
+    at_most(element, views.len(), MOST_TERMS)?;
+    let terms = views.iter().enumerate();
+    let terms: Result<Vec<Term>, Invalid> =
+        terms.map(|(i, view)| term(view).checked(&format!("{element}/{i}"))).collect();
+    Ok(Law::new(&terms?))
+}
+
+fn term(view: &TermView) -> Term {
+    match view {
+        TermView::ConstantRad(value) => Term::Constant(*value),
+        TermView::Sine(sine) => Term::Sine {
+            amplitude: sine.amplitude_rad,
+            frequency: sine.frequency_hz,
+            phase: sine.phase_rad,
+        },
+        TermView::Smoothstep(step) => {
+            Term::Smoothstep { to: step.to_rad, start: step.start_s, duration: step.duration_s }
+        }
+    }
+}
+
+fn pushes(views: &[PushView]) -> Result<Vec<Push>, Invalid> {
+    at_most("/pushes", views.len(), MOST_PUSHES)?;
+    views.iter().enumerate().map(|(i, view)| push(&format!("/pushes/{i}"), view)).collect()
+}
+
+fn push(element: &str, view: &PushView) -> Result<Push, Invalid> {
+    for (i, force) in view.force_n.iter().enumerate() {
+        in_range(&format!("{element}/force_n/{i}"), *force, -1000.0..=1000.0)?;
+    }
+    let start = in_range(&format!("{element}/start_s"), view.start_s, 0.0..=LONGEST_SCENE_S)?;
+    let duration = positive(&format!("{element}/duration_s"), view.duration_s, LONGEST_SCENE_S)?;
+    Ok(Push { force: Vector2::from(view.force_n), start_s: start, duration_s: duration })
+}
+
+fn at_most(element: &str, n: usize, most: usize) -> Result<(), Invalid> {
+    if n <= most {
+        return Ok(());
+    }
+    Err(Invalid::new(element, format!("{n} of them: at most {most} are taken")))
+}
+
+#[cfg(test)]
+mod tests;
