@@ -5,7 +5,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::unusable::Unusable;
 use super::{output, table};
+use crate::chart::work_precision::{self, Peers};
 use crate::chart::{self, Chart, ChartError, Effort};
 
 /// Measures a trade-off on this machine: SVG, PNG and the records as JSON.
@@ -45,13 +47,13 @@ impl Name {
         match self {
             Self::Estimators => chart::estimators::make(effort),
             Self::WorkPrecision => {
-                let mut peers = (Vec::new(), Vec::new());
+                let mut peers = Peers::default();
                 for path in with {
-                    let (records, versions) = chart::work_precision::read(path)?;
-                    peers.0.extend(records);
-                    peers.1.extend(versions);
+                    let more = work_precision::read(path)?;
+                    peers.records.extend(more.records);
+                    peers.versions.extend(more.versions);
                 }
-                chart::work_precision::make(effort, &peers)
+                work_precision::make(effort, &peers)
             }
         }
     }
@@ -59,13 +61,21 @@ impl Name {
 
 pub(super) fn run(args: &ChartArgs) -> anyhow::Result<()> {
     let effort = if args.quick { Effort::Quick } else { Effort::Full };
-    let chart = args.name.make(effort, &args.with)?;
+    let chart = args.name.make(effort, &args.with).map_err(unusable)?;
     let written = chart::write(&chart, &args.output)?;
     write_table(&chart.table)?;
     for path in written {
         anstream::eprintln!("{}", path.display());
     }
     Ok(())
+}
+
+/// Records that cannot be read are unusable input.
+fn unusable(error: ChartError) -> anyhow::Error {
+    match error {
+        ChartError::Peers { path, reason } => Unusable::file(&path, reason).into(),
+        other => other.into(),
+    }
 }
 
 fn write_table(rows: &chart::Table) -> anyhow::Result<()> {

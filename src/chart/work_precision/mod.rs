@@ -12,7 +12,7 @@ mod scenes;
 mod show;
 
 use measure::{ASKED_M, Bench};
-pub use record::{Record, read};
+pub use record::{Peers, Record, read};
 
 use super::{Chart, ChartError, Effort, front};
 
@@ -20,10 +20,7 @@ use super::{Chart, ChartError, Effort, front};
 ///
 /// # Errors
 /// [`ChartError`] if a scene or a record cannot be made.
-pub fn make(
-    effort: Effort,
-    peers: &(Vec<Record>, Vec<(String, String)>),
-) -> Result<Chart, ChartError> {
+pub fn make(effort: Effort, peers: &Peers) -> Result<Chart, ChartError> {
     let quick = effort == Effort::Quick;
     let repeats = if quick { 1 } else { 5 };
     let mut ours = Vec::new();
@@ -35,15 +32,15 @@ pub fn make(
         records.extend(ASKED_M.iter().filter_map(|&asked| bench.chosen(asked)));
         ours.append(&mut records);
     }
-    let figures = show::figures(&ours, &peers.0);
+    let figures = show::figures(&ours, &peers.records);
     let table = show::table(&ours);
-    let records = ours.iter().chain(&peers.0).map(serde_json::to_value);
+    let records = ours.iter().chain(&peers.records).map(serde_json::to_value);
     Ok(Chart {
         name: "work-precision",
         records: records.collect::<Result<_, _>>()?,
         figures,
         table,
-        versions: peers.1.clone(),
+        versions: peers.versions.clone(),
     })
 }
 

@@ -45,15 +45,22 @@ impl Record {
     }
 }
 
+/// What other engines measured, and their versions.
+#[derive(Clone, Debug, Default)]
+pub struct Peers {
+    pub records: Vec<Record>,
+    pub versions: Vec<(String, String)>,
+}
+
 /// The records and versions of a file that another engine's run wrote.
 ///
 /// # Errors
 /// [`ChartError::Peers`] naming the file.
-pub fn read(path: &Path) -> Result<(Vec<Record>, Vec<(String, String)>), ChartError> {
+pub fn read(path: &Path) -> Result<Peers, ChartError> {
     let failed = |reason: String| ChartError::Peers { path: path.to_owned(), reason };
     let bytes = std::fs::read(path).map_err(|e| failed(e.to_string()))?;
     let document: Document<Record> =
         serde_json::from_slice(&bytes).map_err(|e| failed(e.to_string()))?;
     let versions = document.versions.into_iter().filter(|(name, _)| name != "offbd");
-    Ok((document.records, versions.collect()))
+    Ok(Peers { records: document.records, versions: versions.collect() })
 }
