@@ -12,6 +12,8 @@
 //! - [`engine`]: one rig's pipeline (floor 3).
 
 #[cfg(feature = "service")]
+pub mod chart;
+#[cfg(feature = "service")]
 pub mod cli;
 pub mod diagnosis;
 pub mod engine;

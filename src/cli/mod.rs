@@ -5,6 +5,7 @@
 //! reader that closes stdout early ends the command quietly.
 
 mod calibrate;
+mod chart;
 mod corpus;
 mod demo;
 mod judge;
@@ -51,6 +52,7 @@ enum Command {
     Calibrate(calibrate::CalibrateArgs),
     Replay(replay::ReplayArgs),
     Score(score::ScoreArgs),
+    Chart(chart::ChartArgs),
     Demo(demo::DemoArgs),
     Serve(serve::ServeArgs),
     Migrate(serve::MigrateArgs),
@@ -82,6 +84,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Score(args) => score::run(&args),
+        Command::Chart(args) => chart::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Serve(args) => serve::serve(&args, &logging),
         Command::Migrate(args) => serve::migrate(&args),

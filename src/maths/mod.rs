@@ -3,6 +3,7 @@
 //! Pure and deterministic: numbers in, numbers out. Knows nothing of rigs.
 
 mod adaptive;
+pub mod estimators;
 mod linear;
 mod rosenbrock;
 mod runge_kutta;

@@ -32,7 +32,8 @@ pub const FLOORS: [Rule; 14] = [
     rule("http", 4, &["wire", "service"]),
     rule("config", 5, &[]),
     rule("server", 5, &["config"]),
-    rule("cli", 5, &["config", "server"]),
+    rule("chart", 5, &[]),
+    rule("cli", 5, &["chart", "config", "server"]),
 ];
 
 /// The highest floor that is free of input, output, clocks and chance.
@@ -78,6 +79,7 @@ const TRADES: &[(&str, &[&str])] = &[
     ),
     ("service", &["axum", "sqlx"]),
     ("http", &["sqlx"]),
+    ("chart", &["anyhow", "axum", "sqlx", "tokio"]),
 ];
 
 /// How SQL begins; in capitals, as this code writes it.

@@ -3,8 +3,8 @@ use std::process::{Command, Stdio};
 
 use crate::bench::Bench;
 
-const COMMANDS: [&str; 8] =
-    ["simulate", "calibrate", "replay", "score", "demo", "serve", "migrate", "check"];
+const COMMANDS: [&str; 9] =
+    ["simulate", "calibrate", "replay", "score", "chart", "demo", "serve", "migrate", "check"];
 
 #[test]
 fn help_teaches_with_examples_within_eighty_columns() {
@@ -34,6 +34,7 @@ fn bad_arguments_exit_with_2_and_say_what_would_be_right() {
         ("simulate --preset moon", "pingpong"),
         ("simulate --gap 5-4", "12-14"),
         ("calibrate a.csv -o b.json", "--asset"),
+        ("chart pie", "estimators"),
     ] {
         let done = bench.run(2, line);
         assert!(done.stderr.contains(said), "{line}: {}", done.stderr);

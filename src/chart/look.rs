@@ -1,0 +1,78 @@
+//! Colours, markers and strokes that differ in more than colour.
+//!
+//! The colours are those of Okabe & Ito (*Color Universal Design*, 2008), which
+//! stay apart for colour-blind readers; each comes with a marker and a dash of
+//! its own, so that a chart also reads in grey.
+
+use plotters::style::RGBColor;
+
+/// The sign at a point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Marker {
+    Circle,
+    Square,
+    Triangle,
+    Diamond,
+    Cross,
+    Plus,
+    Ring,
+    Star,
+}
+
+/// Colour, marker and dash of a series or a category.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Look {
+    pub rgb: (u8, u8, u8),
+    pub marker: Marker,
+    /// Lengths of stroke and gap; none for an unbroken line.
+    pub dash: Option<(i32, i32)>,
+}
+
+/// In the order in which they are best told apart; yellow, faint on white, last.
+const LOOKS: [Look; 8] = [
+    look((0x00, 0x72, 0xB2), Marker::Circle, None),
+    look((0xD5, 0x5E, 0x00), Marker::Square, Some((18, 8))),
+    look((0x00, 0x9E, 0x73), Marker::Triangle, Some((6, 6))),
+    look((0xCC, 0x79, 0xA7), Marker::Diamond, Some((24, 6))),
+    look((0xE6, 0x9F, 0x00), Marker::Cross, Some((10, 10))),
+    look((0x56, 0xB4, 0xE9), Marker::Ring, Some((14, 4))),
+    look((0x00, 0x00, 0x00), Marker::Plus, Some((4, 10))),
+    look((0xF0, 0xE4, 0x42), Marker::Star, None),
+];
+
+const fn look(rgb: (u8, u8, u8), marker: Marker, dash: Option<(i32, i32)>) -> Look {
+    Look { rgb, marker, dash }
+}
+
+impl Look {
+    /// For what is marked or drawn beside the series.
+    pub const BLACK: Self = look((0, 0, 0), Marker::Ring, None);
+
+    /// The look of the `i`-th series; they repeat after eight.
+    #[must_use]
+    pub fn of(i: usize) -> Self {
+        LOOKS[i % LOOKS.len()]
+    }
+
+    /// The `i`-th of `n` ordered steps, light to dark, in one hue: for bins of a
+    /// quantity.
+    #[must_use]
+    pub fn step(i: usize, n: usize) -> Self {
+        let share = if n < 2 { 1.0 } else { i as f64 / (n - 1) as f64 };
+        let mix = |light: f64, dark: f64| (light + share * (dark - light)).round() as u8;
+        let rgb = (mix(222.0, 8.0), mix(235.0, 48.0), mix(247.0, 107.0));
+        Self { rgb, ..Self::of(i) }
+    }
+
+    pub(super) fn colour(self) -> RGBColor {
+        RGBColor(self.rgb.0, self.rgb.1, self.rgb.2)
+    }
+
+    /// Black or white, whichever reads better on this colour (relative
+    /// luminance of ITU-R BT.709).
+    pub(super) fn ink(self) -> RGBColor {
+        let (r, g, b) = (f64::from(self.rgb.0), f64::from(self.rgb.1), f64::from(self.rgb.2));
+        let luminance = 0.2126 * r + 0.7152 * g + 0.0722 * b;
+        if luminance > 130.0 { RGBColor(0, 0, 0) } else { RGBColor(255, 255, 255) }
+    }
+}

@@ -1,0 +1,39 @@
+//! Charts: measurements as records, a drawing and a table of them.
+//!
+//! A chart measures, keeps what it measured as records beside the machine and
+//! the versions they belong to, and draws them: SVG, whose text stays text, and
+//! the same as PNG. Drawings are described as data ([`Figure`], [`Panel`],
+//! [`Series`], [`Regions`]) and drawn by one routine, so that all charts share
+//! axes, legend, colours and markers.
+//!
+//! To add a chart: a module here whose `make` returns a [`Chart`], and its name
+//! in `src/cli/chart.rs`.
+
+mod draw;
+mod error;
+pub mod estimators;
+mod figure;
+mod front;
+mod legend;
+mod look;
+mod machine;
+mod marker;
+mod raster;
+mod regions;
+mod scale;
+#[cfg(test)]
+mod tests;
+mod timing;
+mod write;
+
+pub use draw::svg;
+pub use error::ChartError;
+pub use figure::{Axis, Figure, Mark, Panel, Series, Stroke};
+pub use front::{Front, front};
+pub use look::{Look, Marker};
+pub use machine::{Document, Machine, versions};
+pub use raster::png;
+pub use regions::{Category, Regions};
+pub use scale::Scale;
+pub use timing::{CpuTime, cpu_time};
+pub use write::{Chart, Effort, Table, write};

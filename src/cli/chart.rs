@@ -1,0 +1,66 @@
+//! `offbd chart`: measures, draws, and keeps the records.
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::{output, table};
+use crate::chart::{self, Chart, ChartError, Effort};
+
+/// Measures a trade-off on this machine: SVG, PNG and the records as JSON.
+///
+/// A short table goes to stdout, the names of the files to stderr. Costs are
+/// CPU time: leave the machine alone meanwhile.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    offbd chart estimators\n  \
+    offbd chart estimators -o measured --quick")]
+pub(super) struct ChartArgs {
+    /// Which chart
+    #[arg(value_enum)]
+    name: Name,
+    /// Where the files go; made if need be
+    #[arg(short, long, value_name = "DIR", default_value = "charts")]
+    output: PathBuf,
+    /// Measure a few points only
+    #[arg(long)]
+    quick: bool,
+}
+
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum Name {
+    /// Acceleration estimators: error against delay and cost
+    Estimators,
+}
+
+impl Name {
+    fn make(self, effort: Effort) -> Result<Chart, ChartError> {
+        match self {
+            Self::Estimators => chart::estimators::make(effort),
+        }
+    }
+}
+
+pub(super) fn run(args: &ChartArgs) -> anyhow::Result<()> {
+    let effort = if args.quick { Effort::Quick } else { Effort::Full };
+    let chart = args.name.make(effort)?;
+    let written = chart::write(&chart, &args.output)?;
+    write_table(&chart.table)?;
+    for path in written {
+        anstream::eprintln!("{}", path.display());
+    }
+    Ok(())
+}
+
+fn write_table(rows: &chart::Table) -> anyhow::Result<()> {
+    let mut out = output::stdout();
+    let mut table = table::table(&rows.heading, &rows.right);
+    for row in &rows.rows {
+        table.add_row(row);
+    }
+    for line in table::lines(&table) {
+        writeln!(out, "{line}")?;
+    }
+    Ok(out.flush()?)
+}
