@@ -40,3 +40,4 @@ picture:
 # How fast samples go through
 bench:
     cargo bench --bench ingest
+    cargo bench --no-default-features --bench batch

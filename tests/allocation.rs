@@ -1,20 +1,24 @@
-//! A warm engine takes samples without touching the heap.
+//! What runs for every sample or step does not touch the heap.
 
 use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::cell::Cell;
 
 use offbd::diagnosis::FaultMemory;
 use offbd::engine::{Engine, Input, Rig, Setup};
+use offbd::plant::{Ball, Instructions, Plate, PlateColumns, RollingBatch, RollingConstants};
 use offbd::vocabulary::Sample;
 
 struct Counting;
 
-static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
+thread_local! {
+    /// Of this thread alone: tests run beside each other.
+    static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
+}
 
 // SAFETY: hands every call on to the system's allocator unchanged.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        ALLOCATIONS.set(ALLOCATIONS.get() + 1);
         // SAFETY: the caller's contract is the system allocator's.
         unsafe { System.alloc(layout) }
     }
@@ -54,8 +58,32 @@ fn a_warm_engine_does_not_allocate() {
         }
     };
     run(0, 2000);
-    let before = ALLOCATIONS.load(Ordering::Relaxed);
+    let before = ALLOCATIONS.get();
     run(2000, 12_000);
-    assert_eq!(ALLOCATIONS.load(Ordering::Relaxed) - before, 0);
+    assert_eq!(ALLOCATIONS.get() - before, 0);
     assert!(before > 0, "the counter counts");
+}
+
+#[test]
+fn a_step_of_a_batch_does_not_allocate() {
+    let before = ALLOCATIONS.get();
+    let constants = [RollingConstants::new(&Ball::default(), &Plate::default()); 75];
+    for instructions in Instructions::available() {
+        let mut batch = RollingBatch::new(&constants, instructions);
+        let ready = ALLOCATIONS.get();
+        for step in 0..100 {
+            let column = &[f64::from(step) * 1e-3; 75];
+            batch.step(&PlateColumns {
+                qx_rad: column,
+                qy_rad: column,
+                qx_rate: column,
+                qy_rate: column,
+                qx_acceleration: column,
+                qy_acceleration: column,
+                step_s: column,
+            });
+        }
+        assert_eq!(ALLOCATIONS.get(), ready, "{instructions}");
+        assert!(ready > before, "the counter counts");
+    }
 }

@@ -7,6 +7,7 @@ pub mod estimators;
 mod linear;
 mod rosenbrock;
 mod runge_kutta;
+pub mod sine;
 mod sliding_quadratic;
 mod statistics;
 mod system;

@@ -5,6 +5,7 @@
 //! and a step is a pure function of both. Knows no faults, no sensors, no
 //! clock. Notation and signs: `ARCHITECTURE.md`, "Frames and signs".
 
+mod batch;
 mod body;
 mod compliant;
 mod contact;
@@ -17,6 +18,7 @@ mod sliding;
 mod tilt;
 mod twin;
 
+pub use batch::{Instructions, PlateColumns, RollingBatch, RollingConstants};
 pub use body::{Ball, GRAVITY_M_S2, Plate, PlateShape};
 pub use compliant::Compliant;
 pub use contact::{Body, Contact, Ground, Motion};

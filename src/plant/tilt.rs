@@ -3,8 +3,10 @@
 use nalgebra::{Vector2, Vector3};
 
 use super::GRAVITY_M_S2;
+use crate::maths::sine::sin_cos;
 
-/// Plate angles about x and y with their first and second rates.
+/// Plate angles about x and y, within ±1000 rad, with their first and second
+/// rates.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tilt {
     /// (qx, qy), rad.
@@ -26,8 +28,8 @@ impl Tilt {
     #[must_use]
     #[inline]
     pub fn motion(&self) -> PlateMotion {
-        let (sin_x, cos_x) = self.angle.x.sin_cos();
-        let (sin_y, cos_y) = self.angle.y.sin_cos();
+        let (sin_x, cos_x) = sin_cos(self.angle.x);
+        let (sin_y, cos_y) = sin_cos(self.angle.y);
         let coupling = self.rate.x * self.rate.y;
         PlateMotion {
             omega: Vector3::new(self.rate.x * cos_y, self.rate.y, self.rate.x * sin_y),

@@ -3,6 +3,7 @@
 
 use std::f64::consts::TAU;
 
+use crate::maths::sine::{self, sin_cos};
 use crate::vocabulary::{Invalid, in_range, positive};
 
 /// One term of an angle.
@@ -117,7 +118,8 @@ fn varying(term: &Term, t: f64, inside: f64) -> [f64; 3] {
         Term::Constant(value) => [value, 0.0, 0.0],
         Term::Sine { amplitude, frequency, phase } => {
             let omega = TAU * frequency;
-            let (sin, cos) = (omega * t + phase).sin_cos();
+            let at = omega * t + phase;
+            let (sin, cos) = if at.abs() <= sine::LIMIT_RAD { sin_cos(at) } else { at.sin_cos() };
             [amplitude * sin, amplitude * omega * cos, -amplitude * omega * omega * sin]
         }
         Term::Smoothstep { start, .. } if inside <= start => [0.0; 3],
