@@ -50,7 +50,7 @@ impl Estimator for Averages {
         self.history.push(position);
         self.slide();
         let [newest, middle, oldest] = self.sums;
-        self.history.is_full().then(|| (newest - 2.0 * middle + oldest) * self.per_cube)
+        self.history.is_full().then_some((newest - 2.0 * middle + oldest) * self.per_cube)
     }
 }
 
