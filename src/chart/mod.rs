@@ -12,6 +12,7 @@
 mod draw;
 mod error;
 pub mod estimators;
+pub mod fidelity;
 mod figure;
 mod front;
 mod legend;
@@ -21,6 +22,7 @@ mod marker;
 mod raster;
 mod regions;
 mod scale;
+pub mod stability;
 #[cfg(test)]
 mod tests;
 mod timing;

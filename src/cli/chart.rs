@@ -32,12 +32,18 @@ pub(super) struct ChartArgs {
 enum Name {
     /// Acceleration estimators: error against delay and cost
     Estimators,
+    /// Models: error over the plate's motion, and what is chosen
+    Fidelity,
+    /// Methods: the largest stable step, measured and predicted
+    Stability,
 }
 
 impl Name {
     fn make(self, effort: Effort) -> Result<Chart, ChartError> {
         match self {
             Self::Estimators => chart::estimators::make(effort),
+            Self::Fidelity => chart::fidelity::make(effort),
+            Self::Stability => chart::stability::make(effort),
         }
     }
 }

@@ -166,12 +166,16 @@ impl Sliding {
         let landed = self.land(at);
         let (free, turn) = self.free(&landed, plate);
         if Self::normal(&free) <= 0.0 || (above >= 0.0 && at.velocity.z > 0.0) {
-            return (Phase::Flight, *at);
+            // A plate that falls away still stops a body that comes faster:
+            // it would go on through the plate.
+            return (Phase::Flight, if at.velocity.z < 0.0 { landed } else { *at });
         }
         let sticking = self.sticking(&free, &turn);
         let slip = self.body.slip(&landed.velocity, &landed.spin);
         let holds = std::array::from_fn(|axis| {
-            if slip[axis].abs() > NO_SLIP_M_S {
+            // Slip ends at NO_SLIP beyond 0, and a little more by rounding:
+            // taken for slip the other way, it would turn over for ever.
+            if slip[axis].abs() > 2.0 * NO_SLIP_M_S {
                 Hold::Slip(slip[axis].signum())
             } else if sticking[axis].abs() > self.friction * Self::normal(&free) {
                 Hold::Slip(sticking[axis].signum())

@@ -2,9 +2,9 @@
 //! computation of its own: one axis in the plate frame by small fixed steps,
 //! the flight as a parabola in the world.
 
-use super::scenes::{KAPPA, held, s3, scene};
+use super::scenes::{KAPPA, held, s3, sampled, scene};
 use offbd::plant::{Ball, Body, Contact, Ground, Hold, Motion, Phase, Plate, Sliding, Tilt};
-use offbd::scene::{Configuration, Method, Model, Pace, run};
+use offbd::scene::{Configuration, Law, Laws, Method, Model, Pace, Term, run};
 
 const G: f64 = 9.81;
 const R: f64 = 0.0127;
@@ -163,4 +163,34 @@ fn validate_the_onset_of_slip_on_a_held_plate() {
         outcome.events.iter().all(|event| event.what == "rolls")
     });
     assert!((ran - theory).abs() < 1e-6, "{ran} for {theory}");
+}
+
+/// A ball that lands on a plate that falls away is stopped all the same, and
+/// flies on: it does not go through the plate.
+#[test]
+fn a_landing_on_a_plate_that_falls_away_is_one() {
+    let wave = Term::Sine { amplitude: 0.05, frequency: 10.0, phase: 0.0 };
+    let laws = Laws::new(Law::default(), Law::new(&[wave]), Vec::new());
+    let configuration =
+        Configuration::new(Model::Sliding, Method::Dopri5, Pace::Tolerance(1e-6)).unwrap();
+    let (outcome, path) =
+        sampled(&scene(Contact::CHAPTER, 2.0), &laws, &configuration, 1e-3).unwrap();
+    assert!(outcome.tally.steps < 20_000, "{} steps", outcome.tally.steps);
+    let lowest = path.iter().map(|(_, at)| at.position.z).fold(f64::INFINITY, f64::min);
+    assert!(lowest > GAP - 1e-6, "{:e} m into the plate", GAP - lowest);
+}
+
+/// Slip that ends, ends: the ball rolls on at 5/7 of its speed. Were the last
+/// of it taken for slip the other way, it would turn over every 1e-8 s.
+#[test]
+fn validate_slip_ends_in_rolling() {
+    let configuration =
+        Configuration::new(Model::Sliding, Method::Dopri5, Pace::Tolerance(1e-6)).unwrap();
+    let mut scene = scene(Contact::CHAPTER, 0.5);
+    scene.initial.velocity.x = 0.7;
+    let outcome = run(&scene, &mut held(0.0, 0.0), &configuration, None).unwrap();
+    assert!((outcome.end.velocity.x - 0.5).abs() < 1e-6, "{}", outcome.end.velocity.x);
+    let found: Vec<&str> = outcome.events.iter().map(|event| event.what).collect();
+    assert_eq!(found, ["slips", "rolls"]);
+    assert!(outcome.tally.steps < 1000, "{} steps", outcome.tally.steps);
 }
