@@ -5,7 +5,10 @@ use super::measure::Fate;
 use super::theory::Limits;
 use crate::chart::{Axis, Category, Figure, Look, Marker, Panel, Regions, Scale, Series, Stroke};
 
-const FATES: [(Fate, &str, (u8, u8, u8), Marker); 4] = [
+/// A fate with its name, colour and sign.
+type Kind = (Fate, &'static str, (u8, u8, u8), Marker);
+
+const FATES: [Kind; 4] = [
     (Fate::Stable, "stable", (0xD4, 0xEC, 0xDF), Marker::Ring),
     (Fate::Touchdown, "stable, but a touchdown fails", (0xF7, 0xE3, 0x9C), Marker::Triangle),
     (Fate::Chatter, "chatter: only slip and energy show it", (0xE6, 0x9F, 0x00), Marker::Plus),
