@@ -70,7 +70,7 @@ pub fn make(effort: Effort) -> Result<Chart, ChartError> {
 impl Ground {
     fn measure(name: &'static str, contact: &Contact, effort: Effort) -> Self {
         let n = match effort {
-            Effort::Full => (8, 6),
+            Effort::Full => (6, 5),
             Effort::Quick => (4, 3),
         };
         let spread = |low: f64, high: f64, n: usize| -> Vec<f64> {
