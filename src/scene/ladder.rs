@@ -19,7 +19,7 @@ use nalgebra::Vector3;
 use super::configuration::{Configuration, Method, Model, Pace};
 use super::drive::Drive;
 use super::events::Event;
-use super::run::{Outcome, Stage, run};
+use super::run::{Outcome, Stage, run_within};
 use super::rungs::{OnCreeping, OnRolling};
 use super::samples::Samples;
 use super::stepping::{Failure, Watch};
@@ -86,6 +86,10 @@ const SURE_TO_ROLL: f64 = 0.9;
 const WORK_CONTACT_STEP: f64 = 85.0;
 const WORK_SLIDING: f64 = 20_000.0;
 const WORK_RODAS4: f64 = 1000.0;
+
+/// Most work of one run of the search, per simulated second: fifty times the
+/// dearest that is charted. What needs more is out of reach.
+const MOST_WORK_PER_S: f64 = 5e7;
 
 /// The first contact step as a part of the plate's shortest time.
 const FIRST_PART: f64 = 0.25;
@@ -198,7 +202,7 @@ impl<D: Drive + Clone> Search<'_, D> {
         loop {
             let works = [contact.work, sliding.unwrap_or(f64::INFINITY), rodas.work];
             let cheapest = (0..3).min_by(|&a, &b| works[a].total_cmp(&works[b]))?;
-            if works[cheapest] == f64::INFINITY {
+            if works[cheapest] > MOST_WORK_PER_S * self.scene.duration_s.max(1.0) {
                 return None;
             }
             let found = match cheapest {
@@ -250,7 +254,8 @@ impl<D: Drive + Clone> Search<'_, D> {
         let (model, method) = (Model::Sliding, Method::Dopri5);
         let pace = Pace::Tolerance((self.tolerance * (1.0 - RIGID_SHARE)).clamp(1e-12, 1.0));
         let configuration = Configuration::new(model, method, pace).ok()?;
-        match run(self.scene, &mut self.drive.clone(), &configuration, None) {
+        let most = self.most_steps(WORK_RODAS4);
+        match run_within(most, self.scene, &mut self.drive.clone(), &configuration, None) {
             Ok(outcome) => {
                 let error = self.rigid_error(&outcome);
                 let meets = error <= self.tolerance * RIGID_SHARE;
@@ -313,11 +318,18 @@ impl<D: Drive + Clone> Search<'_, D> {
         if slips { 0.1 * share * contact.slip_threshold_m_s() * self.scene.duration_s } else { 0.0 }
     }
 
+    /// Steps of `work` each that one run of the search may take.
+    fn most_steps(&self, work: f64) -> u64 {
+        (MOST_WORK_PER_S * self.scene.duration_s.max(1.0) / work) as u64
+    }
+
     fn path(&self, configuration: &Configuration) -> Result<(Outcome, Path), Failure> {
         let mut path = Path::new();
         let mut sink = |_: f64, at: &Motion| path.push(at.position);
         let mut samples = Samples::new(self.scene.duration_s / COMPARED, &mut sink);
-        let outcome = run(self.scene, &mut self.drive.clone(), configuration, Some(&mut samples))?;
+        let most = self.most_steps(WORK_CONTACT_STEP);
+        let drive = &mut self.drive.clone();
+        let outcome = run_within(most, self.scene, drive, configuration, Some(&mut samples))?;
         Ok((outcome, path))
     }
 }
