@@ -1,8 +1,9 @@
 //! Fidelity chosen, not guessed: the cheapest model and method that meet a
 //! wanted accuracy, with the reasons.
 //!
-//! 1. A survey says whether the ball rolls at all, and how far the rolling and
-//!    the creeping ball are off. The first that is near enough runs by
+//! 1. A survey says whether the ball rolls at all, and how far the planar, the
+//!    rolling and the creeping ball are off. The planar one runs on the survey's
+//!    word, which is a bound; the others, if near enough, run by
 //!    Dormand–Prince, watched step by step: if the friction demand, the normal
 //!    force or the edge show that it does not hold, it is given up.
 //! 2. Otherwise three candidates compete, the cheapest next run first: the
@@ -87,6 +88,9 @@ const WORK_CONTACT_STEP: f64 = 85.0;
 const WORK_SLIDING: f64 = 20_000.0;
 const WORK_RODAS4: f64 = 1000.0;
 
+/// A held angle is renewed at least so many times in a scene.
+const LEAST_HOLDS: f64 = 8.0;
+
 /// Most work of one run of the search, per simulated second: fifty times the
 /// dearest that is charted. What needs more is out of reach.
 const MOST_WORK_PER_S: f64 = 5e7;
@@ -115,7 +119,7 @@ pub fn choose<D: Drive + Clone>(
 ) -> Result<Choice, OutOfReach> {
     let survey = Survey::of(scene, &mut drive.clone());
     let mut search = Search { scene, drive, tolerance: tolerance_m, survey, tried: Vec::new() };
-    match search.smooth().or_else(|| search.stiff()) {
+    match search.planar().or_else(|| search.smooth()).or_else(|| search.stiff()) {
         Some((configuration, error_m)) => {
             Ok(Choice { configuration, error_m, survey, tried: search.tried })
         }
@@ -141,6 +145,27 @@ type Path = Vec<Vector3<f64>>;
 impl<D: Drive + Clone> Search<'_, D> {
     fn note(&mut self, model: Model, method: Method, error_m: Option<f64>, verdict: String) {
         self.tried.push(Tried { model, method, error_m, verdict });
+    }
+
+    /// Small angles, held from step to step: the survey's bounds suffice, there
+    /// is nothing to watch on a plate so gentle that they do.
+    fn planar(&mut self) -> Option<(Configuration, f64)> {
+        let (survey, method) = (self.survey, Method::ZeroOrderHold);
+        let why = if self.scene.edges {
+            Some("nobody watches the edge".to_owned())
+        } else {
+            self.not_smooth(survey.planar_error_m)
+        };
+        if let Some(why) = why {
+            self.note(Model::Planar, method, Some(survey.planar_error_m), why);
+            return None;
+        }
+        let share = self.tolerance * (1.0 - MODEL_SHARE);
+        let h = (survey.planar_step_s * share.sqrt()).min(self.scene.duration_s / LEAST_HOLDS);
+        let configuration = Configuration::new(Model::Planar, method, Pace::Step(h)).ok()?;
+        let error = survey.planar_error_m + share;
+        self.note(Model::Planar, method, Some(error), "meets it".to_owned());
+        Some((configuration, error))
     }
 
     /// The rolling and the creeping ball.

@@ -4,9 +4,11 @@
 //! The plate is looked at a few times per shortest time of its law, with the
 //! ball where it starts. That costs less than the cheapest run.
 
+use nalgebra::Vector2;
+
 use super::drive::{Drive, Seen};
 use super::{Scene, Subject};
-use crate::plant::{Creeping, Grip, Motion, Rolling};
+use crate::plant::{Creeping, Grip, Motion, Planar, Rolling, RollingState, Tilt};
 
 /// Looks per shortest time of the plate's law.
 const LOOKS_PER_TIME: f64 = 4.0;
@@ -25,6 +27,11 @@ pub struct Survey {
     pub demand: f64,
     /// Whether the body starts on the plate, not slipping more than it creeps.
     pub starts_rolling: bool,
+    /// Error of small angles, m.
+    pub planar_error_m: f64,
+    /// Step that keeps a held angle within a metre of the moving one, s: the
+    /// error goes with the square of the step.
+    pub planar_step_s: f64,
     /// Error of a model without creep and sag, m.
     pub rolling_error_m: f64,
     /// Error of the creeping model, m.
@@ -57,6 +64,9 @@ struct Worst {
     trade: f64,
     sag: f64,
     settling: f64,
+    angle: f64,
+    rate: f64,
+    acceleration: f64,
 }
 
 impl Worst {
@@ -64,8 +74,46 @@ impl Worst {
         let plate = Seen::new(drive, scene.body().mass_kg(), from);
         let n = ((until - from) / look).ceil().max(1.0) as u32;
         for i in 0..=n {
-            self.look(scene, &plate.at(from + (until - from) * f64::from(i) / f64::from(n)));
+            let t = from + (until - from) * f64::from(i) / f64::from(n);
+            self.turn(&drive.tilt(t), drive.push().norm() / scene.body().mass_kg());
+            self.look(scene, &plate.at(t));
         }
+    }
+
+    /// Notes how far and how fast the plate turns; a push counts as an angle of
+    /// any size, for the planar model has none.
+    fn turn(&mut self, tilt: &Tilt, push: f64) {
+        let angle = if push > 0.0 { f64::INFINITY } else { tilt.angle.norm() };
+        self.angle = self.angle.max(angle);
+        self.rate = self.rate.max(tilt.rate.norm());
+        self.acceleration = self.acceleration.max(tilt.acceleration.norm());
+    }
+
+    /// Error of small angles, m, and the step that holding them takes: at worst
+    /// the plate is always where it is worst, and the ball as far and as fast
+    /// as that drives it.
+    fn planar(&self, scene: &Scene) -> (f64, f64) {
+        let (Subject::Ball(ball), t) = (&scene.subject, scene.duration_s) else {
+            return (f64::INFINITY, 0.0);
+        };
+        let (at, gain) = (&scene.initial, ball.rolling_gravity());
+        let speed = at.velocity.norm() + gain * self.angle * t;
+        let state = RollingState {
+            position: Vector2::new(at.position.xy().norm() + speed * t, 0.0),
+            velocity: Vector2::new(speed, 0.0),
+            spin: at.spin.z,
+        };
+        let worst = |size: f64| Vector2::new(size, 0.0);
+        let tilt = Tilt {
+            angle: worst(self.angle),
+            rate: worst(self.rate),
+            acceleration: worst(self.acceleration),
+        };
+        let left_out = Planar::new(ball, &scene.plate).left_out(&state, &tilt);
+        // The midpoint rule loses h²/24 of the change of the rate, twice the
+        // largest at most, and the ball carries the velocity to the end.
+        let step = (12.0 / (gain * self.rate * t)).sqrt();
+        (left_out * t * t / 2.0, step)
     }
 
     fn look(&mut self, scene: &Scene, plate: &crate::plant::PlateMotion) {
@@ -102,11 +150,14 @@ impl Worst {
         // because the ball is looked at where it starts only; what it lags
         // behind by its settling time is the creeping model's error.
         let rolling = 1.5 * self.trade * scene.duration_s + self.sag * self.demand;
+        let (planar_error_m, planar_step_s) = self.planar(scene);
         let lag = (std::f64::consts::TAU * self.settling / shortest_time).min(1.0);
         let creeping = 1.5 * rolling * lag + 4.0 * self.trade * self.settling;
         Survey {
             demand: self.demand,
             starts_rolling: starts_rolling(scene, self.trade),
+            planar_error_m: planar_error_m + rolling,
+            planar_step_s,
             rolling_error_m: rolling,
             creeping_error_m: creeping,
             sag_m: self.sag,

@@ -69,7 +69,7 @@ fn verdicts(grounds: &[Ground]) -> String {
     let median = crate::maths::median(&mut factors).unwrap_or(1.0);
     format!(
         "Of {} decisions {} are too cheap and {} too dear, by a median factor of {median:.1} in CPU \
-         time and {worst:.0} at worst. A ball at rest on a plate that swings about one axis for 2 s.",
+         time and {worst:.0} at worst. A ball at rest on a plate that swings about one axis for 1 s.",
         sum(|tally| tally.judged),
         sum(|tally| tally.too_cheap),
         sum(|tally| tally.too_dear),
@@ -137,7 +137,7 @@ fn reaches(grounds: &[Ground]) -> String {
         format!("{model} in {}", known().filter(within).count())
     };
     format!(
-        "Worst distance in position over 2 s; dark is far off, blank is not known. Within {} of the \
+        "Worst distance in position over 1 s; dark is far off, blank is not known. Within {} of the \
          {} cells whose truth is known: {}.",
         TOLERANCE_NAMES[1],
         known().count(),

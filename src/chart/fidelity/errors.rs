@@ -8,17 +8,17 @@ use crate::scene::{
 };
 
 /// Length of a scene, s.
-pub(super) const DURATION_S: f64 = 2.0;
+pub(super) const DURATION_S: f64 = 1.0;
 
 /// Time between the moments of comparison, s.
 const EVERY_S: f64 = 0.01;
 
 /// Accuracies asked of the truth's two runs, m.
-const TRUTH_M: [f64; 2] = [1e-8, 1e-7];
+const TRUTH_M: [f64; 2] = [1e-7, 1e-6];
 
 /// Accuracy asked of the models' own methods, m, and the step of the planar
 /// model, s: an error that shows is the model's.
-const METHOD_M: f64 = 1e-9;
+const METHOD_M: f64 = 1e-7;
 const PLANAR_STEP_S: f64 = 1e-4;
 
 /// The smaller models, from the cheapest on.

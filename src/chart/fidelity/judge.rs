@@ -11,7 +11,7 @@ use crate::scene::{Configuration, Method, Model, Pace, choose, run};
 
 /// Plates that turn with more than this, rad/s², are not run: they throw the
 /// ball about at once, over hundreds of metres, as no plate of this kind does.
-const VIOLENT_RAD_S2: f64 = 400.0;
+const VIOLENT_RAD_S2: f64 = 150.0;
 
 fn is_violent(amplitude: f64, frequency: f64) -> bool {
     amplitude * (std::f64::consts::TAU * frequency).powi(2) > VIOLENT_RAD_S2
