@@ -66,7 +66,8 @@ fn amplification(method: Method, k: f64, d: f64, h: f64) -> Matrix2<f64> {
 fn spectral_radius(m: &Matrix2<f64>) -> f64 {
     let (half, determinant) = (m.trace() / 2.0, m.determinant());
     let square = half * half - determinant;
-    if square < 0.0 { determinant.sqrt() } else { half.abs() + square.sqrt() }
+    // Roots that rounding alone sets apart are a pair.
+    if square < 1e-14 { determinant.abs().sqrt() } else { half.abs() + square.sqrt() }
 }
 
 /// Steps of the search for the first step at which the radius passes 1.
