@@ -63,8 +63,13 @@ pub struct OutOfReach {
 /// Dormand–Prince runs at this many times its part of the wanted accuracy: its
 /// estimates are of the fourth-order solution and add up without cancelling.
 /// The fifth-order solution is better by 6 times with a handful of steps, the
-/// worst case seen, and by over a hundred on the charted scenes.
+/// worst case seen, and by over a hundred where the plate swings to and fro a
+/// few times.
 const DOPRI5_SLACK: f64 = 8.0;
+const DOPRI5_SLACK_OF_SWINGS: f64 = 40.0;
+
+/// Shortest times of the plate in a scene from which on it swings to and fro.
+const SWINGS: f64 = 4.0;
 
 /// Part of the tolerance that a model's own error may use up.
 const MODEL_SHARE: f64 = 0.5;
@@ -88,7 +93,7 @@ const WORK_CONTACT_STEP: f64 = 85.0;
 const WORK_SLIDING: f64 = 20_000.0;
 const WORK_RODAS4: f64 = 1000.0;
 
-/// A held angle is renewed at least so many times in a scene.
+/// The angle of a plate that moves is renewed at least so many times in a scene.
 const LEAST_HOLDS: f64 = 8.0;
 
 /// Most work of one run of the search, per simulated second: fifty times the
@@ -161,7 +166,9 @@ impl<D: Drive + Clone> Search<'_, D> {
             return None;
         }
         let share = self.tolerance * (1.0 - MODEL_SHARE);
-        let h = (survey.planar_step_s * share.sqrt()).min(self.scene.duration_s / LEAST_HOLDS);
+        let whole = self.scene.duration_s;
+        let longest = if survey.planar_step_s.is_finite() { whole / LEAST_HOLDS } else { whole };
+        let h = (survey.planar_step_s * share.sqrt()).min(longest);
         let configuration = Configuration::new(Model::Planar, method, Pace::Step(h)).ok()?;
         let error = survey.planar_error_m + share;
         self.note(Model::Planar, method, Some(error), "meets it".to_owned());
@@ -182,7 +189,7 @@ impl<D: Drive + Clone> Search<'_, D> {
                 continue;
             }
             let share = self.tolerance * (1.0 - MODEL_SHARE);
-            let configuration = dopri5_within(model, share)?;
+            let configuration = self.dopri5_within(model, share)?;
             match self.watched(&configuration) {
                 Ok(_) => {
                     let error = error + share;
@@ -196,6 +203,14 @@ impl<D: Drive + Clone> Search<'_, D> {
             }
         }
         None
+    }
+
+    /// Dormand–Prince with steps such that it stays within `error_m`.
+    fn dopri5_within(&self, model: Model, error_m: f64) -> Option<Configuration> {
+        let swings = self.scene.duration_s / self.drive.shortest_time_s();
+        let slack = if swings >= SWINGS { DOPRI5_SLACK_OF_SWINGS } else { DOPRI5_SLACK };
+        let pace = Pace::Tolerance((error_m * slack).clamp(1e-12, 1.0));
+        Configuration::new(model, Method::Dopri5, pace).ok()
     }
 
     fn not_smooth(&self, error: f64) -> Option<String> {
@@ -359,12 +374,6 @@ impl<D: Drive + Clone> Search<'_, D> {
     }
 }
 
-/// Dormand–Prince with steps such that it stays within `error_m`.
-fn dopri5_within(model: Model, error_m: f64) -> Option<Configuration> {
-    let pace = Pace::Tolerance((error_m * DOPRI5_SLACK).clamp(1e-12, 1.0));
-    Configuration::new(model, Method::Dopri5, pace).ok()
-}
-
 fn pace_name(configuration: &Configuration) -> String {
     match configuration.pace() {
         Pace::Step(h) => format!("step {h:.2e} s"),
@@ -433,8 +442,9 @@ impl Refining {
         Configuration::new(Model::Compliant, self.method, pace).ok()
     }
 
-    /// The difference from the run before, m, or a third of the one before
-    /// that where two runs happen to agree; `None` for the first run.
+    /// Error of the run, m, from its difference to the run before; of contact
+    /// steps at least a third of the difference before that, since two runs may
+    /// happen to agree. `None` for the first run.
     fn compare(&mut self, path: Path, steps: u64) -> Option<f64> {
         // A run with nearly as many steps is the same run, and agrees with
         // itself: the plate's own pieces were shorter than the step.

@@ -8,7 +8,7 @@ use nalgebra::Vector2;
 
 use super::drive::{Drive, Seen};
 use super::{Scene, Subject};
-use crate::plant::{Creeping, Grip, Motion, Planar, Rolling, RollingState, Tilt};
+use crate::plant::{Ball, Creeping, Grip, Motion, Planar, Rolling, RollingState, Tilt};
 
 /// Looks per shortest time of the plate's law.
 const LOOKS_PER_TIME: f64 = 4.0;
@@ -60,10 +60,12 @@ impl Survey {
 #[derive(Clone, Copy, Debug, Default)]
 struct Worst {
     demand: f64,
-    /// v − U of the creeping ball, m/s.
-    trade: f64,
+    /// v − U of the creeping ball by creep, m/s, and by sag.
+    creep: f64,
+    sink: f64,
     sag: f64,
-    settling: f64,
+    /// How long sag and creep take to settle, s.
+    settling: [f64; 2],
     angle: f64,
     rate: f64,
     acceleration: f64,
@@ -124,9 +126,11 @@ impl Worst {
                 let y = creeping.enter(at, plate);
                 let grip = Rolling::new(ball, &scene.plate).grip(&y, plate);
                 let give = creeping.give(&grip, plate);
-                self.note(scene, &grip, give.velocity[0].hypot(give.velocity[1]), give.sag);
-                let [sag, slip] = creeping.settling_s(grip.normal.max(f64::MIN_POSITIVE));
-                self.settling = self.settling.max(sag).max(slip);
+                let sink = 2.0 * give.sag * plate.omega.xy().norm() / (1.0 + ball.inertia_factor());
+                let creep = give.slip[0].hypot(give.slip[1]) * creeping_share(ball);
+                self.note(scene, &grip, [creep, sink], give.sag);
+                let settling = creeping.settling_s(grip.normal.max(f64::MIN_POSITIVE));
+                self.settling = [0, 1].map(|i| self.settling[i].max(settling[i]));
             }
             Subject::Block(_) => {
                 let free = plate.free(&at.position, &at.velocity);
@@ -134,28 +138,32 @@ impl Worst {
                 let sag = scene.body().mass_kg() * grip.normal / scene.contact.stiffness_n_per_m();
                 let creep = grip.demand(scene.contact.friction()).min(1.0)
                     * scene.contact.slip_threshold_m_s();
-                self.note(scene, &grip, creep * std::f64::consts::SQRT_2, sag);
+                self.note(scene, &grip, [creep * std::f64::consts::SQRT_2, 0.0], sag);
             }
         }
     }
 
-    fn note(&mut self, scene: &Scene, grip: &Grip, trade: f64, sag: f64) {
+    fn note(&mut self, scene: &Scene, grip: &Grip, [creep, sink]: [f64; 2], sag: f64) {
         self.demand = self.demand.max(grip.demand(scene.contact.friction()));
-        self.trade = self.trade.max(trade.abs());
+        (self.creep, self.sink) = (self.creep.max(creep.abs()), self.sink.max(sink));
         self.sag = self.sag.max(sag);
     }
 
     fn survey(&self, scene: &Scene, shortest_time: f64) -> Survey {
         // The trade adds up over the scene at worst, and half again as much
-        // because the ball is looked at where it starts only; what it lags
-        // behind by its settling time is the creeping model's error.
-        let rolling = 1.5 * self.trade * scene.duration_s + self.sag * self.demand;
+        // because the ball is looked at where it starts only; what each part
+        // lags behind by its settling time is the creeping model's error.
+        let parts = [self.sink, self.creep];
+        let rolling = 1.5 * (parts[0] + parts[1]) * scene.duration_s + self.sag * self.demand;
         let (planar_error_m, planar_step_s) = self.planar(scene);
-        let lag = (std::f64::consts::TAU * self.settling / shortest_time).min(1.0);
-        let creeping = 1.5 * rolling * lag + 4.0 * self.trade * self.settling;
+        let part = |i: usize| {
+            let lag = (std::f64::consts::TAU * self.settling[i] / shortest_time).min(1.0);
+            parts[i] * (2.0 * scene.duration_s * lag + 4.0 * self.settling[i])
+        };
+        let creeping = 1.5 * (part(0) + part(1));
         Survey {
             demand: self.demand,
-            starts_rolling: starts_rolling(scene, self.trade),
+            starts_rolling: starts_rolling(scene),
             planar_error_m: planar_error_m + rolling,
             planar_step_s,
             rolling_error_m: rolling,
@@ -165,12 +173,16 @@ impl Worst {
     }
 }
 
-fn starts_rolling(scene: &Scene, trade: f64) -> bool {
+/// κ/(1 + κ): the part of creep that shows in the velocity.
+fn creeping_share(ball: &Ball) -> f64 {
+    ball.inertia_factor() / (1.0 + ball.inertia_factor())
+}
+
+fn starts_rolling(scene: &Scene) -> bool {
     let (body, at): (_, &Motion) = (scene.body(), &scene.initial);
     let depth = body.rest_height_m() - at.position.z;
     let [x, y] = body.slip(&at.velocity, &at.spin);
-    let threshold = scene.contact.slip_threshold_m_s();
     (0.0..ON_THE_PLATE_M).contains(&depth)
         && at.velocity.z == 0.0
-        && x.hypot(y) <= threshold.min(trade.max(threshold))
+        && x.hypot(y) <= scene.contact.slip_threshold_m_s()
 }
