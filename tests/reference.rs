@@ -151,7 +151,7 @@ fn validate_the_choice_on_every_scene() {
 #[test]
 fn validate_the_choice_on_a_gentle_plate() {
     let sine = |amplitude, frequency| Term::Sine { amplitude, frequency, phase: 1.0 };
-    for (amplitude, frequency) in [(0.003, 0.2), (0.01, 0.5), (0.002, 1.0)] {
+    for (amplitude, frequency) in [(0.003, 0.2), (0.01, 0.5), (0.002, 1.0), (0.001, 10.0)] {
         let law = Law::new(&[sine(amplitude, frequency)]);
         let laws = Laws::new(law.clone(), law, Vec::new());
         let scene = (on_the_chapters_plate(Contact::CHAPTER, 1.0), laws);

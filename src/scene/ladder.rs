@@ -93,7 +93,8 @@ const WORK_CONTACT_STEP: f64 = 85.0;
 const WORK_SLIDING: f64 = 20_000.0;
 const WORK_RODAS4: f64 = 1000.0;
 
-/// The angle of a plate that moves is renewed at least so many times in a scene.
+/// The angle of a plate that moves is renewed at least so many times in a scene
+/// and in the shortest time of its law.
 const LEAST_HOLDS: f64 = 8.0;
 
 /// Most work of one run of the search, per simulated second: fifty times the
@@ -167,7 +168,8 @@ impl<D: Drive + Clone> Search<'_, D> {
         }
         let share = self.tolerance * (1.0 - MODEL_SHARE);
         let whole = self.scene.duration_s;
-        let longest = if survey.planar_step_s.is_finite() { whole / LEAST_HOLDS } else { whole };
+        let time = whole.min(self.drive.shortest_time_s());
+        let longest = if survey.planar_step_s.is_finite() { time / LEAST_HOLDS } else { whole };
         let h = (survey.planar_step_s * share.sqrt()).min(longest);
         let configuration = Configuration::new(Model::Planar, method, Pace::Step(h)).ok()?;
         let error = survey.planar_error_m + share;
