@@ -15,18 +15,17 @@
 //! Costs are counted in work, not in time, so that the choice is the same on
 //! every machine and in every run.
 
-use nalgebra::Vector3;
-
 use super::configuration::{Configuration, Method, Model, Pace};
 use super::drive::Drive;
 use super::events::Event;
+use super::refining::{FIRST_PART, Path, Refining, WORK_CONTACT_STEP, WORK_RODAS4};
 use super::run::{Outcome, Stage, run_within};
-use super::rungs::{OnCreeping, OnRolling};
 use super::samples::Samples;
-use super::stepping::{Failure, Watch};
+use super::stepping::Failure;
+use super::still_rolls::{SURE_TO_ROLL, StillRolls};
 use super::survey::Survey;
 use super::{Scene, Subject};
-use crate::plant::{Ground, Motion, Phase, PlateMotion, Rolling};
+use crate::plant::{Motion, Phase};
 
 /// One candidate that was looked at, and what became of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -84,14 +83,8 @@ const PAIR_SHARE: f64 = 0.65;
 /// that leaves the plate or lands.
 const RIGID_SETTLING_S: f64 = 0.005;
 
-/// Beyond this friction demand a survey is not believed: the ball may slip.
-const SURE_TO_ROLL: f64 = 0.9;
-
-/// Work of one step, ns on the machine of the charts: what the order of the
-/// candidates rests on.
-const WORK_CONTACT_STEP: f64 = 85.0;
+/// Work of a run of the sliding model, ns on the machine of the charts.
 const WORK_SLIDING: f64 = 20_000.0;
-const WORK_RODAS4: f64 = 1000.0;
 
 /// The angle of a plate that moves is renewed at least so many times in a scene
 /// and in the shortest time of its law.
@@ -100,14 +93,6 @@ const LEAST_HOLDS: f64 = 8.0;
 /// Most work of one run of the search, per simulated second: fifty times the
 /// dearest that is charted. What needs more is out of reach.
 const MOST_WORK_PER_S: f64 = 5e7;
-
-/// The first contact step as a part of the plate's shortest time.
-const FIRST_PART: f64 = 0.25;
-
-/// Candidates end here: shorter steps or smaller tolerances than these lose
-/// more by rounding than they gain.
-const FINEST_STEP_S: f64 = 1e-6;
-const FINEST_TOLERANCE_M: f64 = 1e-11;
 
 /// Moments at which two runs are compared.
 const COMPARED: f64 = 200.0;
@@ -144,9 +129,6 @@ struct Search<'a, D> {
     survey: Survey,
     tried: Vec<Tried>,
 }
-
-/// A run's positions at the moments of comparison.
-type Path = Vec<Vector3<f64>>;
 
 impl<D: Drive + Clone> Search<'_, D> {
     fn note(&mut self, model: Model, method: Method, error_m: Option<f64>, verdict: String) {
@@ -380,164 +362,5 @@ fn pace_name(configuration: &Configuration) -> String {
     match configuration.pace() {
         Pace::Step(h) => format!("step {h:.2e} s"),
         Pace::Tolerance(tolerance) => format!("tolerance {tolerance:.0e} m"),
-    }
-}
-
-/// A finer run has at least so many times the steps.
-const LEAST_GROWTH: f64 = 1.3;
-
-/// One method at ever finer paces.
-struct Refining {
-    method: Method,
-    /// The next step, s, or tolerance, m.
-    next: f64,
-    factor: f64,
-    finest: f64,
-    /// Work of the next run; infinite when there is none.
-    work: f64,
-    growth: f64,
-    per_step: f64,
-    before: Path,
-    /// How far the two runs before were apart, m.
-    apart: f64,
-    /// Steps of the run before.
-    steps: u64,
-}
-
-impl Refining {
-    fn steps(h: f64, duration: f64) -> Self {
-        Self {
-            method: Method::ContactStep,
-            next: h,
-            factor: 0.5,
-            finest: FINEST_STEP_S,
-            work: duration / h * WORK_CONTACT_STEP,
-            growth: 2.0,
-            per_step: WORK_CONTACT_STEP,
-            before: Path::new(),
-            apart: f64::INFINITY,
-            steps: 0,
-        }
-    }
-
-    fn tolerances(wanted: f64) -> Self {
-        Self {
-            method: Method::Rodas4,
-            next: (wanted * 1000.0).min(1e-2),
-            factor: 0.1,
-            finest: FINEST_TOLERANCE_M,
-            // A guess, until the first run has told.
-            work: 40.0 * WORK_RODAS4,
-            growth: 1.6,
-            per_step: WORK_RODAS4,
-            before: Path::new(),
-            apart: f64::INFINITY,
-            steps: 0,
-        }
-    }
-
-    fn configuration(&mut self) -> Option<Configuration> {
-        let pace = match self.method {
-            Method::ContactStep => Pace::Step(self.next),
-            _ => Pace::Tolerance(self.next),
-        };
-        Configuration::new(Model::Compliant, self.method, pace).ok()
-    }
-
-    /// Error of the run, m, from its difference to the run before; of contact
-    /// steps at least a third of the difference before that, since two runs may
-    /// happen to agree. `None` for the first run.
-    fn compare(&mut self, path: Path, steps: u64) -> Option<f64> {
-        // A run with nearly as many steps is the same run, and agrees with
-        // itself: the plate's own pieces were shorter than the step.
-        let refined = steps as f64 > LEAST_GROWTH * self.steps as f64;
-        let comparable = refined && self.steps > 0 && self.before.len() == path.len();
-        let pairs = self.before.iter().zip(&path).map(|(a, b)| (a - b).xy().norm());
-        let apart = pairs.fold(0.0, f64::max);
-        let error = comparable.then(|| match self.method {
-            Method::ContactStep => apart.max(self.apart / 3.0),
-            _ => apart,
-        });
-        self.apart = if comparable { apart } else { f64::INFINITY };
-        (self.before, self.steps) = (path, steps);
-        self.next *= self.factor;
-        self.work = steps.max(1) as f64 * self.per_step * self.growth;
-        if self.next < self.finest {
-            self.work = f64::INFINITY;
-        }
-        error
-    }
-}
-
-/// Moments of a step that are checked.
-const CHECKS: u32 = 5;
-
-/// Ends a run where the ball would slip, leave the plate or pass its edge.
-struct StillRolls {
-    rolling: Option<Rolling>,
-    friction: f64,
-    ground: Ground,
-}
-
-impl StillRolls {
-    fn new(scene: &Scene) -> Self {
-        let rolling = match &scene.subject {
-            Subject::Ball(ball) => Some(Rolling::new(ball, &scene.plate)),
-            Subject::Block(_) => None,
-        };
-        Self { rolling, friction: scene.contact.friction(), ground: scene.ground() }
-    }
-
-    /// Checks a few moments of a step: a peak of the demand may lie between
-    /// its ends.
-    fn within(
-        &self,
-        t: [f64; 2],
-        y: [&[f64; 5]; 2],
-        plate: impl Fn(f64) -> PlateMotion,
-    ) -> Result<(), Failure> {
-        (1..=CHECKS).try_for_each(|i| {
-            let s = f64::from(i) / f64::from(CHECKS);
-            let at = t[0] + s * (t[1] - t[0]);
-            let y = std::array::from_fn(|i| y[0][i] + s * (y[1][i] - y[0][i]));
-            self.check(at, &y, &plate(at))
-        })
-    }
-
-    fn check(&self, t: f64, y: &[f64; 5], plate: &PlateMotion) -> Result<(), Failure> {
-        let demand = self
-            .rolling
-            .map_or(f64::INFINITY, |rolling| rolling.grip(y, plate).demand(self.friction));
-        if demand.is_nan() || demand >= SURE_TO_ROLL {
-            let why =
-                if demand == f64::INFINITY { "the ball would fly" } else { "the ball would slip" };
-            return Err(Failure::OutOfRange { at_s: t, why });
-        }
-        if self.ground.margin_m(y[0], y[1]) <= 0.0 {
-            return Err(Failure::OutOfRange { at_s: t, why: "the ball passes the edge" });
-        }
-        Ok(())
-    }
-}
-
-impl<'p, D: Drive> Watch<OnRolling<'p, D>, 5> for StillRolls {
-    fn step(
-        &mut self,
-        rung: &OnRolling<'p, D>,
-        t: [f64; 2],
-        y: [&[f64; 5]; 2],
-    ) -> Result<(), Failure> {
-        self.within(t, y, |t| rung.plate.at(t))
-    }
-}
-
-impl<'p, D: Drive> Watch<OnCreeping<'p, D>, 5> for StillRolls {
-    fn step(
-        &mut self,
-        rung: &OnCreeping<'p, D>,
-        t: [f64; 2],
-        y: [&[f64; 5]; 2],
-    ) -> Result<(), Failure> {
-        self.within(t, y, |t| rung.plate.at(t))
     }
 }
