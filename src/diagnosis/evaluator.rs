@@ -47,6 +47,10 @@ pub struct Surroundings {
     pub clear_s: f64,
     /// Whether the ball was last seen at the edge.
     pub at_edge: bool,
+    /// The axis across whose rim the ball lies; none in a corner.
+    pub rim: Option<Axis>,
+    /// Seconds for which it has lain there.
+    pub rim_s: f64,
     /// Seconds since readings stepped as no ball can; infinite if never.
     pub since_jump_s: f64,
 }
@@ -114,7 +118,9 @@ impl Evaluator {
         }
         let resting = readings.axes[axis].still_s > PRESSED_S
             && twin.abs() < self.limits[axis].breakaway_m_s2;
-        around.clear_s >= evidence.window_s && readings.unseen_s == 0.0 && !resting
+        let clear = around.clear_s >= evidence.window_s;
+        let testable = clear || pinned(axis, evidence, readings, around);
+        testable && readings.unseen_s == 0.0 && !resting
     }
 
     /// What every monitor says, in the order of [`FaultCode::ALL`].
@@ -146,6 +152,12 @@ impl Evaluator {
         let (true, Some(measured), Some(twin)) = (e.enabled, e.measured_m_s2, e.twin_m_s2) else {
             return Finding::default();
         };
+        if around.at_edge {
+            return match e.violates() {
+                true => Finding::fail(None),
+                false => Finding::default(),
+            };
+        }
         self.answers[axis].update(measured, twin, around.dt);
         match e.violates() {
             true => Finding::fail(self.answers[axis].kind(e.limit_m_s2)),
@@ -175,6 +187,17 @@ impl Evaluator {
         }
         frozen(readings, around).unwrap_or(Finding::PASS)
     }
+}
+
+/// Whether a ball at the rim stays there although it ought to leave. A rim
+/// only pushes inward, so all that it can explain is a residual inward: one
+/// outward is the servo's, for as long as the readings are alive.
+fn pinned(axis: Axis, evidence: &Evidence, readings: &Stillness, around: &Surroundings) -> bool {
+    let e = &evidence.axes[axis];
+    let outward =
+        e.residual_m_s2().zip(e.position_m).is_some_and(|(residual, at)| residual * at > 0.0);
+    let alive = readings.axes[axis].identical_s < FROZEN_S;
+    around.rim == Some(axis) && around.rim_s >= evidence.window_s && outward && alive
 }
 
 /// The chapter's rule: enabled and the residual at least 0.01 m/s².

@@ -48,6 +48,9 @@ pub struct Pipeline {
     readings: Stillness,
     clear_s: f64,
     at_edge: bool,
+    /// The axis across whose rim the ball lies, and for how long, s.
+    rim: Option<Axis>,
+    rim_s: f64,
     since_jump_s: f64,
     unjudged_s: f64,
     evidence: Evidence,
@@ -75,6 +78,8 @@ impl Pipeline {
             readings: Stillness::default(),
             clear_s: 0.0,
             at_edge: false,
+            rim: None,
+            rim_s: 0.0,
             since_jump_s: f64::INFINITY,
             unjudged_s: f64::INFINITY,
             evidence: Evidence::default(),
@@ -142,6 +147,7 @@ impl Pipeline {
         self.evaluator.restart();
         self.readings = Stillness::default();
         self.clear_s = 0.0;
+        self.rim_s = 0.0;
         self.gate.restart();
         for axis in Axis::ALL {
             self.forget(axis);
@@ -224,9 +230,12 @@ impl Pipeline {
         let seen = |a: Axis| moment.position[a];
         if Axis::ALL.into_iter().any(|a| seen(a).is_some()) {
             let plate = &setup.rig.plate;
-            let room =
-                plate.edge_distance_m(seen(Axis::X).unwrap_or(0.0), seen(Axis::Y).unwrap_or(0.0));
-            self.at_edge = room < setup.rig.ball.radius_m() + EDGE_MARGIN_M;
+            let (x, y) = (seen(Axis::X).unwrap_or(0.0), seen(Axis::Y).unwrap_or(0.0));
+            let room = setup.rig.ball.radius_m() + EDGE_MARGIN_M;
+            self.at_edge = plate.edge_distance_m(x, y) < room;
+            let rim = plate.edge_axis(x, y, room).filter(|_| plate.rim());
+            self.rim_s = if rim.is_some() && rim == self.rim { self.rim_s + dt } else { 0.0 };
+            self.rim = rim;
         }
         self.clear_s = if self.at_edge { 0.0 } else { self.clear_s + dt };
     }
@@ -294,6 +303,8 @@ impl Pipeline {
             dt,
             clear_s: self.clear_s,
             at_edge: self.at_edge,
+            rim: self.rim,
+            rim_s: self.rim_s,
             since_jump_s: self.since_jump_s,
         }
     }

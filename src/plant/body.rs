@@ -159,6 +159,20 @@ impl Plate {
             PlateShape::Round { diameter_m } => diameter_m / 2.0 - x_m.hypot(y_m),
         }
     }
+
+    /// The axis across whose edge, and no other, the point (x, y) is within
+    /// `room_m`. None on a disc, whose edge lies across both axes at once.
+    #[must_use]
+    pub fn edge_axis(&self, x_m: f64, y_m: f64, room_m: f64) -> Option<Axis> {
+        let PlateShape::Rectangle { length_m, width_m } = self.shape else { return None };
+        let (at_x, at_y) =
+            (length_m / 2.0 - x_m.abs() < room_m, width_m / 2.0 - y_m.abs() < room_m);
+        match (at_x, at_y) {
+            (true, false) => Some(Axis::X),
+            (false, true) => Some(Axis::Y),
+            _ => None,
+        }
+    }
 }
 
 impl Default for Plate {
