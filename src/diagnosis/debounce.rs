@@ -2,12 +2,15 @@
 //!
 //! Prefailed raises it (jumping up to zero first), prepassed lowers it, at
 //! rates that take `fail_s` and `pass_s` from zero to an end. It does not jump
-//! down first: the residual of a ball that a sick servo swings to and fro
-//! crosses zero twice a swing. While the enable condition is lost it freezes.
+//! down first but leaks away in `leak_s`: the residual of a ball that a sick
+//! servo swings to and fro crosses zero twice a swing, and a loose contact
+//! comes and goes. While the enable condition is lost it freezes.
 //! A silent rig is judged by time, not by counts, so the rates are per second.
 
+use super::Settings;
+
 /// What a monitor says of one moment.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Test {
     /// The enable condition does not hold: neither passed nor failed.
     #[default]
@@ -17,7 +20,7 @@ pub enum Test {
 }
 
 /// What the counter came to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Qualified {
     /// Still on its way, or nothing new.
     No,
@@ -61,14 +64,8 @@ impl Debounce {
 
     /// Takes `test`, which held for the `dt` seconds before this sample. A
     /// time of zero qualifies at once.
-    pub fn update(
-        &mut self,
-        test: Test,
-        dt: f64,
-        fail_s: f64,
-        pass_s: f64,
-        trip_s: f64,
-    ) -> Qualified {
+    pub fn update(&mut self, test: Test, dt: f64, leak_s: f64, settings: &Settings) -> Qualified {
+        let Settings { fail_s, pass_s, confirm_s, .. } = *settings;
         let share = |full: f64| if full > 0.0 { dt / full } else { 1.0 };
         match test {
             Test::NotTested => Qualified::No,
@@ -78,13 +75,14 @@ impl Debounce {
                 }
                 self.level = (self.level.max(0.0) + share(fail_s)).min(1.0);
                 match self.level >= 1.0 {
-                    true if self.failing_s >= trip_s => Qualified::Tripped,
+                    true if self.failing_s >= confirm_s => Qualified::Tripped,
                     true => Qualified::Failed,
                     false => Qualified::No,
                 }
             }
             Test::Prepassed => {
-                self.level = (self.level - share(pass_s)).max(-1.0);
+                let full_s = if self.level > 0.0 { leak_s } else { pass_s };
+                self.level = (self.level - share(full_s)).max(-1.0);
                 if self.level <= 0.0 {
                     self.failing_s = 0.0;
                 }

@@ -5,7 +5,7 @@
 //! servos. A monitor that is out of its depth is *not tested*, never *passed*.
 
 use super::stillness::Stillness;
-use super::{Answer, Candidate, Evidence, Limits, Profile, Test};
+use super::{Answer, AxisEvidence, Candidate, Evidence, Limits, Profile, Test};
 use crate::vocabulary::{Axis, FaultCode, FaultKind, PerAxis};
 
 /// The chapter's enable condition: command, rad, or measured acceleration,
@@ -59,16 +59,20 @@ pub struct Surroundings {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Finding {
     pub test: Test,
+    /// The same through the second, shorter window.
+    pub quick: Test,
     pub kind: Option<FaultKind>,
     /// Another cause that reads alike.
     pub rival: Option<Candidate>,
 }
 
 impl Finding {
-    const PASS: Self = Self { test: Test::Prepassed, kind: None, rival: None };
+    const NOTHING: Self =
+        Self { test: Test::NotTested, quick: Test::NotTested, kind: None, rival: None };
+    const PASS: Self = Self { test: Test::Prepassed, ..Self::NOTHING };
 
     const fn fail(kind: Option<FaultKind>) -> Self {
-        Self { test: Test::Prefailed, kind, rival: None }
+        Self { test: Test::Prefailed, kind, ..Self::NOTHING }
     }
 }
 
@@ -103,11 +107,11 @@ impl Evaluator {
     pub fn enabled(
         &self,
         axis: Axis,
-        evidence: &Evidence,
+        e: &AxisEvidence,
+        window_s: f64,
         readings: &Stillness,
         around: &Surroundings,
     ) -> bool {
-        let e = &evidence.axes[axis];
         let (Some(measured), Some(twin), Some(command)) =
             (e.measured_m_s2, e.twin_m_s2, e.command_rad)
         else {
@@ -118,15 +122,17 @@ impl Evaluator {
         }
         let resting = readings.axes[axis].still_s > PRESSED_S
             && twin.abs() < self.limits[axis].breakaway_m_s2;
-        let clear = around.clear_s >= evidence.window_s;
-        let testable = clear || pinned(axis, evidence, readings, around);
+        let clear = around.clear_s >= window_s;
+        let testable = clear || pinned(axis, e, window_s, readings, around);
         testable && readings.unseen_s == 0.0 && !resting
     }
 
-    /// What every monitor says, in the order of [`FaultCode::ALL`].
+    /// What every monitor says, in the order of [`FaultCode::ALL`]; `quick` is
+    /// what the second, shorter window shows.
     pub fn evaluate(
         &mut self,
         evidence: &Evidence,
+        quick: &PerAxis<AxisEvidence>,
         readings: &Stillness,
         around: &Surroundings,
     ) -> [Finding; FaultCode::COUNT] {
@@ -142,27 +148,33 @@ impl Evaluator {
         let blind = [sensor, stuck].iter().any(|f| f.test == Test::Prefailed);
         let mut servo = |axis| match blind {
             true => Finding::default(),
-            false => self.servo(axis, evidence, around),
+            false => self.servo(axis, &evidence.axes[axis], &quick[axis], around),
         };
         [servo(Axis::X), servo(Axis::Y), stuck, sensor]
     }
 
-    fn servo(&mut self, axis: Axis, evidence: &Evidence, around: &Surroundings) -> Finding {
-        let e = &evidence.axes[axis];
-        let (true, Some(measured), Some(twin)) = (e.enabled, e.measured_m_s2, e.twin_m_s2) else {
-            return Finding::default();
+    fn servo(
+        &mut self,
+        axis: Axis,
+        e: &AxisEvidence,
+        quick: &AxisEvidence,
+        around: &Surroundings,
+    ) -> Finding {
+        let judge = |e: &AxisEvidence| match (e.enabled, e.violates()) {
+            (true, true) => Test::Prefailed,
+            // The rim may hold what a servo would not.
+            (true, false) if !around.at_edge => Test::Prepassed,
+            _ => Test::NotTested,
         };
-        if around.at_edge {
-            return match e.violates() {
-                true => Finding::fail(None),
-                false => Finding::default(),
-            };
+        if let (true, false, Some(measured), Some(twin)) =
+            (e.enabled, around.at_edge, e.measured_m_s2, e.twin_m_s2)
+        {
+            self.answers[axis].update(measured, twin, around.dt);
         }
-        self.answers[axis].update(measured, twin, around.dt);
-        match e.violates() {
-            true => Finding::fail(self.answers[axis].kind(e.limit_m_s2)),
-            false => Finding::PASS,
-        }
+        let (test, quick) = (judge(e), judge(quick));
+        let failed = test.max(quick) == Test::Prefailed;
+        let kind = failed.then(|| self.answers[axis].kind(e.limit_m_s2)).flatten();
+        Finding { test, quick, kind, rival: None }
     }
 
     fn sensor(&self, evidence: &Evidence, readings: &Stillness, around: &Surroundings) -> Finding {
@@ -192,12 +204,17 @@ impl Evaluator {
 /// Whether a ball at the rim stays there although it ought to leave. A rim
 /// only pushes inward, so all that it can explain is a residual inward: one
 /// outward is the servo's, for as long as the readings are alive.
-fn pinned(axis: Axis, evidence: &Evidence, readings: &Stillness, around: &Surroundings) -> bool {
-    let e = &evidence.axes[axis];
+fn pinned(
+    axis: Axis,
+    e: &AxisEvidence,
+    window_s: f64,
+    readings: &Stillness,
+    around: &Surroundings,
+) -> bool {
     let outward =
         e.residual_m_s2().zip(e.position_m).is_some_and(|(residual, at)| residual * at > 0.0);
     let alive = readings.axes[axis].identical_s < FROZEN_S;
-    around.rim == Some(axis) && around.rim_s >= evidence.window_s && outward && alive
+    around.rim == Some(axis) && around.rim_s >= window_s && outward && alive
 }
 
 /// The chapter's rule: enabled and the residual at least 0.01 m/s².

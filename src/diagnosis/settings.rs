@@ -45,6 +45,13 @@ impl FromStr for Profile {
     }
 }
 
+/// Shortest window that is judged, s: below it what the servo's model leaves
+/// out of a step of the command looks like a fault.
+const SHORTEST_WINDOW_S: f64 = 0.25;
+
+/// How much shorter a second window must be to be worth its while, s.
+const LEAST_GAIN_S: f64 = 0.1;
+
 /// How a rig is judged; immutable while a session runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
@@ -63,6 +70,9 @@ pub struct Settings {
     pub fail_s: f64,
     /// Continuous agreement before the test passes, s.
     pub pass_s: f64,
+    /// Agreement that takes back all the evidence against a servo, s; for the
+    /// other codes, `pass_s` does.
+    pub leak_s: f64,
     /// Further failure before it counts as a trip (confirmed), s.
     pub confirm_s: f64,
     pub memory: MemoryRules,
@@ -83,6 +93,8 @@ impl Settings {
             // A push by hand shows in the filter for one window.
             fail_s: 0.6,
             pass_s: 1.0,
+            // Two hardest pushes confirm nothing unless within half a second.
+            leak_s: 3.0,
             confirm_s: 0.2,
             memory: MemoryRules::default(),
         };
@@ -94,10 +106,24 @@ impl Settings {
                 twin_accuracy_m_s2: 0.0005,
                 fail_s: 0.0,
                 pass_s: 0.0,
+                leak_s: 0.0,
                 confirm_s: 0.0,
                 ..default
             },
         }
+    }
+
+    /// The same through a second, shorter window that needs `window_s` to see
+    /// through the noise; none where it would not be shorter, or never.
+    ///
+    /// A push shows in a filter for one window, so a failure seen through a
+    /// shorter one need not last as long.
+    #[must_use]
+    pub fn quick(&self, window_s: f64) -> Option<Self> {
+        let window_s = window_s.max(SHORTEST_WINDOW_S);
+        let shorter_s = self.window_s - window_s;
+        let useful = self.profile == Profile::Default && shorter_s >= LEAST_GAIN_S;
+        useful.then(|| Self { window_s, fail_s: (self.fail_s - shorter_s).max(0.0), ..*self })
     }
 
     /// The same with the debounce before a failure set to `fail_s` in [0, 60] s.

@@ -6,13 +6,14 @@
 use nalgebra::Vector2;
 
 use super::frame::{self, Moment};
+use super::look::Look;
 use super::watch::Watch;
 use super::{MonitorState, Output, Readiness, Setup, State};
 use crate::diagnosis::{
     AxisEvidence, Evaluator, Evidence, FaultMemory, Finding, Gated, Limits, OutlierGate, Qualified,
     Reading, Settings, Stillness, Surroundings, Test,
 };
-use crate::maths::{Fit, SlidingQuadratic};
+use crate::maths::Fit;
 use crate::plant::{RollingState, Twin};
 use crate::vocabulary::{Axis, FaultCode, PerAxis, Sample, SimTime};
 
@@ -43,8 +44,11 @@ pub struct Pipeline {
     now: Option<SimTime>,
     period_s: Option<f64>,
     gate: OutlierGate,
-    windows: PerAxis<SlidingQuadratic>,
-    fits: PerAxis<Option<Fit>>,
+    /// Through the long window, by which small faults are found.
+    long: Look,
+    /// Through a shorter one, by which large faults are found sooner, and how
+    /// it is judged; none where noise leaves no room for it.
+    quick: Option<(Look, Settings)>,
     readings: Stillness,
     clear_s: f64,
     at_edge: bool,
@@ -66,6 +70,8 @@ impl Pipeline {
             let gain = setup.twin.axes[axis].gain.abs();
             Limits::new(settings.profile, learnt, gain * rig.ball.rolling_gravity())
         });
+        let needed_s = |axis: Axis| limits[axis].quick_window_s(1.0 / rig.sample_rate_hz);
+        let quick = settings.quick(needed_s(Axis::X).max(needed_s(Axis::Y)));
         Self {
             settings,
             twin: Twin::new(setup.twin),
@@ -73,8 +79,8 @@ impl Pipeline {
             now: None,
             period_s: None,
             gate: OutlierGate::default(),
-            windows: PerAxis::default(),
-            fits: PerAxis::default(),
+            long: Look::default(),
+            quick: quick.map(|settings| (Look::default(), settings)),
             readings: Stillness::default(),
             clear_s: 0.0,
             at_edge: false,
@@ -103,12 +109,12 @@ impl Pipeline {
         let (usable, outliers) = self.estimate(&moment, dt);
         self.locate(setup, &moment, dt);
         self.watch_readings(&moment, dt, usable, outliers);
-        self.collect_evidence(&moment, dt);
+        let quick = self.collect_evidence(&moment, dt);
         self.unjudged_s += dt;
         if self.unjudged_s >= self.settings.period_s {
             let dt = self.unjudged_s.min(self.settings.period_s.max(dt));
             self.unjudged_s = 0.0;
-            let findings = self.evaluate(dt);
+            let findings = self.evaluate(&quick, dt);
             self.remember(&moment, dt, &findings, memory, outputs);
         }
     }
@@ -137,8 +143,9 @@ impl Pipeline {
         self.settings.gap_s.max(GAP_PERIODS * self.period_s.unwrap_or(0.0))
     }
 
-    fn window_s(&self) -> f64 {
-        self.settings.window_s.max(LEAST_SAMPLES * self.period_s.unwrap_or(0.0))
+    /// The window of `settings`, or as long as the least readings take.
+    fn window_s(&self, settings: &Settings) -> f64 {
+        settings.window_s.max(LEAST_SAMPLES * self.period_s.unwrap_or(0.0))
     }
 
     /// Forgets the past motion; what the debounce has gathered stays.
@@ -149,20 +156,21 @@ impl Pipeline {
         self.clear_s = 0.0;
         self.rim_s = 0.0;
         self.gate.restart();
-        for axis in Axis::ALL {
-            self.forget(axis);
-        }
+        self.forget();
     }
 
-    fn forget(&mut self, axis: Axis) {
-        self.windows[axis].clear();
-        self.fits[axis] = None;
+    /// Forgets every reading.
+    fn forget(&mut self) {
+        self.long.forget();
+        if let Some((look, _)) = &mut self.quick {
+            look.forget();
+        }
     }
 
     /// Stage: the twin follows the commands, in lockstep.
     fn step_twin(&mut self, moment: &Moment) {
         let of = |axis: Axis| {
-            let fit = self.fits[axis].map(|f| (f.measured.position, f.measured.velocity));
+            let fit = self.long.fits[axis].map(|f| (f.measured.position, f.measured.velocity));
             fit.unwrap_or((moment.position[axis].unwrap_or(0.0), 0.0))
         };
         let (x, y) = (of(Axis::X), of(Axis::Y));
@@ -176,11 +184,11 @@ impl Pipeline {
         if away.amax() > REBASE_M {
             let shift = self.twin.rebase(observed.position, observed.velocity);
             for (i, axis) in Axis::ALL.into_iter().enumerate() {
-                self.windows[axis].rebase(
-                    moment.at.seconds(),
-                    shift.position[i],
-                    shift.velocity[i],
-                );
+                let (t, p, v) = (moment.at.seconds(), shift.position[i], shift.velocity[i]);
+                self.long.rebase(axis, t, p, v);
+                if let Some((look, _)) = &mut self.quick {
+                    look.rebase(axis, t, p, v);
+                }
             }
         }
     }
@@ -189,32 +197,38 @@ impl Pipeline {
     /// Returns whether the readings are usable and how many earlier ones have
     /// turned out to be outliers.
     fn estimate(&mut self, moment: &Moment, dt: f64) -> (bool, u32) {
-        let (t, window_s) = (moment.at.seconds(), self.window_s());
+        let t = moment.at.seconds();
         let (predicted, gap_s) = (self.twin.motion().position, self.gap_s());
         self.since_jump_s += dt;
-        if Axis::ALL.iter().any(|&a| self.windows[a].newest().is_some_and(|n| t - n > gap_s)) {
+        if self.long.stale(t, gap_s) {
             self.gate.restart();
-            self.forget(Axis::X);
-            self.forget(Axis::Y);
+            self.forget();
         }
         if Axis::ALL.iter().all(|&a| moment.position[a].is_none()) {
             return (true, 0);
         }
         let gated = self.gate.take(t, moment.position, self.noise_m());
         if gated == Gated::Stepped {
-            self.windows.x.clear();
-            self.windows.y.clear();
+            self.forget();
             self.since_jump_s = 0.0;
         }
         for (i, axis) in Axis::ALL.into_iter().enumerate() {
             if let (true, Some(position)) = (gated.usable(), moment.position[axis]) {
-                self.windows[axis].push(t, position, predicted[i], window_s);
-                self.fits[axis] = self.windows[axis].fit();
+                self.push(axis, t, position, predicted[i]);
             }
         }
         match gated {
             Gated::Accepted { outliers } => (true, outliers),
             other => (other.usable(), 0),
+        }
+    }
+
+    fn push(&mut self, axis: Axis, t: f64, measured: f64, predicted: f64) {
+        let long_s = self.window_s(&self.settings);
+        let quick_s = self.quick.as_ref().map(|(_, settings)| self.window_s(settings));
+        self.long.push(axis, t, measured, predicted, long_s);
+        if let (Some((look, _)), Some(quick_s)) = (&mut self.quick, quick_s) {
+            look.push(axis, t, measured, predicted, quick_s);
         }
     }
 
@@ -257,45 +271,71 @@ impl Pipeline {
         });
     }
 
-    /// Stage: residual, limit and gate of this moment.
-    fn collect_evidence(&mut self, moment: &Moment, dt: f64) {
-        let full_s = FULL_WINDOW * self.window_s();
-        let axis_evidence = |axis: Axis| {
-            let fit = self.fits[axis].filter(|f| {
-                moment.position[axis].is_some()
-                    && f.span_s >= full_s
-                    && f.n as f64 >= LEAST_SAMPLES / 2.0
-            });
-            let measured = fit.map(|f| f.measured.acceleration);
-            let twin = fit.map(|f| f.measured.acceleration - f.deviation.acceleration);
-            let error = fit.map_or(0.0, |f| f.acceleration_error);
-            AxisEvidence {
-                command_rad: moment.command[axis],
-                position_m: self.fits[axis].map(|f| f.measured.position),
-                velocity_m_s: self.fits[axis].map(|f| f.measured.velocity),
-                measured_m_s2: measured,
-                twin_m_s2: twin,
-                limit_m_s2: self.evaluator.limits()[axis].at(twin.unwrap_or(0.0), error),
-                enabled: false,
-            }
+    /// Stage: residual, limit and gate of this moment. Returns those of the
+    /// second window.
+    fn collect_evidence(&mut self, moment: &Moment, dt: f64) -> PerAxis<AxisEvidence> {
+        let around = self.surroundings(dt);
+        let see = |axis: Axis, fit: Option<Fit>, window_s: f64| {
+            let mut e = self.axis_evidence(moment, axis, fit, window_s);
+            e.enabled = self.evaluator.enabled(axis, &e, window_s, &self.readings, &around);
+            e
         };
-        let scatter = Axis::ALL.into_iter().filter_map(|a| self.fits[a]).map(|f| f.scatter);
-        let mut evidence = Evidence {
+        let long_s = self.window_s(&self.settings);
+        let fits = &self.long.fits;
+        let evidence = Evidence {
             at: Some(moment.at),
-            window_s: self.window_s(),
-            axes: PerAxis::from_fn(axis_evidence),
+            window_s: long_s,
+            axes: PerAxis::from_fn(|axis| see(axis, fits[axis], long_s)),
             unseen_s: self.readings.unseen_s,
             identical_s: self.readings.identical_s(),
             still_s: self.readings.still_s(),
             outliers: self.readings.outliers(),
-            scatter_m: scatter.reduce(f64::max),
+            scatter_m: self.scatter_m(),
         };
-        let around = self.surroundings(dt);
-        for axis in Axis::ALL {
-            evidence.axes[axis].enabled =
-                self.evaluator.enabled(axis, &evidence, &self.readings, &around);
-        }
+        let quick = self.quick.as_ref().map_or_else(PerAxis::default, |(look, settings)| {
+            let quick_s = self.window_s(settings);
+            PerAxis::from_fn(|axis| see(axis, look.fits[axis], quick_s))
+        });
         self.evidence = evidence;
+        quick
+    }
+
+    /// Scatter of the readings, the worse of both axes, m. A fault that throws
+    /// the ball bends its path within the window; the shorter window takes less
+    /// of that for noise.
+    fn scatter_m(&self) -> Option<f64> {
+        let quick = self.quick.as_ref().map(|(look, _)| &look.fits);
+        let of = |axis: Axis| {
+            let long = self.long.fits[axis]?.scatter;
+            Some(quick.and_then(|fits| fits[axis]).map_or(long, |q| q.scatter.min(long)))
+        };
+        Axis::ALL.into_iter().filter_map(of).reduce(f64::max)
+    }
+
+    /// What `fit` over `window_s` says of `axis`, the gate aside.
+    fn axis_evidence(
+        &self,
+        moment: &Moment,
+        axis: Axis,
+        fit: Option<Fit>,
+        window_s: f64,
+    ) -> AxisEvidence {
+        let full = fit.filter(|f| {
+            moment.position[axis].is_some()
+                && f.span_s >= FULL_WINDOW * window_s
+                && f.n as f64 >= LEAST_SAMPLES / 2.0
+        });
+        let twin = full.map(|f| f.measured.acceleration - f.deviation.acceleration);
+        let error = full.map_or(0.0, |f| f.acceleration_error);
+        AxisEvidence {
+            command_rad: moment.command[axis],
+            position_m: fit.map(|f| f.measured.position),
+            velocity_m_s: fit.map(|f| f.measured.velocity),
+            measured_m_s2: full.map(|f| f.measured.acceleration),
+            twin_m_s2: twin,
+            limit_m_s2: self.evaluator.limits()[axis].at(twin.unwrap_or(0.0), error),
+            enabled: false,
+        }
     }
 
     const fn surroundings(&self, dt: f64) -> Surroundings {
@@ -309,10 +349,18 @@ impl Pipeline {
         }
     }
 
-    /// Stage: the monitors.
-    fn evaluate(&mut self, dt: f64) -> [Finding; FaultCode::COUNT] {
+    /// Stage: the monitors. Where only the second window shows a violation,
+    /// it is the evidence.
+    fn evaluate(&mut self, quick: &PerAxis<AxisEvidence>, dt: f64) -> [Finding; FaultCode::COUNT] {
         let around = self.surroundings(dt);
-        self.evaluator.evaluate(&self.evidence, &self.readings, &around)
+        let findings = self.evaluator.evaluate(&self.evidence, quick, &self.readings, &around);
+        for axis in Axis::ALL {
+            let e = &mut self.evidence.axes[axis];
+            if quick[axis].violates() && !e.violates() {
+                *e = quick[axis];
+            }
+        }
+        findings
     }
 
     /// Stage: debounce and fault memory.
@@ -325,9 +373,10 @@ impl Pipeline {
         outputs: &mut Vec<Output>,
     ) {
         let mut blamed = false;
+        let quick = self.quick.as_ref().map_or(&self.settings, |(_, settings)| settings);
         for (&code, finding) in FaultCode::ALL.iter().zip(findings) {
             let watch = &mut self.watches[code as usize];
-            let qualified = watch.update(code, finding, moment.at, dt, &self.settings);
+            let qualified = watch.update(code, finding, moment.at, dt, &self.settings, quick);
             watch.apply(code, qualified, &self.settings, &self.evidence, memory, outputs);
             let failed = matches!(qualified, Qualified::Failed | Qualified::Tripped);
             blamed |= failed && code.axis().is_none();
@@ -368,7 +417,7 @@ impl Pipeline {
             }
         });
         let ghost = |a: Axis| {
-            self.fits[a].map_or((0.0, 0.0), |f| {
+            self.long.fits[a].map_or((0.0, 0.0), |f| {
                 let (residual, span) = (f.deviation.acceleration, f.span_s);
                 (
                     f.measured.position - residual * span * span / 2.0,

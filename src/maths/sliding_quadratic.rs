@@ -23,6 +23,14 @@ struct Point {
     predicted: f64,
 }
 
+/// The window, s, over which readings `period_s` apart with standard deviation
+/// `noise` give an acceleration known to `error`: the formula above for many
+/// readings, σ_a = σ·√(720·T)/W^(5/2), solved for W.
+#[must_use]
+pub fn window_for(noise: f64, period_s: f64, error: f64) -> f64 {
+    (noise * (720.0 * period_s).sqrt() / error).powf(0.4)
+}
+
 /// Sums over the window of powers of u = t − origin.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sums {
