@@ -59,12 +59,11 @@ impl Limits {
         }
     }
 
-    /// The window, s, in which noise takes as much as the floor, for readings
-    /// `period_s` apart: short enough to see a fault soon, long enough to see
-    /// one of twice the floor.
+    /// The window, s, in which noise adds `share` of the floor to the limit,
+    /// for readings `period_s` apart.
     #[must_use]
-    pub fn quick_window_s(&self, period_s: f64) -> f64 {
-        window_for(self.noise_m, period_s, self.floor_m_s2 / self.errors)
+    pub fn window_s(&self, share: f64, period_s: f64) -> f64 {
+        window_for(self.noise_m, period_s, share * self.floor_m_s2 / self.errors)
     }
 
     /// The limit, m/s², for a predicted acceleration and the standard error of

@@ -45,9 +45,16 @@ impl FromStr for Profile {
     }
 }
 
-/// Shortest window that is judged, s: below it what the servo's model leaves
-/// out of a step of the command looks like a fault.
+/// Windows that are judged, s: below the first what the servo's model leaves
+/// out of a step of the command looks like a fault, beyond the last the ball
+/// has crossed the plate.
 const SHORTEST_WINDOW_S: f64 = 0.25;
+const LONGEST_WINDOW_S: f64 = 1.0;
+
+/// Noise in the limit, as a share of its floor: little where small faults are
+/// looked for, as much again where large ones are.
+const SMALL_SHARE: f64 = 0.25;
+const LARGE_SHARE: f64 = 1.0;
 
 /// How much shorter a second window must be to be worth its while, s.
 const LEAST_GAIN_S: f64 = 0.1;
@@ -113,17 +120,27 @@ impl Settings {
         }
     }
 
-    /// The same through a second, shorter window that needs `window_s` to see
-    /// through the noise; none where it would not be shorter, or never.
-    ///
-    /// A push shows in a filter for one window, so a failure seen through a
-    /// shorter one need not last as long.
+    /// The same through the window, s, that `needed_s` says for a share of
+    /// noise in the limit: one that is long enough to see small faults through
+    /// the noise. Only for a learnt rig, whose noise is known.
     #[must_use]
-    pub fn quick(&self, window_s: f64) -> Option<Self> {
-        let window_s = window_s.max(SHORTEST_WINDOW_S);
-        let shorter_s = self.window_s - window_s;
-        let useful = self.profile == Profile::Default && shorter_s >= LEAST_GAIN_S;
-        useful.then(|| Self { window_s, fail_s: (self.fail_s - shorter_s).max(0.0), ..*self })
+    pub fn long(&self, needed_s: impl Fn(f64) -> f64) -> Self {
+        self.through(needed_s(SMALL_SHARE).clamp(self.window_s, LONGEST_WINDOW_S))
+    }
+
+    /// The same through a second window, short enough to see large faults
+    /// soon; none where noise leaves no room for it.
+    #[must_use]
+    pub fn quick(&self, needed_s: impl Fn(f64) -> f64) -> Option<Self> {
+        let window_s = needed_s(LARGE_SHARE).max(SHORTEST_WINDOW_S);
+        (self.window_s - window_s >= LEAST_GAIN_S).then(|| self.through(window_s))
+    }
+
+    /// A push shows in a filter for one window: the longer that is, the longer
+    /// a failure must last.
+    fn through(&self, window_s: f64) -> Self {
+        let fail_s = (self.fail_s + window_s - self.window_s).max(0.0);
+        Self { window_s, fail_s, ..*self }
     }
 
     /// The same with the debounce before a failure set to `fail_s` in [0, 60] s.

@@ -10,8 +10,8 @@ use super::look::Look;
 use super::watch::Watch;
 use super::{MonitorState, Output, Readiness, Setup, State};
 use crate::diagnosis::{
-    AxisEvidence, Evaluator, Evidence, FaultMemory, Finding, Gated, Limits, OutlierGate, Qualified,
-    Reading, Settings, Stillness, Surroundings, Test,
+    AxisEvidence, Evaluator, Evidence, FaultMemory, Finding, Gated, Limits, OutlierGate, Profile,
+    Qualified, Reading, Settings, Stillness, Surroundings, Test,
 };
 use crate::maths::Fit;
 use crate::plant::{RollingState, Twin};
@@ -70,8 +70,13 @@ impl Pipeline {
             let gain = setup.twin.axes[axis].gain.abs();
             Limits::new(settings.profile, learnt, gain * rig.ball.rolling_gravity())
         });
-        let needed_s = |axis: Axis| limits[axis].quick_window_s(1.0 / rig.sample_rate_hz);
-        let quick = settings.quick(needed_s(Axis::X).max(needed_s(Axis::Y)));
+        let needed_s = |share: f64| {
+            let of = |axis: Axis| limits[axis].window_s(share, 1.0 / rig.sample_rate_hz);
+            of(Axis::X).max(of(Axis::Y))
+        };
+        let adapts = settings.profile == Profile::Default && rig.calibration.is_some();
+        let settings = if adapts { settings.long(needed_s) } else { settings };
+        let quick = if adapts { settings.quick(needed_s) } else { None };
         Self {
             settings,
             twin: Twin::new(setup.twin),
