@@ -56,6 +56,12 @@ impl Debounce {
         self.level > 0.0
     }
 
+    /// Whether it is at its upper end: the test has failed.
+    #[must_use]
+    pub fn failed(&self) -> bool {
+        self.level >= 1.0
+    }
+
     /// Takes suspicion back: another cause accounts for what was seen.
     pub fn exonerate(&mut self) {
         self.level = self.level.min(0.0);
@@ -94,10 +100,13 @@ impl Debounce {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Profile;
     use super::*;
 
     fn run(debounce: &mut Debounce, test: Test, n: usize) -> Vec<Qualified> {
-        (0..n).map(|_| debounce.update(test, 0.125, 0.5, 1.0, 0.25)).collect()
+        let settings =
+            Settings { fail_s: 0.5, pass_s: 1.0, confirm_s: 0.25, ..Settings::default() };
+        (0..n).map(|_| debounce.update(test, 0.125, 2.0, &settings)).collect()
     }
 
     #[test]
@@ -116,17 +125,41 @@ mod tests {
         run(&mut debounce, Test::NotTested, 100);
         assert_eq!(debounce.counter(), before);
         run(&mut debounce, Test::Prepassed, 1);
-        assert_eq!(debounce.counter(), 79);
-        assert_eq!(run(&mut debounce, Test::Prepassed, 13).last(), Some(&Qualified::Passed));
+        assert_eq!(debounce.counter(), 87, "evidence leaks away in two seconds");
+        assert_eq!(run(&mut debounce, Test::Prepassed, 19).last(), Some(&Qualified::Passed));
         assert_eq!(debounce.counter(), -128);
         run(&mut debounce, Test::Prefailed, 1);
         assert_eq!(debounce.counter(), 31, "jumps up to zero first");
     }
 
+    /// Hands that push a ball twice, each time seen for three quarters of what
+    /// fails, confirm nothing unless the second comes within half a second.
+    #[test]
+    fn two_pushes_confirm_nothing_unless_close_together() {
+        let settings = Settings::default();
+        let push_s = 0.75 * settings.fail_s;
+        let confirms = |apart_s: f64| {
+            let mut debounce = Debounce::default();
+            let mut take = |test, seconds: f64| {
+                let n = (seconds / 0.01).round() as usize;
+                let tripped = |_| {
+                    debounce.update(test, 0.01, settings.leak_s, &settings) == Qualified::Tripped
+                };
+                (0..n).any(tripped)
+            };
+            take(Test::Prefailed, push_s);
+            take(Test::Prepassed, apart_s);
+            take(Test::Prefailed, push_s)
+        };
+        assert!(confirms(0.4));
+        assert!(!confirms(0.6));
+    }
+
     #[test]
     fn no_debounce_means_at_once() {
         let mut debounce = Debounce::default();
-        assert_eq!(debounce.update(Test::Prefailed, 0.0, 0.0, 0.0, 0.0), Qualified::Tripped);
+        let settings = Settings::of(Profile::Textbook);
+        assert_eq!(debounce.update(Test::Prefailed, 0.0, 0.0, &settings), Qualified::Tripped);
         assert_eq!(debounce.counter(), 127);
     }
 }

@@ -51,6 +51,8 @@ pub struct Surroundings {
     pub rim: Option<Axis>,
     /// Seconds for which it has lain there.
     pub rim_s: f64,
+    /// Whether it was last seen at an edge without a rim: it is falling.
+    pub over_the_edge: bool,
     /// Seconds since readings stepped as no ball can; infinite if never.
     pub since_jump_s: f64,
 }
@@ -61,14 +63,22 @@ pub struct Finding {
     pub test: Test,
     /// The same through the second, shorter window.
     pub quick: Test,
+    /// The ball has left the plate: a test that failed can have no more
+    /// evidence, and needs none.
+    pub gone: bool,
     pub kind: Option<FaultKind>,
     /// Another cause that reads alike.
     pub rival: Option<Candidate>,
 }
 
 impl Finding {
-    const NOTHING: Self =
-        Self { test: Test::NotTested, quick: Test::NotTested, kind: None, rival: None };
+    const NOTHING: Self = Self {
+        test: Test::NotTested,
+        quick: Test::NotTested,
+        gone: false,
+        kind: None,
+        rival: None,
+    };
     const PASS: Self = Self { test: Test::Prepassed, ..Self::NOTHING };
 
     const fn fail(kind: Option<FaultKind>) -> Self {
@@ -147,7 +157,7 @@ impl Evaluator {
         };
         let blind = [sensor, stuck].iter().any(|f| f.test == Test::Prefailed);
         let mut servo = |axis| match blind {
-            true => Finding::default(),
+            true => Finding { gone: around.over_the_edge, ..Finding::NOTHING },
             false => self.servo(axis, &evidence.axes[axis], &quick[axis], around),
         };
         [servo(Axis::X), servo(Axis::Y), stuck, sensor]
@@ -174,7 +184,7 @@ impl Evaluator {
         let (test, quick) = (judge(e), judge(quick));
         let failed = test.max(quick) == Test::Prefailed;
         let kind = failed.then(|| self.answers[axis].kind(e.limit_m_s2)).flatten();
-        Finding { test, quick, kind, rival: None }
+        Finding { test, quick, gone: around.over_the_edge, kind, rival: None }
     }
 
     fn sensor(&self, evidence: &Evidence, readings: &Stillness, around: &Surroundings) -> Finding {
@@ -258,5 +268,47 @@ fn stuck_ball(readings: &Stillness, around: &Surroundings) -> Finding {
             let rival = Candidate { code: FaultCode::servo(axis), kind, weight: 0.4 };
             Finding { rival: Some(rival), ..Finding::fail(None) }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A ball that lies at the rim at +x while the twin goes by `twin`, m/s².
+    fn at_the_rim(twin: f64, identical_s: f64) -> Test {
+        let mut evaluator = Evaluator::new(
+            Profile::Default,
+            PerAxis::from_fn(|_| Limits::new(Profile::Default, None, 7.0)),
+        );
+        let mut readings = Stillness::default();
+        readings.axes.x.identical_s = identical_s;
+        let around = Surroundings {
+            dt: 0.01,
+            clear_s: 0.0,
+            at_edge: true,
+            rim: Some(Axis::X),
+            rim_s: 1.0,
+            over_the_edge: false,
+            since_jump_s: f64::INFINITY,
+        };
+        let mut x = AxisEvidence {
+            command_rad: Some(0.1),
+            position_m: Some(0.17),
+            measured_m_s2: Some(0.0),
+            twin_m_s2: Some(twin),
+            limit_m_s2: 0.3,
+            ..AxisEvidence::default()
+        };
+        x.enabled = evaluator.enabled(Axis::X, &x, 0.5, &readings, &around);
+        evaluator.servo(Axis::X, &x, &AxisEvidence::default(), &around).test
+    }
+
+    #[test]
+    fn a_rim_explains_a_push_inward_and_nothing_else() {
+        assert_eq!(at_the_rim(-0.8, 0.0), Test::Prefailed, "it ought to leave and stays");
+        assert_eq!(at_the_rim(0.8, 0.0), Test::NotTested, "the rim holds it");
+        assert_eq!(at_the_rim(-0.2, 0.0), Test::NotTested, "within the limit is no pass");
+        assert_eq!(at_the_rim(-0.8, 0.5), Test::NotTested, "the readings may be frozen");
     }
 }

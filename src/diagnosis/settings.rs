@@ -158,3 +158,26 @@ impl Default for Settings {
         Self::of(Profile::Default)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A failure must outlast a push through whichever window: by 0.1 s.
+    #[test]
+    fn the_debounce_goes_with_the_window() {
+        let given = Settings::default();
+        // Noise that asks for 0.4 s at the large share asks for 4^(2/5) of it
+        // at a quarter.
+        let needed_s = |share: f64| 0.4 * share.powf(-0.4);
+        let long = given.long(needed_s);
+        let quick = long.quick(needed_s).unwrap();
+        assert!((long.window_s - 0.4 * 4.0_f64.powf(0.4)).abs() < 1e-12);
+        assert_eq!(quick.window_s, 0.4);
+        for settings in [long, quick] {
+            assert!((settings.fail_s - settings.window_s - 0.1).abs() < 1e-12);
+        }
+        assert_eq!(given.quick(|_| 0.45), None, "noise leaves no room");
+        assert_eq!(given.long(|_| 9.0).window_s, LONGEST_WINDOW_S);
+    }
+}

@@ -46,12 +46,13 @@ pub struct Pipeline {
     gate: OutlierGate,
     /// Through the long window, by which small faults are found.
     long: Look,
-    /// Through a shorter one, by which large faults are found sooner, and how
-    /// it is judged; none where noise leaves no room for it.
-    quick: Option<(Look, Settings)>,
+    /// Through a shorter one, by which large faults are found sooner; none
+    /// where noise leaves no room for it.
+    quick: Option<Look>,
     readings: Stillness,
     clear_s: f64,
     at_edge: bool,
+    open_edge: bool,
     /// The axis across whose rim the ball lies, and for how long, s.
     rim: Option<Axis>,
     rim_s: f64,
@@ -75,8 +76,8 @@ impl Pipeline {
             of(Axis::X).max(of(Axis::Y))
         };
         let adapts = settings.profile == Profile::Default && rig.calibration.is_some();
-        let settings = if adapts { settings.long(needed_s) } else { settings };
-        let quick = if adapts { settings.quick(needed_s) } else { None };
+        let long = if adapts { settings.long(needed_s) } else { settings };
+        let quick = if adapts { long.quick(needed_s) } else { None };
         Self {
             settings,
             twin: Twin::new(setup.twin),
@@ -84,11 +85,12 @@ impl Pipeline {
             now: None,
             period_s: None,
             gate: OutlierGate::default(),
-            long: Look::default(),
-            quick: quick.map(|settings| (Look::default(), settings)),
+            long: Look::new(long),
+            quick: quick.map(Look::new),
             readings: Stillness::default(),
             clear_s: 0.0,
             at_edge: false,
+            open_edge: !rig.plate.rim(),
             rim: None,
             rim_s: 0.0,
             since_jump_s: f64::INFINITY,
@@ -148,9 +150,9 @@ impl Pipeline {
         self.settings.gap_s.max(GAP_PERIODS * self.period_s.unwrap_or(0.0))
     }
 
-    /// The window of `settings`, or as long as the least readings take.
-    fn window_s(&self, settings: &Settings) -> f64 {
-        settings.window_s.max(LEAST_SAMPLES * self.period_s.unwrap_or(0.0))
+    /// The window that the least readings take, s.
+    fn least_window_s(&self) -> f64 {
+        LEAST_SAMPLES * self.period_s.unwrap_or(0.0)
     }
 
     /// Forgets the past motion; what the debounce has gathered stays.
@@ -167,7 +169,7 @@ impl Pipeline {
     /// Forgets every reading.
     fn forget(&mut self) {
         self.long.forget();
-        if let Some((look, _)) = &mut self.quick {
+        if let Some(look) = &mut self.quick {
             look.forget();
         }
     }
@@ -191,7 +193,7 @@ impl Pipeline {
             for (i, axis) in Axis::ALL.into_iter().enumerate() {
                 let (t, p, v) = (moment.at.seconds(), shift.position[i], shift.velocity[i]);
                 self.long.rebase(axis, t, p, v);
-                if let Some((look, _)) = &mut self.quick {
+                if let Some(look) = &mut self.quick {
                     look.rebase(axis, t, p, v);
                 }
             }
@@ -229,11 +231,10 @@ impl Pipeline {
     }
 
     fn push(&mut self, axis: Axis, t: f64, measured: f64, predicted: f64) {
-        let long_s = self.window_s(&self.settings);
-        let quick_s = self.quick.as_ref().map(|(_, settings)| self.window_s(settings));
-        self.long.push(axis, t, measured, predicted, long_s);
-        if let (Some((look, _)), Some(quick_s)) = (&mut self.quick, quick_s) {
-            look.push(axis, t, measured, predicted, quick_s);
+        let least_s = self.least_window_s();
+        self.long.push(axis, t, measured, predicted, least_s);
+        if let Some(look) = &mut self.quick {
+            look.push(axis, t, measured, predicted, least_s);
         }
     }
 
@@ -285,7 +286,8 @@ impl Pipeline {
             e.enabled = self.evaluator.enabled(axis, &e, window_s, &self.readings, &around);
             e
         };
-        let long_s = self.window_s(&self.settings);
+        let least_s = self.least_window_s();
+        let long_s = self.long.window_s(least_s);
         let fits = &self.long.fits;
         let evidence = Evidence {
             at: Some(moment.at),
@@ -297,8 +299,8 @@ impl Pipeline {
             outliers: self.readings.outliers(),
             scatter_m: self.scatter_m(),
         };
-        let quick = self.quick.as_ref().map_or_else(PerAxis::default, |(look, settings)| {
-            let quick_s = self.window_s(settings);
+        let quick = self.quick.as_ref().map_or_else(PerAxis::default, |look| {
+            let quick_s = look.window_s(least_s);
             PerAxis::from_fn(|axis| see(axis, look.fits[axis], quick_s))
         });
         self.evidence = evidence;
@@ -309,7 +311,7 @@ impl Pipeline {
     /// the ball bends its path within the window; the shorter window takes less
     /// of that for noise.
     fn scatter_m(&self) -> Option<f64> {
-        let quick = self.quick.as_ref().map(|(look, _)| &look.fits);
+        let quick = self.quick.as_ref().map(|look| &look.fits);
         let of = |axis: Axis| {
             let long = self.long.fits[axis]?.scatter;
             Some(quick.and_then(|fits| fits[axis]).map_or(long, |q| q.scatter.min(long)))
@@ -350,6 +352,7 @@ impl Pipeline {
             at_edge: self.at_edge,
             rim: self.rim,
             rim_s: self.rim_s,
+            over_the_edge: self.at_edge && self.open_edge,
             since_jump_s: self.since_jump_s,
         }
     }
@@ -378,11 +381,14 @@ impl Pipeline {
         outputs: &mut Vec<Output>,
     ) {
         let mut blamed = false;
-        let quick = self.quick.as_ref().map_or(&self.settings, |(_, settings)| settings);
+        let long = &self.long.settings;
+        let quick = self.quick.as_ref().map_or(long, |look| &look.settings);
         for (&code, finding) in FaultCode::ALL.iter().zip(findings) {
             let watch = &mut self.watches[code as usize];
-            let qualified = watch.update(code, finding, moment.at, dt, &self.settings, quick);
-            watch.apply(code, qualified, &self.settings, &self.evidence, memory, outputs);
+            // Only the servos' residual is seen through the windows.
+            let settings = if code.axis().is_some() { long } else { &self.settings };
+            let qualified = watch.update(code, finding, moment.at, dt, settings, quick);
+            watch.apply(code, qualified, settings, &self.evidence, memory, outputs);
             let failed = matches!(qualified, Qualified::Failed | Qualified::Tripped);
             blamed |= failed && code.axis().is_none();
         }

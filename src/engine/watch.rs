@@ -52,8 +52,14 @@ impl Watch {
         // A loose contact comes and goes; readings and a ball are given up on
         // sooner, for a disturbance shows in them too.
         let leak_s = if code.axis().is_some() { settings.leak_s } else { settings.pass_s };
-        let slow = self.debounce.update(finding.test, dt, leak_s, settings);
-        let fast = self.quick.update(finding.quick, dt, leak_s, quick);
+        let seen = |debounce: &Debounce, test: Test| match finding.gone && debounce.failed() {
+            true => Test::Prefailed,
+            false => test,
+        };
+        let (test, quick_test) =
+            (seen(&self.debounce, finding.test), seen(&self.quick, finding.quick));
+        let slow = self.debounce.update(test, dt, leak_s, settings);
+        let fast = self.quick.update(quick_test, dt, leak_s, quick);
         if finding.test == Test::Prefailed || finding.quick == Test::Prefailed {
             self.since.get_or_insert(at);
             self.kind = finding.kind.or(self.kind);

@@ -210,6 +210,19 @@ mod tests {
         }
     }
 
+    /// The window asked for gives the error asked for, up to the part of a
+    /// reading that it cuts off: 5/2 of it, here 2.5 %.
+    #[test]
+    fn validate_the_window_for_an_error() {
+        let (noise, period_s, error) = (5e-4, 0.004, 0.008);
+        let window_s = window_for(noise, period_s, error);
+        let n = (window_s / period_s) as usize;
+        assert!(n > 90, "{n}");
+        let fit = filled(n, period_s, 10.0, |t| (t * 1e4).sin()).fit().unwrap();
+        let found = fit.acceleration_error / fit.scatter * noise;
+        assert!((found / error - 1.0).abs() < 0.03, "{found} against {error} with {n}");
+    }
+
     #[test]
     fn a_parabola_is_found_exactly_however_long_it_runs() {
         let path = |t: f64| 0.1 - 0.2 * t + 0.15 * t * t;

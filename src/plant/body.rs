@@ -181,3 +181,19 @@ impl Default for Plate {
         Self::CHAPTER
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_edge_lies_across_one_axis_but_in_a_corner_and_on_a_disc() {
+        let plate = Plate::CHAPTER;
+        assert_eq!(plate.edge_axis(0.18, 0.0, 0.02), Some(Axis::X));
+        assert_eq!(plate.edge_axis(0.0, -0.11, 0.02), Some(Axis::Y));
+        assert_eq!(plate.edge_axis(0.18, 0.11, 0.02), None);
+        assert_eq!(plate.edge_axis(0.1, 0.0, 0.02), None);
+        let disc = Plate::new(PlateShape::Round { diameter_m: 0.3 }, 0.02, true).unwrap();
+        assert_eq!(disc.edge_axis(0.14, 0.0, 0.02), None);
+    }
+}

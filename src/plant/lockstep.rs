@@ -314,6 +314,22 @@ mod tests {
         assert_eq!(fidelity.rung, Rung::Planar);
     }
 
+    /// A ball that is observed at rest after a jerk rolls: friction that the
+    /// twin alone sees must not carry it away.
+    #[test]
+    fn a_jerk_is_over_when_the_ball_does_not_follow_it() {
+        let (ladder, _) = ladder(0.6);
+        let mut fidelity = Fidelity::default();
+        let still = RollingState::default();
+        let jerk = Tilt { acceleration: Vector2::new(0.0, 2000.0), ..Tilt::default() };
+        for _ in 0..3 {
+            ladder.acceleration(&mut fidelity, &still, &jerk, H);
+        }
+        assert_eq!(fidelity.rung, Rung::Sliding);
+        let a = settle(&ladder, &mut fidelity, &Tilt::default());
+        assert_eq!((fidelity.rung, a), (Rung::Planar, 0.0));
+    }
+
     #[test]
     fn a_plate_that_falls_away_leaves_the_ball_in_the_air() {
         let (ladder, _) = ladder(0.6);
