@@ -9,5 +9,5 @@ fn main() {
     let said = Command::new(compiler).arg("--version").output();
     let said = said.map(|o| String::from_utf8_lossy(&o.stdout).into_owned()).unwrap_or_default();
     let version = said.split_whitespace().nth(1).unwrap_or("unknown");
-    println!("cargo::rustc-env=OFFBD_RUSTC_VERSION={version}");
+    println!("cargo::rustc-env=BUILD_RUSTC_VERSION={version}");
 }

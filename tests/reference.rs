@@ -146,6 +146,25 @@ fn validate_the_choice_on_every_scene() {
     }
 }
 
+/// A plate that hardly moves needs no more than small angles, and its bound
+/// holds against the compliant model.
+#[test]
+fn validate_the_choice_on_a_gentle_plate() {
+    let sine = |amplitude, frequency| Term::Sine { amplitude, frequency, phase: 1.0 };
+    for (amplitude, frequency) in [(0.003, 0.2), (0.01, 0.5), (0.002, 1.0), (0.001, 10.0)] {
+        let law = Law::new(&[sine(amplitude, frequency)]);
+        let laws = Laws::new(law.clone(), law, Vec::new());
+        let scene = (on_the_chapters_plate(Contact::CHAPTER, 1.0), laws);
+        let chosen = choose(&scene.0, &scene.1, 1e-3).unwrap().configuration;
+        assert_eq!(chosen.model(), Model::Planar, "{amplitude} rad, {frequency} Hz");
+        let tight = configuration(Model::Compliant, Method::Rodas4, Pace::Tolerance(1e-9));
+        let truth = positions(&scene, &tight, 0.01);
+        let path = positions(&scene, &chosen, 0.01);
+        let off = path.iter().zip(&truth).map(|(p, q)| (p - q).norm()).fold(0.0, f64::max);
+        assert!(off <= 1e-3, "{amplitude} rad, {frequency} Hz: {off:e} m");
+    }
+}
+
 #[test]
 fn what_cannot_be_met_is_said() {
     let (scene, laws) = scene("steep");

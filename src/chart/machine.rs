@@ -46,7 +46,7 @@ pub fn versions() -> BTreeMap<String, String> {
     let pair = |name: &str, version: &str| (name.to_owned(), version.to_owned());
     BTreeMap::from([
         pair("offbd", env!("CARGO_PKG_VERSION")),
-        pair("rustc", env!("OFFBD_RUSTC_VERSION")),
+        pair("rustc", env!("BUILD_RUSTC_VERSION")),
     ])
 }
 

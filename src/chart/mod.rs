@@ -14,6 +14,7 @@ mod draw;
 mod equal;
 mod error;
 pub mod estimators;
+pub mod fidelity;
 mod figure;
 mod front;
 mod legend;
@@ -23,6 +24,7 @@ mod marker;
 mod raster;
 mod regions;
 mod scale;
+pub mod stability;
 #[cfg(test)]
 mod tests;
 mod timing;

@@ -40,6 +40,10 @@ enum Name {
     Estimators,
     /// Models and methods: error against CPU time per simulated second
     WorkPrecision,
+    /// Models: error over the plate's motion, and what is chosen
+    Fidelity,
+    /// Methods: the largest stable step, measured and predicted
+    Stability,
 }
 
 impl Name {
@@ -55,6 +59,8 @@ impl Name {
                 }
                 work_precision::make(effort, &peers)
             }
+            Self::Fidelity => chart::fidelity::make(effort),
+            Self::Stability => chart::stability::make(effort),
         }
     }
 }

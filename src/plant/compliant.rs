@@ -126,7 +126,10 @@ impl Compliant {
 
     /// The force with its derivatives.
     fn touch(&self, at: &Motion) -> Touch {
-        if !self.touches(&at.position) {
+        let (p, height) = (&at.position, self.body.rest_height_m());
+        // A body that just touches is about to be pressed in: without this, an
+        // implicit step from there would be an explicit one.
+        if p.z > height || self.ground.margin_m(p.x, p.y) <= 0.0 {
             return Touch::default();
         }
         let force = self.force(at);

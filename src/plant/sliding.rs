@@ -166,7 +166,9 @@ impl Sliding {
         let landed = self.land(at);
         let (free, turn) = self.free(&landed, plate);
         if Self::normal(&free) <= 0.0 || (above >= 0.0 && at.velocity.z > 0.0) {
-            return (Phase::Flight, *at);
+            // A plate that falls away still stops a body that comes faster:
+            // it would go on through the plate.
+            return (Phase::Flight, if at.velocity.z < 0.0 { landed } else { *at });
         }
         let sticking = self.sticking(&free, &turn);
         let slip = self.body.slip(&landed.velocity, &landed.spin);

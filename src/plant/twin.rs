@@ -250,7 +250,11 @@ mod tests {
     fn twin(dead_time_s: f64, lag_s: f64) -> Twin {
         let servo = ServoModel::new(0.2, lag_s, 100.0).unwrap();
         let axis = TwinAxis { servo, dead_time_s, gain: 1.0, level_rad: 0.0 };
-        Twin::new(TwinModel::new(&Ball::default(), &Plate::default(), axis))
+        let (ball, plate) = (Ball::default(), Plate::default());
+        let mut model = TwinModel::new(&ball, &plate, axis);
+        // To be held against the rolling ball, nothing may be left out.
+        model.ladder = Ladder::new(&ball, &plate, 0.6, 0.0);
+        Twin::new(model)
     }
 
     fn at(t: f64) -> SimTime {

@@ -1,8 +1,9 @@
 //! Fidelity chosen, not guessed: the cheapest model and method that meet a
 //! wanted accuracy, with the reasons.
 //!
-//! 1. A survey says whether the ball rolls at all, and how far the rolling and
-//!    the creeping ball are off. The first that is near enough runs by
+//! 1. A survey says whether the ball rolls at all, and how far the planar, the
+//!    rolling and the creeping ball are off. The planar one runs on the survey's
+//!    word, which is a bound; the others, if near enough, run by
 //!    Dormand–Prince, watched step by step: if the friction demand, the normal
 //!    force or the edge show that it does not hold, it is given up.
 //! 2. Otherwise three candidates compete, the cheapest next run first: the
@@ -14,18 +15,17 @@
 //! Costs are counted in work, not in time, so that the choice is the same on
 //! every machine and in every run.
 
-use nalgebra::Vector3;
-
 use super::configuration::{Configuration, Method, Model, Pace};
 use super::drive::Drive;
 use super::events::Event;
-use super::run::{Outcome, Stage, run};
-use super::rungs::{OnCreeping, OnRolling};
+use super::refining::{FIRST_PART, Path, Refining, WORK_CONTACT_STEP, WORK_RODAS4};
+use super::run::{Outcome, Stage, run_within};
 use super::samples::Samples;
-use super::stepping::{Failure, Watch};
+use super::stepping::Failure;
+use super::still_rolls::{SURE_TO_ROLL, StillRolls};
 use super::survey::Survey;
 use super::{Scene, Subject};
-use crate::plant::{Ground, Motion, Phase, PlateMotion, Rolling};
+use crate::plant::{Motion, Phase};
 
 /// One candidate that was looked at, and what became of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,8 +62,13 @@ pub struct OutOfReach {
 /// Dormand–Prince runs at this many times its part of the wanted accuracy: its
 /// estimates are of the fourth-order solution and add up without cancelling.
 /// The fifth-order solution is better by 6 times with a handful of steps, the
-/// worst case seen, and by over a hundred on the charted scenes.
+/// worst case seen, and by over a hundred where the plate swings to and fro a
+/// few times.
 const DOPRI5_SLACK: f64 = 8.0;
+const DOPRI5_SLACK_OF_SWINGS: f64 = 40.0;
+
+/// Shortest times of the plate in a scene from which on it swings to and fro.
+const SWINGS: f64 = 4.0;
 
 /// Part of the tolerance that a model's own error may use up.
 const MODEL_SHARE: f64 = 0.5;
@@ -78,22 +83,16 @@ const PAIR_SHARE: f64 = 0.65;
 /// that leaves the plate or lands.
 const RIGID_SETTLING_S: f64 = 0.005;
 
-/// Beyond this friction demand a survey is not believed: the ball may slip.
-const SURE_TO_ROLL: f64 = 0.9;
-
-/// Work of one step, ns on the machine of the charts: what the order of the
-/// candidates rests on.
-const WORK_CONTACT_STEP: f64 = 85.0;
+/// Work of a run of the sliding model, ns on the machine of the charts.
 const WORK_SLIDING: f64 = 20_000.0;
-const WORK_RODAS4: f64 = 1000.0;
 
-/// The first contact step as a part of the plate's shortest time.
-const FIRST_PART: f64 = 0.25;
+/// The angle of a plate that moves is renewed at least so many times in a scene
+/// and in the shortest time of its law.
+const LEAST_HOLDS: f64 = 8.0;
 
-/// Candidates end here: shorter steps or smaller tolerances than these lose
-/// more by rounding than they gain.
-const FINEST_STEP_S: f64 = 1e-6;
-const FINEST_TOLERANCE_M: f64 = 1e-11;
+/// Most work of one run of the search, per simulated second: fifty times the
+/// dearest that is charted. What needs more is out of reach.
+const MOST_WORK_PER_S: f64 = 5e7;
 
 /// Moments at which two runs are compared.
 const COMPARED: f64 = 200.0;
@@ -111,7 +110,7 @@ pub fn choose<D: Drive + Clone>(
 ) -> Result<Choice, OutOfReach> {
     let survey = Survey::of(scene, &mut drive.clone());
     let mut search = Search { scene, drive, tolerance: tolerance_m, survey, tried: Vec::new() };
-    match search.smooth().or_else(|| search.stiff()) {
+    match search.planar().or_else(|| search.smooth()).or_else(|| search.stiff()) {
         Some((configuration, error_m)) => {
             Ok(Choice { configuration, error_m, survey, tried: search.tried })
         }
@@ -131,12 +130,33 @@ struct Search<'a, D> {
     tried: Vec<Tried>,
 }
 
-/// A run's positions at the moments of comparison.
-type Path = Vec<Vector3<f64>>;
-
 impl<D: Drive + Clone> Search<'_, D> {
     fn note(&mut self, model: Model, method: Method, error_m: Option<f64>, verdict: String) {
         self.tried.push(Tried { model, method, error_m, verdict });
+    }
+
+    /// Small angles, held from step to step: the survey's bounds suffice, there
+    /// is nothing to watch on a plate so gentle that they do.
+    fn planar(&mut self) -> Option<(Configuration, f64)> {
+        let (survey, method) = (self.survey, Method::ZeroOrderHold);
+        let why = if self.scene.edges {
+            Some("nobody watches the edge".to_owned())
+        } else {
+            self.not_smooth(survey.planar_error_m)
+        };
+        if let Some(why) = why {
+            self.note(Model::Planar, method, Some(survey.planar_error_m), why);
+            return None;
+        }
+        let share = self.tolerance * (1.0 - MODEL_SHARE);
+        let whole = self.scene.duration_s;
+        let time = whole.min(self.drive.shortest_time_s());
+        let longest = if survey.planar_step_s.is_finite() { time / LEAST_HOLDS } else { whole };
+        let h = (survey.planar_step_s * share.sqrt()).min(longest);
+        let configuration = Configuration::new(Model::Planar, method, Pace::Step(h)).ok()?;
+        let error = survey.planar_error_m + share;
+        self.note(Model::Planar, method, Some(error), "meets it".to_owned());
+        Some((configuration, error))
     }
 
     /// The rolling and the creeping ball.
@@ -153,7 +173,7 @@ impl<D: Drive + Clone> Search<'_, D> {
                 continue;
             }
             let share = self.tolerance * (1.0 - MODEL_SHARE);
-            let configuration = dopri5_within(model, share)?;
+            let configuration = self.dopri5_within(model, share)?;
             match self.watched(&configuration) {
                 Ok(_) => {
                     let error = error + share;
@@ -167,6 +187,14 @@ impl<D: Drive + Clone> Search<'_, D> {
             }
         }
         None
+    }
+
+    /// Dormand–Prince with steps such that it stays within `error_m`.
+    fn dopri5_within(&self, model: Model, error_m: f64) -> Option<Configuration> {
+        let swings = self.scene.duration_s / self.drive.shortest_time_s();
+        let slack = if swings >= SWINGS { DOPRI5_SLACK_OF_SWINGS } else { DOPRI5_SLACK };
+        let pace = Pace::Tolerance((error_m * slack).clamp(1e-12, 1.0));
+        Configuration::new(model, Method::Dopri5, pace).ok()
     }
 
     fn not_smooth(&self, error: f64) -> Option<String> {
@@ -198,7 +226,7 @@ impl<D: Drive + Clone> Search<'_, D> {
         loop {
             let works = [contact.work, sliding.unwrap_or(f64::INFINITY), rodas.work];
             let cheapest = (0..3).min_by(|&a, &b| works[a].total_cmp(&works[b]))?;
-            if works[cheapest] == f64::INFINITY {
+            if works[cheapest] > MOST_WORK_PER_S * self.scene.duration_s.max(1.0) {
                 return None;
             }
             let found = match cheapest {
@@ -250,7 +278,8 @@ impl<D: Drive + Clone> Search<'_, D> {
         let (model, method) = (Model::Sliding, Method::Dopri5);
         let pace = Pace::Tolerance((self.tolerance * (1.0 - RIGID_SHARE)).clamp(1e-12, 1.0));
         let configuration = Configuration::new(model, method, pace).ok()?;
-        match run(self.scene, &mut self.drive.clone(), &configuration, None) {
+        let most = self.most_steps(WORK_RODAS4);
+        match run_within(most, self.scene, &mut self.drive.clone(), &configuration, None) {
             Ok(outcome) => {
                 let error = self.rigid_error(&outcome);
                 let meets = error <= self.tolerance * RIGID_SHARE;
@@ -313,182 +342,25 @@ impl<D: Drive + Clone> Search<'_, D> {
         if slips { 0.1 * share * contact.slip_threshold_m_s() * self.scene.duration_s } else { 0.0 }
     }
 
+    /// Steps of `work` each that one run of the search may take.
+    fn most_steps(&self, work: f64) -> u64 {
+        (MOST_WORK_PER_S * self.scene.duration_s.max(1.0) / work) as u64
+    }
+
     fn path(&self, configuration: &Configuration) -> Result<(Outcome, Path), Failure> {
         let mut path = Path::new();
         let mut sink = |_: f64, at: &Motion| path.push(at.position);
         let mut samples = Samples::new(self.scene.duration_s / COMPARED, &mut sink);
-        let outcome = run(self.scene, &mut self.drive.clone(), configuration, Some(&mut samples))?;
+        let most = self.most_steps(WORK_CONTACT_STEP);
+        let drive = &mut self.drive.clone();
+        let outcome = run_within(most, self.scene, drive, configuration, Some(&mut samples))?;
         Ok((outcome, path))
     }
-}
-
-/// Dormand–Prince with steps such that it stays within `error_m`.
-fn dopri5_within(model: Model, error_m: f64) -> Option<Configuration> {
-    let pace = Pace::Tolerance((error_m * DOPRI5_SLACK).clamp(1e-12, 1.0));
-    Configuration::new(model, Method::Dopri5, pace).ok()
 }
 
 fn pace_name(configuration: &Configuration) -> String {
     match configuration.pace() {
         Pace::Step(h) => format!("step {h:.2e} s"),
         Pace::Tolerance(tolerance) => format!("tolerance {tolerance:.0e} m"),
-    }
-}
-
-/// A finer run has at least so many times the steps.
-const LEAST_GROWTH: f64 = 1.3;
-
-/// One method at ever finer paces.
-struct Refining {
-    method: Method,
-    /// The next step, s, or tolerance, m.
-    next: f64,
-    factor: f64,
-    finest: f64,
-    /// Work of the next run; infinite when there is none.
-    work: f64,
-    growth: f64,
-    per_step: f64,
-    before: Path,
-    /// How far the two runs before were apart, m.
-    apart: f64,
-    /// Steps of the run before.
-    steps: u64,
-}
-
-impl Refining {
-    fn steps(h: f64, duration: f64) -> Self {
-        Self {
-            method: Method::ContactStep,
-            next: h,
-            factor: 0.5,
-            finest: FINEST_STEP_S,
-            work: duration / h * WORK_CONTACT_STEP,
-            growth: 2.0,
-            per_step: WORK_CONTACT_STEP,
-            before: Path::new(),
-            apart: f64::INFINITY,
-            steps: 0,
-        }
-    }
-
-    fn tolerances(wanted: f64) -> Self {
-        Self {
-            method: Method::Rodas4,
-            next: (wanted * 1000.0).min(1e-2),
-            factor: 0.1,
-            finest: FINEST_TOLERANCE_M,
-            // A guess, until the first run has told.
-            work: 40.0 * WORK_RODAS4,
-            growth: 1.6,
-            per_step: WORK_RODAS4,
-            before: Path::new(),
-            apart: f64::INFINITY,
-            steps: 0,
-        }
-    }
-
-    fn configuration(&mut self) -> Option<Configuration> {
-        let pace = match self.method {
-            Method::ContactStep => Pace::Step(self.next),
-            _ => Pace::Tolerance(self.next),
-        };
-        Configuration::new(Model::Compliant, self.method, pace).ok()
-    }
-
-    /// The difference from the run before, m, or a third of the one before
-    /// that where two runs happen to agree; `None` for the first run.
-    fn compare(&mut self, path: Path, steps: u64) -> Option<f64> {
-        // A run with nearly as many steps is the same run, and agrees with
-        // itself: the plate's own pieces were shorter than the step.
-        let refined = steps as f64 > LEAST_GROWTH * self.steps as f64;
-        let comparable = refined && self.steps > 0 && self.before.len() == path.len();
-        let pairs = self.before.iter().zip(&path).map(|(a, b)| (a - b).xy().norm());
-        let apart = pairs.fold(0.0, f64::max);
-        let error = comparable.then(|| match self.method {
-            Method::ContactStep => apart.max(self.apart / 3.0),
-            _ => apart,
-        });
-        self.apart = if comparable { apart } else { f64::INFINITY };
-        (self.before, self.steps) = (path, steps);
-        self.next *= self.factor;
-        self.work = steps.max(1) as f64 * self.per_step * self.growth;
-        if self.next < self.finest {
-            self.work = f64::INFINITY;
-        }
-        error
-    }
-}
-
-/// Moments of a step that are checked.
-const CHECKS: u32 = 5;
-
-/// Ends a run where the ball would slip, leave the plate or pass its edge.
-struct StillRolls {
-    rolling: Option<Rolling>,
-    friction: f64,
-    ground: Ground,
-}
-
-impl StillRolls {
-    fn new(scene: &Scene) -> Self {
-        let rolling = match &scene.subject {
-            Subject::Ball(ball) => Some(Rolling::new(ball, &scene.plate)),
-            Subject::Block(_) => None,
-        };
-        Self { rolling, friction: scene.contact.friction(), ground: scene.ground() }
-    }
-
-    /// Checks a few moments of a step: a peak of the demand may lie between
-    /// its ends.
-    fn within(
-        &self,
-        t: [f64; 2],
-        y: [&[f64; 5]; 2],
-        plate: impl Fn(f64) -> PlateMotion,
-    ) -> Result<(), Failure> {
-        (1..=CHECKS).try_for_each(|i| {
-            let s = f64::from(i) / f64::from(CHECKS);
-            let at = t[0] + s * (t[1] - t[0]);
-            let y = std::array::from_fn(|i| y[0][i] + s * (y[1][i] - y[0][i]));
-            self.check(at, &y, &plate(at))
-        })
-    }
-
-    fn check(&self, t: f64, y: &[f64; 5], plate: &PlateMotion) -> Result<(), Failure> {
-        let demand = self
-            .rolling
-            .map_or(f64::INFINITY, |rolling| rolling.grip(y, plate).demand(self.friction));
-        if demand.is_nan() || demand >= SURE_TO_ROLL {
-            let why =
-                if demand == f64::INFINITY { "the ball would fly" } else { "the ball would slip" };
-            return Err(Failure::OutOfRange { at_s: t, why });
-        }
-        if self.ground.margin_m(y[0], y[1]) <= 0.0 {
-            return Err(Failure::OutOfRange { at_s: t, why: "the ball passes the edge" });
-        }
-        Ok(())
-    }
-}
-
-impl<'p, D: Drive> Watch<OnRolling<'p, D>, 5> for StillRolls {
-    fn step(
-        &mut self,
-        rung: &OnRolling<'p, D>,
-        t: [f64; 2],
-        y: [&[f64; 5]; 2],
-    ) -> Result<(), Failure> {
-        self.within(t, y, |t| rung.plate.at(t))
-    }
-}
-
-impl<'p, D: Drive> Watch<OnCreeping<'p, D>, 5> for StillRolls {
-    fn step(
-        &mut self,
-        rung: &OnCreeping<'p, D>,
-        t: [f64; 2],
-        y: [&[f64; 5]; 2],
-    ) -> Result<(), Failure> {
-        self.within(t, y, |t| rung.plate.at(t))
     }
 }

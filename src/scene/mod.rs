@@ -10,10 +10,12 @@ mod drive;
 mod events;
 mod ladder;
 mod law;
+mod refining;
 mod run;
 mod rungs;
 mod samples;
 mod stepping;
+mod still_rolls;
 mod survey;
 
 pub use configuration::{Configuration, LONGEST_STEP_S, Method, Model, Pace, SHORTEST_STEP_S};

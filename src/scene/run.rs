@@ -7,7 +7,7 @@ use super::drive::{Drive, Seen};
 use super::events::{Event, Sequence};
 use super::rungs::{OnCompliant, OnCreeping, OnRolling, OnSliding, Rung};
 use super::samples::Samples;
-use super::stepping::{Budget, Course, Failure, Tally, Unwatched, Watch, whole_steps};
+use super::stepping::{Budget, Course, Failure, MOST_STEPS, Tally, Unwatched, Watch, whole_steps};
 use super::{Scene, Subject};
 use crate::maths::{
     DOPRI5, EULER, MIDPOINT, RK4, RODAS3, RODAS4, StepControl, dopri5, semi_implicit_euler,
@@ -39,7 +39,18 @@ pub fn run<D: Drive>(
     configuration: &Configuration,
     samples: Option<&mut Samples<'_>>,
 ) -> Result<Outcome, Failure> {
-    let stage = Stage::new(scene, configuration);
+    run_within(MOST_STEPS, scene, drive, configuration, samples)
+}
+
+/// The same with fewer steps at most.
+pub(super) fn run_within<D: Drive>(
+    most_steps: u64,
+    scene: &Scene,
+    drive: &mut D,
+    configuration: &Configuration,
+    samples: Option<&mut Samples<'_>>,
+) -> Result<Outcome, Failure> {
+    let stage = Stage { most_steps, ..Stage::new(scene, configuration) };
     match configuration.model() {
         Model::Planar => stage.planar(drive, samples),
         Model::Rolling => stage.rolling(drive, samples, &mut Unwatched),
@@ -79,11 +90,13 @@ pub(super) struct Stage<'a> {
     pub scene: &'a Scene,
     method: Method,
     pace: Pace,
+    most_steps: u64,
 }
 
 impl<'a> Stage<'a> {
     pub(super) fn new(scene: &'a Scene, configuration: &Configuration) -> Self {
-        Self { scene, method: configuration.method(), pace: configuration.pace() }
+        let (method, pace) = (configuration.method(), configuration.pace());
+        Self { scene, method, pace, most_steps: MOST_STEPS }
     }
 
     fn course<'s, 'b, const N: usize>(
@@ -91,7 +104,7 @@ impl<'a> Stage<'a> {
         y: [f64; N],
         samples: Option<&'s mut Samples<'b>>,
     ) -> Course<'s, 'b, N> {
-        Course { t: 0.0, y, tally: Tally::default(), samples }
+        Course { t: 0.0, y, tally: Tally::default(), samples, most_steps: self.most_steps }
     }
 
     fn budget(&self) -> Budget {

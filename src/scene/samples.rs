@@ -1,6 +1,7 @@
 //! Samples between the steps: what a method leaves at its own times, seen at
 //! regular ones.
 
+use super::configuration::SHORTEST_STEP_S;
 use crate::plant::Motion;
 
 /// Where samples go: their time, s, and the motion.
@@ -17,8 +18,12 @@ pub struct Samples<'a> {
 const SAME_TIME: f64 = 1e-9;
 
 impl<'a> Samples<'a> {
-    /// A sample each `every_s` seconds, above 0, handed to `sink`.
+    /// A sample each `every_s` seconds, handed to `sink`. An interval that is
+    /// no number or below [`SHORTEST_STEP_S`] would never come to an end: then
+    /// the start alone is sampled.
     pub fn new(every_s: f64, sink: &'a mut Sink<'a>) -> Self {
+        let every_s = if every_s >= SHORTEST_STEP_S { every_s } else { f64::MAX };
+        let every_s = every_s.min(f64::MAX);
         Self { every_s, taken: 0, sink }
     }
 

@@ -16,7 +16,7 @@ pub const MOST_CHANGES: u32 = 100_000;
 pub enum Failure {
     #[error("the state is no number any more at {at_s:.6} s: the step is too long for this method")]
     NotFinite { at_s: f64 },
-    #[error("over {MOST_STEPS} steps at {at_s:.6} s")]
+    #[error("too many steps at {at_s:.6} s")]
     TooManySteps { at_s: f64 },
     #[error("over {MOST_CHANGES} changes between roll, slip and flight at {at_s:.6} s")]
     TooManyChanges { at_s: f64 },
@@ -98,6 +98,8 @@ pub(super) struct Course<'a, 'b, const N: usize> {
     pub y: [f64; N],
     pub tally: Tally,
     pub samples: Option<&'a mut Samples<'b>>,
+    /// Steps, rejected ones included, that end the run.
+    pub most_steps: u64,
 }
 
 impl<const N: usize> Course<'_, '_, N> {
@@ -113,7 +115,7 @@ impl<const N: usize> Course<'_, '_, N> {
         if !y.iter().all(|value| value.is_finite()) {
             return Err(Failure::NotFinite { at_s: t });
         }
-        if self.tally.steps >= MOST_STEPS {
+        if self.tally.steps + self.tally.rejected >= self.most_steps {
             return Err(Failure::TooManySteps { at_s: t });
         }
         watch.step(rung, [self.t, t], [&self.y, &y])?;
