@@ -2,12 +2,15 @@
 //!
 //! Prefailed raises it (jumping up to zero first), prepassed lowers it, at
 //! rates that take `fail_s` and `pass_s` from zero to an end. It does not jump
-//! down first: the residual of a ball that a sick servo swings to and fro
-//! crosses zero twice a swing. While the enable condition is lost it freezes.
+//! down first but leaks away in `leak_s`: the residual of a ball that a sick
+//! servo swings to and fro crosses zero twice a swing, and a loose contact
+//! comes and goes. While the enable condition is lost it freezes.
 //! A silent rig is judged by time, not by counts, so the rates are per second.
 
+use super::Settings;
+
 /// What a monitor says of one moment.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Test {
     /// The enable condition does not hold: neither passed nor failed.
     #[default]
@@ -17,7 +20,7 @@ pub enum Test {
 }
 
 /// What the counter came to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Qualified {
     /// Still on its way, or nothing new.
     No,
@@ -53,6 +56,12 @@ impl Debounce {
         self.level > 0.0
     }
 
+    /// Whether it is at its upper end: the test has failed.
+    #[must_use]
+    pub fn failed(&self) -> bool {
+        self.level >= 1.0
+    }
+
     /// Takes suspicion back: another cause accounts for what was seen.
     pub fn exonerate(&mut self) {
         self.level = self.level.min(0.0);
@@ -61,14 +70,8 @@ impl Debounce {
 
     /// Takes `test`, which held for the `dt` seconds before this sample. A
     /// time of zero qualifies at once.
-    pub fn update(
-        &mut self,
-        test: Test,
-        dt: f64,
-        fail_s: f64,
-        pass_s: f64,
-        trip_s: f64,
-    ) -> Qualified {
+    pub fn update(&mut self, test: Test, dt: f64, leak_s: f64, settings: &Settings) -> Qualified {
+        let Settings { fail_s, pass_s, confirm_s, .. } = *settings;
         let share = |full: f64| if full > 0.0 { dt / full } else { 1.0 };
         match test {
             Test::NotTested => Qualified::No,
@@ -78,13 +81,14 @@ impl Debounce {
                 }
                 self.level = (self.level.max(0.0) + share(fail_s)).min(1.0);
                 match self.level >= 1.0 {
-                    true if self.failing_s >= trip_s => Qualified::Tripped,
+                    true if self.failing_s >= confirm_s => Qualified::Tripped,
                     true => Qualified::Failed,
                     false => Qualified::No,
                 }
             }
             Test::Prepassed => {
-                self.level = (self.level - share(pass_s)).max(-1.0);
+                let full_s = if self.level > 0.0 { leak_s } else { pass_s };
+                self.level = (self.level - share(full_s)).max(-1.0);
                 if self.level <= 0.0 {
                     self.failing_s = 0.0;
                 }
@@ -96,10 +100,13 @@ impl Debounce {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Profile;
     use super::*;
 
     fn run(debounce: &mut Debounce, test: Test, n: usize) -> Vec<Qualified> {
-        (0..n).map(|_| debounce.update(test, 0.125, 0.5, 1.0, 0.25)).collect()
+        let settings =
+            Settings { fail_s: 0.5, pass_s: 1.0, confirm_s: 0.25, ..Settings::default() };
+        (0..n).map(|_| debounce.update(test, 0.125, 2.0, &settings)).collect()
     }
 
     #[test]
@@ -118,17 +125,41 @@ mod tests {
         run(&mut debounce, Test::NotTested, 100);
         assert_eq!(debounce.counter(), before);
         run(&mut debounce, Test::Prepassed, 1);
-        assert_eq!(debounce.counter(), 79);
-        assert_eq!(run(&mut debounce, Test::Prepassed, 13).last(), Some(&Qualified::Passed));
+        assert_eq!(debounce.counter(), 87, "evidence leaks away in two seconds");
+        assert_eq!(run(&mut debounce, Test::Prepassed, 19).last(), Some(&Qualified::Passed));
         assert_eq!(debounce.counter(), -128);
         run(&mut debounce, Test::Prefailed, 1);
         assert_eq!(debounce.counter(), 31, "jumps up to zero first");
     }
 
+    /// Hands that push a ball twice, each time seen for three quarters of what
+    /// fails, confirm nothing unless the second comes within half a second.
+    #[test]
+    fn two_pushes_confirm_nothing_unless_close_together() {
+        let settings = Settings::default();
+        let push_s = 0.75 * settings.fail_s;
+        let confirms = |apart_s: f64| {
+            let mut debounce = Debounce::default();
+            let mut take = |test, seconds: f64| {
+                let n = (seconds / 0.01).round() as usize;
+                let tripped = |_| {
+                    debounce.update(test, 0.01, settings.leak_s, &settings) == Qualified::Tripped
+                };
+                (0..n).any(tripped)
+            };
+            take(Test::Prefailed, push_s);
+            take(Test::Prepassed, apart_s);
+            take(Test::Prefailed, push_s)
+        };
+        assert!(confirms(0.4));
+        assert!(!confirms(0.6));
+    }
+
     #[test]
     fn no_debounce_means_at_once() {
         let mut debounce = Debounce::default();
-        assert_eq!(debounce.update(Test::Prefailed, 0.0, 0.0, 0.0, 0.0), Qualified::Tripped);
+        let settings = Settings::of(Profile::Textbook);
+        assert_eq!(debounce.update(Test::Prefailed, 0.0, 0.0, &settings), Qualified::Tripped);
         assert_eq!(debounce.counter(), 127);
     }
 }

@@ -5,7 +5,7 @@
 //! servos. A monitor that is out of its depth is *not tested*, never *passed*.
 
 use super::stillness::Stillness;
-use super::{Answer, Candidate, Evidence, Limits, Profile, Test};
+use super::{Answer, AxisEvidence, Candidate, Evidence, Limits, Profile, Test};
 use crate::vocabulary::{Axis, FaultCode, FaultKind, PerAxis};
 
 /// The chapter's enable condition: command, rad, or measured acceleration,
@@ -47,6 +47,12 @@ pub struct Surroundings {
     pub clear_s: f64,
     /// Whether the ball was last seen at the edge.
     pub at_edge: bool,
+    /// The axis across whose rim the ball lies; none in a corner.
+    pub rim: Option<Axis>,
+    /// Seconds for which it has lain there.
+    pub rim_s: f64,
+    /// Whether it was last seen at an edge without a rim: it is falling.
+    pub over_the_edge: bool,
     /// Seconds since readings stepped as no ball can; infinite if never.
     pub since_jump_s: f64,
 }
@@ -55,16 +61,28 @@ pub struct Surroundings {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Finding {
     pub test: Test,
+    /// The same through the second, shorter window.
+    pub quick: Test,
+    /// The ball has left the plate: a test that failed can have no more
+    /// evidence, and needs none.
+    pub gone: bool,
     pub kind: Option<FaultKind>,
     /// Another cause that reads alike.
     pub rival: Option<Candidate>,
 }
 
 impl Finding {
-    const PASS: Self = Self { test: Test::Prepassed, kind: None, rival: None };
+    const NOTHING: Self = Self {
+        test: Test::NotTested,
+        quick: Test::NotTested,
+        gone: false,
+        kind: None,
+        rival: None,
+    };
+    const PASS: Self = Self { test: Test::Prepassed, ..Self::NOTHING };
 
     const fn fail(kind: Option<FaultKind>) -> Self {
-        Self { test: Test::Prefailed, kind, rival: None }
+        Self { test: Test::Prefailed, kind, ..Self::NOTHING }
     }
 }
 
@@ -99,11 +117,11 @@ impl Evaluator {
     pub fn enabled(
         &self,
         axis: Axis,
-        evidence: &Evidence,
+        e: &AxisEvidence,
+        window_s: f64,
         readings: &Stillness,
         around: &Surroundings,
     ) -> bool {
-        let e = &evidence.axes[axis];
         let (Some(measured), Some(twin), Some(command)) =
             (e.measured_m_s2, e.twin_m_s2, e.command_rad)
         else {
@@ -114,13 +132,17 @@ impl Evaluator {
         }
         let resting = readings.axes[axis].still_s > PRESSED_S
             && twin.abs() < self.limits[axis].breakaway_m_s2;
-        around.clear_s >= evidence.window_s && readings.unseen_s == 0.0 && !resting
+        let clear = around.clear_s >= window_s;
+        let testable = clear || pinned(axis, e, window_s, readings, around);
+        testable && readings.unseen_s == 0.0 && !resting
     }
 
-    /// What every monitor says, in the order of [`FaultCode::ALL`].
+    /// What every monitor says, in the order of [`FaultCode::ALL`]; `quick` is
+    /// what the second, shorter window shows.
     pub fn evaluate(
         &mut self,
         evidence: &Evidence,
+        quick: &PerAxis<AxisEvidence>,
         readings: &Stillness,
         around: &Surroundings,
     ) -> [Finding; FaultCode::COUNT] {
@@ -135,22 +157,34 @@ impl Evaluator {
         };
         let blind = [sensor, stuck].iter().any(|f| f.test == Test::Prefailed);
         let mut servo = |axis| match blind {
-            true => Finding::default(),
-            false => self.servo(axis, evidence, around),
+            true => Finding { gone: around.over_the_edge, ..Finding::NOTHING },
+            false => self.servo(axis, &evidence.axes[axis], &quick[axis], around),
         };
         [servo(Axis::X), servo(Axis::Y), stuck, sensor]
     }
 
-    fn servo(&mut self, axis: Axis, evidence: &Evidence, around: &Surroundings) -> Finding {
-        let e = &evidence.axes[axis];
-        let (true, Some(measured), Some(twin)) = (e.enabled, e.measured_m_s2, e.twin_m_s2) else {
-            return Finding::default();
+    fn servo(
+        &mut self,
+        axis: Axis,
+        e: &AxisEvidence,
+        quick: &AxisEvidence,
+        around: &Surroundings,
+    ) -> Finding {
+        let judge = |e: &AxisEvidence| match (e.enabled, e.violates()) {
+            (true, true) => Test::Prefailed,
+            // The rim may hold what a servo would not.
+            (true, false) if !around.at_edge => Test::Prepassed,
+            _ => Test::NotTested,
         };
-        self.answers[axis].update(measured, twin, around.dt);
-        match e.violates() {
-            true => Finding::fail(self.answers[axis].kind(e.limit_m_s2)),
-            false => Finding::PASS,
+        if let (true, false, Some(measured), Some(twin)) =
+            (e.enabled, around.at_edge, e.measured_m_s2, e.twin_m_s2)
+        {
+            self.answers[axis].update(measured, twin, around.dt);
         }
+        let (test, quick) = (judge(e), judge(quick));
+        let failed = test.max(quick) == Test::Prefailed;
+        let kind = failed.then(|| self.answers[axis].kind(e.limit_m_s2)).flatten();
+        Finding { test, quick, gone: around.over_the_edge, kind, rival: None }
     }
 
     fn sensor(&self, evidence: &Evidence, readings: &Stillness, around: &Surroundings) -> Finding {
@@ -175,6 +209,22 @@ impl Evaluator {
         }
         frozen(readings, around).unwrap_or(Finding::PASS)
     }
+}
+
+/// Whether a ball at the rim stays there although it ought to leave. A rim
+/// only pushes inward, so all that it can explain is a residual inward: one
+/// outward is the servo's, for as long as the readings are alive.
+fn pinned(
+    axis: Axis,
+    e: &AxisEvidence,
+    window_s: f64,
+    readings: &Stillness,
+    around: &Surroundings,
+) -> bool {
+    let outward =
+        e.residual_m_s2().zip(e.position_m).is_some_and(|(residual, at)| residual * at > 0.0);
+    let alive = readings.axes[axis].identical_s < FROZEN_S;
+    around.rim == Some(axis) && around.rim_s >= window_s && outward && alive
 }
 
 /// The chapter's rule: enabled and the residual at least 0.01 m/s².
@@ -218,5 +268,47 @@ fn stuck_ball(readings: &Stillness, around: &Surroundings) -> Finding {
             let rival = Candidate { code: FaultCode::servo(axis), kind, weight: 0.4 };
             Finding { rival: Some(rival), ..Finding::fail(None) }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A ball that lies at the rim at +x while the twin goes by `twin`, m/s².
+    fn at_the_rim(twin: f64, identical_s: f64) -> Test {
+        let mut evaluator = Evaluator::new(
+            Profile::Default,
+            PerAxis::from_fn(|_| Limits::new(Profile::Default, None, 7.0)),
+        );
+        let mut readings = Stillness::default();
+        readings.axes.x.identical_s = identical_s;
+        let around = Surroundings {
+            dt: 0.01,
+            clear_s: 0.0,
+            at_edge: true,
+            rim: Some(Axis::X),
+            rim_s: 1.0,
+            over_the_edge: false,
+            since_jump_s: f64::INFINITY,
+        };
+        let mut x = AxisEvidence {
+            command_rad: Some(0.1),
+            position_m: Some(0.17),
+            measured_m_s2: Some(0.0),
+            twin_m_s2: Some(twin),
+            limit_m_s2: 0.3,
+            ..AxisEvidence::default()
+        };
+        x.enabled = evaluator.enabled(Axis::X, &x, 0.5, &readings, &around);
+        evaluator.servo(Axis::X, &x, &AxisEvidence::default(), &around).test
+    }
+
+    #[test]
+    fn a_rim_explains_a_push_inward_and_nothing_else() {
+        assert_eq!(at_the_rim(-0.8, 0.0), Test::Prefailed, "it ought to leave and stays");
+        assert_eq!(at_the_rim(0.8, 0.0), Test::NotTested, "the rim holds it");
+        assert_eq!(at_the_rim(-0.2, 0.0), Test::NotTested, "within the limit is no pass");
+        assert_eq!(at_the_rim(-0.8, 0.5), Test::NotTested, "the readings may be frozen");
     }
 }

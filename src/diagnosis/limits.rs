@@ -1,5 +1,7 @@
 //! How far measured and predicted acceleration may differ.
 
+use crate::maths::window_for;
+
 use super::{AxisCalibration, Profile};
 
 /// The chapter's fault limit, m/s² (application 3).
@@ -55,6 +57,13 @@ impl Limits {
                 Self { floor_m_s2: TEXTBOOK_LIMIT_M_S2, share: 0.0, errors: 0.0, ..known }
             }
         }
+    }
+
+    /// The window, s, in which noise adds `share` of the floor to the limit,
+    /// for readings `period_s` apart.
+    #[must_use]
+    pub fn window_s(&self, share: f64, period_s: f64) -> f64 {
+        window_for(self.noise_m, period_s, share * self.floor_m_s2 / self.errors)
     }
 
     /// The limit, m/s², for a predicted acceleration and the standard error of

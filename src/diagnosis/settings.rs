@@ -45,6 +45,20 @@ impl FromStr for Profile {
     }
 }
 
+/// Windows that are judged, s: below the first what the servo's model leaves
+/// out of a step of the command looks like a fault, beyond the last the ball
+/// has crossed the plate.
+const SHORTEST_WINDOW_S: f64 = 0.25;
+const LONGEST_WINDOW_S: f64 = 1.0;
+
+/// Noise in the limit, as a share of its floor: little where small faults are
+/// looked for, as much again where large ones are.
+const SMALL_SHARE: f64 = 0.25;
+const LARGE_SHARE: f64 = 1.0;
+
+/// How much shorter a second window must be to be worth its while, s.
+const LEAST_GAIN_S: f64 = 0.1;
+
 /// How a rig is judged; immutable while a session runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
@@ -63,6 +77,9 @@ pub struct Settings {
     pub fail_s: f64,
     /// Continuous agreement before the test passes, s.
     pub pass_s: f64,
+    /// Agreement that takes back all the evidence against a servo, s; for the
+    /// other codes, `pass_s` does.
+    pub leak_s: f64,
     /// Further failure before it counts as a trip (confirmed), s.
     pub confirm_s: f64,
     pub memory: MemoryRules,
@@ -83,6 +100,8 @@ impl Settings {
             // A push by hand shows in the filter for one window.
             fail_s: 0.6,
             pass_s: 1.0,
+            // Two hardest pushes confirm nothing unless within half a second.
+            leak_s: 3.0,
             confirm_s: 0.2,
             memory: MemoryRules::default(),
         };
@@ -94,10 +113,34 @@ impl Settings {
                 twin_accuracy_m_s2: 0.0005,
                 fail_s: 0.0,
                 pass_s: 0.0,
+                leak_s: 0.0,
                 confirm_s: 0.0,
                 ..default
             },
         }
+    }
+
+    /// The same through the window, s, that `needed_s` says for a share of
+    /// noise in the limit: one that is long enough to see small faults through
+    /// the noise. Only for a learnt rig, whose noise is known.
+    #[must_use]
+    pub fn long(&self, needed_s: impl Fn(f64) -> f64) -> Self {
+        self.through(needed_s(SMALL_SHARE).clamp(self.window_s, LONGEST_WINDOW_S))
+    }
+
+    /// The same through a second window, short enough to see large faults
+    /// soon; none where noise leaves no room for it.
+    #[must_use]
+    pub fn quick(&self, needed_s: impl Fn(f64) -> f64) -> Option<Self> {
+        let window_s = needed_s(LARGE_SHARE).max(SHORTEST_WINDOW_S);
+        (self.window_s - window_s >= LEAST_GAIN_S).then(|| self.through(window_s))
+    }
+
+    /// A push shows in a filter for one window: the longer that is, the longer
+    /// a failure must last.
+    fn through(&self, window_s: f64) -> Self {
+        let fail_s = (self.fail_s + window_s - self.window_s).max(0.0);
+        Self { window_s, fail_s, ..*self }
     }
 
     /// The same with the debounce before a failure set to `fail_s` in [0, 60] s.
@@ -113,5 +156,28 @@ impl Settings {
 impl Default for Settings {
     fn default() -> Self {
         Self::of(Profile::Default)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A failure must outlast a push through whichever window: by 0.1 s.
+    #[test]
+    fn the_debounce_goes_with_the_window() {
+        let given = Settings::default();
+        // Noise that asks for 0.4 s at the large share asks for 4^(2/5) of it
+        // at a quarter.
+        let needed_s = |share: f64| 0.4 * share.powf(-0.4);
+        let long = given.long(needed_s);
+        let quick = long.quick(needed_s).unwrap();
+        assert!((long.window_s - 0.4 * 4.0_f64.powf(0.4)).abs() < 1e-12);
+        assert_eq!(quick.window_s, 0.4);
+        for settings in [long, quick] {
+            assert!((settings.fail_s - settings.window_s - 0.1).abs() < 1e-12);
+        }
+        assert_eq!(given.quick(|_| 0.45), None, "noise leaves no room");
+        assert_eq!(given.long(|_| 9.0).window_s, LONGEST_WINDOW_S);
     }
 }

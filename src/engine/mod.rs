@@ -10,6 +10,7 @@ mod admit;
 mod align;
 mod calibrate;
 mod frame;
+mod look;
 mod pipeline;
 mod rig;
 mod types;

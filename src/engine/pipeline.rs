@@ -6,13 +6,14 @@
 use nalgebra::Vector2;
 
 use super::frame::{self, Moment};
+use super::look::Look;
 use super::watch::Watch;
 use super::{MonitorState, Output, Readiness, Setup, State};
 use crate::diagnosis::{
-    AxisEvidence, Evaluator, Evidence, FaultMemory, Finding, Gated, Limits, OutlierGate, Qualified,
-    Reading, Settings, Stillness, Surroundings, Test,
+    AxisEvidence, Evaluator, Evidence, FaultMemory, Finding, Gated, Limits, OutlierGate, Profile,
+    Qualified, Reading, Settings, Stillness, Surroundings, Test,
 };
-use crate::maths::{Fit, SlidingQuadratic};
+use crate::maths::Fit;
 use crate::plant::{RollingState, Twin};
 use crate::vocabulary::{Axis, FaultCode, PerAxis, Sample, SimTime};
 
@@ -43,11 +44,18 @@ pub struct Pipeline {
     now: Option<SimTime>,
     period_s: Option<f64>,
     gate: OutlierGate,
-    windows: PerAxis<SlidingQuadratic>,
-    fits: PerAxis<Option<Fit>>,
+    /// Through the long window, by which small faults are found.
+    long: Look,
+    /// Through a shorter one, by which large faults are found sooner; none
+    /// where noise leaves no room for it.
+    quick: Option<Look>,
     readings: Stillness,
     clear_s: f64,
     at_edge: bool,
+    open_edge: bool,
+    /// The axis across whose rim the ball lies, and for how long, s.
+    rim: Option<Axis>,
+    rim_s: f64,
     since_jump_s: f64,
     unjudged_s: f64,
     evidence: Evidence,
@@ -63,6 +71,13 @@ impl Pipeline {
             let gain = setup.twin.axes[axis].gain.abs();
             Limits::new(settings.profile, learnt, gain * rig.ball.rolling_gravity())
         });
+        let needed_s = |share: f64| {
+            let of = |axis: Axis| limits[axis].window_s(share, 1.0 / rig.sample_rate_hz);
+            of(Axis::X).max(of(Axis::Y))
+        };
+        let adapts = settings.profile == Profile::Default && rig.calibration.is_some();
+        let long = if adapts { settings.long(needed_s) } else { settings };
+        let quick = if adapts { long.quick(needed_s) } else { None };
         Self {
             settings,
             twin: Twin::new(setup.twin),
@@ -70,11 +85,14 @@ impl Pipeline {
             now: None,
             period_s: None,
             gate: OutlierGate::default(),
-            windows: PerAxis::default(),
-            fits: PerAxis::default(),
+            long: Look::new(long),
+            quick: quick.map(Look::new),
             readings: Stillness::default(),
             clear_s: 0.0,
             at_edge: false,
+            open_edge: !rig.plate.rim(),
+            rim: None,
+            rim_s: 0.0,
             since_jump_s: f64::INFINITY,
             unjudged_s: f64::INFINITY,
             evidence: Evidence::default(),
@@ -98,12 +116,12 @@ impl Pipeline {
         let (usable, outliers) = self.estimate(&moment, dt);
         self.locate(setup, &moment, dt);
         self.watch_readings(&moment, dt, usable, outliers);
-        self.collect_evidence(&moment, dt);
+        let quick = self.collect_evidence(&moment, dt);
         self.unjudged_s += dt;
         if self.unjudged_s >= self.settings.period_s {
             let dt = self.unjudged_s.min(self.settings.period_s.max(dt));
             self.unjudged_s = 0.0;
-            let findings = self.evaluate(dt);
+            let findings = self.evaluate(&quick, dt);
             self.remember(&moment, dt, &findings, memory, outputs);
         }
     }
@@ -132,8 +150,9 @@ impl Pipeline {
         self.settings.gap_s.max(GAP_PERIODS * self.period_s.unwrap_or(0.0))
     }
 
-    fn window_s(&self) -> f64 {
-        self.settings.window_s.max(LEAST_SAMPLES * self.period_s.unwrap_or(0.0))
+    /// The window that the least readings take, s.
+    fn least_window_s(&self) -> f64 {
+        LEAST_SAMPLES * self.period_s.unwrap_or(0.0)
     }
 
     /// Forgets the past motion; what the debounce has gathered stays.
@@ -142,21 +161,23 @@ impl Pipeline {
         self.evaluator.restart();
         self.readings = Stillness::default();
         self.clear_s = 0.0;
+        self.rim_s = 0.0;
         self.gate.restart();
-        for axis in Axis::ALL {
-            self.forget(axis);
-        }
+        self.forget();
     }
 
-    fn forget(&mut self, axis: Axis) {
-        self.windows[axis].clear();
-        self.fits[axis] = None;
+    /// Forgets every reading.
+    fn forget(&mut self) {
+        self.long.forget();
+        if let Some(look) = &mut self.quick {
+            look.forget();
+        }
     }
 
     /// Stage: the twin follows the commands, in lockstep.
     fn step_twin(&mut self, moment: &Moment) {
         let of = |axis: Axis| {
-            let fit = self.fits[axis].map(|f| (f.measured.position, f.measured.velocity));
+            let fit = self.long.fits[axis].map(|f| (f.measured.position, f.measured.velocity));
             fit.unwrap_or((moment.position[axis].unwrap_or(0.0), 0.0))
         };
         let (x, y) = (of(Axis::X), of(Axis::Y));
@@ -170,11 +191,11 @@ impl Pipeline {
         if away.amax() > REBASE_M {
             let shift = self.twin.rebase(observed.position, observed.velocity);
             for (i, axis) in Axis::ALL.into_iter().enumerate() {
-                self.windows[axis].rebase(
-                    moment.at.seconds(),
-                    shift.position[i],
-                    shift.velocity[i],
-                );
+                let (t, p, v) = (moment.at.seconds(), shift.position[i], shift.velocity[i]);
+                self.long.rebase(axis, t, p, v);
+                if let Some(look) = &mut self.quick {
+                    look.rebase(axis, t, p, v);
+                }
             }
         }
     }
@@ -183,32 +204,37 @@ impl Pipeline {
     /// Returns whether the readings are usable and how many earlier ones have
     /// turned out to be outliers.
     fn estimate(&mut self, moment: &Moment, dt: f64) -> (bool, u32) {
-        let (t, window_s) = (moment.at.seconds(), self.window_s());
+        let t = moment.at.seconds();
         let (predicted, gap_s) = (self.twin.motion().position, self.gap_s());
         self.since_jump_s += dt;
-        if Axis::ALL.iter().any(|&a| self.windows[a].newest().is_some_and(|n| t - n > gap_s)) {
+        if self.long.stale(t, gap_s) {
             self.gate.restart();
-            self.forget(Axis::X);
-            self.forget(Axis::Y);
+            self.forget();
         }
         if Axis::ALL.iter().all(|&a| moment.position[a].is_none()) {
             return (true, 0);
         }
         let gated = self.gate.take(t, moment.position, self.noise_m());
         if gated == Gated::Stepped {
-            self.windows.x.clear();
-            self.windows.y.clear();
+            self.forget();
             self.since_jump_s = 0.0;
         }
         for (i, axis) in Axis::ALL.into_iter().enumerate() {
             if let (true, Some(position)) = (gated.usable(), moment.position[axis]) {
-                self.windows[axis].push(t, position, predicted[i], window_s);
-                self.fits[axis] = self.windows[axis].fit();
+                self.push(axis, t, position, predicted[i]);
             }
         }
         match gated {
             Gated::Accepted { outliers } => (true, outliers),
             other => (other.usable(), 0),
+        }
+    }
+
+    fn push(&mut self, axis: Axis, t: f64, measured: f64, predicted: f64) {
+        let least_s = self.least_window_s();
+        self.long.push(axis, t, measured, predicted, least_s);
+        if let Some(look) = &mut self.quick {
+            look.push(axis, t, measured, predicted, least_s);
         }
     }
 
@@ -224,9 +250,12 @@ impl Pipeline {
         let seen = |a: Axis| moment.position[a];
         if Axis::ALL.into_iter().any(|a| seen(a).is_some()) {
             let plate = &setup.rig.plate;
-            let room =
-                plate.edge_distance_m(seen(Axis::X).unwrap_or(0.0), seen(Axis::Y).unwrap_or(0.0));
-            self.at_edge = room < setup.rig.ball.radius_m() + EDGE_MARGIN_M;
+            let (x, y) = (seen(Axis::X).unwrap_or(0.0), seen(Axis::Y).unwrap_or(0.0));
+            let room = setup.rig.ball.radius_m() + EDGE_MARGIN_M;
+            self.at_edge = plate.edge_distance_m(x, y) < room;
+            let rim = plate.edge_axis(x, y, room).filter(|_| plate.rim());
+            self.rim_s = if rim.is_some() && rim == self.rim { self.rim_s + dt } else { 0.0 };
+            self.rim = rim;
         }
         self.clear_s = if self.at_edge { 0.0 } else { self.clear_s + dt };
     }
@@ -248,45 +277,72 @@ impl Pipeline {
         });
     }
 
-    /// Stage: residual, limit and gate of this moment.
-    fn collect_evidence(&mut self, moment: &Moment, dt: f64) {
-        let full_s = FULL_WINDOW * self.window_s();
-        let axis_evidence = |axis: Axis| {
-            let fit = self.fits[axis].filter(|f| {
-                moment.position[axis].is_some()
-                    && f.span_s >= full_s
-                    && f.n as f64 >= LEAST_SAMPLES / 2.0
-            });
-            let measured = fit.map(|f| f.measured.acceleration);
-            let twin = fit.map(|f| f.measured.acceleration - f.deviation.acceleration);
-            let error = fit.map_or(0.0, |f| f.acceleration_error);
-            AxisEvidence {
-                command_rad: moment.command[axis],
-                position_m: self.fits[axis].map(|f| f.measured.position),
-                velocity_m_s: self.fits[axis].map(|f| f.measured.velocity),
-                measured_m_s2: measured,
-                twin_m_s2: twin,
-                limit_m_s2: self.evaluator.limits()[axis].at(twin.unwrap_or(0.0), error),
-                enabled: false,
-            }
+    /// Stage: residual, limit and gate of this moment. Returns those of the
+    /// second window.
+    fn collect_evidence(&mut self, moment: &Moment, dt: f64) -> PerAxis<AxisEvidence> {
+        let around = self.surroundings(dt);
+        let see = |axis: Axis, fit: Option<Fit>, window_s: f64| {
+            let mut e = self.axis_evidence(moment, axis, fit, window_s);
+            e.enabled = self.evaluator.enabled(axis, &e, window_s, &self.readings, &around);
+            e
         };
-        let scatter = Axis::ALL.into_iter().filter_map(|a| self.fits[a]).map(|f| f.scatter);
-        let mut evidence = Evidence {
+        let least_s = self.least_window_s();
+        let long_s = self.long.window_s(least_s);
+        let fits = &self.long.fits;
+        let evidence = Evidence {
             at: Some(moment.at),
-            window_s: self.window_s(),
-            axes: PerAxis::from_fn(axis_evidence),
+            window_s: long_s,
+            axes: PerAxis::from_fn(|axis| see(axis, fits[axis], long_s)),
             unseen_s: self.readings.unseen_s,
             identical_s: self.readings.identical_s(),
             still_s: self.readings.still_s(),
             outliers: self.readings.outliers(),
-            scatter_m: scatter.reduce(f64::max),
+            scatter_m: self.scatter_m(),
         };
-        let around = self.surroundings(dt);
-        for axis in Axis::ALL {
-            evidence.axes[axis].enabled =
-                self.evaluator.enabled(axis, &evidence, &self.readings, &around);
-        }
+        let quick = self.quick.as_ref().map_or_else(PerAxis::default, |look| {
+            let quick_s = look.window_s(least_s);
+            PerAxis::from_fn(|axis| see(axis, look.fits[axis], quick_s))
+        });
         self.evidence = evidence;
+        quick
+    }
+
+    /// Scatter of the readings, the worse of both axes, m. A fault that throws
+    /// the ball bends its path within the window; the shorter window takes less
+    /// of that for noise.
+    fn scatter_m(&self) -> Option<f64> {
+        let quick = self.quick.as_ref().map(|look| &look.fits);
+        let of = |axis: Axis| {
+            let long = self.long.fits[axis]?.scatter;
+            Some(quick.and_then(|fits| fits[axis]).map_or(long, |q| q.scatter.min(long)))
+        };
+        Axis::ALL.into_iter().filter_map(of).reduce(f64::max)
+    }
+
+    /// What `fit` over `window_s` says of `axis`, the gate aside.
+    fn axis_evidence(
+        &self,
+        moment: &Moment,
+        axis: Axis,
+        fit: Option<Fit>,
+        window_s: f64,
+    ) -> AxisEvidence {
+        let full = fit.filter(|f| {
+            moment.position[axis].is_some()
+                && f.span_s >= FULL_WINDOW * window_s
+                && f.n as f64 >= LEAST_SAMPLES / 2.0
+        });
+        let twin = full.map(|f| f.measured.acceleration - f.deviation.acceleration);
+        let error = full.map_or(0.0, |f| f.acceleration_error);
+        AxisEvidence {
+            command_rad: moment.command[axis],
+            position_m: fit.map(|f| f.measured.position),
+            velocity_m_s: fit.map(|f| f.measured.velocity),
+            measured_m_s2: full.map(|f| f.measured.acceleration),
+            twin_m_s2: twin,
+            limit_m_s2: self.evaluator.limits()[axis].at(twin.unwrap_or(0.0), error),
+            enabled: false,
+        }
     }
 
     const fn surroundings(&self, dt: f64) -> Surroundings {
@@ -294,14 +350,25 @@ impl Pipeline {
             dt,
             clear_s: self.clear_s,
             at_edge: self.at_edge,
+            rim: self.rim,
+            rim_s: self.rim_s,
+            over_the_edge: self.at_edge && self.open_edge,
             since_jump_s: self.since_jump_s,
         }
     }
 
-    /// Stage: the monitors.
-    fn evaluate(&mut self, dt: f64) -> [Finding; FaultCode::COUNT] {
+    /// Stage: the monitors. Where only the second window shows a violation,
+    /// it is the evidence.
+    fn evaluate(&mut self, quick: &PerAxis<AxisEvidence>, dt: f64) -> [Finding; FaultCode::COUNT] {
         let around = self.surroundings(dt);
-        self.evaluator.evaluate(&self.evidence, &self.readings, &around)
+        let findings = self.evaluator.evaluate(&self.evidence, quick, &self.readings, &around);
+        for axis in Axis::ALL {
+            let e = &mut self.evidence.axes[axis];
+            if quick[axis].violates() && !e.violates() {
+                *e = quick[axis];
+            }
+        }
+        findings
     }
 
     /// Stage: debounce and fault memory.
@@ -314,10 +381,14 @@ impl Pipeline {
         outputs: &mut Vec<Output>,
     ) {
         let mut blamed = false;
+        let long = &self.long.settings;
+        let quick = self.quick.as_ref().map_or(long, |look| &look.settings);
         for (&code, finding) in FaultCode::ALL.iter().zip(findings) {
             let watch = &mut self.watches[code as usize];
-            let qualified = watch.update(code, finding, moment.at, dt, &self.settings);
-            watch.apply(code, qualified, &self.settings, &self.evidence, memory, outputs);
+            // Only the servos' residual is seen through the windows.
+            let settings = if code.axis().is_some() { long } else { &self.settings };
+            let qualified = watch.update(code, finding, moment.at, dt, settings, quick);
+            watch.apply(code, qualified, settings, &self.evidence, memory, outputs);
             let failed = matches!(qualified, Qualified::Failed | Qualified::Tripped);
             blamed |= failed && code.axis().is_none();
         }
@@ -357,7 +428,7 @@ impl Pipeline {
             }
         });
         let ghost = |a: Axis| {
-            self.fits[a].map_or((0.0, 0.0), |f| {
+            self.long.fits[a].map_or((0.0, 0.0), |f| {
                 let (residual, span) = (f.deviation.acceleration, f.span_s);
                 (
                     f.measured.position - residual * span * span / 2.0,

@@ -11,6 +11,8 @@ use crate::vocabulary::{FaultCode, FaultKind, SimTime};
 #[derive(Clone, Debug, Default)]
 pub struct Watch {
     debounce: Debounce,
+    /// The debounce of what is seen through the second, shorter window.
+    quick: Debounce,
     test: Test,
     enabled_s: f64,
     /// When the run of failures began.
@@ -21,7 +23,7 @@ pub struct Watch {
 
 impl Watch {
     pub fn counter(&self) -> i8 {
-        self.debounce.counter()
+        self.debounce.counter().max(self.quick.counter())
     }
 
     pub const fn test(&self) -> Test {
@@ -32,7 +34,8 @@ impl Watch {
         self.enabled_s
     }
 
-    /// Takes what the monitor says of the last `dt` seconds.
+    /// Takes what the monitor says of the last `dt` seconds. The first of the
+    /// two windows to come to a failure speaks; a pass needs both.
     pub fn update(
         &mut self,
         code: FaultCode,
@@ -40,31 +43,47 @@ impl Watch {
         at: SimTime,
         dt: f64,
         settings: &Settings,
+        quick: &Settings,
     ) -> Qualified {
         self.test = finding.test;
         if finding.test != Test::NotTested {
             self.enabled_s += dt;
         }
-        let (fail_s, pass_s, trip_s) = (settings.fail_s, settings.pass_s, settings.confirm_s);
-        let qualified = self.debounce.update(finding.test, dt, fail_s, pass_s, trip_s);
-        if finding.test == Test::Prefailed {
+        // A loose contact comes and goes; readings and a ball are given up on
+        // sooner, for a disturbance shows in them too.
+        let leak_s = if code.axis().is_some() { settings.leak_s } else { settings.pass_s };
+        let seen = |debounce: &Debounce, test: Test| match finding.gone && debounce.failed() {
+            true => Test::Prefailed,
+            false => test,
+        };
+        let (test, quick_test) =
+            (seen(&self.debounce, finding.test), seen(&self.quick, finding.quick));
+        let slow = self.debounce.update(test, dt, leak_s, settings);
+        let fast = self.quick.update(quick_test, dt, leak_s, quick);
+        if finding.test == Test::Prefailed || finding.quick == Test::Prefailed {
             self.since.get_or_insert(at);
             self.kind = finding.kind.or(self.kind);
             self.candidates = finding.rival.map(|rival| {
                 let own = Candidate { code, kind: finding.kind, weight: 1.0 - rival.weight };
                 [own, rival]
             });
-        } else if !self.debounce.suspicious() {
-            self.since = None;
-            self.kind = None;
-            self.candidates = None;
+        } else if !self.suspicious() {
+            (self.since, self.kind, self.candidates) = (None, None, None);
         }
-        qualified
+        match slow.max(fast) {
+            Qualified::Passed if self.suspicious() || slow != Qualified::Passed => Qualified::No,
+            qualified => qualified,
+        }
+    }
+
+    fn suspicious(&self) -> bool {
+        self.debounce.suspicious() || self.quick.suspicious()
     }
 
     /// Another cause accounts for what was seen: the suspicion is taken back.
     pub fn exonerate(&mut self) {
         self.debounce.exonerate();
+        self.quick.exonerate();
         (self.since, self.kind, self.candidates) = (None, None, None);
     }
 

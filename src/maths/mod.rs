@@ -17,6 +17,6 @@ pub use rosenbrock::{RODAS3, RODAS4, Rosenbrock};
 pub use runge_kutta::{
     DOPRI5, EULER, Estimated, MIDPOINT, RK4, RungeKutta, dopri5, semi_implicit_euler,
 };
-pub use sliding_quadratic::{Fit, Path, SlidingQuadratic};
+pub use sliding_quadratic::{Fit, SlidingQuadratic, window_for};
 pub use statistics::{median, quantile, robust_deviation};
 pub use system::{Stiff, System};

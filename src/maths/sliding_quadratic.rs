@@ -23,6 +23,14 @@ struct Point {
     predicted: f64,
 }
 
+/// The window, s, over which readings `period_s` apart with standard deviation
+/// `noise` give an acceleration known to `error`: the formula above for many
+/// readings, σ_a = σ·√(720·T)/W^(5/2), solved for W.
+#[must_use]
+pub fn window_for(noise: f64, period_s: f64, error: f64) -> f64 {
+    (noise * (720.0 * period_s).sqrt() / error).powf(0.4)
+}
+
 /// Sums over the window of powers of u = t − origin.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sums {
@@ -200,6 +208,19 @@ mod tests {
             let found = fit.acceleration_error / fit.scatter * 1e-4;
             assert!((found / factor - 1.0).abs() < 5e-3, "N = {n}: {found} against {factor}");
         }
+    }
+
+    /// The window asked for gives the error asked for, up to the part of a
+    /// reading that it cuts off: 5/2 of it, here 2.5 %.
+    #[test]
+    fn validate_the_window_for_an_error() {
+        let (noise, period_s, error) = (5e-4, 0.004, 0.008);
+        let window_s = window_for(noise, period_s, error);
+        let n = (window_s / period_s) as usize;
+        assert!(n > 90, "{n}");
+        let fit = filled(n, period_s, 10.0, |t| (t * 1e4).sin()).fit().unwrap();
+        let found = fit.acceleration_error / fit.scatter * noise;
+        assert!((found / error - 1.0).abs() < 0.03, "{found} against {error} with {n}");
     }
 
     #[test]

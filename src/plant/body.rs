@@ -159,11 +159,41 @@ impl Plate {
             PlateShape::Round { diameter_m } => diameter_m / 2.0 - x_m.hypot(y_m),
         }
     }
+
+    /// The axis across whose edge, and no other, the point (x, y) is within
+    /// `room_m`. None on a disc, whose edge lies across both axes at once.
+    #[must_use]
+    pub fn edge_axis(&self, x_m: f64, y_m: f64, room_m: f64) -> Option<Axis> {
+        let PlateShape::Rectangle { length_m, width_m } = self.shape else { return None };
+        let (at_x, at_y) =
+            (length_m / 2.0 - x_m.abs() < room_m, width_m / 2.0 - y_m.abs() < room_m);
+        match (at_x, at_y) {
+            (true, false) => Some(Axis::X),
+            (false, true) => Some(Axis::Y),
+            _ => None,
+        }
+    }
 }
 
 impl Default for Plate {
     /// The chapter's plate: 0.38 × 0.24 × 0.02 m, with a rim.
     fn default() -> Self {
         Self::CHAPTER
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_edge_lies_across_one_axis_but_in_a_corner_and_on_a_disc() {
+        let plate = Plate::CHAPTER;
+        assert_eq!(plate.edge_axis(0.18, 0.0, 0.02), Some(Axis::X));
+        assert_eq!(plate.edge_axis(0.0, -0.11, 0.02), Some(Axis::Y));
+        assert_eq!(plate.edge_axis(0.18, 0.11, 0.02), None);
+        assert_eq!(plate.edge_axis(0.1, 0.0, 0.02), None);
+        let disc = Plate::new(PlateShape::Round { diameter_m: 0.3 }, 0.02, true).unwrap();
+        assert_eq!(disc.edge_axis(0.14, 0.0, 0.02), None);
     }
 }

@@ -163,7 +163,9 @@ impl Ladder {
         } else {
             Rung::Planar
         };
-        if needed >= fidelity.rung {
+        // A ball that grips again rolls at once: friction on the slip that the
+        // observed velocity only seems to show would be all noise.
+        if needed >= fidelity.rung || fidelity.rung == Rung::Sliding {
             (fidelity.rung, fidelity.calm_s) = (needed, 0.0);
         } else {
             fidelity.calm_s += h;
@@ -222,11 +224,13 @@ impl Ladder {
         let before = self.sliding.body.slip(&at.velocity, &at.spin);
         let after = self.sliding.body.slip(&velocity, &spin);
         let mut to = spin;
+        // Rolling as the ball is observed to move: one that does not follow the
+        // predicted impulse would else seem to slip in every step to come.
         if before[0] * after[0] < 0.0 {
-            to.y = velocity.x / self.radius;
+            to.y = at.velocity.x / self.radius;
         }
         if before[1] * after[1] < 0.0 {
-            to.x = -velocity.y / self.radius;
+            to.x = -at.velocity.y / self.radius;
         }
         to
     }
