@@ -265,7 +265,8 @@ impl<D: Drive + Clone> Search<'_, D> {
         let error = refining.compare(path, steps);
         let pace = pace_name(&configuration);
         let onset = if method == Method::ContactStep { self.onset_error() } else { 0.0 };
-        let error = error? + onset;
+        // Two runs that nothing backs up yet tell no error.
+        let error = error.filter(|error| error.is_finite())? + onset;
         if error <= self.tolerance * PAIR_SHARE {
             self.note(model, method, Some(error), format!("{pace} meets it"));
             return Some((configuration, error));
