@@ -60,6 +60,11 @@ fn positions(
     path
 }
 
+fn apart(a: &[Vector2<f64>], b: &[Vector2<f64>]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(b).map(|(p, q)| (p - q).norm()).fold(0.0, f64::max)
+}
+
 /// The worst distance from `truth`.
 fn error(scene: &(Scene, Laws), configuration: &Configuration, truth: &Track) -> f64 {
     let path = positions(scene, configuration, truth[1].0);
@@ -133,6 +138,25 @@ fn validate_creeping_against_the_compliant_model() {
     }
 }
 
+/// On a plate that swings far about both axes, and so turns about its normal,
+/// what the contact gives shows in every term of the motion; what is left goes
+/// with the square of what it gives.
+#[test]
+fn validate_creeping_on_a_plate_that_turns_about_its_normal() {
+    let sine = |frequency, phase| Law::new(&[Term::Sine { amplitude: 0.3, frequency, phase }]);
+    let laws = Laws::new(sine(1.1, 0.9), sine(0.8, 1.6), Vec::new());
+    let off = [1.0, 0.5].map(|part| {
+        let contact = Contact::new(8e5 / part, 1000.0, 0.6, 1e-4 * part).unwrap();
+        let scene = (on_the_chapters_plate(contact, 1.0), laws.clone());
+        let run = |model, method, tolerance| {
+            positions(&scene, &configuration(model, method, Pace::Tolerance(tolerance)), 0.01)
+        };
+        let truth = run(Model::Compliant, Method::Rodas4, 1e-10);
+        apart(&run(Model::Creeping, Method::Dopri5, 1e-9), &truth)
+    });
+    assert!(off[0] < 1e-7 && off[1] < off[0] / 3.5, "{off:?}");
+}
+
 #[test]
 fn validate_the_choice_on_every_scene() {
     for name in SCENES {
@@ -159,8 +183,7 @@ fn validate_the_choice_on_a_gentle_plate() {
         assert_eq!(chosen.model(), Model::Planar, "{amplitude} rad, {frequency} Hz");
         let tight = configuration(Model::Compliant, Method::Rodas4, Pace::Tolerance(1e-9));
         let truth = positions(&scene, &tight, 0.01);
-        let path = positions(&scene, &chosen, 0.01);
-        let off = path.iter().zip(&truth).map(|(p, q)| (p - q).norm()).fold(0.0, f64::max);
+        let off = apart(&positions(&scene, &chosen, 0.01), &truth);
         assert!(off <= 1e-3, "{amplitude} rad, {frequency} Hz: {off:e} m");
     }
 }
@@ -219,25 +242,19 @@ impl Dice {
 }
 
 /// Whatever the plate does, what is chosen is as near as was asked, with RODAS
-/// at 1e-9 m for the truth. In 2000 choices on 400 such scenes fewer than one
-/// in a hundred were not, nearly all on soft plates that the ball leaves; so
-/// one of these 120 may be off, by ten times at most.
+/// at 1e-10 m for the truth. Of 20 000 choices on 4000 such scenes all that
+/// were made were; two were declined, where runs of RODAS hardly agree to 1e-6 m.
 #[test]
 fn validate_the_choice_on_scenes_at_random() {
-    let (mut dice, mut missed) = (Dice(0x9E37_79B9_7F4A_7C15), Vec::new());
+    let mut dice = Dice(0x9E37_79B9_7F4A_7C15);
     for _ in 0..40 {
         let scene = dice.scene();
-        let tight = configuration(Model::Compliant, Method::Rodas4, Pace::Tolerance(1e-9));
+        let tight = configuration(Model::Compliant, Method::Rodas4, Pace::Tolerance(1e-10));
         let truth = positions(&scene, &tight, 0.01);
-        for tolerance in [1e-2, 1e-3, 1e-4] {
+        for tolerance in [1e-2, 1e-3, 1e-4, 1e-5, 1e-6] {
             let chosen = choose(&scene.0, &scene.1, tolerance).unwrap().configuration;
-            let path = positions(&scene, &chosen, 0.01);
-            let off = path.iter().zip(&truth).map(|(p, q)| (p - q).norm()).fold(0.0, f64::max);
-            assert!(off <= 10.0 * tolerance, "{chosen:?} is off by {off:e} m at {tolerance:e}");
-            if off > tolerance {
-                missed.push((chosen, tolerance, off));
-            }
+            let off = apart(&positions(&scene, &chosen, 0.01), &truth);
+            assert!(off <= tolerance, "{chosen:?} is off by {off:e} m at {tolerance:e}");
         }
     }
-    assert!(missed.len() <= 1, "{missed:?}");
 }

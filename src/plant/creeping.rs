@@ -98,10 +98,27 @@ impl Creeping {
         let (grip, rolled) = self.rolling.grip_and_rate(y, plate);
         let give = self.give(&grip, plate);
         let v = [y[2] + give.velocity[0], y[3] + give.velocity[1]];
-        let share = 1.0 / (1.0 + self.kappa);
+        let yielded = self.yielded(&give, plate);
+        let rates = [rolled[2] + yielded[0], rolled[3] + yielded[1], rolled[4] + yielded[2]];
+        ([v[0], v[1], rates[0], rates[1], rates[2]], grip)
+    }
+
+    /// What the rates of (Ux, Uy, wz) differ by from those of a ball that
+    /// gives nothing: v and w are not those of U, and the ball lies deeper.
+    #[inline]
+    fn yielded(&self, give: &Give, plate: &PlateMotion) -> [f64; 3] {
+        let (omega, alpha) = (&plate.omega, &plate.alpha);
+        let (share, sag, [x, y]) = (1.0 / (1.0 + self.kappa), give.sag, give.velocity);
+        // Of r·w, turned by a quarter.
+        let [turn_x, turn_y] = [x + give.slip[0], y + give.slip[1]];
         // α×p acts at the sagged height; twice that comes back from d(Ω·δ)/dt.
-        let euler = [-plate.alpha.y * give.sag * share, plate.alpha.x * give.sag * share];
-        ([v[0], v[1], rolled[2] + euler[0], rolled[3] + euler[1], rolled[4]], grip)
+        let sunk_x = sag * (omega.x * omega.z - alpha.y);
+        let sunk_y = sag * (omega.y * omega.z + alpha.x);
+        [
+            share * (sunk_x + omega.z * (2.0 * y + self.kappa * turn_y)),
+            share * (sunk_y - omega.z * (2.0 * x + self.kappa * turn_x)),
+            -(omega.x * turn_x + omega.y * turn_y) / self.body.arm_m(),
+        ]
     }
 
     /// The state for a ball that moves as `from`: what is left when its slip

@@ -15,6 +15,7 @@
 
 use nalgebra::{Vector2, Vector3};
 
+use super::contact::Motion;
 use super::tilt::PlateMotion;
 use super::{Ball, Plate};
 use crate::maths::{MIDPOINT, RK4, System};
@@ -86,6 +87,23 @@ impl Rolling {
     pub fn rate(&self, y: &[f64; 5], plate: &PlateMotion) -> [f64; 5] {
         let (a, _, spin) = self.forced(y, plate);
         [y[2], y[3], a[0], a[1], spin]
+    }
+
+    /// The state of a ball that moves as `from`, whatever slips.
+    #[must_use]
+    pub fn enter(&self, from: &Motion) -> [f64; 5] {
+        let (p, v) = (&from.position, &from.velocity);
+        [p.x, p.y, v.x, v.y, from.spin.z]
+    }
+
+    /// The ball's motion in the state `y`.
+    #[must_use]
+    pub fn leave(&self, y: &[f64; 5]) -> Motion {
+        Motion {
+            position: Vector3::new(y[0], y[1], self.centre_gap),
+            velocity: Vector3::new(y[2], y[3], 0.0),
+            spin: Vector3::new(-y[3] / self.radius, y[2] / self.radius, y[4]),
+        }
     }
 
     /// Acceleration along x and y, that of the free ball, and the rate of the

@@ -30,21 +30,13 @@ const LEAST_PHASE_S: f64 = 1e-8;
 pub(super) struct Sequence {
     pub phase: Option<Phase>,
     pub events: Vec<Event>,
-    /// Normal speeds of all landings, added up, m/s.
-    pub landing_m_s: f64,
     since_s: f64,
     changes: u32,
 }
 
 impl Sequence {
     pub(super) const fn new() -> Self {
-        Self {
-            phase: None,
-            events: Vec::new(),
-            landing_m_s: 0.0,
-            since_s: f64::NEG_INFINITY,
-            changes: 0,
-        }
+        Self { phase: None, events: Vec::new(), since_s: f64::NEG_INFINITY, changes: 0 }
     }
 
     /// Runs one piece of the drive.
@@ -95,7 +87,6 @@ impl Sequence {
         let (phase, motion) =
             rung.model.enter(&Motion::from_row(&course.y), &rung.plate.at(course.t));
         let phase = if fallen { Phase::Fallen } else { phase };
-        self.landing_m_s += (motion.velocity.z - course.y[5]).max(0.0);
         course.y = motion.to_row();
         let before = self.phase.map(|phase| phase.name());
         if before != Some(phase.name()) && self.events.len() < MOST_EVENTS {

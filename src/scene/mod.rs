@@ -4,13 +4,14 @@
 //! One idea: a run is a model, a method and a pace, all data; the loops below
 //! know none of them by name. Knows no files, no clock, no faults.
 
+mod candidates;
 mod configuration;
 mod controlled;
 mod drive;
 mod events;
 mod ladder;
 mod law;
-mod refining;
+mod reference;
 mod run;
 mod rungs;
 mod samples;

@@ -5,7 +5,7 @@ use nalgebra::Vector2;
 use super::configuration::{Configuration, Method, Model, Pace, SHORTEST_STEP_S};
 use super::drive::{Drive, Seen};
 use super::events::{Event, Sequence};
-use super::rungs::{OnCompliant, OnCreeping, OnRolling, OnSliding, Rung};
+use super::rungs::{OnCompliant, OnRolling, OnSliding, Rolls, Rung};
 use super::samples::Samples;
 use super::stepping::{Budget, Course, Failure, MOST_STEPS, Tally, Unwatched, Watch, whole_steps};
 use super::{Scene, Subject};
@@ -13,7 +13,7 @@ use crate::maths::{
     DOPRI5, EULER, MIDPOINT, RK4, RODAS3, RODAS4, StepControl, dopri5, semi_implicit_euler,
 };
 use crate::plant::{
-    Compliant, ContactStep, Creeping, Motion, Phase, Planar, Rolling, RollingState, Sliding,
+    Ball, Compliant, ContactStep, Creeping, Motion, Phase, Planar, Rolling, RollingState, Sliding,
 };
 use crate::vocabulary::Invalid;
 
@@ -24,8 +24,6 @@ pub struct Outcome {
     pub tally: Tally,
     /// Rolls, slips, flies, falls: the sliding model tells.
     pub events: Vec<Event>,
-    /// Normal speeds of all landings of the sliding model, added up, m/s.
-    pub landing_m_s: f64,
 }
 
 /// Runs `scene` under `drive` as `configuration` says, sampling into `samples`.
@@ -50,11 +48,13 @@ pub(super) fn run_within<D: Drive>(
     configuration: &Configuration,
     samples: Option<&mut Samples<'_>>,
 ) -> Result<Outcome, Failure> {
-    let stage = Stage { most_steps, ..Stage::new(scene, configuration) };
+    let stage = Stage::new(most_steps, scene, configuration);
     match configuration.model() {
         Model::Planar => stage.planar(drive, samples),
-        Model::Rolling => stage.rolling(drive, samples, &mut Unwatched),
-        Model::Creeping => stage.creeping(drive, samples, &mut Unwatched),
+        Model::Rolling => stage.rolling(|ball| scene.rolling(ball), drive, samples, &mut Unwatched),
+        Model::Creeping => {
+            stage.rolling(|ball| scene.creeping(ball), drive, samples, &mut Unwatched)
+        }
         Model::Sliding => stage.sliding(drive, samples, &mut Unwatched),
         Model::Compliant => stage.compliant(drive, samples, &mut Unwatched),
     }
@@ -75,7 +75,7 @@ pub fn suits(scene: &Scene, model: Model) -> Result<(), Invalid> {
 
 /// Longest step of an adaptive method as a part of the plate's shortest time:
 /// longer ones step over what the plate does without seeing it.
-const LONGEST_PART: f64 = 0.2;
+pub(super) const LONGEST_PART: f64 = 0.2;
 
 /// First step of a stiff method, s: the contact may have to settle. The
 /// explicit one tries its longest and finds out.
@@ -94,9 +94,9 @@ pub(super) struct Stage<'a> {
 }
 
 impl<'a> Stage<'a> {
-    pub(super) fn new(scene: &'a Scene, configuration: &Configuration) -> Self {
+    pub(super) fn new(most_steps: u64, scene: &'a Scene, configuration: &Configuration) -> Self {
         let (method, pace) = (configuration.method(), configuration.pace());
-        Self { scene, method, pace, most_steps: MOST_STEPS }
+        Self { scene, method, pace, most_steps }
     }
 
     fn course<'s, 'b, const N: usize>(
@@ -162,9 +162,7 @@ impl<'a> Stage<'a> {
         let (Subject::Ball(ball), Pace::Step(h)) = (&self.scene.subject, self.pace) else {
             return Err(Failure::NotFinite { at_s: 0.0 });
         };
-        let model = Planar::new(ball, &self.scene.plate);
-        let height = self.scene.body().rest_height_m();
-        let radius = ball.radius_m();
+        let (model, rolling) = (Planar::new(ball, &self.scene.plate), self.scene.rolling(ball));
         let start = RollingState {
             position: self.scene.initial.position.xy(),
             velocity: self.scene.initial.velocity.xy(),
@@ -173,68 +171,41 @@ impl<'a> Stage<'a> {
         drive.begin(0.0, &self.scene.initial);
         let xi = model.enter(&start, &drive.tilt(0.0));
         let motion = |drive: &D, t: f64, y: &[f64; 4]| {
-            let state = model.leave(&xi_of(y), &drive.tilt(t));
-            rolled(&state, height, radius)
+            rolling.leave(&model.leave(&xi_of(y), &drive.tilt(t)).to_row())
         };
         let mut course = self.course(row_of(&xi), samples);
         let end = self.pieces(drive, &mut course, motion, |drive, course, until| {
             planar_piece(&model, drive, course, until, h, |t, y| motion(drive, t, y))
         })?;
-        Ok(Outcome { end, tally: course.tally, events: Vec::new(), landing_m_s: 0.0 })
+        Ok(Outcome { end, tally: course.tally, events: Vec::new() })
     }
 
-    pub(super) fn rolling<D: Drive, W>(
+    /// The rolling or the creeping ball.
+    pub(super) fn rolling<D: Drive, M: Rolls, W>(
         &self,
+        model: impl Fn(&Ball) -> M,
         drive: &mut D,
         samples: Option<&mut Samples<'_>>,
         watch: &mut W,
     ) -> Result<Outcome, Failure>
     where
-        W: for<'p> Watch<OnRolling<'p, D>, 5>,
+        W: for<'p> Watch<OnRolling<'p, M, D>, 5>,
     {
         let Subject::Ball(ball) = &self.scene.subject else {
             return Err(Failure::OutOfRange { at_s: 0.0, why: "a block does not roll" });
         };
-        let body = self.scene.body();
-        let model = Rolling::new(ball, &self.scene.plate);
-        let (p, v) = (&self.scene.initial.position, &self.scene.initial.velocity);
-        let mut course = self.course([p.x, p.y, v.x, v.y, self.scene.initial.spin.z], samples);
-        let (mut control, budget) = (self.control(drive), self.budget());
-        let motion =
-            |drive: &D, t: f64, y: &[f64; 5]| OnRolling::new(&model, &body, drive, t).motion(t, y);
-        let end = self.pieces(drive, &mut course, motion, |drive, course, until| {
-            let rung = OnRolling::new(&model, &body, drive, course.t);
-            self.explicit(&rung, course, until, (&mut control, &budget), watch)
-        })?;
-        Ok(Outcome { end, tally: course.tally, events: Vec::new(), landing_m_s: 0.0 })
-    }
-
-    pub(super) fn creeping<D: Drive, W>(
-        &self,
-        drive: &mut D,
-        samples: Option<&mut Samples<'_>>,
-        watch: &mut W,
-    ) -> Result<Outcome, Failure>
-    where
-        W: for<'p> Watch<OnCreeping<'p, D>, 5>,
-    {
-        let Subject::Ball(ball) = &self.scene.subject else {
-            return Err(Failure::OutOfRange { at_s: 0.0, why: "a block does not creep" });
-        };
-        let body = self.scene.body();
-        let model = Creeping::new(ball, &self.scene.plate, &self.scene.contact);
+        let (model, mass) = (&model(ball), ball.mass_kg());
         drive.begin(0.0, &self.scene.initial);
-        let plate = OnCreeping::new(&model, &body, drive, 0.0).plate.at(0.0);
-        let start = model.enter(&self.scene.initial, &plate);
+        let start = model.enter(&self.scene.initial, &Seen::new(drive, mass, 0.0).at(0.0));
         let mut course = self.course(start, samples);
         let (mut control, budget) = (self.control(drive), self.budget());
         let motion =
-            |drive: &D, t: f64, y: &[f64; 5]| OnCreeping::new(&model, &body, drive, t).motion(t, y);
+            |drive: &D, t: f64, y: &[f64; 5]| model.leave(y, &Seen::new(drive, mass, t).at(t));
         let end = self.pieces(drive, &mut course, motion, |drive, course, until| {
-            let rung = OnCreeping::new(&model, &body, drive, course.t);
+            let rung = OnRolling { model, plate: Seen::new(drive, mass, course.t) };
             self.explicit(&rung, course, until, (&mut control, &budget), watch)
         })?;
-        Ok(Outcome { end, tally: course.tally, events: Vec::new(), landing_m_s: 0.0 })
+        Ok(Outcome { end, tally: course.tally, events: Vec::new() })
     }
 
     pub(super) fn sliding<D: Drive, W>(
@@ -257,8 +228,7 @@ impl<'a> Stage<'a> {
             let mut rung = OnSliding { model: &model, phase: Phase::Flight, plate };
             sequence.piece(&mut rung, course, until, (&mut control, &budget), watch)
         })?;
-        let landing_m_s = sequence.landing_m_s;
-        Ok(Outcome { end, tally: course.tally, events: sequence.events, landing_m_s })
+        Ok(Outcome { end, tally: course.tally, events: sequence.events })
     }
 
     pub(super) fn compliant<D: Drive, W>(
@@ -279,7 +249,7 @@ impl<'a> Stage<'a> {
             let rung = OnCompliant { model: &model, plate };
             self.stiff(&rung, course, until, (&mut control, &budget), watch)
         })?;
-        Ok(Outcome { end, tally: course.tally, events: Vec::new(), landing_m_s: 0.0 })
+        Ok(Outcome { end, tally: course.tally, events: Vec::new() })
     }
 
     /// One piece by an explicit method.
@@ -364,15 +334,6 @@ fn row_of(xi: &[Vector2<f64>; 2]) -> [f64; 4] {
     [xi[0].x, xi[0].y, xi[1].x, xi[1].y]
 }
 
-fn rolled(state: &RollingState, height: f64, radius: f64) -> Motion {
-    let v = state.velocity;
-    Motion {
-        position: state.position.push(height),
-        velocity: v.push(0.0),
-        spin: nalgebra::Vector3::new(-v.y / radius, v.x / radius, state.spin),
-    }
-}
-
 /// Fixed steps of at most `h`, each with the angle of its middle held.
 fn planar_piece<D: Drive>(
     model: &Planar,
@@ -407,6 +368,14 @@ fn planar_piece<D: Drive>(
 
 /// The models that a scene asks for.
 impl Scene {
+    pub(super) fn rolling(&self, ball: &Ball) -> Rolling {
+        Rolling::new(ball, &self.plate)
+    }
+
+    pub(super) fn creeping(&self, ball: &Ball) -> Creeping {
+        Creeping::new(ball, &self.plate, &self.contact)
+    }
+
     /// The compliant model of the scene, faithful to the chapter's S-function.
     #[must_use]
     pub fn compliant(&self) -> Compliant {

@@ -2,9 +2,7 @@
 
 use super::drive::{Drive, Seen};
 use crate::maths::{Stiff, System};
-use crate::plant::{Body, Compliant, Creeping, Motion, Phase, Rolling, Sliding};
-
-use nalgebra::Vector3;
+use crate::plant::{Compliant, Creeping, Motion, Phase, PlateMotion, Rolling, Sliding};
 
 /// A model on its plate: a system whose states stand for a motion.
 pub(super) trait Rung<const N: usize>: System<N> {
@@ -14,25 +12,52 @@ pub(super) trait Rung<const N: usize>: System<N> {
     fn motion(&self, t: f64, y: &[f64; N]) -> Motion;
 }
 
-pub(super) struct OnRolling<'a, D> {
-    pub model: &'a Rolling,
-    radius: f64,
-    height: f64,
-    pub plate: Seen<'a, D>,
+/// A model of a ball that stays on the plate and does not slip, or hardly.
+pub(super) trait Rolls {
+    /// Rates of (x, y, two rates that are its own, wz).
+    fn rate(&self, y: &[f64; 5], plate: &PlateMotion) -> [f64; 5];
+
+    fn enter(&self, from: &Motion, plate: &PlateMotion) -> [f64; 5];
+
+    fn leave(&self, y: &[f64; 5], plate: &PlateMotion) -> Motion;
 }
 
-impl<'a, D: Drive> OnRolling<'a, D> {
-    pub(super) fn new(model: &'a Rolling, body: &Body, drive: &'a D, t: f64) -> Self {
-        Self {
-            model,
-            radius: body.arm_m(),
-            height: body.rest_height_m(),
-            plate: Seen::new(drive, body.mass_kg(), t),
-        }
+impl Rolls for Rolling {
+    #[inline]
+    fn rate(&self, y: &[f64; 5], plate: &PlateMotion) -> [f64; 5] {
+        self.rate(y, plate)
+    }
+
+    fn enter(&self, from: &Motion, _: &PlateMotion) -> [f64; 5] {
+        self.enter(from)
+    }
+
+    fn leave(&self, y: &[f64; 5], _: &PlateMotion) -> Motion {
+        self.leave(y)
     }
 }
 
-impl<D: Drive> System<5> for OnRolling<'_, D> {
+impl Rolls for Creeping {
+    #[inline]
+    fn rate(&self, y: &[f64; 5], plate: &PlateMotion) -> [f64; 5] {
+        self.rate(y, plate).0
+    }
+
+    fn enter(&self, from: &Motion, plate: &PlateMotion) -> [f64; 5] {
+        self.enter(from, plate)
+    }
+
+    fn leave(&self, y: &[f64; 5], plate: &PlateMotion) -> Motion {
+        self.leave(y, plate)
+    }
+}
+
+pub(super) struct OnRolling<'a, M, D> {
+    pub model: &'a M,
+    pub plate: Seen<'a, D>,
+}
+
+impl<M: Rolls, D: Drive> System<5> for OnRolling<'_, M, D> {
     const POSITIONS: usize = 2;
 
     #[inline]
@@ -41,39 +66,7 @@ impl<D: Drive> System<5> for OnRolling<'_, D> {
     }
 }
 
-impl<D: Drive> Rung<5> for OnRolling<'_, D> {
-    const SMOOTH: bool = true;
-
-    fn motion(&self, _: f64, y: &[f64; 5]) -> Motion {
-        Motion {
-            position: Vector3::new(y[0], y[1], self.height),
-            velocity: Vector3::new(y[2], y[3], 0.0),
-            spin: Vector3::new(-y[3] / self.radius, y[2] / self.radius, y[4]),
-        }
-    }
-}
-
-pub(super) struct OnCreeping<'a, D> {
-    pub model: &'a Creeping,
-    pub plate: Seen<'a, D>,
-}
-
-impl<'a, D: Drive> OnCreeping<'a, D> {
-    pub(super) fn new(model: &'a Creeping, body: &Body, drive: &'a D, t: f64) -> Self {
-        Self { model, plate: Seen::new(drive, body.mass_kg(), t) }
-    }
-}
-
-impl<D: Drive> System<5> for OnCreeping<'_, D> {
-    const POSITIONS: usize = 2;
-
-    #[inline]
-    fn rate(&self, t: f64, y: &[f64; 5]) -> [f64; 5] {
-        self.model.rate(y, &self.plate.at(t)).0
-    }
-}
-
-impl<D: Drive> Rung<5> for OnCreeping<'_, D> {
+impl<M: Rolls, D: Drive> Rung<5> for OnRolling<'_, M, D> {
     const SMOOTH: bool = true;
 
     fn motion(&self, t: f64, y: &[f64; 5]) -> Motion {

@@ -3,7 +3,7 @@
 use super::Scene;
 use super::Subject;
 use super::drive::Drive;
-use super::rungs::{OnCreeping, OnRolling};
+use super::rungs::{OnRolling, Rolls};
 use super::stepping::{Failure, Watch};
 use crate::plant::{Ground, PlateMotion, Rolling};
 
@@ -61,21 +61,10 @@ impl StillRolls {
     }
 }
 
-impl<'p, D: Drive> Watch<OnRolling<'p, D>, 5> for StillRolls {
+impl<'p, M: Rolls, D: Drive> Watch<OnRolling<'p, M, D>, 5> for StillRolls {
     fn step(
         &mut self,
-        rung: &OnRolling<'p, D>,
-        t: [f64; 2],
-        y: [&[f64; 5]; 2],
-    ) -> Result<(), Failure> {
-        self.within(t, y, |t| rung.plate.at(t))
-    }
-}
-
-impl<'p, D: Drive> Watch<OnCreeping<'p, D>, 5> for StillRolls {
-    fn step(
-        &mut self,
-        rung: &OnCreeping<'p, D>,
+        rung: &OnRolling<'p, M, D>,
         t: [f64; 2],
         y: [&[f64; 5]; 2],
     ) -> Result<(), Failure> {

@@ -36,8 +36,6 @@ pub struct Survey {
     pub rolling_error_m: f64,
     /// Error of the creeping model, m.
     pub creeping_error_m: f64,
-    /// Depth to which the body sinks, m.
-    pub sag_m: f64,
 }
 
 impl Survey {
@@ -168,7 +166,6 @@ impl Worst {
             planar_step_s,
             rolling_error_m: rolling,
             creeping_error_m: creeping,
-            sag_m: self.sag,
         }
     }
 }
