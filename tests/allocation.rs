@@ -5,7 +5,12 @@ use std::cell::Cell;
 
 use offbd::diagnosis::FaultMemory;
 use offbd::engine::{Engine, Input, Rig, Setup};
-use offbd::plant::{Ball, Instructions, Plate, PlateColumns, RollingBatch, RollingConstants};
+use offbd::plant::{
+    Ball, Contact, Instructions, Motion, Plate, PlateColumns, RollingBatch, RollingConstants,
+};
+use offbd::scene::{
+    Configuration, Law, Laws, Method, Model, Pace, Samples, Scene, Subject, Term, run,
+};
 use offbd::vocabulary::Sample;
 
 struct Counting;
@@ -85,5 +90,40 @@ fn a_step_of_a_batch_does_not_allocate() {
         }
         assert_eq!(ALLOCATIONS.get(), ready, "{instructions}");
         assert!(ready > before, "the counter counts");
+    }
+}
+
+/// A second on a plate that swings about x and holds, then swings, about y.
+fn swinging() -> (Scene, Laws) {
+    let sine = Term::Sine { amplitude: 0.05, frequency: 0.7, phase: 0.3 };
+    let step = Term::Smoothstep { to: 0.1, start: 0.3, duration: 0.2 };
+    let laws = Laws::new(Law::new(&[sine]), Law::new(&[step, Term::Constant(0.01)]), Vec::new());
+    let ball = Subject::Ball(Ball::default());
+    (Scene::new(ball, Plate::default(), Contact::CHAPTER, 1.0).unwrap(), laws)
+}
+
+/// Every model by every method, sampled.
+#[test]
+fn a_run_of_a_scene_does_not_allocate() {
+    let before = ALLOCATIONS.get();
+    let (scene, mut laws) = swinging();
+    assert!(ALLOCATIONS.get() > before, "the counter counts");
+    for model in Model::ALL {
+        for &method in model.methods() {
+            let pace = if method.adapts() { Pace::Tolerance(1e-3) } else { Pace::Step(1e-3) };
+            let pace = match (model, method) {
+                (Model::Compliant, Method::Dopri5) => Pace::Step(1e-3),
+                _ => pace,
+            };
+            let configuration = Configuration::new(model, method, pace).unwrap();
+            let (mut sum, start) = (0.0, ALLOCATIONS.get());
+            let mut sink = |_: f64, at: &Motion| sum += at.position.x;
+            // An explicit method may blow up at such a step: so much the better.
+            let _ =
+                run(&scene, &mut laws, &configuration, Some(&mut Samples::new(0.01, &mut sink)));
+            // The sliding model keeps a list of its events: that it rolls.
+            let most = usize::from(model == Model::Sliding);
+            assert_eq!(ALLOCATIONS.get() - start, most, "{model} by {method}");
+        }
     }
 }

@@ -114,6 +114,12 @@ impl Rig {
         ServoModel::new(self.servo.angle_limit_rad, self.servo.lag_s, self.servo.rate_limit_rad_s)
     }
 
+    /// The models of this rig's ball, as near as `profile` asks for.
+    pub(super) fn ladder(&self, profile: Profile) -> Ladder {
+        let accuracy_m_s2 = Settings::of(profile).twin_accuracy_m_s2;
+        Ladder::new(&self.ball, &self.plate, self.contact.friction(), accuracy_m_s2)
+    }
+
     /// The settings of `profile` with what this rig's owner asks for.
     ///
     /// # Errors
@@ -144,9 +150,7 @@ impl Setup {
     pub fn new(rig: Rig, profile: Option<Profile>) -> Result<Self, Invalid> {
         rig.check()?;
         let settings = rig.settings(profile.unwrap_or(rig.diagnostics.profile))?;
-        let mut twin = TwinModel::new(&rig.ball, &rig.plate, nominal_axis(&rig)?);
-        let (friction, accuracy) = (rig.contact.friction(), settings.twin_accuracy_m_s2);
-        twin.ladder = Ladder::new(&rig.ball, &rig.plate, friction, accuracy);
+        let mut twin = TwinModel::new(rig.ladder(settings.profile), nominal_axis(&rig)?);
         for axis in Axis::ALL {
             let learnt = rig.calibration.as_ref().and_then(|c| c.axes[axis]);
             if let Some(learnt) = learnt {

@@ -316,6 +316,59 @@ mod tests {
         assert_eq!(fidelity.rung, Rung::Planar);
     }
 
+    /// A ball that slides on friction μ over a level plate, sent there by a
+    /// steep one.
+    fn sent_sliding(friction: f64) -> (Ladder, Fidelity, RollingState) {
+        let (ladder, _) = ladder(friction);
+        let (mut fidelity, mut ball) = (Fidelity::default(), RollingState::default());
+        carry(&ladder, &mut fidelity, &mut ball, &Tilt::constant(0.0, 1.3), 30);
+        assert_eq!(fidelity.rung, Rung::Sliding);
+        (ladder, fidelity, ball)
+    }
+
+    fn slip(fidelity: &Fidelity, ball: &RollingState) -> f64 {
+        let spin = fidelity.unseen.unwrap().spin;
+        ball.velocity.x - spin.y * Ball::default().radius_m()
+    }
+
+    /// Slip ends after s/((1 + 1/κ)·μ·g), and the sliding rung with it.
+    #[test]
+    fn validate_when_sliding_ends() {
+        let (ladder, mut fidelity, mut ball) = sent_sliding(0.2);
+        let wanted = slip(&fidelity, &ball) / (3.5 * 0.2 * GRAVITY_M_S2);
+        let mut steps = 0;
+        while fidelity.rung == Rung::Sliding {
+            carry(&ladder, &mut fidelity, &mut ball, &Tilt::default(), 1);
+            steps += 1;
+        }
+        // The rung of a step is chosen at its start.
+        let took = f64::from(steps) * H;
+        assert!((wanted..wanted + 2.0 * H).contains(&took), "{took} s, not {wanted} s");
+    }
+
+    /// What was not seen of one slide says nothing about the next.
+    #[test]
+    fn a_slide_is_forgotten() {
+        let (ladder, mut fidelity, mut ball) = sent_sliding(0.2);
+        carry(&ladder, &mut fidelity, &mut ball, &Tilt::default(), 300);
+        let mut fresh = Fidelity::default();
+        ball.velocity = -ball.velocity;
+        let steep = Tilt::constant(0.0, 1.3);
+        let a = carry(&ladder, &mut fidelity, &mut ball.clone(), &steep, 2);
+        assert_eq!(a, carry(&ladder, &mut fresh, &mut ball, &steep, 2));
+    }
+
+    /// A ball whose measured velocity does not follow the friction predicted
+    /// for it, as of one pushed along, comes back to rolling all the same.
+    #[test]
+    fn a_ball_that_is_not_slowed_rolls_again() {
+        let (ladder, mut fidelity, ball) = sent_sliding(0.6);
+        for _ in 0..200 {
+            ladder.acceleration(&mut fidelity, &ball, &Tilt::default(), H);
+        }
+        assert!(fidelity.rung < Rung::Sliding, "{}", fidelity.rung.name());
+    }
+
     /// A first-order lag of 35 ms that gets 0.2 rad at once: for a moment its
     /// acceleration would pull the plate away from under the ball.
     #[test]

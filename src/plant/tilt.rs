@@ -24,6 +24,14 @@ impl Tilt {
         Self { angle: Vector2::new(qx_rad, qy_rad), ..Self::default() }
     }
 
+    /// Each of qx and qy as its angle, rate and acceleration.
+    #[must_use]
+    #[inline]
+    pub fn of(x: [f64; 3], y: [f64; 3]) -> Self {
+        let [angle, rate, acceleration] = [0, 1, 2].map(|i| Vector2::new(x[i], y[i]));
+        Self { angle, rate, acceleration }
+    }
+
     /// The same motion as the plate frame feels it.
     #[must_use]
     #[inline]

@@ -12,7 +12,7 @@ use std::collections::VecDeque;
 
 use nalgebra::Vector2;
 
-use super::{Ball, Contact, Fidelity, Ladder, Plate, RollingState, Servo, ServoModel, Tilt};
+use super::{Fidelity, Ladder, RollingState, Servo, ServoModel, Tilt};
 use crate::vocabulary::{Axis, PerAxis, SimTime};
 
 /// Commands remembered for the dead time. At 1 kHz it holds half a second;
@@ -22,10 +22,6 @@ const COMMAND_HISTORY: usize = 512;
 /// Longest step of the twin between two samples, s: at a servo lag of 20 ms,
 /// the fastest seen, the midpoint rule is off by < 1 % of the acceleration.
 const LONGEST_STEP_S: f64 = 0.01;
-
-/// Acceleration that the twin's model may leave out unless something else is
-/// asked for, m/s²: a twentieth of the smallest limit of a learnt rig.
-pub const ACCURACY_M_S2: f64 = 0.0075;
 
 /// One axis of the twin: how the ball answers the servo that drives it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,11 +44,9 @@ pub struct TwinModel {
 }
 
 impl TwinModel {
-    /// A twin that answers as the asset file says, before anything is learnt,
-    /// with the chapter's friction and an accuracy of [`ACCURACY_M_S2`].
+    /// A twin by the models of `ladder` whose axes are alike.
     #[must_use]
-    pub fn new(ball: &Ball, plate: &Plate, axis: TwinAxis) -> Self {
-        let ladder = Ladder::new(ball, plate, Contact::CHAPTER.friction(), ACCURACY_M_S2);
+    pub fn new(ladder: Ladder, axis: TwinAxis) -> Self {
         Self { ladder, axes: PerAxis { x: axis, y: axis } }
     }
 }
@@ -235,26 +229,22 @@ impl Twin {
     fn tilt(&self) -> Tilt {
         let angle = self.plate_angle();
         let (x, y) = (&self.servos.x, &self.servos.y);
-        Tilt {
-            angle: Vector2::new(angle.y, angle.x),
-            rate: Vector2::new(y.rate, x.rate),
-            acceleration: Vector2::new(y.acceleration, x.acceleration),
-        }
+        // The x servo turns qy, the y servo qx.
+        Tilt::of([angle.y, y.rate, y.acceleration], [angle.x, x.rate, x.acceleration])
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plant::{Ball, Plate};
 
     fn twin(dead_time_s: f64, lag_s: f64) -> Twin {
         let servo = ServoModel::new(0.2, lag_s, 100.0).unwrap();
         let axis = TwinAxis { servo, dead_time_s, gain: 1.0, level_rad: 0.0 };
-        let (ball, plate) = (Ball::default(), Plate::default());
-        let mut model = TwinModel::new(&ball, &plate, axis);
         // To be held against the rolling ball, nothing may be left out.
-        model.ladder = Ladder::new(&ball, &plate, 0.6, 0.0);
-        Twin::new(model)
+        let ladder = Ladder::new(&Ball::default(), &Plate::default(), 0.6, 0.0);
+        Twin::new(TwinModel::new(ladder, axis))
     }
 
     fn at(t: f64) -> SimTime {

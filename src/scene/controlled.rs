@@ -173,11 +173,7 @@ impl Drive for Controlled {
     #[inline]
     fn tilt(&self, t: f64) -> Tilt {
         let [x, y] = self.lag.map(|lag| lag.after(t - self.since_s, self.closed.lag_s));
-        Tilt {
-            angle: Vector2::new(x[0], y[0]),
-            rate: Vector2::new(x[1], y[1]),
-            acceleration: Vector2::new(x[2], y[2]),
-        }
+        Tilt::of(x, y)
     }
 
     fn push(&self) -> Vector2<f64> {

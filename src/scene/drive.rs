@@ -56,12 +56,7 @@ impl Laws {
 impl Drive for Laws {
     #[inline]
     fn tilt(&self, t: f64) -> Tilt {
-        let (x, y) = (self.qx.at(t, self.inside), self.qy.at(t, self.inside));
-        Tilt {
-            angle: Vector2::new(x[0], y[0]),
-            rate: Vector2::new(x[1], y[1]),
-            acceleration: Vector2::new(x[2], y[2]),
-        }
+        Tilt::of(self.qx.at(t, self.inside), self.qy.at(t, self.inside))
     }
 
     fn push(&self) -> Vector2<f64> {

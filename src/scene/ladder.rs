@@ -16,7 +16,7 @@
 //! Work is counted in steps, not in time, so that the choice is the same on
 //! every machine and in every run.
 
-use super::candidates::{WORK_CONTACT_STEP, WORK_DOPRI5, candidates};
+use super::candidates::{self, METHOD_SHARE, Task, WORK_CONTACT_STEP, WORK_DOPRI5};
 use super::configuration::{Configuration, Method, Model, Pace};
 use super::drive::Drive;
 use super::reference::{Path, Reference, most_steps};
@@ -61,18 +61,10 @@ pub struct OutOfReach {
 /// Part of the tolerance that a model's own error may use up.
 const MODEL_SHARE: f64 = 0.5;
 
-/// Part of the tolerance at which Dormand–Prince runs to be compared with. Its
-/// estimates are of the fourth-order solution and add up without cancelling:
-/// the fifth-order one has never been seen to be off by more.
-const METHOD_SHARE: f64 = 0.1;
-
-/// What it is compared with: so many times that.
-const COARSER: [f64; 3] = [1000.0, 100.0, 10.0];
-
 /// Part of the tolerance by which a run may differ from the reference, with the
 /// reference's own error: between the moments of comparison it may be a little
 /// more.
-const MEASURED_SHARE: f64 = 0.95;
+const MEASURED_SHARE: f64 = 0.97;
 
 /// The angle of a plate that moves is renewed at least so many times in a scene
 /// and in the shortest time of its law.
@@ -150,9 +142,13 @@ impl<D: Drive + Clone> Search<'_, D> {
                 self.note(model, Method::Dopri5, Some(error), why);
                 continue;
             }
-            let fine = dopri5(model, self.tolerance * METHOD_SHARE)?;
-            return match self.watched(&fine) {
-                Ok(path) => self.coarsest(path, &fine, error + self.tolerance * METHOD_SHARE),
+            return match self.watched(model) {
+                Ok(path) => {
+                    let tolerance_m = self.tolerance * METHOD_SHARE;
+                    let (work, error_m) = (path.steps as f64 * WORK_DOPRI5, error + tolerance_m);
+                    let reference = Reference { path, work, tolerance_m, error_m };
+                    self.first_near(candidates::smooth(&self.task(), model), &reference)
+                }
                 Err(failure) => {
                     self.note(model, Method::Dopri5, None, failure.to_string());
                     None
@@ -162,30 +158,9 @@ impl<D: Drive + Clone> Search<'_, D> {
         None
     }
 
-    /// The longest steps that stay near the path of the `fine` ones, which is
-    /// off by `error` at most.
-    fn coarsest(
-        &mut self,
-        path: Path,
-        fine: &Configuration,
-        error: f64,
-    ) -> Option<(Configuration, f64)> {
-        let (most_steps, tolerance_m) = (path.steps, self.tolerance * METHOD_SHARE);
-        let reference = Reference { path, tolerance_m, error_m: error };
-        for coarser in COARSER {
-            let configuration = dopri5(fine.model(), tolerance_m * coarser)?;
-            let off = self.off(&configuration, &reference, most_steps);
-            if off.meets {
-                return Some((configuration, off.error_m));
-            }
-        }
-        self.note(
-            fine.model(),
-            fine.method(),
-            Some(error),
-            format!("{} meets it", pace_name(fine)),
-        );
-        Some((*fine, error))
+    fn task(&self) -> Task<'_> {
+        let time_s = self.drive.shortest_time_s();
+        Task { scene: self.scene, time_s, wanted_m: self.tolerance }
     }
 
     fn not_smooth(&self, error: f64) -> Option<String> {
@@ -202,11 +177,14 @@ impl<D: Drive + Clone> Search<'_, D> {
             .then(|| format!("friction demand up to {:.2} of μ·F_z", self.survey.demand))
     }
 
-    fn watched(&self, configuration: &Configuration) -> Result<Path, Failure> {
+    /// The path of `model`, a ball that rolls, as long as it does.
+    fn watched(&self, model: Model) -> Result<Path, Failure> {
         let (scene, mut drive) = (self.scene, self.drive.clone());
-        let stage = Stage::new(most_steps(scene, WORK_DOPRI5), scene, configuration);
+        let finest = candidates::finest(model, self.tolerance)
+            .ok_or(Failure::OutOfRange { at_s: 0.0, why: "no such run" })?;
+        let stage = Stage::new(most_steps(scene, WORK_DOPRI5), scene, &finest);
         let watch = &mut StillRolls::new(scene);
-        Path::of(scene, |samples| match configuration.model() {
+        Path::of(scene, |samples| match model {
             Model::Rolling => {
                 stage.rolling(|ball| scene.rolling(ball), &mut drive, Some(samples), watch)
             }
@@ -214,30 +192,37 @@ impl<D: Drive + Clone> Search<'_, D> {
         })
     }
 
-    /// The first candidate that the reference bears out; else the accuracy for
-    /// which there would be a reference, m.
+    /// The first candidate that the compliant model bears out; else the
+    /// accuracy for which it could, m.
     fn measured(&mut self) -> Result<(Configuration, f64), f64> {
         let reference = self.reference()?;
-        let most_steps = (reference.work() / WORK_CONTACT_STEP) as u64;
         let rolls = self.unsure_to_roll().is_none();
-        let time = self.drive.shortest_time_s();
+        let all = candidates::any(&self.task(), rolls, &reference);
+        self.first_near(all, &reference).ok_or(reference.error_m)
+    }
+
+    /// The first candidate that is near enough to the reference.
+    fn first_near(
+        &mut self,
+        candidates: Vec<(f64, Configuration)>,
+        reference: &Reference,
+    ) -> Option<(Configuration, f64)> {
         let mut steps_before = 0;
-        for (work, configuration) in candidates(self.scene, time, self.tolerance, rolls, &reference)
-        {
+        for (work, configuration) in candidates {
             let fixed = configuration.method() == Method::ContactStep;
             // The plate's own pieces are shorter than the step: the same run.
             if fixed && work <= steps_before as f64 * WORK_CONTACT_STEP {
                 continue;
             }
-            let off = self.off(&configuration, &reference, most_steps);
+            let off = self.off(&configuration, reference);
             if off.meets {
-                return Ok((configuration, off.error_m));
+                return Some((configuration, off.error_m));
             }
             if fixed {
                 steps_before = off.steps;
             }
         }
-        Err(reference.error_m)
+        None
     }
 
     fn reference(&mut self) -> Result<Reference, f64> {
@@ -254,12 +239,8 @@ impl<D: Drive + Clone> Search<'_, D> {
     }
 
     /// Runs a candidate and holds it against the reference.
-    fn off(
-        &mut self,
-        configuration: &Configuration,
-        reference: &Reference,
-        most_steps: u64,
-    ) -> Off {
+    fn off(&mut self, configuration: &Configuration, reference: &Reference) -> Off {
+        let most_steps = (reference.work / WORK_CONTACT_STEP).ceil() as u64;
         let (model, method) = (configuration.model(), configuration.method());
         match Path::run(most_steps, self.scene, &mut self.drive.clone(), configuration) {
             Ok(path) => {
@@ -283,11 +264,6 @@ struct Off {
     error_m: f64,
     steps: u64,
     meets: bool,
-}
-
-fn dopri5(model: Model, tolerance_m: f64) -> Option<Configuration> {
-    let pace = Pace::Tolerance(tolerance_m.clamp(1e-12, 1.0));
-    Configuration::new(model, Method::Dopri5, pace).ok()
 }
 
 fn pace_name(configuration: &Configuration) -> String {

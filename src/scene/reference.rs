@@ -40,8 +40,9 @@ pub(super) fn most_steps(scene: &Scene, work: f64) -> u64 {
     (MOST_WORK_PER_S * scene.duration_s.max(1.0) / work) as u64
 }
 
-/// Moments at which two runs are compared.
-const COMPARED: f64 = 200.0;
+/// Moments at which two runs are compared: a prime number, so that they do not
+/// all fall on the ends of steps, where a run is at its best.
+const COMPARED: f64 = 499.0;
 
 /// Positions of a run at the moments of comparison, and its steps.
 pub(super) struct Path {
@@ -83,8 +84,11 @@ impl Path {
 /// A path and how far it may be off.
 pub(super) struct Reference {
     pub path: Path,
+    /// What it took, ns.
+    pub work: f64,
+    /// That of its method, m.
     pub tolerance_m: f64,
-    /// How far the run before was from it, m: more than it is off itself.
+    /// More than it is off, m.
     pub error_m: f64,
 }
 
@@ -110,7 +114,9 @@ impl Reference {
             }
             match path {
                 Some(path) if nearest <= wanted_m * AGREED_SHARE => {
-                    return Ok(Self { path, tolerance_m, error_m: nearest });
+                    // The coarser run was farther from it than it is off itself.
+                    let work = WORK_RODAS4 * path.steps as f64;
+                    return Ok(Self { path, work, tolerance_m, error_m: nearest });
                 }
                 path => before = path,
             }
@@ -119,14 +125,9 @@ impl Reference {
         Err(nearest / AGREED_SHARE)
     }
 
-    /// The work that it took, ns.
-    pub(super) fn work(&self) -> f64 {
-        WORK_RODAS4 * self.path.steps as f64
-    }
-
     /// The work of RODAS at another tolerance, ns.
     pub(super) fn work_at(&self, tolerance_m: f64) -> f64 {
-        self.work() * (self.tolerance_m / tolerance_m).powf(STEPS_BY_TOLERANCE)
+        self.work * (self.tolerance_m / tolerance_m).powf(STEPS_BY_TOLERANCE)
     }
 }
 

@@ -4,6 +4,7 @@
 use nalgebra::{Matrix2, Vector2};
 
 use super::recording::{Recording, Stretch};
+use crate::diagnosis::Profile;
 use crate::engine::Rig;
 use crate::engine::frame::Moment;
 use crate::plant::{ServoModel, TwinAxis, TwinModel};
@@ -151,7 +152,7 @@ impl Fitter<'_> {
         let spec = &self.rig.servo;
         let servo = ServoModel::new(spec.angle_limit_rad, lag_s, spec.rate_limit_rad_s).ok()?;
         let axis = TwinAxis { servo, dead_time_s, gain, level_rad };
-        Some(TwinModel::new(&self.rig.ball, &self.rig.plate, axis))
+        Some(TwinModel::new(self.rig.ladder(Profile::Default), axis))
     }
 
     fn explain(&self, dead_time_s: f64, lag_s: f64) -> Option<Explained> {

@@ -147,6 +147,7 @@ fn learn_in_windows(
 mod tests {
     use super::fit::without_line;
     use super::*;
+    use crate::diagnosis::Profile;
     use crate::plant::{RollingState, ServoModel, Twin, TwinAxis, TwinModel};
     use crate::vocabulary::SimTime;
 
@@ -156,7 +157,7 @@ mod tests {
         let rig = Rig::chapter("a");
         let servo = ServoModel::new(0.2, 0.05, 100.0).unwrap();
         let axis = TwinAxis { servo, dead_time_s: 0.06, gain, level_rad: 0.01 };
-        let mut twin = Twin::new(TwinModel::new(&rig.ball, &rig.plate, axis));
+        let mut twin = Twin::new(TwinModel::new(rig.ladder(Profile::Default), axis));
         let times: Vec<f64> = (0..(seconds / 0.01) as u32).map(|i| f64::from(i) * 0.01).collect();
         // The level is compensated, as a controller would.
         let command = |w: f64, t: f64| -0.01 + amplitude * ((w * t).cos() + (2.7 * w * t).sin());
