@@ -11,7 +11,7 @@ import numpy as np
 import reference
 from scenes import chosen
 
-REPEATS = 5
+REPEATS = 3
 SHORTEST = 20_000_000  # ns that the repeats of a short run should add up to
 LONGEST = 20_000_000_000  # ns after which repeating stops early
 MOST = 1000

@@ -45,13 +45,20 @@ def tools():
     return found
 
 
+def load(path):
+    """Each engine's name with the load average when it began."""
+    return [line.split() for line in path.read_text().splitlines()]
+
+
 def main():
     """Merge the files that are given."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("-o", "--output", required=True)
+    parser.add_argument("--load", required=True, type=pathlib.Path)
     parser.add_argument("parts", nargs="+", type=pathlib.Path)
     arguments = parser.parse_args()
-    merged = {"chart": "work-precision", "machine": machine(), "versions": tools(), "records": []}
+    merged = {"chart": "work-precision", "machine": machine(), "versions": tools()}
+    merged |= {"load": load(arguments.load), "records": []}
     for part in arguments.parts:
         content = json.loads(part.read_text())
         merged["versions"] |= content["versions"]

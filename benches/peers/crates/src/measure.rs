@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::scene::{SCENES, Scene};
 
-const REPEATS: usize = 5;
+const REPEATS: usize = 3;
 /// What the repeats of a short run should add up to.
 const SHORTEST: Duration = Duration::from_millis(20);
 /// After which repeating stops early.
