@@ -62,7 +62,7 @@ fn a_scene_file_is_run_and_its_files_are_written() {
     bench.write("my.json", r#"{"name":"mine","duration_s":0.1,"qy":[{"constant_rad":0.1}]}"#);
     let done = bench.ok("scene my.json -o out --format json");
     let told = object(&done);
-    assert_eq!((&told["scene"], &told["model"]), (&"mine".into(), &"rolling".into()));
+    assert_eq!((&told["scene"], &told["model"]), (&"mine".into(), &"compliant".into()));
     assert!(told["error_m"].as_f64().unwrap() < 1e-4 && told["cpu_s"].as_f64().unwrap() > 0.0);
     exists(&bench, &["out/trajectory.csv", "out/position.svg", "out/position.png", "out/path.svg"]);
     // A 200th of the scene is shorter than 10 ms.
@@ -251,10 +251,10 @@ fn half_an_answer_is_enough() {
         ("--model compliant --step 1e-4", "compliant", "contact-step"),
         ("--model compliant --method rk4", "compliant", "rk4"),
         ("--model sliding", "sliding", "dopri5"),
-        ("--method rk4", "rolling", "rk4"),
+        ("--method rk4", "compliant", "rk4"),
         ("--method rodas3", "compliant", "rodas3"),
         ("--method zoh", "planar", "zoh"),
-        ("--step 0.002", "rolling", "rk4"),
+        ("--step 0.002", "compliant", "contact-step"),
     ] {
         let told = object(&bench.ok(&format!("scene slope {options} --format json")));
         assert_eq!((&told["model"], &told["method"]), (&model.into(), &method.into()), "{options}");
