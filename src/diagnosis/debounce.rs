@@ -8,6 +8,7 @@
 //! A silent rig is judged by time, not by counts, so the rates are per second.
 
 use super::Settings;
+use crate::vocabulary::FaultCode;
 
 /// What a monitor says of one moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -17,6 +18,37 @@ pub enum Test {
     NotTested,
     Prepassed,
     Prefailed,
+}
+
+/// How fast the counter of one monitor moves, s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pace {
+    /// Failure from zero to the upper end.
+    pub fail_s: f64,
+    /// Further failure until it counts as a trip.
+    pub confirm_s: f64,
+    /// Agreement from zero to the lower end.
+    pub pass_s: f64,
+    /// Agreement from the upper end to zero.
+    pub leak_s: f64,
+}
+
+impl Pace {
+    /// The pace of `code`'s monitor: a loose contact comes and goes; readings
+    /// and a ball are given up on sooner, for a disturbance shows in them too.
+    #[must_use]
+    pub const fn of(code: FaultCode, settings: &Settings) -> Self {
+        let Settings { fail_s, confirm_s, pass_s, .. } = *settings;
+        match code {
+            FaultCode::XServo | FaultCode::YServo => {
+                Self { fail_s, confirm_s, pass_s, leak_s: settings.leak_s }
+            }
+            FaultCode::StuckBall => Self { fail_s, confirm_s, pass_s, leak_s: pass_s },
+            FaultCode::Sensor => {
+                Self { fail_s: settings.readings_fail_s, confirm_s, pass_s, leak_s: pass_s }
+            }
+        }
+    }
 }
 
 /// What the counter came to.
@@ -70,8 +102,8 @@ impl Debounce {
 
     /// Takes `test`, which held for the `dt` seconds before this sample. A
     /// time of zero qualifies at once.
-    pub fn update(&mut self, test: Test, dt: f64, leak_s: f64, settings: &Settings) -> Qualified {
-        let Settings { fail_s, pass_s, confirm_s, .. } = *settings;
+    pub fn update(&mut self, test: Test, dt: f64, pace: &Pace) -> Qualified {
+        let Pace { fail_s, confirm_s, pass_s, leak_s } = *pace;
         let share = |full: f64| if full > 0.0 { dt / full } else { 1.0 };
         match test {
             Test::NotTested => Qualified::No,
@@ -104,9 +136,8 @@ mod tests {
     use super::*;
 
     fn run(debounce: &mut Debounce, test: Test, n: usize) -> Vec<Qualified> {
-        let settings =
-            Settings { fail_s: 0.5, pass_s: 1.0, confirm_s: 0.25, ..Settings::default() };
-        (0..n).map(|_| debounce.update(test, 0.125, 2.0, &settings)).collect()
+        let pace = Pace { fail_s: 0.5, confirm_s: 0.25, pass_s: 1.0, leak_s: 2.0 };
+        (0..n).map(|_| debounce.update(test, 0.125, &pace)).collect()
     }
 
     #[test]

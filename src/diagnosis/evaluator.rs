@@ -5,7 +5,7 @@
 //! servos. A monitor that is out of its depth is *not tested*, never *passed*.
 
 use super::stillness::Stillness;
-use super::{Answer, AxisEvidence, Candidate, Evidence, Limits, Profile, Test};
+use super::{AxisEvidence, Candidate, Evidence, Limits, Profile, Test};
 use crate::vocabulary::{Axis, FaultCode, FaultKind, PerAxis};
 
 /// The chapter's enable condition: command, rad, or measured acceleration,
@@ -41,8 +41,6 @@ const JUMP_S: f64 = 2.0;
 /// What the monitors look at besides the evidence.
 #[derive(Clone, Copy, Debug)]
 pub struct Surroundings {
-    /// Seconds since the sample judged before, s.
-    pub dt: f64,
     /// Seconds for which the ball has been clear of the edge.
     pub clear_s: f64,
     /// Whether the ball was last seen at the edge.
@@ -61,8 +59,8 @@ pub struct Surroundings {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Finding {
     pub test: Test,
-    /// The same through the second, shorter window.
-    pub quick: Test,
+    /// Evidence for a fault of this servo, nats; none where it has no say.
+    pub nats: Option<f64>,
     /// The ball has left the plate: a test that failed can have no more
     /// evidence, and needs none.
     pub gone: bool,
@@ -72,13 +70,8 @@ pub struct Finding {
 }
 
 impl Finding {
-    const NOTHING: Self = Self {
-        test: Test::NotTested,
-        quick: Test::NotTested,
-        gone: false,
-        kind: None,
-        rival: None,
-    };
+    const NOTHING: Self =
+        Self { test: Test::NotTested, nats: None, gone: false, kind: None, rival: None };
     const PASS: Self = Self { test: Test::Prepassed, ..Self::NOTHING };
 
     const fn fail(kind: Option<FaultKind>) -> Self {
@@ -91,25 +84,18 @@ impl Finding {
 pub struct Evaluator {
     profile: Profile,
     limits: PerAxis<Limits>,
-    /// How each servo has answered of late.
-    answers: PerAxis<Answer>,
 }
 
 impl Evaluator {
     #[must_use]
     pub fn new(profile: Profile, limits: PerAxis<Limits>) -> Self {
-        Self { profile, limits, answers: PerAxis::default() }
+        Self { profile, limits }
     }
 
     /// The limits in force.
     #[must_use]
     pub const fn limits(&self) -> &PerAxis<Limits> {
         &self.limits
-    }
-
-    /// Forgets what was followed over time, as after a gap.
-    pub fn restart(&mut self) {
-        self.answers = PerAxis::default();
     }
 
     /// Whether the residual of `axis` may be judged: the enable condition.
@@ -137,12 +123,11 @@ impl Evaluator {
         testable && readings.unseen_s == 0.0 && !resting
     }
 
-    /// What every monitor says, in the order of [`FaultCode::ALL`]; `quick` is
-    /// what the second, shorter window shows.
+    /// What every monitor says, in the order of [`FaultCode::ALL`].
+    #[must_use]
     pub fn evaluate(
-        &mut self,
+        &self,
         evidence: &Evidence,
-        quick: &PerAxis<AxisEvidence>,
         readings: &Stillness,
         around: &Surroundings,
     ) -> [Finding; FaultCode::COUNT] {
@@ -156,35 +141,17 @@ impl Evaluator {
             _ => stuck_ball(readings, around),
         };
         let blind = [sensor, stuck].iter().any(|f| f.test == Test::Prefailed);
-        let mut servo = |axis| match blind {
+        let servo = |axis| match blind {
             true => Finding { gone: around.over_the_edge, ..Finding::NOTHING },
-            false => self.servo(axis, &evidence.axes[axis], &quick[axis], around),
+            false => servo(&evidence.axes[axis], around),
         };
         [servo(Axis::X), servo(Axis::Y), stuck, sensor]
     }
 
-    fn servo(
-        &mut self,
-        axis: Axis,
-        e: &AxisEvidence,
-        quick: &AxisEvidence,
-        around: &Surroundings,
-    ) -> Finding {
-        let judge = |e: &AxisEvidence| match (e.enabled, e.violates()) {
-            (true, true) => Test::Prefailed,
-            // The rim may hold what a servo would not.
-            (true, false) if !around.at_edge => Test::Prepassed,
-            _ => Test::NotTested,
-        };
-        if let (true, false, Some(measured), Some(twin)) =
-            (e.enabled, around.at_edge, e.measured_m_s2, e.twin_m_s2)
-        {
-            self.answers[axis].update(measured, twin, around.dt);
-        }
-        let (test, quick) = (judge(e), judge(quick));
-        let failed = test.max(quick) == Test::Prefailed;
-        let kind = failed.then(|| self.answers[axis].kind(e.limit_m_s2)).flatten();
-        Finding { test, quick, gone: around.over_the_edge, kind, rival: None }
+    /// Scatter of the readings that is noise, m.
+    #[must_use]
+    pub fn noisy_m(&self) -> f64 {
+        (NOISY * self.limits.x.noise_m.max(self.limits.y.noise_m)).max(QUIET_M)
     }
 
     fn sensor(&self, evidence: &Evidence, readings: &Stillness, around: &Surroundings) -> Finding {
@@ -203,12 +170,23 @@ impl Evaluator {
         if readings.outliers() >= MANY_OUTLIERS {
             return Finding::fail(Some(FaultKind::Spikes));
         }
-        let noise = self.limits.x.noise_m.max(self.limits.y.noise_m);
-        if evidence.scatter_m.is_some_and(|s| s > (NOISY * noise).max(QUIET_M)) {
+        if evidence.scatter_m.is_some_and(|s| s > self.noisy_m()) {
             return Finding::fail(Some(FaultKind::Noise));
         }
         frozen(readings, around).unwrap_or(Finding::PASS)
     }
+}
+
+/// What the residual and the weighed explanations say of one servo.
+fn servo(e: &AxisEvidence, around: &Surroundings) -> Finding {
+    let test = match (e.enabled, e.violates()) {
+        (true, true) => Test::Prefailed,
+        // The rim may hold what a servo would not.
+        (true, false) if !around.at_edge => Test::Prepassed,
+        _ => Test::NotTested,
+    };
+    let kind = e.answer.and_then(|answer| answer.kind());
+    Finding { test, nats: Some(e.nats), gone: around.over_the_edge, kind, rival: None }
 }
 
 /// Whether a ball at the rim stays there although it ought to leave. A rim
@@ -277,14 +255,13 @@ mod tests {
 
     /// A ball that lies at the rim at +x while the twin goes by `twin`, m/s².
     fn at_the_rim(twin: f64, identical_s: f64) -> Test {
-        let mut evaluator = Evaluator::new(
+        let evaluator = Evaluator::new(
             Profile::Default,
             PerAxis::from_fn(|_| Limits::new(Profile::Default, None, 7.0)),
         );
         let mut readings = Stillness::default();
         readings.axes.x.identical_s = identical_s;
         let around = Surroundings {
-            dt: 0.01,
             clear_s: 0.0,
             at_edge: true,
             rim: Some(Axis::X),
@@ -301,7 +278,7 @@ mod tests {
             ..AxisEvidence::default()
         };
         x.enabled = evaluator.enabled(Axis::X, &x, 0.5, &readings, &around);
-        evaluator.servo(Axis::X, &x, &AxisEvidence::default(), &around).test
+        servo(&x, &around).test
     }
 
     #[test]

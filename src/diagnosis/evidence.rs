@@ -1,6 +1,7 @@
 //! What speaks for a fault: the numbers at one moment, and the suspicion that
 //! they lead to.
 
+use super::Answer;
 use crate::vocabulary::{Axis, FaultCode, FaultKind, PerAxis, SimTime};
 
 /// One axis at one moment. Accelerations are over the estimation window.
@@ -20,6 +21,11 @@ pub struct AxisEvidence {
     pub limit_m_s2: f64,
     /// Whether the enable condition holds: the residual may be judged.
     pub enabled: bool,
+    /// Evidence for a fault of the servo: logarithm of how much likelier the
+    /// motion is if it is broken, nats.
+    pub nats: f64,
+    /// How the servo has answered its command of late.
+    pub answer: Option<Answer>,
 }
 
 impl AxisEvidence {

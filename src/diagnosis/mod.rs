@@ -3,7 +3,6 @@
 //! Sees what was measured, what the twin predicts and what was commanded, and
 //! decides. Does not know which plant it watches, nor where samples come from.
 
-mod answer;
 mod calibration;
 mod debounce;
 mod evaluator;
@@ -11,18 +10,21 @@ mod evidence;
 mod limits;
 mod memory;
 mod outlier;
+mod scatter;
+mod servo;
 mod settings;
 mod status;
 mod stillness;
 
-pub use answer::Answer;
 pub use calibration::{AxisCalibration, Calibration};
-pub use debounce::{Debounce, Qualified, Test};
+pub use debounce::{Debounce, Pace, Qualified, Test};
 pub use evaluator::{Evaluator, Finding, Surroundings};
 pub use evidence::{AxisEvidence, Candidate, Evidence, Suspicion, Transition};
 pub use limits::Limits;
 pub use memory::{FaultMemory, FaultRecord, MemoryRules};
 pub use outlier::{Gated, OutlierGate};
+pub use scatter::Scatter;
+pub use servo::{Answer, AxisNature, Course, Servo, ServoEstimate};
 pub use settings::{Profile, Settings};
 pub use status::StatusByte;
 pub use stillness::{AxisStillness, Reading, Stillness};

@@ -45,19 +45,11 @@ impl FromStr for Profile {
     }
 }
 
-/// Windows that are judged, s: below the first what the servo's model leaves
-/// out of a step of the command looks like a fault, beyond the last the ball
-/// has crossed the plate.
-const SHORTEST_WINDOW_S: f64 = 0.25;
+/// Longest window that is judged, s: beyond it the ball has crossed the plate.
 const LONGEST_WINDOW_S: f64 = 1.0;
 
-/// Noise in the limit, as a share of its floor: little where small faults are
-/// looked for, as much again where large ones are.
-const SMALL_SHARE: f64 = 0.25;
-const LARGE_SHARE: f64 = 1.0;
-
-/// How much shorter a second window must be to be worth its while, s.
-const LEAST_GAIN_S: f64 = 0.1;
+/// Noise in the limit, as a share of its floor.
+const NOISE_SHARE: f64 = 0.25;
 
 /// How a rig is judged; immutable while a session runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,6 +67,8 @@ pub struct Settings {
     pub reorder_s: f64,
     /// Continuous failure before the test fails (pending), s.
     pub fail_s: f64,
+    /// The same for what the readings themselves show, s.
+    pub readings_fail_s: f64,
     /// Continuous agreement before the test passes, s.
     pub pass_s: f64,
     /// Agreement that takes back all the evidence against a servo, s; for the
@@ -82,6 +76,10 @@ pub struct Settings {
     pub leak_s: f64,
     /// Further failure before it counts as a trip (confirmed), s.
     pub confirm_s: f64,
+    /// Evidence by which a servo's test fails (pending), nats.
+    pub suspect_nats: f64,
+    /// Evidence that counts as a trip (confirmed), nats.
+    pub confirm_nats: f64,
     pub memory: MemoryRules,
 }
 
@@ -94,15 +92,20 @@ impl Settings {
             // A twentieth of the smallest limit that a learnt rig gets.
             twin_accuracy_m_s2: 0.0075,
             window_s: 0.5,
-            period_s: 0.0,
+            // What is judged are means over this long.
+            period_s: 0.05,
             gap_s: 0.3,
             reorder_s: 0.1,
             // A push by hand shows in the filter for one window.
             fail_s: 0.6,
+            // A push shows in no reading by itself.
+            readings_fail_s: 0.3,
             pass_s: 1.0,
             // Two hardest pushes confirm nothing unless within half a second.
             leak_s: 3.0,
             confirm_s: 0.2,
+            suspect_nats: 12.0,
+            confirm_nats: 18.0,
             memory: MemoryRules::default(),
         };
         match profile {
@@ -112,9 +115,12 @@ impl Settings {
                 period_s: 0.1,
                 twin_accuracy_m_s2: 0.0005,
                 fail_s: 0.0,
+                readings_fail_s: 0.0,
                 pass_s: 0.0,
                 leak_s: 0.0,
                 confirm_s: 0.0,
+                suspect_nats: f64::INFINITY,
+                confirm_nats: f64::INFINITY,
                 ..default
             },
         }
@@ -123,22 +129,12 @@ impl Settings {
     /// The same through the window, s, that `needed_s` says for a share of
     /// noise in the limit: one that is long enough to see small faults through
     /// the noise. Only for a learnt rig, whose noise is known.
-    #[must_use]
-    pub fn long(&self, needed_s: impl Fn(f64) -> f64) -> Self {
-        self.through(needed_s(SMALL_SHARE).clamp(self.window_s, LONGEST_WINDOW_S))
-    }
-
-    /// The same through a second window, short enough to see large faults
-    /// soon; none where noise leaves no room for it.
-    #[must_use]
-    pub fn quick(&self, needed_s: impl Fn(f64) -> f64) -> Option<Self> {
-        let window_s = needed_s(LARGE_SHARE).max(SHORTEST_WINDOW_S);
-        (self.window_s - window_s >= LEAST_GAIN_S).then(|| self.through(window_s))
-    }
-
+    ///
     /// A push shows in a filter for one window: the longer that is, the longer
     /// a failure must last.
-    fn through(&self, window_s: f64) -> Self {
+    #[must_use]
+    pub fn through(&self, needed_s: impl Fn(f64) -> f64) -> Self {
+        let window_s = needed_s(NOISE_SHARE).clamp(self.window_s, LONGEST_WINDOW_S);
         let fail_s = (self.fail_s + window_s - self.window_s).max(0.0);
         Self { window_s, fail_s, ..*self }
     }
@@ -167,17 +163,12 @@ mod tests {
     #[test]
     fn the_debounce_goes_with_the_window() {
         let given = Settings::default();
-        // Noise that asks for 0.4 s at the large share asks for 4^(2/5) of it
+        // Noise that asks for 0.4 s at the full share asks for 4^(2/5) of it
         // at a quarter.
-        let needed_s = |share: f64| 0.4 * share.powf(-0.4);
-        let long = given.long(needed_s);
-        let quick = long.quick(needed_s).unwrap();
+        let long = given.through(|share: f64| 0.4 * share.powf(-0.4));
         assert!((long.window_s - 0.4 * 4.0_f64.powf(0.4)).abs() < 1e-12);
-        assert_eq!(quick.window_s, 0.4);
-        for settings in [long, quick] {
-            assert!((settings.fail_s - settings.window_s - 0.1).abs() < 1e-12);
-        }
-        assert_eq!(given.quick(|_| 0.45), None, "noise leaves no room");
-        assert_eq!(given.long(|_| 9.0).window_s, LONGEST_WINDOW_S);
+        assert!((long.fail_s - long.window_s - 0.1).abs() < 1e-12);
+        assert_eq!(given.through(|_| 9.0).window_s, LONGEST_WINDOW_S);
+        assert_eq!(given.through(|_| 0.1).window_s, given.window_s);
     }
 }

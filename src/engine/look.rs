@@ -1,4 +1,4 @@
-//! One look at the ball: the filter of each axis over one window, and its fit.
+//! A look at the ball: the filter of each axis over one window, and its fit.
 
 use crate::diagnosis::Settings;
 use crate::maths::{Fit, SlidingQuadratic};
@@ -27,7 +27,11 @@ impl Look {
     pub(super) fn push(&mut self, axis: Axis, t: f64, measured: f64, predicted: f64, least_s: f64) {
         let window_s = self.window_s(least_s);
         self.windows[axis].push(t, measured, predicted, window_s);
-        self.fits[axis] = self.windows[axis].fit();
+    }
+
+    /// Fits both axes to what their windows hold.
+    pub(super) fn fit(&mut self) {
+        self.fits = PerAxis::from_fn(|axis| self.windows[axis].fit());
     }
 
     /// Forgets every reading.

@@ -24,8 +24,8 @@ use admit::Admit;
 use align::Align;
 use pipeline::Pipeline;
 
-use crate::diagnosis::FaultMemory;
-use crate::vocabulary::{FaultCode, Sample};
+use crate::diagnosis::{FaultMemory, ServoEstimate};
+use crate::vocabulary::{FaultCode, PerAxis, Sample};
 
 /// One rig's pipeline for the length of one session (one operation cycle).
 #[derive(Clone, Debug)]
@@ -111,6 +111,13 @@ impl Engine {
                 outputs.push(watch::transition(code, at, evidence, &self.memory));
             }
         }
+    }
+
+    /// How each servo has answered over this session; none where too little of
+    /// it was seen.
+    #[must_use]
+    pub fn servo_estimates(&self) -> PerAxis<Option<ServoEstimate>> {
+        self.pipeline.servo_estimates()
     }
 
     /// Where the engine stands after the last judged sample.

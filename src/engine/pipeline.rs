@@ -10,11 +10,11 @@ use super::look::Look;
 use super::watch::Watch;
 use super::{MonitorState, Output, Readiness, Setup, State};
 use crate::diagnosis::{
-    AxisEvidence, Evaluator, Evidence, FaultMemory, Finding, Gated, Limits, OutlierGate, Profile,
-    Qualified, Reading, Settings, Stillness, Surroundings, Test,
+    AxisEvidence, AxisNature, Course, Evaluator, Evidence, FaultMemory, Finding, Gated, Limits,
+    OutlierGate, Profile, Qualified, Reading, Scatter, Servo, ServoEstimate, Settings, Stillness,
+    Surroundings, Test,
 };
-use crate::maths::Fit;
-use crate::plant::{RollingState, Twin};
+use crate::plant::{RollingState, Twin, TwinMotion};
 use crate::vocabulary::{Axis, FaultCode, PerAxis, Sample, SimTime};
 
 /// Samples that a window holds at least: a filter over fewer is all noise.
@@ -35,6 +35,14 @@ const REBASE_M: f64 = 1.0;
 /// A ball at rest seems to move by less than this many noise deviations.
 const STILL_FACTOR: f64 = 6.0;
 
+/// What one reading may add to the scatter, in limits of it.
+const SCATTER_LIMITS: f64 = 2.0;
+/// Stillness after which a ball counts as at rest, s.
+const RESTING_S: f64 = 0.25;
+/// Longer than any healthy sensor repeats itself, s: three of the slowest
+/// refreshes seen on a moving ball.
+const REPEATED_S: f64 = 0.12;
+
 /// The stages' state.
 #[derive(Clone, Debug)]
 pub struct Pipeline {
@@ -44,11 +52,9 @@ pub struct Pipeline {
     now: Option<SimTime>,
     period_s: Option<f64>,
     gate: OutlierGate,
-    /// Through the long window, by which small faults are found.
-    long: Look,
-    /// Through a shorter one, by which large faults are found sooner; none
-    /// where noise leaves no room for it.
-    quick: Option<Look>,
+    look: Look,
+    scatter: PerAxis<Scatter>,
+    servos: PerAxis<Servo>,
     readings: Stillness,
     clear_s: f64,
     at_edge: bool,
@@ -76,8 +82,15 @@ impl Pipeline {
             of(Axis::X).max(of(Axis::Y))
         };
         let adapts = settings.profile == Profile::Default && rig.calibration.is_some();
-        let long = if adapts { settings.long(needed_s) } else { settings };
-        let quick = if adapts { long.quick(needed_s) } else { None };
+        let settings = if adapts { settings.through(needed_s) } else { settings };
+        let servo = |axis: Axis| {
+            let learnt = rig.calibration.as_ref().and_then(|c| c.axes[axis].as_ref());
+            Servo::new(AxisNature {
+                noise_m: limits[axis].noise_m,
+                residual_m_s2: learnt.map(|l| l.residual_m_s2),
+                breakaway_m_s2: limits[axis].breakaway_m_s2,
+            })
+        };
         Self {
             settings,
             twin: Twin::new(setup.twin),
@@ -85,8 +98,9 @@ impl Pipeline {
             now: None,
             period_s: None,
             gate: OutlierGate::default(),
-            long: Look::new(long),
-            quick: quick.map(Look::new),
+            look: Look::new(settings),
+            scatter: PerAxis::default(),
+            servos: PerAxis::from_fn(servo),
             readings: Stillness::default(),
             clear_s: 0.0,
             at_edge: false,
@@ -116,12 +130,16 @@ impl Pipeline {
         let (usable, outliers) = self.estimate(&moment, dt);
         self.locate(setup, &moment, dt);
         self.watch_readings(&moment, dt, usable, outliers);
-        let quick = self.collect_evidence(&moment, dt);
+        self.follow_servos(&moment, usable);
         self.unjudged_s += dt;
-        if self.unjudged_s >= self.settings.period_s {
-            let dt = self.unjudged_s.min(self.settings.period_s.max(dt));
+        // Time stamps in milliseconds must not make a period a sample longer.
+        if self.unjudged_s >= self.settings.period_s - 1e-3 {
+            let dt = self.unjudged_s.min(self.settings.period_s + dt);
             self.unjudged_s = 0.0;
-            let findings = self.evaluate(&quick, dt);
+            self.look.fit();
+            self.collect_evidence(&moment);
+            let around = self.surroundings();
+            let findings = self.evaluator.evaluate(&self.evidence, &self.readings, &around);
             self.remember(&moment, dt, &findings, memory, outputs);
         }
     }
@@ -158,7 +176,7 @@ impl Pipeline {
     /// Forgets the past motion; what the debounce has gathered stays.
     fn restart(&mut self) {
         self.twin.restart();
-        self.evaluator.restart();
+        self.pause_servos();
         self.readings = Stillness::default();
         self.clear_s = 0.0;
         self.rim_s = 0.0;
@@ -168,16 +186,21 @@ impl Pipeline {
 
     /// Forgets every reading.
     fn forget(&mut self) {
-        self.long.forget();
-        if let Some(look) = &mut self.quick {
-            look.forget();
+        self.look.forget();
+        self.scatter = PerAxis::default();
+        self.pause_servos();
+    }
+
+    fn pause_servos(&mut self) {
+        for axis in Axis::ALL {
+            self.servos[axis].pause();
         }
     }
 
     /// Stage: the twin follows the commands, in lockstep.
     fn step_twin(&mut self, moment: &Moment) {
         let of = |axis: Axis| {
-            let fit = self.long.fits[axis].map(|f| (f.measured.position, f.measured.velocity));
+            let fit = self.look.fits[axis].map(|f| (f.measured.position, f.measured.velocity));
             fit.unwrap_or((moment.position[axis].unwrap_or(0.0), 0.0))
         };
         let (x, y) = (of(Axis::X), of(Axis::Y));
@@ -192,10 +215,9 @@ impl Pipeline {
             let shift = self.twin.rebase(observed.position, observed.velocity);
             for (i, axis) in Axis::ALL.into_iter().enumerate() {
                 let (t, p, v) = (moment.at.seconds(), shift.position[i], shift.velocity[i]);
-                self.long.rebase(axis, t, p, v);
-                if let Some(look) = &mut self.quick {
-                    look.rebase(axis, t, p, v);
-                }
+                self.look.rebase(axis, t, p, v);
+                self.scatter[axis] = Scatter::default();
+                self.servos[axis].rebase(t, p, v);
             }
         }
     }
@@ -207,7 +229,7 @@ impl Pipeline {
         let t = moment.at.seconds();
         let (predicted, gap_s) = (self.twin.motion().position, self.gap_s());
         self.since_jump_s += dt;
-        if self.long.stale(t, gap_s) {
+        if self.look.stale(t, gap_s) {
             self.gate.restart();
             self.forget();
         }
@@ -221,20 +243,15 @@ impl Pipeline {
         }
         for (i, axis) in Axis::ALL.into_iter().enumerate() {
             if let (true, Some(position)) = (gated.usable(), moment.position[axis]) {
-                self.push(axis, t, position, predicted[i]);
+                let least_s = self.least_window_s();
+                self.look.push(axis, t, position, predicted[i], least_s);
+                let most_m = SCATTER_LIMITS * self.evaluator.noisy_m();
+                self.scatter[axis].take(t, position - predicted[i], most_m);
             }
         }
         match gated {
             Gated::Accepted { outliers } => (true, outliers),
             other => (other.usable(), 0),
-        }
-    }
-
-    fn push(&mut self, axis: Axis, t: f64, measured: f64, predicted: f64) {
-        let least_s = self.least_window_s();
-        self.long.push(axis, t, measured, predicted, least_s);
-        if let Some(look) = &mut self.quick {
-            look.push(axis, t, measured, predicted, least_s);
         }
     }
 
@@ -277,56 +294,63 @@ impl Pipeline {
         });
     }
 
-    /// Stage: residual, limit and gate of this moment. Returns those of the
-    /// second window.
-    fn collect_evidence(&mut self, moment: &Moment, dt: f64) -> PerAxis<AxisEvidence> {
-        let around = self.surroundings(dt);
-        let see = |axis: Axis, fit: Option<Fit>, window_s: f64| {
-            let mut e = self.axis_evidence(moment, axis, fit, window_s);
+    /// Stage: what the ball's answer says of each servo.
+    fn follow_servos(&mut self, moment: &Moment, usable: bool) {
+        if self.settings.profile == Profile::Textbook {
+            return;
+        }
+        let motion = *self.twin.motion();
+        for (i, axis) in Axis::ALL.into_iter().enumerate() {
+            let servo = &mut self.servos[axis];
+            match moment.position[axis] {
+                _ if self.at_edge => servo.pause(),
+                Some(_) if !answers(axis, &self.readings, &motion, &self.evaluator) => {
+                    servo.pause();
+                }
+                Some(position) if usable => {
+                    let course = Course {
+                        position_m: motion.position[i],
+                        velocity_m_s: motion.velocity[i],
+                        acceleration_m_s2: motion.acceleration[i],
+                    };
+                    servo.take(moment.at.seconds(), position, &course);
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// Stage: residual, limit and gate of this moment.
+    fn collect_evidence(&mut self, moment: &Moment) {
+        let around = self.surroundings();
+        let window_s = self.look.window_s(self.least_window_s());
+        let see = |axis: Axis| {
+            let mut e = self.axis_evidence(moment, axis, window_s);
             e.enabled = self.evaluator.enabled(axis, &e, window_s, &self.readings, &around);
             e
         };
-        let least_s = self.least_window_s();
-        let long_s = self.long.window_s(least_s);
-        let fits = &self.long.fits;
-        let evidence = Evidence {
+        let fits = &self.look.fits;
+        // A curve over a window takes a push for noise, three readings in a
+        // row a sharp bend; noise shows in both.
+        let scatter = |axis: Axis| {
+            let (curve, close) = (fits[axis]?.scatter, self.scatter[axis].deviation_m());
+            Some(close.map_or(curve, |c| c.min(curve)))
+        };
+        self.evidence = Evidence {
             at: Some(moment.at),
-            window_s: long_s,
-            axes: PerAxis::from_fn(|axis| see(axis, fits[axis], long_s)),
+            window_s,
+            axes: PerAxis::from_fn(see),
             unseen_s: self.readings.unseen_s,
             identical_s: self.readings.identical_s(),
             still_s: self.readings.still_s(),
             outliers: self.readings.outliers(),
-            scatter_m: self.scatter_m(),
+            scatter_m: Axis::ALL.into_iter().filter_map(scatter).reduce(f64::max),
         };
-        let quick = self.quick.as_ref().map_or_else(PerAxis::default, |look| {
-            let quick_s = look.window_s(least_s);
-            PerAxis::from_fn(|axis| see(axis, look.fits[axis], quick_s))
-        });
-        self.evidence = evidence;
-        quick
     }
 
-    /// Scatter of the readings, the worse of both axes, m. A fault that throws
-    /// the ball bends its path within the window; the shorter window takes less
-    /// of that for noise.
-    fn scatter_m(&self) -> Option<f64> {
-        let quick = self.quick.as_ref().map(|look| &look.fits);
-        let of = |axis: Axis| {
-            let long = self.long.fits[axis]?.scatter;
-            Some(quick.and_then(|fits| fits[axis]).map_or(long, |q| q.scatter.min(long)))
-        };
-        Axis::ALL.into_iter().filter_map(of).reduce(f64::max)
-    }
-
-    /// What `fit` over `window_s` says of `axis`, the gate aside.
-    fn axis_evidence(
-        &self,
-        moment: &Moment,
-        axis: Axis,
-        fit: Option<Fit>,
-        window_s: f64,
-    ) -> AxisEvidence {
+    /// What is seen of `axis` over `window_s`, the gate aside.
+    fn axis_evidence(&self, moment: &Moment, axis: Axis, window_s: f64) -> AxisEvidence {
+        let (fit, servo) = (self.look.fits[axis], &self.servos[axis]);
         let full = fit.filter(|f| {
             moment.position[axis].is_some()
                 && f.span_s >= FULL_WINDOW * window_s
@@ -342,12 +366,13 @@ impl Pipeline {
             twin_m_s2: twin,
             limit_m_s2: self.evaluator.limits()[axis].at(twin.unwrap_or(0.0), error),
             enabled: false,
+            nats: servo.nats(),
+            answer: (self.settings.profile == Profile::Default).then(|| servo.answer()),
         }
     }
 
-    const fn surroundings(&self, dt: f64) -> Surroundings {
+    const fn surroundings(&self) -> Surroundings {
         Surroundings {
-            dt,
             clear_s: self.clear_s,
             at_edge: self.at_edge,
             rim: self.rim,
@@ -355,20 +380,6 @@ impl Pipeline {
             over_the_edge: self.at_edge && self.open_edge,
             since_jump_s: self.since_jump_s,
         }
-    }
-
-    /// Stage: the monitors. Where only the second window shows a violation,
-    /// it is the evidence.
-    fn evaluate(&mut self, quick: &PerAxis<AxisEvidence>, dt: f64) -> [Finding; FaultCode::COUNT] {
-        let around = self.surroundings(dt);
-        let findings = self.evaluator.evaluate(&self.evidence, quick, &self.readings, &around);
-        for axis in Axis::ALL {
-            let e = &mut self.evidence.axes[axis];
-            if quick[axis].violates() && !e.violates() {
-                *e = quick[axis];
-            }
-        }
-        findings
     }
 
     /// Stage: debounce and fault memory.
@@ -381,27 +392,34 @@ impl Pipeline {
         outputs: &mut Vec<Output>,
     ) {
         let mut blamed = false;
-        let long = &self.long.settings;
-        let quick = self.quick.as_ref().map_or(long, |look| &look.settings);
         for (&code, finding) in FaultCode::ALL.iter().zip(findings) {
             let watch = &mut self.watches[code as usize];
-            // Only the servos' residual is seen through the windows.
-            let settings = if code.axis().is_some() { long } else { &self.settings };
-            let qualified = watch.update(code, finding, moment.at, dt, settings, quick);
-            watch.apply(code, qualified, settings, &self.evidence, memory, outputs);
+            let rising = code.axis().and_then(|axis| self.servos[axis].rising_since());
+            let qualified = watch.update(code, finding, moment.at, dt, &self.settings, rising);
+            watch.apply(code, qualified, &self.settings, &self.evidence, memory, outputs);
             let failed = matches!(qualified, Qualified::Failed | Qualified::Tripped);
             blamed |= failed && code.axis().is_none();
         }
         if blamed {
             // What the servos were suspected of before is accounted for.
-            self.watches[FaultCode::XServo as usize].exonerate();
-            self.watches[FaultCode::YServo as usize].exonerate();
+            for axis in Axis::ALL {
+                self.servos[axis].exonerate();
+                self.watches[FaultCode::servo(axis) as usize].exonerate();
+            }
         }
     }
 
     /// Starts the monitor of `code` again, as after a clear.
     pub fn reset_monitor(&mut self, code: FaultCode) {
         self.watches[code as usize] = Watch::default();
+        if let Some(axis) = code.axis() {
+            self.servos[axis].exonerate();
+        }
+    }
+
+    /// How each servo has answered over this session.
+    pub fn servo_estimates(&self) -> PerAxis<Option<ServoEstimate>> {
+        PerAxis::from_fn(|axis| self.servos[axis].estimate())
     }
 
     /// The evidence of the last sample.
@@ -428,7 +446,7 @@ impl Pipeline {
             }
         });
         let ghost = |a: Axis| {
-            self.long.fits[a].map_or((0.0, 0.0), |f| {
+            self.look.fits[a].map_or((0.0, 0.0), |f| {
                 let (residual, span) = (f.deviation.acceleration, f.span_s);
                 (
                     f.measured.position - residual * span * span / 2.0,
@@ -448,6 +466,18 @@ impl Pipeline {
             fidelity: *self.twin.fidelity(),
         }
     }
+}
+
+/// Whether the ball's motion along `axis` can answer its servo: not while it
+/// rests within its breakaway angle, nor while readings that stand still
+/// although the ball is asked to move leave open what does not move.
+fn answers(axis: Axis, readings: &Stillness, motion: &TwinMotion, evaluator: &Evaluator) -> bool {
+    let own = &readings.axes[axis];
+    let asked = motion.acceleration[axis as usize].abs();
+    let resting = own.still_s > RESTING_S && asked < evaluator.limits()[axis].breakaway_m_s2;
+    let pressed = Axis::ALL.into_iter().any(|a| readings.axes[a].pressed_s > 0.0);
+    let frozen = own.identical_s > REPEATED_S && own.pressed_s > 0.0;
+    !resting && !frozen && !(pressed && readings.still_s() > REPEATED_S)
 }
 
 /// Acceleration that counts as asking a ball to move on any rig, m/s²: one

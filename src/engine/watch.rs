@@ -2,8 +2,8 @@
 
 use super::Output;
 use crate::diagnosis::{
-    Candidate, Debounce, Evidence, FaultMemory, Finding, Qualified, Settings, Suspicion, Test,
-    Transition,
+    Candidate, Debounce, Evidence, FaultMemory, Finding, Pace, Qualified, Settings, Suspicion,
+    Test, Transition,
 };
 use crate::vocabulary::{FaultCode, FaultKind, SimTime};
 
@@ -11,8 +11,8 @@ use crate::vocabulary::{FaultCode, FaultKind, SimTime};
 #[derive(Clone, Debug, Default)]
 pub struct Watch {
     debounce: Debounce,
-    /// The debounce of what is seen through the second, shorter window.
-    quick: Debounce,
+    /// Evidence by weight, as a share of what makes the test fail.
+    weight: f64,
     test: Test,
     enabled_s: f64,
     /// When the run of failures began.
@@ -23,7 +23,13 @@ pub struct Watch {
 
 impl Watch {
     pub fn counter(&self) -> i8 {
-        self.debounce.counter().max(self.quick.counter())
+        // In range by construction.
+        let weighed = (127.0 * self.weight.clamp(0.0, 1.0)) as i8;
+        if self.weight > 0.0 {
+            self.debounce.counter().max(weighed)
+        } else {
+            self.debounce.counter()
+        }
     }
 
     pub const fn test(&self) -> Test {
@@ -34,8 +40,9 @@ impl Watch {
         self.enabled_s
     }
 
-    /// Takes what the monitor says of the last `dt` seconds. The first of the
-    /// two windows to come to a failure speaks; a pass needs both.
+    /// Takes what the monitor says of the last `dt` seconds. A servo fails by
+    /// time, as every monitor does, or by the weight of evidence, which has
+    /// been `rising` since a moment; a pass needs both.
     pub fn update(
         &mut self,
         code: FaultCode,
@@ -43,25 +50,22 @@ impl Watch {
         at: SimTime,
         dt: f64,
         settings: &Settings,
-        quick: &Settings,
+        rising: Option<SimTime>,
     ) -> Qualified {
         self.test = finding.test;
         if finding.test != Test::NotTested {
             self.enabled_s += dt;
         }
-        // A loose contact comes and goes; readings and a ball are given up on
-        // sooner, for a disturbance shows in them too.
-        let leak_s = if code.axis().is_some() { settings.leak_s } else { settings.pass_s };
-        let seen = |debounce: &Debounce, test: Test| match finding.gone && debounce.failed() {
+        let test = match finding.gone && self.debounce.failed() {
             true => Test::Prefailed,
-            false => test,
+            false => finding.test,
         };
-        let (test, quick_test) =
-            (seen(&self.debounce, finding.test), seen(&self.quick, finding.quick));
-        let slow = self.debounce.update(test, dt, leak_s, settings);
-        let fast = self.quick.update(quick_test, dt, leak_s, quick);
-        if finding.test == Test::Prefailed || finding.quick == Test::Prefailed {
-            self.since.get_or_insert(at);
+        let timed = self.debounce.update(test, dt, &Pace::of(code, settings));
+        let weighed = self.weigh(finding, settings);
+        if timed.max(weighed) >= Qualified::Failed || finding.test == Test::Prefailed {
+            // The deviation shows in the filter half a window after it began.
+            let filtered = at + -settings.window_s / 2.0;
+            self.since = self.since.or(rising).or(Some(filtered));
             self.kind = finding.kind.or(self.kind);
             self.candidates = finding.rival.map(|rival| {
                 let own = Candidate { code, kind: finding.kind, weight: 1.0 - rival.weight };
@@ -70,20 +74,36 @@ impl Watch {
         } else if !self.suspicious() {
             (self.since, self.kind, self.candidates) = (None, None, None);
         }
-        match slow.max(fast) {
-            Qualified::Passed if self.suspicious() || slow != Qualified::Passed => Qualified::No,
+        match timed.max(weighed) {
+            Qualified::Passed if self.weight > 0.5 => Qualified::No,
             qualified => qualified,
         }
     }
 
+    /// Evidence that does not grow any more because the ball has left the plate
+    /// counts for as much as it will ever do.
+    fn weigh(&mut self, finding: &Finding, settings: &Settings) -> Qualified {
+        let Some(nats) = finding.nats else {
+            let failed = finding.gone && self.weight >= 1.0;
+            return if failed { Qualified::Tripped } else { Qualified::No };
+        };
+        self.weight = nats / settings.suspect_nats;
+        match nats {
+            n if n >= settings.confirm_nats => Qualified::Tripped,
+            n if n >= settings.suspect_nats && finding.gone => Qualified::Tripped,
+            n if n >= settings.suspect_nats => Qualified::Failed,
+            _ => Qualified::No,
+        }
+    }
+
     fn suspicious(&self) -> bool {
-        self.debounce.suspicious() || self.quick.suspicious()
+        self.debounce.suspicious() || self.weight > 0.5
     }
 
     /// Another cause accounts for what was seen: the suspicion is taken back.
     pub fn exonerate(&mut self) {
         self.debounce.exonerate();
-        self.quick.exonerate();
+        self.weight = 0.0;
         (self.since, self.kind, self.candidates) = (None, None, None);
     }
 
@@ -107,13 +127,13 @@ impl Watch {
                 }
             }
             Qualified::Failed if failed => {}
-            Qualified::Failed => self.fail(code, settings, evidence, memory, outputs),
+            Qualified::Failed => self.fail(code, evidence, memory, outputs),
             Qualified::Tripped if failed && record.tripped_this_cycle => {}
             Qualified::Tripped => {
                 if !failed {
-                    self.fail(code, settings, evidence, memory, outputs);
+                    self.fail(code, evidence, memory, outputs);
                 }
-                if memory.trip(code, &self.suspicion(settings), &settings.memory) {
+                if memory.trip(code, &self.suspicion(), &settings.memory) {
                     self.announce(code, evidence, memory, outputs);
                 }
             }
@@ -123,21 +143,19 @@ impl Watch {
     fn fail(
         &self,
         code: FaultCode,
-        settings: &Settings,
         evidence: &Evidence,
         memory: &mut FaultMemory,
         outputs: &mut Vec<Output>,
     ) {
-        if memory.failed(code, &self.suspicion(settings), evidence) {
+        if memory.failed(code, &self.suspicion(), evidence) {
             self.announce(code, evidence, memory, outputs);
         }
     }
 
-    /// What is suspected now. The deviation shows in the filter half a window
-    /// after it began.
-    fn suspicion(&self, settings: &Settings) -> Suspicion {
+    /// What is suspected now.
+    fn suspicion(&self) -> Suspicion {
         Suspicion {
-            onset: self.since.map(|t| t + -settings.window_s / 2.0),
+            onset: self.since,
             kind: self.kind,
             candidates: self.candidates.map(|c| c.to_vec()).unwrap_or_default(),
         }

@@ -31,6 +31,8 @@ pub(super) type Stretch = Range<usize>;
 pub(super) struct Recording {
     pub(super) moments: Vec<Moment>,
     pub(super) gap_s: f64,
+    /// Median time between samples, s.
+    pub(super) period_s: f64,
 }
 
 impl Recording {
@@ -41,7 +43,7 @@ impl Recording {
         moments.dedup_by_key(|m| m.at);
         let mut steps: Vec<f64> = moments.windows(2).map(|w| w[1].at - w[0].at).collect();
         let period_s = median(&mut steps).unwrap_or(0.0);
-        let mut recording = Self { moments, gap_s: GAP_S.max(GAP_PERIODS * period_s) };
+        let mut recording = Self { moments, gap_s: GAP_S.max(GAP_PERIODS * period_s), period_s };
         recording.drop_unusable(rig);
         recording
     }

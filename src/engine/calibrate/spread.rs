@@ -18,6 +18,8 @@ pub(super) struct Healthy {
 
 /// Window of the residual, s: the one that the default profile judges by.
 const RESIDUAL_WINDOW_S: f64 = 0.5;
+/// Samples that a window holds at least, as when it is judged.
+const LEAST_SAMPLES: f64 = 8.0;
 /// Rest after which the plate's tilt counts as withstood, s.
 const REST_S: f64 = 0.5;
 /// Share of the withstood tilts that the breakaway angle covers.
@@ -36,14 +38,15 @@ pub(super) fn healthy_spread(
         let Some(model) = fitter.model(dead, lag, gain, level) else { continue };
         let path = recording.twin_path(&model, axis);
         let mut filter = SlidingQuadratic::default();
+        let window_s = RESIDUAL_WINDOW_S.max(LEAST_SAMPLES * recording.period_s);
         for (m, &z) in recording.moments.iter().zip(&path) {
             let stale = filter.newest().is_some_and(|n| m.at.seconds() - n > recording.gap_s);
             if stale {
                 filter.clear();
             }
             let Some(position) = m.position[axis] else { continue };
-            filter.push(m.at.seconds(), position, z, RESIDUAL_WINDOW_S);
-            let Some(fit) = filter.fit().filter(|f| f.span_s > 0.8 * RESIDUAL_WINDOW_S) else {
+            filter.push(m.at.seconds(), position, z, window_s);
+            let Some(fit) = filter.fit().filter(|f| f.span_s > 0.8 * window_s) else {
                 continue;
             };
             scatters.push(fit.scatter);

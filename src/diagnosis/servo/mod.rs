@@ -1,0 +1,261 @@
+//! How a servo answers: two explanations of the ball's motion along one axis,
+//! weighed against each other as readings come.
+//!
+//! One Kalman filter ([`filter`]) believes the servo healthy: offset, gain and
+//! delay are nearly those of the twin, and if not, steadily so. The other lets
+//! them be anything that a broken servo may do, and lets them change within
+//! seconds. The logarithm of the ratio of their likelihoods, added up and never
+//! let below zero, is Page's CUSUM of a composite hypothesis: for true models
+//! and white noise it passes h by chance less than once in eʰ blocks (Lorden
+//! 1971, Basseville & Nikiforov 1993, 2.2 and 5.2). Multiple models: Magill
+//! 1965; pushes as rival explanation: Willsky & Jones 1976.
+//!
+//! The open filter's parameters are the servo's effective offset, gain and
+//! delay, which say of which kind a fault is. Where a ball cannot answer - at
+//! rest within its breakaway angle, at the edge, unseen - nothing is weighed.
+
+mod block;
+mod estimate;
+mod filter;
+
+pub use block::Course;
+pub use estimate::ServoEstimate;
+
+use block::{Block, Gatherer};
+use estimate::Session;
+use filter::{Filter, PARAMETERS, Prior, Step};
+
+use crate::vocabulary::{FaultKind, SimTime};
+
+/// What a broken servo may do: ±0.3 m/s² is a horn slipped by 2.5°, a gain
+/// change of −0.7 lies between half dead and dead, 0.2 s is a servo slowed
+/// down tenfold; and it may begin within seconds.
+const OPEN: Prior = Prior { deviation: [0.3, 0.7, 0.2], memory_s: 5.0 };
+
+/// What a healthy servo of a learnt rig does: offsets within 0.15° over the
+/// plate, a gain learnt to 7 %, a delay learnt to 20 ms; all of them steady.
+const LEARNT: Prior = Prior { deviation: [0.02, 0.07, 0.02], memory_s: 100.0 };
+
+/// What is known of a servo before anything is learnt: plates 1.7° off level,
+/// gains from 0.5 to 2 and lags from 80 to 300 ms have been seen on healthy
+/// rigs. They are learnt on the way, within the first minutes.
+const UNKNOWN: Prior = Prior { deviation: [0.2, 0.4, 0.1], memory_s: 1000.0 };
+
+/// Correlation time of what the twin leaves out, s: turns a deviation over the
+/// half second in which it is learnt into a spectral density.
+const MODEL_ERROR_S: f64 = 0.5;
+/// Deviation of the model that is assumed at least, and believed at most, of
+/// the healthy residual, m/s²: friction and pushes in the healthy recording
+/// widen what is learnt.
+const LEAST_ERROR_M_S2: f64 = 0.015;
+const MOST_ERROR_M_S2: f64 = 0.025;
+/// Speed below which friction begins to hold the ball, m/s, and the time for
+/// which it then acts one way, s.
+const STICKING_M_S: f64 = 0.02;
+const STICKING_S: f64 = 0.1;
+/// Readings of a block that count as independent: sensors repeat themselves.
+const INDEPENDENT: u32 = 4;
+/// Error of a block's mean that is always assumed, m: roughness of plate and
+/// panel.
+const ROUGHNESS_M: f64 = 1.4e-4;
+
+/// Most nats that a monitor keeps: how far it may run ahead of a servo that is
+/// well again.
+const MOST_NATS: f64 = 40.0;
+
+/// What is known of an axis before the session; immutable.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisNature {
+    /// Standard deviation of a reading, m.
+    pub noise_m: f64,
+    /// Standard deviation of the healthy residual, m/s²; none if not learnt.
+    pub residual_m_s2: Option<f64>,
+    /// Acceleration that a ball at rest resists, m/s².
+    pub breakaway_m_s2: f64,
+}
+
+impl AxisNature {
+    fn prior(&self) -> Prior {
+        if self.residual_m_s2.is_some() { LEARNT } else { UNKNOWN }
+    }
+
+    /// Spectral density of what the twin leaves out at a speed, m²/s³.
+    fn density(&self, speed_m_s: f64) -> f64 {
+        let error = self.residual_m_s2.unwrap_or(MOST_ERROR_M_S2);
+        let error = error.clamp(LEAST_ERROR_M_S2, MOST_ERROR_M_S2);
+        let stuck = self.breakaway_m_s2 * (1.0 - speed_m_s / STICKING_M_S).max(0.0);
+        MODEL_ERROR_S * error * error + STICKING_S * stuck * stuck
+    }
+
+    fn variance(&self, n: u32) -> f64 {
+        self.noise_m * self.noise_m / f64::from(n.clamp(1, INDEPENDENT)) + ROUGHNESS_M * ROUGHNESS_M
+    }
+}
+
+/// The two explanations of one axis.
+#[derive(Clone, Copy, Debug)]
+pub struct Servo {
+    nature: AxisNature,
+    gatherer: Gatherer,
+    last: Option<Block>,
+    healthy: Filter,
+    open: Filter,
+    /// Evidence for a fault, nats, in [0, [`MOST_NATS`]].
+    nats: f64,
+    /// When it was last without any, s.
+    rising_since: Option<f64>,
+    session: Session,
+}
+
+impl Servo {
+    #[must_use]
+    pub fn new(nature: AxisNature) -> Self {
+        Self {
+            nature,
+            gatherer: Gatherer::default(),
+            last: None,
+            healthy: Filter::new(nature.prior()),
+            open: Filter::new(OPEN),
+            nats: 0.0,
+            rising_since: None,
+            session: Session::default(),
+        }
+    }
+
+    /// Takes a reading at `t` s and the twin's course at the same moment.
+    /// Returns whether that completed a block that could be weighed.
+    pub fn take(&mut self, t: f64, measured_m: f64, course: &Course) -> bool {
+        let Some(block) = self.gatherer.take(t, measured_m, course) else { return false };
+        let Some(last) = self.last.replace(block) else {
+            let variance = self.nature.variance(block.n);
+            self.healthy.anchor(block.deviation_m(), variance);
+            self.open.anchor(block.deviation_m(), variance);
+            return false;
+        };
+        self.weigh(&last, &block);
+        true
+    }
+
+    fn weigh(&mut self, last: &Block, block: &Block) {
+        let dt = block.t - last.t;
+        let speed = (block.measured_m - last.measured_m).abs() / dt;
+        let step = Step { dt, forcing: forcing(last, block), density: self.nature.density(speed) };
+        let (y, variance) = (block.deviation_m(), self.nature.variance(block.n));
+        self.healthy.predict(&step);
+        self.open.predict(&step);
+        let open = self.open.correct(y, variance, dt);
+        let healthy = self.healthy.correct(y, variance, dt);
+        self.nats = (self.nats + open - healthy).clamp(0.0, MOST_NATS);
+        self.rising_since = match self.nats > 0.0 {
+            true => self.rising_since.or(Some(last.t)),
+            false => None,
+        };
+        self.session.take(dt, &self.open, &OPEN);
+    }
+
+    /// Stops following the ball: it cannot answer, or was not seen. What is
+    /// known of the servo stays.
+    pub fn pause(&mut self) {
+        self.gatherer.drop();
+        self.last = None;
+    }
+
+    /// Forgets all evidence: another cause accounts for it.
+    pub fn exonerate(&mut self) {
+        self.pause();
+        self.open = Filter::new(OPEN);
+        (self.nats, self.rising_since) = (0.0, None);
+    }
+
+    /// The twin was moved by the line through `position` m at `t` with slope
+    /// `velocity` m/s.
+    pub fn rebase(&mut self, t: f64, position: f64, velocity: f64) {
+        self.gatherer.drop();
+        let Some(last) = &mut self.last else { return };
+        let at_last = position + velocity * (last.t - t);
+        last.course.position_m -= at_last;
+        last.course.velocity_m_s -= velocity;
+        self.healthy.shift(at_last, velocity);
+        self.open.shift(at_last, velocity);
+    }
+
+    /// Evidence for a fault, nats: the logarithm of how much likelier the
+    /// readings are if the servo is broken.
+    #[must_use]
+    pub const fn nats(&self) -> f64 {
+        self.nats
+    }
+
+    /// When the evidence began to gather: Page's estimate of the onset.
+    #[must_use]
+    pub fn rising_since(&self) -> Option<SimTime> {
+        self.rising_since.and_then(SimTime::new)
+    }
+
+    /// How the servo answers now, against the twin's.
+    #[must_use]
+    pub fn answer(&self) -> Answer {
+        let [offset, gain, delay] = std::array::from_fn(|k| self.open.parameter(k));
+        Answer {
+            offset_m_s2: offset.0,
+            offset_error_m_s2: offset.1.sqrt(),
+            gain: 1.0 + gain.0,
+            gain_error: gain.1.sqrt(),
+            delay_s: delay.0,
+            delay_error_s: delay.1.sqrt(),
+        }
+    }
+
+    /// How it has answered over the session; none where too little was seen.
+    #[must_use]
+    pub fn estimate(&self) -> Option<ServoEstimate> {
+        self.session.estimate()
+    }
+}
+
+/// What one unit of each parameter adds to the deviation and its rate from one
+/// block to the next: of the offset, of the twin's own acceleration, and of its
+/// rate of change.
+fn forcing(last: &Block, block: &Block) -> [[f64; 2]; PARAMETERS] {
+    let (dt, a, b) = (block.t - last.t, &last.course, &block.course);
+    let gained = b.velocity_m_s - a.velocity_m_s;
+    let moved = b.position_m - a.position_m - a.velocity_m_s * dt;
+    let bent = gained - a.acceleration_m_s2 * dt;
+    [[dt * dt / 2.0, dt], [moved, gained], [-bent, a.acceleration_m_s2 - b.acceleration_m_s2]]
+}
+
+/// A servo's effective parameters of late, with their standard errors.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Answer {
+    /// Acceleration that no command explains, m/s².
+    pub offset_m_s2: f64,
+    pub offset_error_m_s2: f64,
+    /// Share of the command that the ball answers; 1 is healthy.
+    pub gain: f64,
+    pub gain_error: f64,
+    /// Delay beyond the twin's, s.
+    pub delay_s: f64,
+    pub delay_error_s: f64,
+}
+
+impl Answer {
+    /// The kind of fault that answers like this; none where it could be several.
+    #[must_use]
+    pub fn kind(&self) -> Option<FaultKind> {
+        let knows_gain = self.gain_error < 0.25;
+        let knows_delay = self.delay_error_s < 0.1;
+        let offset = self.offset_m_s2.abs() > 2.0 * self.offset_error_m_s2.max(0.03);
+        match self.gain {
+            _ if knows_delay && self.delay_s > 0.08 && self.delay_s > 3.0 * self.delay_error_s => {
+                Some(FaultKind::Slow)
+            }
+            _ if !knows_gain => None,
+            g if g < -0.3 => Some(FaultKind::Reversed),
+            g if g <= 0.25 && offset => Some(FaultKind::Held),
+            g if g <= 0.25 => Some(FaultKind::Dead),
+            g if (0.7..1.3).contains(&g) && offset => Some(FaultKind::Offset),
+            g if !(0.85..1.15).contains(&g) => Some(FaultKind::Gain),
+            _ => None,
+        }
+    }
+}
