@@ -35,6 +35,14 @@ const NOISY: f64 = 4.0;
 /// Scatter that no sensor is blamed for, m: a tracker good to a pixel.
 const QUIET_M: f64 = 1e-3;
 
+/// Evidence against both servos at once that speaks for what they share, nats.
+const SHARED_NATS: f64 = 6.0;
+/// Evidence against both that neither ball nor sensor account for, nats: both
+/// have failed, as when their supply does.
+const BOTH_NATS: f64 = 30.0;
+/// Speed below which a ball counts as held back, m/s.
+const HELD_BACK_M_S: f64 = 0.03;
+
 /// Seconds for which a jump of the readings counts as evidence.
 const JUMP_S: f64 = 2.0;
 
@@ -73,6 +81,11 @@ impl Finding {
     const NOTHING: Self =
         Self { test: Test::NotTested, nats: None, gone: false, kind: None, rival: None };
     const PASS: Self = Self { test: Test::Prepassed, ..Self::NOTHING };
+
+    /// This finding, or the other where this one is no failure.
+    fn or(self, other: Option<Self>) -> Self {
+        if self.test == Test::Prefailed { self } else { other.unwrap_or(self) }
+    }
 
     const fn fail(kind: Option<FaultKind>) -> Self {
         Self { test: Test::Prefailed, kind, ..Self::NOTHING }
@@ -138,12 +151,12 @@ impl Evaluator {
         let sensor = self.sensor(evidence, readings, around);
         let stuck = match sensor.test {
             Test::Prefailed => Finding::default(),
-            _ => stuck_ball(readings, around),
+            _ => stuck_ball(readings, around).or(held_back(evidence, around)),
         };
         let blind = [sensor, stuck].iter().any(|f| f.test == Test::Prefailed);
         let servo = |axis| match blind {
             true => Finding { gone: around.over_the_edge, ..Finding::NOTHING },
-            false => servo(&evidence.axes[axis], around),
+            false => servo(axis, evidence, around),
         };
         [servo(Axis::X), servo(Axis::Y), stuck, sensor]
     }
@@ -177,16 +190,21 @@ impl Evaluator {
     }
 }
 
-/// What the residual and the weighed explanations say of one servo.
-fn servo(e: &AxisEvidence, around: &Surroundings) -> Finding {
+/// What the residual and the weighed explanations say of one servo. Two servos
+/// do not fail in the same second: evidence against both speaks for neither,
+/// unless nothing else accounts for it.
+fn servo(axis: Axis, evidence: &Evidence, around: &Surroundings) -> Finding {
+    let (e, other) = (&evidence.axes[axis], &evidence.axes[axis.other()]);
+    let nats = if other.nats < BOTH_NATS { (e.nats - other.nats).max(0.0) } else { e.nats };
     let test = match (e.enabled, e.violates()) {
+        (true, true) if other.violates() && e.nats.min(other.nats) < BOTH_NATS => Test::NotTested,
         (true, true) => Test::Prefailed,
         // The rim may hold what a servo would not.
         (true, false) if !around.at_edge => Test::Prepassed,
         _ => Test::NotTested,
     };
     let kind = e.answer.and_then(|answer| answer.kind());
-    Finding { test, nats: Some(e.nats), gone: around.over_the_edge, kind, rival: None }
+    Finding { test, nats: Some(nats), gone: around.over_the_edge, kind, rival: None }
 }
 
 /// Whether a ball at the rim stays there although it ought to leave. A rim
@@ -228,6 +246,15 @@ fn frozen(readings: &Stillness, around: &Surroundings) -> Option<Finding> {
     }
     let alone = |axis: Axis| dead(axis) && axes[axis.other()].identical_s < FROZEN_S / 2.0;
     Axis::ALL.into_iter().any(alone).then(|| Finding::fail(Some(FaultKind::Frozen)))
+}
+
+/// The ball hardly moves, and neither servo is answered.
+fn held_back(evidence: &Evidence, around: &Surroundings) -> Option<Finding> {
+    let PerAxis { x, y } = &evidence.axes;
+    let slow = |e: &AxisEvidence| e.velocity_m_s.is_some_and(|v| v.abs() < HELD_BACK_M_S);
+    let shared = x.nats.min(y.nats) >= SHARED_NATS && !around.at_edge;
+    (shared && slow(x) && slow(y))
+        .then(|| Finding { nats: Some(x.nats + y.nats), ..Finding::fail(None) })
 }
 
 /// The ball stands still although it is asked to move.
@@ -278,7 +305,11 @@ mod tests {
             ..AxisEvidence::default()
         };
         x.enabled = evaluator.enabled(Axis::X, &x, 0.5, &readings, &around);
-        servo(&x, &around).test
+        let evidence = Evidence {
+            axes: PerAxis { x, y: AxisEvidence::default() },
+            ..Evidence::default()
+        };
+        servo(Axis::X, &evidence, &around).test
     }
 
     #[test]

@@ -397,7 +397,12 @@ impl Pipeline {
             let rising = code.axis().and_then(|axis| self.servos[axis].rising_since());
             let qualified = watch.update(code, finding, moment.at, dt, &self.settings, rising);
             watch.apply(code, qualified, &self.settings, &self.evidence, memory, outputs);
-            let failed = matches!(qualified, Qualified::Failed | Qualified::Tripped);
+            let failed = match qualified {
+                Qualified::Tripped => true,
+                // What is weighed goes on being weighed until it is sure.
+                Qualified::Failed => finding.nats.is_none(),
+                Qualified::No | Qualified::Passed => false,
+            };
             blamed |= failed && code.axis().is_none();
         }
         if blamed {

@@ -2,8 +2,8 @@
 
 use super::Output;
 use crate::diagnosis::{
-    Candidate, Debounce, Evidence, FaultMemory, Finding, Pace, Qualified, Settings, Suspicion,
-    Test, Transition,
+    Answer, Candidate, Debounce, Evidence, FaultMemory, Finding, Pace, Qualified, Settings,
+    Suspicion, Test, Transition,
 };
 use crate::vocabulary::{FaultCode, FaultKind, SimTime};
 
@@ -18,7 +18,7 @@ pub struct Watch {
     /// When the run of failures began.
     since: Option<SimTime>,
     kind: Option<FaultKind>,
-    candidates: Option<[Candidate; 2]>,
+    rival: Option<Candidate>,
 }
 
 impl Watch {
@@ -67,12 +67,9 @@ impl Watch {
             let filtered = at + -settings.window_s / 2.0;
             self.since = self.since.or(rising).or(Some(filtered));
             self.kind = finding.kind.or(self.kind);
-            self.candidates = finding.rival.map(|rival| {
-                let own = Candidate { code, kind: finding.kind, weight: 1.0 - rival.weight };
-                [own, rival]
-            });
+            self.rival = finding.rival;
         } else if !self.suspicious() {
-            (self.since, self.kind, self.candidates) = (None, None, None);
+            (self.since, self.kind, self.rival) = (None, None, None);
         }
         match timed.max(weighed) {
             Qualified::Passed if self.weight > 0.5 => Qualified::No,
@@ -104,7 +101,7 @@ impl Watch {
     pub fn exonerate(&mut self) {
         self.debounce.exonerate();
         self.weight = 0.0;
-        (self.since, self.kind, self.candidates) = (None, None, None);
+        (self.since, self.kind, self.rival) = (None, None, None);
     }
 
     /// Tells the memory, and the world where the status byte says so.
@@ -133,7 +130,7 @@ impl Watch {
                 if !failed {
                     self.fail(code, evidence, memory, outputs);
                 }
-                if memory.trip(code, &self.suspicion(), &settings.memory) {
+                if memory.trip(code, &self.suspicion(code, evidence), &settings.memory) {
                     self.announce(code, evidence, memory, outputs);
                 }
             }
@@ -147,18 +144,22 @@ impl Watch {
         memory: &mut FaultMemory,
         outputs: &mut Vec<Output>,
     ) {
-        if memory.failed(code, &self.suspicion(), evidence) {
+        if memory.failed(code, &self.suspicion(code, evidence), evidence) {
             self.announce(code, evidence, memory, outputs);
         }
     }
 
     /// What is suspected now.
-    fn suspicion(&self) -> Suspicion {
-        Suspicion {
-            onset: self.since,
-            kind: self.kind,
-            candidates: self.candidates.map(|c| c.to_vec()).unwrap_or_default(),
-        }
+    fn suspicion(&self, code: FaultCode, evidence: &Evidence) -> Suspicion {
+        let candidates = match (self.rival, code.axis()) {
+            (Some(rival), _) => {
+                let own = Candidate { code, kind: self.kind, weight: 1.0 - rival.weight };
+                vec![own, rival]
+            }
+            (None, Some(axis)) => kinds(code, evidence.axes[axis].answer),
+            (None, None) => Vec::new(),
+        };
+        Suspicion { onset: self.since, kind: self.kind, candidates }
     }
 
     fn announce(
@@ -171,6 +172,29 @@ impl Watch {
         let Some(at) = evidence.at else { return };
         outputs.push(transition(code, at, evidence, memory));
     }
+}
+
+/// Likelihood below which a kind is not worth a candidate.
+const LEAST_LIKELIHOOD: f64 = 0.05;
+
+/// The kinds of fault that a servo's answer leaves open, the likeliest first;
+/// none where only one is left.
+fn kinds(code: FaultCode, answer: Option<Answer>) -> Vec<Candidate> {
+    let Some(answer) = answer else { return Vec::new() };
+    let mut found: Vec<Candidate> = answer
+        .kinds()
+        .filter(|&(_, weight)| weight >= LEAST_LIKELIHOOD)
+        .map(|(kind, weight)| Candidate { code, kind: Some(kind), weight })
+        .collect();
+    if found.len() < 2 {
+        return Vec::new();
+    }
+    let sum: f64 = found.iter().map(|c| c.weight).sum();
+    for candidate in &mut found {
+        candidate.weight /= sum;
+    }
+    found.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+    found
 }
 
 /// The transition that `memory` now shows for `code`.

@@ -4,10 +4,10 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::verdict::{
-    AxisEvidenceView, CandidateView, EvidenceView, candidate_view, evidence_view,
+    AnswerView, AxisEvidenceView, CandidateView, EvidenceView, candidate_view, evidence_view,
 };
 use crate::diagnosis::{
-    AxisEvidence, Candidate, Evidence, FaultMemory, FaultRecord, StatusByte, Suspicion,
+    Answer, AxisEvidence, Candidate, Evidence, FaultMemory, FaultRecord, StatusByte, Suspicion,
 };
 use crate::vocabulary::{FaultCode, FaultKind, PerAxis, SimTime, UnknownWord};
 
@@ -151,6 +151,20 @@ fn axis_evidence(view: &AxisEvidenceView) -> AxisEvidence {
         twin_m_s2: view.twin_m_s2,
         limit_m_s2: view.limit_m_s2,
         enabled: view.enabled,
+        nats: view.nats,
+        answer: view.answer.as_ref().map(answer),
+    }
+}
+
+const fn answer(view: &AnswerView) -> Answer {
+    Answer {
+        offset_m_s2: view.offset_m_s2,
+        offset_error_m_s2: view.offset_error_m_s2,
+        gain: view.gain,
+        gain_error: view.gain_error,
+        delay_s: view.delay_s,
+        delay_error_s: view.delay_error_s,
+        likelihoods: view.likelihoods,
     }
 }
 
@@ -169,7 +183,13 @@ mod tests {
                     limit_m_s2: 0.2,
                     ..AxisEvidence::default()
                 },
-                y: AxisEvidence { enabled: true, twin_m_s2: Some(0.3), ..AxisEvidence::default() },
+                y: AxisEvidence {
+                    enabled: true,
+                    twin_m_s2: Some(0.3),
+                    nats: 12.5,
+                    answer: Some(Answer { gain: 0.5, gain_error: 0.1, ..Answer::default() }),
+                    ..AxisEvidence::default()
+                },
             },
             outliers: 3,
             ..Evidence::default()

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use utoipa::ToSchema;
 
-use crate::diagnosis::{AxisEvidence, Candidate, Evidence, Transition};
+use crate::diagnosis::{Answer, AxisEvidence, Candidate, Evidence, Transition};
 use crate::engine::{Admission, Output};
 use crate::vocabulary::{Axis, FaultCode, FaultStatus};
 
@@ -84,6 +84,31 @@ pub struct AxisEvidenceView {
     pub limit_m_s2: f64,
     /// Whether the enable condition (the gate) holds.
     pub enabled: bool,
+    /// Evidence for a fault of the servo: logarithm of how much likelier the
+    /// motion is if it is broken, nats.
+    #[serde(default)]
+    pub nats: f64,
+    /// How the servo has answered its command of late; none where the profile
+    /// does not ask.
+    #[serde(default)]
+    pub answer: Option<AnswerView>,
+}
+
+/// A servo's effective parameters against the twin's, with standard errors.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize, ToSchema)]
+pub struct AnswerView {
+    /// Acceleration that no command explains, m/s².
+    pub offset_m_s2: f64,
+    pub offset_error_m_s2: f64,
+    /// Share of the command that the ball answers; 1 is healthy.
+    pub gain: f64,
+    pub gain_error: f64,
+    /// Delay beyond the twin's, s.
+    pub delay_s: f64,
+    pub delay_error_s: f64,
+    /// Likelihoods of the kinds of fault that answer like this: dead, held,
+    /// reversed, gain, offset, slow; they sum to one.
+    pub likelihoods: [f64; 6],
 }
 
 /// The last line of a verdict.
@@ -160,6 +185,20 @@ fn axis_evidence_view(axis: &AxisEvidence) -> AxisEvidenceView {
         residual_m_s2: axis.residual_m_s2(),
         limit_m_s2: axis.limit_m_s2,
         enabled: axis.enabled,
+        nats: axis.nats,
+        answer: axis.answer.as_ref().map(answer_view),
+    }
+}
+
+const fn answer_view(answer: &Answer) -> AnswerView {
+    AnswerView {
+        offset_m_s2: answer.offset_m_s2,
+        offset_error_m_s2: answer.offset_error_m_s2,
+        gain: answer.gain,
+        gain_error: answer.gain_error,
+        delay_s: answer.delay_s,
+        delay_error_s: answer.delay_error_s,
+        likelihoods: answer.likelihoods,
     }
 }
 
@@ -196,9 +235,13 @@ pub fn sentence(transition: &Transition) -> String {
     format!("{name} {}{since}: {what}", transition.status)
 }
 
+/// Standard error of a gain beyond which it is better not said.
+const SAYABLE_GAIN_ERROR: f64 = 0.3;
+
 fn servo_sentence(axis: Axis, evidence: &Evidence) -> String {
     let e = &evidence.axes[axis];
-    match (e.measured_m_s2, e.twin_m_s2) {
+    let answer = e.answer.map(|answer| answer_words(axis, &answer)).unwrap_or_default();
+    let seen = match (e.measured_m_s2, e.twin_m_s2) {
         (Some(measured), Some(twin)) => format!(
             "the ball accelerates by {measured:.2} m/s² along {} where {} asks for {twin:.2} m/s² (limit {:.2})",
             axis.as_str(),
@@ -206,7 +249,22 @@ fn servo_sentence(axis: Axis, evidence: &Evidence) -> String {
             e.limit_m_s2,
         ),
         _ => format!("the ball's acceleration along {} is not testable now", axis.as_str()),
+    };
+    format!("{answer}{seen}")
+}
+
+/// How much of its command the servo answers, where that can be said.
+fn answer_words(axis: Axis, answer: &Answer) -> String {
+    if answer.gain_error > SAYABLE_GAIN_ERROR {
+        return String::new();
     }
+    let off = answer.offset_m_s2;
+    let offset = match off.abs() > 2.0 * answer.offset_error_m_s2 {
+        true => format!(" with {off:+.2} m/s² that nobody asked for"),
+        false => String::new(),
+    };
+    let (gain, error) = (100.0 * answer.gain, 100.0 * answer.gain_error);
+    format!("the servo answers {gain:.0} ± {error:.0} % of {}{offset}; ", axis.command())
 }
 
 fn sensor_sentence(evidence: &Evidence) -> String {

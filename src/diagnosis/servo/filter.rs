@@ -96,6 +96,11 @@ impl Filter {
         (self.state[2 + k], self.covariance[2 + k][2 + k])
     }
 
+    /// Covariance of the parameters.
+    pub(super) fn spread(&self) -> [[f64; PARAMETERS]; PARAMETERS] {
+        std::array::from_fn(|i| std::array::from_fn(|j| self.covariance[2 + i][2 + j]))
+    }
+
     /// Carries the estimate over `step`.
     pub(super) fn predict(&mut self, step: &Step) {
         let Step { dt, forcing, density } = *step;

@@ -14,10 +14,12 @@
 //! delay, which say of which kind a fault is. Where a ball cannot answer - at
 //! rest within its breakaway angle, at the edge, unseen - nothing is weighed.
 
+mod answer;
 mod block;
 mod estimate;
 mod filter;
 
+pub use answer::Answer;
 pub use block::Course;
 pub use estimate::ServoEstimate;
 
@@ -25,7 +27,7 @@ use block::{Block, Gatherer};
 use estimate::Session;
 use filter::{Filter, PARAMETERS, Prior, Step};
 
-use crate::vocabulary::{FaultKind, SimTime};
+use crate::vocabulary::SimTime;
 
 /// What a broken servo may do: ±0.3 m/s² is a horn slipped by 2.5°, a gain
 /// change of −0.7 lies between half dead and dead, 0.2 s is a servo slowed
@@ -195,15 +197,7 @@ impl Servo {
     /// How the servo answers now, against the twin's.
     #[must_use]
     pub fn answer(&self) -> Answer {
-        let [offset, gain, delay] = std::array::from_fn(|k| self.open.parameter(k));
-        Answer {
-            offset_m_s2: offset.0,
-            offset_error_m_s2: offset.1.sqrt(),
-            gain: 1.0 + gain.0,
-            gain_error: gain.1.sqrt(),
-            delay_s: delay.0,
-            delay_error_s: delay.1.sqrt(),
-        }
+        Answer::new(&self.open)
     }
 
     /// How it has answered over the session; none where too little was seen.
@@ -222,40 +216,4 @@ fn forcing(last: &Block, block: &Block) -> [[f64; 2]; PARAMETERS] {
     let moved = b.position_m - a.position_m - a.velocity_m_s * dt;
     let bent = gained - a.acceleration_m_s2 * dt;
     [[dt * dt / 2.0, dt], [moved, gained], [-bent, a.acceleration_m_s2 - b.acceleration_m_s2]]
-}
-
-/// A servo's effective parameters of late, with their standard errors.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Answer {
-    /// Acceleration that no command explains, m/s².
-    pub offset_m_s2: f64,
-    pub offset_error_m_s2: f64,
-    /// Share of the command that the ball answers; 1 is healthy.
-    pub gain: f64,
-    pub gain_error: f64,
-    /// Delay beyond the twin's, s.
-    pub delay_s: f64,
-    pub delay_error_s: f64,
-}
-
-impl Answer {
-    /// The kind of fault that answers like this; none where it could be several.
-    #[must_use]
-    pub fn kind(&self) -> Option<FaultKind> {
-        let knows_gain = self.gain_error < 0.25;
-        let knows_delay = self.delay_error_s < 0.1;
-        let offset = self.offset_m_s2.abs() > 2.0 * self.offset_error_m_s2.max(0.03);
-        match self.gain {
-            _ if knows_delay && self.delay_s > 0.08 && self.delay_s > 3.0 * self.delay_error_s => {
-                Some(FaultKind::Slow)
-            }
-            _ if !knows_gain => None,
-            g if g < -0.3 => Some(FaultKind::Reversed),
-            g if g <= 0.25 && offset => Some(FaultKind::Held),
-            g if g <= 0.25 => Some(FaultKind::Dead),
-            g if (0.7..1.3).contains(&g) && offset => Some(FaultKind::Offset),
-            g if !(0.85..1.15).contains(&g) => Some(FaultKind::Gain),
-            _ => None,
-        }
-    }
 }
