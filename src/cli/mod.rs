@@ -17,6 +17,7 @@ mod scene;
 mod score;
 mod serve;
 mod simulate;
+mod soak;
 mod table;
 mod unusable;
 
@@ -55,6 +56,7 @@ enum Command {
     Calibrate(calibrate::CalibrateArgs),
     Replay(replay::ReplayArgs),
     Score(score::ScoreArgs),
+    Soak(soak::SoakArgs),
     Scene(scene::SceneArgs),
     Chart(chart::ChartArgs),
     Demo(demo::DemoArgs),
@@ -88,6 +90,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Score(args) => score::run(&args),
+        Command::Soak(args) => soak::run(&args),
         Command::Scene(args) => scene::run(&args),
         Command::Chart(args) => chart::run(&args),
         Command::Demo(args) => demo::run(&args),

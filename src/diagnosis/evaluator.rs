@@ -305,10 +305,8 @@ mod tests {
             ..AxisEvidence::default()
         };
         x.enabled = evaluator.enabled(Axis::X, &x, 0.5, &readings, &around);
-        let evidence = Evidence {
-            axes: PerAxis { x, y: AxisEvidence::default() },
-            ..Evidence::default()
-        };
+        let evidence =
+            Evidence { axes: PerAxis { x, y: AxisEvidence::default() }, ..Evidence::default() };
         servo(Axis::X, &evidence, &around).test
     }
 

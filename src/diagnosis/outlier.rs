@@ -22,6 +22,9 @@ const NOISE_FACTOR: f64 = 8.0;
 /// what the velocity found from a few readings may be off by.
 const STEP_M: f64 = 0.012;
 
+/// What a hand gives a ball while nobody looks, m/s².
+const SHOVE_M_S2: f64 = 2.0;
+
 /// Readings in a row, and seconds, that make a new place believable.
 const BELIEVED_AFTER: u32 = 4;
 const BELIEVED_AFTER_S: f64 = 0.12;
@@ -154,7 +157,9 @@ impl OutlierGate {
         }
         self.elsewhere = None;
         let accepted = self.accept(Track::start(t_s, position_m));
-        let stepped = step_m(track, &there) > NOISE_FACTOR * noise_m + STEP_M;
+        let unseen_s = there.since_s - track.at_s;
+        let bent_m = SHOVE_M_S2 * unseen_s * unseen_s;
+        let stepped = step_m(track, &there) > NOISE_FACTOR * noise_m + STEP_M + bent_m;
         if stepped { Gated::Stepped } else { accepted }
     }
 

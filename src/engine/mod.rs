@@ -24,7 +24,7 @@ use admit::Admit;
 use align::Align;
 use pipeline::Pipeline;
 
-use crate::diagnosis::{FaultMemory, ServoEstimate};
+use crate::diagnosis::{Evidence, FaultMemory, ServoEstimate};
 use crate::vocabulary::{FaultCode, PerAxis, Sample};
 
 /// One rig's pipeline for the length of one session (one operation cycle).
@@ -111,6 +111,12 @@ impl Engine {
                 outputs.push(watch::transition(code, at, evidence, &self.memory));
             }
         }
+    }
+
+    /// What was seen at the last judged sample.
+    #[must_use]
+    pub const fn evidence(&self) -> &Evidence {
+        self.pipeline.evidence()
     }
 
     /// How each servo has answered over this session; none where too little of

@@ -35,6 +35,9 @@ const REBASE_M: f64 = 1.0;
 /// A ball at rest seems to move by less than this many noise deviations.
 const STILL_FACTOR: f64 = 6.0;
 
+/// Acceleration that moving air gives a ping-pong ball, m/s²: half of what a
+/// fan at arm's length does.
+const GUST_M_S2: f64 = 0.03;
 /// What one reading may add to the scatter, in limits of it.
 const SCATTER_LIMITS: f64 = 2.0;
 /// Stillness after which a ball counts as at rest, s.
@@ -89,6 +92,7 @@ impl Pipeline {
                 noise_m: limits[axis].noise_m,
                 residual_m_s2: learnt.map(|l| l.residual_m_s2),
                 breakaway_m_s2: limits[axis].breakaway_m_s2,
+                gust_m_s2: GUST_M_S2 * rig.ball.sail_share().min(1.0),
             })
         };
         Self {
@@ -474,15 +478,17 @@ impl Pipeline {
 }
 
 /// Whether the ball's motion along `axis` can answer its servo: not while it
-/// rests within its breakaway angle, nor while readings that stand still
-/// although the ball is asked to move leave open what does not move.
+/// rests within its breakaway angle, nor while readings that repeat themselves
+/// although the ball is asked to move leave open whether they are alive, nor
+/// while it stands still in every direction.
 fn answers(axis: Axis, readings: &Stillness, motion: &TwinMotion, evaluator: &Evaluator) -> bool {
     let own = &readings.axes[axis];
     let asked = motion.acceleration[axis as usize].abs();
     let resting = own.still_s > RESTING_S && asked < evaluator.limits()[axis].breakaway_m_s2;
-    let pressed = Axis::ALL.into_iter().any(|a| readings.axes[a].pressed_s > 0.0);
     let frozen = own.identical_s > REPEATED_S && own.pressed_s > 0.0;
-    !resting && !frozen && !(pressed && readings.still_s() > REPEATED_S)
+    let pressed = Axis::ALL.into_iter().any(|a| readings.axes[a].pressed_s > 0.0);
+    let stuck = pressed && readings.still_s() > RESTING_S;
+    !resting && !frozen && !stuck
 }
 
 /// Acceleration that counts as asking a ball to move on any rig, m/s²: one

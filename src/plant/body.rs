@@ -43,6 +43,14 @@ impl Ball {
         self.inertia_factor
     }
 
+    /// How easily air moves it: its area over its mass, a ping-pong ball's being
+    /// one.
+    #[must_use]
+    pub fn sail_share(&self) -> f64 {
+        const PING_PONG: f64 = 0.02 * 0.02 / 0.0027;
+        self.radius_m * self.radius_m / self.mass_kg / PING_PONG
+    }
+
     /// Acceleration per unit of slope while rolling, g/(1 + κ), m/s²:
     /// 5/7 g for a solid ball, 3/5 g for a hollow one.
     #[must_use]

@@ -3,6 +3,7 @@
 use nalgebra::Vector2;
 
 use super::noise::{Noise, Purpose};
+use crate::plant::Ball;
 
 /// How often it happens; immutable.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -32,6 +33,8 @@ struct Push {
 #[derive(Clone, Debug)]
 pub(super) struct DisturbanceState {
     rates: Disturbances,
+    /// How easily air moves the ball.
+    sail: f64,
     noise: Noise,
     next_push_s: f64,
     next_gust_s: f64,
@@ -39,11 +42,18 @@ pub(super) struct DisturbanceState {
 }
 
 impl DisturbanceState {
-    pub(super) fn new(rates: Disturbances, seed: u64) -> Self {
+    pub(super) fn new(rates: Disturbances, ball: &Ball, seed: u64) -> Self {
         let mut noise = Noise::new(seed, Purpose::Disturbance);
         let next_push_s = noise.waiting_s(rates.pushes_per_minute);
         let next_gust_s = noise.waiting_s(rates.gusts_per_minute);
-        Self { rates, noise, next_push_s, next_gust_s, in_force: Vec::new() }
+        Self {
+            rates,
+            sail: ball.sail_share(),
+            noise,
+            next_push_s,
+            next_gust_s,
+            in_force: Vec::new(),
+        }
     }
 
     /// The acceleration of a free ball at `at_s`, m/s².
@@ -54,7 +64,7 @@ impl DisturbanceState {
             self.next_push_s = at_s + self.noise.waiting_s(self.rates.pushes_per_minute);
         }
         if at_s >= self.next_gust_s {
-            let strength = self.noise.uniform(GUST_M_S2[0], GUST_M_S2[1]);
+            let strength = self.sail * self.noise.uniform(GUST_M_S2[0], GUST_M_S2[1]);
             let until_s = at_s + self.noise.uniform(GUST_S[0], GUST_S[1]);
             self.somewhere(strength, until_s);
             self.next_gust_s = at_s + self.noise.waiting_s(self.rates.gusts_per_minute);

@@ -20,6 +20,7 @@ mod sensor;
 mod servo;
 mod transport;
 mod truth;
+mod variety;
 
 pub use ball::Surface;
 pub use controller::ControllerModel;

@@ -17,6 +17,7 @@ pub(super) enum Purpose {
     ServoY,
     SensorFault,
     Transport,
+    Variety,
 }
 
 /// A seeded source of random numbers.

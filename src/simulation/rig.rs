@@ -110,7 +110,7 @@ impl SimulatedRig {
                 1.0 / model.rig.sample_rate_hz,
             ),
             reference: ReferenceState::new(reference, reach, seed),
-            disturbances: DisturbanceState::new(disturbances, seed),
+            disturbances: DisturbanceState::new(disturbances, &model.rig.ball, seed),
             faults: Vec::new(),
             table,
             model,

@@ -35,7 +35,7 @@ impl Session {
     pub(super) fn take(&mut self, dt: f64, open: &Filter, prior: &Prior) {
         self.seconds += dt;
         self.since_s += dt;
-        if self.since_s < prior.memory_s {
+        if self.since_s < prior.memory_s[0] {
             return;
         }
         self.since_s = 0.0;

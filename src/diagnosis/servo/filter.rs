@@ -28,8 +28,8 @@ const STATES: usize = 2 + PARAMETERS;
 pub(super) struct Prior {
     /// Standard deviation of each parameter: m/s², 1, s.
     pub(super) deviation: [f64; PARAMETERS],
-    /// Time within which they may change, s.
-    pub(super) memory_s: f64,
+    /// Time within which each may change, s.
+    pub(super) memory_s: [f64; PARAMETERS],
 }
 
 /// What happened between two readings.
@@ -104,7 +104,7 @@ impl Filter {
     /// Carries the estimate over `step`.
     pub(super) fn predict(&mut self, step: &Step) {
         let Step { dt, forcing, density } = *step;
-        let keep = (-dt / self.prior.memory_s).exp();
+        let keep = self.prior.memory_s.map(|memory_s| (-dt / memory_s).exp());
         let x = &mut self.state;
         let forced = |row: usize, of: &dyn Fn(usize) -> f64| -> f64 {
             (0..PARAMETERS).map(|k| forcing[k][row] * of(2 + k)).sum()
@@ -112,7 +112,7 @@ impl Filter {
         let (push, pull) = (forced(0, &|k| x[k]), forced(1, &|k| x[k]));
         x[0] += dt * x[1] + push;
         x[1] += pull;
-        for value in &mut x[2..] {
+        for (value, keep) in x[2..].iter_mut().zip(keep) {
             *value *= keep;
         }
         // Φ P, then (Φ P) Φᵀ; only the first two rows of Φ are not diagonal.
@@ -121,7 +121,7 @@ impl Filter {
             let (push, pull) = (forced(0, &|k| p[k][j]), forced(1, &|k| p[k][j]));
             p[0][j] += dt * p[1][j] + push;
             p[1][j] += pull;
-            for row in &mut p[2..] {
+            for (row, keep) in p[2..].iter_mut().zip(keep) {
                 row[j] *= keep;
             }
         }
@@ -129,7 +129,7 @@ impl Filter {
             let (push, pull) = (forced(0, &|k| row[k]), forced(1, &|k| row[k]));
             row[0] += dt * row[1] + push;
             row[1] += pull;
-            for value in &mut row[2..] {
+            for (value, keep) in row[2..].iter_mut().zip(keep) {
                 *value *= keep;
             }
         }
@@ -139,7 +139,7 @@ impl Filter {
         p[1][1] += density * dt;
         for k in 0..PARAMETERS {
             let deviation = self.prior.deviation[k];
-            p[2 + k][2 + k] += (1.0 - keep * keep) * deviation * deviation;
+            p[2 + k][2 + k] += (1.0 - keep[k] * keep[k]) * deviation * deviation;
         }
     }
 
@@ -175,7 +175,7 @@ impl Filter {
 mod tests {
     use super::*;
 
-    const OPEN: Prior = Prior { deviation: [0.3, 0.7, 0.2], memory_s: 1e9 };
+    const OPEN: Prior = Prior { deviation: [0.3, 0.7, 0.2], memory_s: [1e9; 3] };
 
     /// Follows `path` under a twin that accelerates by sin(2 t).
     fn follow(prior: Prior, path: impl Fn(f64) -> f64) -> Filter {

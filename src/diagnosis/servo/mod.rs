@@ -32,16 +32,16 @@ use crate::vocabulary::SimTime;
 /// What a broken servo may do: ±0.3 m/s² is a horn slipped by 2.5°, a gain
 /// change of −0.7 lies between half dead and dead, 0.2 s is a servo slowed
 /// down tenfold; and it may begin within seconds.
-const OPEN: Prior = Prior { deviation: [0.3, 0.7, 0.2], memory_s: 5.0 };
+const OPEN: Prior = Prior { deviation: [0.3, 0.7, 0.2], memory_s: [5.0; PARAMETERS] };
 
 /// What a healthy servo of a learnt rig does: offsets within 0.15° over the
 /// plate, a gain learnt to 7 %, a delay learnt to 20 ms; all of them steady.
-const LEARNT: Prior = Prior { deviation: [0.02, 0.07, 0.02], memory_s: 100.0 };
+const LEARNT: Prior = Prior { deviation: [0.02, 0.07, 0.02], memory_s: [100.0; PARAMETERS] };
 
 /// What is known of a servo before anything is learnt: plates 1.7° off level,
 /// gains from 0.5 to 2 and lags from 80 to 300 ms have been seen on healthy
 /// rigs. They are learnt on the way, within the first minutes.
-const UNKNOWN: Prior = Prior { deviation: [0.2, 0.4, 0.1], memory_s: 1000.0 };
+const UNKNOWN: Prior = Prior { deviation: [0.2, 0.4, 0.1], memory_s: [1000.0; PARAMETERS] };
 
 /// Correlation time of what the twin leaves out, s: turns a deviation over the
 /// half second in which it is learnt into a spectral density.
@@ -51,6 +51,9 @@ const MODEL_ERROR_S: f64 = 0.5;
 /// widen what is learnt.
 const LEAST_ERROR_M_S2: f64 = 0.015;
 const MOST_ERROR_M_S2: f64 = 0.025;
+/// How long after a change of its acceleration the twin may be wrong about it,
+/// s: what a lag of the first order leaves out of a servo.
+const SHAPE_S: f64 = 0.01;
 /// Speed below which friction begins to hold the ball, m/s, and the time for
 /// which it then acts one way, s.
 const STICKING_M_S: f64 = 0.02;
@@ -60,6 +63,9 @@ const INDEPENDENT: u32 = 4;
 /// Error of a block's mean that is always assumed, m: roughness of plate and
 /// panel.
 const ROUGHNESS_M: f64 = 1.4e-4;
+
+/// How long a gust lasts, s.
+const GUST_S: f64 = 2.0;
 
 /// Most nats that a monitor keeps: how far it may run ahead of a servo that is
 /// well again.
@@ -74,19 +80,30 @@ pub struct AxisNature {
     pub residual_m_s2: Option<f64>,
     /// Acceleration that a ball at rest resists, m/s².
     pub breakaway_m_s2: f64,
+    /// Acceleration that moving air gives the ball, m/s².
+    pub gust_m_s2: f64,
 }
 
 impl AxisNature {
     fn prior(&self) -> Prior {
-        if self.residual_m_s2.is_some() { LEARNT } else { UNKNOWN }
+        if self.residual_m_s2.is_none() {
+            return UNKNOWN;
+        }
+        let mut prior = LEARNT;
+        if self.gust_m_s2 > prior.deviation[0] {
+            (prior.deviation[0], prior.memory_s[0]) = (self.gust_m_s2, GUST_S);
+        }
+        prior
     }
 
-    /// Spectral density of what the twin leaves out at a speed, m²/s³.
-    fn density(&self, speed_m_s: f64) -> f64 {
+    /// Spectral density of what the twin leaves out at a speed and at a rate of
+    /// change of its acceleration, m/s³; in m²/s³.
+    fn density(&self, speed_m_s: f64, jerk_m_s3: f64) -> f64 {
         let error = self.residual_m_s2.unwrap_or(MOST_ERROR_M_S2);
         let error = error.clamp(LEAST_ERROR_M_S2, MOST_ERROR_M_S2);
         let stuck = self.breakaway_m_s2 * (1.0 - speed_m_s / STICKING_M_S).max(0.0);
-        MODEL_ERROR_S * error * error + STICKING_S * stuck * stuck
+        let late = SHAPE_S * jerk_m_s3;
+        MODEL_ERROR_S * error * error + STICKING_S * (stuck * stuck + late * late)
     }
 
     fn variance(&self, n: u32) -> f64 {
@@ -141,7 +158,9 @@ impl Servo {
     fn weigh(&mut self, last: &Block, block: &Block) {
         let dt = block.t - last.t;
         let speed = (block.measured_m - last.measured_m).abs() / dt;
-        let step = Step { dt, forcing: forcing(last, block), density: self.nature.density(speed) };
+        let jerk = (block.course.acceleration_m_s2 - last.course.acceleration_m_s2) / dt;
+        let density = self.nature.density(speed, jerk);
+        let step = Step { dt, forcing: forcing(last, block), density };
         let (y, variance) = (block.deviation_m(), self.nature.variance(block.n));
         self.healthy.predict(&step);
         self.open.predict(&step);
