@@ -125,12 +125,17 @@ pub(super) fn report(rig: &Rig, calibration: &Calibration) {
 
 type Row = (&'static str, fn(&AxisCalibration) -> String, &'static str);
 
-fn rows() -> [Row; 7] {
+fn rows() -> [Row; 8] {
     [
         ("gain", |a| format!("{:.3}", a.gain), "measured over modelled acceleration"),
         ("dead time", |a| format!("{:.0} ms", a.dead_time_s * 1e3), "command to first movement"),
         ("lag", |a| format!("{:.0} ms", a.lag_s * 1e3), "time constant of the servo"),
         ("level", |a| format!("{:.2}°", a.level_rad.to_degrees()), "plate angle at command 0"),
+        (
+            "resistance",
+            |a| format!("{:.3} m/s²", a.resistance_m_s2),
+            "a rolling ball slows down by",
+        ),
         ("noise", |a| format!("{:.2} mm", a.noise_m * 1e3), "readings about the motion, rms"),
         ("breakaway", |a| format!("{:.2}°", a.breakaway_rad.to_degrees()), "a ball at rest starts"),
         ("residual", |a| format!("{:.3} m/s²", a.residual_m_s2), "measured - twin, rms"),

@@ -13,6 +13,8 @@ pub struct AxisCalibration {
     pub lag_s: f64,
     /// Plate and horn off level, rad.
     pub level_rad: f64,
+    /// Deceleration of a rolling ball, m/s².
+    pub resistance_m_s2: f64,
     /// Standard deviation of the readings about the fitted motion, m.
     pub noise_m: f64,
     /// Tilt below which a ball at rest stays at rest, rad.

@@ -163,6 +163,7 @@ impl Setup {
                     dead_time_s: learnt.dead_time_s,
                     gain: learnt.gain,
                     level_rad: learnt.level_rad,
+                    resistance_m_s2: learnt.resistance_m_s2,
                 };
             }
         }
@@ -173,5 +174,5 @@ impl Setup {
 /// Both axes before anything is learnt.
 fn nominal_axis(rig: &Rig) -> Result<TwinAxis, Invalid> {
     let (servo, dead_time_s) = (rig.servo_model()?, rig.servo.dead_time_s);
-    Ok(TwinAxis { servo, dead_time_s, gain: 1.0, level_rad: 0.0 })
+    Ok(TwinAxis { servo, dead_time_s, gain: 1.0, level_rad: 0.0, resistance_m_s2: 0.0 })
 }

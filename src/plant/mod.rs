@@ -31,4 +31,4 @@ pub use rolling::{Grip, Rolling, RollingState};
 pub use servo::{Servo, ServoModel};
 pub use sliding::{Hold, Phase, Sliding};
 pub use tilt::{PlateMotion, Tilt};
-pub use twin::{Twin, TwinAxis, TwinModel, TwinMotion};
+pub use twin::{Twin, TwinAxis, TwinModel, TwinMotion, resisting};

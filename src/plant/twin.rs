@@ -34,6 +34,18 @@ pub struct TwinAxis {
     pub gain: f64,
     /// Angle at a command of zero, rad: plate and servo horn off level.
     pub level_rad: f64,
+    /// Deceleration of a rolling ball, m/s².
+    pub resistance_m_s2: f64,
+}
+
+/// Speed at which rolling resistance acts in full, m/s: slower, the ball
+/// sticks and goes by turns, and half of it is as good a guess as any.
+const RESISTED_M_S: f64 = 0.01;
+
+/// Share of the rolling resistance that acts against a velocity, m/s.
+#[must_use]
+pub fn resisting(velocity_m_s: f64) -> f64 {
+    (velocity_m_s / RESISTED_M_S).clamp(-1.0, 1.0)
 }
 
 /// What the twin is made of; immutable.
@@ -199,7 +211,11 @@ impl Twin {
             let tilt = self.move_servos(start, h / 2.0);
             let unit = self.model.ladder.acceleration(&mut self.fidelity, observed, &tilt, h);
             let axes = &self.model.axes;
-            let a = Vector2::new(unit.x * axes.x.gain, unit.y * axes.y.gain);
+            let against = observed.velocity.map(resisting);
+            let a = Vector2::new(
+                unit.x * axes.x.gain - axes.x.resistance_m_s2 * against.x,
+                unit.y * axes.y.gain - axes.y.resistance_m_s2 * against.y,
+            );
             self.motion.position += self.motion.velocity * h + a * (h * h / 2.0);
             self.motion.velocity += a * h;
             self.motion.acceleration = a;
@@ -241,7 +257,7 @@ mod tests {
 
     fn twin(dead_time_s: f64, lag_s: f64) -> Twin {
         let servo = ServoModel::new(0.2, lag_s, 100.0).unwrap();
-        let axis = TwinAxis { servo, dead_time_s, gain: 1.0, level_rad: 0.0 };
+        let axis = TwinAxis { servo, dead_time_s, gain: 1.0, level_rad: 0.0, resistance_m_s2: 0.0 };
         // To be held against the rolling ball, nothing may be left out.
         let ladder = Ladder::new(&Ball::default(), &Plate::default(), 0.6, 0.0);
         Twin::new(TwinModel::new(ladder, axis))

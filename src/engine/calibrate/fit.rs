@@ -1,7 +1,7 @@
 //! Gain, level, dead time and lag of one axis: least trimmed squares over
 //! windows, inside a search.
 
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{Matrix3, Vector3};
 
 use super::recording::{Recording, Stretch};
 use crate::diagnosis::Profile;
@@ -13,17 +13,18 @@ use crate::vocabulary::Axis;
 /// Windows that are kept, of all: the rest may hold pushes.
 const KEPT: f64 = 0.8;
 
-/// One window with its straight line taken away: measured path, twin's path
-/// and the parabola t²/2, orthogonal to 1 and t.
+/// One window with its straight line taken away: measured path, twin's path,
+/// the parabola t²/2 and what rolling resistance of 1 m/s² would add, all
+/// orthogonal to 1 and t.
 struct Window {
     yy: f64,
-    normal: Matrix2<f64>,
-    right: Vector2<f64>,
+    normal: Matrix3<f64>,
+    right: Vector3<f64>,
     n: usize,
 }
 
 impl Window {
-    fn new(moments: &[Moment], path: &[f64], axis: Axis) -> Self {
+    fn new(moments: &[Moment], path: &[f64], resisted: &[f64], axis: Axis) -> Self {
         let t0 = moments[0].at;
         let times: Vec<f64> = moments.iter().map(|m| m.at - t0).collect();
         let straighten = |values: Vec<f64>| without_line(&times, values);
@@ -31,17 +32,18 @@ impl Window {
         let z = straighten(path.to_vec());
         let p = straighten(times.iter().map(|t| t * t / 2.0).collect());
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let cross = dot(&z, &p);
+        let r = straighten(resisted.to_vec());
+        let causes = [&z, &p, &r];
         Self {
             yy: dot(&y, &y),
-            normal: Matrix2::new(dot(&z, &z), cross, cross, dot(&p, &p)),
-            right: Vector2::new(dot(&z, &y), dot(&p, &y)),
+            normal: Matrix3::from_fn(|i, j| dot(causes[i], causes[j])),
+            right: Vector3::from_fn(|i, _| dot(causes[i], &y)),
             n: moments.len(),
         }
     }
 
     /// Mean square of what gain and level leave unexplained, m².
-    fn unexplained(&self, c: &Vector2<f64>) -> f64 {
+    fn unexplained(&self, c: &Vector3<f64>) -> f64 {
         let squares = self.yy - 2.0 * c.dot(&self.right) + c.dot(&(self.normal * c));
         squares.max(0.0) / self.n as f64
     }
@@ -63,11 +65,12 @@ pub(super) fn without_line(times: &[f64], mut values: Vec<f64>) -> Vec<f64> {
     values
 }
 
-/// Gain and level (as an acceleration) that explain the windows best.
+/// Gain, level (as an acceleration) and rolling resistance that explain the windows best.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Explained {
     pub(super) gain: f64,
     pub(super) offset_m_s2: f64,
+    pub(super) resistance_m_s2: f64,
     /// Mean square left over in the kept windows, m².
     pub(super) left: f64,
     /// Share of the variance explained.
@@ -92,12 +95,11 @@ impl Explained {
 fn explain(windows: &mut [Window]) -> Option<Explained> {
     let keep = ((windows.len() as f64 * KEPT).ceil() as usize).min(windows.len());
     let mut kept = windows.len();
-    let mut c = Vector2::zeros();
+    let mut c = Vector3::zeros();
     for _ in 0..4 {
-        let (normal, right) = windows[..kept]
-            .iter()
-            .fold((Matrix2::zeros(), Vector2::zeros()), |(n, r), w| (n + w.normal, r + w.right));
-        c = normal.try_inverse()? * right;
+        let sums = |(n, r): (Matrix3<f64>, Vector3<f64>), w: &Window| (n + w.normal, r + w.right);
+        let (normal, right) = windows[..kept].iter().fold(Default::default(), sums);
+        c = solve(normal, right)?;
         windows.sort_by(|a, b| a.unexplained(&c).total_cmp(&b.unexplained(&c)));
         kept = keep;
     }
@@ -105,10 +107,36 @@ fn explain(windows: &mut [Window]) -> Option<Explained> {
     let n: usize = kept.iter().map(|w| w.n).sum();
     let left = kept.iter().map(|w| w.unexplained(&c) * w.n as f64).sum::<f64>() / n as f64;
     let total = kept.iter().map(|w| w.yy).sum::<f64>() / n as f64;
-    let normal = kept.iter().fold(Matrix2::zeros(), |sum, w| sum + w.normal);
+    let normal = kept.iter().fold(Matrix3::zeros(), |sum, w| sum + w.normal);
+    let normal = if c.z > 0.0 { normal } else { without_resistance(normal) };
     // What is left over is coloured: it counts as one reading a window, not n.
     let gain_error = (left * n as f64 / kept.len() as f64 * normal.try_inverse()?[(0, 0)]).sqrt();
-    Some(Explained { gain: c.x, offset_m_s2: c.y, left, share: 1.0 - left / total, gain_error })
+    Some(Explained {
+        gain: c.x,
+        offset_m_s2: c.y,
+        resistance_m_s2: c.z,
+        left,
+        share: 1.0 - left / total,
+        gain_error,
+    })
+}
+
+/// The least squares; a resistance that would drive the ball is none.
+fn solve(normal: Matrix3<f64>, right: Vector3<f64>) -> Option<Vector3<f64>> {
+    let c = normal.try_inverse()? * right;
+    if c.z > 0.0 {
+        return Some(c);
+    }
+    let right = Vector3::new(right.x, right.y, 0.0);
+    Some(without_resistance(normal).try_inverse()? * right)
+}
+
+fn without_resistance(mut normal: Matrix3<f64>) -> Matrix3<f64> {
+    for k in 0..2 {
+        (normal[(2, k)], normal[(k, 2)]) = (0.0, 0.0);
+    }
+    normal[(2, 2)] = 1.0;
+    normal
 }
 
 /// Step of dead time and lag at which the search ends, s.
@@ -148,23 +176,23 @@ impl Fitter<'_> {
         lag_s: f64,
         gain: f64,
         level_rad: f64,
+        resistance_m_s2: f64,
     ) -> Option<TwinModel> {
         let spec = &self.rig.servo;
         let servo = ServoModel::new(spec.angle_limit_rad, lag_s, spec.rate_limit_rad_s).ok()?;
-        let axis = TwinAxis { servo, dead_time_s, gain, level_rad };
+        let axis = TwinAxis { servo, dead_time_s, gain, level_rad, resistance_m_s2 };
         Some(TwinModel::new(self.rig.ladder(Profile::Default), axis))
     }
 
     fn explain(&self, dead_time_s: f64, lag_s: f64) -> Option<Explained> {
-        let model = self.model(dead_time_s, lag_s, 1.0, 0.0)?;
+        let model = self.model(dead_time_s, lag_s, 1.0, 0.0, 0.0)?;
         let mut windows = Vec::with_capacity(self.n_windows());
         for (recording, stretches) in self.recordings.iter().zip(&self.stretches) {
             let path = recording.twin_path(&model, self.axis);
-            windows.extend(
-                stretches.iter().map(|s| {
-                    Window::new(&recording.moments[s.clone()], &path[s.clone()], self.axis)
-                }),
-            );
+            windows.extend(stretches.iter().map(|s| {
+                let resisted = &recording.resisted[self.axis][s.clone()];
+                Window::new(&recording.moments[s.clone()], &path[s.clone()], resisted, self.axis)
+            }));
         }
         explain(&mut windows)
     }

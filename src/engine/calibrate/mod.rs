@@ -1,8 +1,9 @@
 //! Learning a rig from healthy sessions.
 //!
 //! In windows of a second or two the measured path of one axis is fitted by
-//! `x₀ + v₀ t + k·z(t) + b t²/2`, where z is the twin's path under the recorded
-//! commands: k (gain) and b (level) are the rig's, x₀ and v₀ the window's own.
+//! `x₀ + v₀ t + k·z(t) + b t²/2 + c·r(t)`, where z is the twin's path under the
+//! recorded commands and r what rolling resistance adds: k (gain), b (level) and
+//! c (resistance) are the rig's, x₀ and v₀ the window's own.
 //! Dead time and lag are searched for. The worst fifth of the windows is left
 //! out (least trimmed squares, Rousseeuw 1984), so that hands pushing the ball
 //! do not count. Fitting the path instead of its second difference explains
@@ -131,12 +132,16 @@ fn learn_in_windows(
     }
     let slope = axis.drive_sign() * rig.ball.rolling_gravity();
     let level_rad = found.offset_m_s2 / (found.gain * slope);
-    let healthy = healthy_spread(&fitter, dead_time_s, lag_s, found.gain, level_rad);
+    let healthy = {
+        let (gain, resistance) = (found.gain, found.resistance_m_s2);
+        healthy_spread(&fitter, dead_time_s, lag_s, gain, level_rad, resistance)
+    };
     Ok(AxisCalibration {
         gain: found.gain,
         dead_time_s,
         lag_s,
         level_rad,
+        resistance_m_s2: found.resistance_m_s2,
         noise_m: healthy.noise_m.max(1e-5),
         breakaway_rad: healthy.breakaway_rad,
         residual_m_s2: healthy.residual_m_s2.max(1e-4),
@@ -156,7 +161,8 @@ mod tests {
     fn session(seconds: f64, amplitude: f64, gain: f64) -> Vec<Sample> {
         let rig = Rig::chapter("a");
         let servo = ServoModel::new(0.2, 0.05, 100.0).unwrap();
-        let axis = TwinAxis { servo, dead_time_s: 0.06, gain, level_rad: 0.01 };
+        let axis =
+            TwinAxis { servo, dead_time_s: 0.06, gain, level_rad: 0.01, resistance_m_s2: 0.0 };
         let mut twin = Twin::new(TwinModel::new(rig.ladder(Profile::Default), axis));
         let times: Vec<f64> = (0..(seconds / 0.01) as u32).map(|i| f64::from(i) * 0.01).collect();
         // The level is compensated, as a controller would.

@@ -10,7 +10,7 @@ use crate::diagnosis::OutlierGate;
 use crate::engine::Rig;
 use crate::engine::frame::{Moment, moment};
 use crate::maths::median;
-use crate::plant::{RollingState, Twin, TwinModel};
+use crate::plant::{RollingState, Twin, TwinModel, resisting};
 use crate::vocabulary::{Axis, PerAxis, Sample, SimTime};
 
 /// Samples that a window must hold; it grows where that takes longer.
@@ -21,6 +21,8 @@ const GAP_PERIODS: f64 = 4.0;
 /// A window counts as motion when the readings of each third span this, m: a
 /// ball that sticks for part of it answers no gain.
 const MOVING_M: f64 = 0.002;
+/// Time over which a velocity is the slope of the path, s.
+const SLOPE_S: f64 = 0.16;
 /// Noise assumed by the outlier gate before anything is known, m.
 const ASSUMED_NOISE_M: f64 = 2e-3;
 
@@ -31,6 +33,10 @@ pub(super) type Stretch = Range<usize>;
 pub(super) struct Recording {
     pub(super) moments: Vec<Moment>,
     pub(super) gap_s: f64,
+    /// The ball's velocity at every moment, m/s.
+    velocity: Vec<Vector2<f64>>,
+    /// Path that a rolling resistance of 1 m/s² adds at every moment, m.
+    pub(super) resisted: PerAxis<Vec<f64>>,
     /// Median time between samples, s.
     pub(super) period_s: f64,
 }
@@ -43,8 +49,12 @@ impl Recording {
         moments.dedup_by_key(|m| m.at);
         let mut steps: Vec<f64> = moments.windows(2).map(|w| w[1].at - w[0].at).collect();
         let period_s = median(&mut steps).unwrap_or(0.0);
-        let mut recording = Self { moments, gap_s: GAP_S.max(GAP_PERIODS * period_s), period_s };
+        let gap_s = GAP_S.max(GAP_PERIODS * period_s);
+        let (velocity, resisted) = Default::default();
+        let mut recording = Self { moments, gap_s, velocity, resisted, period_s };
         recording.drop_unusable(rig);
+        recording.velocity = recording.velocities();
+        recording.resisted = PerAxis::from_fn(|axis| recording.resisted_path(axis));
         recording
     }
 
@@ -62,6 +72,39 @@ impl Recording {
                 m.position = PerAxis::default();
             }
         }
+    }
+
+    /// Velocities as slopes over [`SLOPE_S`]; zero where an end is not measured.
+    fn velocities(&self) -> Vec<Vector2<f64>> {
+        let moments = &self.moments;
+        let (mut early, mut late) = (0, 0);
+        let mut slope = |i: usize| {
+            while moments[i].at - moments[early].at > SLOPE_S / 2.0 {
+                early += 1;
+            }
+            while late + 1 < moments.len() && moments[late].at - moments[i].at < SLOPE_S / 2.0 {
+                late += 1;
+            }
+            let (a, b) = (&moments[early], &moments[late.max(i)]);
+            let along = |axis: Axis| match (a.position[axis], b.position[axis]) {
+                (Some(from), Some(to)) if b.at > a.at => (to - from) / (b.at - a.at),
+                _ => 0.0,
+            };
+            Vector2::new(along(Axis::X), along(Axis::Y))
+        };
+        (0..moments.len()).map(&mut slope).collect()
+    }
+
+    fn resisted_path(&self, axis: Axis) -> Vec<f64> {
+        let (mut position, mut speed, mut before) = (0.0, 0.0, None);
+        let step = |(m, v): (&Moment, &Vector2<f64>)| {
+            let dt = before.replace(m.at).map_or(0.0, |b: SimTime| m.at - b);
+            let a = -resisting(v[axis as usize]);
+            position += dt * (speed + dt * a / 2.0);
+            speed += dt * a;
+            position
+        };
+        self.moments.iter().zip(&self.velocity).map(step).collect()
     }
 
     pub(super) fn has(&self, axis: Axis) -> bool {
@@ -109,7 +152,7 @@ impl Recording {
     pub(super) fn twin_path(&self, model: &TwinModel, axis: Axis) -> Vec<f64> {
         let mut twin = Twin::new(*model);
         let mut before: Option<SimTime> = None;
-        let step = |m: &Moment| {
+        let step = |(m, velocity): (&Moment, &Vector2<f64>)| {
             if before.is_some_and(|b| m.at - b > self.gap_s) {
                 twin.restart();
             }
@@ -117,12 +160,13 @@ impl Recording {
             let at = |a: Axis| m.position[a].unwrap_or(0.0);
             let observed = RollingState {
                 position: Vector2::new(at(Axis::X), at(Axis::Y)),
-                ..RollingState::default()
+                velocity: *velocity,
+                spin: 0.0,
             };
             twin.advance(m.at, m.command, &observed);
             twin.motion().position[axis as usize]
         };
-        self.moments.iter().map(step).collect()
+        self.moments.iter().zip(&self.velocity).map(step).collect()
     }
 }
 

@@ -31,11 +31,12 @@ pub(super) fn healthy_spread(
     lag: f64,
     gain: f64,
     level: f64,
+    resistance_m_s2: f64,
 ) -> Healthy {
     let (mut scatters, mut residuals, mut withstood) = (Vec::new(), Vec::new(), Vec::new());
     let axis = fitter.axis;
     for recording in fitter.recordings {
-        let Some(model) = fitter.model(dead, lag, gain, level) else { continue };
+        let Some(model) = fitter.model(dead, lag, gain, level, resistance_m_s2) else { continue };
         let path = recording.twin_path(&model, axis);
         let mut filter = SlidingQuadratic::default();
         let window_s = RESIDUAL_WINDOW_S.max(LEAST_SAMPLES * recording.period_s);
