@@ -36,7 +36,7 @@ const NOISY: f64 = 4.0;
 const QUIET_M: f64 = 1e-3;
 
 /// Evidence against both servos at once that speaks for what they share, nats.
-const SHARED_NATS: f64 = 6.0;
+const SHARED_NATS: f64 = 9.0;
 /// Evidence against both that neither ball nor sensor account for, nats: both
 /// have failed, as when their supply does.
 const BOTH_NATS: f64 = 30.0;

@@ -105,7 +105,7 @@ impl Settings {
             leak_s: 3.0,
             confirm_s: 0.2,
             suspect_nats: 12.0,
-            confirm_nats: 18.0,
+            confirm_nats: 17.0,
             memory: MemoryRules::default(),
         };
         match profile {

@@ -50,7 +50,7 @@ const MODEL_ERROR_S: f64 = 0.5;
 /// the healthy residual, m/s²: friction and pushes in the healthy recording
 /// widen what is learnt.
 const LEAST_ERROR_M_S2: f64 = 0.015;
-const MOST_ERROR_M_S2: f64 = 0.025;
+const MOST_ERROR_M_S2: f64 = 0.04;
 /// How long after a change of its acceleration the twin may be wrong about it,
 /// s: what a lag of the first order leaves out of a servo.
 const SHAPE_S: f64 = 0.01;
