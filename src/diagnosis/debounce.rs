@@ -174,7 +174,8 @@ mod tests {
             let mut take = |test, seconds: f64| {
                 let n = (seconds / 0.01).round() as usize;
                 let tripped = |_| {
-                    debounce.update(test, 0.01, settings.leak_s, &settings) == Qualified::Tripped
+                    debounce.update(test, 0.01, &Pace::of(FaultCode::XServo, &settings))
+                        == Qualified::Tripped
                 };
                 (0..n).any(tripped)
             };
@@ -190,7 +191,10 @@ mod tests {
     fn no_debounce_means_at_once() {
         let mut debounce = Debounce::default();
         let settings = Settings::of(Profile::Textbook);
-        assert_eq!(debounce.update(Test::Prefailed, 0.0, 0.0, &settings), Qualified::Tripped);
+        assert_eq!(
+            debounce.update(Test::Prefailed, 0.0, &Pace::of(FaultCode::XServo, &settings)),
+            Qualified::Tripped
+        );
         assert_eq!(debounce.counter(), 127);
     }
 }

@@ -137,6 +137,12 @@ impl Filter {
         p[0][1] += density * dt * dt / 2.0;
         p[1][0] += density * dt * dt / 2.0;
         p[1][1] += density * dt;
+        for i in 1..STATES {
+            for j in 0..i {
+                // Rounding would let the two halves part.
+                p[i][j] = p[j][i];
+            }
+        }
         for k in 0..PARAMETERS {
             let deviation = self.prior.deviation[k];
             p[2 + k][2 + k] += (1.0 - keep[k] * keep[k]) * deviation * deviation;
