@@ -10,7 +10,7 @@ use offbd::vocabulary::Sample;
 use reqwest::Method;
 use serde_json::{Value, json};
 use sqlx::{ConnectOptions, Connection, SqliteConnection};
-use support::{Bench, Client, batch, csv, rig};
+use support::{Bench, Client, Events, batch, csv, rig};
 use tokio_tungstenite::connect_async;
 use tokio_tungstenite::tungstenite::Message;
 
@@ -206,41 +206,6 @@ async fn events_missed_come_first_and_each_comes_once() {
         assert_eq!(event["asset"], "b");
         assert!(event["id"].as_i64().unwrap() > last);
         last = event["id"].as_i64().unwrap();
-    }
-}
-
-/// Server-Sent Events, one by one.
-struct Events {
-    response: reqwest::Response,
-    text: String,
-}
-
-impl Events {
-    fn new(response: reqwest::Response) -> Self {
-        assert_eq!(response.status(), 200);
-        Self { response, text: String::new() }
-    }
-
-    /// The next event's data, with its `id`.
-    async fn next(&mut self) -> Value {
-        loop {
-            if let Some((event, rest)) = self.text.split_once("\n\n") {
-                let event = event.to_owned();
-                self.text = rest.to_owned();
-                let field = |name: &str| {
-                    event.lines().find_map(|l| l.strip_prefix(name)).map(|v| v.trim().to_owned())
-                };
-                if let Some(data) = field("data:") {
-                    let mut data: Value = serde_json::from_str(&data).unwrap();
-                    data["id"] = field("id:").unwrap().parse::<i64>().unwrap().into();
-                    return data;
-                }
-                continue;
-            }
-            let chunk = tokio::time::timeout(support::DEADLINE, self.response.chunk()).await;
-            let chunk = chunk.unwrap().unwrap().expect("the stream goes on");
-            self.text.push_str(std::str::from_utf8(&chunk).unwrap());
-        }
     }
 }
 

@@ -21,7 +21,7 @@ pub use debounce::{Debounce, Qualified, Test};
 pub use evaluator::{Evaluator, Finding, Surroundings};
 pub use evidence::{AxisEvidence, Candidate, Evidence, Suspicion, Transition};
 pub use limits::Limits;
-pub use memory::{FaultMemory, FaultRecord, MemoryRules};
+pub use memory::{FaultMemory, FaultRecord, InUse, MemoryRules};
 pub use outlier::{Gated, OutlierGate};
 pub use settings::{Profile, Settings};
 pub use status::StatusByte;

@@ -9,6 +9,7 @@
 mod admit;
 mod align;
 mod calibrate;
+mod coverage;
 mod frame;
 mod look;
 mod pipeline;
@@ -22,6 +23,7 @@ pub use types::{Admission, Input, MonitorState, Output, Readiness, Rejection, St
 
 use admit::Admit;
 use align::Align;
+use coverage::Coverage;
 use pipeline::Pipeline;
 
 use crate::diagnosis::FaultMemory;
@@ -34,6 +36,7 @@ pub struct Engine {
     memory: FaultMemory,
     admit: Admit,
     align: Align,
+    coverage: Coverage,
     pipeline: Pipeline,
 }
 
@@ -46,6 +49,7 @@ impl Engine {
         Self {
             admit: Admit::new(&setup.rig.mapping),
             align: Align::default(),
+            coverage: Coverage::default(),
             pipeline: Pipeline::new(&setup),
             memory,
             setup,
@@ -83,9 +87,16 @@ impl Engine {
         if admission == Admission::Accepted {
             self.align.push(sample);
             while let Some(next) = self.align.pop(self.setup.settings.reorder_s) {
-                self.pipeline.judge(&self.setup, &next, &mut self.memory, outputs);
+                self.judge(&next, outputs);
             }
         }
+    }
+
+    fn judge(&mut self, sample: &Sample, outputs: &mut Vec<Output>) {
+        let gap_s =
+            self.setup.settings.gap_s.max(pipeline::GAP_PERIODS / self.setup.rig.sample_rate_hz);
+        self.coverage.take(sample, gap_s);
+        self.pipeline.judge(&self.setup, sample, &mut self.memory, outputs);
     }
 
     fn clear(&mut self, code: FaultCode, outputs: &mut Vec<Output>) {
@@ -100,8 +111,9 @@ impl Engine {
 
     fn end(&mut self, outputs: &mut Vec<Output>) {
         while let Some(next) = self.align.flush() {
-            self.pipeline.judge(&self.setup, &next, &mut self.memory, outputs);
+            self.judge(&next, outputs);
         }
+        self.count_use();
         let before = self.memory.clone();
         self.memory.end_cycle(&self.setup.settings.memory);
         let Some(at) = self.pipeline.now() else { return };
@@ -110,6 +122,16 @@ impl Engine {
                 let evidence = self.pipeline.evidence();
                 outputs.push(watch::transition(code, at, evidence, &self.memory));
             }
+        }
+    }
+
+    /// Takes note of how much of this session each monitor could judge.
+    fn count_use(&mut self) {
+        let (state, settings) = (self.state(), &self.setup.settings);
+        let needed_s = settings.fail_s + settings.confirm_s;
+        for (&code, monitor) in FaultCode::ALL.iter().zip(&state.monitors) {
+            let data_s = self.coverage.data_s(code);
+            self.memory.count_use(code, data_s, monitor.enabled_s, needed_s);
         }
     }
 

@@ -11,6 +11,7 @@ use crate::engine::{Engine, Input, Output, Rig, Setup};
 use crate::store::{JobState, ReplayRow, SessionRow, Write};
 use crate::vocabulary::Invalid;
 use crate::wire::asset;
+use crate::wire::basis::Basis;
 use crate::wire::service::{DifferenceView, ReplayResultView, ReplaySettingsView, ReplayView};
 use crate::wire::verdict::{FaultView, Verdict, fault_view};
 
@@ -143,6 +144,7 @@ fn judge(bench: &Bench, row: &ReplayRow) -> Result<Option<ReplayResultView>, Ser
     let recorded = recorded(bench, &session)?;
     let setup = setup(&session, &views::from_json(&row.settings)?)?;
     let mut player = Player {
+        basis: Basis::of(&setup),
         engine: Engine::new(setup, views::memory(&session.baseline)?),
         session: &session,
         outputs: Vec::new(),
@@ -169,6 +171,7 @@ fn recorded(bench: &Bench, session: &SessionRow) -> Result<Vec<FaultView>, Servi
 }
 
 struct Player<'a> {
+    basis: Basis,
     engine: Engine,
     session: &'a SessionRow,
     outputs: Vec<Output>,
@@ -204,7 +207,7 @@ impl Player<'_> {
             if let Output::Transition(transition) = output
                 && self.faults.len() <= MAX_LINES
             {
-                self.faults.push(fault_view(&self.session.name, transition));
+                self.faults.push(fault_view(&self.session.name, &self.basis, transition));
             }
         }
     }

@@ -6,8 +6,10 @@
 //! not; they are converted by hand. Knows no sockets and no SQL.
 
 pub mod asset;
+pub mod basis;
 pub mod memory;
 mod preset;
+pub mod provenance;
 pub mod scene;
 pub mod service;
 pub mod session_csv;

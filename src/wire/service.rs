@@ -5,9 +5,11 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::memory::FaultRecordView;
+use super::provenance::ProvenanceView;
 use super::verdict::{EvidenceView, FaultView, SummaryView, evidence_view};
+use crate::diagnosis::StatusByte;
 use crate::engine::{MonitorState, State};
-use crate::vocabulary::{Axis, FaultCode, PerAxis};
+use crate::vocabulary::{Axis, FaultCode, FaultStatus, PerAxis};
 
 /// A page of a list.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
@@ -50,6 +52,75 @@ pub struct FaultEntryView {
     pub changed_at: String,
     #[serde(flatten)]
     pub record: FaultRecordView,
+    #[serde(flatten)]
+    pub provenance: ProvenanceView,
+    /// The monitor as it stands in the open session, debounce counter and
+    /// readiness; null without one, and in lists across the fleet.
+    pub monitor: Option<MonitorView>,
+}
+
+/// An event: a person cleared a code while no session was open. It has the
+/// keys of a fault line, without a session and a time on the device's clock.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct ClearedView {
+    /// Always `fault`.
+    #[serde(rename = "type")]
+    pub line: String,
+    /// Always null, as `session_id` is.
+    pub session: Option<String>,
+    /// Always null.
+    pub t_s: Option<f64>,
+    pub code: String,
+    /// Always null.
+    pub kind: Option<String>,
+    /// Always `cleared`.
+    pub status: String,
+    /// ISO 14229 status byte, two hexadecimal digits.
+    pub status_byte: String,
+    pub axis: Option<String>,
+    pub command: Option<String>,
+    /// Who cleared it.
+    pub by: String,
+    /// The same in one sentence.
+    pub summary: String,
+}
+
+/// What an event tells.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+pub struct EventView {
+    pub asset: String,
+    /// The service's id of the session; null if none was open.
+    pub session_id: Option<String>,
+    #[serde(flatten)]
+    pub change: ChangeView,
+}
+
+/// What has changed.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+#[serde(untagged)]
+pub enum ChangeView {
+    /// In a session.
+    Fault(Box<FaultView>),
+    /// By hand, while no session was open.
+    Cleared(Box<ClearedView>),
+}
+
+/// The event of `code` cleared by `by` while no session was open.
+#[must_use]
+pub fn cleared_view(code: FaultCode, by: &str) -> ClearedView {
+    ClearedView {
+        line: "fault".to_owned(),
+        session: None,
+        t_s: None,
+        code: code.to_string(),
+        kind: None,
+        status: FaultStatus::Cleared.to_string(),
+        status_byte: StatusByte::default().to_string(),
+        axis: code.axis().map(|a| a.as_str().to_owned()),
+        command: code.axis().map(|a| a.command().to_owned()),
+        by: by.to_owned(),
+        summary: format!("{code} cleared by {by}: nothing of it is on record"),
+    }
 }
 
 /// One monitor at one moment.
@@ -117,7 +188,7 @@ pub fn state_view(asset: &str, session: Option<(&str, &str, u64)>, state: &State
         twin_velocity_m_s: xy(&state.twin_velocity_m_s),
         plate_angle_rad: xy(&state.plate_angle_rad),
         evidence: evidence_view(&state.evidence),
-        monitors: FaultCode::ALL.iter().zip(&state.monitors).map(monitor_view).collect(),
+        monitors: monitor_views(state),
         fidelity: state.fidelity.rung.name().to_owned(),
         fidelity_reason: state.fidelity.to_string(),
     }
@@ -125,6 +196,12 @@ pub fn state_view(asset: &str, session: Option<(&str, &str, u64)>, state: &State
 
 fn xy(pair: &PerAxis<f64>) -> XyView {
     XyView { x: pair[Axis::X], y: pair[Axis::Y] }
+}
+
+/// The views of the monitors, in the order of [`FaultCode::ALL`].
+#[must_use]
+pub fn monitor_views(state: &State) -> Vec<MonitorView> {
+    FaultCode::ALL.iter().zip(&state.monitors).map(monitor_view).collect()
 }
 
 fn monitor_view((code, monitor): (&FaultCode, &MonitorState)) -> MonitorView {
