@@ -171,3 +171,84 @@ async fn a_fault_names_the_calibration_and_the_settings_that_judged_it() {
     assert_eq!(event["calibration_id"], calibrated["calibration_id"]);
     assert_eq!(event["settings_id"], calibrated["settings_id"]);
 }
+
+/// A column of a recording.
+fn column<'a>(recording: &'a Value, name: &str) -> &'a Vec<Value> {
+    recording["columns"][name].as_array().unwrap()
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn the_seconds_around_a_fault_are_those_that_were_judged() {
+    let mut bench = Bench::start().await;
+    bench.client.asset("a").await;
+    // Without a count: samples wait for earlier ones, the last ones too.
+    let samples: Vec<Sample> = rig(3000, 1500).iter().map(|s| Sample { seq: None, ..*s }).collect();
+    let events = bench.client.request(reqwest::Method::GET, "events?asset=a&after=0");
+    let mut events = Events::new(events.send().await.unwrap());
+    bench.client.telemetry("a", Some("s"), &samples[..2200]).await;
+    let path = "assets/a/faults/x_servo/recording";
+    let early = bench.client.get(path).await.expect(200);
+    assert_eq!(early["complete"], false, "it goes on");
+    bench.client.telemetry("a", Some("s"), &samples[2200..]).await;
+    bench.client.end("a", "s").await;
+    bench.restart().await;
+    let client = &bench.client;
+    let recording = client.get(path).await.expect(200);
+    assert_eq!((&recording["complete"], &recording["session"]), (&json!(true), &json!("s")));
+    let time = |name: &str| recording[name].as_f64().unwrap();
+    assert!(time("onset_s") < time("failed_s") && time("failed_s") < time("confirmed_s"));
+    assert_eq!(time("from_s"), time("onset_s") - 10.0);
+    assert_eq!(time("to_s"), time("confirmed_s") + 10.0);
+    let within = |s: &&Sample| (time("from_s")..=time("to_s")).contains(&s.t_s);
+    let wanted: Vec<&Sample> = samples.iter().filter(within).collect();
+    let sent = |of: fn(&Sample) -> Option<f64>| wanted.iter().map(|s| json!(of(s))).collect();
+    let sent: [Vec<Value>; 3] = [sent(|s| Some(s.t_s)), sent(|s| s.cmd_qy_rad), sent(|s| s.x_m)];
+    for (name, sent) in ["t_s", "cmd_qy_rad", "x_m"].iter().zip(&sent) {
+        assert_eq!(column(&recording, name), sent, "{name}");
+    }
+    let n_early = column(&early, "t_s").len();
+    assert_eq!(column(&early, "x_twin_m_s2")[..], column(&recording, "x_twin_m_s2")[..n_early]);
+    // What the events said at their moments stands in the rows of these moments.
+    for _ in 0..2 {
+        let event = loop {
+            let event = events.next().await;
+            if event["code"] == "x_servo" {
+                break event;
+            }
+        };
+        let at = sent[0].iter().position(|t_s| *t_s == event["t_s"]).unwrap();
+        let seen = &event["evidence"]["x"];
+        for name in ["measured_m_s2", "twin_m_s2", "residual_m_s2", "limit_m_s2", "enabled"] {
+            assert_eq!(column(&recording, &format!("x_{name}"))[at], seen[name], "{name}");
+        }
+        assert!(
+            seen["residual_m_s2"].as_f64().unwrap().abs() > seen["limit_m_s2"].as_f64().unwrap()
+        );
+    }
+    let request = client.request(reqwest::Method::GET, &format!("{path}?before_s=0&after_s=1"));
+    let csv = client.send(request.header("accept", "text/csv")).await;
+    assert_eq!(csv.headers["content-type"], "text/csv; charset=utf-8");
+    let mut lines = csv.text.lines();
+    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
+    assert_eq!(header.len(), recording["columns"].as_object().unwrap().len());
+    let n =
+        wanted.iter().filter(|s| (time("onset_s")..=time("confirmed_s") + 1.0).contains(&s.t_s));
+    assert_eq!(lines.clone().count(), n.count());
+    let first: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let at = wanted.iter().position(|s| s.t_s == first[0].parse::<f64>().unwrap()).unwrap();
+    for (name, cell) in header.iter().zip(first) {
+        let value = &column(&recording, name)[at];
+        assert_eq!(if value.is_null() { String::new() } else { value.to_string() }, cell, "{name}");
+    }
+    assert_eq!(
+        client.get(&format!("{path}?before_s=61")).await.problem(400)["parameter"],
+        "before_s"
+    );
+    assert_eq!(
+        client.get("assets/a/faults/sensor/recording").await.problem(404)["type"],
+        "urn:offbd:problem:no-recording"
+    );
+    let session = client.session("a", "s").await;
+    client.delete(&format!("sessions/{}", session["id"].as_str().unwrap())).await.expect(204);
+    client.get(path).await.problem(404);
+}

@@ -26,7 +26,7 @@ use align::Align;
 use coverage::Coverage;
 use pipeline::Pipeline;
 
-use crate::diagnosis::FaultMemory;
+use crate::diagnosis::{Evidence, FaultMemory};
 use crate::vocabulary::{FaultCode, Sample};
 
 /// One rig's pipeline for the length of one session (one operation cycle).
@@ -71,32 +71,54 @@ impl Engine {
     /// Takes one input and appends what follows from it to `outputs`: exactly
     /// one [`Output::Admitted`] for a sample, then the transitions it caused.
     pub fn handle(&mut self, input: Input, outputs: &mut Vec<Output>) {
+        self.observe(input, outputs, |_| {});
+    }
+
+    /// The same, and shows the evidence of every sample that is judged on the
+    /// way to `seen`, in order of time.
+    pub fn observe(
+        &mut self,
+        input: Input,
+        outputs: &mut Vec<Output>,
+        mut seen: impl FnMut(&Evidence),
+    ) {
         match input {
-            Input::Sample(sample) => self.sample(sample, outputs),
+            Input::Sample(sample) => self.sample(sample, outputs, &mut seen),
             Input::Clear(code) => self.clear(code, outputs),
             Input::Acknowledge(code) => {
                 self.memory.acknowledge(code);
             }
-            Input::End => self.end(outputs),
+            Input::End => self.end(outputs, &mut seen),
         }
     }
 
-    fn sample(&mut self, sample: Sample, outputs: &mut Vec<Output>) {
+    fn sample(
+        &mut self,
+        sample: Sample,
+        outputs: &mut Vec<Output>,
+        seen: &mut impl FnMut(&Evidence),
+    ) {
         let admission = self.admit.take(&sample, self.align.released_s());
         outputs.push(Output::Admitted(admission));
         if admission == Admission::Accepted {
             self.align.push(sample);
             while let Some(next) = self.align.pop(self.setup.settings.reorder_s) {
-                self.judge(&next, outputs);
+                self.judge(&next, outputs, seen);
             }
         }
     }
 
-    fn judge(&mut self, sample: &Sample, outputs: &mut Vec<Output>) {
+    fn judge(
+        &mut self,
+        sample: &Sample,
+        outputs: &mut Vec<Output>,
+        seen: &mut impl FnMut(&Evidence),
+    ) {
         let gap_s =
             self.setup.settings.gap_s.max(pipeline::GAP_PERIODS / self.setup.rig.sample_rate_hz);
         self.coverage.take(sample, gap_s);
         self.pipeline.judge(&self.setup, sample, &mut self.memory, outputs);
+        seen(self.pipeline.evidence());
     }
 
     fn clear(&mut self, code: FaultCode, outputs: &mut Vec<Output>) {
@@ -109,9 +131,9 @@ impl Engine {
         }
     }
 
-    fn end(&mut self, outputs: &mut Vec<Output>) {
+    fn end(&mut self, outputs: &mut Vec<Output>, seen: &mut impl FnMut(&Evidence)) {
         while let Some(next) = self.align.flush() {
-            self.judge(&next, outputs);
+            self.judge(&next, outputs, seen);
         }
         self.count_use();
         let before = self.memory.clone();

@@ -10,6 +10,7 @@ pub mod basis;
 pub mod memory;
 mod preset;
 pub mod provenance;
+pub mod recording;
 pub mod scene;
 pub mod service;
 pub mod session_csv;
