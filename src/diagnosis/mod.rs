@@ -14,6 +14,7 @@ mod outlier;
 mod settings;
 mod status;
 mod stillness;
+pub mod trend;
 
 pub use answer::Answer;
 pub use calibration::{AxisCalibration, Calibration};
