@@ -7,6 +7,7 @@
 
 pub mod asset;
 pub mod basis;
+pub mod difference;
 pub mod memory;
 mod preset;
 pub mod provenance;

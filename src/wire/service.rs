@@ -4,6 +4,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::difference::{ComparedView, TallyView};
 use super::memory::FaultRecordView;
 use super::provenance::ProvenanceView;
 use super::verdict::{EvidenceView, FaultView, SummaryView, evidence_view};
@@ -235,6 +236,16 @@ pub struct ReplaySettingsView {
     /// `default` or `textbook`; without it the one of the asset file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub profile: Option<String>,
+    /// Id of a calibration of the asset (of the job that learnt it, or its own)
+    /// to be used instead of the one in force when the session was opened.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<String>,
+    /// Continuous failure before a test fails, in [0, 60] s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub debounce_s: Option<f64>,
+    /// Wanted false alarms per rig and year, above 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub false_alarms_per_rig_year: Option<f64>,
     /// An asset file, or the parts of it that are to be different (JSON merge
     /// patch, RFC 7396), over the one in force when the session was opened.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -244,6 +255,12 @@ pub struct ReplaySettingsView {
 /// A place where the verdict of a replay and the recorded one differ.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct DifferenceView {
+    /// `altered`, `moved`, `only_recorded` or `only_replayed`.
+    #[serde(default)]
+    pub change: String,
+    /// Replayed − recorded, s; above 0 where the replay is later.
+    #[serde(default)]
+    pub moved_s: Option<f64>,
     /// Null where only the replay has it.
     pub recorded: Option<FaultView>,
     /// Null where only the record has it.
@@ -259,8 +276,21 @@ pub struct ReplayResultView {
     pub recorded_hash: Option<String>,
     /// Whether the two verdicts are the same, transition by transition.
     pub same: bool,
+    /// Every transition of either verdict, in the order of time.
+    #[serde(default)]
+    pub transitions: Vec<ComparedView>,
+    /// How many of them there are of each change.
+    #[serde(default)]
+    pub tally: TallyView,
+    /// The fault lines of those that are not the same.
     pub differences: Vec<DifferenceView>,
-    /// Whether `faults` or `differences` were cut at their limit.
+    /// Of the calibration that judged in the replay; null on a rig not learnt.
+    #[serde(default)]
+    pub calibration_id: Option<String>,
+    /// Of the profile, the settings and the rig's description that judged.
+    #[serde(default)]
+    pub settings_id: String,
+    /// Whether the verdicts were cut at their limit of 10000 transitions.
     pub truncated: bool,
 }
 
