@@ -10,7 +10,7 @@ use offbd::vocabulary::Sample;
 use reqwest::Method;
 use serde_json::{Value, json};
 use sqlx::{ConnectOptions, Connection, SqliteConnection};
-use support::{Bench, Client, batch, csv, rig};
+use support::{Bench, Client, Events, batch, csv, rig};
 use tokio_tungstenite::connect_async;
 use tokio_tungstenite::tungstenite::Message;
 
@@ -206,41 +206,6 @@ async fn events_missed_come_first_and_each_comes_once() {
         assert_eq!(event["asset"], "b");
         assert!(event["id"].as_i64().unwrap() > last);
         last = event["id"].as_i64().unwrap();
-    }
-}
-
-/// Server-Sent Events, one by one.
-struct Events {
-    response: reqwest::Response,
-    text: String,
-}
-
-impl Events {
-    fn new(response: reqwest::Response) -> Self {
-        assert_eq!(response.status(), 200);
-        Self { response, text: String::new() }
-    }
-
-    /// The next event's data, with its `id`.
-    async fn next(&mut self) -> Value {
-        loop {
-            if let Some((event, rest)) = self.text.split_once("\n\n") {
-                let event = event.to_owned();
-                self.text = rest.to_owned();
-                let field = |name: &str| {
-                    event.lines().find_map(|l| l.strip_prefix(name)).map(|v| v.trim().to_owned())
-                };
-                if let Some(data) = field("data:") {
-                    let mut data: Value = serde_json::from_str(&data).unwrap();
-                    data["id"] = field("id:").unwrap().parse::<i64>().unwrap().into();
-                    return data;
-                }
-                continue;
-            }
-            let chunk = tokio::time::timeout(support::DEADLINE, self.response.chunk()).await;
-            let chunk = chunk.unwrap().unwrap().expect("the stream goes on");
-            self.text.push_str(std::str::from_utf8(&chunk).unwrap());
-        }
     }
 }
 
@@ -537,4 +502,70 @@ async fn operation() {
     let mut store = store(&bench).await;
     sqlx::query("SELECT 1").execute(&mut store).await.unwrap();
     store.close().await.unwrap();
+}
+
+/// A replay of the session `id` with `settings`, once it is done.
+async fn replayed(client: &Client, id: &str, settings: Value) -> Value {
+    let answer = client.post(&format!("sessions/{id}/replays"), &settings).await.expect(202);
+    let path = format!("replays/{}", answer["id"].as_str().unwrap());
+    support::eventually(|| async {
+        let replay = client.get(&path).await.expect(200);
+        assert_ne!(replay["state"], "failed", "{replay}");
+        (replay["state"] == "done").then(|| replay["result"].clone())
+    })
+    .await
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_replay_says_what_other_settings_would_have_changed() {
+    let bench = Bench::start().await;
+    let client = &bench.client;
+    client.asset("a").await;
+    let import = |name: &str| format!("assets/a/sessions/import?name={name}");
+    client.post_text(&import("good"), "text/csv", csv(&rig(9000, 9000))).await.expect(201);
+    client.post_text(&import("sick"), "text/csv", csv(&rig(3000, 1500))).await.expect(201);
+    let good = client.session("a", "good").await["id"].clone();
+    let learning = client.post("assets/a/calibrations", &json!({ "sessions": [good] })).await;
+    let path = format!("assets/a/calibrations/{}", learning.expect(202)["id"].as_str().unwrap());
+    let learnt = support::eventually(|| async {
+        let job = client.get(&path).await.expect(200);
+        (job["state"] == "done").then_some(job)
+    })
+    .await;
+    let sick = client.session("a", "sick").await["id"].as_str().unwrap().to_owned();
+    let recorded = client.get("assets/a/faults/x_servo").await.expect(200);
+
+    let same = replayed(client, &sick, json!({})).await;
+    let n_faults = same["faults"].as_array().unwrap().len();
+    assert_eq!(same["tally"]["same"], n_faults);
+    assert_eq!(same["transitions"].as_array().unwrap().len(), n_faults);
+    assert_eq!((&same["same"], &same["differences"]), (&json!(true), &json!([])));
+    assert_eq!(same["settings_id"], recorded["last_occurrence"]["settings_id"]);
+
+    let slow = replayed(client, &sick, json!({ "debounce_s": 1.1 })).await;
+    let failed = slow["transitions"].as_array().unwrap();
+    let failed = failed.iter().find(|t| t["code"] == "x_servo").unwrap();
+    assert_eq!(failed["change"], "moved", "{failed}");
+    assert!(failed["moved_s"].as_f64().unwrap() > 0.3, "{failed}");
+    assert_ne!(slow["settings_id"], same["settings_id"]);
+    let lines = slow["differences"].as_array().unwrap();
+    let line = lines.iter().find(|d| d["recorded"]["code"] == "x_servo").unwrap();
+    assert_eq!((&line["change"], &line["moved_s"]), (&failed["change"], &failed["moved_s"]));
+    assert_eq!(line["replayed"]["t_s"], failed["replayed_t_s"]);
+
+    for id in [&learnt["id"], &learnt["calibration"]["id"]] {
+        let on_learnt = replayed(client, &sick, json!({ "calibration": id })).await;
+        assert_eq!(on_learnt["calibration_id"], learnt["calibration"]["id"]);
+        assert_eq!(on_learnt["same"], false);
+        assert_eq!(on_learnt["faults"][0]["calibration_id"], learnt["calibration"]["id"]);
+    }
+    for (settings, pointer) in [
+        (json!({ "calibration": "none such" }), "/calibration"),
+        (json!({ "debounce_s": -1 }), "/debounce_s"),
+        (json!({ "false_alarms_per_rig_year": 0 }), "/false_alarms_per_rig_year"),
+        (json!({ "asset": { "ball": { "mass_kg": -1 } } }), "/asset/ball/mass_kg"),
+    ] {
+        let answer = client.post(&format!("sessions/{sick}/replays"), &settings).await;
+        assert_eq!(answer.problem(422)["pointer"], pointer);
+    }
 }

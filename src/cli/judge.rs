@@ -9,6 +9,7 @@ use crate::diagnosis::{FaultMemory, Profile, Transition};
 use crate::engine::{Admission, Engine, Input, Output, Rig, Setup};
 use crate::vocabulary::Sample;
 use crate::wire::asset;
+use crate::wire::basis::Basis;
 use crate::wire::session_csv::{Reader, RowError};
 use crate::wire::verdict::{FaultView, SummaryView, Verdict, fault_view};
 
@@ -76,6 +77,7 @@ fn open(path: &Path) -> Result<Reader<File>, Unusable> {
 /// An engine with what comes out of it for one session.
 struct Bench {
     session: String,
+    basis: Basis,
     engine: Engine,
     outputs: Vec<Output>,
     verdict: Verdict,
@@ -91,6 +93,7 @@ impl Bench {
     fn new(setup: Setup, session: String) -> Self {
         Self {
             session,
+            basis: Basis::of(&setup),
             engine: Engine::new(setup, FaultMemory::default()),
             outputs: Vec::new(),
             verdict: Verdict::default(),
@@ -142,7 +145,7 @@ impl Bench {
     }
 
     fn transition(&mut self, transition: &Transition) {
-        self.faults.push(fault_view(&self.session, transition));
+        self.faults.push(fault_view(&self.session, &self.basis, transition));
     }
 
     /// The verdict; none when there was nothing to judge.

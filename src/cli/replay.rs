@@ -1,5 +1,7 @@
 //! `offbd replay`: judges recordings.
 
+mod against;
+
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -12,6 +14,7 @@ use super::output::{self, Format, words};
 use super::table;
 use super::unusable::Unusable;
 use crate::diagnosis::Profile;
+use crate::engine::Setup;
 use crate::vocabulary::FaultStatus;
 use crate::wire::verdict::FaultView;
 
@@ -26,7 +29,8 @@ use crate::wire::verdict::FaultView;
     Examples:\n  \
     offbd replay --asset learnt.json monday.csv tuesday.csv\n  \
     offbd replay --format json sick.csv | jq 'select(.status == \"confirmed\")'\n  \
-    offbd replay --profile textbook sick.csv\n\n\
+    offbd replay --profile textbook sick.csv\n  \
+    offbd replay --asset learnt.json --against relearnt.json monday.csv\n\n\
     A bad row is rejected by line number on stderr and counted. Exit status: 0 all\n\
     judged (faults or not), 3 a file could not be used; the others are judged."
 )]
@@ -43,6 +47,13 @@ pub(super) struct ReplayArgs {
     /// Judge by this profile instead of the asset's
     #[arg(long, value_parser = words::<Profile>(Profile::ALL.map(Profile::as_str)))]
     profile: Option<Profile>,
+    /// Judge by this asset file too, and show where the two verdicts differ
+    #[arg(long, value_name = "ASSET.json")]
+    against: Option<PathBuf>,
+    /// Judge by this profile too (of `--against`, or else of the same asset
+    /// file), and show where the two verdicts differ
+    #[arg(long, value_name = "PROFILE", value_parser = words::<Profile>(Profile::ALL.map(Profile::as_str)))]
+    against_profile: Option<Profile>,
     /// Files judged at a time [default: one per core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
@@ -50,12 +61,14 @@ pub(super) struct ReplayArgs {
 
 pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     let setup = judge::set_up(judge::load_rig(args.asset.as_deref())?, args.profile)?;
+    let against = against_setup(args)?;
     let bar = progress(args.sessions.len());
-    let judge_all = || -> Vec<Result<Judged, Unusable>> {
+    let judge_all = || -> Vec<Result<Verdicts, Unusable>> {
         let judge = |path: &PathBuf| {
-            let result = judge::judge_file(&setup, path);
+            let judged = judge::judge_file(&setup, path)?;
+            let against = against.as_ref().map(|s| judge::judge_file(s, path)).transpose()?;
             bar.inc(1);
-            result
+            Ok(Verdicts { judged, against })
         };
         args.sessions.par_iter().map(judge).collect()
     };
@@ -64,12 +77,28 @@ pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     for (path, result) in args.sessions.iter().zip(&results) {
         report_rows(path, result);
     }
-    let judged: Vec<&Judged> = results.iter().flatten().collect();
+    let verdicts: Vec<&Verdicts> = results.iter().flatten().collect();
     match args.format {
-        Format::Json => write_json(&judged)?,
-        Format::Table => write_table(&judged)?,
+        Format::Json => write_json(&verdicts)?,
+        Format::Table => write_table(&verdicts)?,
     }
     outcome(results)
+}
+
+/// A session's verdict, and the other one where that is wanted.
+struct Verdicts {
+    judged: Judged,
+    against: Option<Judged>,
+}
+
+/// What the other verdict is reached by, if one is wanted.
+fn against_setup(args: &ReplayArgs) -> Result<Option<Setup>, Unusable> {
+    if args.against.is_none() && args.against_profile.is_none() {
+        return Ok(None);
+    }
+    let asset = args.against.as_ref().or(args.asset.as_ref());
+    let rig = judge::load_rig(asset.map(PathBuf::as_path))?;
+    judge::set_up(rig, args.against_profile).map(Some)
 }
 
 /// A progress bar on stderr, hidden where that is no terminal or there is one
@@ -93,9 +122,9 @@ pub(super) fn in_threads<T: Send>(
 }
 
 /// Says on stderr what was not taken.
-fn report_rows(path: &Path, result: &Result<Judged, Unusable>) {
+fn report_rows(path: &Path, result: &Result<Verdicts, Unusable>) {
     let name = path.display();
-    let Ok(judged) = result else { return };
+    let Ok(Verdicts { judged, .. }) = result else { return };
     for row in &judged.bad_rows {
         anstream::eprintln!("{name}: {row}; row rejected");
     }
@@ -111,27 +140,30 @@ fn report_rows(path: &Path, result: &Result<Judged, Unusable>) {
     }
 }
 
-fn write_json(judged: &[&Judged]) -> anyhow::Result<()> {
+fn write_json(verdicts: &[&Verdicts]) -> anyhow::Result<()> {
     let mut out = output::stdout();
-    for session in judged {
+    for Verdicts { judged: session, against } in verdicts {
         for fault in &session.faults {
             serde_json::to_writer(&mut out, fault)?;
             writeln!(out)?;
         }
         serde_json::to_writer(&mut out, &session.summary)?;
         writeln!(out)?;
+        if let Some(against) = against {
+            against::write_json(&mut out, session, against)?;
+        }
     }
     Ok(out.flush()?)
 }
 
-fn write_table(judged: &[&Judged]) -> anyhow::Result<()> {
+fn write_table(verdicts: &[&Verdicts]) -> anyhow::Result<()> {
     let mut out = output::stdout();
-    if judged.is_empty() {
+    if verdicts.is_empty() {
         return Ok(());
     }
     let heading = ["session", "samples", "rejected", "seconds", "verdict"];
     let mut summaries = table::table(&heading, &[1, 2, 3]);
-    for session in judged {
+    for Verdicts { judged: session, .. } in verdicts {
         let s = &session.summary;
         summaries.add_row([
             s.session.clone(),
@@ -144,8 +176,13 @@ fn write_table(judged: &[&Judged]) -> anyhow::Result<()> {
     for line in table::lines(&summaries) {
         writeln!(out, "{line}")?;
     }
-    for session in judged {
-        write_sentences(&mut out, session, judged.len() > 1)?;
+    for Verdicts { judged, .. } in verdicts {
+        write_sentences(&mut out, judged, verdicts.len() > 1)?;
+    }
+    for Verdicts { judged, against } in verdicts {
+        if let Some(against) = against {
+            against::write_table(&mut out, judged, against)?;
+        }
     }
     Ok(out.flush()?)
 }
@@ -189,7 +226,7 @@ fn write_sentences(out: &mut impl Write, session: &Judged, several: bool) -> any
 }
 
 /// All were judged, or else the files that were not.
-fn outcome(results: Vec<Result<Judged, Unusable>>) -> anyhow::Result<()> {
+fn outcome<T>(results: Vec<Result<T, Unusable>>) -> anyhow::Result<()> {
     let mut unusable: Vec<Unusable> = results.into_iter().filter_map(Result::err).collect();
     let Some(last) = unusable.pop() else { return Ok(()) };
     for error in unusable {

@@ -1,11 +1,12 @@
 //! The fault memory of one rig: per code the status byte, the trip, healing
-//! and aging counters, occurrences, the freeze frame and who acknowledged.
+//! and aging counters, occurrences, the freeze frame, whether it has been
+//! acknowledged, and how often its monitor could judge.
 //!
 //! One session is one operation cycle. Knows nothing of sensors or thresholds:
 //! it is told FAILED, PASSED, cycle start and cycle end.
 
 use super::{Evidence, Suspicion};
-use crate::vocabulary::{FaultCode, FaultKind, FaultStatus};
+use crate::vocabulary::{FaultCode, FaultKind, FaultStatus, SimTime};
 
 use super::StatusByte;
 
@@ -30,6 +31,43 @@ impl Default for MemoryRules {
     }
 }
 
+/// How often a monitor has been in a position to find its fault: the in-use
+/// performance of SAE J1979. Neither clearing nor aging erases it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct InUse {
+    /// Operation cycles that have ended.
+    pub cycles: u32,
+    /// Those that brought enough data to judge by.
+    pub with_data: u32,
+    /// Those in which the gate was open long enough to have found a fault.
+    pub judged: u32,
+}
+
+impl InUse {
+    /// How much longer than a fault takes to be confirmed there must be data:
+    /// a gate that is open for a tenth of the time is wide enough, one that is
+    /// stricter shows as a low ratio. Chosen, not measured.
+    const DATA_FACTOR: f64 = 10.0;
+
+    /// Counts a cycle that ends, with `data_s` seconds of data and the gate
+    /// open for `enabled_s` of them, for a fault that takes `needed_s` to be
+    /// confirmed. A cycle that judged had enough data, so that
+    /// `judged` ≤ `with_data` ≤ `cycles`.
+    pub fn count(&mut self, data_s: f64, enabled_s: f64, needed_s: f64) {
+        let judged = enabled_s > 0.0 && enabled_s >= needed_s;
+        let with_data = judged || (data_s > 0.0 && data_s >= Self::DATA_FACTOR * needed_s);
+        self.cycles = self.cycles.saturating_add(1);
+        self.with_data = self.with_data.saturating_add(u32::from(with_data));
+        self.judged = self.judged.saturating_add(u32::from(judged));
+    }
+
+    /// Judged cycles over those with data, 0 to 1; none before there is one.
+    #[must_use]
+    pub fn ratio(&self) -> Option<f64> {
+        (self.with_data > 0).then(|| f64::from(self.judged) / f64::from(self.with_data))
+    }
+}
+
 /// What is remembered of one code.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FaultRecord {
@@ -44,15 +82,41 @@ pub struct FaultRecord {
     pub healed: bool,
     /// Times the test went from not failed to failed since the last clear.
     pub occurrences: u32,
+    /// Onset of the first of them, on the clock of its session.
+    pub first_onset: Option<SimTime>,
+    /// Onset of the last of them, on the clock of its session.
+    pub last_onset: Option<SimTime>,
+    /// Operation cycles with a failure since the last clear.
+    pub failed_cycles: u32,
     /// Whether the current occurrence has been acknowledged.
     pub acknowledged: bool,
     /// What was suspected when the test last failed.
     pub suspicion: Option<Suspicion>,
     /// The moment of the first failure of the current occurrence.
     pub freeze_frame: Option<Evidence>,
+    /// How often the monitor could judge at all.
+    pub in_use: InUse,
 }
 
 impl FaultRecord {
+    /// Good cycles that count towards healing.
+    #[must_use]
+    pub fn healing_counter(&self, rules: &MemoryRules) -> u8 {
+        if self.status.confirmed() { self.good_cycles.min(rules.healing_cycles) } else { 0 }
+    }
+
+    /// Good cycles after healing, which count towards aging.
+    #[must_use]
+    pub fn aging_counter(&self, rules: &MemoryRules) -> u8 {
+        let past = self.good_cycles.saturating_sub(rules.healing_cycles);
+        if self.status.confirmed() { past.min(rules.aging_cycles) } else { 0 }
+    }
+
+    /// The same with nothing on record but `status` and the monitor's use.
+    fn erased(&self, status: StatusByte) -> Self {
+        Self { status, in_use: self.in_use, ..Self::default() }
+    }
+
     /// The contract's word for the status byte.
     #[must_use]
     pub const fn word(&self) -> FaultStatus {
@@ -106,6 +170,13 @@ impl FaultMemory {
             record.occurrences = record.occurrences.saturating_add(1);
             record.acknowledged = false;
             record.freeze_frame = Some(frame.clone());
+            record.last_onset = suspicion.onset;
+            if record.occurrences == 1 {
+                record.first_onset = suspicion.onset;
+            }
+        }
+        if !before.failed_this_cycle() {
+            record.failed_cycles = record.failed_cycles.saturating_add(1);
         }
         record.suspicion = Some(suspicion.clone());
         record.good_cycles = 0;
@@ -163,15 +234,22 @@ impl FaultMemory {
             }
             if record.good_cycles >= rules.healing_cycles.saturating_add(rules.aging_cycles) {
                 record.status.age();
-                let status = record.status;
-                *record = FaultRecord { status, ..FaultRecord::default() };
+                *record = record.erased(record.status);
             }
         }
     }
 
-    /// Erases everything stored of `code`: it has never run.
+    /// Takes note of how much of the cycle that ends `code` could be judged;
+    /// see [`InUse::count`].
+    pub fn count_use(&mut self, code: FaultCode, data_s: f64, enabled_s: f64, needed_s: f64) {
+        self.record_mut(code).in_use.count(data_s, enabled_s, needed_s);
+    }
+
+    /// Erases everything stored of `code`: it has never run. How often its
+    /// monitor could judge stays, as SAE J1979 has it.
     pub fn clear(&mut self, code: FaultCode) {
-        *self.record_mut(code) = FaultRecord::default();
+        let record = self.record_mut(code);
+        *record = record.erased(StatusByte::default());
     }
 
     /// Marks the current occurrence of `code` as seen by a person. Returns
@@ -185,139 +263,4 @@ impl FaultMemory {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const CODE: FaultCode = FaultCode::XServo;
-
-    struct Bench {
-        memory: FaultMemory,
-        rules: MemoryRules,
-    }
-
-    impl Bench {
-        fn new(confirmation_threshold: u8, indicator: bool) -> Self {
-            let rules = MemoryRules {
-                confirmation_threshold,
-                indicator,
-                healing_cycles: 1,
-                aging_cycles: 1,
-            };
-            Self { memory: FaultMemory::default(), rules }
-        }
-
-        fn byte(&self) -> String {
-            self.memory.record(CODE).status.to_string()
-        }
-
-        fn failed(&mut self) -> String {
-            self.memory.failed(CODE, &Suspicion::default(), &Evidence::default());
-            self.memory.trip(CODE, &Suspicion::default(), &self.rules);
-            self.byte()
-        }
-
-        fn passed(&mut self) -> String {
-            self.memory.passed(CODE);
-            self.byte()
-        }
-
-        fn start(&mut self) -> String {
-            self.memory.start_cycle();
-            self.byte()
-        }
-
-        fn end(&mut self) -> String {
-            self.memory.end_cycle(&self.rules);
-            self.byte()
-        }
-    }
-
-    /// The published vectors for a confirmation threshold of 1, with and
-    /// without the warning indicator. Healing takes the first good cycle,
-    /// aging the second, so that "cycle end" and "healed" coincide here.
-    #[test]
-    fn validate_vectors_with_indicator() {
-        let mut bench = Bench::new(1, true);
-        bench.rules.healing_cycles = 2;
-        assert_eq!(bench.byte(), "50");
-        assert_eq!(bench.start(), "50");
-        assert_eq!(bench.failed(), "AF");
-        assert_eq!(bench.passed(), "AE");
-        assert_eq!(bench.end(), "AE", "a cycle with a failure does not end pending");
-        assert_eq!(bench.start(), "EC");
-        assert_eq!(bench.passed(), "AC");
-        assert_eq!(bench.end(), "A8");
-        bench.start();
-        bench.passed();
-        assert_eq!(bench.end(), "28", "healed");
-        bench.start();
-        bench.passed();
-        assert_eq!(bench.end(), "20", "aged");
-    }
-
-    #[test]
-    fn validate_vectors_without_indicator() {
-        let mut bench = Bench::new(1, false);
-        bench.start();
-        assert_eq!(bench.failed(), "2F");
-        assert_eq!(bench.passed(), "2E");
-        bench.end();
-        assert_eq!(bench.start(), "6C");
-        assert_eq!(bench.passed(), "2C");
-        assert_eq!(bench.end(), "28");
-        bench.start();
-        bench.passed();
-        assert_eq!(bench.end(), "20", "aged");
-    }
-
-    #[test]
-    fn validate_vectors_with_threshold_two() {
-        let mut bench = Bench::new(2, false);
-        bench.start();
-        assert_eq!(bench.failed(), "27");
-        assert_eq!(bench.failed(), "27", "one cycle counts once");
-        bench.end();
-        bench.start();
-        assert_eq!(bench.failed(), "2F");
-    }
-
-    #[test]
-    fn a_good_cycle_in_between_restarts_the_trip_counter() {
-        let mut bench = Bench::new(2, false);
-        bench.start();
-        bench.failed();
-        bench.end();
-        bench.start();
-        bench.passed();
-        bench.end();
-        bench.start();
-        assert_eq!(bench.failed(), "27");
-    }
-
-    #[test]
-    fn a_cycle_without_a_result_neither_heals_nor_ends_pending() {
-        let mut bench = Bench::new(1, true);
-        bench.start();
-        bench.failed();
-        bench.passed();
-        bench.end();
-        bench.start();
-        assert_eq!(bench.end(), "EC");
-        assert_eq!(bench.memory.record(CODE).good_cycles, 0);
-    }
-
-    #[test]
-    fn clearing_and_acknowledging_are_different_acts() {
-        let mut bench = Bench::new(1, true);
-        assert!(!bench.memory.acknowledge(CODE), "nothing to acknowledge");
-        bench.failed();
-        assert!(bench.memory.acknowledge(CODE));
-        assert_eq!(bench.byte(), "AF");
-        bench.passed();
-        bench.failed();
-        assert!(!bench.memory.record(CODE).acknowledged, "a new occurrence asks again");
-        bench.memory.clear(CODE);
-        assert_eq!(bench.memory.record(CODE), &FaultRecord::default());
-        assert_eq!(bench.byte(), "50");
-    }
-}
+mod tests;

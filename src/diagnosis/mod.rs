@@ -15,13 +15,14 @@ mod servo;
 mod settings;
 mod status;
 mod stillness;
+pub mod trend;
 
 pub use calibration::{AxisCalibration, Calibration};
 pub use debounce::{Debounce, Pace, Qualified, Test};
 pub use evaluator::{Evaluator, Finding, Surroundings};
 pub use evidence::{AxisEvidence, Candidate, Evidence, Suspicion, Transition};
 pub use limits::Limits;
-pub use memory::{FaultMemory, FaultRecord, MemoryRules};
+pub use memory::{FaultMemory, FaultRecord, InUse, MemoryRules};
 pub use outlier::{Gated, OutlierGate};
 pub use scatter::Scatter;
 pub use servo::{Answer, AxisNature, Course, Servo, ServoEstimate};

@@ -9,6 +9,7 @@
 mod admit;
 mod align;
 mod calibrate;
+mod coverage;
 mod frame;
 mod look;
 mod pipeline;
@@ -22,6 +23,7 @@ pub use types::{Admission, Input, MonitorState, Output, Readiness, Rejection, St
 
 use admit::Admit;
 use align::Align;
+use coverage::Coverage;
 use pipeline::Pipeline;
 
 use crate::diagnosis::{Evidence, FaultMemory, ServoEstimate};
@@ -34,6 +36,7 @@ pub struct Engine {
     memory: FaultMemory,
     admit: Admit,
     align: Align,
+    coverage: Coverage,
     pipeline: Pipeline,
 }
 
@@ -46,6 +49,7 @@ impl Engine {
         Self {
             admit: Admit::new(&setup.rig.mapping),
             align: Align::default(),
+            coverage: Coverage::default(),
             pipeline: Pipeline::new(&setup),
             memory,
             setup,
@@ -67,25 +71,54 @@ impl Engine {
     /// Takes one input and appends what follows from it to `outputs`: exactly
     /// one [`Output::Admitted`] for a sample, then the transitions it caused.
     pub fn handle(&mut self, input: Input, outputs: &mut Vec<Output>) {
+        self.observe(input, outputs, |_| {});
+    }
+
+    /// The same, and shows the evidence of every sample that is judged on the
+    /// way to `seen`, in order of time.
+    pub fn observe(
+        &mut self,
+        input: Input,
+        outputs: &mut Vec<Output>,
+        mut seen: impl FnMut(&Evidence),
+    ) {
         match input {
-            Input::Sample(sample) => self.sample(sample, outputs),
+            Input::Sample(sample) => self.sample(sample, outputs, &mut seen),
             Input::Clear(code) => self.clear(code, outputs),
             Input::Acknowledge(code) => {
                 self.memory.acknowledge(code);
             }
-            Input::End => self.end(outputs),
+            Input::End => self.end(outputs, &mut seen),
         }
     }
 
-    fn sample(&mut self, sample: Sample, outputs: &mut Vec<Output>) {
+    fn sample(
+        &mut self,
+        sample: Sample,
+        outputs: &mut Vec<Output>,
+        seen: &mut impl FnMut(&Evidence),
+    ) {
         let admission = self.admit.take(&sample, self.align.released_s());
         outputs.push(Output::Admitted(admission));
         if admission == Admission::Accepted {
             self.align.push(sample);
             while let Some(next) = self.align.pop(self.setup.settings.reorder_s) {
-                self.pipeline.judge(&self.setup, &next, &mut self.memory, outputs);
+                self.judge(&next, outputs, seen);
             }
         }
+    }
+
+    fn judge(
+        &mut self,
+        sample: &Sample,
+        outputs: &mut Vec<Output>,
+        seen: &mut impl FnMut(&Evidence),
+    ) {
+        let gap_s =
+            self.setup.settings.gap_s.max(pipeline::GAP_PERIODS / self.setup.rig.sample_rate_hz);
+        self.coverage.take(sample, gap_s);
+        self.pipeline.judge(&self.setup, sample, &mut self.memory, outputs);
+        seen(self.pipeline.evidence());
     }
 
     fn clear(&mut self, code: FaultCode, outputs: &mut Vec<Output>) {
@@ -98,10 +131,11 @@ impl Engine {
         }
     }
 
-    fn end(&mut self, outputs: &mut Vec<Output>) {
+    fn end(&mut self, outputs: &mut Vec<Output>, seen: &mut impl FnMut(&Evidence)) {
         while let Some(next) = self.align.flush() {
-            self.pipeline.judge(&self.setup, &next, &mut self.memory, outputs);
+            self.judge(&next, outputs, seen);
         }
+        self.count_use();
         let before = self.memory.clone();
         self.memory.end_cycle(&self.setup.settings.memory);
         let Some(at) = self.pipeline.now() else { return };
@@ -124,6 +158,16 @@ impl Engine {
     #[must_use]
     pub fn servo_estimates(&self) -> PerAxis<Option<ServoEstimate>> {
         self.pipeline.servo_estimates()
+    }
+
+    /// Takes note of how much of this session each monitor could judge.
+    fn count_use(&mut self) {
+        let (state, settings) = (self.state(), &self.setup.settings);
+        let needed_s = settings.fail_s + settings.confirm_s;
+        for (&code, monitor) in FaultCode::ALL.iter().zip(&state.monitors) {
+            let data_s = self.coverage.data_s(code);
+            self.memory.count_use(code, data_s, monitor.enabled_s, needed_s);
+        }
     }
 
     /// Where the engine stands after the last judged sample.

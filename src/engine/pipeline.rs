@@ -21,7 +21,7 @@ use crate::vocabulary::{Axis, FaultCode, PerAxis, Sample, SimTime};
 const LEAST_SAMPLES: f64 = 8.0;
 /// Periods without a sample that make a gap, where that is longer than the
 /// settings' gap.
-const GAP_PERIODS: f64 = 4.0;
+pub(super) const GAP_PERIODS: f64 = 4.0;
 /// Longest period assumed before a second one has been seen, s.
 const LONGEST_FIRST_PERIOD_S: f64 = 0.25;
 /// How fast the period is followed, share per sample.

@@ -14,7 +14,7 @@ use tokio_util::sync::CancellationToken;
 use super::{App, Problem, Query};
 use crate::service::EventFeed;
 use crate::vocabulary::Invalid;
-use crate::wire::verdict::FaultView;
+use crate::wire::service::EventView;
 
 /// Silence after which a comment is sent, so that nobody between takes the
 /// connection for dead.
@@ -31,11 +31,12 @@ pub(super) struct EventsQuery {
 }
 
 /// Fault transitions as they become durable: events of the type `fault` whose
-/// data is a fault line with the `asset`, each with an id. With the header
-/// `Last-Event-ID` the ones missed come first.
+/// data is a fault line with `asset` and `session_id`, each with an id. A code
+/// that is cleared while no session is open is an event without a session and
+/// without `t_s`. With the header `Last-Event-ID` the ones missed come first.
 #[utoipa::path(get, path = "/events", tag = "faults", operation_id = "stream_events",
     params(EventsQuery),
-    responses((status = 200, body = FaultView, content_type = "text/event-stream"),
+    responses((status = 200, body = EventView, content_type = "text/event-stream"),
         (status = 400, body = Problem), (status = 404, body = Problem)))]
 pub(super) async fn events(
     State(app): State<App>,

@@ -2,12 +2,16 @@
 
 use axum::Json;
 use axum::extract::{Path, State};
-use axum::http::StatusCode;
+use axum::http::header::CONTENT_TYPE;
+use axum::http::{HeaderMap, StatusCode};
+use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
 
 use super::layers::about;
+use super::sessions::Form;
 use super::{Problem, Query, page_limit};
-use crate::service::{FaultQuery, Service};
+use crate::service::{Around, FaultQuery, Service};
+use crate::wire::recording::{ColumnsView, RecordingView, write_csv};
 use crate::wire::service::{FaultEntryView, Page};
 
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
@@ -113,6 +117,58 @@ pub(super) async fn acknowledge(
 ) -> Result<Json<FaultEntryView>, Problem> {
     about(&asset);
     Ok(Json(service.acknowledge(&asset, &code, query.actor()).await?))
+}
+
+#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[into_params(parameter_in = Query)]
+pub(super) struct AroundQuery {
+    /// Seconds before the onset, 0 to 60; 10 without it.
+    before_s: Option<f64>,
+    /// Seconds after the confirmation (or the failure that was none), 0 to 60;
+    /// 10 without it.
+    after_s: Option<f64>,
+}
+
+/// Seconds on either side where none are asked for.
+const AROUND_S: f64 = 10.0;
+
+/// The seconds before and after the last occurrence of a fault: what the device
+/// sent, and beside it measured and twin acceleration, residual, limit and
+/// gate, for which the recording is judged again from the beginning of its
+/// session (at most 10 million samples, two recordings at a time). JSON
+/// columns, or CSV if `Accept` asks for `text/csv`. It is there for as long as
+/// the session is, which nothing but `DELETE` removes.
+#[utoipa::path(get, path = "/assets/{asset}/faults/{code}/recording", tag = "faults",
+    operation_id = "get_fault_recording",
+    params(("asset", description = "Name of the asset"), ("code", description = "Fault code"),
+        AroundQuery),
+    responses((status = 200, content((RecordingView = "application/json"),
+            (String = "text/csv"))),
+        (status = 400, body = Problem), (status = 404, body = Problem),
+        (status = 406, body = Problem),
+        (status = 413, body = Problem, description = "Too far into its session"),
+        (status = 429, body = Problem)))]
+pub(super) async fn recording(
+    State(service): State<Service>,
+    Path((asset, code)): Path<(String, String)>,
+    Query(query): Query<AroundQuery>,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    about(&asset);
+    let form = Form::wanted(&headers, Form::Json)?;
+    let around = Around {
+        before_s: query.before_s.unwrap_or(AROUND_S),
+        after_s: query.after_s.unwrap_or(AROUND_S),
+    };
+    let (mut view, rows) = service.fault_recording(&asset, &code, around).await?;
+    if form == Form::Json {
+        view.columns = ColumnsView::of(&rows);
+        return Ok(Json(view).into_response());
+    }
+    let mut text = Vec::new();
+    // A vector takes everything that is written to it.
+    let _ = write_csv(&mut text, &rows);
+    Ok(([(CONTENT_TYPE, form.kind())], text).into_response())
 }
 
 /// Faults across the fleet.

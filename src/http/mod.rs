@@ -103,6 +103,7 @@ fn api() -> OpenApiRouter<App> {
         .routes(routes!(faults::of_asset))
         .routes(routes!(faults::get, faults::clear))
         .routes(routes!(faults::acknowledge))
+        .routes(routes!(faults::recording))
         .routes(routes!(faults::of_fleet))
         .routes(routes!(events::events))
         .routes(routes!(sessions::open))

@@ -91,6 +91,7 @@ impl From<ServiceError> for Problem {
             E::UnknownReplay { .. } => missing("unknown-replay", "No such replay"),
             E::UnknownCalibration { .. } => missing("unknown-calibration", "No such calibration"),
             E::UnknownCode(_) => missing("unknown-code", "No such fault code"),
+            E::NoRecording { .. } => missing("no-recording", "No recording"),
             E::AssetExists { .. } => conflict("asset-exists", "The asset is there already"),
             E::SessionExists { .. } => conflict("session-exists", "The session is there already"),
             E::SessionEnded { .. } => conflict("session-ended", "The session has ended"),

@@ -196,7 +196,7 @@ pub(super) async fn telemetry(
     Path(id): Path<String>,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let form = Form::wanted(&headers)?;
+    let form = Form::wanted(&headers, Form::Csv)?;
     let (session, recording) = service.recording(&id).await?;
     let file = format!("attachment; filename=\"{id}.{}\"", form.suffix());
     let with_seq = session.last_seq.is_some();
@@ -208,20 +208,21 @@ pub(super) async fn telemetry(
 
 /// How a recording is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Form {
+pub(super) enum Form {
     Csv,
     Json,
 }
 
 impl Form {
-    /// The form that `Accept` asks for.
-    fn wanted(headers: &HeaderMap) -> Result<Self, Problem> {
-        let Some(accept) = headers.get(ACCEPT) else { return Ok(Self::Csv) };
+    /// The form that `Accept` asks for, `usual` if any will do.
+    pub(super) fn wanted(headers: &HeaderMap, usual: Self) -> Result<Self, Problem> {
+        let Some(accept) = headers.get(ACCEPT) else { return Ok(usual) };
         let accept = accept.to_str().unwrap_or_default();
         for range in accept.split(',') {
             match range.split(';').next().unwrap_or_default().trim() {
                 "application/json" => return Ok(Self::Json),
-                "text/csv" | "text/*" | "*/*" => return Ok(Self::Csv),
+                "text/csv" | "text/*" => return Ok(Self::Csv),
+                "*/*" => return Ok(usual),
                 _ => {}
             }
         }
@@ -229,7 +230,7 @@ impl Form {
         Err(Problem::new(StatusCode::NOT_ACCEPTABLE, "not-acceptable", "No such format", detail))
     }
 
-    const fn kind(self) -> &'static str {
+    pub(super) const fn kind(self) -> &'static str {
         match self {
             Self::Csv => "text/csv; charset=utf-8",
             Self::Json => "application/json",

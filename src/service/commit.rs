@@ -102,9 +102,12 @@ impl Committer {
 
     fn announce(&self, set: WriteSet) {
         for write in set.writes {
-            if let Write::Transition(row) = write {
-                self.events.publish(Event::from(row));
-            }
+            let event = match write {
+                Write::Transition(row) => Some(Event::of_transition(row)),
+                Write::Act(row) => Event::of_act(row),
+                _ => None,
+            };
+            event.into_iter().for_each(|event| self.events.publish(event));
         }
         (set.done)(true);
     }

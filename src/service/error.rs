@@ -29,6 +29,10 @@ pub enum ServiceError {
     SessionEnded { asset: String, name: String },
     #[error("{code} of asset `{asset}` has no occurrence to acknowledge")]
     NothingToAcknowledge { asset: String, code: String },
+    #[error(
+        "{code} of asset `{asset}` has no recording: nothing is on record, or its session is gone"
+    )]
+    NoRecording { asset: String, code: String },
     #[error("calibration `{id}` is not done: {state}")]
     NotDone { id: String, state: String },
     #[error(transparent)]

@@ -7,7 +7,7 @@ use tokio::sync::broadcast;
 use tokio::sync::broadcast::error::RecvError;
 
 use super::ServiceError;
-use crate::store::{Store, TransitionRow};
+use crate::store::{ActionRow, EventRow, Store, TransitionRow};
 
 /// Events kept for listeners that are behind; one further behind reads them
 /// from the store.
@@ -22,25 +22,38 @@ pub struct Event {
     /// Rises with every event, never given twice.
     pub id: i64,
     pub asset: String,
-    /// The service's id of the session.
-    pub session: String,
+    /// The service's id of the session; none if none was open.
+    pub session: Option<String>,
     /// The fault line, JSON.
     pub document: String,
 }
 
-impl From<TransitionRow> for Event {
-    fn from(row: TransitionRow) -> Self {
+impl From<EventRow> for Event {
+    fn from(row: EventRow) -> Self {
         Self { id: row.id, asset: row.asset, session: row.session, document: row.document }
     }
 }
 
 impl Event {
+    pub(super) fn of_transition(row: TransitionRow) -> Self {
+        let session = Some(row.session);
+        Self { id: row.id, asset: row.asset, session, document: row.document }
+    }
+
+    /// None for an act that changed nothing, or that a transition tells of.
+    pub(super) fn of_act(row: ActionRow) -> Option<Self> {
+        let document = row.event?;
+        Some(Self { id: row.id, asset: row.asset, session: row.session, document })
+    }
+
     /// The fault line with `asset` and the session's id, a JSON object.
     #[must_use]
     pub fn line(&self) -> String {
         let rest = self.document.strip_prefix('{').unwrap_or(&self.document);
         // Names and ids need no escaping: letters, digits, `-`, `_`, `.`.
-        format!(r#"{{"asset":"{}","session_id":"{}",{rest}"#, self.asset, self.session)
+        let session = self.session.as_ref().map(|id| format!("\"{id}\""));
+        let session = session.as_deref().unwrap_or("null");
+        format!(r#"{{"asset":"{}","session_id":{session},{rest}"#, self.asset)
     }
 }
 

@@ -3,7 +3,7 @@
 use super::{Service, ServiceError, views};
 use crate::store::{ActionKind, FaultFilter, FaultOrder};
 use crate::vocabulary::{FaultCode, Invalid};
-use crate::wire::service::{FaultEntryView, Page};
+use crate::wire::service::{FaultEntryView, MonitorView, Page, monitor_views};
 
 /// The statuses that a word of a query stands for; none: all.
 fn statuses(word: &str) -> Result<Vec<&'static str>, ServiceError> {
@@ -36,6 +36,11 @@ fn order(word: &str) -> Result<FaultOrder, ServiceError> {
 
 fn code(word: &str) -> Result<FaultCode, ServiceError> {
     word.parse().map_err(ServiceError::UnknownCode)
+}
+
+fn take(monitors: &mut Vec<MonitorView>, code: &str) -> Option<MonitorView> {
+    let at = monitors.iter().position(|monitor| monitor.code == code)?;
+    Some(monitors.swap_remove(at))
 }
 
 /// What is asked of the fleet's faults, in words.
@@ -86,8 +91,22 @@ impl Service {
     ) -> Result<Page<FaultEntryView>, ServiceError> {
         self.asset(asset).await?;
         let (asset, sort) = (Some(asset.to_owned()), Some("asset".to_owned()));
-        let query = FaultQuery { status, asset, sort, ..FaultQuery::default() };
-        self.faults(query, FaultCode::COUNT as u32).await
+        let query = FaultQuery { status, asset: asset.clone(), sort, ..FaultQuery::default() };
+        let mut page = self.faults(query, FaultCode::COUNT as u32).await?;
+        let mut monitors = self.monitors(asset.as_deref().unwrap_or_default()).await;
+        for entry in &mut page.items {
+            entry.monitor = take(&mut monitors, &entry.record.code);
+        }
+        Ok(page)
+    }
+
+    /// The monitors of the open session, if there is one; none also where the
+    /// asset's shard has no time to say.
+    async fn monitors(&self, asset: &str) -> Vec<MonitorView> {
+        let seen = self.look(asset, |running| {
+            running.open.as_ref().map(|open| monitor_views(&open.engine.state()))
+        });
+        seen.await.ok().flatten().unwrap_or_default()
     }
 
     /// What is remembered of one code; one that never failed is `cleared`.
@@ -97,10 +116,12 @@ impl Service {
     pub async fn fault(&self, asset: &str, word: &str) -> Result<FaultEntryView, ServiceError> {
         let code = code(word)?;
         self.asset(asset).await?;
-        match self.inner.store.fault(asset, code.as_str()).await? {
-            Some(row) => views::fault(row),
-            None => views::never_failed(&self.inner.store, asset, code).await,
-        }
+        let mut entry = match self.inner.store.fault(asset, code.as_str()).await? {
+            Some(row) => views::fault(row)?,
+            None => views::never_failed(&self.inner.store, asset, code).await?,
+        };
+        entry.monitor = take(&mut self.monitors(asset).await, code.as_str());
+        Ok(entry)
     }
 
     /// A person clears a code: everything stored of it is erased.

@@ -23,6 +23,7 @@ mod jobs;
 mod limits;
 mod playback;
 mod rebuild;
+mod recordings;
 mod replays;
 mod running;
 mod sessions;
@@ -43,6 +44,7 @@ pub use error::ServiceError;
 pub use events::{Event, EventFeed};
 pub use faults::FaultQuery;
 pub use limits::{Limits, RETRY_AFTER_S};
+pub use recordings::Around;
 pub use sessions::Recording;
 pub use telemetry::Pending;
 
@@ -68,6 +70,8 @@ struct Inner {
     bench: jobs::Bench,
     /// One permit for each sample between arrival and commit.
     in_flight: Arc<Semaphore>,
+    /// One permit for each recording of a fault that is being made.
+    recordings: Arc<Semaphore>,
 }
 
 /// What runs behind a [`Service`]; ends when all its clones are dropped.
@@ -134,7 +138,18 @@ impl Service {
         let (jobs, queue) = mpsc::channel(jobs::MAX_QUEUED);
         let workers = jobs::spawn(limits.jobs, &bench, queue);
         let in_flight = Arc::new(Semaphore::new(limits.in_flight_samples));
-        let inner = Inner { store, limits, events, shards, writer: sets, jobs, bench, in_flight };
+        let recordings = Arc::new(Semaphore::new(recordings::MAX_AT_ONCE));
+        let inner = Inner {
+            store,
+            limits,
+            events,
+            shards,
+            writer: sets,
+            jobs,
+            bench,
+            in_flight,
+            recordings,
+        };
         let workers = Workers { shards: threads, jobs: workers, closing, committer };
         Ok((Self { inner: Arc::new(inner) }, workers))
     }

@@ -14,10 +14,10 @@ pub(super) fn load(context: &Context, name: &str) -> Result<Running, ServiceErro
     let row = context.wait(context.store.asset(name))?;
     let row = row.ok_or_else(|| ServiceError::UnknownAsset { name: name.to_owned() })?;
     let rig = views::rig(&row.document)?;
-    let memory = context.wait(views::stored_memory(&context.store, name))?;
+    let (memory, provenance) = context.wait(views::stored_memory(&context.store, name))?;
     let session = context.wait(context.store.open_session(name))?;
     let open = session.map(|session| reopen(context, &session)).transpose()?;
-    Ok(Running { row, rig, memory, open, life: Life::default(), deleted: false })
+    Ok(Running { row, rig, memory, provenance, open, life: Life::default(), deleted: false })
 }
 
 fn reopen(context: &Context, row: &SessionRow) -> Result<OpenSession, ServiceError> {

@@ -8,14 +8,19 @@ use super::playback::{Flow, play};
 use super::{Service, ServiceError, views};
 use crate::diagnosis::Profile;
 use crate::engine::{Engine, Input, Output, Rig, Setup};
-use crate::store::{JobState, ReplayRow, SessionRow, Write};
+use crate::store::{JobState, Micros, ReplayRow, SessionRow, Store, Write};
 use crate::vocabulary::Invalid;
-use crate::wire::asset;
+use crate::wire::asset::{self, CalibrationView};
+use crate::wire::basis::Basis;
+use crate::wire::difference::{Compared, compare, tally};
 use crate::wire::service::{DifferenceView, ReplayResultView, ReplaySettingsView, ReplayView};
 use crate::wire::verdict::{FaultView, Verdict, fault_view};
 
 /// Fault lines, and differences, in a result; more are left out, and it says so.
 const MAX_LINES: usize = 10_000;
+
+/// Calibrations that are looked through at a time for the one that is wanted.
+const PAGE: u32 = 64;
 
 /// Samples between two looks at whether the service is closing.
 const LOOK_EVERY: u64 = 1024;
@@ -32,7 +37,8 @@ impl Service {
         settings: ReplaySettingsView,
     ) -> Result<ReplayView, ServiceError> {
         let session = self.session_row(session).await?;
-        setup(&session, &settings)?;
+        let learnt = learnt(&self.inner.store, &session.asset, &settings).await?;
+        setup(&session, &settings, learnt.as_ref())?;
         let place = self.job_place()?;
         let row = ReplayRow {
             id: Uuid::now_v7().to_string(),
@@ -76,11 +82,55 @@ fn view(row: ReplayRow, share: f64) -> Result<ReplayView, ServiceError> {
     })
 }
 
-/// The set-up for a replay of `session`.
-fn setup(session: &SessionRow, settings: &ReplaySettingsView) -> Result<Setup, ServiceError> {
+/// The calibration that `settings` ask for.
+async fn learnt(
+    store: &Store,
+    asset: &str,
+    settings: &ReplaySettingsView,
+) -> Result<Option<CalibrationView>, ServiceError> {
+    let Some(id) = &settings.calibration else { return Ok(None) };
+    let mut before = None::<(Micros, String)>;
+    loop {
+        let from = before.as_ref().map(|(made_at, id)| (*made_at, id.as_str()));
+        let rows = store.calibrations(asset, from, PAGE).await?;
+        let Some(last) = rows.last() else {
+            let reason = format!("asset `{asset}` has no calibration `{id}` that is done");
+            return Err(Invalid::new("/calibration", reason).into());
+        };
+        before = Some((last.made_at, last.id.clone()));
+        for row in &rows {
+            let Some(document) = &row.document else { continue };
+            let view: CalibrationView = views::from_json(document)?;
+            if row.id == *id || view.id == *id {
+                return Ok(Some(view));
+            }
+        }
+    }
+}
+
+/// The set-up for a replay of `session` on what was `learnt`, if that is not
+/// what it was recorded with.
+fn setup(
+    session: &SessionRow,
+    settings: &ReplaySettingsView,
+    learnt: Option<&CalibrationView>,
+) -> Result<Setup, ServiceError> {
     let profile = settings.profile.as_deref().map(str::parse::<Profile>).transpose();
     let profile = profile.map_err(|e| Invalid::new("/profile", e.to_string()))?;
-    Ok(Setup::new(rig(session, settings)?, profile)?)
+    let mut file = asset::view(&rig(session, settings)?);
+    if learnt.is_some() {
+        file.calibration = learnt.cloned();
+    }
+    let diagnostics = file.diagnostics.get_or_insert_default();
+    diagnostics.debounce_s = settings.debounce_s.or(diagnostics.debounce_s);
+    let rate = &mut diagnostics.false_alarms_per_rig_year;
+    *rate = settings.false_alarms_per_rig_year.or(*rate);
+    // The wish stands at the top of the body, not inside an asset file.
+    let top = |e: Invalid| {
+        let element = e.element.strip_prefix("/diagnostics").unwrap_or(&e.element).to_owned();
+        Invalid::new(element, e.reason)
+    };
+    Ok(Setup::new(asset::rig(&file).map_err(top)?, profile)?)
 }
 
 fn rig(session: &SessionRow, settings: &ReplaySettingsView) -> Result<Rig, ServiceError> {
@@ -141,8 +191,11 @@ fn judge(bench: &Bench, row: &ReplayRow) -> Result<Option<ReplayResultView>, Ser
     let session =
         session.ok_or_else(|| ServiceError::UnknownSession { id: row.session.clone() })?;
     let recorded = recorded(bench, &session)?;
-    let setup = setup(&session, &views::from_json(&row.settings)?)?;
+    let settings: ReplaySettingsView = views::from_json(&row.settings)?;
+    let learnt = bench.runtime.block_on(learnt(&bench.store, &session.asset, &settings))?;
+    let setup = setup(&session, &settings, learnt.as_ref())?;
     let mut player = Player {
+        basis: Basis::of(&setup),
         engine: Engine::new(setup, views::memory(&session.baseline)?),
         session: &session,
         outputs: Vec::new(),
@@ -169,6 +222,7 @@ fn recorded(bench: &Bench, session: &SessionRow) -> Result<Vec<FaultView>, Servi
 }
 
 struct Player<'a> {
+    basis: Basis,
     engine: Engine,
     session: &'a SessionRow,
     outputs: Vec<Output>,
@@ -204,7 +258,7 @@ impl Player<'_> {
             if let Output::Transition(transition) = output
                 && self.faults.len() <= MAX_LINES
             {
-                self.faults.push(fault_view(&self.session.name, transition));
+                self.faults.push(fault_view(&self.session.name, &self.basis, transition));
             }
         }
     }
@@ -221,37 +275,35 @@ impl Player<'_> {
         faults.truncate(MAX_LINES);
         recorded.truncate(MAX_LINES);
         let recorded_hash = self.session.verdict_hash.clone();
-        let differences = differences(recorded, &faults);
+        let all = compare(&recorded, &faults);
         let same_hash = recorded_hash.as_ref().is_none_or(|hash| *hash == summary.verdict_hash);
-        let same = differences.is_empty() && same_hash;
-        ReplayResultView { faults, summary, recorded_hash, same, differences, truncated }
+        ReplayResultView {
+            same: all.iter().all(Compared::is_same) && same_hash,
+            differences: differences(&all, &recorded, &faults),
+            tally: tally(&all),
+            transitions: all.into_iter().map(|one| one.view).collect(),
+            faults,
+            summary,
+            recorded_hash,
+            calibration_id: self.basis.calibration_id,
+            settings_id: self.basis.settings_id,
+            truncated,
+        }
     }
 }
 
-/// Whether two fault lines say the same, apart from the numbers behind them.
-fn agree(a: &FaultView, b: &FaultView) -> bool {
-    a.t_s.to_bits() == b.t_s.to_bits()
-        && (&a.code, &a.kind, &a.status, &a.status_byte)
-            == (&b.code, &b.kind, &b.status, &b.status_byte)
-        && a.onset_s.map(f64::to_bits) == b.onset_s.map(f64::to_bits)
-}
-
-/// Goes through both verdicts in the order of time.
-fn differences(recorded: Vec<FaultView>, replayed: &[FaultView]) -> Vec<DifferenceView> {
-    let mut differences = Vec::new();
-    let mut replayed = replayed.iter().peekable();
-    for recorded in recorded {
-        while let Some(early) = replayed.next_if(|r| r.t_s < recorded.t_s) {
-            differences.push(DifferenceView { recorded: None, replayed: Some(early.clone()) });
-        }
-        let partner = replayed.next_if(|r| r.t_s == recorded.t_s && r.code == recorded.code);
-        if !partner.is_some_and(|partner| agree(&recorded, partner)) {
-            let (recorded, replayed) = (Some(recorded), partner.cloned());
-            differences.push(DifferenceView { recorded, replayed });
-        }
-    }
-    let late = replayed.map(|r| DifferenceView { recorded: None, replayed: Some(r.clone()) });
-    differences.extend(late);
-    differences.truncate(MAX_LINES);
-    differences
+/// The fault lines of what is not the same.
+fn differences(
+    all: &[Compared],
+    recorded: &[FaultView],
+    replayed: &[FaultView],
+) -> Vec<DifferenceView> {
+    let line = |faults: &[FaultView], at: Option<usize>| at.and_then(|at| faults.get(at).cloned());
+    let view = |one: &Compared| DifferenceView {
+        change: one.view.change.clone(),
+        moved_s: one.view.moved_s,
+        recorded: line(recorded, one.recorded),
+        replayed: line(replayed, one.replayed),
+    };
+    all.iter().filter(|one| !one.is_same()).map(view).take(MAX_LINES).collect()
 }

@@ -6,12 +6,15 @@ use uuid::Uuid;
 use super::clock::rfc3339;
 use super::commit::Life;
 use super::{ServiceError, views};
-use crate::diagnosis::FaultMemory;
+use crate::diagnosis::{FaultMemory, FaultRecord, MemoryRules};
 use crate::engine::{Admission, Engine, Input, Output, Rig, Setup};
 use crate::store::{
     ActionKind, ActionRow, AssetRow, FaultRow, Micros, Progress, SessionRow, TransitionRow, Write,
 };
-use crate::vocabulary::{FaultCode, Sample};
+use crate::vocabulary::{FaultCode, FaultStatus, Sample};
+use crate::wire::basis::Basis;
+use crate::wire::provenance::{ActView, OccurrenceView, ProvenanceView};
+use crate::wire::service::cleared_view;
 use crate::wire::telemetry::{AckView, RowView};
 use crate::wire::verdict::{SummaryView, Verdict, fault_view};
 use crate::wire::{asset, memory};
@@ -38,6 +41,8 @@ pub(super) struct Running {
     pub(super) rig: Rig,
     /// The fault memory as last written.
     pub(super) memory: FaultMemory,
+    /// What is known beside it, as last written.
+    pub(super) provenance: Provenance,
     pub(super) open: Option<OpenSession>,
     pub(super) life: Life,
     pub(super) deleted: bool,
@@ -48,6 +53,7 @@ pub(super) struct OpenSession {
     pub(super) id: String,
     pub(super) name: String,
     pub(super) engine: Engine,
+    basis: Basis,
     pub(super) progress: Progress,
     pub(super) n_transitions: i64,
     /// Whether a recording is being imported into it: no live telemetry then.
@@ -65,6 +71,7 @@ impl OpenSession {
         Self {
             id,
             name,
+            basis: Basis::of(&setup),
             engine: Engine::new(setup, baseline),
             progress: Progress::default(),
             n_transitions: 0,
@@ -132,7 +139,7 @@ impl OpenSession {
     fn report(&mut self, asset: &str, work: &mut Work) -> Result<(), ServiceError> {
         for output in &self.outputs {
             let Output::Transition(transition) = output else { continue };
-            let view = fault_view(&self.name, transition);
+            let view = fault_view(&self.name, &self.basis, transition);
             work.writes.push(Write::Transition(TransitionRow {
                 id: 0,
                 asset: asset.to_owned(),
@@ -147,6 +154,17 @@ impl OpenSession {
             self.n_transitions += 1;
         }
         Ok(())
+    }
+
+    /// What a code that fails anew now is said to come from.
+    fn occurrence(&self, at: Micros) -> OccurrenceView {
+        OccurrenceView {
+            session: self.name.clone(),
+            session_id: self.id.clone(),
+            noted_at: rfc3339(at),
+            calibration_id: self.basis.calibration_id.clone(),
+            settings_id: self.basis.settings_id.clone(),
+        }
     }
 
     fn summary(&self) -> SummaryView {
@@ -178,13 +196,13 @@ impl Running {
             opened_at: work.at,
             ended_at: None,
             setup: views::to_json(&asset::view(&self.rig))?,
-            baseline: views::to_json(&memory::view(&self.memory))?,
+            baseline: views::to_json(&memory::view(&self.memory, &setup.settings.memory))?,
             progress: Progress::default(),
             verdict: None,
             verdict_hash: None,
         }));
         self.open = Some(OpenSession::new(id, name, setup, self.memory.clone()));
-        self.remember(work)
+        self.remember(None, work)
     }
 
     /// Opens a session named by this moment.
@@ -205,7 +223,7 @@ impl Running {
             hash: summary.verdict_hash,
         });
         let memory = open.engine.memory().clone();
-        self.remember_as(memory, work)
+        self.remember_as(memory, Some(&open.occurrence(work.at)), None, work)
     }
 
     /// Puts `samples`, each with its index in the batch, into the open session;
@@ -247,7 +265,7 @@ impl Running {
         ack.last_seq = open.progress.last_seq.and_then(|seq| u64::try_from(seq).ok());
         self.append(first_index, recorded, work);
         work.writes.append(&mut transitions.writes);
-        self.remember(work)?;
+        self.remember(None, work)?;
         Ok(n_taken)
     }
 
@@ -276,6 +294,15 @@ impl Running {
         actor: String,
         work: &mut Work,
     ) -> Result<(), ServiceError> {
+        let mut memory = self.memory.clone();
+        match kind {
+            ActionKind::Clear => memory.clear(code),
+            ActionKind::Acknowledge => drop(memory.acknowledge(code)),
+        }
+        let cleared = kind == ActionKind::Clear
+            && self.open.is_none()
+            && self.memory.record(code).word() != FaultStatus::Cleared;
+        let event = cleared.then(|| views::to_json(&cleared_view(code, &actor))).transpose()?;
         work.writes.push(Write::Act(ActionRow {
             id: 0,
             asset: self.row.name.clone(),
@@ -283,20 +310,17 @@ impl Running {
             after_index: self.open.as_ref().map_or(0, |open| open.progress.n_samples),
             kind: kind.as_str().to_owned(),
             code: code.to_string(),
-            actor,
+            actor: actor.clone(),
             at: work.at,
+            event,
         }));
+        let act = Act { kind, code, view: ActView { by: actor, at: rfc3339(work.at) } };
         if let Some(open) = &mut self.open {
             open.input(input(kind, code));
             open.report(&self.row.name, work)?;
-            return self.remember(work);
+            return self.remember(Some(&act), work);
         }
-        let mut memory = self.memory.clone();
-        match kind {
-            ActionKind::Clear => memory.clear(code),
-            ActionKind::Acknowledge => drop(memory.acknowledge(code)),
-        }
-        self.remember_as(memory, work)
+        self.remember_as(memory, None, Some(&act), work)
     }
 
     /// The fault memory as the engine has it, or as last written.
@@ -305,22 +329,33 @@ impl Running {
     }
 
     /// Writes what has changed in the engine's fault memory.
-    fn remember(&mut self, work: &mut Work) -> Result<(), ServiceError> {
+    fn remember(&mut self, act: Option<&Act>, work: &mut Work) -> Result<(), ServiceError> {
         let Some(open) = &self.open else { return Ok(()) };
-        if *open.engine.memory() == self.memory {
+        if act.is_none() && *open.engine.memory() == self.memory {
             return Ok(());
         }
-        let memory = open.engine.memory().clone();
-        self.remember_as(memory, work)
+        let (memory, here) = (open.engine.memory().clone(), open.occurrence(work.at));
+        self.remember_as(memory, Some(&here), act, work)
     }
 
-    fn remember_as(&mut self, memory: FaultMemory, work: &mut Work) -> Result<(), ServiceError> {
-        for &code in FaultCode::ALL {
-            let record = memory.record(code);
-            if record == self.memory.record(code) {
+    /// Writes what has changed with `memory`, in the session of `here`, and
+    /// with what a person did.
+    fn remember_as(
+        &mut self,
+        memory: FaultMemory,
+        here: Option<&OccurrenceView>,
+        act: Option<&Act>,
+        work: &mut Work,
+    ) -> Result<(), ServiceError> {
+        let rules = self.rules();
+        for (&code, known) in FaultCode::ALL.iter().zip(&mut self.provenance) {
+            let (before, record) = (self.memory.record(code), memory.record(code));
+            let act = act.filter(|act| act.code == code);
+            let provenance = follow(known, before, record, here, act);
+            if record == before && provenance == *known {
                 continue;
             }
-            let view = memory::record_view(code, record);
+            let view = memory::record_view(code, record, &rules);
             work.writes.push(Write::Fault(FaultRow {
                 asset: self.row.name.clone(),
                 code: code.to_string(),
@@ -328,11 +363,62 @@ impl Running {
                 acknowledged: i64::from(view.acknowledged),
                 changed_at: work.at,
                 record: views::to_json(&view)?,
+                provenance: views::to_json(&provenance)?,
             }));
+            *known = provenance;
         }
         self.memory = memory;
         Ok(())
     }
+
+    /// The rules in force: those of the open session, or of the asset file.
+    fn rules(&self) -> MemoryRules {
+        let of_file = || self.rig.settings(self.rig.diagnostics.profile).ok().map(|s| s.memory);
+        let open = self.open.as_ref().map(|open| open.engine.setup().settings.memory);
+        open.or_else(of_file).unwrap_or_default()
+    }
+}
+
+/// What is known of each code beside its record, in the order of
+/// [`FaultCode::ALL`].
+pub(super) type Provenance = [ProvenanceView; FaultCode::COUNT];
+
+/// What a person did about a code.
+struct Act {
+    kind: ActionKind,
+    code: FaultCode,
+    view: ActView,
+}
+
+/// What is known of a code after its record has become `after`.
+fn follow(
+    known: &ProvenanceView,
+    before: &FaultRecord,
+    after: &FaultRecord,
+    here: Option<&OccurrenceView>,
+    act: Option<&Act>,
+) -> ProvenanceView {
+    let mut known = known.clone();
+    match act.map(|act| (act.kind, &act.view)) {
+        Some((ActionKind::Clear, view)) => known.cleared = Some(view.clone()),
+        Some((ActionKind::Acknowledge, view)) if !before.acknowledged => {
+            known.acknowledgement = Some(view.clone());
+        }
+        _ => {}
+    }
+    if after.occurrences > before.occurrences {
+        known.last_occurrence = here.cloned();
+        if before.occurrences == 0 {
+            known.first_occurrence = here.cloned();
+        }
+    }
+    if !after.acknowledged {
+        known.acknowledgement = None;
+    }
+    if after.occurrences == 0 {
+        (known.first_occurrence, known.last_occurrence) = (None, None);
+    }
+    known
 }
 
 /// The engine's input for an action.

@@ -5,12 +5,14 @@ use serde::de::DeserializeOwned;
 
 use super::ServiceError;
 use super::clock::rfc3339;
-use crate::diagnosis::FaultMemory;
+use super::running::Provenance;
+use crate::diagnosis::{FaultMemory, FaultRecord, MemoryRules};
 use crate::engine::Rig;
 use crate::store::{FaultFilter, FaultRow, SessionRow, Store};
 use crate::vocabulary::{FaultCode, Invalid};
 use crate::wire::asset;
 use crate::wire::memory::{self, FaultRecordView, MemoryView};
+use crate::wire::provenance::ProvenanceView;
 use crate::wire::service::{FaultEntryView, Page, SessionView};
 use crate::wire::verdict::hex;
 
@@ -33,18 +35,32 @@ pub(super) fn memory(document: &str) -> Result<FaultMemory, ServiceError> {
     memory::memory(&view).map_err(ServiceError::corrupt)
 }
 
-/// The fault memory that the store has for `asset`.
-pub(super) async fn stored_memory(store: &Store, asset: &str) -> Result<FaultMemory, ServiceError> {
+/// The fault memory that the store has for `asset`, and what it knows beside.
+pub(super) async fn stored_memory(
+    store: &Store,
+    asset: &str,
+) -> Result<(FaultMemory, Provenance), ServiceError> {
     let filter = FaultFilter { asset: Some(asset.to_owned()), ..FaultFilter::default() };
     let rows = store.faults(&filter, FaultCode::COUNT as u32).await?;
+    let mut provenance = Provenance::default();
+    for row in &rows {
+        let code: FaultCode = row.code.parse().map_err(ServiceError::corrupt)?;
+        provenance[code as usize] = from_json(&row.provenance)?;
+    }
     let records: Result<Vec<FaultRecordView>, _> =
         rows.iter().map(|row| from_json(&row.record)).collect();
-    memory::memory(&MemoryView { records: records? }).map_err(ServiceError::corrupt)
+    let memory = memory::memory(&MemoryView { records: records? });
+    Ok((memory.map_err(ServiceError::corrupt)?, provenance))
 }
 
 pub(super) fn fault(row: FaultRow) -> Result<FaultEntryView, ServiceError> {
-    let record = from_json(&row.record)?;
-    Ok(FaultEntryView { asset: row.asset, changed_at: rfc3339(row.changed_at), record })
+    Ok(FaultEntryView {
+        record: from_json(&row.record)?,
+        provenance: from_json(&row.provenance)?,
+        asset: row.asset,
+        changed_at: rfc3339(row.changed_at),
+        monitor: None,
+    })
 }
 
 pub(super) fn session(row: SessionRow) -> Result<SessionView, ServiceError> {
@@ -73,8 +89,14 @@ pub(super) async fn never_failed(
 ) -> Result<FaultEntryView, ServiceError> {
     let row = store.asset(name).await?;
     let changed_at = row.map(|row| rfc3339(row.created_at)).unwrap_or_default();
-    let record = memory::record_view(code, FaultMemory::default().record(code));
-    Ok(FaultEntryView { asset: name.to_owned(), changed_at, record })
+    let (record, rules) = (FaultRecord::default(), MemoryRules::default());
+    Ok(FaultEntryView {
+        asset: name.to_owned(),
+        changed_at,
+        record: memory::record_view(code, &record, &rules),
+        provenance: ProvenanceView::default(),
+        monitor: None,
+    })
 }
 
 /// A page out of `rows`, of which there is one more than `limit` if another

@@ -21,8 +21,8 @@ use sqlx::sqlite::{
 
 pub use read::{FaultFilter, FaultOrder, SessionFilter};
 pub use rows::{
-    ActionKind, ActionRow, AssetRow, CalibrationRow, FaultRow, JobState, Micros, Progress,
-    ReplayRow, SessionRow, TransitionRow,
+    ActionKind, ActionRow, AssetRow, CalibrationRow, EventRow, FaultRow, JobState, Micros,
+    Progress, ReplayRow, SessionRow, TransitionRow,
 };
 pub use tail::{FULL_CHUNK_SAMPLES, MAX_TAIL_CHUNKS};
 pub use write::{Write, Writer};

@@ -3,7 +3,7 @@
 use sqlx::{QueryBuilder, Sqlite};
 
 use super::{
-    ActionRow, AssetRow, CalibrationRow, FaultRow, Micros, ReplayRow, SessionRow, Store,
+    ActionRow, AssetRow, CalibrationRow, EventRow, FaultRow, Micros, ReplayRow, SessionRow, Store,
     StoreError, TransitionRow, codec,
 };
 use crate::vocabulary::Sample;
@@ -191,17 +191,23 @@ impl Store {
             .await?)
     }
 
-    /// Transitions of `asset`, or of all, with an id above `after`.
+    /// Events of `asset`, or of all, with an id above `after`.
     pub async fn events(
         &self,
         asset: Option<&str>,
         after: i64,
         limit: u32,
-    ) -> Result<Vec<TransitionRow>, StoreError> {
-        let mut query = QueryBuilder::<Sqlite>::new("SELECT * FROM transition WHERE id > ");
-        query.push_bind(after);
-        if let Some(asset) = asset {
-            query.push(" AND asset = ").push_bind(asset);
+    ) -> Result<Vec<EventRow>, StoreError> {
+        let mut query = QueryBuilder::<Sqlite>::new("");
+        for select in [
+            "SELECT id, asset, session, document FROM transition WHERE id > ",
+            " UNION ALL SELECT id, asset, session, event FROM action
+             WHERE event IS NOT NULL AND id > ",
+        ] {
+            query.push(select).push_bind(after);
+            if let Some(asset) = asset {
+                query.push(" AND asset = ").push_bind(asset);
+            }
         }
         query.push(" ORDER BY id LIMIT ").push_bind(i64::from(limit));
         Ok(query.build_query_as().fetch_all(&self.pool).await?)

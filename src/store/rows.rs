@@ -99,6 +99,8 @@ pub struct ActionRow {
     pub code: String,
     pub actor: String,
     pub at: Micros,
+    /// The event of a change that is in no session.
+    pub event: Option<String>,
 }
 
 #[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
@@ -117,6 +119,17 @@ pub struct TransitionRow {
     pub document: String,
 }
 
+/// Something to be told: a transition, or an act that changed a code while no
+/// session was open.
+#[derive(Clone, Debug, PartialEq, Eq, sqlx::FromRow)]
+pub struct EventRow {
+    /// Rises with every event, never given twice.
+    pub id: i64,
+    pub asset: String,
+    pub session: Option<String>,
+    pub document: String,
+}
+
 #[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
 pub struct FaultRow {
     pub asset: String,
@@ -126,6 +139,8 @@ pub struct FaultRow {
     pub acknowledged: i64,
     pub changed_at: Micros,
     pub record: String,
+    /// What is known beside the record.
+    pub provenance: String,
 }
 
 /// Where a background job stands.

@@ -291,8 +291,8 @@ async fn end_session(
 
 async fn insert_action(db: &mut SqliteConnection, row: &ActionRow) -> Result<(), StoreError> {
     sqlx::query(
-        "INSERT INTO action (id, asset, session, after_index, kind, code, actor, at)
-         VALUES ($1, $2, $3, $4, $5, $6, $7, $8)",
+        "INSERT INTO action (id, asset, session, after_index, kind, code, actor, at, event)
+         VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9)",
     )
     .bind(row.id)
     .bind(&row.asset)
@@ -302,6 +302,7 @@ async fn insert_action(db: &mut SqliteConnection, row: &ActionRow) -> Result<(),
     .bind(&row.code)
     .bind(&row.actor)
     .bind(row.at)
+    .bind(&row.event)
     .execute(db)
     .await?;
     Ok(())
@@ -331,11 +332,11 @@ async fn insert_transition(
 
 async fn put_fault(db: &mut SqliteConnection, row: &FaultRow) -> Result<(), StoreError> {
     sqlx::query(
-        "INSERT INTO fault (asset, code, status, acknowledged, changed_at, record)
-         VALUES ($1, $2, $3, $4, $5, $6)
+        "INSERT INTO fault (asset, code, status, acknowledged, changed_at, record, provenance)
+         VALUES ($1, $2, $3, $4, $5, $6, $7)
          ON CONFLICT (asset, code) DO UPDATE SET status = excluded.status,
          acknowledged = excluded.acknowledged, changed_at = excluded.changed_at,
-         record = excluded.record",
+         record = excluded.record, provenance = excluded.provenance",
     )
     .bind(&row.asset)
     .bind(&row.code)
@@ -343,6 +344,7 @@ async fn put_fault(db: &mut SqliteConnection, row: &FaultRow) -> Result<(), Stor
     .bind(row.acknowledged)
     .bind(row.changed_at)
     .bind(&row.record)
+    .bind(&row.provenance)
     .execute(db)
     .await?;
     Ok(())

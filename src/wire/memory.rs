@@ -7,7 +7,8 @@ use super::verdict::{
     AnswerView, AxisEvidenceView, CandidateView, EvidenceView, candidate_view, evidence_view,
 };
 use crate::diagnosis::{
-    Answer, AxisEvidence, Candidate, Evidence, FaultMemory, FaultRecord, StatusByte, Suspicion,
+    Answer, AxisEvidence, Candidate, Evidence, FaultMemory, FaultRecord, InUse, MemoryRules,
+    StatusByte, Suspicion,
 };
 use crate::vocabulary::{FaultCode, FaultKind, PerAxis, SimTime, UnknownWord};
 
@@ -26,12 +27,25 @@ pub struct FaultRecordView {
     pub status: String,
     /// ISO 14229 status byte, two hexadecimal digits.
     pub status_byte: String,
+    #[serde(default)]
+    pub status_bits: StatusBitsView,
     pub axis: Option<String>,
     pub command: Option<String>,
+    /// When the deviation began that failed the test last, s on the clock of
+    /// the last occurrence's session.
     pub onset_s: Option<f64>,
     pub candidates: Vec<CandidateView>,
     /// Times the test failed anew since the last clear.
     pub occurrences: u32,
+    /// Onset of the first of them, s on the clock of its session.
+    #[serde(default)]
+    pub first_onset_s: Option<f64>,
+    /// Onset of the last of them, s on the clock of its session.
+    #[serde(default)]
+    pub last_onset_s: Option<f64>,
+    /// Operation cycles (sessions) with a failure since the last clear.
+    #[serde(default)]
+    pub failed_cycles: u32,
     /// Whether the current occurrence has been acknowledged.
     pub acknowledged: bool,
     /// Operation cycles that counted as a trip.
@@ -40,27 +54,78 @@ pub struct FaultRecordView {
     /// Good operation cycles in a row.
     pub good_cycles: u8,
     pub healed: bool,
+    /// Good operation cycles of a confirmed fault that count towards healing,
+    /// and how many it takes.
+    #[serde(default)]
+    pub healing_counter: u8,
+    #[serde(default)]
+    pub healing_cycles: u8,
+    /// Good operation cycles since it healed, and how many it takes until
+    /// everything of it is erased (aging).
+    #[serde(default)]
+    pub aging_counter: u8,
+    #[serde(default)]
+    pub aging_cycles: u8,
     /// The first failure of the current occurrence.
     pub freeze_frame: Option<EvidenceView>,
+    #[serde(default)]
+    pub in_use: InUseView,
+}
+
+/// The ISO 14229 status byte, bit by bit from 0 to 7.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize, ToSchema)]
+pub struct StatusBitsView {
+    /// The latest result of the test is a failure.
+    pub test_failed: bool,
+    /// It has failed in this session.
+    pub test_failed_this_operation_cycle: bool,
+    /// It has failed in this session or in the last one that came to a result.
+    pub pending: bool,
+    /// It has failed long enough, often enough, and is kept until it ages.
+    pub confirmed: bool,
+    /// The test has not come to a result since the code was last cleared.
+    pub test_not_completed_since_last_clear: bool,
+    /// It has failed since the code was last cleared.
+    pub test_failed_since_last_clear: bool,
+    /// The test has not come to a result in this session.
+    pub test_not_completed_this_operation_cycle: bool,
+    /// A warning is asked for.
+    pub warning_indicator_requested: bool,
+}
+
+/// How often a monitor has been in a position to find its fault (the in-use
+/// performance of SAE J1979). Counted at the end of each session; neither
+/// clearing nor aging erases it.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize, ToSchema)]
+pub struct InUseView {
+    /// Operation cycles (sessions) that have ended.
+    pub operation_cycles: u32,
+    /// Those that brought enough data to judge by.
+    pub cycles_with_data: u32,
+    /// Those in which the gate was open long enough to have found a fault.
+    pub cycles_judged: u32,
+    /// `cycles_judged` over `cycles_with_data`, 0 to 1; null before there is
+    /// one. A low one says that the gate is too strict for this rig.
+    pub ratio: Option<f64>,
 }
 
 /// The view of a fault memory.
 #[must_use]
-pub fn view(memory: &FaultMemory) -> MemoryView {
-    let records =
-        FaultCode::ALL.iter().map(|&code| record_view(code, memory.record(code))).collect();
-    MemoryView { records }
+pub fn view(memory: &FaultMemory, rules: &MemoryRules) -> MemoryView {
+    let record = |&code| record_view(code, memory.record(code), rules);
+    MemoryView { records: FaultCode::ALL.iter().map(record).collect() }
 }
 
 /// The view of one record.
 #[must_use]
-pub fn record_view(code: FaultCode, record: &FaultRecord) -> FaultRecordView {
+pub fn record_view(code: FaultCode, record: &FaultRecord, rules: &MemoryRules) -> FaultRecordView {
     let suspicion = record.suspicion.as_ref();
     FaultRecordView {
         code: code.to_string(),
         kind: record.kind().map(|k| k.to_string()),
         status: record.word().to_string(),
         status_byte: record.status.to_string(),
+        status_bits: status_bits(record.status),
         axis: code.axis().map(|a| a.as_str().to_owned()),
         command: code.axis().map(|a| a.command().to_owned()),
         onset_s: suspicion.and_then(|s| s.onset).map(SimTime::seconds),
@@ -68,12 +133,42 @@ pub fn record_view(code: FaultCode, record: &FaultRecord) -> FaultRecordView {
             .map(|s| s.candidates.iter().map(candidate_view).collect())
             .unwrap_or_default(),
         occurrences: record.occurrences,
+        first_onset_s: record.first_onset.map(SimTime::seconds),
+        last_onset_s: record.last_onset.map(SimTime::seconds),
+        failed_cycles: record.failed_cycles,
         acknowledged: record.acknowledged,
         trips: record.trips,
         tripped_this_cycle: record.tripped_this_cycle,
         good_cycles: record.good_cycles,
         healed: record.healed,
+        healing_counter: record.healing_counter(rules),
+        healing_cycles: rules.healing_cycles,
+        aging_counter: record.aging_counter(rules),
+        aging_cycles: rules.aging_cycles,
         freeze_frame: record.freeze_frame.as_ref().map(evidence_view),
+        in_use: in_use_view(&record.in_use),
+    }
+}
+
+const fn status_bits(byte: StatusByte) -> StatusBitsView {
+    StatusBitsView {
+        test_failed: byte.test_failed(),
+        test_failed_this_operation_cycle: byte.failed_this_cycle(),
+        pending: byte.pending(),
+        confirmed: byte.confirmed(),
+        test_not_completed_since_last_clear: !byte.completed_since_clear(),
+        test_failed_since_last_clear: byte.failed_since_clear(),
+        test_not_completed_this_operation_cycle: !byte.completed_this_cycle(),
+        warning_indicator_requested: byte.indicator_requested(),
+    }
+}
+
+fn in_use_view(in_use: &InUse) -> InUseView {
+    InUseView {
+        operation_cycles: in_use.cycles,
+        cycles_with_data: in_use.with_data,
+        cycles_judged: in_use.judged,
+        ratio: in_use.ratio(),
     }
 }
 
@@ -111,9 +206,17 @@ fn fault_record(view: &FaultRecordView) -> Result<FaultRecord, MemoryError> {
         good_cycles: view.good_cycles,
         healed: view.healed,
         occurrences: view.occurrences,
+        first_onset: view.first_onset_s.and_then(SimTime::new),
+        last_onset: view.last_onset_s.and_then(SimTime::new),
+        failed_cycles: view.failed_cycles,
         acknowledged: view.acknowledged,
         suspicion: (suspicion != Suspicion::default()).then_some(suspicion),
         freeze_frame: view.freeze_frame.as_ref().map(evidence),
+        in_use: InUse {
+            cycles: view.in_use.operation_cycles,
+            with_data: view.in_use.cycles_with_data,
+            judged: view.in_use.cycles_judged,
+        },
     })
 }
 
@@ -202,8 +305,30 @@ mod tests {
         let mut before = FaultMemory::default();
         before.failed(FaultCode::YServo, &suspicion, &frame);
         before.acknowledge(FaultCode::YServo);
-        let json = serde_json::to_string(&view(&before)).unwrap();
+        before.count_use(FaultCode::Sensor, 60.0, 30.0, 0.8);
+        let json = serde_json::to_string(&view(&before, &MemoryRules::default())).unwrap();
         let after = memory(&serde_json::from_str(&json).unwrap()).unwrap();
         assert_eq!(after, before);
+    }
+
+    /// The bits of ISO 14229-1, D.2: 0 is the lowest.
+    #[test]
+    fn validate_the_bits_have_their_places() {
+        let names = [
+            "test_failed",
+            "test_failed_this_operation_cycle",
+            "pending",
+            "confirmed",
+            "test_not_completed_since_last_clear",
+            "test_failed_since_last_clear",
+            "test_not_completed_this_operation_cycle",
+            "warning_indicator_requested",
+        ];
+        for (i, name) in names.iter().enumerate() {
+            let bits = serde_json::to_value(status_bits(StatusByte::from_bits(1 << i))).unwrap();
+            for other in names {
+                assert_eq!(bits[other], other == *name, "bit {i}: {bits}");
+            }
+        }
     }
 }

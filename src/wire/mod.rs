@@ -6,8 +6,12 @@
 //! not; they are converted by hand. Knows no sockets and no SQL.
 
 pub mod asset;
+pub mod basis;
+pub mod difference;
 pub mod memory;
 mod preset;
+pub mod provenance;
+pub mod recording;
 pub mod scene;
 pub mod service;
 pub mod session_csv;

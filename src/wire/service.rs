@@ -4,10 +4,13 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::difference::{ComparedView, TallyView};
 use super::memory::FaultRecordView;
+use super::provenance::ProvenanceView;
 use super::verdict::{EvidenceView, FaultView, SummaryView, evidence_view};
+use crate::diagnosis::StatusByte;
 use crate::engine::{MonitorState, State};
-use crate::vocabulary::{Axis, FaultCode, PerAxis};
+use crate::vocabulary::{Axis, FaultCode, FaultStatus, PerAxis};
 
 /// A page of a list.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
@@ -50,6 +53,75 @@ pub struct FaultEntryView {
     pub changed_at: String,
     #[serde(flatten)]
     pub record: FaultRecordView,
+    #[serde(flatten)]
+    pub provenance: ProvenanceView,
+    /// The monitor as it stands in the open session, debounce counter and
+    /// readiness; null without one, and in lists across the fleet.
+    pub monitor: Option<MonitorView>,
+}
+
+/// An event: a person cleared a code while no session was open. It has the
+/// keys of a fault line, without a session and a time on the device's clock.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct ClearedView {
+    /// Always `fault`.
+    #[serde(rename = "type")]
+    pub line: String,
+    /// Always null, as `session_id` is.
+    pub session: Option<String>,
+    /// Always null.
+    pub t_s: Option<f64>,
+    pub code: String,
+    /// Always null.
+    pub kind: Option<String>,
+    /// Always `cleared`.
+    pub status: String,
+    /// ISO 14229 status byte, two hexadecimal digits.
+    pub status_byte: String,
+    pub axis: Option<String>,
+    pub command: Option<String>,
+    /// Who cleared it.
+    pub by: String,
+    /// The same in one sentence.
+    pub summary: String,
+}
+
+/// What an event tells.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+pub struct EventView {
+    pub asset: String,
+    /// The service's id of the session; null if none was open.
+    pub session_id: Option<String>,
+    #[serde(flatten)]
+    pub change: ChangeView,
+}
+
+/// What has changed.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+#[serde(untagged)]
+pub enum ChangeView {
+    /// In a session.
+    Fault(Box<FaultView>),
+    /// By hand, while no session was open.
+    Cleared(Box<ClearedView>),
+}
+
+/// The event of `code` cleared by `by` while no session was open.
+#[must_use]
+pub fn cleared_view(code: FaultCode, by: &str) -> ClearedView {
+    ClearedView {
+        line: "fault".to_owned(),
+        session: None,
+        t_s: None,
+        code: code.to_string(),
+        kind: None,
+        status: FaultStatus::Cleared.to_string(),
+        status_byte: StatusByte::default().to_string(),
+        axis: code.axis().map(|a| a.as_str().to_owned()),
+        command: code.axis().map(|a| a.command().to_owned()),
+        by: by.to_owned(),
+        summary: format!("{code} cleared by {by}: nothing of it is on record"),
+    }
 }
 
 /// One monitor at one moment.
@@ -117,7 +189,7 @@ pub fn state_view(asset: &str, session: Option<(&str, &str, u64)>, state: &State
         twin_velocity_m_s: xy(&state.twin_velocity_m_s),
         plate_angle_rad: xy(&state.plate_angle_rad),
         evidence: evidence_view(&state.evidence),
-        monitors: FaultCode::ALL.iter().zip(&state.monitors).map(monitor_view).collect(),
+        monitors: monitor_views(state),
         fidelity: state.fidelity.rung.name().to_owned(),
         fidelity_reason: state.fidelity.to_string(),
     }
@@ -125,6 +197,12 @@ pub fn state_view(asset: &str, session: Option<(&str, &str, u64)>, state: &State
 
 fn xy(pair: &PerAxis<f64>) -> XyView {
     XyView { x: pair[Axis::X], y: pair[Axis::Y] }
+}
+
+/// The views of the monitors, in the order of [`FaultCode::ALL`].
+#[must_use]
+pub fn monitor_views(state: &State) -> Vec<MonitorView> {
+    FaultCode::ALL.iter().zip(&state.monitors).map(monitor_view).collect()
 }
 
 fn monitor_view((code, monitor): (&FaultCode, &MonitorState)) -> MonitorView {
@@ -158,6 +236,16 @@ pub struct ReplaySettingsView {
     /// `default` or `textbook`; without it the one of the asset file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub profile: Option<String>,
+    /// Id of a calibration of the asset (of the job that learnt it, or its own)
+    /// to be used instead of the one in force when the session was opened.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<String>,
+    /// Continuous failure before a test fails, in [0, 60] s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub debounce_s: Option<f64>,
+    /// Wanted false alarms per rig and year, above 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub false_alarms_per_rig_year: Option<f64>,
     /// An asset file, or the parts of it that are to be different (JSON merge
     /// patch, RFC 7396), over the one in force when the session was opened.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -167,6 +255,12 @@ pub struct ReplaySettingsView {
 /// A place where the verdict of a replay and the recorded one differ.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct DifferenceView {
+    /// `altered`, `moved`, `only_recorded` or `only_replayed`.
+    #[serde(default)]
+    pub change: String,
+    /// Replayed − recorded, s; above 0 where the replay is later.
+    #[serde(default)]
+    pub moved_s: Option<f64>,
     /// Null where only the replay has it.
     pub recorded: Option<FaultView>,
     /// Null where only the record has it.
@@ -182,8 +276,21 @@ pub struct ReplayResultView {
     pub recorded_hash: Option<String>,
     /// Whether the two verdicts are the same, transition by transition.
     pub same: bool,
+    /// Every transition of either verdict, in the order of time.
+    #[serde(default)]
+    pub transitions: Vec<ComparedView>,
+    /// How many of them there are of each change.
+    #[serde(default)]
+    pub tally: TallyView,
+    /// The fault lines of those that are not the same.
     pub differences: Vec<DifferenceView>,
-    /// Whether `faults` or `differences` were cut at their limit.
+    /// Of the calibration that judged in the replay; null on a rig not learnt.
+    #[serde(default)]
+    pub calibration_id: Option<String>,
+    /// Of the profile, the settings and the rig's description that judged.
+    #[serde(default)]
+    pub settings_id: String,
+    /// Whether the verdicts were cut at their limit of 10000 transitions.
     pub truncated: bool,
 }
 

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use utoipa::ToSchema;
 
+use super::basis::Basis;
 use crate::diagnosis::{Answer, AxisEvidence, Candidate, Evidence, Transition};
 use crate::engine::{Admission, Output};
 use crate::vocabulary::{Axis, FaultCode, FaultStatus};
@@ -35,6 +36,12 @@ pub struct FaultView {
     pub command: Option<String>,
     /// Causes that read alike; empty where only one does.
     pub candidates: Vec<CandidateView>,
+    /// Of the calibration that judged; null on a rig not learnt.
+    #[serde(default)]
+    pub calibration_id: Option<String>,
+    /// Of the profile, the settings and the rig's description that judged.
+    #[serde(default)]
+    pub settings_id: String,
     /// The numbers at that moment, in one sentence and one by one.
     pub summary: String,
     pub evidence: EvidenceView,
@@ -130,7 +137,7 @@ pub struct SummaryView {
 
 /// The view of the transition of a status byte.
 #[must_use]
-pub fn fault_view(session: &str, transition: &Transition) -> FaultView {
+pub fn fault_view(session: &str, basis: &Basis, transition: &Transition) -> FaultView {
     let axis = transition.axis();
     FaultView {
         line: "fault".to_owned(),
@@ -144,6 +151,8 @@ pub fn fault_view(session: &str, transition: &Transition) -> FaultView {
         axis: axis.map(|a| a.as_str().to_owned()),
         command: axis.map(|a| a.command().to_owned()),
         candidates: transition.suspicion.candidates.iter().map(candidate_view).collect(),
+        calibration_id: basis.calibration_id.clone(),
+        settings_id: basis.settings_id.clone(),
         summary: sentence(transition),
         evidence: evidence_view(&transition.evidence),
     }

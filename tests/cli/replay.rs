@@ -127,3 +127,36 @@ fn the_table_says_it_in_words_within_eighty_columns() {
     assert!(done.stdout.contains("x_servo (dead) confirmed since"));
     assert_eq!(done.stderr, "");
 }
+
+#[test]
+fn two_verdicts_are_compared_transition_by_transition() {
+    let bench = Bench::new();
+    bench.calibrated().ok("simulate --seconds 30 --fault x_servo:dead@10 --seed 2 -o sick.csv");
+    let patient = bench.read("learnt.json");
+    let mut asset: Value = serde_json::from_str(&patient).unwrap();
+    asset["diagnostics"] = serde_json::json!({ "debounce_s": 1.1 });
+    bench.write("patient.json", &asset.to_string());
+    let same = bench.ok("replay --asset learnt.json --against learnt.json --format json sick.csv");
+    let lines = same.json();
+    let (comparison, rest) = lines.split_last().unwrap();
+    let differences: Vec<&Value> = rest.iter().filter(|l| l["type"] == "difference").collect();
+    let faults = rest.iter().filter(|l| l["type"] == "fault").count();
+    assert!(faults >= 2 && differences.len() == faults);
+    assert!(differences.iter().all(|l| l["change"] == "same" && l["moved_s"] == 0.0));
+    assert_eq!((&comparison["type"], &comparison["same"]), (&"comparison".into(), &faults.into()));
+    assert_eq!(comparison["verdict_hash"], comparison["against_hash"]);
+    let line = "replay --asset learnt.json --against patient.json";
+    let other = bench.ok(&format!("{line} --format json sick.csv")).json();
+    let pending = other.iter().find(|l| l["type"] == "difference").unwrap();
+    assert_eq!((&pending["change"], &pending["code"]), (&"moved".into(), &"x_servo".into()));
+    // The debounce before a failure is half a second longer.
+    let moved_s = pending["moved_s"].as_f64().unwrap();
+    assert!((0.3..0.9).contains(&moved_s), "{moved_s}");
+    let t_s = |key: &str| pending[key].as_f64().unwrap();
+    assert!((t_s("replayed_t_s") - t_s("recorded_t_s") - moved_s).abs() < 1e-12);
+    let table = bench.ok(&format!("{line} sick.csv")).stdout;
+    assert!(table.lines().all(|line| line.chars().count() <= 80), "{table}");
+    assert!(table.contains("moved") && table.contains("here, s"), "{table}");
+    let textbook = bench.ok("replay --asset learnt.json --against-profile textbook sick.csv");
+    assert!(textbook.stdout.contains("there only"), "{}", textbook.stdout);
+}

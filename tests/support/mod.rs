@@ -250,6 +250,41 @@ pub fn judged(name: &str, samples: &[Sample]) -> (String, Vec<String>) {
     (verdict.hash(), verdict.confirmed().iter().map(ToString::to_string).collect())
 }
 
+/// Server-Sent Events, one by one.
+pub struct Events {
+    response: reqwest::Response,
+    text: String,
+}
+
+impl Events {
+    pub fn new(response: reqwest::Response) -> Self {
+        assert_eq!(response.status(), 200);
+        Self { response, text: String::new() }
+    }
+
+    /// The next event's data, with its `id`.
+    pub async fn next(&mut self) -> Value {
+        loop {
+            if let Some((event, rest)) = self.text.split_once("\n\n") {
+                let event = event.to_owned();
+                self.text = rest.to_owned();
+                let field = |name: &str| {
+                    event.lines().find_map(|l| l.strip_prefix(name)).map(|v| v.trim().to_owned())
+                };
+                if let Some(data) = field("data:") {
+                    let mut data: Value = serde_json::from_str(&data).unwrap();
+                    data["id"] = field("id:").unwrap().parse::<i64>().unwrap().into();
+                    return data;
+                }
+                continue;
+            }
+            let chunk = tokio::time::timeout(DEADLINE, self.response.chunk()).await;
+            let chunk = chunk.unwrap().unwrap().expect("the stream goes on");
+            self.text.push_str(std::str::from_utf8(&chunk).unwrap());
+        }
+    }
+}
+
 /// Asks again until `done` gives something; fails after [`DEADLINE`].
 #[expect(clippy::disallowed_methods, reason = "a test must not wait for ever")]
 pub async fn eventually<T, F: Future<Output = Option<T>>>(mut done: impl FnMut() -> F) -> T {

@@ -47,6 +47,7 @@ mod tests {
     use super::*;
     use crate::diagnosis::{Evidence, StatusByte, Suspicion, Transition};
     use crate::vocabulary::{FaultCode, FaultStatus, SimTime};
+    use crate::wire::basis::Basis;
     use crate::wire::verdict::fault_view;
 
     #[test]
@@ -59,7 +60,7 @@ mod tests {
             suspicion: Suspicion::default(),
             evidence: Evidence::default(),
         };
-        let json = serde_json::to_string(&fault_view("a", &transition)).unwrap();
+        let json = serde_json::to_string(&fault_view("a", &Basis::default(), &transition)).unwrap();
         let text = format!(": hello\n\nid: 7\nevent: fault\ndata: {json}\n\n:\n\n");
         for cut in 0..text.len() {
             let mut lines = Lines::default();

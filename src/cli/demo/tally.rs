@@ -115,6 +115,7 @@ mod tests {
     use crate::diagnosis::{Evidence, StatusByte, Suspicion, Transition};
     use crate::simulation::Fault;
     use crate::vocabulary::SimTime;
+    use crate::wire::basis::Basis;
     use crate::wire::verdict::fault_view;
 
     fn truth(words: &str) -> FaultTruth {
@@ -125,7 +126,8 @@ mod tests {
         let at = SimTime::new(t_s).unwrap();
         let (byte, suspicion) = (StatusByte::default(), Suspicion::default());
         let evidence = Evidence::default();
-        fault_view(session, &Transition { at, code, status, byte, suspicion, evidence })
+        let transition = Transition { at, code, status, byte, suspicion, evidence };
+        fault_view(session, &Basis::default(), &transition)
     }
 
     fn tally(heard: &[FaultView]) -> Tally {

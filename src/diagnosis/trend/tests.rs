@@ -1,0 +1,159 @@
+//! Against the published figures, by counting, and on drifts that are known.
+
+use super::*;
+use proptest::prelude::*;
+
+const GAIN: Band = Band { low: 0.7, nominal: 1.0, high: 1.3 };
+
+/// Deterministic noise with a normal distribution's scale: the sum of twelve
+/// uniform numbers less six.
+fn noise(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+    let mut uniform = move || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        (state >> 11) as f64 / (1u64 << 53) as f64
+    };
+    move || (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+}
+
+/// Sen 1968, section 6: times 1, 2, 3, 4, 10, 12, 18 and a slope of 4. The
+/// example's points are at unequal times; sessions that estimated nothing
+/// stand for the times between.
+#[test]
+fn validate_sens_own_example() {
+    let mut values = [f64::NAN; 18];
+    for (t, y) in [(1, 9.0), (2, 15.0), (3, 19.0), (4, 20.0), (10, 45.0), (12, 55.0), (18, 78.0)] {
+        values[t - 1] = y;
+    }
+    let trend = Trend::of(&values).unwrap();
+    assert_eq!((trend.slope, trend.n_sessions), (4.0, 7));
+    // His 93 % interval is 26/7 to 35/8; at 99 % it is wider.
+    assert!(trend.slope_low <= 26.0 / 7.0 && trend.slope_high >= 35.0 / 8.0, "{trend:?}");
+    assert!(trend.slope_low > 0.0);
+}
+
+/// The interval's ranks against the exact distribution of Kendall's S, counted
+/// over all orders of five sessions: only a run that rises or falls throughout
+/// is a drift, and that is 2 of 120.
+#[test]
+fn validate_how_often_chance_makes_a_drift_by_counting() {
+    fn orders(rest: &mut Vec<f64>, k: usize, take: &mut impl FnMut(&[f64])) {
+        if k == rest.len() {
+            return take(rest);
+        }
+        for i in k..rest.len() {
+            rest.swap(k, i);
+            orders(rest, k + 1, take);
+            rest.swap(k, i);
+        }
+    }
+    let count = |n: usize| {
+        let (mut n_all, mut n_drifts) = (0, 0);
+        orders(&mut (0..n).map(|i| i as f64).collect(), 0, &mut |values| {
+            n_all += 1;
+            n_drifts += u32::from(Trend::of(values).unwrap().is_significant());
+        });
+        f64::from(n_drifts) / f64::from(n_all)
+    };
+    assert_eq!(count(5), 2.0 / 120.0);
+    for n in [6, 7, 8] {
+        let share = count(n);
+        assert!(share > 0.0 && share <= 0.01, "{n} sessions: {share}");
+    }
+}
+
+/// Healthy rigs: the share that is taken to drift is the one asked for, and
+/// none of them is warned of.
+#[test]
+fn validate_that_no_drift_is_no_warning() {
+    let mut drifts = 0;
+    for seed in 1..=1000 {
+        let mut noise = noise(seed);
+        let values: Vec<f64> = (0..30).map(|_| 1.0 + 0.02 * noise()).collect();
+        let trend = Trend::of(&values).unwrap();
+        drifts += u32::from(trend.is_significant());
+        assert_eq!(warning(&trend, &GAIN, 0.004, 20.0), None, "{trend:?}");
+    }
+    // 1 % of 1000 within four standard deviations of a binomial.
+    assert!((1..=23).contains(&drifts), "{drifts}");
+}
+
+/// A servo that loses half a percent of its gain a session crosses 0.7 in its
+/// sixtieth: it is warned of within the horizon before, and rightly.
+#[test]
+fn validate_that_a_known_drift_is_warned_of_in_time() {
+    for seed in 1..=200 {
+        let mut noise = noise(seed);
+        let values: Vec<f64> =
+            (0..60).map(|i| 1.0 - 0.005 * f64::from(i) + 0.01 * noise()).collect();
+        let warned = |n: usize| {
+            let trend = Trend::of(&values[..n])?;
+            warning(&trend, &GAIN, 0.003, 20.0)
+        };
+        assert_eq!(warned(15), None, "45 sessions ahead is beyond the horizon");
+        let Some(Warning::Crosses { sessions }) = warned(50) else { panic!("{:?}", warned(50)) };
+        // The line has crossed where 0.005 (i + sessions) is 0.3.
+        assert!((sessions - 11.0).abs() < 3.0, "seed {seed}: {sessions}");
+        assert!(warned(45).is_some());
+    }
+}
+
+#[test]
+fn wild_sessions_do_not_move_the_line() {
+    let mut values: Vec<f64> = (0..20).map(|i| 1.0 - 0.01 * f64::from(i)).collect();
+    for i in [2, 9, 13, 18] {
+        values[i] = 50.0;
+    }
+    let trend = Trend::of(&values).unwrap();
+    assert!((trend.slope + 0.01).abs() < 1e-3, "{trend:?}");
+    assert!((trend.level - 0.81).abs() < 0.02, "{trend:?}");
+}
+
+#[test]
+fn a_step_that_stays_is_a_drift_beyond_half_the_limit() {
+    let trend = Trend::of(&[0.8; 12]).unwrap();
+    assert_eq!((trend.slope, trend.is_significant()), (0.0, false));
+    let Some(Warning::Drifted { share }) = warning(&trend, &GAIN, 0.005, 20.0) else { panic!() };
+    assert!((share - 2.0 / 3.0).abs() < 1e-12);
+    assert_eq!(warning(&trend, &GAIN, 0.05, 20.0), None, "not sure enough");
+    let small = Trend::of(&[0.9; 12]).unwrap();
+    assert_eq!(warning(&small, &GAIN, 0.0, 20.0), None);
+    assert_eq!(Trend::of(&[1.0; LEAST_SESSIONS - 1]), None);
+}
+
+proptest! {
+    /// Other units, another zero: the same line. Backwards: its mirror image.
+    #[test]
+    fn the_line_goes_with_its_units(
+        values in prop::collection::vec(-10.0..10.0_f64, LEAST_SESSIONS..40),
+        scale in prop_oneof![-5.0..-0.1_f64, 0.1..5.0_f64],
+        offset in -5.0..5.0_f64,
+    ) {
+        let trend = Trend::of(&values).unwrap();
+        let other: Vec<f64> = values.iter().map(|v| scale * v + offset).collect();
+        let other = Trend::of(&other).unwrap();
+        prop_assert!((other.slope - scale * trend.slope).abs() < 1e-9);
+        prop_assert!((other.level - scale * trend.level - offset).abs() < 1e-8);
+        prop_assert_eq!(other.is_significant(), trend.is_significant());
+        prop_assert!(trend.slope_low <= trend.slope && trend.slope <= trend.slope_high);
+    }
+
+    /// What is warned to cross does so along the line, and not before.
+    #[test]
+    fn a_warning_comes_true_along_the_line(
+        slope in -0.05..0.05_f64,
+        start in 0.8..1.2_f64,
+    ) {
+        let values: Vec<f64> = (0..10).map(|i| start + slope * f64::from(i)).collect();
+        let trend = Trend::of(&values).unwrap();
+        let level = |ahead: f64| start + slope * (9.0 + ahead);
+        if let Some(Warning::Crosses { sessions }) = warning(&trend, &GAIN, 0.0, 20.0) {
+            prop_assert!(sessions <= 20.0);
+            let inside = |v: f64| (GAIN.low - 1e-9..=GAIN.high + 1e-9).contains(&v);
+            prop_assert!(sessions == 0.0 || inside(level(sessions)), "{}", level(sessions));
+            prop_assert!(!inside(level(sessions + 1e-3)) || slope.abs() < 1e-4);
+        }
+    }
+}
