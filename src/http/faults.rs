@@ -6,9 +6,9 @@ use axum::http::StatusCode;
 use serde::Deserialize;
 
 use super::layers::about;
-use super::{Problem, Query, page_limit};
+use super::{PageQuery, Problem, Query, page_limit};
 use crate::service::{FaultQuery, Service};
-use crate::wire::service::{FaultEntryView, Page};
+use crate::wire::service::{FaultEntryView, HistoryView, Page};
 
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
 #[into_params(parameter_in = Query)]
@@ -113,6 +113,24 @@ pub(super) async fn acknowledge(
 ) -> Result<Json<FaultEntryView>, Problem> {
     about(&asset);
     Ok(Json(service.acknowledge(&asset, &code, query.actor()).await?))
+}
+
+/// What happened to a code, newest first: its changes of status, and who
+/// acknowledged or cleared it.
+#[utoipa::path(get, path = "/assets/{asset}/faults/{code}/history", tag = "faults",
+    operation_id = "get_fault_history",
+    params(("asset", description = "Name of the asset"), ("code", description = "Fault code"),
+        PageQuery),
+    responses((status = 200, body = Page<HistoryView>), (status = 400, body = Problem),
+        (status = 404, body = Problem)))]
+pub(super) async fn history(
+    State(service): State<Service>,
+    Path((asset, code)): Path<(String, String)>,
+    Query(page): Query<PageQuery>,
+) -> Result<Json<Page<HistoryView>>, Problem> {
+    about(&asset);
+    let limit = page_limit(page.limit);
+    Ok(Json(service.history(&asset, &code, page.cursor.as_deref(), limit).await?))
 }
 
 /// Faults across the fleet.

@@ -11,12 +11,13 @@ use serde::Deserialize;
 
 use super::layers::about;
 use super::telemetry::Format;
-use super::{App, Problem, Query, body, page_limit};
+use super::{App, PageQuery, Problem, Query, body, page_limit};
 use crate::service::{Recording, Service, ServiceError};
 use crate::vocabulary::{Invalid, Sample};
 use crate::wire::service::{ImportView, Page, SessionView};
 use crate::wire::session_csv::{write_header, write_rows};
 use crate::wire::telemetry::sample_view;
+use crate::wire::verdict::FaultView;
 
 /// Most rows of an imported file; a longer one is refused.
 const MAX_IMPORT_ROWS: usize = 2_000_000;
@@ -204,6 +205,21 @@ pub(super) async fn telemetry(
     let body = Body::from_stream(parts(recording, form, start, with_seq));
     Ok(([(CONTENT_TYPE, form.kind().to_owned()), (CONTENT_DISPOSITION, file)], body)
         .into_response())
+}
+
+/// The changes of status in a session, in order.
+#[utoipa::path(get, path = "/sessions/{id}/faults", tag = "sessions",
+    operation_id = "list_session_faults",
+    params(("id", description = "The service's id of the session"), PageQuery),
+    responses((status = 200, body = Page<FaultView>), (status = 400, body = Problem),
+        (status = 404, body = Problem)))]
+pub(super) async fn faults(
+    State(service): State<Service>,
+    Path(id): Path<String>,
+    Query(page): Query<PageQuery>,
+) -> Result<Json<Page<FaultView>>, Problem> {
+    let limit = page_limit(page.limit);
+    Ok(Json(service.session_faults(&id, page.cursor.as_deref(), limit).await?))
 }
 
 /// How a recording is written.

@@ -77,7 +77,10 @@ fn view(row: ReplayRow, share: f64) -> Result<ReplayView, ServiceError> {
 }
 
 /// The set-up for a replay of `session`.
-fn setup(session: &SessionRow, settings: &ReplaySettingsView) -> Result<Setup, ServiceError> {
+pub(super) fn setup(
+    session: &SessionRow,
+    settings: &ReplaySettingsView,
+) -> Result<Setup, ServiceError> {
     let profile = settings.profile.as_deref().map(str::parse::<Profile>).transpose();
     let profile = profile.map_err(|e| Invalid::new("/profile", e.to_string()))?;
     Ok(Setup::new(rig(session, settings)?, profile)?)
