@@ -19,7 +19,7 @@ const SOURCES: [&str; 6] = [
 ];
 
 /// The oldest Node that the page's tools run on, as `web/package.json` has it.
-const NODE: (u32, u32) = (20, 19);
+const NODE: (u32, u32) = (18, 19);
 
 fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rerun-if-changed=build.rs");

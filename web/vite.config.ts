@@ -26,7 +26,7 @@ function brotli(): Plugin {
 }
 
 export default defineConfig({
-  oxc: { jsx: { runtime: "automatic", importSource: "preact" } },
+  esbuild: { jsx: "automatic", jsxImportSource: "preact" },
   build: { assetsDir: "static", emptyOutDir: true, modulePreload: { polyfill: false }, chunkSizeWarningLimit: 1000 },
   plugins: [brotli()],
   // `npx vite` shows changes at once, against a service on its usual port.

@@ -34,7 +34,7 @@ const POLICY: &str = "default-src 'self'; img-src 'self' data: blob:; media-src 
 /// What is said at `/` by a program that was built without the page.
 const NO_PAGE: &str = "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\">\
     <title>offbd</title><h1>offbd runs, without its dashboard</h1>\
-    <p>It was built where there was no Node 20.19 or later. Install Node and npm, then build \
+    <p>It was built where there was no Node 18.19 or later. Install Node and npm, then build \
     again: <code>cargo build --release</code>. Nothing else is missing: the interface is at \
     <a href=\"/docs/\">/docs</a>.</p></html>";
 
