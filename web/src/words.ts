@@ -56,7 +56,8 @@ const NONE = "–";
 /** A number with `digits` after the point and its unit; a dash where there is none. */
 export function number(value: number | null | undefined, digits: number, unit = ""): string {
   if (value === null || value === undefined || !Number.isFinite(value)) return NONE;
-  const text = value.toFixed(digits).replace("-", "−");
+  const rounded = value.toFixed(digits);
+  const text = Number(rounded) === 0 ? rounded.replace("-", "") : rounded.replace("-", "−");
   return unit ? `${text}\u202f${unit}` : text;
 }
 
@@ -80,6 +81,12 @@ export function ago(moment: string | null | undefined, now = Date.now()): string
   if (!moment) return "never";
   const s = Math.max(0, (now - Date.parse(moment)) / 1000);
   return s < 2 ? "now" : `${duration(s < 60 ? Math.round(s) : s).replace(".0", "")} ago`;
+}
+
+/** What a fault line says, without the code that stands before it, as a sentence. */
+export function sentence(summary: string): string {
+  const text = summary.replace(/^[^:]*: /, "").replace(/-(?=\d)/g, "−");
+  return `${text.charAt(0).toUpperCase()}${text.slice(1)}.`;
 }
 
 export const clock = (moment: string | null | undefined) =>

@@ -109,10 +109,7 @@ struct Wish {
     fault: String,
 }
 
-async fn break_it(
-    State(desk): State<Desk>,
-    Json(wish): Json<Wish>,
-) -> Result<StatusCode, Problem> {
+async fn break_it(State(desk): State<Desk>, Json(wish): Json<Wish>) -> Result<StatusCode, Problem> {
     // On the command line a fault has a time, too; here it is now.
     let fault: Fault = format!("{}@0", wish.fault).parse().map_err(|error| {
         let (status, title) = (StatusCode::UNPROCESSABLE_ENTITY, "No such fault");

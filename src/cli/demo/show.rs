@@ -10,7 +10,7 @@ use std::time::Duration;
 use tokio::sync::mpsc;
 use tokio::time::{Instant, Interval, MissedTickBehavior, interval, timeout};
 
-use super::client::{Client, Uplink};
+use super::client::{self, Client, Uplink};
 use super::events;
 use super::hands::{Act, Hands};
 use super::plan::{self, Episode};
@@ -263,11 +263,24 @@ impl Show {
             rows.push(std::mem::replace(&mut self.next, self.rig.next_sample()));
         }
         for batch in rows.chunks(MAX_ROWS) {
-            let ack = session.uplink.send(&session.name, batch).await?;
+            let ack = match session.uplink.send(&session.name, batch).await {
+                Err(error) if client::is_ended(&error) => {
+                    self.go_on_in_another(session);
+                    session.uplink.send(&session.name, batch).await?
+                }
+                ack => ack?,
+            };
             session.id = ack.session_id.or(session.id.take());
         }
         session.announce(due_s);
         Ok(())
+    }
+
+    /// A visitor has ended the session; a device would begin another.
+    fn go_on_in_another(&mut self, session: &mut Session) {
+        self.n_sessions += 1;
+        (session.name, session.id) = (format!("{}-{}", self.name, self.n_sessions), None);
+        say(self.rig.truth().t_s, &format!(">> ended by a visitor; session {}", session.name));
     }
 
     /// Ends a session: its verdict is settled, and all of it has been heard.
@@ -295,9 +308,8 @@ impl Show {
         say(now_s, &format!(">> session {name} ends, verdict {short}"));
         let of_episode = |truth: &&crate::simulation::FaultTruth| {
             // A repair by hand gives a fault another end than was planned.
-            let is_it = |f: &Fault| {
-                (f.effect, f.onset_s) == (truth.fault.effect, truth.fault.onset_s)
-            };
+            let is_it =
+                |f: &Fault| (f.effect, f.onset_s) == (truth.fault.effect, truth.fault.onset_s);
             episode.faults.iter().any(is_it) && truth.fault.onset_s <= now_s
         };
         self.tally.injected(&name, self.rig.faults().filter(of_episode).copied());

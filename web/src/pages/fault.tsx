@@ -6,12 +6,12 @@ import { events } from "../api/events";
 import type { FaultEntry, History } from "../api/types";
 import { useAsk, useTitle } from "../hooks";
 import { TraceBuffer } from "../live/buffer";
-import { Act, Empty, FaultChip, Facts, Loading, Trouble } from "../parts/bits";
+import { Act, Empty, Facts, Loading, StatusChip, Trouble } from "../parts/bits";
 import { EvidenceTable } from "../parts/evidence";
 import type { Mark } from "../parts/line-chart";
 import { ChartGroup, RigCharts } from "../parts/rig-charts";
 import { at, Link } from "../router";
-import { clock, codeMeaning, codeTitle, faultTitle, kindMeaning, seconds, STATUS_BITS } from "../words";
+import { clock, codeMeaning, codeTitle, faultTitle, kindMeaning, seconds, sentence, STATUS_BITS } from "../words";
 
 /** Seconds shown before the onset and after the confirmation. */
 const BEFORE_S = 5;
@@ -38,25 +38,25 @@ function Shown({ fault, history, error, again }: { fault: FaultEntry; history: H
       <header class="page-head">
         <div>
           <p class="crumbs"><Link to="/">Fleet</Link> / <Link to={at("rigs", asset)}>{asset}</Link></p>
-          <h1>{faultTitle(code, fault.kind)} <FaultChip {...fault} /></h1>
+          <h1>{faultTitle(code, fault.kind)} <StatusChip {...fault} /></h1>
         </div>
         {isOn && <Acts fault={fault} again={again} />}
       </header>
       <Trouble error={error} />
       {latest?.fault && isOn
-        ? <p class="sentence">{latest.fault.summary}</p>
+        ? <p class="sentence">{sentence(latest.fault.summary)}</p>
         : <Empty title={fault.status === "cleared" ? "Nothing is on record" : "On record, but not active"}>
             <p>{codeTitle(code)}: {codeMeaning(code)}. {fault.status === "healed" ? "Enough good sessions followed, so it has healed." : "Nothing of it has been found since it was last cleared."}</p>
           </Empty>}
       <div class="pair">
-        <Causes fault={fault} />
+        <div class="column">
+          <Causes fault={fault} />
+          <Timeline history={history} fault={fault} />
+        </div>
         <StatusByte byte={fault.status_byte} />
       </div>
       {latest && isOn && <Around key={latest.id} history={history} latest={latest} onset={fault.onset_s} />}
-      <div class="pair">
-        {fault.freeze_frame && <section class="card"><h2>Freeze frame</h2><p class="quiet small-text">The numbers at the first failure of the current occurrence.</p><EvidenceTable of={fault.freeze_frame} /></section>}
-        <Timeline history={history} fault={fault} />
-      </div>
+      {fault.freeze_frame && <section class="card"><h2>Freeze frame</h2><p class="quiet small-text">The numbers at the first failure of the current occurrence.</p><EvidenceTable of={fault.freeze_frame} /></section>}
     </main>
   );
 }

@@ -6,11 +6,11 @@ import { healthOf, useFleet } from "../live/fleet";
 import { Empty, FaultChip, HealthMark, Loading, Trouble, type Health } from "../parts/bits";
 import { VirtualList } from "../parts/virtual-list";
 import { at, go, Link, usePlace } from "../router";
-import { ago, codeTitle, count, number, severity } from "../words";
+import { ago, codeTitle, count, number, sentence, severity } from "../words";
 
 const FILTERS: { key: Health | "all"; word: string }[] = [
   { key: "all", word: "All" }, { key: "fault", word: "Fault" }, { key: "suspect", word: "Suspected" },
-  { key: "ok", word: "Healthy" }, { key: "silent", word: "Silent" }, { key: "idle", word: "No session" },
+  { key: "ok", word: "No fault" }, { key: "silent", word: "Silent" }, { key: "idle", word: "No session" },
 ];
 
 const SORTS = {
@@ -23,6 +23,9 @@ const SORTS = {
 /** Later than this is worth a colour, s. */
 const LAG_S = 2;
 
+/** bench-2 comes before bench-10. */
+const NAMES = new Intl.Collator("en", { numeric: true });
+
 type Row = { entry: FleetEntry; health: Health; worst: number };
 
 function matches(entry: FleetEntry, text: string): boolean {
@@ -31,7 +34,7 @@ function matches(entry: FleetEntry, text: string): boolean {
 }
 
 function order(sort: keyof typeof SORTS): (a: Row, b: Row) => number {
-  const name = (a: Row, b: Row) => (a.entry.asset < b.entry.asset ? -1 : 1);
+  const name = (a: Row, b: Row) => NAMES.compare(a.entry.asset, b.entry.asset);
   const rank: Record<Health, number> = { fault: 0, suspect: 1, silent: 2, ok: 3, idle: 4 };
   const by: Record<keyof typeof SORTS, (a: Row, b: Row) => number> = {
     severity: (a, b) => b.worst - a.worst || rank[a.health] - rank[b.health],
@@ -112,14 +115,14 @@ export function FleetPage() {
             ? <VirtualList items={shown} rowHeight={height} label="Rigs" id={(row) => row.entry.asset} row={(row) => <FleetRow row={row} now={now} />} />
             : <p class="quiet">No rig matches. <button type="button" class="link" onClick={() => go("/", true)}>Show all {count(rows.length)}</button></p>}
         </section>
-        <section class="feed" aria-label="Events">
+        <section class={`feed${lines.length ? "" : " none"}`} aria-label="Events">
           <h2>Events</h2>
           {lines.length === 0 && <p class="quiet">None since this page was opened. Changes of any fault appear here as they happen.</p>}
           <ol aria-live="polite">
             {lines.slice(0, 20).map((line) => (
               <li key={line.event}>
                 <Link to={at("rigs", line.asset ?? "", "faults", line.code)}><b>{line.asset}</b> <span class={`status-${line.status}`}>{line.status}</span></Link>
-                <p>{line.summary}</p>
+                <p>{sentence(line.summary)}</p>
               </li>
             ))}
           </ol>

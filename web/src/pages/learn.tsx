@@ -61,7 +61,7 @@ const SHOWN_S = 20;
 function Textbook() {
   const sessions = useAsk(() => api.sessions({ limit: 50 }).then((page) => page.items.filter((s) => s.samples > 500)), "sessions", 10_000);
   const [id, setId] = useState("");
-  const chosen = sessions.data?.find((s) => s.id === id) ?? sessions.data?.find((s) => s.state === "ended") ?? sessions.data?.[0];
+  const chosen = sessions.data?.find((s) => s.id === id) ?? sessions.data?.find((s) => s.verdict?.faults.length === 0) ?? sessions.data?.find((s) => s.state === "ended") ?? sessions.data?.[0];
   return (
     <section class="card">
       <h2>Why 0.01 m/s² fails on a real rig</h2>

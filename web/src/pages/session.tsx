@@ -10,7 +10,7 @@ import { ChartGroup, RigCharts } from "../parts/rig-charts";
 import { RigView } from "../parts/rig-view";
 import { XyTrace } from "../parts/xy-trace";
 import { at, go, Link, usePlace } from "../router";
-import { clock, codeTitle, count, duration, faultTitle, seconds } from "../words";
+import { clock, codeTitle, count, duration, faultTitle, seconds, sentence } from "../words";
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10] as const;
 const SPANS = [10, 30, 60, 0] as const;
@@ -172,7 +172,7 @@ function Found({ session, faults, seek }: { session: Session; faults: FaultLine[
       {faults.length === 0
         ? <p class="status-ok">No fault</p>
         : <ol class="found">{faults.map((line) => (
-            <li><button type="button" class="link n" onClick={() => seek((line.onset_s ?? line.t_s) - 0.5)} aria-label={`Go to ${seconds(line.t_s)}`}>{seconds(line.t_s)}</button> <span><b>{faultTitle(line.code, line.kind)}</b> <span class={`status-${line.status}`}>{line.status}</span><br /><span class="quiet">{line.summary.replace(/^[^:]*: /, "")}</span></span></li>
+            <li><button type="button" class="link n" onClick={() => seek((line.onset_s ?? line.t_s) - 0.5)} aria-label={`Go to ${seconds(line.t_s)}`}>{seconds(line.t_s)}</button> <span><b>{faultTitle(line.code, line.kind)}</b> <span class={`status-${line.status}`}>{line.status}</span><br /><span class="quiet">{sentence(line.summary)}</span></span></li>
           ))}</ol>}
     </section>
   );

@@ -9,7 +9,7 @@ export type Health = "fault" | "suspect" | "ok" | "silent" | "idle";
 const HEALTH: Record<Health, { sign: string; word: string }> = {
   fault: { sign: "▲", word: "fault" },
   suspect: { sign: "◆", word: "suspected" },
-  ok: { sign: "●", word: "healthy" },
+  ok: { sign: "●", word: "no fault" },
   silent: { sign: "○", word: "silent" },
   idle: { sign: "○", word: "no session" },
 };
@@ -20,10 +20,17 @@ export function HealthMark({ health, word = true }: { health: Health; word?: boo
   return <span class={`health health-${health}`}><span aria-hidden="true">{sign}</span>{word ? <span>{text}</span> : <span class="hidden">{text}</span>}</span>;
 }
 
-export function FaultChip({ code, kind, status, acknowledged }: { code: string; kind?: string | null; status: string; acknowledged?: boolean }) {
-  const level = ["none", "pending", "known", "confirmed"][severity({ status, acknowledged })];
-  const note = status === "confirmed" && acknowledged ? "confirmed, acknowledged" : status;
-  return <span class={`chip chip-${level}`} title={note}><b>{faultTitle(code, kind)}</b> <span>{note}</span></span>;
+type Standing = { status: string; acknowledged?: boolean };
+
+const level = (fault: Standing) => ["none", "pending", "known", "confirmed"][severity(fault)];
+const standing = ({ status, acknowledged }: Standing) => (acknowledged && status !== "cleared" ? `${status}, acknowledged` : status);
+
+export function StatusChip(fault: Standing) {
+  return <span class={`chip chip-${level(fault)}`}><b>{standing(fault)}</b></span>;
+}
+
+export function FaultChip({ code, kind, ...fault }: Standing & { code: string; kind?: string | null }) {
+  return <span class={`chip chip-${level(fault)}`}><b>{faultTitle(code, kind)}</b> <span>{standing(fault)}</span></span>;
 }
 
 export function Trouble({ error, again }: { error: unknown; again?: () => void }) {

@@ -34,7 +34,8 @@ export interface LineChartOptions {
 
 type Data = [number[], ...(number | null)[][]];
 
-const FONT = "12px system-ui, sans-serif";
+/** How much larger than usual letters are: the style sheet enlarges all on a wall. */
+const scale = () => parseFloat(getComputedStyle(document.documentElement).fontSize) / 16;
 
 export class LineChart {
   private plot?: uPlot;
@@ -76,13 +77,15 @@ export class LineChart {
   }
 
   private size() {
-    return { width: Math.max(this.element.clientWidth, 120), height: this.options.height };
+    return { width: Math.max(this.element.clientWidth, 120), height: this.element.clientHeight || this.options.height };
   }
 
   private build(): void {
     this.plot?.destroy();
     const { lines, digits = 1, band, sync, least = 0 } = this.options;
-    const axis = { stroke: colour("quiet"), grid: { stroke: colour("grid"), width: 1 }, ticks: { show: false }, font: FONT, gap: 4 };
+    const large = scale();
+    const font = `${12 * large}px system-ui, sans-serif`;
+    const axis = { stroke: colour("quiet"), grid: { stroke: colour("grid"), width: 1 }, ticks: { show: false }, font, gap: 4 };
     const plain = (n: number | null) => (n === null ? "" : n.toFixed(digits).replace("-", "−"));
     const series: uPlot.Series[] = [
       { label: "t" },
@@ -106,8 +109,8 @@ export class LineChart {
         y: { range: (_, low, high) => this.scale(low, high, least) },
       },
       axes: [
-        { ...axis, size: 22, values: (_, ticks) => ticks.map((t) => `${Number(t.toFixed(2))}`.replace("-", "−")), space: 60 },
-        { ...axis, size: 46, values: (_, ticks) => ticks.map(plain), space: 26 },
+        { ...axis, size: 22 * large, values: (_, ticks) => ticks.map((t) => `${Number(t.toFixed(2))}`.replace("-", "−")), space: 60 * large },
+        { ...axis, size: 46 * large, values: (_, ticks) => ticks.map(plain), space: 26 * large },
       ],
       bands: band ? [{ series: [band[0] + 1, band[1] + 1], fill: colour("band") }] : [],
       cursor: { drag: { x: false, y: false }, points: { size: 6 }, ...(sync ? { sync: { key: sync, setSeries: false } } : {}) },
@@ -154,7 +157,10 @@ export class LineChart {
     const { ctx, bbox } = plot;
     const lines: Mark[] = this.head === null ? this.marks : [...this.marks, { t: this.head, label: "", colour: "ink" }];
     ctx.save();
-    ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
+    const line = 12 * scale() * devicePixelRatio;
+    ctx.font = `${line * 0.92}px system-ui, sans-serif`;
+    // Labels that would cover each other go into rows.
+    const rows: number[] = [];
     for (const mark of lines) {
       if (mark.t < this.range[0] || mark.t > this.range[1]) continue;
       const x = Math.round(plot.valToPos(mark.t, "x", true));
@@ -167,8 +173,12 @@ export class LineChart {
       ctx.stroke();
       const width = ctx.measureText(mark.label).width + 6 * devicePixelRatio;
       const fits = x + width < bbox.left + bbox.width;
+      const left = fits ? x : x - width;
+      const free = rows.findIndex((end) => end <= left);
+      const row = free < 0 ? rows.length : free;
+      rows[row] = left + width;
       ctx.textAlign = fits ? "left" : "right";
-      ctx.fillText(mark.label, x + (fits ? 4 : -4) * devicePixelRatio, bbox.top + 11 * devicePixelRatio);
+      ctx.fillText(mark.label, x + (fits ? 4 : -4) * devicePixelRatio, bbox.top + (row + 0.9) * line);
     }
     ctx.restore();
   }

@@ -133,7 +133,7 @@ function OneChart({ group, kind: name, axis, height, onSeek }: { group: ChartGro
           {kind.gates && <span class="key key-gate">judged</span>}
         </span>
       </figcaption>
-      <div ref={element} role="img" aria-label={`${kind.title(axis)} over time: ${kind.about}`} style={{ height: `${height}px` }} />
+      <div ref={element} role="img" aria-label={`${kind.title(axis)} over time: ${kind.about}`} style={{ height: `${height / 16}rem` }} />
     </figure>
   );
 }

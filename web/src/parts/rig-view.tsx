@@ -50,7 +50,7 @@ export function RigView({ asset, pose, name }: Props) {
     scene.current?.render();
     if (shown && readout.current && now - lastWords.current > 120) {
       lastWords.current = now;
-      readout.current.textContent = `qx ${degrees(shown.qx)}  qy ${degrees(shown.qy)}`;
+      readout.current.textContent = `twin's plate: qx ${degrees(shown.qx)}  qy ${degrees(shown.qy)}`;
     }
   });
 
@@ -71,7 +71,7 @@ export function RigView({ asset, pose, name }: Props) {
         aria-label="Plate and ball in three dimensions; the twin is the see-through ball. Arrow keys turn the view." />
       {state === "failed" && <p class="stage-note">This browser shows no 3D (WebGL). The charts have all of it.</p>}
       {state === "loading" && <p class="stage-note">Loading 3D…</p>}
-      <output ref={readout} class="stage-tilt" aria-label="Tilt of the plate">qx –  qy –</output>
+      <output ref={readout} class="stage-tilt" aria-label="Tilt of the twin's plate">qx –  qy –</output>
       <p class="stage-keys" aria-hidden="true"><span class="key key-measured">measured</span><span class="key key-twin">twin</span></p>
       <div class="stage-tools">
         {VIEWS.map((each) => <button type="button" class="small" aria-pressed={view === each} onClick={() => choose(each)}>{each}</button>)}

@@ -39,6 +39,7 @@ export class RigScene {
   private path: number[] = [];
   private size = 0.4;
   private radius = 0.0127;
+  private view: ViewName = "free";
   private isDirty = true;
   private readonly stop: (() => void)[] = [];
 
@@ -70,7 +71,9 @@ export class RigScene {
   }
 
   look(view: ViewName): void {
-    const d = this.size * 1.9;
+    // A narrow picture needs more distance to show the whole width.
+    const d = this.size * 1.45 * Math.max(1, 1.25 / this.camera.aspect);
+    this.view = view;
     const place = { free: [0.55 * d, -0.95 * d, 0.75 * d], top: [0, -0.001 * d, 1.35 * d], "along x": [-1.35 * d, 0, 0.12 * d], "along y": [0, -1.35 * d, 0.12 * d] }[view];
     this.camera.position.set(place[0]!, place[1]!, place[2]!);
     this.controls.target.set(0, 0, 0);
@@ -123,8 +126,10 @@ export class RigScene {
     const { clientWidth: width, clientHeight: height } = this.canvas.parentElement!;
     if (!width || !height) return;
     this.renderer.setSize(width, height, false);
+    const before = this.camera.aspect;
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
+    if (Math.abs(before - this.camera.aspect) > 0.01) this.look(this.view);
     this.isDirty = true;
   }
 
