@@ -7,7 +7,7 @@ use axum::extract::State;
 use axum::http::HeaderMap;
 use axum::response::Sse;
 use axum::response::sse::{Event as Message, KeepAlive};
-use futures_util::Stream;
+use futures_util::{Stream, StreamExt};
 use serde::Deserialize;
 use tokio_util::sync::CancellationToken;
 
@@ -32,7 +32,8 @@ pub(super) struct EventsQuery {
 
 /// Fault transitions as they become durable: events of the type `fault` whose
 /// data is a fault line with the `asset`, each with an id. With the header
-/// `Last-Event-ID` the ones missed come first.
+/// `Last-Event-ID` the ones missed come first. Before all comes one of the type
+/// `begin`, whose id says after which event the others follow.
 #[utoipa::path(get, path = "/events", tag = "faults", operation_id = "stream_events",
     params(EventsQuery),
     responses((status = 200, body = FaultView, content_type = "text/event-stream"),
@@ -48,7 +49,9 @@ pub(super) async fn events(
     };
     let feed = app.service.events(query.asset, after).await?;
     let keep_alive = KeepAlive::new().interval(KEEP_ALIVE);
-    Ok(Sse::new(messages(feed, app.closing)).keep_alive(keep_alive))
+    let begin = Message::default().id(feed.last().to_string()).event("begin").data("{}");
+    let begin = futures_util::stream::once(std::future::ready(Ok(begin)));
+    Ok(Sse::new(begin.chain(messages(feed, app.closing).fuse())).keep_alive(keep_alive))
 }
 
 fn last_id(text: &str) -> Result<i64, Problem> {

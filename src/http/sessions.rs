@@ -6,7 +6,7 @@ use axum::extract::{Path, State};
 use axum::http::header::{ACCEPT, CONTENT_DISPOSITION, CONTENT_TYPE, LOCATION};
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
-use futures_util::Stream;
+use futures_util::{Stream, StreamExt};
 use serde::Deserialize;
 
 use super::layers::about;
@@ -314,7 +314,7 @@ fn parts(
     with_seq: bool,
 ) -> impl Stream<Item = Result<Bytes, std::io::Error>> + Send {
     let begin = (recording, Part::Start(start));
-    futures_util::stream::unfold(begin, move |(mut recording, part)| async move {
+    let parts = futures_util::stream::unfold(begin, move |(mut recording, part)| async move {
         let first = match part {
             Part::Start(start) => return Some((Ok(start.into()), (recording, Part::First))),
             Part::First => true,
@@ -329,5 +329,7 @@ fn parts(
             Ok(None) => Some((Ok(Bytes::from_static(form.end())), (recording, Part::Done))),
             Err(error) => Some((Err(std::io::Error::other(error)), (recording, Part::Done))),
         }
-    })
+    });
+    // Compression asks once more after the end.
+    parts.fuse()
 }

@@ -107,7 +107,7 @@ test("played back, scrubbed, judged again, recorded, downloaded, deleted", async
   assert.match(video.suggestedFilename(), /^bench-sick\.(webm|mp4)$/);
   assert.ok(bytes.length > 5000, `a video of ${bytes.length} bytes`);
 
-  const [csv] = await Promise.all([view.waitForEvent("download"), view.getByRole("link", { name: "Download CSV" }).click()]);
+  const [csv] = await Promise.all([view.waitForEvent("download"), view.getByRole("button", { name: "Download CSV" }).click()]);
   const lines = readFileSync(await csv.path(), "utf8").trim().split("\n");
   assert.equal(lines.length, rig.sick.trim().split("\n").length);
 

@@ -98,7 +98,13 @@ export const api = {
   calibration: (asset: string, job: string) => get<CalibrationJob>(`/assets/${id(asset)}/calibrations/${id(job)}`),
   activate: (asset: string, job: string) =>
     send<CalibrationJob>("POST", `/assets/${id(asset)}/calibrations/${id(job)}/activate`),
-  recordingUrl: (session: string) => `${BASE}/sessions/${id(session)}/telemetry`,
+  /** The recording as a file; asked for like all else, so that it needs no other way to be allowed. */
+  recording: async (session: string) => {
+    const init = authorised({ headers: { accept: "text/csv" } });
+    const answer = await fetch(`${BASE}/sessions/${id(session)}/telemetry`, init);
+    if (!answer.ok) throw new ProblemError(answer.status, await answer.json().catch(() => ({})));
+    return answer.blob();
+  },
   demo: () => get<Demo>("/demo"),
   demoBreak: (fault: string) => send<void>("POST", "/demo/faults", { fault }),
   demoRepair: () => send<void>("DELETE", "/demo/faults"),

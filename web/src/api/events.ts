@@ -45,6 +45,7 @@ class Events {
       setTimeout(() => this.open(), this.wait);
       this.wait = Math.min(this.wait * 2, RETRY_MS[1]);
     };
+    source.addEventListener("begin", (message) => (this.last = Number(message.lastEventId)));
     source.addEventListener("fault", (message) => {
       this.last = Number(message.lastEventId);
       const line = { ...(JSON.parse(message.data) as FaultLine), event: this.last };

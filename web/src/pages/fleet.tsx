@@ -63,7 +63,7 @@ export function FleetPage() {
   const now = useNow();
   const height = useRowHeight();
   const text = query.get("search") ?? "";
-  const filter = (query.get("health") ?? "all") as Health | "all";
+  const filter = (query.get("health") || "all") as Health | "all";
   const sort = (query.get("sort") ?? "severity") as keyof typeof SORTS;
   const change = (key: string, value: string) => {
     const next = new URLSearchParams(query);

@@ -22,7 +22,8 @@ export function ImportDialogue({ file, assets, asset: wanted, close }: Props) {
   const [table, setTable] = useState<Table>();
   const [mapping, setMapping] = useState<Mapping>();
   const [problem, setProblem] = useState<string>();
-  const [asset, setAsset] = useState(wanted ?? assets[0] ?? "");
+  const [chosen, setAsset] = useState(wanted);
+  const asset = chosen ?? assets[0] ?? "";
   const [name, setName] = useState(file.name.replace(/\.\w+$/, ""));
   const [done, setDone] = useState<Import>();
   useEffect(() => {

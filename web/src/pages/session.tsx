@@ -7,7 +7,7 @@ import { TraceBuffer } from "../live/buffer";
 import { Act, Dialogue, Facts, Loading, Trouble } from "../parts/bits";
 import type { Mark } from "../parts/line-chart";
 import { ChartGroup, RigCharts } from "../parts/rig-charts";
-import { RigView } from "../parts/rig-view";
+import { RigView, save } from "../parts/rig-view";
 import { XyTrace } from "../parts/xy-trace";
 import { at, go, Link, usePlace } from "../router";
 import { clock, codeTitle, count, duration, faultTitle, seconds, sentence } from "../words";
@@ -118,7 +118,7 @@ function Player({ session, asset, faults, again }: { session: Session; asset: As
           <h1>{session.name}</h1>
         </div>
         <div class="page-tools">
-          <a class="button" href={api.recordingUrl(session.id)} download={`${session.name}.csv`}>Download CSV</a>
+          <Act act={async () => save(await api.recording(session.id), `${session.asset}-${session.name}.csv`)}>Download CSV</Act>
           {session.state === "open" ? <Act act={() => api.endSession(session.id).then(again)}>End session</Act> : <button type="button" onClick={() => setDeleting(true)}>Delete</button>}
         </div>
       </header>

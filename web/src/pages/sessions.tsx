@@ -37,7 +37,7 @@ export function SessionsPage() {
         </div>
       </header>
       <DropZone take={setFile} />
-      {file && <ImportDialogue key={file.name + file.lastModified} file={file} assets={assets.data ?? []} asset={asset || undefined} close={() => setFile(undefined)} />}
+      {file && <ImportDialogue key={file.name + file.lastModified} file={file} assets={assets.data ?? []} asset={asset || undefined} close={() => setFile((now) => (now === file ? undefined : now))} />}
       <Trouble error={first.error} again={() => void first.again()} />
       {!first.data && !first.error && <Loading what="the sessions" />}
       {first.data && items.length === 0 && <Empty title="No session yet"><p>A session begins when a rig sends its first sample, or when a recording is imported.</p></Empty>}
