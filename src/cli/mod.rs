@@ -19,6 +19,7 @@ mod serve;
 mod simulate;
 mod table;
 mod unusable;
+mod watch;
 
 use std::process::ExitCode;
 
@@ -59,6 +60,7 @@ enum Command {
     Chart(chart::ChartArgs),
     Demo(demo::DemoArgs),
     Serve(serve::ServeArgs),
+    Watch(watch::WatchArgs),
     Migrate(serve::MigrateArgs),
     Check(serve::CheckArgs),
 }
@@ -92,6 +94,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Chart(args) => chart::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Serve(args) => serve::serve(&args, &logging),
+        Command::Watch(args) => watch::run(&args),
         Command::Migrate(args) => serve::migrate(&args),
         Command::Check(args) => serve::check(&args),
     }

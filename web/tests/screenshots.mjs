@@ -5,7 +5,7 @@ import { join } from "node:path";
 import { ask, browser, demo, directory, page, recordings, remove, serve } from "./support.mjs";
 
 const out = process.argv[2] ?? "screenshots";
-const only = process.argv[3];
+const only = process.argv[3]?.split(",");
 const SIZES = { phone: { width: 390, height: 844 }, laptop: { width: 1366, height: 850 }, wall: { width: 2560, height: 1440 } };
 const THEMES = ["light", "dark"];
 mkdirSync(out, { recursive: true });
@@ -14,7 +14,7 @@ mkdirSync(out, { recursive: true });
 const settle = (view, ms = 1500) => view.waitForTimeout(ms);
 
 async function shoot(of, name, url, ready, act) {
-  if (only && !name.includes(only)) return;
+  if (only && !only.includes(name)) return;
   for (const [size, viewport] of Object.entries(SIZES)) {
     for (const colorScheme of THEMES) {
       const view = await page(of, { viewport, colorScheme });
@@ -22,7 +22,9 @@ async function shoot(of, name, url, ready, act) {
       await ready(view);
       if (act) await act(view);
       await settle(view);
-      await view.screenshot({ path: join(out, `${name}-${size}-${colorScheme}.png`), fullPage: size === "phone" });
+      const fullPage = size === "phone" && name !== "fleet";
+      if (fullPage) await view.evaluate(() => scrollTo(0, 0));
+      await view.screenshot({ path: join(out, `${name}-${size}-${colorScheme}.png`), fullPage });
       if (view.errors.length) console.error(`${name} ${size} ${colorScheme}:`, view.errors);
       await view.done();
     }
@@ -47,7 +49,14 @@ try {
   await ask(base, "POST", "/demo/faults", { fault: "x_servo:dead" });
   await shoot(of, "fleet", `${base}/`, heading("Fleet"), (view) => view.getByText("X servo").first().waitFor());
   await shoot(of, "fault", `${base}/rigs/bench-1/faults/x_servo`, heading("Status byte"), (view) => settle(view));
-  await shoot(of, "asset", `${base}/rigs/demo-rig`, heading("Monitors"), (view) => settle(view, 7000));
+  await shoot(of, "asset", `${base}/rigs/demo-rig`, heading("Monitors"), async (view) => {
+    // A healthy moment, then a servo dies.
+    await ask(base, "DELETE", "/demo/faults");
+    await ask(base, "DELETE", "/assets/demo-rig/faults/x_servo");
+    await settle(view, 5000);
+    await ask(base, "POST", "/demo/faults", { fault: "x_servo:reversed" });
+    await view.getByRole("list", { name: "Active faults" }).waitFor();
+  });
   await shoot(of, "sessions", `${base}/sessions`, heading("Sessions"), (view) => view.getByText("monday").first().waitFor());
   await shoot(of, "session", `${base}/sessions/${imported.session.id}?t=19`, heading("Judge it again"), async (view) => {
     await view.getByRole("button", { name: "Play" }).waitFor();

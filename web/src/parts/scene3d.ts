@@ -36,7 +36,9 @@ export class RigScene {
   private ball = new Group();
   private ghost = new Group();
   private trail!: Line<BufferGeometry, LineBasicMaterial>;
-  private path: number[] = [];
+  /** Three numbers for each moment of the trail; one buffer for good, so that nothing piles up. */
+  private readonly path = new Float32BufferAttribute(new Float32Array(TRAIL * 3), 3);
+  private nPath = 0;
   private size = 0.4;
   private radius = 0.0127;
   private view: ViewName = "free";
@@ -95,20 +97,24 @@ export class RigScene {
   }
 
   clearTrail(): void {
-    this.path = [];
+    this.nPath = 0;
   }
 
   show(pose: Pose): void {
     this.plate.rotation.set(pose.qx, pose.qy, 0, "XYZ");
     this.place(this.ball, pose.ball);
     this.place(this.ghost, pose.ghost);
-    if (pose.ball) {
-      this.path.push(pose.ball.x, pose.ball.y, 0.0006);
-      if (this.path.length > TRAIL * 3) this.path.splice(0, 3);
-      this.trail.geometry.setAttribute("position", new Float32BufferAttribute(this.path, 3));
-      this.trail.geometry.computeBoundingSphere();
-    }
+    if (pose.ball) this.leaveTrail(pose.ball);
     this.isDirty = true;
+  }
+
+  private leaveTrail({ x, y }: { x: number; y: number }): void {
+    const points = this.path.array;
+    if (this.nPath === TRAIL) points.copyWithin(0, 3);
+    else this.nPath++;
+    this.path.setXYZ(this.nPath - 1, x, y, 0.0006);
+    this.path.needsUpdate = true;
+    this.trail.geometry.setDrawRange(0, this.nPath);
   }
 
   render(): void {
@@ -168,7 +174,9 @@ export class RigScene {
     this.scene.add(foot);
     this.plate.add(slab, edges, this.grid(length, width, Boolean(diameter)), frame(this.size * 0.22, "frame"));
     const material = new LineBasicMaterial({ color: colour("measured"), transparent: true, opacity: 0.7 });
-    this.trail = new Line(new BufferGeometry(), material);
+    this.trail = new Line(new BufferGeometry().setAttribute("position", this.path), material);
+    this.trail.frustumCulled = false;
+    this.trail.geometry.setDrawRange(0, this.nPath);
     this.plate.add(this.trail);
   }
 

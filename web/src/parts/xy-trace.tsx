@@ -38,6 +38,11 @@ function draw(canvas: HTMLCanvasElement, asset: Asset, buffer: TraceBuffer, t: n
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
   context.clearRect(0, 0, width, height);
   outline(context, place, length, depth, Boolean(diameter), scale);
+  // The twin knows no rim; what lies beyond the plate is left out.
+  context.save();
+  context.beginPath();
+  context.rect(...place(-length / 2, depth / 2), length * scale, depth * scale);
+  context.clip();
   path(context, place, buffer, t, tail, "twinPosition", "twin", [5, 3]);
   path(context, place, buffer, t, tail, "position", "measured", []);
   for (const [key, name] of [["twinPosition", "twin"], ["position", "measured"]] as const) {
@@ -50,6 +55,7 @@ function draw(canvas: HTMLCanvasElement, asset: Asset, buffer: TraceBuffer, t: n
     context.fill();
     context.globalAlpha = 1;
   }
+  context.restore();
 }
 
 function outline(context: CanvasRenderingContext2D, place: (x: number, y: number) => [number, number], length: number, depth: number, round: boolean, scale: number): void {
