@@ -55,6 +55,7 @@ export class RigScene {
     this.controls.addEventListener("change", () => (this.isDirty = true));
     const resized = new ResizeObserver(() => this.resize());
     resized.observe(canvas.parentElement!);
+    canvas.addEventListener("webglcontextrestored", () => this.build());
     this.stop.push(() => resized.disconnect(), onTheme(() => this.build()));
     this.build();
     this.look("free");
@@ -136,7 +137,8 @@ export class RigScene {
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
     if (Math.abs(before - this.camera.aspect) > 0.01) this.look(this.view);
-    this.isDirty = true;
+    // A new size empties the canvas; it must not be seen empty.
+    this.renderer.render(this.scene, this.camera);
   }
 
   private build(): void {
