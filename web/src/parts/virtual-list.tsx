@@ -18,7 +18,9 @@ export function VirtualList<T>({ items, rowHeight, label, row, id }: Props<T>) {
   const [range, setRange] = useState<[number, number]>([0, 30]);
   useEffect(() => {
     const measure = () => {
-      const box = element.current!.getBoundingClientRect();
+      // A scroll may come after the list has gone and before this is cleaned up.
+      if (!element.current) return;
+      const box = element.current.getBoundingClientRect();
       const first = Math.max(Math.floor(-box.top / rowHeight) - BEYOND, 0);
       const last = Math.ceil((innerHeight - box.top) / rowHeight) + BEYOND;
       setRange((before) => (before[0] === first && before[1] === last ? before : [first, last]));
