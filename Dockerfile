@@ -3,12 +3,17 @@
 # The interface has no log-in of its own; publish the port accordingly.
 
 FROM rust:1-bookworm AS build
+# Node builds the dashboard; the program needs none to run.
+RUN apt-get update && apt-get install -y --no-install-recommends nodejs npm \
+    && rm -rf /var/lib/apt/lists/*
 WORKDIR /src
 COPY Cargo.toml Cargo.lock build.rs ./
 COPY migrations migrations
 COPY benches benches
 COPY examples examples
 COPY src src
+COPY docs/charts docs/charts
+COPY web web
 # Benchmarks and examples are there because Cargo.toml names them.
 # Packages and compiled dependencies stay in the cache mounts from build to
 # build; the program is copied out, for a mount is no part of the image.

@@ -32,6 +32,19 @@ tour:
     cargo build --release
     scripts/tour --update
 
+# The dashboard while it is worked on: shows changes at once, beside `just serve`
+web:
+    cd web && npm ci && npx vite
+
+# The dashboard in a real browser
+browser:
+    cargo build --bin offbd
+    npm --prefix web test
+
+# The dashboard's pictures in README.md, anew
+screenshots:
+    scripts/screenshots --docs
+
 # The picture in README.md, anew
 picture:
     cargo build --release

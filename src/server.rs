@@ -6,6 +6,7 @@ use std::net::SocketAddr;
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
+use axum::Router;
 use tokio::net::TcpListener;
 use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
@@ -34,6 +35,14 @@ pub struct Server {
 /// If the configuration cannot be, the store cannot be opened, or the address
 /// is taken.
 pub async fn start(config: Config) -> Result<Server> {
+    start_with(config, None).await
+}
+
+/// The same for the demo, with `demo` beside the interface.
+///
+/// # Errors
+/// As for [`start`].
+pub async fn start_with(config: Config, demo: Option<Router>) -> Result<Server> {
     config.check()?;
     http::gather_metrics();
     let lock = lock(&config)?;
@@ -46,7 +55,8 @@ pub async fn start(config: Config) -> Result<Server> {
     let resumed = service.resume().await?;
     let closing = CancellationToken::new();
     let budget = Budget::new(config.limits.bodies_bytes);
-    let router = http::router(App { service, budget, closing: closing.clone() });
+    let app = App { service, budget, closing: closing.clone(), demo: demo.is_some() };
+    let router = http::router(app, demo.unwrap_or_default());
     let stop = closing.clone().cancelled_owned();
     let serving =
         tokio::spawn(

@@ -183,10 +183,12 @@ async fn events_missed_come_first_and_each_comes_once() {
     client.telemetry("b", Some("s"), &samples[..1000]).await;
     client.end("a", "s").await;
     client.end("b", "s").await;
+    assert_eq!(live.next().await, json!({"id":0}), "the beginning");
     let first = live.next().await;
     let id = first["id"].as_i64().unwrap();
     let request = client.request(Method::GET, "events?asset=b").header("last-event-id", id);
     let mut caught_up = Events::new(request.send().await.unwrap());
+    assert_eq!(caught_up.next().await, json!({"id":id}), "where it goes on from");
     let of_b = caught_up.next().await;
     assert_eq!((&of_b["asset"], &of_b["type"]), (&json!("b"), &json!("fault")));
     let mut ids = vec![id];
@@ -358,6 +360,10 @@ async fn sessions_are_opened_ended_deleted_and_exported() {
     }
     assert_eq!(client.get(&at).await.expect(200)["samples"], 20_000);
     assert_eq!(client.recording("a", "Mäandern 1").await, samples);
+    let packed = client.request(Method::GET, &format!("{at}/telemetry"));
+    let packed = packed.header("accept-encoding", "gzip").send().await.unwrap();
+    assert_eq!(packed.headers()["content-encoding"], "gzip");
+    assert!(packed.bytes().await.is_ok(), "it ends well when it is packed, too");
     let request = client.request(Method::GET, &format!("{at}/telemetry"));
     let exported = client.send(request.header("accept", "application/json")).await.expect(200);
     assert_eq!(exported["session"], "Mäandern 1");

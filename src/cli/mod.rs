@@ -20,6 +20,7 @@ mod simulate;
 mod soak;
 mod table;
 mod unusable;
+mod watch;
 
 use std::process::ExitCode;
 
@@ -61,6 +62,7 @@ enum Command {
     Chart(chart::ChartArgs),
     Demo(demo::DemoArgs),
     Serve(serve::ServeArgs),
+    Watch(watch::WatchArgs),
     Migrate(serve::MigrateArgs),
     Check(serve::CheckArgs),
 }
@@ -95,6 +97,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Chart(args) => chart::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Serve(args) => serve::serve(&args, &logging),
+        Command::Watch(args) => watch::run(&args),
         Command::Migrate(args) => serve::migrate(&args),
         Command::Check(args) => serve::check(&args),
     }

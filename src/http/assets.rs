@@ -11,7 +11,7 @@ use super::layers::about;
 use super::{App, PageQuery, Problem, Query, body, page_limit};
 use crate::service::Service;
 use crate::wire::asset::AssetView;
-use crate::wire::service::{Page, StateView};
+use crate::wire::service::{FleetEntryView, Page, StateView};
 
 /// Longest asset file, bytes; a longer one is refused.
 const MAX_ASSET_BYTES: usize = 64 << 10;
@@ -100,4 +100,16 @@ pub(super) async fn state(
 ) -> Result<Json<StateView>, Problem> {
     about(&asset);
     Ok(Json(service.state(&asset).await?))
+}
+
+/// The fleet at a glance: for each asset, in the order of their names, its open
+/// session, when it was last heard of, and its active faults.
+#[utoipa::path(get, path = "/fleet", tag = "assets", operation_id = "get_fleet",
+    params(PageQuery),
+    responses((status = 200, body = Page<FleetEntryView>), (status = 400, body = Problem)))]
+pub(super) async fn fleet(
+    State(service): State<Service>,
+    Query(page): Query<PageQuery>,
+) -> Result<Json<Page<FleetEntryView>>, Problem> {
+    Ok(Json(service.fleet(page.cursor.as_deref(), page_limit(page.limit)).await?))
 }

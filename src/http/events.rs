@@ -7,7 +7,7 @@ use axum::extract::State;
 use axum::http::HeaderMap;
 use axum::response::Sse;
 use axum::response::sse::{Event as Message, KeepAlive};
-use futures_util::Stream;
+use futures_util::{Stream, StreamExt};
 use serde::Deserialize;
 use tokio_util::sync::CancellationToken;
 
@@ -34,6 +34,8 @@ pub(super) struct EventsQuery {
 /// data is a fault line with `asset` and `session_id`, each with an id. A code
 /// that is cleared while no session is open is an event without a session and
 /// without `t_s`. With the header `Last-Event-ID` the ones missed come first.
+/// Before all comes one of the type `begin`, whose id says after which event the
+/// others follow.
 #[utoipa::path(get, path = "/events", tag = "faults", operation_id = "stream_events",
     params(EventsQuery),
     responses((status = 200, body = EventView, content_type = "text/event-stream"),
@@ -49,7 +51,9 @@ pub(super) async fn events(
     };
     let feed = app.service.events(query.asset, after).await?;
     let keep_alive = KeepAlive::new().interval(KEEP_ALIVE);
-    Ok(Sse::new(messages(feed, app.closing)).keep_alive(keep_alive))
+    let begin = Message::default().id(feed.last().to_string()).event("begin").data("{}");
+    let begin = futures_util::stream::once(std::future::ready(Ok(begin)));
+    Ok(Sse::new(begin.chain(messages(feed, app.closing).fuse())).keep_alive(keep_alive))
 }
 
 fn last_id(text: &str) -> Result<i64, Problem> {

@@ -9,10 +9,10 @@ use serde::Deserialize;
 
 use super::layers::about;
 use super::sessions::Form;
-use super::{Problem, Query, page_limit};
+use super::{PageQuery, Problem, Query, page_limit};
 use crate::service::{Around, FaultQuery, Service};
 use crate::wire::recording::{ColumnsView, RecordingView, write_csv};
-use crate::wire::service::{FaultEntryView, Page};
+use crate::wire::service::{FaultEntryView, HistoryView, Page};
 
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
 #[into_params(parameter_in = Query)]
@@ -169,6 +169,24 @@ pub(super) async fn recording(
     // A vector takes everything that is written to it.
     let _ = write_csv(&mut text, &rows);
     Ok(([(CONTENT_TYPE, form.kind())], text).into_response())
+}
+
+/// What happened to a code, newest first: its changes of status, and who
+/// acknowledged or cleared it.
+#[utoipa::path(get, path = "/assets/{asset}/faults/{code}/history", tag = "faults",
+    operation_id = "get_fault_history",
+    params(("asset", description = "Name of the asset"), ("code", description = "Fault code"),
+        PageQuery),
+    responses((status = 200, body = Page<HistoryView>), (status = 400, body = Problem),
+        (status = 404, body = Problem)))]
+pub(super) async fn history(
+    State(service): State<Service>,
+    Path((asset, code)): Path<(String, String)>,
+    Query(page): Query<PageQuery>,
+) -> Result<Json<Page<HistoryView>>, Problem> {
+    about(&asset);
+    let limit = page_limit(page.limit);
+    Ok(Json(service.history(&asset, &code, page.cursor.as_deref(), limit).await?))
 }
 
 /// Faults across the fleet.

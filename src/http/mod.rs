@@ -16,6 +16,7 @@ mod replays;
 mod sessions;
 mod stream;
 mod telemetry;
+mod traces;
 
 use std::sync::Arc;
 
@@ -43,6 +44,8 @@ pub struct App {
     pub budget: Budget,
     /// Cancelled when the server stops: long answers end then.
     pub closing: CancellationToken,
+    /// Whether this is the demo, which mounts more than the interface.
+    pub demo: bool,
 }
 
 impl FromRef<App> for Service {
@@ -98,12 +101,14 @@ fn api() -> OpenApiRouter<App> {
         .routes(routes!(assets::list, assets::create))
         .routes(routes!(assets::get, assets::put, assets::delete))
         .routes(routes!(assets::state))
+        .routes(routes!(assets::fleet))
         .routes(routes!(telemetry::post))
         .routes(routes!(stream::stream))
         .routes(routes!(faults::of_asset))
         .routes(routes!(faults::get, faults::clear))
         .routes(routes!(faults::acknowledge))
         .routes(routes!(faults::recording))
+        .routes(routes!(faults::history))
         .routes(routes!(faults::of_fleet))
         .routes(routes!(events::events))
         .routes(routes!(sessions::open))
@@ -112,6 +117,8 @@ fn api() -> OpenApiRouter<App> {
         .routes(routes!(sessions::get, sessions::delete))
         .routes(routes!(sessions::end))
         .routes(routes!(sessions::telemetry))
+        .routes(routes!(sessions::faults))
+        .routes(routes!(traces::trace))
         .routes(routes!(replays::create))
         .routes(routes!(replays::get))
         .routes(routes!(calibrations::list, calibrations::create))
@@ -159,17 +166,17 @@ pub fn openapi_yaml() -> String {
     openapi().to_yaml().unwrap_or_else(|error| format!("# {error}\n"))
 }
 
-/// The whole of what is served.
-pub fn router(app: App) -> Router {
+/// The whole of what is served, with `more` beside the interface.
+pub fn router(app: App, more: Router) -> Router {
     let (router, document) = api().split_for_parts();
     let document = described(document);
     let yaml: Arc<str> = document.to_yaml().unwrap_or_default().into();
     let router = router
         .route("/openapi.yaml", axum::routing::get(move || operations::openapi(yaml)))
-        .route("/", axum::routing::get(page::fleet))
         .merge(SwaggerUi::new("/docs").url("/openapi.json", document))
-        .fallback(problem::not_found)
+        .fallback(page::serve)
         .method_not_allowed_fallback(problem::method_not_allowed)
-        .with_state(app);
+        .with_state(app)
+        .merge(more);
     layers::around(router)
 }

@@ -18,15 +18,19 @@ pub(super) struct HealthView {
     /// Always `ok`.
     status: &'static str,
     version: &'static str,
+    /// Whether this is the demo, with a simulated rig.
+    demo: bool,
 }
 
-const HEALTHY: HealthView = HealthView { status: "ok", version: env!("CARGO_PKG_VERSION") };
+const fn healthy(demo: bool) -> Json<HealthView> {
+    Json(HealthView { status: "ok", version: env!("CARGO_PKG_VERSION"), demo })
+}
 
 /// Whether the process lives.
 #[utoipa::path(get, path = "/healthz", tag = "operation",
     responses((status = 200, body = HealthView)))]
-pub(super) async fn healthz() -> Json<HealthView> {
-    Json(HEALTHY)
+pub(super) async fn healthz(State(app): State<App>) -> Json<HealthView> {
+    healthy(app.demo)
 }
 
 /// Whether it can take telemetry now; if not, why.
@@ -39,7 +43,7 @@ pub(super) async fn readyz(State(app): State<App>) -> Result<Json<HealthView>, P
         return Err(crate::service::ServiceError::Unavailable { what }.into());
     }
     app.service.ready().await?;
-    Ok(Json(HEALTHY))
+    Ok(healthy(app.demo))
 }
 
 static METRICS: OnceLock<Option<PrometheusHandle>> = OnceLock::new();

@@ -6,17 +6,18 @@ use axum::extract::{Path, State};
 use axum::http::header::{ACCEPT, CONTENT_DISPOSITION, CONTENT_TYPE, LOCATION};
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
-use futures_util::Stream;
+use futures_util::{Stream, StreamExt};
 use serde::Deserialize;
 
 use super::layers::about;
 use super::telemetry::Format;
-use super::{App, Problem, Query, body, page_limit};
+use super::{App, PageQuery, Problem, Query, body, page_limit};
 use crate::service::{Recording, Service, ServiceError};
 use crate::vocabulary::{Invalid, Sample};
 use crate::wire::service::{ImportView, Page, SessionView};
 use crate::wire::session_csv::{write_header, write_rows};
 use crate::wire::telemetry::sample_view;
+use crate::wire::verdict::FaultView;
 
 /// Most rows of an imported file; a longer one is refused.
 const MAX_IMPORT_ROWS: usize = 2_000_000;
@@ -206,6 +207,21 @@ pub(super) async fn telemetry(
         .into_response())
 }
 
+/// The changes of status in a session, in order.
+#[utoipa::path(get, path = "/sessions/{id}/faults", tag = "sessions",
+    operation_id = "list_session_faults",
+    params(("id", description = "The service's id of the session"), PageQuery),
+    responses((status = 200, body = Page<FaultView>), (status = 400, body = Problem),
+        (status = 404, body = Problem)))]
+pub(super) async fn faults(
+    State(service): State<Service>,
+    Path(id): Path<String>,
+    Query(page): Query<PageQuery>,
+) -> Result<Json<Page<FaultView>>, Problem> {
+    let limit = page_limit(page.limit);
+    Ok(Json(service.session_faults(&id, page.cursor.as_deref(), limit).await?))
+}
+
 /// How a recording is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Form {
@@ -299,7 +315,7 @@ fn parts(
     with_seq: bool,
 ) -> impl Stream<Item = Result<Bytes, std::io::Error>> + Send {
     let begin = (recording, Part::Start(start));
-    futures_util::stream::unfold(begin, move |(mut recording, part)| async move {
+    let parts = futures_util::stream::unfold(begin, move |(mut recording, part)| async move {
         let first = match part {
             Part::Start(start) => return Some((Ok(start.into()), (recording, Part::First))),
             Part::First => true,
@@ -314,5 +330,7 @@ fn parts(
             Ok(None) => Some((Ok(Bytes::from_static(form.end())), (recording, Part::Done))),
             Err(error) => Some((Err(std::io::Error::other(error)), (recording, Part::Done))),
         }
-    })
+    });
+    // Compression asks once more after the end.
+    parts.fuse()
 }

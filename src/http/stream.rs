@@ -24,6 +24,7 @@ use super::{App, Problem, Query};
 use crate::service::{Event, EventFeed, Pending, Service, ServiceError};
 use crate::vocabulary::Invalid;
 use crate::wire::telemetry::{self, AckView};
+use crate::wire::trace::TraceView;
 
 /// Batches whose acknowledgement is owed; then nothing more is read.
 const MAX_PENDING: usize = 32;
@@ -48,10 +49,14 @@ pub(super) struct StreamQuery {
     state: Option<f64>,
     /// Fault events after the one with this id come first; 0 for all.
     after: Option<i64>,
+    /// Whether each state brings a `trace` of what was judged since the last.
+    #[serde(default)]
+    trace: bool,
 }
 
 /// Frames from the service: `ack` answers a batch (with its `id`), `error` says
-/// why one was not taken, `fault` is a fault line, `state` where the twin is.
+/// why one was not taken, `fault` is a fault line, `state` where the twin is,
+/// with a `trace` if that was asked for.
 #[derive(Debug, ToSchema)]
 #[allow(dead_code, reason = "describes the frames for the interface's document")]
 pub(super) struct FrameView {
@@ -62,6 +67,8 @@ pub(super) struct FrameView {
     id: Option<String>,
     #[schema(inline)]
     ack: Option<AckView>,
+    /// With a `state`, if asked for: what was judged since the one before.
+    trace: Option<TraceView>,
 }
 
 /// A WebSocket: batches up, as JSON rows or columns in text frames, each with
@@ -85,6 +92,7 @@ pub(super) async fn stream(
         Problem::new(StatusCode::UPGRADE_REQUIRED, "websocket", "Not a WebSocket", detail)
     })?;
     let period = query.state.map(period).transpose()?;
+    let watch = query.trace.then(Watched::default);
     let events = app.service.events(Some(asset.clone()), query.after).await?;
     let frame = app.service.limits().batch_bytes;
     let upgrade = upgrade
@@ -93,7 +101,7 @@ pub(super) async fn stream(
         .max_write_buffer_size(MAX_WRITE_BUFFER);
     Ok(upgrade.on_upgrade(move |socket| async move {
         metrics::gauge!("offbd_streams").increment(1.0);
-        let session = Session::new(socket, app, asset, events, period);
+        let session = Session::new(socket, app, asset, events, period, watch);
         session.run().await;
         metrics::gauge!("offbd_streams").decrement(1.0);
     }))
@@ -122,6 +130,13 @@ struct Owed {
 
 type Answer = Pin<Box<dyn Future<Output = Result<AckView, ServiceError>> + Send>>;
 
+/// What a watcher has been told.
+#[derive(Default)]
+struct Watched {
+    session_id: Option<String>,
+    seen: u64,
+}
+
 struct Session {
     socket: WebSocket,
     app: App,
@@ -131,6 +146,8 @@ struct Session {
     pings: Interval,
     heard: Instant,
     owed: VecDeque<Owed>,
+    /// None if no traces are asked for.
+    watched: Option<Watched>,
 }
 
 /// What happens next on a connection.
@@ -151,6 +168,7 @@ impl Session {
         asset: String,
         events: EventFeed,
         period: Option<Duration>,
+        watched: Option<Watched>,
     ) -> Self {
         let ticks = |period| {
             let mut ticks = interval_at(Instant::now() + period, period);
@@ -159,7 +177,7 @@ impl Session {
         };
         let (states, pings) = (period.map(ticks), ticks(PING_EVERY));
         let owed = VecDeque::new();
-        Self { socket, app, asset, events, states, pings, heard: Instant::now(), owed }
+        Self { socket, app, asset, events, states, pings, heard: Instant::now(), owed, watched }
     }
 
     async fn run(mut self) {
@@ -287,10 +305,8 @@ impl Session {
     }
 
     async fn state(&mut self) -> Result<(), End> {
-        let service: &Service = &self.app.service;
-        match service.state(&self.asset).await {
-            Ok(state) => {
-                let mut frame = serde_json::to_value(&state).unwrap_or_default();
+        match self.look().await {
+            Ok(mut frame) => {
                 frame["type"] = "state".into();
                 self.send(frame.to_string()).await
             }
@@ -298,6 +314,20 @@ impl Session {
             Err(ServiceError::Busy { .. }) => Ok(()),
             Err(error) => self.answer(None, Err(error)).await,
         }
+    }
+
+    /// The state and, for a watcher, the trace since the last.
+    async fn look(&mut self) -> Result<serde_json::Value, ServiceError> {
+        let service: &Service = &self.app.service;
+        let Some(watched) = &mut self.watched else {
+            let state = service.state(&self.asset).await?;
+            return Ok(serde_json::to_value(&state).unwrap_or_default());
+        };
+        let seen = service.watch(&self.asset, watched.session_id.clone(), watched.seen).await?;
+        *watched = Watched { session_id: seen.state.session_id.clone(), seen: seen.seen };
+        let mut frame = serde_json::to_value(&seen.state).unwrap_or_default();
+        frame["trace"] = serde_json::to_value(&seen.trace).unwrap_or_default();
+        Ok(frame)
     }
 
     async fn ping(&mut self) -> Result<(), End> {

@@ -2,13 +2,14 @@
 
 use tokio::sync::oneshot;
 
+use super::running::Running;
 use super::shard::Job;
 use super::{Service, ServiceError, settled, views};
-use crate::engine::Rig;
+use crate::engine::{Rig, State};
 use crate::store::{AssetRow, Write};
 use crate::vocabulary::Invalid;
 use crate::wire::asset::{self, AssetView};
-use crate::wire::service::{Page, StateView, state_view};
+use crate::wire::service::{Page, StateView, WatchView, state_view};
 
 /// The rig of an asset file. What is no JSON at all is wrong as a whole, not in
 /// the element at which reading stopped.
@@ -16,6 +17,13 @@ fn parse(document: &[u8]) -> Result<Rig, Invalid> {
     let json = serde_json::from_slice::<serde::de::IgnoredAny>(document);
     json.map_err(|error| Invalid::new("", error.to_string()))?;
     asset::parse(document)
+}
+
+fn state_of(asset: &str, running: &Running) -> StateView {
+    let Some(open) = &running.open else { return state_view(asset, None, &State::default()) };
+    let samples = u64::try_from(open.progress.n_samples).unwrap_or_default();
+    let session = (open.id.as_str(), open.name.as_str(), samples);
+    state_view(asset, Some(session), &open.engine.state())
 }
 
 impl Service {
@@ -137,13 +145,27 @@ impl Service {
     /// [`ServiceError::UnknownAsset`].
     pub async fn state(&self, name: &str) -> Result<StateView, ServiceError> {
         let asset = name.to_owned();
+        self.look(name, move |running| state_of(&asset, running)).await
+    }
+
+    /// The same with what has been judged since the watcher had `seen` so much
+    /// of the session `session_id`.
+    ///
+    /// # Errors
+    /// [`ServiceError::UnknownAsset`].
+    pub async fn watch(
+        &self,
+        name: &str,
+        session_id: Option<String>,
+        seen: u64,
+    ) -> Result<WatchView, ServiceError> {
+        let asset = name.to_owned();
         self.look(name, move |running| {
-            let Some(open) = &running.open else {
-                return state_view(&asset, None, &crate::engine::State::default());
-            };
-            let samples = u64::try_from(open.progress.n_samples).unwrap_or_default();
-            let session = (open.id.as_str(), open.name.as_str(), samples);
-            state_view(&asset, Some(session), &open.engine.state())
+            let state = state_of(&asset, running);
+            let seen = if state.session_id == session_id { seen } else { 0 };
+            let recent = running.open.as_ref().map(|open| open.recent.since(seen));
+            let (trace, seen) = recent.unwrap_or_default();
+            WatchView { state, trace, seen }
         })
         .await
     }

@@ -99,6 +99,12 @@ pub struct EventFeed {
 }
 
 impl EventFeed {
+    /// The id after which the feed goes on.
+    #[must_use]
+    pub const fn last(&self) -> i64 {
+        self.last
+    }
+
     /// The next event; none once the service ends. Safe to cancel.
     ///
     /// # Errors

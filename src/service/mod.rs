@@ -18,17 +18,22 @@ mod commit;
 mod error;
 mod events;
 mod faults;
+mod fleet;
+mod history;
 mod import;
 mod jobs;
 mod limits;
 mod playback;
+mod presence;
 mod rebuild;
+mod recent;
 mod recordings;
 mod replays;
 mod running;
 mod sessions;
 mod shard;
 mod telemetry;
+mod traces;
 mod views;
 
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -47,9 +52,11 @@ pub use limits::{Limits, RETRY_AFTER_S};
 pub use recordings::Around;
 pub use sessions::Recording;
 pub use telemetry::Pending;
+pub use traces::{MAX_TRACE_POINTS, TraceQuery};
 
 use self::commit::{Committer, WriteSet};
 use self::events::Events;
+use self::presence::Presences;
 use self::running::{Running, Work};
 use self::shard::{Context, Job, Shard};
 use crate::store::{Store, Writer};
@@ -64,6 +71,7 @@ struct Inner {
     store: Store,
     limits: Limits,
     events: Events,
+    presences: Presences,
     shards: Vec<mpsc::Sender<Job>>,
     writer: mpsc::Sender<WriteSet>,
     jobs: mpsc::Sender<jobs::Job>,
@@ -72,6 +80,8 @@ struct Inner {
     in_flight: Arc<Semaphore>,
     /// One permit for each recording of a fault that is being made.
     recordings: Arc<Semaphore>,
+    /// One permit for each trace that is being made.
+    traces: Arc<Semaphore>,
 }
 
 /// What runs behind a [`Service`]; ends when all its clones are dropped.
@@ -125,11 +135,12 @@ impl Service {
         let (sets, queue) = mpsc::channel(limits.commit_queue);
         let committer = Committer::new(writer, queue, events.clone());
         let committer = tokio::spawn(committer.run());
+        let presences = Presences::default();
         let mut shards = Vec::new();
         let mut threads = Vec::new();
         for number in 0..limits.shards {
             let (jobs, queue) = mpsc::channel(limits.shard_queue);
-            let context = Context::new(store.clone(), clock, sets.clone());
+            let context = Context::new(store.clone(), clock, presences.clone(), sets.clone());
             threads.push(Shard::spawn(number, context, queue)?);
             shards.push(jobs);
         }
@@ -139,16 +150,19 @@ impl Service {
         let workers = jobs::spawn(limits.jobs, &bench, queue);
         let in_flight = Arc::new(Semaphore::new(limits.in_flight_samples));
         let recordings = Arc::new(Semaphore::new(recordings::MAX_AT_ONCE));
+        let traces = Arc::new(Semaphore::new(traces::MAX_AT_ONCE));
         let inner = Inner {
             store,
             limits,
             events,
+            presences,
             shards,
             writer: sets,
             jobs,
             bench,
             in_flight,
             recordings,
+            traces,
         };
         let workers = Workers { shards: threads, jobs: workers, closing, committer };
         Ok((Self { inner: Arc::new(inner) }, workers))

@@ -110,7 +110,7 @@ async fn learnt(
 
 /// The set-up for a replay of `session` on what was `learnt`, if that is not
 /// what it was recorded with.
-fn setup(
+pub(super) fn setup(
     session: &SessionRow,
     settings: &ReplaySettingsView,
     learnt: Option<&CalibrationView>,

@@ -5,6 +5,7 @@ use uuid::Uuid;
 
 use super::clock::rfc3339;
 use super::commit::Life;
+use super::recent::Recent;
 use super::{ServiceError, views};
 use crate::diagnosis::{FaultMemory, FaultRecord, MemoryRules};
 use crate::engine::{Admission, Engine, Input, Output, Rig, Setup};
@@ -58,6 +59,8 @@ pub(super) struct OpenSession {
     pub(super) n_transitions: i64,
     /// Whether a recording is being imported into it: no live telemetry then.
     pub(super) importing: bool,
+    /// For those who watch.
+    pub(super) recent: Recent,
     verdict: Verdict,
     outputs: Vec<Output>,
     /// The latest time among the samples that were taken as they should be.
@@ -76,6 +79,7 @@ impl OpenSession {
             progress: Progress::default(),
             n_transitions: 0,
             importing: false,
+            recent: Recent::default(),
             verdict: Verdict::default(),
             outputs: Vec::new(),
             latest_t_s: f64::NEG_INFINITY,
@@ -95,6 +99,7 @@ impl OpenSession {
         if matches!(admission, Some(Admission::Accepted | Admission::SetAside(_))) {
             self.note(sample, admission == Some(Admission::Accepted));
         }
+        self.recent.take(|| self.engine.state());
         admission
     }
 

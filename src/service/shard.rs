@@ -8,6 +8,7 @@ use tokio::runtime::Handle;
 use tokio::sync::{mpsc, oneshot};
 
 use super::commit::{Life, WriteSet};
+use super::presence::Presences;
 use super::running::{Running, Work};
 use super::{Clock, ServiceError, rebuild};
 use crate::store::{Store, Write};
@@ -19,13 +20,19 @@ pub(super) type Job = Box<dyn FnOnce(&mut Shard) + Send>;
 pub(super) struct Context {
     pub(super) store: Store,
     pub(super) clock: Clock,
+    pub(super) presences: Presences,
     pub(super) runtime: Handle,
     writer: mpsc::Sender<WriteSet>,
 }
 
 impl Context {
-    pub(super) fn new(store: Store, clock: Clock, writer: mpsc::Sender<WriteSet>) -> Self {
-        Self { store, clock, runtime: Handle::current(), writer }
+    pub(super) fn new(
+        store: Store,
+        clock: Clock,
+        presences: Presences,
+        writer: mpsc::Sender<WriteSet>,
+    ) -> Self {
+        Self { store, clock, presences, runtime: Handle::current(), writer }
     }
 
     /// Waits for a question to the store; only on a shard's thread.
@@ -113,7 +120,9 @@ impl Shard {
         match outcome {
             Ok(Ok(answer)) => {
                 self.context.settle(work.writes, life, answer, reply);
-                if !running.deleted {
+                if running.deleted {
+                    self.context.presences.forget(name);
+                } else {
                     self.running.insert(name.to_owned(), running);
                 }
             }

@@ -128,6 +128,9 @@ fn take(
             None => nameless(context, running, &samples, work, &mut ack)?,
         }
     }
+    if let (Some(open), Some((_, last))) = (&running.open, samples.last()) {
+        context.presences.note(&running.row.name, &open.id, work.at, last.t_s);
+    }
     running.count_rejected(ack.rejected.len(), work);
     ack.rejected.sort_by_key(|row| row.index);
     count(&ack);

@@ -105,7 +105,7 @@ pub(super) fn page<R, V, K: Serialize>(
     mut rows: Vec<R>,
     limit: u32,
     key: impl Fn(&R) -> K,
-    view: impl Fn(R) -> Result<V, ServiceError>,
+    view: impl FnMut(R) -> Result<V, ServiceError>,
 ) -> Result<Page<V>, ServiceError> {
     let more = rows.len() > limit as usize;
     rows.truncate(limit as usize);

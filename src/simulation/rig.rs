@@ -122,7 +122,7 @@ impl SimulatedRig {
         self.faults.push(Watch::new(fault));
     }
 
-    /// Ends every fault of `code` now.
+    /// Ends every fault of `code` now, those still to come included.
     pub fn repair(&mut self, code: FaultCode) {
         let now_s = self.now_s;
         let of_code = |w: &&mut Watch| w.fault().effect.code() == code;

@@ -66,10 +66,11 @@ impl Watch {
         &self.truth.fault
     }
 
-    /// Ends the fault at `at_s`, if it is there.
+    /// Ends the fault at `at_s`; one still to come never begins.
     pub(super) fn end(&mut self, at_s: f64) {
-        if self.truth.fault.active(at_s) {
-            self.truth.fault.end_s = Some(at_s);
+        let fault = &mut self.truth.fault;
+        if fault.end_s.is_none_or(|end_s| end_s > at_s) {
+            fault.end_s = Some(at_s.max(fault.onset_s));
         }
     }
 

@@ -213,6 +213,92 @@ impl Store {
         Ok(query.build_query_as().fetch_all(&self.pool).await?)
     }
 
+    /// The open sessions of the assets from `first` to `last`.
+    pub async fn open_sessions_of(
+        &self,
+        first: &str,
+        last: &str,
+    ) -> Result<Vec<SessionRow>, StoreError> {
+        let mut query = QueryBuilder::<Sqlite>::new(SESSION);
+        query.push("state = 'open' AND asset >= ").push_bind(first);
+        query.push(" AND asset <= ").push_bind(last);
+        Ok(query.build_query_as().fetch_all(&self.pool).await?)
+    }
+
+    /// When the latest session of each asset from `first` to `last` was opened
+    /// or ended.
+    pub async fn last_sessions_of(
+        &self,
+        first: &str,
+        last: &str,
+    ) -> Result<Vec<(String, Micros)>, StoreError> {
+        Ok(sqlx::query_as(
+            "SELECT asset, MAX(COALESCE(ended_at, opened_at)) FROM session
+             WHERE asset >= $1 AND asset <= $2 GROUP BY asset",
+        )
+        .bind(first)
+        .bind(last)
+        .fetch_all(&self.pool)
+        .await?)
+    }
+
+    /// The active faults of the assets from `first` to `last`.
+    pub async fn active_faults_of(
+        &self,
+        first: &str,
+        last: &str,
+    ) -> Result<Vec<FaultRow>, StoreError> {
+        Ok(sqlx::query_as(
+            "SELECT * FROM fault WHERE asset >= $1 AND asset <= $2
+             AND status IN ('pending', 'confirmed') ORDER BY asset, status, code",
+        )
+        .bind(first)
+        .bind(last)
+        .fetch_all(&self.pool)
+        .await?)
+    }
+
+    /// Changes of a code of `asset` with an id below `before`, newest first.
+    pub async fn transitions_before(
+        &self,
+        asset: &str,
+        code: &str,
+        before: i64,
+        limit: u32,
+    ) -> Result<Vec<TransitionRow>, StoreError> {
+        Ok(sqlx::query_as(
+            "SELECT * FROM transition WHERE asset = $1 AND code = $2 AND id < $3
+             ORDER BY id DESC LIMIT $4",
+        )
+        .bind(asset)
+        .bind(code)
+        .bind(before)
+        .bind(i64::from(limit))
+        .fetch_all(&self.pool)
+        .await?)
+    }
+
+    /// What people did about a code of `asset`, with an id below `before`,
+    /// newest first.
+    pub async fn actions_before(
+        &self,
+        asset: &str,
+        code: &str,
+        before: i64,
+        limit: u32,
+    ) -> Result<Vec<ActionRow>, StoreError> {
+        Ok(sqlx::query_as(
+            "SELECT * FROM action WHERE asset = $1 AND code = $2 AND id < $3
+             ORDER BY id DESC LIMIT $4",
+        )
+        .bind(asset)
+        .bind(code)
+        .bind(before)
+        .bind(i64::from(limit))
+        .fetch_all(&self.pool)
+        .await?)
+    }
+
     /// The id of the latest event.
     pub async fn last_event(&self) -> Result<i64, StoreError> {
         Ok(sqlx::query_scalar("SELECT value FROM counter WHERE name = 'event'")

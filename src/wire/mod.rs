@@ -16,4 +16,5 @@ pub mod scene;
 pub mod service;
 pub mod session_csv;
 pub mod telemetry;
+pub mod trace;
 pub mod verdict;

@@ -7,6 +7,7 @@ use utoipa::ToSchema;
 use super::difference::{ComparedView, TallyView};
 use super::memory::FaultRecordView;
 use super::provenance::ProvenanceView;
+use super::trace::TraceView;
 use super::verdict::{EvidenceView, FaultView, SummaryView, evidence_view};
 use crate::diagnosis::StatusByte;
 use crate::engine::{MonitorState, State};
@@ -122,6 +123,68 @@ pub fn cleared_view(code: FaultCode, by: &str) -> ClearedView {
         by: by.to_owned(),
         summary: format!("{code} cleared by {by}: nothing of it is on record"),
     }
+}
+
+/// One asset of the fleet, at a glance.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct FleetEntryView {
+    pub asset: String,
+    /// Whether it has been learnt from healthy sessions.
+    pub calibrated: bool,
+    /// The open session; null if there is none.
+    pub session: Option<String>,
+    pub session_id: Option<String>,
+    /// Samples recorded in it.
+    pub samples: u64,
+    /// Of the last sample, s on the device's clock.
+    pub last_t_s: Option<f64>,
+    /// RFC 3339: when a sample last came. Until one comes after a restart of
+    /// the service, when the latest session was opened or ended.
+    pub last_seen: Option<String>,
+    /// How much later than the promptest of the session the last batch came,
+    /// s; null until one comes.
+    pub lag_s: Option<f64>,
+    /// Pending and confirmed ones.
+    pub faults: Vec<FleetFaultView>,
+}
+
+/// An active fault, at a glance.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct FleetFaultView {
+    pub code: String,
+    pub kind: Option<String>,
+    /// `pending` or `confirmed`.
+    pub status: String,
+    pub acknowledged: bool,
+    /// RFC 3339: when the record last changed.
+    pub changed_at: String,
+}
+
+/// Something that happened to a code of an asset.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct HistoryView {
+    /// Rises with every event and act, over all assets.
+    pub id: i64,
+    /// RFC 3339.
+    pub at: String,
+    /// `pending`, `confirmed`, `healed` or `cleared`: the status it changed to;
+    /// `acknowledge` or `clear`: what a person did.
+    pub what: String,
+    /// Who did it, if a person.
+    pub by: Option<String>,
+    pub session_id: Option<String>,
+    /// The fault line of a change of status.
+    pub fault: Option<FaultView>,
+}
+
+/// What a watcher of an asset is told: where its twin is, and what has been
+/// judged since he was last told.
+#[derive(Clone, Debug)]
+pub struct WatchView {
+    pub state: StateView,
+    pub trace: TraceView,
+    /// Moments told so far, for the next question.
+    pub seen: u64,
 }
 
 /// One monitor at one moment.

@@ -30,3 +30,9 @@ fn migrating_twice_changes_nothing() {
     assert!(first.contains("offbd.sqlite"), "{first}");
     assert_eq!(bench.ok("migrate --data store").stdout, first);
 }
+
+#[test]
+fn watching_where_nobody_serves_says_so() {
+    let done = Bench::new().run(1, "watch bench-1 --address 127.0.0.1:1");
+    assert!(done.stderr.contains("no stream of bench-1 at 127.0.0.1:1"), "{}", done.stderr);
+}

@@ -3,7 +3,7 @@ use std::process::{Command, Stdio};
 
 use crate::bench::Bench;
 
-const COMMANDS: [&str; 10] = [
+const COMMANDS: [&str; 11] = [
     "simulate",
     "calibrate",
     "replay",
@@ -12,6 +12,7 @@ const COMMANDS: [&str; 10] = [
     "chart",
     "demo",
     "serve",
+    "watch",
     "migrate",
     "check",
 ];

@@ -119,6 +119,11 @@ async fn accepted(answer: Response) -> anyhow::Result<Response> {
     bail!("{status}: {}", answer.text().await.unwrap_or_default())
 }
 
+/// Whether a batch was refused because its session has ended.
+pub(super) fn is_ended(error: &anyhow::Error) -> bool {
+    format!("{error:#}").contains("urn:offbd:problem:session-ended")
+}
+
 impl Uplink {
     /// The name of the transport.
     pub(super) const fn name(&self) -> &'static str {

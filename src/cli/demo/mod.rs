@@ -6,6 +6,7 @@
 
 mod client;
 mod events;
+mod hands;
 mod plan;
 mod show;
 mod tally;
@@ -22,6 +23,7 @@ use crate::engine::Rig;
 use crate::server;
 use crate::simulation::{Disturbances, Fault, Preset, Reference, SimulatedRig};
 use client::Client;
+use hands::Hands;
 use show::Show;
 
 /// Shows it all: the service, a simulated rig streaming to it, faults found.
@@ -59,6 +61,8 @@ pub(super) struct DemoArgs {
     seed: u64,
 }
 
+/// The name of the demo's rig.
+const ASSET: &str = "demo-rig";
 /// A day: the demo's end where none is asked for.
 const ENDLESS_S: f64 = 86_400.0;
 /// Healthy seconds from which the rig is learnt; simulated in moments.
@@ -82,8 +86,10 @@ async fn demo(args: &DemoArgs) -> anyhow::Result<()> {
     let listen = SocketAddr::from((Ipv4Addr::LOCALHOST, args.port));
     let data = store.path.clone();
     let config = Config { listen, data, ..Config::default() };
-    let server = server::start(config).await.context("cannot start; --port 0 takes a free port")?;
-    let result = show(args, &server.address.to_string(), &store).await;
+    let (hands, routes) = hands::hands(ASSET);
+    let server = server::start_with(config, Some(routes));
+    let server = server.await.context("cannot start; --port 0 takes a free port")?;
+    let result = show(args, &server.address.to_string(), &store, hands).await;
     server.shutdown().await?;
     let outcome = result?;
     if args.seconds.is_some() && !outcome.interrupted && !outcome.agreed {
@@ -98,7 +104,12 @@ struct Outcome {
     interrupted: bool,
 }
 
-async fn show(args: &DemoArgs, address: &str, store: &StoreDirectory) -> anyhow::Result<Outcome> {
+async fn show(
+    args: &DemoArgs,
+    address: &str,
+    store: &StoreDirectory,
+    hands: Hands,
+) -> anyhow::Result<Outcome> {
     let seconds = args.seconds.unwrap_or(ENDLESS_S);
     let asked = args.fault.clone();
     let faults = if asked.is_empty() { plan::shown(seconds) } else { asked };
@@ -112,7 +123,7 @@ async fn show(args: &DemoArgs, address: &str, store: &StoreDirectory) -> anyhow:
     let client = Client::new(address.to_owned(), &rig.name)?;
     client.register(&rig).await?;
     let simulated = simulated_rig(Reference::Steps, args.seed)?;
-    let mut show = Show::new(client, simulated, args.speed).await?;
+    let mut show = Show::new(client, simulated, args.speed, hands).await?;
     let interrupted = show.run(plan::episodes(faults, seconds)).await?;
     let agreed = show.conclude()?;
     Ok(Outcome { agreed, interrupted })
@@ -126,7 +137,7 @@ fn simulated_rig(reference: Reference, seed: u64) -> anyhow::Result<SimulatedRig
 /// The rig as its owner knows it, with what a healthy session teaches.
 fn learnt_rig(seed: u64) -> anyhow::Result<Rig> {
     let model = Preset::Chapter.model()?;
-    let mut rig = Rig { name: "demo-rig".to_owned(), ..model.rig };
+    let mut rig = Rig { name: ASSET.to_owned(), ..model.rig };
     let mut healthy = simulated_rig(Reference::Lissajous, seed.wrapping_add(1))?;
     let samples = simulate::record(&mut healthy, HEALTHY_S);
     let data = calibrate::samples_hash(&samples)?;

@@ -3,6 +3,8 @@
 //! A fault ends before the next begins and the session with it, so that each is
 //! judged on a rig that was whole at the start of its session.
 
+use std::collections::VecDeque;
+
 use crate::simulation::BallFault;
 use crate::simulation::{Fault, FaultEffect, SensorFault, ServoFault};
 use crate::vocabulary::Axis;
@@ -68,6 +70,19 @@ pub(super) fn episodes(mut faults: Vec<Fault>, seconds: f64) -> Vec<Episode> {
     all
 }
 
+/// What is left to be shown of `rest` from `now_s` on, after the script was
+/// interrupted; at least one episode up to `end_s`.
+pub(super) fn go_on(rest: &mut VecDeque<Episode>, now_s: f64, end_s: f64) {
+    rest.retain(|episode| episode.end_s > now_s);
+    if rest.is_empty() && now_s < end_s {
+        rest.push_back(Episode { start_s: now_s, end_s, faults: Vec::new() });
+    }
+    if let Some(first) = rest.front_mut() {
+        first.start_s = now_s;
+        first.faults.retain(|fault| fault.onset_s > now_s);
+    }
+}
+
 fn repair_before_the_next(faults: &mut [Fault]) {
     for i in 1..faults.len() {
         let next_s = faults[i].onset_s;
@@ -109,6 +124,22 @@ mod tests {
         let close = episodes(faults(&["x_servo:dead@10-20", "y_servo:dead@21"]), 60.0);
         assert_eq!(close.len(), 1);
         assert_eq!(close[0].faults.len(), 2);
+    }
+
+    #[test]
+    fn after_a_break_the_script_goes_on_with_what_is_to_come() {
+        let planned = episodes(faults(&["x_servo:dead@10-20", "y_servo:dead@40-50"]), 60.0);
+        let mut rest = VecDeque::from(planned.clone());
+        go_on(&mut rest, 15.0, 60.0);
+        assert_eq!((rest.len(), rest[0].start_s, rest[0].faults.len()), (2, 15.0, 0));
+        go_on(&mut rest, 35.0, 60.0);
+        assert_eq!((rest.len(), rest[0].start_s, &rest[0].faults), (1, 35.0, &planned[1].faults));
+        rest.clear();
+        go_on(&mut rest, 55.0, 60.0);
+        assert_eq!(rest, [Episode { start_s: 55.0, end_s: 60.0, faults: vec![] }]);
+        rest.clear();
+        go_on(&mut rest, 60.0, 60.0);
+        assert!(rest.is_empty());
     }
 
     #[test]

@@ -3,18 +3,20 @@
 //! The rig's clock is a deadline: at every tick all rows that are due by then
 //! are sent, so that a stall is caught up with and nothing is lost.
 
+use std::collections::VecDeque;
 use std::io::Write;
 use std::time::Duration;
 
 use tokio::sync::mpsc;
 use tokio::time::{Instant, Interval, MissedTickBehavior, interval, timeout};
 
-use super::client::{Client, Uplink};
+use super::client::{self, Client, Uplink};
 use super::events;
-use super::plan::Episode;
+use super::hands::{Act, Hands};
+use super::plan::{self, Episode};
 use super::tally::Tally;
 use crate::cli::{output, table};
-use crate::simulation::{Fault, SimulatedRig};
+use crate::simulation::{Fault, FaultEffect, SimulatedRig};
 use crate::vocabulary::{FaultCode, Sample};
 use crate::wire::verdict::FaultView;
 
@@ -35,9 +37,21 @@ pub(super) struct Show {
     ticks: Interval,
     events: mpsc::Receiver<FaultView>,
     tally: Tally,
+    hands: Hands,
+    /// Whether faults come and go by themselves.
+    script: bool,
     /// What the names of this show's sessions begin with.
     name: String,
     n_sessions: u32,
+}
+
+/// Why a session's stream ends.
+enum Cut {
+    /// It has come to its end.
+    End,
+    Interrupted,
+    /// A visitor does something.
+    Act(Act),
 }
 
 /// One session in progress.
@@ -82,6 +96,7 @@ impl Show {
         client: Client,
         mut rig: SimulatedRig,
         speed: f64,
+        hands: Hands,
     ) -> anyhow::Result<Self> {
         for &code in FaultCode::ALL {
             client.clear(code).await?;
@@ -92,23 +107,97 @@ impl Show {
         let name = jiff::Timestamp::now().strftime("demo-%Y%m%dT%H%M%S").to_string();
         let (next, started) = (rig.next_sample(), Instant::now());
         let tally = Tally::default();
-        Ok(Self { client, rig, next, speed, started, ticks, events, tally, name, n_sessions: 0 })
+        Ok(Self {
+            client,
+            rig,
+            next,
+            speed,
+            started,
+            ticks,
+            events,
+            tally,
+            hands,
+            script: true,
+            name,
+            n_sessions: 0,
+        })
     }
 
-    /// Streams all `episodes`; returns whether Ctrl-C cut them short.
+    /// Streams all `episodes`, and what visitors do in between; returns whether
+    /// Ctrl-C cut them short.
     pub(super) async fn run(&mut self, episodes: Vec<Episode>) -> anyhow::Result<bool> {
-        for episode in episodes {
-            let mut session = self.begin(&episode).await?;
-            let interrupted = tokio::select! {
-                result = self.stream(&mut session) => result.map(|()| false),
-                result = tokio::signal::ctrl_c() => Ok(result.map(|()| true)?),
-            }?;
-            self.end(session, &episode).await?;
-            if interrupted {
+        let end_s = episodes.last().map_or(0.0, |last| last.end_s);
+        let mut rest = VecDeque::from(episodes);
+        while let Some(mut episode) = rest.pop_front() {
+            let mut cut = self.scripted(&mut episode).await?;
+            if let Cut::Act(act) = cut {
+                cut = self.by_hand(act, end_s).await?;
+                plan::go_on(&mut rest, self.next.t_s, end_s);
+            }
+            if matches!(cut, Cut::Interrupted) {
                 return Ok(true);
             }
         }
         Ok(false)
+    }
+
+    /// An episode as it was planned, or until a visitor lays hands on the rig.
+    async fn scripted(&mut self, episode: &mut Episode) -> anyhow::Result<Cut> {
+        let mut session = self.begin(episode).await?;
+        let cut = self.stream(&mut session).await?;
+        self.end(session, episode).await?;
+        Ok(cut)
+    }
+
+    /// One session in which visitors break and repair, until they hand the rig
+    /// back to the script.
+    async fn by_hand(&mut self, first: Act, end_s: f64) -> anyhow::Result<Cut> {
+        self.script = false;
+        self.repair();
+        let start_s = self.next.t_s;
+        let mut episode = Episode { start_s, end_s, faults: Vec::new() };
+        let mut session = self.begin(&episode).await?;
+        let mut cut = Cut::Act(first);
+        while let Cut::Act(act) = cut {
+            match act {
+                Act::Script => break,
+                Act::Repair => self.repair(),
+                Act::Break(effect) => self.break_now(effect, &mut episode).await?,
+            }
+            cut = self.stream(&mut session).await?;
+        }
+        self.repair();
+        self.end(session, &episode).await?;
+        self.script = true;
+        Ok(cut)
+    }
+
+    fn repair(&mut self) {
+        FaultCode::ALL.iter().for_each(|&code| self.rig.repair(code));
+        say(self.rig.truth().t_s, ">> all repaired");
+    }
+
+    async fn break_now(
+        &mut self,
+        effect: FaultEffect,
+        episode: &mut Episode,
+    ) -> anyhow::Result<()> {
+        self.clear_if_found_before(effect.code()).await?;
+        self.rig.repair(effect.code());
+        let onset_s = self.rig.truth().t_s;
+        let fault = Fault { effect, onset_s, end_s: None };
+        self.rig.inject(fault);
+        episode.faults.push(fault);
+        say(onset_s, &format!(">> {}:{} injected", effect.code(), effect.kind()));
+        Ok(())
+    }
+
+    /// Tells visitors how the rig is.
+    fn show(&self) {
+        let now_s = self.rig.truth().t_s;
+        let broken = self.rig.faults().map(|t| t.fault).filter(|fault| fault.active(now_s));
+        let words = |fault: Fault| format!("{}:{}", fault.effect.code(), fault.effect.kind());
+        self.hands.show(self.script, broken.map(words).collect());
     }
 
     /// Writes the comparison; returns whether injected and found agree.
@@ -145,7 +234,7 @@ impl Show {
         if self.tally.has_found(code) { self.client.clear(code).await } else { Ok(()) }
     }
 
-    async fn stream(&mut self, session: &mut Session) -> anyhow::Result<()> {
+    async fn stream(&mut self, session: &mut Session) -> anyhow::Result<Cut> {
         loop {
             tokio::select! {
                 _ = self.ticks.tick() => {}
@@ -153,11 +242,17 @@ impl Show {
                     self.heard(&fault);
                     continue;
                 }
+                act = self.hands.next() => return Ok(Cut::Act(act)),
+                interrupted = tokio::signal::ctrl_c() => {
+                    interrupted?;
+                    return Ok(Cut::Interrupted);
+                }
             }
             let due_s = (self.started.elapsed().as_secs_f64() * self.speed).min(session.end_s);
             self.send_due(session, due_s).await?;
+            self.show();
             if due_s >= session.end_s {
-                return Ok(());
+                return Ok(Cut::End);
             }
         }
     }
@@ -168,11 +263,24 @@ impl Show {
             rows.push(std::mem::replace(&mut self.next, self.rig.next_sample()));
         }
         for batch in rows.chunks(MAX_ROWS) {
-            let ack = session.uplink.send(&session.name, batch).await?;
+            let ack = match session.uplink.send(&session.name, batch).await {
+                Err(error) if client::is_ended(&error) => {
+                    self.go_on_in_another(session);
+                    session.uplink.send(&session.name, batch).await?
+                }
+                ack => ack?,
+            };
             session.id = ack.session_id.or(session.id.take());
         }
         session.announce(due_s);
         Ok(())
+    }
+
+    /// A visitor has ended the session; a device would begin another.
+    fn go_on_in_another(&mut self, session: &mut Session) {
+        self.n_sessions += 1;
+        (session.name, session.id) = (format!("{}-{}", self.name, self.n_sessions), None);
+        say(self.rig.truth().t_s, &format!(">> ended by a visitor; session {}", session.name));
     }
 
     /// Ends a session: its verdict is settled, and all of it has been heard.
@@ -199,7 +307,10 @@ impl Show {
         let short = hash.get(..12).unwrap_or(&hash);
         say(now_s, &format!(">> session {name} ends, verdict {short}"));
         let of_episode = |truth: &&crate::simulation::FaultTruth| {
-            episode.faults.contains(&truth.fault) && truth.fault.onset_s <= now_s
+            // A repair by hand gives a fault another end than was planned.
+            let is_it =
+                |f: &Fault| (f.effect, f.onset_s) == (truth.fault.effect, truth.fault.onset_s);
+            episode.faults.iter().any(is_it) && truth.fault.onset_s <= now_s
         };
         self.tally.injected(&name, self.rig.faults().filter(of_episode).copied());
         Ok(())

@@ -1,0 +1,81 @@
+//! The fleet at a glance.
+
+use std::collections::BTreeMap;
+
+use super::clock::rfc3339;
+use super::{Service, ServiceError, views};
+use crate::store::{AssetRow, FaultRow, Micros, SessionRow};
+use crate::wire::asset::AssetView;
+use crate::wire::memory::FaultRecordView;
+use crate::wire::service::{FleetEntryView, FleetFaultView, Page};
+
+/// What the store knows of a stretch of the fleet, by asset.
+struct Known {
+    open: BTreeMap<String, SessionRow>,
+    last: BTreeMap<String, Micros>,
+    faults: BTreeMap<String, Vec<FleetFaultView>>,
+}
+
+impl Service {
+    /// Assets in the order of their names, each at a glance.
+    ///
+    /// # Errors
+    /// [`ServiceError::Invalid`] for a cursor that is none.
+    pub async fn fleet(
+        &self,
+        cursor: Option<&str>,
+        limit: u32,
+    ) -> Result<Page<FleetEntryView>, ServiceError> {
+        let after = cursor.map(views::cursor::<String>).transpose()?.unwrap_or_default();
+        let rows = self.inner.store.assets(&after, limit + 1).await?;
+        let mut known = match (rows.first(), rows.last()) {
+            (Some(first), Some(last)) => self.known(&first.name, &last.name).await?,
+            _ => return Ok(Page { items: Vec::new(), next: None }),
+        };
+        views::page(rows, limit, |row| row.name.clone(), |row| self.entry(row, &mut known))
+    }
+
+    async fn known(&self, first: &str, last: &str) -> Result<Known, ServiceError> {
+        let store = &self.inner.store;
+        let open = store.open_sessions_of(first, last).await?;
+        let mut faults: BTreeMap<String, Vec<FleetFaultView>> = BTreeMap::new();
+        for row in store.active_faults_of(first, last).await? {
+            faults.entry(row.asset.clone()).or_default().push(fault(row)?);
+        }
+        Ok(Known {
+            open: open.into_iter().map(|row| (row.asset.clone(), row)).collect(),
+            last: store.last_sessions_of(first, last).await?.into_iter().collect(),
+            faults,
+        })
+    }
+
+    fn entry(&self, row: AssetRow, known: &mut Known) -> Result<FleetEntryView, ServiceError> {
+        let file: AssetView = views::from_json(&row.document)?;
+        let presence = self.inner.presences.of(&row.name);
+        let open = known.open.remove(&row.name);
+        let seen = presence.as_ref().map(|p| p.seen_at).or(known.last.remove(&row.name));
+        let progress = open.as_ref().map(|open| open.progress).unwrap_or_default();
+        Ok(FleetEntryView {
+            faults: known.faults.remove(&row.name).unwrap_or_default(),
+            calibrated: file.calibration.is_some(),
+            session_id: open.as_ref().map(|open| open.id.clone()),
+            session: open.map(|open| open.name),
+            samples: u64::try_from(progress.n_samples).unwrap_or_default(),
+            last_t_s: progress.last_t_s,
+            last_seen: seen.map(rfc3339),
+            lag_s: presence.map(|p| p.lag_s),
+            asset: row.name,
+        })
+    }
+}
+
+fn fault(row: FaultRow) -> Result<FleetFaultView, ServiceError> {
+    let record: FaultRecordView = views::from_json(&row.record)?;
+    Ok(FleetFaultView {
+        code: row.code,
+        kind: record.kind,
+        status: row.status,
+        acknowledged: row.acknowledged != 0,
+        changed_at: rfc3339(row.changed_at),
+    })
+}

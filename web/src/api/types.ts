@@ -1,0 +1,40 @@
+/** The interface's own types, under short names. `npm run types` makes them from openapi.yaml. */
+import type { components } from "../../generated/schema";
+
+type Schemas = components["schemas"];
+
+export type Asset = Schemas["AssetView"];
+export type AssetAxes = Schemas["AxesView"];
+export type Axis = "x" | "y";
+export type AxisCalibration = Schemas["AxisCalibrationView"];
+export type AxisTrace = Schemas["AxisTraceView"];
+export type Calibration = Schemas["CalibrationView"];
+export type CalibrationJob = Schemas["CalibrationJobView"];
+export type Evidence = Schemas["EvidenceView"];
+export type FaultEntry = Schemas["FaultRecordView"] & { asset: string; changed_at: string };
+export type FaultLine = Schemas["FaultView"] & { asset?: string; session_id?: string };
+export type FleetEntry = Schemas["FleetEntryView"];
+export type FleetFault = Schemas["FleetFaultView"];
+export type Health = Schemas["HealthView"];
+export type History = Schemas["HistoryView"];
+export type Import = Schemas["ImportView"];
+export type Monitor = Schemas["MonitorView"];
+export type Problem = Schemas["Problem"];
+export type Replay = Schemas["ReplayView"];
+export type ReplaySettings = Schemas["ReplaySettingsView"];
+export type Session = Schemas["SessionView"];
+export type State = Schemas["StateView"];
+export type Trace = Schemas["TraceView"];
+
+export interface Page<T> {
+  items: T[];
+  next?: string | null;
+}
+
+/** What the demo says of its rig; only the demo answers this. */
+export interface Demo {
+  asset: string;
+  script: boolean;
+  broken: string[];
+  buttons: string[];
+}

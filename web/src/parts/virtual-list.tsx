@@ -1,0 +1,47 @@
+/** A list of which only the rows in sight are in the document. */
+import type { ComponentChildren } from "preact";
+import { useEffect, useRef, useState } from "preact/hooks";
+
+/** Rows beyond the edges that are there already when they come into sight. */
+const BEYOND = 6;
+
+interface Props<T> {
+  items: T[];
+  rowHeight: number;
+  label: string;
+  row: (item: T) => ComponentChildren;
+  id: (item: T) => string;
+}
+
+export function VirtualList<T>({ items, rowHeight, label, row, id }: Props<T>) {
+  const element = useRef<HTMLDivElement>(null);
+  const [range, setRange] = useState<[number, number]>([0, 30]);
+  useEffect(() => {
+    const measure = () => {
+      // A scroll may come after the list has gone and before this is cleaned up.
+      if (!element.current) return;
+      const box = element.current.getBoundingClientRect();
+      const first = Math.max(Math.floor(-box.top / rowHeight) - BEYOND, 0);
+      const last = Math.ceil((innerHeight - box.top) / rowHeight) + BEYOND;
+      setRange((before) => (before[0] === first && before[1] === last ? before : [first, last]));
+    };
+    measure();
+    addEventListener("scroll", measure, { passive: true });
+    addEventListener("resize", measure);
+    return () => {
+      removeEventListener("scroll", measure);
+      removeEventListener("resize", measure);
+    };
+  }, [rowHeight, items.length]);
+  const [first, last] = range;
+  return (
+    <div ref={element} class="virtual" style={{ height: `${items.length * rowHeight}px` }} role="list" aria-label={label}>
+      {items.slice(first, last).map((item, i) => (
+        <div key={id(item)} class="virtual-row" role="listitem" aria-setsize={items.length} aria-posinset={first + i + 1}
+          style={{ height: `${rowHeight}px`, transform: `translateY(${(first + i) * rowHeight}px)` }}>
+          {row(item)}
+        </div>
+      ))}
+    </div>
+  );
+}

@@ -1,0 +1,105 @@
+// The demo: a rig broken by a button, seen live, understood, repaired, cleared.
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import { ask, browser, demo, page } from "./support.mjs";
+
+let show, chromium;
+
+before(async () => {
+  chromium = await browser();
+  show = await demo();
+});
+
+after(async () => {
+  await chromium?.close();
+  await show?.stop();
+});
+
+/** The first event of the fleet that `wanted` likes, as it arrives. */
+async function event(base, wanted) {
+  const answer = await fetch(`${base}/api/v1/events`);
+  const found = (async () => {
+    let text = "";
+    for await (const part of answer.body) {
+      text += Buffer.from(part);
+      const lines = text.split("\n").filter((line) => line.startsWith("data:") && line.endsWith("}"));
+      const hit = lines.map((line) => JSON.parse(line.slice(5))).find(wanted);
+      if (hit) return hit;
+    }
+  })();
+  return { found };
+}
+
+test("a fault is seen within two seconds of its event, on the fleet and on the rig", async () => {
+  const fleet = await page(chromium), rig = await page(chromium), buttons = await page(chromium);
+  await fleet.goto(show.url);
+  await fleet.getByRole("link", { name: /demo-rig/ }).waitFor();
+  await rig.goto(`${show.url}/rigs/demo-rig`);
+  await rig.getByRole("heading", { name: "Monitors" }).waitFor();
+  await buttons.goto(`${show.url}/learn`);
+  const confirmed = await event(show.url, (line) => line.code === "y_servo" && line.status === "confirmed");
+  await buttons.getByRole("button", { name: "Break: Y servo, dead" }).click();
+  await buttons.getByText("Broken now").waitFor();
+  const line = await confirmed.found;
+  await Promise.all([
+    fleet.getByRole("region", { name: "Rigs" }).getByText("Y servo").waitFor({ timeout: 2000 }),
+    rig.getByRole("list", { name: "Active faults" }).getByText("Y servo").waitFor({ timeout: 2000 }),
+  ]);
+  assert.equal(line.asset, "demo-rig");
+  await rig.getByText("failed", { exact: true }).waitFor();
+  for (const view of [fleet, rig, buttons]) {
+    assert.deepEqual(view.errors, []);
+    if (view !== rig) await view.done();
+  }
+
+  // The rig's page moves: the twin's tilt and the session's samples change.
+  const samples = rig.locator("dt:text-is('Samples') + dd");
+  const before = await samples.textContent();
+  await rig.waitForFunction((was) => [...document.querySelectorAll("dt")].find((dt) => dt.textContent === "Samples").nextSibling.textContent !== was, before);
+  assert.match(await rig.getByLabel("Tilt of the twin's plate").textContent(), /qx .*° +qy .*°/);
+
+  // From there to the fault, its sentence, its bits, its charts.
+  await rig.getByRole("link", { name: /Look at it/ }).first().click();
+  await rig.getByRole("heading", { name: /Status byte/ }).waitFor();
+  await rig.getByText("The test fails right now.").waitFor();
+  await rig.getByRole("img", { name: /Residual along y/ }).waitFor();
+  await rig.getByLabel("Your name, kept with what you do").fill("ada");
+  await rig.getByRole("button", { name: "Acknowledge" }).click();
+  await rig.getByText("ada acknowledged it").waitFor();
+  await ask(show.url, "DELETE", "/demo/faults");
+  await rig.getByRole("button", { name: "Clear" }).click();
+  await rig.getByText("Nothing is on record").waitFor();
+  await rig.getByText("ada cleared it").waitFor();
+  assert.deepEqual(rig.errors, []);
+  await rig.done();
+});
+
+test("the script takes over again, and a visitor who ends the session does not stop the show", async () => {
+  const view = await page(chromium);
+  await view.goto(`${show.url}/learn`);
+  await view.getByRole("button", { name: "Back to the script" }).click();
+  await view.getByText("A script breaks and repairs it").waitFor();
+  await view.goto(`${show.url}/rigs/demo-rig`);
+  const session = view.locator("dt:text-is('Session') + dd");
+  await session.getByText("demo-").waitFor();
+  const before = await session.textContent();
+  await view.getByRole("button", { name: "End session" }).click();
+  await view.waitForFunction((was) => {
+    const now = [...document.querySelectorAll("dt")].find((dt) => dt.textContent === "Session").nextSibling.textContent;
+    return now.startsWith("demo-") && now !== was;
+  }, before);
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});
+
+test("the textbook's limit is broken by a rig that the default calls whole", async () => {
+  const view = await page(chromium);
+  await view.goto(`${show.url}/learn`);
+  await view.getByRole("heading", { name: "textbook" }).waitFor();
+  const share = view.locator("dt:text-is('Beyond the limit, of what is judged') + dd");
+  await view.waitForFunction(() => [...document.querySelectorAll("dt")].filter((dt) => dt.textContent.startsWith("Beyond") && /\d/.test(dt.nextSibling.textContent)).length === 2);
+  const [usual, textbook] = (await share.allTextContents()).map((text) => parseInt(text, 10));
+  assert.ok(textbook > 30 && usual < textbook / 2, `default ${usual} %, textbook ${textbook} %`);
+  await view.getByRole("img", { name: /Speed against accuracy/ }).first().waitFor();
+  await view.done();
+});

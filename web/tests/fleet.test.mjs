@@ -1,0 +1,88 @@
+// The fleet: empty, many, sick, and a service that goes away and comes back.
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import { ask, browser, directory, page, recordings, remove, serve } from "./support.mjs";
+
+let work, service, chromium, rig;
+
+before(async () => {
+  work = directory();
+  chromium = await browser();
+  rig = recordings(work);
+});
+
+after(async () => {
+  await chromium?.close();
+  remove(work);
+});
+
+test("an empty fleet says what to do", async () => {
+  const empty = await serve(directory());
+  const view = await page(chromium);
+  await view.goto(empty.url);
+  await view.getByText("No rig yet").waitFor();
+  await view.getByRole("link", { name: "Set up a rig" }).click();
+  await view.getByRole("heading", { name: "Set up a rig" }).waitFor();
+  await view.goto(`${empty.url}/sessions`);
+  await view.getByText("No session yet").waitFor();
+  assert.deepEqual(view.errors, []);
+  await view.done();
+  await empty.stop();
+});
+
+const N = 3000;
+
+test("thousands of rigs: found, filtered, and only those in sight are in the document", async () => {
+  service = await serve(`${work}/many`);
+  for (let i = 0; i < N; i += 100) {
+    await Promise.all(Array.from({ length: 100 }, (_, k) => ask(service.url, "POST", "/assets", { name: `rig-${i + k}` })));
+  }
+  await ask(service.url, "PUT", "/assets/rig-7", { ...rig.learnt, name: "rig-7" });
+  const view = await page(chromium);
+  await view.goto(service.url);
+  await view.getByRole("button", { name: /^All/ }).getByText("3\u202f000").waitFor();
+  const rows = view.getByRole("list", { name: "Rigs" }).getByRole("listitem");
+  assert.ok((await rows.count()) < 60, `${await rows.count()} rows are in the document`);
+  await view.evaluate(() => scrollTo(0, document.body.scrollHeight / 2));
+  await view.getByRole("link", { name: /rig-1500/ }).waitFor();
+  assert.ok((await rows.count()) < 60);
+  await view.getByRole("searchbox").fill("rig-29 no-such");
+  await view.getByText("No rig matches").waitFor();
+  await view.getByRole("searchbox").fill("rig-2999");
+  await view.getByRole("link", { name: /rig-2999/ }).waitFor();
+  assert.equal(await rows.count(), 1);
+  assert.match(view.url(), /search=rig-2999/);
+  await view.getByRole("searchbox").fill("");
+
+  // A fault shows at once, first of all, and can be filtered.
+  await ask(service.url, "POST", "/assets/rig-7/telemetry?session=now", rig.sick, "text/csv");
+  await view.getByRole("region", { name: "Rigs" }).getByText("X servo, dead").waitFor({ timeout: 2000 });
+  await view.getByRole("button", { name: /^Fault/ }).click();
+  assert.equal(await rows.filter({ hasText: "rig-7" }).count(), 1);
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});
+
+test("when the service comes back, the page catches up", async () => {
+  const view = await page(chromium, { viewport: { width: 1500, height: 900 } });
+  await view.goto(`${service.url}/?search=rig-8`);
+  await view.getByRole("link", { name: /rig-8\b/ }).first().waitFor();
+  await view.getByText("live", { exact: true }).waitFor();
+  const { port } = service;
+  await service.stop();
+  await view.getByText("connection lost").waitFor();
+  await view.getByText("The service does not answer").waitFor();
+  service = await serve(`${work}/many`, port);
+  await ask(service.url, "PUT", "/assets/rig-8", { ...rig.learnt, name: "rig-8" });
+  await ask(service.url, "POST", "/assets/rig-8/telemetry?session=later", rig.sick, "text/csv");
+  await view.getByText("live", { exact: true }).waitFor();
+  await view.getByRole("region", { name: "Rigs" }).getByText("X servo, dead").first().waitFor();
+  await view.getByText("The service does not answer").waitFor({ state: "detached" });
+  // What was missed has come as events too, each once.
+  const feed = view.getByRole("region", { name: "Events" });
+  await feed.getByText("confirmed").waitFor();
+  assert.equal(await feed.getByRole("listitem").count(), 2);
+  assert.deepEqual(view.errors, []);
+  await view.done();
+  await service.stop();
+});

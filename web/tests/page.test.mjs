@@ -1,0 +1,142 @@
+// What is served: small, cacheable, from here alone; and readable by everybody.
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import { get } from "node:http";
+import { readFileSync } from "node:fs";
+import { createRequire } from "node:module";
+import { brotliDecompressSync } from "node:zlib";
+import { ask, browser, directory, page, recordings, remove, serve } from "./support.mjs";
+
+const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
+
+/** First load without the 3D view, bytes as sent. */
+const FIRST_LOAD = 500_000;
+
+let work, service, chromium, session;
+
+before(async () => {
+  work = directory();
+  chromium = await browser();
+  service = await serve(work);
+  const { learnt, sick } = recordings(work);
+  await ask(service.url, "POST", "/assets", { ...learnt, name: "bench" });
+  session = (await ask(service.url, "POST", "/assets/bench/sessions/import?name=monday", sick, "text/csv")).session;
+});
+
+after(async () => {
+  await chromium?.close();
+  await service?.stop();
+  remove(work);
+});
+
+const fetched = (path, headers = {}) => new Promise((done, failed) => {
+  get(service.url + path, { headers }, (answer) => {
+    const parts = [];
+    answer.on("data", (part) => parts.push(part));
+    answer.on("end", () => done({ status: answer.statusCode, headers: answer.headers, body: Buffer.concat(parts) }));
+  }).on("error", failed);
+});
+
+test("the page is asked for by its hash, its parts are kept for ever", async () => {
+  const html = await fetched("/", { accept: "text/html" });
+  assert.equal(html.status, 200);
+  assert.match(html.headers["content-security-policy"], /default-src 'self'/);
+  assert.equal(html.headers["cache-control"], "no-cache");
+  assert.equal((await fetched("/", { "if-none-match": html.headers.etag })).status, 304);
+  assert.equal((await fetched("/", { "if-none-match": '"other"' })).status, 200);
+  const script = /src="(\/static\/[^"]+\.js)"/.exec(html.body)[1];
+  const plain = await fetched(script);
+  assert.match(plain.headers["cache-control"], /immutable/);
+  assert.match(plain.headers["content-type"], /javascript/);
+  const packed = await fetched(script, { "accept-encoding": "gzip, br" });
+  assert.equal(packed.headers["content-encoding"], "br");
+  assert.ok(packed.body.length < plain.body.length / 2);
+  assert.deepEqual(brotliDecompressSync(packed.body), plain.body);
+  assert.notEqual(packed.headers.etag, plain.headers.etag);
+});
+
+test("the page's own addresses are the page, others are problems", async () => {
+  const html = { accept: "text/html,*/*" };
+  assert.match((await fetched("/rigs/bench", html)).headers["content-type"], /text\/html/);
+  for (const [path, headers] of [["/rigs/bench", {}], ["/api/v1/none", html], ["/static/none.js", html]]) {
+    const answer = await fetched(path, headers);
+    assert.equal(answer.status, 404, path);
+    assert.match(answer.headers["content-type"], /problem\+json/, path);
+  }
+});
+
+test("the first load is small and asks nobody else", async () => {
+  const view = await page(chromium);
+  let bytes = 0;
+  const elsewhere = [];
+  const client = await view.context().newCDPSession(view);
+  await client.send("Network.enable");
+  client.on("Network.loadingFinished", ({ encodedDataLength }) => (bytes += encodedDataLength));
+  view.on("request", (request) => request.url().startsWith(service.url) || elsewhere.push(request.url()));
+  await view.goto(`${service.url}/rigs/bench/faults/x_servo`);
+  await view.getByRole("heading", { name: "Before and after" }).waitFor();
+  await view.goto(service.url);
+  await view.getByText("bench").first().waitFor();
+  assert.ok(bytes > 10_000 && bytes < FIRST_LOAD, `${bytes} bytes`);
+  assert.deepEqual(elsewhere, []);
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});
+
+/** Views with the sign that they are there. */
+const VIEWS = () => [
+  ["/", "bench"], ["/rigs/bench", "Monitors"], ["/rigs/bench/faults/x_servo", "Freeze frame"], ["/rigs/bench/faults/sensor", "Nothing is on record"],
+  ["/sessions", "monday"], [`/sessions/${session.id}`, "Judge it again"], ["/set-up", "Units that the device sends"],
+  ["/rigs/bench/set-up?step=connect", "Waiting for the first sample"], ["/rigs/bench/set-up?step=check", "Signs and units"],
+  ["/rigs/bench/set-up?step=learn", "What was learnt"], ["/learn", "Why 0.01"], ["/nowhere", "There is nothing here"],
+];
+
+for (const colorScheme of ["light", "dark"]) {
+  for (const width of [390, 1280]) {
+    test(`every view is usable by everybody, ${colorScheme}, ${width} px wide`, async () => {
+      const view = await page(chromium, { colorScheme, viewport: { width, height: 800 } });
+      for (const [path, sign] of VIEWS()) {
+        await view.goto(service.url + path);
+        await view.getByText(sign).first().waitFor();
+        await view.evaluate(AXE);
+        const { violations } = await view.evaluate(() => window.axe.run());
+        const serious = violations.filter(({ impact }) => ["serious", "critical"].includes(impact));
+        const words = serious.map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.html).join(" | ").slice(0, 400)}`);
+        assert.deepEqual(words, [], path);
+        const over = await view.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+        assert.ok(over <= 0, `${path} is ${over} px too wide`);
+      }
+      assert.deepEqual(view.errors, []);
+      await view.done();
+    });
+  }
+}
+
+test("a rig that is not there, a fault that is not, a session that is not: said in words", async () => {
+  const view = await page(chromium);
+  for (const [path, words] of [["/rigs/nobody", "there is no asset `nobody`"], ["/rigs/bench/faults/none", "no such fault code"], ["/sessions/none", "there is no session `none`"]]) {
+    await view.goto(service.url + path);
+    await view.getByRole("alert").getByText(words).waitFor();
+  }
+  assert.ok(view.errors.every((error) => error.includes("404")), view.errors.join("\n"));
+  await view.done();
+});
+
+test("the keyboard reaches it all, the theme is kept", async () => {
+  const view = await page(chromium);
+  await view.goto(service.url);
+  await view.getByRole("link", { name: /bench/ }).first().waitFor();
+  await view.keyboard.press("Tab");
+  assert.equal(await view.evaluate(() => document.activeElement.textContent), "Skip to the content");
+  await view.getByRole("link", { name: /bench/ }).first().focus();
+  await view.keyboard.press("Enter");
+  await view.getByRole("heading", { name: "Monitors" }).waitFor();
+  const change = view.getByRole("button", { name: /Colours/ });
+  await change.click();
+  await change.click();
+  assert.equal(await view.evaluate(() => document.documentElement.dataset.theme), "dark");
+  await view.reload();
+  await view.getByRole("heading", { name: "Monitors" }).waitFor();
+  assert.equal(await view.evaluate(() => document.documentElement.dataset.theme), "dark");
+  await view.done();
+});

@@ -1,0 +1,121 @@
+// Recordings: imported from anybody's CSV, played back, judged again, taken away.
+import assert from "node:assert/strict";
+import { readFileSync, writeFileSync } from "node:fs";
+import { after, before, test } from "node:test";
+import { ask, browser, directory, page, recordings, remove, serve } from "./support.mjs";
+
+let work, service, chromium, rig;
+
+before(async () => {
+  work = directory();
+  chromium = await browser();
+  service = await serve(`${work}/store`);
+  rig = recordings(work);
+  await ask(service.url, "POST", "/assets", { ...rig.learnt, name: "bench" });
+});
+
+after(async () => {
+  await chromium?.close();
+  await service?.stop();
+  remove(work);
+});
+
+/** The healthy recording as another would have written it: semicolons, degrees, millimetres, milliseconds, x the other way. */
+function foreign() {
+  const rows = rig.healthy.trim().split("\n").slice(1).map((line) => line.split(","));
+  const scaled = (cell, factor) => (cell === "" ? "" : (Number(cell) * factor).toFixed(3).replace(".", ","));
+  const degrees = 180 / Math.PI;
+  const lines = rows.map(([t, qx, qy, x, y]) => [scaled(t, 1000), scaled(x, -1000), scaled(y, 1000), scaled(qx, degrees), scaled(qy, degrees)].join(";"));
+  return ["time [ms];ball x (mm);ball y (mm);qx (deg);qy (deg)", ...lines].join("\n");
+}
+
+test("a foreign file is mapped, its sign is found wrong, mended, imported", async () => {
+  const file = `${work}/foreign.csv`;
+  writeFileSync(file, foreign());
+  const view = await page(chromium);
+  await view.goto(`${service.url}/sessions`);
+  await view.locator("input[type=file]").setInputFiles(file);
+  const dialogue = view.getByRole("dialog");
+  await dialogue.getByText("the ball goes the other way").waitFor();
+  for (const [role, unit] of [["Time", "ms"], ["Command qx (about x)", "°"], ["Ball x", "mm"]]) {
+    const chosen = await dialogue.getByLabel(`Unit of ${role}`).evaluate((select) => select.selectedOptions[0].textContent);
+    assert.equal(chosen, unit, role);
+  }
+  await dialogue.getByText("90.0\u202fs: 100.0\u202fHz").waitFor();
+  await dialogue.getByRole("button", { name: "Flip x" }).click();
+  await dialogue.getByText("x: +qy moves the ball toward +x, as it should").waitFor();
+  await dialogue.getByText("y: +qx moves the ball toward −y, as it should").waitFor();
+  await dialogue.getByRole("button", { name: /^Import/ }).click();
+  await view.getByRole("heading", { name: "foreign" }).waitFor();
+  await view.getByText("No fault", { exact: true }).waitFor();
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});
+
+test("a file that is dropped opens the dialogue; one that is none is said to be none", async () => {
+  const view = await page(chromium);
+  await view.goto(`${service.url}/sessions`);
+  await view.getByText("Drop a recording").waitFor();
+  const drop = (name, text) => view.evaluate(([name, text]) => {
+    const files = new DataTransfer();
+    files.items.add(new File([text], name, { type: "text/csv" }));
+    dispatchEvent(new DragEvent("drop", { dataTransfer: files, bubbles: true, cancelable: true }));
+  }, [name, text]);
+  await drop("numbers.csv", "0,1,2,3\n1,2,3,4\n2,3,4,5\n");
+  await view.getByRole("alert").getByText("it should have the names of the columns").waitFor();
+  await view.keyboard.press("Escape");
+  await view.getByRole("dialog").waitFor({ state: "detached" });
+  await drop("dropped.csv", rig.sick);
+  const dialogue = view.getByRole("dialog");
+  await dialogue.getByLabel("Rig").fill("new-rig");
+  await dialogue.getByText("There is no rig new-rig yet").waitFor();
+  await dialogue.getByRole("button", { name: /^Import/ }).click();
+  await view.getByRole("heading", { name: "dropped" }).waitFor();
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});
+
+test("played back, scrubbed, judged again, recorded, downloaded, deleted", async () => {
+  const { session } = await ask(service.url, "POST", "/assets/bench/sessions/import?name=sick", rig.sick, "text/csv");
+  const view = await page(chromium);
+  await view.goto(`${service.url}/sessions/${session.id}`);
+  const moment = view.getByRole("slider", { name: "Moment" });
+  await view.getByRole("button", { name: "Play" }).click();
+  await view.waitForFunction(() => Number(document.querySelector(".scrub").value) > 0.5);
+  await view.getByRole("button", { name: "Pause" }).click();
+  await moment.fill("25");
+  await view.getByText("25.00 s").waitFor();
+
+  // At 25 s the ball has left the twin behind: the picture is of that moment.
+  await view.getByText("Loading 3D").waitFor({ state: "detached" });
+  assert.match(await view.getByLabel("Tilt of the twin's plate").textContent(), /qy −1\d\.\d°/);
+  await view.getByRole("button", { name: /Go to 21/ }).first().click();
+  await view.waitForFunction(() => Number(document.querySelector(".scrub").value) < 21);
+
+  await view.getByRole("button", { name: "Judge again" }).click();
+  await view.getByText("Another verdict").waitFor();
+  await view.getByText("X servo, Y servo").waitFor();
+  await view.getByLabel("Profile").selectOption("");
+  await view.getByRole("button", { name: "Judge again" }).click();
+  await view.getByText("The same verdict, transition by transition.").waitFor();
+
+  await view.getByRole("button", { name: "Play" }).click();
+  await view.getByRole("button", { name: /record/ }).click();
+  await view.waitForFunction((from) => Number(document.querySelector(".scrub").value) > Number(from) + 1, await moment.inputValue());
+  const [video] = await Promise.all([view.waitForEvent("download"), view.getByRole("button", { name: /stop/ }).click()]);
+  const bytes = readFileSync(await video.path());
+  assert.match(video.suggestedFilename(), /^bench-sick\.(webm|mp4)$/);
+  assert.ok(bytes.length > 5000, `a video of ${bytes.length} bytes`);
+
+  const [csv] = await Promise.all([view.waitForEvent("download"), view.getByRole("button", { name: "Download CSV" }).click()]);
+  const lines = readFileSync(await csv.path(), "utf8").trim().split("\n");
+  assert.equal(lines.length, rig.sick.trim().split("\n").length);
+
+  await view.getByRole("button", { name: "Delete" }).click();
+  await view.getByRole("dialog").getByRole("button", { name: "Delete" }).click();
+  await view.getByRole("heading", { name: "Sessions" }).waitFor();
+  await view.getByRole("link", { name: "foreign" }).waitFor();
+  assert.equal(await view.getByRole("link", { name: "sick", exact: true }).count(), 0);
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});

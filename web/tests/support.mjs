@@ -1,0 +1,99 @@
+// The real program, a real browser, and rigs to show in it.
+import assert from "node:assert/strict";
+import { execFileSync, spawn } from "node:child_process";
+import { existsSync, mkdtempSync, readFileSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { fileURLToPath } from "node:url";
+import { chromium } from "playwright-core";
+
+const ROOT = fileURLToPath(new URL("../..", import.meta.url));
+export const BINARY = process.env.BINARY ?? join(process.env.CARGO_TARGET_DIR ?? join(ROOT, "target"), "debug/offbd");
+const BROWSERS = [process.env.CHROMIUM, "/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"];
+
+/** Longest wait for anything that should be there in a moment, ms. */
+export const SOON = 20_000;
+
+export const directory = () => mkdtempSync(join(tmpdir(), "offbd-web-"));
+
+/** What a stream says until it names an address. */
+function address(child, stream) {
+  return new Promise((found, failed) => {
+    let said = "";
+    const late = setTimeout(() => failed(new Error(`no address came:\n${said}`)), SOON * 3);
+    child.once("exit", (code) => failed(new Error(`it ended with ${code}:\n${said}`)));
+    child[stream].on("data", (bytes) => {
+      if (said.length < 1e5) said += bytes;
+      const port = /(?:http:\/\/|address=)127\.0\.0\.1:(\d+)/.exec(said.replaceAll(/\u001b\[\d*m/g, ""))?.[1];
+      if (port) clearTimeout(late), found(Number(port));
+    });
+  });
+}
+
+/** A running program; `stop` ends it as Ctrl-C would. */
+async function run(args, stream) {
+  assert.ok(existsSync(BINARY), `${BINARY} is missing; build it with cargo build, or name another in BINARY`);
+  const child = spawn(BINARY, args, { env: { ...process.env, NO_COLOR: "1" }, stdio: ["ignore", "pipe", "pipe"] });
+  child.stdout.resume();
+  child.stderr.resume();
+  const ended = new Promise((done) => child.once("exit", done));
+  const port = await address(child, stream);
+  const stop = async () => {
+    child.kill("SIGINT");
+    await ended;
+  };
+  return { port, url: `http://127.0.0.1:${port}`, stop };
+}
+
+export const serve = (data, port = 0) => run(["serve", "--data", data, "--listen", `127.0.0.1:${port}`], "stderr");
+export const demo = (...args) => run(["demo", "--port", "0", ...args], "stdout");
+
+/** Runs a command of the program to its end; what it prints. */
+export const offbd = (...args) => execFileSync(BINARY, args, { encoding: "utf8", stdio: ["ignore", "pipe", "pipe"] });
+
+/** A learnt rig, and a session in which its x servo dies at 20 s. */
+export function recordings(where) {
+  const path = (name) => join(where, name);
+  offbd("simulate", "--reference", "lissajous", "--seconds", "90", "--rig", path("rig.json"), "-o", path("healthy.csv"));
+  offbd("calibrate", "--asset", path("rig.json"), path("healthy.csv"), "-o", path("learnt.json"));
+  offbd("simulate", "--seed", "2", "--seconds", "40", "--fault", "x_servo:dead@20", "-o", path("sick.csv"));
+  const read = (name) => readFileSync(path(name), "utf8");
+  return { path, rig: JSON.parse(read("rig.json")), learnt: JSON.parse(read("learnt.json")), healthy: read("healthy.csv"), sick: read("sick.csv") };
+}
+
+/** Asks the interface; an answer that is no success is an error. */
+export async function ask(base, method, path, body, type = "application/json") {
+  const answer = await fetch(`${base}/api/v1${path}`, {
+    method, headers: body === undefined ? {} : { "content-type": type },
+    body: body === undefined ? undefined : typeof body === "string" ? body : JSON.stringify(body),
+  });
+  const text = await answer.text();
+  assert.ok(answer.ok, `${method} ${path}: ${answer.status} ${text}`);
+  return text && answer.headers.get("content-type")?.includes("json") ? JSON.parse(text) : text;
+}
+
+export async function browser() {
+  const executablePath = BROWSERS.find((path) => path && existsSync(path));
+  assert.ok(executablePath, "no Chromium found; name one in CHROMIUM");
+  return chromium.launch({ executablePath, args: ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"] });
+}
+
+/** What a browser says when it cannot reach a service that is down; all else is an error of the page. */
+const UNREACHABLE = /ERR_CONNECTION_REFUSED|ERR_CONNECTION_RESET|ERR_INCOMPLETE_CHUNKED_ENCODING|ERR_EMPTY_RESPONSE/;
+
+/** A page that remembers what went wrong in it. */
+export async function page(of, options = {}) {
+  const context = await of.newContext({ viewport: { width: 1280, height: 800 }, reducedMotion: "reduce", ...options });
+  const view = await context.newPage();
+  view.setDefaultTimeout(SOON);
+  const errors = [];
+  view.on("pageerror", (error) => errors.push(String(error)));
+  view.on("console", (message) => {
+    // WebGL without a graphics card says that it is slow.
+    const expected = UNREACHABLE.test(message.text()) || /GPU stall|GL Driver Message/.test(message.text());
+    if (["error", "warning"].includes(message.type()) && !expected) errors.push(message.text());
+  });
+  return Object.assign(view, { errors, done: () => context.close() });
+}
+
+export const remove = (path) => rmSync(path, { recursive: true, force: true });
