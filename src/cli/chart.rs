@@ -44,6 +44,8 @@ enum Name {
     Fidelity,
     /// Methods: the largest stable step, measured and predicted
     Stability,
+    /// Detectors of servo faults: delay against false alarms
+    Detectors,
 }
 
 impl Name {
@@ -61,6 +63,7 @@ impl Name {
             }
             Self::Fidelity => chart::fidelity::make(effort),
             Self::Stability => chart::stability::make(effort),
+            Self::Detectors => chart::detectors::make(effort),
         }
     }
 }
