@@ -18,7 +18,8 @@ use crate::chart::{self, Chart, ChartError, Effort};
 #[command(after_help = "Examples:\n  \
     offbd chart work-precision\n  \
     offbd chart work-precision --with peers.json\n  \
-    offbd chart estimators -o measured --quick")]
+    offbd chart estimators -o measured --quick\n  \
+    offbd chart detectors")]
 pub(super) struct ChartArgs {
     /// Which chart
     #[arg(value_enum)]

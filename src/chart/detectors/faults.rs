@@ -1,7 +1,7 @@
-//! The faults, from ones that are hardly there to ones that nobody overlooks.
+//! The faults that are simulated, and how they read.
 
-/// All kinds, at two or three sizes where they have one: about half of, as much
-/// as and more than what the recorded faults of real rigs are like.
+/// All kinds, at two or three sizes where they have one: from what is clear to
+/// what is hardly there.
 pub(super) const ALL: [&str; 26] = [
     "x_servo:dead",
     "y_servo:hold",
@@ -40,7 +40,7 @@ pub(super) const FEW: [&str; 5] = [
     "sensor:jump=0.035,-0.02",
 ];
 
-/// How many of a list's first are servo faults.
+/// Whether it is one that a residual shows as what it is.
 pub(super) fn is_servo(fault: &str) -> bool {
     fault.contains("_servo:")
 }

@@ -208,11 +208,11 @@ const COLUMNS: [(&str, fn() -> String); 4] = [
 fn working_points(records: &[Record]) -> String {
     let all = COLUMNS.iter().filter_map(|(short, method)| {
         let at = working(records).into_iter().find(|c| c.method == method())?;
-        Some(format!("{short}: {}, {}", setting(at), rate(at)))
+        Some(format!("{short} {} ({}/h)", setting(at), per_h(at)))
     });
     format!(
-        "Of faults that had a chance. {}. A method that cries always finds all; only the verdict \
-         can accuse ball or readings.",
+        "Shares of the faults that had a chance. Set to (false alarms): {}. Only the verdict can \
+         accuse ball or readings.",
         all.collect::<Vec<_>>().join("; ")
     )
 }
