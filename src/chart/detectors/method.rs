@@ -56,7 +56,7 @@ impl Method {
         match self {
             Self::Chapter => [0.003, 10.0],
             Self::Debounced => [0.01, 3.0],
-            Self::Cusum { .. } => [1.0, 3000.0],
+            Self::Cusum { .. } => [1.0, 10_000.0],
             Self::Weighed => [0.5, 40.0],
         }
     }

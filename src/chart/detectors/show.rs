@@ -153,7 +153,7 @@ fn by_fault(records: &[Record]) -> Figure {
     // Rows count from below.
     faults.reverse();
     let panel = |title: &str, share: fn(&Kind) -> f64| {
-        let columns = COLUMNS.iter().map(|(short, _)| (*short).to_owned()).collect();
+        let columns = columns().iter().map(|(short, _)| (*short).to_owned()).collect();
         let rows = faults.iter().map(|f| faults::words(f)).collect();
         let x = Axis::new("", Scale::Names(columns));
         let mut panel = Panel::new(title, x, Axis::new("", Scale::Names(rows)));
@@ -182,11 +182,11 @@ fn grid(records: &[Record], faults: &[&str], share: fn(&Kind) -> f64) -> Regions
         let kind = kinds(records).find(|k| k.fault == fault && k.method == method);
         kind.map_or(SHARES.len(), |k| LEAST.iter().filter(|least| share(k) >= **least).count())
     };
-    let cells = faults.iter().flat_map(|f| COLUMNS.iter().map(|(_, m)| cell(f, &m())));
+    let cells = faults.iter().flat_map(|f| columns().map(|(_, method)| cell(f, &method)));
     let edges = |n: usize| (0..=n).map(|i| i as f64 - 0.5).collect();
     Regions {
         categories: SHARES.iter().enumerate().map(shade).collect(),
-        x_edges: edges(COLUMNS.len()),
+        x_edges: edges(columns().len()),
         y_edges: edges(faults.len()),
         cells: cells.collect(),
     }
@@ -197,21 +197,24 @@ const LEAST: [f64; 4] = [0.05, 0.5, 0.8, 0.95];
 const SHARES: [&str; 5] = ["below 5 %", "5 to 50 %", "50 to 80 %", "80 to 95 %", "95 % and more"];
 
 /// The methods beside each other, by a short name.
-const COLUMNS: [(&str, fn() -> String); 4] = [
-    ("chapter", || METHODS[1].name()),
-    ("debounced", || METHODS[2].name()),
-    ("CUSUM", || METHODS[3].name()),
-    ("offbd", || VERDICT.to_owned()),
-];
+fn columns() -> [(&'static str, String); 4] {
+    [
+        ("chapter", METHODS[1].name()),
+        ("debounced", METHODS[2].name()),
+        ("CUSUM", METHODS[4].name()),
+        ("offbd", VERDICT.to_owned()),
+    ]
+}
 
 /// The settings compared, in words.
 fn working_points(records: &[Record]) -> String {
-    let all = COLUMNS.iter().filter_map(|(short, method)| {
-        let at = working(records).into_iter().find(|c| c.method == method())?;
-        Some(format!("{short} {} ({}/h)", setting(at), per_h(at)))
+    let all = columns().into_iter().filter_map(|(short, method)| {
+        let at = working(records).into_iter().find(|c| c.method == method)?;
+        let median = at.found.median_s.map_or_else(|| "never".to_owned(), brief);
+        Some(format!("{short} {} ({}/h, {median} s)", setting(at), per_h(at)))
     });
     format!(
-        "Shares of the faults that had a chance. Set to (false alarms): {}. Only the verdict can \
+        "Shares of the faults that had a chance. Set to (false alarms, median delay for servos): {}. Only the verdict can \
          accuse ball or readings.",
         all.collect::<Vec<_>>().join("; ")
     )
