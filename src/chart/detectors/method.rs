@@ -233,6 +233,7 @@ mod tests {
             assert!(pair[0].threshold < pair[1].threshold);
         }
         let chosen = detectors.iter().filter(|d| d.chosen).map(|d| d.threshold);
-        assert!(chosen.eq([12.0, 18.0, 0.01]));
+        let settings = Settings::default();
+        assert!(chosen.eq([settings.suspect_nats, settings.confirm_nats, 0.01]));
     }
 }
