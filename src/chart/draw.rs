@@ -130,7 +130,8 @@ fn wrapped(text: &str, size: f64) -> Vec<String> {
 fn draw_panel(panel: &Panel, place: &Area<'_>, whole: &Area<'_>) -> Drawn {
     let inner = place.margin(if panel.title.is_empty() { 8 } else { 50 }, 8, 12, 22);
     let mut builder = ChartBuilder::on(&inner);
-    builder.x_label_area_size(92).y_label_area_size(128);
+    let names = (panel.y.scale.longest_name() as f64 * TICK * CHARACTER) as i32;
+    builder.x_label_area_size(92).y_label_area_size(128.max(names + 30));
     let mut axes =
         builder.build_cartesian_2d(panel.x.scale.clone(), panel.y.scale.clone()).map_err(said)?;
     draw_regions(panel, &axes, whole)?;

@@ -16,6 +16,9 @@ pub enum ChartError {
     /// A scene cannot be.
     #[error("{0}")]
     Scene(#[from] crate::vocabulary::Invalid),
+    /// A simulated rig cannot be learnt.
+    #[error("{0}")]
+    Rig(#[from] crate::engine::CannotCalibrate),
     /// Somebody else's records could not be read.
     #[error("{}: {reason}", path.display())]
     Peers { path: PathBuf, reason: String },

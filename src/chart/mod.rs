@@ -10,6 +10,7 @@
 //! in `src/cli/chart.rs`.
 
 mod dash;
+pub mod detectors;
 mod draw;
 mod equal;
 mod error;

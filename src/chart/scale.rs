@@ -1,4 +1,4 @@
-//! An axis' range, ticks and their labels: linear, or logarithmic with decades.
+//! An axis' range, ticks and their labels: linear, logarithmic with decades, or names.
 
 use std::ops::Range;
 
@@ -14,6 +14,8 @@ pub enum Scale {
     Linear(f64, f64),
     /// From the first to the second, both positive.
     Log(f64, f64),
+    /// Names at 0, 1, 2 and so on.
+    Names(Vec<String>),
 }
 
 impl Scale {
@@ -33,21 +35,36 @@ impl Scale {
         Self::Linear(low, high)
     }
 
+    /// The first and the last value.
+    pub(super) fn ends(&self) -> (f64, f64) {
+        match self {
+            Self::Linear(low, high) | Self::Log(low, high) => (*low, *high),
+            Self::Names(names) => (-0.5, names.len() as f64 - 0.5),
+        }
+    }
+
     pub(super) fn contains(&self, value: f64) -> bool {
-        let (Self::Linear(low, high) | Self::Log(low, high)) = *self;
+        let (low, high) = self.ends();
         (low..=high).contains(&value)
     }
 
     pub(super) fn clamp(&self, value: f64) -> f64 {
-        let (Self::Linear(low, high) | Self::Log(low, high)) = *self;
+        let (low, high) = self.ends();
         value.clamp(low, high)
+    }
+
+    /// Characters of the longest name; of numbers none count.
+    pub(super) fn longest_name(&self) -> usize {
+        let Self::Names(names) = self else { return 0 };
+        names.iter().map(|name| name.chars().count()).max().unwrap_or_default()
     }
 
     /// Where `value` lies between the ends, 0 to 1.
     fn share(&self, value: f64) -> f64 {
-        match *self {
-            Self::Linear(low, high) => (value - low) / (high - low),
-            Self::Log(low, high) => (value / low).ln() / (high / low).ln(),
+        let (low, high) = self.ends();
+        match self {
+            Self::Log(..) => (value / low).ln() / (high / low).ln(),
+            _ => (value - low) / (high - low),
         }
     }
 
@@ -56,13 +73,14 @@ impl Scale {
         match *self {
             Self::Linear(low, high) => multiples(low, high, nice_step(high - low)),
             Self::Log(low, high) => labelled_log(low, high),
+            Self::Names(ref names) => (0..names.len()).map(|i| i as f64).collect(),
         }
     }
 
     /// Values with a faint line, those with a label among them.
     fn ticks(&self) -> Vec<f64> {
         match *self {
-            Self::Linear(..) => self.labelled(),
+            Self::Linear(..) | Self::Names(_) => self.labelled(),
             Self::Log(low, high) if high / low > 1e6 => decades(low, high, &[1.0]),
             Self::Log(low, high) => {
                 decades(low, high, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0])
@@ -73,6 +91,7 @@ impl Scale {
     fn label(&self, value: f64) -> String {
         match *self {
             Self::Log(low, high) if low < 0.9e-4 || high > 1.1e5 => power_of_ten(value),
+            Self::Names(ref names) => names.get(value as usize).cloned().unwrap_or_default(),
             _ => plain(value),
         }
     }
@@ -157,7 +176,7 @@ impl Ranged for Scale {
     }
 
     fn range(&self) -> Range<f64> {
-        let (Self::Linear(low, high) | Self::Log(low, high)) = *self;
+        let (low, high) = self.ends();
         low..high
     }
 }
@@ -183,6 +202,7 @@ mod tests {
         assert_eq!(labels(&Scale::Log(1e-9, 1e-6)), ["10⁻⁹", "10⁻⁸", "10⁻⁷", "10⁻⁶"]);
         assert_eq!(labels(&Scale::Linear(-1.0, 1.0)), ["−1", "−0.5", "0", "0.5", "1"]);
         assert!(labels(&Scale::Log(1e-12, 1e3)).len() <= MOST_LABELS + 1);
+        assert_eq!(labels(&Scale::Names(vec!["a".to_owned(), "b".to_owned()])), ["a", "b"]);
     }
 
     #[test]

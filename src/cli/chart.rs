@@ -18,7 +18,8 @@ use crate::chart::{self, Chart, ChartError, Effort};
 #[command(after_help = "Examples:\n  \
     offbd chart work-precision\n  \
     offbd chart work-precision --with peers.json\n  \
-    offbd chart estimators -o measured --quick")]
+    offbd chart estimators -o measured --quick\n  \
+    offbd chart detectors")]
 pub(super) struct ChartArgs {
     /// Which chart
     #[arg(value_enum)]
@@ -44,6 +45,8 @@ enum Name {
     Fidelity,
     /// Methods: the largest stable step, measured and predicted
     Stability,
+    /// Detectors of servo faults: delay against false alarms
+    Detectors,
 }
 
 impl Name {
@@ -61,6 +64,7 @@ impl Name {
             }
             Self::Fidelity => chart::fidelity::make(effort),
             Self::Stability => chart::stability::make(effort),
+            Self::Detectors => chart::detectors::make(effort),
         }
     }
 }

@@ -59,6 +59,44 @@ fn work_precision_puts_the_choice_and_peers_beside_what_is_charted() {
 }
 
 #[test]
+fn detectors_are_compared_on_sessions_with_and_without_faults() {
+    let bench = Bench::new();
+    let done = bench.ok("chart detectors --quick -o charts");
+    assert!(done.stdout.starts_with("method "), "{}", done.stdout);
+    assert!(done.stdout.lines().all(|line| line.chars().count() <= 80), "{}", done.stdout);
+    let drawing = bench.read("charts/detectors.svg");
+    for text in ["s rule", "offbd, weighed", "CUSUM", "false alarms per hour", "0.01 m/s²"] {
+        assert!(drawing.contains(text), "{text}");
+    }
+    assert!(bench.read("charts/detectors-faults.svg").contains("servo dead"));
+    let records = records(&bench, "charts/detectors.json");
+    let of = |what: &str| -> Vec<&Value> { records.iter().filter(|r| r["of"] == what).collect() };
+    // The higher the threshold, the fewer are alarmed and the fewer are found.
+    let sweep = of("method");
+    for pair in sweep.windows(2).filter(|p| p[0]["method"] == p[1]["method"]) {
+        let at = |i: usize, key: &str| pair[i][key].as_u64().unwrap();
+        // A sum that starts anew after each alarm is not monotonous in what is
+        // found; the verdict has no threshold.
+        if pair[0]["unit"] == "nats" || pair[0]["unit"] == "m/s²" {
+            assert!(at(0, "false_alarms") >= at(1, "false_alarms"), "{pair:?}");
+            assert!(at(0, "n_detected") >= at(1, "n_detected"), "{pair:?}");
+        }
+    }
+    // A dead servo is what every method is for; a ball is nobody's but ours.
+    let right = |method: &str, fault: &str| {
+        let all = of("fault");
+        let kind = all.iter().find(|k| k["method"] == method && k["fault"] == fault);
+        kind.map(|k| (k["n_right"].as_u64(), k["n_faults"].as_u64()))
+    };
+    let (found, chances) = right("offbd, verdict", "x_servo:dead").unwrap();
+    assert!(chances > Some(0) && found == chances);
+    assert_eq!(right("debounced residual", "stuck_ball:glued").unwrap().0, Some(0));
+    let costs = of("cost");
+    assert_eq!(costs[0]["ratio"], 1.0);
+    assert!(costs.iter().all(|c| c["cost_ns"].as_f64() > Some(0.0)));
+}
+
+#[test]
 fn records_that_are_none_are_named() {
     let bench = Bench::new();
     std::fs::write(bench.path("peers.json"), "{}").unwrap();
