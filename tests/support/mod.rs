@@ -262,7 +262,7 @@ impl Events {
         Self { response, text: String::new() }
     }
 
-    /// The next event's data, with its `id`.
+    /// The next fault event's data, with its `id`.
     pub async fn next(&mut self) -> Value {
         loop {
             if let Some((event, rest)) = self.text.split_once("\n\n") {
@@ -271,7 +271,9 @@ impl Events {
                 let field = |name: &str| {
                     event.lines().find_map(|l| l.strip_prefix(name)).map(|v| v.trim().to_owned())
                 };
-                if let Some(data) = field("data:") {
+                // The first, `begin`, only says where the others follow on.
+                let of_fault = field("event:").as_deref() == Some("fault");
+                if let Some(data) = field("data:").filter(|_| of_fault) {
                     let mut data: Value = serde_json::from_str(&data).unwrap();
                     data["id"] = field("id:").unwrap().parse::<i64>().unwrap().into();
                     return data;
