@@ -262,8 +262,19 @@ impl Events {
         Self { response, text: String::new() }
     }
 
-    /// The next fault event's data, with its `id`.
+    /// The next fault event's data, with its `id`; the first event of all,
+    /// `begin`, only says where the others follow on.
     pub async fn next(&mut self) -> Value {
+        loop {
+            let (kind, data) = self.any().await;
+            if kind == "fault" {
+                return data;
+            }
+        }
+    }
+
+    /// The next event's type, and its data with its `id`.
+    pub async fn any(&mut self) -> (String, Value) {
         loop {
             if let Some((event, rest)) = self.text.split_once("\n\n") {
                 let event = event.to_owned();
@@ -271,12 +282,10 @@ impl Events {
                 let field = |name: &str| {
                     event.lines().find_map(|l| l.strip_prefix(name)).map(|v| v.trim().to_owned())
                 };
-                // The first, `begin`, only says where the others follow on.
-                let of_fault = field("event:").as_deref() == Some("fault");
-                if let Some(data) = field("data:").filter(|_| of_fault) {
+                if let Some(data) = field("data:") {
                     let mut data: Value = serde_json::from_str(&data).unwrap();
                     data["id"] = field("id:").unwrap().parse::<i64>().unwrap().into();
-                    return data;
+                    return (field("event:").unwrap(), data);
                 }
                 continue;
             }
