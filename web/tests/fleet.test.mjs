@@ -56,7 +56,7 @@ test("thousands of rigs: found, filtered, and only those in sight are in the doc
 
   // A fault shows at once, first of all, and can be filtered.
   await ask(service.url, "POST", "/assets/rig-7/telemetry?session=now", rig.sick, "text/csv");
-  await view.getByRole("region", { name: "Rigs" }).getByText("X servo, dead").waitFor({ timeout: 2000 });
+  await view.getByRole("region", { name: "Rigs" }).getByText(/X servo/).waitFor({ timeout: 2000 });
   await view.getByRole("button", { name: /^Fault/ }).click();
   assert.equal(await rows.filter({ hasText: "rig-7" }).count(), 1);
   assert.deepEqual(view.errors, []);
@@ -76,7 +76,7 @@ test("when the service comes back, the page catches up", async () => {
   await ask(service.url, "PUT", "/assets/rig-8", { ...rig.learnt, name: "rig-8" });
   await ask(service.url, "POST", "/assets/rig-8/telemetry?session=later", rig.sick, "text/csv");
   await view.getByText("live", { exact: true }).waitFor();
-  await view.getByRole("region", { name: "Rigs" }).getByText("X servo, dead").first().waitFor();
+  await view.getByRole("region", { name: "Rigs" }).getByText(/X servo/).first().waitFor();
   await view.getByText("The service does not answer").waitFor({ state: "detached" });
   // What was missed has come as events too, each once.
   const feed = view.getByRole("region", { name: "Events" });

@@ -2,6 +2,7 @@
 import assert from "node:assert/strict";
 import { execFileSync, spawn } from "node:child_process";
 import { existsSync, mkdtempSync, readFileSync, rmSync } from "node:fs";
+import { after } from "node:test";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { fileURLToPath } from "node:url";
@@ -30,10 +31,19 @@ function address(child, stream) {
   });
 }
 
+const running = new Set();
+
+// A test that fails leaves its programs behind; they would keep it from ending.
+after(() => {
+  for (const child of running) child.kill("SIGKILL");
+});
+
 /** A running program; `stop` ends it as Ctrl-C would. */
 async function run(args, stream) {
   assert.ok(existsSync(BINARY), `${BINARY} is missing; build it with cargo build, or name another in BINARY`);
   const child = spawn(BINARY, args, { env: { ...process.env, NO_COLOR: "1" }, stdio: ["ignore", "pipe", "pipe"] });
+  running.add(child);
+  child.once("exit", () => running.delete(child));
   child.stdout.resume();
   child.stderr.resume();
   const ended = new Promise((done) => child.once("exit", done));
