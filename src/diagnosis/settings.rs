@@ -4,7 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::MemoryRules;
-use crate::vocabulary::{Invalid, UnknownWord, in_range};
+use crate::vocabulary::{Invalid, UnknownWord, in_range, positive};
 
 /// A named set of [`Settings`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -50,6 +50,19 @@ const LONGEST_WINDOW_S: f64 = 1.0;
 
 /// Noise in the limit, as a share of its floor.
 const NOISE_SHARE: f64 = 0.25;
+
+/// What `offbd soak` has measured on healthy rigs, no two alike, with hands and
+/// air: so often a year the evidence against a servo passes so many nats, and e
+/// times more seldom with every so many more. For true models it would be one.
+const SOAKED_NATS: f64 = 10.0;
+const SOAKED_PER_YEAR: f64 = 32.4 * 365.25;
+const NATS_PER_E: f64 = 2.15;
+/// Evidence that confirms at least, and at most: less than one push gives now
+/// and then says nothing, more than the other is not kept.
+const LEAST_NATS: f64 = 8.0;
+const MOST_NATS: f64 = 36.0;
+/// Share of what confirms that makes the test fail.
+const SUSPECT_SHARE: f64 = 2.0 / 3.0;
 
 /// How a rig is judged; immutable while a session runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -143,6 +156,19 @@ impl Settings {
         Self { window_s, fail_s, ..*self }
     }
 
+    /// The same for a wanted number of false alarms per rig and year, in
+    /// (0, 1e6]: it sets the evidence that confirms a servo's fault.
+    ///
+    /// # Errors
+    /// [`Invalid`] naming `/diagnostics/false_alarms_per_rig_year`.
+    pub fn with_false_alarms(self, per_year: f64) -> Result<Self, Invalid> {
+        let per_year = positive("/diagnostics/false_alarms_per_rig_year", per_year, 1e6)?;
+        let nats = SOAKED_NATS + NATS_PER_E * (SOAKED_PER_YEAR / per_year).ln();
+        let confirm_nats = nats.clamp(LEAST_NATS, MOST_NATS);
+        let suspect_nats = self.suspect_nats.min(SUSPECT_SHARE * confirm_nats);
+        Ok(Self { confirm_nats, suspect_nats, ..self })
+    }
+
     /// The same with the debounce before a failure set to `fail_s` in [0, 60] s.
     ///
     /// # Errors
@@ -162,6 +188,20 @@ impl Default for Settings {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Fewer false alarms take more evidence, e times fewer always as much more.
+    #[test]
+    fn evidence_goes_with_the_false_alarms_wanted() {
+        let nats = |n: f64| Settings::default().with_false_alarms(n).unwrap().confirm_nats;
+        let e = std::f64::consts::E;
+        assert!((nats(10.0) - nats(10.0 * e) - NATS_PER_E).abs() < 1e-9);
+        assert!((nats(SOAKED_PER_YEAR) - SOAKED_NATS).abs() < 1e-9);
+        assert_eq!((nats(1e6), nats(1e-9)), (LEAST_NATS, MOST_NATS));
+        for n in [0.0, -1.0, f64::NAN, 1e7] {
+            let error = Settings::default().with_false_alarms(n).unwrap_err();
+            assert_eq!(error.element, "/diagnostics/false_alarms_per_rig_year");
+        }
+    }
 
     /// A failure must outlast a push through whichever window: by 0.1 s.
     #[test]

@@ -103,9 +103,6 @@ impl Rig {
         self.servo_model()?;
         positive("/axes/position_unit_m", self.mapping.position_unit_m, 1000.0)?;
         positive("/axes/command_unit_rad", self.mapping.command_unit_rad, 1000.0)?;
-        if let Some(rate) = self.diagnostics.false_alarms_per_rig_year {
-            positive("/diagnostics/false_alarms_per_rig_year", rate, 1e6)?;
-        }
         self.settings(self.diagnostics.profile)?;
         Ok(())
     }
@@ -126,10 +123,15 @@ impl Rig {
     /// [`Invalid`] naming the element under `/diagnostics`.
     pub fn settings(&self, profile: Profile) -> Result<Settings, Invalid> {
         let settings = Settings::of(profile);
-        match (profile, self.diagnostics.debounce_s) {
-            (Profile::Default, Some(debounce_s)) => settings.with_debounce(debounce_s),
-            _ => Ok(settings),
+        if profile != Profile::Default {
+            return Ok(settings);
         }
+        let DiagnosticsSpec { false_alarms_per_rig_year, debounce_s, .. } = self.diagnostics;
+        let settings = match false_alarms_per_rig_year {
+            Some(per_year) => settings.with_false_alarms(per_year)?,
+            None => settings,
+        };
+        debounce_s.map_or(Ok(settings), |debounce_s| settings.with_debounce(debounce_s))
     }
 }
 
