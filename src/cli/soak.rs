@@ -3,14 +3,16 @@
 
 use std::collections::BTreeMap;
 use std::io::Write;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::calibrate::write_asset;
 use super::output::{self, Format};
 use super::replay::{in_threads, progress};
-use super::simulate::record;
+use super::simulate::{record, write_session};
 use super::table;
 use super::unusable::Unusable;
 use crate::diagnosis::FaultMemory;
@@ -41,6 +43,10 @@ pub(super) struct SoakArgs {
     /// A table for people, or one JSON object
     #[arg(long, value_enum, default_value = "table")]
     format: Format,
+    /// Keep the recordings in which there was a false alarm, and what their
+    /// rigs were calibrated on, in this directory
+    #[arg(long, value_name = "DIR")]
+    keep: Option<PathBuf>,
     /// Sessions at a time [default: one per core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
@@ -122,7 +128,7 @@ pub(super) fn run(args: &SoakArgs) -> anyhow::Result<()> {
         soaked
     };
     let each: Vec<Soaked> = in_threads(args.jobs, || {
-        (0..n_rigs).into_par_iter().map(soak).collect::<Result<Vec<_>, Unusable>>()
+        (0..n_rigs).into_par_iter().map(soak).collect::<anyhow::Result<Vec<_>>>()
     })??;
     bar.finish_and_clear();
     // In the order of the rigs, whatever the threads did.
@@ -139,7 +145,7 @@ pub(super) fn run(args: &SoakArgs) -> anyhow::Result<()> {
     Ok(out.flush()?)
 }
 
-fn soak_rig(args: &SoakArgs, seed: u64, n_sessions: u64) -> Result<Soaked, Unusable> {
+fn soak_rig(args: &SoakArgs, seed: u64, n_sessions: u64) -> anyhow::Result<Soaked> {
     let cannot = |e: crate::vocabulary::Invalid| Unusable::new("cannot soak", e);
     let model = RigModel::varied(seed).map_err(cannot)?;
     let session = |reference, hands, seed, seconds| -> Result<Vec<Sample>, Unusable> {
@@ -148,7 +154,7 @@ fn soak_rig(args: &SoakArgs, seed: u64, n_sessions: u64) -> Result<Soaked, Unusa
     };
     let healthy = session(Reference::Lissajous, Disturbances::default(), seed, CALIBRATION_S)?;
     let mut rig = model.rig.clone();
-    let Ok(calibration) = calibrate(&rig, &[healthy], "", "") else {
+    let Ok(calibration) = calibrate(&rig, std::slice::from_ref(&healthy), "", "") else {
         return Ok(Soaked { refused: 1, ..Soaked::default() });
     };
     rig.calibration = Some(calibration);
@@ -159,9 +165,22 @@ fn soak_rig(args: &SoakArgs, seed: u64, n_sessions: u64) -> Result<Soaked, Unusa
         let reference = Reference::ALL[(n % Reference::ALL.len() as u64) as usize];
         let samples = session(reference, HANDS, seed.wrapping_add((n + 1) << 32), SESSION_S)?;
         let name = format!("{} {reference}", setup.rig.name);
-        soaked = soaked.with(watch(&setup, &name, &samples));
+        let found = watch(&setup, &name, &samples);
+        if let (Some(dir), false) = (&args.keep, found.alarms.is_empty()) {
+            let dir = dir.join(&setup.rig.name);
+            keep(&dir, &setup, &healthy)?;
+            write_session(&dir.join(format!("{reference}.csv")), &samples, false)?;
+        }
+        soaked = soaked.with(found);
     }
     Ok(soaked)
+}
+
+/// Keeps a rig and what it was calibrated on.
+fn keep(dir: &Path, setup: &Setup, healthy: &[Sample]) -> anyhow::Result<()> {
+    std::fs::create_dir_all(dir).map_err(|e| Unusable::new(dir.display(), e))?;
+    write_asset(&setup.rig, &dir.join("rig.json"))?;
+    write_session(&dir.join("calibration.csv"), healthy, false)
 }
 
 /// Judges one healthy session with its gaps.

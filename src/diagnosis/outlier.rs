@@ -57,6 +57,15 @@ struct Elsewhere {
     at_s: f64,
     position_m: Vector2<f64>,
     n: u32,
+    /// Those that differ from the one before: a sensor that is logged faster
+    /// than it reads repeats itself, outliers and all.
+    distinct: u32,
+}
+
+impl Elsewhere {
+    fn differs(&self, position_m: Vector2<f64>) -> u32 {
+        u32::from(position_m != self.position_m)
+    }
 }
 
 /// Where the ball was and how it moved.
@@ -65,11 +74,13 @@ struct Track {
     at_s: f64,
     position_m: Vector2<f64>,
     velocity_m_s: Vector2<f64>,
+    /// Readings that make it. A path of few may be outliers itself.
+    n: u32,
 }
 
 impl Track {
-    fn start(at_s: f64, position_m: Vector2<f64>) -> Self {
-        Self { at_s, position_m, velocity_m_s: Vector2::zeros() }
+    fn start(at_s: f64, position_m: Vector2<f64>, n: u32) -> Self {
+        Self { at_s, position_m, velocity_m_s: Vector2::zeros(), n }
     }
 
     /// Distance of a reading from where the ball is expected, m.
@@ -85,7 +96,7 @@ impl Track {
         let now = (position_m - self.position_m) / dt;
         let gain = 1.0 - (-dt / VELOCITY_MEMORY_S).exp();
         let velocity_m_s = self.velocity_m_s + gain * (now - self.velocity_m_s);
-        Self { at_s: t_s, position_m, velocity_m_s }
+        Self { at_s: t_s, position_m, velocity_m_s, n: self.n.saturating_add(1) }
     }
 }
 
@@ -109,7 +120,7 @@ impl OutlierGate {
         let position_m =
             Vector2::new(position_m.x.unwrap_or(held.x), position_m.y.unwrap_or(held.y));
         let Some(track) = self.track else {
-            return self.accept(Track::start(t_s, position_m));
+            return self.accept(Track::start(t_s, position_m, 1));
         };
         let reach = |from_s: f64| NOISE_FACTOR * noise_m + PUSH_M_S * (t_s - from_s);
         let off_m = track.off_m(t_s, position_m);
@@ -143,23 +154,24 @@ impl OutlierGate {
         track: &Track,
         noise_m: f64,
     ) -> Gated {
-        let (since_s, first_m, n) = match staying {
-            Some(e) => (e.since_s, e.first_m, e.n + 1),
+        let (since_s, first_m, n, distinct) = match staying {
+            Some(e) => (e.since_s, e.first_m, e.n + 1, e.distinct + e.differs(position_m)),
             None => {
-                self.outliers += self.elsewhere.map_or(0, |e| e.n);
-                (t_s, position_m, 1)
+                self.outliers += self.elsewhere.map_or(0, |e| e.distinct);
+                (t_s, position_m, 1, 1)
             }
         };
-        let there = Elsewhere { since_s, first_m, at_s: t_s, position_m, n };
+        let there = Elsewhere { since_s, first_m, at_s: t_s, position_m, n, distinct };
         if n < BELIEVED_AFTER || t_s - since_s < BELIEVED_AFTER_S {
             self.elsewhere = Some(there);
             return Gated::Refused;
         }
         self.elsewhere = None;
-        let accepted = self.accept(Track::start(t_s, position_m));
+        let accepted = self.accept(Track::start(t_s, position_m, n));
         let unseen_s = there.since_s - track.at_s;
         let bent_m = SHOVE_M_S2 * unseen_s * unseen_s;
-        let stepped = step_m(track, &there) > NOISE_FACTOR * noise_m + STEP_M + bent_m;
+        let apart = step_m(track, &there) > NOISE_FACTOR * noise_m + STEP_M + bent_m;
+        let stepped = apart && track.n >= BELIEVED_AFTER;
         if stepped { Gated::Stepped } else { accepted }
     }
 
@@ -170,7 +182,7 @@ impl OutlierGate {
 
     fn accept(&mut self, track: Track) -> Gated {
         self.track = Some(track);
-        let outliers = self.outliers + self.elsewhere.map_or(0, |e| e.n);
+        let outliers = self.outliers + self.elsewhere.map_or(0, |e| e.distinct);
         (self.outliers, self.elsewhere) = (0, None);
         Gated::Accepted { outliers }
     }
@@ -198,6 +210,9 @@ mod tests {
     #[test]
     fn lone_readings_are_refused_and_steps_believed_later() {
         let mut gate = OutlierGate::default();
+        for i in 0..5 {
+            gate.take(-0.1 + f64::from(i) * 0.02, along_x(0.0), 1e-3);
+        }
         let mut take = |i: u32, x: f64| gate.take(f64::from(i) * 0.02, along_x(x), 1e-3);
         assert_eq!(take(0, 0.0), Gated::Accepted { outliers: 0 });
         assert_eq!(take(1, 0.1), Gated::Refused);
@@ -207,6 +222,32 @@ mod tests {
         }
         assert_eq!(take(9, 0.2), Gated::Stepped);
         assert_eq!(take(10, 0.2), Gated::Accepted { outliers: 0 });
+    }
+
+    /// After a gap nothing says that the first reading was a good one.
+    #[test]
+    fn readings_that_leave_a_first_outlier_do_not_step() {
+        let mut gate = OutlierGate::default();
+        gate.take(0.0, along_x(0.1), 1e-3);
+        for i in 1..100 {
+            let gated = gate.take(f64::from(i) * 0.02, along_x(0.0), 1e-3);
+            assert_ne!(gated, Gated::Stepped, "{i}");
+        }
+    }
+
+    #[test]
+    fn an_outlier_that_is_repeated_is_one() {
+        let mut gate = OutlierGate::default();
+        let mut outliers = 0;
+        for i in 0..100 {
+            let x = if i / 3 == 10 { 0.1 } else { 0.0 };
+            if let Gated::Accepted { outliers: n } =
+                gate.take(f64::from(i) * 0.01, along_x(x), 1e-3)
+            {
+                outliers += n;
+            }
+        }
+        assert_eq!(outliers, 1);
     }
 
     #[test]

@@ -484,7 +484,8 @@ impl Pipeline {
 fn answers(axis: Axis, readings: &Stillness, motion: &TwinMotion, evaluator: &Evaluator) -> bool {
     let own = &readings.axes[axis];
     let asked = motion.acceleration[axis as usize].abs();
-    let resting = own.still_s > RESTING_S && asked < evaluator.limits()[axis].breakaway_m_s2;
+    let held_m_s2 = evaluator.limits()[axis].breakaway_m_s2.max(LEAST_PRESS_M_S2);
+    let resting = own.still_s > RESTING_S && asked < held_m_s2;
     let frozen = own.identical_s > REPEATED_S && own.pressed_s > 0.0;
     let pressed = Axis::ALL.into_iter().any(|a| readings.axes[a].pressed_s > 0.0);
     let stuck = pressed && readings.still_s() > RESTING_S;
