@@ -32,7 +32,7 @@ impl Scatter {
             // The variance of what is left, in variances of a reading.
             let share = (1.0 + u * u + v * v).sqrt();
             let left = (y1 - u * y0 - v * deviation_m).abs().min(share * most_m) / share;
-            let fade = (-late / MEMORY_S).exp();
+            let fade = MEMORY_S / (MEMORY_S + late);
             self.size_m = fade * self.size_m + (1.0 - fade) * left;
             self.weight = fade * self.weight + (1.0 - fade);
         }

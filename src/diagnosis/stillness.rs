@@ -79,9 +79,9 @@ impl Stillness {
     pub fn update(&mut self, reading: &Reading) {
         let seen = Axis::ALL.iter().any(|&a| reading.position_m[a].is_some());
         self.unseen_s = if seen { 0.0 } else { self.unseen_s + reading.dt };
-        let fade = (-reading.dt / MEMORY_S).exp();
+        let fade = MEMORY_S / (MEMORY_S + reading.dt);
         self.missing = self.missing * fade + if seen { 0.0 } else { 1.0 - fade };
-        self.outliers *= (-reading.dt / OUTLIER_MEMORY_S).exp();
+        self.outliers *= OUTLIER_MEMORY_S / (OUTLIER_MEMORY_S + reading.dt);
         self.outliers += f64::from(reading.outliers);
         if !reading.usable {
             return;
@@ -167,6 +167,7 @@ mod tests {
             watch.update(&reading(None, true));
         }
         assert!((watch.unseen_s - 2.0).abs() < 1e-9);
-        assert!((watch.missing - (1.0 - (-1.0_f64).exp())).abs() < 1e-9);
+        // The share seen fades as (1 + dt/memory)⁻ⁿ.
+        assert!((watch.missing - (1.0 - 1.005_f64.powi(-200))).abs() < 1e-9);
     }
 }

@@ -76,7 +76,10 @@ impl Ledger {
         if self.forgot && self.times.front().is_some_and(|&oldest| t_s < oldest) {
             return false;
         }
-        let at = self.times.partition_point(|&t| t < t_s);
+        let at = match self.times.back() {
+            Some(&newest) if t_s > newest => self.times.len(),
+            _ => self.times.partition_point(|&t| t < t_s),
+        };
         if self.times.get(at).is_some_and(|&t| t == t_s) {
             return false;
         }

@@ -26,8 +26,9 @@ impl Align {
     pub fn push(&mut self, sample: Sample) {
         let first = self.waiting.is_empty() && self.released.is_none();
         self.newest_s = if first { sample.t_s } else { self.newest_s.max(sample.t_s) };
-        let at = self.waiting.partition_point(|s| s.t_s <= sample.t_s);
-        self.waiting.insert(at, sample);
+        // Mostly it is the latest; a sort by halves would first look elsewhere.
+        let after = self.waiting.iter().rev().take_while(|s| s.t_s > sample.t_s).count();
+        self.waiting.insert(self.waiting.len() - after, sample);
     }
 
     /// The next sample in order whose turn has come.

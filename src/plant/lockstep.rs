@@ -7,9 +7,9 @@
 //! | rolling | friction and the plate's push can hold the ball without slip |
 //! | sliding | they cannot: the ball slips, or leaves the plate |
 //!
-//! Whether friction holds is asked of the plate's angles and rates alone: the
-//! acceleration of a servo modelled as a first-order lag jumps with each command,
-//! which no servo's does, and would throw the ball off.
+//! Whether friction holds, and whether small angles do, is asked of the plate's
+//! angles and rates alone: the rate of a servo modelled as a first-order lag
+//! jumps with each command, which no servo's does, and would throw the ball off.
 //!
 //! It climbs at once and comes down after the motion has been calm for a
 //! while. The compliant model has no rung: what it adds to the acceleration of
@@ -125,6 +125,12 @@ impl Ladder {
         }
     }
 
+    /// The planar model, the lowest rung.
+    #[must_use]
+    pub const fn planar(&self) -> &Planar {
+        &self.planar
+    }
+
     /// Acceleration of the ball along x and y, m/s², at the `observed` motion,
     /// over a step of `h` seconds with the plate as `tilt`.
     pub fn acceleration(
@@ -135,7 +141,8 @@ impl Ladder {
         h: f64,
     ) -> Vector2<f64> {
         fidelity.accuracy_m_s2 = self.accuracy_m_s2;
-        fidelity.left_out_m_s2 = self.planar.left_out(observed, tilt);
+        let evenly = Tilt { acceleration: Vector2::zeros(), ..*tilt };
+        fidelity.left_out_m_s2 = self.planar.left_out(observed, &evenly);
         fidelity.demand = self.planar.friction_part(&tilt.angle) / self.friction;
         let small = fidelity.left_out_m_s2 <= self.accuracy_m_s2;
         let grips = fidelity.demand <= CALM_PART;

@@ -18,6 +18,7 @@
 
 use nalgebra::Vector2;
 
+use super::servo::{Servo, Sweep};
 use super::tilt::Tilt;
 use super::{Ball, GRAVITY_M_S2, Plate, RollingState};
 
@@ -72,6 +73,24 @@ impl Planar {
         drive(&tilt.angle) * self.gain - drive(&tilt.acceleration) * self.offset
     }
 
+    /// What a servo that goes `before` and then through `swept` for `h` seconds
+    /// adds to the path of a ball at rest, on an axis that is `level_rad` off
+    /// level; exactly.
+    ///
+    /// The rate of a servo modelled as a lag jumps with its command, and with it
+    /// the velocity of the ball: x = ξ − c·q holds throughout.
+    #[must_use]
+    #[inline]
+    pub fn answer(&self, before: &Servo, swept: &Sweep, level_rad: f64, h: f64) -> Answer {
+        let turned = swept.servo.angle - before.angle - before.rate * h;
+        let faster = swept.servo.rate - before.rate;
+        Answer {
+            position_m: self.gain * (swept.twice + level_rad * h * h / 2.0) - self.offset * turned,
+            velocity_m_s: self.gain * (swept.once + level_rad * h) - self.offset * faster,
+            acceleration_m_s2: self.gain * (swept.servo.angle + level_rad),
+        }
+    }
+
     /// Friction that rolling on a plate held at `angle` takes, over the ball's
     /// weight: κ/(1 + κ) of the larger angle.
     #[must_use]
@@ -95,6 +114,15 @@ impl Planar {
             + length(&tilt.acceleration) * angle * (away + self.reach * angle);
         gravity + turning
     }
+}
+
+/// What a step of one servo adds to the ball's path.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Answer {
+    pub position_m: f64,
+    pub velocity_m_s: f64,
+    /// Acceleration at the end by gravity, m/s².
+    pub acceleration_m_s2: f64,
 }
 
 /// The angles that drive the ball along x and y.

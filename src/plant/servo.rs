@@ -49,21 +49,88 @@ impl ServoModel {
     /// The servo after `h` seconds of the held command `command_rad`.
     #[must_use]
     pub fn advance(&self, servo: &Servo, command_rad: f64, h: f64) -> Servo {
-        let target = command_rad.clamp(-self.angle_limit_rad, self.angle_limit_rad);
-        let error = target - servo.angle;
-        let (rate_limit, lag) = (self.rate_limit_rad_s, self.lag_s);
+        self.sweep(servo, command_rad, h).servo
+    }
+
+    /// The same, with the angle's integrals over the step.
+    #[must_use]
+    #[inline]
+    pub fn sweep(&self, servo: &Servo, command_rad: f64, h: f64) -> Sweep {
+        let target = command_rad.min(self.angle_limit_rad).max(-self.angle_limit_rad);
         // While the lag asks for more than the rate limit the angle runs
         // straight; the rest of the step decays exponentially.
-        let linear_band = rate_limit * lag;
-        let ramp = ((error.abs() - linear_band) / rate_limit).clamp(0.0, h);
-        let left = error - error.signum() * rate_limit * ramp;
-        let angle =
-            if lag > 0.0 { target - left * (-(h - ramp) / lag).exp() } else { target - left };
-        let after = target - angle;
-        let rate = if lag > 0.0 { (after / lag).clamp(-rate_limit, rate_limit) } else { 0.0 };
-        let ramping = after.abs() > linear_band;
-        let acceleration = if lag > 0.0 && !ramping { -rate / lag } else { 0.0 };
-        Servo { angle, rate, acceleration }
+        let beyond = (target - servo.angle).abs() - self.linear_band_rad();
+        if beyond <= 0.0 {
+            return self.decay(servo.angle, target, h);
+        }
+        let ramp_s = (beyond / self.rate_limit_rad_s).min(h);
+        let ramped = self.ramp(servo.angle, target, ramp_s);
+        if ramp_s == h {
+            return ramped;
+        }
+        ramped.then(&self.decay(ramped.servo.angle, target, h - ramp_s), h - ramp_s)
+    }
+
+    /// Distance from the target, rad, below which the rate limit does not act.
+    fn linear_band_rad(&self) -> f64 {
+        self.rate_limit_rad_s * self.lag_s
+    }
+
+    /// From `angle` straight towards `target` for `h` seconds.
+    fn ramp(&self, angle: f64, target: f64, h: f64) -> Sweep {
+        let rate = self.rate_limit_rad_s.copysign(target - angle);
+        Sweep {
+            servo: Servo { angle: angle + rate * h, rate, acceleration: 0.0 },
+            once: (angle + rate * h / 2.0) * h,
+            twice: (angle + rate * h / 3.0) * h * h / 2.0,
+        }
+    }
+
+    /// From `angle` towards `target` for `h` seconds, e times nearer each lag.
+    #[inline]
+    fn decay(&self, angle: f64, target: f64, h: f64) -> Sweep {
+        let (error, lag) = (target - angle, self.lag_s);
+        if lag == 0.0 {
+            let servo = Servo { angle: target, ..Servo::default() };
+            return Sweep { servo, once: target * h, twice: target * h * h / 2.0 };
+        }
+        let left = error * (-h / lag).exp();
+        let (rate, decayed) = (left / lag, lag * (error - left));
+        Sweep {
+            servo: Servo { angle: target - left, rate, acceleration: -rate / lag },
+            once: target * h - decayed,
+            twice: target * h * h / 2.0 - lag * (error * h - decayed),
+        }
+    }
+}
+
+/// A servo's motion over a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sweep {
+    /// Where it is at the end.
+    pub servo: Servo,
+    /// The angle's integral over the step, rad·s.
+    pub once: f64,
+    /// The integral of that, rad·s²: how far a unit acceleration per radian
+    /// carries.
+    pub twice: f64,
+}
+
+impl Sweep {
+    /// A servo that has not moved yet.
+    #[must_use]
+    pub fn start(servo: Servo) -> Self {
+        Self { servo, once: 0.0, twice: 0.0 }
+    }
+
+    /// This step and, after it, a `next` one of `h` seconds.
+    #[must_use]
+    pub fn then(&self, next: &Self, h: f64) -> Self {
+        Self {
+            servo: next.servo,
+            once: self.once + next.once,
+            twice: self.twice + self.once * h + next.twice,
+        }
     }
 }
 
@@ -117,6 +184,29 @@ mod tests {
             let once = model.advance(&start, command, h);
             let twice = model.advance(&model.advance(&start, command, h * split), command, h * (1.0 - split));
             prop_assert!((once.angle - twice.angle).abs() < 1e-12);
+        }
+
+        /// The integrals are those of the angle, by Simpson's rule.
+        #[test]
+        fn a_sweep_integrates_the_angle(
+            lag in 0.02..0.5_f64, rate in 0.5..50.0_f64, from in -1.0..1.0_f64,
+            command in -1.0..1.0_f64, h in 0.001..0.5_f64,
+        ) {
+            let model = ServoModel::new(1.0, lag, rate).unwrap();
+            let start = Servo { angle: from, ..Servo::default() };
+            let sweep = model.sweep(&start, command, h);
+            let (n, dt) = (1000, h / 1000.0);
+            let (mut once, mut twice) = (0.0, 0.0);
+            for i in 0..n {
+                let t = f64::from(i) * dt;
+                let angle = |t: f64| model.advance(&start, command, t).angle;
+                let area = |f: &dyn Fn(f64) -> f64| (f(t) + 4.0 * f(t + dt / 2.0) + f(t + dt)) * dt / 6.0;
+                once += area(&angle);
+                // ∬q = ∫(h − t)·q.
+                twice += area(&|t| (h - t) * angle(t));
+            }
+            prop_assert!((sweep.once - once).abs() < 1e-7 * h, "{} {once}", sweep.once);
+            prop_assert!((sweep.twice - twice).abs() < 1e-7 * h * h, "{} {twice}", sweep.twice);
         }
     }
 }

@@ -180,7 +180,10 @@ impl SimulatedRig {
         let middle = self.turn_plate(self.now_s, h / 2.0, &faults);
         let end = self.turn_plate(self.now_s + h / 2.0, h / 2.0, &faults);
         let push = self.disturbances.at(self.now_s);
-        self.ball = self.table.advance(&self.ball, [&start, &middle, &end], push, faults.ball, h);
+        // The rate of a lag jumps with its command: the ball feels that too.
+        let acceleration = (end.rate - start.rate) / h;
+        let tilts = [start, middle, end].map(|tilt| Tilt { acceleration, ..tilt });
+        self.ball = self.table.advance(&self.ball, tilts.each_ref(), push, faults.ball, h);
         self.now_s += h;
         self.watch();
     }

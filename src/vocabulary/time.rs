@@ -13,7 +13,8 @@ impl SimTime {
     /// The moment `seconds` after the clock's zero; `None` unless finite.
     #[must_use]
     pub fn new(seconds: f64) -> Option<Self> {
-        seconds.is_finite().then_some(Self(seconds))
+        // The total order tells −0 from 0; no clock does.
+        seconds.is_finite().then_some(Self(seconds + 0.0))
     }
 
     /// Seconds since the clock's zero.

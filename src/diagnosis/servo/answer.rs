@@ -33,6 +33,9 @@ const TOLERANCE: [f64; PARAMETERS] = [0.05, 0.1, 0.03];
 /// What a free parameter costs, nats.
 const FREE_NATS: f64 = 1.0;
 
+/// Evidence from which it is asked of which kind a fault would be, nats.
+const ASKED_NATS: f64 = 4.0;
+
 /// Likelihood of a kind, among all, from which it is named.
 const NAMED: f64 = 0.5;
 
@@ -50,12 +53,14 @@ pub struct Answer {
     pub delay_s: f64,
     pub delay_error_s: f64,
     /// Likelihoods of the kinds of fault that answer like this, in the order
-    /// dead, held, reversed, gain, offset, slow; they sum to one.
+    /// dead, held, reversed, gain, offset, slow; they sum to one, or are all
+    /// zero while hardly anything speaks for a fault.
     pub likelihoods: [f64; CLAIMS.len()],
 }
 
 impl Answer {
-    pub(super) fn new(filter: &Filter) -> Self {
+    /// What `filter` has found while `nats` speak for a fault.
+    pub(super) fn new(filter: &Filter, nats: f64) -> Self {
         let [offset, gain, delay] = std::array::from_fn(|k| filter.parameter(k));
         Self {
             offset_m_s2: offset.0,
@@ -64,7 +69,10 @@ impl Answer {
             gain_error: gain.1.sqrt(),
             delay_s: delay.0,
             delay_error_s: delay.1.sqrt(),
-            likelihoods: likelihoods([offset.0, gain.0, delay.0], &filter.spread()),
+            likelihoods: match nats >= ASKED_NATS {
+                true => likelihoods([offset.0, gain.0, delay.0], &filter.spread()),
+                false => Default::default(),
+            },
         }
     }
 

@@ -216,7 +216,7 @@ impl Servo {
     /// How the servo answers now, against the twin's.
     #[must_use]
     pub fn answer(&self) -> Answer {
-        Answer::new(&self.open)
+        Answer::new(&self.open, self.nats)
     }
 
     /// How it has answered over the session; none where too little was seen.

@@ -57,7 +57,7 @@ const PLATE_M: f64 = 1.0;
 /// The chapter's rule blames y, too, once x is fast enough: its limit lies
 /// below what the axes do to each other. This sequence of places keeps below
 /// that, and opens the enable condition of both axes.
-const SEED: u64 = 9;
+const SEED: u64 = 1;
 
 /// What the owner knows.
 fn rig() -> Result<Rig, Invalid> {
@@ -82,7 +82,7 @@ fn model(bad_x: bool) -> Result<RigModel, Invalid> {
     Ok(RigModel {
         // Slow enough to swing, not to run away, through the late servo.
         controller: ControllerModel {
-            bandwidth_rad_s: 1.3,
+            bandwidth_rad_s: 1.1,
             damping: 1.0,
             integral: 0.0,
             derivative_filter_s: 0.03,
