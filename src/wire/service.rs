@@ -148,7 +148,6 @@ pub struct FleetEntryView {
     /// Pending and confirmed ones.
     pub faults: Vec<FleetFaultView>,
     /// Of faults on their way: drifts of a servo over the sessions.
-    #[serde(default)]
     pub warnings: Vec<TrendWarningView>,
 }
 

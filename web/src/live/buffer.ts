@@ -1,5 +1,5 @@
 /** A growing trace as flat columns, for charts and pictures; the oldest go first. */
-import type { Axis, Trace } from "../api/types";
+import type { Around, Axis, Trace } from "../api/types";
 
 export const AXES: readonly Axis[] = ["x", "y"];
 
@@ -37,6 +37,20 @@ export class TraceBuffer {
     const buffer = new TraceBuffer(Infinity);
     buffer.append(trace);
     return buffer;
+  }
+
+  /** The seconds around a fault: they say nothing of where the twin was. */
+  static ofRecording({ columns: c }: Around): TraceBuffer {
+    const none = c.t_s.map(() => null);
+    const trace = (command: Column, position: Column, measured: Column, twin: Column, limit: Column, enabled: (boolean | null)[]) => ({
+      command_rad: command, plate_angle_rad: none, position_m: position, twin_position_m: none,
+      measured_m_s2: measured, twin_m_s2: twin, limit_m_s2: limit, enabled: enabled.map(Boolean),
+    });
+    return TraceBuffer.of({
+      t_s: c.t_s,
+      x: trace(c.cmd_qy_rad, c.x_m, c.x_measured_m_s2, c.x_twin_m_s2, c.x_limit_m_s2, c.x_enabled),
+      y: trace(c.cmd_qx_rad, c.y_m, c.y_measured_m_s2, c.y_twin_m_s2, c.y_limit_m_s2, c.y_enabled),
+    } as unknown as Trace);
   }
 
   constructor(private readonly most = MOST) {}

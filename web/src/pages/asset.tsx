@@ -9,6 +9,7 @@ import { Act, Facts, FaultChip, HealthMark, Loading, Trouble, type Health } from
 import type { Mark } from "../parts/line-chart";
 import { ChartGroup, RigCharts } from "../parts/rig-charts";
 import { RigView } from "../parts/rig-view";
+import { TrendsCard, TrendWarnings, useTrends } from "../parts/trends";
 import { XyTrace } from "../parts/xy-trace";
 import { at, go, Link } from "../router";
 import { clock, codeMeaning, codeTitle, count, degrees, millimetres, number, seconds, severity } from "../words";
@@ -52,6 +53,7 @@ function Live({ asset, faults, changed }: { asset: Asset; faults: FaultEntry[]; 
   const heard = useRef({ at: 0, t: -1, session: "" });
   const shown = useRef(0);
   const now = useNow(500);
+  const trends = useTrends(asset.name);
 
   useEffect(() => {
     let last = 0;
@@ -120,6 +122,7 @@ function Live({ asset, faults, changed }: { asset: Asset; faults: FaultEntry[]; 
           {active.map((fault) => <li><Link to={at("rigs", asset.name, "faults", fault.code)} class={`banner banner-${fault.status}`}><FaultChip {...fault} /> <span>{codeMeaning(fault.code)}</span> <span class="more">Look at it →</span></Link></li>)}
         </ul>
       )}
+      <TrendWarnings trends={trends.data} />
       {!asset.calibration && <p class="note">Nothing has been learnt of this rig yet, so only large faults are found. <Link to={at("rigs", asset.name, "set-up")}>Calibrate it</Link> from a healthy minute.</p>}
       {state && !state.session_id && <p class="note">No session is open. As soon as the rig sends, it is shown here. <Link to={`${at("rigs", asset.name, "set-up")}?step=connect`}>How to send</Link></p>}
       <div class="live-top">
@@ -139,6 +142,7 @@ function Live({ asset, faults, changed }: { asset: Asset; faults: FaultEntry[]; 
         <p class="quiet small-text">Time on the device's clock, s. The residual counts only while the ground is tinted (the gate is open); the band is the limit.</p>
       </section>
       <Numbers asset={asset} state={state} />
+      <TrendsCard asked={trends} />
     </main>
   );
 }
