@@ -128,11 +128,11 @@ function Live({ asset, faults, changed }: { asset: Asset; faults: FaultEntry[]; 
       <div class="live-top">
         <RigView asset={asset} pose={pose} name={`${asset.name}-live`} />
         <div class="live-side">
-          <section class="card"><h2>From above</h2><XyTrace asset={asset} moment={() => (buffer.t.length ? { buffer, t: shown.current, tail: TAIL_S } : null)} /></section>
+          <section class="card"><h2>From above</h2><XyTrace asset={asset} moment={() => ({ buffer, t: shown.current, tail: TAIL_S })} /></section>
           <Monitors monitors={state?.monitors ?? []} />
         </div>
       </div>
-      <section class="card">
+      {(!state || state.session_id) && <section class="card">
         <div class="card-head">
           <h2>Rig and twin</h2>
           <div class="chips" role="group" aria-label="Time shown">{SPANS.map((s) => <button type="button" class="small" aria-pressed={span === s} onClick={() => setSpan(s)}>{s} s</button>)}
@@ -140,7 +140,7 @@ function Live({ asset, faults, changed }: { asset: Asset; faults: FaultEntry[]; 
         </div>
         <RigCharts group={group} kinds={["residual", "acceleration", "command", "position"]} height={136} />
         <p class="quiet small-text">Time on the device's clock, s. The residual counts only while the ground is tinted (the gate is open); the band is the limit.</p>
-      </section>
+      </section>}
       <Numbers asset={asset} state={state} />
       <TrendsCard asked={trends} />
     </main>

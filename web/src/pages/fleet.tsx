@@ -1,5 +1,5 @@
 /** All rigs: which is sick, which is silent, which lags. */
-import { useEffect, useMemo, useState } from "preact/hooks";
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import type { FleetEntry } from "../api/types";
 import { useNow, useTitle } from "../hooks";
 import { healthOf, useFleet } from "../live/fleet";
@@ -29,15 +29,23 @@ const LAG_S = 2;
 /** bench-2 comes before bench-10. */
 const NAMES = new Intl.Collator("en", { numeric: true });
 
-type Row = { entry: FleetEntry; health: Health; worst: number };
+type Row = { entry: FleetEntry; health: Health; worst: number; place: number };
 
 function matches(entry: FleetEntry, text: string): boolean {
   const haystack = [entry.asset, entry.session ?? "", ...entry.faults.flatMap((f) => [f.code, codeTitle(f.code), f.kind ?? ""]), ...entry.warnings.flatMap((w) => [w.code, codeTitle(w.code), w.parameter])].join(" ").toLowerCase();
   return text.toLowerCase().split(/\s+/).every((word) => haystack.includes(word));
 }
 
+/** Assets as a person orders them; comparing thousands of names takes too long for every second. */
+function useNameOrder(fleet: FleetEntry[] = []): Map<string, number> {
+  const names = fleet.map((entry) => entry.asset);
+  const key = useRef<string[]>([]);
+  if (names.length !== key.current.length || names.some((name, i) => name !== key.current[i])) key.current = names;
+  return useMemo(() => new Map([...key.current].sort(NAMES.compare).map((name, i) => [name, i])), [key.current]);
+}
+
 function order(sort: keyof typeof SORTS): (a: Row, b: Row) => number {
-  const name = (a: Row, b: Row) => NAMES.compare(a.entry.asset, b.entry.asset);
+  const name = (a: Row, b: Row) => a.place - b.place;
   const rank: Record<Health, number> = { fault: 0, suspect: 1, drift: 2, silent: 3, ok: 4, idle: 5 };
   const by: Record<keyof typeof SORTS, (a: Row, b: Row) => number> = {
     severity: (a, b) => b.worst - a.worst || rank[a.health] - rank[b.health],
@@ -73,8 +81,9 @@ export function FleetPage() {
     value ? next.set(key, value) : next.delete(key);
     go(`/${next.size ? `?${next}` : ""}`, true);
   };
+  const places = useNameOrder(fleet);
   const rows = useMemo<Row[]>(() => (fleet ?? []).map((entry) => ({
-    entry, health: healthOf(entry, now), worst: Math.max(0, ...entry.faults.map(severity)),
+    entry, health: healthOf(entry, now), worst: Math.max(0, ...entry.faults.map(severity)), place: places.get(entry.asset) ?? 0,
   })), [fleet, now]);
   const shown = useMemo(() => rows
     .filter((row) => (filter === "all" || row.health === filter) && (!text || matches(row.entry, text)))

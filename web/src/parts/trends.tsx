@@ -77,7 +77,7 @@ function TrendChart({ trend, points }: { trend: Trend; points: TrendPoint[] }) {
         {sure && <line class="slope" x1={x(0)} x2={x(values.length - 1)} y1={y(line(0))} y2={y(line(values.length - 1))} />}
         {values.map((value, i) => value !== null && <circle cx={x(i)} cy={y(value)} r={3}><title>{points[i]!.session}: {write(value, 1)}</title></circle>)}
       </svg>
-      <p class="quiet small-text">limits {write(trend.limit_low)} and {write(trend.limit_high)}; {sure ? <>{write(trend.slope, 1)} a session</> : "no sure drift"}{trend.warning?.sessions_left != null && <b class="late">; at the limit in {Math.round(trend.warning.sessions_left)} sessions</b>}</p>
+      <p class="quiet small-text">limits {number(trend.limit_low * factor, digits)} and {write(trend.limit_high)}; {sure ? <>{write(trend.slope, 1)} a session</> : "no sure drift"}{trend.warning?.sessions_left != null && <b class="late">; at the limit in {Math.round(trend.warning.sessions_left)} sessions</b>}</p>
     </figure>
   );
 }
