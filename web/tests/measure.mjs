@@ -86,7 +86,6 @@ try {
   await view.addInitScript(watch);
   await view.goto(service.url);
   await view.getByRole("link", { name: /rig-1\b/ }).waitFor();
-  await frames(view, `fleet of ${RIGS} at rest`);
   await view.evaluate(() => {
     let y = 0;
     const step = () => { scrollTo(0, (y += 97) % document.body.scrollHeight); requestAnimationFrame(step); };
