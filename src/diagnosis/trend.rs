@@ -16,14 +16,14 @@ use crate::maths::{median, robust_deviation};
 /// them have a slope, so that the work is their square.
 pub const MAX_SESSIONS: usize = 200;
 
-/// Fewest sessions that make a trend: with five, a run that rises throughout
-/// has a chance of 2/5! = 1.7 % without any drift; with four it has 8 %.
-pub const LEAST_SESSIONS: usize = 5;
+/// Fewest sessions that make a trend: with seven, a run that rises or falls
+/// throughout has a chance of 2/7! = 0.04 % without any drift; with six, 0.3 %.
+pub const LEAST_SESSIONS: usize = 7;
 
-/// The quantile of the normal distribution for a confidence of 99 %, two-sided:
-/// one rig of a hundred without drift is taken to have one, and then it must
-/// lead to the limit too.
-const QUANTILE: f64 = 2.576;
+/// The quantile of the normal distribution for a confidence of 99.9 %,
+/// two-sided: a rig has six parameters, each looked at after every session, and
+/// one that is noisy leads to its limit wherever it is taken to drift.
+const QUANTILE: f64 = 3.291;
 
 /// Standard error of a median over that of a mean, of normal values: √(π/2).
 const MEDIAN_ERROR: f64 = 1.2533;
@@ -36,7 +36,7 @@ const DRIFT_SHARE: f64 = 0.5;
 pub struct Trend {
     /// Change per session.
     pub slope: f64,
-    /// The slope lies between these with a confidence of 99 %.
+    /// The slope lies between these with a confidence of 99.9 %.
     pub slope_low: f64,
     pub slope_high: f64,
     /// What the line says of the last session, and its standard error.

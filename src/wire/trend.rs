@@ -18,7 +18,7 @@ pub struct TrendsView {
     /// What the sessions estimated, oldest first, the last 200.
     pub points: Vec<TrendPointView>,
     /// Of the sessions that were judged by this calibration: one for each axis
-    /// and parameter of which there are five estimates.
+    /// and parameter of which there are seven estimates.
     pub trends: Vec<TrendView>,
 }
 
@@ -67,13 +67,13 @@ pub struct TrendView {
     pub sessions: usize,
     /// Change per session.
     pub slope: f64,
-    /// The slope lies between these with a confidence of 99 %.
+    /// The slope lies between these with a confidence of 99.9 %.
     pub slope_low: f64,
     pub slope_high: f64,
     /// What the line says of the last session, and its standard error.
     pub level: f64,
     pub level_error: f64,
-    /// What is usual: the median of the first five.
+    /// What is usual: the median of the first five of these.
     pub nominal: f64,
     /// Between these it is no fault.
     pub limit_low: f64,

@@ -7,7 +7,7 @@ fn bench() -> (Bench, String) {
     let bench = Bench::new();
     bench.calibrated();
     let mut names = Vec::new();
-    for i in 0..8 {
+    for i in 0..10 {
         let (name, gain) = (format!("s{i}.csv"), 1.0 - 0.02 * f64::from(i));
         let session = format!("simulate --reference lissajous --seed {} -o {name}", 100 + i);
         bench.ok(&format!("{session} --fault x_servo:gain={gain}@0"));
@@ -27,7 +27,7 @@ fn a_drift_is_shown_and_warned_of() {
 
     let lines = bench.ok(&format!("trends --asset learnt.json --format json {names}")).json();
     let [view] = &lines[..] else { panic!("one object") };
-    assert_eq!((view["points"].as_array().unwrap().len(), &view["asset"]), (8, &"chapter".into()));
+    assert_eq!((view["points"].as_array().unwrap().len(), &view["asset"]), (10, &"chapter".into()));
     let summary = view["trends"][0]["warning"]["summary"].as_str().unwrap();
     assert!(summary.contains("falls; at this slope it reaches"), "{summary}");
 }
@@ -36,7 +36,7 @@ fn a_drift_is_shown_and_warned_of() {
 fn too_few_sessions_and_a_rig_that_is_not_learnt_are_told() {
     let (bench, _) = bench();
     let few = bench.ok("trends --asset learnt.json s0.csv s1.csv").stdout;
-    assert!(few.contains("5 sessions with enough motion make a trend; there are fewer"), "{few}");
+    assert!(few.contains("7 sessions with enough motion make a trend; there are fewer"), "{few}");
     let refused = bench.run(3, "trends --asset rig.json s0.csv").stderr;
     assert!(refused.contains("it has no calibration"), "{refused}");
 }

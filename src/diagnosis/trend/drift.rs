@@ -1,12 +1,15 @@
 //! Which parameters of a servo are followed, and the limits of each.
 
-use super::{Band, LEAST_SESSIONS, MAX_SESSIONS, MEDIAN_ERROR, Trend, Warning, warning};
+use super::{Band, MAX_SESSIONS, MEDIAN_ERROR, Trend, Warning, warning};
 use crate::diagnosis::ServoEstimate;
 use crate::maths::{median, robust_deviation};
 
 /// How far ahead a warning looks, sessions: in time to plan a repair, and no
 /// further than a line through as many sessions can be believed.
 pub const HORIZON_SESSIONS: f64 = 20.0;
+
+/// The first sessions, which say what is usual: few, for a drift begins at once.
+const USUAL_SESSIONS: usize = 5;
 
 /// A servo's parameter that is followed from session to session.
 ///
@@ -90,7 +93,7 @@ pub fn drift(parameter: Parameter, sessions: &[Option<ServoEstimate>]) -> Option
 /// What is usual, and its standard error: the median of the first estimates.
 fn usual(values: &[f64]) -> Option<(f64, f64)> {
     let estimated = values.iter().copied().filter(|value| value.is_finite());
-    let mut first: Vec<f64> = estimated.take(LEAST_SESSIONS).collect();
+    let mut first: Vec<f64> = estimated.take(USUAL_SESSIONS).collect();
     let usual = median(&mut first)?;
     let error = MEDIAN_ERROR * robust_deviation(&mut first)? / (first.len() as f64).sqrt();
     Some((usual, error))

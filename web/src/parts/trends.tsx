@@ -41,7 +41,7 @@ export function TrendsCard({ asked }: { asked: ReturnType<typeof useTrends> }) {
       <Trouble error={asked.error} again={() => void asked.again()} />
       {!trends && !asked.error && <Loading what="the trends" />}
       {trends && !trends.calibration_id && <p class="quiet">Nothing is followed until the rig has been learnt.</p>}
-      {trends?.calibration_id && !trends.trends.length && <p class="quiet">{points.length} of 5 sessions that it takes have been estimated since the rig was learnt; each needs twenty seconds in which the ball moves. A session counts once it has ended.</p>}
+      {trends?.calibration_id && !trends.trends.length && <p class="quiet">{points.length} of 7 sessions that it takes have been estimated since the rig was learnt; each needs twenty seconds in which the ball moves. A session counts once it has ended.</p>}
       {trends && trends.trends.length > 0 && (
         <>
           <p class="quiet small-text">One dot for each session since the rig was learnt, oldest on the left. A line that surely leads beyond a limit (dashed) within 20 sessions is warned of. Compare like with like: another motion may move the dots too.</p>
