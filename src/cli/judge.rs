@@ -5,9 +5,9 @@ use std::fs::File;
 use std::path::Path;
 
 use super::unusable::{Unusable, read};
-use crate::diagnosis::{FaultMemory, Profile, Transition};
+use crate::diagnosis::{FaultMemory, Profile, ServoEstimate, Transition};
 use crate::engine::{Admission, Engine, Input, Output, Rig, Setup};
-use crate::vocabulary::Sample;
+use crate::vocabulary::{PerAxis, Sample};
 use crate::wire::asset;
 use crate::wire::basis::Basis;
 use crate::wire::session_csv::{Reader, RowError};
@@ -25,6 +25,8 @@ pub(super) struct Judged {
     pub bad_rows: Vec<RowError>,
     /// Rows that came too late, or too far ahead, to be judged.
     pub n_set_aside: u64,
+    /// How each servo has answered; none where too little motion was seen.
+    pub estimates: PerAxis<Option<ServoEstimate>>,
 }
 
 /// The rig of an asset file; without one the chapter's.
@@ -160,7 +162,8 @@ impl Bench {
         let (first, last) = self.span_s?;
         let summary =
             self.verdict.summary(&self.session, self.n_samples, self.n_rejected, last - first);
+        let estimates = self.engine.servo_estimates();
         let Self { faults, bad_rows, n_set_aside, .. } = self;
-        Some(Judged { faults, summary, bad_rows, n_set_aside })
+        Some(Judged { faults, summary, bad_rows, n_set_aside, estimates })
     }
 }

@@ -19,6 +19,7 @@ mod serve;
 mod simulate;
 mod soak;
 mod table;
+mod trends;
 mod unusable;
 mod watch;
 
@@ -56,6 +57,7 @@ enum Command {
     Simulate(Box<simulate::SimulateArgs>),
     Calibrate(calibrate::CalibrateArgs),
     Replay(replay::ReplayArgs),
+    Trends(trends::TrendsArgs),
     Score(score::ScoreArgs),
     Soak(soak::SoakArgs),
     Scene(scene::SceneArgs),
@@ -91,6 +93,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Simulate(args) => simulate::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Replay(args) => replay::run(&args),
+        Command::Trends(args) => trends::run(&args),
         Command::Score(args) => score::run(&args),
         Command::Soak(args) => soak::run(&args),
         Command::Scene(args) => scene::run(&args),

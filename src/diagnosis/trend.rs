@@ -6,20 +6,27 @@
 //! Its confidence is Sen's, from the distribution of Kendall's S without any
 //! drift. Knows no rig: numbers in order of sessions in, a judgement out.
 
-use crate::maths::median;
+mod drift;
+
+pub use drift::{Drift, HORIZON_SESSIONS, Parameter, drift};
+
+use crate::maths::{median, robust_deviation};
 
 /// Sessions that a trend looks back over; of more the last count. Every two of
 /// them have a slope, so that the work is their square.
 pub const MAX_SESSIONS: usize = 200;
 
-/// Fewest sessions that make a trend: with five, a run that rises throughout
-/// has a chance of 2/5! = 1.7 % without any drift; with four it has 8 %.
-pub const LEAST_SESSIONS: usize = 5;
+/// Fewest sessions that make a trend: with seven, a run that rises or falls
+/// throughout has a chance of 2/7! = 0.04 % without any drift; with six, 0.3 %.
+pub const LEAST_SESSIONS: usize = 7;
 
-/// The quantile of the normal distribution for a confidence of 99 %, two-sided:
-/// one rig of a hundred without drift is taken to have one, and then it must
-/// lead to the limit too.
-const QUANTILE: f64 = 2.576;
+/// The quantile of the normal distribution for a confidence of 99.9 %,
+/// two-sided: a rig has six parameters, each looked at after every session, and
+/// one that is noisy leads to its limit wherever it is taken to drift.
+const QUANTILE: f64 = 3.291;
+
+/// Standard error of a median over that of a mean, of normal values: √(π/2).
+const MEDIAN_ERROR: f64 = 1.2533;
 
 /// Share of the limit beyond which a drift is warned of however slow it is.
 const DRIFT_SHARE: f64 = 0.5;
@@ -29,11 +36,12 @@ const DRIFT_SHARE: f64 = 0.5;
 pub struct Trend {
     /// Change per session.
     pub slope: f64,
-    /// The slope lies between these with a confidence of 99 %.
+    /// The slope lies between these with a confidence of 99.9 %.
     pub slope_low: f64,
     pub slope_high: f64,
-    /// What the line says of the last session.
+    /// What the line says of the last session, and its standard error.
     pub level: f64,
+    pub level_error: f64,
     pub n_sessions: usize,
 }
 
@@ -59,7 +67,11 @@ impl Trend {
         let last = values.len() as f64 - 1.0;
         let mut levels: Vec<f64> = points.iter().map(|(i, v)| v + slope * (last - i)).collect();
         let level = median(&mut levels)?;
-        Some(Self { slope, slope_low, slope_high, level, n_sessions: points.len() })
+        let scattered =
+            MEDIAN_ERROR * robust_deviation(&mut levels)? / (points.len() as f64).sqrt();
+        let turned = (slope_high - slope_low) / (2.0 * QUANTILE) * last / 2.0;
+        let level_error = scattered.hypot(turned);
+        Some(Self { slope, slope_low, slope_high, level, level_error, n_sessions: points.len() })
     }
 
     /// Whether there is a drift at all: the confidence has no zero in it.
@@ -107,12 +119,19 @@ fn confidence(slopes: &[f64], n: usize) -> (f64, f64) {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Band {
     pub low: f64,
-    /// What it is as calibrated.
+    /// What it usually is.
     pub nominal: f64,
     pub high: f64,
 }
 
 impl Band {
+    /// The same room on either side of another nominal value.
+    #[must_use]
+    pub fn about(&self, nominal: f64) -> Self {
+        let by = nominal - self.nominal;
+        Self { low: self.low + by, nominal, high: self.high + by }
+    }
+
     /// How far `value` is on its way from nominal to the limit on its side: 0
     /// to 1, and more beyond it.
     #[must_use]
@@ -135,17 +154,16 @@ pub enum Warning {
 
 /// What is to be said of a trend with the limits of `band`, looking `horizon`
 /// sessions ahead. A line that may as well be level is said nothing of, unless
-/// its level, of which `level_sd` is the standard error, is surely beyond half
-/// the limit.
+/// its level is surely beyond half the limit.
 #[must_use]
-pub fn warning(trend: &Trend, band: &Band, level_sd: f64, horizon: f64) -> Option<Warning> {
+pub fn warning(trend: &Trend, band: &Band, horizon: f64) -> Option<Warning> {
     let until = trend.sessions_until(band).filter(|&sessions| sessions <= horizon);
     if let Some(sessions) = until.filter(|_| trend.is_significant()) {
         return Some(Warning::Crosses { sessions });
     }
     // The nearer end of the level's confidence decides.
     let away = trend.level - band.nominal;
-    let least = (away.abs() - QUANTILE * level_sd).max(0.0) * away.signum();
+    let least = (away.abs() - QUANTILE * trend.level_error).max(0.0) * away.signum();
     let share = band.share(trend.level);
     (band.share(band.nominal + least) > DRIFT_SHARE).then_some(Warning::Drifted { share })
 }

@@ -12,6 +12,7 @@ use super::{App, PageQuery, Problem, Query, body, page_limit};
 use crate::service::Service;
 use crate::wire::asset::AssetView;
 use crate::wire::service::{FleetEntryView, Page, StateView};
+use crate::wire::trend::TrendsView;
 
 /// Longest asset file, bytes; a longer one is refused.
 const MAX_ASSET_BYTES: usize = 64 << 10;
@@ -100,6 +101,20 @@ pub(super) async fn state(
 ) -> Result<Json<StateView>, Problem> {
     about(&asset);
     Ok(Json(service.state(&asset).await?))
+}
+
+/// Drift before fault: what the sessions estimated of both servos, the line
+/// through it with its confidence, its limits, and a warning where it leads to
+/// one. A session counts once it has ended.
+#[utoipa::path(get, path = "/assets/{asset}/trends", tag = "assets", operation_id = "get_trends",
+    params(("asset", description = "Name of the asset")),
+    responses((status = 200, body = TrendsView), (status = 404, body = Problem)))]
+pub(super) async fn trends(
+    State(service): State<Service>,
+    Path(asset): Path<String>,
+) -> Result<Json<TrendsView>, Problem> {
+    about(&asset);
+    Ok(Json(service.trends(&asset).await?))
 }
 
 /// The fleet at a glance: for each asset, in the order of their names, its open

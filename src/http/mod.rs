@@ -101,6 +101,7 @@ fn api() -> OpenApiRouter<App> {
         .routes(routes!(assets::list, assets::create))
         .routes(routes!(assets::get, assets::put, assets::delete))
         .routes(routes!(assets::state))
+        .routes(routes!(assets::trends))
         .routes(routes!(assets::fleet))
         .routes(routes!(telemetry::post))
         .routes(routes!(stream::stream))

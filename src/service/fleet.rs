@@ -4,16 +4,24 @@ use std::collections::BTreeMap;
 
 use super::clock::rfc3339;
 use super::{Service, ServiceError, views};
-use crate::store::{AssetRow, FaultRow, Micros, SessionRow};
+use crate::store::{AssetRow, FaultRow, Micros, SessionRow, WarningRow};
 use crate::wire::asset::AssetView;
 use crate::wire::memory::FaultRecordView;
 use crate::wire::service::{FleetEntryView, FleetFaultView, Page};
+use crate::wire::trend::TrendWarningView;
 
 /// What the store knows of a stretch of the fleet, by asset.
 struct Known {
     open: BTreeMap<String, SessionRow>,
     last: BTreeMap<String, Micros>,
     faults: BTreeMap<String, Vec<FleetFaultView>>,
+    warnings: BTreeMap<String, Vec<Warned>>,
+}
+
+/// Warnings, and the calibration by which they came about.
+struct Warned {
+    calibration_id: Option<String>,
+    warnings: Vec<TrendWarningView>,
 }
 
 impl Service {
@@ -42,10 +50,18 @@ impl Service {
         for row in store.active_faults_of(first, last).await? {
             faults.entry(row.asset.clone()).or_default().push(fault(row)?);
         }
+        let mut warnings: BTreeMap<String, Vec<Warned>> = BTreeMap::new();
+        for WarningRow { asset, calibration_id, warnings: json } in
+            store.warnings_of(first, last).await?
+        {
+            let warned = Warned { calibration_id, warnings: views::from_json(&json)? };
+            warnings.entry(asset).or_default().push(warned);
+        }
         Ok(Known {
             open: open.into_iter().map(|row| (row.asset.clone(), row)).collect(),
             last: store.last_sessions_of(first, last).await?.into_iter().collect(),
             faults,
+            warnings,
         })
     }
 
@@ -55,7 +71,11 @@ impl Service {
         let open = known.open.remove(&row.name);
         let seen = presence.as_ref().map(|p| p.seen_at).or(known.last.remove(&row.name));
         let progress = open.as_ref().map(|open| open.progress).unwrap_or_default();
+        let calibration_id = file.calibration.as_ref().map(|c| &c.id);
+        let mut warned = known.warnings.remove(&row.name).unwrap_or_default();
+        warned.retain(|warned| warned.calibration_id.as_ref() == calibration_id);
         Ok(FleetEntryView {
+            warnings: warned.into_iter().flat_map(|warned| warned.warnings).collect(),
             faults: known.faults.remove(&row.name).unwrap_or_default(),
             calibrated: file.calibration.is_some(),
             session_id: open.as_ref().map(|open| open.id.clone()),

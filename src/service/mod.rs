@@ -34,6 +34,7 @@ mod sessions;
 mod shard;
 mod telemetry;
 mod traces;
+mod trends;
 mod views;
 
 use std::hash::{DefaultHasher, Hash, Hasher};

@@ -6,7 +6,8 @@ use uuid::Uuid;
 use super::clock::rfc3339;
 use super::commit::Life;
 use super::recent::Recent;
-use super::{ServiceError, views};
+use super::shard::Context;
+use super::{ServiceError, trends, views};
 use crate::diagnosis::{FaultMemory, FaultRecord, MemoryRules};
 use crate::engine::{Admission, Engine, Input, Output, Rig, Setup};
 use crate::store::{
@@ -54,7 +55,7 @@ pub(super) struct OpenSession {
     pub(super) id: String,
     pub(super) name: String,
     pub(super) engine: Engine,
-    basis: Basis,
+    pub(super) basis: Basis,
     pub(super) progress: Progress,
     pub(super) n_transitions: i64,
     /// Whether a recording is being imported into it: no live telemetry then.
@@ -216,7 +217,7 @@ impl Running {
     }
 
     /// Ends the open session, if there is one.
-    pub(super) fn end(&mut self, work: &mut Work) -> Result<(), ServiceError> {
+    pub(super) fn end(&mut self, context: &Context, work: &mut Work) -> Result<(), ServiceError> {
         let Some(mut open) = self.open.take() else { return Ok(()) };
         open.input(Input::End);
         open.report(&self.row.name, work)?;
@@ -227,6 +228,7 @@ impl Running {
             verdict: views::to_json(&summary)?,
             hash: summary.verdict_hash,
         });
+        work.writes.append(&mut trends::ended(context, &self.row.name, &open, work.at)?);
         let memory = open.engine.memory().clone();
         self.remember_as(memory, Some(&open.occurrence(work.at)), None, work)
     }

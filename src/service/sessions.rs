@@ -89,9 +89,9 @@ impl Service {
     pub async fn end_session(&self, id: &str) -> Result<SessionView, ServiceError> {
         let row = self.session_row(id).await?;
         let wanted = row.id.clone();
-        self.call(&row.asset, move |_, running, work| {
+        self.call(&row.asset, move |context, running, work| {
             if running.open.as_ref().is_some_and(|open| open.id == wanted) {
-                running.end(work)?;
+                running.end(context, work)?;
             }
             Ok(())
         })
@@ -107,9 +107,9 @@ impl Service {
     pub async fn delete_session(&self, id: &str) -> Result<(), ServiceError> {
         let row = self.session_row(id).await?;
         let session = row.id.clone();
-        self.call(&row.asset, move |_, running, work| {
+        self.call(&row.asset, move |context, running, work| {
             if running.open.as_ref().is_some_and(|open| open.id == session) {
-                running.end(work)?;
+                running.end(context, work)?;
             }
             work.writes.push(Write::DeleteSession { session });
             Ok(())

@@ -169,7 +169,7 @@ pub(super) fn switch(
     if let Some(row) = context.wait(context.store.session_named(&running.row.name, name))? {
         return Ok(Switched::Ended(Box::new(row)));
     }
-    running.end(work)?;
+    running.end(context, work)?;
     running.open(name.to_owned(), work)?;
     Ok(Switched::Open)
 }
@@ -218,7 +218,7 @@ fn nameless(
         // Once a batch: a clock that jumps to and fro opens no session each time.
         watch = false;
         if !is_recorded(context, &open.id, first)? {
-            running.end(work)?;
+            running.end(context, work)?;
         }
     }
 }

@@ -22,7 +22,7 @@ use sqlx::sqlite::{
 pub use read::{FaultFilter, FaultOrder, SessionFilter};
 pub use rows::{
     ActionKind, ActionRow, AssetRow, CalibrationRow, EventRow, FaultRow, JobState, Micros,
-    Progress, ReplayRow, SessionRow, TransitionRow,
+    Progress, ReplayRow, SessionRow, TransitionRow, TrendEntry, TrendRow, WarningRow,
 };
 pub use tail::{FULL_CHUNK_SAMPLES, MAX_TAIL_CHUNKS};
 pub use write::{Write, Writer};

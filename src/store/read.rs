@@ -4,7 +4,7 @@ use sqlx::{QueryBuilder, Sqlite};
 
 use super::{
     ActionRow, AssetRow, CalibrationRow, EventRow, FaultRow, Micros, ReplayRow, SessionRow, Store,
-    StoreError, TransitionRow, codec,
+    StoreError, TransitionRow, TrendEntry, WarningRow, codec,
 };
 use crate::vocabulary::Sample;
 
@@ -251,6 +251,40 @@ impl Store {
         Ok(sqlx::query_as(
             "SELECT * FROM fault WHERE asset >= $1 AND asset <= $2
              AND status IN ('pending', 'confirmed') ORDER BY asset, status, code",
+        )
+        .bind(first)
+        .bind(last)
+        .fetch_all(&self.pool)
+        .await?)
+    }
+
+    /// What the sessions of `asset` estimated, with their names, newest first:
+    /// at most `limit` rows, of which a session has one for each axis.
+    pub async fn trend(&self, asset: &str, limit: u32) -> Result<Vec<TrendEntry>, StoreError> {
+        Ok(sqlx::query_as(
+            "SELECT trend.*, session.name AS session_name FROM trend
+             JOIN session ON session.id = trend.session WHERE trend.asset = $1
+             ORDER BY trend.ended_at DESC, trend.session DESC, trend.axis LIMIT $2",
+        )
+        .bind(asset)
+        .bind(i64::from(limit))
+        .fetch_all(&self.pool)
+        .await?)
+    }
+
+    /// The warnings of the assets from `first` to `last`, as of the last
+    /// session that estimated the axis.
+    pub async fn warnings_of(
+        &self,
+        first: &str,
+        last: &str,
+    ) -> Result<Vec<WarningRow>, StoreError> {
+        Ok(sqlx::query_as(
+            "SELECT asset, calibration_id, warnings FROM trend
+             WHERE asset >= $1 AND asset <= $2 AND warnings IS NOT NULL AND NOT EXISTS (
+                SELECT 1 FROM trend later WHERE later.asset = trend.asset
+                AND later.axis = trend.axis AND later.ended_at > trend.ended_at)
+             ORDER BY asset, axis",
         )
         .bind(first)
         .bind(last)

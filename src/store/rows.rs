@@ -197,3 +197,41 @@ pub struct CalibrationRow {
     pub document: Option<String>,
     pub error: Option<String>,
 }
+
+/// What a session estimated of the servo behind an axis.
+#[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
+pub struct TrendRow {
+    pub session: String,
+    /// `x` or `y`.
+    pub axis: String,
+    pub asset: String,
+    pub ended_at: Micros,
+    pub n_samples: i64,
+    pub calibration_id: Option<String>,
+    pub gain: f64,
+    pub gain_error: f64,
+    pub offset_m_s2: f64,
+    pub offset_error_m_s2: f64,
+    pub delay_s: f64,
+    pub delay_error_s: f64,
+    /// Motion that it rests on, s.
+    pub motion_s: f64,
+    /// What the sessions up to this one lead to.
+    pub warnings: Option<String>,
+}
+
+/// The same with the session's name.
+#[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
+pub struct TrendEntry {
+    pub session_name: String,
+    #[sqlx(flatten)]
+    pub row: TrendRow,
+}
+
+/// The warnings of an axis as of the last session that estimated it.
+#[derive(Clone, Debug, PartialEq, Eq, sqlx::FromRow)]
+pub struct WarningRow {
+    pub asset: String,
+    pub calibration_id: Option<String>,
+    pub warnings: String,
+}

@@ -7,7 +7,7 @@ use sqlx::{ConnectOptions, Connection, SqliteConnection};
 use super::tail::Tails;
 use super::{
     ActionRow, AssetRow, CalibrationRow, FaultRow, MIGRATIONS, Micros, Progress, ReplayRow,
-    SessionRow, StoreError, TransitionRow, options,
+    SessionRow, StoreError, TransitionRow, TrendRow, options,
 };
 use crate::vocabulary::Sample;
 
@@ -42,6 +42,7 @@ pub enum Write {
     Act(ActionRow),
     Transition(TransitionRow),
     Fault(FaultRow),
+    Trend(TrendRow),
     PutReplay(ReplayRow),
     PutCalibration(CalibrationRow),
     ActivateCalibration {
@@ -165,6 +166,7 @@ impl Group<'_> {
                 insert_action(db, row).await
             }
             Write::Fault(row) => put_fault(db, row).await,
+            Write::Trend(row) => insert_trend(db, row).await,
             Write::PutReplay(row) => put_replay(db, row).await,
             Write::PutCalibration(row) => put_calibration(db, row).await,
             Write::ActivateCalibration { asset, id } => activate(db, asset, id).await,
@@ -345,6 +347,31 @@ async fn put_fault(db: &mut SqliteConnection, row: &FaultRow) -> Result<(), Stor
     .bind(row.changed_at)
     .bind(&row.record)
     .bind(&row.provenance)
+    .execute(db)
+    .await?;
+    Ok(())
+}
+
+async fn insert_trend(db: &mut SqliteConnection, row: &TrendRow) -> Result<(), StoreError> {
+    sqlx::query(
+        "INSERT INTO trend (session, axis, asset, ended_at, n_samples, calibration_id, gain,
+         gain_error, offset_m_s2, offset_error_m_s2, delay_s, delay_error_s, motion_s, warnings)
+         VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14)",
+    )
+    .bind(&row.session)
+    .bind(&row.axis)
+    .bind(&row.asset)
+    .bind(row.ended_at)
+    .bind(row.n_samples)
+    .bind(&row.calibration_id)
+    .bind(row.gain)
+    .bind(row.gain_error)
+    .bind(row.offset_m_s2)
+    .bind(row.offset_error_m_s2)
+    .bind(row.delay_s)
+    .bind(row.delay_error_s)
+    .bind(row.motion_s)
+    .bind(&row.warnings)
     .execute(db)
     .await?;
     Ok(())

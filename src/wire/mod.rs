@@ -17,4 +17,5 @@ pub mod service;
 pub mod session_csv;
 pub mod telemetry;
 pub mod trace;
+pub mod trend;
 pub mod verdict;

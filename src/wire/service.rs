@@ -8,6 +8,7 @@ use super::difference::{ComparedView, TallyView};
 use super::memory::FaultRecordView;
 use super::provenance::ProvenanceView;
 use super::trace::TraceView;
+use super::trend::TrendWarningView;
 use super::verdict::{EvidenceView, FaultView, SummaryView, evidence_view};
 use crate::diagnosis::StatusByte;
 use crate::engine::{MonitorState, State};
@@ -146,6 +147,8 @@ pub struct FleetEntryView {
     pub lag_s: Option<f64>,
     /// Pending and confirmed ones.
     pub faults: Vec<FleetFaultView>,
+    /// Of faults on their way: drifts of a servo over the sessions.
+    pub warnings: Vec<TrendWarningView>,
 }
 
 /// An active fault, at a glance.

@@ -9,4 +9,5 @@ mod scene;
 mod score;
 mod service;
 mod simulate;
+mod trends;
 mod usage;

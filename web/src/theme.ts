@@ -4,6 +4,8 @@ export type Theme = "system" | "light" | "dark";
 
 const KEY = "offbd.theme";
 const listeners = new Set<() => void>();
+/** Asked for in every frame, changed by the theme alone. */
+const known = new Map<string, string>();
 
 export const theme = () => (localStorage.getItem(KEY) ?? "system") as Theme;
 
@@ -16,6 +18,7 @@ function apply(): void {
   const wanted = theme();
   document.documentElement.style.colorScheme = wanted === "system" ? "light dark" : wanted;
   document.documentElement.dataset.theme = isDark() ? "dark" : "light";
+  known.clear();
   listeners.forEach((listener) => listener());
 }
 
@@ -30,7 +33,14 @@ export function onTheme(listener: () => void): () => void {
 }
 
 /** The value of a custom property of the style sheet, as the theme has it now. */
-export const colour = (name: string) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+export function colour(name: string): string {
+  let value = known.get(name);
+  if (value === undefined) {
+    value = getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+    known.set(name, value);
+  }
+  return value;
+}
 
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", apply);
 apply();

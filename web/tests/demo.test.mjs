@@ -96,10 +96,10 @@ test("the textbook's limit is broken by a rig that the default calls whole", asy
   const view = await page(chromium);
   await view.goto(`${show.url}/learn`);
   await view.getByRole("heading", { name: "textbook" }).waitFor();
-  const share = view.locator("dt:text-is('Beyond the limit, of what is judged') + dd");
-  await view.waitForFunction(() => [...document.querySelectorAll("dt")].filter((dt) => dt.textContent.startsWith("Beyond") && /\d/.test(dt.nextSibling.textContent)).length === 2);
+  const share = view.locator("dt:text-is('Beyond the limit') + dd");
+  await view.waitForFunction(() => [...document.querySelectorAll("dt")].filter((dt) => dt.textContent === "Beyond the limit" && /\d/.test(dt.nextSibling.textContent)).length === 2);
   const [usual, textbook] = (await share.allTextContents()).map((text) => parseInt(text, 10));
-  assert.ok(textbook > 30 && usual < textbook / 2, `default ${usual} %, textbook ${textbook} %`);
+  assert.ok(textbook > 10 && usual < textbook / 2, `default ${usual} %, textbook ${textbook} %`);
   await view.getByRole("img", { name: /Speed against accuracy/ }).first().waitFor();
   await view.done();
 });

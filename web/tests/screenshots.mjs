@@ -2,7 +2,7 @@
 // themes. Run by scripts/screenshots; the first argument is the directory.
 import { mkdirSync } from "node:fs";
 import { join } from "node:path";
-import { ask, browser, demo, directory, page, recordings, remove, serve } from "./support.mjs";
+import { ask, browser, demo, directory, drifting, page, recordings, remove, serve } from "./support.mjs";
 
 const out = process.argv[2] ?? "screenshots";
 const only = process.argv[3]?.split(",");
@@ -40,6 +40,7 @@ try {
   await ask(base, "POST", "/assets", { ...learnt, name: "bench-1" });
   await ask(base, "POST", "/assets/bench-1/sessions/import?name=healthy", healthy, "text/csv");
   const imported = await ask(base, "POST", "/assets/bench-1/sessions/import?name=monday", sick, "text/csv");
+  await drifting(base, work, learnt);
   for (let i = 2; i < 40; i++) {
     await ask(base, "POST", "/assets", { name: `bench-${i}` });
     const rows = sick.split("\n").slice(1, 200).join("\n");
@@ -56,6 +57,11 @@ try {
     await settle(view, 5000);
     await ask(base, "POST", "/demo/faults", { fault: "x_servo:reversed" });
     await view.getByRole("list", { name: "Active faults" }).waitFor();
+  });
+  await shoot(of, "drift", `${base}/rigs/weak`, heading("Drift over sessions"), async (view) => {
+    await view.getByText("at the limit in").waitFor();
+    await view.getByRole("heading", { name: "Drift over sessions" }).scrollIntoViewIfNeeded();
+    await view.evaluate(() => scrollTo(0, document.body.scrollHeight));
   });
   await shoot(of, "sessions", `${base}/sessions`, heading("Sessions"), (view) => view.getByText("monday").first().waitFor());
   await shoot(of, "session", `${base}/sessions/${imported.session.id}?t=19`, heading("Judge it again"), async (view) => {

@@ -71,6 +71,17 @@ export function recordings(where) {
   return { path, rig: JSON.parse(read("rig.json")), learnt: JSON.parse(read("learnt.json")), healthy: read("healthy.csv"), sick: read("sick.csv") };
 }
 
+/** Registers a learnt rig whose x servo loses 2 % of its gain in each of `n` sessions. */
+export async function drifting(base, where, learnt, name = "weak", n = 10) {
+  await ask(base, "POST", "/assets", { ...learnt, name });
+  for (let i = 0; i < n; i++) {
+    const path = join(where, "drifting.csv");
+    const args = ["simulate", "--reference", "lissajous", "--seed", `${100 + i}`, "--fault", `x_servo:gain=${1 - 0.02 * i}@0`, "-o", path];
+    offbd(...args);
+    await ask(base, "POST", `/assets/${name}/sessions/import?name=day-${i + 1}`, readFileSync(path, "utf8"), "text/csv");
+  }
+}
+
 /** Asks the interface; an answer that is no success is an error. */
 export async function ask(base, method, path, body, type = "application/json") {
   const answer = await fetch(`${base}/api/v1${path}`, {

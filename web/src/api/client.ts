@@ -1,8 +1,8 @@
 /** Requests to the interface. What goes wrong is a `ProblemError` with the service's own words. */
 import { actor, authorised } from "./access";
 import type {
-  Asset, CalibrationJob, Demo, FaultEntry, FaultLine, FleetEntry, Health, History, Import, Page, Problem,
-  Replay, ReplaySettings, Session, State, Trace,
+  Around, Asset, CalibrationJob, Demo, FaultEntry, FaultLine, FleetEntry, Health, History, Import, Page, Problem,
+  Replay, ReplaySettings, Session, State, Trace, Trends,
 } from "./types";
 
 const BASE = "/api/v1";
@@ -70,9 +70,13 @@ export const api = {
   putAsset: (asset: Asset) => send<Asset>("PUT", `/assets/${id(asset.name)}`, asset),
   deleteAsset: (name: string) => send<void>("DELETE", `/assets/${id(name)}`),
   state: (name: string) => get<State>(`/assets/${id(name)}/state`),
+  trends: (name: string) => get<Trends>(`/assets/${id(name)}/trends`),
   faultsOf: (name: string, status = "all") =>
     get<Page<FaultEntry>>(`/assets/${id(name)}/faults${query({ status })}`).then((page) => page.items),
   fault: (name: string, code: string) => get<FaultEntry>(`/assets/${id(name)}/faults/${id(code)}`),
+  /** The seconds around the last occurrence, as recorded and as judged. */
+  around: (name: string, code: string, stretch: { before_s: number; after_s: number }) =>
+    get<Around>(`/assets/${id(name)}/faults/${id(code)}/recording${query(stretch)}`),
   history: (name: string, code: string) =>
     get<Page<History>>(`/assets/${id(name)}/faults/${id(code)}/history${query({ limit: 200 })}`),
   acknowledge: (name: string, code: string) =>

@@ -11,7 +11,7 @@ export type AxisTrace = Schemas["AxisTraceView"];
 export type Calibration = Schemas["CalibrationView"];
 export type CalibrationJob = Schemas["CalibrationJobView"];
 export type Evidence = Schemas["EvidenceView"];
-export type FaultEntry = Schemas["FaultRecordView"] & { asset: string; changed_at: string };
+export type FaultEntry = Schemas["FaultEntryView"];
 export type FaultLine = Schemas["FaultView"] & { asset?: string; session_id?: string };
 export type FleetEntry = Schemas["FleetEntryView"];
 export type FleetFault = Schemas["FleetFaultView"];
@@ -25,6 +25,10 @@ export type ReplaySettings = Schemas["ReplaySettingsView"];
 export type Session = Schemas["SessionView"];
 export type State = Schemas["StateView"];
 export type Trace = Schemas["TraceView"];
+export type Trend = Schemas["TrendView"];
+export type TrendPoint = Schemas["TrendPointView"];
+export type Trends = Schemas["TrendsView"];
+export type Around = Schemas["RecordingView"];
 
 export interface Page<T> {
   items: T[];

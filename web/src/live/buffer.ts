@@ -1,5 +1,5 @@
 /** A growing trace as flat columns, for charts and pictures; the oldest go first. */
-import type { Axis, Trace } from "../api/types";
+import type { Around, Axis, Trace } from "../api/types";
 
 export const AXES: readonly Axis[] = ["x", "y"];
 
@@ -28,6 +28,21 @@ const MOST = 10_000;
 const minus = (a: number | null | undefined, b: number | null | undefined) =>
   a === null || a === undefined || b === null || b === undefined ? null : a - b;
 
+/** Longest time in which nothing is judged that lines go across, s. */
+const ACROSS_S = 0.2;
+
+/** The rows of a recording that were judged, and others where none was for a while. */
+function drawable(columns: Around["columns"]): Around["columns"] {
+  let last = -Infinity;
+  const kept = columns.t_s.flatMap((t, i) => {
+    const judged = columns.x_limit_m_s2[i] != null;
+    if (!judged && t - last < ACROSS_S) return [];
+    last = t;
+    return [i];
+  });
+  return Object.fromEntries(Object.entries(columns).map(([name, column]) => [name, kept.map((i) => column[i])])) as Around["columns"];
+}
+
 export class TraceBuffer {
   t: number[] = [];
   x = axis();
@@ -37,6 +52,21 @@ export class TraceBuffer {
     const buffer = new TraceBuffer(Infinity);
     buffer.append(trace);
     return buffer;
+  }
+
+  /** The seconds around a fault: they say nothing of where the twin was. */
+  static ofRecording({ columns }: Around): TraceBuffer {
+    const c = drawable(columns);
+    const none = c.t_s.map(() => null);
+    const trace = (command: Column, position: Column, measured: Column, twin: Column, limit: Column, enabled: (boolean | null)[]) => ({
+      command_rad: command, plate_angle_rad: none, position_m: position, twin_position_m: none,
+      measured_m_s2: measured, twin_m_s2: twin, limit_m_s2: limit, enabled: enabled.map(Boolean),
+    });
+    return TraceBuffer.of({
+      t_s: c.t_s,
+      x: trace(c.cmd_qy_rad, c.x_m, c.x_measured_m_s2, c.x_twin_m_s2, c.x_limit_m_s2, c.x_enabled),
+      y: trace(c.cmd_qx_rad, c.y_m, c.y_measured_m_s2, c.y_twin_m_s2, c.y_limit_m_s2, c.y_enabled),
+    } as unknown as Trace);
   }
 
   constructor(private readonly most = MOST) {}

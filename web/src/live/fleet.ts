@@ -20,6 +20,7 @@ export function healthOf(entry: FleetEntry, now: number): Health {
   const worst = Math.max(0, ...entry.faults.map(severity));
   if (worst >= 2) return "fault";
   if (worst === 1) return "suspect";
+  if (entry.warnings.length) return "drift";
   if (!entry.session_id) return "idle";
   return entry.last_seen && now - Date.parse(entry.last_seen) < SILENT_MS ? "ok" : "silent";
 }

@@ -9,6 +9,7 @@ import { Act, Facts, FaultChip, HealthMark, Loading, Trouble, type Health } from
 import type { Mark } from "../parts/line-chart";
 import { ChartGroup, RigCharts } from "../parts/rig-charts";
 import { RigView } from "../parts/rig-view";
+import { TrendsCard, TrendWarnings, useTrends } from "../parts/trends";
 import { XyTrace } from "../parts/xy-trace";
 import { at, go, Link } from "../router";
 import { clock, codeMeaning, codeTitle, count, degrees, millimetres, number, seconds, severity } from "../words";
@@ -52,6 +53,7 @@ function Live({ asset, faults, changed }: { asset: Asset; faults: FaultEntry[]; 
   const heard = useRef({ at: 0, t: -1, session: "" });
   const shown = useRef(0);
   const now = useNow(500);
+  const trends = useTrends(asset.name);
 
   useEffect(() => {
     let last = 0;
@@ -120,16 +122,17 @@ function Live({ asset, faults, changed }: { asset: Asset; faults: FaultEntry[]; 
           {active.map((fault) => <li><Link to={at("rigs", asset.name, "faults", fault.code)} class={`banner banner-${fault.status}`}><FaultChip {...fault} /> <span>{codeMeaning(fault.code)}</span> <span class="more">Look at it →</span></Link></li>)}
         </ul>
       )}
+      <TrendWarnings trends={trends.data} />
       {!asset.calibration && <p class="note">Nothing has been learnt of this rig yet, so only large faults are found. <Link to={at("rigs", asset.name, "set-up")}>Calibrate it</Link> from a healthy minute.</p>}
       {state && !state.session_id && <p class="note">No session is open. As soon as the rig sends, it is shown here. <Link to={`${at("rigs", asset.name, "set-up")}?step=connect`}>How to send</Link></p>}
       <div class="live-top">
         <RigView asset={asset} pose={pose} name={`${asset.name}-live`} />
         <div class="live-side">
-          <section class="card"><h2>From above</h2><XyTrace asset={asset} moment={() => (buffer.t.length ? { buffer, t: shown.current, tail: TAIL_S } : null)} /></section>
+          <section class="card"><h2>From above</h2><XyTrace asset={asset} moment={() => ({ buffer, t: shown.current, tail: TAIL_S })} /></section>
           <Monitors monitors={state?.monitors ?? []} />
         </div>
       </div>
-      <section class="card">
+      {(!state || state.session_id) && <section class="card">
         <div class="card-head">
           <h2>Rig and twin</h2>
           <div class="chips" role="group" aria-label="Time shown">{SPANS.map((s) => <button type="button" class="small" aria-pressed={span === s} onClick={() => setSpan(s)}>{s} s</button>)}
@@ -137,8 +140,9 @@ function Live({ asset, faults, changed }: { asset: Asset; faults: FaultEntry[]; 
         </div>
         <RigCharts group={group} kinds={["residual", "acceleration", "command", "position"]} height={136} />
         <p class="quiet small-text">Time on the device's clock, s. The residual counts only while the ground is tinted (the gate is open); the band is the limit.</p>
-      </section>
+      </section>}
       <Numbers asset={asset} state={state} />
+      <TrendsCard asked={trends} />
     </main>
   );
 }

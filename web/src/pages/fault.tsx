@@ -1,20 +1,22 @@
 /** One fault: what was seen, what it may be, since when, and what people did about it. */
+import type { ComponentChildren } from "preact";
 import { useEffect, useMemo, useState } from "preact/hooks";
 import { actor, rememberActor } from "../api/access";
 import { api } from "../api/client";
 import { events } from "../api/events";
-import type { FaultEntry, History } from "../api/types";
+import type { Around as Recording, FaultEntry, History } from "../api/types";
 import { useAsk, useTitle } from "../hooks";
 import { TraceBuffer } from "../live/buffer";
 import { Act, Empty, Facts, Loading, StatusChip, Trouble } from "../parts/bits";
 import { EvidenceTable } from "../parts/evidence";
 import type { Mark } from "../parts/line-chart";
 import { ChartGroup, RigCharts } from "../parts/rig-charts";
+import { save } from "../parts/rig-view";
 import { at, Link } from "../router";
 import { clock, codeMeaning, codeTitle, faultTitle, kindMeaning, seconds, sentence, STATUS_BITS } from "../words";
 
-/** Seconds shown before the onset and after the confirmation. */
-const BEFORE_S = 5;
+/** Seconds shown before and after the occurrence. */
+const BEFORE_S = 6;
 const AFTER_S = 6;
 
 export function FaultPage({ name, code }: { name: string; code: string }) {
@@ -53,9 +55,12 @@ function Shown({ fault, history, error, again }: { fault: FaultEntry; history: H
           <Causes fault={fault} />
           <Timeline history={history} fault={fault} />
         </div>
-        <StatusByte byte={fault.status_byte} />
+        <div class="column">
+          <StatusByte byte={fault.status_byte} />
+          <Monitor fault={fault} />
+        </div>
       </div>
-      {latest && isOn && <Around key={latest.id} history={history} latest={latest} onset={fault.onset_s} />}
+      {fault.last_occurrence && <Around key={`${fault.last_occurrence.session_id} ${fault.onset_s}`} fault={fault} />}
       {fault.freeze_frame && <section class="card"><h2>Freeze frame</h2><p class="quiet small-text">The numbers at the first failure of the current occurrence.</p><EvidenceTable of={fault.freeze_frame} /></section>}
     </main>
   );
@@ -93,13 +98,50 @@ function Causes({ fault }: { fault: FaultEntry }) {
         ))}
       </ul>
       <Facts of={[
-        ["Since", fault.onset_s == null ? "the evidence does not say" : `${seconds(fault.onset_s)} on the device's clock`],
-        ...(fault.axis ? [["Axis", `${fault.axis}, moved by ${fault.command}`] as [string, string]] : []),
-        ["Occurrences", `${fault.occurrences} since the last clear`],
-        ["Sessions with it", `${fault.trips}`],
-        ["Good sessions since", `${fault.good_cycles}`],
+        ...(fault.axis ? [["Axis", `${fault.axis}, moved by ${fault.command}`] as Fact] : []),
+        ["Occurrences", `${fault.occurrences} since the last clear, in ${plural(fault.failed_cycles ?? 0, "session")}`],
+        ...occurrence("First", fault.first_occurrence, fault.first_onset_s),
+        ...(fault.occurrences > 1 ? occurrence("Last", fault.last_occurrence, fault.last_onset_s) : []),
+        ...(fault.last_occurrence ? [
+          ["Judged by", fault.last_occurrence.calibration_id ? <>calibration <code>{fault.last_occurrence.calibration_id}</code></> : "a rig that has not been learnt"] as Fact,
+          ["Settings", <code>{fault.last_occurrence.settings_id}</code>] as Fact,
+        ] : []),
+        ["Acknowledged", act(fault.acknowledgement, fault.occurrences ? "not yet" : "nothing to acknowledge")],
+        ["Cleared", act(fault.cleared, "never")],
+        ...(fault.status === "confirmed" ? [["Heals after", `${plural(fault.healing_cycles ?? 0, "good session")}; there were ${fault.healing_counter ?? 0}`] as Fact] : []),
+        ...(fault.status === "healed" ? [["Is erased after", `${plural(fault.aging_cycles ?? 0, "good session")}; there were ${fault.aging_counter ?? 0}`] as Fact] : []),
         ["Last change", clock(fault.changed_at)],
       ]} />
+    </section>
+  );
+}
+
+type Fact = [string, ComponentChildren];
+
+const plural = (n: number, word: string) => `${n} ${word}${n === 1 ? "" : "s"}`;
+
+const act = (done: FaultEntry["cleared"], never: string) => (done ? <>by <b>{done.by}</b>, {clock(done.at)}</> : never);
+
+/** When and in which session it failed anew. */
+function occurrence(which: string, of: FaultEntry["last_occurrence"], onset?: number | null): Fact[] {
+  if (!of) return [];
+  const where = `${at("sessions", of.session_id)}${onset == null ? "" : `?t=${onset.toFixed(2)}`}`;
+  return [[`${which} occurrence`, <>{clock(of.noted_at)}, {onset == null ? "in" : `${seconds(onset)} into the clock of`} <Link to={where}>{of.session}</Link></>]];
+}
+
+/** Where the test stands, and whether it has had the chance to find anything. */
+function Monitor({ fault }: { fault: FaultEntry }) {
+  const { monitor: m, in_use: use } = fault;
+  const cycles = use?.cycles_with_data ?? 0;
+  return (
+    <section class="card">
+      <h2>Its monitor</h2>
+      <Facts of={[
+        ["In this session", m ? `${m.complete_this_cycle ? "has come to a result" : "no result yet"}; could judge for ${seconds(m.enabled_s, 1)}` : "none is open"],
+        ...(m ? [["Fault detection counter", `${m.counter}, of −128 (passed) to 127 (failed)`.replace("-", "−")] as Fact] : []),
+        ["In-use ratio", use?.ratio == null ? "no session with enough data has ended yet" : `${Math.round(use.ratio * 100)} %: could have found it in ${use.cycles_judged} of ${plural(cycles, "session")} with enough data`],
+      ]} />
+      {use?.ratio != null && use.ratio < 0.5 && <p class="note">A low ratio says that the gate is too strict for how this rig is used.</p>}
     </section>
   );
 }
@@ -129,35 +171,50 @@ function StatusByte({ byte }: { byte: string }) {
   );
 }
 
-/** The seconds before and after, from the session's recording. */
-function Around({ history, latest, onset }: { history: History[]; latest: History; onset?: number | null }) {
-  const session = latest.session_id ?? "";
-  const line = latest.fault!;
-  const start = line.onset_s ?? onset ?? line.t_s;
-  const [from, to] = [start - BEFORE_S, Math.max(line.t_s, start) + AFTER_S];
-  const trace = useAsk(() => api.trace(session, { from_s: from, to_s: to }), `${session} ${from}`);
-  const group = useMemo(() => new ChartGroup(), []);
-  const buffer = useMemo(() => trace.data && TraceBuffer.of(trace.data), [trace.data]);
+/** The seconds before and after the last occurrence, as recorded and as judged. */
+function Around({ fault }: { fault: FaultEntry }) {
+  const { asset, code } = fault;
+  const asked = useAsk(() => api.around(asset, code, { before_s: BEFORE_S, after_s: AFTER_S }), `${asset} ${code} around`);
+  const recording = asked.data;
+  // What comes after the fault in a session that runs is there a little later.
   useEffect(() => {
-    if (!buffer?.t.length) return;
-    const changes = history.filter((entry) => entry.session_id === session && entry.fault && entry.fault.t_s >= from && entry.fault.t_s <= to);
-    const marks: Mark[] = changes.map(({ fault }) => ({ t: fault!.t_s, label: fault!.status, colour: fault!.status === "confirmed" ? "bad" : "warn" }));
-    if (line.onset_s != null) marks.unshift({ t: line.onset_s, label: "onset", colour: "ink" });
-    group.setMarks(marks);
-    group.draw(buffer, [Math.max(from, buffer.first), Math.min(to, Math.max(buffer.last, from + 1))]);
-  }, [buffer, history.length]);
-  const axes = line.axis === "x" || line.axis === "y" ? [line.axis] as ("x" | "y")[] : (["x", "y"] as ("x" | "y")[]);
+    if (!recording || recording.complete || recording.columns.t_s.at(-1)! >= recording.to_s - 0.5) return;
+    const timer = setTimeout(() => void asked.again(), 1000);
+    return () => clearTimeout(timer);
+  }, [recording]);
+  const session = fault.last_occurrence!;
+  const axes = fault.axis === "x" || fault.axis === "y" ? [fault.axis] as ("x" | "y")[] : (["x", "y"] as ("x" | "y")[]);
+  const start = recording?.onset_s ?? recording?.failed_s;
   return (
     <section class="card">
       <div class="card-head">
         <h2>Before and after</h2>
-        <Link class="button" to={`${at("sessions", session)}?t=${start.toFixed(2)}`}>Play the session back</Link>
+        <div class="page-tools">
+          {recording && <button type="button" onClick={() => save(new Blob([JSON.stringify(recording)], { type: "application/json" }), `${asset}-${code}.json`)}>Save the evidence</button>}
+          <Link class="button" to={`${at("sessions", session.session_id)}${start == null ? "" : `?t=${start.toFixed(2)}`}`}>Play the session back</Link>
+        </div>
       </div>
-      <Trouble error={trace.error} again={() => void trace.again()} />
-      {trace.data && !buffer?.t.length && <p class="quiet">The recording has nothing from these seconds.</p>}
-      <RigCharts group={group} kinds={["residual", "acceleration", "command", "position"]} axes={axes} height={150} />
+      <Trouble error={asked.error} again={() => void asked.again()} />
+      {recording && <Seconds recording={recording} axes={axes} />}
     </section>
   );
+}
+
+function Seconds({ recording, axes }: { recording: Recording; axes: ("x" | "y")[] }) {
+  const group = useMemo(() => new ChartGroup(), []);
+  const buffer = useMemo(() => TraceBuffer.ofRecording(recording), [recording]);
+  useEffect(() => {
+    if (!buffer.t.length) return;
+    const marks: Mark[] = [];
+    if (recording.onset_s != null) marks.push({ t: recording.onset_s, label: "onset", colour: "ink" });
+    marks.push({ t: recording.failed_s, label: "pending", colour: "warn" });
+    if (recording.confirmed_s != null) marks.push({ t: recording.confirmed_s, label: "confirmed", colour: "bad" });
+    group.setMarks(marks);
+    group.draw(buffer, [Math.max(recording.from_s, buffer.first), Math.min(recording.to_s, Math.max(buffer.last, recording.failed_s + 1))]);
+  }, [buffer]);
+  return buffer.t.length
+    ? <RigCharts group={group} kinds={["residual", "acceleration", "command", "position"]} axes={axes} height={150} measuredOnly />
+    : <p class="quiet">The recording has nothing from these seconds.</p>;
 }
 
 const WHAT: Record<string, string> = {

@@ -1,16 +1,19 @@
 /** All rigs: which is sick, which is silent, which lags. */
-import { useEffect, useMemo, useState } from "preact/hooks";
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import type { FleetEntry } from "../api/types";
 import { useNow, useTitle } from "../hooks";
 import { healthOf, useFleet } from "../live/fleet";
 import { Empty, FaultChip, HealthMark, Loading, Trouble, type Health } from "../parts/bits";
+import { DriftChips } from "../parts/trends";
 import { VirtualList } from "../parts/virtual-list";
 import { at, go, Link, usePlace } from "../router";
 import { ago, codeTitle, count, number, sentence, severity } from "../words";
 
-const FILTERS: { key: Health | "all"; word: string }[] = [
+type Filter = Health | "all";
+
+const FILTERS: { key: Filter; word: string }[] = [
   { key: "all", word: "All" }, { key: "fault", word: "Fault" }, { key: "suspect", word: "Suspected" },
-  { key: "ok", word: "No fault" }, { key: "silent", word: "Silent" }, { key: "idle", word: "No session" },
+  { key: "drift", word: "Drifting" }, { key: "ok", word: "No fault" }, { key: "silent", word: "Silent" }, { key: "idle", word: "No session" },
 ];
 
 const SORTS = {
@@ -26,16 +29,24 @@ const LAG_S = 2;
 /** bench-2 comes before bench-10. */
 const NAMES = new Intl.Collator("en", { numeric: true });
 
-type Row = { entry: FleetEntry; health: Health; worst: number };
+type Row = { entry: FleetEntry; health: Health; worst: number; place: number };
 
 function matches(entry: FleetEntry, text: string): boolean {
-  const haystack = [entry.asset, entry.session ?? "", ...entry.faults.flatMap((f) => [f.code, codeTitle(f.code), f.kind ?? ""])].join(" ").toLowerCase();
+  const haystack = [entry.asset, entry.session ?? "", ...entry.faults.flatMap((f) => [f.code, codeTitle(f.code), f.kind ?? ""]), ...entry.warnings.flatMap((w) => [w.code, codeTitle(w.code), w.parameter])].join(" ").toLowerCase();
   return text.toLowerCase().split(/\s+/).every((word) => haystack.includes(word));
 }
 
+/** Assets as a person orders them; comparing thousands of names takes too long for every second. */
+function useNameOrder(fleet: FleetEntry[] = []): Map<string, number> {
+  const names = fleet.map((entry) => entry.asset);
+  const key = useRef<string[]>([]);
+  if (names.length !== key.current.length || names.some((name, i) => name !== key.current[i])) key.current = names;
+  return useMemo(() => new Map([...key.current].sort(NAMES.compare).map((name, i) => [name, i])), [key.current]);
+}
+
 function order(sort: keyof typeof SORTS): (a: Row, b: Row) => number {
-  const name = (a: Row, b: Row) => NAMES.compare(a.entry.asset, b.entry.asset);
-  const rank: Record<Health, number> = { fault: 0, suspect: 1, silent: 2, ok: 3, idle: 4 };
+  const name = (a: Row, b: Row) => a.place - b.place;
+  const rank: Record<Health, number> = { fault: 0, suspect: 1, drift: 2, silent: 3, ok: 4, idle: 5 };
   const by: Record<keyof typeof SORTS, (a: Row, b: Row) => number> = {
     severity: (a, b) => b.worst - a.worst || rank[a.health] - rank[b.health],
     name: () => 0,
@@ -63,20 +74,21 @@ export function FleetPage() {
   const now = useNow();
   const height = useRowHeight();
   const text = query.get("search") ?? "";
-  const filter = (query.get("health") || "all") as Health | "all";
+  const filter = (query.get("health") || "all") as Filter;
   const sort = (query.get("sort") ?? "severity") as keyof typeof SORTS;
   const change = (key: string, value: string) => {
     const next = new URLSearchParams(query);
     value ? next.set(key, value) : next.delete(key);
     go(`/${next.size ? `?${next}` : ""}`, true);
   };
+  const places = useNameOrder(fleet);
   const rows = useMemo<Row[]>(() => (fleet ?? []).map((entry) => ({
-    entry, health: healthOf(entry, now), worst: Math.max(0, ...entry.faults.map(severity)),
+    entry, health: healthOf(entry, now), worst: Math.max(0, ...entry.faults.map(severity)), place: places.get(entry.asset) ?? 0,
   })), [fleet, now]);
   const shown = useMemo(() => rows
     .filter((row) => (filter === "all" || row.health === filter) && (!text || matches(row.entry, text)))
     .sort(order(sort in SORTS ? sort : "severity")), [rows, filter, text, sort]);
-  const n = (health: Health | "all") => (health === "all" ? rows.length : rows.filter((row) => row.health === health).length);
+  const n = (health: Filter) => (health === "all" ? rows.length : rows.filter((row) => row.health === health).length);
 
   if (!fleet) return <main>{error ? <><h1>Fleet</h1><Trouble error={error} again={() => void again()} /></> : <Loading what="the fleet" />}</main>;
   if (!fleet.length) {
@@ -138,7 +150,7 @@ function FleetRow({ row: { entry, health }, now }: { row: Row; now: number }) {
     <Link to={at("rigs", entry.asset)} class={`fleet-row row-${health}`}>
       <span class="name">{entry.asset}{!entry.calibrated && <span class="quiet small-text" title="Nothing has been learnt of this rig yet: only large faults are seen"> not learnt</span>}</span>
       <HealthMark health={health} />
-      <span class="faults">{faults.length ? faults.map((fault) => <FaultChip {...fault} />) : <span class="quiet">none</span>}</span>
+      <span class="faults">{faults.map((fault) => <FaultChip {...fault} />)}<DriftChips warnings={entry.warnings} />{!faults.length && !entry.warnings.length && <span class="quiet">none</span>}</span>
       <span class="quiet clip">{entry.session ?? "–"}</span>
       <span class={`n${(entry.lag_s ?? 0) > LAG_S ? " late" : ""}`}><span class="only-small">lag </span>{number(entry.lag_s, 1, "s")}</span>
       <span class="n quiet">{ago(entry.last_seen, now)}</span>

@@ -61,11 +61,12 @@ const SHOWN_S = 20;
 function Textbook() {
   const sessions = useAsk(() => api.sessions({ limit: 50 }).then((page) => page.items.filter((s) => s.samples > 500)), "sessions", 10_000);
   const [id, setId] = useState("");
-  const chosen = sessions.data?.find((s) => s.id === id) ?? sessions.data?.find((s) => s.verdict?.faults.length === 0) ?? sessions.data?.find((s) => s.state === "ended") ?? sessions.data?.[0];
+  const isWhole = (s: Session) => s.verdict?.faults.length === 0;
+  const chosen = sessions.data?.find((s) => s.id === id) ?? sessions.data?.find((s) => isWhole(s) && s.asset === "demo-rig") ?? sessions.data?.find(isWhole) ?? sessions.data?.find((s) => s.state === "ended") ?? sessions.data?.[0];
   return (
     <section class="card">
       <h2>Why 0.01 m/s² fails on a real rig</h2>
-      <p>The book chapter's rule calls it a fault when measured and simulated acceleration differ by 0.01 m/s². On a simulation without noise that works. A camera that sees the ball to a fraction of a millimetre, differentiated twice, is off by far more than that, all the time. Below, one session judged by both: by the profile <b>default</b>, whose limit follows from the noise and which waits until a deviation lasts, and by <b>textbook</b>, the rule to the letter.</p>
+      <p>The book chapter's rule calls it a fault when measured and simulated acceleration differ by 0.01 m/s². On a simulation without noise that works. A camera that sees the ball to a fraction of a millimetre, differentiated twice, is off by far more than that, all the time. Below, one session without a fault, judged by both: by the profile <b>default</b>, whose limit follows from the noise and which waits until a deviation lasts, and by <b>textbook</b>, the rule to the letter: it looks only while the command is beyond 4.6° or the acceleration beyond 0.5 m/s², and then raises an alarm at once.</p>
       <Trouble error={sessions.error} />
       {sessions.data?.length === 0 && <p class="note">There is no session to show it on yet. Run <code>offbd demo</code>, or import a recording.</p>}
       {chosen && (
@@ -78,15 +79,16 @@ function Textbook() {
   );
 }
 
-function beyond(trace: Trace): number {
-  const share = (["x", "y"] as const).map((axis) => {
-    const { measured_m_s2: m, twin_m_s2: t, limit_m_s2: limit, enabled } = trace[axis];
-    const judged = enabled.filter(Boolean).length;
-    const over = m.filter((value, i) => enabled[i] && value != null && t[i] != null && Math.abs(value - t[i]!) >= limit[i]!).length;
-    return judged ? over / judged : 0;
-  });
-  return Math.max(...share);
+/** Shares along x: of the moments beyond the limit, of those judged, and of these beyond it. */
+function shares({ x: { measured_m_s2: m, twin_m_s2: t, limit_m_s2: limit, enabled } }: Trace) {
+  const known = m.flatMap((value, i) => (value != null && t[i] != null ? [i] : []));
+  const over = (i: number) => Math.abs(m[i]! - t[i]!) >= limit[i]!;
+  const judged = known.filter((i) => enabled[i]);
+  const share = (some: number[], of: number[]) => (of.length ? some.length / of.length : null);
+  return { beyond: share(known.filter(over), known), judged: share(judged, known), false: share(judged.filter(over), judged) };
 }
+
+const percent = (share?: number | null) => number(share == null ? share : 100 * share, 0, "%");
 
 function Judged({ session, profile }: { session: Session; profile: string }) {
   const from = session.first_t_s ?? 0;
@@ -103,13 +105,16 @@ function Judged({ session, profile }: { session: Session; profile: string }) {
     await until(() => api.replayState(begun.id), isSettled, setReplay);
   };
   const found = replay?.result;
+  const share = useMemo(() => trace.data && shares(trace.data), [trace.data]);
   return (
     <div>
       <h3>{profile}</h3>
       <Trouble error={trace.error} again={() => void trace.again()} />
       <RigCharts group={group} kinds={["residual"]} axes={["x"]} height={170} />
       <Facts of={[
-        ["Beyond the limit, of what is judged", trace.data ? number(100 * beyond(trace.data), 0, "%") : "–"],
+        ["Beyond the limit", percent(share?.beyond)],
+        ["Judged: the gate is open", percent(share?.judged)],
+        ["Beyond the limit, of what is judged", share && !share.judged ? "nothing: the gate never opened" : percent(share?.false)],
         ["Whole session", found ? (found.summary.faults.length ? found.summary.faults.map(codeTitle).join(", ") : "no fault") : replay ? "judging…" : <Act act={judge}>Judge it all</Act>],
         ["Changes of status", found ? count(found.faults.length) : "–"],
       ]} />

@@ -164,7 +164,7 @@ function Connect({ name, next }: { name: string; next: () => void }) {
       <p class="quiet small-text">The service asks for no token. Whoever reaches this address can send; keep it within your network.{/localhost|127\.0\.0\.1/.test(location.hostname) && " A device needs this computer's name or address instead of 127.0.0.1, and the service must listen there (--listen 0.0.0.0:8087)."}</p>
       <div class={`wait ${came ? "wait-good" : ""}`} role="status">
         {came
-          ? <><b>{alive ? "Samples are coming." : "Samples have come."}</b> {count(state!.samples)} in session <b>{state!.session}</b>, the last at {seconds(state!.t_s)} on the device's clock: ball at {millimetres(state!.evidence.x.position_m)}, {millimetres(state!.evidence.y.position_m)}.</>
+          ? <><b>{alive ? "Samples are coming." : "Samples have come."}</b> {count(state!.samples)} in session <b>{state!.session}</b>{state!.t_s == null ? "; they are judged as soon as later ones follow." : <>, the last at {seconds(state!.t_s)} on the device's clock: ball at {millimetres(state!.evidence.x.position_m)}, {millimetres(state!.evidence.y.position_m)}.</>}</>
           : <><span class="spinner" aria-hidden="true" /> Waiting for the first sample…</>}
       </div>
       <div class="form-end"><button type="button" class="primary" disabled={!came} onClick={next}>Check it</button></div>
@@ -241,7 +241,8 @@ function Learn({ asset, changed }: { asset: Asset; changed: () => Promise<void> 
   const [chosen, setChosen] = useState<Set<string>>();
   const [job, setJob] = useState<CalibrationJob>();
   const length = (s: Session) => (s.first_t_s != null && s.last_t_s != null ? s.last_t_s - s.first_t_s : 0);
-  const picked = chosen ?? new Set(sessions.data?.[0] && length(sessions.data[0]) >= MINUTE_S ? [sessions.data[0].id] : []);
+  const usable = sessions.data?.find((s) => length(s) >= MINUTE_S && !s.verdict?.faults.length);
+  const picked = chosen ?? new Set(usable ? [usable.id] : []);
   const total = (sessions.data ?? []).filter((s) => picked.has(s.id)).reduce((sum, s) => sum + length(s), 0);
   const toggle = (id: string) => {
     const next = new Set(picked);
@@ -311,8 +312,9 @@ function Learnt({ asset, job }: { asset: Asset; job?: CalibrationJob }) {
             </tbody>
           </table>
           <h3>What can be found, how fast</h3>
+          <p>A servo that is dead, held or reversed shows within a second or two of being asked for a tilt. Smaller faults need motion: on a quiet simulated rig, of those that came in the midst of a session, a gain of 0.7 or 1.5, a horn slipped by 0.9° and a servo three times as slow were found every time. Slower changes are followed over the sessions and warned of before they are faults.</p>
           {limit > 0 && state?.session_id
-            ? <p>In the session that runs now, a deviation beyond {number(limit, 2, "m/s²")} counts: about {degrees(limit / rolling)} of plate angle that is not as commanded. It is looked for through a window of {seconds(state.evidence.window_s)}, then it must last. A dead servo shows as soon as it is asked for more than that; a smaller error shows later or not at all.</p>
+            ? <p>In the session that runs now, a deviation beyond {number(limit, 2, "m/s²")} counts: about {degrees(limit / rolling)} of plate angle that is not as commanded. It is looked for through a window of {seconds(state.evidence.window_s)}, then it must last.</p>
             : <p class="quiet">As soon as the next session runs, the limit in force stands here.</p>}
           <p><Link class="button primary" to={at("rigs", asset.name)}>Done: see it live</Link></p>
         </>

@@ -4,11 +4,12 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import { words as problemWords } from "../api/client";
 import { faultTitle, severity } from "../words";
 
-export type Health = "fault" | "suspect" | "ok" | "silent" | "idle";
+export type Health = "fault" | "suspect" | "drift" | "ok" | "silent" | "idle";
 
 const HEALTH: Record<Health, { sign: string; word: string }> = {
   fault: { sign: "▲", word: "fault" },
   suspect: { sign: "◆", word: "suspected" },
+  drift: { sign: "◇", word: "drifting" },
   ok: { sign: "●", word: "no fault" },
   silent: { sign: "○", word: "silent" },
   idle: { sign: "○", word: "no session" },

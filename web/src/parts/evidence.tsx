@@ -5,6 +5,8 @@ import { degrees, millimetres, number, seconds } from "../words";
 export function EvidenceTable({ of }: { of: Evidence }) {
   const axes = [of.x, of.y];
   const residual = (axis: Evidence["x"]) => axis.residual_m_s2 ?? null;
+  const answer = (show: (a: NonNullable<Evidence["x"]["answer"]>) => string) => axes.map((a) => (a.answer ? show(a.answer) : number(null, 0)));
+  const about = (value: number, error: number, digits: number, unit = "") => `${number(value, digits)} ± ${number(error, digits, unit)}`;
   const rows: [string, string[]][] = [
     ["Command behind the axis", axes.map((a) => degrees(a.command_rad, 2))],
     ["Position", axes.map((a) => millimetres(a.position_m))],
@@ -14,6 +16,12 @@ export function EvidenceTable({ of }: { of: Evidence }) {
     ["Residual", axes.map((a) => number(residual(a), 3, "m/s²"))],
     ["Limit", axes.map((a) => number(a.limit_m_s2, 3, "m/s²"))],
     ["Gate", axes.map((a) => (a.enabled ? "open" : "closed"))],
+    ["Evidence against the servo", axes.map((a) => number(a.nats, 1, "nats"))],
+    ...(axes.some((a) => a.answer) ? [
+      ["Answers this share of its command", answer((a) => about(a.gain, a.gain_error, 2))] as [string, string[]],
+      ["Acceleration that nothing asks for", answer((a) => about(a.offset_m_s2, a.offset_error_m_s2, 2, "m/s²"))] as [string, string[]],
+      ["Delay beyond the twin's", answer((a) => about(a.delay_s * 1e3, a.delay_error_s * 1e3, 0, "ms"))] as [string, string[]],
+    ] : []),
   ];
   const beyond = (a: Evidence["x"]) => a.enabled && Math.abs(residual(a) ?? 0) >= a.limit_m_s2;
   return (

@@ -97,25 +97,30 @@ interface Props {
   height?: number;
   axes?: Axis[];
   onSeek?: (t: number) => void;
+  /** Leaves out the lines of where the twin was: a recording has none. */
+  measuredOnly?: boolean;
 }
 
-export function RigCharts({ group, kinds, height = 150, axes = ["x", "y"], onSeek }: Props) {
+const TWINS_PLACE = ["twinPosition", "plate"];
+const without = (kind: Kind): Kind => ({ ...kind, lines: kind.lines.filter((line) => !TWINS_PLACE.includes(line.of)) });
+
+export function RigCharts({ group, kinds, height = 150, axes = ["x", "y"], onSeek, measuredOnly }: Props) {
   return (
     <div class={`charts charts-${axes.length}`}>
-      {kinds.flatMap((kind) => axes.map((axis) => <OneChart key={kind + axis} group={group} kind={kind} axis={axis} height={height} onSeek={onSeek} />))}
+      {kinds.flatMap((kind) => axes.map((axis) => <OneChart key={kind + axis} group={group} kind={kind} axis={axis} height={height} onSeek={onSeek} measuredOnly={measuredOnly} />))}
     </div>
   );
 }
 
-function OneChart({ group, kind: name, axis, height, onSeek }: { group: ChartGroup; kind: ChartKind; axis: Axis; height: number; onSeek?: (t: number) => void }) {
+function OneChart({ group, kind: name, axis, height, onSeek, measuredOnly }: { group: ChartGroup; kind: ChartKind; axis: Axis; height: number; onSeek?: (t: number) => void; measuredOnly?: boolean }) {
   const element = useRef<HTMLDivElement>(null);
   const seek = useRef(onSeek);
   seek.current = onSeek;
-  const kind = KINDS[name];
+  const kind = useMemo(() => (measuredOnly ? without(KINDS[name]) : KINDS[name]), [name, measuredOnly]);
   const options = useMemo<LineChartOptions>(() => ({
     lines: kind.lines, unit: kind.unit, digits: kind.digits, height, band: kind.band, least: kind.least, sync: "rig",
     ...(onSeek ? { onSeek: (t: number) => seek.current?.(t) } : {}),
-  }), [name, height]);
+  }), [kind, height]);
   useEffect(() => {
     const chart = new LineChart(element.current!, options);
     group.add(name + axis, chart, kind, axis);

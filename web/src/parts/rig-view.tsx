@@ -10,6 +10,14 @@ const VIEWS: ViewName[] = ["free", "top", "along x", "along y"];
 /** Size of a step by an arrow key, rad. */
 const STEP = 0.12;
 
+/** Longest wait for a moment in which the page has nothing else to do, ms. */
+const REST_MS = 1500;
+
+const rested = () => new Promise<void>((go) => {
+  if ("requestIdleCallback" in window) requestIdleCallback(() => go(), { timeout: REST_MS });
+  else setTimeout(go, REST_MS / 5);
+});
+
 interface Props {
   asset: Asset;
   /** The pose to show now; asked before each frame. */
@@ -29,7 +37,8 @@ export function RigView({ asset, pose, name }: Props) {
 
   useEffect(() => {
     let gone = false;
-    import("./scene3d").then(({ RigScene }) => {
+    // First what can be read and pressed, then what takes long to load.
+    rested().then(() => import("./scene3d")).then(({ RigScene }) => {
       if (gone) return;
       scene.current = new RigScene(canvas.current!, asset);
       setState("shown");

@@ -1,0 +1,83 @@
+// What the set-up gives an owner to paste, pasted: against the real program.
+import assert from "node:assert/strict";
+import { spawn } from "node:child_process";
+import { writeFileSync } from "node:fs";
+import { join } from "node:path";
+import { after, before, test } from "node:test";
+import { ask, browser, directory, page, remove, serve, SOON } from "./support.mjs";
+
+let work, service, chromium, view;
+
+before(async () => {
+  work = directory();
+  chromium = await browser();
+  service = await serve(join(work, "data"));
+  await ask(service.url, "POST", "/assets", { name: "bench-1" });
+  view = await page(chromium);
+  await view.goto(`${service.url}/rigs/bench-1/set-up?step=connect`);
+});
+
+after(async () => {
+  await chromium?.close();
+  await service?.stop();
+  remove(work);
+});
+
+/** The text under `word`, as the page shows it. */
+async function snippet(word) {
+  await view.getByRole("button", { name: word, exact: true }).click();
+  return view.getByRole("region", { name: `${word} snippet` }).textContent();
+}
+
+const samples = async () => (await ask(service.url, "GET", "/assets/bench-1/state")).samples;
+
+/** Runs a program in the work directory until `done` says so or it ends; what it printed. */
+async function run(program, args, done = () => false) {
+  const child = spawn(program, args, { cwd: work, stdio: ["ignore", "pipe", "pipe"] });
+  let said = "";
+  child.stdout.on("data", (bytes) => (said += bytes));
+  child.stderr.on("data", (bytes) => (said += bytes));
+  const ended = new Promise((end) => child.once("exit", end));
+  const late = AbortSignal.timeout(SOON);
+  while (child.exitCode === null && !late.aborted && !(await done())) await new Promise((go) => setTimeout(go, 100));
+  if (child.exitCode === null && late.aborted) child.kill();
+  const ok = child.exitCode === 0 || (await done());
+  child.kill();
+  await ended;
+  return { ok, said };
+}
+
+test("curl sends a sample and a recording, and the page sees them come", async () => {
+  const text = await snippet("curl");
+  writeFileSync(join(work, "recording.csv"), "t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n0.01,0,0.02,0.010,-0.004\n0.02,0,0.02,0.011,-0.004\n");
+  const { ok, said } = await run("sh", ["-ec", text]);
+  assert.ok(ok, said);
+  assert.equal(said.match(/"accepted":/g).length, 2, said);
+  assert.equal(await samples(), 3);
+  await view.getByText("Samples have come.").waitFor();
+  await view.getByText("they are judged as soon as later ones follow").waitFor();
+});
+
+test("Python sends batches as long as it runs", async () => {
+  const text = await snippet("Python");
+  writeFileSync(join(work, "device.py"), text);
+  await ask(service.url, "POST", "/assets/bench-1/sessions", { name: "python" });
+  const { ok, said } = await run("python3", ["device.py"], async () => (await samples()) >= 60);
+  assert.ok(ok, said);
+  assert.doesNotMatch(said, /not sent/);
+  const { items } = await ask(service.url, "GET", "/sessions?asset=bench-1&limit=1");
+  assert.deepEqual([items[0].name, items[0].rejected], ["python", 0]);
+});
+
+test("the microcontroller's row and body are what the interface takes", async () => {
+  const text = await snippet("Arduino / ESP32");
+  const format = /"%s(\{.*?\})",/.exec(text)[1].replaceAll('\\"', '"');
+  const values = [7, 0.07, 0, 0.02, 0.01, -0.004];
+  const row = format.replace(/%[.\d]*[uf]/g, () => String(values.shift()));
+  assert.equal(values.length, 0, "as many places as values");
+  const [, before, behind] = /POST\("(.*?)" \+ batch \+ "(.*?)"\)/.exec(text).map((part) => part.replaceAll('\\"', '"'));
+  const path = /URL = "http:\/\/[^/]+\/api\/v1([^"]+)"/.exec(text)[1];
+  const answer = await ask(service.url, "POST", `${path}?session=esp32`, before + row + behind);
+  assert.deepEqual([answer.accepted, answer.rejected, answer.last_seq], [1, [], 7]);
+  assert.deepEqual(view.errors, []);
+});

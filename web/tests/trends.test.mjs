@@ -1,0 +1,38 @@
+// Drift before fault: a servo that weakens from session to session.
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import { browser, directory, drifting, page, recordings, remove, serve } from "./support.mjs";
+
+let work, service, chromium;
+
+before(async () => {
+  work = directory();
+  chromium = await browser();
+  service = await serve(`${work}/data`);
+  await drifting(service.url, work, recordings(work).learnt);
+});
+
+after(async () => {
+  await chromium?.close();
+  await service?.stop();
+  remove(work);
+});
+
+test("the fleet warns of a fault on its way, and the rig's page shows why", async () => {
+  const view = await page(chromium);
+  await view.goto(service.url);
+  const row = view.getByRole("list", { name: "Rigs" }).getByRole("listitem").filter({ hasText: "weak" });
+  await row.getByText("drifting").waitFor();
+  await row.getByText(/fault in \d+ sessions/).waitFor();
+  await view.getByRole("button", { name: /^Drifting/ }).getByText("1").click();
+  await row.getByRole("link").click();
+
+  await view.getByRole("list", { name: "Faults on their way" }).getByText(/gain is .* and falls; at this slope it reaches/).waitFor();
+  const drift = view.locator("#drift");
+  assert.equal(await drift.getByRole("img").count(), 6, "three parameters of two servos");
+  const chart = drift.getByRole("img", { name: /Gain of the x servo over 10 sessions.*it is warned of/ });
+  assert.equal(await chart.locator("circle").count(), 10);
+  assert.equal(await drift.getByText(/at the limit in \d+ sessions/).count(), 1);
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});

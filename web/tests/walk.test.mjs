@@ -1,0 +1,74 @@
+// The walk of README.md, from the demo to understanding a fault, step by step in
+// a fresh browser. What it says in italics or bold is to be found on the page.
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import { after, before, test } from "node:test";
+import { browser, demo, offbd, page } from "./support.mjs";
+
+const README = readFileSync(new URL("../../README.md", import.meta.url), "utf8");
+const WALK = README.slice(README.indexOf("## A walk through the dashboard"), README.indexOf("## A tour in five minutes"));
+
+let show, chromium, view;
+
+before(async () => {
+  chromium = await browser();
+  show = await demo();
+  view = await page(chromium);
+});
+
+after(async () => {
+  await chromium?.close();
+  await show?.stop();
+});
+
+/** Presses what the walk calls `words`, which must stand in it. */
+async function press(words, role = "button", name = words) {
+  assert.ok(WALK.replace(/\s+/g, " ").includes(words), `the walk does not say “${words}”`);
+  await view.getByRole(role, { name }).first().click();
+}
+
+test("from the demo to understanding a fault", async () => {
+  await view.goto(show.url);
+  await view.getByRole("link", { name: /demo-rig/ }).waitFor();
+
+  await press("Demo", "link");
+  await press("dead", "button", "Break: X servo, dead");
+  await press("Watch demo-rig", "link");
+  const monitor = view.getByRole("listitem").filter({ hasText: "X servo" }).filter({ has: view.getByRole("meter") });
+  await monitor.getByText("failed", { exact: true }).waitFor();
+  for (const chart of ["Residual along x", "Acceleration along x"]) await view.getByRole("img", { name: chart }).waitFor();
+
+  await press("Look at it", "link", /X servo.*Look at it/);
+  assert.match(await view.locator(".sentence").textContent(), /^[A-Z].*\.$/);
+  await view.getByRole("heading", { name: "What it may be" }).waitFor();
+  await view.getByRole("heading", { name: /Status byte/ }).waitFor();
+  await view.getByRole("row").filter({ hasText: "confirmedDTC" }).waitFor();
+  await view.getByRole("img", { name: /Residual along x/ }).waitFor();
+
+  await press("Play the session back", "link");
+  await press("Judge again");
+  await view.getByText("Another verdict").waitFor();
+
+  await press("Demo", "link");
+  await view.getByRole("heading", { name: "textbook" }).waitFor();
+  await press("Repair all");
+  await view.getByText("The simulated rig is whole.").waitFor();
+  await view.goto(`${show.url}/rigs/demo-rig/faults/x_servo`);
+  await view.getByLabel("Your name, kept with what you do").fill("ada");
+  await press("acknowledge", "button", "Acknowledge");
+  await view.locator("dt:text-is('Acknowledged') + dd").getByText("ada").waitFor();
+  await press("clear", "button", "Clear");
+  await view.locator("dt:text-is('Cleared') + dd").getByText("ada").waitFor();
+
+  await press("Set up", "link");
+  await view.getByRole("heading", { name: "Set up a rig" }).waitFor();
+  await press("Sessions", "link");
+  await view.getByText(/drop/i).first().waitFor();
+  assert.deepEqual(view.errors, []);
+});
+
+test("the rig can be followed in a terminal", () => {
+  assert.ok(WALK.includes("`offbd watch demo-rig`"));
+  const lines = offbd("watch", "demo-rig", "--address", `127.0.0.1:${show.port}`, "--states", "2");
+  assert.match(lines, /x/);
+});
