@@ -104,7 +104,9 @@ impl Show {
         let events = events::listen(client.events().await?);
         let mut ticks = interval(TICK);
         ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
-        let name = jiff::Timestamp::now().strftime("demo-%Y%m%dT%H%M%S").to_string();
+        // To the millisecond: the next demo on a store that is kept may begin within
+        // the second, and a session of the same name would be taken for this one.
+        let name = jiff::Timestamp::now().strftime("demo-%Y%m%dT%H%M%S%.3f").to_string();
         let (next, started) = (rig.next_sample(), Instant::now());
         let tally = Tally::default();
         Ok(Self {
