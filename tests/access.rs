@@ -88,9 +88,10 @@ fn operations() -> Vec<(Method, String, String)> {
             operations.push((method, path.clone(), right.to_owned()));
         }
     }
-    // What deletes comes last, so that the others find what they ask for.
+    // What deletes comes last, the asset with its devices last of all, so that
+    // the others find what they ask for.
     operations.sort_by_key(|(method, path, _)| {
-        (method == Method::DELETE, std::cmp::Reverse(path.len()), path.clone())
+        (method == Method::DELETE, path.ends_with("/assets/{asset}"), path.clone())
     });
     operations
 }

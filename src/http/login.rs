@@ -17,6 +17,9 @@ use super::{App, Problem, guard};
 use crate::service::access::{Caller, Credential, Deed, Role};
 use crate::wire::access::CallerView;
 
+/// Where a login is.
+const ADDRESS: &str = "/api/v1/login";
+
 /// The cookie's name.
 pub(super) const COOKIE: &str = "offbd_login";
 
@@ -78,7 +81,7 @@ pub(super) async fn log_in(
     let (secret, lasts) = app.service.log_in(&pass).await?;
     let caller = Caller::Known(pass);
     let address = guard::address(&parts).map(|address| address.to_string());
-    let deed = Deed { act: "log_in".to_owned(), target: parts.uri.path().to_owned(), address };
+    let deed = Deed { act: "log_in".to_owned(), target: ADDRESS.to_owned(), address };
     app.service.note(&caller, deed).await?;
     let cookie = cookie(&secret, lasts.as_secs(), app.policy.encrypted);
     Ok((cookie, Json(view(&caller))).into_response())
