@@ -569,3 +569,90 @@ async fn without_tokens_no_page_elsewhere_gets_in() {
     let view = client.get("login").await.expect(200);
     assert_eq!((&view["authentication"], &view["role"]), (&json!("off"), &json!("admin")));
 }
+
+/// `offbd serve` in a process of its own that logs all there is to say.
+struct Loud {
+    child: std::process::Child,
+    log: Option<std::thread::JoinHandle<String>>,
+    client: Client,
+}
+
+impl Loud {
+    fn start(data: &std::path::Path) -> Self {
+        use std::io::BufRead;
+        let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_offbd"))
+            .args(["serve", "--listen", "127.0.0.1:0", "--log-format", "json", "--log", "trace"])
+            .arg("--data")
+            .arg(data)
+            .env("OFFBD_AUTH", "required")
+            .stderr(std::process::Stdio::piped())
+            .spawn()
+            .unwrap();
+        let log = std::io::BufReader::new(child.stderr.take().unwrap());
+        let mut lines = log.lines().map_while(Result::ok);
+        let mut begun = String::new();
+        let address = lines.find_map(|line| {
+            begun += &line;
+            let line: Value = serde_json::from_str(&line).ok()?;
+            (line["message"] == "serving").then(|| line["address"].as_str().unwrap().to_owned())
+        });
+        let client = Client::new(address.expect("the log says where it listens"));
+        let log = std::thread::spawn(move || lines.fold(begun, |all, line| all + &line + "\n"));
+        Self { child, log: Some(log), client }
+    }
+
+    /// Stops it; all that it logged.
+    fn stop(mut self) -> String {
+        let pid = self.child.id().to_string();
+        let kill = std::process::Command::new("kill").args(["-TERM", &pid]).status();
+        assert!(kill.unwrap().success());
+        assert!(self.child.wait().unwrap().success());
+        self.log.take().unwrap().join().unwrap()
+    }
+}
+
+impl Drop for Loud {
+    fn drop(&mut self) {
+        // One that has ended already needs no killing.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn no_log_and_no_error_has_a_secret() {
+    let data = tempfile::tempdir().unwrap();
+    let config = config(data.path());
+    let root = token(&config, "root", Role::Admin, None).await;
+    let loud = Loud::start(data.path());
+    let admin = loud.client.with(&root);
+    let wrong = format!("offbd_{}", "5".repeat(64));
+    let mut told = String::new();
+    let mut hear = |answer: Answer| {
+        told += &answer.text;
+        told += &format!("{:?}", answer.headers);
+        answer
+    };
+    hear(admin.get("assets").await).expect(200);
+    hear(loud.client.with(&wrong).get("assets").await).problem(401);
+    hear(loud.client.post("login", &json!({ "token": wrong })).await).problem(401);
+    hear(loud.client.post("login", &json!({ "tokens": root })).await).problem(422);
+    hear(loud.client.post_text("login", "application/json", format!("{{\"token\":{root}")).await)
+        .problem(422);
+    hear(loud.client.get(&format!("assets?token={root}")).await).problem(401);
+    let made = admin.post("tokens", &json!({ "name": "v", "role": "viewer" })).await.expect(201);
+    let login = loud.client.post("login", &json!({ "token": root })).await;
+    let cookie = cookie(&login);
+    let ask = loud.client.request(Method::GET, "assets").header(COOKIE, cookie.clone());
+    hear(loud.client.send(ask).await).expect(200);
+    hear(admin.get("tokens").await).expect(200);
+    hear(admin.get("audit").await).expect(200);
+    let log = loud.stop();
+    assert!(log.contains("/api/v1/login"), "the log is what was meant");
+    let cookie = cookie.split_once('=').unwrap().1;
+    for secret in [&root[6..], &wrong[6..], &made["secret"].as_str().unwrap()[6..], cookie] {
+        let line = log.lines().find(|line| line.contains(secret));
+        assert_eq!(line, None, "in the log");
+        assert!(!told.contains(secret), "in an answer: {told}");
+    }
+}

@@ -9,8 +9,8 @@ use std::time::Duration;
 
 use axum::extract::{ConnectInfo, MatchedPath, RawPathParams, Request, State};
 use axum::http::header::{
-    ALLOW, AUTHORIZATION, COOKIE, HOST, HeaderValue, LOCATION, ORIGIN, RETRY_AFTER, UPGRADE,
-    WWW_AUTHENTICATE,
+    ALLOW, AUTHORIZATION, COOKIE, HOST, HeaderName, HeaderValue, LOCATION, ORIGIN, RETRY_AFTER,
+    UPGRADE, WWW_AUTHENTICATE,
 };
 use axum::http::request::Parts;
 use axum::http::uri::Authority;
@@ -45,7 +45,7 @@ pub(super) struct Guard {
 /// Why a request does not come through, with a header that belongs to it.
 struct Refusal {
     problem: Problem,
-    header: Option<(axum::http::HeaderName, HeaderValue)>,
+    header: Option<Box<(HeaderName, HeaderValue)>>,
 }
 
 impl From<Problem> for Refusal {
@@ -57,7 +57,7 @@ impl From<Problem> for Refusal {
 impl IntoResponse for Refusal {
     fn into_response(self) -> Response {
         let mut response = self.problem.into_response();
-        if let Some((name, value)) = self.header {
+        if let Some((name, value)) = self.header.map(|header| *header) {
             response.headers_mut().insert(name, value);
         }
         response
@@ -112,7 +112,7 @@ impl Guard {
             let allowed: Vec<_> = methods.iter().map(|(method, _)| method.as_str()).collect();
             let problem = problem::not_allowed(&parts.method, &parts.uri);
             let header = HeaderValue::from_str(&allowed.join(",")).ok();
-            Refusal { problem, header: header.map(|value| (ALLOW, value)) }
+            Refusal { problem, header: header.map(|value| Box::new((ALLOW, value))) }
         })
     }
 
@@ -217,7 +217,10 @@ impl Guard {
         tracing::info!(caller = caller.name(), role, right = right.as_str(), "refused");
         let scope =
             HeaderValue::from_static("Bearer realm=\"offbd\", error=\"insufficient_scope\"");
-        Err(Refusal { problem: forbidden(detail), header: Some((WWW_AUTHENTICATE, scope)) })
+        Err(Refusal {
+            problem: forbidden(detail),
+            header: Some(Box::new((WWW_AUTHENTICATE, scope))),
+        })
     }
 
     /// The asset that a request is about: in its path, that of the session in
@@ -310,12 +313,12 @@ fn unauthenticated(detail: &str, error: Option<&str>) -> Refusal {
         Problem::new(StatusCode::UNAUTHORIZED, "unauthenticated", "Not authenticated", detail);
     let error = error.map(|error| format!(", error=\"{error}\"")).unwrap_or_default();
     let challenge = HeaderValue::from_str(&format!("Bearer realm=\"offbd\"{error}")).ok();
-    Refusal { problem, header: challenge.map(|challenge| (WWW_AUTHENTICATE, challenge)) }
+    Refusal { problem, header: challenge.map(|challenge| Box::new((WWW_AUTHENTICATE, challenge))) }
 }
 
 fn too_often(wait: Duration) -> Refusal {
     let seconds = wait.as_secs() + 1;
     let detail = format!("too many requests; come again in {seconds} s");
     let problem = Problem::new(StatusCode::TOO_MANY_REQUESTS, "rate", "Too often", detail);
-    Refusal { problem, header: Some((RETRY_AFTER, HeaderValue::from(seconds))) }
+    Refusal { problem, header: Some(Box::new((RETRY_AFTER, HeaderValue::from(seconds)))) }
 }
