@@ -656,3 +656,14 @@ async fn no_log_and_no_error_has_a_secret() {
         assert!(!told.contains(secret), "in an answer: {told}");
     }
 }
+
+#[test]
+fn the_manual_has_the_policy() {
+    let manual = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/operations.md");
+    let manual = std::fs::read_to_string(manual).unwrap();
+    for (right, allowed) in POLICY {
+        let words = allowed.map(|allowed| if allowed { "yes" } else { "no" }).join(" | ");
+        let row = format!("| {right} | {words} | ");
+        assert!(manual.contains(&row), "docs/operations.md has no row `{row}`");
+    }
+}
