@@ -59,7 +59,7 @@ def parse_arguments():
     parser.add_argument("file", help="CSV file, or - for stdin")
     parser.add_argument("--asset", required=True, help="the rig's name at the service")
     parser.add_argument("--url", default="http://127.0.0.1:8087")
-    parser.add_argument("--token-file", metavar="FILE", help="the device's token, where one is asked for")
+    parser.add_argument("--token-file", metavar="FILE", help="the device's token")
     parser.add_argument("--session", help="name of the session [default: the time]")
     parser.add_argument("--register", metavar="ASSET.json", help="register this asset file first")
     parser.add_argument("--rows", type=int, default=100, help="most rows of a batch")

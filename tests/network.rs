@@ -45,7 +45,7 @@ impl Raw {
     }
 
     /// What comes until the server closes the connection.
-    async fn to_end(&mut self) -> String {
+    async fn rest(&mut self) -> String {
         self.until("\u{0}never").await
     }
 }
@@ -57,14 +57,14 @@ async fn a_head_that_never_ends_is_given_up() {
     let bench = Bench::start_with(|config| config.limits.header_timeout_s = 1).await;
     let mut slow = Raw::new(&bench).await;
     slow.send("GET /healthz HTTP/1.1\r\nhost: localhost\r\nx-slow: ").await;
-    let answer = slow.to_end().await;
+    let answer = slow.rest().await;
     assert!(!answer.contains(" 200 "), "{answer}");
     let mut silent = Raw::new(&bench).await;
-    assert_eq!(silent.to_end().await, "");
+    assert_eq!(silent.rest().await, "");
     // Between two requests, too.
     let mut idle = Raw::new(&bench).await;
     assert!(idle.send(HEALTH).await.until("}").await.contains(" 200 OK"));
-    assert_eq!(idle.to_end().await, "");
+    assert_eq!(idle.rest().await, "");
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -115,7 +115,7 @@ async fn free(bench: &Bench) {
 async fn one_connection_too_many_is_closed_at_once() {
     let (bench, raw) = taken(|_| {}).await;
     let mut refused = Raw::new(&bench).await;
-    assert_eq!(refused.to_end().await, "");
+    assert_eq!(refused.rest().await, "");
     drop(raw);
     free(&bench).await;
 }
@@ -127,7 +127,7 @@ async fn one_address_has_its_share_of_the_connections() {
         config.limits.connections_per_address = 1;
     })
     .await;
-    assert_eq!(Raw::new(&bench).await.to_end().await, "");
+    assert_eq!(Raw::new(&bench).await.rest().await, "");
     drop(raw);
     free(&bench).await;
 }
@@ -150,7 +150,7 @@ async fn a_websocket_holds_its_place() {
     let (mut socket, _) = tokio_tungstenite::connect_async(url).await.unwrap();
     // The client's own connection is the other.
     bench.client.get("/healthz").await.expect(200);
-    assert_eq!(Raw::new(&bench).await.to_end().await, "");
+    assert_eq!(Raw::new(&bench).await.rest().await, "");
     socket.close(None).await.unwrap();
     while socket.next().await.is_some_and(|frame| frame.is_ok()) {}
     free(&bench).await;
@@ -218,7 +218,7 @@ async fn validate_curl_and_a_websocket_come_in_encrypted() {
     let plain = curl(words(&format!("http://{address}/healthz"))).await;
     assert!(!plain.status.success(), "{plain:?}");
     // Whoever begins no encryption is not waited for.
-    assert_eq!(Raw::new(&bench).await.to_end().await, "");
+    assert_eq!(Raw::new(&bench).await.rest().await, "");
 
     let mut roots = RootCertStore::empty();
     roots.add(CertificateDer::from_pem_file(&files.certificate).unwrap()).unwrap();
