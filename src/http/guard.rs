@@ -79,7 +79,8 @@ pub(super) async fn guard(
 impl Guard {
     async fn through(&self, request: Request, next: Next) -> Result<Response, Refusal> {
         let (mut parts, body) = request.into_parts();
-        let rule = self.rule(&parts)?;
+        let path = parts.extensions.get::<MatchedPath>().map(MatchedPath::as_str);
+        let rule = rule(&self.rules, path, &parts.method, &parts.uri)?;
         self.check_host(&parts)?;
         self.check_origin(&parts)?;
         let caller = self.caller(&parts, rule.right).await?;
@@ -94,26 +95,6 @@ impl Guard {
             self.app.service.note(&caller, deed).await.map_err(Problem::from)?;
         }
         Ok(response)
-    }
-
-    /// What the request takes. What no route has is the page's, or not there.
-    fn rule(&self, parts: &Parts) -> Result<Rule, Refusal> {
-        let Some(path) = parts.extensions.get::<MatchedPath>() else {
-            return Ok(Rule { right: Right::Open, act: String::new() });
-        };
-        let Some(methods) = self.rules.of(path.as_str()) else {
-            tracing::error!(path = path.as_str(), "the route states no right");
-            let detail = "this path is not open to anybody";
-            return Err(forbidden(detail).into());
-        };
-        let wanted = if parts.method == Method::HEAD { &Method::GET } else { &parts.method };
-        let known = methods.iter().find(|(method, _)| method == wanted);
-        known.map(|(_, rule)| rule.clone()).ok_or_else(|| {
-            let allowed: Vec<_> = methods.iter().map(|(method, _)| method.as_str()).collect();
-            let problem = problem::not_allowed(&parts.method, &parts.uri);
-            let header = HeaderValue::from_str(&allowed.join(",")).ok();
-            Refusal { problem, header: header.map(|value| Box::new((ALLOW, value))) }
-        })
     }
 
     /// Where nobody is asked for a token, whoever can name this machine could
@@ -254,6 +235,24 @@ fn done(deed: Deed, response: &Response) -> Option<Deed> {
     response.status().is_success().then_some(Deed { target, ..deed })
 }
 
+/// What a request for the route `path` takes. What no route has is the page's, or
+/// not there.
+fn rule(rules: &Rules, path: Option<&str>, method: &Method, uri: &Uri) -> Result<Rule, Refusal> {
+    let Some(path) = path else { return Ok(Rule { right: Right::Open, act: String::new() }) };
+    let Some(methods) = rules.of(path) else {
+        tracing::error!(path, "the route states no right");
+        return Err(forbidden("this path is not open to anybody").into());
+    };
+    let wanted = if *method == Method::HEAD { &Method::GET } else { method };
+    let known = methods.iter().find(|(method, _)| method == wanted);
+    known.map(|(_, rule)| rule.clone()).ok_or_else(|| {
+        let allowed: Vec<_> = methods.iter().map(|(method, _)| method.as_str()).collect();
+        let header = HeaderValue::from_str(&allowed.join(",")).ok();
+        let header = header.map(|value| Box::new((ALLOW, value)));
+        Refusal { problem: problem::not_allowed(method, uri), header }
+    })
+}
+
 #[derive(Deserialize)]
 struct AssetQuery {
     asset: Option<String>,
@@ -321,4 +320,40 @@ fn too_often(wait: Duration) -> Refusal {
     let detail = format!("too many requests; come again in {seconds} s");
     let problem = Problem::new(StatusCode::TOO_MANY_REQUESTS, "rate", "Too often", detail);
     Refusal { problem, header: Some(Box::new((RETRY_AFTER, HeaderValue::from(seconds)))) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::http::routes::More;
+
+    #[test]
+    fn what_states_no_right_is_refused() {
+        let mut document = crate::http::openapi();
+        let item = document.paths.paths.get_mut("/api/v1/assets").unwrap();
+        item.get.as_mut().unwrap().extensions = None;
+        let item = document.paths.paths.get_mut("/metrics").unwrap();
+        item.get.as_mut().unwrap().extensions = None;
+        let rules = Rules::new(&document, &More::default());
+        let uri = Uri::from_static("/");
+        let found = |path, method: Method| {
+            let rule = rule(&rules, Some(path), &method, &uri);
+            rule.map(|rule| rule.right).map_err(|refusal| refusal.problem.status)
+        };
+        assert_eq!(found("/metrics", Method::GET), Err(403));
+        assert_eq!(found("/nowhere", Method::GET), Err(403));
+        assert_eq!(found("/api/v1/assets", Method::GET), Err(405));
+        assert_eq!(found("/api/v1/assets", Method::POST), Ok(Right::Operate));
+        assert_eq!(found("/api/v1/fleet", Method::HEAD), Ok(Right::Read));
+        assert_eq!(found("/api/v1/fleet", Method::OPTIONS), Err(405));
+    }
+
+    #[test]
+    fn an_origin_is_its_host_and_port() {
+        let host: Authority = "rig.example:8087".parse().unwrap();
+        assert!(is_of("http://rig.example:8087", &host));
+        for other in ["http://rig.example", "http://rig.example:80", "null", "", "http://x@y:1"] {
+            assert!(!is_of(other, &host), "{other}");
+        }
+    }
 }
