@@ -1,6 +1,7 @@
 # Builds with BuildKit (the cache mounts need it): docker build -t offbd .
 # Runs: docker run -p 127.0.0.1:8087:8087 -v offbd:/var/lib/offbd offbd
-# The interface has no log-in of its own; publish the port accordingly.
+# It asks for a token; the first one:
+# docker run --rm -v offbd:/var/lib/offbd offbd token create --name ann --role admin
 
 FROM rust:1-bookworm AS build
 # Node builds the dashboard; the program needs none to run.

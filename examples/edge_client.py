@@ -26,10 +26,14 @@ import urllib.request
 COLUMNS = ("t_s", "cmd_qx_rad", "cmd_qy_rad", "x_m", "y_m")
 LONGEST_PAUSE_S = 30.0
 TIMEOUT_S = 30.0
+HEADERS = {"Content-Type": "application/json"}
 
 
 def main():
     args = parse_arguments()
+    if args.token_file:
+        with open(args.token_file) as file:
+            HEADERS["Authorization"] = f"Bearer {file.read().strip()}"
     base = f"{args.url}/api/v1/assets/{urllib.parse.quote(args.asset)}"
     if args.register:
         with open(args.register, "rb") as file:
@@ -55,6 +59,7 @@ def parse_arguments():
     parser.add_argument("file", help="CSV file, or - for stdin")
     parser.add_argument("--asset", required=True, help="the rig's name at the service")
     parser.add_argument("--url", default="http://127.0.0.1:8087")
+    parser.add_argument("--token-file", metavar="FILE", help="the device's token")
     parser.add_argument("--session", help="name of the session [default: the time]")
     parser.add_argument("--register", metavar="ASSET.json", help="register this asset file first")
     parser.add_argument("--rows", type=int, default=100, help="most rows of a batch")
@@ -108,8 +113,7 @@ def deliver(method, url, body):
     """Sends until it is acknowledged; returns the answer."""
     pause = 0.2
     while True:
-        headers = {"Content-Type": "application/json"}
-        request = urllib.request.Request(url, data=body, method=method, headers=headers)
+        request = urllib.request.Request(url, data=body, method=method, headers=HEADERS)
         try:
             with urllib.request.urlopen(request, timeout=TIMEOUT_S) as answer:
                 return json.load(answer)

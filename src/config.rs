@@ -26,9 +26,47 @@ pub struct Config {
     pub data: PathBuf,
     /// `sqlite:FILE`; without it the store is in `data`.
     pub database: Option<String>,
+    /// Whether a token is asked for; without it only where other machines can
+    /// connect.
+    pub auth: Option<Auth>,
+    /// Pages elsewhere that may use the interface, `https://HOST[:PORT]`.
+    pub origins: Vec<String>,
+    /// Connections are encrypted if it is there.
+    pub tls: Option<TlsConfig>,
     pub log: LogConfig,
     pub limits: LimitsConfig,
+    pub rates: RatesConfig,
     pub workers: WorkersConfig,
+}
+
+/// Whether a token is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Auth {
+    Required,
+    /// Only where no other machine can connect.
+    Off,
+}
+
+/// By what connections are encrypted; PEM files, read anew when they change.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TlsConfig {
+    /// The certificate, and those between it and the root.
+    pub certificate: PathBuf,
+    /// Its private key.
+    pub key: PathBuf,
+}
+
+/// Requests a second, where a token is asked for; ten seconds' worth may come
+/// at once. One too many is told when to come again.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RatesConfig {
+    /// With one token.
+    pub token_per_s: u32,
+    /// From one address without a token, or with one not seen lately.
+    pub address_per_s: u32,
 }
 
 /// What is logged, to stderr.
@@ -63,6 +101,15 @@ pub struct LimitsConfig {
     pub in_flight_samples: usize,
     pub assets: usize,
     pub body_timeout_s: u64,
+    /// Seconds for a connection to be encrypted, and for the head of each
+    /// request to come; then the connection is closed.
+    pub header_timeout_s: u64,
+    /// Seconds for a client to take what is sent; then the connection is closed.
+    pub write_timeout_s: u64,
+    /// Connections at a time; the next is closed at once.
+    pub connections: usize,
+    /// Connections of one address at a time; the next is closed at once.
+    pub connections_per_address: usize,
     /// Seconds that a stop may take.
     pub shutdown_s: u64,
 }
@@ -85,8 +132,12 @@ impl Default for Config {
             listen: SocketAddr::from(([127, 0, 0, 1], 8087)),
             data: PathBuf::from("offbd-data"),
             database: None,
+            auth: None,
+            origins: Vec::new(),
+            tls: None,
             log: LogConfig::default(),
             limits: LimitsConfig::default(),
+            rates: RatesConfig::default(),
             workers: WorkersConfig::default(),
         }
     }
@@ -109,8 +160,18 @@ impl Default for LimitsConfig {
             in_flight_samples: limits.in_flight_samples,
             assets: limits.assets,
             body_timeout_s: limits.body_timeout.as_secs(),
+            header_timeout_s: 30,
+            write_timeout_s: 30,
+            connections: 16_384,
+            connections_per_address: 4096,
             shutdown_s: 20,
         }
+    }
+}
+
+impl Default for RatesConfig {
+    fn default() -> Self {
+        Self { token_per_s: 2000, address_per_s: 500 }
     }
 }
 
@@ -159,6 +220,7 @@ impl Config {
             builder = builder.add_source(File::from(file).format(FileFormat::Toml));
         }
         let environment = environment.prefix_separator("_").separator("__").try_parsing(true);
+        let environment = environment.list_separator(",").with_list_parse_key("origins");
         let mut config: Self = builder.add_source(environment).build()?.try_deserialize()?;
         config.override_with(flags);
         config.check()?;
@@ -194,6 +256,21 @@ impl Config {
         within("limits.body_timeout_s", seconds, 1, 3600)?;
         let seconds = usize::try_from(limits.shutdown_s).unwrap_or(usize::MAX);
         within("limits.shutdown_s", seconds, 1, 3600)?;
+        let seconds = usize::try_from(limits.header_timeout_s).unwrap_or(usize::MAX);
+        within("limits.header_timeout_s", seconds, 1, 3600)?;
+        let seconds = usize::try_from(limits.write_timeout_s).unwrap_or(usize::MAX);
+        within("limits.write_timeout_s", seconds, 1, 3600)?;
+        within("limits.connections", limits.connections, 1, 1_000_000)?;
+        let most = limits.connections_per_address;
+        within("limits.connections_per_address", most, 1, 1_000_000)?;
+        for (key, rate) in [
+            ("rates.token_per_s", self.rates.token_per_s),
+            ("rates.address_per_s", self.rates.address_per_s),
+        ] {
+            within(key, usize::try_from(rate).unwrap_or(usize::MAX), 1, 1_000_000)?;
+        }
+        self.asks_for_tokens()?;
+        self.origins.iter().try_for_each(|origin| check_origin(origin))?;
         within("workers.shards", self.workers.shards, 1, 256)?;
         within("workers.queue", self.workers.queue, 1, 100_000)?;
         within("workers.jobs", self.workers.jobs, 1, 256)?;
@@ -201,6 +278,24 @@ impl Config {
             return Err(ConfigError::Invalid { key: "log.level", reason: error.to_string() });
         }
         self.database_file().map(drop)
+    }
+
+    /// Whether a token is asked for.
+    ///
+    /// # Errors
+    /// [`ConfigError::Invalid`] if none is, where other machines can connect.
+    pub fn asks_for_tokens(&self) -> Result<bool, ConfigError> {
+        let alone = self.listen.ip().to_canonical().is_loopback();
+        if self.auth == Some(Auth::Off) && !alone {
+            let reason = format!(
+                "is `off`, but other machines can connect to {}: set `auth` to `required` and \
+                 make a token with `offbd token create --name NAME --role admin`, or listen on \
+                 127.0.0.1",
+                self.listen
+            );
+            return Err(ConfigError::Invalid { key: "auth", reason });
+        }
+        Ok(self.auth.map_or(!alone, |auth| auth == Auth::Required))
     }
 
     /// The file of the embedded store.
@@ -237,6 +332,17 @@ impl Config {
     }
 }
 
+/// An origin is as browsers write it (RFC 6454, section 6.1).
+fn check_origin(origin: &str) -> Result<(), ConfigError> {
+    let host = origin.strip_prefix("https://").or_else(|| origin.strip_prefix("http://"));
+    let whole = |host: &str| !host.is_empty() && !host.contains(['/', '?', '#', '@', ' ', '*']);
+    if host.is_some_and(whole) && origin.chars().all(|c| c.is_ascii() && !c.is_ascii_uppercase()) {
+        return Ok(());
+    }
+    let reason = format!("has `{origin}`; an origin is https://host or https://host:port");
+    Err(ConfigError::Invalid { key: "origins", reason })
+}
+
 fn within(key: &'static str, value: usize, least: usize, most: usize) -> Result<(), ConfigError> {
     if (least..=most).contains(&value) {
         return Ok(());
@@ -263,15 +369,38 @@ mod tests {
     #[test]
     fn each_source_is_above_the_one_before() {
         let toml = "listen = '127.0.0.1:1'\ndata = 'file'\n[log]\nlevel = 'debug'\n";
-        let environment = [("OFFBD_DATA", "env"), ("OFFBD_LIMITS__ASSETS", "7")];
+        let environment = [
+            ("OFFBD_DATA", "env"),
+            ("OFFBD_LIMITS__ASSETS", "7"),
+            ("OFFBD_ORIGINS", "https://a.example,https://b.example"),
+        ];
         let flags = Flags { listen: Some(([127, 0, 0, 1], 3).into()), ..Flags::default() };
         let config = load(toml, &environment, &flags).unwrap();
         assert_eq!(config.listen.port(), 3);
         assert_eq!(config.data, PathBuf::from("env"));
         assert_eq!(config.log.level, "debug");
         assert_eq!(config.limits.assets, 7);
+        assert_eq!(config.origins, ["https://a.example", "https://b.example"]);
         assert_eq!(config.limits.batch_samples, LimitsConfig::default().batch_samples);
         assert_eq!(config.database_file().unwrap(), PathBuf::from("env/offbd.sqlite"));
+    }
+
+    #[test]
+    fn a_token_is_asked_for_where_other_machines_can_connect() {
+        for (listen, auth, asked) in [
+            ("127.0.0.1:1", None, Some(false)),
+            ("[::1]:1", None, Some(false)),
+            ("[::ffff:127.0.0.1]:1", None, Some(false)),
+            ("0.0.0.0:1", None, Some(true)),
+            ("[::]:1", None, Some(true)),
+            ("192.0.2.1:1", None, Some(true)),
+            ("127.0.0.1:1", Some(Auth::Required), Some(true)),
+            ("127.0.0.1:1", Some(Auth::Off), Some(false)),
+            ("0.0.0.0:1", Some(Auth::Off), None),
+        ] {
+            let config = Config { listen: listen.parse().unwrap(), auth, ..Config::default() };
+            assert_eq!(config.asks_for_tokens().ok(), asked, "{listen} {auth:?}");
+        }
     }
 
     #[test]
@@ -289,6 +418,12 @@ mod tests {
             ("[log]\nlevel = 'a=b=c'", "log.level"),
             ("database = 'mysql://x'", "database"),
             ("database = 'sqlite:'", "database"),
+            ("auth = 'maybe'", "auth"),
+            ("auth = 'off'\nlisten = '0.0.0.0:1'", "auth"),
+            ("origins = ['https://a.example/']", "origins"),
+            ("[tls]\ncertificate = 'a'", "key"),
+            ("[limits]\nconnections = 0", "limits.connections"),
+            ("[rates]\ntoken_per_s = 0", "rates.token_per_s"),
         ] {
             let error = error(toml, &[]);
             assert!(error.contains(key), "{toml}: {error}");

@@ -1,19 +1,28 @@
 //! The server: configuration, store, service and sockets put together, from
-//! start to a graceful stop. Also what stands behind `migrate` and `check`.
+//! start to a graceful stop. Also what stands behind `migrate`, `check` and
+//! `token`.
+
+mod listen;
+mod places;
+mod tls;
+pub mod tokens;
 
 use std::fs::{File, TryLockError};
 use std::net::SocketAddr;
+use std::num::NonZeroU32;
+use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
-use axum::Router;
 use tokio::net::TcpListener;
 use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
 
+use self::listen::Connections;
+use self::tls::Tls;
 use crate::config::Config;
-use crate::http::{self, App, Budget};
-use crate::service::{Service, Workers};
+use crate::http::{self, App, Budget, More, Policy, Rate, Rates};
+use crate::service::{Clock, Service, Workers};
 use crate::store::Store;
 
 /// A running server.
@@ -22,7 +31,7 @@ pub struct Server {
     pub address: SocketAddr,
     closing: CancellationToken,
     deadline: Duration,
-    serving: JoinHandle<std::io::Result<()>>,
+    serving: JoinHandle<()>,
     store: Store,
     workers: Workers,
     /// Held until the store is closed.
@@ -42,9 +51,10 @@ pub async fn start(config: Config) -> Result<Server> {
 ///
 /// # Errors
 /// As for [`start`].
-pub async fn start_with(config: Config, demo: Option<Router>) -> Result<Server> {
+pub async fn start_with(config: Config, demo: Option<More>) -> Result<Server> {
     config.check()?;
     http::gather_metrics();
+    let tls = config.tls.as_ref().map(Tls::read).transpose()?;
     let lock = lock(&config)?;
     let (store, writer) = open(&config).await?;
     let listener = TcpListener::bind(config.listen)
@@ -55,16 +65,43 @@ pub async fn start_with(config: Config, demo: Option<Router>) -> Result<Server> 
     let resumed = service.resume().await?;
     let closing = CancellationToken::new();
     let budget = Budget::new(config.limits.bodies_bytes);
-    let app = App { service, budget, closing: closing.clone(), demo: demo.is_some() };
+    let policy = Arc::new(policy(&config)?);
+    advise(&config, &policy, &store).await?;
+    let app = App { service, budget, policy, closing: closing.clone(), demo: demo.is_some() };
     let router = http::router(app, demo.unwrap_or_default());
-    let stop = closing.clone().cancelled_owned();
-    let serving =
-        tokio::spawn(
-            async move { axum::serve(listener, router).with_graceful_shutdown(stop).await },
-        );
+    let connections = Connections::new(&config.limits, tls.clone(), closing.clone());
+    let serving = tokio::spawn(connections.serve(listener, router));
+    tls.map(|tls| tokio::spawn(tls.watch(closing.clone())));
     tracing::info!(%address, resumed, store = %store.path().display(), "serving");
     let deadline = Duration::from_secs(config.limits.shutdown_s);
     Ok(Server { address, closing, deadline, serving, store, workers, lock })
+}
+
+/// Who is let in.
+fn policy(config: &Config) -> Result<Policy> {
+    let rate = |per_s| Rate(NonZeroU32::new(per_s).unwrap_or(NonZeroU32::MIN));
+    Ok(Policy {
+        required: config.asks_for_tokens()?,
+        origins: config.origins.clone(),
+        encrypted: config.tls.is_some(),
+        rates: Rates::new(rate(config.rates.token_per_s), rate(config.rates.address_per_s)),
+    })
+}
+
+/// Says what an operator should know of before somebody finds out.
+async fn advise(config: &Config, policy: &Policy, store: &Store) -> Result<()> {
+    if policy.required && store.n_tokens(Clock.now()).await? == 0 {
+        tracing::warn!(
+            "no token is in force, so nobody comes in; make one with \
+             `offbd token create --name NAME --role admin`, with the same --data and --config"
+        );
+    }
+    if policy.required && !policy.encrypted && !config.listen.ip().is_loopback() {
+        tracing::warn!(
+            "tokens travel unencrypted; set `tls`, or let nobody in but a proxy that encrypts"
+        );
+    }
+    Ok(())
 }
 
 /// Takes the store for this process: two writers would not know of each other.
@@ -110,7 +147,7 @@ impl Server {
             served
         };
         match tokio::time::timeout(deadline, finish).await {
-            Ok(served) => Ok(served??),
+            Ok(served) => Ok(served?),
             Err(_) => bail!("the stop took longer than {} s", deadline.as_secs()),
         }
     }
@@ -165,8 +202,10 @@ pub async fn migrate(config: &Config) -> Result<String> {
 pub fn check(config: &Config) -> Result<String> {
     config.check()?;
     Ok(format!(
-        "listen   {}\nstore    {}\nlog      {:?}, {}\nworkers  {} shards",
+        "listen   {}\naccess   {}, {}\nstore    {}\nlog      {:?}, {}\nworkers  {} shards",
         config.listen,
+        if config.asks_for_tokens()? { "with a token" } else { "for everyone on this machine" },
+        if config.tls.is_some() { "encrypted" } else { "not encrypted" },
         config.database_file()?.display(),
         config.log.format,
         config.log.level,

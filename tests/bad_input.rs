@@ -174,7 +174,7 @@ async fn a_body_that_never_ends() {
     let bench = Bench::start_with(|config| config.limits.body_timeout_s = 1).await;
     bench.client.asset("a").await;
     let mut socket = tokio::net::TcpStream::connect(&bench.client.address).await.unwrap();
-    let head = "POST /api/v1/assets/a/telemetry HTTP/1.1\r\nHost: x\r\n\
+    let head = "POST /api/v1/assets/a/telemetry HTTP/1.1\r\nHost: localhost\r\n\
         Content-Type: application/json\r\nContent-Length: 1000\r\n\r\n{\"samples\":[";
     socket.write_all(head.as_bytes()).await.unwrap();
     let mut answer = vec![0; 4096];

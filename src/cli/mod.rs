@@ -19,6 +19,7 @@ mod serve;
 mod simulate;
 mod soak;
 mod table;
+mod token;
 mod trends;
 mod unusable;
 mod watch;
@@ -65,6 +66,7 @@ enum Command {
     Demo(demo::DemoArgs),
     Serve(serve::ServeArgs),
     Watch(watch::WatchArgs),
+    Token(token::TokenArgs),
     Migrate(serve::MigrateArgs),
     Check(serve::CheckArgs),
 }
@@ -101,6 +103,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Demo(args) => demo::run(&args),
         Command::Serve(args) => serve::serve(&args, &logging),
         Command::Watch(args) => watch::run(&args),
+        Command::Token(args) => token::run(&args),
         Command::Migrate(args) => serve::migrate(&args),
         Command::Check(args) => serve::check(&args),
     }

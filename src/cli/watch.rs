@@ -2,6 +2,7 @@
 //! any other: states and fault lines over the WebSocket.
 
 use std::io::{IsTerminal, Write};
+use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use clap::Args;
@@ -9,7 +10,12 @@ use futures_util::StreamExt;
 use serde_json::Value;
 use tokio_tungstenite::connect_async;
 use tokio_tungstenite::tungstenite::Message;
+use tokio_tungstenite::tungstenite::client::IntoClientRequest;
+use tokio_tungstenite::tungstenite::handshake::client::Request;
+use tokio_tungstenite::tungstenite::http::HeaderValue;
+use tokio_tungstenite::tungstenite::http::header::AUTHORIZATION;
 
+use super::unusable::{self, Unusable};
 use super::{output, table};
 use crate::wire::service::StateView;
 use crate::wire::verdict::{AxisEvidenceView, FaultView};
@@ -33,6 +39,9 @@ pub(super) struct WatchArgs {
     /// States a second, 0.1 to 50
     #[arg(long, default_value_t = 4.0, value_name = "HZ", value_parser = rate)]
     hz: f64,
+    /// File with a token, where the service asks for one
+    #[arg(long, value_name = "FILE")]
+    token_file: Option<PathBuf>,
     /// End after so many states [default: none]
     #[arg(long, value_name = "N")]
     states: Option<u64>,
@@ -51,9 +60,8 @@ pub(super) fn run(args: &WatchArgs) -> anyhow::Result<()> {
 }
 
 async fn watch(args: &WatchArgs) -> anyhow::Result<()> {
-    let WatchArgs { asset, address, hz, .. } = args;
-    let url = format!("ws://{address}/api/v1/assets/{asset}/stream?state={hz}");
-    let connected = connect_async(&url).await;
+    let WatchArgs { asset, address, .. } = args;
+    let connected = connect_async(request(args)?).await;
     let (mut socket, _) =
         connected.with_context(|| format!("no stream of {asset} at {address}"))?;
     let mut screen = Screen { redraws: std::io::stdout().is_terminal(), drawn: 0 };
@@ -73,6 +81,22 @@ async fn watch(args: &WatchArgs) -> anyhow::Result<()> {
         }
     }
     Ok(())
+}
+
+/// The request for the stream, with the token if there is one.
+fn request(args: &WatchArgs) -> anyhow::Result<Request> {
+    let WatchArgs { asset, address, hz, token_file, .. } = args;
+    let url = format!("ws://{address}/api/v1/assets/{asset}/stream?state={hz}");
+    let mut request = url.into_client_request()?;
+    if let Some(file) = token_file {
+        let token = String::from_utf8(unusable::read(file)?);
+        let token = token.map_err(|error| Unusable::file(file, error))?;
+        let value = HeaderValue::from_str(&format!("Bearer {}", token.trim()));
+        let mut value = value.map_err(|error| Unusable::file(file, error))?;
+        value.set_sensitive(true);
+        request.headers_mut().insert(AUTHORIZATION, value);
+    }
+    Ok(request)
 }
 
 struct Screen {

@@ -3,6 +3,7 @@
 use std::convert::Infallible;
 use std::time::Duration;
 
+use axum::Extension;
 use axum::extract::State;
 use axum::http::HeaderMap;
 use axum::response::Sse;
@@ -12,7 +13,8 @@ use serde::Deserialize;
 use tokio_util::sync::CancellationToken;
 
 use super::{App, Problem, Query};
-use crate::service::EventFeed;
+use crate::service::access::Caller;
+use crate::service::{EventFeed, Service};
 use crate::vocabulary::Invalid;
 use crate::wire::service::EventView;
 
@@ -43,6 +45,7 @@ pub(super) struct EventsQuery {
 pub(super) async fn events(
     State(app): State<App>,
     Query(query): Query<EventsQuery>,
+    Extension(caller): Extension<Caller>,
     headers: HeaderMap,
 ) -> Result<Sse<impl Stream<Item = Result<Message, Infallible>>>, Problem> {
     let after = match headers.get("last-event-id") {
@@ -53,7 +56,8 @@ pub(super) async fn events(
     let keep_alive = KeepAlive::new().interval(KEEP_ALIVE);
     let begin = Message::default().id(feed.last().to_string()).event("begin").data("{}");
     let begin = futures_util::stream::once(std::future::ready(Ok(begin)));
-    Ok(Sse::new(begin.chain(messages(feed, app.closing).fuse())).keep_alive(keep_alive))
+    let ended = ended(app.service, caller, app.closing);
+    Ok(Sse::new(begin.chain(messages(feed).take_until(ended))).keep_alive(keep_alive))
 }
 
 fn last_id(text: &str) -> Result<i64, Problem> {
@@ -61,20 +65,21 @@ fn last_id(text: &str) -> Result<i64, Problem> {
     Ok(text.trim().parse().map_err(|_| reason())?)
 }
 
-fn messages(
-    feed: EventFeed,
-    closing: CancellationToken,
-) -> impl Stream<Item = Result<Message, Infallible>> {
-    futures_util::stream::unfold((feed, closing), |(mut feed, closing)| async {
-        let event = tokio::select! {
-            () = closing.cancelled() => return None,
-            event = feed.next() => event,
-        };
-        match event {
+/// Ends when the service stops, or the caller's token is no longer in force.
+async fn ended(service: Service, caller: Caller, closing: CancellationToken) {
+    tokio::select! {
+        () = closing.cancelled() => {}
+        () = service.lapse(&caller) => {}
+    }
+}
+
+fn messages(feed: EventFeed) -> impl Stream<Item = Result<Message, Infallible>> {
+    futures_util::stream::unfold(feed, |mut feed| async {
+        match feed.next().await {
             Ok(Some(event)) => {
                 let data = event.line();
                 let message = Message::default().id(event.id.to_string()).event("fault");
-                Some((Ok(message.data(data)), (feed, closing)))
+                Some((Ok(message.data(data)), feed))
             }
             Ok(None) => None,
             Err(error) => {

@@ -1,15 +1,16 @@
 //! Fault memory: of one asset and across the fleet.
 
-use axum::Json;
 use axum::extract::{Path, State};
 use axum::http::header::CONTENT_TYPE;
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
+use axum::{Extension, Json};
 use serde::Deserialize;
 
 use super::layers::about;
 use super::sessions::Form;
 use super::{PageQuery, Problem, Query, page_limit};
+use crate::service::access::Caller;
 use crate::service::{Around, FaultQuery, Service};
 use crate::wire::recording::{ColumnsView, RecordingView, write_csv};
 use crate::wire::service::{FaultEntryView, HistoryView, Page};
@@ -42,7 +43,7 @@ pub(super) struct FleetQuery {
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
 #[into_params(parameter_in = Query)]
 pub(super) struct ActorQuery {
-    /// Who does it; kept with the act.
+    /// Who does it; kept with the act. With a token it is the token's name.
     by: Option<String>,
 }
 
@@ -50,8 +51,9 @@ pub(super) struct ActorQuery {
 const MAX_ACTOR: usize = 100;
 
 impl ActorQuery {
-    fn actor(self) -> String {
-        let mut actor = self.by.unwrap_or_else(|| "unknown".to_owned());
+    fn actor(self, caller: &Caller) -> String {
+        let known = caller.name().map(str::to_owned).or(self.by);
+        let mut actor = known.unwrap_or_else(|| "unknown".to_owned());
         while actor.len() > MAX_ACTOR {
             actor.pop();
         }
@@ -97,9 +99,10 @@ pub(super) async fn clear(
     State(service): State<Service>,
     Path((asset, code)): Path<(String, String)>,
     Query(query): Query<ActorQuery>,
+    Extension(caller): Extension<Caller>,
 ) -> Result<StatusCode, Problem> {
     about(&asset);
-    service.clear(&asset, &code, query.actor()).await?;
+    service.clear(&asset, &code, query.actor(&caller)).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 
@@ -114,9 +117,10 @@ pub(super) async fn acknowledge(
     State(service): State<Service>,
     Path((asset, code)): Path<(String, String)>,
     Query(query): Query<ActorQuery>,
+    Extension(caller): Extension<Caller>,
 ) -> Result<Json<FaultEntryView>, Problem> {
     about(&asset);
-    Ok(Json(service.acknowledge(&asset, &code, query.actor()).await?))
+    Ok(Json(service.acknowledge(&asset, &code, query.actor(&caller)).await?))
 }
 
 #[derive(Debug, Deserialize, utoipa::IntoParams)]

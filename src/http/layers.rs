@@ -1,5 +1,5 @@
 //! What is around every handler: request ids, spans, metrics, time limits,
-//! panics, compression.
+//! panics, headers for browsers, compression.
 
 use std::any::Any;
 use std::time::{Duration, Instant};
@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use axum::Router;
 use axum::body::Body;
 use axum::extract::{MatchedPath, Request};
+use axum::http::header::CONTENT_LENGTH;
 use axum::http::{HeaderName, StatusCode};
 use axum::middleware::{Next, from_fn};
 use axum::response::{IntoResponse, Response};
@@ -19,7 +20,7 @@ use tower_http::trace::TraceLayer;
 use tracing::Span;
 use tracing::field::Empty;
 
-use super::Problem;
+use super::{Policy, Problem, headers};
 
 /// Longest time until an answer begins; only an import may take longer.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(60);
@@ -29,12 +30,14 @@ const IMPORT_TIMEOUT: Duration = Duration::from_secs(900);
 
 const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 
-pub(super) fn around(router: Router) -> Router {
+pub(super) fn around(router: Router, policy: &Policy) -> Router {
     router
         .layer(from_fn(limit_time))
         .layer(from_fn(count))
         .layer(CatchPanicLayer::custom(panicked))
         .layer(from_fn(name_instance))
+        .layer(from_fn(headers::secure))
+        .layer(headers::cors(&policy.origins))
         .layer(CompressionLayer::new())
         .layer(TraceLayer::new_for_http().make_span_with(span))
         .layer(PropagateRequestIdLayer::new(REQUEST_ID))
@@ -88,10 +91,10 @@ async fn name_instance(request: Request, next: Next) -> Response {
     match response.extensions_mut().remove::<Problem>() {
         Some(problem) => {
             let instance = id.map(|id| format!("urn:uuid:{id}").into());
-            let headers = std::mem::take(response.headers_mut());
+            let mut headers = std::mem::take(response.headers_mut());
             let mut named = Problem { instance, ..problem }.into_response();
-            let allow = headers.get(axum::http::header::ALLOW).cloned();
-            allow.map(|allow| named.headers_mut().insert(axum::http::header::ALLOW, allow));
+            headers.remove(CONTENT_LENGTH);
+            named.headers_mut().extend(headers);
             named
         }
         None => response,

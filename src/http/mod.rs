@@ -8,14 +8,20 @@ mod body;
 mod calibrations;
 mod events;
 mod faults;
+mod guard;
+mod headers;
 mod layers;
+mod login;
 mod operations;
 mod page;
 mod problem;
+mod rates;
 mod replays;
+mod routes;
 mod sessions;
 mod stream;
 mod telemetry;
+mod tokens;
 mod traces;
 
 use std::sync::Arc;
@@ -26,15 +32,20 @@ use serde::Deserialize;
 use tokio_util::sync::CancellationToken;
 use utoipa::OpenApi;
 use utoipa::openapi::{Content, OpenApi as Document, RefOr};
-use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 use utoipa_swagger_ui::SwaggerUi;
 
 pub use body::Budget;
+pub use guard::Policy;
 pub use operations::gather_metrics;
 pub use problem::Problem;
+pub use rates::{Rate, Rates};
+pub use routes::More;
 
+use self::guard::Guard;
+use self::routes::{Guarded, Rules, operations_mut};
 use crate::service::Service;
+use crate::service::access::Right;
 
 /// What the handlers share.
 #[derive(Clone)]
@@ -42,6 +53,8 @@ pub struct App {
     pub service: Service,
     /// Bytes of request bodies in memory.
     pub budget: Budget,
+    /// Who is let in.
+    pub policy: Arc<Policy>,
     /// Cancelled when the server stops: long answers end then.
     pub closing: CancellationToken,
     /// Whether this is the demo, which mounts more than the interface.
@@ -68,6 +81,7 @@ impl FromRef<App> for Service {
         (name = "telemetry", description = "Samples in"),
         (name = "faults", description = "Fault memory"),
         (name = "sessions", description = "Recordings"),
+        (name = "access", description = "Tokens, logins, the audit log"),
         (name = "operation", description = "Health and metrics"),
     )
 )]
@@ -96,54 +110,69 @@ struct PageQuery {
     limit: Option<u32>,
 }
 
-fn api() -> OpenApiRouter<App> {
-    let v1 = OpenApiRouter::new()
-        .routes(routes!(assets::list, assets::create))
-        .routes(routes!(assets::get, assets::put, assets::delete))
-        .routes(routes!(assets::state))
-        .routes(routes!(assets::trends))
-        .routes(routes!(assets::fleet))
-        .routes(routes!(telemetry::post))
-        .routes(routes!(stream::stream))
-        .routes(routes!(faults::of_asset))
-        .routes(routes!(faults::get, faults::clear))
-        .routes(routes!(faults::acknowledge))
-        .routes(routes!(faults::recording))
-        .routes(routes!(faults::history))
-        .routes(routes!(faults::of_fleet))
-        .routes(routes!(events::events))
-        .routes(routes!(sessions::open))
-        .routes(routes!(sessions::import))
-        .routes(routes!(sessions::list))
-        .routes(routes!(sessions::get, sessions::delete))
-        .routes(routes!(sessions::end))
-        .routes(routes!(sessions::telemetry))
-        .routes(routes!(sessions::faults))
-        .routes(routes!(traces::trace))
-        .routes(routes!(replays::create))
-        .routes(routes!(replays::get))
-        .routes(routes!(calibrations::list, calibrations::create))
-        .routes(routes!(calibrations::get))
-        .routes(routes!(calibrations::activate));
-    OpenApiRouter::with_openapi(Api::openapi())
-        .routes(routes!(operations::healthz))
-        .routes(routes!(operations::readyz))
-        .routes(routes!(operations::metrics))
+/// Every operation, with the right that it takes.
+fn api() -> Guarded {
+    use Right::{Administer, Conduct, Feed, Known, Open, Operate, Read, ReadAsset};
+    let v1 = Guarded::new(Document::default())
+        .routes(Read, routes!(assets::list))
+        .routes(Operate, routes!(assets::create))
+        .routes(ReadAsset, routes!(assets::get))
+        .routes(Operate, routes!(assets::put))
+        .routes(Administer, routes!(assets::delete))
+        .routes(ReadAsset, routes!(assets::state))
+        .routes(Read, routes!(assets::trends))
+        .routes(Read, routes!(assets::fleet))
+        .routes(Feed, routes!(telemetry::post))
+        .routes(ReadAsset, routes!(stream::stream))
+        .routes(ReadAsset, routes!(faults::of_asset))
+        .routes(ReadAsset, routes!(faults::get))
+        .routes(Operate, routes!(faults::clear))
+        .routes(Operate, routes!(faults::acknowledge))
+        .routes(Read, routes!(faults::recording))
+        .routes(Read, routes!(faults::history))
+        .routes(Read, routes!(faults::of_fleet))
+        .routes(ReadAsset, routes!(events::events))
+        .routes(Conduct, routes!(sessions::open))
+        .routes(Operate, routes!(sessions::import))
+        .routes(ReadAsset, routes!(sessions::list))
+        .routes(ReadAsset, routes!(sessions::get))
+        .routes(Administer, routes!(sessions::delete))
+        .routes(Conduct, routes!(sessions::end))
+        .routes(Read, routes!(sessions::telemetry))
+        .routes(ReadAsset, routes!(sessions::faults))
+        .routes(Read, routes!(traces::trace))
+        .routes(Operate, routes!(replays::create))
+        .routes(Read, routes!(replays::get))
+        .routes(Read, routes!(calibrations::list))
+        .routes(Operate, routes!(calibrations::create))
+        .routes(Read, routes!(calibrations::get))
+        .routes(Operate, routes!(calibrations::activate))
+        .routes(Administer, routes!(tokens::list, tokens::create))
+        .routes(Administer, routes!(tokens::get, tokens::revoke))
+        .routes(Administer, routes!(tokens::audit))
+        .routes(Open, routes!(login::log_in))
+        .routes(Known, routes!(login::get, login::log_out));
+    Guarded::new(Api::openapi())
+        .routes(Open, routes!(operations::healthz))
+        .routes(Open, routes!(operations::readyz))
+        .routes(Read, routes!(operations::metrics))
         .nest("/api/v1", v1)
 }
+
+/// What else the router has; it is the same for everyone, everywhere.
+const OPEN_PAGES: [&str; 5] =
+    ["/openapi.yaml", "/openapi.json", "/docs", "/docs/", "/docs/{*rest}"];
 
 /// The description of the interface.
 #[must_use]
 pub fn openapi() -> Document {
-    described(api().into_openapi())
+    described(api().split().1)
 }
 
 /// The document with the media type of problems put right.
 fn described(mut document: Document) -> Document {
     let items = document.paths.paths.values_mut();
-    let operations = items.flat_map(|item| {
-        [&mut item.get, &mut item.put, &mut item.post, &mut item.delete].into_iter().flatten()
-    });
+    let operations = items.flat_map(operations_mut);
     for response in operations.flat_map(|operation| operation.responses.responses.values_mut()) {
         let RefOr::T(response) = response else { continue };
         let of_problem = |content: &RefOr<Content>| {
@@ -168,16 +197,21 @@ pub fn openapi_yaml() -> String {
 }
 
 /// The whole of what is served, with `more` beside the interface.
-pub fn router(app: App, more: Router) -> Router {
-    let (router, document) = api().split_for_parts();
+pub fn router(app: App, more: More) -> Router {
+    let (router, document) = api().split();
     let document = described(document);
+    let mut rules = Rules::new(&document, &more);
+    OPEN_PAGES.iter().for_each(|path| rules.open(path));
     let yaml: Arc<str> = document.to_yaml().unwrap_or_default().into();
+    let policy = app.policy.clone();
+    let guard = Arc::new(Guard { app: app.clone(), rules });
     let router = router
         .route("/openapi.yaml", axum::routing::get(move || operations::openapi(yaml)))
         .merge(SwaggerUi::new("/docs").url("/openapi.json", document))
         .fallback(page::serve)
         .method_not_allowed_fallback(problem::method_not_allowed)
         .with_state(app)
-        .merge(more);
-    layers::around(router)
+        .merge(more.router)
+        .layer(axum::middleware::from_fn_with_state(guard, guard::guard));
+    layers::around(router, &policy)
 }

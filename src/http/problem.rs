@@ -2,7 +2,7 @@
 //! an error has.
 
 use axum::extract::rejection::QueryRejection;
-use axum::http::header::{CONTENT_TYPE, HeaderValue, RETRY_AFTER};
+use axum::http::header::{CONTENT_TYPE, HeaderValue, RETRY_AFTER, WWW_AUTHENTICATE};
 use axum::http::{Method, StatusCode, Uri};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
@@ -73,6 +73,9 @@ impl IntoResponse for Problem {
         if matches!(status, StatusCode::SERVICE_UNAVAILABLE | StatusCode::TOO_MANY_REQUESTS) {
             headers.insert(RETRY_AFTER, HeaderValue::from(RETRY_AFTER_S));
         }
+        if status == StatusCode::UNAUTHORIZED {
+            headers.insert(WWW_AUTHENTICATE, HeaderValue::from_static("Bearer realm=\"offbd\""));
+        }
         response.extensions_mut().insert(self);
         response
     }
@@ -90,9 +93,11 @@ impl From<ServiceError> for Problem {
             E::UnknownSession { .. } => missing("unknown-session", "No such session"),
             E::UnknownReplay { .. } => missing("unknown-replay", "No such replay"),
             E::UnknownCalibration { .. } => missing("unknown-calibration", "No such calibration"),
+            E::UnknownToken { .. } => missing("unknown-token", "No such token"),
             E::UnknownCode(_) => missing("unknown-code", "No such fault code"),
             E::NoRecording { .. } => missing("no-recording", "No recording"),
             E::AssetExists { .. } => conflict("asset-exists", "The asset is there already"),
+            E::TokenExists { .. } => conflict("token-exists", "The name is taken"),
             E::SessionExists { .. } => conflict("session-exists", "The session is there already"),
             E::SessionEnded { .. } => conflict("session-ended", "The session has ended"),
             E::NothingToAcknowledge { .. } => conflict("nothing-to-acknowledge", "No occurrence"),
@@ -166,6 +171,10 @@ pub(super) async fn not_found(uri: Uri) -> Problem {
 }
 
 pub(super) async fn method_not_allowed(method: Method, uri: Uri) -> Problem {
+    not_allowed(&method, &uri)
+}
+
+pub(super) fn not_allowed(method: &Method, uri: &Uri) -> Problem {
     let detail = format!("{} does not take {method}", uri.path());
     Problem::new(StatusCode::METHOD_NOT_ALLOWED, "method", "Method not allowed", detail)
 }

@@ -9,6 +9,7 @@ use std::collections::VecDeque;
 use std::pin::Pin;
 use std::time::Duration;
 
+use axum::Extension;
 use axum::extract::ws::rejection::WebSocketUpgradeRejection;
 use axum::extract::ws::{CloseFrame, Message, WebSocket, WebSocketUpgrade, close_code};
 use axum::extract::{Path, State};
@@ -21,6 +22,7 @@ use utoipa::ToSchema;
 
 use super::layers::about;
 use super::{App, Problem, Query};
+use crate::service::access::{Caller, Right};
 use crate::service::{Event, EventFeed, Pending, Service, ServiceError};
 use crate::vocabulary::Invalid;
 use crate::wire::telemetry::{self, AckView};
@@ -74,7 +76,8 @@ pub(super) struct FrameView {
 /// A WebSocket: batches up, as JSON rows or columns in text frames, each with
 /// an optional `id`; down come `ack` (once durable), `error` (with a
 /// `problem`), `fault` and, if asked for, `state` frames, all JSON objects
-/// with a `type`.
+/// with a `type`. Batches are taken from whoever may send the asset's telemetry;
+/// others see. When the token ends, so does the stream.
 #[utoipa::path(get, path = "/assets/{asset}/stream", tag = "telemetry",
     operation_id = "stream_telemetry",
     params(("asset", description = "Name of the asset"), StreamQuery),
@@ -84,6 +87,7 @@ pub(super) async fn stream(
     State(app): State<App>,
     Path(asset): Path<String>,
     Query(query): Query<StreamQuery>,
+    Extension(caller): Extension<Caller>,
     upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
 ) -> Result<Response, Problem> {
     about(&asset);
@@ -101,7 +105,7 @@ pub(super) async fn stream(
         .max_write_buffer_size(MAX_WRITE_BUFFER);
     Ok(upgrade.on_upgrade(move |socket| async move {
         metrics::gauge!("offbd_streams").increment(1.0);
-        let session = Session::new(socket, app, asset, events, period, watch);
+        let session = Session::new(socket, app, caller, asset, events, period, watch);
         session.run().await;
         metrics::gauge!("offbd_streams").decrement(1.0);
     }))
@@ -140,6 +144,10 @@ struct Watched {
 struct Session {
     socket: WebSocket,
     app: App,
+    /// Whether batches are taken.
+    feeds: bool,
+    /// Ends with the caller's token.
+    lapse: Pin<Box<dyn Future<Output = ()> + Send>>,
     asset: String,
     events: EventFeed,
     states: Option<Interval>,
@@ -153,6 +161,7 @@ struct Session {
 /// What happens next on a connection.
 enum Next {
     Closing,
+    Lapsed,
     Answer(Result<AckView, ServiceError>),
     Frame(Option<Result<Message, axum::Error>>),
     Event(Result<Option<std::sync::Arc<Event>>, ServiceError>),
@@ -165,6 +174,7 @@ impl Session {
     fn new(
         socket: WebSocket,
         app: App,
+        caller: Caller,
         asset: String,
         events: EventFeed,
         period: Option<Duration>,
@@ -176,8 +186,11 @@ impl Session {
             ticks
         };
         let (states, pings) = (period.map(ticks), ticks(PING_EVERY));
-        let owed = VecDeque::new();
-        Self { socket, app, asset, events, states, pings, heard: Instant::now(), owed, watched }
+        let (owed, heard) = (VecDeque::new(), Instant::now());
+        let feeds = caller.may(Right::Feed, &asset);
+        let service = app.service.clone();
+        let lapse = Box::pin(async move { service.lapse(&caller).await });
+        Self { socket, app, feeds, lapse, asset, events, states, pings, heard, owed, watched }
     }
 
     async fn run(mut self) {
@@ -195,7 +208,7 @@ impl Session {
 
     async fn next(&mut self) -> Next {
         let full = self.owed.len() >= MAX_PENDING;
-        let Self { socket, app, events, states, pings, owed, .. } = self;
+        let Self { socket, app, lapse, events, states, pings, owed, .. } = self;
         let answer = async {
             match owed.front_mut() {
                 Some(owed) => owed.answer.as_mut().await,
@@ -211,6 +224,7 @@ impl Session {
         tokio::select! {
             biased;
             () = app.closing.cancelled() => Next::Closing,
+            () = lapse => Next::Lapsed,
             answer = answer => Next::Answer(answer),
             event = events.next() => Next::Event(event),
             _ = pings.tick() => Next::Ping,
@@ -222,6 +236,7 @@ impl Session {
     async fn follow(&mut self, next: Next) -> Result<(), End> {
         match next {
             Next::Closing => self.close().await,
+            Next::Lapsed => Err(End::Close(close_code::POLICY, "the token is no longer in force")),
             Next::Answer(answer) => {
                 let id = self.owed.pop_front().and_then(|owed| owed.id);
                 self.answer(id, answer).await
@@ -262,6 +277,12 @@ impl Session {
 
     /// Takes a batch; its answer comes after those of the ones before.
     async fn batch(&mut self, document: &[u8]) -> Result<(), End> {
+        if !self.feeds {
+            let detail = "the token's role does not send telemetry of this asset";
+            let title = "Not allowed";
+            let problem = Problem::new(StatusCode::FORBIDDEN, "forbidden", title, detail);
+            return self.send(json!({ "type": "error", "problem": problem }).to_string()).await;
+        }
         let parsed = telemetry::json(document, self.app.service.limits().batch_samples);
         let (id, submitted) = match parsed {
             Ok(mut batch) => {

@@ -6,7 +6,7 @@ use super::running::Running;
 use super::shard::Job;
 use super::{Service, ServiceError, settled, views};
 use crate::engine::{Rig, State};
-use crate::store::{AssetRow, Write};
+use crate::store::{AccessWrite, AssetRow, Write};
 use crate::vocabulary::Invalid;
 use crate::wire::asset::{self, AssetView};
 use crate::wire::service::{Page, StateView, WatchView, state_view};
@@ -125,7 +125,8 @@ impl Service {
         .await
     }
 
-    /// Deletes an asset with its sessions, recordings and faults.
+    /// Deletes an asset with its sessions, recordings and faults, and revokes
+    /// the tokens of its devices.
     ///
     /// # Errors
     /// [`ServiceError::UnknownAsset`].
@@ -133,10 +134,14 @@ impl Service {
         let asset = name.to_owned();
         self.call(name, move |_, running, work| {
             running.deleted = true;
+            let revoke = AccessWrite::RevokeDevices { asset: asset.clone(), at: work.at };
             work.writes.push(Write::DeleteAsset { name: asset });
+            work.writes.push(Write::Access(revoke));
             Ok(())
         })
-        .await
+        .await?;
+        self.inner.passes.forget();
+        Ok(())
     }
 
     /// Where the twin of `name` stands, samples under way included.

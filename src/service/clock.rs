@@ -15,6 +15,15 @@ impl Clock {
     }
 }
 
+/// The moment that RFC 3339 text says.
+///
+/// # Errors
+/// Says what is wrong with it.
+pub fn moment(text: &str) -> Result<Micros, String> {
+    let parsed: Result<jiff::Timestamp, _> = text.parse();
+    parsed.map(jiff::Timestamp::as_microsecond).map_err(|error| error.to_string())
+}
+
 /// A moment as RFC 3339, UTC, to the microsecond: always of one length, so that
 /// text sorts as time does.
 #[must_use]

@@ -19,10 +19,14 @@ pub enum ServiceError {
     UnknownReplay { id: String },
     #[error("asset `{asset}` has no calibration `{id}`")]
     UnknownCalibration { asset: String, id: String },
+    #[error("there is no token `{id}`")]
+    UnknownToken { id: String },
     #[error("no such fault code: {0}")]
     UnknownCode(UnknownWord),
     #[error("there is an asset `{name}` already; replace it with PUT /api/v1/assets/{name}")]
     AssetExists { name: String },
+    #[error("there is a token `{name}` in force; revoke it first, or take another name")]
+    TokenExists { name: String },
     #[error("asset `{asset}` has a session `{name}` already")]
     SessionExists { asset: String, name: String },
     #[error("session `{name}` of asset `{asset}` has ended; new samples need another session")]

@@ -11,6 +11,7 @@
 //! Knows no HTTP and no SQL. Reads the clock for what is stored beside the
 //! samples (arrival, opening, actions); no judgement depends on it.
 
+pub mod access;
 mod assets;
 mod calibrations;
 mod clock;
@@ -45,7 +46,7 @@ use tokio::sync::{Semaphore, mpsc, oneshot};
 use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
 
-pub use clock::Clock;
+pub use clock::{Clock, moment};
 pub use error::ServiceError;
 pub use events::{Event, EventFeed};
 pub use faults::FaultQuery;
@@ -55,6 +56,7 @@ pub use sessions::Recording;
 pub use telemetry::Pending;
 pub use traces::{MAX_TRACE_POINTS, TraceQuery};
 
+use self::access::Passes;
 use self::commit::{Committer, WriteSet};
 use self::events::Events;
 use self::presence::Presences;
@@ -73,6 +75,7 @@ struct Inner {
     limits: Limits,
     events: Events,
     presences: Presences,
+    passes: Passes,
     shards: Vec<mpsc::Sender<Job>>,
     writer: mpsc::Sender<WriteSet>,
     jobs: mpsc::Sender<jobs::Job>,
@@ -157,6 +160,7 @@ impl Service {
             limits,
             events,
             presences,
+            passes: Passes::default(),
             shards,
             writer: sets,
             jobs,

@@ -82,6 +82,14 @@ impl Service {
         self.session(&id).await
     }
 
+    /// The asset of a session; none if there is no such session.
+    ///
+    /// # Errors
+    /// [`ServiceError::Store`] if the store cannot be read.
+    pub async fn asset_of_session(&self, id: &str) -> Result<Option<String>, ServiceError> {
+        Ok(self.inner.store.session(id).await?.map(|row| row.asset))
+    }
+
     /// Ends a session; one that has ended stays as it is.
     ///
     /// # Errors

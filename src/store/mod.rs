@@ -5,6 +5,7 @@
 //! returns. Documents are JSON text that the store does not read. Knows SQL
 //! and the chunk format; knows no status codes, no engine and no clock.
 
+mod access;
 pub mod codec;
 mod read;
 mod rows;
@@ -19,6 +20,7 @@ use sqlx::sqlite::{
     SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous,
 };
 
+pub use access::{AccessWrite, AuditRow, LAST_ID, MAX_LOGINS, TokenRow};
 pub use read::{FaultFilter, FaultOrder, SessionFilter};
 pub use rows::{
     ActionKind, ActionRow, AssetRow, CalibrationRow, EventRow, FaultRow, JobState, Micros,

@@ -6,8 +6,8 @@ use sqlx::{ConnectOptions, Connection, SqliteConnection};
 
 use super::tail::Tails;
 use super::{
-    ActionRow, AssetRow, CalibrationRow, FaultRow, MIGRATIONS, Micros, Progress, ReplayRow,
-    SessionRow, StoreError, TransitionRow, TrendRow, options,
+    AccessWrite, ActionRow, AssetRow, CalibrationRow, FaultRow, MIGRATIONS, Micros, Progress,
+    ReplayRow, SessionRow, StoreError, TransitionRow, TrendRow, options,
 };
 use crate::vocabulary::Sample;
 
@@ -49,6 +49,7 @@ pub enum Write {
         asset: String,
         id: String,
     },
+    Access(AccessWrite),
 }
 
 /// The only connection that changes anything.
@@ -170,6 +171,7 @@ impl Group<'_> {
             Write::PutReplay(row) => put_replay(db, row).await,
             Write::PutCalibration(row) => put_calibration(db, row).await,
             Write::ActivateCalibration { asset, id } => activate(db, asset, id).await,
+            Write::Access(write) => write.apply(db).await,
             Write::CreateAsset(row) => create_asset(db, row).await,
             Write::UpdateAsset(row) => update_asset(db, row).await,
             Write::OpenSession(row) => open_session(db, row).await,

@@ -5,6 +5,7 @@
 //! domain value that cannot be wrong. Views are `Serialize`, domain types are
 //! not; they are converted by hand. Knows no sockets and no SQL.
 
+pub mod access;
 pub mod asset;
 pub mod basis;
 pub mod difference;

@@ -9,5 +9,6 @@ mod scene;
 mod score;
 mod service;
 mod simulate;
+mod token;
 mod trends;
 mod usage;

@@ -58,6 +58,8 @@ impl Bench {
 #[derive(Clone)]
 pub struct Client {
     pub address: String,
+    /// Shown with every request.
+    pub token: Option<String>,
     http: reqwest::Client,
 }
 
@@ -96,7 +98,12 @@ impl Answer {
 
 impl Client {
     pub fn new(address: String) -> Self {
-        Self { address, http: reqwest::Client::new() }
+        Self { address, token: None, http: reqwest::Client::new() }
+    }
+
+    /// The same with a token to show.
+    pub fn with(&self, token: &str) -> Self {
+        Self { token: Some(token.to_owned()), ..self.clone() }
     }
 
     pub fn url(&self, path: &str) -> String {
@@ -105,7 +112,11 @@ impl Client {
     }
 
     pub fn request(&self, method: Method, path: &str) -> reqwest::RequestBuilder {
-        self.http.request(method, self.url(path))
+        let request = self.http.request(method, self.url(path));
+        match &self.token {
+            Some(token) => request.bearer_auth(token),
+            None => request,
+        }
     }
 
     pub async fn send(&self, request: reqwest::RequestBuilder) -> Answer {
@@ -293,6 +304,14 @@ impl Events {
             let chunk = chunk.unwrap().unwrap().expect("the stream goes on");
             self.text.push_str(std::str::from_utf8(&chunk).unwrap());
         }
+    }
+}
+
+impl Events {
+    /// Whether the service ends the stream without another event.
+    pub async fn ended(&mut self) -> bool {
+        let chunk = tokio::time::timeout(DEADLINE, self.response.chunk()).await;
+        matches!(chunk, Ok(Ok(None))) && self.text.is_empty()
     }
 }
 

@@ -5,6 +5,7 @@ import { api } from "./api/client";
 import { events, type Link as Connection } from "./api/events";
 import { useAsk } from "./hooks";
 import { Empty, Loading } from "./parts/bits";
+import { Door, Leave } from "./parts/door";
 import { lazy, Suspense } from "./parts/lazy";
 import { Link, usePlace } from "./router";
 import { setTheme, theme, type Theme } from "./theme";
@@ -61,6 +62,7 @@ function Frame() {
         <Link to="/" class="brand"><img src="/icon.svg" alt="" width="24" height="24" />offbd</Link>
         <nav aria-label="Views">{tabs.map(([to, word, here]) => <Link to={to} aria-current={here ? "page" : undefined}>{word}</Link>)}</nav>
         <span class={`link-state link-${link}`} role="status">{TITLES[link]}</span>
+        <Leave />
         <button type="button" class="small" onClick={switchTheme} aria-label={`Colours: ${chosen}; change`} title={`Colours: ${chosen}`}>{THEMES[chosen].sign}</button>
       </header>
       <div id="content" tabIndex={-1}>
@@ -71,4 +73,4 @@ function Frame() {
   );
 }
 
-render(<Frame />, document.getElementById("app")!);
+render(<Door><Frame /></Door>, document.getElementById("app")!);

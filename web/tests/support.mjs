@@ -55,7 +55,7 @@ async function run(args, stream) {
   return { port, url: `http://127.0.0.1:${port}`, stop };
 }
 
-export const serve = (data, port = 0) => run(["serve", "--data", data, "--listen", `127.0.0.1:${port}`], "stderr");
+export const serve = (data, port = 0, ...more) => run(["serve", "--data", data, "--listen", `127.0.0.1:${port}`, ...more], "stderr");
 export const demo = (...args) => run(["demo", "--port", "0", ...args], "stdout");
 
 /** Runs a command of the program to its end; what it prints. */

@@ -4,14 +4,15 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use axum::Json;
 use axum::extract::State;
-use axum::http::StatusCode;
-use axum::routing::{get, post};
-use axum::{Json, Router};
+use axum::http::{Method, StatusCode};
+use axum::routing::{delete, get, post};
 use serde::{Deserialize, Serialize};
 use tokio::sync::mpsc;
 
-use crate::http::Problem;
+use crate::http::{More, Problem};
+use crate::service::access::Right;
 use crate::simulation::{Fault, FaultEffect};
 
 /// Acts that wait for the show; the next is told to come again.
@@ -69,17 +70,21 @@ struct Desk {
 }
 
 /// Hands for the show, and the routes by which they are moved.
-pub(super) fn hands(asset: &str) -> (Hands, Router) {
+pub(super) fn hands(asset: &str) -> (Hands, More) {
     let (sender, acts) = mpsc::channel(MAX_WAITING);
     let buttons = BUTTONS.map(str::to_owned).to_vec();
     let asset = asset.to_owned();
     let shown = Shown { asset, script: true, broken: Vec::new(), buttons };
     let shown = Arc::new(Mutex::new(shown));
-    let routes = Router::new()
-        .route("/api/v1/demo", get(look))
-        .route("/api/v1/demo/faults", post(break_it).delete(repair))
-        .route("/api/v1/demo/script", post(script))
-        .with_state(Desk { acts: sender, shown: shown.clone() });
+    let desk = Desk { acts: sender, shown: shown.clone() };
+    let (look, break_it) = (get(look).with_state(desk.clone()), post(break_it));
+    let (break_it, repair) = (break_it.with_state(desk.clone()), delete(repair));
+    let (repair, script) = (repair.with_state(desk.clone()), post(script).with_state(desk));
+    let routes = More::default()
+        .route("/api/v1/demo", Method::GET, Right::Read, look)
+        .route("/api/v1/demo/faults", Method::POST, Right::Operate, break_it)
+        .route("/api/v1/demo/faults", Method::DELETE, Right::Operate, repair)
+        .route("/api/v1/demo/script", Method::POST, Right::Operate, script);
     (Hands { acts, shown }, routes)
 }
 

@@ -1,7 +1,7 @@
 /**
- * The one place that knows how a request proves who sends it. The service has
- * no log-in today, so nothing is added; a token or a cookie would be kept, added
- * and renewed here, for requests and for streams alike.
+ * The one place that knows how a request proves who sends it: by a cookie that
+ * the service gives for a token and no script can read. It goes along with
+ * requests and with streams alike.
  */
 export function authorised(init: RequestInit): RequestInit {
   return { ...init, credentials: "same-origin" };
@@ -12,7 +12,20 @@ export function streamUrl(path: string): string {
   return path;
 }
 
-/** What a person who acts is called; kept with the act. */
+const listeners = new Set<() => void>();
+
+/** Calls `shut` when the service no longer knows who asks; the answer ends that. */
+export function whenShut(shut: () => void): () => void {
+  listeners.add(shut);
+  return () => listeners.delete(shut);
+}
+
+/** The service does not know who asks. */
+export function shut(): void {
+  listeners.forEach((listener) => listener());
+}
+
+/** What a person who acts is called; kept with the act where no token says it. */
 export function actor(): string {
   return localStorage.getItem("offbd.actor") || "dashboard";
 }

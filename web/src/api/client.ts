@@ -1,11 +1,12 @@
 /** Requests to the interface. What goes wrong is a `ProblemError` with the service's own words. */
-import { actor, authorised } from "./access";
+import { actor, authorised, shut } from "./access";
 import type {
-  Around, Asset, CalibrationJob, Demo, FaultEntry, FaultLine, FleetEntry, Health, History, Import, Page, Problem,
-  Replay, ReplaySettings, Session, State, Trace, Trends,
+  Around, Asset, CalibrationJob, Caller, Demo, FaultEntry, FaultLine, FleetEntry, Health, History, Import, MadeToken,
+  Page, Problem, Replay, ReplaySettings, Session, State, Trace, Trends,
 } from "./types";
 
 const BASE = "/api/v1";
+const LOGIN = `${BASE}/login`;
 
 /** Longest wait for an answer; an import may take longer. */
 const TIMEOUT_MS = 70_000;
@@ -15,6 +16,9 @@ export class ProblemError extends Error {
     super(problem.detail ?? problem.title ?? `the service answered ${status}`);
   }
 }
+
+/** True where the service does not know who asks. */
+export const isUnauthenticated = (error: unknown) => error instanceof ProblemError && error.status === 401;
 
 /** True where the service could not be reached at all. */
 export function isUnreachable(error: unknown): boolean {
@@ -29,6 +33,7 @@ export function words(error: unknown): string {
 async function ask<T>(path: string, init: RequestInit = {}): Promise<T> {
   const signal = init.signal ?? AbortSignal.timeout(TIMEOUT_MS);
   const answer = await fetch(path, authorised({ ...init, signal }));
+  if (answer.status === 401 && path !== LOGIN) shut();
   if (!answer.ok) throw new ProblemError(answer.status, await answer.json().catch(() => ({})));
   const isJson = answer.headers.get("content-type")?.includes("json");
   return (isJson ? await answer.json() : undefined) as T;
@@ -64,6 +69,11 @@ async function all<T>(path: string, values: Query, most = 20_000): Promise<T[]> 
 
 export const api = {
   health: () => ask<Health>("/healthz"),
+  caller: () => ask<Caller>(LOGIN),
+  logIn: (token: string) => send<Caller>("POST", "/login", { token }),
+  logOut: () => send<void>("DELETE", "/login"),
+  createDeviceToken: (asset: string) =>
+    send<MadeToken>("POST", "/tokens", { name: `${asset.slice(0, 70)} ${new Date().toISOString()}`, role: "device", asset }),
   fleet: () => all<FleetEntry>("/fleet", {}),
   asset: (name: string) => get<Asset>(`/assets/${id(name)}`),
   createAsset: (asset: Partial<Asset>) => send<Asset>("POST", "/assets", asset),

@@ -5,17 +5,21 @@ export interface Snippet {
   text: string;
 }
 
-export function snippets(asset: string, origin: string): Snippet[] {
+/** The snippets for `asset`; where the service asks for a token, `token` stands in them. */
+export function snippets(asset: string, origin: string, token?: string): Snippet[] {
   const url = `${origin}/api/v1/assets/${encodeURIComponent(asset)}/telemetry`;
   const host = origin.replace(/\/\/(localhost|127\.0\.0\.1)/, "//SERVER");
   const remote = url.replace(origin, host);
+  const curl = token ? `-H 'authorization: Bearer ${token}' ` : "";
+  const python = token ? `, "authorization": "Bearer ${token}"` : "";
+  const arduino = token ? `\n  http.addHeader("authorization", "Bearer ${token}");` : "";
   return [
     { word: "curl", text: `# One sample: seconds on the device's clock, commanded angles in rad, ball in m.
-curl --json '{"samples":[{"seq":1,"t_s":0.00,"cmd_qx_rad":0.0,"cmd_qy_rad":0.02,"x_m":0.010,"y_m":-0.004}]}' \\
+curl ${curl}--json '{"samples":[{"seq":1,"t_s":0.00,"cmd_qx_rad":0.0,"cmd_qy_rad":0.02,"x_m":0.010,"y_m":-0.004}]}' \\
   ${url}
 
 # A whole recording with the header t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m
-curl -H 'content-type: text/csv' --data-binary @recording.csv ${url}
+curl ${curl}-H 'content-type: text/csv' --data-binary @recording.csv ${url}
 ` },
     { word: "Python", text: `import json, time, urllib.request
 
@@ -27,7 +31,7 @@ def read_rig():
 
 def send(samples):
     request = urllib.request.Request(
-        URL, json.dumps({"samples": samples}).encode(), {"content-type": "application/json"})
+        URL, json.dumps({"samples": samples}).encode(), {"content-type": "application/json"${python}})
     with urllib.request.urlopen(request, timeout=5) as answer:
         return json.load(answer)       # {"accepted": 10, "rejected": [], ...}: durable
 
@@ -62,7 +66,7 @@ void sample(float qx, float qy, float x, float y) {   // rad and m; every 10 ms
   if (++n < 20) return;
   HTTPClient http;
   http.begin(URL);
-  http.addHeader("content-type", "application/json");
+  http.addHeader("content-type", "application/json");${arduino}
   int status = http.POST("{\\"samples\\":[" + batch + "]}");
   http.end();
   if (status == 200 || n > 200) { batch = ""; n = 0; }  // else sent again with the next

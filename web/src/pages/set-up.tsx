@@ -8,6 +8,7 @@ import { PlayoutClock, TraceBuffer } from "../live/buffer";
 import { compare, mended, PLAIN, type Signs } from "../live/signs";
 import { snippets } from "../live/snippets";
 import { Act, Code, Facts, Loading, Trouble } from "../parts/bits";
+import { DeviceToken, useCaller } from "../parts/door";
 import { XyTrace } from "../parts/xy-trace";
 import { at, go, Link, usePlace } from "../router";
 import { clock, count, degrees, duration, millimetres, number, seconds } from "../words";
@@ -152,7 +153,9 @@ function useRig(name: string) {
 }
 
 function Connect({ name, next }: { name: string; next: () => void }) {
-  const all = snippets(name, location.origin);
+  const [token, setToken] = useState("offbd_TOKEN");
+  const asks = useCaller()?.authentication === "required";
+  const all = snippets(name, location.origin, asks ? token : undefined);
   const [word, setWord] = useState("Python");
   const { state, alive } = useRig(name);
   const came = (state?.samples ?? 0) > 0;
@@ -161,7 +164,7 @@ function Connect({ name, next }: { name: string; next: () => void }) {
       <p>Send samples as they come, ten times a second or so. The service answers once they are stored; what is sent twice counts once.</p>
       <div class="chips" role="group" aria-label="Language">{all.map((each) => <button type="button" aria-pressed={each.word === word} onClick={() => setWord(each.word)}>{each.word}</button>)}</div>
       <Code label={`${word} snippet`}>{all.find((each) => each.word === word)!.text}</Code>
-      <p class="quiet small-text">The service asks for no token. Whoever reaches this address can send; keep it within your network.{/localhost|127\.0\.0\.1/.test(location.hostname) && " A device needs this computer's name or address instead of 127.0.0.1, and the service must listen there (--listen 0.0.0.0:8087)."}</p>
+      <p class="quiet small-text"><DeviceToken asset={name} made={setToken} />{/localhost|127\.0\.0\.1/.test(location.hostname) && " A device needs this computer's name or address instead of 127.0.0.1, and the service must listen there (--listen 0.0.0.0:8087)."}</p>
       <div class={`wait ${came ? "wait-good" : ""}`} role="status">
         {came
           ? <><b>{alive ? "Samples are coming." : "Samples have come."}</b> {count(state!.samples)} in session <b>{state!.session}</b>{state!.t_s == null ? "; they are judged as soon as later ones follow." : <>, the last at {seconds(state!.t_s)} on the device's clock: ball at {millimetres(state!.evidence.x.position_m)}, {millimetres(state!.evidence.y.position_m)}.</>}</>

@@ -1,0 +1,137 @@
+//! `offbd token`: who may use the service, said at the machine itself.
+
+use std::io::Write as _;
+
+use clap::{Args, Subcommand};
+
+use super::output::{self, Format};
+use super::serve::ConfigArgs;
+use super::table;
+use super::unusable::BadArgument;
+use crate::server::tokens;
+use crate::service::access::{NewToken, Role};
+use crate::service::{Clock, ServiceError};
+use crate::store::Micros;
+use crate::wire::access::TokenView;
+
+/// Makes, lists and revokes tokens, in the store itself.
+///
+/// For the first token, and wherever the service cannot be asked: it need not
+/// run, and may. A token that is revoked here is refused within seconds.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    offbd token create --name ann --role admin\n  \
+    offbd token create --name bench-1 --role device --asset bench-1 --days 365\n  \
+    offbd token list\n  \
+    offbd token revoke bench-1")]
+pub(super) struct TokenArgs {
+    #[command(subcommand)]
+    command: TokenCommand,
+}
+
+#[derive(Clone, Debug, Subcommand)]
+enum TokenCommand {
+    Create(CreateArgs),
+    List(ListArgs),
+    Revoke(RevokeArgs),
+}
+
+/// Makes a token and prints it, this once: it is stored as a hash only.
+#[derive(Clone, Debug, Args)]
+struct CreateArgs {
+    /// What stands beside everything that is done with it
+    #[arg(long)]
+    name: String,
+    /// device (one asset's own), viewer, operator or admin
+    #[arg(long, value_parser = role)]
+    role: Role,
+    /// The one asset of a device
+    #[arg(long, required_if_eq("role", "device"))]
+    asset: Option<String>,
+    /// Days until it ends by itself [default: never]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=36500))]
+    days: Option<u32>,
+    #[command(flatten)]
+    config: ConfigArgs,
+}
+
+/// Lists the tokens, the latest first, those revoked too.
+#[derive(Clone, Debug, Args)]
+struct ListArgs {
+    /// How to print
+    #[arg(long, value_enum, default_value_t = Format::Table)]
+    format: Format,
+    #[command(flatten)]
+    config: ConfigArgs,
+}
+
+/// Revokes a token, and ends the logins made with it.
+#[derive(Clone, Debug, Args)]
+struct RevokeArgs {
+    /// Its name or its id
+    token: String,
+    #[command(flatten)]
+    config: ConfigArgs,
+}
+
+fn role(word: &str) -> Result<Role, String> {
+    word.parse()
+}
+
+pub(super) fn run(args: &TokenArgs) -> anyhow::Result<()> {
+    let runtime = super::runtime()?;
+    match &args.command {
+        TokenCommand::Create(args) => runtime.block_on(create(args)),
+        TokenCommand::List(args) => runtime.block_on(list(args)),
+        TokenCommand::Revoke(args) => {
+            runtime.block_on(tokens::revoke_token(&args.config.load()?, &args.token))
+        }
+    }
+}
+
+async fn create(args: &CreateArgs) -> anyhow::Result<()> {
+    const DAY: Micros = 86_400_000_000;
+    let expires_at = args.days.map(|days| Clock.now() + Micros::from(days) * DAY);
+    let CreateArgs { name, role, asset, .. } = args.clone();
+    let wanted = NewToken { name, role, asset, expires_at };
+    let made = tokens::create_token(&args.config.load()?, wanted).await;
+    let secret = made.map_err(|error| match error.downcast::<ServiceError>() {
+        Ok(error @ ServiceError::Invalid(_)) => BadArgument(error.to_string()).into(),
+        Ok(error) => error.into(),
+        Err(error) => error,
+    })?;
+    anstream::eprintln!("keep it; it is shown this once");
+    output::line(&secret)
+}
+
+async fn list(args: &ListArgs) -> anyhow::Result<()> {
+    let tokens = tokens::tokens(&args.config.load()?).await?;
+    let mut out = output::stdout();
+    match args.format {
+        Format::Table => {
+            let mut table = table::table(&["name", "role", "asset", "last used", "ends"], &[]);
+            for token in &tokens {
+                table.add_row(row(token));
+            }
+            table::lines(&table).try_for_each(|line| writeln!(out, "{line}"))?;
+        }
+        Format::Json => {
+            for token in &tokens {
+                writeln!(out, "{}", serde_json::to_string(token)?)?;
+            }
+        }
+    }
+    Ok(out.flush()?)
+}
+
+fn row(token: &TokenView) -> [String; 5] {
+    // To the second.
+    let short = |moment: &str| moment.split('.').next().unwrap_or(moment).replace('T', " ");
+    let or_dash = |moment: &Option<String>| moment.as_deref().map_or("-".to_owned(), short);
+    let ends = match &token.revoked_at {
+        Some(at) => format!("revoked {}", short(at)),
+        None => or_dash(&token.expires_at),
+    };
+    let asset = token.asset.clone().unwrap_or_else(|| "-".to_owned());
+    [token.name.clone(), token.role.clone(), asset, or_dash(&token.last_used_at), ends]
+}

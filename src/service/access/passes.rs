@@ -1,0 +1,217 @@
+//! Whether what a caller shows is in force: looked up in the store, and known
+//! for a little while.
+//!
+//! A secret is looked up by its SHA-256, never compared: what the time of an
+//! answer tells is about the hash, which nobody can steer towards another's.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use sha2::{Digest, Sha256};
+use tokio::sync::watch;
+
+use super::tokens::random;
+use super::{Caller, Pass};
+use crate::service::{Service, ServiceError};
+use crate::store::{AccessWrite, Micros, TokenRow, Write};
+use crate::wire::verdict::hex;
+
+/// For how long a token is taken as it was found. What another process does to
+/// it, such as `offbd token revoke`, is noticed after that.
+pub const LOOK_AGAIN: Duration = Duration::from_secs(5);
+
+/// Tokens known at a time; when there are more, all are looked up anew.
+const MAX_KNOWN: usize = 50_000;
+
+/// How exactly the last use of a token is kept.
+const USE_EVERY: Duration = Duration::from_secs(3600);
+
+/// How long a login lasts.
+const LOGIN: Duration = Duration::from_secs(7 * 24 * 3600);
+
+const fn micros(time: Duration) -> Micros {
+    // The times above are far from the end of the range.
+    time.as_micros() as Micros
+}
+
+/// What a caller shows, as its SHA-256.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Credential {
+    Token([u8; 32]),
+    /// The cookie of a login.
+    Login([u8; 32]),
+}
+
+impl Credential {
+    #[must_use]
+    pub fn token(secret: &str) -> Self {
+        Self::Token(Sha256::digest(secret).into())
+    }
+
+    #[must_use]
+    pub fn login(cookie: &str) -> Self {
+        Self::Login(Sha256::digest(cookie).into())
+    }
+
+    pub(super) fn digest(&self) -> String {
+        let (Self::Token(digest) | Self::Login(digest)) = self;
+        hex(digest)
+    }
+}
+
+struct Known {
+    pass: Arc<Pass>,
+    looked_at: Micros,
+}
+
+impl Known {
+    fn holds(&self, now: Micros) -> bool {
+        let fresh = (self.looked_at..self.looked_at + micros(LOOK_AGAIN)).contains(&now);
+        fresh && self.pass.expires_at.is_none_or(|end| now < end)
+    }
+}
+
+/// What was found lately.
+pub(in crate::service) struct Passes {
+    known: Mutex<HashMap<Credential, Known>>,
+    /// Counts the changes of tokens made by this process.
+    changes: watch::Sender<u64>,
+}
+
+impl Default for Passes {
+    fn default() -> Self {
+        Self { known: Mutex::default(), changes: watch::channel(0).0 }
+    }
+}
+
+impl Passes {
+    fn recall(&self, credential: &Credential, now: Micros) -> Option<Arc<Pass>> {
+        let known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        known.get(credential).filter(|known| known.holds(now)).map(|known| known.pass.clone())
+    }
+
+    /// Keeps what was found, unless tokens have changed since `change`.
+    fn keep(&self, pass: &Arc<Pass>, change: u64, now: Micros) {
+        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        if *self.changes.borrow() != change {
+            return;
+        }
+        if known.len() >= MAX_KNOWN {
+            known.clear();
+        }
+        known.insert(pass.credential, Known { pass: pass.clone(), looked_at: now });
+    }
+
+    pub(in crate::service) fn forget(&self) {
+        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        known.clear();
+        self.changes.send_modify(|change| *change += 1);
+    }
+}
+
+fn pass(row: TokenRow, credential: Credential, now: Micros) -> Result<Option<Pass>, ServiceError> {
+    if row.revoked_at.is_some() || row.expires_at.is_some_and(|end| end <= now) {
+        return Ok(None);
+    }
+    Ok(Some(Pass {
+        role: row.role.parse().map_err(ServiceError::corrupt)?,
+        id: row.id,
+        name: row.name,
+        asset: row.asset,
+        expires_at: row.expires_at,
+        credential,
+    }))
+}
+
+impl Service {
+    /// Whom `credential` belongs to, if that is known without asking the store.
+    #[must_use]
+    pub fn recall(&self, credential: &Credential) -> Option<Arc<Pass>> {
+        self.inner.passes.recall(credential, self.inner.bench.clock.now())
+    }
+
+    /// Whom `credential` belongs to; nobody if it is none, revoked or expired.
+    ///
+    /// # Errors
+    /// [`ServiceError::Store`] if that cannot be found out.
+    pub async fn authenticate(
+        &self,
+        credential: &Credential,
+    ) -> Result<Option<Arc<Pass>>, ServiceError> {
+        let inner = &self.inner;
+        let now = inner.bench.clock.now();
+        if let Some(pass) = inner.passes.recall(credential, now) {
+            return Ok(Some(pass));
+        }
+        let change = *inner.passes.changes.borrow();
+        let row = match credential {
+            Credential::Token(_) => inner.store.token_by_hash(&credential.digest()).await?,
+            Credential::Login(_) => inner.store.token_by_login(&credential.digest(), now).await?,
+        };
+        let Some(row) = row else { return Ok(None) };
+        let used_at = row.last_used_at;
+        let Some(pass) = pass(row, *credential, now)?.map(Arc::new) else { return Ok(None) };
+        inner.passes.keep(&pass, change, now);
+        if used_at.is_none_or(|at| now - at >= micros(USE_EVERY)) {
+            self.note_use(&pass.id, now);
+        }
+        Ok(Some(pass))
+    }
+
+    /// Notes that a token is used; nobody waits for it.
+    fn note_use(&self, id: &str, at: Micros) {
+        let (bench, id) = (self.inner.bench.clone(), id.to_owned());
+        tokio::spawn(async move {
+            let written = bench.write(Write::Access(AccessWrite::TokenUsed { id, at })).await;
+            if let Err(error) = written {
+                tracing::warn!(%error, "the use of a token was not noted");
+            }
+        });
+    }
+
+    /// Ends when the caller's token is revoked or expires; never for anyone.
+    pub async fn lapse(&self, caller: &Caller) {
+        let Some(pass) = caller.pass() else { return std::future::pending().await };
+        let mut changes = self.inner.passes.changes.subscribe();
+        loop {
+            // A store that cannot say takes nothing away from whom it knew.
+            if matches!(self.authenticate(&pass.credential).await, Ok(None)) {
+                return;
+            }
+            tokio::select! {
+                _ = changes.changed() => {}
+                () = tokio::time::sleep(LOOK_AGAIN) => {}
+            }
+        }
+    }
+
+    /// Logs a browser in for the token behind `pass`; returns the cookie's
+    /// secret and for how long it is good.
+    ///
+    /// # Errors
+    /// [`ServiceError::Unavailable`] if the store does not take it.
+    pub async fn log_in(&self, pass: &Pass) -> Result<(String, Duration), ServiceError> {
+        let cookie = random()?;
+        let at = self.inner.bench.clock.now();
+        let write = AccessWrite::Login {
+            hash: Credential::login(&cookie).digest(),
+            token: pass.id.clone(),
+            at,
+            expires_at: at + micros(LOGIN),
+        };
+        self.inner.bench.write(Write::Access(write)).await?;
+        Ok((cookie, LOGIN))
+    }
+
+    /// Ends a login; a token shown in a header has none.
+    ///
+    /// # Errors
+    /// [`ServiceError::Unavailable`] if the store does not take it.
+    pub async fn log_out(&self, pass: &Pass) -> Result<(), ServiceError> {
+        if let Credential::Login(_) = pass.credential {
+            self.change_access(AccessWrite::Logout { hash: pass.credential.digest() }).await?;
+        }
+        Ok(())
+    }
+}

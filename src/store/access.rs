@@ -1,0 +1,256 @@
+//! Tokens, logins and the audit log.
+
+use sqlx::SqliteConnection;
+
+use super::{Micros, Store, StoreError};
+
+#[derive(Clone, Debug, PartialEq, Eq, sqlx::FromRow)]
+pub struct TokenRow {
+    pub id: String,
+    /// SHA-256 of the secret, hexadecimal.
+    pub hash: String,
+    pub name: String,
+    pub role: String,
+    /// The one asset of a device.
+    pub asset: Option<String>,
+    pub created_at: Micros,
+    pub created_by: String,
+    pub expires_at: Option<Micros>,
+    pub last_used_at: Option<Micros>,
+    pub revoked_at: Option<Micros>,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq, sqlx::FromRow)]
+pub struct AuditRow {
+    pub id: String,
+    pub at: Micros,
+    /// Name of the token.
+    pub actor: String,
+    /// Its id.
+    pub token: Option<String>,
+    pub act: String,
+    pub target: String,
+    pub address: Option<String>,
+}
+
+/// A change of who may do what, or that something was done.
+#[derive(Clone, Debug)]
+pub enum AccessWrite {
+    /// A new token; a conflict if another in force has its name.
+    CreateToken(TokenRow),
+    RevokeToken {
+        id: String,
+        at: Micros,
+    },
+    /// The tokens of an asset's devices.
+    RevokeDevices {
+        asset: String,
+        at: Micros,
+    },
+    TokenUsed {
+        id: String,
+        at: Micros,
+    },
+    /// A login; those that have expired go, and the oldest of a token that has
+    /// more than [`MAX_LOGINS`].
+    Login {
+        hash: String,
+        token: String,
+        at: Micros,
+        expires_at: Micros,
+    },
+    Logout {
+        hash: String,
+    },
+    Audit(AuditRow),
+}
+
+/// What comes after every id: they are made of hexadecimal digits and dashes.
+pub const LAST_ID: &str = "~";
+
+/// Logins of one token at a time; with one more, the oldest ends.
+pub const MAX_LOGINS: i64 = 100;
+
+impl AccessWrite {
+    pub(super) async fn apply(&self, db: &mut SqliteConnection) -> Result<(), StoreError> {
+        match self {
+            Self::CreateToken(row) => create_token(db, row).await,
+            Self::RevokeToken { id, at } => {
+                let sql = "UPDATE token SET revoked_at = $2 WHERE id = $1 AND revoked_at IS NULL";
+                stamp(db, sql, id, *at).await
+            }
+            Self::RevokeDevices { asset, at } => {
+                let sql =
+                    "UPDATE token SET revoked_at = $2 WHERE asset = $1 AND revoked_at IS NULL";
+                stamp(db, sql, asset, *at).await
+            }
+            Self::TokenUsed { id, at } => {
+                stamp(db, "UPDATE token SET last_used_at = $2 WHERE id = $1", id, *at).await
+            }
+            Self::Login { hash, token, at, expires_at } => {
+                sqlx::query("DELETE FROM login WHERE expires_at <= $1")
+                    .bind(at)
+                    .execute(&mut *db)
+                    .await?;
+                make_room(db, token).await?;
+                login(db, hash, token, *expires_at).await
+            }
+            Self::Logout { hash } => {
+                sqlx::query("DELETE FROM login WHERE hash = $1").bind(hash).execute(db).await?;
+                Ok(())
+            }
+            Self::Audit(row) => audit(db, row).await,
+        }
+    }
+}
+
+async fn stamp(
+    db: &mut SqliteConnection,
+    sql: &'static str,
+    key: &str,
+    at: Micros,
+) -> Result<(), StoreError> {
+    sqlx::query(sql).bind(key).bind(at).execute(db).await?;
+    Ok(())
+}
+
+async fn create_token(db: &mut SqliteConnection, row: &TokenRow) -> Result<(), StoreError> {
+    sqlx::query(
+        "INSERT INTO token (id, hash, name, role, asset, created_at, created_by, expires_at)
+         VALUES ($1, $2, $3, $4, $5, $6, $7, $8)",
+    )
+    .bind(&row.id)
+    .bind(&row.hash)
+    .bind(&row.name)
+    .bind(&row.role)
+    .bind(&row.asset)
+    .bind(row.created_at)
+    .bind(&row.created_by)
+    .bind(row.expires_at)
+    .execute(db)
+    .await?;
+    Ok(())
+}
+
+/// Leaves room for one more login of `token`.
+async fn make_room(db: &mut SqliteConnection, token: &str) -> Result<(), StoreError> {
+    sqlx::query(
+        "DELETE FROM login WHERE token = $1 AND hash NOT IN
+         (SELECT hash FROM login WHERE token = $1 ORDER BY expires_at DESC LIMIT $2)",
+    )
+    .bind(token)
+    .bind(MAX_LOGINS - 1)
+    .execute(db)
+    .await?;
+    Ok(())
+}
+
+async fn login(
+    db: &mut SqliteConnection,
+    hash: &str,
+    token: &str,
+    expires_at: Micros,
+) -> Result<(), StoreError> {
+    sqlx::query("INSERT INTO login (hash, token, expires_at) VALUES ($1, $2, $3)")
+        .bind(hash)
+        .bind(token)
+        .bind(expires_at)
+        .execute(db)
+        .await?;
+    Ok(())
+}
+
+async fn audit(db: &mut SqliteConnection, row: &AuditRow) -> Result<(), StoreError> {
+    sqlx::query(
+        "INSERT INTO audit (id, at, actor, token, act, target, address)
+         VALUES ($1, $2, $3, $4, $5, $6, $7)",
+    )
+    .bind(&row.id)
+    .bind(row.at)
+    .bind(&row.actor)
+    .bind(&row.token)
+    .bind(&row.act)
+    .bind(&row.target)
+    .bind(&row.address)
+    .execute(db)
+    .await?;
+    Ok(())
+}
+
+impl Store {
+    /// The token whose secret has this hash, revoked and expired ones too.
+    ///
+    /// # Errors
+    /// [`StoreError`], as for every question here, if the database fails.
+    pub async fn token_by_hash(&self, hash: &str) -> Result<Option<TokenRow>, StoreError> {
+        Ok(sqlx::query_as("SELECT * FROM token WHERE hash = $1")
+            .bind(hash)
+            .fetch_optional(&self.pool)
+            .await?)
+    }
+
+    /// The token behind a login whose cookie has this hash; its end is the
+    /// login's where that comes first.
+    pub async fn token_by_login(
+        &self,
+        hash: &str,
+        now: Micros,
+    ) -> Result<Option<TokenRow>, StoreError> {
+        Ok(sqlx::query_as(
+            "SELECT t.id, t.hash, t.name, t.role, t.asset, t.created_at, t.created_by,
+             CASE WHEN t.expires_at < l.expires_at THEN t.expires_at ELSE l.expires_at END
+             AS expires_at, t.last_used_at, t.revoked_at
+             FROM login l JOIN token t ON t.id = l.token
+             WHERE l.hash = $1 AND l.expires_at > $2",
+        )
+        .bind(hash)
+        .bind(now)
+        .fetch_optional(&self.pool)
+        .await?)
+    }
+
+    /// A token, revoked ones too.
+    pub async fn token(&self, id: &str) -> Result<Option<TokenRow>, StoreError> {
+        Ok(sqlx::query_as("SELECT * FROM token WHERE id = $1")
+            .bind(id)
+            .fetch_optional(&self.pool)
+            .await?)
+    }
+
+    /// The token in force of this name.
+    pub async fn token_named(&self, name: &str) -> Result<Option<TokenRow>, StoreError> {
+        Ok(sqlx::query_as("SELECT * FROM token WHERE name = $1 AND revoked_at IS NULL")
+            .bind(name)
+            .fetch_optional(&self.pool)
+            .await?)
+    }
+
+    /// Tokens, the latest first, those made before the one with the id `before`.
+    pub async fn tokens(&self, before: &str, limit: u32) -> Result<Vec<TokenRow>, StoreError> {
+        Ok(sqlx::query_as("SELECT * FROM token WHERE id < $1 ORDER BY id DESC LIMIT $2")
+            .bind(before)
+            .bind(i64::from(limit))
+            .fetch_all(&self.pool)
+            .await?)
+    }
+
+    /// How many tokens are in force.
+    pub async fn n_tokens(&self, now: Micros) -> Result<i64, StoreError> {
+        Ok(sqlx::query_scalar(
+            "SELECT COUNT(*) FROM token
+             WHERE revoked_at IS NULL AND (expires_at IS NULL OR expires_at > $1)",
+        )
+        .bind(now)
+        .fetch_one(&self.pool)
+        .await?)
+    }
+
+    /// The audit log, the latest first, before the entry with the id `before`.
+    pub async fn audit(&self, before: &str, limit: u32) -> Result<Vec<AuditRow>, StoreError> {
+        Ok(sqlx::query_as("SELECT * FROM audit WHERE id < $1 ORDER BY id DESC LIMIT $2")
+            .bind(before)
+            .bind(i64::from(limit))
+            .fetch_all(&self.pool)
+            .await?)
+    }
+}

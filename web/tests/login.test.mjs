@@ -1,0 +1,76 @@
+// A service that asks who is there, and the page's way in.
+import assert from "node:assert/strict";
+import { readFileSync, writeFileSync } from "node:fs";
+import { join } from "node:path";
+import { after, before, test } from "node:test";
+import { createRequire } from "node:module";
+import { browser, directory, offbd, page, remove, serve } from "./support.mjs";
+
+const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
+
+let work, service, chromium, view, admin;
+
+before(async () => {
+  work = directory();
+  chromium = await browser();
+  const data = join(work, "data");
+  admin = offbd("token", "create", "--name", "ann", "--role", "admin", "--data", data).trim();
+  writeFileSync(join(work, "offbd.toml"), "auth = 'required'\n");
+  service = await serve(data, 0, "--config", join(work, "offbd.toml"));
+  const made = await asks("POST", "/assets", admin, { name: "bench-1" });
+  assert.equal(made.status, 201);
+  view = await page(chromium);
+  await view.goto(`${service.url}/rigs/bench-1/set-up?step=connect`);
+});
+
+after(async () => {
+  await chromium?.close();
+  await service?.stop();
+  remove(work);
+});
+
+const asks = (method, path, token, body) => fetch(`${service.url}/api/v1${path}`, {
+  method, headers: { authorization: `Bearer ${token}`, "content-type": "application/json" }, body: JSON.stringify(body),
+});
+
+test("whoever is not known finds the way in and nothing else", async () => {
+  await view.getByLabel("Token").waitFor();
+  assert.doesNotMatch(await view.textContent("body"), /bench-1/);
+  const wrong = await view.evaluate(`${AXE}; axe.run().then((found) => found.violations.map((v) => v.id))`);
+  assert.deepEqual(wrong, []);
+  await view.getByLabel("Token").fill("offbd_wrong");
+  await view.getByRole("button", { name: "Log in" }).click();
+  await view.getByText("none of this service").waitFor();
+});
+
+test("a token opens the page where it was asked for", async () => {
+  await view.getByLabel("Token").fill(admin);
+  await view.getByRole("button", { name: "Log in" }).click();
+  await view.getByRole("heading", { name: "Set up bench-1" }).waitFor();
+  await view.getByText("ann", { exact: true }).waitFor();
+  await view.getByRole("status").getByText("live", { exact: true }).or(view.locator(".link-live")).first().waitFor();
+  const [cookie] = await view.context().cookies();
+  assert.deepEqual([cookie.httpOnly, cookie.sameSite], [true, "Strict"]);
+  assert.equal(await view.evaluate("document.cookie"), "");
+  assert.ok(!JSON.stringify(await view.evaluate("({ ...localStorage })")).includes(admin));
+});
+
+test("a device's snippet shows a token of its own", async () => {
+  const snippet = view.getByRole("region", { name: "Python snippet" });
+  assert.match(await snippet.textContent(), /Bearer offbd_TOKEN/);
+  await view.getByRole("button", { name: "Make a token for this rig" }).click();
+  await snippet.getByText(/Bearer offbd_[0-9a-f]{64}/).waitFor();
+  const [token] = /offbd_[0-9a-f]{64}/.exec(await snippet.textContent());
+  const sample = { seq: 1, t_s: 0, cmd_qx_rad: 0, cmd_qy_rad: 0, x_m: 0, y_m: 0 };
+  const sent = await asks("POST", "/assets/bench-1/telemetry", token, { samples: [sample] });
+  assert.equal((await sent.json()).accepted, 1);
+  await view.getByText(/Samples (are coming|have come)/).waitFor();
+  assert.equal((await asks("POST", "/assets", token, { name: "other" })).status, 403);
+});
+
+test("who leaves is not known any more", async () => {
+  await view.getByRole("button", { name: "Log out" }).click();
+  await view.getByLabel("Token").waitFor();
+  await view.reload();
+  await view.getByLabel("Token").waitFor();
+});
