@@ -12,6 +12,7 @@ use config::{Environment, File, FileFormat};
 use serde::Deserialize;
 
 use crate::service::Limits;
+use crate::store::Place;
 
 /// Name of the database file in the data directory.
 const DATABASE: &str = "offbd.sqlite";
@@ -24,7 +25,8 @@ pub struct Config {
     pub listen: SocketAddr,
     /// Directory of the embedded store; made if it is not there.
     pub data: PathBuf,
-    /// `sqlite:FILE`; without it the store is in `data`.
+    /// `sqlite:FILE` or `postgres://USER:PASSWORD@HOST/DATABASE`; without it a
+    /// file in `data`.
     pub database: Option<String>,
     pub log: LogConfig,
     pub limits: LimitsConfig,
@@ -200,23 +202,16 @@ impl Config {
         if let Err(error) = self.log.level.parse::<tracing_subscriber::EnvFilter>() {
             return Err(ConfigError::Invalid { key: "log.level", reason: error.to_string() });
         }
-        self.database_file().map(drop)
+        self.place().map(drop)
     }
 
-    /// The file of the embedded store.
+    /// Where the database is.
     ///
     /// # Errors
     /// [`ConfigError::Invalid`] if `database` is none that this version knows.
-    pub fn database_file(&self) -> Result<PathBuf, ConfigError> {
-        let Some(url) = &self.database else { return Ok(self.data.join(DATABASE)) };
-        let file = url.strip_prefix("sqlite://").or_else(|| url.strip_prefix("sqlite:"));
-        match file.filter(|file| !file.is_empty()) {
-            Some(file) => Ok(PathBuf::from(file)),
-            None => {
-                let reason = format!("is `{url}`; this version knows `sqlite:FILE`");
-                Err(ConfigError::Invalid { key: "database", reason })
-            }
-        }
+    pub fn place(&self) -> Result<Place, ConfigError> {
+        let Some(url) = &self.database else { return Ok(Place::File(self.data.join(DATABASE))) };
+        Place::of_url(url).map_err(|reason| ConfigError::Invalid { key: "database", reason })
     }
 
     /// The service's limits.
@@ -271,7 +266,7 @@ mod tests {
         assert_eq!(config.log.level, "debug");
         assert_eq!(config.limits.assets, 7);
         assert_eq!(config.limits.batch_samples, LimitsConfig::default().batch_samples);
-        assert_eq!(config.database_file().unwrap(), PathBuf::from("env/offbd.sqlite"));
+        assert_eq!(config.place().unwrap(), Place::File("env/offbd.sqlite".into()));
     }
 
     #[test]
@@ -289,9 +284,11 @@ mod tests {
             ("[log]\nlevel = 'a=b=c'", "log.level"),
             ("database = 'mysql://x'", "database"),
             ("database = 'sqlite:'", "database"),
+            ("database = 'postgres://a:secret@h:port/d'", "database"),
         ] {
             let error = error(toml, &[]);
             assert!(error.contains(key), "{toml}: {error}");
+            assert!(!error.contains("secret"), "{error}");
         }
         let error = error("", &[("OFFBD_WORKERS__SHARDS", "many")]);
         assert!(error.contains("shards"), "{error}");

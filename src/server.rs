@@ -14,7 +14,7 @@ use tokio_util::sync::CancellationToken;
 use crate::config::Config;
 use crate::http::{self, App, Budget};
 use crate::service::{Service, Workers};
-use crate::store::Store;
+use crate::store::{Place, Store};
 
 /// A running server.
 pub struct Server {
@@ -25,8 +25,8 @@ pub struct Server {
     serving: JoinHandle<std::io::Result<()>>,
     store: Store,
     workers: Workers,
-    /// Held until the store is closed.
-    lock: File,
+    /// Held until the store is closed; none where the database keeps it.
+    lock: Option<File>,
 }
 
 /// Opens the store, resumes open sessions, and listens.
@@ -45,8 +45,9 @@ pub async fn start(config: Config) -> Result<Server> {
 pub async fn start_with(config: Config, demo: Option<Router>) -> Result<Server> {
     config.check()?;
     http::gather_metrics();
-    let lock = lock(&config)?;
-    let (store, writer) = open(&config).await?;
+    let place = config.place()?;
+    let lock = lock(&place)?;
+    let (store, writer) = open(&place).await?;
     let listener = TcpListener::bind(config.listen)
         .await
         .with_context(|| format!("`listen`: cannot listen on {}", config.listen))?;
@@ -62,22 +63,24 @@ pub async fn start_with(config: Config, demo: Option<Router>) -> Result<Server> 
         tokio::spawn(
             async move { axum::serve(listener, router).with_graceful_shutdown(stop).await },
         );
-    tracing::info!(%address, resumed, store = %store.path().display(), "serving");
+    tracing::info!(%address, resumed, store = %store.place(), "serving");
     let deadline = Duration::from_secs(config.limits.shutdown_s);
     Ok(Server { address, closing, deadline, serving, store, workers, lock })
 }
 
 /// Takes the store for this process: two writers would not know of each other.
-/// The lock goes with the process, however it ends.
-fn lock(config: &Config) -> Result<File> {
-    let path = config.database_file()?.with_extension("lock");
+/// The lock goes with the process, however it ends. A server of PostgreSQL keeps
+/// one itself, as long as the writer is connected.
+fn lock(place: &Place) -> Result<Option<File>> {
+    let Some(file) = place.file() else { return Ok(None) };
+    let path = file.with_extension("lock");
     if let Some(directory) = path.parent() {
         std::fs::create_dir_all(directory)
             .with_context(|| format!("`data`: cannot make {}", directory.display()))?;
     }
     let lock = File::create(&path).with_context(|| format!("cannot make {}", path.display()))?;
     match lock.try_lock() {
-        Ok(()) => Ok(lock),
+        Ok(()) => Ok(Some(lock)),
         Err(TryLockError::WouldBlock) => {
             bail!("`data`: another process uses this store ({} is locked)", path.display())
         }
@@ -87,9 +90,8 @@ fn lock(config: &Config) -> Result<File> {
     }
 }
 
-async fn open(config: &Config) -> Result<(Store, crate::store::Writer)> {
-    let file = config.database_file()?;
-    Store::open(&file).await.with_context(|| format!("cannot open the store {}", file.display()))
+async fn open(place: &Place) -> Result<(Store, crate::store::Writer)> {
+    Store::open(place).await.with_context(|| format!("cannot open the store {place}"))
 }
 
 impl Server {
@@ -150,12 +152,11 @@ async fn stop_signal() -> Result<()> {
 /// If the store cannot be opened or is newer than this version.
 pub async fn migrate(config: &Config) -> Result<String> {
     config.check()?;
-    let _lock = lock(config)?;
-    let file = config.database_file()?;
-    let n = Store::migrate(&file)
-        .await
-        .with_context(|| format!("cannot migrate the store {}", file.display()))?;
-    Ok(format!("{}: {n} migrations applied", file.display()))
+    let place = config.place()?;
+    let _lock = lock(&place)?;
+    let migrated = Store::migrate(&place).await;
+    let n = migrated.with_context(|| format!("cannot migrate the store {place}"))?;
+    Ok(format!("{place}: {n} migrations applied"))
 }
 
 /// Checks the configuration; says in a few lines what it comes to.
@@ -167,7 +168,7 @@ pub fn check(config: &Config) -> Result<String> {
     Ok(format!(
         "listen   {}\nstore    {}\nlog      {:?}, {}\nworkers  {} shards",
         config.listen,
-        config.database_file()?.display(),
+        config.place()?,
         config.log.format,
         config.log.level,
         config.workers.shards,

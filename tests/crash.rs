@@ -20,6 +20,7 @@ impl Process {
         let mut child = Command::new(env!("CARGO_BIN_EXE_offbd"))
             .args(["serve", "--listen", "127.0.0.1:0", "--log-format", "json", "--data"])
             .arg(data)
+            .args(support::config(data).database.iter().flat_map(|url| ["--database", url]))
             .stderr(Stdio::piped())
             .spawn()
             .unwrap();

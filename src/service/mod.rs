@@ -41,7 +41,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 
 use futures_util::{StreamExt, stream};
-use tokio::sync::{Semaphore, mpsc, oneshot};
+use tokio::sync::{Semaphore, mpsc, oneshot, watch};
 use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
 
@@ -55,12 +55,12 @@ pub use sessions::Recording;
 pub use telemetry::Pending;
 pub use traces::{MAX_TRACE_POINTS, TraceQuery};
 
-use self::commit::{Committer, WriteSet};
+use self::commit::{Committer, Outage, WriteSet};
 use self::events::Events;
 use self::presence::Presences;
 use self::running::{Running, Work};
 use self::shard::{Context, Job, Shard};
-use crate::store::{Store, Writer};
+use crate::store::{Store, StoreError, Writer};
 
 /// Cheap to clone; all clones are one service.
 #[derive(Clone)]
@@ -75,6 +75,7 @@ struct Inner {
     presences: Presences,
     shards: Vec<mpsc::Sender<Job>>,
     writer: mpsc::Sender<WriteSet>,
+    outage: watch::Receiver<Outage>,
     jobs: mpsc::Sender<jobs::Job>,
     bench: jobs::Bench,
     /// One permit for each sample between arrival and commit.
@@ -134,7 +135,8 @@ impl Service {
         let clock = Clock;
         let events = Events::new(store.clone());
         let (sets, queue) = mpsc::channel(limits.commit_queue);
-        let committer = Committer::new(writer, queue, events.clone());
+        let (told, outage) = watch::channel(None);
+        let committer = Committer::new(writer, queue, events.clone(), told);
         let committer = tokio::spawn(committer.run());
         let presences = Presences::default();
         let mut shards = Vec::new();
@@ -159,6 +161,7 @@ impl Service {
             presences,
             shards,
             writer: sets,
+            outage,
             jobs,
             bench,
             in_flight,
@@ -198,7 +201,8 @@ impl Service {
     /// Whether the store answers and the shards and the writer run.
     ///
     /// # Errors
-    /// [`ServiceError::Unavailable`] naming what does not.
+    /// [`ServiceError::Unavailable`] or [`ServiceError::Outage`], naming what
+    /// does not.
     pub async fn ready(&self) -> Result<(), ServiceError> {
         if self.inner.writer.is_closed() {
             return Err(ServiceError::Unavailable { what: "the writer has stopped" });
@@ -206,8 +210,11 @@ impl Service {
         if self.inner.shards.iter().any(mpsc::Sender::is_closed) {
             return Err(ServiceError::Unavailable { what: "a shard has stopped" });
         }
-        self.inner.store.ping().await?;
-        Ok(())
+        if let Some(reason) = self.inner.outage.borrow().clone() {
+            return Err(ServiceError::Outage { reason });
+        }
+        let away = |error: StoreError| ServiceError::Outage { reason: error.to_string() };
+        self.inner.store.ping().await.map_err(away)
     }
 
     fn shard(&self, asset: &str) -> &mpsc::Sender<Job> {

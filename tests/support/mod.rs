@@ -2,6 +2,8 @@
 
 #![allow(dead_code, reason = "each test uses a part")]
 
+pub mod postgres;
+
 use std::future::Future;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -12,6 +14,7 @@ use offbd::vocabulary::Sample;
 use reqwest::header::CONTENT_TYPE;
 use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
+use sqlx::{ConnectOptions, Executor};
 
 /// Longest time to wait for anything; far more than it takes.
 pub const DEADLINE: Duration = Duration::from_secs(60);
@@ -23,9 +26,19 @@ pub struct Bench {
     pub data: tempfile::TempDir,
 }
 
-/// A configuration that uses `data` and any free port.
+/// Whether these tests are the ones of `tests/on_postgres.rs`.
+pub fn on_postgres() -> bool {
+    module_path!().starts_with("on_postgres::")
+}
+
+/// A configuration that uses `data`, or the database of its name, and any free
+/// port.
 pub fn config(data: &Path) -> Config {
     let mut config = Config { data: data.to_owned(), ..Config::default() };
+    if on_postgres() {
+        let name = data.file_name().unwrap().to_str().unwrap();
+        config.database = Some(postgres::shared_database(name));
+    }
     config.listen.set_port(0);
     config.workers.shards = 2;
     config
@@ -45,12 +58,38 @@ impl Bench {
         Self { server: Some(server), client, data }
     }
 
+    /// A connection of its own to the server's store.
+    pub async fn store(&self) -> sqlx::AnyConnection {
+        let file = || format!("sqlite://{}/offbd.sqlite", self.data.path().display());
+        let url = config(self.data.path()).database.unwrap_or_else(file);
+        url.parse::<sqlx::any::AnyConnectOptions>().unwrap().connect().await.unwrap()
+    }
+
+    /// Lets nobody write until it is dropped or let go of.
+    pub async fn hold(&self) -> Hold {
+        let mut store = self.store().await;
+        let words = if on_postgres() { "BEGIN; LOCK TABLE counter" } else { "BEGIN IMMEDIATE" };
+        store.execute(words).await.unwrap();
+        Hold { store }
+    }
+
     /// Stops gracefully and starts again on the same data.
     pub async fn restart(&mut self) {
         self.server.take().unwrap().shutdown().await.unwrap();
         let server = server::start(config(self.data.path())).await.unwrap();
         self.client = Client::new(server.address.to_string());
         self.server = Some(server);
+    }
+}
+
+/// Holds the store, see [`Bench::hold`].
+pub struct Hold {
+    store: sqlx::AnyConnection,
+}
+
+impl Hold {
+    pub async fn let_go(mut self) {
+        self.store.execute("ROLLBACK").await.unwrap();
     }
 }
 

@@ -1,0 +1,17 @@
+//! The tests that start the service once more, with PostgreSQL below it: a
+//! private server that this process starts.
+
+#[path = "bad_input.rs"]
+mod bad_input;
+#[path = "crash.rs"]
+mod crash;
+#[path = "fault_memory.rs"]
+mod fault_memory;
+#[path = "main_job.rs"]
+mod main_job;
+#[path = "same_verdict.rs"]
+mod same_verdict;
+#[path = "service.rs"]
+mod service;
+#[path = "views.rs"]
+mod views;
