@@ -2,7 +2,9 @@
 
 #![allow(dead_code, reason = "each test uses a part")]
 
+pub mod device;
 pub mod postgres;
+pub mod process;
 
 use std::future::Future;
 use std::path::Path;
@@ -44,6 +46,17 @@ pub fn config(data: &Path) -> Config {
     config
 }
 
+/// The URL of the store below `data`.
+pub fn url(data: &Path) -> String {
+    let file = || format!("sqlite://{}/offbd.sqlite", data.display());
+    config(data).database.unwrap_or_else(file)
+}
+
+pub async fn connection(url: &str) -> sqlx::AnyConnection {
+    sqlx::any::install_default_drivers();
+    url.parse::<sqlx::any::AnyConnectOptions>().unwrap().connect().await.unwrap()
+}
+
 impl Bench {
     pub async fn start() -> Self {
         Self::start_with(|_| {}).await
@@ -60,9 +73,7 @@ impl Bench {
 
     /// A connection of its own to the server's store.
     pub async fn store(&self) -> sqlx::AnyConnection {
-        let file = || format!("sqlite://{}/offbd.sqlite", self.data.path().display());
-        let url = config(self.data.path()).database.unwrap_or_else(file);
-        url.parse::<sqlx::any::AnyConnectOptions>().unwrap().connect().await.unwrap()
+        connection(&url(self.data.path())).await
     }
 
     /// Lets nobody write until it is dropped or let go of.
@@ -204,9 +215,14 @@ impl Client {
         let id = session["id"].as_str().unwrap();
         let csv = self.get(&format!("sessions/{id}/telemetry")).await;
         assert_eq!(csv.status, 200);
-        let reader = offbd::wire::session_csv::Reader::new(csv.text.as_bytes()).unwrap();
-        reader.map(Result::unwrap).collect()
+        read_csv(&csv.text)
     }
+}
+
+/// The samples of a session file.
+pub fn read_csv(text: &str) -> Vec<Sample> {
+    let reader = offbd::wire::session_csv::Reader::new(text.as_bytes()).unwrap();
+    reader.map(Result::unwrap).collect()
 }
 
 /// A batch as JSON rows.
@@ -276,17 +292,32 @@ pub fn rig(n: usize, dead_from: usize) -> Vec<Sample> {
 
 /// The verdict that the engine itself gives on `samples`.
 pub fn judged(name: &str, samples: &[Sample]) -> (String, Vec<String>) {
-    use offbd::engine::{Engine, Input, Rig, Setup};
+    let Judgement { hash, faults, .. } = judgement(name, samples);
+    (hash, faults)
+}
+
+/// What the engine itself says of a recording.
+pub struct Judgement {
+    pub hash: String,
+    pub faults: Vec<String>,
+    pub n_transitions: usize,
+    pub memory: offbd::diagnosis::FaultMemory,
+}
+
+pub fn judgement(name: &str, samples: &[Sample]) -> Judgement {
+    use offbd::engine::{Engine, Input, Output, Rig, Setup};
     let setup = Setup::new(Rig::chapter(name), None).unwrap();
     let mut engine = Engine::new(setup, Default::default());
     let mut verdict = offbd::wire::verdict::Verdict::default();
-    let mut outputs = Vec::new();
+    let (mut outputs, mut n_transitions) = (Vec::new(), 0);
     for input in samples.iter().map(|s| Input::Sample(*s)).chain([Input::End]) {
         outputs.clear();
         engine.handle(input, &mut outputs);
         outputs.iter().for_each(|o| verdict.take(o));
+        n_transitions += outputs.iter().filter(|o| matches!(o, Output::Transition(_))).count();
     }
-    (verdict.hash(), verdict.confirmed().iter().map(ToString::to_string).collect())
+    let faults = verdict.confirmed().iter().map(ToString::to_string).collect();
+    Judgement { hash: verdict.hash(), faults, n_transitions, memory: engine.memory().clone() }
 }
 
 /// Server-Sent Events, one by one.

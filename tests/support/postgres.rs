@@ -23,7 +23,7 @@ if read -r signal; then
     echo gone
 else
     kill -s QUIT $server; wait $server
-    rm -rf "$2" "$2.lock"
+    rm -rf "$2"
 fi
 "#;
 
@@ -82,6 +82,10 @@ impl Postgres {
         child.wait().unwrap();
     }
 
+    pub fn directory(&self) -> &Path {
+        &self.directory
+    }
+
     /// The URL of the database of this name, made if it is not there.
     pub fn database(&self, name: &str) -> String {
         database(&self.directory, name)
@@ -104,6 +108,11 @@ fn database(directory: &Path, name: &str) -> String {
         .unwrap();
     let error = String::from_utf8_lossy(&made.stderr);
     assert!(made.status.success() || error.contains("already exists"), "{error}");
+    url(directory, name)
+}
+
+/// The URL of a database on the server whose socket is in `directory`.
+pub fn url(directory: &Path, name: &str) -> String {
     let socket = directory.to_str().unwrap().replace('/', "%2F");
     format!("postgres://offbd@{socket}/{name}")
 }
@@ -121,6 +130,8 @@ pub fn shared_database(name: &str) -> String {
             // It lives as long as the process.
             std::mem::forget(Postgres::in_directory(known.clone()));
         }
+        // Whoever comes now sees the directory.
+        std::fs::remove_file(known.with_extension("lock")).unwrap();
         known
     });
     database(directory, name)
