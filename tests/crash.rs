@@ -10,12 +10,12 @@ use support::device::{Line, Random, device};
 use support::process::Process;
 use support::{judged, rig};
 
-/// How often the process is killed; OFFBD_TEST_KILLS says otherwise.
+/// How often the process is killed; KILLS says otherwise.
 const KILLS: usize = 10;
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn killed_many_times_under_load() {
-    let n_kills = std::env::var("OFFBD_TEST_KILLS").map_or(KILLS, |n| n.parse().unwrap());
+    let n_kills = std::env::var("KILLS").map_or(KILLS, |n| n.parse().unwrap());
     let data = tempfile::tempdir().unwrap();
     let mut process = Process::start(data.path());
     let line = Line::to(&process.client);

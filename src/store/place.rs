@@ -5,10 +5,9 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
-use std::sync::Once;
 use std::time::Duration;
 
-use sqlx::any::{AnyConnectOptions, AnyPoolOptions, install_drivers};
+use sqlx::any::{AnyConnectOptions, AnyPoolOptions, install_default_drivers};
 use sqlx::postgres::PgConnectOptions;
 use sqlx::{AnyConnection, AnyPool, AssertSqlSafe, ConnectOptions, Executor};
 
@@ -69,12 +68,7 @@ impl Place {
     }
 
     fn options(&self) -> Result<AnyConnectOptions, StoreError> {
-        static DRIVERS: Once = Once::new();
-        DRIVERS.call_once(|| {
-            // Somebody else in the process may have installed theirs: then the
-            // connection says what is missing.
-            let _ = install_drivers(&[sqlx::sqlite::any::DRIVER, sqlx::postgres::any::DRIVER]);
-        });
+        install_default_drivers();
         match self {
             Self::File(file) => Ok(file_url(file)?.parse()?),
             Self::Server(url) => Ok(url.parse()?),

@@ -8,7 +8,7 @@ use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::OnceLock;
 
 const MISSING: &str = "no `initdb` of PostgreSQL in PATH or /usr/lib/postgresql/*/bin: install \
-    `postgresql`, or set OFFBD_TEST_POSTGRES to the directory that has it";
+    `postgresql`, or set POSTGRES_PROGRAMS to the directory that has it";
 
 /// Runs the server whose programs are in $1 on the data in $2 until a line
 /// comes, which names the signal. Says `ready` when it answers, and `gone` when
@@ -140,7 +140,7 @@ pub fn shared_database(name: &str) -> String {
 fn programs() -> &'static PathBuf {
     static PROGRAMS: OnceLock<PathBuf> = OnceLock::new();
     PROGRAMS.get_or_init(|| {
-        if let Some(directory) = std::env::var_os("OFFBD_TEST_POSTGRES") {
+        if let Some(directory) = std::env::var_os("POSTGRES_PROGRAMS") {
             return directory.into();
         }
         let path = std::env::var_os("PATH").unwrap_or_default();

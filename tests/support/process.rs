@@ -20,12 +20,13 @@ impl Process {
     pub fn start_with(data: &Path, environment: &[(&str, &Path)]) -> Self {
         let mut child = command(data).envs(environment.iter().copied()).spawn().unwrap();
         let mut log = BufReader::new(child.stderr.take().unwrap()).lines().map_while(Result::ok);
-        let address = log
-            .find_map(|line| {
-                let line: serde_json::Value = serde_json::from_str(&line).ok()?;
-                (line["message"] == "serving").then(|| line["address"].as_str().unwrap().to_owned())
-            })
-            .expect("the log says where it listens");
+        let mut said = String::new();
+        let address = log.find_map(|line| {
+            said.push_str(&line);
+            let line: serde_json::Value = serde_json::from_str(&line).ok()?;
+            (line["message"] == "serving").then(|| line["address"].as_str().unwrap().to_owned())
+        });
+        let address = address.unwrap_or_else(|| panic!("it does not serve: {said}"));
         std::thread::spawn(move || log.for_each(drop));
         Self { child, client: Client::new(address) }
     }
