@@ -11,7 +11,7 @@ use std::time::Duration;
 use config::{Environment, File, FileFormat};
 use serde::Deserialize;
 
-use crate::service::Limits;
+use crate::service::{Limits, Retention};
 use crate::store::Place;
 
 /// Name of the database file in the data directory.
@@ -31,6 +31,7 @@ pub struct Config {
     pub log: LogConfig,
     pub limits: LimitsConfig,
     pub workers: WorkersConfig,
+    pub retention: RetentionConfig,
 }
 
 /// What is logged, to stderr.
@@ -81,6 +82,51 @@ pub struct WorkersConfig {
     pub jobs: usize,
 }
 
+/// How long recordings are kept; what is left out, for ever. See [`Retention`].
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RetentionConfig {
+    /// Days that an ended session is kept.
+    pub days: Option<usize>,
+    /// Bytes that an asset's ended sessions may hold.
+    pub bytes_per_asset: Option<usize>,
+    /// Days that an ended session with a change of a fault is kept.
+    pub fault_days: Option<usize>,
+    /// Seconds between two looks.
+    pub sweep_s: u64,
+}
+
+impl Default for RetentionConfig {
+    fn default() -> Self {
+        let sweep_s = Retention::default().every.as_secs();
+        Self { days: None, bytes_per_asset: None, fault_days: None, sweep_s }
+    }
+}
+
+impl RetentionConfig {
+    fn check(&self) -> Result<(), ConfigError> {
+        /// A hundred years.
+        const MAX_DAYS: usize = 36_525;
+        let days = self.days.unwrap_or(1);
+        within("retention.days", days, 1, MAX_DAYS)?;
+        within("retention.fault_days", self.fault_days.unwrap_or(MAX_DAYS), days, MAX_DAYS)?;
+        let bytes = self.bytes_per_asset.unwrap_or(usize::MAX);
+        within("retention.bytes_per_asset", bytes, 1, usize::MAX)?;
+        let seconds = usize::try_from(self.sweep_s).unwrap_or(usize::MAX);
+        within("retention.sweep_s", seconds, 1, 86_400)
+    }
+
+    fn retention(&self) -> Retention {
+        let age = |days: usize| Duration::from_secs(days as u64 * 86_400);
+        Retention {
+            age: self.days.map(age),
+            bytes_per_asset: self.bytes_per_asset.map(|bytes| bytes as u64),
+            fault_age: self.fault_days.map(age),
+            every: Duration::from_secs(self.sweep_s),
+        }
+    }
+}
+
 impl Default for Config {
     fn default() -> Self {
         Self {
@@ -90,6 +136,7 @@ impl Default for Config {
             log: LogConfig::default(),
             limits: LimitsConfig::default(),
             workers: WorkersConfig::default(),
+            retention: RetentionConfig::default(),
         }
     }
 }
@@ -202,6 +249,7 @@ impl Config {
         if let Err(error) = self.log.level.parse::<tracing_subscriber::EnvFilter>() {
             return Err(ConfigError::Invalid { key: "log.level", reason: error.to_string() });
         }
+        self.retention.check()?;
         self.place().map(drop)
     }
 
@@ -227,6 +275,7 @@ impl Config {
             import_bytes: self.limits.import_bytes,
             assets: self.limits.assets,
             body_timeout: Duration::from_secs(self.limits.body_timeout_s),
+            retention: self.retention.retention(),
             ..Limits::default()
         }
     }
@@ -284,6 +333,7 @@ mod tests {
             ("[log]\nlevel = 'a=b=c'", "log.level"),
             ("database = 'mysql://x'", "database"),
             ("database = 'sqlite:'", "database"),
+            ("[retention]\ndays = 30\nfault_days = 29", "retention.fault_days"),
             ("database = 'postgres://a:secret@h:port/d'", "database"),
         ] {
             let error = error(toml, &[]);

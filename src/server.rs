@@ -3,6 +3,7 @@
 
 use std::fs::{File, TryLockError};
 use std::net::SocketAddr;
+use std::path::Path;
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
@@ -14,7 +15,7 @@ use tokio_util::sync::CancellationToken;
 use crate::config::Config;
 use crate::http::{self, App, Budget};
 use crate::service::{Service, Workers};
-use crate::store::{Place, Store};
+use crate::store::{self, Place, Store};
 
 /// A running server.
 pub struct Server {
@@ -157,6 +158,30 @@ pub async fn migrate(config: &Config) -> Result<String> {
     let migrated = Store::migrate(&place).await;
     let n = migrated.with_context(|| format!("cannot migrate the store {place}"))?;
     Ok(format!("{place}: {n} migrations applied"))
+}
+
+/// Copies the embedded store to `file`, also while it is served; says what was
+/// made.
+///
+/// # Errors
+/// If there is no embedded store, `file` is there already, or cannot be written.
+pub async fn back_up(config: &Config, file: &Path) -> Result<String> {
+    let place = config.place()?;
+    let made = store::back_up(&place, file).await;
+    made.with_context(|| format!("cannot back up the store {place}"))?;
+    Ok(format!("{}: a copy of {place}", file.display()))
+}
+
+/// Makes the embedded store from the copy `file`; says what was made.
+///
+/// # Errors
+/// If the copy cannot be, the store is in use, or is there without `replace`.
+pub async fn restore(config: &Config, file: &Path, replace: bool) -> Result<String> {
+    let place = config.place()?;
+    let _lock = lock(&place)?;
+    let made = store::restore(&place, file, replace).await;
+    made.with_context(|| format!("cannot restore the store {place}"))?;
+    Ok(format!("{place}: as in {}", file.display()))
 }
 
 /// Checks the configuration; says in a few lines what it comes to.

@@ -1,6 +1,8 @@
 //! The tests that start the service once more, with PostgreSQL below it: a
 //! private server that this process starts.
 
+#[path = "arrival.rs"]
+mod arrival;
 #[path = "bad_input.rs"]
 mod bad_input;
 #[path = "crash.rs"]
@@ -9,6 +11,8 @@ mod crash;
 mod fault_memory;
 #[path = "main_job.rs"]
 mod main_job;
+#[path = "retention.rs"]
+mod retention;
 #[path = "same_verdict.rs"]
 mod same_verdict;
 #[path = "service.rs"]

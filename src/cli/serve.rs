@@ -30,7 +30,7 @@ pub(super) struct ConfigArgs {
 
 impl ConfigArgs {
     /// The configuration, checked.
-    fn load(&self) -> Result<Config, ConfigError> {
+    pub(super) fn load(&self) -> Result<Config, ConfigError> {
         let Self { listen, data, database, .. } = self.clone();
         Config::load(self.config.as_deref(), &Flags { listen, data, database })
     }

@@ -29,6 +29,7 @@ mod rebuild;
 mod recent;
 mod recordings;
 mod replays;
+mod retention;
 mod running;
 mod sessions;
 mod shard;
@@ -51,6 +52,7 @@ pub use events::{Event, EventFeed};
 pub use faults::FaultQuery;
 pub use limits::{Limits, RETRY_AFTER_S};
 pub use recordings::Around;
+pub use retention::Retention;
 pub use sessions::Recording;
 pub use telemetry::Pending;
 pub use traces::{MAX_TRACE_POINTS, TraceQuery};
@@ -150,7 +152,15 @@ impl Service {
         let closing = CancellationToken::new();
         let bench = jobs::Bench::new(store.clone(), clock, sets.clone(), closing.clone());
         let (jobs, queue) = mpsc::channel(jobs::MAX_QUEUED);
-        let workers = jobs::spawn(limits.jobs, &bench, queue);
+        let mut workers = jobs::spawn(limits.jobs, &bench, queue);
+        let sweeper = retention::Sweeper {
+            store: store.clone(),
+            clock,
+            writer: sets.clone(),
+            closing: closing.clone(),
+            retention: limits.retention.clone(),
+        };
+        workers.push(tokio::spawn(sweeper.run()));
         let in_flight = Arc::new(Semaphore::new(limits.in_flight_samples));
         let recordings = Arc::new(Semaphore::new(recordings::MAX_AT_ONCE));
         let traces = Arc::new(Semaphore::new(traces::MAX_AT_ONCE));

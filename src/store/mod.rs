@@ -5,7 +5,9 @@
 //! returns. Documents are JSON text that the store does not read. Knows SQL
 //! and the chunk format; knows no status codes, no engine and no clock.
 
+mod backup;
 pub mod codec;
+mod expiry;
 mod place;
 mod question;
 mod read;
@@ -13,11 +15,13 @@ mod rows;
 mod tail;
 mod write;
 
+use std::path::PathBuf;
 use std::time::Duration;
 
 use sqlx::AnyPool;
 use sqlx::migrate::Migrator;
 
+pub use backup::{back_up, restore};
 pub use place::Place;
 pub use read::{FaultFilter, FaultOrder, SessionFilter};
 pub use rows::{
@@ -51,6 +55,14 @@ pub enum StoreError {
          restart to go on with what it holds"
     )]
     Overtaken { expected: i64, found: i64 },
+    #[error("PostgreSQL is backed up and restored by its own pg_dump and pg_restore")]
+    OwnTools,
+    #[error("{} is there already", file.display())]
+    Exists { file: PathBuf },
+    #[error("{}: {source}", file.display())]
+    File { file: PathBuf, source: std::io::Error },
+    #[error("the copy is damaged: {found}")]
+    Damaged { found: String },
 }
 
 impl StoreError {
@@ -74,7 +86,13 @@ impl StoreError {
                 sqlx::Error::Encode(_) | sqlx::Error::ColumnDecode { .. } | sqlx::Error::Decode(_)
             ),
             Self::Taken | Self::Overtaken { .. } => true,
-            Self::Migration(_) | Self::Chunk { .. } | Self::Word { .. } => false,
+            Self::Migration(_)
+            | Self::Chunk { .. }
+            | Self::Word { .. }
+            | Self::OwnTools
+            | Self::Exists { .. }
+            | Self::File { .. }
+            | Self::Damaged { .. } => false,
         }
     }
 }

@@ -70,7 +70,7 @@ impl Place {
     fn options(&self) -> Result<AnyConnectOptions, StoreError> {
         install_default_drivers();
         match self {
-            Self::File(file) => Ok(file_url(file)?.parse()?),
+            Self::File(file) => Ok(file_url(file, "rwc")?.parse()?),
             Self::Server(url) => Ok(url.parse()?),
         }
     }
@@ -131,9 +131,9 @@ fn taken(error: sqlx::Error) -> StoreError {
     if code.is_some_and(|code| code == NOT_AVAILABLE) { StoreError::Taken } else { error.into() }
 }
 
-/// The URL of a file that is made if it is not there; every byte that could
-/// mean something in a URL is escaped.
-fn file_url(file: &Path) -> Result<String, StoreError> {
+/// The URL of a file, with `rw` or, to make it if it is not there, `rwc`; every
+/// byte that could mean something in a URL is escaped.
+pub(super) fn file_url(file: &Path, mode: &str) -> Result<String, StoreError> {
     use fmt::Write;
     let mut url = "sqlite://".to_owned();
     for byte in std::path::absolute(file).map_err(sqlx::Error::Io)?.as_os_str().as_encoded_bytes() {
@@ -144,7 +144,7 @@ fn file_url(file: &Path) -> Result<String, StoreError> {
             byte => drop(write!(url, "%{byte:02x}")),
         }
     }
-    Ok(url + "?mode=rwc")
+    Ok(url + "?mode=" + mode)
 }
 
 async fn within<T>(connect: impl Future<Output = Result<T, StoreError>>) -> Result<T, StoreError> {

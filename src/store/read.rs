@@ -42,7 +42,11 @@ pub struct FaultFilter {
 }
 
 const SESSION: &str = "SELECT id, asset, name, state, opened_at, ended_at, setup, baseline,
-    n_samples, n_rejected, first_t_s, last_t_s, last_seq, verdict, verdict_hash FROM session WHERE ";
+    n_samples, n_rejected, first_t_s, last_t_s, last_seq, verdict, verdict_hash FROM session
+    WHERE ";
+
+/// Not given up by retention.
+const KEPT: &str = "expired_at IS NULL AND ";
 
 impl Store {
     /// # Errors
@@ -76,7 +80,7 @@ impl Store {
 
     pub async fn session(&self, id: &str) -> Result<Option<SessionRow>, StoreError> {
         let mut query = Question::new(SESSION);
-        query.push("id = ").bind(id)?;
+        query.push(KEPT).push("id = ").bind(id)?;
         Ok(query.rows().fetch_optional(&self.pool).await?)
     }
 
@@ -86,6 +90,7 @@ impl Store {
         Ok(query.rows().fetch_optional(&self.pool).await?)
     }
 
+    /// Also one that retention has given up: its name is taken until it is gone.
     pub async fn session_named(
         &self,
         asset: &str,
@@ -102,7 +107,7 @@ impl Store {
         limit: u32,
     ) -> Result<Vec<SessionRow>, StoreError> {
         let mut query = Question::new(SESSION);
-        query.push("1 = 1");
+        query.push(KEPT).push("1 = 1");
         if let Some(asset) = &filter.asset {
             query.push(" AND asset = ").bind(asset)?;
         }

@@ -43,6 +43,16 @@ pub enum Write {
     DeleteSession {
         session: String,
     },
+    /// An ended session is given up: nobody sees it any more.
+    ExpireSession {
+        session: String,
+        at: Micros,
+    },
+    /// The first chunks of a session that is given up, at most `limit`.
+    DropChunks {
+        session: String,
+        limit: u32,
+    },
     Act(ActionRow),
     Transition(TransitionRow),
     Fault(FaultRow),
@@ -244,6 +254,8 @@ impl Group<'_> {
                 self.tails.forget();
                 delete(db, "DELETE FROM session WHERE id = $1", session).await
             }
+            Write::ExpireSession { session, at } => expire(db, session, *at).await,
+            Write::DropChunks { session, limit } => drop_chunks(db, session, *limit).await,
             Write::DeleteAsset { name } => {
                 self.flush(db).await?;
                 self.tails.forget();
@@ -340,13 +352,36 @@ async fn end_session(
     hash: &str,
 ) -> Result<(), StoreError> {
     sqlx::query(
-        "UPDATE session SET state = 'ended', ended_at = $2, verdict = $3, verdict_hash = $4
+        "UPDATE session SET state = 'ended', ended_at = $2, verdict = $3, verdict_hash = $4,
+         n_bytes = (SELECT CAST(COALESCE(SUM(LENGTH(data)), 0) AS BIGINT) FROM chunk
+                    WHERE chunk.session = session.id)
          WHERE id = $1",
     )
     .bind(session)
     .bind(ended_at)
     .bind(verdict)
     .bind(hash)
+    .execute(db)
+    .await?;
+    Ok(())
+}
+
+async fn expire(db: &mut AnyConnection, session: &str, at: Micros) -> Result<(), StoreError> {
+    sqlx::query("UPDATE session SET expired_at = $2 WHERE id = $1 AND state = 'ended'")
+        .bind(session)
+        .bind(at)
+        .execute(db)
+        .await?;
+    Ok(())
+}
+
+async fn drop_chunks(db: &mut AnyConnection, session: &str, limit: u32) -> Result<(), StoreError> {
+    sqlx::query(
+        "DELETE FROM chunk WHERE session = $1 AND first_index IN
+         (SELECT first_index FROM chunk WHERE session = $1 ORDER BY first_index LIMIT $2)",
+    )
+    .bind(session)
+    .bind(i64::from(limit))
     .execute(db)
     .await?;
     Ok(())
