@@ -93,6 +93,25 @@ async fn a_store_has_one_server() {
     assert!(error.contains("another process"), "{error}");
 }
 
+#[tokio::test]
+async fn a_guest_writes_beside_the_service() {
+    use offbd::store::{Place, Store, Write};
+    let bench = Bench::start().await;
+    bench.client.asset("a").await;
+    let place = Place::of_url(&support::url(bench.data.path())).unwrap();
+    let (store, mut writer) = Store::open_beside(&place).await.unwrap();
+    let mut row = store.asset("a").await.unwrap().unwrap();
+    row.name = "b".to_owned();
+    for _ in 0..2 {
+        let name = row.name.clone();
+        let mut set = vec![Write::CreateAsset(row.clone()), Write::DeleteAsset { name }];
+        writer.commit(&mut [&mut set]).await.unwrap();
+        bench.client.telemetry("a", None, &rig(10, 10)).await;
+    }
+    writer.close().await.unwrap();
+    bench.client.get("/readyz").await.expect(200);
+}
+
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn too_much_at_once_is_turned_away_and_nothing_is_lost() {
     let bench = Bench::start_with(|config| {

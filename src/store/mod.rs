@@ -123,7 +123,21 @@ impl Store {
     /// [`StoreError`] if it cannot be opened, is not ours, or another process
     /// writes to it.
     pub async fn open(place: &Place) -> Result<(Self, Writer), StoreError> {
-        let writer = Writer::open(place).await?;
+        Self::open_as(place, false).await
+    }
+
+    /// Opens the database at `place` beside a service that may be running on
+    /// it. This writer must write nothing that an event or an engine follows
+    /// from: the service would not know of it.
+    ///
+    /// # Errors
+    /// As for [`Store::open`].
+    pub async fn open_beside(place: &Place) -> Result<(Self, Writer), StoreError> {
+        Self::open_as(place, true).await
+    }
+
+    async fn open_as(place: &Place, guest: bool) -> Result<(Self, Writer), StoreError> {
+        let writer = Writer::open(place, guest).await?;
         Ok((Self { pool: place.readers()?, place: place.clone() }, writer))
     }
 
@@ -133,7 +147,7 @@ impl Store {
     /// # Errors
     /// As for [`Store::open`], or if it is newer than this version.
     pub async fn migrate(place: &Place) -> Result<usize, StoreError> {
-        Writer::open(place).await?.close().await?;
+        Writer::open(place, false).await?.close().await?;
         Ok(MIGRATIONS.iter().count())
     }
 

@@ -75,13 +75,20 @@ impl Place {
         }
     }
 
-    /// A connection that may write, the only one: a second is refused by the
-    /// server, or by the lock beside the file.
-    pub(super) async fn writer(&self) -> Result<AnyConnection, StoreError> {
+    /// A connection that may write. The `only` one takes the lock that the
+    /// server keeps; that of a file is not the store's.
+    pub(super) async fn writer(&self, only: bool) -> Result<AnyConnection, StoreError> {
         let options = self.options()?;
         let connect = async {
             let mut connection = options.connect().await?;
-            connection.execute(AssertSqlSafe(self.durable())).await.map_err(taken)?;
+            connection.execute(self.durable()).await?;
+            if only && matches!(self, Self::Server(_)) {
+                let lock = format!(
+                    "SET lock_timeout = '{LOCK_WAIT}'; SELECT pg_advisory_lock({WRITER_LOCK});
+                     SET lock_timeout = DEFAULT"
+                );
+                connection.execute(AssertSqlSafe(lock)).await.map_err(taken)?;
+            }
             Ok(connection)
         };
         within(connect).await
@@ -104,13 +111,10 @@ impl Place {
 
     /// A commit is on the disk when it returns, also where the server is set
     /// up otherwise.
-    fn durable(&self) -> String {
+    const fn durable(&self) -> &'static str {
         match self {
-            Self::File(_) => "PRAGMA journal_mode = wal; PRAGMA synchronous = full".to_owned(),
-            Self::Server(_) => format!(
-                "SET synchronous_commit = on; SET lock_timeout = '{LOCK_WAIT}';
-                 SELECT pg_advisory_lock({WRITER_LOCK})"
-            ),
+            Self::File(_) => "PRAGMA journal_mode = wal; PRAGMA synchronous = full",
+            Self::Server(_) => "SET synchronous_commit = on",
         }
     }
 
