@@ -117,7 +117,8 @@ async fn pass(
                     LOSE_THE_COMMIT => return Ok(()),
                     LOSE_THE_ANSWER => {
                         server.write_all(said).await?;
-                        server.read(&mut down).await?;
+                        let n = server.read(&mut down).await?;
+                        assert!(down[..n].starts_with(b"C"), "the commit is complete");
                         return Ok(());
                     }
                     _ if said.is_empty() => return Ok(()),

@@ -23,8 +23,8 @@ const READER_WAIT: Duration = Duration::from_secs(10);
 const CONNECT_WAIT: Duration = Duration::from_secs(10);
 
 /// The advisory lock of PostgreSQL that the one writer of a database holds as
-/// long as it is connected: "offbd" in ASCII.
-const WRITER_LOCK: i64 = 0x6f_66_66_62_64;
+/// long as it is connected.
+const WRITER_LOCK: i64 = i64::from_be_bytes(*b"\0\0\0offbd");
 
 /// How long a writer waits for the one before it to be gone: the server may be
 /// busy with the last words of a process that was killed.

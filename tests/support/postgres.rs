@@ -130,8 +130,9 @@ pub fn shared_database(name: &str) -> String {
             // It lives as long as the process.
             std::mem::forget(Postgres::in_directory(known.clone()));
         }
-        // Whoever comes now sees the directory.
-        std::fs::remove_file(known.with_extension("lock")).unwrap();
+        // Whoever comes now sees the directory; somebody who has waited may
+        // have removed it before.
+        let _ = std::fs::remove_file(known.with_extension("lock"));
         known
     });
     database(directory, name)
