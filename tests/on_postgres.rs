@@ -1,6 +1,8 @@
 //! The tests that start the service once more, with PostgreSQL below it: a
 //! private server that this process starts.
 
+#![expect(clippy::duplicate_mod, reason = "each of the files brings its own support")]
+
 #[path = "arrival.rs"]
 mod arrival;
 #[path = "bad_input.rs"]
