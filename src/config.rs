@@ -11,7 +11,8 @@ use std::time::Duration;
 use config::{Environment, File, FileFormat};
 use serde::Deserialize;
 
-use crate::service::Limits;
+use crate::service::{Limits, Retention};
+use crate::store::Place;
 
 /// Name of the database file in the data directory.
 const DATABASE: &str = "offbd.sqlite";
@@ -24,7 +25,8 @@ pub struct Config {
     pub listen: SocketAddr,
     /// Directory of the embedded store; made if it is not there.
     pub data: PathBuf,
-    /// `sqlite:FILE`; without it the store is in `data`.
+    /// `sqlite:FILE` or `postgres://USER:PASSWORD@HOST/DATABASE`; without it a
+    /// file in `data`.
     pub database: Option<String>,
     /// Whether a token is asked for; without it only where other machines can
     /// connect.
@@ -37,6 +39,7 @@ pub struct Config {
     pub limits: LimitsConfig,
     pub rates: RatesConfig,
     pub workers: WorkersConfig,
+    pub retention: RetentionConfig,
 }
 
 /// Whether a token is asked for.
@@ -126,6 +129,51 @@ pub struct WorkersConfig {
     pub jobs: usize,
 }
 
+/// How long recordings are kept; what is left out, for ever. See [`Retention`].
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RetentionConfig {
+    /// Days that an ended session is kept.
+    pub days: Option<usize>,
+    /// Bytes that an asset's ended sessions may hold.
+    pub bytes_per_asset: Option<usize>,
+    /// Days that an ended session with a change of a fault is kept.
+    pub fault_days: Option<usize>,
+    /// Seconds between two looks.
+    pub sweep_s: u64,
+}
+
+impl Default for RetentionConfig {
+    fn default() -> Self {
+        let sweep_s = Retention::default().every.as_secs();
+        Self { days: None, bytes_per_asset: None, fault_days: None, sweep_s }
+    }
+}
+
+impl RetentionConfig {
+    fn check(&self) -> Result<(), ConfigError> {
+        /// A hundred years.
+        const MAX_DAYS: usize = 36_525;
+        let days = self.days.unwrap_or(1);
+        within("retention.days", days, 1, MAX_DAYS)?;
+        within("retention.fault_days", self.fault_days.unwrap_or(MAX_DAYS), days, MAX_DAYS)?;
+        let bytes = self.bytes_per_asset.unwrap_or(usize::MAX);
+        within("retention.bytes_per_asset", bytes, 1, usize::MAX)?;
+        let seconds = usize::try_from(self.sweep_s).unwrap_or(usize::MAX);
+        within("retention.sweep_s", seconds, 1, 86_400)
+    }
+
+    fn retention(&self) -> Retention {
+        let age = |days: usize| Duration::from_secs(days as u64 * 86_400);
+        Retention {
+            age: self.days.map(age),
+            bytes_per_asset: self.bytes_per_asset.map(|bytes| bytes as u64),
+            fault_age: self.fault_days.map(age),
+            every: Duration::from_secs(self.sweep_s),
+        }
+    }
+}
+
 impl Default for Config {
     fn default() -> Self {
         Self {
@@ -139,6 +187,7 @@ impl Default for Config {
             limits: LimitsConfig::default(),
             rates: RatesConfig::default(),
             workers: WorkersConfig::default(),
+            retention: RetentionConfig::default(),
         }
     }
 }
@@ -277,7 +326,8 @@ impl Config {
         if let Err(error) = self.log.level.parse::<tracing_subscriber::EnvFilter>() {
             return Err(ConfigError::Invalid { key: "log.level", reason: error.to_string() });
         }
-        self.database_file().map(drop)
+        self.retention.check()?;
+        self.place().map(drop)
     }
 
     /// Whether a token is asked for.
@@ -298,20 +348,13 @@ impl Config {
         Ok(self.auth.map_or(!alone, |auth| auth == Auth::Required))
     }
 
-    /// The file of the embedded store.
+    /// Where the database is.
     ///
     /// # Errors
     /// [`ConfigError::Invalid`] if `database` is none that this version knows.
-    pub fn database_file(&self) -> Result<PathBuf, ConfigError> {
-        let Some(url) = &self.database else { return Ok(self.data.join(DATABASE)) };
-        let file = url.strip_prefix("sqlite://").or_else(|| url.strip_prefix("sqlite:"));
-        match file.filter(|file| !file.is_empty()) {
-            Some(file) => Ok(PathBuf::from(file)),
-            None => {
-                let reason = format!("is `{url}`; this version knows `sqlite:FILE`");
-                Err(ConfigError::Invalid { key: "database", reason })
-            }
-        }
+    pub fn place(&self) -> Result<Place, ConfigError> {
+        let Some(url) = &self.database else { return Ok(Place::File(self.data.join(DATABASE))) };
+        Place::of_url(url).map_err(|reason| ConfigError::Invalid { key: "database", reason })
     }
 
     /// The service's limits.
@@ -327,6 +370,7 @@ impl Config {
             import_bytes: self.limits.import_bytes,
             assets: self.limits.assets,
             body_timeout: Duration::from_secs(self.limits.body_timeout_s),
+            retention: self.retention.retention(),
             ..Limits::default()
         }
     }
@@ -382,7 +426,7 @@ mod tests {
         assert_eq!(config.limits.assets, 7);
         assert_eq!(config.origins, ["https://a.example", "https://b.example"]);
         assert_eq!(config.limits.batch_samples, LimitsConfig::default().batch_samples);
-        assert_eq!(config.database_file().unwrap(), PathBuf::from("env/offbd.sqlite"));
+        assert_eq!(config.place().unwrap(), Place::File("env/offbd.sqlite".into()));
     }
 
     #[test]
@@ -424,9 +468,12 @@ mod tests {
             ("[tls]\ncertificate = 'a'", "key"),
             ("[limits]\nconnections = 0", "limits.connections"),
             ("[rates]\ntoken_per_s = 0", "rates.token_per_s"),
+            ("[retention]\ndays = 30\nfault_days = 29", "retention.fault_days"),
+            ("database = 'postgres://a:secret@h:port/d'", "database"),
         ] {
             let error = error(toml, &[]);
             assert!(error.contains(key), "{toml}: {error}");
+            assert!(!error.contains("secret"), "{error}");
         }
         let error = error("", &[("OFFBD_WORKERS__SHARDS", "many")]);
         assert!(error.contains("shards"), "{error}");

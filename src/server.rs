@@ -10,6 +10,7 @@ pub mod tokens;
 use std::fs::{File, TryLockError};
 use std::net::SocketAddr;
 use std::num::NonZeroU32;
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -23,7 +24,7 @@ use self::tls::Tls;
 use crate::config::Config;
 use crate::http::{self, App, Budget, More, Policy, Rate, Rates};
 use crate::service::{Clock, Service, Workers};
-use crate::store::Store;
+use crate::store::{self, Place, Store};
 
 /// A running server.
 pub struct Server {
@@ -34,8 +35,8 @@ pub struct Server {
     serving: JoinHandle<()>,
     store: Store,
     workers: Workers,
-    /// Held until the store is closed.
-    lock: File,
+    /// Held until the store is closed; none where the database keeps it.
+    lock: Option<File>,
 }
 
 /// Opens the store, resumes open sessions, and listens.
@@ -55,8 +56,9 @@ pub async fn start_with(config: Config, demo: Option<More>) -> Result<Server> {
     config.check()?;
     http::gather_metrics();
     let tls = config.tls.as_ref().map(Tls::read).transpose()?;
-    let lock = lock(&config)?;
-    let (store, writer) = open(&config).await?;
+    let place = config.place()?;
+    let lock = lock(&place)?;
+    let (store, writer) = open(&place).await?;
     let listener = TcpListener::bind(config.listen)
         .await
         .with_context(|| format!("`listen`: cannot listen on {}", config.listen))?;
@@ -72,7 +74,7 @@ pub async fn start_with(config: Config, demo: Option<More>) -> Result<Server> {
     let connections = Connections::new(&config.limits, tls.clone(), closing.clone());
     let serving = tokio::spawn(connections.serve(listener, router));
     tls.map(|tls| tokio::spawn(tls.watch(closing.clone())));
-    tracing::info!(%address, resumed, store = %store.path().display(), "serving");
+    tracing::info!(%address, resumed, store = %store.place(), "serving");
     let deadline = Duration::from_secs(config.limits.shutdown_s);
     Ok(Server { address, closing, deadline, serving, store, workers, lock })
 }
@@ -105,16 +107,18 @@ async fn advise(config: &Config, policy: &Policy, store: &Store) -> Result<()> {
 }
 
 /// Takes the store for this process: two writers would not know of each other.
-/// The lock goes with the process, however it ends.
-fn lock(config: &Config) -> Result<File> {
-    let path = config.database_file()?.with_extension("lock");
+/// The lock goes with the process, however it ends. A server of PostgreSQL keeps
+/// one itself, as long as the writer is connected.
+fn lock(place: &Place) -> Result<Option<File>> {
+    let Some(file) = place.file() else { return Ok(None) };
+    let path = file.with_extension("lock");
     if let Some(directory) = path.parent() {
         std::fs::create_dir_all(directory)
             .with_context(|| format!("`data`: cannot make {}", directory.display()))?;
     }
     let lock = File::create(&path).with_context(|| format!("cannot make {}", path.display()))?;
     match lock.try_lock() {
-        Ok(()) => Ok(lock),
+        Ok(()) => Ok(Some(lock)),
         Err(TryLockError::WouldBlock) => {
             bail!("`data`: another process uses this store ({} is locked)", path.display())
         }
@@ -124,9 +128,8 @@ fn lock(config: &Config) -> Result<File> {
     }
 }
 
-async fn open(config: &Config) -> Result<(Store, crate::store::Writer)> {
-    let file = config.database_file()?;
-    Store::open(&file).await.with_context(|| format!("cannot open the store {}", file.display()))
+async fn open(place: &Place) -> Result<(Store, crate::store::Writer)> {
+    Store::open(place).await.with_context(|| format!("cannot open the store {place}"))
 }
 
 impl Server {
@@ -187,12 +190,35 @@ async fn stop_signal() -> Result<()> {
 /// If the store cannot be opened or is newer than this version.
 pub async fn migrate(config: &Config) -> Result<String> {
     config.check()?;
-    let _lock = lock(config)?;
-    let file = config.database_file()?;
-    let n = Store::migrate(&file)
-        .await
-        .with_context(|| format!("cannot migrate the store {}", file.display()))?;
-    Ok(format!("{}: {n} migrations applied", file.display()))
+    let place = config.place()?;
+    let _lock = lock(&place)?;
+    let migrated = Store::migrate(&place).await;
+    let n = migrated.with_context(|| format!("cannot migrate the store {place}"))?;
+    Ok(format!("{place}: {n} migrations applied"))
+}
+
+/// Copies the embedded store to `file`, also while it is served; says what was
+/// made.
+///
+/// # Errors
+/// If there is no embedded store, `file` is there already, or cannot be written.
+pub async fn back_up(config: &Config, file: &Path) -> Result<String> {
+    let place = config.place()?;
+    let made = store::back_up(&place, file).await;
+    made.with_context(|| format!("cannot back up the store {place}"))?;
+    Ok(format!("{}: a copy of {place}", file.display()))
+}
+
+/// Makes the embedded store from the copy `file`; says what was made.
+///
+/// # Errors
+/// If the copy cannot be, the store is in use, or is there without `replace`.
+pub async fn restore(config: &Config, file: &Path, replace: bool) -> Result<String> {
+    let place = config.place()?;
+    let _lock = lock(&place)?;
+    let made = store::restore(&place, file, replace).await;
+    made.with_context(|| format!("cannot restore the store {place}"))?;
+    Ok(format!("{place}: as in {}", file.display()))
 }
 
 /// Checks the configuration; says in a few lines what it comes to.
@@ -206,7 +232,7 @@ pub fn check(config: &Config) -> Result<String> {
         config.listen,
         if config.asks_for_tokens()? { "with a token" } else { "for everyone on this machine" },
         if config.tls.is_some() { "encrypted" } else { "not encrypted" },
-        config.database_file()?.display(),
+        config.place()?,
         config.log.format,
         config.log.level,
         config.workers.shards,

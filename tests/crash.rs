@@ -3,45 +3,44 @@
 
 mod support;
 
-use std::io::{BufRead, BufReader};
-use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::Command;
 
 use serde_json::json;
-use support::{Client, judged, rig};
+use support::device::{Line, Random, device};
+use support::process::Process;
+use support::{judged, rig};
 
-struct Process {
-    child: Child,
-    client: Client,
-}
+/// How often the process is killed; KILLS says otherwise.
+const KILLS: usize = 10;
 
-impl Process {
-    fn start(data: &Path) -> Self {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_offbd"))
-            .args(["serve", "--listen", "127.0.0.1:0", "--log-format", "json", "--data"])
-            .arg(data)
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let mut log = BufReader::new(child.stderr.take().unwrap()).lines().map_while(Result::ok);
-        let address = log
-            .find_map(|line| {
-                let line: serde_json::Value = serde_json::from_str(&line).ok()?;
-                (line["message"] == "serving").then(|| line["address"].as_str().unwrap().to_owned())
-            })
-            .expect("the log says where it listens");
-        std::thread::spawn(move || log.for_each(drop));
-        Self { child, client: Client::new(address) }
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn killed_many_times_under_load() {
+    let n_kills = std::env::var("KILLS").map_or(KILLS, |n| n.parse().unwrap());
+    let data = tempfile::tempdir().unwrap();
+    let mut process = Process::start(data.path());
+    let line = Line::to(&process.client);
+    let devices = [("counts", true), ("does-not", false), ("counts-too", true)]
+        .map(|(name, counts)| device(&line, name, counts, data.path(), None));
+    let mut random = Random(1);
+    for kill in 0..n_kills {
+        line.progress(random.below(600) as u64).await;
+        drop(process);
+        if kill % 5 == 4 {
+            Process::stillborn(data.path(), random.below(60_000) as u64);
+        }
+        process = Process::start(data.path());
+        line.moves(&process.client);
     }
-}
-
-impl Drop for Process {
-    /// SIGKILL: no warning, no last word.
-    fn drop(&mut self) {
-        // One that has ended already needs no killing.
-        let _ = self.child.kill();
-        self.child.wait().unwrap();
+    line.hang_up();
+    let mut laps = 0;
+    for device in devices {
+        laps += device.await.unwrap();
     }
+    println!(
+        "{n_kills} kills under load, {} at start; {laps} recordings, {} samples: each stored once",
+        n_kills / 5,
+        line.acknowledged()
+    );
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

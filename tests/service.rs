@@ -9,24 +9,26 @@ use futures_util::{SinkExt, StreamExt};
 use offbd::vocabulary::Sample;
 use reqwest::Method;
 use serde_json::{Value, json};
-use sqlx::{ConnectOptions, Connection, SqliteConnection};
+use sqlx::Executor;
 use support::{Bench, Client, Events, batch, csv, rig};
 use tokio_tungstenite::connect_async;
 use tokio_tungstenite::tungstenite::Message;
 
-/// Another connection to the server's store.
-async fn store(bench: &Bench) -> SqliteConnection {
-    let file = bench.data.path().join("offbd.sqlite");
-    sqlx::sqlite::SqliteConnectOptions::new().filename(file).connect().await.unwrap()
-}
-
-async fn execute(connection: &mut SqliteConnection, sql: &'static str) {
-    sqlx::query(sql).execute(connection).await.unwrap();
-}
-
 async fn sessions(client: &Client, asset: &str) -> Vec<Value> {
     let page = client.get(&format!("sessions?asset={asset}")).await.expect(200);
     page["items"].as_array().unwrap().clone()
+}
+
+/// Makes the store refuse chunks of the session `id`.
+fn broken(id: &str) -> String {
+    if support::on_postgres() {
+        let rule = format!("CHECK (session <> '{id}') NOT VALID");
+        return format!("ALTER TABLE chunk ADD CONSTRAINT broken {rule}");
+    }
+    format!(
+        "CREATE TRIGGER broken BEFORE INSERT ON chunk WHEN NEW.session = '{id}'
+         BEGIN SELECT RAISE(ABORT, 'broken on purpose'); END"
+    )
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -38,14 +40,10 @@ async fn what_the_store_does_not_take_is_not_acknowledged() {
     let samples = rig(1000, 300);
     client.telemetry("a", Some("s"), &samples[..500]).await;
     let known = client.get("assets/a/faults?status=all").await.expect(200);
-    let mut store = store(&bench).await;
-    execute(
-        &mut store,
-        "CREATE TRIGGER broken BEFORE INSERT ON chunk
-         WHEN NEW.session = (SELECT id FROM session WHERE asset = 'a' AND state = 'open')
-         BEGIN SELECT RAISE(ABORT, 'broken on purpose'); END",
-    )
-    .await;
+    let mut store = bench.store().await;
+    let session = client.session("a", "s").await;
+    let id = session["id"].as_str().unwrap();
+    store.execute(sqlx::AssertSqlSafe(broken(id))).await.unwrap();
     for part in samples[500..].chunks(100) {
         let answer = client.post("assets/a/telemetry", &batch(Some("s"), part)).await;
         answer.problem(503);
@@ -53,7 +51,12 @@ async fn what_the_store_does_not_take_is_not_acknowledged() {
     }
     assert_eq!(client.get("assets/a/faults?status=all").await.expect(200), known);
     client.telemetry("b", Some("s"), &samples[..100]).await;
-    execute(&mut store, "DROP TRIGGER broken").await;
+    let mended = if support::on_postgres() {
+        "ALTER TABLE chunk DROP CONSTRAINT broken"
+    } else {
+        "DROP TRIGGER broken"
+    };
+    store.execute(mended).await.unwrap();
     for part in samples[500..].chunks(100) {
         assert_eq!(client.telemetry("a", Some("s"), part).await["accepted"], 100);
     }
@@ -70,7 +73,7 @@ async fn small_batches_become_few_chunks() {
     for part in samples.chunks(3) {
         bench.client.telemetry("a", Some("s"), part).await;
     }
-    let mut store = store(&bench).await;
+    let mut store = bench.store().await;
     let mut chunks = async || -> i64 {
         sqlx::query_scalar("SELECT COUNT(*) FROM chunk").fetch_one(&mut store).await.unwrap()
     };
@@ -86,8 +89,27 @@ async fn small_batches_become_few_chunks() {
 async fn a_store_has_one_server() {
     let bench = Bench::start().await;
     let second = offbd::server::start(support::config(bench.data.path())).await;
-    let error = second.err().expect("the store is taken").to_string();
+    let error = format!("{:#}", second.err().expect("the store is taken"));
     assert!(error.contains("another process"), "{error}");
+}
+
+#[tokio::test]
+async fn a_guest_writes_beside_the_service() {
+    use offbd::store::{Place, Store, Write};
+    let bench = Bench::start().await;
+    bench.client.asset("a").await;
+    let place = Place::of_url(&support::url(bench.data.path())).unwrap();
+    let (store, mut writer) = Store::open_beside(&place).await.unwrap();
+    let mut row = store.asset("a").await.unwrap().unwrap();
+    row.name = "b".to_owned();
+    for _ in 0..2 {
+        let name = row.name.clone();
+        let mut set = vec![Write::CreateAsset(row.clone()), Write::DeleteAsset { name }];
+        writer.commit(&mut [&mut set]).await.unwrap();
+        bench.client.telemetry("a", None, &rig(10, 10)).await;
+    }
+    writer.close().await.unwrap();
+    bench.client.get("/readyz").await.expect(200);
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -101,8 +123,7 @@ async fn too_much_at_once_is_turned_away_and_nothing_is_lost() {
     client.asset("a").await;
     client.telemetry("a", Some("s"), &rig(1, 1)).await;
     let samples = rig(400, 400);
-    let mut store = store(&bench).await;
-    execute(&mut store, "BEGIN IMMEDIATE").await;
+    let hold = bench.hold().await;
     let send = |part: &[Sample]| {
         let (client, body) = (client.clone(), batch(Some("s"), part));
         tokio::spawn(async move { client.post("assets/a/telemetry", &body).await })
@@ -119,7 +140,7 @@ async fn too_much_at_once_is_turned_away_and_nothing_is_lost() {
         assert_eq!(answer.headers["retry-after"], "1");
         (sent, turned_away) = (rest, turned_away + 1);
     }
-    execute(&mut store, "ROLLBACK").await;
+    hold.let_go().await;
     for waiting in sent {
         waiting.await.unwrap().expect(200);
     }
@@ -141,8 +162,7 @@ async fn a_stop_finishes_what_is_under_way() {
     let events = client.request(Method::GET, "events").send().await.unwrap();
     let url = format!("ws://{}/api/v1/assets/a/stream", client.address);
     let (mut socket, _) = connect_async(url).await.unwrap();
-    let mut store = store(&bench).await;
-    execute(&mut store, "BEGIN IMMEDIATE").await;
+    let hold = bench.hold().await;
     socket.send(Message::text(batch(Some("s"), &samples[100..]).to_string())).await.unwrap();
     // The batch is in the engine, not yet in the store.
     support::eventually(|| async {
@@ -151,7 +171,7 @@ async fn a_stop_finishes_what_is_under_way() {
     })
     .await;
     let stopping = tokio::spawn(bench.server.take().unwrap().shutdown());
-    execute(&mut store, "ROLLBACK").await;
+    hold.let_go().await;
     let mut acknowledged = false;
     while let Some(Ok(frame)) = socket.next().await {
         match frame {
@@ -505,9 +525,6 @@ async fn operation() {
     assert_eq!(request.send().await.unwrap().headers()["content-encoding"], "gzip");
     let request = client.request(Method::GET, "/healthz").header("x-request-id", "mine");
     assert_eq!(request.send().await.unwrap().headers()["x-request-id"], "mine");
-    let mut store = store(&bench).await;
-    sqlx::query("SELECT 1").execute(&mut store).await.unwrap();
-    store.close().await.unwrap();
 }
 
 /// A replay of the session `id` with `settings`, once it is done.

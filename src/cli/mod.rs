@@ -4,6 +4,7 @@
 //! faults or without), 2 bad arguments, 3 unusable input, 1 anything else. A
 //! reader that closes stdout early ends the command quietly.
 
+mod backup;
 mod calibrate;
 mod chart;
 mod corpus;
@@ -67,6 +68,8 @@ enum Command {
     Serve(serve::ServeArgs),
     Watch(watch::WatchArgs),
     Token(token::TokenArgs),
+    Backup(backup::BackupArgs),
+    Restore(backup::RestoreArgs),
     Migrate(serve::MigrateArgs),
     Check(serve::CheckArgs),
 }
@@ -104,6 +107,8 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Serve(args) => serve::serve(&args, &logging),
         Command::Watch(args) => watch::run(&args),
         Command::Token(args) => token::run(&args),
+        Command::Backup(args) => backup::backup(&args),
+        Command::Restore(args) => backup::restore(&args),
         Command::Migrate(args) => serve::migrate(&args),
         Command::Check(args) => serve::check(&args),
     }

@@ -23,7 +23,7 @@ pub(super) struct ConfigArgs {
     /// Directory of the embedded store [default: offbd-data]
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// sqlite:FILE instead of the file in the data directory
+    /// sqlite:FILE or postgres://… instead of the file in the data directory
     #[arg(long, value_name = "URL")]
     database: Option<String>,
 }

@@ -109,7 +109,7 @@ impl From<ServiceError> for Problem {
                 new(StatusCode::INSUFFICIENT_STORAGE, "registry-full", "The registry is full")
             }
             E::Busy { .. } => new(StatusCode::TOO_MANY_REQUESTS, "busy", "Too much at once"),
-            E::Unavailable { .. } => {
+            E::Unavailable { .. } | E::Outage { .. } => {
                 new(StatusCode::SERVICE_UNAVAILABLE, "unavailable", "Not available now")
             }
             E::Store(_) => {

@@ -1,9 +1,10 @@
 //! Tokens at the machine itself, beside a service that runs or without one: the
 //! store is written directly, as whoever can write it need not be asked.
 
+use std::path::Path;
+
 use anyhow::{Context, Result, bail};
 
-use super::open;
 use crate::config::Config;
 use crate::service::Clock;
 use crate::service::access::{Deed, NewToken, mint, token_view};
@@ -20,12 +21,12 @@ const PAGE: u32 = 500;
 /// that runs on it goes on, and finds what is written here.
 async fn beside(config: &Config) -> Result<(Store, Writer)> {
     config.check()?;
-    let file = config.database_file()?;
-    if let Some(directory) = file.parent() {
+    let place = config.place()?;
+    if let Some(directory) = place.file().and_then(Path::parent) {
         std::fs::create_dir_all(directory)
             .with_context(|| format!("`data`: cannot make {}", directory.display()))?;
     }
-    open(config).await
+    Store::open_beside(&place).await.with_context(|| format!("cannot open the store {place}"))
 }
 
 async fn write(mut writer: Writer, change: AccessWrite, act: &str, id: &str) -> Result<()> {

@@ -2,14 +2,23 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, watch};
 
 use super::events::{Event, Events};
-use crate::store::{Write, Writer};
+use crate::store::{StoreError, Write, Writer};
 
 /// Write sets in one transaction; the next ones make the next group.
 const MAX_GROUP_SETS: usize = 512;
+
+/// How long the writer waits before it tries a database again that is away: at
+/// first, and doubled each time up to the longest.
+const RETRY_FIRST: Duration = Duration::from_millis(50);
+const RETRY_LONGEST: Duration = Duration::from_secs(2);
+
+/// Why nothing can be written now; none while all is well.
+pub(super) type Outage = Option<String>;
 
 /// One life of an asset's engine, from its (re)building to its end. Once
 /// broken, nothing more of it is written: it is ahead of the store.
@@ -42,6 +51,7 @@ pub(super) struct Committer {
     writer: Writer,
     queue: mpsc::Receiver<WriteSet>,
     events: Events,
+    outage: watch::Sender<Outage>,
 }
 
 impl Committer {
@@ -49,8 +59,9 @@ impl Committer {
         writer: Writer,
         queue: mpsc::Receiver<WriteSet>,
         events: Events,
+        outage: watch::Sender<Outage>,
     ) -> Self {
-        Self { writer, queue, events }
+        Self { writer, queue, events, outage }
     }
 
     /// Runs until every sender is gone and the queue is empty.
@@ -79,7 +90,8 @@ impl Committer {
         }
     }
 
-    /// Whether all of it is durable now.
+    /// Whether all of it is durable now. While the database is away, this
+    /// waits: the queue fills up behind it, and what comes then is turned away.
     async fn write(&mut self, group: &mut [WriteSet]) -> bool {
         let mut sets: Vec<_> =
             group.iter_mut().map(|set| &mut set.writes).filter(|w| !w.is_empty()).collect();
@@ -87,16 +99,58 @@ impl Committer {
             return true;
         }
         metrics::histogram!("offbd_commit_sets").record(sets.len() as f64);
-        match self.writer.commit(&mut sets).await {
-            Ok(()) => {
+        loop {
+            let Err(error) = self.writer.commit(&mut sets).await else {
                 metrics::counter!("offbd_commits_total").increment(1);
-                true
-            }
-            Err(error) => {
-                metrics::counter!("offbd_commit_failures_total").increment(1);
+                return true;
+            };
+            metrics::counter!("offbd_commit_failures_total").increment(1);
+            if !error.is_outage() {
                 tracing::error!(%error, sets = sets.len(), "commit failed");
-                false
+                return false;
             }
+            if self.come_back(&error).await {
+                return true;
+            }
+        }
+    }
+
+    /// Waits until the database is back; returns whether the commit that
+    /// failed with `error` has come through after all.
+    async fn come_back(&mut self, error: &StoreError) -> bool {
+        self.down(error);
+        let mut wait = RETRY_FIRST;
+        loop {
+            tokio::time::sleep(wait).await;
+            wait = (wait * 2).min(RETRY_LONGEST);
+            match self.writer.reconnect().await {
+                Ok(came_through) => {
+                    self.up();
+                    return came_through;
+                }
+                Err(error) => self.down(&error),
+            }
+        }
+    }
+
+    /// Notes why nothing can be written; logs a reason once.
+    fn down(&self, error: &StoreError) {
+        let reason = error.to_string();
+        metrics::gauge!("offbd_store_writable").set(0.0);
+        self.outage.send_if_modified(|outage| {
+            let new = outage.as_ref() != Some(&reason);
+            if new {
+                tracing::error!(reason, "the database takes nothing; trying again");
+                *outage = Some(reason);
+            }
+            new
+        });
+    }
+
+    fn up(&self) {
+        metrics::gauge!("offbd_store_writable").set(1.0);
+        if self.outage.send_replace(None).is_some() {
+            tracing::info!("the database is back");
         }
     }
 

@@ -53,6 +53,9 @@ pub enum ServiceError {
     /// The store failed, or what runs behind the service; come again.
     #[error("{what}; what was not acknowledged was not taken, send it again")]
     Unavailable { what: &'static str },
+    /// The database is away; what waits is kept, up to the limits.
+    #[error("the database takes nothing now: {reason}")]
+    Outage { reason: String },
     #[error("the store: {0}")]
     Store(Arc<StoreError>),
     #[error("the store holds what this version cannot read: {what}")]

@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use super::retention::Retention;
+
 /// The bounds that an operator may set.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Limits {
@@ -25,6 +27,8 @@ pub struct Limits {
     pub assets: usize,
     /// Longest time for a request's body to arrive; then the request is given up.
     pub body_timeout: Duration,
+    /// How long recordings are kept.
+    pub retention: Retention,
 }
 
 impl Default for Limits {
@@ -40,6 +44,7 @@ impl Default for Limits {
             import_bytes: 64 << 20,
             assets: 10_000,
             body_timeout: Duration::from_secs(30),
+            retention: Retention::default(),
         }
     }
 }

@@ -30,6 +30,7 @@ mod rebuild;
 mod recent;
 mod recordings;
 mod replays;
+mod retention;
 mod running;
 mod sessions;
 mod shard;
@@ -42,7 +43,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 
 use futures_util::{StreamExt, stream};
-use tokio::sync::{Semaphore, mpsc, oneshot};
+use tokio::sync::{Semaphore, mpsc, oneshot, watch};
 use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
 
@@ -52,17 +53,18 @@ pub use events::{Event, EventFeed};
 pub use faults::FaultQuery;
 pub use limits::{Limits, RETRY_AFTER_S};
 pub use recordings::Around;
+pub use retention::Retention;
 pub use sessions::Recording;
 pub use telemetry::Pending;
 pub use traces::{MAX_TRACE_POINTS, TraceQuery};
 
 use self::access::Passes;
-use self::commit::{Committer, WriteSet};
+use self::commit::{Committer, Outage, WriteSet};
 use self::events::Events;
 use self::presence::Presences;
 use self::running::{Running, Work};
 use self::shard::{Context, Job, Shard};
-use crate::store::{Store, Writer};
+use crate::store::{Store, StoreError, Writer};
 
 /// Cheap to clone; all clones are one service.
 #[derive(Clone)]
@@ -78,6 +80,7 @@ struct Inner {
     passes: Passes,
     shards: Vec<mpsc::Sender<Job>>,
     writer: mpsc::Sender<WriteSet>,
+    outage: watch::Receiver<Outage>,
     jobs: mpsc::Sender<jobs::Job>,
     bench: jobs::Bench,
     /// One permit for each sample between arrival and commit.
@@ -137,7 +140,8 @@ impl Service {
         let clock = Clock;
         let events = Events::new(store.clone());
         let (sets, queue) = mpsc::channel(limits.commit_queue);
-        let committer = Committer::new(writer, queue, events.clone());
+        let (told, outage) = watch::channel(None);
+        let committer = Committer::new(writer, queue, events.clone(), told);
         let committer = tokio::spawn(committer.run());
         let presences = Presences::default();
         let mut shards = Vec::new();
@@ -151,7 +155,15 @@ impl Service {
         let closing = CancellationToken::new();
         let bench = jobs::Bench::new(store.clone(), clock, sets.clone(), closing.clone());
         let (jobs, queue) = mpsc::channel(jobs::MAX_QUEUED);
-        let workers = jobs::spawn(limits.jobs, &bench, queue);
+        let mut workers = jobs::spawn(limits.jobs, &bench, queue);
+        let sweeper = retention::Sweeper {
+            store: store.clone(),
+            clock,
+            writer: sets.clone(),
+            closing: closing.clone(),
+            retention: limits.retention.clone(),
+        };
+        workers.push(tokio::spawn(sweeper.run()));
         let in_flight = Arc::new(Semaphore::new(limits.in_flight_samples));
         let recordings = Arc::new(Semaphore::new(recordings::MAX_AT_ONCE));
         let traces = Arc::new(Semaphore::new(traces::MAX_AT_ONCE));
@@ -163,6 +175,7 @@ impl Service {
             passes: Passes::default(),
             shards,
             writer: sets,
+            outage,
             jobs,
             bench,
             in_flight,
@@ -202,7 +215,8 @@ impl Service {
     /// Whether the store answers and the shards and the writer run.
     ///
     /// # Errors
-    /// [`ServiceError::Unavailable`] naming what does not.
+    /// [`ServiceError::Unavailable`] or [`ServiceError::Outage`], naming what
+    /// does not.
     pub async fn ready(&self) -> Result<(), ServiceError> {
         if self.inner.writer.is_closed() {
             return Err(ServiceError::Unavailable { what: "the writer has stopped" });
@@ -210,8 +224,11 @@ impl Service {
         if self.inner.shards.iter().any(mpsc::Sender::is_closed) {
             return Err(ServiceError::Unavailable { what: "a shard has stopped" });
         }
-        self.inner.store.ping().await?;
-        Ok(())
+        if let Some(reason) = self.inner.outage.borrow().clone() {
+            return Err(ServiceError::Outage { reason });
+        }
+        let away = |error: StoreError| ServiceError::Outage { reason: error.to_string() };
+        self.inner.store.ping().await.map_err(away)
     }
 
     fn shard(&self, asset: &str) -> &mpsc::Sender<Job> {

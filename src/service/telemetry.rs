@@ -15,11 +15,14 @@ use crate::wire::telemetry::{AckView, Batch, RowView, key, keys};
 /// through for a retransmitted batch; older samples are not found.
 const MAX_CHUNKS_SEARCHED: u32 = 32;
 
-/// The acknowledgement of a batch that is under way.
+/// The acknowledgement of a batch that is under way. Its samples count as
+/// under way until they are durable or refused, also if nobody waits for it.
 pub struct Pending {
-    answer: oneshot::Receiver<Result<AckView, ServiceError>>,
-    _permit: OwnedSemaphorePermit,
+    answer: oneshot::Receiver<Result<Taken, ServiceError>>,
 }
+
+/// What was taken, and the place it took.
+type Taken = (AckView, OwnedSemaphorePermit);
 
 impl Pending {
     /// Waits until the batch is durable.
@@ -27,7 +30,7 @@ impl Pending {
     /// # Errors
     /// [`ServiceError`] if it was not taken, or not as a whole.
     pub async fn acknowledged(self) -> Result<AckView, ServiceError> {
-        settled(self.answer.await)
+        settled(self.answer.await).map(|(ack, _)| ack)
     }
 }
 
@@ -93,11 +96,11 @@ fn take_job(
     let asset = asset.to_owned();
     let job: Job = Box::new(move |shard| {
         let act = |context: &Context, running: &mut Running, work: &mut Work| {
-            take(context, running, batch, importing, work)
+            Ok((take(context, running, batch, importing, work)?, permit))
         };
         shard.act(&asset, act, reply);
     });
-    (job, Pending { answer, _permit: permit })
+    (job, Pending { answer })
 }
 
 /// Takes a batch on the asset's shard.

@@ -1,6 +1,6 @@
 //! Tokens, logins and the audit log.
 
-use sqlx::SqliteConnection;
+use sqlx::AnyConnection;
 
 use super::{Micros, Store, StoreError};
 
@@ -65,14 +65,15 @@ pub enum AccessWrite {
     Audit(AuditRow),
 }
 
-/// What comes after every id: they are made of hexadecimal digits and dashes.
-pub const LAST_ID: &str = "~";
+/// What comes after every id, in whatever order of letters a database has: ids
+/// are made of hexadecimal digits and dashes.
+pub const LAST_ID: &str = "z";
 
 /// Logins of one token at a time; with one more, the oldest ends.
 pub const MAX_LOGINS: i64 = 100;
 
 impl AccessWrite {
-    pub(super) async fn apply(&self, db: &mut SqliteConnection) -> Result<(), StoreError> {
+    pub(super) async fn apply(&self, db: &mut AnyConnection) -> Result<(), StoreError> {
         match self {
             Self::CreateToken(row) => create_token(db, row).await,
             Self::RevokeToken { id, at } => {
@@ -105,7 +106,7 @@ impl AccessWrite {
 }
 
 async fn stamp(
-    db: &mut SqliteConnection,
+    db: &mut AnyConnection,
     sql: &'static str,
     key: &str,
     at: Micros,
@@ -114,7 +115,7 @@ async fn stamp(
     Ok(())
 }
 
-async fn create_token(db: &mut SqliteConnection, row: &TokenRow) -> Result<(), StoreError> {
+async fn create_token(db: &mut AnyConnection, row: &TokenRow) -> Result<(), StoreError> {
     sqlx::query(
         "INSERT INTO token (id, hash, name, role, asset, created_at, created_by, expires_at)
          VALUES ($1, $2, $3, $4, $5, $6, $7, $8)",
@@ -133,7 +134,7 @@ async fn create_token(db: &mut SqliteConnection, row: &TokenRow) -> Result<(), S
 }
 
 /// Leaves room for one more login of `token`.
-async fn make_room(db: &mut SqliteConnection, token: &str) -> Result<(), StoreError> {
+async fn make_room(db: &mut AnyConnection, token: &str) -> Result<(), StoreError> {
     sqlx::query(
         "DELETE FROM login WHERE token = $1 AND hash NOT IN
          (SELECT hash FROM login WHERE token = $1 ORDER BY expires_at DESC LIMIT $2)",
@@ -146,7 +147,7 @@ async fn make_room(db: &mut SqliteConnection, token: &str) -> Result<(), StoreEr
 }
 
 async fn login(
-    db: &mut SqliteConnection,
+    db: &mut AnyConnection,
     hash: &str,
     token: &str,
     expires_at: Micros,
@@ -160,7 +161,7 @@ async fn login(
     Ok(())
 }
 
-async fn audit(db: &mut SqliteConnection, row: &AuditRow) -> Result<(), StoreError> {
+async fn audit(db: &mut AnyConnection, row: &AuditRow) -> Result<(), StoreError> {
     sqlx::query(
         "INSERT INTO audit (id, at, actor, token, act, target, address)
          VALUES ($1, $2, $3, $4, $5, $6, $7)",

@@ -6,21 +6,25 @@
 //! and the chunk format; knows no status codes, no engine and no clock.
 
 mod access;
+mod backup;
 pub mod codec;
+mod expiry;
+mod place;
+mod question;
 mod read;
 mod rows;
 mod tail;
 mod write;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
+use sqlx::AnyPool;
 use sqlx::migrate::Migrator;
-use sqlx::sqlite::{
-    SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous,
-};
 
 pub use access::{AccessWrite, AuditRow, LAST_ID, MAX_LOGINS, TokenRow};
+pub use backup::{back_up, restore};
+pub use place::Place;
 pub use read::{FaultFilter, FaultOrder, SessionFilter};
 pub use rows::{
     ActionKind, ActionRow, AssetRow, CalibrationRow, EventRow, FaultRow, JobState, Micros,
@@ -31,14 +35,8 @@ pub use write::{Write, Writer};
 
 static MIGRATIONS: Migrator = sqlx::migrate!("./migrations");
 
-/// Connections for reading; more readers wait for one.
-const MAX_READERS: u32 = 4;
-
-/// How long a reader waits for a connection before it fails.
-const READER_WAIT: Duration = Duration::from_secs(10);
-
-/// How long SQLite waits for another process's lock before it fails.
-const LOCK_WAIT: Duration = Duration::from_secs(5);
+/// How long the database may take to say that it is there.
+const PING_WAIT: Duration = Duration::from_secs(2);
 
 /// Why the store could not do it.
 #[derive(Debug, thiserror::Error)]
@@ -51,6 +49,22 @@ pub enum StoreError {
     Chunk { session: String, first_index: i64, source: codec::CodecError },
     #[error("{column} holds `{found}`, which this version does not know")]
     Word { column: &'static str, found: String },
+    #[error("another process uses this database")]
+    Taken,
+    /// Another process has written, or the database is an older copy of itself.
+    #[error(
+        "the database is not as it was left: {found} commits instead of {expected}; \
+         restart to go on with what it holds"
+    )]
+    Overtaken { expected: i64, found: i64 },
+    #[error("PostgreSQL is backed up and restored by its own pg_dump and pg_restore")]
+    OwnTools,
+    #[error("{} is there already", file.display())]
+    Exists { file: PathBuf },
+    #[error("{}: {source}", file.display())]
+    File { file: PathBuf, source: std::io::Error },
+    #[error("the copy is damaged: {found}")]
+    Damaged { found: String },
 }
 
 impl StoreError {
@@ -60,52 +74,99 @@ impl StoreError {
         let Self::Database(sqlx::Error::Database(error)) = self else { return false };
         error.is_unique_violation() || error.is_foreign_key_violation()
     }
+
+    /// Whether the same change may go through later: the database is away,
+    /// locked or full. Otherwise the change itself cannot be.
+    #[must_use]
+    pub fn is_outage(&self) -> bool {
+        match self {
+            Self::Database(sqlx::Error::Database(error)) => {
+                error.code().is_none_or(|code| !is_of_the_change(&code))
+            }
+            Self::Database(error) => !matches!(
+                error,
+                sqlx::Error::Encode(_) | sqlx::Error::ColumnDecode { .. } | sqlx::Error::Decode(_)
+            ),
+            Self::Taken | Self::Overtaken { .. } => true,
+            Self::Migration(_)
+            | Self::Chunk { .. }
+            | Self::Word { .. }
+            | Self::OwnTools
+            | Self::Exists { .. }
+            | Self::File { .. }
+            | Self::Damaged { .. } => false,
+        }
+    }
+}
+
+/// Whether an error's code means that the change cannot be. Of PostgreSQL the
+/// classes 22 (data), 23 (constraints) and 42 (SQL), in five characters; of
+/// SQLite, whose low byte is the primary code, 1 (SQL), 18 (too big),
+/// 19 (constraints), 20 (type) and 25 (range).
+fn is_of_the_change(code: &str) -> bool {
+    if code.len() == 5 {
+        return ["22", "23", "42"].iter().any(|class| code.starts_with(class));
+    }
+    code.parse::<i32>().is_ok_and(|code| [1, 18, 19, 20, 25].contains(&(code & 0xff)))
 }
 
 /// The readers' side of the store; cheap to clone.
 #[derive(Clone, Debug)]
 pub struct Store {
-    pool: SqlitePool,
-    path: PathBuf,
+    pool: AnyPool,
+    place: Place,
 }
 
 impl Store {
-    /// Opens the database file at `path`, made and migrated as needed.
+    /// Opens the database at `place`, migrated as needed; a file is made if it
+    /// is not there.
     ///
     /// # Errors
-    /// [`StoreError`] if the file cannot be opened or is not ours.
-    pub async fn open(path: &Path) -> Result<(Self, Writer), StoreError> {
-        let writer = Writer::open(path).await?;
-        let pool = SqlitePoolOptions::new()
-            .max_connections(MAX_READERS)
-            .acquire_timeout(READER_WAIT)
-            .connect_with(options(path).pragma("query_only", "on"))
-            .await?;
-        Ok((Self { pool, path: path.to_owned() }, writer))
+    /// [`StoreError`] if it cannot be opened, is not ours, or another process
+    /// writes to it.
+    pub async fn open(place: &Place) -> Result<(Self, Writer), StoreError> {
+        Self::open_as(place, false).await
     }
 
-    /// Brings the database file at `path` to this version's schema; returns
-    /// how many migrations it has.
+    /// Opens the database at `place` beside a service that may be running on
+    /// it. This writer must write nothing that an event or an engine follows
+    /// from: the service would not know of it.
     ///
     /// # Errors
-    /// [`StoreError`] if the file cannot be opened or is newer than this version.
-    pub async fn migrate(path: &Path) -> Result<usize, StoreError> {
-        Writer::open(path).await?.close().await?;
+    /// As for [`Store::open`].
+    pub async fn open_beside(place: &Place) -> Result<(Self, Writer), StoreError> {
+        Self::open_as(place, true).await
+    }
+
+    async fn open_as(place: &Place, guest: bool) -> Result<(Self, Writer), StoreError> {
+        let writer = Writer::open(place, guest).await?;
+        Ok((Self { pool: place.readers()?, place: place.clone() }, writer))
+    }
+
+    /// Brings the database at `place` to this version's schema; returns how
+    /// many migrations it has.
+    ///
+    /// # Errors
+    /// As for [`Store::open`], or if it is newer than this version.
+    pub async fn migrate(place: &Place) -> Result<usize, StoreError> {
+        Writer::open(place, false).await?.close().await?;
         Ok(MIGRATIONS.iter().count())
     }
 
-    /// The database file.
+    /// Where the database is.
     #[must_use]
-    pub fn path(&self) -> &Path {
-        &self.path
+    pub const fn place(&self) -> &Place {
+        &self.place
     }
 
     /// Whether the database answers.
     ///
     /// # Errors
-    /// [`StoreError`] if it does not.
+    /// [`StoreError`] if it does not, or not soon.
     pub async fn ping(&self) -> Result<(), StoreError> {
-        sqlx::query("SELECT 1").execute(&self.pool).await?;
+        let ping = sqlx::query("SELECT 1").execute(&self.pool);
+        let late = |_| sqlx::Error::Io(std::io::ErrorKind::TimedOut.into());
+        tokio::time::timeout(PING_WAIT, ping).await.map_err(late)??;
         Ok(())
     }
 
@@ -113,15 +174,4 @@ impl Store {
     pub async fn close(&self) {
         self.pool.close().await;
     }
-}
-
-/// WAL with `synchronous=FULL`: a commit is on the disk when it returns.
-fn options(path: &Path) -> SqliteConnectOptions {
-    SqliteConnectOptions::new()
-        .filename(path)
-        .create_if_missing(true)
-        .journal_mode(SqliteJournalMode::Wal)
-        .synchronous(SqliteSynchronous::Full)
-        .foreign_keys(true)
-        .busy_timeout(LOCK_WAIT)
 }

@@ -1,7 +1,6 @@
 //! What can be asked of the store.
 
-use sqlx::{QueryBuilder, Sqlite};
-
+use super::question::Question;
 use super::{
     ActionRow, AssetRow, CalibrationRow, EventRow, FaultRow, Micros, ReplayRow, SessionRow, Store,
     StoreError, TransitionRow, TrendEntry, WarningRow, codec,
@@ -43,7 +42,11 @@ pub struct FaultFilter {
 }
 
 const SESSION: &str = "SELECT id, asset, name, state, opened_at, ended_at, setup, baseline,
-    n_samples, n_rejected, first_t_s, last_t_s, last_seq, verdict, verdict_hash FROM session WHERE ";
+    n_samples, n_rejected, first_t_s, last_t_s, last_seq, verdict, verdict_hash FROM session
+    WHERE ";
+
+/// Not given up by retention.
+const KEPT: &str = "expired_at IS NULL AND ";
 
 impl Store {
     /// # Errors
@@ -76,25 +79,26 @@ impl Store {
     }
 
     pub async fn session(&self, id: &str) -> Result<Option<SessionRow>, StoreError> {
-        let mut query = QueryBuilder::<Sqlite>::new(SESSION);
-        query.push("id = ").push_bind(id);
-        Ok(query.build_query_as().fetch_optional(&self.pool).await?)
+        let mut query = Question::new(SESSION);
+        query.push(KEPT).push("id = ").bind(id)?;
+        Ok(query.rows().fetch_optional(&self.pool).await?)
     }
 
     pub async fn open_session(&self, asset: &str) -> Result<Option<SessionRow>, StoreError> {
-        let mut query = QueryBuilder::<Sqlite>::new(SESSION);
-        query.push("state = 'open' AND asset = ").push_bind(asset);
-        Ok(query.build_query_as().fetch_optional(&self.pool).await?)
+        let mut query = Question::new(SESSION);
+        query.push("state = 'open' AND asset = ").bind(asset)?;
+        Ok(query.rows().fetch_optional(&self.pool).await?)
     }
 
+    /// Also one that retention has given up: its name is taken until it is gone.
     pub async fn session_named(
         &self,
         asset: &str,
         name: &str,
     ) -> Result<Option<SessionRow>, StoreError> {
-        let mut query = QueryBuilder::<Sqlite>::new(SESSION);
-        query.push("asset = ").push_bind(asset).push(" AND name = ").push_bind(name);
-        Ok(query.build_query_as().fetch_optional(&self.pool).await?)
+        let mut query = Question::new(SESSION);
+        query.push("asset = ").bind(asset)?.push(" AND name = ").bind(name)?;
+        Ok(query.rows().fetch_optional(&self.pool).await?)
     }
 
     pub async fn sessions(
@@ -102,20 +106,20 @@ impl Store {
         filter: &SessionFilter,
         limit: u32,
     ) -> Result<Vec<SessionRow>, StoreError> {
-        let mut query = QueryBuilder::<Sqlite>::new(SESSION);
-        query.push("1 = 1");
+        let mut query = Question::new(SESSION);
+        query.push(KEPT).push("1 = 1");
         if let Some(asset) = &filter.asset {
-            query.push(" AND asset = ").push_bind(asset);
+            query.push(" AND asset = ").bind(asset)?;
         }
         if let Some(state) = &filter.state {
-            query.push(" AND state = ").push_bind(state);
+            query.push(" AND state = ").bind(state)?;
         }
         if let Some((opened_at, id)) = &filter.before {
-            query.push(" AND (opened_at, id) < (").push_bind(opened_at);
-            query.push(", ").push_bind(id).push(")");
+            query.push(" AND (opened_at, id) < (").bind(opened_at)?;
+            query.push(", ").bind(id)?.push(")");
         }
-        query.push(" ORDER BY opened_at DESC, id DESC LIMIT ").push_bind(i64::from(limit));
-        Ok(query.build_query_as().fetch_all(&self.pool).await?)
+        query.push(" ORDER BY opened_at DESC, id DESC LIMIT ").bind(i64::from(limit))?;
+        Ok(query.rows().fetch_all(&self.pool).await?)
     }
 
     /// The first chunk of `session` that begins at `index` or later: where it
@@ -198,19 +202,19 @@ impl Store {
         after: i64,
         limit: u32,
     ) -> Result<Vec<EventRow>, StoreError> {
-        let mut query = QueryBuilder::<Sqlite>::new("");
+        let mut query = Question::new("");
         for select in [
             "SELECT id, asset, session, document FROM transition WHERE id > ",
             " UNION ALL SELECT id, asset, session, event FROM action
              WHERE event IS NOT NULL AND id > ",
         ] {
-            query.push(select).push_bind(after);
+            query.push(select).bind(after)?;
             if let Some(asset) = asset {
-                query.push(" AND asset = ").push_bind(asset);
+                query.push(" AND asset = ").bind(asset)?;
             }
         }
-        query.push(" ORDER BY id LIMIT ").push_bind(i64::from(limit));
-        Ok(query.build_query_as().fetch_all(&self.pool).await?)
+        query.push(" ORDER BY id LIMIT ").bind(i64::from(limit))?;
+        Ok(query.rows().fetch_all(&self.pool).await?)
     }
 
     /// The open sessions of the assets from `first` to `last`.
@@ -219,10 +223,10 @@ impl Store {
         first: &str,
         last: &str,
     ) -> Result<Vec<SessionRow>, StoreError> {
-        let mut query = QueryBuilder::<Sqlite>::new(SESSION);
-        query.push("state = 'open' AND asset >= ").push_bind(first);
-        query.push(" AND asset <= ").push_bind(last);
-        Ok(query.build_query_as().fetch_all(&self.pool).await?)
+        let mut query = Question::new(SESSION);
+        query.push("state = 'open' AND asset >= ").bind(first)?;
+        query.push(" AND asset <= ").bind(last)?;
+        Ok(query.rows().fetch_all(&self.pool).await?)
     }
 
     /// When the latest session of each asset from `first` to `last` was opened
@@ -345,27 +349,26 @@ impl Store {
         filter: &FaultFilter,
         limit: u32,
     ) -> Result<Vec<FaultRow>, StoreError> {
-        let mut query = QueryBuilder::<Sqlite>::new("SELECT * FROM fault WHERE 1 = 1");
+        let mut query = Question::new("SELECT * FROM fault WHERE 1 = 1");
         if !filter.statuses.is_empty() {
             query.push(" AND status IN (");
-            let mut words = query.separated(", ");
-            for status in &filter.statuses {
-                words.push_bind(*status);
+            for (i, status) in filter.statuses.iter().enumerate() {
+                query.push(if i == 0 { "" } else { ", " }).bind(*status)?;
             }
             query.push(")");
         }
         if let Some(asset) = &filter.asset {
-            query.push(" AND asset = ").push_bind(asset);
+            query.push(" AND asset = ").bind(asset)?;
         }
         if let Some(code) = filter.code {
-            query.push(" AND code = ").push_bind(code);
+            query.push(" AND code = ").bind(code)?;
         }
         if let Some(acknowledged) = filter.acknowledged {
-            query.push(" AND acknowledged = ").push_bind(i64::from(acknowledged));
+            query.push(" AND acknowledged = ").bind(i64::from(acknowledged))?;
         }
-        page(&mut query, filter);
-        query.push(" LIMIT ").push_bind(i64::from(limit));
-        Ok(query.build_query_as().fetch_all(&self.pool).await?)
+        page(&mut query, filter)?;
+        query.push(" LIMIT ").bind(i64::from(limit))?;
+        Ok(query.rows().fetch_all(&self.pool).await?)
     }
 
     pub async fn fault(&self, asset: &str, code: &str) -> Result<Option<FaultRow>, StoreError> {
@@ -404,14 +407,14 @@ impl Store {
         before: Option<(Micros, &str)>,
         limit: u32,
     ) -> Result<Vec<CalibrationRow>, StoreError> {
-        let mut query = QueryBuilder::<Sqlite>::new("SELECT * FROM calibration WHERE asset = ");
-        query.push_bind(asset);
+        let mut query = Question::new("SELECT * FROM calibration WHERE asset = ");
+        query.bind(asset)?;
         if let Some((made_at, id)) = before {
-            query.push(" AND (made_at, id) < (").push_bind(made_at);
-            query.push(", ").push_bind(id).push(")");
+            query.push(" AND (made_at, id) < (").bind(made_at)?;
+            query.push(", ").bind(id)?.push(")");
         }
-        query.push(" ORDER BY made_at DESC, id DESC LIMIT ").push_bind(i64::from(limit));
-        Ok(query.build_query_as().fetch_all(&self.pool).await?)
+        query.push(" ORDER BY made_at DESC, id DESC LIMIT ").bind(i64::from(limit))?;
+        Ok(query.rows().fetch_all(&self.pool).await?)
     }
 
     /// Jobs that a former process left unfinished.
@@ -423,7 +426,7 @@ impl Store {
 }
 
 /// The page's beginning and order.
-fn page(query: &mut QueryBuilder<Sqlite>, filter: &FaultFilter) {
+fn page(query: &mut Question, filter: &FaultFilter) -> Result<(), StoreError> {
     if let Some((changed_at, asset, code)) = &filter.after {
         match filter.order {
             FaultOrder::Newest => query.push(" AND (changed_at, asset, code) < ("),
@@ -431,15 +434,16 @@ fn page(query: &mut QueryBuilder<Sqlite>, filter: &FaultFilter) {
             FaultOrder::Asset => query.push(" AND (asset, code) > ("),
         };
         if filter.order != FaultOrder::Asset {
-            query.push_bind(*changed_at).push(", ");
+            query.bind(*changed_at)?.push(", ");
         }
-        query.push_bind(asset.clone()).push(", ").push_bind(code.clone()).push(")");
+        query.bind(asset.clone())?.push(", ").bind(code.clone())?.push(")");
     }
     query.push(match filter.order {
         FaultOrder::Newest => " ORDER BY changed_at DESC, asset DESC, code DESC",
         FaultOrder::Oldest => " ORDER BY changed_at, asset, code",
         FaultOrder::Asset => " ORDER BY asset, code",
     });
+    Ok(())
 }
 
 fn decode(

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use sqlx::SqliteConnection;
+use sqlx::AnyConnection;
 
 use super::{StoreError, codec};
 use crate::vocabulary::Sample;
@@ -44,7 +44,7 @@ impl Tails {
     /// Appends `samples` to `session`, the first of them having `first_index`.
     pub(super) async fn append(
         &mut self,
-        connection: &mut SqliteConnection,
+        connection: &mut AnyConnection,
         session: &str,
         first_index: i64,
         samples: &[Sample],
@@ -67,7 +67,7 @@ impl Tails {
     /// Merges what is left: `session` has ended.
     pub(super) async fn finish(
         &mut self,
-        connection: &mut SqliteConnection,
+        connection: &mut AnyConnection,
         session: &str,
     ) -> Result<(), StoreError> {
         self.known.remove(session);
@@ -76,7 +76,7 @@ impl Tails {
 
     async fn tail(
         &self,
-        connection: &mut SqliteConnection,
+        connection: &mut AnyConnection,
         session: &str,
     ) -> Result<Tail, StoreError> {
         if let Some(tail) = self.known.get(session) {
@@ -107,7 +107,7 @@ const fn length(samples: &[Sample]) -> i64 {
 }
 
 async fn insert(
-    connection: &mut SqliteConnection,
+    connection: &mut AnyConnection,
     session: &str,
     first_index: i64,
     samples: &[Sample],
@@ -131,7 +131,7 @@ async fn insert(
 
 /// Makes one run of the small chunks, which are all at the end, and cuts it
 /// into full chunks and a rest. Returns the tail that this leaves.
-async fn merge(connection: &mut SqliteConnection, session: &str) -> Result<Tail, StoreError> {
+async fn merge(connection: &mut AnyConnection, session: &str) -> Result<Tail, StoreError> {
     let small: Vec<(i64, Vec<u8>)> = sqlx::query_as(
         "SELECT first_index, data FROM chunk WHERE session = $1 AND n < $2 ORDER BY first_index",
     )

@@ -1,15 +1,19 @@
 //! The one writer: groups of changes, one transaction each, durable on return.
 
-use std::path::{Path, PathBuf};
+use std::time::Duration;
 
-use sqlx::{ConnectOptions, Connection, SqliteConnection};
+use sqlx::{AnyConnection, Connection};
 
 use super::tail::Tails;
 use super::{
-    AccessWrite, ActionRow, AssetRow, CalibrationRow, FaultRow, MIGRATIONS, Micros, Progress,
-    ReplayRow, SessionRow, StoreError, TransitionRow, TrendRow, options,
+    AccessWrite, ActionRow, AssetRow, CalibrationRow, FaultRow, MIGRATIONS, Micros, Place,
+    Progress, ReplayRow, SessionRow, StoreError, TransitionRow, TrendRow,
 };
 use crate::vocabulary::Sample;
+
+/// How long a commit may take before its connection is given up. A disk that
+/// is slower than this cannot carry the service.
+const COMMIT_WAIT: Duration = Duration::from_secs(30);
 
 /// One change.
 #[derive(Clone, Debug)]
@@ -39,6 +43,16 @@ pub enum Write {
     DeleteSession {
         session: String,
     },
+    /// An ended session is given up: nobody sees it any more.
+    ExpireSession {
+        session: String,
+        at: Micros,
+    },
+    /// The first chunks of a session that is given up, at most `limit`.
+    DropChunks {
+        session: String,
+        limit: u32,
+    },
     Act(ActionRow),
     Transition(TransitionRow),
     Fault(FaultRow),
@@ -52,12 +66,23 @@ pub enum Write {
     Access(AccessWrite),
 }
 
-/// The only connection that changes anything.
+/// The one that changes things; a guest beside it may write what no event and
+/// no engine follows from. Every transaction counts itself in the
+/// database, so that after a loss of the connection the writer knows whether
+/// the last one came through, and notices if somebody else has written.
 #[derive(Debug)]
 pub struct Writer {
-    path: PathBuf,
-    connection: SqliteConnection,
+    place: Place,
+    /// None after a failure, until [`Writer::reconnect`].
+    connection: Option<AnyConnection>,
+    /// The last id given to an event.
     last_id: i64,
+    /// Transactions that the database has seen.
+    n_commits: i64,
+    /// Whether it writes beside the one that counts.
+    guest: bool,
+    /// Whether a transaction may have come through that is not counted yet.
+    in_doubt: bool,
     tails: Tails,
 }
 
@@ -71,27 +96,69 @@ struct Pending {
 }
 
 impl Writer {
-    pub(super) async fn open(path: &Path) -> Result<Self, StoreError> {
-        let mut connection = options(path).connect().await?;
+    pub(super) async fn open(place: &Place, guest: bool) -> Result<Self, StoreError> {
+        let mut connection = place.writer(!guest).await?;
         MIGRATIONS.run_direct(None, &mut connection, false).await?;
-        let last_id = last_id(&mut connection).await?;
-        Ok(Self { path: path.to_owned(), connection, last_id, tails: Tails::default() })
+        let last_id = counter(&mut connection, "event").await?;
+        let n_commits = counter(&mut connection, "commit").await?;
+        let place = place.clone();
+        let (connection, tails) = (Some(connection), Tails::default());
+        Ok(Self { place, connection, last_id, n_commits, guest, in_doubt: false, tails })
     }
 
     /// Applies the sets, in order, in one transaction that is durable on
     /// return; gives ids to their actions and transitions.
     ///
     /// # Errors
-    /// [`StoreError`]; then nothing of any set has been applied.
+    /// [`StoreError`]. If [`StoreError::is_outage`], the transaction may have
+    /// come through all the same: [`Writer::reconnect`] knows. Otherwise
+    /// nothing of any set has been applied.
     pub async fn commit(&mut self, sets: &mut [&mut Vec<Write>]) -> Result<(), StoreError> {
+        if self.connection.is_none() && self.reconnect().await? {
+            // Whoever asked for that one has not waited for its outcome.
+            tracing::warn!("a commit came through that was given up");
+        }
         let last_id = self.last_id;
-        let result = self.try_commit(sets).await;
-        if result.is_err() {
-            self.last_id = last_id;
-            self.tails.forget();
-            self.reconnect().await;
+        let late = |_| Err(sqlx::Error::Io(std::io::ErrorKind::TimedOut.into()).into());
+        let attempt = tokio::time::timeout(COMMIT_WAIT, self.attempt(sets));
+        let result = attempt.await.unwrap_or_else(late);
+        match &result {
+            Ok(()) => {
+                self.n_commits += i64::from(!self.guest);
+                self.in_doubt = false;
+            }
+            Err(_) => {
+                // A connection that failed may be in any state: a new one is not.
+                self.connection = None;
+                self.last_id = last_id;
+                self.tails.forget();
+            }
         }
         result
+    }
+
+    /// Connects anew; returns whether the last commit, which failed, has come
+    /// through after all. Nothing is in doubt afterwards.
+    ///
+    /// # Errors
+    /// [`StoreError`] if the database is still away, or not as it was left.
+    pub async fn reconnect(&mut self) -> Result<bool, StoreError> {
+        self.connection = None;
+        let mut connection = self.place.writer(!self.guest).await?;
+        // A change of nothing waits for what the lost connection may still do.
+        sqlx::query("UPDATE counter SET value = value WHERE name = 'commit'")
+            .execute(&mut connection)
+            .await?;
+        let found = counter(&mut connection, "commit").await?;
+        let came_through = self.in_doubt && found == self.n_commits + 1;
+        if found != self.n_commits && !came_through {
+            return Err(StoreError::Overtaken { expected: self.n_commits, found });
+        }
+        self.last_id = counter(&mut connection, "event").await?;
+        self.n_commits = found;
+        self.in_doubt = false;
+        self.connection = Some(connection);
+        Ok(came_through)
     }
 
     /// Closes the connection, its journal folded into the database file.
@@ -99,40 +166,53 @@ impl Writer {
     /// # Errors
     /// [`StoreError`] if the last checkpoint fails; all commits stay durable.
     pub async fn close(self) -> Result<(), StoreError> {
-        Ok(self.connection.close().await?)
-    }
-
-    /// A connection that failed may be in any state: a new one is not. If it
-    /// cannot be had, the next commit fails too.
-    async fn reconnect(&mut self) {
-        if let Ok(connection) = options(&self.path).connect().await {
-            self.connection = connection;
+        match self.connection {
+            Some(connection) => Ok(connection.close().await?),
+            None => Ok(()),
         }
     }
 
-    async fn try_commit(&mut self, sets: &mut [&mut Vec<Write>]) -> Result<(), StoreError> {
-        let first_id = self.last_id;
-        let mut transaction = self.connection.begin_with("BEGIN IMMEDIATE").await?;
+    async fn attempt(&mut self, sets: &mut [&mut Vec<Write>]) -> Result<(), StoreError> {
+        let Some(connection) = &mut self.connection else {
+            return Err(sqlx::Error::PoolClosed.into());
+        };
+        let mut transaction = connection.begin_with(self.place.begin()).await?;
         let mut group =
             Group { last_id: &mut self.last_id, tails: &mut self.tails, pending: Vec::new() };
         for write in sets.iter_mut().flat_map(|set| set.iter_mut()) {
             group.apply(&mut transaction, write).await?;
         }
         group.flush(&mut transaction).await?;
-        if self.last_id != first_id {
-            sqlx::query("UPDATE counter SET value = $1 WHERE name = 'event'")
-                .bind(self.last_id)
-                .execute(&mut *transaction)
-                .await?;
+        if !self.guest {
+            count(&mut transaction, self.n_commits, self.last_id).await?;
+            self.in_doubt = true;
         }
         Ok(transaction.commit().await?)
     }
 }
 
-async fn last_id(connection: &mut SqliteConnection) -> Result<i64, StoreError> {
-    Ok(sqlx::query_scalar("SELECT value FROM counter WHERE name = 'event'")
-        .fetch_one(connection)
-        .await?)
+async fn counter(db: &mut AnyConnection, name: &str) -> Result<i64, StoreError> {
+    let question = sqlx::query_scalar("SELECT value FROM counter WHERE name = $1").bind(name);
+    Ok(question.fetch_one(db).await?)
+}
+
+/// Counts this transaction, and the events up to `last_id`.
+async fn count(db: &mut AnyConnection, n_commits: i64, last_id: i64) -> Result<(), StoreError> {
+    let counted = sqlx::query(
+        "UPDATE counter SET value = CASE name WHEN 'commit' THEN $1 ELSE $2 END
+         WHERE name IN ('commit', 'event')
+         AND EXISTS (SELECT 1 FROM counter WHERE name = 'commit' AND value = $3)",
+    )
+    .bind(n_commits + 1)
+    .bind(last_id)
+    .bind(n_commits)
+    .execute(&mut *db)
+    .await?;
+    if counted.rows_affected() == 2 {
+        return Ok(());
+    }
+    let found = counter(db, "commit").await?;
+    Err(StoreError::Overtaken { expected: n_commits, found })
 }
 
 /// The transaction at hand.
@@ -148,11 +228,7 @@ impl Group<'_> {
         *self.last_id
     }
 
-    async fn apply(
-        &mut self,
-        db: &mut SqliteConnection,
-        write: &mut Write,
-    ) -> Result<(), StoreError> {
+    async fn apply(&mut self, db: &mut AnyConnection, write: &mut Write) -> Result<(), StoreError> {
         match write {
             Write::Append { session, first_index, samples, progress } => {
                 self.defer(session, *first_index, samples, *progress);
@@ -185,6 +261,8 @@ impl Group<'_> {
                 self.tails.forget();
                 delete(db, "DELETE FROM session WHERE id = $1", session).await
             }
+            Write::ExpireSession { session, at } => expire(db, session, *at).await,
+            Write::DropChunks { session, limit } => drop_chunks(db, session, *limit).await,
             Write::DeleteAsset { name } => {
                 self.flush(db).await?;
                 self.tails.forget();
@@ -204,7 +282,7 @@ impl Group<'_> {
         self.pending.push(Pending { session, first_index, samples, progress });
     }
 
-    async fn flush(&mut self, db: &mut SqliteConnection) -> Result<(), StoreError> {
+    async fn flush(&mut self, db: &mut AnyConnection) -> Result<(), StoreError> {
         for Pending { session, first_index, samples, progress } in self.pending.drain(..) {
             if !samples.is_empty() {
                 self.tails.append(db, &session, first_index, &samples).await?;
@@ -226,12 +304,12 @@ impl Group<'_> {
     }
 }
 
-async fn delete(db: &mut SqliteConnection, sql: &'static str, key: &str) -> Result<(), StoreError> {
+async fn delete(db: &mut AnyConnection, sql: &'static str, key: &str) -> Result<(), StoreError> {
     sqlx::query(sql).bind(key).execute(db).await?;
     Ok(())
 }
 
-async fn create_asset(db: &mut SqliteConnection, row: &AssetRow) -> Result<(), StoreError> {
+async fn create_asset(db: &mut AnyConnection, row: &AssetRow) -> Result<(), StoreError> {
     sqlx::query(
         "INSERT INTO asset (name, document, revision, created_at, updated_at)
          VALUES ($1, $2, $3, $4, $5)",
@@ -246,7 +324,7 @@ async fn create_asset(db: &mut SqliteConnection, row: &AssetRow) -> Result<(), S
     Ok(())
 }
 
-async fn update_asset(db: &mut SqliteConnection, row: &AssetRow) -> Result<(), StoreError> {
+async fn update_asset(db: &mut AnyConnection, row: &AssetRow) -> Result<(), StoreError> {
     sqlx::query("UPDATE asset SET document = $2, revision = $3, updated_at = $4 WHERE name = $1")
         .bind(&row.name)
         .bind(&row.document)
@@ -257,7 +335,7 @@ async fn update_asset(db: &mut SqliteConnection, row: &AssetRow) -> Result<(), S
     Ok(())
 }
 
-async fn open_session(db: &mut SqliteConnection, row: &SessionRow) -> Result<(), StoreError> {
+async fn open_session(db: &mut AnyConnection, row: &SessionRow) -> Result<(), StoreError> {
     sqlx::query(
         "INSERT INTO session (id, asset, name, state, opened_at, setup, baseline, n_samples,
          n_rejected) VALUES ($1, $2, $3, 'open', $4, $5, $6, 0, 0)",
@@ -274,14 +352,16 @@ async fn open_session(db: &mut SqliteConnection, row: &SessionRow) -> Result<(),
 }
 
 async fn end_session(
-    db: &mut SqliteConnection,
+    db: &mut AnyConnection,
     session: &str,
     ended_at: Micros,
     verdict: &str,
     hash: &str,
 ) -> Result<(), StoreError> {
     sqlx::query(
-        "UPDATE session SET state = 'ended', ended_at = $2, verdict = $3, verdict_hash = $4
+        "UPDATE session SET state = 'ended', ended_at = $2, verdict = $3, verdict_hash = $4,
+         n_bytes = (SELECT CAST(COALESCE(SUM(LENGTH(data)), 0) AS BIGINT) FROM chunk
+                    WHERE chunk.session = session.id)
          WHERE id = $1",
     )
     .bind(session)
@@ -293,7 +373,28 @@ async fn end_session(
     Ok(())
 }
 
-async fn insert_action(db: &mut SqliteConnection, row: &ActionRow) -> Result<(), StoreError> {
+async fn expire(db: &mut AnyConnection, session: &str, at: Micros) -> Result<(), StoreError> {
+    sqlx::query("UPDATE session SET expired_at = $2 WHERE id = $1 AND state = 'ended'")
+        .bind(session)
+        .bind(at)
+        .execute(db)
+        .await?;
+    Ok(())
+}
+
+async fn drop_chunks(db: &mut AnyConnection, session: &str, limit: u32) -> Result<(), StoreError> {
+    sqlx::query(
+        "DELETE FROM chunk WHERE session = $1 AND first_index IN
+         (SELECT first_index FROM chunk WHERE session = $1 ORDER BY first_index LIMIT $2)",
+    )
+    .bind(session)
+    .bind(i64::from(limit))
+    .execute(db)
+    .await?;
+    Ok(())
+}
+
+async fn insert_action(db: &mut AnyConnection, row: &ActionRow) -> Result<(), StoreError> {
     sqlx::query(
         "INSERT INTO action (id, asset, session, after_index, kind, code, actor, at, event)
          VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9)",
@@ -312,10 +413,7 @@ async fn insert_action(db: &mut SqliteConnection, row: &ActionRow) -> Result<(),
     Ok(())
 }
 
-async fn insert_transition(
-    db: &mut SqliteConnection,
-    row: &TransitionRow,
-) -> Result<(), StoreError> {
+async fn insert_transition(db: &mut AnyConnection, row: &TransitionRow) -> Result<(), StoreError> {
     sqlx::query(
         "INSERT INTO transition (id, asset, session, ordinal, t_s, code, status, at, document)
          VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9)",
@@ -334,7 +432,7 @@ async fn insert_transition(
     Ok(())
 }
 
-async fn put_fault(db: &mut SqliteConnection, row: &FaultRow) -> Result<(), StoreError> {
+async fn put_fault(db: &mut AnyConnection, row: &FaultRow) -> Result<(), StoreError> {
     sqlx::query(
         "INSERT INTO fault (asset, code, status, acknowledged, changed_at, record, provenance)
          VALUES ($1, $2, $3, $4, $5, $6, $7)
@@ -354,7 +452,7 @@ async fn put_fault(db: &mut SqliteConnection, row: &FaultRow) -> Result<(), Stor
     Ok(())
 }
 
-async fn insert_trend(db: &mut SqliteConnection, row: &TrendRow) -> Result<(), StoreError> {
+async fn insert_trend(db: &mut AnyConnection, row: &TrendRow) -> Result<(), StoreError> {
     sqlx::query(
         "INSERT INTO trend (session, axis, asset, ended_at, n_samples, calibration_id, gain,
          gain_error, offset_m_s2, offset_error_m_s2, delay_s, delay_error_s, motion_s, warnings)
@@ -379,7 +477,7 @@ async fn insert_trend(db: &mut SqliteConnection, row: &TrendRow) -> Result<(), S
     Ok(())
 }
 
-async fn put_replay(db: &mut SqliteConnection, row: &ReplayRow) -> Result<(), StoreError> {
+async fn put_replay(db: &mut AnyConnection, row: &ReplayRow) -> Result<(), StoreError> {
     sqlx::query(
         "INSERT INTO replay (id, session, state, settings, created_at, finished_at, result, error)
          VALUES ($1, $2, $3, $4, $5, $6, $7, $8)
@@ -399,10 +497,7 @@ async fn put_replay(db: &mut SqliteConnection, row: &ReplayRow) -> Result<(), St
     Ok(())
 }
 
-async fn put_calibration(
-    db: &mut SqliteConnection,
-    row: &CalibrationRow,
-) -> Result<(), StoreError> {
+async fn put_calibration(db: &mut AnyConnection, row: &CalibrationRow) -> Result<(), StoreError> {
     sqlx::query(
         "INSERT INTO calibration (id, asset, state, sessions, made_at, active, document, error)
          VALUES ($1, $2, $3, $4, $5, $6, $7, $8)
@@ -422,7 +517,7 @@ async fn put_calibration(
     Ok(())
 }
 
-async fn activate(db: &mut SqliteConnection, asset: &str, id: &str) -> Result<(), StoreError> {
+async fn activate(db: &mut AnyConnection, asset: &str, id: &str) -> Result<(), StoreError> {
     sqlx::query(
         "UPDATE calibration SET active = CASE WHEN id = $2 THEN 1 ELSE 0 END WHERE asset = $1",
     )

@@ -2,6 +2,10 @@
 
 #![allow(dead_code, reason = "each test uses a part")]
 
+pub mod device;
+pub mod postgres;
+pub mod process;
+
 use std::future::Future;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -12,6 +16,7 @@ use offbd::vocabulary::Sample;
 use reqwest::header::CONTENT_TYPE;
 use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
+use sqlx::{ConnectOptions, Executor};
 
 /// Longest time to wait for anything; far more than it takes.
 pub const DEADLINE: Duration = Duration::from_secs(60);
@@ -23,12 +28,33 @@ pub struct Bench {
     pub data: tempfile::TempDir,
 }
 
-/// A configuration that uses `data` and any free port.
+/// Whether these tests are the ones of `tests/on_postgres.rs`.
+pub fn on_postgres() -> bool {
+    module_path!().starts_with("on_postgres::")
+}
+
+/// A configuration that uses `data`, or the database of its name, and any free
+/// port.
 pub fn config(data: &Path) -> Config {
     let mut config = Config { data: data.to_owned(), ..Config::default() };
+    if on_postgres() {
+        let name = data.file_name().unwrap().to_str().unwrap();
+        config.database = Some(postgres::shared_database(name));
+    }
     config.listen.set_port(0);
     config.workers.shards = 2;
     config
+}
+
+/// The URL of the store below `data`.
+pub fn url(data: &Path) -> String {
+    let file = || format!("sqlite://{}/offbd.sqlite", data.display());
+    config(data).database.unwrap_or_else(file)
+}
+
+pub async fn connection(url: &str) -> sqlx::AnyConnection {
+    sqlx::any::install_default_drivers();
+    url.parse::<sqlx::any::AnyConnectOptions>().unwrap().connect().await.unwrap()
 }
 
 impl Bench {
@@ -45,12 +71,36 @@ impl Bench {
         Self { server: Some(server), client, data }
     }
 
+    /// A connection of its own to the server's store.
+    pub async fn store(&self) -> sqlx::AnyConnection {
+        connection(&url(self.data.path())).await
+    }
+
+    /// Lets nobody write until it is dropped or let go of.
+    pub async fn hold(&self) -> Hold {
+        let mut store = self.store().await;
+        let words = if on_postgres() { "BEGIN; LOCK TABLE counter" } else { "BEGIN IMMEDIATE" };
+        store.execute(words).await.unwrap();
+        Hold { store }
+    }
+
     /// Stops gracefully and starts again on the same data.
     pub async fn restart(&mut self) {
         self.server.take().unwrap().shutdown().await.unwrap();
         let server = server::start(config(self.data.path())).await.unwrap();
         self.client = Client::new(server.address.to_string());
         self.server = Some(server);
+    }
+}
+
+/// Holds the store, see [`Bench::hold`].
+pub struct Hold {
+    store: sqlx::AnyConnection,
+}
+
+impl Hold {
+    pub async fn let_go(mut self) {
+        self.store.execute("ROLLBACK").await.unwrap();
     }
 }
 
@@ -176,9 +226,14 @@ impl Client {
         let id = session["id"].as_str().unwrap();
         let csv = self.get(&format!("sessions/{id}/telemetry")).await;
         assert_eq!(csv.status, 200);
-        let reader = offbd::wire::session_csv::Reader::new(csv.text.as_bytes()).unwrap();
-        reader.map(Result::unwrap).collect()
+        read_csv(&csv.text)
     }
+}
+
+/// The samples of a session file.
+pub fn read_csv(text: &str) -> Vec<Sample> {
+    let reader = offbd::wire::session_csv::Reader::new(text.as_bytes()).unwrap();
+    reader.map(Result::unwrap).collect()
 }
 
 /// A batch as JSON rows.
@@ -248,17 +303,32 @@ pub fn rig(n: usize, dead_from: usize) -> Vec<Sample> {
 
 /// The verdict that the engine itself gives on `samples`.
 pub fn judged(name: &str, samples: &[Sample]) -> (String, Vec<String>) {
-    use offbd::engine::{Engine, Input, Rig, Setup};
+    let Judgement { hash, faults, .. } = judgement(name, samples);
+    (hash, faults)
+}
+
+/// What the engine itself says of a recording.
+pub struct Judgement {
+    pub hash: String,
+    pub faults: Vec<String>,
+    pub n_transitions: usize,
+    pub memory: offbd::diagnosis::FaultMemory,
+}
+
+pub fn judgement(name: &str, samples: &[Sample]) -> Judgement {
+    use offbd::engine::{Engine, Input, Output, Rig, Setup};
     let setup = Setup::new(Rig::chapter(name), None).unwrap();
     let mut engine = Engine::new(setup, Default::default());
     let mut verdict = offbd::wire::verdict::Verdict::default();
-    let mut outputs = Vec::new();
+    let (mut outputs, mut n_transitions) = (Vec::new(), 0);
     for input in samples.iter().map(|s| Input::Sample(*s)).chain([Input::End]) {
         outputs.clear();
         engine.handle(input, &mut outputs);
         outputs.iter().for_each(|o| verdict.take(o));
+        n_transitions += outputs.iter().filter(|o| matches!(o, Output::Transition(_))).count();
     }
-    (verdict.hash(), verdict.confirmed().iter().map(ToString::to_string).collect())
+    let faults = verdict.confirmed().iter().map(ToString::to_string).collect();
+    Judgement { hash: verdict.hash(), faults, n_transitions, memory: engine.memory().clone() }
 }
 
 /// Server-Sent Events, one by one.

@@ -1,0 +1,172 @@
+//! A private server of PostgreSQL, reached through a socket in a directory of
+//! its own. It ends with the process that started it, however that ends.
+
+use std::fs::File;
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::OnceLock;
+
+const MISSING: &str = "no `initdb` of PostgreSQL in PATH or /usr/lib/postgresql/*/bin: install \
+    `postgresql`, or set POSTGRES_PROGRAMS to the directory that has it";
+
+/// Runs the server whose programs are in $1 on the data in $2 until a line
+/// comes, which names the signal. Says `ready` when it answers, and `gone` when
+/// it does not any more. At the end of input it ends at once and removes all.
+const WATCH: &str = r#"
+"$1/postgres" -D "$2" -c listen_addresses= -c unix_socket_directories="$2" \
+    -c max_connections=200 >>"$2/log" 2>&1 & server=$!
+until grep -qs ready "$2/postmaster.pid"; do kill -0 $server || exit 1; sleep 0.05; done
+echo ready
+if read -r signal; then
+    kill -s "$signal" $server; wait $server
+    echo gone
+else
+    kill -s QUIT $server; wait $server
+    rm -rf "$2"
+fi
+"#;
+
+pub struct Postgres {
+    directory: PathBuf,
+    running: Option<(Child, ChildStdin, BufReader<std::process::ChildStdout>)>,
+}
+
+impl Postgres {
+    /// A new server in an empty directory. Names are sorted as in English, so
+    /// that nothing depends on the order of bytes.
+    pub fn new() -> Self {
+        Self::in_directory(tempfile::tempdir().unwrap().keep())
+    }
+
+    fn in_directory(directory: PathBuf) -> Self {
+        if is_root() {
+            let owner = Command::new("chown").arg("nobody").arg(&directory).status().unwrap();
+            assert!(owner.success());
+        }
+        let made = as_nobody(programs().join("initdb"))
+            .args(["--username=offbd", "--auth=trust", "--encoding=UTF8", "--locale=C"])
+            .args(["--locale-provider=icu", "--icu-locale=en-US", "--no-sync", "-D"])
+            .arg(&directory)
+            .output()
+            .unwrap();
+        assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+        let mut server = Self { directory, running: None };
+        server.start();
+        server
+    }
+
+    pub fn start(&mut self) {
+        let mut child = as_nobody("sh")
+            .args(["-c", WATCH, "watch"])
+            .args([programs(), &self.directory])
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let (input, output) = (child.stdin.take().unwrap(), child.stdout.take().unwrap());
+        let mut output = BufReader::new(output);
+        let mut line = String::new();
+        output.read_line(&mut line).unwrap();
+        assert_eq!(line, "ready\n", "see {}/log", self.directory.display());
+        self.running = Some((child, input, output));
+    }
+
+    /// Stops it by a signal: `INT` breaks off what runs, `QUIT` is a crash.
+    pub fn stop(&mut self, signal: &str) {
+        let (mut child, mut input, mut output) = self.running.take().unwrap();
+        writeln!(input, "{signal}").unwrap();
+        let mut line = String::new();
+        output.read_line(&mut line).unwrap();
+        assert_eq!(line, "gone\n");
+        child.wait().unwrap();
+    }
+
+    pub fn directory(&self) -> &Path {
+        &self.directory
+    }
+
+    /// The URL of the database of this name, made if it is not there.
+    pub fn database(&self, name: &str) -> String {
+        database(&self.directory, name)
+    }
+}
+
+impl Drop for Postgres {
+    fn drop(&mut self) {
+        let Some((mut child, input, _)) = self.running.take() else { return };
+        drop(input);
+        child.wait().unwrap();
+    }
+}
+
+fn database(directory: &Path, name: &str) -> String {
+    let made = Command::new(programs().join("createdb"))
+        .args(["-U", "offbd", "-h"])
+        .args([directory, Path::new(name)])
+        .output()
+        .unwrap();
+    let error = String::from_utf8_lossy(&made.stderr);
+    assert!(made.status.success() || error.contains("already exists"), "{error}");
+    url(directory, name)
+}
+
+/// The URL of a database on the server whose socket is in `directory`.
+pub fn url(directory: &Path, name: &str) -> String {
+    let socket = directory.to_str().unwrap().replace('/', "%2F");
+    format!("postgres://offbd@{socket}/{name}")
+}
+
+/// The URL of a database on the one server that this process's tests share.
+/// This module may be in the process several times: the first takes the lock.
+pub fn shared_database(name: &str) -> String {
+    static DIRECTORY: OnceLock<PathBuf> = OnceLock::new();
+    let directory = DIRECTORY.get_or_init(|| {
+        let known = std::env::temp_dir().join(format!("offbd-postgres-{}", std::process::id()));
+        let lock = File::create(known.with_extension("lock")).unwrap();
+        lock.lock().unwrap();
+        if !known.exists() {
+            std::fs::create_dir(&known).unwrap();
+            // It lives as long as the process.
+            std::mem::forget(Postgres::in_directory(known.clone()));
+        }
+        // Whoever comes now sees the directory; somebody who has waited may
+        // have removed it before.
+        let _ = std::fs::remove_file(known.with_extension("lock"));
+        known
+    });
+    database(directory, name)
+}
+
+fn programs() -> &'static PathBuf {
+    static PROGRAMS: OnceLock<PathBuf> = OnceLock::new();
+    PROGRAMS.get_or_init(|| {
+        if let Some(directory) = std::env::var_os("POSTGRES_PROGRAMS") {
+            return directory.into();
+        }
+        let path = std::env::var_os("PATH").unwrap_or_default();
+        let versions = std::fs::read_dir("/usr/lib/postgresql").into_iter().flatten().flatten();
+        let mut installed: Vec<_> = versions.map(|version| version.path().join("bin")).collect();
+        installed.sort();
+        let known = installed.into_iter().rev().chain(std::env::split_paths(&path));
+        let whole = |directory: &PathBuf| {
+            ["initdb", "postgres", "createdb"].iter().all(|name| directory.join(name).exists())
+        };
+        known.into_iter().find(whole).expect(MISSING)
+    })
+}
+
+fn is_root() -> bool {
+    let id = Command::new("id").arg("-u").output().unwrap();
+    id.stdout == b"0\n"
+}
+
+/// `program`, not as root: the server refuses to.
+fn as_nobody(program: impl AsRef<std::ffi::OsStr>) -> Command {
+    if !is_root() {
+        return Command::new(program);
+    }
+    let mut command = Command::new("runuser");
+    command.args(["-u", "nobody", "--"]).arg(program).current_dir("/");
+    command
+}
