@@ -35,6 +35,10 @@ const NOISY: f64 = 4.0;
 /// Scatter that no sensor is blamed for, m: a tracker good to a pixel.
 const QUIET_M: f64 = 1e-3;
 
+/// Evidence against a servo that explains why a ball stands that was asked to
+/// move by it alone, nats: what makes it suspected.
+const EXPLAINED_NATS: f64 = 12.0;
+
 /// Evidence against both servos at once that speaks for what they share, nats.
 const SHARED_NATS: f64 = 9.0;
 /// Evidence against both that neither ball nor sensor account for, nats: both
@@ -151,7 +155,7 @@ impl Evaluator {
         let sensor = self.sensor(evidence, readings, around);
         let stuck = match sensor.test {
             Test::Prefailed => Finding::default(),
-            _ => stuck_ball(readings, around).or(held_back(evidence, around)),
+            _ => stuck_ball(evidence, readings, around).or(held_back(evidence, around)),
         };
         let blind = [sensor, stuck].iter().any(|f| f.test == Test::Prefailed);
         let servo = |axis| match blind {
@@ -257,8 +261,10 @@ fn held_back(evidence: &Evidence, around: &Surroundings) -> Option<Finding> {
         .then(|| Finding { nats: Some(x.nats + y.nats), ..Finding::fail(None) })
 }
 
-/// The ball stands still although it is asked to move.
-fn stuck_ball(readings: &Stillness, around: &Surroundings) -> Finding {
+/// The ball stands still although it is asked to move. Asked along one axis
+/// alone, it may stand because that servo does not answer: evidence gathered
+/// while the ball still rolled says so.
+fn stuck_ball(evidence: &Evidence, readings: &Stillness, around: &Surroundings) -> Finding {
     if around.at_edge || readings.unseen_s > 0.0 {
         return Finding::default();
     }
@@ -269,6 +275,9 @@ fn stuck_ball(readings: &Stillness, around: &Surroundings) -> Finding {
         (false, false) => Finding::default(),
         (x_pressed, _) => {
             let axis = if x_pressed { Axis::X } else { Axis::Y };
+            if evidence.axes[axis].nats >= EXPLAINED_NATS {
+                return Finding::default();
+            }
             let kind = Some(FaultKind::Dead);
             let rival = Candidate { code: FaultCode::servo(axis), kind, weight: 0.4 };
             Finding { rival: Some(rival), ..Finding::fail(None) }
@@ -278,6 +287,7 @@ fn stuck_ball(readings: &Stillness, around: &Surroundings) -> Finding {
 
 #[cfg(test)]
 mod tests {
+    use super::super::stillness::Reading;
     use super::*;
 
     /// A ball that lies at the rim at +x while the twin goes by `twin`, m/s².
@@ -308,6 +318,39 @@ mod tests {
         let evidence =
             Evidence { axes: PerAxis { x, y: AxisEvidence::default() }, ..Evidence::default() };
         servo(Axis::X, &evidence, &around).test
+    }
+
+    /// A ball that stands in the middle and is asked to move along x alone, by a
+    /// servo that has so much evidence against it.
+    fn standing(nats: f64) -> Test {
+        let around = Surroundings {
+            clear_s: 1.0,
+            at_edge: false,
+            rim: None,
+            rim_s: 0.0,
+            over_the_edge: false,
+            since_jump_s: f64::INFINITY,
+        };
+        let reading = Reading {
+            dt: 0.5,
+            position_m: PerAxis { x: Some(0.0), y: Some(0.0) },
+            pressed: PerAxis { x: true, y: false },
+            still_m: 1e-3,
+            usable: true,
+            outliers: 0,
+        };
+        let mut readings = Stillness::default();
+        (0..3).for_each(|_| readings.update(&reading));
+        let x = AxisEvidence { nats, ..AxisEvidence::default() };
+        let evidence =
+            Evidence { axes: PerAxis { x, y: AxisEvidence::default() }, ..Evidence::default() };
+        stuck_ball(&evidence, &readings, &around).test
+    }
+
+    #[test]
+    fn a_servo_that_was_suspected_while_the_ball_rolled_explains_why_it_stands() {
+        assert_eq!(standing(0.0), Test::Prefailed);
+        assert_eq!(standing(EXPLAINED_NATS), Test::NotTested);
     }
 
     #[test]

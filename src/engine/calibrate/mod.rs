@@ -217,6 +217,25 @@ mod tests {
         assert_eq!(refused(blind), CannotCalibrate::NoAxis);
     }
 
+    /// A panel reads a ball at rest better than one that rolls, and a twin has
+    /// nothing to be wrong about.
+    #[test]
+    fn a_ball_at_rest_makes_no_rig_look_better() {
+        let rig = Rig::chapter("a");
+        let rolling = session(60.0, 0.03, 0.85);
+        let mut with_rest = rolling.clone();
+        let last = *rolling.last().unwrap();
+        let later = |i: u32| Sample { t_s: last.t_s + 0.01 * f64::from(i), ..last };
+        with_rest.extend((1..9000).map(later));
+        let learnt = |s: Vec<Sample>| calibrate(&rig, &[s], "", "").unwrap().axes.x.unwrap();
+        let (rolling, with_rest) = (learnt(rolling), learnt(with_rest));
+        assert!((with_rest.noise_m / rolling.noise_m - 1.0).abs() < 0.05, "{with_rest:?}");
+        assert!(
+            (with_rest.residual_m_s2 / rolling.residual_m_s2 - 1.0).abs() < 0.2,
+            "{with_rest:?}"
+        );
+    }
+
     #[test]
     fn an_axis_without_readings_is_left_out() {
         let mut one_sided = session(60.0, 0.03, 1.0);

@@ -50,8 +50,11 @@ pub(super) fn healthy_spread(
             let Some(fit) = filter.fit().filter(|f| f.span_s > 0.8 * window_s) else {
                 continue;
             };
-            scatters.push(fit.scatter);
-            residuals.push(fit.deviation.acceleration);
+            // A ball at rest answers nothing, and its readings err least.
+            if fit.measured.velocity.abs() * window_s > REST_SPAN_M {
+                scatters.push(fit.scatter);
+                residuals.push(fit.deviation.acceleration);
+            }
         }
         withstood.extend(tilts_at_rest(recording, axis, level, dead + lag));
     }
