@@ -9,8 +9,8 @@ use sha2::{Digest, Sha256};
 use super::judge::{load_rig, read_samples};
 use super::unusable::{Unusable, read};
 use super::{output, table};
-use crate::diagnosis::{AxisCalibration, Calibration};
-use crate::engine::{Rig, calibrate};
+use crate::diagnosis::{AxisCalibration, Calibration, Prospects, ServoProspects};
+use crate::engine::{Rig, calibrate_and_foresee};
 use crate::vocabulary::{Axis, Sample};
 use crate::wire::{asset, session_csv, verdict};
 
@@ -77,7 +77,7 @@ pub(super) fn learn(
 ) -> Result<Calibration, crate::engine::CannotCalibrate> {
     let now = jiff::Timestamp::now();
     let made_at = now.round(jiff::Unit::Second).unwrap_or(now).to_string();
-    calibrate(rig, sessions, data_sha256, &made_at)
+    calibrate_and_foresee(rig, sessions, data_sha256, &made_at)
 }
 
 /// SHA-256 over the files' bytes, one after the other.
@@ -121,6 +121,47 @@ pub(super) fn report(rig: &Rig, calibration: &Calibration) {
     for line in table::lines(&learnt) {
         anstream::eprintln!("{line}");
     }
+    calibration.prospects.iter().for_each(foresee);
+}
+
+/// What can be found how soon, on stderr.
+fn foresee(prospects: &Prospects) {
+    anstream::eprintln!("\na fault during this recording would have been confirmed after");
+    let heading = ["", "x", "y", "meaning"];
+    let mut servos = table::table(&heading, &[1, 2]);
+    let numbers: [(_, fn(&ServoProspects) -> String, _); 5] = [
+        ("dead", |s| seconds(s.dead_s), "the servo answers nothing"),
+        ("half", |s| seconds(s.half_gain_s), "it answers half"),
+        ("off by 1°", |s| seconds(s.offset_1deg_s), "its horn has slipped"),
+        ("least loss", |s| percent(s.least_gain_loss), "of the answer that is found in 10 s"),
+        ("least slip", |s| degrees(s.least_offset_rad), "of the horn that is found in 10 s"),
+    ];
+    for (name, number, meaning) in numbers {
+        let of = |axis: Axis| prospects.servos[axis].as_ref().map_or("-".to_owned(), number);
+        servos.add_row([name.to_owned(), of(Axis::X), of(Axis::Y), meaning.to_owned()]);
+    }
+    for line in table::lines(&servos) {
+        anstream::eprintln!("{line}");
+    }
+    let Prospects { n_trials, stuck_s, frozen_s, unseen_s, .. } = prospects;
+    anstream::eprintln!(
+        "a stuck ball {}, frozen readings {}, no ball seen {}; medians of {n_trials} trials",
+        seconds(*stuck_s),
+        seconds(*frozen_s),
+        seconds(*unseen_s)
+    );
+}
+
+fn seconds(delay_s: Option<f64>) -> String {
+    delay_s.map_or("> 10 s".to_owned(), |s| format!("{s:.1} s"))
+}
+
+fn percent(share: Option<f64>) -> String {
+    share.map_or("-".to_owned(), |s| format!("{:.0} %", s * 100.0))
+}
+
+fn degrees(angle_rad: Option<f64>) -> String {
+    angle_rad.map_or("-".to_owned(), |a| format!("{:.1}°", a.to_degrees()))
 }
 
 type Row = (&'static str, fn(&AxisCalibration) -> String, &'static str);

@@ -23,6 +23,38 @@ pub struct AxisCalibration {
     pub residual_m_s2: f64,
 }
 
+/// How soon a fault of one axis' servo would be confirmed, and how small it may
+/// be; none where fewer than half of the trials found it within 10 s.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ServoProspects {
+    /// Median delay of a servo that does not answer, s.
+    pub dead_s: Option<f64>,
+    /// Median delay of one that answers half, s.
+    pub half_gain_s: Option<f64>,
+    /// Median delay of one whose horn has slipped by 1°, s.
+    pub offset_1deg_s: Option<f64>,
+    /// Smallest share of the gain, of those tried, whose loss is found.
+    pub least_gain_loss: Option<f64>,
+    /// Smallest slip of the horn, of those tried, that is found, rad.
+    pub least_offset_rad: Option<f64>,
+}
+
+/// How soon a fault would be confirmed on this rig, had it come during the
+/// healthy recording; as for [`ServoProspects`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Prospects {
+    /// Moments at which each fault was put in.
+    pub n_trials: usize,
+    /// Per axis; none where nothing was learnt.
+    pub servos: PerAxis<Option<ServoProspects>>,
+    /// Median delay of a ball that sticks, s.
+    pub stuck_s: Option<f64>,
+    /// Median delay of readings that freeze, s.
+    pub frozen_s: Option<f64>,
+    /// Median delay of a ball that is not seen, s.
+    pub unseen_s: Option<f64>,
+}
+
 /// A calibration: what was learnt per axis, from which data, when.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibration {
@@ -36,4 +68,6 @@ pub struct Calibration {
     pub duration_s: f64,
     /// When it was made, RFC 3339; told by the caller.
     pub made_at: String,
+    /// What can be found by it, how soon; none where that was not tried.
+    pub prospects: Option<Prospects>,
 }

@@ -17,7 +17,7 @@ mod status;
 mod stillness;
 pub mod trend;
 
-pub use calibration::{AxisCalibration, Calibration};
+pub use calibration::{AxisCalibration, Calibration, Prospects, ServoProspects};
 pub use debounce::{Debounce, Pace, Qualified, Test};
 pub use evaluator::{Evaluator, Finding, Surroundings};
 pub use evidence::{AxisEvidence, Candidate, Evidence, Suspicion, Transition};

@@ -17,7 +17,7 @@ mod rig;
 mod types;
 mod watch;
 
-pub use calibrate::{CannotCalibrate, calibrate};
+pub use calibrate::{CannotCalibrate, calibrate, calibrate_and_foresee};
 pub use rig::{AxisMapping, DiagnosticsSpec, MAX_NAME, Rig, ServoSpec, Setup};
 pub use types::{Admission, Input, MonitorState, Output, Readiness, Rejection, State};
 

@@ -7,7 +7,7 @@ use super::clock::rfc3339;
 use super::jobs::{Bench, Job};
 use super::{Service, ServiceError, views};
 use crate::diagnosis::Calibration;
-use crate::engine::{Rig, Setup, calibrate};
+use crate::engine::{Rig, Setup, calibrate_and_foresee};
 use crate::store::{CalibrationRow, JobState, Write};
 use crate::vocabulary::{Invalid, Sample};
 use crate::wire::asset::{self, CalibrationView};
@@ -171,7 +171,8 @@ fn learn(bench: &Bench, row: &CalibrationRow) -> Result<Calibration, String> {
         sessions.push(samples);
     }
     let sha256 = hex(&hash.finalize());
-    calibrate(&rig, &sessions, &sha256, &rfc3339(row.made_at)).map_err(|e| e.to_string())
+    let made_at = rfc3339(row.made_at);
+    calibrate_and_foresee(&rig, &sessions, &sha256, &made_at).map_err(|e| e.to_string())
 }
 
 /// The asset's rig, of which the set-up can be made.

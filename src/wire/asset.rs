@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use utoipa::ToSchema;
 
-use crate::diagnosis::{AxisCalibration, Calibration, Profile};
+use crate::diagnosis::{AxisCalibration, Calibration, Profile, Prospects, ServoProspects};
 use crate::engine::{AxisMapping, DiagnosticsSpec, Rig, ServoSpec};
 use crate::plant::{Ball, Contact, Plate, PlateShape};
 use crate::vocabulary::{Axis, Invalid, PerAxis, in_range, positive};
@@ -195,6 +195,46 @@ pub struct CalibrationView {
     pub x: Option<AxisCalibrationView>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub y: Option<AxisCalibrationView>,
+    /// What can be found, how soon.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub prospects: Option<ProspectsView>,
+}
+
+/// How soon a fault would have been confirmed, had it come during the sessions
+/// that were learnt from: medians over trials, in which the fault was put into
+/// the readings. Null where fewer than half of them found it within 10 s.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ProspectsView {
+    /// Moments at which each fault was put in.
+    pub trials: usize,
+    /// None where nothing was learnt of the axis.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub x: Option<ServoProspectsView>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub y: Option<ServoProspectsView>,
+    /// A ball that sticks, s.
+    pub stuck_s: Option<f64>,
+    /// Readings that freeze, s.
+    pub frozen_s: Option<f64>,
+    /// A ball that is not seen, s.
+    pub unseen_s: Option<f64>,
+}
+
+/// The same for one axis' servo.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ServoProspectsView {
+    /// One that does not answer, s.
+    pub dead_s: Option<f64>,
+    /// One that answers half, s.
+    pub half_gain_s: Option<f64>,
+    /// One whose horn has slipped by 1°, s.
+    pub offset_1deg_s: Option<f64>,
+    /// Smallest share of the gain, of those tried, whose loss is found.
+    pub least_gain_loss: Option<f64>,
+    /// Smallest slip of the horn, of those tried, that is found, rad.
+    pub least_offset_rad: Option<f64>,
 }
 
 /// One axis as learnt.
@@ -344,7 +384,43 @@ fn calibration(view: &CalibrationView) -> Result<Calibration, Invalid> {
         n_samples: view.samples,
         duration_s: view.duration_s,
         made_at: view.made_at.clone(),
+        prospects: view.prospects.as_ref().map(prospects),
     })
+}
+
+fn prospects(view: &ProspectsView) -> Prospects {
+    let servo = |v: &ServoProspectsView| ServoProspects {
+        dead_s: v.dead_s,
+        half_gain_s: v.half_gain_s,
+        offset_1deg_s: v.offset_1deg_s,
+        least_gain_loss: v.least_gain_loss,
+        least_offset_rad: v.least_offset_rad,
+    };
+    Prospects {
+        n_trials: view.trials,
+        servos: PerAxis { x: view.x.as_ref().map(servo), y: view.y.as_ref().map(servo) },
+        stuck_s: view.stuck_s,
+        frozen_s: view.frozen_s,
+        unseen_s: view.unseen_s,
+    }
+}
+
+fn prospects_view(prospects: &Prospects) -> ProspectsView {
+    let servo = |p: ServoProspects| ServoProspectsView {
+        dead_s: p.dead_s,
+        half_gain_s: p.half_gain_s,
+        offset_1deg_s: p.offset_1deg_s,
+        least_gain_loss: p.least_gain_loss,
+        least_offset_rad: p.least_offset_rad,
+    };
+    ProspectsView {
+        trials: prospects.n_trials,
+        x: prospects.servos.x.map(servo),
+        y: prospects.servos.y.map(servo),
+        stuck_s: prospects.stuck_s,
+        frozen_s: prospects.frozen_s,
+        unseen_s: prospects.unseen_s,
+    }
 }
 
 fn axis_calibration(axis: Axis, view: &AxisCalibrationView) -> Result<AxisCalibration, Invalid> {
@@ -439,6 +515,7 @@ pub fn calibration_view(calibration: &Calibration) -> CalibrationView {
         duration_s: calibration.duration_s,
         x: calibration.axes.x.as_ref().map(axis),
         y: calibration.axes.y.as_ref().map(axis),
+        prospects: calibration.prospects.as_ref().map(prospects_view),
     }
 }
 
@@ -496,6 +573,15 @@ mod tests {
             n_samples: 12,
             duration_s: 1.5,
             made_at: "2026-01-01T00:00:00Z".to_owned(),
+            prospects: Some(Prospects {
+                n_trials: 12,
+                servos: PerAxis {
+                    x: Some(ServoProspects { dead_s: Some(0.5), ..ServoProspects::default() }),
+                    y: None,
+                },
+                stuck_s: Some(1.5),
+                ..Prospects::default()
+            }),
         });
         let json = serde_json::to_vec(&view(&rig)).unwrap();
         assert_eq!(parse(&json).unwrap(), rig);

@@ -10,10 +10,12 @@
 //! 94–98 % of real recordings where differences explain 10–60 %.
 
 mod fit;
+mod prospects;
 mod recording;
 mod spread;
 
 use fit::Fitter;
+use prospects::prospects;
 use recording::{Recording, Stretch};
 use spread::healthy_spread;
 
@@ -91,7 +93,24 @@ pub fn calibrate(
         n_samples: sessions.iter().map(|s| s.len() as u64).sum(),
         duration_s: recordings.iter().map(Recording::duration_s).sum(),
         made_at: made_at.to_owned(),
+        prospects: None,
     })
+}
+
+/// [`calibrate`], and what can be found by it: [`prospects`].
+///
+/// # Errors
+/// As for [`calibrate`].
+pub fn calibrate_and_foresee(
+    rig: &Rig,
+    sessions: &[Vec<Sample>],
+    data_sha256: &str,
+    made_at: &str,
+) -> Result<Calibration, CannotCalibrate> {
+    let mut calibration = calibrate(rig, sessions, data_sha256, made_at)?;
+    let learnt = Rig { calibration: Some(calibration.clone()), ..rig.clone() };
+    calibration.prospects = prospects(&learnt, sessions);
+    Ok(calibration)
 }
 
 /// Learns from long windows, or from short ones where there are too few.
@@ -158,7 +177,7 @@ mod tests {
 
     /// A rig with known gain, dead time, lag and level under a sum of sines,
     /// made by the twin itself: the ball never rests and never leaves.
-    fn session(seconds: f64, amplitude: f64, gain: f64) -> Vec<Sample> {
+    pub(super) fn session(seconds: f64, amplitude: f64, gain: f64) -> Vec<Sample> {
         let rig = Rig::chapter("a");
         let servo = ServoModel::new(0.2, 0.05, 100.0).unwrap();
         let axis =

@@ -2,7 +2,7 @@
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { api, isSettled, until } from "../api/client";
 import { follow } from "../api/stream";
-import type { Asset, AssetAxes, AxisCalibration, CalibrationJob, Session, State } from "../api/types";
+import type { Asset, AssetAxes, AxisCalibration, CalibrationJob, Prospects, ServoProspects, Session, State } from "../api/types";
 import { useAsk, useNow, useTitle } from "../hooks";
 import { PlayoutClock, TraceBuffer } from "../live/buffer";
 import { compare, mended, PLAIN, type Signs } from "../live/signs";
@@ -315,7 +315,8 @@ function Learnt({ asset, job }: { asset: Asset; job?: CalibrationJob }) {
             </tbody>
           </table>
           <h3>What can be found, how fast</h3>
-          <p>A servo that is dead, held or reversed shows within a second or two of being asked for a tilt. Smaller faults need motion: on a quiet simulated rig, of those that came in the midst of a session, a gain of 0.7 or 1.5, a horn slipped by 0.9° and a servo three times as slow were found every time. Slower changes are followed over the sessions and warned of before they are faults.</p>
+          {c.prospects ? <Found prospects={c.prospects} /> : <p class="quiet">Not tried: the sessions are too short for it.</p>}
+          <p>Slower changes are followed over the sessions and warned of before they are faults.</p>
           {limit > 0 && state?.session_id
             ? <p>In the session that runs now, a deviation beyond {number(limit, 2, "m/s²")} counts: about {degrees(limit / rolling)} of plate angle that is not as commanded. It is looked for through a window of {seconds(state.evidence.window_s)}, then it must last.</p>
             : <p class="quiet">As soon as the next session runs, the limit in force stands here.</p>}
@@ -323,5 +324,33 @@ function Learnt({ asset, job }: { asset: Asset; job?: CalibrationJob }) {
         </>
       )}
     </section>
+  );
+}
+
+/** How soon a fault would have been confirmed, had it come during the sessions learnt from. */
+function Found({ prospects: p }: { prospects: Prospects }) {
+  const after = (s?: number | null) => (s == null ? "not in 10 s" : seconds(s, 1));
+  const rows: [string, (s: ServoProspects) => string][] = [
+    ["A servo that answers nothing", (s) => after(s.dead_s)],
+    ["One that answers half", (s) => after(s.half_gain_s)],
+    ["One whose horn has slipped by 1°", (s) => after(s.offset_1deg_s)],
+    ["Smallest loss of its answer that is found", (s) => (s.least_gain_loss == null ? "–" : number(s.least_gain_loss * 100, 0, "%"))],
+    ["Smallest slip that is found", (s) => (s.least_offset_rad == null ? "–" : degrees(s.least_offset_rad, 1))],
+  ];
+  return (
+    <>
+      <table class="numbers">
+        <thead><tr><th scope="col">confirmed after, median of {p.trials} trials</th><th scope="col" class="n">x</th><th scope="col" class="n">y</th></tr></thead>
+        <tbody>
+          {rows.map(([word, show]) => (
+            <tr><th scope="row">{word}</th><td class="n">{p.x ? show(p.x) : "–"}</td><td class="n">{p.y ? show(p.y) : "–"}</td></tr>
+          ))}
+          <tr><th scope="row">A ball that sticks</th><td class="n" colSpan={2}>{after(p.stuck_s)}</td></tr>
+          <tr><th scope="row">Readings that freeze</th><td class="n" colSpan={2}>{after(p.frozen_s)}</td></tr>
+          <tr><th scope="row">No ball seen</th><td class="n" colSpan={2}>{after(p.unseen_s)}</td></tr>
+        </tbody>
+      </table>
+      <p class="quiet">Each fault was put into the sessions that were learnt from, at {p.trials} moments: with more motion, smaller faults are found, and sooner.</p>
+    </>
   );
 }
