@@ -250,12 +250,16 @@ const SAYABLE_GAIN_ERROR: f64 = 0.3;
 fn servo_sentence(axis: Axis, evidence: &Evidence) -> String {
     let e = &evidence.axes[axis];
     let answer = e.answer.map(|answer| answer_words(axis, &answer)).unwrap_or_default();
+    // A residual within its limit is not what raised it.
+    let ground = match e.violates() {
+        true => format!("limit {:.2}", e.limit_m_s2),
+        false => format!("weight of evidence {:.0} nats", e.nats),
+    };
     let seen = match (e.measured_m_s2, e.twin_m_s2) {
         (Some(measured), Some(twin)) => format!(
-            "the ball accelerates by {measured:.2} m/s² along {} where {} asks for {twin:.2} m/s² (limit {:.2})",
+            "the ball accelerates by {measured:.2} m/s² along {} where {} asks for {twin:.2} m/s² ({ground})",
             axis.as_str(),
             axis.command(),
-            e.limit_m_s2,
         ),
         _ => format!("the ball's acceleration along {} is not testable now", axis.as_str()),
     };
