@@ -21,6 +21,10 @@ pub struct AxisCalibration {
     pub breakaway_rad: f64,
     /// Robust standard deviation of the acceleration residual, m/s².
     pub residual_m_s2: f64,
+    /// Acceleration that nineteen of twenty moments of the recording stayed below,
+    /// m/s²: beyond it, gain and delay are not known as well. Infinite where it
+    /// was not learnt.
+    pub familiar_m_s2: f64,
 }
 
 /// How soon a fault of one axis' servo would be confirmed, and how small it may

@@ -93,6 +93,7 @@ impl Pipeline {
                 residual_m_s2: learnt.map(|l| l.residual_m_s2),
                 breakaway_m_s2: limits[axis].breakaway_m_s2,
                 gust_m_s2: GUST_M_S2 * rig.ball.sail_share().min(1.0),
+                familiar_m_s2: learnt.map_or(f64::INFINITY, |l| l.familiar_m_s2),
             })
         };
         Self {

@@ -252,6 +252,10 @@ pub struct AxisCalibrationView {
     pub noise_m: f64,
     pub breakaway_rad: f64,
     pub residual_m_s2: f64,
+    /// Acceleration up to which gain and delay were learnt, m/s²; none where that
+    /// is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub familiar_m_s2: Option<f64>,
 }
 
 /// Parses and checks an asset file.
@@ -434,6 +438,9 @@ fn axis_calibration(axis: Axis, view: &AxisCalibrationView) -> Result<AxisCalibr
         noise_m: positive(&at("noise_m"), view.noise_m, 1.0)?,
         breakaway_rad: in_range(&at("breakaway_rad"), view.breakaway_rad, 0.0..=1.0)?,
         residual_m_s2: positive(&at("residual_m_s2"), view.residual_m_s2, 100.0)?,
+        familiar_m_s2: view.familiar_m_s2.map_or(Ok(f64::INFINITY), |familiar| {
+            in_range(&at("familiar_m_s2"), familiar, 0.0..=1e3)
+        })?,
     })
 }
 
@@ -506,6 +513,7 @@ pub fn calibration_view(calibration: &Calibration) -> CalibrationView {
         noise_m: c.noise_m,
         breakaway_rad: c.breakaway_rad,
         residual_m_s2: c.residual_m_s2,
+        familiar_m_s2: c.familiar_m_s2.is_finite().then_some(c.familiar_m_s2),
     };
     CalibrationView {
         id: calibration_id(calibration),
@@ -535,6 +543,7 @@ pub fn calibration_id(calibration: &Calibration) -> String {
             learnt.noise_m,
             learnt.breakaway_rad,
             learnt.residual_m_s2,
+            learnt.familiar_m_s2,
         ] {
             hash.update(number.to_bits().to_le_bytes());
         }
@@ -562,6 +571,7 @@ mod tests {
             noise_m: 4e-4,
             breakaway_rad: 0.005,
             residual_m_s2: 0.02,
+            familiar_m_s2: 0.4,
         };
         let mut rig = Rig::chapter("b");
         rig.plate = Plate::new(PlateShape::Round { diameter_m: 0.3 }, 0.005, false).unwrap();

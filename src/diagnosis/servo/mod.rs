@@ -54,6 +54,10 @@ const MOST_ERROR_M_S2: f64 = 0.04;
 /// How long after a change of its acceleration the twin may be wrong about it,
 /// s: what a lag of the first order leaves out of a servo.
 const SHAPE_S: f64 = 0.01;
+/// Share of an acceleration beyond the familiar ones by which the twin may be
+/// wrong: play takes a larger part of small motions, a servo turns only so fast,
+/// and a circle tells dead time and lag apart as little as one sine can.
+const UNFAMILIAR: f64 = 0.3;
 /// Speed below which friction begins to hold the ball, m/s, and the time for
 /// which it then acts one way, s.
 const STICKING_M_S: f64 = 0.02;
@@ -82,6 +86,8 @@ pub struct AxisNature {
     pub breakaway_m_s2: f64,
     /// Acceleration that moving air gives the ball, m/s².
     pub gust_m_s2: f64,
+    /// Acceleration up to which gain and delay were learnt, m/s².
+    pub familiar_m_s2: f64,
 }
 
 impl AxisNature {
@@ -96,14 +102,16 @@ impl AxisNature {
         prior
     }
 
-    /// Spectral density of what the twin leaves out at a speed and at a rate of
-    /// change of its acceleration, m/s³; in m²/s³.
-    fn density(&self, speed_m_s: f64, jerk_m_s3: f64) -> f64 {
+    /// Spectral density of what the twin leaves out at a speed, at its own
+    /// acceleration and at the rate of change of that, m/s³; in m²/s³.
+    fn density(&self, speed_m_s: f64, pull_m_s2: f64, jerk_m_s3: f64) -> f64 {
         let error = self.residual_m_s2.unwrap_or(MOST_ERROR_M_S2);
         let error = error.clamp(LEAST_ERROR_M_S2, MOST_ERROR_M_S2);
         let stuck = self.breakaway_m_s2 * (1.0 - speed_m_s / STICKING_M_S).max(0.0);
         let late = SHAPE_S * jerk_m_s3;
-        MODEL_ERROR_S * error * error + STICKING_S * (stuck * stuck + late * late)
+        let strange = UNFAMILIAR * (pull_m_s2 - self.familiar_m_s2).max(0.0);
+        MODEL_ERROR_S * (error * error + strange * strange)
+            + STICKING_S * (stuck * stuck + late * late)
     }
 
     fn variance(&self, n: u32) -> f64 {
@@ -159,7 +167,8 @@ impl Servo {
         let dt = block.t - last.t;
         let speed = (block.measured_m - last.measured_m).abs() / dt;
         let jerk = (block.course.acceleration_m_s2 - last.course.acceleration_m_s2) / dt;
-        let density = self.nature.density(speed, jerk);
+        let pull = last.course.acceleration_m_s2.abs().max(block.course.acceleration_m_s2.abs());
+        let density = self.nature.density(speed, pull, jerk);
         let step = Step { dt, forcing: forcing(last, block), density };
         let (y, variance) = (block.deviation_m(), self.nature.variance(block.n));
         self.healthy.predict(&step);

@@ -164,6 +164,7 @@ fn learn_in_windows(
         noise_m: healthy.noise_m.max(1e-5),
         breakaway_rad: healthy.breakaway_rad,
         residual_m_s2: healthy.residual_m_s2.max(1e-4),
+        familiar_m_s2: healthy.familiar_m_s2,
     })
 }
 

@@ -14,6 +14,7 @@ pub(super) struct Healthy {
     pub(super) noise_m: f64,
     pub(super) residual_m_s2: f64,
     pub(super) breakaway_rad: f64,
+    pub(super) familiar_m_s2: f64,
 }
 
 /// Window of the residual, s: the one that the default profile judges by.
@@ -24,6 +25,8 @@ const LEAST_SAMPLES: f64 = 8.0;
 const REST_S: f64 = 0.5;
 /// Share of the withstood tilts that the breakaway angle covers.
 const REST_SHARE: f64 = 0.95;
+/// Share of the accelerations that count as familiar.
+const FAMILIAR_SHARE: f64 = 0.95;
 
 pub(super) fn healthy_spread(
     fitter: &Fitter,
@@ -34,6 +37,7 @@ pub(super) fn healthy_spread(
     resistance_m_s2: f64,
 ) -> Healthy {
     let (mut scatters, mut residuals, mut withstood) = (Vec::new(), Vec::new(), Vec::new());
+    let mut driven = Vec::new();
     let axis = fitter.axis;
     for recording in fitter.recordings {
         let Some(model) = fitter.model(dead, lag, gain, level, resistance_m_s2) else { continue };
@@ -54,6 +58,7 @@ pub(super) fn healthy_spread(
             if fit.measured.velocity.abs() * window_s > REST_SPAN_M {
                 scatters.push(fit.scatter);
                 residuals.push(fit.deviation.acceleration);
+                driven.push((fit.measured.acceleration - fit.deviation.acceleration).abs());
             }
         }
         withstood.extend(tilts_at_rest(recording, axis, level, dead + lag));
@@ -62,6 +67,7 @@ pub(super) fn healthy_spread(
         noise_m: median(&mut scatters).unwrap_or(0.0),
         residual_m_s2: robust_deviation(&mut residuals).unwrap_or(0.0),
         breakaway_rad: quantile(&mut withstood, REST_SHARE).unwrap_or(0.0),
+        familiar_m_s2: quantile(&mut driven, FAMILIAR_SHARE).unwrap_or(0.0),
     }
 }
 
