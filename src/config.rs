@@ -36,6 +36,7 @@ pub struct Config {
     /// Connections are encrypted if it is there.
     pub tls: Option<TlsConfig>,
     pub log: LogConfig,
+    pub traces: TracesConfig,
     pub limits: LimitsConfig,
     pub rates: RatesConfig,
     pub workers: WorkersConfig,
@@ -79,6 +80,37 @@ pub struct LogConfig {
     pub format: LogFormat,
     /// A filter of `tracing`: `info`, `offbd=debug,info`, …
     pub level: String,
+}
+
+/// Where traces go, by OTLP over HTTP; nowhere without an endpoint.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct TracesConfig {
+    /// `http://HOST:PORT` of a collector, which encrypts what goes further.
+    pub endpoint: Option<String>,
+    /// The share of requests that are traced, 0 to 1.
+    pub share: f64,
+}
+
+impl Default for TracesConfig {
+    fn default() -> Self {
+        Self { endpoint: None, share: 1.0 }
+    }
+}
+
+impl TracesConfig {
+    fn check(&self) -> Result<(), ConfigError> {
+        let invalid = |key, reason| Err(ConfigError::Invalid { key, reason });
+        if !(0.0..=1.0).contains(&self.share) {
+            return invalid("traces.share", format!("is {}; it must be from 0 to 1", self.share));
+        }
+        match &self.endpoint {
+            Some(endpoint) if !endpoint.starts_with("http://") => {
+                invalid("traces.endpoint", "is no `http://HOST:PORT`".to_owned())
+            }
+            _ => Ok(()),
+        }
+    }
 }
 
 /// How a line of the log is written.
@@ -184,6 +216,7 @@ impl Default for Config {
             origins: Vec::new(),
             tls: None,
             log: LogConfig::default(),
+            traces: TracesConfig::default(),
             limits: LimitsConfig::default(),
             rates: RatesConfig::default(),
             workers: WorkersConfig::default(),
@@ -326,6 +359,7 @@ impl Config {
         if let Err(error) = self.log.level.parse::<tracing_subscriber::EnvFilter>() {
             return Err(ConfigError::Invalid { key: "log.level", reason: error.to_string() });
         }
+        self.traces.check()?;
         self.retention.check()?;
         self.place().map(drop)
     }
@@ -468,6 +502,9 @@ mod tests {
             ("[tls]\ncertificate = 'a'", "key"),
             ("[limits]\nconnections = 0", "limits.connections"),
             ("[rates]\ntoken_per_s = 0", "rates.token_per_s"),
+            ("[traces]\nendpoint = 'https://secret.example'", "traces.endpoint"),
+            ("[traces]\nshare = 1.5", "traces.share"),
+            ("[traces]\nshare = nan", "traces.share"),
             ("[retention]\ndays = 30\nfault_days = 29", "retention.fault_days"),
             ("database = 'postgres://a:secret@h:port/d'", "database"),
         ] {

@@ -6,6 +6,7 @@ mod listen;
 mod places;
 mod tls;
 pub mod tokens;
+mod traces;
 
 use std::fs::{File, TryLockError};
 use std::net::SocketAddr;
@@ -21,6 +22,7 @@ use tokio_util::sync::CancellationToken;
 
 use self::listen::Connections;
 use self::tls::Tls;
+pub use self::traces::Traces;
 use crate::config::Config;
 use crate::http::{self, App, Budget, More, Policy, Rate, Rates};
 use crate::service::{Clock, Service, Workers};

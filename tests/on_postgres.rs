@@ -3,6 +3,8 @@
 
 #![expect(clippy::duplicate_mod, reason = "each of the files brings its own support")]
 
+#[path = "access.rs"]
+mod access;
 #[path = "arrival.rs"]
 mod arrival;
 #[path = "bad_input.rs"]

@@ -3,9 +3,12 @@
 use std::io::IsTerminal;
 
 use clap::Args;
-use tracing_subscriber::EnvFilter;
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::util::SubscriberInitExt;
+use tracing_subscriber::{EnvFilter, Layer};
 
 use crate::config::{LogConfig, LogFormat};
+use crate::server::Traces;
 
 #[derive(Clone, Debug, Args)]
 pub(super) struct LoggingArgs {
@@ -25,18 +28,19 @@ enum Format {
 
 impl LoggingArgs {
     /// Starts logging for this process: as the command line says, else as
-    /// `config` does. A second start is ignored.
-    pub(super) fn start(&self, config: &LogConfig) {
+    /// `config` does; and `traces`, if there are any. A second start is ignored.
+    pub(super) fn start(&self, config: &LogConfig, traces: Option<&Traces>) {
         let level = self.log.as_deref().unwrap_or(&config.level);
         let filter = EnvFilter::try_new(level).unwrap_or_else(|_| EnvFilter::new("info"));
         let colour = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
-        let logs = tracing_subscriber::fmt()
-            .with_env_filter(filter)
+        let logs = tracing_subscriber::fmt::layer()
             .with_writer(std::io::stderr)
             .with_ansi(colour)
             .with_target(false);
         let json = self.log_format.map_or(config.format == LogFormat::Json, |f| f == Format::Json);
+        let logs = if json { logs.json().flatten_event(true).boxed() } else { logs.boxed() };
+        let registry = tracing_subscriber::registry().with(logs.with_filter(filter));
         // Only a test that runs two commands in one process starts it twice.
-        let _ = if json { logs.json().flatten_event(true).try_init() } else { logs.try_init() };
+        let _ = registry.with(traces.map(Traces::layer)).try_init();
     }
 }

@@ -90,9 +90,9 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Serve(_) => {}
         // The service inside the demo speaks up when something is wrong only.
         Command::Demo(_) => {
-            logging.start(&LogConfig { level: "warn".to_owned(), ..LogConfig::default() })
+            logging.start(&LogConfig { level: "warn".to_owned(), ..LogConfig::default() }, None)
         }
-        _ => logging.start(&LogConfig::default()),
+        _ => logging.start(&LogConfig::default(), None),
     }
     match cli.command {
         Command::Simulate(args) => simulate::run(&args),

@@ -8,7 +8,7 @@ use clap::Args;
 use super::logging::LoggingArgs;
 use super::output;
 use crate::config::{Config, ConfigError, Flags};
-use crate::server;
+use crate::server::{self, Traces};
 
 /// Where the service's configuration comes from, lowest first: the defaults, a
 /// TOML file, the environment, the command line.
@@ -75,8 +75,11 @@ pub(super) struct CheckArgs {
 
 pub(super) fn serve(args: &ServeArgs, logging: &LoggingArgs) -> anyhow::Result<()> {
     let config = args.config.load()?;
-    logging.start(&config.log);
-    super::runtime()?.block_on(server::serve(config))
+    let traces = Traces::start(&config.traces)?;
+    logging.start(&config.log, traces.as_ref());
+    let served = super::runtime()?.block_on(server::serve(config));
+    traces.iter().for_each(Traces::stop);
+    served
 }
 
 pub(super) fn migrate(args: &MigrateArgs) -> anyhow::Result<()> {

@@ -2,7 +2,7 @@
 
 use crate::diagnosis::{Evidence, Transition};
 use crate::plant::Fidelity;
-use crate::vocabulary::{FaultCode, PerAxis, Sample, SimTime};
+use crate::vocabulary::{Brief, FaultCode, PerAxis, Sample, SimTime};
 
 /// Something that happens to a rig.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,12 +44,25 @@ pub enum Admission {
 pub enum Rejection {
     #[error("{field} is not a finite number")]
     NotFinite { field: &'static str },
-    #[error("{field} is {value}, beyond ±{limit}")]
+    #[error("{field} is {}, beyond ±{limit}", Brief(*value))]
     Absurd { field: &'static str, value: f64, limit: f64 },
     #[error("t_s is {behind_s:.3} s behind what has been judged: kept, not judged")]
     Late { behind_s: f64 },
     #[error("t_s jumps {ahead_s:.0} s ahead: kept, not judged unless the clock goes on from there")]
     Jump { ahead_s: f64 },
+}
+
+impl Rejection {
+    /// The kind of reason in one word.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::NotFinite { .. } => "not_finite",
+            Self::Absurd { .. } => "absurd",
+            Self::Late { .. } => "late",
+            Self::Jump { .. } => "jump",
+        }
+    }
 }
 
 /// Whether a monitor has come to a result.

@@ -2,13 +2,13 @@
 
 use axum::Json;
 use axum::body::Body;
-use axum::extract::{Path, State};
+use axum::extract::State;
 use axum::http::StatusCode;
 use axum::http::header::LOCATION;
 use axum::response::IntoResponse;
 
 use super::layers::about;
-use super::{App, PageQuery, Problem, Query, body, page_limit};
+use super::{App, Asset, PageQuery, Problem, Query, body, page_limit};
 use crate::service::Service;
 use crate::wire::asset::AssetView;
 use crate::wire::service::{FleetEntryView, Page, StateView};
@@ -52,11 +52,11 @@ pub(super) async fn create(
 
 /// The asset file, with every default filled in.
 #[utoipa::path(get, path = "/assets/{asset}", tag = "assets", operation_id = "get_asset",
-    params(("asset", description = "Name of the asset")),
+    params(("asset" = String, description = "Name of the asset")),
     responses((status = 200, body = AssetView), (status = 404, body = Problem)))]
 pub(super) async fn get(
     State(service): State<Service>,
-    Path(asset): Path<String>,
+    Asset(asset): Asset,
 ) -> Result<Json<AssetView>, Problem> {
     Ok(Json(service.asset(&asset).await?))
 }
@@ -64,28 +64,26 @@ pub(super) async fn get(
 /// Replaces the asset file, or registers the asset. An open session goes on
 /// with what it began with; the next session uses the new file.
 #[utoipa::path(put, path = "/assets/{asset}", tag = "assets", operation_id = "put_asset",
-    params(("asset", description = "Name of the asset")), request_body = AssetView,
+    params(("asset" = String, description = "Name of the asset")), request_body = AssetView,
     responses((status = 200, body = AssetView), (status = 201, body = AssetView),
         (status = 400, body = Problem), (status = 422, body = Problem)))]
 pub(super) async fn put(
     State(app): State<App>,
-    Path(asset): Path<String>,
+    Asset(asset): Asset,
     body: Body,
 ) -> Result<impl IntoResponse, Problem> {
-    about(&asset);
     let (view, new) = app.service.put_asset(&asset, &document(&app, body).await?).await?;
     Ok((if new { StatusCode::CREATED } else { StatusCode::OK }, Json(view)))
 }
 
 /// Deletes an asset with its sessions, recordings and faults.
 #[utoipa::path(delete, path = "/assets/{asset}", tag = "assets", operation_id = "delete_asset",
-    params(("asset", description = "Name of the asset")),
+    params(("asset" = String, description = "Name of the asset")),
     responses((status = 204), (status = 404, body = Problem)))]
 pub(super) async fn delete(
     State(service): State<Service>,
-    Path(asset): Path<String>,
+    Asset(asset): Asset,
 ) -> Result<StatusCode, Problem> {
-    about(&asset);
     service.delete_asset(&asset).await?;
     Ok(StatusCode::NO_CONTENT)
 }
@@ -93,13 +91,12 @@ pub(super) async fn delete(
 /// The twin beside the rig after the last judged sample: accelerations,
 /// residual, limit, gate, fidelity, and each monitor's readiness.
 #[utoipa::path(get, path = "/assets/{asset}/state", tag = "assets", operation_id = "get_state",
-    params(("asset", description = "Name of the asset")),
+    params(("asset" = String, description = "Name of the asset")),
     responses((status = 200, body = StateView), (status = 404, body = Problem)))]
 pub(super) async fn state(
     State(service): State<Service>,
-    Path(asset): Path<String>,
+    Asset(asset): Asset,
 ) -> Result<Json<StateView>, Problem> {
-    about(&asset);
     Ok(Json(service.state(&asset).await?))
 }
 
@@ -107,13 +104,12 @@ pub(super) async fn state(
 /// through it with its confidence, its limits, and a warning where it leads to
 /// one. A session counts once it has ended.
 #[utoipa::path(get, path = "/assets/{asset}/trends", tag = "assets", operation_id = "get_trends",
-    params(("asset", description = "Name of the asset")),
+    params(("asset" = String, description = "Name of the asset")),
     responses((status = 200, body = TrendsView), (status = 404, body = Problem)))]
 pub(super) async fn trends(
     State(service): State<Service>,
-    Path(asset): Path<String>,
+    Asset(asset): Asset,
 ) -> Result<Json<TrendsView>, Problem> {
-    about(&asset);
     Ok(Json(service.trends(&asset).await?))
 }
 

@@ -16,12 +16,19 @@ use super::Problem;
 #[derive(Clone, Debug)]
 pub struct Budget {
     bytes: Arc<Semaphore>,
+    all: usize,
 }
 
 impl Budget {
     #[must_use]
     pub fn new(bytes: usize) -> Self {
-        Self { bytes: Arc::new(Semaphore::new(bytes.min(Semaphore::MAX_PERMITS))) }
+        let all = bytes.min(Semaphore::MAX_PERMITS);
+        Self { bytes: Arc::new(Semaphore::new(all)), all }
+    }
+
+    /// Bytes in memory now.
+    pub(super) fn used(&self) -> usize {
+        self.all - self.bytes.available_permits()
     }
 }
 

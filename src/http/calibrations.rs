@@ -2,16 +2,15 @@
 
 use axum::Json;
 use axum::body::Body;
-use axum::extract::{Path, State};
+use axum::extract::State;
 use axum::http::StatusCode;
 use axum::http::header::LOCATION;
 use axum::response::IntoResponse;
 use serde::Deserialize;
 use utoipa::ToSchema;
 
-use super::layers::about;
 use super::sessions::small;
-use super::{App, PageQuery, Problem, Query, page_limit};
+use super::{App, Asset, OfAsset, PageQuery, Problem, Query, page_limit};
 use crate::service::Service;
 use crate::wire::service::{CalibrationJobView, Page};
 
@@ -25,17 +24,16 @@ pub(super) struct NewCalibration {
 
 /// Learns the rig from healthy sessions of it, in the background.
 #[utoipa::path(post, path = "/assets/{asset}/calibrations", tag = "assets",
-    operation_id = "calibrate", params(("asset", description = "Name of the asset")),
+    operation_id = "calibrate", params(("asset" = String, description = "Name of the asset")),
     request_body = NewCalibration,
     responses((status = 202, body = CalibrationJobView, description = "`Location` says where to look"),
         (status = 400, body = Problem), (status = 404, body = Problem),
         (status = 422, body = Problem), (status = 429, body = Problem)))]
 pub(super) async fn create(
     State(app): State<App>,
-    Path(asset): Path<String>,
+    Asset(asset): Asset,
     body: Body,
 ) -> Result<impl IntoResponse, Problem> {
-    about(&asset);
     let wanted: NewCalibration = small(&app, body).await?;
     let job = app.service.calibrate(&asset, wanted.sessions).await?;
     let location = format!("/api/v1/assets/{asset}/calibrations/{}", job.id);
@@ -45,11 +43,11 @@ pub(super) async fn create(
 /// Lists the calibrations, newest first.
 #[utoipa::path(get, path = "/assets/{asset}/calibrations", tag = "assets",
     operation_id = "list_calibrations",
-    params(("asset", description = "Name of the asset"), PageQuery),
+    params(("asset" = String, description = "Name of the asset"), PageQuery),
     responses((status = 200, body = Page<CalibrationJobView>), (status = 404, body = Problem)))]
 pub(super) async fn list(
     State(service): State<Service>,
-    Path(asset): Path<String>,
+    Asset(asset): Asset,
     Query(page): Query<PageQuery>,
 ) -> Result<Json<Page<CalibrationJobView>>, Problem> {
     let limit = page_limit(page.limit);
@@ -59,11 +57,11 @@ pub(super) async fn list(
 /// A calibration: where it stands, what was learnt, or what the data lack.
 #[utoipa::path(get, path = "/assets/{asset}/calibrations/{id}", tag = "assets",
     operation_id = "get_calibration",
-    params(("asset", description = "Name of the asset"), ("id", description = "Its id")),
+    params(("asset" = String, description = "Name of the asset"), ("id" = String, description = "Its id")),
     responses((status = 200, body = CalibrationJobView), (status = 404, body = Problem)))]
 pub(super) async fn get(
     State(service): State<Service>,
-    Path((asset, id)): Path<(String, String)>,
+    OfAsset(asset, id): OfAsset,
 ) -> Result<Json<CalibrationJobView>, Problem> {
     Ok(Json(service.calibration(&asset, &id).await?))
 }
@@ -72,13 +70,12 @@ pub(super) async fn get(
 /// it began with; the next session uses it.
 #[utoipa::path(post, path = "/assets/{asset}/calibrations/{id}/activate", tag = "assets",
     operation_id = "activate_calibration",
-    params(("asset", description = "Name of the asset"), ("id", description = "Its id")),
+    params(("asset" = String, description = "Name of the asset"), ("id" = String, description = "Its id")),
     responses((status = 200, body = CalibrationJobView), (status = 404, body = Problem),
         (status = 409, body = Problem, description = "It is not done")))]
 pub(super) async fn activate(
     State(service): State<Service>,
-    Path((asset, id)): Path<(String, String)>,
+    OfAsset(asset, id): OfAsset,
 ) -> Result<Json<CalibrationJobView>, Problem> {
-    about(&asset);
     Ok(Json(service.activate_calibration(&asset, &id).await?))
 }

@@ -11,12 +11,12 @@ use axum::response::sse::{Event as Message, KeepAlive};
 use futures_util::{Stream, StreamExt};
 use serde::Deserialize;
 use tokio_util::sync::CancellationToken;
+use utoipa::ToSchema;
 
 use super::{App, Problem, Query};
 use crate::service::access::Caller;
 use crate::service::{EventFeed, Service};
 use crate::vocabulary::Invalid;
-use crate::wire::service::EventView;
 
 /// Silence after which a comment is sent, so that nobody between takes the
 /// connection for dead.
@@ -32,6 +32,19 @@ pub(super) struct EventsQuery {
     after: Option<i64>,
 }
 
+/// One event of the stream, as a browser's `EventSource` gives it.
+#[derive(Debug, ToSchema)]
+#[allow(dead_code, reason = "describes the events for the interface's document")]
+pub(super) struct MessageView {
+    /// `fault`, or `begin` before all others.
+    event: String,
+    /// Of the event, a whole number that rises.
+    id: String,
+    /// In a `fault` the JSON of an `EventView`, in a `begin` that of an empty
+    /// object.
+    data: String,
+}
+
 /// Fault transitions as they become durable: events of the type `fault` whose
 /// data is a fault line with `asset` and `session_id`, each with an id. A code
 /// that is cleared while no session is open is an event without a session and
@@ -40,7 +53,7 @@ pub(super) struct EventsQuery {
 /// others follow.
 #[utoipa::path(get, path = "/events", tag = "faults", operation_id = "stream_events",
     params(EventsQuery),
-    responses((status = 200, body = EventView, content_type = "text/event-stream"),
+    responses((status = 200, body = MessageView, content_type = "text/event-stream"),
         (status = 400, body = Problem), (status = 404, body = Problem)))]
 pub(super) async fn events(
     State(app): State<App>,

@@ -1,15 +1,14 @@
 //! Fault memory: of one asset and across the fleet.
 
-use axum::extract::{Path, State};
+use axum::extract::State;
 use axum::http::header::CONTENT_TYPE;
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
 use axum::{Extension, Json};
 use serde::Deserialize;
 
-use super::layers::about;
 use super::sessions::Form;
-use super::{PageQuery, Problem, Query, page_limit};
+use super::{Asset, OfAsset, PageQuery, Problem, Query, page_limit};
 use crate::service::access::Caller;
 use crate::service::{Around, FaultQuery, Service};
 use crate::wire::recording::{ColumnsView, RecordingView, write_csv};
@@ -20,6 +19,7 @@ use crate::wire::service::{FaultEntryView, HistoryView, Page};
 pub(super) struct StatusQuery {
     /// `active` (pending or confirmed; the default), `pending`, `confirmed`,
     /// `healed`, `cleared` or `all`.
+    #[param(pattern = "^(active|pending|confirmed|healed|cleared|all)$")]
     status: Option<String>,
 }
 
@@ -28,15 +28,18 @@ pub(super) struct StatusQuery {
 pub(super) struct FleetQuery {
     /// `active` (pending or confirmed; the default), `pending`, `confirmed`,
     /// `healed`, `cleared` or `all`.
+    #[param(pattern = "^(active|pending|confirmed|healed|cleared|all)$")]
     status: Option<String>,
     asset: Option<String>,
     code: Option<String>,
     acknowledged: Option<bool>,
     /// `-changed_at` (the default), `changed_at` or `asset`.
+    #[param(pattern = "^(-changed_at|changed_at|asset)$")]
     sort: Option<String>,
     /// `next` of the page before; with the same `sort`.
     cursor: Option<String>,
-    /// Items on the page, 1 to 500; 50 without it.
+    /// Items on the page, brought into 1 to 500; 50 without it.
+    #[param(format = Int64, maximum = 4_294_967_295_u32)]
     limit: Option<u32>,
 }
 
@@ -64,44 +67,41 @@ impl ActorQuery {
 /// The fault memory of an asset.
 #[utoipa::path(get, path = "/assets/{asset}/faults", tag = "faults",
     operation_id = "list_asset_faults",
-    params(("asset", description = "Name of the asset"), StatusQuery),
+    params(("asset" = String, description = "Name of the asset"), StatusQuery),
     responses((status = 200, body = Page<FaultEntryView>), (status = 400, body = Problem),
         (status = 404, body = Problem)))]
 pub(super) async fn of_asset(
     State(service): State<Service>,
-    Path(asset): Path<String>,
+    Asset(asset): Asset,
     Query(query): Query<StatusQuery>,
 ) -> Result<Json<Page<FaultEntryView>>, Problem> {
-    about(&asset);
     Ok(Json(service.asset_faults(&asset, query.status).await?))
 }
 
 /// What is remembered of one code.
 #[utoipa::path(get, path = "/assets/{asset}/faults/{code}", tag = "faults",
     operation_id = "get_fault",
-    params(("asset", description = "Name of the asset"), ("code", description = "Fault code")),
+    params(("asset" = String, description = "Name of the asset"), ("code" = String, description = "Fault code")),
     responses((status = 200, body = FaultEntryView), (status = 404, body = Problem)))]
 pub(super) async fn get(
     State(service): State<Service>,
-    Path((asset, code)): Path<(String, String)>,
+    OfAsset(asset, code): OfAsset,
 ) -> Result<Json<FaultEntryView>, Problem> {
-    about(&asset);
     Ok(Json(service.fault(&asset, &code).await?))
 }
 
 /// Clears a code: everything stored of it is erased.
 #[utoipa::path(delete, path = "/assets/{asset}/faults/{code}", tag = "faults",
     operation_id = "clear_fault",
-    params(("asset", description = "Name of the asset"), ("code", description = "Fault code"),
+    params(("asset" = String, description = "Name of the asset"), ("code" = String, description = "Fault code"),
         ActorQuery),
     responses((status = 204), (status = 404, body = Problem)))]
 pub(super) async fn clear(
     State(service): State<Service>,
-    Path((asset, code)): Path<(String, String)>,
+    OfAsset(asset, code): OfAsset,
     Query(query): Query<ActorQuery>,
     Extension(caller): Extension<Caller>,
 ) -> Result<StatusCode, Problem> {
-    about(&asset);
     service.clear(&asset, &code, query.actor(&caller)).await?;
     Ok(StatusCode::NO_CONTENT)
 }
@@ -109,17 +109,16 @@ pub(super) async fn clear(
 /// Acknowledges the current occurrence of a code.
 #[utoipa::path(post, path = "/assets/{asset}/faults/{code}/acknowledge", tag = "faults",
     operation_id = "acknowledge_fault",
-    params(("asset", description = "Name of the asset"), ("code", description = "Fault code"),
+    params(("asset" = String, description = "Name of the asset"), ("code" = String, description = "Fault code"),
         ActorQuery),
     responses((status = 200, body = FaultEntryView), (status = 404, body = Problem),
         (status = 409, body = Problem, description = "There is no occurrence")))]
 pub(super) async fn acknowledge(
     State(service): State<Service>,
-    Path((asset, code)): Path<(String, String)>,
+    OfAsset(asset, code): OfAsset,
     Query(query): Query<ActorQuery>,
     Extension(caller): Extension<Caller>,
 ) -> Result<Json<FaultEntryView>, Problem> {
-    about(&asset);
     Ok(Json(service.acknowledge(&asset, &code, query.actor(&caller)).await?))
 }
 
@@ -127,9 +126,11 @@ pub(super) async fn acknowledge(
 #[into_params(parameter_in = Query)]
 pub(super) struct AroundQuery {
     /// Seconds before the onset, 0 to 60; 10 without it.
+    #[param(minimum = 0, maximum = 60)]
     before_s: Option<f64>,
     /// Seconds after the confirmation (or the failure that was none), 0 to 60;
     /// 10 without it.
+    #[param(minimum = 0, maximum = 60)]
     after_s: Option<f64>,
 }
 
@@ -144,7 +145,7 @@ const AROUND_S: f64 = 10.0;
 /// the session is, which nothing but `DELETE` removes.
 #[utoipa::path(get, path = "/assets/{asset}/faults/{code}/recording", tag = "faults",
     operation_id = "get_fault_recording",
-    params(("asset", description = "Name of the asset"), ("code", description = "Fault code"),
+    params(("asset" = String, description = "Name of the asset"), ("code" = String, description = "Fault code"),
         AroundQuery),
     responses((status = 200, content((RecordingView = "application/json"),
             (String = "text/csv"))),
@@ -154,11 +155,10 @@ const AROUND_S: f64 = 10.0;
         (status = 429, body = Problem)))]
 pub(super) async fn recording(
     State(service): State<Service>,
-    Path((asset, code)): Path<(String, String)>,
+    OfAsset(asset, code): OfAsset,
     Query(query): Query<AroundQuery>,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    about(&asset);
     let form = Form::wanted(&headers, Form::Json)?;
     let around = Around {
         before_s: query.before_s.unwrap_or(AROUND_S),
@@ -179,16 +179,15 @@ pub(super) async fn recording(
 /// acknowledged or cleared it.
 #[utoipa::path(get, path = "/assets/{asset}/faults/{code}/history", tag = "faults",
     operation_id = "get_fault_history",
-    params(("asset", description = "Name of the asset"), ("code", description = "Fault code"),
+    params(("asset" = String, description = "Name of the asset"), ("code" = String, description = "Fault code"),
         PageQuery),
     responses((status = 200, body = Page<HistoryView>), (status = 400, body = Problem),
         (status = 404, body = Problem)))]
 pub(super) async fn history(
     State(service): State<Service>,
-    Path((asset, code)): Path<(String, String)>,
+    OfAsset(asset, code): OfAsset,
     Query(page): Query<PageQuery>,
 ) -> Result<Json<Page<HistoryView>>, Problem> {
-    about(&asset);
     let limit = page_limit(page.limit);
     Ok(Json(service.history(&asset, &code, page.cursor.as_deref(), limit).await?))
 }
@@ -196,7 +195,8 @@ pub(super) async fn history(
 /// Faults across the fleet.
 #[utoipa::path(get, path = "/faults", tag = "faults", operation_id = "list_faults",
     params(FleetQuery),
-    responses((status = 200, body = Page<FaultEntryView>), (status = 400, body = Problem)))]
+    responses((status = 200, body = Page<FaultEntryView>), (status = 400, body = Problem),
+        (status = 404, body = Problem, description = "No such asset or code")))]
 pub(super) async fn of_fleet(
     State(service): State<Service>,
     Query(query): Query<FleetQuery>,

@@ -47,7 +47,7 @@ pub(super) fn around(router: Router, policy: &Policy) -> Router {
 fn span(request: &Request<Body>) -> Span {
     let id = request_id(request).unwrap_or_default();
     let (method, path) = (request.method(), request.uri().path());
-    tracing::info_span!("request", %method, path, request_id = id, asset = Empty)
+    tracing::info_span!("request", %method, path, request_id = id, asset = Empty, status = Empty)
 }
 
 /// Says in the request's span which asset it is about.
@@ -77,6 +77,7 @@ async fn count(request: Request, next: Next) -> Response {
     let begun = Instant::now();
     let response = next.run(request).await;
     let status = response.status().as_str().to_owned();
+    Span::current().record("status", &status);
     metrics::counter!("offbd_http_requests_total", "path" => path.clone(), "status" => status)
         .increment(1);
     metrics::histogram!("offbd_http_request_seconds", "path" => path)

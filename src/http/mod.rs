@@ -6,12 +6,14 @@
 mod assets;
 mod body;
 mod calibrations;
+mod description;
 mod events;
 mod faults;
 mod guard;
 mod headers;
 mod layers;
 mod login;
+mod metrics;
 mod operations;
 mod page;
 mod problem;
@@ -28,22 +30,23 @@ use std::sync::Arc;
 
 use axum::Router;
 use axum::extract::{FromRef, FromRequestParts};
+use axum::http::request::Parts;
 use serde::Deserialize;
 use tokio_util::sync::CancellationToken;
 use utoipa::OpenApi;
-use utoipa::openapi::{Content, OpenApi as Document, RefOr};
+use utoipa::openapi::OpenApi as Document;
 use utoipa_axum::routes;
 use utoipa_swagger_ui::SwaggerUi;
 
 pub use body::Budget;
 pub use guard::Policy;
-pub use operations::gather_metrics;
+pub use metrics::gather_metrics;
 pub use problem::Problem;
 pub use rates::{Rate, Rates};
 pub use routes::More;
 
 use self::guard::Guard;
-use self::routes::{Guarded, Rules, operations_mut};
+use self::routes::{Guarded, Rules};
 use crate::service::Service;
 use crate::service::access::Right;
 
@@ -76,6 +79,7 @@ impl FromRef<App> for Service {
             Lengths in metres, angles in radians, times in seconds on the device's clock; \
             moments of the service in RFC 3339.",
     ),
+    components(schemas(crate::wire::service::EventView)),
     tags(
         (name = "assets", description = "The registry of rigs"),
         (name = "telemetry", description = "Samples in"),
@@ -100,13 +104,46 @@ fn page_limit(limit: Option<u32>) -> u32 {
 #[from_request(via(axum::extract::Query), rejection(Problem))]
 struct Query<T>(T);
 
+/// What is named in the path; what is wrong with it becomes a problem.
+#[derive(FromRequestParts)]
+#[from_request(via(axum::extract::Path), rejection(Problem))]
+struct Path<T>(T);
+
+/// The asset in the path, noted in the request's span.
+struct Asset(String);
+
+impl<S: Send + Sync> FromRequestParts<S> for Asset {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+        let Path::<String>(asset) = Path::from_request_parts(parts, state).await?;
+        layers::about(&asset);
+        Ok(Self(asset))
+    }
+}
+
+/// The same with what of it is meant: a fault code, the id of a calibration.
+struct OfAsset(String, String);
+
+impl<S: Send + Sync> FromRequestParts<S> for OfAsset {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+        let Path((asset, of)): Path<(String, String)> =
+            Path::from_request_parts(parts, state).await?;
+        layers::about(&asset);
+        Ok(Self(asset, of))
+    }
+}
+
 /// Which page of a list.
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
 #[into_params(parameter_in = Query)]
 struct PageQuery {
     /// `next` of the page before.
     cursor: Option<String>,
-    /// Items on the page, 1 to 500; 50 without it.
+    /// Items on the page, brought into 1 to 500; 50 without it.
+    #[param(format = Int64, maximum = 4_294_967_295_u32)]
     limit: Option<u32>,
 }
 
@@ -155,7 +192,7 @@ fn api() -> Guarded {
     Guarded::new(Api::openapi())
         .routes(Open, routes!(operations::healthz))
         .routes(Open, routes!(operations::readyz))
-        .routes(Read, routes!(operations::metrics))
+        .routes(Read, routes!(metrics::metrics))
         .nest("/api/v1", v1)
 }
 
@@ -166,28 +203,7 @@ const OPEN_PAGES: [&str; 5] =
 /// The description of the interface.
 #[must_use]
 pub fn openapi() -> Document {
-    described(api().split().1)
-}
-
-/// The document with the media type of problems put right.
-fn described(mut document: Document) -> Document {
-    let items = document.paths.paths.values_mut();
-    let operations = items.flat_map(operations_mut);
-    for response in operations.flat_map(|operation| operation.responses.responses.values_mut()) {
-        let RefOr::T(response) = response else { continue };
-        let of_problem = |content: &RefOr<Content>| {
-            let RefOr::T(Content { schema: Some(RefOr::Ref(schema)), .. }) = content else {
-                return false;
-            };
-            schema.ref_location.ends_with("/Problem")
-        };
-        if response.content.get("application/json").is_some_and(of_problem)
-            && let Some(content) = response.content.swap_remove("application/json")
-        {
-            response.content.insert("application/problem+json".to_owned(), content);
-        }
-    }
-    document
+    description::complete(api().split().1)
 }
 
 /// The description of the interface as YAML, as committed in `openapi.yaml`.
@@ -199,7 +215,7 @@ pub fn openapi_yaml() -> String {
 /// The whole of what is served, with `more` beside the interface.
 pub fn router(app: App, more: More) -> Router {
     let (router, document) = api().split();
-    let document = described(document);
+    let document = description::complete(document);
     let mut rules = Rules::new(&document, &more);
     OPEN_PAGES.iter().for_each(|path| rules.open(path));
     let yaml: Arc<str> = document.to_yaml().unwrap_or_default().into();

@@ -1,12 +1,11 @@
-//! Health, readiness, metrics and the description of the interface.
+//! Health, readiness and the description of the interface.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use axum::Json;
 use axum::extract::State;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::IntoResponse;
-use metrics_exporter_prometheus::{PrometheusBuilder, PrometheusHandle};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -44,31 +43,6 @@ pub(super) async fn readyz(State(app): State<App>) -> Result<Json<HealthView>, P
     }
     app.service.ready().await?;
     Ok(healthy(app.demo))
-}
-
-static METRICS: OnceLock<Option<PrometheusHandle>> = OnceLock::new();
-
-/// Begins to gather metrics, once for the process.
-pub fn gather_metrics() {
-    METRICS.get_or_init(|| match PrometheusBuilder::new().install_recorder() {
-        Ok(handle) => Some(handle),
-        Err(error) => {
-            tracing::error!(%error, "no metrics");
-            None
-        }
-    });
-}
-
-/// Metrics in the text format of Prometheus.
-#[utoipa::path(get, path = "/metrics", tag = "operation",
-    responses((status = 200, body = String, content_type = "text/plain")))]
-pub(super) async fn metrics() -> impl IntoResponse {
-    let handle = METRICS.get().and_then(Option::as_ref);
-    let text = handle.map(|handle| {
-        handle.run_upkeep();
-        handle.render()
-    });
-    ([(CONTENT_TYPE, "text/plain; version=0.0.4")], text.unwrap_or_default())
 }
 
 pub(super) async fn openapi(yaml: Arc<str>) -> impl IntoResponse {

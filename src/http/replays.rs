@@ -2,13 +2,13 @@
 
 use axum::Json;
 use axum::body::Body;
-use axum::extract::{Path, State};
+use axum::extract::State;
 use axum::http::StatusCode;
 use axum::http::header::LOCATION;
 use axum::response::IntoResponse;
 
 use super::sessions::small;
-use super::{App, Problem};
+use super::{App, Path, Problem};
 use crate::service::Service;
 use crate::wire::service::{ReplaySettingsView, ReplayView};
 
@@ -16,7 +16,7 @@ use crate::wire::service::{ReplaySettingsView, ReplayView};
 /// has some. Nothing of the session or of the fault memory changes.
 #[utoipa::path(post, path = "/sessions/{id}/replays", tag = "sessions",
     operation_id = "replay_session",
-    params(("id", description = "The service's id of the session")),
+    params(("id" = String, description = "The service's id of the session")),
     request_body = Option<ReplaySettingsView>,
     responses((status = 202, body = ReplayView, description = "`Location` says where to look"),
         (status = 400, body = Problem), (status = 404, body = Problem),
@@ -35,7 +35,7 @@ pub(super) async fn create(
 /// Where a replay stands; once done: its verdict, the hash, and how it differs
 /// from the recorded verdict.
 #[utoipa::path(get, path = "/replays/{id}", tag = "sessions", operation_id = "get_replay",
-    params(("id", description = "Id of the replay")),
+    params(("id" = String, description = "Id of the replay")),
     responses((status = 200, body = ReplayView), (status = 404, body = Problem)))]
 pub(super) async fn get(
     State(service): State<Service>,

@@ -2,16 +2,15 @@
 
 use axum::Json;
 use axum::body::{Body, Bytes};
-use axum::extract::{Path, State};
+use axum::extract::State;
 use axum::http::header::{ACCEPT, CONTENT_DISPOSITION, CONTENT_TYPE, LOCATION};
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
 use futures_util::{Stream, StreamExt};
 use serde::Deserialize;
 
-use super::layers::about;
 use super::telemetry::Format;
-use super::{App, PageQuery, Problem, Query, body, page_limit};
+use super::{App, Asset, PageQuery, Path, Problem, Query, body, page_limit};
 use crate::service::{Recording, Service, ServiceError};
 use crate::vocabulary::{Invalid, Sample};
 use crate::wire::service::{ImportView, Page, SessionView};
@@ -41,10 +40,12 @@ pub(super) struct SessionsQuery {
     /// Sessions of this asset alone.
     asset: Option<String>,
     /// `open` or `ended`.
+    #[param(pattern = "^(open|ended)$")]
     state: Option<String>,
     /// `next` of the page before.
     cursor: Option<String>,
-    /// Items on the page, 1 to 500; 50 without it.
+    /// Items on the page, brought into 1 to 500; 50 without it.
+    #[param(format = Int64, maximum = 4_294_967_295_u32)]
     limit: Option<u32>,
 }
 
@@ -61,17 +62,16 @@ fn created<T: serde::Serialize>(id: &str, view: T) -> impl IntoResponse + use<T>
 
 /// Opens a session; the asset's open one is ended. The body may be empty.
 #[utoipa::path(post, path = "/assets/{asset}/sessions", tag = "sessions",
-    operation_id = "open_session", params(("asset", description = "Name of the asset")),
+    operation_id = "open_session", params(("asset" = String, description = "Name of the asset")),
     request_body = Option<NewSession>,
     responses((status = 201, body = SessionView), (status = 404, body = Problem),
         (status = 409, body = Problem, description = "The name is taken"),
         (status = 422, body = Problem)))]
 pub(super) async fn open(
     State(app): State<App>,
-    Path(asset): Path<String>,
+    Asset(asset): Asset,
     body: Body,
 ) -> Result<impl IntoResponse, Problem> {
-    about(&asset);
     let wanted: NewSession = small(&app, body).await?;
     let session = app.service.open_session(&asset, wanted.name).await?;
     Ok(created(&session.id.clone(), session))
@@ -87,6 +87,7 @@ pub(super) async fn small<T: Default + serde::de::DeserializeOwned>(
     if read.bytes.trim_ascii().is_empty() {
         return Ok(T::default());
     }
+    crate::wire::asset::check_object(&read.bytes)?;
     let mut json = serde_json::Deserializer::from_slice(&read.bytes);
     let parsed: Option<T> = serde_path_to_error::deserialize(&mut json).map_err(|error| {
         let pointer = crate::wire::asset::pointer(error.path());
@@ -101,19 +102,18 @@ pub(super) async fn small<T: Default + serde::de::DeserializeOwned>(
 /// live telemetry of the asset has to wait.
 #[utoipa::path(post, path = "/assets/{asset}/sessions/import", tag = "sessions",
     operation_id = "import_session",
-    params(("asset", description = "Name of the asset"), ImportQuery),
+    params(("asset" = String, description = "Name of the asset"), ImportQuery),
     request_body(content = String, content_type = "text/csv"),
     responses((status = 201, body = ImportView), (status = 400, body = Problem),
         (status = 404, body = Problem), (status = 409, body = Problem),
         (status = 413, body = Problem), (status = 415, body = Problem)))]
 pub(super) async fn import(
     State(app): State<App>,
-    Path(asset): Path<String>,
+    Asset(asset): Asset,
     Query(query): Query<ImportQuery>,
     headers: HeaderMap,
     body: Body,
 ) -> Result<impl IntoResponse, Problem> {
-    about(&asset);
     if headers.contains_key(CONTENT_TYPE) && Format::of(&headers)? != Format::Csv {
         let detail = "a recording is imported as text/csv";
         let status = StatusCode::UNSUPPORTED_MEDIA_TYPE;
@@ -149,7 +149,7 @@ pub(super) async fn list(
 
 /// A session, with its verdict once it has ended.
 #[utoipa::path(get, path = "/sessions/{id}", tag = "sessions", operation_id = "get_session",
-    params(("id", description = "The service's id of the session")),
+    params(("id" = String, description = "The service's id of the session")),
     responses((status = 200, body = SessionView), (status = 404, body = Problem)))]
 pub(super) async fn get(
     State(service): State<Service>,
@@ -162,7 +162,7 @@ pub(super) async fn get(
 /// memory keeps what the session left in it.
 #[utoipa::path(delete, path = "/sessions/{id}", tag = "sessions",
     operation_id = "delete_session",
-    params(("id", description = "The service's id of the session")),
+    params(("id" = String, description = "The service's id of the session")),
     responses((status = 204), (status = 404, body = Problem)))]
 pub(super) async fn delete(
     State(service): State<Service>,
@@ -175,7 +175,7 @@ pub(super) async fn delete(
 /// Ends a session: what waits is judged, the verdict is settled. One that has
 /// ended stays as it is.
 #[utoipa::path(post, path = "/sessions/{id}/end", tag = "sessions", operation_id = "end_session",
-    params(("id", description = "The service's id of the session")),
+    params(("id" = String, description = "The service's id of the session")),
     responses((status = 200, body = SessionView), (status = 404, body = Problem)))]
 pub(super) async fn end(
     State(service): State<Service>,
@@ -188,7 +188,7 @@ pub(super) async fn end(
 /// `application/json`.
 #[utoipa::path(get, path = "/sessions/{id}/telemetry", tag = "sessions",
     operation_id = "get_recording",
-    params(("id", description = "The service's id of the session")),
+    params(("id" = String, description = "The service's id of the session")),
     responses((status = 200, content((String = "text/csv"),
             (crate::wire::telemetry::RowsView = "application/json"))),
         (status = 404, body = Problem), (status = 406, body = Problem)))]
@@ -210,7 +210,7 @@ pub(super) async fn telemetry(
 /// The changes of status in a session, in order.
 #[utoipa::path(get, path = "/sessions/{id}/faults", tag = "sessions",
     operation_id = "list_session_faults",
-    params(("id", description = "The service's id of the session"), PageQuery),
+    params(("id" = String, description = "The service's id of the session"), PageQuery),
     responses((status = 200, body = Page<FaultView>), (status = 400, body = Problem),
         (status = 404, body = Problem)))]
 pub(super) async fn faults(

@@ -10,9 +10,9 @@ use std::pin::Pin;
 use std::time::Duration;
 
 use axum::Extension;
+use axum::extract::State;
 use axum::extract::ws::rejection::WebSocketUpgradeRejection;
 use axum::extract::ws::{CloseFrame, Message, WebSocket, WebSocketUpgrade, close_code};
-use axum::extract::{Path, State};
 use axum::http::StatusCode;
 use axum::response::Response;
 use serde::Deserialize;
@@ -20,8 +20,7 @@ use serde_json::json;
 use tokio::time::{Instant, Interval, MissedTickBehavior, interval_at, timeout};
 use utoipa::ToSchema;
 
-use super::layers::about;
-use super::{App, Problem, Query};
+use super::{App, Asset, Problem, Query};
 use crate::service::access::{Caller, Right};
 use crate::service::{Event, EventFeed, Pending, Service, ServiceError};
 use crate::vocabulary::Invalid;
@@ -48,6 +47,7 @@ const MAX_STATE_HZ: f64 = 50.0;
 #[into_params(parameter_in = Query)]
 pub(super) struct StreamQuery {
     /// States per second wanted, at most 50; none without it.
+    #[param(exclusive_minimum = 0)]
     state: Option<f64>,
     /// Fault events after the one with this id come first; 0 for all.
     after: Option<i64>,
@@ -80,17 +80,16 @@ pub(super) struct FrameView {
 /// others see. When the token ends, so does the stream.
 #[utoipa::path(get, path = "/assets/{asset}/stream", tag = "telemetry",
     operation_id = "stream_telemetry",
-    params(("asset", description = "Name of the asset"), StreamQuery),
+    params(("asset" = String, description = "Name of the asset"), StreamQuery),
     responses((status = 101, body = FrameView, description = "Frames from the service"),
         (status = 404, body = Problem), (status = 426, body = Problem)))]
 pub(super) async fn stream(
     State(app): State<App>,
-    Path(asset): Path<String>,
+    Asset(asset): Asset,
     Query(query): Query<StreamQuery>,
     Extension(caller): Extension<Caller>,
     upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
 ) -> Result<Response, Problem> {
-    about(&asset);
     let upgrade = upgrade.map_err(|rejection| {
         let detail = format!("this address takes WebSockets: {}", rejection.body_text());
         Problem::new(StatusCode::UPGRADE_REQUIRED, "websocket", "Not a WebSocket", detail)

@@ -2,13 +2,12 @@
 
 use axum::Json;
 use axum::body::Body;
-use axum::extract::{Path, State};
+use axum::extract::State;
 use axum::http::header::CONTENT_TYPE;
 use axum::http::{HeaderMap, StatusCode};
 use serde::Deserialize;
 
-use super::layers::about;
-use super::{App, Problem, Query, body};
+use super::{App, Asset, Problem, Query, body};
 use crate::vocabulary::Invalid;
 use crate::wire::telemetry::{self, AckView, Batch, BatchError, RowsView};
 
@@ -71,7 +70,7 @@ pub(super) struct SessionQuery {
 /// Another name than that of the open session ends that and opens the other.
 #[utoipa::path(post, path = "/assets/{asset}/telemetry", tag = "telemetry",
     operation_id = "post_telemetry",
-    params(("asset", description = "Name of the asset"), SessionQuery),
+    params(("asset" = String, description = "Name of the asset"), SessionQuery),
     request_body(content((RowsView = "application/json"), (String = "application/x-ndjson"),
         (String = "text/csv"))),
     responses((status = 200, body = AckView, description = "Durable"),
@@ -81,16 +80,16 @@ pub(super) struct SessionQuery {
         (status = 409, body = Problem, description = "The session has ended"),
         (status = 413, body = Problem, description = "Too long"),
         (status = 415, body = Problem, description = "Another format"),
+        (status = 422, body = Problem, description = "Not the name of a session"),
         (status = 429, body = Problem, description = "Too much at once; `Retry-After` says when"),
         (status = 503, body = Problem, description = "Not taken; `Retry-After` says when")))]
 pub(super) async fn post(
     State(app): State<App>,
-    Path(asset): Path<String>,
+    Asset(asset): Asset,
     Query(query): Query<SessionQuery>,
     headers: HeaderMap,
     body: Body,
 ) -> Result<Json<AckView>, Problem> {
-    about(&asset);
     let format = Format::of(&headers)?;
     let limits = app.service.limits();
     let read = body::read(body, limits.batch_bytes, limits.body_timeout, &app.budget).await?;

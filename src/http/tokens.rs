@@ -1,14 +1,14 @@
 //! `/tokens` and `/audit`: who may do what, and who did what.
 
 use axum::body::Body;
-use axum::extract::{Path, State};
+use axum::extract::State;
 use axum::http::StatusCode;
 use axum::http::header::LOCATION;
 use axum::response::IntoResponse;
 use axum::{Extension, Json};
 
 use super::sessions::small;
-use super::{App, PageQuery, Problem, Query, page_limit};
+use super::{App, PageQuery, Path, Problem, Query, page_limit};
 use crate::service::Service;
 use crate::service::access::{Caller, NewToken};
 use crate::service::moment;
@@ -56,7 +56,7 @@ pub(super) async fn list(
 
 /// A token, without its secret.
 #[utoipa::path(get, path = "/tokens/{token}", tag = "access", operation_id = "get_token",
-    params(("token", description = "Id of the token")),
+    params(("token" = String, description = "Id of the token")),
     responses((status = 200, body = TokenView), (status = 404, body = Problem)))]
 pub(super) async fn get(
     State(service): State<Service>,
@@ -67,7 +67,7 @@ pub(super) async fn get(
 
 /// Revokes a token, with the logins and streams that it began.
 #[utoipa::path(delete, path = "/tokens/{token}", tag = "access", operation_id = "revoke_token",
-    params(("token", description = "Id of the token")),
+    params(("token" = String, description = "Id of the token")),
     responses((status = 204), (status = 404, body = Problem)))]
 pub(super) async fn revoke(
     State(service): State<Service>,

@@ -1,10 +1,10 @@
 //! `/sessions/{id}/trace`: a session to be drawn.
 
 use axum::Json;
-use axum::extract::{Path, State};
+use axum::extract::State;
 use serde::Deserialize;
 
-use super::{Problem, Query};
+use super::{Path, Problem, Query};
 use crate::service::{MAX_TRACE_POINTS, Service, TraceQuery};
 use crate::wire::service::ReplaySettingsView;
 use crate::wire::trace::TraceView;
@@ -16,10 +16,12 @@ pub(super) struct StretchQuery {
     from_s: Option<f64>,
     /// Up to this time, s; to the end without it.
     to_s: Option<f64>,
-    /// Moments wanted at most, 1 to 20000; 5000 without it. A longer stretch is
-    /// thinned out.
+    /// Moments wanted at most, brought into 1 to 20000; 5000 without it. A longer
+    /// stretch is thinned out.
+    #[param(format = Int64, maximum = 4_294_967_295_u32)]
     points: Option<u32>,
     /// `default` or `textbook`; without it the one of the asset file.
+    #[param(pattern = "^(default|textbook)$")]
     profile: Option<String>,
 }
 
@@ -31,7 +33,7 @@ const DEFAULT_POINTS: u32 = 5000;
 /// its beginning; nothing of it changes.
 #[utoipa::path(get, path = "/sessions/{id}/trace", tag = "sessions",
     operation_id = "get_trace",
-    params(("id", description = "The service's id of the session"), StretchQuery),
+    params(("id" = String, description = "The service's id of the session"), StretchQuery),
     responses((status = 200, body = TraceView), (status = 400, body = Problem),
         (status = 404, body = Problem),
         (status = 413, body = Problem, description = "The session is too long"),

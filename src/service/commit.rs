@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tokio::sync::{mpsc, watch};
+use tracing::Instrument;
 
 use super::events::{Event, Events};
-use crate::store::{StoreError, Write, Writer};
+use crate::store::{StoreError, TransitionRow, Write, Writer};
 
 /// Write sets in one transaction; the next ones make the next group.
 const MAX_GROUP_SETS: usize = 512;
@@ -100,7 +101,9 @@ impl Committer {
         }
         metrics::histogram!("offbd_commit_sets").record(sets.len() as f64);
         loop {
-            let Err(error) = self.writer.commit(&mut sets).await else {
+            let span = tracing::debug_span!("commit", sets = sets.len());
+            let commit = timed(self.writer.commit(&mut sets)).instrument(span);
+            let Err(error) = commit.await else {
                 metrics::counter!("offbd_commits_total").increment(1);
                 return true;
             };
@@ -157,7 +160,10 @@ impl Committer {
     fn announce(&self, set: WriteSet) {
         for write in set.writes {
             let event = match write {
-                Write::Transition(row) => Some(Event::of_transition(row)),
+                Write::Transition(row) => {
+                    count(&row);
+                    Some(Event::of_transition(row))
+                }
                 Write::Act(row) => Event::of_act(row),
                 _ => None,
             };
@@ -165,6 +171,20 @@ impl Committer {
         }
         (set.done)(true);
     }
+}
+
+/// Notes what a commit took.
+#[expect(clippy::disallowed_methods, reason = "what a commit took is a metric")]
+async fn timed<T>(commit: impl Future<Output = T>) -> T {
+    let begun = Instant::now();
+    let outcome = commit.await;
+    metrics::histogram!("offbd_commit_seconds").record(begun.elapsed().as_secs_f64());
+    outcome
+}
+
+fn count(row: &TransitionRow) {
+    let (code, status) = (row.code.clone(), row.status.clone());
+    metrics::counter!("offbd_fault_changes_total", "code" => code, "status" => status).increment(1);
 }
 
 fn refuse(set: WriteSet) {

@@ -91,6 +91,21 @@ struct Inner {
     traces: Arc<Semaphore>,
 }
 
+/// What waits for something to be done with it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Load {
+    /// Samples between arrival and commit.
+    pub samples: usize,
+    /// Requests that wait for each shard.
+    pub shards: Vec<usize>,
+    /// Sets of changes that wait for the writer.
+    pub writer: usize,
+}
+
+fn waiting<T>(queue: &mpsc::Sender<T>) -> usize {
+    queue.max_capacity() - queue.capacity()
+}
+
 /// What runs behind a [`Service`]; ends when all its clones are dropped.
 pub struct Workers {
     shards: Vec<std::thread::JoinHandle<()>>,
@@ -229,6 +244,15 @@ impl Service {
         }
         let away = |error: StoreError| ServiceError::Outage { reason: error.to_string() };
         self.inner.store.ping().await.map_err(away)
+    }
+
+    /// What waits now.
+    #[must_use]
+    pub fn load(&self) -> Load {
+        let Inner { shards, writer, in_flight, limits, .. } = &*self.inner;
+        let samples = limits.in_flight_samples - in_flight.available_permits();
+        let shards = shards.iter().map(waiting).collect();
+        Load { samples, shards, writer: waiting(writer) }
     }
 
     fn shard(&self, asset: &str) -> &mpsc::Sender<Job> {

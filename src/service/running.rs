@@ -7,6 +7,7 @@ use super::clock::rfc3339;
 use super::commit::Life;
 use super::recent::Recent;
 use super::shard::Context;
+use super::telemetry::unjudged;
 use super::{ServiceError, trends, views};
 use crate::diagnosis::{FaultMemory, FaultRecord, MemoryRules};
 use crate::engine::{Admission, Engine, Input, Output, Rig, Setup};
@@ -258,10 +259,14 @@ impl Running {
                 Some(Admission::Accepted) => recorded.push(*sample),
                 Some(Admission::SetAside(why)) => {
                     recorded.push(*sample);
+                    unjudged(why.as_str());
                     ack.late.push(row(why.to_string()));
                 }
                 Some(Admission::Duplicate) => ack.duplicate += 1,
-                Some(Admission::Rejected(why)) => ack.rejected.push(row(why.to_string())),
+                Some(Admission::Rejected(why)) => {
+                    unjudged(why.as_str());
+                    ack.rejected.push(row(why.to_string()));
+                }
                 None => ack.rejected.push(row("the engine did not take it".to_owned())),
             }
             open.report(&self.row.name, &mut transitions)?;

@@ -89,8 +89,10 @@ impl Shard {
     ) -> Result<std::thread::JoinHandle<()>, ServiceError> {
         let work = move || {
             let mut shard = Self { context, running: BTreeMap::new() };
+            let engines = metrics::gauge!("offbd_engines", "shard" => number.to_string());
             while let Some(job) = queue.blocking_recv() {
                 job(&mut shard);
+                engines.set(f64::from(u32::try_from(shard.running.len()).unwrap_or(u32::MAX)));
             }
         };
         let thread = std::thread::Builder::new().name(format!("shard-{number}"));

@@ -1,8 +1,10 @@
 //! A batch arrives.
 
 use std::future::Future;
+use std::time::Instant;
 
 use tokio::sync::{OwnedSemaphorePermit, oneshot};
+use tracing::Span;
 
 use super::running::{Running, Work};
 use super::shard::{Context, Job};
@@ -19,6 +21,7 @@ const MAX_CHUNKS_SEARCHED: u32 = 32;
 /// under way until they are durable or refused, also if nobody waits for it.
 pub struct Pending {
     answer: oneshot::Receiver<Result<Taken, ServiceError>>,
+    begun: Instant,
 }
 
 /// What was taken, and the place it took.
@@ -30,7 +33,9 @@ impl Pending {
     /// # Errors
     /// [`ServiceError`] if it was not taken, or not as a whole.
     pub async fn acknowledged(self) -> Result<AckView, ServiceError> {
-        settled(self.answer.await).map(|(ack, _)| ack)
+        let (ack, _) = settled(self.answer.await)?;
+        metrics::histogram!("offbd_ack_seconds").record(self.begun.elapsed().as_secs_f64());
+        Ok(ack)
     }
 }
 
@@ -86,6 +91,7 @@ impl Service {
     }
 }
 
+#[expect(clippy::disallowed_methods, reason = "how long an acknowledgement took is a metric")]
 fn take_job(
     asset: &str,
     batch: Batch,
@@ -94,13 +100,15 @@ fn take_job(
 ) -> (Job, Pending) {
     let (reply, answer) = oneshot::channel();
     let asset = asset.to_owned();
+    let request = Span::current();
     let job: Job = Box::new(move |shard| {
+        let _judging = tracing::debug_span!(parent: &request, "judge").entered();
         let act = |context: &Context, running: &mut Running, work: &mut Work| {
             Ok((take(context, running, batch, importing, work)?, permit))
         };
         shard.act(&asset, act, reply);
     });
-    (job, Pending { answer })
+    (job, Pending { answer, begun: Instant::now() })
 }
 
 /// Takes a batch on the asset's shard.
@@ -116,7 +124,10 @@ fn take(
     for (index, row) in batch.rows.into_iter().enumerate() {
         match row {
             Ok(sample) => samples.push((index, sample)),
-            Err(reason) => ack.rejected.push(RowView { index, reason }),
+            Err(reason) => {
+                unjudged("form");
+                ack.rejected.push(RowView { index, reason });
+            }
         }
     }
     if running.open.as_ref().is_some_and(|open| open.importing != importing) {
@@ -138,6 +149,11 @@ fn take(
     ack.rejected.sort_by_key(|row| row.index);
     count(&ack);
     Ok(ack)
+}
+
+/// Counts a sample that is not judged; `reason` is one of few.
+pub(super) fn unjudged(reason: &'static str) {
+    metrics::counter!("offbd_samples_unjudged_total", "reason" => reason).increment(1);
 }
 
 fn count(ack: &AckView) {

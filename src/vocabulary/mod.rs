@@ -12,6 +12,6 @@ mod time;
 
 pub use axis::{Axis, PerAxis};
 pub use fault::{FaultCode, FaultKind, FaultStatus, UnknownWord};
-pub use number::{Invalid, in_range, positive};
+pub use number::{Brief, Invalid, in_range, positive};
 pub use sample::Sample;
 pub use time::SimTime;

@@ -29,12 +29,15 @@ pub struct TokenView {
 #[serde(deny_unknown_fields)]
 pub struct NewTokenView {
     /// 1 to 100 bytes; no other token in force has it.
+    #[schema(min_length = 1, max_length = 100)]
     pub name: String,
     /// `device`, `viewer`, `operator` or `admin`.
+    #[schema(pattern = "^(device|viewer|operator|admin)$")]
     pub role: String,
     /// For a device: its one asset.
     pub asset: Option<String>,
     /// RFC 3339; without it the token does not end by itself.
+    #[schema(format = DateTime)]
     pub expires_at: Option<String>,
 }
 

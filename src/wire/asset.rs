@@ -15,6 +15,7 @@ use crate::vocabulary::{Axis, Invalid, PerAxis, in_range, positive};
 #[serde(deny_unknown_fields)]
 pub struct AssetView {
     /// 1 to 128 letters, digits, `-`, `_` or `.`.
+    #[schema(pattern = "^[A-Za-z0-9._-]{1,128}$")]
     pub name: String,
     /// Samples a second that the device sends, about.
     #[serde(default = "default_rate")]
@@ -47,10 +48,13 @@ fn default_rate() -> f64 {
 #[serde(deny_unknown_fields, default)]
 pub struct BallView {
     /// In (0, 1] m.
+    #[schema(exclusive_minimum = 0, maximum = 1)]
     pub radius_m: f64,
     /// In (0, 100] kg.
+    #[schema(exclusive_minimum = 0, maximum = 100)]
     pub mass_kg: f64,
     /// κ of I = κ m r², in [0, 1]: 0.4 solid, 0.667 hollow.
+    #[schema(minimum = 0, maximum = 1)]
     pub inertia_factor: f64,
 }
 
@@ -70,15 +74,19 @@ impl Default for BallView {
 #[serde(deny_unknown_fields)]
 pub struct PlateView {
     /// Along x, in (0, 10] m.
+    #[schema(exclusive_minimum = 0, maximum = 10)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub length_m: Option<f64>,
     /// Along y, in (0, 10] m.
+    #[schema(exclusive_minimum = 0, maximum = 10)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub width_m: Option<f64>,
     /// Of a round plate, in (0, 10] m.
+    #[schema(exclusive_minimum = 0, maximum = 10)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub diameter_m: Option<f64>,
     /// In [0, 1] m.
+    #[schema(minimum = 0, maximum = 1)]
     #[serde(default = "default_thickness")]
     pub thickness_m: f64,
     /// Whether a rim stops the ball at the edge.
@@ -105,12 +113,16 @@ impl Default for PlateView {
 #[serde(deny_unknown_fields, default)]
 pub struct ContactView {
     /// K, in (0, 1e12] N/m.
+    #[schema(exclusive_minimum = 0, maximum = 1e12)]
     pub stiffness_n_per_m: f64,
     /// D, in (0, 1e9] N·s/m.
+    #[schema(exclusive_minimum = 0, maximum = 1e9)]
     pub damping_n_s_per_m: f64,
     /// μ, in (0, 100].
+    #[schema(exclusive_minimum = 0, maximum = 100)]
     pub friction: f64,
     /// Slip speed at which friction saturates, in (0, 10] m/s.
+    #[schema(exclusive_minimum = 0, maximum = 10)]
     pub slip_threshold_m_s: f64,
 }
 
@@ -127,10 +139,13 @@ pub struct ServoView {
     /// Largest plate angle, in (0, π/2] rad.
     pub angle_limit_rad: f64,
     /// From a command to the first movement, in [0, 5] s.
+    #[schema(minimum = 0, maximum = 5)]
     pub dead_time_s: f64,
     /// First-order lag, in [0, 10] s.
+    #[schema(minimum = 0, maximum = 10)]
     pub lag_s: f64,
     /// Fastest turn, in (0, 1000] rad/s.
+    #[schema(exclusive_minimum = 0, maximum = 1000)]
     pub rate_limit_rad_s: f64,
 }
 
@@ -167,12 +182,14 @@ impl Default for AxesView {
 #[serde(deny_unknown_fields)]
 pub struct DiagnosticsView {
     /// `default` or `textbook`.
+    #[schema(pattern = "^(default|textbook)$")]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub profile: Option<String>,
     /// Wanted false alarms per rig and year, above 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub false_alarms_per_rig_year: Option<f64>,
     /// Continuous failure before a test fails, in [0, 60] s.
+    #[schema(minimum = 0, maximum = 60)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub debounce_s: Option<f64>,
 }
@@ -264,11 +281,24 @@ pub struct AxisCalibrationView {
 /// [`Invalid`] with the JSON pointer of the offending element; the empty
 /// pointer stands for the document, with line and column in the reason.
 pub fn parse(document: &[u8]) -> Result<Rig, Invalid> {
+    check_object(document)?;
     let mut json = serde_json::Deserializer::from_slice(document);
     let view: AssetView = serde_path_to_error::deserialize(&mut json)
         .map_err(|e| Invalid::new(pointer(e.path()), e.inner().to_string()))?;
     json.end().map_err(|e| Invalid::new("", e.to_string()))?;
     rig(&view)
+}
+
+/// That a document is not a list: serde would take one of an object's values, in
+/// their order, for the object.
+///
+/// # Errors
+/// [`Invalid`] about the whole document.
+pub fn check_object(document: &[u8]) -> Result<(), Invalid> {
+    if document.trim_ascii_start().starts_with(b"[") {
+        return Err(Invalid::new("", "is a list, not an object"));
+    }
+    Ok(())
 }
 
 /// JSON pointer (RFC 6901) of a path inside a document.

@@ -3,7 +3,7 @@
 use nalgebra::{Vector2, Vector3};
 use serde::Deserialize;
 
-use super::asset::{BallView, ContactView, contact, outline, pointer};
+use super::asset::{BallView, ContactView, check_object, contact, outline, pointer};
 use super::preset::PresetOr;
 use crate::plant::{Ball, Contact, Motion, Plate};
 use crate::scene::{LONGEST_SCENE_S, Law, Laws, Push, Scene, Subject, Term};
@@ -162,6 +162,7 @@ pub struct NamedScene {
 /// [`Invalid`] with the JSON pointer of the offending element; the empty
 /// pointer stands for the document, with line and column in the reason.
 pub fn parse(document: &[u8]) -> Result<NamedScene, Invalid> {
+    check_object(document)?;
     let mut json = serde_json::Deserializer::from_slice(document);
     let view: SceneView = serde_path_to_error::deserialize(&mut json)
         .map_err(|e| Invalid::new(pointer(e.path()), e.inner().to_string()))?;

@@ -16,7 +16,7 @@ use offbd::vocabulary::Sample;
 use reqwest::header::CONTENT_TYPE;
 use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
-use sqlx::{ConnectOptions, Executor};
+use sqlx::{AssertSqlSafe, ConnectOptions, Executor};
 
 /// Longest time to wait for anything; far more than it takes.
 pub const DEADLINE: Duration = Duration::from_secs(60);
@@ -55,6 +55,25 @@ pub fn url(data: &Path) -> String {
 pub async fn connection(url: &str) -> sqlx::AnyConnection {
     sqlx::any::install_default_drivers();
     url.parse::<sqlx::any::AnyConnectOptions>().unwrap().connect().await.unwrap()
+}
+
+/// All that the store below `data` holds, as bytes to search in: its files, or
+/// its rows as text.
+pub async fn stored(data: &Path) -> Vec<u8> {
+    if !on_postgres() {
+        let files = std::fs::read_dir(data).unwrap().map(|file| file.unwrap().path());
+        return files.flat_map(|file| std::fs::read(file).unwrap()).collect();
+    }
+    let mut store = connection(&url(data)).await;
+    let tables = "SELECT tablename::text FROM pg_tables WHERE schemaname = 'public'";
+    let tables: Vec<String> = sqlx::query_scalar(tables).fetch_all(&mut store).await.unwrap();
+    let mut rows = Vec::new();
+    for table in tables {
+        let all = AssertSqlSafe(format!("SELECT row::text FROM {table} row"));
+        let of_table: Vec<String> = sqlx::query_scalar(all).fetch_all(&mut store).await.unwrap();
+        rows.extend(of_table.concat().into_bytes());
+    }
+    rows
 }
 
 impl Bench {

@@ -6,7 +6,7 @@ use serde::de::{IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 
 use super::MAX_SEQ;
-use crate::vocabulary::Sample;
+use crate::vocabulary::{Brief, Sample};
 
 /// A value where a number is expected.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -35,7 +35,9 @@ impl Cell {
             Self::Missing | Self::Null => Ok(None),
             Self::Whole(seq) if seq <= MAX_SEQ => Ok(Some(seq)),
             Self::Whole(seq) => Err(format!("`seq` is {seq}, beyond {MAX_SEQ}")),
-            Self::Number(value) => Err(format!("`seq` is {value}, not a whole number from 0")),
+            Self::Number(value) => {
+                Err(format!("`seq` is {}, not a whole number from 0", Brief(value)))
+            }
             Self::Other(what) => Err(format!("`seq` is {what}, not a whole number")),
         }
     }
