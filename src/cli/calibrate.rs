@@ -129,7 +129,7 @@ fn foresee(prospects: &Prospects) {
     anstream::eprintln!("\na fault during this recording would have been confirmed after");
     let heading = ["", "x", "y", "meaning"];
     let mut servos = table::table(&heading, &[1, 2]);
-    let numbers: [(_, fn(&ServoProspects) -> String, _); 5] = [
+    let numbers: [ServoRow; 5] = [
         ("dead", |s| seconds(s.dead_s), "the servo answers nothing"),
         ("half", |s| seconds(s.half_gain_s), "it answers half"),
         ("off by 1°", |s| seconds(s.offset_1deg_s), "its horn has slipped"),
@@ -165,6 +165,7 @@ fn degrees(angle_rad: Option<f64>) -> String {
 }
 
 type Row = (&'static str, fn(&AxisCalibration) -> String, &'static str);
+type ServoRow = (&'static str, fn(&ServoProspects) -> String, &'static str);
 
 fn rows() -> [Row; 8] {
     [

@@ -97,7 +97,7 @@ pub fn calibrate(
     })
 }
 
-/// [`calibrate`], and what can be found by it: [`prospects`].
+/// [`calibrate`], and what can be found by it: [`Calibration::prospects`].
 ///
 /// # Errors
 /// As for [`calibrate`].
