@@ -1,6 +1,7 @@
 //! Health, readiness, metrics and the description of the interface.
 
 use std::sync::{Arc, OnceLock};
+use std::time::Duration;
 
 use axum::Json;
 use axum::extract::State;
@@ -8,6 +9,7 @@ use axum::http::header::CONTENT_TYPE;
 use axum::response::IntoResponse;
 use metrics_exporter_prometheus::{PrometheusBuilder, PrometheusHandle};
 use serde::Serialize;
+use tokio_util::sync::CancellationToken;
 use utoipa::ToSchema;
 
 use super::{App, Problem};
@@ -57,6 +59,21 @@ pub fn gather_metrics() {
             None
         }
     });
+}
+
+/// How often what was measured is folded into the metrics. Between, every single
+/// duration is kept: a moment's worth, whether anybody asks for the metrics or not.
+const UPKEEP: Duration = Duration::from_secs(5);
+
+/// Folds what was measured into the metrics until the server stops.
+pub async fn keep_metrics(closing: CancellationToken) {
+    let Some(Some(handle)) = METRICS.get() else { return };
+    loop {
+        tokio::select! {
+            () = closing.cancelled() => return,
+            () = tokio::time::sleep(UPKEEP) => handle.run_upkeep(),
+        }
+    }
 }
 
 /// Metrics in the text format of Prometheus.
