@@ -76,6 +76,7 @@ pub async fn start_with(config: Config, demo: Option<More>) -> Result<Server> {
     let connections = Connections::new(&config.limits, tls.clone(), closing.clone());
     let serving = tokio::spawn(connections.serve(listener, router));
     tls.map(|tls| tokio::spawn(tls.watch(closing.clone())));
+    tokio::spawn(http::keep_metrics(closing.clone()));
     tracing::info!(%address, resumed, store = %store.place(), "serving");
     let deadline = Duration::from_secs(config.limits.shutdown_s);
     Ok(Server { address, closing, deadline, serving, store, workers, lock })

@@ -18,17 +18,27 @@ struct Counting;
 thread_local! {
     /// Of this thread alone: tests run beside each other.
     static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
+    /// Bytes that this thread holds, and most that it has held.
+    static HELD: Cell<isize> = const { Cell::new(0) };
+    static MOST: Cell<isize> = const { Cell::new(0) };
+}
+
+fn hold(bytes: isize) {
+    HELD.set(HELD.get() + bytes);
+    MOST.set(MOST.get().max(HELD.get()));
 }
 
 // SAFETY: hands every call on to the system's allocator unchanged.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATIONS.set(ALLOCATIONS.get() + 1);
+        hold(layout.size() as isize);
         // SAFETY: the caller's contract is the system allocator's.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
+        hold(-(layout.size() as isize));
         // SAFETY: as above.
         unsafe { System.dealloc(at, layout) }
     }
@@ -67,6 +77,48 @@ fn a_warm_engine_does_not_allocate() {
     run(2000, 12_000);
     assert_eq!(ALLOCATIONS.get() - before, 0);
     assert!(before > 0, "the counter counts");
+}
+
+/// Ten thousand rigs at 100 Hz must fit into a small machine.
+#[test]
+fn an_engine_is_small() {
+    let before = HELD.get();
+    let setup = Setup::new(Rig::chapter("a"), None).unwrap();
+    let mut engine = Box::new(Engine::new(setup, FaultMemory::default()));
+    let mut outputs = Vec::new();
+    for i in 0..6000 {
+        engine.handle(Input::Sample(sample(i)), &mut outputs);
+        outputs.clear();
+    }
+    let held = HELD.get() - before;
+    assert!((1..16 << 10).contains(&held), "{held} bytes");
+}
+
+#[cfg(feature = "service")]
+#[test]
+fn a_length_that_is_only_announced_takes_no_room() {
+    use offbd::wire::telemetry::msgpack;
+    const ARRAY: u8 = 0xdd;
+    const STRING: u8 = 0xdb;
+    const BYTES: u8 = 0xc6;
+    const MAP: u8 = 0xdf;
+    for (name, marker) in [
+        ("samples", ARRAY),
+        ("t_s", ARRAY),
+        ("id", STRING),
+        ("session", STRING),
+        ("note", BYTES),
+        ("note", ARRAY),
+        ("samples", MAP),
+    ] {
+        let key = [&[0x81, 0xa0 | name.len() as u8], name.as_bytes()].concat();
+        let document = [&key[..], &[marker, 0xff, 0xff, 0xff, 0xff, 0xc0]].concat();
+        let before = HELD.get();
+        MOST.set(before);
+        assert!(msgpack(&document, 1 << 20).is_err(), "{name}");
+        let most = MOST.get() - before;
+        assert!((1..32 << 10).contains(&most), "{name}: {most} bytes");
+    }
 }
 
 #[test]

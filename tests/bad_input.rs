@@ -99,6 +99,17 @@ async fn documents_that_are_no_batch() {
         let problem = client.post_text(TELEMETRY, kind, body).await.problem(status);
         assert_eq!(problem["pointer"], pointer, "{body}: {problem}");
     }
+    for (body, pointer) in [
+        (&[][..], ""),
+        (b"{\"samples\":[]}", ""),
+        (b"\x81\xa7samples\xdd\xff\xff\xff\xff", "/samples/0"),
+        (b"\x81\xa3t_s\x92\x00", "/t_s/1"),
+    ] {
+        let request = client.request(Method::POST, TELEMETRY);
+        let request = request.header("content-type", "application/msgpack").body(body.to_vec());
+        let problem = client.send(request).await.problem(400);
+        assert_eq!(problem["pointer"], pointer, "{body:x?}: {problem}");
+    }
     let named = r#"{"session":"b","samples":[]}"#;
     let answer = client.post_text("assets/a/telemetry?session=c", "application/json", named).await;
     assert_eq!(answer.problem(422)["pointer"], "/session");

@@ -2,7 +2,8 @@
 
 mod support;
 
-use offbd::store::codec;
+use offbd::store::codec::{self, Stay};
+use offbd::vocabulary::Sample;
 use serde_json::Value;
 use sqlx::{AssertSqlSafe, Executor};
 use support::{Bench, eventually, rig};
@@ -67,7 +68,8 @@ async fn the_old_goes_and_what_is_around_a_fault_later() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn too_much_goes_from_its_oldest_end() {
     let (healthy, sick) = (rig(500, 500), rig(1500, 500));
-    let bytes = codec::encode(&healthy).len() * 2 + codec::encode(&sick).len() + 10;
+    let size = |samples: &[Sample]| codec::encode(samples, Stay::Long).len();
+    let bytes = size(&healthy) * 2 + size(&sick) + 10;
     let bench = Bench::start_with(|config| {
         config.retention.bytes_per_asset = Some(bytes);
         config.retention.sweep_s = 1;

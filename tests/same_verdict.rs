@@ -5,7 +5,7 @@ mod support;
 use futures_util::{SinkExt, StreamExt};
 use offbd::vocabulary::Sample;
 use serde_json::{Value, json};
-use support::{Bench, Client, batch, csv, judged, rig};
+use support::{Bench, Client, batch, csv, judged, packed, rig};
 use tokio_tungstenite::connect_async;
 use tokio_tungstenite::tungstenite::Message;
 
@@ -23,7 +23,18 @@ async fn whatever_the_way_in() {
     let samples = rig(3000, 1500);
     let (hash, faults) = judged("a", &samples);
     assert!(faults.contains(&"x_servo".to_owned()), "{faults:?}");
-    for asset in ["ones", "hundreds", "columns", "lines", "csv", "socket", "imported"] {
+    let assets = [
+        "ones",
+        "hundreds",
+        "columns",
+        "packed",
+        "lines",
+        "csv",
+        "socket",
+        "packed-socket",
+        "imported",
+    ];
+    for asset in assets {
         client.asset(asset).await;
     }
     for sample in &samples {
@@ -33,22 +44,69 @@ async fn whatever_the_way_in() {
         client.telemetry("hundreds", Some("s"), part).await;
     }
     for part in samples.chunks(777) {
-        client.post("assets/columns/telemetry", &columns(part)).await.expect(200);
+        let said = client.post("assets/columns/telemetry", &columns(part)).await.expect(200);
+        let packed = client.post_packed("assets/packed/telemetry", &columns(part)).await;
+        assert_eq!(outcome(packed.expect(200)), outcome(said));
         let path = "assets/csv/telemetry?session=s";
         client.post_text(path, "text/csv", csv(part)).await.expect(200);
         let path = "assets/lines/telemetry?session=s";
         client.post_text(path, "application/x-ndjson", lines(part)).await.expect(200);
     }
-    over_websocket(client, "socket", &samples).await;
+    over_websocket(client, "socket", &samples, |frame| Message::text(frame.to_string())).await;
+    over_websocket(client, "packed-socket", &samples, |frame| Message::binary(packed(frame))).await;
     let path = "assets/imported/sessions/import?name=s";
     let imported = client.post_text(path, "text/csv", csv(&samples)).await.expect(201);
     assert_eq!(imported["accepted"], 3000);
-    for asset in ["ones", "hundreds", "columns", "lines", "csv", "socket", "imported"] {
+    for asset in assets {
         let (found, recording) = settled(client, asset).await;
         assert_eq!(found, hash, "{asset}");
         assert_eq!(recording, samples, "{asset}");
     }
     assert_eq!(replayed_from_a_file(&samples), hash);
+}
+
+/// An acknowledgement without the id, which is a session's own.
+fn outcome(mut ack: Value) -> Value {
+    ack.as_object_mut().unwrap().remove("session_id");
+    ack
+}
+
+/// Rows of which some are no samples, some there already and some late get the
+/// same answer in both formats.
+#[tokio::test]
+async fn an_acknowledgement_is_the_same_in_both_formats() {
+    let bench = Bench::start().await;
+    let client = &bench.client;
+    for asset in ["text", "packed"] {
+        client.asset(asset).await;
+    }
+    let good = rig(300, 300);
+    let row =
+        |i: usize| serde_json::to_value(offbd::wire::telemetry::sample_view(&good[i])).unwrap();
+    let mut odd: Vec<Value> = (0..200).map(row).collect();
+    odd.extend([json!(7), json!({}), json!({ "t_s": "1" }), json!({ "t_s": null }), row(3)]);
+    odd.extend([json!({ "t_s": 2.0, "seq": -1 }), json!({ "t_s": 1e300 }), row(290), row(250)]);
+    odd.extend([json!({ "t_s": 0.001, "seq": 9000 }), json!({ "t_s": 9e5, "seq": 9001 })]);
+    for batch in [
+        json!({ "session": "s", "samples": odd }),
+        json!({ "session": "s", "samples": [] }),
+        json!({ "session": 3, "samples": [] }),
+        json!({ "session": "s", "t_s": [0, 1], "x_m": [0] }),
+        json!([]),
+    ] {
+        let text = client.post("assets/text/telemetry", &batch).await;
+        let packed = client.post_packed("assets/packed/telemetry", &batch).await;
+        assert_eq!(packed.status, text.status, "{}", packed.text);
+        let (packed, text) = (packed.json(), text.json());
+        if text["status"].is_number() {
+            assert_eq!((&packed["type"], &packed["pointer"]), (&text["type"], &text["pointer"]));
+        } else {
+            assert_eq!(outcome(packed), outcome(text));
+        }
+    }
+    let (said, packed) = (settled(client, "text").await, settled(client, "packed").await);
+    assert_eq!(said, packed);
+    assert_eq!(said.1.len(), 204);
 }
 
 /// The hash that the command line gives for the session as a file.
@@ -81,14 +139,19 @@ fn lines(samples: &[Sample]) -> String {
 }
 
 /// Sends everything before it reads an answer, then reads them all.
-async fn over_websocket(client: &Client, asset: &str, samples: &[Sample]) {
+async fn over_websocket(
+    client: &Client,
+    asset: &str,
+    samples: &[Sample],
+    frame_of: impl Fn(&Value) -> Message,
+) {
     let url = format!("ws://{}/api/v1/assets/{asset}/stream?state=20", client.address);
     let (mut socket, _) = connect_async(url).await.unwrap();
     let parts: Vec<_> = samples.chunks(50).collect();
     for (i, part) in parts.iter().enumerate() {
         let mut frame = batch(Some("s"), part);
         frame["id"] = json!(i);
-        socket.send(Message::text(frame.to_string())).await.unwrap();
+        socket.send(frame_of(&frame)).await.unwrap();
     }
     socket.send(Message::text("{\"samples\":[")).await.unwrap();
     let (mut next, mut faults, mut states, mut errors) = (0, 0, 0, 0);

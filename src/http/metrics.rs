@@ -6,12 +6,14 @@
 //! seen as a rise. No label takes a value from outside.
 
 use std::sync::OnceLock;
+use std::time::Duration;
 
 use axum::extract::State;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::IntoResponse;
 use metrics::{counter, describe_counter, describe_gauge, describe_histogram, gauge};
 use metrics_exporter_prometheus::{BuildError, Matcher, PrometheusBuilder, PrometheusHandle};
+use tokio_util::sync::CancellationToken;
 
 use super::App;
 use crate::vocabulary::{FaultCode, FaultStatus};
@@ -71,6 +73,10 @@ const NUMBERS: [f64; 10] = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 256.0, 
 
 static RECORDER: OnceLock<Option<PrometheusHandle>> = OnceLock::new();
 
+/// How often what was measured is folded into the metrics. Between, every single
+/// duration is kept: a moment's worth, whether anybody asks for the metrics or not.
+const UPKEEP: Duration = Duration::from_secs(5);
+
 /// Begins to gather metrics, once for the process.
 pub fn gather_metrics() {
     RECORDER.get_or_init(|| match install() {
@@ -84,6 +90,17 @@ pub fn gather_metrics() {
             None
         }
     });
+}
+
+/// Folds what was measured into the metrics until the server stops.
+pub async fn keep_metrics(closing: CancellationToken) {
+    let Some(Some(handle)) = RECORDER.get() else { return };
+    loop {
+        tokio::select! {
+            () = closing.cancelled() => return,
+            () = tokio::time::sleep(UPKEEP) => handle.run_upkeep(),
+        }
+    }
 }
 
 fn install() -> Result<PrometheusHandle, BuildError> {

@@ -40,7 +40,7 @@ use utoipa_swagger_ui::SwaggerUi;
 
 pub use body::Budget;
 pub use guard::Policy;
-pub use metrics::gather_metrics;
+pub use metrics::{gather_metrics, keep_metrics};
 pub use problem::Problem;
 pub use rates::{Rate, Rates};
 pub use routes::More;

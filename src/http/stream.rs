@@ -15,16 +15,18 @@ use axum::extract::ws::rejection::WebSocketUpgradeRejection;
 use axum::extract::ws::{CloseFrame, Message, WebSocket, WebSocketUpgrade, close_code};
 use axum::http::StatusCode;
 use axum::response::Response;
-use serde::Deserialize;
+use futures_util::{FutureExt, SinkExt};
+use serde::{Deserialize, Serialize};
 use serde_json::json;
 use tokio::time::{Instant, Interval, MissedTickBehavior, interval_at, timeout};
 use utoipa::ToSchema;
 
+use super::telemetry::Format;
 use super::{App, Asset, Problem, Query};
 use crate::service::access::{Caller, Right};
 use crate::service::{Event, EventFeed, Pending, Service, ServiceError};
 use crate::vocabulary::Invalid;
-use crate::wire::telemetry::{self, AckView};
+use crate::wire::telemetry::AckView;
 use crate::wire::trace::TraceView;
 
 /// Batches whose acknowledgement is owed; then nothing more is read.
@@ -73,8 +75,8 @@ pub(super) struct FrameView {
     trace: Option<TraceView>,
 }
 
-/// A WebSocket: batches up, as JSON rows or columns in text frames, each with
-/// an optional `id`; down come `ack` (once durable), `error` (with a
+/// A WebSocket: batches up, as JSON rows or columns in text frames or the same as
+/// MessagePack in binary frames, each with an optional `id`; down come `ack` (once durable), `error` (with a
 /// `problem`), `fault` and, if asked for, `state` frames, all JSON objects
 /// with a `type`. Batches are taken from whoever may send the asset's telemetry;
 /// others see. When the token ends, so does the stream.
@@ -236,10 +238,7 @@ impl Session {
         match next {
             Next::Closing => self.close().await,
             Next::Lapsed => Err(End::Close(close_code::POLICY, "the token is no longer in force")),
-            Next::Answer(answer) => {
-                let id = self.owed.pop_front().and_then(|owed| owed.id);
-                self.answer(id, answer).await
-            }
+            Next::Answer(answer) => self.answers(answer).await,
             Next::Event(Ok(Some(event))) => self.fault(&event).await,
             Next::Event(Ok(None)) => Err(End::Close(close_code::AWAY, "the service is closing")),
             Next::Event(Err(_)) => Err(End::Close(close_code::ERROR, "the store failed")),
@@ -258,7 +257,7 @@ impl Session {
     async fn close(&mut self) -> Result<(), End> {
         while let Some(owed) = self.owed.pop_front() {
             let answer = owed.answer.await;
-            self.answer(owed.id, answer).await?;
+            self.send(answer_frame(owed.id.as_deref(), answer)).await?;
         }
         Err(End::Close(close_code::AWAY, "the service is closing"))
     }
@@ -267,22 +266,22 @@ impl Session {
     async fn message(&mut self, message: Message) -> Result<(), End> {
         self.heard = Instant::now();
         match message {
-            Message::Text(text) => self.batch(text.as_bytes()).await,
-            Message::Binary(bytes) => self.batch(&bytes).await,
+            Message::Text(text) => self.batch(Format::Json, text.as_bytes()).await,
+            Message::Binary(bytes) => self.batch(Format::of_bytes(&bytes), &bytes).await,
             Message::Close(_) => Err(End::Gone),
             Message::Ping(_) | Message::Pong(_) => Ok(()),
         }
     }
 
     /// Takes a batch; its answer comes after those of the ones before.
-    async fn batch(&mut self, document: &[u8]) -> Result<(), End> {
+    async fn batch(&mut self, format: Format, document: &[u8]) -> Result<(), End> {
         if !self.feeds {
             let detail = "the token's role does not send telemetry of this asset";
             let title = "Not allowed";
             let problem = Problem::new(StatusCode::FORBIDDEN, "forbidden", title, detail);
             return self.send(json!({ "type": "error", "problem": problem }).to_string()).await;
         }
-        let parsed = telemetry::json(document, self.app.service.limits().batch_samples);
+        let parsed = format.parse(document, self.app.service.limits().batch_samples);
         let (id, submitted) = match parsed {
             Ok(mut batch) => {
                 let id = batch.id.take();
@@ -298,23 +297,17 @@ impl Session {
         Ok(())
     }
 
-    async fn answer(
-        &mut self,
-        id: Option<String>,
-        answer: Result<AckView, ServiceError>,
-    ) -> Result<(), End> {
-        let mut frame = match answer {
-            Ok(ack) => {
-                let mut frame = serde_json::to_value(&ack).unwrap_or_default();
-                frame["type"] = "ack".into();
-                frame
-            }
-            Err(error) => json!({ "type": "error", "problem": Problem::from(error) }),
-        };
-        if let Some(id) = id {
-            frame["id"] = id.into();
+    /// Gives the answer to the first batch that is owed one, and to those after it
+    /// whose answers are there too, in one write.
+    async fn answers(&mut self, first: Result<AckView, ServiceError>) -> Result<(), End> {
+        let mut frames = Vec::new();
+        let mut next = Some(first);
+        while let Some(answer) = next {
+            let id = self.owed.pop_front().and_then(|owed| owed.id);
+            frames.push(Message::Text(answer_frame(id.as_deref(), answer).into()));
+            next = self.owed.front_mut().and_then(|owed| owed.answer.as_mut().now_or_never());
         }
-        self.send(frame.to_string()).await
+        self.send_messages(frames).await
     }
 
     async fn fault(&mut self, event: &Event) -> Result<(), End> {
@@ -332,7 +325,7 @@ impl Session {
             }
             // Telemetry goes first; the next state comes when there is room.
             Err(ServiceError::Busy { .. }) => Ok(()),
-            Err(error) => self.answer(None, Err(error)).await,
+            Err(error) => self.send(answer_frame(None, Err(error))).await,
         }
     }
 
@@ -354,21 +347,54 @@ impl Session {
         if self.heard.elapsed() > 2 * PING_EVERY {
             return Err(End::Close(close_code::POLICY, "nothing heard for too long"));
         }
-        self.send_message(Message::Ping(axum::body::Bytes::new())).await
+        self.send_messages(vec![Message::Ping(axum::body::Bytes::new())]).await
     }
 
     async fn send(&mut self, text: String) -> Result<(), End> {
-        self.send_message(Message::Text(text.into())).await
+        self.send_messages(vec![Message::Text(text.into())]).await
     }
 
-    async fn send_message(&mut self, message: Message) -> Result<(), End> {
-        match timeout(SEND_TIMEOUT, self.socket.send(message)).await {
+    async fn send_messages(&mut self, messages: Vec<Message>) -> Result<(), End> {
+        let send = async {
+            for message in messages {
+                self.socket.feed(message).await?;
+            }
+            self.socket.flush().await
+        };
+        match timeout(SEND_TIMEOUT, send).await {
             Ok(Ok(())) => Ok(()),
             Ok(Err(_)) => Err(End::Gone),
             Err(_) => {
                 metrics::counter!("offbd_streams_cut_off_total").increment(1);
                 Err(End::Gone)
             }
+        }
+    }
+}
+
+/// An acknowledgement as it goes out.
+#[derive(Serialize)]
+struct AckFrame<'a> {
+    #[serde(rename = "type")]
+    kind: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    id: Option<&'a str>,
+    #[serde(flatten)]
+    ack: &'a AckView,
+}
+
+fn answer_frame(id: Option<&str>, answer: Result<AckView, ServiceError>) -> String {
+    match answer {
+        Ok(ack) => {
+            let frame = AckFrame { kind: "ack", id, ack: &ack };
+            serde_json::to_string(&frame).unwrap_or_default()
+        }
+        Err(error) => {
+            let mut frame = json!({ "type": "error", "problem": Problem::from(error) });
+            if let Some(id) = id {
+                frame["id"] = id.into();
+            }
+            frame.to_string()
         }
     }
 }

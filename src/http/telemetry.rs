@@ -15,6 +15,7 @@ use crate::wire::telemetry::{self, AckView, Batch, BatchError, RowsView};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Format {
     Json,
+    Msgpack,
     Ndjson,
     Csv,
 }
@@ -27,15 +28,28 @@ impl Format {
         let essence = text.split(';').next().unwrap_or_default().trim().to_ascii_lowercase();
         match essence.as_str() {
             "application/json" => Ok(Self::Json),
+            "application/msgpack" | "application/vnd.msgpack" | "application/x-msgpack" => {
+                Ok(Self::Msgpack)
+            }
             "application/x-ndjson" | "application/ndjson" | "application/jsonl" => Ok(Self::Ndjson),
             "text/csv" => Ok(Self::Csv),
             _ => Err(unsupported(text)),
         }
     }
 
+    /// The format of a binary frame: MessagePack begins with the mark of a map,
+    /// which no JSON begins with.
+    pub(super) fn of_bytes(document: &[u8]) -> Self {
+        match document.first() {
+            Some(0x80..=0x8f | 0xde | 0xdf) => Self::Msgpack,
+            _ => Self::Json,
+        }
+    }
+
     pub(super) fn parse(self, document: &[u8], limit: usize) -> Result<Batch, BatchError> {
         match self {
             Self::Json => telemetry::json(document, limit),
+            Self::Msgpack => telemetry::msgpack(document, limit),
             Self::Ndjson => telemetry::ndjson(document, limit),
             Self::Csv => telemetry::csv(document, limit),
         }
@@ -43,8 +57,10 @@ impl Format {
 }
 
 fn unsupported(found: &str) -> Problem {
-    let detail =
-        format!("`{found}` is not taken; take application/json, application/x-ndjson or text/csv");
+    let detail = format!(
+        "`{found}` is not taken; take application/json, application/msgpack, \
+         application/x-ndjson or text/csv"
+    );
     let title = "No such format";
     Problem::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, "media-type", title, detail)
 }
@@ -58,11 +74,11 @@ pub(super) struct SessionQuery {
 
 /// Takes a batch of samples. Answered once it is durable.
 ///
-/// JSON rows as below, or columns (`{"t_s":[…],"x_m":[…],…}`), NDJSON with one
-/// sample a line, or CSV with the header of a session file. A row that is no
-/// sample is reported by its index and the others are taken. A sample is known
-/// by `seq` within its session, or by `t_s` where it has no `seq`; sent twice,
-/// it counts once.
+/// JSON rows as below, or columns (`{"t_s":[…],"x_m":[…],…}`), the same document
+/// as MessagePack, NDJSON with one sample a line, or CSV with the header of a
+/// session file. A row that is no sample is reported by its index and the others
+/// are taken. A sample is known by `seq` within its session, or by `t_s` where it
+/// has no `seq`; sent twice, it counts once.
 ///
 /// Without the name of a session the samples go to the asset's open session,
 /// or to a new one. When the clock of such a device falls back by more than
@@ -71,8 +87,8 @@ pub(super) struct SessionQuery {
 #[utoipa::path(post, path = "/assets/{asset}/telemetry", tag = "telemetry",
     operation_id = "post_telemetry",
     params(("asset" = String, description = "Name of the asset"), SessionQuery),
-    request_body(content((RowsView = "application/json"), (String = "application/x-ndjson"),
-        (String = "text/csv"))),
+    request_body(content((RowsView = "application/json"), (RowsView = "application/msgpack"),
+        (String = "application/x-ndjson"), (String = "text/csv"))),
     responses((status = 200, body = AckView, description = "Durable"),
         (status = 400, body = Problem, description = "Not a batch; `pointer` names the place"),
         (status = 404, body = Problem, description = "No such asset"),

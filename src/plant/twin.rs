@@ -77,16 +77,12 @@ pub struct TwinMotion {
 }
 
 /// Commands in force, rad, with the moment from which each holds, s.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct CommandHistory {
     entries: VecDeque<(f64, f64)>,
 }
 
 impl CommandHistory {
-    fn new() -> Self {
-        Self { entries: VecDeque::with_capacity(COMMAND_HISTORY) }
-    }
-
     fn push(&mut self, at: f64, command: f64) {
         if self.entries.back().is_some_and(|&(_, last)| last == command) {
             return;
@@ -128,7 +124,7 @@ impl Twin {
         Self {
             model,
             now: None,
-            commands: PerAxis::from_fn(|_| CommandHistory::new()),
+            commands: PerAxis::default(),
             servos: PerAxis::default(),
             motion: TwinMotion::default(),
             fidelity: Fidelity::default(),

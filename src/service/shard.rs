@@ -78,7 +78,8 @@ impl Context {
 
 pub(super) struct Shard {
     context: Context,
-    running: BTreeMap<String, Running>,
+    /// Boxed: they are large, and are taken out for each thing that is done.
+    running: BTreeMap<String, Box<Running>>,
 }
 
 impl Shard {
@@ -181,12 +182,12 @@ impl Shard {
 
     /// The running asset, out of the shard's hands, rebuilt from the store if
     /// it is not running or has gone ahead of it.
-    fn take(&mut self, name: &str) -> Result<Running, ServiceError> {
+    fn take(&mut self, name: &str) -> Result<Box<Running>, ServiceError> {
         match self.running.remove(name) {
             Some(running) if !running.life.is_broken() => Ok(running),
             _ => {
                 self.context.fence()?;
-                let load = || rebuild::load(&self.context, name);
+                let load = || rebuild::load(&self.context, name).map(Box::new);
                 catch_unwind(AssertUnwindSafe(load)).unwrap_or_else(|_| {
                     tracing::error!(asset = name, "rebuilding the engine failed");
                     Err(ServiceError::Unavailable { what: "the asset's engine cannot be rebuilt" })

@@ -13,6 +13,7 @@ mod place;
 mod question;
 mod read;
 mod rows;
+mod rows_at_once;
 mod tail;
 mod write;
 

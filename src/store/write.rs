@@ -4,7 +4,8 @@ use std::time::Duration;
 
 use sqlx::{AnyConnection, Connection};
 
-use super::tail::Tails;
+use super::rows_at_once::{RowsAtOnce, in_parts};
+use super::tail::{Run, Tails};
 use super::{
     AccessWrite, ActionRow, AssetRow, CalibrationRow, FaultRow, MIGRATIONS, Micros, Place,
     Progress, ReplayRow, SessionRow, StoreError, TransitionRow, TrendRow,
@@ -84,15 +85,6 @@ pub struct Writer {
     /// Whether a transaction may have come through that is not counted yet.
     in_doubt: bool,
     tails: Tails,
-}
-
-/// Samples that wait for the end of the group, so that consecutive batches of
-/// a session become one chunk.
-struct Pending {
-    session: String,
-    first_index: i64,
-    samples: Vec<Sample>,
-    progress: Progress,
 }
 
 impl Writer {
@@ -219,7 +211,9 @@ async fn count(db: &mut AnyConnection, n_commits: i64, last_id: i64) -> Result<(
 struct Group<'a> {
     last_id: &'a mut i64,
     tails: &'a mut Tails,
-    pending: Vec<Pending>,
+    /// Samples that wait for the end of the group, so that consecutive batches
+    /// of a session become one chunk.
+    pending: Vec<Run>,
 }
 
 impl Group<'_> {
@@ -279,29 +273,41 @@ impl Group<'_> {
             return;
         }
         let (session, samples) = (session.to_owned(), samples.to_vec());
-        self.pending.push(Pending { session, first_index, samples, progress });
+        self.pending.push(Run { session, first_index, samples, progress });
     }
 
     async fn flush(&mut self, db: &mut AnyConnection) -> Result<(), StoreError> {
-        for Pending { session, first_index, samples, progress } in self.pending.drain(..) {
-            if !samples.is_empty() {
-                self.tails.append(db, &session, first_index, &samples).await?;
-            }
-            sqlx::query(
-                "UPDATE session SET n_samples = $2, n_rejected = $3, first_t_s = $4,
-                 last_t_s = $5, last_seq = $6 WHERE id = $1",
-            )
-            .bind(&session)
-            .bind(progress.n_samples)
-            .bind(progress.n_rejected)
-            .bind(progress.first_t_s)
-            .bind(progress.last_t_s)
-            .bind(progress.last_seq)
-            .execute(&mut *db)
-            .await?;
-        }
-        Ok(())
+        let runs = std::mem::take(&mut self.pending);
+        self.tails.append(db, &runs).await?;
+        put_progress(db, &runs).await
     }
+}
+
+/// Absent values go as others that cannot be: their type is then the same in
+/// every execution of a statement, as PostgreSQL wants it.
+async fn put_progress(db: &mut AnyConnection, runs: &[Run]) -> Result<(), StoreError> {
+    static PUT: RowsAtOnce = RowsAtOnce::new(
+        "UPDATE session SET n_samples = run.column2, n_rejected = run.column3,
+         first_t_s = CASE WHEN run.column2 = 0 THEN NULL ELSE run.column4 END,
+         last_t_s = CASE WHEN run.column2 = 0 THEN NULL ELSE run.column5 END,
+         last_seq = NULLIF(run.column6, -1) FROM (VALUES ",
+        6,
+        ") AS run WHERE id = run.column1",
+    );
+    for part in in_parts(runs) {
+        let mut query = sqlx::query(PUT.sql(part.len()));
+        for Run { session, progress, .. } in part {
+            query = query
+                .bind(session)
+                .bind(progress.n_samples)
+                .bind(progress.n_rejected)
+                .bind(progress.first_t_s.unwrap_or_default())
+                .bind(progress.last_t_s.unwrap_or_default())
+                .bind(progress.last_seq.unwrap_or(-1));
+        }
+        query.execute(&mut *db).await?;
+    }
+    Ok(())
 }
 
 async fn delete(db: &mut AnyConnection, sql: &'static str, key: &str) -> Result<(), StoreError> {

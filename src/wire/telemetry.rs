@@ -1,4 +1,4 @@
-//! Batches of telemetry: JSON rows, JSON columns, NDJSON and CSV.
+//! Batches of telemetry: rows or columns as JSON or MessagePack, NDJSON and CSV.
 //!
 //! Two kinds of trouble are kept apart. A document that cannot be read is
 //! refused as a whole, with the place; a row that is no sample is reported by
@@ -15,7 +15,6 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use self::cells::{Document, Row};
-use super::asset::pointer;
 use super::session_csv::Reader;
 use crate::vocabulary::Sample;
 
@@ -53,19 +52,19 @@ pub enum BatchError {
 /// # Errors
 /// [`BatchError`] if the document is malformed or too long.
 pub fn json(document: &[u8], limit: usize) -> Result<Batch, BatchError> {
-    let parsed = match cells::parse(document, limit) {
-        Ok(parsed) => parsed,
-        Err(error) => match lenient::quote_non_finite(document) {
-            Some(quoted) => cells::parse(&quoted, limit).map_err(|_| malformed(&error))?,
-            None => return Err(malformed(&error)),
-        },
-    };
-    batch(parsed, limit)
+    let parsed = cells::json(document, limit).or_else(|error| {
+        let quoted = lenient::quote_non_finite(document);
+        quoted.and_then(|quoted| cells::json(&quoted, limit).ok()).ok_or(error)
+    });
+    batch(parsed?, limit)
 }
 
-fn malformed(error: &serde_path_to_error::Error<serde_json::Error>) -> BatchError {
-    let pointer = pointer(error.path());
-    BatchError::Malformed { pointer, reason: error.inner().to_string() }
+/// Reads the same document as MessagePack; at most `limit` rows.
+///
+/// # Errors
+/// [`BatchError`] if the document is malformed or too long.
+pub fn msgpack(document: &[u8], limit: usize) -> Result<Batch, BatchError> {
+    batch(cells::msgpack(document, limit)?, limit)
 }
 
 fn batch(document: Document, limit: usize) -> Result<Batch, BatchError> {

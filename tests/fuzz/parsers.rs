@@ -10,8 +10,9 @@ use offbd::wire::{asset, scene, session_csv};
 pub type Parser = fn(&[u8]) -> String;
 
 /// Every parser by the directory of its corpus.
-pub const PARSERS: [(&str, Parser); 8] = [
+pub const PARSERS: [(&str, Parser); 9] = [
     ("json", |input| batch(telemetry::json(input, LIMIT))),
+    ("msgpack", |input| batch(telemetry::msgpack(input, LIMIT))),
     ("ndjson", |input| batch(telemetry::ndjson(input, LIMIT))),
     ("csv", |input| batch(telemetry::csv(input, LIMIT))),
     ("calibration", calibration),

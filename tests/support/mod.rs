@@ -215,6 +215,12 @@ impl Client {
         self.send(request.body(body.into())).await
     }
 
+    /// Posts `body` as MessagePack.
+    pub async fn post_packed(&self, path: &str, body: &Value) -> Answer {
+        let request = self.request(Method::POST, path).header(CONTENT_TYPE, "application/msgpack");
+        self.send(request.body(packed(body))).await
+    }
+
     pub async fn asset(&self, name: &str) {
         self.post("assets", &json!({ "name": name })).await.expect(201);
     }
@@ -259,6 +265,11 @@ pub fn read_csv(text: &str) -> Vec<Sample> {
 pub fn batch(session: Option<&str>, samples: &[Sample]) -> Value {
     let rows: Vec<_> = samples.iter().map(offbd::wire::telemetry::sample_view).collect();
     json!({ "session": session, "samples": rows })
+}
+
+/// A document as MessagePack.
+pub fn packed(document: &Value) -> Vec<u8> {
+    rmp_serde::to_vec_named(document).unwrap()
 }
 
 /// Samples as a session file.

@@ -1,12 +1,22 @@
-//! The syntactic view of a JSON batch: cells that may be anything.
+//! The syntactic view of a batch in JSON or MessagePack: cells that may be
+//! anything.
 
 use std::fmt;
 
-use serde::de::{IgnoredAny, MapAccess, SeqAccess, Visitor};
+use serde::de::{Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 
-use super::MAX_SEQ;
+use super::{BatchError, MAX_SEQ};
 use crate::vocabulary::{Brief, Sample};
+use crate::wire::asset::pointer;
+
+/// Deepest nesting of a MessagePack document; one beyond is refused. As in
+/// `serde_json`.
+const MAX_DEPTH: usize = 128;
+
+/// Values for which room is made because an array announces them; for more, once
+/// they have come.
+const MAX_AHEAD: usize = 128;
 
 /// A value where a number is expected.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -157,7 +167,7 @@ impl Columns {
     }
 }
 
-/// A batch as JSON.
+/// A batch.
 #[derive(Debug, Default)]
 pub(super) struct Document {
     pub(super) session: Option<String>,
@@ -166,21 +176,47 @@ pub(super) struct Document {
     pub(super) columns: Columns,
 }
 
-/// Parses a document, keeping at most `limit` values of each array.
-pub(super) fn parse(
-    document: &[u8],
-    limit: usize,
-) -> Result<Document, serde_path_to_error::Error<serde_json::Error>> {
+/// Parses JSON, keeping at most `limit` values of each array.
+pub(super) fn json(document: &[u8], limit: usize) -> Result<Document, BatchError> {
     let mut json = serde_json::Deserializer::from_slice(document);
-    let mut track = serde_path_to_error::Track::new();
-    let tracked = serde_path_to_error::Deserializer::new(&mut json, &mut track);
-    let parsed = tracked.deserialize_map(DocumentVisitor { limit });
-    let result = parsed.and_then(|d| json.end().map(|()| d));
-    result.map_err(|error| serde_path_to_error::Error::new(track.path(), error))
+    let parsed = json.deserialize_map(DocumentVisitor { limit });
+    parsed.and_then(|parsed| json.end().map(|()| parsed)).map_err(|error| {
+        let pointer = place(&mut serde_json::Deserializer::from_slice(document), limit);
+        BatchError::Malformed { pointer, reason: error.to_string() }
+    })
 }
 
-#[derive(Clone, Copy, Deserialize)]
-#[serde(field_identifier, rename_all = "snake_case")]
+/// Parses MessagePack, keeping at most `limit` values of each array.
+pub(super) fn msgpack(document: &[u8], limit: usize) -> Result<Document, BatchError> {
+    let unpack = || {
+        let mut unpack = rmp_serde::Deserializer::new(document);
+        unpack.set_max_depth(MAX_DEPTH);
+        unpack
+    };
+    let mut whole = unpack();
+    let parsed = whole.deserialize_map(DocumentVisitor { limit });
+    let trailing = whole.get_ref().len();
+    let error = match parsed {
+        Ok(parsed) if trailing == 0 => return Ok(parsed),
+        Ok(_) => rmp_serde::decode::Error::custom(format!("{trailing} bytes follow the document")),
+        Err(error) => error,
+    };
+    let pointer = place(&mut unpack(), limit);
+    Err(BatchError::Malformed { pointer, reason: error.to_string() })
+}
+
+/// The pointer of the element at which the parser stops. Keeping track of it
+/// takes time, so a document is read so only once it has failed.
+fn place<'de>(document: impl Deserializer<'de>, limit: usize) -> String {
+    let mut track = serde_path_to_error::Track::new();
+    let tracked = serde_path_to_error::Deserializer::new(document, &mut track);
+    match tracked.deserialize_map(DocumentVisitor { limit }) {
+        Ok(_) => String::new(),
+        Err(_) => pointer(&track.path()),
+    }
+}
+
+#[derive(Clone, Copy)]
 enum Key {
     Session,
     Id,
@@ -191,8 +227,39 @@ enum Key {
     CmdQyRad,
     XM,
     YM,
-    #[serde(other)]
     Unknown,
+}
+
+/// By name alone: what serde derives would also take numbers.
+impl<'de> Deserialize<'de> for Key {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_str(KeyVisitor)
+    }
+}
+
+struct KeyVisitor;
+
+impl Visitor<'_> for KeyVisitor {
+    type Value = Key;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("the name of a field")
+    }
+
+    fn visit_str<E>(self, name: &str) -> Result<Key, E> {
+        Ok(match name {
+            "session" => Key::Session,
+            "id" => Key::Id,
+            "samples" => Key::Samples,
+            "seq" => Key::Seq,
+            "t_s" => Key::TS,
+            "cmd_qx_rad" => Key::CmdQxRad,
+            "cmd_qy_rad" => Key::CmdQyRad,
+            "x_m" => Key::XM,
+            "y_m" => Key::YM,
+            _ => Key::Unknown,
+        })
+    }
 }
 
 struct DocumentVisitor {
@@ -235,16 +302,24 @@ struct Mark(String);
 
 impl<'de> Deserialize<'de> for Mark {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        #[derive(Deserialize)]
-        #[serde(untagged, expecting = "a string or a whole number")]
-        enum Word {
-            Text(String),
-            Whole(u64),
-        }
-        Ok(Self(match Word::deserialize(deserializer)? {
-            Word::Text(text) => text,
-            Word::Whole(number) => number.to_string(),
-        }))
+        deserializer.deserialize_any(MarkVisitor)
+    }
+}
+
+struct MarkVisitor;
+
+impl Visitor<'_> for MarkVisitor {
+    type Value = Mark;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a string or a whole number")
+    }
+
+    fn visit_str<E>(self, text: &str) -> Result<Mark, E> {
+        Ok(Mark(text.to_owned()))
+    }
+    fn visit_u64<E>(self, number: u64) -> Result<Mark, E> {
+        Ok(Mark(number.to_string()))
     }
 }
 
@@ -275,7 +350,8 @@ impl<'de, T: Deserialize<'de>> Visitor<'de> for Capped<T> {
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Rows<T>, A::Error> {
-        let mut rows = Rows { kept: Vec::new(), n: 0 };
+        let announced = seq.size_hint().unwrap_or_default().min(self.limit).min(MAX_AHEAD);
+        let mut rows = Rows { kept: Vec::with_capacity(announced), n: 0 };
         while rows.n < self.limit {
             let Some(value) = seq.next_element()? else { return Ok(rows) };
             rows.kept.push(value);
@@ -301,6 +377,16 @@ macro_rules! otherwise {
                 "a string"
             }))
         }
+        fn visit_bytes<E>(self, _: &[u8]) -> Result<Self::Value, E> {
+            Ok($of("bytes"))
+        }
+        fn visit_newtype_struct<D: Deserializer<'de>>(
+            self,
+            extension: D,
+        ) -> Result<Self::Value, D::Error> {
+            extension.deserialize_any(IgnoredAny)?;
+            Ok($of("an extension"))
+        }
         fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Self::Value, A::Error> {
             while seq.next_element::<IgnoredAny>()?.is_some() {}
             Ok($of("an array"))
@@ -324,7 +410,8 @@ impl<'de> Visitor<'de> for CellVisitor {
     }
 
     fn visit_f64<E>(self, value: f64) -> Result<Cell, E> {
-        Ok(Cell::Number(value))
+        let finite = value.is_finite();
+        Ok(if finite { Cell::Number(value) } else { Cell::Other(super::lenient::MEANING) })
     }
     fn visit_u64<E>(self, value: u64) -> Result<Cell, E> {
         Ok(Cell::Whole(value))

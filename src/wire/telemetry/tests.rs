@@ -1,4 +1,5 @@
 use proptest::prelude::*;
+use serde_json::{Value, json};
 
 use super::*;
 
@@ -129,6 +130,8 @@ proptest! {
         prop_assert_eq!(&said(json(&rows, LIMIT).unwrap()), &wanted);
         let lines: Vec<_> = views.iter().map(|v| serde_json::to_string(v).unwrap()).collect();
         prop_assert_eq!(&said(ndjson(lines.join("\n").as_bytes(), LIMIT).unwrap()), &wanted);
+        let packed = rmp_serde::to_vec_named(&RowsView { session: None, samples: views }).unwrap();
+        prop_assert_eq!(&said(msgpack(&packed, LIMIT).unwrap()), &wanted);
         let mut text = Vec::new();
         crate::wire::session_csv::write(&mut text, &samples).unwrap();
         prop_assert_eq!(&said(csv(&text, LIMIT).unwrap()), &wanted);
@@ -137,6 +140,7 @@ proptest! {
     #[test]
     fn any_bytes_are_read_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
         let _ = json(&bytes, LIMIT);
+        let _ = msgpack(&bytes, LIMIT);
         let _ = ndjson(&bytes, LIMIT);
         let _ = csv(&bytes, LIMIT);
     }
@@ -145,4 +149,135 @@ proptest! {
     fn any_text_like_json_is_read_or_refused(text in r#"[\{\}\[\]:,"a-z_0-9.eE+\- ]{0,80}"#) {
         let _ = json(text.as_bytes(), LIMIT);
     }
+
+    /// Whatever a document says, it says it in both formats: the same rows with
+    /// the same reasons, or refused at the same place.
+    #[test]
+    fn msgpack_is_its_json_twin(document in document()) {
+        let place = |batch: Result<Batch, BatchError>| batch.map_err(|error| match error {
+            BatchError::Malformed { pointer, .. } => Err(pointer),
+            BatchError::TooMany { found, limit } => Ok((found, limit)),
+        });
+        let packed = rmp_serde::to_vec_named(&document).unwrap();
+        let text = serde_json::to_vec(&document).unwrap();
+        prop_assert_eq!(place(msgpack(&packed, LIMIT)), place(json(&text, LIMIT)));
+    }
+
+    #[test]
+    fn cut_or_bent_msgpack_is_read_or_refused(
+        document in document(),
+        cut in any::<prop::sample::Index>(),
+        bend in any::<(prop::sample::Index, u8)>(),
+    ) {
+        let packed = rmp_serde::to_vec_named(&document).unwrap();
+        let whole = msgpack(&packed, LIMIT);
+        let cut = &packed[..cut.index(packed.len())];
+        prop_assert!(msgpack(cut, LIMIT).is_err());
+        let mut longer = packed.clone();
+        longer.push(0xc0);
+        prop_assert!(msgpack(&longer, LIMIT).is_err() || whole.is_err());
+        let mut bent = packed;
+        let at = bend.0.index(bent.len());
+        bent[at] = bend.1;
+        let _ = msgpack(&bent, LIMIT);
+    }
+}
+
+/// What may stand where a number should.
+fn value() -> impl Strategy<Value = Value> {
+    prop_oneof![
+        4 => finite().prop_map(|v| json!(v)),
+        2 => any::<i64>().prop_map(|v| json!(v)),
+        1 => any::<u64>().prop_map(|v| json!(v)),
+        1 => Just(Value::Null),
+        1 => any::<bool>().prop_map(|v| json!(v)),
+        1 => "[a-z\u{e9}\u{1}]{0,40}".prop_map(|v| json!(v)),
+        1 => Just(json!([1, [2]])),
+        1 => Just(json!({ "t_s": { "x": 1 } })),
+    ]
+}
+
+const FIELDS: &str = "t_s|seq|cmd_qx_rad|cmd_qy_rad|x_m|y_m|note";
+
+fn row() -> impl Strategy<Value = Value> {
+    let object = proptest::collection::btree_map(FIELDS, value(), 0..7)
+        .prop_map(|fields| Value::Object(fields.into_iter().collect()));
+    prop_oneof![8 => object, 1 => value()]
+}
+
+/// An object that may be a batch.
+fn document() -> impl Strategy<Value = Value> {
+    let rows = proptest::collection::vec(row(), 0..LIMIT + 20);
+    let rows = (rows, value()).prop_map(|(rows, id)| json!({ "samples": rows, "id": id }));
+    let column = |n| proptest::collection::vec(value(), n).prop_map(Value::from);
+    let columns = (0..LIMIT + 20).prop_flat_map(move |n| {
+        proptest::collection::btree_map(FIELDS, column(n), 1..7)
+            .prop_map(|columns| Value::Object(columns.into_iter().collect()))
+    });
+    let fields = "session|id|samples|t_s|x_m|note";
+    let odd = proptest::collection::btree_map(fields, prop_oneof![value(), column(3)], 0..5)
+        .prop_map(|fields| Value::Object(fields.into_iter().collect()));
+    prop_oneof![rows, columns, odd]
+}
+
+fn refused(document: &[u8]) -> (String, String) {
+    match msgpack(document, LIMIT) {
+        Err(BatchError::Malformed { pointer, reason }) => (pointer, reason),
+        other => panic!("{document:x?}: {other:?}"),
+    }
+}
+
+#[test]
+fn what_json_does_not_have_spoils_its_row_alone() {
+    let column = |values: &[&[u8]]| {
+        let mut document = vec![0x81, 0xa3, b't', b'_', b's', 0x90 | values.len() as u8];
+        values.iter().for_each(|value| document.extend_from_slice(value));
+        document
+    };
+    let (nan, half) = (0x7fc0_0000_u32.to_be_bytes(), 0.5_f32.to_be_bytes());
+    let f32 = |v: [u8; 4]| [0xca, v[0], v[1], v[2], v[3]];
+    let document = column(&[
+        &f32(nan),
+        &f32(half),
+        &[0xc4, 2, 1, 2],    // bytes
+        &[0xd4, 5, 0],       // an extension
+        &[0xa2, 0xff, 0xfe], // a string that is no UTF-8
+        &[0xd3, 0x80, 0, 0, 0, 0, 0, 0, 0],
+    ]);
+    let batch = msgpack(&document, LIMIT).unwrap();
+    let wanted = [
+        (0, "`t_s` is not finite, not a number"),
+        (2, "`t_s` is bytes, not a number"),
+        (3, "`t_s` is an extension, not a number"),
+        (4, "`t_s` is bytes, not a number"),
+    ];
+    assert_eq!(reasons(&batch), wanted);
+    assert_eq!(batch.rows[1], Ok(Sample { t_s: 0.5, ..Sample::default() }));
+    assert_eq!(batch.rows[5], Ok(Sample { t_s: i64::MIN as f64, ..Sample::default() }));
+}
+
+#[test]
+fn hostile_msgpack_is_refused_with_the_place() {
+    for document in [&[][..], &[0x90], &[0xc1], &[0xdf, 0xff, 0xff, 0xff, 0xff]] {
+        assert_eq!(refused(document).0, "", "{document:x?}");
+    }
+    let key = |name: &str, value: &[u8]| {
+        [&[0x81, 0xa0 | name.len() as u8], name.as_bytes(), value].concat()
+    };
+    let huge = [0xff; 4];
+    for (name, marker, place) in [
+        ("samples", 0xdd, "/samples/0"),
+        ("x_m", 0xdd, "/x_m/0"),
+        ("session", 0xdb, "/session"),
+        ("note", 0xc6, "/note"),
+    ] {
+        let document = key(name, &[&[marker][..], &huge].concat());
+        assert_eq!(refused(&document).0, place);
+    }
+    let deep = [vec![0x91; 100_000], vec![0xc0]].concat();
+    for name in ["note", "samples", "t_s"] {
+        assert!(refused(&key(name, &deep)).1.contains("depth"), "{name}");
+    }
+    assert_eq!(refused(&[0x81, 0x07, 0xc0]).0, "/7", "a key that is no name");
+    assert!(refused(&[0x80, 0xc0]).1.contains("1 bytes follow"));
 }
