@@ -284,11 +284,7 @@ function Learn({ asset, changed }: { asset: Asset; changed: () => Promise<void> 
 }
 
 function Learnt({ asset, job }: { asset: Asset; job?: CalibrationJob }) {
-  const { state } = useRig(asset.name);
   const c = asset.calibration;
-  const x = state?.evidence.x, y = state?.evidence.y;
-  const rolling = 9.81 / (1 + (asset.ball?.inertia_factor ?? 0.4));
-  const limit = Math.max(x?.limit_m_s2 ?? 0, y?.limit_m_s2 ?? 0);
   return (
     <section class="card">
       <h2>What was learnt</h2>
@@ -317,9 +313,6 @@ function Learnt({ asset, job }: { asset: Asset; job?: CalibrationJob }) {
           <h3>What can be found, how fast</h3>
           {c.prospects ? <Found prospects={c.prospects} /> : <p class="quiet">Not tried: the sessions are too short for it.</p>}
           <p>Slower changes are followed over the sessions and warned of before they are faults.</p>
-          {limit > 0 && state?.session_id
-            ? <p>In the session that runs now, a deviation beyond {number(limit, 2, "m/s²")} counts: about {degrees(limit / rolling)} of plate angle that is not as commanded. It is looked for through a window of {seconds(state.evidence.window_s)}, then it must last.</p>
-            : <p class="quiet">As soon as the next session runs, the limit in force stands here.</p>}
           <p><Link class="button primary" to={at("rigs", asset.name)}>Done: see it live</Link></p>
         </>
       )}
