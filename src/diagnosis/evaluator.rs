@@ -38,7 +38,7 @@ const QUIET_M: f64 = 1e-3;
 
 /// Evidence against a servo that explains why a ball stands that was asked to
 /// move by it alone, nats: what makes it suspected.
-const EXPLAINED_NATS: f64 = 12.0;
+const EXPLAINED_NATS: f64 = 10.0;
 
 /// Evidence against both servos at once that speaks for what they share, nats.
 const SHARED_NATS: f64 = 9.0;

@@ -33,8 +33,9 @@ const BELIEVED_AFTER_S: f64 = 0.12;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Gated {
     /// Where a ball can be; and how many readings before it were outliers, as
-    /// is known now that they have not stayed where they were.
-    Accepted { outliers: u32 },
+    /// is known now that they have not stayed where they were. Undone: one of
+    /// them had been accepted.
+    Accepted { outliers: u32, undone: bool },
     /// Not to be used: an outlier, or the first of a new path.
     Refused,
     /// Accepted after all, on a path that does not meet the old one.
@@ -140,7 +141,8 @@ impl OutlierGate {
             && before.off_m(t_s, position_m) <= reach(before.at_s)
         {
             self.outliers += 1;
-            return self.accept(before.followed_by(t_s, position_m));
+            let outliers = self.follow(before.followed_by(t_s, position_m));
+            return Gated::Accepted { outliers, undone: true };
         }
         self.refuse(t_s, position_m, staying, &track, noise_m)
     }
@@ -181,10 +183,14 @@ impl OutlierGate {
     }
 
     fn accept(&mut self, track: Track) -> Gated {
-        self.track = Some(track);
+        Gated::Accepted { outliers: self.follow(track), undone: false }
+    }
+
+    /// Goes on along `track`; returns the outliers not yet told.
+    fn follow(&mut self, track: Track) -> u32 {
         let outliers = self.outliers + self.elsewhere.map_or(0, |e| e.distinct);
-        (self.outliers, self.elsewhere) = (0, None);
-        Gated::Accepted { outliers }
+        (self.track, self.outliers, self.elsewhere) = (Some(track), 0, None);
+        outliers
     }
 }
 
@@ -214,14 +220,26 @@ mod tests {
             gate.take(-0.1 + f64::from(i) * 0.02, along_x(0.0), 1e-3);
         }
         let mut take = |i: u32, x: f64| gate.take(f64::from(i) * 0.02, along_x(x), 1e-3);
-        assert_eq!(take(0, 0.0), Gated::Accepted { outliers: 0 });
+        assert_eq!(take(0, 0.0), Gated::Accepted { outliers: 0, undone: false });
         assert_eq!(take(1, 0.1), Gated::Refused);
-        assert_eq!(take(2, 0.001), Gated::Accepted { outliers: 1 });
+        assert_eq!(take(2, 0.001), Gated::Accepted { outliers: 1, undone: false });
         for i in 3..9 {
             assert_eq!(take(i, 0.2), Gated::Refused, "{i}");
         }
         assert_eq!(take(9, 0.2), Gated::Stepped);
-        assert_eq!(take(10, 0.2), Gated::Accepted { outliers: 0 });
+        assert_eq!(take(10, 0.2), Gated::Accepted { outliers: 0, undone: false });
+    }
+
+    /// Within reach of a push, but the next reading is back on the old path.
+    #[test]
+    fn an_outlier_that_was_accepted_is_undone() {
+        let mut gate = OutlierGate::default();
+        for i in 0..5 {
+            gate.take(-0.25 + f64::from(i) * 0.05, along_x(0.0), 1e-3);
+        }
+        let mut take = |i: u32, x: f64| gate.take(f64::from(i) * 0.05, along_x(x), 1e-3);
+        assert_eq!(take(0, 0.04), Gated::Accepted { outliers: 0, undone: false });
+        assert_eq!(take(1, 0.0), Gated::Accepted { outliers: 1, undone: true });
     }
 
     /// After a gap nothing says that the first reading was a good one.
@@ -241,7 +259,7 @@ mod tests {
         let mut outliers = 0;
         for i in 0..100 {
             let x = if i / 3 == 10 { 0.1 } else { 0.0 };
-            if let Gated::Accepted { outliers: n } =
+            if let Gated::Accepted { outliers: n, .. } =
                 gate.take(f64::from(i) * 0.01, along_x(x), 1e-3)
             {
                 outliers += n;

@@ -121,8 +121,8 @@ impl Settings {
             leak_s: 3.0,
             confirm_s: 0.2,
             gather_s: 0.0,
-            suspect_nats: 12.0,
-            confirm_nats: 17.0,
+            suspect_nats: 10.0,
+            confirm_nats: 14.0,
             memory: MemoryRules::default(),
         };
         match profile {

@@ -255,7 +255,12 @@ impl Pipeline {
             }
         }
         match gated {
-            Gated::Accepted { outliers } => (true, outliers),
+            Gated::Accepted { outliers, undone } => {
+                if undone {
+                    self.pause_servos();
+                }
+                (true, outliers)
+            }
             other => (other.usable(), 0),
         }
     }
@@ -295,7 +300,8 @@ impl Pipeline {
             pressed,
             still_m: STILL_FACTOR * self.noise_m(),
             usable,
-            outliers,
+            // Bounces off the rim look like outliers.
+            outliers: if self.clear_s < self.settings.window_s { 0 } else { outliers },
         });
     }
 
