@@ -122,7 +122,7 @@ impl Settings {
             confirm_s: 0.2,
             gather_s: 0.0,
             suspect_nats: 10.0,
-            confirm_nats: 14.0,
+            confirm_nats: 15.0,
             memory: MemoryRules::default(),
         };
         match profile {
