@@ -55,11 +55,11 @@ const NOISE_SHARE: f64 = 0.25;
 /// air: so often a year the evidence against a servo passes so many nats, and e
 /// times more seldom with every so many more. For true models it would be one.
 const SOAKED_NATS: f64 = 10.0;
-const SOAKED_PER_YEAR: f64 = 32.4 * 365.25;
-const NATS_PER_E: f64 = 2.15;
-/// Evidence that confirms at least, and at most: less than one push gives now
-/// and then says nothing, more than the other is not kept.
-const LEAST_NATS: f64 = 8.0;
+const SOAKED_PER_YEAR: f64 = 1.88 * 365.25;
+const NATS_PER_E: f64 = 1.7;
+/// Evidence that confirms at least, and at most: the one is passed every hour,
+/// more than the other is not kept.
+const LEAST_NATS: f64 = 6.5;
 const MOST_NATS: f64 = 36.0;
 /// Share of what confirms that makes the test fail.
 const SUSPECT_SHARE: f64 = 2.0 / 3.0;
@@ -122,7 +122,7 @@ impl Settings {
             confirm_s: 0.2,
             gather_s: 0.0,
             suspect_nats: 10.0,
-            confirm_nats: 15.0,
+            confirm_nats: 17.0,
             memory: MemoryRules::default(),
         };
         match profile {
