@@ -54,12 +54,12 @@ const NOISE_SHARE: f64 = 0.25;
 /// What `offbd soak` has measured on healthy rigs, no two alike, with hands and
 /// air: so often a year the evidence against a servo passes so many nats, and e
 /// times more seldom with every so many more. For true models it would be one.
-const SOAKED_NATS: f64 = 10.0;
-const SOAKED_PER_YEAR: f64 = 1.88 * 365.25;
-const NATS_PER_E: f64 = 1.7;
-/// Evidence that confirms at least, and at most: the one is passed every hour,
-/// more than the other is not kept.
-const LEAST_NATS: f64 = 6.5;
+const SOAKED_NATS: f64 = 8.0;
+const SOAKED_PER_YEAR: f64 = 5400.0;
+const NATS_PER_E: f64 = 1.6;
+/// Evidence that confirms at least, and at most: healthy rigs pass the one every
+/// hour, and more than the other is not kept.
+const LEAST_NATS: f64 = 7.5;
 const MOST_NATS: f64 = 36.0;
 /// Share of what confirms that makes the test fail.
 const SUSPECT_SHARE: f64 = 2.0 / 3.0;

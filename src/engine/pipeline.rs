@@ -133,7 +133,7 @@ impl Pipeline {
         self.n_judged += 1;
         self.step_twin(&moment);
         let (usable, outliers) = self.estimate(&moment, dt);
-        self.locate(setup, &moment, dt);
+        self.locate(setup, &moment, dt, usable);
         self.watch_readings(&moment, dt, usable, outliers);
         self.follow_servos(&moment, usable);
         self.unjudged_s += dt;
@@ -272,10 +272,11 @@ impl Pipeline {
     }
 
     /// Stage: how far the ball is from the edge, and for how long it has been
-    /// clear of it. An axis that is not measured does not count.
-    fn locate(&mut self, setup: &Setup, moment: &Moment, dt: f64) {
+    /// clear of it. An axis that is not measured does not count, nor does an
+    /// outlier.
+    fn locate(&mut self, setup: &Setup, moment: &Moment, dt: f64, usable: bool) {
         let seen = |a: Axis| moment.position[a];
-        if Axis::ALL.into_iter().any(|a| seen(a).is_some()) {
+        if usable && Axis::ALL.into_iter().any(|a| seen(a).is_some()) {
             let plate = &setup.rig.plate;
             let (x, y) = (seen(Axis::X).unwrap_or(0.0), seen(Axis::Y).unwrap_or(0.0));
             let room = setup.rig.ball.radius_m() + EDGE_MARGIN_M;
