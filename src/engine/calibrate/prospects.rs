@@ -7,13 +7,11 @@
 //! commands answer what the fault adds, as those of a controller of
 //! [`CONTROL_RAD_S`] that is well damped.
 
-use crate::diagnosis::{
-    AxisCalibration, Calibration, FaultMemory, Profile, Prospects, ServoProspects,
-};
+use crate::diagnosis::{Calibration, FaultMemory, Prospects, ServoProspects};
 use crate::engine::frame::{Moment, moment};
 use crate::engine::{AxisMapping, Engine, Input, Output, Rig, Setup};
 use crate::maths::median;
-use crate::plant::{RollingState, ServoModel, Twin, TwinAxis, TwinModel};
+use crate::plant::{RollingState, Twin};
 use crate::vocabulary::{Axis, FaultCode, FaultStatus, PerAxis, Sample};
 
 /// Moments, over all sessions, at which a fault is put in.
@@ -69,7 +67,7 @@ pub(super) fn prospects(rig: &Rig, sessions: &[Vec<Sample>]) -> Option<Prospects
         (span > 0.0).then(|| Course::new(rig, samples, span, (ONSETS as f64 * span / total).ceil()))
     };
     let courses: Vec<Course> = sessions.iter().zip(&spans).filter_map(course).collect();
-    let trials = Trials::new(rig, learnt, &setup, &courses);
+    let trials = Trials::new(rig, &setup, &courses);
     (!trials.starts.is_empty()).then(|| trials.prospects(learnt))
 }
 
@@ -119,25 +117,6 @@ fn sample(moment: &Moment) -> Sample {
     }
 }
 
-/// The rig as learnt.
-fn model(rig: &Rig, learnt: &Calibration) -> Option<TwinModel> {
-    let spec = &rig.servo;
-    let axis = |learnt: AxisCalibration| {
-        let lag_s = learnt.lag_s;
-        Some(TwinAxis {
-            servo: ServoModel::new(spec.angle_limit_rad, lag_s, spec.rate_limit_rad_s).ok()?,
-            dead_time_s: learnt.dead_time_s,
-            gain: learnt.gain,
-            level_rad: learnt.level_rad,
-            resistance_m_s2: 0.0,
-        })
-    };
-    let x = axis(learnt.axes.x.or(learnt.axes.y)?)?;
-    let y = axis(learnt.axes.y.or(learnt.axes.x)?)?;
-    let ladder = rig.ladder(Profile::Default);
-    Some(TwinModel { ladder, axes: PerAxis { x, y } })
-}
-
 /// A session judged up to here, in which nothing was found.
 struct Start<'a> {
     course: &'a Course,
@@ -152,12 +131,11 @@ struct Trials<'a> {
 }
 
 impl<'a> Trials<'a> {
-    fn new(rig: &'a Rig, learnt: &Calibration, setup: &Setup, courses: &'a [Course]) -> Self {
+    fn new(rig: &'a Rig, setup: &Setup, courses: &'a [Course]) -> Self {
         let mut starts = Vec::new();
-        let Some(model) = model(rig, learnt) else { return Self { rig, starts } };
         for course in courses {
             let mut engine = Engine::new(setup.clone(), FaultMemory::default());
-            let mut twin = Twin::new(model);
+            let mut twin = Twin::new(setup.twin);
             let mut outputs = Vec::new();
             for (i, m) in course.moments.iter().enumerate() {
                 if course.onsets.contains(&i) && !outputs.iter().any(|o| confirmed(o).is_some()) {
