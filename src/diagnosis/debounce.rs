@@ -36,17 +36,25 @@ pub struct Pace {
 impl Pace {
     /// The pace of `code`'s monitor: a loose contact comes and goes; readings
     /// and a ball are given up on sooner, for a disturbance shows in them too.
+    /// The ball of a learnt rig that stands fails as soon as readings do, unless
+    /// it has a `rival`: another cause that reads alike, which has to have its
+    /// time to show.
     #[must_use]
-    pub const fn of(code: FaultCode, settings: &Settings) -> Self {
+    pub const fn of(code: FaultCode, rival: bool, settings: &Settings) -> Self {
         let Settings { fail_s, confirm_s, pass_s, .. } = *settings;
         match code {
             FaultCode::XServo | FaultCode::YServo => {
                 Self { fail_s, confirm_s, pass_s, leak_s: settings.leak_s }
             }
-            FaultCode::StuckBall => Self { fail_s, confirm_s, pass_s, leak_s: pass_s },
-            FaultCode::Sensor => {
-                Self { fail_s: settings.readings_fail_s, confirm_s, pass_s, leak_s: pass_s }
+            FaultCode::StuckBall if rival || !settings.learnt => {
+                Self { fail_s, confirm_s, pass_s, leak_s: pass_s }
             }
+            FaultCode::StuckBall | FaultCode::Sensor => Self {
+                fail_s: settings.readings_fail_s,
+                confirm_s: settings.readings_confirm_s,
+                pass_s,
+                leak_s: pass_s,
+            },
         }
     }
 }
@@ -174,7 +182,7 @@ mod tests {
             let mut take = |test, seconds: f64| {
                 let n = (seconds / 0.01).round() as usize;
                 let tripped = |_| {
-                    debounce.update(test, 0.01, &Pace::of(FaultCode::XServo, &settings))
+                    debounce.update(test, 0.01, &Pace::of(FaultCode::XServo, false, &settings))
                         == Qualified::Tripped
                 };
                 (0..n).any(tripped)
@@ -188,11 +196,23 @@ mod tests {
     }
 
     #[test]
+    fn a_ball_that_stands_fails_sooner_where_it_can_be_nothing_else() {
+        let settings = Settings { learnt: true, ..Settings::default() };
+        let fails = |rival, after_s: f64| {
+            let mut debounce = Debounce::default();
+            let pace = Pace::of(FaultCode::StuckBall, rival, &settings);
+            debounce.update(Test::Prefailed, after_s, &pace) == Qualified::Failed
+        };
+        assert_eq!([0.25, 0.35].map(|s| fails(false, s)), [false, true]);
+        assert_eq!([0.55, 0.65].map(|s| fails(true, s)), [false, true]);
+    }
+
+    #[test]
     fn no_debounce_means_at_once() {
         let mut debounce = Debounce::default();
         let settings = Settings::of(Profile::Textbook);
         assert_eq!(
-            debounce.update(Test::Prefailed, 0.0, &Pace::of(FaultCode::XServo, &settings)),
+            debounce.update(Test::Prefailed, 0.0, &Pace::of(FaultCode::XServo, false, &settings)),
             Qualified::Tripped
         );
         assert_eq!(debounce.counter(), 127);

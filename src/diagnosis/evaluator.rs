@@ -66,6 +66,8 @@ pub struct Surroundings {
     pub over_the_edge: bool,
     /// Seconds since readings stepped as no ball can; infinite if never.
     pub since_jump_s: f64,
+    /// Scatter of the readings that is noise, m.
+    pub noisy_m: f64,
 }
 
 /// What one monitor says of one moment.
@@ -166,10 +168,12 @@ impl Evaluator {
         [servo(Axis::X), servo(Axis::Y), stuck, sensor]
     }
 
-    /// Scatter of the readings that is noise, m.
+    /// Scatter of the readings that is noise, m, where healthy ones blur by
+    /// `blur_m` because of the ball's motion.
     #[must_use]
-    pub fn noisy_m(&self) -> f64 {
-        (NOISY * self.limits.x.noise_m.max(self.limits.y.noise_m)).max(QUIET_M)
+    pub fn noisy_m(&self, blur_m: f64) -> f64 {
+        let noise_m = self.limits.x.noise_m.max(self.limits.y.noise_m);
+        (NOISY * (noise_m * noise_m + blur_m * blur_m).sqrt()).max(QUIET_M)
     }
 
     fn sensor(&self, evidence: &Evidence, readings: &Stillness, around: &Surroundings) -> Finding {
@@ -190,7 +194,7 @@ impl Evaluator {
         }
         // A bounce off the rim is no parabola.
         let rolls = around.clear_s >= evidence.window_s;
-        if rolls && evidence.scatter_m.is_some_and(|s| s > self.noisy_m()) {
+        if rolls && evidence.scatter_m.is_some_and(|s| s > around.noisy_m) {
             return Finding::fail(Some(FaultKind::Noise));
         }
         frozen(readings, around).unwrap_or(Finding::PASS)
@@ -308,6 +312,7 @@ mod tests {
             rim_s: 1.0,
             over_the_edge: false,
             since_jump_s: f64::INFINITY,
+            noisy_m: 1.0,
         };
         let mut x = AxisEvidence {
             command_rad: Some(0.1),
@@ -333,6 +338,7 @@ mod tests {
             rim_s: 0.0,
             over_the_edge: false,
             since_jump_s: f64::INFINITY,
+            noisy_m: 1.0,
         };
         let reading = Reading {
             dt: 0.5,
@@ -354,6 +360,33 @@ mod tests {
     fn a_servo_that_was_suspected_while_the_ball_rolled_explains_why_it_stands() {
         assert_eq!(standing(0.0), Test::Prefailed);
         assert_eq!(standing(EXPLAINED_NATS), Test::NotTested);
+    }
+
+    /// Readings that scatter by 2 mm, of a ball that is clear of the edge and
+    /// moves `blur_m` within the uncertainty of a reading's time.
+    fn scattered(noise_m: f64, clear_s: f64, blur_m: f64) -> Test {
+        let mut limit = Limits::new(Profile::Default, None, 7.0);
+        limit.noise_m = noise_m;
+        let evaluator = Evaluator::new(Profile::Default, PerAxis::from_fn(|_| limit));
+        let around = Surroundings {
+            clear_s,
+            at_edge: false,
+            rim: None,
+            rim_s: 0.0,
+            over_the_edge: false,
+            since_jump_s: f64::INFINITY,
+            noisy_m: evaluator.noisy_m(blur_m),
+        };
+        let evidence = Evidence { scatter_m: Some(2e-3), window_s: 0.5, ..Evidence::default() };
+        evaluator.sensor(&evidence, &Stillness::default(), &around).test
+    }
+
+    #[test]
+    fn scatter_is_noise_where_neither_rim_nor_motion_makes_it() {
+        assert_eq!(scattered(3e-4, 1.0, 0.0), Test::Prefailed);
+        assert_eq!(scattered(5e-4, 1.0, 0.0), Test::Prepassed, "it was so when healthy");
+        assert_eq!(scattered(3e-4, 0.4, 0.0), Test::Prepassed, "it has bounced off the rim");
+        assert_eq!(scattered(3e-4, 1.0, 4e-4), Test::Prepassed, "it is fast");
     }
 
     #[test]

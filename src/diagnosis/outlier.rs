@@ -120,10 +120,10 @@ impl OutlierGate {
         let held = self.track.map_or(Vector2::zeros(), |t| t.position_m);
         let position_m =
             Vector2::new(position_m.x.unwrap_or(held.x), position_m.y.unwrap_or(held.y));
-        let Some(track) = self.track else {
-            return self.accept(Track::start(t_s, position_m, 1));
-        };
         let reach = |from_s: f64| NOISE_FACTOR * noise_m + PUSH_M_S * (t_s - from_s);
+        let Some(track) = self.track else {
+            return self.begin(t_s, position_m, reach);
+        };
         let off_m = track.off_m(t_s, position_m);
         // The longer the old place has not been read, the farther the ball may
         // have come; readings that stay at a new one still speak for a step.
@@ -145,6 +145,21 @@ impl OutlierGate {
             return Gated::Accepted { outliers, undone: true };
         }
         self.refuse(t_s, position_m, staying, &track, noise_m)
+    }
+
+    /// A reading where there is no track yet: refused until the next one agrees,
+    /// for it may be an outlier, or until a few have not, for the ball may be
+    /// faster than a push.
+    fn begin(&mut self, t_s: f64, position_m: Vector2<f64>, reach: impl Fn(f64) -> f64) -> Gated {
+        let before = self.elsewhere.take();
+        let n = before.map_or(1, |e| e.n + 1);
+        let agrees = |e: Elsewhere| (position_m - e.position_m).amax() <= reach(e.at_s);
+        if n >= BELIEVED_AFTER || before.is_some_and(agrees) {
+            return self.accept(Track::start(t_s, position_m, n));
+        }
+        let (since_s, first_m, at_s) = (t_s, position_m, t_s);
+        self.elsewhere = Some(Elsewhere { since_s, first_m, at_s, position_m, n, distinct: 1 });
+        Gated::Refused
     }
 
     /// A reading off the track: refused, until enough of them have stayed.
@@ -251,6 +266,26 @@ mod tests {
             let gated = gate.take(f64::from(i) * 0.02, along_x(0.0), 1e-3);
             assert_ne!(gated, Gated::Stepped, "{i}");
         }
+    }
+
+    /// Neither is that reading used: what is judged would start from it.
+    #[test]
+    fn the_first_reading_waits_for_one_that_agrees() {
+        let mut gate = OutlierGate::default();
+        let mut take = |t: f64, x: f64| gate.take(t, along_x(x), 1e-3).usable();
+        let readings = [(0.0, 0.1), (0.02, 0.0), (0.04, 0.001)];
+        assert_eq!(readings.map(|(t, x)| take(t, x)), [false, false, true]);
+    }
+
+    /// A ball that rolls faster than a push could make it.
+    #[test]
+    fn a_fast_ball_is_followed_within_a_few_readings() {
+        let mut gate = OutlierGate::default();
+        let mut take = |i: u32| {
+            let t = f64::from(i) * 0.02;
+            gate.take(t, along_x(1.5 * t), 1e-3).usable()
+        };
+        assert_eq!([0, 1, 2, 3].map(&mut take), [false, false, false, true]);
     }
 
     #[test]

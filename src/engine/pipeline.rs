@@ -38,6 +38,9 @@ const STILL_FACTOR: f64 = 6.0;
 /// Acceleration that moving air gives a ping-pong ball, m/s²: half of what a
 /// fan at arm's length does.
 const GUST_M_S2: f64 = 0.03;
+/// Uncertainty of the time of a reading, in sample periods: devices send what
+/// they read up to a tenth of a period late.
+const TIMING_SHARE: f64 = 0.1;
 /// What one reading may add to the scatter, in limits of it.
 const SCATTER_LIMITS: f64 = 2.0;
 /// Stillness after which a ball counts as at rest, s.
@@ -66,6 +69,8 @@ pub struct Pipeline {
     rim: Option<Axis>,
     rim_s: f64,
     since_jump_s: f64,
+    /// Scatter of the readings that is noise now, m.
+    noisy_m: f64,
     unjudged_s: f64,
     evidence: Evidence,
     watches: [Watch; FaultCode::COUNT],
@@ -113,6 +118,7 @@ impl Pipeline {
             rim: None,
             rim_s: 0.0,
             since_jump_s: f64::INFINITY,
+            noisy_m: 0.0,
             unjudged_s: f64::INFINITY,
             evidence: Evidence::default(),
             watches: Default::default(),
@@ -142,6 +148,7 @@ impl Pipeline {
             let dt = self.unjudged_s.min(self.settings.period_s + dt);
             self.unjudged_s = 0.0;
             self.look.fit();
+            self.noisy_m = self.noise_limit_m();
             self.collect_evidence(&moment);
             let around = self.surroundings();
             let findings = self.evaluator.evaluate(&self.evidence, &self.readings, &around);
@@ -242,25 +249,25 @@ impl Pipeline {
             return (true, 0);
         }
         let gated = self.gate.take(t, moment.position, self.noise_m());
-        if gated == Gated::Stepped {
-            self.forget();
-            self.since_jump_s = 0.0;
+        match gated {
+            Gated::Stepped => {
+                self.forget();
+                self.since_jump_s = 0.0;
+            }
+            // The window holds a reading that should not be in it.
+            Gated::Accepted { undone: true, .. } => self.forget(),
+            Gated::Accepted { .. } | Gated::Refused => {}
         }
         for (i, axis) in Axis::ALL.into_iter().enumerate() {
             if let (true, Some(position)) = (gated.usable(), moment.position[axis]) {
                 let least_s = self.least_window_s();
                 self.look.push(axis, t, position, predicted[i], least_s);
-                let most_m = SCATTER_LIMITS * self.evaluator.noisy_m();
+                let most_m = SCATTER_LIMITS * self.noisy_m;
                 self.scatter[axis].take(t, position - predicted[i], most_m);
             }
         }
         match gated {
-            Gated::Accepted { outliers, undone } => {
-                if undone {
-                    self.pause_servos();
-                }
-                (true, outliers)
-            }
+            Gated::Accepted { outliers, .. } => (true, outliers),
             other => (other.usable(), 0),
         }
     }
@@ -383,6 +390,15 @@ impl Pipeline {
         }
     }
 
+    /// Scatter of the readings that is noise now, m: a reading blurs by as much
+    /// as the ball moves within the uncertainty of its time.
+    fn noise_limit_m(&self) -> f64 {
+        let speed = |axis: Axis| self.look.fits[axis].map_or(0.0, |f| f.measured.velocity);
+        let (x, y) = (speed(Axis::X), speed(Axis::Y));
+        let within_s = TIMING_SHARE * self.period_s.unwrap_or(0.0);
+        self.evaluator.noisy_m((x * x + y * y).sqrt() * within_s)
+    }
+
     const fn surroundings(&self) -> Surroundings {
         Surroundings {
             clear_s: self.clear_s,
@@ -391,6 +407,7 @@ impl Pipeline {
             rim_s: self.rim_s,
             over_the_edge: self.at_edge && self.open_edge,
             since_jump_s: self.since_jump_s,
+            noisy_m: self.noisy_m,
         }
     }
 

@@ -60,7 +60,8 @@ impl Watch {
             true => Test::Prefailed,
             false => finding.test,
         };
-        let timed = self.debounce.update(test, dt, &Pace::of(code, settings));
+        let timed =
+            self.debounce.update(test, dt, &Pace::of(code, finding.rival.is_some(), settings));
         let gathered_s = rising.map_or(0.0, |since| at - since);
         let weighed = match gathered_s >= settings.gather_s {
             true => self.weigh(finding, settings),

@@ -74,12 +74,23 @@ impl Table {
             return *state;
         }
         if fault == Some(BallFault::Glued) || self.rests(before, tilt[0], push, fault) {
-            return BallState { rolling: at_rest(before), lost: false };
+            return BallState { rolling: self.spun_down(at_rest(before), fault, h), lost: false };
         }
         let drag = self.drag(before, fault);
         let plate = tilt.map(|tilt| tilt.motion().pushed(push + drag));
         let after = self.rolling.rk4(before, plate.each_ref(), h);
-        self.at_the_edge(stopped_by(before, after, drag))
+        let after = self.spun_down(stopped_by(before, after, drag), fault, h);
+        self.at_the_edge(after)
+    }
+
+    /// The spin about the normal is braked as rolling is: by a couple of the
+    /// weight times the reach of the contact, which is rolling_rad·r. Without it
+    /// a ball that circles would spin faster without end.
+    fn spun_down(&self, state: RollingState, fault: Option<BallFault>, h: f64) -> RollingState {
+        let kappa = self.ball.inertia_factor();
+        let couple = self.resistance(self.surface.rolling_rad, fault) * (1.0 + kappa);
+        let braked = couple / (kappa * self.ball.radius_m()) * h;
+        RollingState { spin: state.spin.signum() * (state.spin.abs() - braked).max(0.0), ..state }
     }
 
     /// The resistance as an acceleration of a rolling ball, m/s².
@@ -186,6 +197,19 @@ mod tests {
         let rolled = run(&table(true), rest, 0.02, None, 500).rolling.position.x;
         let expected = 9.81 / 1.4 * (0.02_f64.sin() - 0.002_f64.sin()) / 8.0;
         assert!((rolled / expected - 1.0).abs() < 5e-3, "{rolled} m is not {expected} m");
+    }
+
+    /// Couple m·g·rolling_rad·r on an inertia κ·m·r².
+    #[test]
+    fn validate_that_a_ball_that_spins_on_the_spot_is_braked() {
+        let spinning = RollingState { spin: -20.0, ..RollingState::default() };
+        let from = BallState { rolling: spinning, lost: false };
+        let rate = 9.81 * 0.002_f64.sin() / (0.4 * Ball::default().radius_m());
+        for seconds in [2, 8] {
+            let spin = run(&table(true), from, 0.0, None, 1000 * seconds).rolling.spin;
+            let wanted = -(20.0 - rate * f64::from(seconds)).max(0.0);
+            assert!((spin - wanted).abs() < 1e-9, "{spin} is not {wanted}");
+        }
     }
 
     #[test]

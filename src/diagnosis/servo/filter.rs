@@ -105,7 +105,7 @@ impl Filter {
     /// Carries the estimate over `step`.
     pub(super) fn predict(&mut self, step: &Step) {
         let Step { dt, forcing, density } = *step;
-        let keep = self.prior.memory_s.map(|memory_s| (-dt / memory_s).exp());
+        let keep = self.prior.memory_s.map(|memory_s| memory_s / (memory_s + dt));
         let x = &mut self.state;
         let forced = |row: usize, of: &dyn Fn(usize) -> f64| -> f64 {
             (0..PARAMETERS).map(|k| forcing[k][row] * of(2 + k)).sum()
@@ -159,9 +159,12 @@ impl Filter {
         let likelihood = |s: f64| -0.5 * (innovation * innovation / s + s.ln());
         let reach = PUSH_M_S * PUSH_M_S;
         let plain = likelihood(p[0][0] + variance);
-        let pushed = likelihood(p[0][0] + reach * dt * dt / 3.0 + variance) - PUSH_NATS;
+        // Nearer than that no push can be the likelier explanation.
+        let far = innovation * innovation > 2.0 * PUSH_NATS * (p[0][0] + variance);
+        let wide = reach * dt * dt / 3.0;
+        let pushed = if far { likelihood(p[0][0] + wide + variance) - PUSH_NATS } else { plain };
         if pushed > plain {
-            p[0][0] += reach * dt * dt / 3.0;
+            p[0][0] += wide;
             p[0][1] += reach * dt / 2.0;
             p[1][0] += reach * dt / 2.0;
             p[1][1] += reach;
