@@ -192,9 +192,11 @@ fn verdict(session: &Judged) -> String {
     let confirmed = FaultStatus::Confirmed.as_str();
     let mut words: Vec<String> = Vec::new();
     for code in &session.summary.faults {
-        let is_first = |f: &&FaultView| f.code == *code && f.status == confirmed;
-        let Some(fault) = session.faults.iter().find(is_first) else { continue };
-        words.push(format!("{} at {:.2} s", named(fault), fault.t_s));
+        let of_code = || session.faults.iter().filter(|f| f.code == *code && f.status == confirmed);
+        let Some(first) = of_code().next() else { continue };
+        // The kind may have shown only later.
+        let kind = of_code().find(|f| f.kind.is_some());
+        words.push(format!("{} at {:.2} s", named(kind.unwrap_or(first)), first.t_s));
     }
     match (words.is_empty(), session.faults.is_empty()) {
         (false, _) => words.join(", "),

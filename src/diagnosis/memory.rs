@@ -201,6 +201,19 @@ impl FaultMemory {
         record.status != before
     }
 
+    /// The kind of a fault on record may show only after its confirmation: takes
+    /// `suspicion` where it says one and the record does not. Returns whether it
+    /// did.
+    pub fn name(&mut self, code: FaultCode, suspicion: &Suspicion) -> bool {
+        let record = self.record_mut(code);
+        let named = record.kind().is_none() && suspicion.kind.is_some();
+        let named = named && record.status.test_failed() && record.status.confirmed();
+        if named {
+            record.suspicion = Some(suspicion.clone());
+        }
+        named
+    }
+
     /// PASSED for `code`. Returns whether the byte changed.
     pub fn passed(&mut self, code: FaultCode) -> bool {
         let record = self.record_mut(code);

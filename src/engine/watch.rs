@@ -128,9 +128,11 @@ impl Watch {
                     self.announce(code, evidence, memory, outputs);
                 }
             }
-            Qualified::Failed if failed => {}
+            Qualified::Failed if failed => self.name(code, evidence, memory, outputs),
             Qualified::Failed => self.fail(code, evidence, memory, outputs),
-            Qualified::Tripped if failed && record.tripped_this_cycle => {}
+            Qualified::Tripped if failed && record.tripped_this_cycle => {
+                self.name(code, evidence, memory, outputs);
+            }
             Qualified::Tripped => {
                 if !failed {
                     self.fail(code, evidence, memory, outputs);
@@ -150,6 +152,20 @@ impl Watch {
         outputs: &mut Vec<Output>,
     ) {
         if memory.failed(code, &self.suspicion(code, evidence), evidence) {
+            self.announce(code, evidence, memory, outputs);
+        }
+    }
+
+    /// Tells the kind of a fault that was confirmed before it showed.
+    fn name(
+        &self,
+        code: FaultCode,
+        evidence: &Evidence,
+        memory: &mut FaultMemory,
+        outputs: &mut Vec<Output>,
+    ) {
+        let unnamed = self.kind.is_some() && memory.record(code).kind().is_none();
+        if unnamed && memory.name(code, &self.suspicion(code, evidence)) {
             self.announce(code, evidence, memory, outputs);
         }
     }

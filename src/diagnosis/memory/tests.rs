@@ -132,6 +132,21 @@ fn clearing_and_acknowledging_are_different_acts() {
 }
 
 #[test]
+fn a_kind_is_told_once_and_only_of_a_confirmed_failure() {
+    let mut bench = Bench::new(1, true);
+    let of = |kind| Suspicion { kind, ..Suspicion::default() };
+    let (dead, held) = (of(Some(FaultKind::Dead)), of(Some(FaultKind::Held)));
+    assert!(!bench.memory.name(CODE, &dead), "nothing has failed");
+    bench.memory.failed(CODE, &of(None), &Evidence::default());
+    assert!(!bench.memory.name(CODE, &dead), "it is pending");
+    bench.failed();
+    assert!(!bench.memory.name(CODE, &of(None)));
+    assert!(bench.memory.name(CODE, &dead));
+    assert!(!bench.memory.name(CODE, &held), "it has a kind");
+    assert_eq!(bench.memory.record(CODE).kind(), Some(FaultKind::Dead));
+}
+
+#[test]
 fn occurrences_remember_the_first_and_the_last_onset() {
     let mut bench = Bench::new(1, false);
     let at = |t_s: f64| Suspicion { onset: SimTime::new(t_s), ..Suspicion::default() };
