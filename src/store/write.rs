@@ -1,9 +1,11 @@
 //! The one writer: groups of changes, one transaction each, durable on return.
 
+use std::collections::HashSet;
 use std::time::Duration;
 
 use sqlx::{AnyConnection, Connection};
 
+use super::journal::{Changes, Journal};
 use super::rows_at_once::{RowsAtOnce, in_parts};
 use super::tail::{Run, Tails};
 use super::{
@@ -15,6 +17,13 @@ use crate::vocabulary::Sample;
 /// How long a commit may take before its connection is given up. A disk that
 /// is slower than this cannot carry the service.
 const COMMIT_WAIT: Duration = Duration::from_secs(30);
+
+/// Transactions at least in which a full journal is folded, so that nobody waits
+/// long for one.
+const FOLDS: usize = 16;
+
+/// Bytes folded in one transaction while nobody waits.
+const FOLD_BYTES: usize = 1 << 20;
 
 /// One change.
 #[derive(Clone, Debug)]
@@ -82,9 +91,32 @@ pub struct Writer {
     n_commits: i64,
     /// Whether it writes beside the one that counts.
     guest: bool,
-    /// Whether a transaction may have come through that is not counted yet.
-    in_doubt: bool,
+    /// Of the transaction that may have come through and is not counted yet.
+    in_doubt: Option<Changes>,
     tails: Tails,
+    journal: Journal,
+    /// Sessions that the database did not let be folded. They take no more until
+    /// it does.
+    refused: HashSet<String>,
+    /// The journal's bytes at the last [`Writer::fold`].
+    n_bytes_before: usize,
+}
+
+/// Where sessions go that are in the journal.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Way {
+    /// Into their chunks.
+    #[default]
+    Fold,
+    /// To the journal's end.
+    Carry,
+}
+
+/// What a transaction does beside its sets.
+#[derive(Debug, Default)]
+struct Moves {
+    sessions: Vec<String>,
+    way: Way,
 }
 
 impl Writer {
@@ -93,9 +125,23 @@ impl Writer {
         MIGRATIONS.run_direct(None, &mut connection, false).await?;
         let last_id = counter(&mut connection, "event").await?;
         let n_commits = counter(&mut connection, "commit").await?;
-        let place = place.clone();
-        let (connection, tails) = (Some(connection), Tails::default());
-        Ok(Self { place, connection, last_id, n_commits, guest, in_doubt: false, tails })
+        let journal = Journal::load(&mut connection).await?;
+        Ok(Self {
+            place: place.clone(),
+            connection: Some(connection),
+            last_id,
+            n_commits,
+            guest,
+            in_doubt: None,
+            tails: Tails::default(),
+            journal,
+            refused: HashSet::new(),
+            n_bytes_before: 0,
+        })
+    }
+
+    pub(super) fn journal(&self) -> Journal {
+        self.journal.clone()
     }
 
     /// Applies the sets, in order, in one transaction that is durable on
@@ -106,19 +152,80 @@ impl Writer {
     /// come through all the same: [`Writer::reconnect`] knows. Otherwise
     /// nothing of any set has been applied.
     pub async fn commit(&mut self, sets: &mut [&mut Vec<Write>]) -> Result<(), StoreError> {
+        self.transact(sets, None).await
+    }
+
+    /// Folds what has been in the journal longest, if the journal has more than
+    /// `above` bytes: twice as much as has come since the last call, so that it
+    /// stays below twice `above` and what one group brings.
+    ///
+    /// A session whose chunks the database refuses stays in the journal. It takes
+    /// no more samples until the database takes those.
+    ///
+    /// # Errors
+    /// As for [`Writer::commit`].
+    pub async fn fold(&mut self, above: usize) -> Result<(), StoreError> {
+        let n_bytes = self.journal.n_bytes();
+        let grown = n_bytes.saturating_sub(self.n_bytes_before);
+        if n_bytes > above {
+            let sessions = self.journal.oldest((above / FOLDS).max(2 * grown), &HashSet::new());
+            self.fold_these(sessions).await?;
+        }
+        self.n_bytes_before = self.journal.n_bytes();
+        Ok(())
+    }
+
+    async fn fold_all(&mut self) -> Result<(), StoreError> {
+        while self.journal.n_bytes() > 0 {
+            let sessions = self.journal.oldest(FOLD_BYTES, &self.refused);
+            let done = sessions.is_empty();
+            self.fold_these(sessions).await?;
+            if done {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    async fn fold_these(&mut self, sessions: Vec<String>) -> Result<(), StoreError> {
+        let moves = Moves { sessions, way: Way::Fold };
+        match self.transact(&mut [], Some(&moves)).await {
+            Err(error) if !error.is_outage() => self.fold_each(moves.sessions).await,
+            result => result,
+        }
+    }
+
+    /// Folds each of `sessions` on its own, those that can be.
+    async fn fold_each(&mut self, sessions: Vec<String>) -> Result<(), StoreError> {
+        for session in sessions {
+            let mut moves = Moves { sessions: vec![session.clone()], way: Way::Fold };
+            let Err(error) = self.transact(&mut [], Some(&moves)).await else { continue };
+            if error.is_outage() {
+                return Err(error);
+            }
+            tracing::error!(session, %error, "a recording cannot be stored; it takes no more");
+            moves.way = Way::Carry;
+            self.transact(&mut [], Some(&moves)).await?;
+            self.refused.insert(session);
+        }
+        Ok(())
+    }
+
+    async fn transact(
+        &mut self,
+        sets: &mut [&mut Vec<Write>],
+        moves: Option<&Moves>,
+    ) -> Result<(), StoreError> {
         if self.connection.is_none() && self.reconnect().await? {
             // Whoever asked for that one has not waited for its outcome.
             tracing::warn!("a commit came through that was given up");
         }
         let last_id = self.last_id;
         let late = |_| Err(sqlx::Error::Io(std::io::ErrorKind::TimedOut.into()).into());
-        let attempt = tokio::time::timeout(COMMIT_WAIT, self.attempt(sets));
+        let attempt = tokio::time::timeout(COMMIT_WAIT, self.attempt(sets, moves));
         let result = attempt.await.unwrap_or_else(late);
         match &result {
-            Ok(()) => {
-                self.n_commits += i64::from(!self.guest);
-                self.in_doubt = false;
-            }
+            Ok(()) => self.came_through(),
             Err(_) => {
                 // A connection that failed may be in any state: a new one is not.
                 self.connection = None;
@@ -142,42 +249,71 @@ impl Writer {
             .execute(&mut connection)
             .await?;
         let found = counter(&mut connection, "commit").await?;
-        let came_through = self.in_doubt && found == self.n_commits + 1;
+        let came_through = self.in_doubt.is_some() && found == self.n_commits + 1;
         if found != self.n_commits && !came_through {
             return Err(StoreError::Overtaken { expected: self.n_commits, found });
         }
         self.last_id = counter(&mut connection, "event").await?;
-        self.n_commits = found;
-        self.in_doubt = false;
+        if came_through {
+            self.came_through();
+        }
+        self.in_doubt = None;
         self.connection = Some(connection);
         Ok(came_through)
     }
 
-    /// Closes the connection, its journal folded into the database file.
+    /// Takes note of the last transaction.
+    fn came_through(&mut self) {
+        self.n_commits += i64::from(!self.guest);
+        if let Some(changes) = self.in_doubt.take() {
+            self.refused.retain(|session| !changes.gone.contains(session));
+            self.journal.apply(changes);
+        }
+    }
+
+    /// Folds what is in the journal and closes the connection.
     ///
     /// # Errors
-    /// [`StoreError`] if the last checkpoint fails; all commits stay durable.
-    pub async fn close(self) -> Result<(), StoreError> {
+    /// [`StoreError`] if that fails; all commits stay durable.
+    pub async fn close(mut self) -> Result<(), StoreError> {
+        if !self.guest {
+            self.fold_all().await?;
+        }
         match self.connection {
             Some(connection) => Ok(connection.close().await?),
             None => Ok(()),
         }
     }
 
-    async fn attempt(&mut self, sets: &mut [&mut Vec<Write>]) -> Result<(), StoreError> {
+    async fn attempt(
+        &mut self,
+        sets: &mut [&mut Vec<Write>],
+        moves: Option<&Moves>,
+    ) -> Result<(), StoreError> {
         let Some(connection) = &mut self.connection else {
             return Err(sqlx::Error::PoolClosed.into());
         };
         let mut transaction = connection.begin_with(self.place.begin()).await?;
-        let mut group =
-            Group { last_id: &mut self.last_id, tails: &mut self.tails, pending: Vec::new() };
+        let mut group = Group {
+            number: self.n_commits + 1,
+            last_id: &mut self.last_id,
+            tails: &mut self.tails,
+            journal: &self.journal,
+            refused: &self.refused,
+            changes: Changes::default(),
+            pending: Vec::new(),
+        };
         for write in sets.iter_mut().flat_map(|set| set.iter_mut()) {
             group.apply(&mut transaction, write).await?;
         }
+        if let Some(moves) = moves {
+            group.relocate(&mut transaction, moves).await?;
+        }
         group.flush(&mut transaction).await?;
+        let changes = group.changes;
         if !self.guest {
             count(&mut transaction, self.n_commits, self.last_id).await?;
-            self.in_doubt = true;
+            self.in_doubt = Some(changes);
         }
         Ok(transaction.commit().await?)
     }
@@ -209,10 +345,15 @@ async fn count(db: &mut AnyConnection, n_commits: i64, last_id: i64) -> Result<(
 
 /// The transaction at hand.
 struct Group<'a> {
+    /// Counts the transactions; the row of the journal.
+    number: i64,
     last_id: &'a mut i64,
     tails: &'a mut Tails,
+    journal: &'a Journal,
+    refused: &'a HashSet<String>,
+    changes: Changes,
     /// Samples that wait for the end of the group, so that consecutive batches
-    /// of a session become one chunk.
+    /// of a session become one run.
     pending: Vec<Run>,
 }
 
@@ -246,20 +387,19 @@ impl Group<'_> {
             Write::UpdateAsset(row) => update_asset(db, row).await,
             Write::OpenSession(row) => open_session(db, row).await,
             Write::EndSession { session, ended_at, verdict, hash } => {
-                self.flush(db).await?;
-                self.tails.finish(db, session).await?;
+                self.finish(db, session).await?;
                 end_session(db, session, *ended_at, verdict, hash).await
             }
             Write::DeleteSession { session } => {
-                self.flush(db).await?;
-                self.tails.forget();
+                self.forget(session);
                 delete(db, "DELETE FROM session WHERE id = $1", session).await
             }
             Write::ExpireSession { session, at } => expire(db, session, *at).await,
             Write::DropChunks { session, limit } => drop_chunks(db, session, *limit).await,
             Write::DeleteAsset { name } => {
-                self.flush(db).await?;
-                self.tails.forget();
+                if let Some(session) = open_session_of(db, name).await? {
+                    self.forget(&session);
+                }
                 delete(db, "DELETE FROM asset WHERE name = $1", name).await
             }
         }
@@ -276,11 +416,78 @@ impl Group<'_> {
         self.pending.push(Run { session, first_index, samples, progress });
     }
 
-    async fn flush(&mut self, db: &mut AnyConnection) -> Result<(), StoreError> {
-        let runs = std::mem::take(&mut self.pending);
-        self.tails.append(db, &runs).await?;
-        put_progress(db, &runs).await
+    /// The samples of `session` that wait, behind those in the journal.
+    fn take(&mut self, session: &str) -> Result<Option<Run>, StoreError> {
+        let held = self.journal.run(session)?;
+        let at = self.pending.iter().position(|run| run.session == session);
+        let new = at.map(|at| self.pending.swap_remove(at));
+        Ok(match (held, new) {
+            (Some(held), Some(new)) => Some(held.followed_by(new)),
+            (held, new) => held.or(new),
+        })
     }
+
+    /// `session` is deleted: nothing of it is left to be folded.
+    fn forget(&mut self, session: &str) {
+        self.pending.retain(|run| run.session != session);
+        self.tails.forget();
+        self.changes.gone.insert(session.to_owned());
+    }
+
+    /// Folds all of `session`, which ends.
+    async fn finish(&mut self, db: &mut AnyConnection, session: &str) -> Result<(), StoreError> {
+        let run = self.take(session)?;
+        put_progress(db, run.as_slice()).await?;
+        let run = run.unwrap_or_else(|| Run::nothing(session));
+        self.tails.finish(db, &run).await?;
+        self.changes.gone.insert(run.session);
+        Ok(())
+    }
+
+    /// Folds what must be, appends the rest to the journal.
+    async fn flush(&mut self, db: &mut AnyConnection) -> Result<(), StoreError> {
+        let at_once = |run: &Run| self.refused.contains(&run.session) || self.journal.is_large(run);
+        let folded: Vec<_> =
+            self.pending.iter().filter(|run| at_once(run)).map(|run| run.session.clone()).collect();
+        self.fold(db, &folded).await?;
+        Journal::append(db, self.number, &self.pending, &mut self.changes).await
+    }
+
+    async fn fold(&mut self, db: &mut AnyConnection, sessions: &[String]) -> Result<(), StoreError> {
+        let mut runs = Vec::with_capacity(sessions.len());
+        for session in sessions {
+            runs.extend(self.take(session)?);
+        }
+        put_progress(db, &runs).await?;
+        self.tails.append(db, &runs).await?;
+        self.changes.gone.extend(runs.into_iter().map(|run| run.session));
+        Ok(())
+    }
+
+    /// Moves all that the journal has of some sessions; nothing else waits.
+    async fn relocate(&mut self, db: &mut AnyConnection, moves: &Moves) -> Result<(), StoreError> {
+        match moves.way {
+            Way::Fold => self.fold(db, &moves.sessions).await?,
+            Way::Carry => {
+                for session in &moves.sessions {
+                    let run = self.take(session)?;
+                    self.pending.extend(run);
+                    self.changes.gone.insert(session.clone());
+                }
+                Journal::append(db, self.number, &self.pending, &mut self.changes).await?;
+                self.pending.clear();
+            }
+        }
+        self.journal.trim(db, self.number, &mut self.changes).await
+    }
+}
+
+async fn open_session_of(
+    db: &mut AnyConnection,
+    asset: &str,
+) -> Result<Option<String>, StoreError> {
+    let question = sqlx::query_scalar("SELECT id FROM session WHERE state = 'open' AND asset = $1");
+    Ok(question.bind(asset).fetch_optional(db).await?)
 }
 
 /// Absent values go as others that cannot be: their type is then the same in
