@@ -13,7 +13,7 @@ use proptest::test_runner::TestCaseError;
 use sqlx::Connection;
 use sqlx::migrate::Migrator;
 use support::process::Process;
-use support::{connection, rig, url};
+use support::{Bench, connection, rig, url};
 
 const ASSETS: usize = 3;
 
@@ -402,4 +402,35 @@ async fn killed_between_the_journal_and_the_chunks() {
     assert_eq!(session["verdict"]["verdict_hash"], support::judged("a", &samples).0);
     assert_eq!(process.client.recording("a", "s").await, samples);
     assert_eq!(rows(&url(data.path()), "chunk").await, 1);
+}
+
+/// Whoever reads while all is moved from the journal to small chunks and from
+/// these to long ones finds everything that was acknowledged before.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn read_while_it_is_folded() {
+    let bench = Bench::start_with(|config| config.limits.journal_bytes = 3000).await;
+    bench.client.asset("a").await;
+    let samples = rig(9000, 9000);
+    bench.client.telemetry("a", Some("s"), &samples[..30]).await;
+    let (sent, acknowledged) = tokio::sync::watch::channel(30);
+    let (client, recorded) = (bench.client.clone(), samples.clone());
+    let sending = tokio::spawn(async move {
+        for (i, part) in recorded[30..].chunks(30).enumerate() {
+            client.telemetry("a", Some("s"), part).await;
+            sent.send_replace(60 + i * 30);
+        }
+    });
+    let mut n_read = 0;
+    while !sending.is_finished() {
+        let n = *acknowledged.borrow();
+        let session = bench.client.session("a", "s").await;
+        assert!(session["samples"].as_u64().unwrap() >= n as u64, "{session}");
+        let recording = bench.client.recording("a", "s").await;
+        assert!(recording.len() >= n, "{} of {n}", recording.len());
+        assert_eq!(recording, samples[..recording.len()]);
+        n_read += 1;
+    }
+    sending.await.unwrap();
+    assert!(n_read > 3, "{n_read}");
+    assert_eq!(bench.client.recording("a", "s").await, samples);
 }

@@ -126,6 +126,7 @@ impl Writer {
         let last_id = counter(&mut connection, "event").await?;
         let n_commits = counter(&mut connection, "commit").await?;
         let journal = Journal::load(&mut connection).await?;
+        let n_bytes_before = journal.n_bytes();
         Ok(Self {
             place: place.clone(),
             connection: Some(connection),
@@ -136,7 +137,7 @@ impl Writer {
             tails: Tails::default(),
             journal,
             refused: HashSet::new(),
-            n_bytes_before: 0,
+            n_bytes_before,
         })
     }
 
@@ -168,7 +169,8 @@ impl Writer {
         let n_bytes = self.journal.n_bytes();
         let grown = n_bytes.saturating_sub(self.n_bytes_before);
         if n_bytes > above {
-            let sessions = self.journal.oldest((above / FOLDS).max(2 * grown), &HashSet::new());
+            let n_bytes = (above / FOLDS).max(2 * grown).max(1);
+            let sessions = self.journal.oldest(n_bytes, &HashSet::new());
             self.fold_these(sessions).await?;
         }
         self.n_bytes_before = self.journal.n_bytes();
