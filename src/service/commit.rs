@@ -81,7 +81,9 @@ impl Committer {
     /// Folds what is too much in the journal; nobody waits for it but the next
     /// group.
     async fn fold(&mut self) {
-        let Err(error) = self.writer.fold(self.journal_bytes).await else { return };
+        let folded = self.writer.fold(self.journal_bytes).await;
+        metrics::gauge!("offbd_journal_bytes").set(self.writer.journal_bytes() as f64);
+        let Err(error) = folded else { return };
         metrics::counter!("offbd_commit_failures_total").increment(1);
         if error.is_outage() {
             self.come_back(&error).await;

@@ -33,8 +33,9 @@ pub(super) struct Journal {
 #[derive(Debug, Default)]
 struct Held {
     sessions: HashMap<String, Unfolded>,
-    /// The bytes of each row of the table.
+    /// The bytes of each row of the table, and of all.
     rows: BTreeMap<i64, usize>,
+    n_bytes: usize,
 }
 
 /// What the journal has of a session.
@@ -137,7 +138,7 @@ impl Journal {
 
     /// Bytes of the table's rows.
     pub(super) fn n_bytes(&self) -> usize {
-        self.lock().rows.values().sum()
+        self.lock().n_bytes
     }
 
     /// Whether `run` is better folded at once than appended.
@@ -219,10 +220,12 @@ impl Journal {
             held.sessions.remove(session);
         }
         if let Some(first) = changes.first_row {
-            held.rows = held.rows.split_off(&first);
+            let left = held.rows.split_off(&first);
+            let removed = std::mem::replace(&mut held.rows, left);
+            held.n_bytes -= removed.values().sum::<usize>();
         }
         let Some((row, n_bytes)) = changes.row else { return };
-        held.rows.insert(row, n_bytes);
+        held.add_row(row, n_bytes);
         for (run, session) in changes.runs {
             held.take(row, session, run);
         }
@@ -275,6 +278,11 @@ impl SessionRow {
 }
 
 impl Held {
+    fn add_row(&mut self, id: i64, n_bytes: usize) {
+        self.rows.insert(id, n_bytes);
+        self.n_bytes += n_bytes;
+    }
+
     fn take(&mut self, row: i64, session: String, run: Encoded) {
         let Encoded { first_index, n_samples, progress, chunk } = run;
         let unfolded = self.sessions.entry(session).or_insert_with(|| Unfolded {
@@ -301,7 +309,7 @@ impl Held {
     ) -> Result<(), StoreError> {
         let entries: Vec<Entry<'_>> =
             rmp_serde::from_slice(data).map_err(|e| StoreError::journal(id, &e))?;
-        self.rows.insert(id, data.len());
+        self.add_row(id, data.len());
         for entry in entries {
             let progress = entry.progress();
             if !folded.get(entry.session).is_some_and(|folded| progress.is_beyond(folded)) {

@@ -141,6 +141,12 @@ impl Writer {
         })
     }
 
+    /// Bytes in the journal.
+    #[must_use]
+    pub fn journal_bytes(&self) -> usize {
+        self.journal.n_bytes()
+    }
+
     pub(super) fn journal(&self) -> Journal {
         self.journal.clone()
     }
