@@ -90,9 +90,9 @@ impl Wanted {
 /// The sample at `index`; some have nothing but their time.
 fn sample(index: usize) -> Sample {
     let t_s = index as f64 * 0.01;
-    let reading = |value: f64| (index % 7 != 0).then_some(value);
+    let reading = |value: f64| (!index.is_multiple_of(7)).then_some(value);
     Sample {
-        seq: (index % 5 != 0).then_some(index as u64),
+        seq: (!index.is_multiple_of(5)).then_some(index as u64),
         t_s,
         cmd_qx_rad: reading(t_s.sin()),
         cmd_qy_rad: None,
@@ -139,7 +139,8 @@ impl Trial {
         let mut made = (0..ASSETS).map(|i| Write::CreateAsset(asset(&i.to_string()))).collect();
         writer.commit(&mut [&mut made]).await.unwrap();
         let open = vec![Wanted::default(); ASSETS];
-        let mut this = Self { place, store, writer: Some(writer), open, ended: vec![], n_opened: 0 };
+        let mut this =
+            Self { place, store, writer: Some(writer), open, ended: vec![], n_opened: 0 };
         for asset in 0..ASSETS {
             let opened = this.opened(asset);
             this.commit(vec![opened]).await;
@@ -216,7 +217,11 @@ impl Trial {
     async fn restart(&mut self, well: bool) {
         self.store.close().await;
         let writer = self.writer.take().unwrap();
-        if well { writer.close().await.unwrap() } else { drop(writer) }
+        if well {
+            writer.close().await.unwrap()
+        } else {
+            drop(writer)
+        }
         let (store, writer) = Store::open(&self.place).await.unwrap();
         (self.store, self.writer) = (store, Some(writer));
         if well {
@@ -227,7 +232,8 @@ impl Trial {
     async fn read(&self, session: &str, from: usize) -> Vec<Sample> {
         let mut samples: Vec<Sample> = Vec::new();
         let next = |n: usize| i64::try_from(from + n).unwrap();
-        while let Some(more) = self.store.samples_from(session, next(samples.len())).await.unwrap() {
+        while let Some(more) = self.store.samples_from(session, next(samples.len())).await.unwrap()
+        {
             assert!(!more.is_empty());
             samples.extend(more);
         }
@@ -302,7 +308,8 @@ async fn older(data: &Path, samples: &[Sample]) {
             std::fs::copy(file.path(), first.path().join(file.file_name())).unwrap();
         }
     }
-    let place = of(&Place::of_url(&url(data)).unwrap()) + if support::on_postgres() { "" } else { "?mode=rwc" };
+    let place = of(&Place::of_url(&url(data)).unwrap())
+        + if support::on_postgres() { "" } else { "?mode=rwc" };
     let mut db = connection(&place).await;
     Migrator::new(first.path()).await.unwrap().run_direct(None, &mut db, false).await.unwrap();
     sqlx::query("INSERT INTO asset VALUES ('0', '{}', 1, 0, 0)").execute(&mut db).await.unwrap();
@@ -340,8 +347,7 @@ async fn an_older_database_goes_on() {
     let place = Place::of_url(&url(data.path())).unwrap();
     let (store, writer) = Store::open(&place).await.unwrap();
     let open = vec![Wanted { id: "old".to_owned(), asset: 0, samples, n_rejected: 0 }];
-    let mut trial =
-        Trial { place, store, writer: Some(writer), open, ended: vec![], n_opened: 0 };
+    let mut trial = Trial { place, store, writer: Some(writer), open, ended: vec![], n_opened: 0 };
     trial.check().await.unwrap();
     for step in [
         Step::Commit(vec![(0, 40)]),

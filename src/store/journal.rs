@@ -106,16 +106,7 @@ impl Encoded {
     fn entry<'a>(&'a self, session: &'a str) -> Entry<'a> {
         let Progress { n_samples, n_rejected, first_t_s, last_t_s, last_seq } = self.progress;
         let (first_index, chunk) = (self.first_index, &self.chunk[..]);
-        Entry {
-            session,
-            first_index,
-            n_samples,
-            n_rejected,
-            first_t_s,
-            last_t_s,
-            last_seq,
-            chunk,
-        }
+        Entry { session, first_index, n_samples, n_rejected, first_t_s, last_t_s, last_seq, chunk }
     }
 }
 
@@ -180,13 +171,13 @@ impl Journal {
     pub(super) async fn append(
         db: &mut AnyConnection,
         id: i64,
-        runs: &[Run],
+        runs: Vec<Run>,
         changes: &mut Changes,
     ) -> Result<(), StoreError> {
         if runs.is_empty() {
             return Ok(());
         }
-        changes.runs = runs.iter().map(|run| (Encoded::of(run), run.session.clone())).collect();
+        changes.runs = runs.into_iter().map(|run| (Encoded::of(&run), run.session)).collect();
         let entries: Vec<_> =
             changes.runs.iter().map(|(run, session)| run.entry(session)).collect();
         let data = rmp_serde::to_vec(&entries).map_err(|e| StoreError::journal(id, &e))?;
@@ -315,7 +306,8 @@ impl Held {
             if !folded.get(entry.session).is_some_and(|folded| progress.is_beyond(folded)) {
                 continue;
             }
-            let n_samples = codec::n_samples(entry.chunk).map_err(|e| StoreError::journal(id, &e))?;
+            let n_samples =
+                codec::n_samples(entry.chunk).map_err(|e| StoreError::journal(id, &e))?;
             let chunk = entry.chunk.to_vec();
             let run = Encoded { first_index: entry.first_index, n_samples, progress, chunk };
             self.take(id, entry.session.to_owned(), run);

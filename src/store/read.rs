@@ -89,7 +89,7 @@ impl Store {
     pub async fn open_session(&self, asset: &str) -> Result<Option<SessionRow>, StoreError> {
         let mut query = Question::new(SESSION);
         query.push("state = 'open' AND asset = ").bind(asset)?;
-        Ok(self.session_rows(query).await?.pop())
+        self.session_row(query).await
     }
 
     /// Also one that retention has given up: its name is taken until it is gone.
@@ -100,7 +100,7 @@ impl Store {
     ) -> Result<Option<SessionRow>, StoreError> {
         let mut query = Question::new(SESSION);
         query.push("asset = ").bind(asset)?.push(" AND name = ").bind(name)?;
-        Ok(self.session_rows(query).await?.pop())
+        self.session_row(query).await
     }
 
     pub async fn sessions(
@@ -122,6 +122,16 @@ impl Store {
         }
         query.push(" ORDER BY opened_at DESC, id DESC LIMIT ").bind(i64::from(limit))?;
         self.session_rows(query).await
+    }
+
+    /// The answer to `query`, which asks for one session. An open one is looked up
+    /// again by its id: only by that does the journal know it.
+    async fn session_row(&self, query: Question) -> Result<Option<SessionRow>, StoreError> {
+        let row: Option<SessionRow> = query.rows().fetch_optional(&self.pool).await?;
+        match row {
+            Some(row) if row.is_open() => self.session(&row.id).await,
+            row => Ok(row),
+        }
     }
 
     /// The answer to `query`, which asks for sessions.
@@ -471,5 +481,9 @@ fn page(query: &mut Question, filter: &FaultFilter) -> Result<(), StoreError> {
 
 fn decode(session: &str, first_index: i64, data: &[u8]) -> Result<Vec<Sample>, StoreError> {
     let session = || session.to_owned();
-    codec::decode(data).map_err(|source| StoreError::Chunk { session: session(), first_index, source })
+    codec::decode(data).map_err(|source| StoreError::Chunk {
+        session: session(),
+        first_index,
+        source,
+    })
 }

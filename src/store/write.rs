@@ -284,13 +284,12 @@ impl Writer {
     /// # Errors
     /// [`StoreError`] if that fails; all commits stay durable.
     pub async fn close(mut self) -> Result<(), StoreError> {
-        if !self.guest {
-            self.fold_all().await?;
+        let away = self.connection.is_none();
+        let folded = if self.guest || away { Ok(()) } else { self.fold_all().await };
+        if let Some(connection) = self.connection {
+            connection.close().await?;
         }
-        match self.connection {
-            Some(connection) => Ok(connection.close().await?),
-            None => Ok(()),
-        }
+        folded
     }
 
     async fn attempt(
@@ -458,10 +457,19 @@ impl Group<'_> {
         let folded: Vec<_> =
             self.pending.iter().filter(|run| at_once(run)).map(|run| run.session.clone()).collect();
         self.fold(db, &folded).await?;
-        Journal::append(db, self.number, &self.pending, &mut self.changes).await
+        self.append(db).await
     }
 
-    async fn fold(&mut self, db: &mut AnyConnection, sessions: &[String]) -> Result<(), StoreError> {
+    async fn append(&mut self, db: &mut AnyConnection) -> Result<(), StoreError> {
+        let runs = std::mem::take(&mut self.pending);
+        Journal::append(db, self.number, runs, &mut self.changes).await
+    }
+
+    async fn fold(
+        &mut self,
+        db: &mut AnyConnection,
+        sessions: &[String],
+    ) -> Result<(), StoreError> {
         let mut runs = Vec::with_capacity(sessions.len());
         for session in sessions {
             runs.extend(self.take(session)?);
@@ -482,8 +490,7 @@ impl Group<'_> {
                     self.pending.extend(run);
                     self.changes.gone.insert(session.clone());
                 }
-                Journal::append(db, self.number, &self.pending, &mut self.changes).await?;
-                self.pending.clear();
+                self.append(db).await?;
             }
         }
         self.journal.trim(db, self.number, &mut self.changes).await
