@@ -1,10 +1,13 @@
 //! The one writer: groups of changes, one transaction each, durable on return.
 
+mod fold;
+
 use std::collections::HashSet;
 use std::time::Duration;
 
 use sqlx::{AnyConnection, Connection};
 
+use self::fold::Moves;
 use super::journal::{Changes, Journal};
 use super::rows_at_once::{RowsAtOnce, in_parts};
 use super::tail::{Run, Tails};
@@ -17,13 +20,6 @@ use crate::vocabulary::Sample;
 /// How long a commit may take before its connection is given up. A disk that
 /// is slower than this cannot carry the service.
 const COMMIT_WAIT: Duration = Duration::from_secs(30);
-
-/// Transactions at least in which a full journal is folded, so that nobody waits
-/// long for one.
-const FOLDS: usize = 16;
-
-/// Bytes folded in one transaction while nobody waits.
-const FOLD_BYTES: usize = 1 << 20;
 
 /// One change.
 #[derive(Clone, Debug)]
@@ -102,23 +98,6 @@ pub struct Writer {
     n_bytes_before: usize,
 }
 
-/// Where sessions go that are in the journal.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum Way {
-    /// Into their chunks.
-    #[default]
-    Fold,
-    /// To the journal's end.
-    Carry,
-}
-
-/// What a transaction does beside its sets.
-#[derive(Debug, Default)]
-struct Moves {
-    sessions: Vec<String>,
-    way: Way,
-}
-
 impl Writer {
     pub(super) async fn open(place: &Place, guest: bool) -> Result<Self, StoreError> {
         let mut connection = place.writer(!guest).await?;
@@ -160,63 +139,6 @@ impl Writer {
     /// nothing of any set has been applied.
     pub async fn commit(&mut self, sets: &mut [&mut Vec<Write>]) -> Result<(), StoreError> {
         self.transact(sets, None).await
-    }
-
-    /// Folds what has been in the journal longest, if the journal has more than
-    /// `above` bytes: twice as much as has come since the last call, so that it
-    /// stays below twice `above` and what one group brings.
-    ///
-    /// A session whose chunks the database refuses stays in the journal. It takes
-    /// no more samples until the database takes those.
-    ///
-    /// # Errors
-    /// As for [`Writer::commit`].
-    pub async fn fold(&mut self, above: usize) -> Result<(), StoreError> {
-        let n_bytes = self.journal.n_bytes();
-        let grown = n_bytes.saturating_sub(self.n_bytes_before);
-        if n_bytes > above {
-            let n_bytes = (above / FOLDS).max(2 * grown).max(1);
-            let sessions = self.journal.oldest(n_bytes, &HashSet::new());
-            self.fold_these(sessions).await?;
-        }
-        self.n_bytes_before = self.journal.n_bytes();
-        Ok(())
-    }
-
-    async fn fold_all(&mut self) -> Result<(), StoreError> {
-        while self.journal.n_bytes() > 0 {
-            let sessions = self.journal.oldest(FOLD_BYTES, &self.refused);
-            let done = sessions.is_empty();
-            self.fold_these(sessions).await?;
-            if done {
-                break;
-            }
-        }
-        Ok(())
-    }
-
-    async fn fold_these(&mut self, sessions: Vec<String>) -> Result<(), StoreError> {
-        let moves = Moves { sessions, way: Way::Fold };
-        match self.transact(&mut [], Some(&moves)).await {
-            Err(error) if !error.is_outage() => self.fold_each(moves.sessions).await,
-            result => result,
-        }
-    }
-
-    /// Folds each of `sessions` on its own, those that can be.
-    async fn fold_each(&mut self, sessions: Vec<String>) -> Result<(), StoreError> {
-        for session in sessions {
-            let mut moves = Moves { sessions: vec![session.clone()], way: Way::Fold };
-            let Err(error) = self.transact(&mut [], Some(&moves)).await else { continue };
-            if error.is_outage() {
-                return Err(error);
-            }
-            tracing::error!(session, %error, "a recording cannot be stored; it takes no more");
-            moves.way = Way::Carry;
-            self.transact(&mut [], Some(&moves)).await?;
-            self.refused.insert(session);
-        }
-        Ok(())
     }
 
     async fn transact(
@@ -284,8 +206,7 @@ impl Writer {
     /// # Errors
     /// [`StoreError`] if that fails; all commits stay durable.
     pub async fn close(mut self) -> Result<(), StoreError> {
-        let away = self.connection.is_none();
-        let folded = if self.guest || away { Ok(()) } else { self.fold_all().await };
+        let folded = if self.guest { Ok(()) } else { self.fold_all().await };
         if let Some(connection) = self.connection {
             connection.close().await?;
         }
@@ -422,87 +343,6 @@ impl Group<'_> {
         let (session, samples) = (session.to_owned(), samples.to_vec());
         self.pending.push(Run { session, first_index, samples, progress });
     }
-
-    /// The samples of `session` that wait, behind those in the journal.
-    fn take(&mut self, session: &str) -> Result<Option<Run>, StoreError> {
-        let held = self.journal.run(session)?;
-        let at = self.pending.iter().position(|run| run.session == session);
-        let new = at.map(|at| self.pending.swap_remove(at));
-        Ok(match (held, new) {
-            (Some(held), Some(new)) => Some(held.followed_by(new)),
-            (held, new) => held.or(new),
-        })
-    }
-
-    /// `session` is deleted: nothing of it is left to be folded.
-    fn forget(&mut self, session: &str) {
-        self.pending.retain(|run| run.session != session);
-        self.tails.forget();
-        self.changes.gone.insert(session.to_owned());
-    }
-
-    /// Folds all of `session`, which ends.
-    async fn finish(&mut self, db: &mut AnyConnection, session: &str) -> Result<(), StoreError> {
-        let run = self.take(session)?;
-        put_progress(db, run.as_slice()).await?;
-        let run = run.unwrap_or_else(|| Run::nothing(session));
-        self.tails.finish(db, &run).await?;
-        self.changes.gone.insert(run.session);
-        Ok(())
-    }
-
-    /// Folds what must be, appends the rest to the journal.
-    async fn flush(&mut self, db: &mut AnyConnection) -> Result<(), StoreError> {
-        let at_once = |run: &Run| self.refused.contains(&run.session) || self.journal.is_large(run);
-        let folded: Vec<_> =
-            self.pending.iter().filter(|run| at_once(run)).map(|run| run.session.clone()).collect();
-        self.fold(db, &folded).await?;
-        self.append(db).await
-    }
-
-    async fn append(&mut self, db: &mut AnyConnection) -> Result<(), StoreError> {
-        let runs = std::mem::take(&mut self.pending);
-        Journal::append(db, self.number, runs, &mut self.changes).await
-    }
-
-    async fn fold(
-        &mut self,
-        db: &mut AnyConnection,
-        sessions: &[String],
-    ) -> Result<(), StoreError> {
-        let mut runs = Vec::with_capacity(sessions.len());
-        for session in sessions {
-            runs.extend(self.take(session)?);
-        }
-        put_progress(db, &runs).await?;
-        self.tails.append(db, &runs).await?;
-        self.changes.gone.extend(runs.into_iter().map(|run| run.session));
-        Ok(())
-    }
-
-    /// Moves all that the journal has of some sessions; nothing else waits.
-    async fn relocate(&mut self, db: &mut AnyConnection, moves: &Moves) -> Result<(), StoreError> {
-        match moves.way {
-            Way::Fold => self.fold(db, &moves.sessions).await?,
-            Way::Carry => {
-                for session in &moves.sessions {
-                    let run = self.take(session)?;
-                    self.pending.extend(run);
-                    self.changes.gone.insert(session.clone());
-                }
-                self.append(db).await?;
-            }
-        }
-        self.journal.trim(db, self.number, &mut self.changes).await
-    }
-}
-
-async fn open_session_of(
-    db: &mut AnyConnection,
-    asset: &str,
-) -> Result<Option<String>, StoreError> {
-    let question = sqlx::query_scalar("SELECT id FROM session WHERE state = 'open' AND asset = $1");
-    Ok(question.bind(asset).fetch_optional(db).await?)
 }
 
 /// Absent values go as others that cannot be: their type is then the same in
@@ -577,6 +417,14 @@ async fn open_session(db: &mut AnyConnection, row: &SessionRow) -> Result<(), St
     .execute(db)
     .await?;
     Ok(())
+}
+
+async fn open_session_of(
+    db: &mut AnyConnection,
+    asset: &str,
+) -> Result<Option<String>, StoreError> {
+    let question = sqlx::query_scalar("SELECT id FROM session WHERE state = 'open' AND asset = $1");
+    Ok(question.bind(asset).fetch_optional(db).await?)
 }
 
 async fn end_session(
