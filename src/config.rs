@@ -134,6 +134,7 @@ pub struct LimitsConfig {
     /// Bytes of request bodies in memory at a time.
     pub bodies_bytes: usize,
     pub in_flight_samples: usize,
+    pub journal_bytes: usize,
     pub assets: usize,
     pub body_timeout_s: u64,
     /// Seconds for a connection to be encrypted, and for the head of each
@@ -240,6 +241,7 @@ impl Default for LimitsConfig {
             import_bytes: limits.import_bytes,
             bodies_bytes: 256 << 20,
             in_flight_samples: limits.in_flight_samples,
+            journal_bytes: limits.journal_bytes,
             assets: limits.assets,
             body_timeout_s: limits.body_timeout.as_secs(),
             header_timeout_s: 30,
@@ -334,6 +336,7 @@ impl Config {
         within("limits.assets", limits.assets, 1, 1_000_000)?;
         let samples = limits.batch_samples;
         within("limits.in_flight_samples", limits.in_flight_samples, samples, 100_000_000)?;
+        within("limits.journal_bytes", limits.journal_bytes, 1, 1 << 30)?;
         let seconds = usize::try_from(limits.body_timeout_s).unwrap_or(usize::MAX);
         within("limits.body_timeout_s", seconds, 1, 3600)?;
         let seconds = usize::try_from(limits.shutdown_s).unwrap_or(usize::MAX);
@@ -399,6 +402,7 @@ impl Config {
             jobs: self.workers.jobs,
             shard_queue: self.workers.queue,
             in_flight_samples: self.limits.in_flight_samples,
+            journal_bytes: self.limits.journal_bytes,
             batch_samples: self.limits.batch_samples,
             batch_bytes: self.limits.batch_bytes,
             import_bytes: self.limits.import_bytes,

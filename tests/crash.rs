@@ -3,6 +3,7 @@
 
 mod support;
 
+use std::path::Path;
 use std::process::Command;
 
 use serde_json::json;
@@ -13,11 +14,18 @@ use support::{judged, rig};
 /// How often the process is killed; KILLS says otherwise.
 const KILLS: usize = 10;
 
+/// What the journal may hold, one after the other: nothing, so that every commit
+/// is followed by a folding; a few batches; all there is.
+const JOURNAL_BYTES: [&str; 3] = ["1", "20000", "16777216"];
+
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn killed_many_times_under_load() {
     let n_kills = std::env::var("KILLS").map_or(KILLS, |n| n.parse().unwrap());
     let data = tempfile::tempdir().unwrap();
-    let mut process = Process::start(data.path());
+    let start = |bytes: &str| {
+        Process::start_with(data.path(), &[("OFFBD_LIMITS__JOURNAL_BYTES", Path::new(bytes))])
+    };
+    let mut process = start(JOURNAL_BYTES[0]);
     let line = Line::to(&process.client);
     let devices = [("counts", true), ("does-not", false), ("counts-too", true)]
         .map(|(name, counts)| device(&line, name, counts, data.path(), None));
@@ -28,7 +36,7 @@ async fn killed_many_times_under_load() {
         if kill % 5 == 4 {
             Process::stillborn(data.path(), random.below(60_000) as u64);
         }
-        process = Process::start(data.path());
+        process = start(JOURNAL_BYTES[kill % JOURNAL_BYTES.len()]);
         line.moves(&process.client);
     }
     line.hang_up();

@@ -13,6 +13,8 @@ mod bad_input;
 mod crash;
 #[path = "fault_memory.rs"]
 mod fault_memory;
+#[path = "journal.rs"]
+mod journal;
 #[path = "main_job.rs"]
 mod main_job;
 #[path = "retention.rs"]

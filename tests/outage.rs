@@ -57,6 +57,7 @@ async fn a_server_that_stops_and_starts() {
     let bench = Bench::start_with(|config| {
         config.database = Some(url.clone());
         config.limits.in_flight_samples = 300;
+        config.limits.journal_bytes = 5000;
         config.limits.batch_samples = 300;
     })
     .await;
@@ -143,7 +144,11 @@ async fn a_commit_whose_outcome_nobody_heard() {
     let proxy = tokio::spawn(proxy(from, to, loses.clone()));
     eventually(|| async { between.path().join(".s.PGSQL.5432").exists().then_some(()) }).await;
     let through = support::postgres::url(between.path(), "twin");
-    let bench = Bench::start_with(|config| config.database = Some(through)).await;
+    let bench = Bench::start_with(|config| {
+        config.database = Some(through);
+        config.limits.journal_bytes = 5000;
+    })
+    .await;
     let load = Load::begin(3, &bench.client, bench.data.path(), Some(&url));
     for i in 0..40 {
         load.line.progress(50).await;
@@ -176,7 +181,11 @@ fn faulty(directory: &Path) -> PathBuf {
 async fn a_disk_that_is_full_or_fails() {
     let data = tempfile::tempdir().unwrap();
     let (library, faults) = (faulty(data.path()), data.path().join("faults"));
-    let environment = [("LD_PRELOAD", library.as_path()), ("FAULTS", faults.as_path())];
+    let environment = [
+        ("LD_PRELOAD", library.as_path()),
+        ("FAULTS", faults.as_path()),
+        ("OFFBD_LIMITS__JOURNAL_BYTES", Path::new("5000")),
+    ];
     let mut process = Process::start_with(data.path(), &environment);
     let load = Load::begin(2, &process.client, data.path(), None);
     // ENOSPC is 28, EIO is 5.

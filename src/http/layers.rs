@@ -30,18 +30,21 @@ const IMPORT_TIMEOUT: Duration = Duration::from_secs(900);
 
 const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 
+/// Puts it around, from the outside in. As one layer: of several, the router would
+/// put each into a box of its own, for every request.
 pub(super) fn around(router: Router, policy: &Policy) -> Router {
-    router
-        .layer(from_fn(limit_time))
-        .layer(from_fn(count))
-        .layer(CatchPanicLayer::custom(panicked))
-        .layer(from_fn(name_instance))
-        .layer(from_fn(headers::secure))
-        .layer(headers::cors(&policy.origins))
-        .layer(CompressionLayer::new())
-        .layer(TraceLayer::new_for_http().make_span_with(span))
-        .layer(PropagateRequestIdLayer::new(REQUEST_ID))
-        .layer(SetRequestIdLayer::new(REQUEST_ID, MakeRequestUuid))
+    router.layer((
+        SetRequestIdLayer::new(REQUEST_ID, MakeRequestUuid),
+        PropagateRequestIdLayer::new(REQUEST_ID),
+        TraceLayer::new_for_http().make_span_with(span),
+        CompressionLayer::new(),
+        headers::cors(&policy.origins),
+        from_fn(headers::secure),
+        from_fn(name_instance),
+        CatchPanicLayer::custom(panicked),
+        from_fn(count),
+        from_fn(limit_time),
+    ))
 }
 
 fn span(request: &Request<Body>) -> Span {

@@ -187,7 +187,7 @@ async fn rig(bench: &Bench, asset: &str) -> Result<Rig, ServiceError> {
 async fn recording(bench: &Bench, id: &str, room: usize) -> Result<Vec<Sample>, ServiceError> {
     let mut samples: Vec<Sample> = Vec::new();
     let next = |n: usize| i64::try_from(n).unwrap_or(i64::MAX);
-    while let Some((_, chunk)) = bench.store.chunk_from(id, next(samples.len())).await? {
+    while let Some(chunk) = bench.store.samples_from(id, next(samples.len())).await? {
         samples.extend(chunk);
         if samples.len() > room {
             let (what, limit) = ("samples in the sessions of a calibration", MAX_SAMPLES);

@@ -53,6 +53,8 @@ pub(super) struct Committer {
     queue: mpsc::Receiver<WriteSet>,
     events: Events,
     outage: watch::Sender<Outage>,
+    /// Bytes of the journal above which it is folded.
+    journal_bytes: usize,
 }
 
 impl Committer {
@@ -61,8 +63,9 @@ impl Committer {
         queue: mpsc::Receiver<WriteSet>,
         events: Events,
         outage: watch::Sender<Outage>,
+        journal_bytes: usize,
     ) -> Self {
-        Self { writer, queue, events, outage }
+        Self { writer, queue, events, outage, journal_bytes }
     }
 
     /// Runs until every sender is gone and the queue is empty.
@@ -70,8 +73,23 @@ impl Committer {
         let mut group = Vec::new();
         while self.queue.recv_many(&mut group, MAX_GROUP_SETS).await > 0 {
             self.commit(std::mem::take(&mut group)).await;
+            self.fold().await;
         }
         self.writer
+    }
+
+    /// Folds what is too much in the journal; nobody waits for it but the next
+    /// group.
+    async fn fold(&mut self) {
+        let folded = self.writer.fold(self.journal_bytes).await;
+        metrics::gauge!("offbd_journal_bytes").set(self.writer.journal_bytes() as f64);
+        let Err(error) = folded else { return };
+        metrics::counter!("offbd_commit_failures_total").increment(1);
+        if error.is_outage() {
+            self.come_back(&error).await;
+        } else {
+            tracing::error!(%error, "the journal cannot be folded");
+        }
     }
 
     async fn commit(&mut self, group: Vec<WriteSet>) {

@@ -17,6 +17,10 @@ pub struct Limits {
     pub commit_queue: usize,
     /// Samples between arrival and commit; the next batch is told to come again.
     pub in_flight_samples: usize,
+    /// Bytes of the journal, of which memory holds as many; above, what has been in
+    /// it longest is folded into the recordings after each commit. It stays below
+    /// twice this.
+    pub journal_bytes: usize,
     /// Samples in one batch; a longer one is refused.
     pub batch_samples: usize,
     /// Bytes of one batch; a longer one is refused.
@@ -39,6 +43,7 @@ impl Default for Limits {
             shard_queue: 256,
             commit_queue: 1024,
             in_flight_samples: 500_000,
+            journal_bytes: 16 << 20,
             batch_samples: 10_000,
             batch_bytes: 4 << 20,
             import_bytes: 64 << 20,

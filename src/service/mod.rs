@@ -156,7 +156,7 @@ impl Service {
         let events = Events::new(store.clone());
         let (sets, queue) = mpsc::channel(limits.commit_queue);
         let (told, outage) = watch::channel(None);
-        let committer = Committer::new(writer, queue, events.clone(), told);
+        let committer = Committer::new(writer, queue, events.clone(), told, limits.journal_bytes);
         let committer = tokio::spawn(committer.run());
         let presences = Presences::default();
         let mut shards = Vec::new();

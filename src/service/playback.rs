@@ -25,7 +25,7 @@ pub(super) fn play(
     }
     let mut actions = actions.into_iter().peekable();
     let mut n_played = 0;
-    while let Some((_, samples)) = runtime.block_on(store.chunk_from(session, n_played))? {
+    while let Some(samples) = runtime.block_on(store.samples_from(session, n_played))? {
         for sample in samples {
             while let Some((_, action)) = actions.next_if(|(after, _)| *after <= n_played) {
                 take(action);

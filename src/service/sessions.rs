@@ -31,11 +31,10 @@ impl Recording {
     /// # Errors
     /// [`ServiceError::Store`].
     pub async fn next(&mut self) -> Result<Option<Vec<Sample>>, ServiceError> {
-        let Some((first, samples)) = self.store.chunk_from(&self.session, self.next).await? else {
-            return Ok(None);
-        };
-        self.next = first + i64::try_from(samples.len()).unwrap_or(i64::MAX);
-        Ok(Some(samples))
+        let samples = self.store.samples_from(&self.session, self.next).await?;
+        let n = samples.as_ref().map_or(0, Vec::len);
+        self.next += i64::try_from(n).unwrap_or(i64::MAX);
+        Ok(samples)
     }
 }
 

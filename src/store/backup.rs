@@ -57,7 +57,7 @@ pub async fn restore(place: &Place, copy: &Path, replace: bool) -> Result<(), St
     settle(&part, file)
 }
 
-/// Moves the old file away, with the journal that belongs to it.
+/// Moves the old file away, with the write-ahead log that belongs to it.
 fn set_aside(file: &Path) -> Result<(), StoreError> {
     let aside = beside(file, ".replaced");
     for end in ["-shm", "-wal", ""] {

@@ -130,6 +130,11 @@ pub fn decode(bytes: &[u8]) -> Result<Vec<Sample>, CodecError> {
     (0..n).map(|i| sample(i).ok_or(CodecError::NoTime)).collect()
 }
 
+/// How many samples a chunk says that it has.
+pub(super) fn n_samples(bytes: &[u8]) -> Result<usize, CodecError> {
+    header(&mut Reader { bytes, at: 0 })
+}
+
 fn header(reader: &mut Reader<'_>) -> Result<usize, CodecError> {
     let header = reader.take(HEADER, "header")?;
     if header[0] != FORMAT {

@@ -9,6 +9,7 @@ mod access;
 mod backup;
 pub mod codec;
 mod expiry;
+mod journal;
 mod place;
 mod question;
 mod read;
@@ -48,6 +49,8 @@ pub enum StoreError {
     Migration(#[from] sqlx::migrate::MigrateError),
     #[error("chunk {first_index} of session {session}: {source}")]
     Chunk { session: String, first_index: i64, source: codec::CodecError },
+    #[error("row {id} of the journal: {reason}")]
+    Journal { id: i64, reason: String },
     #[error("{column} holds `{found}`, which this version does not know")]
     Word { column: &'static str, found: String },
     #[error("another process uses this database")]
@@ -76,6 +79,10 @@ impl StoreError {
         error.is_unique_violation() || error.is_foreign_key_violation()
     }
 
+    fn journal(id: i64, error: &dyn std::fmt::Display) -> Self {
+        Self::Journal { id, reason: error.to_string() }
+    }
+
     /// Whether the same change may go through later: the database is away,
     /// locked or full. Otherwise the change itself cannot be.
     #[must_use]
@@ -91,6 +98,7 @@ impl StoreError {
             Self::Taken | Self::Overtaken { .. } => true,
             Self::Migration(_)
             | Self::Chunk { .. }
+            | Self::Journal { .. }
             | Self::Word { .. }
             | Self::OwnTools
             | Self::Exists { .. }
@@ -116,6 +124,7 @@ fn is_of_the_change(code: &str) -> bool {
 pub struct Store {
     pool: AnyPool,
     place: Place,
+    journal: journal::Journal,
 }
 
 impl Store {
@@ -141,7 +150,8 @@ impl Store {
 
     async fn open_as(place: &Place, guest: bool) -> Result<(Self, Writer), StoreError> {
         let writer = Writer::open(place, guest).await?;
-        Ok((Self { pool: place.readers()?, place: place.clone() }, writer))
+        let (pool, place, journal) = (place.readers()?, place.clone(), writer.journal());
+        Ok((Self { pool, place, journal }, writer))
     }
 
     /// Brings the database at `place` to this version's schema; returns how

@@ -114,8 +114,8 @@ impl Place {
     const fn durable(&self) -> &'static str {
         match self {
             // A large group fits into 8 MiB of pages (2 MiB unless said); what does
-            // not is written twice. The journal is folded into the file every 64 MiB
-            // (4 MiB unless said): chunks that are merged soon never get there.
+            // not is written twice. The write-ahead log goes into the file every 64 MiB
+            // (4 MiB unless said): the pages of the journal, used again and again, get there once.
             Self::File(_) => {
                 "PRAGMA journal_mode = wal; PRAGMA synchronous = full; \
                  PRAGMA cache_size = -8192; PRAGMA wal_autocheckpoint = 16384"

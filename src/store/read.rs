@@ -79,15 +79,17 @@ impl Store {
     }
 
     pub async fn session(&self, id: &str) -> Result<Option<SessionRow>, StoreError> {
+        let progress = self.journal.progress(id);
         let mut query = Question::new(SESSION);
         query.push(KEPT).push("id = ").bind(id)?;
-        Ok(query.rows().fetch_optional(&self.pool).await?)
+        let row: Option<SessionRow> = query.rows().fetch_optional(&self.pool).await?;
+        Ok(row.map(|row| row.with(progress.as_ref())))
     }
 
     pub async fn open_session(&self, asset: &str) -> Result<Option<SessionRow>, StoreError> {
         let mut query = Question::new(SESSION);
         query.push("state = 'open' AND asset = ").bind(asset)?;
-        Ok(query.rows().fetch_optional(&self.pool).await?)
+        self.session_row(query).await
     }
 
     /// Also one that retention has given up: its name is taken until it is gone.
@@ -98,7 +100,7 @@ impl Store {
     ) -> Result<Option<SessionRow>, StoreError> {
         let mut query = Question::new(SESSION);
         query.push("asset = ").bind(asset)?.push(" AND name = ").bind(name)?;
-        Ok(query.rows().fetch_optional(&self.pool).await?)
+        self.session_row(query).await
     }
 
     pub async fn sessions(
@@ -119,35 +121,63 @@ impl Store {
             query.push(", ").bind(id)?.push(")");
         }
         query.push(" ORDER BY opened_at DESC, id DESC LIMIT ").bind(i64::from(limit))?;
-        Ok(query.rows().fetch_all(&self.pool).await?)
+        self.session_rows(query).await
     }
 
-    /// The first chunk of `session` that begins at `index` or later: where it
-    /// begins and its samples.
-    pub async fn chunk_from(
+    /// The answer to `query`, which asks for one session. An open one is looked up
+    /// again by its id: only by that does the journal know it.
+    async fn session_row(&self, query: Question) -> Result<Option<SessionRow>, StoreError> {
+        let row: Option<SessionRow> = query.rows().fetch_optional(&self.pool).await?;
+        match row {
+            Some(row) if row.is_open() => self.session(&row.id).await,
+            row => Ok(row),
+        }
+    }
+
+    /// The answer to `query`, which asks for sessions.
+    async fn session_rows(&self, query: Question) -> Result<Vec<SessionRow>, StoreError> {
+        let known = self.journal.all_progress();
+        let rows: Vec<SessionRow> = query.rows().fetch_all(&self.pool).await?;
+        let noted = rows.into_iter().map(|row| {
+            let progress = known.get(&row.id);
+            row.with(progress)
+        });
+        Ok(noted.collect())
+    }
+
+    /// Samples of the recording of `session` from the one at `index` on, as many
+    /// as are together; none at its end.
+    pub async fn samples_from(
         &self,
         session: &str,
         index: i64,
-    ) -> Result<Option<(i64, Vec<Sample>)>, StoreError> {
-        let row: Option<(i64, Vec<u8>)> = sqlx::query_as(
-            "SELECT first_index, data FROM chunk WHERE session = $1 AND first_index >= $2
-             ORDER BY first_index LIMIT 1",
+    ) -> Result<Option<Vec<Sample>>, StoreError> {
+        if let Some(samples) = self.journal.samples_from(session, index)? {
+            return Ok(Some(samples));
+        }
+        let row: Option<(i64, i64, Vec<u8>)> = sqlx::query_as(
+            "SELECT first_index, n, data FROM chunk WHERE session = $1 AND first_index <= $2
+             ORDER BY first_index DESC LIMIT 1",
         )
         .bind(session)
         .bind(index)
         .fetch_optional(&self.pool)
         .await?;
-        row.map(|row| decode(session, row)).transpose()
+        let row = row.filter(|(first_index, n, _)| index < first_index + n);
+        let Some((first_index, _, data)) = row else { return Ok(None) };
+        let mut samples = decode(session, first_index, &data)?;
+        Ok(Some(samples.split_off(usize::try_from(index - first_index).unwrap_or_default())))
     }
 
     /// The chunks of `session` that may hold a sample with a `t_s` from `first`
-    /// to `last`, the latest first, at most `limit`.
+    /// to `last`, the latest first, at most `limit` and what the journal has.
     pub async fn chunks_between(
         &self,
         session: &str,
         (first, last): (f64, f64),
         limit: u32,
     ) -> Result<Vec<Vec<Sample>>, StoreError> {
+        let mut chunks = Vec::from_iter(self.journal.run(session)?.map(|run| run.samples));
         let rows: Vec<(i64, Vec<u8>)> = sqlx::query_as(
             "SELECT first_index, data FROM chunk
              WHERE session = $1 AND min_t_s <= $3 AND max_t_s >= $2
@@ -159,7 +189,10 @@ impl Store {
         .bind(i64::from(limit))
         .fetch_all(&self.pool)
         .await?;
-        rows.into_iter().map(|row| decode(session, row).map(|(_, samples)| samples)).collect()
+        for (first_index, data) in rows {
+            chunks.push(decode(session, first_index, &data)?);
+        }
+        Ok(chunks)
     }
 
     /// What people did in `session`, in order.
@@ -226,7 +259,7 @@ impl Store {
         let mut query = Question::new(SESSION);
         query.push("state = 'open' AND asset >= ").bind(first)?;
         query.push(" AND asset <= ").bind(last)?;
-        Ok(query.rows().fetch_all(&self.pool).await?)
+        self.session_rows(query).await
     }
 
     /// When the latest session of each asset from `first` to `last` was opened
@@ -446,14 +479,11 @@ fn page(query: &mut Question, filter: &FaultFilter) -> Result<(), StoreError> {
     Ok(())
 }
 
-fn decode(
-    session: &str,
-    (first_index, data): (i64, Vec<u8>),
-) -> Result<(i64, Vec<Sample>), StoreError> {
-    let samples = codec::decode(&data).map_err(|source| StoreError::Chunk {
-        session: session.to_owned(),
+fn decode(session: &str, first_index: i64, data: &[u8]) -> Result<Vec<Sample>, StoreError> {
+    let session = || session.to_owned();
+    codec::decode(data).map_err(|source| StoreError::Chunk {
+        session: session(),
         first_index,
         source,
-    })?;
-    Ok((first_index, samples))
+    })
 }

@@ -32,6 +32,14 @@ pub struct Progress {
     pub last_seq: Option<i64>,
 }
 
+impl Progress {
+    /// Whether `other` is of an earlier moment of the same session.
+    #[must_use]
+    pub(super) const fn is_beyond(&self, other: &Self) -> bool {
+        self.n_samples + self.n_rejected > other.n_samples + other.n_rejected
+    }
+}
+
 #[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
 pub struct SessionRow {
     pub id: String,

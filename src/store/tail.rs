@@ -13,9 +13,9 @@ use crate::vocabulary::Sample;
 /// Samples in a full chunk; a longer run is cut into several.
 pub const FULL_CHUNK_SAMPLES: usize = 8192;
 
-/// Samples in a small chunk at most, so that only a merge makes full ones and
-/// all small ones are at the end.
-const SMALL_CHUNK_SAMPLES: usize = FULL_CHUNK_SAMPLES / 2;
+/// Samples in a chunk that stays as it is; smaller ones are all at the end of
+/// their session, and are merged as soon as they are as many together.
+const LONG_CHUNK_SAMPLES: usize = 2048;
 
 /// Small chunks at the end of a session; when there are as many, the writer
 /// merges them within the transaction at hand.
@@ -49,38 +49,41 @@ impl Tails {
         connection: &mut AnyConnection,
         runs: &[Run],
     ) -> Result<(), StoreError> {
-        let pieces: Vec<_> = runs.iter().flat_map(Run::pieces).collect();
-        insert(connection, &pieces).await?;
+        let mut small = Vec::new();
         for run in runs.iter().filter(|run| !run.samples.is_empty()) {
-            self.grow(connection, run).await?;
+            let tail = self.tail(connection, &run.session).await?;
+            let (n_chunks, n_samples) = (tail.n_chunks + 1, tail.n_samples + run.samples.len());
+            let tail = if n_chunks < MAX_TAIL_CHUNKS && n_samples < LONG_CHUNK_SAMPLES {
+                small.extend(cut(&run.session, run.first_index, &run.samples, Stay::Short));
+                Tail { n_chunks, n_samples }
+            } else {
+                merge(connection, run, tail, Stay::Short).await?
+            };
+            self.remember(&run.session, tail);
         }
-        Ok(())
+        insert(connection, &small).await
     }
 
-    /// Takes note of a run that has been inserted; merges what has become too much.
-    async fn grow(&mut self, connection: &mut AnyConnection, run: &Run) -> Result<(), StoreError> {
-        let mut tail = match self.known.get(&run.session) {
-            Some(known) => Tail {
-                n_chunks: known.n_chunks + run.samples.len().div_ceil(SMALL_CHUNK_SAMPLES),
-                n_samples: known.n_samples + run.samples.len(),
-            },
-            None => count(connection, &run.session).await?,
-        };
-        if tail.n_chunks >= MAX_TAIL_CHUNKS || tail.n_samples >= FULL_CHUNK_SAMPLES {
-            tail = merge(connection, &run.session, Stay::Short).await?;
+    async fn tail(
+        &self,
+        connection: &mut AnyConnection,
+        session: &str,
+    ) -> Result<Tail, StoreError> {
+        match self.known.get(session) {
+            Some(known) => Ok(*known),
+            None => count(connection, session).await,
         }
-        self.remember(&run.session, tail);
-        Ok(())
     }
 
-    /// Merges what is left: `session` has ended.
+    /// Appends the last run of a session, which ends, and merges what is left.
     pub(super) async fn finish(
         &mut self,
         connection: &mut AnyConnection,
-        session: &str,
+        run: &Run,
     ) -> Result<(), StoreError> {
-        self.known.remove(session);
-        merge(connection, session, Stay::Long).await.map(drop)
+        let tail = self.tail(connection, &run.session).await?;
+        self.known.remove(&run.session);
+        merge(connection, run, tail, Stay::Long).await.map(drop)
     }
 
     fn remember(&mut self, session: &str, tail: Tail) {
@@ -92,6 +95,7 @@ impl Tails {
 }
 
 /// Samples at the end of a session, and how far it has come with them.
+#[derive(Debug)]
 pub(super) struct Run {
     pub(super) session: String,
     pub(super) first_index: i64,
@@ -100,8 +104,15 @@ pub(super) struct Run {
 }
 
 impl Run {
-    fn pieces(&self) -> impl Iterator<Item = Piece<'_>> {
-        cut(&self.session, self.first_index, &self.samples, SMALL_CHUNK_SAMPLES, Stay::Short)
+    pub(super) fn nothing(session: &str) -> Self {
+        let (session, progress) = (session.to_owned(), Progress::default());
+        Self { session, first_index: 0, samples: Vec::new(), progress }
+    }
+
+    /// This and the next run of the same session.
+    pub(super) fn followed_by(mut self, next: Self) -> Self {
+        self.samples.extend(next.samples);
+        Self { progress: next.progress, ..self }
     }
 }
 
@@ -113,17 +124,17 @@ struct Piece<'a> {
     stay: Stay,
 }
 
-/// Chunks of at most `most` samples; those that are full stay.
+/// Full chunks and a rest; long ones stay, and the `rest` as it says.
 fn cut<'a>(
     session: &'a str,
     first_index: i64,
     samples: &'a [Sample],
-    most: usize,
     rest: Stay,
 ) -> impl Iterator<Item = Piece<'a>> {
-    samples.chunks(most).enumerate().map(move |(i, samples)| {
-        let stay = if samples.len() == FULL_CHUNK_SAMPLES { Stay::Long } else { rest };
-        Piece { session, first_index: first_index + (i * most) as i64, samples, stay }
+    samples.chunks(FULL_CHUNK_SAMPLES).enumerate().map(move |(i, samples)| {
+        let first_index = first_index + (i * FULL_CHUNK_SAMPLES) as i64;
+        let stay = if samples.len() >= LONG_CHUNK_SAMPLES { Stay::Long } else { rest };
+        Piece { session, first_index, samples, stay }
     })
 }
 
@@ -133,7 +144,7 @@ async fn count(connection: &mut AnyConnection, session: &str) -> Result<Tail, St
          WHERE session = $1 AND n < $2",
     )
     .bind(session)
-    .bind(FULL_CHUNK_SAMPLES as i64)
+    .bind(LONG_CHUNK_SAMPLES as i64)
     .fetch_one(connection)
     .await?;
     let count = |n: i64| usize::try_from(n).unwrap_or(0);
@@ -163,33 +174,44 @@ async fn insert(connection: &mut AnyConnection, pieces: &[Piece<'_>]) -> Result<
     Ok(())
 }
 
-/// Makes one run of the small chunks, which are all at the end, and cuts it
-/// into full chunks and a rest. Returns the tail that this leaves.
+/// Makes one run of the small chunks of the `tail`, which are all at the end, and
+/// of `run`, and cuts it into full chunks and a rest. Returns the tail that this
+/// leaves.
 async fn merge(
     connection: &mut AnyConnection,
-    session: &str,
+    run: &Run,
+    tail: Tail,
     rest: Stay,
 ) -> Result<Tail, StoreError> {
-    let small: Vec<(i64, Vec<u8>)> = sqlx::query_as(
+    let session = &run.session;
+    let small = if tail.n_chunks > 0 { take_small(connection, session).await? } else { vec![] };
+    let first_index = small.first().map_or(run.first_index, |(first_index, _)| *first_index);
+    let mut samples = decode_all(session, &small)?;
+    samples.extend_from_slice(&run.samples);
+    let pieces: Vec<_> = cut(session, first_index, &samples, rest).collect();
+    insert(connection, &pieces).await?;
+    let small = pieces.last().filter(|piece| piece.samples.len() < LONG_CHUNK_SAMPLES);
+    Ok(small.map_or(Tail::default(), |last| Tail { n_chunks: 1, n_samples: last.samples.len() }))
+}
+
+/// Reads and removes the small chunks of `session`.
+async fn take_small(
+    connection: &mut AnyConnection,
+    session: &str,
+) -> Result<Vec<(i64, Vec<u8>)>, StoreError> {
+    let small = sqlx::query_as(
         "SELECT first_index, data FROM chunk WHERE session = $1 AND n < $2 ORDER BY first_index",
     )
     .bind(session)
-    .bind(FULL_CHUNK_SAMPLES as i64)
+    .bind(LONG_CHUNK_SAMPLES as i64)
     .fetch_all(&mut *connection)
     .await?;
-    let Some((first_index, _)) = small.first() else {
-        return Ok(Tail::default());
-    };
-    let run = decode_all(session, &small)?;
     sqlx::query("DELETE FROM chunk WHERE session = $1 AND n < $2")
         .bind(session)
-        .bind(FULL_CHUNK_SAMPLES as i64)
-        .execute(&mut *connection)
+        .bind(LONG_CHUNK_SAMPLES as i64)
+        .execute(connection)
         .await?;
-    let pieces: Vec<_> = cut(session, *first_index, &run, FULL_CHUNK_SAMPLES, rest).collect();
-    insert(connection, &pieces).await?;
-    let n_samples = run.len() % FULL_CHUNK_SAMPLES;
-    Ok(Tail { n_chunks: usize::from(n_samples > 0), n_samples })
+    Ok(small)
 }
 
 fn decode_all(session: &str, chunks: &[(i64, Vec<u8>)]) -> Result<Vec<Sample>, StoreError> {

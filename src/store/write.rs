@@ -1,9 +1,14 @@
 //! The one writer: groups of changes, one transaction each, durable on return.
 
+mod fold;
+
+use std::collections::HashSet;
 use std::time::Duration;
 
 use sqlx::{AnyConnection, Connection};
 
+use self::fold::Moves;
+use super::journal::{Changes, Journal};
 use super::rows_at_once::{RowsAtOnce, in_parts};
 use super::tail::{Run, Tails};
 use super::{
@@ -82,9 +87,15 @@ pub struct Writer {
     n_commits: i64,
     /// Whether it writes beside the one that counts.
     guest: bool,
-    /// Whether a transaction may have come through that is not counted yet.
-    in_doubt: bool,
+    /// Of the transaction that may have come through and is not counted yet.
+    in_doubt: Option<Changes>,
     tails: Tails,
+    journal: Journal,
+    /// Sessions that the database did not let be folded. They take no more until
+    /// it does.
+    refused: HashSet<String>,
+    /// The journal's bytes at the last [`Writer::fold`].
+    n_bytes_before: usize,
 }
 
 impl Writer {
@@ -93,9 +104,30 @@ impl Writer {
         MIGRATIONS.run_direct(None, &mut connection, false).await?;
         let last_id = counter(&mut connection, "event").await?;
         let n_commits = counter(&mut connection, "commit").await?;
-        let place = place.clone();
-        let (connection, tails) = (Some(connection), Tails::default());
-        Ok(Self { place, connection, last_id, n_commits, guest, in_doubt: false, tails })
+        let journal = Journal::load(&mut connection).await?;
+        let n_bytes_before = journal.n_bytes();
+        Ok(Self {
+            place: place.clone(),
+            connection: Some(connection),
+            last_id,
+            n_commits,
+            guest,
+            in_doubt: None,
+            tails: Tails::default(),
+            journal,
+            refused: HashSet::new(),
+            n_bytes_before,
+        })
+    }
+
+    /// Bytes in the journal.
+    #[must_use]
+    pub fn journal_bytes(&self) -> usize {
+        self.journal.n_bytes()
+    }
+
+    pub(super) fn journal(&self) -> Journal {
+        self.journal.clone()
     }
 
     /// Applies the sets, in order, in one transaction that is durable on
@@ -106,19 +138,24 @@ impl Writer {
     /// come through all the same: [`Writer::reconnect`] knows. Otherwise
     /// nothing of any set has been applied.
     pub async fn commit(&mut self, sets: &mut [&mut Vec<Write>]) -> Result<(), StoreError> {
+        self.transact(sets, None).await
+    }
+
+    async fn transact(
+        &mut self,
+        sets: &mut [&mut Vec<Write>],
+        moves: Option<&Moves>,
+    ) -> Result<(), StoreError> {
         if self.connection.is_none() && self.reconnect().await? {
             // Whoever asked for that one has not waited for its outcome.
             tracing::warn!("a commit came through that was given up");
         }
         let last_id = self.last_id;
         let late = |_| Err(sqlx::Error::Io(std::io::ErrorKind::TimedOut.into()).into());
-        let attempt = tokio::time::timeout(COMMIT_WAIT, self.attempt(sets));
+        let attempt = tokio::time::timeout(COMMIT_WAIT, self.attempt(sets, moves));
         let result = attempt.await.unwrap_or_else(late);
         match &result {
-            Ok(()) => {
-                self.n_commits += i64::from(!self.guest);
-                self.in_doubt = false;
-            }
+            Ok(()) => self.came_through(),
             Err(_) => {
                 // A connection that failed may be in any state: a new one is not.
                 self.connection = None;
@@ -142,42 +179,69 @@ impl Writer {
             .execute(&mut connection)
             .await?;
         let found = counter(&mut connection, "commit").await?;
-        let came_through = self.in_doubt && found == self.n_commits + 1;
+        let came_through = self.in_doubt.is_some() && found == self.n_commits + 1;
         if found != self.n_commits && !came_through {
             return Err(StoreError::Overtaken { expected: self.n_commits, found });
         }
         self.last_id = counter(&mut connection, "event").await?;
-        self.n_commits = found;
-        self.in_doubt = false;
+        if came_through {
+            self.came_through();
+        }
+        self.in_doubt = None;
         self.connection = Some(connection);
         Ok(came_through)
     }
 
-    /// Closes the connection, its journal folded into the database file.
-    ///
-    /// # Errors
-    /// [`StoreError`] if the last checkpoint fails; all commits stay durable.
-    pub async fn close(self) -> Result<(), StoreError> {
-        match self.connection {
-            Some(connection) => Ok(connection.close().await?),
-            None => Ok(()),
+    /// Takes note of the last transaction.
+    fn came_through(&mut self) {
+        self.n_commits += i64::from(!self.guest);
+        if let Some(changes) = self.in_doubt.take() {
+            self.refused.retain(|session| !changes.gone.contains(session));
+            self.journal.apply(changes);
         }
     }
 
-    async fn attempt(&mut self, sets: &mut [&mut Vec<Write>]) -> Result<(), StoreError> {
+    /// Folds what is in the journal and closes the connection.
+    ///
+    /// # Errors
+    /// [`StoreError`] if that fails; all commits stay durable.
+    pub async fn close(mut self) -> Result<(), StoreError> {
+        let folded = if self.guest { Ok(()) } else { self.fold_all().await };
+        if let Some(connection) = self.connection {
+            connection.close().await?;
+        }
+        folded
+    }
+
+    async fn attempt(
+        &mut self,
+        sets: &mut [&mut Vec<Write>],
+        moves: Option<&Moves>,
+    ) -> Result<(), StoreError> {
         let Some(connection) = &mut self.connection else {
             return Err(sqlx::Error::PoolClosed.into());
         };
         let mut transaction = connection.begin_with(self.place.begin()).await?;
-        let mut group =
-            Group { last_id: &mut self.last_id, tails: &mut self.tails, pending: Vec::new() };
+        let mut group = Group {
+            number: self.n_commits + 1,
+            last_id: &mut self.last_id,
+            tails: &mut self.tails,
+            journal: &self.journal,
+            refused: &self.refused,
+            changes: Changes::default(),
+            pending: Vec::new(),
+        };
         for write in sets.iter_mut().flat_map(|set| set.iter_mut()) {
             group.apply(&mut transaction, write).await?;
         }
+        if let Some(moves) = moves {
+            group.relocate(&mut transaction, moves).await?;
+        }
         group.flush(&mut transaction).await?;
+        let changes = group.changes;
         if !self.guest {
             count(&mut transaction, self.n_commits, self.last_id).await?;
-            self.in_doubt = true;
+            self.in_doubt = Some(changes);
         }
         Ok(transaction.commit().await?)
     }
@@ -209,10 +273,15 @@ async fn count(db: &mut AnyConnection, n_commits: i64, last_id: i64) -> Result<(
 
 /// The transaction at hand.
 struct Group<'a> {
+    /// Counts the transactions; the row of the journal.
+    number: i64,
     last_id: &'a mut i64,
     tails: &'a mut Tails,
+    journal: &'a Journal,
+    refused: &'a HashSet<String>,
+    changes: Changes,
     /// Samples that wait for the end of the group, so that consecutive batches
-    /// of a session become one chunk.
+    /// of a session become one run.
     pending: Vec<Run>,
 }
 
@@ -246,20 +315,19 @@ impl Group<'_> {
             Write::UpdateAsset(row) => update_asset(db, row).await,
             Write::OpenSession(row) => open_session(db, row).await,
             Write::EndSession { session, ended_at, verdict, hash } => {
-                self.flush(db).await?;
-                self.tails.finish(db, session).await?;
+                self.finish(db, session).await?;
                 end_session(db, session, *ended_at, verdict, hash).await
             }
             Write::DeleteSession { session } => {
-                self.flush(db).await?;
-                self.tails.forget();
+                self.forget(session);
                 delete(db, "DELETE FROM session WHERE id = $1", session).await
             }
             Write::ExpireSession { session, at } => expire(db, session, *at).await,
             Write::DropChunks { session, limit } => drop_chunks(db, session, *limit).await,
             Write::DeleteAsset { name } => {
-                self.flush(db).await?;
-                self.tails.forget();
+                if let Some(session) = open_session_of(db, name).await? {
+                    self.forget(&session);
+                }
                 delete(db, "DELETE FROM asset WHERE name = $1", name).await
             }
         }
@@ -274,12 +342,6 @@ impl Group<'_> {
         }
         let (session, samples) = (session.to_owned(), samples.to_vec());
         self.pending.push(Run { session, first_index, samples, progress });
-    }
-
-    async fn flush(&mut self, db: &mut AnyConnection) -> Result<(), StoreError> {
-        let runs = std::mem::take(&mut self.pending);
-        self.tails.append(db, &runs).await?;
-        put_progress(db, &runs).await
     }
 }
 
@@ -355,6 +417,14 @@ async fn open_session(db: &mut AnyConnection, row: &SessionRow) -> Result<(), St
     .execute(db)
     .await?;
     Ok(())
+}
+
+async fn open_session_of(
+    db: &mut AnyConnection,
+    asset: &str,
+) -> Result<Option<String>, StoreError> {
+    let question = sqlx::query_scalar("SELECT id FROM session WHERE state = 'open' AND asset = $1");
+    Ok(question.bind(asset).fetch_optional(db).await?)
 }
 
 async fn end_session(
