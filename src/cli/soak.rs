@@ -1,7 +1,7 @@
 //! `offbd soak`: days of healthy operation of many simulated rigs; whatever is
 //! confirmed is a false alarm.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -189,20 +189,23 @@ fn watch(setup: &Setup, name: &str, samples: &[Sample]) -> Soaked {
     let mut soaked = Soaked { rig_days: SESSION_S / 86_400.0, ..Soaked::default() };
     let (mut outputs, mut peaks) = (Vec::new(), [0.0_f64; 2]);
     let mut seen: BTreeMap<&str, FaultStatus> = BTreeMap::new();
-    let mut found = Vec::new();
+    let (mut found, mut on_record) = (Vec::new(), BTreeSet::new());
     for sample in samples.iter().filter(|s| s.t_s % GAP_EVERY_S > GAP_S) {
         engine.handle(Input::Sample(*sample), &mut outputs);
         soaked.samples += 1;
         for output in outputs.drain(..) {
             let Output::Transition(change) = output else { continue };
             if !change.byte.test_failed() {
+                on_record.remove(change.code.as_str());
                 continue;
             }
             let worst = seen.entry(change.code.as_str()).or_insert(change.status);
             if *worst != FaultStatus::Confirmed {
                 *worst = change.status;
             }
-            if change.status == FaultStatus::Confirmed {
+            // Told again, with its kind, it is the same.
+            let confirmed = change.status == FaultStatus::Confirmed;
+            if confirmed && on_record.insert(change.code.as_str()) {
                 found.push(format!("{name}: {}", crate::wire::verdict::sentence(&change)));
             }
         }
