@@ -34,6 +34,11 @@ function changed(entry: FleetEntry, line: FaultLine): FleetEntry {
   return { ...entry, faults: active ? [...others, fault] : others };
 }
 
+/** Whether an event tells of the same change again, as when its kind shows later. */
+function retold(known: FaultLine, line: FaultLine): boolean {
+  return known.asset === line.asset && known.session === line.session && known.code === line.code && known.status === line.status && known.onset_s === line.onset_s;
+}
+
 export function useFleet() {
   const [every, setEvery] = useState(rhythm(0));
   const asked = useAsk(api.fleet, "fleet", every);
@@ -55,7 +60,7 @@ export function useFleet() {
   const latest = useRef(asked.data);
   latest.current = asked.data;
   useEffect(() => events.listen((line) => {
-    setLines((before) => [line, ...before].slice(0, MOST_LINES));
+    setLines((before) => [line, ...before.filter((known) => !retold(known, line))].slice(0, MOST_LINES));
     const entry = current.current.get(line.asset ?? "");
     if (!entry) return void asked.again();
     const after = changed(entry, line);
