@@ -297,6 +297,17 @@ mod tests {
     use super::super::stillness::Reading;
     use super::*;
 
+    /// A ball clear of the edge, of whose readings nothing is known.
+    const CLEAR: Surroundings = Surroundings {
+        clear_s: 1.0,
+        at_edge: false,
+        rim: None,
+        rim_s: 0.0,
+        over_the_edge: false,
+        since_jump_s: f64::INFINITY,
+        noisy_m: 1.0,
+    };
+
     /// A ball that lies at the rim at +x while the twin goes by `twin`, m/s².
     fn at_the_rim(twin: f64, identical_s: f64) -> Test {
         let evaluator = Evaluator::new(
@@ -305,15 +316,8 @@ mod tests {
         );
         let mut readings = Stillness::default();
         readings.axes.x.identical_s = identical_s;
-        let around = Surroundings {
-            clear_s: 0.0,
-            at_edge: true,
-            rim: Some(Axis::X),
-            rim_s: 1.0,
-            over_the_edge: false,
-            since_jump_s: f64::INFINITY,
-            noisy_m: 1.0,
-        };
+        let around =
+            Surroundings { clear_s: 0.0, at_edge: true, rim: Some(Axis::X), rim_s: 1.0, ..CLEAR };
         let mut x = AxisEvidence {
             command_rad: Some(0.1),
             position_m: Some(0.17),
@@ -331,15 +335,6 @@ mod tests {
     /// A ball that stands in the middle and is asked to move along x alone, by a
     /// servo that has so much evidence against it.
     fn standing(nats: f64) -> Test {
-        let around = Surroundings {
-            clear_s: 1.0,
-            at_edge: false,
-            rim: None,
-            rim_s: 0.0,
-            over_the_edge: false,
-            since_jump_s: f64::INFINITY,
-            noisy_m: 1.0,
-        };
         let reading = Reading {
             dt: 0.5,
             position_m: PerAxis { x: Some(0.0), y: Some(0.0) },
@@ -353,7 +348,7 @@ mod tests {
         let x = AxisEvidence { nats, ..AxisEvidence::default() };
         let evidence =
             Evidence { axes: PerAxis { x, y: AxisEvidence::default() }, ..Evidence::default() };
-        stuck_ball(&evidence, &readings, &around).test
+        stuck_ball(&evidence, &readings, &CLEAR).test
     }
 
     #[test]
@@ -368,15 +363,7 @@ mod tests {
         let mut limit = Limits::new(Profile::Default, None, 7.0);
         limit.noise_m = noise_m;
         let evaluator = Evaluator::new(Profile::Default, PerAxis::from_fn(|_| limit));
-        let around = Surroundings {
-            clear_s,
-            at_edge: false,
-            rim: None,
-            rim_s: 0.0,
-            over_the_edge: false,
-            since_jump_s: f64::INFINITY,
-            noisy_m: evaluator.noisy_m(blur_m),
-        };
+        let around = Surroundings { clear_s, noisy_m: evaluator.noisy_m(blur_m), ..CLEAR };
         let evidence = Evidence { scatter_m: Some(2e-3), window_s: 0.5, ..Evidence::default() };
         evaluator.sensor(&evidence, &Stillness::default(), &around).test
     }

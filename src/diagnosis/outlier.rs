@@ -228,12 +228,18 @@ mod tests {
         PerAxis { x: Some(x), y: None }
     }
 
+    /// A gate that has seen a ball at rest at 0 until a period before t = 0.
+    fn resting(period_s: f64) -> OutlierGate {
+        let mut gate = OutlierGate::default();
+        for i in -5..0 {
+            gate.take(f64::from(i) * period_s, along_x(0.0), 1e-3);
+        }
+        gate
+    }
+
     #[test]
     fn lone_readings_are_refused_and_steps_believed_later() {
-        let mut gate = OutlierGate::default();
-        for i in 0..5 {
-            gate.take(-0.1 + f64::from(i) * 0.02, along_x(0.0), 1e-3);
-        }
+        let mut gate = resting(0.02);
         let mut take = |i: u32, x: f64| gate.take(f64::from(i) * 0.02, along_x(x), 1e-3);
         assert_eq!(take(0, 0.0), Gated::Accepted { outliers: 0, undone: false });
         assert_eq!(take(1, 0.1), Gated::Refused);
@@ -248,10 +254,7 @@ mod tests {
     /// Within reach of a push, but the next reading is back on the old path.
     #[test]
     fn an_outlier_that_was_accepted_is_undone() {
-        let mut gate = OutlierGate::default();
-        for i in 0..5 {
-            gate.take(-0.25 + f64::from(i) * 0.05, along_x(0.0), 1e-3);
-        }
+        let mut gate = resting(0.05);
         let mut take = |i: u32, x: f64| gate.take(f64::from(i) * 0.05, along_x(x), 1e-3);
         assert_eq!(take(0, 0.04), Gated::Accepted { outliers: 0, undone: false });
         assert_eq!(take(1, 0.0), Gated::Accepted { outliers: 1, undone: true });

@@ -126,6 +126,7 @@ impl Settings {
             // Two hardest pushes confirm nothing unless within half a second.
             leak_s: 3.0,
             confirm_s: 0.2,
+            // Two judgements more: no healthy rig that was soaked needed longer.
             readings_confirm_s: 0.1,
             gather_s: 0.0,
             suspect_nats: 10.0,

@@ -38,8 +38,8 @@ const STILL_FACTOR: f64 = 6.0;
 /// Acceleration that moving air gives a ping-pong ball, m/s²: half of what a
 /// fan at arm's length does.
 const GUST_M_S2: f64 = 0.03;
-/// Uncertainty of the time of a reading, in sample periods: devices send what
-/// they read up to a tenth of a period late.
+/// Uncertainty of the time of a reading, in sample periods. Assumed: the varied
+/// rigs that are soaked draw one of up to 0.15 (`simulation::variety`).
 const TIMING_SHARE: f64 = 0.1;
 /// What one reading may add to the scatter, in limits of it.
 const SCATTER_LIMITS: f64 = 2.0;

@@ -10,7 +10,8 @@ use crate::diagnosis::{Answer, AxisEvidence, Candidate, Evidence, Transition};
 use crate::engine::{Admission, Output};
 use crate::vocabulary::{Axis, FaultCode, FaultStatus};
 
-/// A change of a fault's status.
+/// A change of a fault's status; or its kind, where that shows only after the
+/// confirmation: the status is then the same as before.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct FaultView {
     /// Always `fault`.

@@ -49,7 +49,7 @@ const PUSH_M_S: f64 = 0.15;
 /// What it costs to say that the ball was pushed, nats. The prior odds of a push
 /// within a twentieth of a second would be five or more. Believing sooner in
 /// pushes makes the judgement later and surer, most of all where one push follows
-/// another.
+/// another: at as few false alarms of soaked rigs, 0.2 m/s at 1.5 nats find as much.
 const PUSH_NATS: f64 = 1.0;
 /// Rate of the deviation that is possible at the start, m/s (standard deviation).
 const START_M_S: f64 = 0.5;
