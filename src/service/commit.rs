@@ -2,11 +2,14 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use tokio::runtime::Handle;
 use tokio::sync::{mpsc, watch};
 use tracing::Instrument;
 
+use super::ServiceError;
 use super::events::{Event, Events};
 use crate::store::{StoreError, TransitionRow, Write, Writer};
 
@@ -68,8 +71,19 @@ impl Committer {
         Self { writer, queue, events, outage, journal_bytes }
     }
 
+    /// Runs on a thread of its own: among the tasks of the runtime each step of a
+    /// commit would wait its turn, and everybody waits for the commit.
+    pub(super) fn spawn(self) -> Result<JoinHandle<Writer>, ServiceError> {
+        let runtime = Handle::current();
+        let thread = std::thread::Builder::new().name("writer".to_owned());
+        thread.spawn(move || runtime.block_on(self.run())).map_err(|error| {
+            tracing::error!(%error, "no thread for the writer");
+            ServiceError::Unavailable { what: "no thread for the writer" }
+        })
+    }
+
     /// Runs until every sender is gone and the queue is empty.
-    pub(super) async fn run(mut self) -> Writer {
+    async fn run(mut self) -> Writer {
         let mut group = Vec::new();
         while self.queue.recv_many(&mut group, MAX_GROUP_SETS).await > 0 {
             self.commit(std::mem::take(&mut group)).await;

@@ -111,7 +111,7 @@ pub struct Workers {
     shards: Vec<std::thread::JoinHandle<()>>,
     jobs: Vec<JoinHandle<()>>,
     closing: CancellationToken,
-    committer: JoinHandle<Writer>,
+    committer: std::thread::JoinHandle<Writer>,
 }
 
 impl Workers {
@@ -126,20 +126,22 @@ impl Workers {
             }
         }
         for shard in self.shards {
-            let joined = tokio::task::spawn_blocking(move || shard.join()).await;
-            if !matches!(joined, Ok(Ok(()))) {
+            if joined(shard).await.is_none() {
                 tracing::error!("a shard ended by panic");
             }
         }
-        match self.committer.await {
-            Ok(writer) => {
-                if let Err(error) = writer.close().await {
-                    tracing::error!(%error, "closing the store");
-                }
-            }
-            Err(error) => tracing::error!(%error, "the writer ended by panic"),
+        let Some(writer) = joined(self.committer).await else {
+            return tracing::error!("the writer ended by panic");
+        };
+        if let Err(error) = writer.close().await {
+            tracing::error!(%error, "closing the store");
         }
     }
+}
+
+/// Waits for a thread; none if it ended by panic.
+async fn joined<T: Send + 'static>(thread: std::thread::JoinHandle<T>) -> Option<T> {
+    tokio::task::spawn_blocking(|| thread.join()).await.ok()?.ok()
 }
 
 impl Service {
@@ -157,7 +159,7 @@ impl Service {
         let (sets, queue) = mpsc::channel(limits.commit_queue);
         let (told, outage) = watch::channel(None);
         let committer = Committer::new(writer, queue, events.clone(), told, limits.journal_bytes);
-        let committer = tokio::spawn(committer.run());
+        let committer = committer.spawn()?;
         let presences = Presences::default();
         let mut shards = Vec::new();
         let mut threads = Vec::new();
