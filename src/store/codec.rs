@@ -3,12 +3,13 @@
 //! A chunk is a format byte, the number of samples, then one column after the
 //! other (`seq`, `t_s`, the two commands, the two positions). A column says
 //! which samples have it (none, all, or a bitmap), and holds their values as
-//! plain little-endian words or packed by `pco`, whichever is shorter. Every
-//! bit of a number survives, also of −0.0, subnormals and NaN.
+//! plain little-endian words or packed by `pco`, whichever is shorter; of numbers
+//! that count up by one, the first. Every bit of a number survives, also of −0.0,
+//! subnormals and NaN.
 
-use pco::ChunkConfig;
 use pco::data_types::Number;
 use pco::standalone::{simple_compress, simple_decompress};
+use pco::{ChunkConfig, DeltaSpec};
 
 use crate::vocabulary::Sample;
 
@@ -19,10 +20,13 @@ pub const MAX_CHUNK_SAMPLES: usize = 65_536;
 /// Fewest values worth packing; fewer are stored plain.
 const MIN_PACKED: usize = 512;
 
-/// How hard `pco` tries, of 0 to 12. Its default, 8, takes four times as long
-/// for a tenth less: 0.47 against 0.12 µs a sample, 17.3 against 18.6 bytes, on
-/// two sines and two noisy positions.
+/// How hard `pco` tries, of 0 to 12, and that it takes differences of neighbours
+/// where that helps, and looks for no other regularity. On quantised commands and
+/// positions with the noise of a camera or a touch panel that takes 120 ns a sample
+/// for 5.9 and 3.1 bytes; with its search 160 ns for 5.8 and 3.2, at its default
+/// level of 8 200 to 300 ns for 5.7 and 2.9.
 const LEVEL: usize = 4;
+const DELTA: DeltaSpec = DeltaSpec::TryConsecutive(1);
 
 /// Whether a chunk is to stay. One that is merged into another soon is stored
 /// plain: packing is what takes the time.
@@ -39,6 +43,7 @@ const ALL: u8 = 1;
 const SOME: u8 = 2;
 const PLAIN: u8 = 0;
 const PACKED: u8 = 1;
+const COUNTING: u8 = 2;
 
 /// Bytes that are no chunk.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -65,6 +70,8 @@ pub enum CodecError {
 trait Word: Number + Copy {
     fn word(self) -> [u8; 8];
     fn from_word(word: [u8; 8]) -> Self;
+    /// What follows it when counting; none for what does not count.
+    fn successor(self) -> Option<Self>;
 }
 
 impl Word for u64 {
@@ -74,6 +81,9 @@ impl Word for u64 {
     fn from_word(word: [u8; 8]) -> Self {
         Self::from_le_bytes(word)
     }
+    fn successor(self) -> Option<Self> {
+        self.checked_add(1)
+    }
 }
 
 impl Word for f64 {
@@ -82,6 +92,9 @@ impl Word for f64 {
     }
     fn from_word(word: [u8; 8]) -> Self {
         Self::from_bits(u64::from_le_bytes(word))
+    }
+    fn successor(self) -> Option<Self> {
+        None
     }
 }
 
@@ -179,6 +192,11 @@ fn put_bitmap(bytes: &mut Vec<u8>, present: impl Iterator<Item = bool>) {
 }
 
 fn put_values<T: Word>(bytes: &mut Vec<u8>, values: &[T], stay: Stay) {
+    if values.is_sorted_by(|a, b| a.successor().is_some_and(|next| next.word() == b.word())) {
+        bytes.push(COUNTING);
+        bytes.extend_from_slice(&values[0].word());
+        return;
+    }
     let plain = values.len() * 8;
     if let Some(packed) = pack(values, stay).filter(|packed| packed.len() + 4 < plain) {
         bytes.push(PACKED);
@@ -196,7 +214,8 @@ fn pack<T: Word>(values: &[T], stay: Stay) -> Option<Vec<u8>> {
     if stay == Stay::Short || values.len() < MIN_PACKED {
         return None;
     }
-    simple_compress(values, &ChunkConfig::default().with_compression_level(LEVEL)).ok()
+    let config = ChunkConfig::default().with_compression_level(LEVEL).with_delta_spec(DELTA);
+    simple_compress(values, &config).ok()
 }
 
 fn column<T: Word>(reader: &mut Reader<'_>, n: usize) -> Result<Vec<Option<T>>, CodecError> {
@@ -226,6 +245,16 @@ fn values<T: Word>(reader: &mut Reader<'_>, expected: usize) -> Result<Vec<T>, C
             let packed = reader.take(length, "values")?;
             let values: Vec<T> =
                 simple_decompress(packed).map_err(|e| CodecError::Packed(e.to_string()))?;
+            if values.len() != expected {
+                return Err(CodecError::Count { found: values.len(), expected });
+            }
+            Ok(values)
+        }
+        COUNTING => {
+            let first = reader.take(8, "values")?.as_chunks::<8>().0;
+            let count =
+                std::iter::successors(first.first().map(|w| T::from_word(*w)), |v| v.successor());
+            let values: Vec<T> = count.take(expected).collect();
             if values.len() != expected {
                 return Err(CodecError::Count { found: values.len(), expected });
             }
@@ -296,6 +325,20 @@ mod tests {
                 let back = decode(&encode(&samples, stay)).expect("own bytes");
                 prop_assert_eq!(bits(&back), bits(&samples));
             }
+        }
+
+        /// A device's count, from any number to the greatest there is, with or
+        /// without a number left out.
+        #[test]
+        fn a_count_survives_and_is_short(n in 2..300u64, after in 0..500u64, gap in 0..600u64) {
+            let first = u64::MAX - n - after;
+            let sample = |i| Sample { seq: Some(first + i + u64::from(i >= gap)), t_s: i as f64, ..Sample::default() };
+            let samples: Vec<_> = (0..n).map(sample).collect();
+            let bytes = encode(&samples, Stay::Short);
+            prop_assert_eq!(bits(&decode(&bytes).expect("own bytes")), bits(&samples));
+            let nameless: Vec<_> = samples.iter().map(|s| Sample { seq: None, ..*s }).collect();
+            let extra = bytes.len() - encode(&nameless, Stay::Short).len();
+            prop_assert_eq!(extra == 9, gap == 0 || gap >= n, "{} bytes", extra);
         }
 
         #[test]
