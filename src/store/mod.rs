@@ -7,7 +7,8 @@
 
 mod access;
 mod backup;
-pub mod codec;
+pub mod checkpoint;
+mod codec;
 mod expiry;
 mod journal;
 mod place;

@@ -12,6 +12,7 @@ use sqlx::postgres::PgConnectOptions;
 use sqlx::{AnyConnection, AnyPool, AssertSqlSafe, ConnectOptions, Executor};
 
 use super::StoreError;
+use super::checkpoint::FULL_PAGES;
 
 /// Connections for reading; more readers wait for one.
 const MAX_READERS: u32 = 4;
@@ -81,7 +82,7 @@ impl Place {
         let options = self.options()?;
         let connect = async {
             let mut connection = options.connect().await?;
-            connection.execute(self.durable()).await?;
+            connection.execute(AssertSqlSafe(self.durable())).await?;
             if only && matches!(self, Self::Server(_)) {
                 let lock = format!(
                     "SET lock_timeout = '{LOCK_WAIT}'; SELECT pg_advisory_lock({WRITER_LOCK});
@@ -111,16 +112,15 @@ impl Place {
 
     /// A commit is on the disk when it returns, also where the server is set
     /// up otherwise.
-    const fn durable(&self) -> &'static str {
+    fn durable(&self) -> String {
         match self {
             // A large group fits into 8 MiB of pages (2 MiB unless said); what does
-            // not is written twice. The write-ahead log goes into the file every 64 MiB
-            // (4 MiB unless said): the pages of the journal, used again and again, get there once.
-            Self::File(_) => {
+            // not is written twice.
+            Self::File(_) => format!(
                 "PRAGMA journal_mode = wal; PRAGMA synchronous = full; \
-                 PRAGMA cache_size = -8192; PRAGMA wal_autocheckpoint = 16384"
-            }
-            Self::Server(_) => "SET synchronous_commit = on",
+                 PRAGMA cache_size = -8192; PRAGMA wal_autocheckpoint = {FULL_PAGES}"
+            ),
+            Self::Server(_) => "SET synchronous_commit = on".to_owned(),
         }
     }
 

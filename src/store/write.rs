@@ -8,6 +8,7 @@ use std::time::Duration;
 use sqlx::{AnyConnection, Connection};
 
 use self::fold::Moves;
+use super::checkpoint::Checkpoints;
 use super::journal::{Changes, Journal};
 use super::rows_at_once::{RowsAtOnce, in_parts};
 use super::tail::{Run, Tails};
@@ -87,6 +88,7 @@ pub struct Writer {
     n_commits: i64,
     /// Whether it writes beside the one that counts.
     guest: bool,
+    checkpoints: Option<Checkpoints>,
     /// Of the transaction that may have come through and is not counted yet.
     in_doubt: Option<Changes>,
     tails: Tails,
@@ -112,6 +114,7 @@ impl Writer {
             last_id,
             n_commits,
             guest,
+            checkpoints: if guest { None } else { Checkpoints::beside(place) },
             in_doubt: None,
             tails: Tails::default(),
             journal,
@@ -155,7 +158,12 @@ impl Writer {
         let attempt = tokio::time::timeout(COMMIT_WAIT, self.attempt(sets, moves));
         let result = attempt.await.unwrap_or_else(late);
         match &result {
-            Ok(()) => self.came_through(),
+            Ok(()) => {
+                self.came_through();
+                if let Some(checkpoints) = &mut self.checkpoints {
+                    checkpoints.note(n_samples(sets));
+                }
+            }
             Err(_) => {
                 // A connection that failed may be in any state: a new one is not.
                 self.connection = None;
@@ -207,6 +215,9 @@ impl Writer {
     /// [`StoreError`] if that fails; all commits stay durable.
     pub async fn close(mut self) -> Result<(), StoreError> {
         let folded = if self.guest { Ok(()) } else { self.fold_all().await };
+        if let Some(checkpoints) = self.checkpoints {
+            checkpoints.close().await;
+        }
         if let Some(connection) = self.connection {
             connection.close().await?;
         }
@@ -245,6 +256,12 @@ impl Writer {
         }
         Ok(transaction.commit().await?)
     }
+}
+
+fn n_samples(sets: &[&mut Vec<Write>]) -> usize {
+    let of =
+        |write: &Write| if let Write::Append { samples, .. } = write { samples.len() } else { 0 };
+    sets.iter().flat_map(|set| set.iter()).map(of).sum()
 }
 
 async fn counter(db: &mut AnyConnection, name: &str) -> Result<i64, StoreError> {
