@@ -92,8 +92,9 @@ pub struct FaultRecord {
     pub acknowledged: bool,
     /// What was suspected when the test last failed.
     pub suspicion: Option<Suspicion>,
-    /// The moment of the first failure of the current occurrence.
-    pub freeze_frame: Option<Evidence>,
+    /// The moment of the first failure of the current occurrence. Boxed: most
+    /// records have none, and every asset has several.
+    pub freeze_frame: Option<Box<Evidence>>,
     /// How often the monitor could judge at all.
     pub in_use: InUse,
 }
@@ -169,7 +170,7 @@ impl FaultMemory {
         if !before.test_failed() {
             record.occurrences = record.occurrences.saturating_add(1);
             record.acknowledged = false;
-            record.freeze_frame = Some(frame.clone());
+            record.freeze_frame = Some(Box::new(frame.clone()));
             record.last_onset = suspicion.onset;
             if record.occurrences == 1 {
                 record.first_onset = suspicion.onset;

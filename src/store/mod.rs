@@ -7,8 +7,8 @@
 
 mod access;
 mod backup;
-pub mod checkpoint;
-mod codec;
+mod checkpoint;
+pub mod codec;
 mod expiry;
 mod journal;
 mod place;

@@ -145,7 +145,7 @@ pub fn record_view(code: FaultCode, record: &FaultRecord, rules: &MemoryRules) -
         healing_cycles: rules.healing_cycles,
         aging_counter: record.aging_counter(rules),
         aging_cycles: rules.aging_cycles,
-        freeze_frame: record.freeze_frame.as_ref().map(evidence_view),
+        freeze_frame: record.freeze_frame.as_deref().map(evidence_view),
         in_use: in_use_view(&record.in_use),
     }
 }
@@ -211,7 +211,7 @@ fn fault_record(view: &FaultRecordView) -> Result<FaultRecord, MemoryError> {
         failed_cycles: view.failed_cycles,
         acknowledged: view.acknowledged,
         suspicion: (suspicion != Suspicion::default()).then_some(suspicion),
-        freeze_frame: view.freeze_frame.as_ref().map(evidence),
+        freeze_frame: view.freeze_frame.as_ref().map(evidence).map(Box::new),
         in_use: InUse {
             cycles: view.in_use.operation_cycles,
             with_data: view.in_use.cycles_with_data,
