@@ -419,9 +419,9 @@ fn follow(
         _ => {}
     }
     if after.occurrences > before.occurrences {
-        known.last_occurrence = here.cloned();
+        known.last_occurrence = here.cloned().map(Box::new);
         if before.occurrences == 0 {
-            known.first_occurrence = here.cloned();
+            known.first_occurrence = here.cloned().map(Box::new);
         }
     }
     if !after.acknowledged {

@@ -4,15 +4,16 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// What is known of a code beside its record.
+/// What is known of a code beside its record. Occurrences are boxed: most codes of
+/// most assets have none.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct ProvenanceView {
     /// The first occurrence since the last clear; null without one.
     #[serde(default)]
-    pub first_occurrence: Option<OccurrenceView>,
+    pub first_occurrence: Option<Box<OccurrenceView>>,
     /// The last one; it may be the first.
     #[serde(default)]
-    pub last_occurrence: Option<OccurrenceView>,
+    pub last_occurrence: Option<Box<OccurrenceView>>,
     /// Who acknowledged the current occurrence, and when; null until then.
     #[serde(default)]
     pub acknowledgement: Option<ActView>,
