@@ -241,7 +241,11 @@ pub fn check(config: &Config) -> Result<String> {
     Ok(format!(
         "listen   {}\naccess   {}, {}\nstore    {}\nlog      {:?}, {}\nworkers  {} shards",
         config.listen,
-        if config.asks_for_tokens()? { "with a token" } else { "for everyone on this machine" },
+        match (config.asks_for_tokens()?, &config.jwt) {
+            (true, Some(jwt)) => format!("with a token, or one of {}", jwt.issuer),
+            (true, None) => "with a token".to_owned(),
+            (false, _) => "for everyone on this machine".to_owned(),
+        },
         if config.tls.is_some() { "encrypted" } else { "not encrypted" },
         config.place()?,
         config.log.format,

@@ -38,9 +38,9 @@ pub struct KeySet {
 /// Why a document is no set of keys.
 #[derive(Debug, thiserror::Error)]
 pub enum Unusable {
-    #[error("is no JSON Web Key Set: {0}")]
+    #[error("it is no JSON Web Key Set")]
     Form(#[from] serde_json::Error),
-    #[error("has no key that verifies RS, PS, ES256, ES384 or EdDSA signatures")]
+    #[error("it has no key that verifies RS, PS, ES256, ES384 or EdDSA signatures")]
     Empty,
 }
 
