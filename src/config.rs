@@ -4,13 +4,14 @@
 //! One typed structure, checked as a whole at start; what is wrong is named by
 //! its key. A key that does not exist is an error, wherever it comes from.
 
-use std::net::SocketAddr;
+use std::net::{IpAddr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use config::{Environment, File, FileFormat};
 use serde::Deserialize;
 
+use crate::service::access::jwt::Expected;
 use crate::service::{Limits, Retention};
 use crate::store::Place;
 
@@ -35,6 +36,8 @@ pub struct Config {
     pub origins: Vec<String>,
     /// Connections are encrypted if it is there.
     pub tls: Option<TlsConfig>,
+    /// Tokens of an identity provider are taken if it is there.
+    pub jwt: Option<JwtConfig>,
     pub log: LogConfig,
     pub traces: TracesConfig,
     pub limits: LimitsConfig,
@@ -60,6 +63,95 @@ pub struct TlsConfig {
     pub certificate: PathBuf,
     /// Its private key.
     pub key: PathBuf,
+}
+
+/// Whose JSON Web Tokens are taken beside the service's own.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JwtConfig {
+    /// A token's `iss` is this.
+    pub issuer: String,
+    /// A token's `aud` is this, or has it.
+    pub audience: String,
+    /// The provider's public keys (JWKS): a file, or a URL, `https://` or on this
+    /// machine `http://`.
+    pub jwks: String,
+    /// Where the role is: a claim's name, or a JSON pointer.
+    #[serde(default = "role_claim")]
+    pub role_claim: String,
+    /// Where the one asset of a device is, likewise.
+    #[serde(default = "asset_claim")]
+    pub asset_claim: String,
+}
+
+fn role_claim() -> String {
+    "offbd_role".to_owned()
+}
+
+fn asset_claim() -> String {
+    "offbd_asset".to_owned()
+}
+
+/// Where a provider's keys are.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum KeyPlace {
+    File(PathBuf),
+    Url(hyper::Uri),
+}
+
+impl JwtConfig {
+    fn check(&self, asked: bool) -> Result<(), ConfigError> {
+        let invalid = |key, reason: &str| Err(ConfigError::Invalid { key, reason: reason.into() });
+        if !asked {
+            let reason = "is set, but nobody is asked for a token: set `auth` to `required`";
+            return invalid("jwt", reason);
+        }
+        let blank = |word: &str| word.is_empty() || word.contains(char::is_whitespace);
+        match self {
+            Self { issuer, .. } if blank(issuer) => invalid("jwt.issuer", "is no URL"),
+            Self { audience, .. } if audience.is_empty() => invalid("jwt.audience", "is empty"),
+            Self { role_claim, .. } if role_claim.is_empty() => {
+                invalid("jwt.role_claim", "is empty")
+            }
+            Self { asset_claim, .. } if asset_claim.is_empty() => {
+                invalid("jwt.asset_claim", "is empty")
+            }
+            _ => self.place().map(drop),
+        }
+    }
+
+    /// Where the keys are.
+    ///
+    /// # Errors
+    /// [`ConfigError::Invalid`] if they would come unprotected, or nowhere from.
+    pub fn place(&self) -> Result<KeyPlace, ConfigError> {
+        let invalid =
+            |reason: &str| ConfigError::Invalid { key: "jwt.jwks", reason: reason.into() };
+        if self.jwks.is_empty() {
+            return Err(invalid("is empty"));
+        }
+        if !self.jwks.contains("://") {
+            return Ok(KeyPlace::File(PathBuf::from(&self.jwks)));
+        }
+        let url: hyper::Uri = self.jwks.parse().map_err(|_| invalid("is no URL"))?;
+        let host = url.host().unwrap_or_default().trim_matches(['[', ']']);
+        let alone = host == "localhost" || host.parse().is_ok_and(|ip: IpAddr| ip.is_loopback());
+        if url.authority().is_some_and(|authority| authority.as_str().contains('@')) {
+            return Err(invalid("has a password, which is not sent"));
+        }
+        match url.scheme_str() {
+            Some("https") => Ok(KeyPlace::Url(url)),
+            Some("http") if alone => Ok(KeyPlace::Url(url)),
+            _ => Err(invalid("is no `https://…`; `http://…` is for this machine alone")),
+        }
+    }
+
+    /// What a token must say.
+    #[must_use]
+    pub fn expected(&self) -> Expected {
+        let Self { issuer, audience, role_claim, asset_claim, .. } = self.clone();
+        Expected { issuer, audience, role_claim, asset_claim }
+    }
 }
 
 /// Requests a second, where a token is asked for; ten seconds' worth may come
@@ -216,6 +308,7 @@ impl Default for Config {
             auth: None,
             origins: Vec::new(),
             tls: None,
+            jwt: None,
             log: LogConfig::default(),
             traces: TracesConfig::default(),
             limits: LimitsConfig::default(),
@@ -354,7 +447,8 @@ impl Config {
         ] {
             within(key, usize::try_from(rate).unwrap_or(usize::MAX), 1, 1_000_000)?;
         }
-        self.asks_for_tokens()?;
+        let asked = self.asks_for_tokens()?;
+        self.jwt.as_ref().map_or(Ok(()), |jwt| jwt.check(asked))?;
         self.origins.iter().try_for_each(|origin| check_origin(origin))?;
         within("workers.shards", self.workers.shards, 1, 256)?;
         within("workers.queue", self.workers.queue, 1, 100_000)?;
@@ -486,6 +580,32 @@ mod tests {
     }
 
     #[test]
+    fn keys_come_from_a_file_or_protected() {
+        let jwks = |jwks: &str| {
+            let toml = format!(
+                "auth = 'required'\n[jwt]\nissuer = 'https://i'\naudience = 'a'\njwks = '{jwks}'"
+            );
+            load(&toml, &[], &Flags::default()).map(|config| config.jwt.unwrap().place().unwrap())
+        };
+        assert_eq!(jwks("/etc/jwks.json"), Ok(KeyPlace::File("/etc/jwks.json".into())));
+        for url in ["https://i/jwks", "http://127.0.0.1:1/", "http://[::1]:1/", "http://localhost"]
+        {
+            assert_eq!(jwks(url), Ok(KeyPlace::Url(url.parse().unwrap())));
+        }
+        for none in [
+            "",
+            "http://i/jwks",
+            "http://localhost.example/jwks",
+            "ftp://i",
+            "https://",
+            "https://u:secret@i/jwks",
+        ] {
+            let error = jwks(none).unwrap_err();
+            assert!(error.contains("jwt.jwks") && !error.contains("secret"), "{none}: {error}");
+        }
+    }
+
+    #[test]
     fn what_cannot_be_is_named() {
         let error = |toml: &str, environment: &[(&str, &str)]| {
             load(toml, environment, &Flags::default()).unwrap_err()
@@ -504,6 +624,8 @@ mod tests {
             ("auth = 'off'\nlisten = '0.0.0.0:1'", "auth"),
             ("origins = ['https://a.example/']", "origins"),
             ("[tls]\ncertificate = 'a'", "key"),
+            ("[jwt]\nissuer = 'a'\naudience = 'b'", "jwks"),
+            ("[jwt]\nissuer = 'a'\naudience = 'b'\njwks = 'c'", "auth"),
             ("[limits]\nconnections = 0", "limits.connections"),
             ("[rates]\ntoken_per_s = 0", "rates.token_per_s"),
             ("[traces]\nendpoint = 'https://secret.example'", "traces.endpoint"),

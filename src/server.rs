@@ -2,6 +2,7 @@
 //! start to a graceful stop. Also what stands behind `migrate`, `check` and
 //! `token`.
 
+mod keys;
 mod listen;
 mod places;
 mod tls;
@@ -20,6 +21,7 @@ use tokio::net::TcpListener;
 use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
 
+use self::keys::Keys;
 use self::listen::Connections;
 use self::tls::Tls;
 pub use self::traces::Traces;
@@ -58,6 +60,10 @@ pub async fn start_with(config: Config, demo: Option<More>) -> Result<Server> {
     config.check()?;
     http::gather_metrics();
     let tls = config.tls.as_ref().map(Tls::read).transpose()?;
+    let (provider, keys) = match &config.jwt {
+        Some(jwt) => Some(Keys::read(jwt).await?).unzip(),
+        None => (None, None),
+    };
     let place = config.place()?;
     let lock = lock(&place)?;
     let (store, writer) = open(&place).await?;
@@ -65,7 +71,8 @@ pub async fn start_with(config: Config, demo: Option<More>) -> Result<Server> {
         .await
         .with_context(|| format!("`listen`: cannot listen on {}", config.listen))?;
     let address = listener.local_addr()?;
-    let (service, workers) = Service::start(store.clone(), writer, config.service_limits()).await?;
+    let limits = config.service_limits();
+    let (service, workers) = Service::start(store.clone(), writer, limits, provider).await?;
     let resumed = service.resume().await?;
     let closing = CancellationToken::new();
     let budget = Budget::new(config.limits.bodies_bytes);
@@ -76,6 +83,7 @@ pub async fn start_with(config: Config, demo: Option<More>) -> Result<Server> {
     let connections = Connections::new(&config.limits, tls.clone(), closing.clone());
     let serving = tokio::spawn(connections.serve(listener, router));
     tls.map(|tls| tokio::spawn(tls.watch(closing.clone())));
+    keys.map(|keys| tokio::spawn(keys.watch(closing.clone())));
     tokio::spawn(http::keep_metrics(closing.clone()));
     tracing::info!(%address, resumed, store = %store.place(), "serving");
     let deadline = Duration::from_secs(config.limits.shutdown_s);
@@ -95,7 +103,7 @@ fn policy(config: &Config) -> Result<Policy> {
 
 /// Says what an operator should know of before somebody finds out.
 async fn advise(config: &Config, policy: &Policy, store: &Store) -> Result<()> {
-    if policy.required && store.n_tokens(Clock.now()).await? == 0 {
+    if policy.required && config.jwt.is_none() && store.n_tokens(Clock.now()).await? == 0 {
         tracing::warn!(
             "no token is in force, so nobody comes in; make one with \
              `offbd token create --name NAME --role admin`, with the same --data and --config"
@@ -233,7 +241,11 @@ pub fn check(config: &Config) -> Result<String> {
     Ok(format!(
         "listen   {}\naccess   {}, {}\nstore    {}\nlog      {:?}, {}\nworkers  {} shards",
         config.listen,
-        if config.asks_for_tokens()? { "with a token" } else { "for everyone on this machine" },
+        match (config.asks_for_tokens()?, &config.jwt) {
+            (true, Some(jwt)) => format!("with a token, or one of {}", jwt.issuer),
+            (true, None) => "with a token".to_owned(),
+            (false, _) => "for everyone on this machine".to_owned(),
+        },
         if config.tls.is_some() { "encrypted" } else { "not encrypted" },
         config.place()?,
         config.log.format,

@@ -12,6 +12,7 @@ use offbd::service::access::{NewToken, Role};
 use reqwest::Method;
 use reqwest::header::{COOKIE, HOST, ORIGIN, SET_COOKIE, WWW_AUTHENTICATE};
 use serde_json::{Value, json};
+use support::provider::{self, Key, Published};
 use support::{Answer, Bench, Client, Events, batch, config, eventually, rig};
 use tokio_tungstenite::tungstenite::Message;
 use tokio_tungstenite::tungstenite::client::IntoClientRequest;
@@ -117,7 +118,10 @@ async fn status(client: &Client, method: &Method, path: &str) -> u16 {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn validate_the_matrix_of_callers_and_operations() {
-    let gate = Gate::new().await;
+    let (key, keys) = (Key::new("k"), tempfile::NamedTempFile::new().unwrap());
+    std::fs::write(keys.path(), provider::jwks(&[&key])).unwrap();
+    let path = keys.path().display();
+    let gate = Gate::with(|config| config.jwt = Some(provider::config(path))).await;
     let opened = gate.admin.post("assets/a/sessions", &json!({ "name": "s" })).await.expect(201);
     let session = opened["id"].as_str().unwrap();
     let callers = [
@@ -128,6 +132,16 @@ async fn validate_the_matrix_of_callers_and_operations() {
         ("operator", gate.caller("operator", Role::Operator, None).await),
         ("admin", gate.admin.clone()),
     ];
+    // The same by tokens of an identity provider.
+    let signed = |claims: Value| gate.bench.client.with(&key.token(&claims));
+    let signed = [
+        ("nobody", gate.bench.client.with(&Key::new("k").token(&provider::claims("s", "admin")))),
+        ("b's device", signed(provider::device("b"))),
+        ("a's device", signed(provider::device("a"))),
+        ("viewer", signed(provider::claims("victor", "viewer"))),
+        ("operator", signed(provider::claims("olga", "operator"))),
+        ("admin", signed(provider::claims("ann", "admin"))),
+    ];
     let policy = BTreeMap::from(POLICY);
     let mut asked = 0;
     for (method, path, right) in operations() {
@@ -137,7 +151,9 @@ async fn validate_the_matrix_of_callers_and_operations() {
         // What concerns one asset says so in its query where its path does not.
         let about = right == "read-asset" && !path.contains('{');
         let full = if about { format!("{full}?asset=a") } else { full };
-        for ((name, client), allowed) in callers.iter().zip(policy[right.as_str()]) {
+        let allowed = policy[right.as_str()];
+        let asking = callers.iter().zip(allowed).chain(signed.iter().zip(allowed));
+        for ((name, client), allowed) in asking {
             let status = status(client, &method, &full).await;
             let expected: &[u16] = match (allowed, *name) {
                 (true, _) => &[],
@@ -151,7 +167,7 @@ async fn validate_the_matrix_of_callers_and_operations() {
             asked += 1;
         }
     }
-    assert!(asked >= 6 * 40, "{asked}");
+    assert!(asked >= 12 * 40, "{asked}");
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -579,7 +595,7 @@ struct Loud {
 }
 
 impl Loud {
-    fn start(data: &std::path::Path) -> Self {
+    fn start(data: &std::path::Path, environment: &[(&str, &str)]) -> Self {
         use std::io::BufRead;
         let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_offbd"))
             .args(["serve", "--listen", "127.0.0.1:0", "--log-format", "json", "--log", "trace"])
@@ -587,6 +603,7 @@ impl Loud {
             .arg(data)
             .args(config(data).database.iter().flat_map(|url| ["--database", url]))
             .env("OFFBD_AUTH", "required")
+            .envs(environment.iter().copied())
             .stderr(std::process::Stdio::piped())
             .spawn()
             .unwrap();
@@ -626,7 +643,18 @@ async fn no_log_and_no_error_has_a_secret() {
     let data = tempfile::tempdir().unwrap();
     let config = config(data.path());
     let root = token(&config, "root", Role::Admin, None).await;
-    let loud = Loud::start(data.path());
+    let key = Key::new("k");
+    let jwks = encrypted(&key, data.path()).await;
+    let certificate = data.path().join("certificate.pem");
+    let loud = Loud::start(
+        data.path(),
+        &[
+            ("OFFBD_JWT__ISSUER", provider::ISSUER),
+            ("OFFBD_JWT__AUDIENCE", provider::AUDIENCE),
+            ("OFFBD_JWT__JWKS", &jwks),
+            ("SSL_CERT_FILE", certificate.to_str().unwrap()),
+        ],
+    );
     let admin = loud.client.with(&root);
     let wrong = format!("offbd_{}", "5".repeat(64));
     let mut told = String::new();
@@ -647,9 +675,15 @@ async fn no_log_and_no_error_has_a_secret() {
     let cookie = cookie(&login);
     let ask = loud.client.request(Method::GET, "assets").header(COOKIE, cookie.clone());
     hear(loud.client.send(ask).await).expect(200);
+    let signed = key.token(&provider::claims("olga", "operator"));
+    let forged = Key::new("k").token(&provider::claims("mallory", "admin"));
+    hear(loud.client.with(&signed).get("assets").await).expect(200);
+    hear(loud.client.with(&forged).get("assets").await).problem(401);
+    hear(loud.client.post("login", &json!({ "token": signed })).await).problem(401);
     hear(admin.get("tokens").await).expect(200);
     hear(admin.get("audit").await).expect(200);
     let log = loud.stop();
+    assert!(log.contains("its signature is wrong"), "what an operator asks");
     assert!(log.contains("/api/v1/login"), "the log is what was meant");
     let cookie = cookie.split_once('=').unwrap().1;
     for secret in [&root[6..], &wrong[6..], &made["secret"].as_str().unwrap()[6..], cookie] {
@@ -657,6 +691,29 @@ async fn no_log_and_no_error_has_a_secret() {
         assert_eq!(line, None, "in the log");
         assert!(!told.contains(secret), "in an answer: {told}");
     }
+    for part in signed.split('.').chain(forged.split('.')) {
+        assert_eq!(log.lines().find(|line| line.contains(part)), None, "in the log");
+        assert!(!told.contains(part), "in an answer: {told}");
+    }
+    assert!(!log.contains("mallory"), "what was not verified is not told");
+}
+
+/// The URL where `key` is published over TLS, by the certificate that is put into
+/// `directory`.
+async fn encrypted(key: &Key, directory: &std::path::Path) -> String {
+    use tokio_rustls::rustls::{ServerConfig, crypto::ring, pki_types::PrivateKeyDer};
+    let certified = rcgen::generate_simple_self_signed(["localhost".to_owned()]).unwrap();
+    std::fs::write(directory.join("certificate.pem"), certified.cert.pem()).unwrap();
+    let secret = PrivateKeyDer::Pkcs8(certified.signing_key.serialize_der().into());
+    let tls = ServerConfig::builder_with_provider(ring::default_provider().into())
+        .with_safe_default_protocol_versions()
+        .unwrap()
+        .with_no_client_auth()
+        .with_single_cert(vec![certified.cert.der().clone()], secret)
+        .unwrap();
+    let published = Published::new(provider::jwks(&[key]));
+    let port = published.serve(Some(std::sync::Arc::new(tls).into())).await;
+    format!("https://localhost:{port}/jwks")
 }
 
 #[test]

@@ -23,7 +23,7 @@ use serde::Deserialize;
 use super::rates::Rates;
 use super::routes::{Rule, Rules};
 use super::{App, Problem, login, problem};
-use crate::service::access::{Caller, Credential, Deed, Reach, Right};
+use crate::service::access::{Caller, Credential, Deed, Pass, Reach, Right};
 
 /// How callers are told apart, and what is asked of them.
 pub struct Policy {
@@ -148,16 +148,11 @@ impl Guard {
             return Err(unauthenticated(detail, None));
         };
         let known = shown.and_then(|shown| self.app.service.recall(&shown));
-        let pass = match (known, shown) {
-            (Some(pass), _) => Some(pass),
-            (None, shown) => {
+        let pass = match known {
+            Some(pass) => Some(pass),
+            None => {
                 self.take_address(parts)?;
-                match shown {
-                    Some(shown) => {
-                        self.app.service.authenticate(&shown).await.map_err(Problem::from)?
-                    }
-                    None => None,
-                }
+                self.find(&parts.headers, shown).await?
             }
         };
         let Some(pass) = pass else {
@@ -166,6 +161,20 @@ impl Guard {
         };
         policy.rates.take_token(&pass.id).map_err(too_often)?;
         Ok(Some(Caller::Known(pass)))
+    }
+
+    /// Whom something belongs to that is not known yet.
+    async fn find(
+        &self,
+        headers: &HeaderMap,
+        shown: Option<Credential>,
+    ) -> Result<Option<Arc<Pass>>, Problem> {
+        let service = &self.app.service;
+        match (shown, headers.get(AUTHORIZATION).and_then(bearer)) {
+            (Some(Credential::Jwt(_)), Some(token)) => Ok(service.verify(token).await),
+            (Some(shown), _) => Ok(service.authenticate(&shown).await?),
+            (None, _) => Ok(None),
+        }
     }
 
     fn take_address(&self, parts: &Parts) -> Result<(), Refusal> {
@@ -292,15 +301,19 @@ fn is_of(origin: &str, host: &Authority) -> bool {
 /// credential. A header goes before a cookie.
 fn credential(headers: &HeaderMap, encrypted: bool) -> Option<Option<Credential>> {
     if let Some(shown) = headers.get(AUTHORIZATION) {
-        let (scheme, secret) = shown.to_str().ok().and_then(|s| s.split_once(' ')).unzip();
-        let bearer = scheme.is_some_and(|scheme| scheme.eq_ignore_ascii_case("bearer"));
-        return Some(secret.filter(|_| bearer).map(|secret| Credential::token(secret.trim())));
+        return Some(bearer(shown).map(Credential::bearer));
     }
     let cookies = headers.get_all(COOKIE).iter().filter_map(|cookies| cookies.to_str().ok());
     let mut cookies = cookies.flat_map(|cookies| cookies.split(';'));
     let name = login::cookie_name(encrypted);
     let login = cookies.find_map(|cookie| cookie.trim().strip_prefix(name)?.strip_prefix('='));
     login.map(|login| Some(Credential::login(login)))
+}
+
+/// The secret of `Authorization: Bearer SECRET`.
+fn bearer(shown: &HeaderValue) -> Option<&str> {
+    let (scheme, secret) = shown.to_str().ok()?.split_once(' ')?;
+    scheme.eq_ignore_ascii_case("bearer").then(|| secret.trim())
 }
 
 fn forbidden(detail: &str) -> Problem {

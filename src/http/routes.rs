@@ -50,7 +50,8 @@ impl Guarded {
     /// The router, and the description with the ways to show a token.
     pub(super) fn split(self) -> (Router<App>, Document) {
         let (router, mut document) = self.router.split_for_parts();
-        let bearer = HttpBuilder::new().scheme(HttpAuthScheme::Bearer).bearer_format("offbd_…");
+        let bearer =
+            HttpBuilder::new().scheme(HttpAuthScheme::Bearer).bearer_format("offbd_… or JWT");
         let cookie = SecurityScheme::ApiKey(ApiKey::Cookie(ApiKeyValue::new(COOKIE)));
         let components = document.components.take().unwrap_or_default();
         let components = ComponentsBuilder::from(components)

@@ -58,7 +58,7 @@ pub use sessions::Recording;
 pub use telemetry::Pending;
 pub use traces::{MAX_TRACE_POINTS, TraceQuery};
 
-use self::access::Passes;
+use self::access::{Passes, Provider};
 use self::commit::{Committer, Outage, WriteSet};
 use self::events::Events;
 use self::presence::Presences;
@@ -78,6 +78,7 @@ struct Inner {
     events: Events,
     presences: Presences,
     passes: Passes,
+    provider: Option<Provider>,
     shards: Vec<mpsc::Sender<Job>>,
     writer: mpsc::Sender<WriteSet>,
     outage: watch::Receiver<Outage>,
@@ -145,7 +146,8 @@ async fn joined<T: Send + 'static>(thread: std::thread::JoinHandle<T>) -> Option
 }
 
 impl Service {
-    /// Starts the shards and the writer on the current tokio runtime.
+    /// Starts the shards and the writer on the current tokio runtime. The tokens of
+    /// `provider` are taken beside the service's own.
     ///
     /// # Errors
     /// [`ServiceError`] if the store cannot be read or no thread can be started.
@@ -153,6 +155,7 @@ impl Service {
         store: Store,
         writer: Writer,
         limits: Limits,
+        provider: Option<Provider>,
     ) -> Result<(Self, Workers), ServiceError> {
         let clock = Clock;
         let events = Events::new(store.clone());
@@ -190,6 +193,7 @@ impl Service {
             events,
             presences,
             passes: Passes::default(),
+            provider,
             shards,
             writer: sets,
             outage,

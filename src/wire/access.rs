@@ -56,9 +56,10 @@ pub struct AuditView {
     pub id: String,
     /// RFC 3339.
     pub at: String,
-    /// The name of the token; `anyone` where none is asked for.
+    /// The name of the token, of a JSON Web Token the subject; `anyone` where none
+    /// is asked for.
     pub actor: String,
-    /// The token's id.
+    /// The token's id; of a JSON Web Token the issuer and the subject.
     pub token_id: Option<String>,
     /// The operation, as in this description.
     pub act: String,
@@ -73,7 +74,7 @@ pub struct AuditView {
 pub struct CallerView {
     /// `required` or `off`.
     pub authentication: String,
-    /// The token's name.
+    /// The token's name; of a JSON Web Token the subject.
     pub name: Option<String>,
     /// What the caller may do; `admin` where no token is asked for.
     pub role: String,

@@ -3,14 +3,18 @@
 
 use offbd::diagnosis::FaultMemory;
 use offbd::engine::{Engine, Input, Rig, Setup, calibrate};
+use offbd::service::access::Role;
+use offbd::service::access::jwt::{KeySet, MAX_SUBJECT, verify};
 use offbd::vocabulary::Sample;
 use offbd::wire::telemetry::{self, Batch, BatchError};
 use offbd::wire::{asset, scene, session_csv};
 
+use crate::support::provider::{self, Key};
+
 pub type Parser = fn(&[u8]) -> String;
 
 /// Every parser by the directory of its corpus.
-pub const PARSERS: [(&str, Parser); 9] = [
+pub const PARSERS: [(&str, Parser); 11] = [
     ("json", |input| batch(telemetry::json(input, LIMIT))),
     ("msgpack", |input| batch(telemetry::msgpack(input, LIMIT))),
     ("ndjson", |input| batch(telemetry::ndjson(input, LIMIT))),
@@ -20,6 +24,8 @@ pub const PARSERS: [(&str, Parser); 9] = [
     ("scene", scene_file),
     ("chunk", chunk),
     ("moment", moment),
+    ("jwt", jwt),
+    ("jwks", jwks),
 ];
 
 /// Samples in a batch.
@@ -149,4 +155,44 @@ fn moment(input: &[u8]) -> String {
         Ok(moment) => format!("a moment {}", moment < 0),
         Err(reason) => kind(&reason),
     }
+}
+
+/// In 2027, when the tokens of the corpus are in force.
+const NOW: i64 = 1_800_000_000_000_000;
+
+/// A token of an identity provider, whose key signs whatever is in it: the header
+/// up to the first line's end, the claims behind it.
+fn jwt(input: &[u8]) -> String {
+    let key = Key::new("k");
+    let end = input.iter().position(|byte| *byte == b'\n').unwrap_or(input.len());
+    let (header, claims) = input.split_at(end);
+    let claims = claims.strip_prefix(b"\n").unwrap_or(claims);
+    let message = format!("{}.{}", provider::base64(header), provider::base64(claims));
+    let token = format!("{message}.{}", provider::base64(key.sign(message.as_bytes())));
+    let keys = KeySet::parse(provider::jwks(&[&key]).as_bytes()).unwrap();
+    match verify(&token, &keys, &provider::config("").expected(), NOW) {
+        Ok(verified) => {
+            assert!((1..=MAX_SUBJECT).contains(&verified.subject.len()));
+            assert!(verified.expires_at > NOW);
+            assert_eq!(verified.role == Role::Device, verified.asset.is_some());
+            format!("{} {}", verified.role, verified.expires_at == i64::MAX)
+        }
+        Err(refusal) => kind(&refusal.to_string()),
+    }
+}
+
+/// The keys of an identity provider, and tokens that none of them has signed.
+fn jwks(input: &[u8]) -> String {
+    let keys = match KeySet::parse(input) {
+        Ok(keys) => keys,
+        Err(error) => return kind(&error.to_string()),
+    };
+    let claims = provider::claims("s", "admin");
+    let told = ["EdDSA", "ES256", "ES384", "RS256", "PS512"].map(|algorithm| {
+        let header = serde_json::json!({ "alg": algorithm, "kid": "k" });
+        let forged = provider::token(&header, &claims, |_| vec![1; 64]);
+        let refusal = verify(&forged, &keys, &provider::config("").expected(), NOW).unwrap_err();
+        kind(&refusal.to_string())
+    });
+    format!("{} {}", keys.n_keys().min(3), told.join(" "))
 }

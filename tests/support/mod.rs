@@ -5,6 +5,7 @@
 pub mod device;
 pub mod postgres;
 pub mod process;
+pub mod provider;
 
 use std::future::Future;
 use std::path::Path;

@@ -5,7 +5,9 @@
 //! the others all or nothing. Knows no headers, no cookies and no addresses.
 
 mod audit;
+pub mod jwt;
 mod passes;
+mod provider;
 mod tokens;
 
 use std::fmt;
@@ -15,6 +17,7 @@ use std::sync::Arc;
 pub use audit::Deed;
 pub(super) use passes::Passes;
 pub use passes::{Credential, LOOK_AGAIN};
+pub use provider::{KeyFeed, MAX_KEY_AGE, Provider};
 pub use tokens::{MAX_TOKEN_NAME, Minted, NewToken, PREFIX, mint, token_view};
 
 use crate::store::Micros;
@@ -135,8 +138,9 @@ impl Right {
 /// A token that was found to be in force.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pass {
-    /// The token's id.
+    /// The token's id; of a JSON Web Token the issuer and the subject.
     pub id: String,
+    /// The token's name; of a JSON Web Token the subject.
     pub name: String,
     pub role: Role,
     /// The one asset of a device.
@@ -144,6 +148,8 @@ pub struct Pass {
     pub expires_at: Option<Micros>,
     /// By what it was found.
     pub credential: Credential,
+    /// What signed it, if it is a JSON Web Token.
+    pub signed_by: Option<jwt::Fingerprint>,
 }
 
 /// Who asks.

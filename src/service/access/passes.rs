@@ -11,8 +11,8 @@ use std::time::Duration;
 use sha2::{Digest, Sha256};
 use tokio::sync::watch;
 
-use super::tokens::random;
-use super::{Caller, Pass};
+use super::tokens::{PREFIX, random};
+use super::{Caller, Pass, jwt};
 use crate::service::{Service, ServiceError};
 use crate::store::{AccessWrite, Micros, TokenRow, Write};
 use crate::wire::verdict::hex;
@@ -41,9 +41,22 @@ pub enum Credential {
     Token([u8; 32]),
     /// The cookie of a login.
     Login([u8; 32]),
+    /// A token of the identity provider.
+    Jwt([u8; 32]),
 }
 
 impl Credential {
+    /// What is shown as a bearer's: the service's own tokens are told by their
+    /// prefix.
+    #[must_use]
+    pub fn bearer(secret: &str) -> Self {
+        if secret.starts_with(PREFIX) {
+            Self::token(secret)
+        } else {
+            Self::Jwt(Sha256::digest(secret).into())
+        }
+    }
+
     #[must_use]
     pub fn token(secret: &str) -> Self {
         Self::Token(Sha256::digest(secret).into())
@@ -55,7 +68,7 @@ impl Credential {
     }
 
     pub(super) fn digest(&self) -> String {
-        let (Self::Token(digest) | Self::Login(digest)) = self;
+        let (Self::Token(digest) | Self::Login(digest) | Self::Jwt(digest)) = self;
         hex(digest)
     }
 }
@@ -121,6 +134,7 @@ fn pass(row: TokenRow, credential: Credential, now: Micros) -> Result<Option<Pas
         asset: row.asset,
         expires_at: row.expires_at,
         credential,
+        signed_by: None,
     }))
 }
 
@@ -131,7 +145,8 @@ impl Service {
         self.inner.passes.recall(credential, self.inner.bench.clock.now())
     }
 
-    /// Whom `credential` belongs to; nobody if it is none, revoked or expired.
+    /// Whom `credential` belongs to; nobody if it is none, revoked or expired. A
+    /// JSON Web Token that is not known yet is for [`Service::verify`].
     ///
     /// # Errors
     /// [`ServiceError::Store`] if that cannot be found out.
@@ -148,6 +163,7 @@ impl Service {
         let row = match credential {
             Credential::Token(_) => inner.store.token_by_hash(&credential.digest()).await?,
             Credential::Login(_) => inner.store.token_by_login(&credential.digest(), now).await?,
+            Credential::Jwt(_) => None,
         };
         let Some(row) = row else { return Ok(None) };
         let used_at = row.last_used_at;
@@ -157,6 +173,40 @@ impl Service {
             self.note_use(&pass.id, now);
         }
         Ok(Some(pass))
+    }
+
+    /// Whom a JSON Web Token names; nobody if it is not in force, or none is taken.
+    pub async fn verify(&self, token: &str) -> Option<Arc<Pass>> {
+        let provider = self.inner.provider.as_ref()?;
+        let now = self.inner.bench.clock.now();
+        let verified = provider.verify(token, now).await;
+        let refused = |reason| tracing::info!(%reason, "a JSON Web Token is refused");
+        let jwt::Verified { subject, role, asset, expires_at, key } =
+            verified.map_err(refused).ok()?;
+        let pass = Arc::new(Pass {
+            // An issuer has no space, and the service's own ids are no URLs.
+            id: format!("{} {subject}", provider.expected.issuer),
+            name: subject,
+            role,
+            asset,
+            expires_at: Some(expires_at),
+            credential: Credential::Jwt(Sha256::digest(token).into()),
+            signed_by: Some(key),
+        });
+        let change = *self.inner.passes.changes.borrow();
+        self.inner.passes.keep(&pass, change, now);
+        Some(pass)
+    }
+
+    /// Whether a token is known to be no longer in force. A store that cannot say
+    /// takes nothing away from whom it knew.
+    async fn has_lapsed(&self, pass: &Pass) -> bool {
+        let Some(key) = pass.signed_by else {
+            return matches!(self.authenticate(&pass.credential).await, Ok(None));
+        };
+        let now = self.inner.bench.clock.now();
+        let published = self.inner.provider.as_ref().is_some_and(|p| p.has(key, now));
+        !published || pass.expires_at.is_some_and(|end| now >= end)
     }
 
     /// Notes that a token is used; nobody waits for it.
@@ -170,15 +220,12 @@ impl Service {
         });
     }
 
-    /// Ends when the caller's token is revoked or expires; never for anyone.
+    /// Ends when the caller's token is revoked or expires, or the key that signed
+    /// it is withdrawn; never for anyone.
     pub async fn lapse(&self, caller: &Caller) {
         let Some(pass) = caller.pass() else { return std::future::pending().await };
         let mut changes = self.inner.passes.changes.subscribe();
-        loop {
-            // A store that cannot say takes nothing away from whom it knew.
-            if matches!(self.authenticate(&pass.credential).await, Ok(None)) {
-                return;
-            }
+        while !self.has_lapsed(pass).await {
             tokio::select! {
                 _ = changes.changed() => {}
                 () = tokio::time::sleep(LOOK_AGAIN) => {}
