@@ -46,10 +46,6 @@ use rustix::time::{ClockId, clock_gettime};
 use client::{Client, Socket};
 use load::{DEVICES, Load, SAMPLES, Way, columns_as_msgpack, loads, loads_of_peer, recording};
 
-/// As in the program.
-#[global_allocator]
-static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
-
 /// Assets whose memory is looked at.
 const ASSETS: usize = 10_000;
 

@@ -19,7 +19,10 @@ pub(super) const FULL_PAGES: i64 = 16_384;
 /// Pages from which on it is copied until it is full.
 const MANY_PAGES: i64 = FULL_PAGES / 4 * 3;
 
-/// Bytes committed between two copies.
+/// Copies of a shorter log, of which each has less to do than the one before.
+const COPIES: u32 = 8;
+
+/// Bytes committed until it is copied again.
 const EVERY_BYTES: usize = 16 << 20;
 
 /// Bytes that a commit takes of the log beside its samples, and each of those in the
@@ -77,23 +80,28 @@ async fn run(place: Place, mut due: mpsc::Receiver<()>) {
     }
 }
 
-/// Copies what is in the log; when that is much, until it is full.
+/// Copies what is in the log, and what is committed meanwhile, until all of it is
+/// copied: the next commit then begins the log anew. Under load that never comes
+/// about, so while the log is short a few copies will do, and a long one is copied
+/// until it is full.
 async fn copy(place: &Place, connection: &mut Option<AnyConnection>) -> Result<(), StoreError> {
     let connection = match connection {
         Some(connection) => connection,
         none => none.insert(place.writer(false).await?),
     };
     let mut before = 0;
-    loop {
+    for n_copies in 1.. {
         let (_, pages, copied): (i64, i64, i64) =
             sqlx::query_as("PRAGMA wal_checkpoint(PASSIVE)").fetch_one(&mut *connection).await?;
         // A reader may still need what would be written over.
         let stands = copied <= before;
-        if pages < MANY_PAGES || copied >= pages || stands {
-            return Ok(());
+        let enough = pages < MANY_PAGES && n_copies >= COPIES;
+        if copied >= pages || stands || enough {
+            break;
         }
         before = copied;
     }
+    Ok(())
 }
 
 #[cfg(test)]
