@@ -80,8 +80,8 @@ async fn run(place: Place, mut due: mpsc::Receiver<()>) {
     }
 }
 
-/// Copies what is in the log, and what is committed meanwhile, until all of it is
-/// copied: the next commit then begins the log anew. Under load that never comes
+/// Copies what is in the log, and what is committed meanwhile, until nothing is
+/// left: the next commit then begins the log anew. Under load that never comes
 /// about, so while the log is short a few copies will do, and a long one is copied
 /// until it is full.
 async fn copy(place: &Place, connection: &mut Option<AnyConnection>) -> Result<(), StoreError> {
@@ -91,12 +91,13 @@ async fn copy(place: &Place, connection: &mut Option<AnyConnection>) -> Result<(
     };
     let mut before = 0;
     for n_copies in 1.. {
+        // How much is in the log is as of the copy's beginning.
         let (_, pages, copied): (i64, i64, i64) =
             sqlx::query_as("PRAGMA wal_checkpoint(PASSIVE)").fetch_one(&mut *connection).await?;
-        // A reader may still need what would be written over.
-        let stands = copied <= before;
         let enough = pages < MANY_PAGES && n_copies >= COPIES;
-        if copied >= pages || stands || enough {
+        // All is copied, or a reader still needs what would be written over.
+        let stands = copied <= before;
+        if stands || enough {
             break;
         }
         before = copied;
