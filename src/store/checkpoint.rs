@@ -26,7 +26,7 @@ const COPIES: u32 = 8;
 const EVERY_BYTES: usize = 16 << 20;
 
 /// Bytes that a commit takes of the log beside its samples, and each of those in the
-/// journal and later in a chunk: four pages, and 46 and 19 bytes.
+/// journal and later in a chunk: four pages, and some 45 and 20 bytes.
 const COMMIT_BYTES: usize = 4 << 12;
 const SAMPLE_BYTES: usize = 65;
 
