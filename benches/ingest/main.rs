@@ -299,12 +299,9 @@ async fn latency(samples: &[Sample], load: &str, batch: usize) -> Result<()> {
     latencies.sort();
     ensure!(!latencies.is_empty(), "no fault was found");
     let at = |share: f64| latencies[((latencies.len() - 1) as f64 * share) as usize];
-    let (half, most, last) = (at(0.5), at(0.99), at(1.0));
-    let n = latencies.len();
-    println!(
-        "{load}: {rate:.0} samples/s, {n} events: median {half:.1?}, p90 {:.1?}, p99 {most:.1?}, worst {last:.1?}",
-        at(0.9)
-    );
+    let [half, most, nearly_all, worst] = [0.5, 0.9, 0.99, 1.0].map(at);
+    println!("{load}: {rate:.0} samples/s, {} events:", latencies.len());
+    println!("median {half:.1?}, p90 {most:.1?}, p99 {nearly_all:.1?}, worst {worst:.1?}");
     Ok(())
 }
 

@@ -4,8 +4,8 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// What is known of a code beside its record. Occurrences are boxed: most codes of
-/// most assets have none.
+/// What is known of a code beside its record.
+// Occurrences are boxed: most codes of most assets have none.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct ProvenanceView {
     /// The first occurrence since the last clear; null without one.
