@@ -293,6 +293,34 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Four times what comes is folded from one and a half times the limit on, so the
+    /// oldest of it is gone before a quarter of that more has come.
+    #[test]
+    fn the_journal_stays_below_twice_its_limit_and_what_one_group_brings(
+        groups in prop::collection::vec(prop::collection::vec((0..ASSETS, 1..80usize), 1..6), 1..100),
+        above in 2000..20_000usize,
+    ) {
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+        runtime.block_on(async {
+            let data = tempfile::tempdir().unwrap();
+            let mut trial = Trial::begin(data.path()).await;
+            let (mut before, mut most) = (trial.writer().journal_bytes(), 0);
+            for group in groups {
+                trial.take(Step::Commit(group)).await?;
+                let n_bytes = trial.writer().journal_bytes();
+                most = most.max(n_bytes.saturating_sub(before));
+                prop_assert!(n_bytes <= above * 15 / 8 + most * 5 / 4, "{n_bytes}");
+                trial.take(Step::Fold(above)).await?;
+                before = trial.writer().journal_bytes();
+            }
+            Ok(())
+        })?;
+    }
+}
+
 /// How many orders are tried; CASES says otherwise.
 fn cases() -> u32 {
     std::env::var("CASES").map_or(24, |n| n.parse().unwrap())

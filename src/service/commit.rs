@@ -88,6 +88,7 @@ impl Committer {
         while self.queue.recv_many(&mut group, MAX_GROUP_SETS).await > 0 {
             self.commit(std::mem::take(&mut group)).await;
             self.fold().await;
+            self.writer.copy_log().await;
         }
         self.writer
     }

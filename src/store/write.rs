@@ -8,7 +8,7 @@ use std::time::Duration;
 use sqlx::{AnyConnection, Connection};
 
 use self::fold::Moves;
-use super::checkpoint::Checkpoints;
+use super::checkpoint::{self, Checkpoints};
 use super::journal::{Changes, Journal};
 use super::rows_at_once::{RowsAtOnce, in_parts};
 use super::tail::{Run, Tails};
@@ -88,7 +88,7 @@ pub struct Writer {
     n_commits: i64,
     /// Whether it writes beside the one that counts.
     guest: bool,
-    checkpoints: Option<Checkpoints>,
+    pub(super) checkpoints: Option<Checkpoints>,
     /// Of the transaction that may have come through and is not counted yet.
     in_doubt: Option<Changes>,
     tails: Tails,
@@ -172,6 +172,21 @@ impl Writer {
             }
         }
         result
+    }
+
+    /// Copies the rest of the log into the file, if it is little, so that the next
+    /// commit begins the log anew.
+    pub async fn copy_log(&mut self) {
+        if !self.checkpoints.as_ref().is_some_and(Checkpoints::is_little_left) {
+            return;
+        }
+        let Some(connection) = &mut self.connection else { return };
+        let late = |_| Err(sqlx::Error::Io(std::io::ErrorKind::TimedOut.into()));
+        let copied = tokio::time::timeout(COMMIT_WAIT, checkpoint::copy(connection)).await;
+        if let Err(error) = copied.unwrap_or_else(late) {
+            tracing::warn!(%error, "the write-ahead log is not copied into the file");
+            self.connection = None;
+        }
     }
 
     /// Connects anew; returns whether the last commit, which failed, has come

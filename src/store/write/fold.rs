@@ -11,7 +11,7 @@ use crate::store::tail::Run;
 
 /// Transactions at least in which a full journal is folded, so that nobody waits
 /// long for one.
-const FOLDS: usize = 16;
+const FOLDS: usize = 64;
 
 /// Bytes folded in one transaction while nobody waits.
 const FOLD_BYTES: usize = 1 << 20;
@@ -34,8 +34,9 @@ pub(super) struct Moves {
 
 impl Writer {
     /// Folds what has been in the journal longest, if the journal has more than
-    /// `above` bytes: twice as much as has come since the last call, so that it
-    /// stays below twice `above` and what one group brings.
+    /// `above` bytes: a little at a time, for whoever comes meanwhile waits. From half
+    /// as much again on it is four times what has come since the last call, so that
+    /// the journal stays below twice `above` and what one group brings.
     ///
     /// A session whose chunks the database refuses stays in the journal. It takes
     /// no more samples until the database takes those.
@@ -46,8 +47,8 @@ impl Writer {
         let n_bytes = self.journal.n_bytes();
         let grown = n_bytes.saturating_sub(self.n_bytes_before);
         if n_bytes > above {
-            let n_bytes = (above / FOLDS).max(2 * grown).max(1);
-            let sessions = self.journal.oldest(n_bytes, &HashSet::new());
+            let pressed = if n_bytes > above + above / 2 { 4 * grown } else { 1 };
+            let sessions = self.journal.oldest(pressed.max(above / FOLDS), &HashSet::new());
             self.fold_these(sessions).await?;
         }
         self.n_bytes_before = self.journal.n_bytes();
