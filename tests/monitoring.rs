@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use axum::Router;
 use axum::body::Bytes;
+use axum::http::Method;
 use axum::routing::post;
 use serde_json::{Value, json};
 use support::process::Process;
@@ -176,6 +177,31 @@ async fn traces_go_to_the_collector() {
         let more = tokio::time::timeout(support::DEADLINE, traces.recv()).await;
         told.extend(more.expect("the traces come").unwrap());
     }
+}
+
+/// The example of <https://www.w3.org/TR/trace-context/#examples-of-http-traceparent-headers>.
+const TRACE: [u8; 16] = 0x4bf92f3577b34da6a3ce929d0e0e4736_u128.to_be_bytes();
+const PARENT: [u8; 8] = 0x00f067aa0ba902b7_u64.to_be_bytes();
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_request_belongs_to_the_trace_of_its_caller() {
+    let (address, mut traces) = collector().await;
+    let data = tempfile::tempdir().unwrap();
+    let endpoint = format!("http://{address}");
+    let of_itself =
+        [("OFFBD_TRACES__ENDPOINT", endpoint.as_ref()), ("OFFBD_TRACES__SHARE", "0".as_ref())];
+    let process = Process::start_with(data.path(), &of_itself);
+    let ask = |path: &str, parent: &str| {
+        let request = process.client.request(Method::GET, path).header("traceparent", parent);
+        async move { assert!(request.send().await.unwrap().status().is_success()) }
+    };
+    ask("/api/v1/assets", "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-00").await;
+    ask("/api/v1/assets", "nonsense").await;
+    ask("/api/v1/fleet", "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01").await;
+    let told = tokio::time::timeout(support::DEADLINE, traces.recv()).await.unwrap().unwrap();
+    let of = |id: &[u8]| told.windows(id.len()).any(|window| window == id);
+    assert!(of(&TRACE) && of(&PARENT) && has(&told, "/api/v1/fleet"));
+    assert!(!has(&told, "/api/v1/assets"), "the caller does not trace it");
 }
 
 /// Without the collector everything goes on.

@@ -11,6 +11,9 @@ use axum::http::header::CONTENT_LENGTH;
 use axum::http::{HeaderName, StatusCode};
 use axum::middleware::{Next, from_fn};
 use axum::response::{IntoResponse, Response};
+use opentelemetry::propagation::TextMapPropagator;
+use opentelemetry_http::HeaderExtractor;
+use opentelemetry_sdk::propagation::TraceContextPropagator;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::compression::CompressionLayer;
 use tower_http::request_id::{
@@ -19,6 +22,7 @@ use tower_http::request_id::{
 use tower_http::trace::TraceLayer;
 use tracing::Span;
 use tracing::field::Empty;
+use tracing_opentelemetry::OpenTelemetrySpanExt;
 
 use super::{Policy, Problem, headers};
 
@@ -47,10 +51,20 @@ pub(super) fn around(router: Router, policy: &Policy) -> Router {
     ))
 }
 
+/// The request's span, within the trace of its caller
+/// (<https://www.w3.org/TR/trace-context/>), if it has one.
 fn span(request: &Request<Body>) -> Span {
     let id = request_id(request).unwrap_or_default();
     let (method, path) = (request.method(), request.uri().path());
-    tracing::info_span!("request", %method, path, request_id = id, asset = Empty, status = Empty)
+    let span = tracing::info_span!(
+        "request", %method, path, request_id = id, asset = Empty, status = Empty
+    );
+    if request.headers().contains_key("traceparent") {
+        let caller = TraceContextPropagator::new().extract(&HeaderExtractor(request.headers()));
+        // Where nothing is traced, there is nothing to belong to.
+        let _ = span.set_parent(caller);
+    }
+    span
 }
 
 /// Says in the request's span which asset it is about.
