@@ -24,7 +24,7 @@ pub(super) const FULL_PAGES: i64 = 16_384;
 /// again, get into the file the less the more it is.
 const EVERY_BYTES: usize = 16 << 20;
 
-/// Pages that the writer may copy itself.
+/// Pages that the writer may copy itself: 4 MiB, some 15 ms at most on two busy cores.
 const LITTLE_PAGES: i64 = 1024;
 
 /// Copies after which as little is left as ever will be: each has less to do than
