@@ -299,7 +299,7 @@ proptest! {
     /// Four times what comes is folded from one and a half times the limit on, so the
     /// oldest of it is gone before a quarter of that more has come.
     #[test]
-    fn the_journal_stays_below_twice_its_limit_and_what_one_group_brings(
+    fn the_journal_stays_below_twice_its_limit_and_a_little_more_than_a_group(
         groups in prop::collection::vec(prop::collection::vec((0..ASSETS, 1..80usize), 1..6), 1..100),
         above in 2000..20_000usize,
     ) {

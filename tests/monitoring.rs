@@ -157,8 +157,9 @@ async fn collector() -> (String, mpsc::UnboundedReceiver<Bytes>) {
     (address, traces)
 }
 
-fn has(bytes: &[u8], word: &str) -> bool {
-    bytes.windows(word.len()).any(|window| window == word.as_bytes())
+fn has(bytes: &[u8], word: impl AsRef<[u8]>) -> bool {
+    let word = word.as_ref();
+    bytes.windows(word.len()).any(|window| window == word)
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -199,8 +200,7 @@ async fn a_request_belongs_to_the_trace_of_its_caller() {
     ask("/api/v1/assets", "nonsense").await;
     ask("/api/v1/fleet", "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01").await;
     let told = tokio::time::timeout(support::DEADLINE, traces.recv()).await.unwrap().unwrap();
-    let of = |id: &[u8]| told.windows(id.len()).any(|window| window == id);
-    assert!(of(&TRACE) && of(&PARENT) && has(&told, "/api/v1/fleet"));
+    assert!(has(&told, TRACE) && has(&told, PARENT) && has(&told, "/api/v1/fleet"));
     assert!(!has(&told, "/api/v1/assets"), "the caller does not trace it");
 }
 

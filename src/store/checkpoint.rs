@@ -20,8 +20,8 @@ use super::{Place, StoreError};
 /// after all: when a reader has held on to it. SQLite's own are 4 MiB.
 pub(super) const FULL_PAGES: i64 = 16_384;
 
-/// Bytes committed until the log is copied. The pages of the journal, used again and
-/// again, get into the file the less the more it is.
+/// Bytes committed until the log is copied. A page written again and again, as those
+/// of the journal are, goes into the file once each time.
 const EVERY_BYTES: usize = 16 << 20;
 
 /// Pages that the writer may copy itself: 4 MiB, some 15 ms at most on two busy cores.

@@ -36,7 +36,7 @@ impl Writer {
     /// Folds what has been in the journal longest, if the journal has more than
     /// `above` bytes: a little at a time, for whoever comes meanwhile waits. From half
     /// as much again on it is four times what has come since the last call, so that
-    /// the journal stays below twice `above` and what one group brings.
+    /// the journal stays below 15/8 of `above` and 5/4 of what one group brings.
     ///
     /// A session whose chunks the database refuses stays in the journal. It takes
     /// no more samples until the database takes those.
