@@ -10,6 +10,7 @@ mod backup;
 mod checkpoint;
 pub mod codec;
 mod expiry;
+mod fleet;
 mod journal;
 mod place;
 mod question;

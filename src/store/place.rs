@@ -17,6 +17,11 @@ use super::checkpoint::FULL_PAGES;
 /// Connections for reading; more readers wait for one.
 const MAX_READERS: u32 = 4;
 
+/// Memory that a connection keeps a file's pages in, KiB. A large group fits into that
+/// of the one writer, what does not is written twice; a reader needs few again.
+const ONLY_CACHE_KIB: u32 = 8192;
+const CACHE_KIB: u32 = 512;
+
 /// How long a reader waits for a connection before it fails.
 const READER_WAIT: Duration = Duration::from_secs(10);
 
@@ -76,13 +81,13 @@ impl Place {
         }
     }
 
-    /// A connection that may write. The `only` one takes the lock that the
-    /// server keeps; that of a file is not the store's.
+    /// A connection that may write. The `only` one has room for large groups, and
+    /// takes the lock that the server keeps; that of a file is not the store's.
     pub(super) async fn writer(&self, only: bool) -> Result<AnyConnection, StoreError> {
         let options = self.options()?;
         let connect = async {
             let mut connection = options.connect().await?;
-            connection.execute(AssertSqlSafe(self.durable())).await?;
+            connection.execute(AssertSqlSafe(self.durable(only))).await?;
             if only && matches!(self, Self::Server(_)) {
                 let lock = format!(
                     "SET lock_timeout = '{LOCK_WAIT}'; SELECT pg_advisory_lock({WRITER_LOCK});
@@ -97,29 +102,34 @@ impl Place {
 
     /// Connections that may only read.
     pub(super) fn readers(&self) -> Result<AnyPool, StoreError> {
-        let read_only = match self {
-            Self::File(_) => "PRAGMA query_only = on",
-            Self::Server(_) => "SET default_transaction_read_only = on",
+        let pool = AnyPoolOptions::new().max_connections(MAX_READERS).acquire_timeout(READER_WAIT);
+        let (pool, read_only) = match self {
+            // One that waits costs nothing; a new one takes its memory from elsewhere than
+            // where the one before it left some.
+            Self::File(_) => (
+                pool.idle_timeout(None).max_lifetime(None),
+                format!("PRAGMA query_only = on; PRAGMA cache_size = -{CACHE_KIB}"),
+            ),
+            Self::Server(_) => (pool, "SET default_transaction_read_only = on".to_owned()),
         };
-        let pool = AnyPoolOptions::new()
-            .max_connections(MAX_READERS)
-            .acquire_timeout(READER_WAIT)
-            .after_connect(move |connection, _| {
-                Box::pin(async move { connection.execute(read_only).await.map(drop) })
-            });
+        let pool = pool.after_connect(move |connection, _| {
+            let read_only = read_only.clone();
+            Box::pin(async move { connection.execute(AssertSqlSafe(read_only)).await.map(drop) })
+        });
         Ok(pool.connect_lazy_with(self.options()?))
     }
 
     /// A commit is on the disk when it returns, also where the server is set
     /// up otherwise.
-    fn durable(&self) -> String {
+    fn durable(&self, only: bool) -> String {
         match self {
-            // A large group fits into 8 MiB of pages (2 MiB unless said); what does
-            // not is written twice.
-            Self::File(_) => format!(
-                "PRAGMA journal_mode = wal; PRAGMA synchronous = full; \
-                 PRAGMA cache_size = -8192; PRAGMA wal_autocheckpoint = {FULL_PAGES}"
-            ),
+            Self::File(_) => {
+                let cache = if only { ONLY_CACHE_KIB } else { CACHE_KIB };
+                format!(
+                    "PRAGMA journal_mode = wal; PRAGMA synchronous = full; \
+                     PRAGMA cache_size = -{cache}; PRAGMA wal_autocheckpoint = {FULL_PAGES}"
+                )
+            }
             Self::Server(_) => "SET synchronous_commit = on".to_owned(),
         }
     }

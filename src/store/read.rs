@@ -3,7 +3,7 @@
 use super::question::Question;
 use super::{
     ActionRow, AssetRow, CalibrationRow, EventRow, FaultRow, Micros, ReplayRow, SessionRow, Store,
-    StoreError, TransitionRow, TrendEntry, WarningRow, codec,
+    StoreError, TransitionRow, TrendEntry, codec,
 };
 use crate::vocabulary::Sample;
 
@@ -41,7 +41,8 @@ pub struct FaultFilter {
     pub after: Option<(Micros, String, String)>,
 }
 
-const SESSION: &str = "SELECT id, asset, name, state, opened_at, ended_at, setup, baseline,
+pub(super) const SESSION: &str =
+    "SELECT id, asset, name, state, opened_at, ended_at, setup, baseline,
     n_samples, n_rejected, first_t_s, last_t_s, last_seq, verdict, verdict_hash FROM session
     WHERE ";
 
@@ -113,8 +114,11 @@ impl Store {
         if let Some(asset) = &filter.asset {
             query.push(" AND asset = ").bind(asset)?;
         }
-        if let Some(state) = &filter.state {
-            query.push(" AND state = ").bind(state)?;
+        match filter.state.as_deref() {
+            // There are few of them, and an index of just those.
+            Some("open") => drop(query.push(" AND state = 'open'")),
+            Some(state) => drop(query.push(" AND state = ").bind(state)?),
+            None => {}
         }
         if let Some((opened_at, id)) = &filter.before {
             query.push(" AND (opened_at, id) < (").bind(opened_at)?;
@@ -135,7 +139,10 @@ impl Store {
     }
 
     /// The answer to `query`, which asks for sessions.
-    async fn session_rows(&self, query: Question) -> Result<Vec<SessionRow>, StoreError> {
+    pub(super) async fn session_rows(
+        &self,
+        query: Question,
+    ) -> Result<Vec<SessionRow>, StoreError> {
         let known = self.journal.all_progress();
         let rows: Vec<SessionRow> = query.rows().fetch_all(&self.pool).await?;
         let noted = rows.into_iter().map(|row| {
@@ -250,51 +257,6 @@ impl Store {
         Ok(query.rows().fetch_all(&self.pool).await?)
     }
 
-    /// The open sessions of the assets from `first` to `last`.
-    pub async fn open_sessions_of(
-        &self,
-        first: &str,
-        last: &str,
-    ) -> Result<Vec<SessionRow>, StoreError> {
-        let mut query = Question::new(SESSION);
-        query.push("state = 'open' AND asset >= ").bind(first)?;
-        query.push(" AND asset <= ").bind(last)?;
-        self.session_rows(query).await
-    }
-
-    /// When the latest session of each asset from `first` to `last` was opened
-    /// or ended.
-    pub async fn last_sessions_of(
-        &self,
-        first: &str,
-        last: &str,
-    ) -> Result<Vec<(String, Micros)>, StoreError> {
-        Ok(sqlx::query_as(
-            "SELECT asset, MAX(COALESCE(ended_at, opened_at)) FROM session
-             WHERE asset >= $1 AND asset <= $2 GROUP BY asset",
-        )
-        .bind(first)
-        .bind(last)
-        .fetch_all(&self.pool)
-        .await?)
-    }
-
-    /// The active faults of the assets from `first` to `last`.
-    pub async fn active_faults_of(
-        &self,
-        first: &str,
-        last: &str,
-    ) -> Result<Vec<FaultRow>, StoreError> {
-        Ok(sqlx::query_as(
-            "SELECT * FROM fault WHERE asset >= $1 AND asset <= $2
-             AND status IN ('pending', 'confirmed') ORDER BY asset, status, code",
-        )
-        .bind(first)
-        .bind(last)
-        .fetch_all(&self.pool)
-        .await?)
-    }
-
     /// What the sessions of `asset` estimated, with their names, newest first:
     /// at most `limit` rows, of which a session has one for each axis.
     pub async fn trend(&self, asset: &str, limit: u32) -> Result<Vec<TrendEntry>, StoreError> {
@@ -305,26 +267,6 @@ impl Store {
         )
         .bind(asset)
         .bind(i64::from(limit))
-        .fetch_all(&self.pool)
-        .await?)
-    }
-
-    /// The warnings of the assets from `first` to `last`, as of the last
-    /// session that estimated the axis.
-    pub async fn warnings_of(
-        &self,
-        first: &str,
-        last: &str,
-    ) -> Result<Vec<WarningRow>, StoreError> {
-        Ok(sqlx::query_as(
-            "SELECT asset, calibration_id, warnings FROM trend
-             WHERE asset >= $1 AND asset <= $2 AND warnings IS NOT NULL AND NOT EXISTS (
-                SELECT 1 FROM trend later WHERE later.asset = trend.asset
-                AND later.axis = trend.axis AND later.ended_at > trend.ended_at)
-             ORDER BY asset, axis",
-        )
-        .bind(first)
-        .bind(last)
         .fetch_all(&self.pool)
         .await?)
     }

@@ -1,0 +1,153 @@
+//! What a stretch of the fleet, from one asset's name to another's, is asked at a
+//! glance: again and again, so that no question may cost more the longer the history.
+
+use super::question::Question;
+use super::read::SESSION;
+use super::{FaultRow, Micros, SessionRow, Store, StoreError, WarningRow};
+
+const LAST_SESSIONS: &str = "SELECT last.asset, COALESCE(last.ended_at, last.opened_at)
+    FROM asset CROSS JOIN session last
+    WHERE asset.name >= $1 AND asset.name <= $2 AND last.id = (
+        SELECT id FROM session WHERE session.asset = asset.name
+        ORDER BY opened_at DESC, id DESC LIMIT 1)";
+
+const WARNINGS: &str = "SELECT last.asset, last.calibration_id, last.warnings
+    FROM asset CROSS JOIN (SELECT 'x' AS name UNION ALL SELECT 'y') axis CROSS JOIN trend last
+    WHERE asset.name >= $1 AND asset.name <= $2
+    AND last.axis = axis.name AND last.warnings IS NOT NULL AND last.session = (
+        SELECT session FROM trend WHERE trend.asset = asset.name AND trend.axis = axis.name
+        ORDER BY ended_at DESC, session DESC LIMIT 1)
+    ORDER BY last.asset, last.axis";
+
+impl Store {
+    /// The open sessions of the assets from `first` to `last`.
+    ///
+    /// # Errors
+    /// [`StoreError`], as for every question here, if the database fails.
+    pub async fn open_sessions_of(
+        &self,
+        first: &str,
+        last: &str,
+    ) -> Result<Vec<SessionRow>, StoreError> {
+        let mut query = Question::new(SESSION);
+        query.push("state = 'open' AND asset >= ").bind(first)?;
+        query.push(" AND asset <= ").bind(last)?;
+        self.session_rows(query).await
+    }
+
+    /// When the latest session of each asset from `first` to `last` was ended or,
+    /// if it is open, opened.
+    pub async fn last_sessions_of(
+        &self,
+        first: &str,
+        last: &str,
+    ) -> Result<Vec<(String, Micros)>, StoreError> {
+        let rows = sqlx::query_as(LAST_SESSIONS).bind(first).bind(last);
+        Ok(rows.fetch_all(&self.pool).await?)
+    }
+
+    /// The active faults of the assets from `first` to `last`.
+    pub async fn active_faults_of(
+        &self,
+        first: &str,
+        last: &str,
+    ) -> Result<Vec<FaultRow>, StoreError> {
+        Ok(sqlx::query_as(
+            "SELECT * FROM fault WHERE asset >= $1 AND asset <= $2
+             AND status IN ('pending', 'confirmed') ORDER BY asset, status, code",
+        )
+        .bind(first)
+        .bind(last)
+        .fetch_all(&self.pool)
+        .await?)
+    }
+
+    /// The warnings of the assets from `first` to `last`, as of the last session that
+    /// estimated the axis.
+    pub async fn warnings_of(
+        &self,
+        first: &str,
+        last: &str,
+    ) -> Result<Vec<WarningRow>, StoreError> {
+        let rows = sqlx::query_as(WARNINGS).bind(first).bind(last);
+        Ok(rows.fetch_all(&self.pool).await?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicU64, Ordering};
+
+    use sqlx::sqlite::SqliteConnection;
+    use sqlx::{Connection, Executor};
+
+    use super::*;
+    use crate::store::Place;
+
+    /// Two assets with `n` sessions each, that warn of both axes.
+    const HISTORY: &str = "
+        INSERT INTO asset VALUES ('a', '{}', 1, 0, 0), ('b', '{}', 1, 0, 0);
+        INSERT INTO session (id, asset, name, state, opened_at, ended_at, setup, baseline,
+            n_samples, n_rejected)
+        WITH RECURSIVE n (i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < $1)
+        SELECT asset.name || i, asset.name, i, 'ended', 10 * i, 10 * i + 5, '{}', '{}', 0, 0
+            FROM n, asset;
+        INSERT INTO trend SELECT id, axis.name, asset, ended_at, 0, NULL, 1, 1, 1, 1, 1, 1, 1,
+            axis.name
+            FROM session, (SELECT 'x' AS name UNION ALL SELECT 'y') axis";
+
+    /// The connection to a database with the history of `n` sessions.
+    async fn with_history(folder: &tempfile::TempDir, n: u32) -> (Store, SqliteConnection) {
+        let place = Place::File(folder.path().join(format!("{n}.db")));
+        let (store, writer) = Store::open(&place).await.unwrap();
+        writer.close().await.unwrap();
+        let file = place.file().unwrap().display();
+        let mut db = SqliteConnection::connect(&format!("sqlite://{file}")).await.unwrap();
+        db.execute(sqlx::AssertSqlSafe(HISTORY.replace("$1", &n.to_string()))).await.unwrap();
+        (store, db)
+    }
+
+    /// Instructions of SQLite's machine that `question` takes.
+    async fn cost(db: &mut SqliteConnection, question: &'static str) -> u64 {
+        let count = Arc::new(AtomicU64::new(0));
+        let counted = count.clone();
+        db.lock_handle().await.unwrap().set_progress_handler(1, move || {
+            counted.fetch_add(1, Ordering::Relaxed);
+            true
+        });
+        let rows = sqlx::query(question).bind("a").bind("b").fetch_all(&mut *db).await.unwrap();
+        assert!(!rows.is_empty());
+        db.lock_handle().await.unwrap().remove_progress_handler();
+        count.load(Ordering::Relaxed)
+    }
+
+    #[tokio::test]
+    async fn a_long_history_costs_no_more_than_a_short_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let (_, mut short) = with_history(&folder, 2).await;
+        let (_, mut long) = with_history(&folder, 200).await;
+        for question in [LAST_SESSIONS, WARNINGS] {
+            let (short, long) = (cost(&mut short, question).await, cost(&mut long, question).await);
+            assert_eq!(short, long, "{question}");
+        }
+    }
+
+    #[tokio::test]
+    async fn the_last_of_each_asset_counts() {
+        let folder = tempfile::tempdir().unwrap();
+        let (store, mut db) = with_history(&folder, 3).await;
+        let last = store.last_sessions_of("a", "b").await.unwrap();
+        assert_eq!(last, [("a".to_owned(), 35), ("b".to_owned(), 35)]);
+        assert_eq!(store.last_sessions_of("b", "z").await.unwrap().len(), 1);
+        let warnings = async || store.warnings_of("a", "b").await.unwrap();
+        let of =
+            |rows: Vec<WarningRow>| Vec::from_iter(rows.into_iter().map(|r| r.asset + &r.warnings));
+        assert_eq!(of(warnings().await), ["ax", "ay", "bx", "by"]);
+        // What an earlier session warned of is over; one that did not see the axis says nothing.
+        let over = "UPDATE trend SET warnings = NULL WHERE session = 'a3' AND axis = 'x';
+                    DELETE FROM trend WHERE session = 'b3' AND axis = 'y'";
+        db.execute(over).await.unwrap();
+        assert_eq!(of(warnings().await), ["ay", "bx", "by"]);
+    }
+}
