@@ -157,6 +157,16 @@ async fn collector() -> (String, mpsc::UnboundedReceiver<Bytes>) {
     (address, traces)
 }
 
+/// A service that sends this share of its own traces to a collector.
+async fn traced(share: &str) -> (Process, mpsc::UnboundedReceiver<Bytes>, tempfile::TempDir) {
+    let (address, traces) = collector().await;
+    let data = tempfile::tempdir().unwrap();
+    let endpoint = format!("http://{address}");
+    let settings =
+        [("OFFBD_TRACES__ENDPOINT", endpoint.as_ref()), ("OFFBD_TRACES__SHARE", share.as_ref())];
+    (Process::start_with(data.path(), &settings), traces, data)
+}
+
 fn has(bytes: &[u8], word: impl AsRef<[u8]>) -> bool {
     let word = word.as_ref();
     bytes.windows(word.len()).any(|window| window == word)
@@ -164,11 +174,7 @@ fn has(bytes: &[u8], word: impl AsRef<[u8]>) -> bool {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn traces_go_to_the_collector() {
-    let (address, mut traces) = collector().await;
-    let data = tempfile::tempdir().unwrap();
-    let endpoint = format!("http://{address}");
-    let process =
-        Process::start_with(data.path(), &[("OFFBD_TRACES__ENDPOINT", endpoint.as_ref())]);
+    let (process, mut traces, _data) = traced("1").await;
     process.client.asset("a").await;
     process.client.telemetry("a", Some("s"), &rig(50, usize::MAX)).await;
     let mut told = Vec::new();
@@ -186,12 +192,7 @@ const PARENT: [u8; 8] = 0x00f067aa0ba902b7_u64.to_be_bytes();
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_request_belongs_to_the_trace_of_its_caller() {
-    let (address, mut traces) = collector().await;
-    let data = tempfile::tempdir().unwrap();
-    let endpoint = format!("http://{address}");
-    let of_itself =
-        [("OFFBD_TRACES__ENDPOINT", endpoint.as_ref()), ("OFFBD_TRACES__SHARE", "0".as_ref())];
-    let process = Process::start_with(data.path(), &of_itself);
+    let (process, mut traces, _data) = traced("0").await;
     let ask = |path: &str, parent: &str| {
         let request = process.client.request(Method::GET, path).header("traceparent", parent);
         async move { assert!(request.send().await.unwrap().status().is_success()) }

@@ -19,6 +19,31 @@ async fn sessions(client: &Client, asset: &str) -> Vec<Value> {
     page["items"].as_array().unwrap().clone()
 }
 
+#[tokio::test]
+async fn sessions_are_listed_by_state_newest_first() {
+    let bench = Bench::start().await;
+    let client = &bench.client;
+    for asset in ["a", "b"] {
+        client.asset(asset).await;
+        for session in ["1", "2", "3"] {
+            client.telemetry(asset, Some(session), &rig(10, usize::MAX)).await;
+        }
+    }
+    for (query, wanted) in [
+        ("state=open", vec!["b3", "a3"]),
+        ("state=ended", vec!["b2", "b1", "a2", "a1"]),
+        ("asset=a&state=open", vec!["a3"]),
+        ("asset=a&state=ended", vec!["a2", "a1"]),
+        ("asset=a", vec!["a3", "a2", "a1"]),
+    ] {
+        let page = client.get(&format!("sessions?{query}")).await.expect(200);
+        let word = |s: &Value, key: &str| s[key].as_str().unwrap().to_owned();
+        let name = |s: &Value| word(s, "asset") + &word(s, "name");
+        let listed: Vec<_> = page["items"].as_array().unwrap().iter().map(name).collect();
+        assert_eq!(listed, wanted, "{query}");
+    }
+}
+
 /// Makes the store refuse chunks of the session `id`.
 fn broken(id: &str) -> String {
     if support::on_postgres() {

@@ -84,6 +84,7 @@ mod tests {
 
     use super::*;
     use crate::store::Place;
+    use crate::store::place::file_url;
 
     /// Two assets with `n` sessions each, that warn of both axes.
     const HISTORY: &str = "
@@ -102,8 +103,8 @@ mod tests {
         let place = Place::File(folder.path().join(format!("{n}.db")));
         let (store, writer) = Store::open(&place).await.unwrap();
         writer.close().await.unwrap();
-        let file = place.file().unwrap().display();
-        let mut db = SqliteConnection::connect(&format!("sqlite://{file}")).await.unwrap();
+        let url = file_url(place.file().unwrap(), "rw").unwrap();
+        let mut db = SqliteConnection::connect(&url).await.unwrap();
         db.execute(sqlx::AssertSqlSafe(HISTORY.replace("$1", &n.to_string()))).await.unwrap();
         (store, db)
     }

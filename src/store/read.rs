@@ -115,7 +115,8 @@ impl Store {
             query.push(" AND asset = ").bind(asset)?;
         }
         match filter.state.as_deref() {
-            // There are few of them, and an index of just those.
+            // Few, and with an index of just those, which is for this text. Of the many others
+            // a page is best taken in its order, so their word is no text of the question.
             Some("open") => drop(query.push(" AND state = 'open'")),
             Some(state) => drop(query.push(" AND state = ").bind(state)?),
             None => {}
