@@ -153,6 +153,7 @@ impl Server {
     pub async fn shutdown(self) -> Result<()> {
         let Self { closing, deadline, serving, store, workers, lock, .. } = self;
         closing.cancel();
+        workers.close();
         let finish = async {
             let served = serving.await;
             workers.finish().await;

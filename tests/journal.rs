@@ -202,11 +202,12 @@ impl Trial {
             }
             Step::Delete(at) => {
                 let last = self.open[at].append(1);
+                let given_up = Write::GiveUpAsset { name: at.to_string(), at: 1 };
                 let gone = Write::DeleteAsset { name: at.to_string() };
                 let again = Write::CreateAsset(asset(&at.to_string()));
                 let opened = self.opened(at);
                 self.ended.retain(|wanted| wanted.asset != at);
-                self.commit(vec![last, gone, again, opened]).await;
+                self.commit(vec![last, given_up, gone, again, opened]).await;
             }
             Step::Stop => self.restart(true).await,
             Step::Kill => self.restart(false).await,

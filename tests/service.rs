@@ -133,7 +133,11 @@ async fn a_guest_writes_beside_the_service() {
     row.name = "b".to_owned();
     for _ in 0..2 {
         let name = row.name.clone();
-        let mut set = vec![Write::CreateAsset(row.clone()), Write::DeleteAsset { name }];
+        let mut set = vec![
+            Write::CreateAsset(row.clone()),
+            Write::GiveUpAsset { name: name.clone(), at: 1 },
+            Write::DeleteAsset { name },
+        ];
         writer.commit(&mut [&mut set]).await.unwrap();
         bench.client.telemetry("a", None, &rig(10, 10)).await;
     }

@@ -34,7 +34,7 @@ enum Kind {
 use Kind::{Counter, Gauge, Numbers, Seconds};
 
 /// Every metric with its kind and its meaning.
-const METRICS: [(&str, Kind, &str); 27] = [
+const METRICS: [(&str, Kind, &str); 28] = [
     ("offbd_ack_seconds", Seconds, "From the arrival of a batch until it was durable"),
     ("offbd_bodies_bytes", Gauge, "Bytes of request bodies in memory"),
     ("offbd_build_info", Gauge, "1, with the version"),
@@ -48,6 +48,7 @@ const METRICS: [(&str, Kind, &str); 27] = [
     ("offbd_fault_changes_total", Counter, "Changes of status that became durable, by fault code"),
     ("offbd_http_request_seconds", Seconds, "Until the answer to a request began, by path"),
     ("offbd_http_requests_total", Counter, "Requests answered, by path and status"),
+    ("offbd_ingest_stalled", Gauge, "Whether nothing is taken and nothing committed"),
     ("offbd_journal_bytes", Gauge, "Bytes in the journal, not folded into the recordings yet"),
     ("offbd_process_resident_bytes", Gauge, "Memory of the process (Linux)"),
     ("offbd_refused_total", Counter, "Requests refused before they were looked at, by status"),
@@ -152,6 +153,7 @@ fn begin_with_nothing() {
             counter!("offbd_fault_changes_total", "code" => code, "status" => status).absolute(0);
         }
     }
+    gauge!("offbd_ingest_stalled").set(0.0);
     gauge!("offbd_journal_bytes").set(0.0);
     gauge!("offbd_streams").set(0.0);
     gauge!("offbd_store_writable").set(1.0);

@@ -109,8 +109,11 @@ impl From<ServiceError> for Problem {
                 new(StatusCode::INSUFFICIENT_STORAGE, "registry-full", "The registry is full")
             }
             E::Busy { .. } => new(StatusCode::TOO_MANY_REQUESTS, "busy", "Too much at once"),
-            E::Unavailable { .. } | E::Outage { .. } => {
+            E::Unavailable { .. } | E::Outage { .. } | E::Stalled { .. } => {
                 new(StatusCode::SERVICE_UNAVAILABLE, "unavailable", "Not available now")
+            }
+            E::NotStored { .. } => {
+                new(StatusCode::SERVICE_UNAVAILABLE, "store", "The store failed")
             }
             E::Store(_) => {
                 tracing::error!(error = detail, "the store failed");

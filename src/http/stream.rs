@@ -2,8 +2,8 @@
 //! down, over one WebSocket.
 //!
 //! Back-pressure is not reading: while `MAX_PENDING` batches wait for their
-//! commit, or the asset's shard has no room, the next frame stays in the
-//! socket. A client that does not read its answers is cut off.
+//! commit, or one waits for room, the next frame stays in the socket; answers
+//! and all else go on. A client that does not read its answers is cut off.
 
 use std::collections::VecDeque;
 use std::pin::Pin;
@@ -31,6 +31,11 @@ use crate::wire::trace::TraceView;
 
 /// Batches whose acknowledgement is owed; then nothing more is read.
 const MAX_PENDING: usize = 32;
+
+/// Rows of those batches, from which on nothing more is read either. An answer may
+/// list every row of its batch, some 100 bytes each, so a stream's answers are kept
+/// to some 5 MB, or to one batch.
+const MAX_PENDING_ROWS: usize = 50_000;
 
 /// Longest time to send one frame; a client slower than that is cut off.
 const SEND_TIMEOUT: Duration = Duration::from_secs(10);
@@ -130,10 +135,33 @@ enum End {
 /// A batch whose acknowledgement is owed.
 struct Owed {
     id: Option<String>,
-    answer: Answer,
+    n_rows: usize,
+    answer: Outcome<AckView>,
 }
 
-type Answer = Pin<Box<dyn Future<Output = Result<AckView, ServiceError>> + Send>>;
+/// A batch that waits for room.
+struct Waiting {
+    id: Option<String>,
+    n_rows: usize,
+    submitted: Outcome<Pending>,
+}
+
+type Outcome<T> = Pin<Box<dyn Future<Output = Result<T, ServiceError>> + Send>>;
+
+fn answer(submitted: Result<Pending, ServiceError>) -> Outcome<AckView> {
+    match submitted {
+        Ok(pending) => Box::pin(pending.acknowledged()),
+        Err(error) => Box::pin(std::future::ready(Err(error))),
+    }
+}
+
+/// The outcome of what is there; for ever without.
+async fn outcome<T>(of: Option<&mut Outcome<T>>) -> Result<T, ServiceError> {
+    match of {
+        Some(outcome) => outcome.as_mut().await,
+        None => std::future::pending().await,
+    }
+}
 
 /// What a watcher has been told.
 #[derive(Default)]
@@ -155,6 +183,8 @@ struct Session {
     pings: Interval,
     heard: Instant,
     owed: VecDeque<Owed>,
+    /// The last batch that was read, after those that are owed their answer.
+    waiting: Option<Waiting>,
     /// None if no traces are asked for.
     watched: Option<Watched>,
 }
@@ -164,6 +194,7 @@ enum Next {
     Closing,
     Lapsed,
     Answer(Result<AckView, ServiceError>),
+    Submitted(Result<Pending, ServiceError>),
     Frame(Option<Result<Message, axum::Error>>),
     Event(Result<Option<std::sync::Arc<Event>>, ServiceError>),
     State,
@@ -187,11 +218,24 @@ impl Session {
             ticks
         };
         let (states, pings) = (period.map(ticks), ticks(PING_EVERY));
-        let (owed, heard) = (VecDeque::new(), Instant::now());
+        let (owed, waiting, heard) = (VecDeque::new(), None, Instant::now());
         let feeds = caller.may(Right::Feed, &asset);
         let service = app.service.clone();
         let lapse = Box::pin(async move { service.lapse(&caller).await });
-        Self { socket, app, feeds, lapse, asset, events, states, pings, heard, owed, watched }
+        Self {
+            socket,
+            app,
+            feeds,
+            lapse,
+            asset,
+            events,
+            states,
+            pings,
+            heard,
+            owed,
+            waiting,
+            watched,
+        }
     }
 
     async fn run(mut self) {
@@ -208,14 +252,8 @@ impl Session {
     }
 
     async fn next(&mut self) -> Next {
-        let full = self.owed.len() >= MAX_PENDING;
-        let Self { socket, app, lapse, events, states, pings, owed, .. } = self;
-        let answer = async {
-            match owed.front_mut() {
-                Some(owed) => owed.answer.as_mut().await,
-                None => std::future::pending().await,
-            }
-        };
+        let full = self.is_full();
+        let Self { socket, app, lapse, events, states, pings, owed, waiting, .. } = self;
         let state = async {
             match states {
                 Some(states) => states.tick().await,
@@ -226,7 +264,10 @@ impl Session {
             biased;
             () = app.closing.cancelled() => Next::Closing,
             () = lapse => Next::Lapsed,
-            answer = answer => Next::Answer(answer),
+            answer = outcome(owed.front_mut().map(|owed| &mut owed.answer)) => Next::Answer(answer),
+            submitted = outcome(waiting.as_mut().map(|waiting| &mut waiting.submitted)) => {
+                Next::Submitted(submitted)
+            }
             event = events.next() => Next::Event(event),
             _ = pings.tick() => Next::Ping,
             _ = state => Next::State,
@@ -234,11 +275,27 @@ impl Session {
         }
     }
 
+    /// Whether nothing more is read now.
+    fn is_full(&self) -> bool {
+        let n_rows: usize = self.owed.iter().map(|owed| owed.n_rows).sum();
+        let n_pending = self.owed.len();
+        self.waiting.is_some() || n_pending >= MAX_PENDING || n_rows >= MAX_PENDING_ROWS
+    }
+
     async fn follow(&mut self, next: Next) -> Result<(), End> {
         match next {
             Next::Closing => self.close().await,
             Next::Lapsed => Err(End::Close(close_code::POLICY, "the token is no longer in force")),
             Next::Answer(answer) => self.answers(answer).await,
+            Next::Submitted(submitted) => {
+                let waiting = self.waiting.take();
+                self.owed.extend(waiting.map(|Waiting { id, n_rows, .. }| Owed {
+                    id,
+                    n_rows,
+                    answer: answer(submitted),
+                }));
+                Ok(())
+            }
             Next::Event(Ok(Some(event))) => self.fault(&event).await,
             Next::Event(Ok(None)) => Err(End::Close(close_code::AWAY, "the service is closing")),
             Next::Event(Err(_)) => Err(End::Close(close_code::ERROR, "the store failed")),
@@ -253,8 +310,10 @@ impl Session {
         }
     }
 
-    /// The service stops: what was taken is still acknowledged.
+    /// The service stops: what was taken is still acknowledged, a batch that waits
+    /// for room is not taken.
     async fn close(&mut self) -> Result<(), End> {
+        self.waiting = None;
         while let Some(owed) = self.owed.pop_front() {
             let answer = owed.answer.await;
             self.send(answer_frame(owed.id.as_deref(), answer)).await?;
@@ -273,7 +332,8 @@ impl Session {
         }
     }
 
-    /// Takes a batch; its answer comes after those of the ones before.
+    /// Takes a batch, when there is room; its answer comes after those of the ones
+    /// before.
     async fn batch(&mut self, format: Format, document: &[u8]) -> Result<(), End> {
         if !self.feeds {
             let detail = "the token's role does not send telemetry of this asset";
@@ -282,18 +342,17 @@ impl Session {
             return self.send(json!({ "type": "error", "problem": problem }).to_string()).await;
         }
         let parsed = format.parse(document, self.app.service.limits().batch_samples);
-        let (id, submitted) = match parsed {
+        match parsed {
             Ok(mut batch) => {
-                let id = batch.id.take();
-                (id, self.app.service.submit_in_turn(&self.asset, batch, false).await)
+                let (id, n_rows) = (batch.id.take(), batch.rows.len());
+                let submitted = self.app.service.submit_in_turn(&self.asset, batch, false);
+                self.waiting = Some(Waiting { id, n_rows, submitted: Box::pin(submitted) });
             }
-            Err(error) => (None, Err(error.into())),
-        };
-        let answer: Answer = match submitted {
-            Ok(pending) => Box::pin(Pending::acknowledged(pending)),
-            Err(error) => Box::pin(std::future::ready(Err(error))),
-        };
-        self.owed.push_back(Owed { id, answer });
+            Err(error) => {
+                let answer = answer(Err(error.into()));
+                self.owed.push_back(Owed { id: None, n_rows: 0, answer });
+            }
+        }
         Ok(())
     }
 

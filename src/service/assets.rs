@@ -126,22 +126,29 @@ impl Service {
     }
 
     /// Deletes an asset with its sessions, recordings and faults, and revokes
-    /// the tokens of its devices.
+    /// the tokens of its devices. It is hidden at once; what is stored of it goes in
+    /// pieces, also if the caller goes away. Until then its name is taken.
     ///
     /// # Errors
-    /// [`ServiceError::UnknownAsset`].
+    /// [`ServiceError::UnknownAsset`], also while it is being deleted;
+    /// [`ServiceError::NotStored`] if the store does not take a piece: the next sweep
+    /// of retention goes on.
     pub async fn delete_asset(&self, name: &str) -> Result<(), ServiceError> {
-        let asset = name.to_owned();
-        self.call(name, move |_, running, work| {
-            running.deleted = true;
-            let revoke = AccessWrite::RevokeDevices { asset: asset.clone(), at: work.at };
-            work.writes.push(Write::DeleteAsset { name: asset });
-            work.writes.push(Write::Access(revoke));
-            Ok(())
-        })
-        .await?;
-        self.inner.passes.forget();
-        Ok(())
+        let (this, name) = (self.clone(), name.to_owned());
+        let deletion = async move {
+            let asset = name.clone();
+            this.call(&name, move |_, running, work| {
+                running.deleted = true;
+                let revoke = AccessWrite::RevokeDevices { asset: asset.clone(), at: work.at };
+                work.writes.push(Write::GiveUpAsset { name: asset, at: work.at });
+                work.writes.push(Write::Access(revoke));
+                Ok(())
+            })
+            .await?;
+            this.inner.passes.forget();
+            this.inner.deleter.asset(&name).await
+        };
+        self.to_the_end(deletion).await
     }
 
     /// Where the twin of `name` stands, samples under way included.

@@ -1,12 +1,13 @@
 //! The one that writes: commits all that waits as one group, then answers.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use tokio::runtime::Handle;
 use tokio::sync::{mpsc, watch};
+use tokio_util::sync::CancellationToken;
 use tracing::Instrument;
 
 use super::ServiceError;
@@ -20,6 +21,17 @@ const MAX_GROUP_SETS: usize = 512;
 /// first, and doubled each time up to the longest.
 const RETRY_FIRST: Duration = Duration::from_millis(50);
 const RETRY_LONGEST: Duration = Duration::from_secs(2);
+
+/// How often a group of sets may fail although the database answers and takes other
+/// changes: then each set is tried alone, and one that fails alone as often is
+/// refused. One loss of the connection may follow another by chance, three for the
+/// same changes hardly. A set on which the database hangs is so given up after six
+/// times the longest commit, 3 min.
+const MAX_FAILURES: u32 = 3;
+
+/// How long a commit may still take when the service closes: within
+/// `limits.shutdown_s`, 20 s by default, with time left for those who wait for it.
+const CLOSING_WAIT: Duration = Duration::from_secs(5);
 
 /// Why nothing can be written now; none while all is well.
 pub(super) type Outage = Option<String>;
@@ -41,8 +53,8 @@ impl Life {
     }
 }
 
-/// What is told to those who wait: whether it is durable.
-pub(super) type Done = Box<dyn FnOnce(bool) + Send>;
+/// Tells those who wait that it is durable, or why it is not.
+pub(super) type Done = Box<dyn FnOnce(Result<(), ServiceError>) + Send>;
 
 /// Changes that belong together, and who waits for them.
 pub(super) struct WriteSet {
@@ -52,28 +64,40 @@ pub(super) struct WriteSet {
 }
 
 pub(super) struct Committer {
-    writer: Writer,
-    queue: mpsc::Receiver<WriteSet>,
-    events: Events,
-    outage: watch::Sender<Outage>,
+    pub(super) writer: Writer,
+    pub(super) queue: mpsc::Receiver<WriteSet>,
+    pub(super) events: Events,
+    pub(super) outage: watch::Sender<Outage>,
+    /// Commits that came through.
+    pub(super) n_commits: Arc<AtomicU64>,
+    /// Then a database that is away is no longer waited for.
+    pub(super) closing: CancellationToken,
     /// Bytes of the journal above which it is folded.
-    journal_bytes: usize,
+    pub(super) journal_bytes: usize,
+}
+
+/// Why sets are not durable.
+enum Failure {
+    /// They cannot be, or the database has failed on them [`MAX_FAILURES`] times.
+    OfTheSets,
+    /// The database is away, and the service closes.
+    Closing,
+}
+
+/// What a database was like when it could be asked again.
+enum Back {
+    /// The commit that seemed to fail has come through.
+    CameThrough,
+    /// It has not.
+    Failed,
+    /// The service closes, and the database is still away.
+    Closing,
 }
 
 impl Committer {
-    pub(super) const fn new(
-        writer: Writer,
-        queue: mpsc::Receiver<WriteSet>,
-        events: Events,
-        outage: watch::Sender<Outage>,
-        journal_bytes: usize,
-    ) -> Self {
-        Self { writer, queue, events, outage, journal_bytes }
-    }
-
     /// Runs on a thread of its own: among the tasks of the runtime each step of a
     /// commit would wait its turn, and everybody waits for the commit.
-    pub(super) fn spawn(self) -> Result<JoinHandle<Writer>, ServiceError> {
+    pub(super) fn spawn(self) -> Result<JoinHandle<Option<Writer>>, ServiceError> {
         let runtime = Handle::current();
         let thread = std::thread::Builder::new().name("writer".to_owned());
         thread.spawn(move || runtime.block_on(self.run())).map_err(|error| {
@@ -82,79 +106,142 @@ impl Committer {
         })
     }
 
-    /// Runs until every sender is gone and the queue is empty.
-    async fn run(mut self) -> Writer {
+    /// Runs until every sender is gone and the queue is empty; returns `None` if the
+    /// service closes while the database is away, which ends it too.
+    async fn run(mut self) -> Option<Writer> {
         let mut group = Vec::new();
         while self.queue.recv_many(&mut group, MAX_GROUP_SETS).await > 0 {
-            self.commit(std::mem::take(&mut group)).await;
-            self.fold().await;
+            let went_on = self.commit(std::mem::take(&mut group)).await && self.fold().await;
+            if !went_on {
+                self.give_up().await;
+                return None;
+            }
             self.writer.copy_log().await;
         }
-        self.writer
+        Some(self.writer)
+    }
+
+    /// Refuses all that waits, and takes nothing more.
+    async fn give_up(&mut self) {
+        tracing::warn!("the database is away; what is not acknowledged may not be stored");
+        self.queue.close();
+        while let Some(set) = self.queue.recv().await {
+            refuse(set, closing());
+        }
     }
 
     /// Folds what is too much in the journal; nobody waits for it but the next
-    /// group.
-    async fn fold(&mut self) {
-        let folded = self.writer.fold(self.journal_bytes).await;
+    /// group. Returns whether the writer goes on.
+    async fn fold(&mut self) -> bool {
+        let folding = self.writer.fold(self.journal_bytes);
+        let Some(folded) = unless_closing(&self.closing, folding).await else { return false };
         metrics::gauge!("offbd_journal_bytes").set(self.writer.journal_bytes() as f64);
-        let Err(error) = folded else { return };
+        let Err(error) = folded else { return true };
         metrics::counter!("offbd_commit_failures_total").increment(1);
         if error.is_outage() {
-            self.come_back(&error).await;
-        } else {
-            tracing::error!(%error, "the journal cannot be folded");
+            return !matches!(self.come_back(&error).await, Back::Closing);
         }
+        tracing::error!(%error, "the journal cannot be folded");
+        true
     }
 
-    async fn commit(&mut self, group: Vec<WriteSet>) {
+    /// Commits `group`, or what of it can be; returns whether the writer goes on.
+    async fn commit(&mut self, group: Vec<WriteSet>) -> bool {
         let (broken, mut group): (Vec<_>, Vec<_>) =
             group.into_iter().partition(|set| set.life.is_broken());
-        broken.into_iter().for_each(refuse);
-        if self.write(&mut group).await {
-            group.into_iter().for_each(|set| self.announce(set));
-            return;
+        broken.into_iter().for_each(refuse_broken);
+        match self.write(&mut group).await {
+            Ok(()) => group.into_iter().for_each(|set| self.announce(set)),
+            Err(Failure::Closing) => {
+                group.into_iter().for_each(|set| refuse(set, closing()));
+                return false;
+            }
+            // One set may have spoilt it for all.
+            Err(Failure::OfTheSets) if group.len() > 1 => return self.commit_each(group).await,
+            Err(Failure::OfTheSets) => group.into_iter().for_each(refuse_alone),
         }
-        // One set may have spoilt it for all: each on its own.
-        for set in group {
-            let mut alone = [set];
-            let written = !alone[0].life.is_broken() && self.write(&mut alone).await;
-            let [set] = alone;
-            if written { self.announce(set) } else { refuse(set) }
-        }
+        true
     }
 
-    /// Whether all of it is durable now. While the database is away, this
-    /// waits: the queue fills up behind it, and what comes then is turned away.
-    async fn write(&mut self, group: &mut [WriteSet]) -> bool {
+    /// Commits each of `sets` on its own; returns whether the writer goes on.
+    async fn commit_each(&mut self, sets: Vec<WriteSet>) -> bool {
+        let mut goes_on = true;
+        for set in sets {
+            if !goes_on {
+                refuse(set, closing());
+                continue;
+            }
+            if set.life.is_broken() {
+                refuse_broken(set);
+                continue;
+            }
+            let mut alone = [set];
+            let written = self.write(&mut alone).await;
+            let [set] = alone;
+            match written {
+                Ok(()) => self.announce(set),
+                Err(Failure::OfTheSets) => refuse_alone(set),
+                Err(Failure::Closing) => {
+                    refuse(set, closing());
+                    goes_on = false;
+                }
+            }
+        }
+        goes_on
+    }
+
+    /// Makes all of `group` durable. While the database is away, this waits: the queue
+    /// fills up behind it, and what comes then is turned away.
+    async fn write(&mut self, group: &mut [WriteSet]) -> Result<(), Failure> {
         let mut sets: Vec<_> =
             group.iter_mut().map(|set| &mut set.writes).filter(|w| !w.is_empty()).collect();
         if sets.is_empty() {
-            return true;
+            return Ok(());
         }
         metrics::histogram!("offbd_commit_sets").record(sets.len() as f64);
-        loop {
-            let span = tracing::debug_span!("commit", sets = sets.len());
-            let commit = timed(self.writer.commit(&mut sets)).instrument(span);
-            let Err(error) = commit.await else {
-                metrics::counter!("offbd_commits_total").increment(1);
-                return true;
-            };
+        for n_failed in 1.. {
+            let Err(error) = self.attempt(&mut sets).await? else { break };
             metrics::counter!("offbd_commit_failures_total").increment(1);
-            if !error.is_outage() {
-                tracing::error!(%error, sets = sets.len(), "commit failed");
-                return false;
+            if error.is_outage() {
+                match self.come_back(&error).await {
+                    Back::CameThrough => break,
+                    Back::Closing => return Err(Failure::Closing),
+                    Back::Failed if n_failed < MAX_FAILURES => continue,
+                    Back::Failed => {}
+                }
             }
-            if self.come_back(&error).await {
-                return true;
-            }
+            tracing::error!(%error, sets = sets.len(), n_failed, "commit failed");
+            return Err(Failure::OfTheSets);
+        }
+        metrics::counter!("offbd_commits_total").increment(1);
+        self.n_commits.fetch_add(1, Ordering::Relaxed);
+        Ok(())
+    }
+
+    /// Commits `sets` once; when the service closes, within [`CLOSING_WAIT`].
+    async fn attempt(
+        &mut self,
+        sets: &mut [&mut Vec<Write>],
+    ) -> Result<Result<(), StoreError>, Failure> {
+        let span = tracing::debug_span!("commit", sets = sets.len());
+        let commit = timed(self.writer.commit(sets)).instrument(span);
+        unless_closing(&self.closing, commit).await.ok_or(Failure::Closing)
+    }
+
+    /// Waits until the database is back after `error`, or the service closes.
+    async fn come_back(&mut self, error: &StoreError) -> Back {
+        self.down(error);
+        let closing = self.closing.clone();
+        match unless_closing(&closing, self.reconnect()).await {
+            Some(true) => Back::CameThrough,
+            Some(false) => Back::Failed,
+            None => Back::Closing,
         }
     }
 
-    /// Waits until the database is back; returns whether the commit that
-    /// failed with `error` has come through after all.
-    async fn come_back(&mut self, error: &StoreError) -> bool {
-        self.down(error);
+    /// Waits until the database is back; returns whether the commit that failed last
+    /// has come through after all.
+    async fn reconnect(&mut self) -> bool {
         let mut wait = RETRY_FIRST;
         loop {
             tokio::time::sleep(wait).await;
@@ -202,7 +289,7 @@ impl Committer {
             };
             event.into_iter().for_each(|event| self.events.publish(event));
         }
-        (set.done)(true);
+        (set.done)(Ok(()));
     }
 }
 
@@ -220,7 +307,39 @@ fn count(row: &TransitionRow) {
     metrics::counter!("offbd_fault_changes_total", "code" => code, "status" => status).increment(1);
 }
 
-fn refuse(set: WriteSet) {
+/// The outcome of `work`; `None` if the service has been closing for [`CLOSING_WAIT`]
+/// before it is there.
+async fn unless_closing<T>(
+    closing: &CancellationToken,
+    work: impl Future<Output = T>,
+) -> Option<T> {
+    tokio::select! {
+        biased;
+        outcome = work => Some(outcome),
+        () = async {
+            closing.cancelled().await;
+            tokio::time::sleep(CLOSING_WAIT).await;
+        } => None,
+    }
+}
+
+const fn closing() -> ServiceError {
+    ServiceError::Unavailable { what: "the service is closing" }
+}
+
+/// Refuses a set that the database does not take, also alone.
+fn refuse_alone(set: WriteSet) {
+    let what = set.writes.first().map_or_else(String::new, Write::subject);
+    tracing::error!(what, n_writes = set.writes.len(), "refused: the store does not take it");
+    refuse(set, ServiceError::NotStored { what });
+}
+
+/// Refuses a set of an engine that has gone ahead of one that was refused.
+fn refuse_broken(set: WriteSet) {
+    refuse(set, ServiceError::Unavailable { what: "what came before it is not stored" });
+}
+
+fn refuse(set: WriteSet, why: ServiceError) {
     set.life.break_off();
-    (set.done)(false);
+    (set.done)(Err(why));
 }

@@ -53,6 +53,14 @@ pub enum ServiceError {
     /// The store failed, or what runs behind the service; come again.
     #[error("{what}; what was not acknowledged was not taken, send it again")]
     Unavailable { what: &'static str },
+    /// The database does not take it, though it takes other changes.
+    #[error("the store does not take {what}; see the log")]
+    NotStored { what: String },
+    /// Samples in flight are at their limit, and none becomes durable.
+    #[error(
+        "the samples in flight are at their limit, and nothing has been committed for {seconds} s"
+    )]
+    Stalled { seconds: u64 },
     /// The database is away; what waits is kept, up to the limits.
     #[error("the database takes nothing now: {reason}")]
     Outage { reason: String },

@@ -99,17 +99,22 @@ pub(super) async fn write_one(
     writer: &mpsc::Sender<WriteSet>,
     write: Write,
 ) -> Result<(), ServiceError> {
+    write_all(writer, vec![write]).await
+}
+
+/// Makes changes durable, together, that belong to no engine.
+pub(super) async fn write_all(
+    writer: &mpsc::Sender<WriteSet>,
+    writes: Vec<Write>,
+) -> Result<(), ServiceError> {
     let (settled, wait) = oneshot::channel();
-    let done = Box::new(move |durable| {
-        let _ = settled.send(durable);
+    let done = Box::new(move |outcome| {
+        let _ = settled.send(outcome);
     });
-    let set = WriteSet { writes: vec![write], life: Life::default(), done };
+    let set = WriteSet { writes, life: Life::default(), done };
     let gone = ServiceError::Unavailable { what: "the service is closing" };
     writer.send(set).await.map_err(|_| gone)?;
-    match wait.await {
-        Ok(true) => Ok(()),
-        _ => Err(ServiceError::Unavailable { what: "the store did not take it" }),
-    }
+    wait.await.unwrap_or(Err(ServiceError::Unavailable { what: "the writer is gone" }))
 }
 
 /// Starts `n` workers on `queue`.

@@ -54,6 +54,13 @@ impl Default for Limits {
     }
 }
 
+impl Limits {
+    /// Samples in the longest batch that is taken.
+    pub(super) fn longest_batch(&self) -> usize {
+        self.batch_samples.min(self.in_flight_samples)
+    }
+}
+
 /// Seconds after which a caller who was turned away may come again.
 pub const RETRY_AFTER_S: u64 = 1;
 

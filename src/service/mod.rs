@@ -16,6 +16,7 @@ mod assets;
 mod calibrations;
 mod clock;
 mod commit;
+mod deletion;
 mod error;
 mod events;
 mod faults;
@@ -38,9 +39,11 @@ mod telemetry;
 mod traces;
 mod trends;
 mod views;
+mod watchdog;
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use futures_util::{StreamExt, stream};
 use tokio::sync::{Semaphore, mpsc, oneshot, watch};
@@ -60,10 +63,12 @@ pub use traces::{MAX_TRACE_POINTS, TraceQuery};
 
 use self::access::{Passes, Provider};
 use self::commit::{Committer, Outage, WriteSet};
+use self::deletion::Deleter;
 use self::events::Events;
 use self::presence::Presences;
 use self::running::{Running, Work};
 use self::shard::{Context, Job, Shard};
+use self::watchdog::{STALLED_AFTER, Watchdog};
 use crate::store::{Store, StoreError, Writer};
 
 /// Cheap to clone; all clones are one service.
@@ -82,10 +87,13 @@ struct Inner {
     shards: Vec<mpsc::Sender<Job>>,
     writer: mpsc::Sender<WriteSet>,
     outage: watch::Receiver<Outage>,
+    deleter: Deleter,
     jobs: mpsc::Sender<jobs::Job>,
     bench: jobs::Bench,
     /// One permit for each sample between arrival and commit.
     in_flight: Arc<Semaphore>,
+    /// Whether those are at their limit and none becomes durable.
+    stalled: Arc<AtomicBool>,
     /// One permit for each recording of a fault that is being made.
     recordings: Arc<Semaphore>,
     /// One permit for each trace that is being made.
@@ -112,15 +120,21 @@ pub struct Workers {
     shards: Vec<std::thread::JoinHandle<()>>,
     jobs: Vec<JoinHandle<()>>,
     closing: CancellationToken,
-    committer: std::thread::JoinHandle<Writer>,
+    committer: std::thread::JoinHandle<Option<Writer>>,
 }
 
 impl Workers {
-    /// Breaks off background jobs (they begin anew with the next start), waits
-    /// until everything queued is judged and committed, and closes the store's
-    /// writer. All clones of the service must be dropped before.
-    pub async fn finish(self) {
+    /// Breaks off background jobs and deletions (they begin anew or go on with the next
+    /// start). From now on a database that is away is waited for no longer than some
+    /// seconds: what waits for it is refused then.
+    pub fn close(&self) {
         self.closing.cancel();
+    }
+
+    /// Closes, waits until everything queued is judged and committed, and closes the
+    /// store's writer. All clones of the service must be dropped before.
+    pub async fn finish(self) {
+        self.close();
         for worker in self.jobs {
             if worker.await.is_err() {
                 tracing::error!("a worker ended by panic");
@@ -134,6 +148,7 @@ impl Workers {
         let Some(writer) = joined(self.committer).await else {
             return tracing::error!("the writer ended by panic");
         };
+        let Some(writer) = writer else { return };
         if let Err(error) = writer.close().await {
             tracing::error!(%error, "closing the store");
         }
@@ -161,7 +176,17 @@ impl Service {
         let events = Events::new(store.clone());
         let (sets, queue) = mpsc::channel(limits.commit_queue);
         let (told, outage) = watch::channel(None);
-        let committer = Committer::new(writer, queue, events.clone(), told, limits.journal_bytes);
+        let closing = CancellationToken::new();
+        let n_commits = Arc::new(AtomicU64::new(0));
+        let committer = Committer {
+            writer,
+            queue,
+            events: events.clone(),
+            outage: told,
+            n_commits: n_commits.clone(),
+            closing: closing.clone(),
+            journal_bytes: limits.journal_bytes,
+        };
         let committer = committer.spawn()?;
         let presences = Presences::default();
         let mut shards = Vec::new();
@@ -172,19 +197,29 @@ impl Service {
             threads.push(Shard::spawn(number, context, queue)?);
             shards.push(jobs);
         }
-        let closing = CancellationToken::new();
         let bench = jobs::Bench::new(store.clone(), clock, sets.clone(), closing.clone());
         let (jobs, queue) = mpsc::channel(jobs::MAX_QUEUED);
         let mut workers = jobs::spawn(limits.jobs, &bench, queue);
+        let deleter = Deleter::new(store.clone(), sets.clone());
         let sweeper = retention::Sweeper {
             store: store.clone(),
             clock,
             writer: sets.clone(),
+            deleter: deleter.clone(),
             closing: closing.clone(),
             retention: limits.retention.clone(),
         };
         workers.push(tokio::spawn(sweeper.run()));
         let in_flight = Arc::new(Semaphore::new(limits.in_flight_samples));
+        let stalled = Arc::new(AtomicBool::new(false));
+        let watchdog = Watchdog {
+            in_flight: in_flight.clone(),
+            batch_samples: limits.longest_batch(),
+            n_commits,
+            stalled: stalled.clone(),
+            closing: closing.clone(),
+        };
+        workers.push(tokio::spawn(watchdog.run()));
         let recordings = Arc::new(Semaphore::new(recordings::MAX_AT_ONCE));
         let traces = Arc::new(Semaphore::new(traces::MAX_AT_ONCE));
         let inner = Inner {
@@ -197,9 +232,11 @@ impl Service {
             shards,
             writer: sets,
             outage,
+            deleter,
             jobs,
             bench,
             in_flight,
+            stalled,
             recordings,
             traces,
         };
@@ -233,11 +270,11 @@ impl Service {
         &self.inner.limits
     }
 
-    /// Whether the store answers and the shards and the writer run.
+    /// Whether the store answers, the shards and the writer run, and ingest goes on.
     ///
     /// # Errors
-    /// [`ServiceError::Unavailable`] or [`ServiceError::Outage`], naming what
-    /// does not.
+    /// [`ServiceError::Unavailable`], [`ServiceError::Outage`] or
+    /// [`ServiceError::Stalled`], naming what does not.
     pub async fn ready(&self) -> Result<(), ServiceError> {
         if self.inner.writer.is_closed() {
             return Err(ServiceError::Unavailable { what: "the writer has stopped" });
@@ -247,6 +284,9 @@ impl Service {
         }
         if let Some(reason) = self.inner.outage.borrow().clone() {
             return Err(ServiceError::Outage { reason });
+        }
+        if self.inner.stalled.load(Ordering::Relaxed) {
+            return Err(ServiceError::Stalled { seconds: STALLED_AFTER.as_secs() });
         }
         let away = |error: StoreError| ServiceError::Outage { reason: error.to_string() };
         self.inner.store.ping().await.map_err(away)
@@ -278,7 +318,7 @@ impl Service {
     ) -> Result<T, ServiceError> {
         let (reply, answer) = oneshot::channel();
         let name = asset.to_owned();
-        let job: Job = Box::new(move |shard| shard.act(&name, act, reply));
+        let job: Job = Box::new(move |shard| shard.act(&name, act, reply.into()));
         self.shard(asset).try_send(job).map_err(ServiceError::from_full)?;
         settled(answer.await)
     }

@@ -10,6 +10,7 @@ use tokio::sync::mpsc;
 use tokio_util::sync::CancellationToken;
 
 use super::commit::WriteSet;
+use super::deletion::Deleter;
 use super::jobs::write_one;
 use super::{Clock, ServiceError};
 use crate::store::{Micros, Store, Write};
@@ -17,9 +18,6 @@ use crate::store::{Micros, Store, Write};
 /// Sessions given up by one sweep, for each reason; the next goes on. A clock
 /// that is far ahead for an hour does not cost everything.
 const MAX_EXPIRED: u32 = 100;
-
-/// Chunks deleted in one transaction; others commit in between.
-const CHUNKS_AT_ONCE: u32 = 16;
 
 /// How long what is kept; `None` is for ever.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -46,6 +44,7 @@ pub(super) struct Sweeper {
     pub(super) store: Store,
     pub(super) clock: Clock,
     pub(super) writer: mpsc::Sender<WriteSet>,
+    pub(super) deleter: Deleter,
     pub(super) closing: CancellationToken,
     pub(super) retention: Retention,
 }
@@ -79,10 +78,7 @@ impl Sweeper {
         if let Some(bytes) = bytes_per_asset {
             self.shrink(i64::try_from(bytes).unwrap_or(i64::MAX)).await?;
         }
-        for (session, n_chunks) in self.store.expired_sessions().await? {
-            self.delete(session, n_chunks).await?;
-        }
-        Ok(())
+        self.deleter.all().await
     }
 
     fn before(&self, age: Duration) -> Option<Micros> {
@@ -116,14 +112,5 @@ impl Sweeper {
             write_one(&self.writer, Write::ExpireSession { session, at }).await?;
         }
         Ok(())
-    }
-
-    async fn delete(&self, session: String, n_chunks: i64) -> Result<(), ServiceError> {
-        let pieces = n_chunks.unsigned_abs().div_ceil(u64::from(CHUNKS_AT_ONCE));
-        for _ in 0..pieces {
-            let (session, limit) = (session.clone(), CHUNKS_AT_ONCE);
-            write_one(&self.writer, Write::DropChunks { session, limit }).await?;
-        }
-        write_one(&self.writer, Write::DeleteSession { session }).await
     }
 }

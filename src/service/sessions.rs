@@ -107,21 +107,30 @@ impl Service {
     }
 
     /// Deletes a session with its recording and transitions. The asset's fault
-    /// memory keeps what the session left in it.
+    /// memory keeps what the session left in it. It is hidden at once; what is stored
+    /// of it goes in pieces, also if the caller goes away. Until then its name is
+    /// taken.
     ///
     /// # Errors
-    /// [`ServiceError::UnknownSession`].
+    /// [`ServiceError::UnknownSession`], also while it is being deleted;
+    /// [`ServiceError::NotStored`] if the store does not take a piece: the next sweep
+    /// of retention goes on.
     pub async fn delete_session(&self, id: &str) -> Result<(), ServiceError> {
-        let row = self.session_row(id).await?;
-        let session = row.id.clone();
-        self.call(&row.asset, move |context, running, work| {
-            if running.open.as_ref().is_some_and(|open| open.id == session) {
-                running.end(context, work)?;
-            }
-            work.writes.push(Write::DeleteSession { session });
-            Ok(())
-        })
-        .await
+        let SessionRow { id, asset, .. } = self.session_row(id).await?;
+        let this = self.clone();
+        let deletion = async move {
+            let session = id.clone();
+            this.call(&asset, move |context, running, work| {
+                if running.open.as_ref().is_some_and(|open| open.id == session) {
+                    running.end(context, work)?;
+                }
+                work.writes.push(Write::ExpireSession { session, at: work.at });
+                Ok(())
+            })
+            .await?;
+            this.inner.deleter.session(&id).await
+        };
+        self.to_the_end(deletion).await
     }
 
     /// # Errors

@@ -5,7 +5,7 @@ use std::future::Future;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use tokio::runtime::Handle;
-use tokio::sync::{mpsc, oneshot};
+use tokio::sync::{OwnedSemaphorePermit, mpsc, oneshot};
 
 use super::commit::{Life, WriteSet};
 use super::presence::Presences;
@@ -15,6 +15,36 @@ use crate::store::{Store, Write};
 
 /// Something to do on a shard.
 pub(super) type Job = Box<dyn FnOnce(&mut Shard) + Send>;
+
+/// Who waits for an outcome, and what is given back with it whether or not
+/// anybody reads it.
+pub(super) struct Reply<T> {
+    waiting: oneshot::Sender<Result<T, ServiceError>>,
+    permit: Option<OwnedSemaphorePermit>,
+}
+
+impl<T> Reply<T> {
+    /// With a permit that is given back before the outcome is told, or when the
+    /// reply is dropped.
+    pub(super) const fn with_permit(
+        waiting: oneshot::Sender<Result<T, ServiceError>>,
+        permit: OwnedSemaphorePermit,
+    ) -> Self {
+        Self { waiting, permit: Some(permit) }
+    }
+
+    fn send(self, outcome: Result<T, ServiceError>) {
+        drop(self.permit);
+        // The one who asked may be gone; what is durable stays so.
+        let _ = self.waiting.send(outcome);
+    }
+}
+
+impl<T> From<oneshot::Sender<Result<T, ServiceError>>> for Reply<T> {
+    fn from(waiting: oneshot::Sender<Result<T, ServiceError>>) -> Self {
+        Self { waiting, permit: None }
+    }
+}
 
 /// What a shard works with, apart from the engines.
 pub(super) struct Context {
@@ -65,12 +95,10 @@ impl Context {
         writes: Vec<Write>,
         life: Life,
         answer: T,
-        reply: oneshot::Sender<Result<T, ServiceError>>,
+        reply: Reply<T>,
     ) {
-        let done = Box::new(move |durable| {
-            let failed = ServiceError::Unavailable { what: "the store did not take it" };
-            // The one who asked may be gone; what is durable stays so.
-            let _ = reply.send(if durable { Ok(answer) } else { Err(failed) });
+        let done = Box::new(move |outcome: Result<(), ServiceError>| {
+            reply.send(outcome.map(|()| answer));
         });
         self.write(WriteSet { writes, life, done });
     }
@@ -92,6 +120,10 @@ impl Shard {
             let mut shard = Self { context, running: BTreeMap::new() };
             let engines = metrics::gauge!("offbd_engines", "shard" => number.to_string());
             while let Some(job) = queue.blocking_recv() {
+                if shard.context.writer.is_closed() {
+                    // Nothing can become durable; dropping the job tells who waits for it.
+                    continue;
+                }
                 job(&mut shard);
                 engines.set(f64::from(u32::try_from(shard.running.len()).unwrap_or(u32::MAX)));
             }
@@ -110,11 +142,11 @@ impl Shard {
         &mut self,
         name: &str,
         act: impl FnOnce(&Context, &mut Running, &mut Work) -> Result<T, ServiceError>,
-        reply: oneshot::Sender<Result<T, ServiceError>>,
+        reply: Reply<T>,
     ) {
         let mut running = match self.take(name) {
             Ok(running) => running,
-            Err(error) => return drop(reply.send(Err(error))),
+            Err(error) => return reply.send(Err(error)),
         };
         let life = running.life.clone();
         let mut work = Work::at(self.context.clock.now());
@@ -135,7 +167,7 @@ impl Shard {
                 } else {
                     life.break_off();
                 }
-                drop(reply.send(Err(error)));
+                reply.send(Err(error));
             }
             Err(_) => {
                 tracing::error!(asset = name, "an engine failed; it is rebuilt from the store");
@@ -171,13 +203,25 @@ impl Shard {
                 self.running.insert(name.to_owned(), running);
                 Err(ServiceError::AssetExists { name: name.to_owned() })
             }
-            Err(ServiceError::UnknownAsset { .. }) => make(&self.context),
+            Err(ServiceError::UnknownAsset { .. }) => self.make(name, make),
             Err(error) => Err(error),
         };
         match absent {
-            Ok(write) => self.context.settle(vec![write], Life::default(), (), reply),
+            Ok(write) => self.context.settle(vec![write], Life::default(), (), reply.into()),
             Err(error) => drop(reply.send(Err(error))),
         }
+    }
+
+    /// What `make` says, unless another asset `name` is still being deleted.
+    fn make(
+        &self,
+        name: &str,
+        make: impl FnOnce(&Context) -> Result<Write, ServiceError>,
+    ) -> Result<Write, ServiceError> {
+        if self.context.wait(self.context.store.is_being_deleted(name))? {
+            return Err(ServiceError::Busy { what: "the asset of this name is being deleted" });
+        }
+        make(&self.context)
     }
 
     /// The running asset, out of the shard's hands, rebuilt from the store if

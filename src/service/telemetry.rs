@@ -7,7 +7,7 @@ use tokio::sync::{OwnedSemaphorePermit, oneshot};
 use tracing::Span;
 
 use super::running::{Running, Work};
-use super::shard::{Context, Job};
+use super::shard::{Context, Job, Reply};
 use super::{Service, ServiceError, settled};
 use crate::store::SessionRow;
 use crate::vocabulary::Sample;
@@ -17,15 +17,12 @@ use crate::wire::telemetry::{AckView, Batch, RowView, key, keys};
 /// through for a retransmitted batch; older samples are not found.
 const MAX_CHUNKS_SEARCHED: u32 = 32;
 
-/// The acknowledgement of a batch that is under way. Its samples count as
-/// under way until they are durable or refused, also if nobody waits for it.
+/// The acknowledgement of a batch that is under way. Its samples are in flight
+/// until they are durable or refused, whether or not anybody reads this.
 pub struct Pending {
-    answer: oneshot::Receiver<Result<Taken, ServiceError>>,
+    answer: oneshot::Receiver<Result<AckView, ServiceError>>,
     begun: Instant,
 }
-
-/// What was taken, and the place it took.
-type Taken = (AckView, OwnedSemaphorePermit);
 
 impl Pending {
     /// Waits until the batch is durable.
@@ -33,7 +30,7 @@ impl Pending {
     /// # Errors
     /// [`ServiceError`] if it was not taken, or not as a whole.
     pub async fn acknowledged(self) -> Result<AckView, ServiceError> {
-        let (ack, _) = settled(self.answer.await)?;
+        let ack = settled(self.answer.await)?;
         metrics::histogram!("offbd_ack_seconds").record(self.begun.elapsed().as_secs_f64());
         Ok(ack)
     }
@@ -57,7 +54,7 @@ impl Service {
         Ok(pending)
     }
 
-    /// The same, but waits for room.
+    /// The same, but waits for room. Dropped before it is ready, it has taken nothing.
     ///
     /// # Errors
     /// [`ServiceError::TooMany`]; [`ServiceError::Unavailable`] when closing.
@@ -66,7 +63,7 @@ impl Service {
         asset: &str,
         batch: Batch,
         importing: bool,
-    ) -> impl Future<Output = Result<Pending, ServiceError>> + Send {
+    ) -> impl Future<Output = Result<Pending, ServiceError>> + Send + use<> {
         let (this, asset) = (self.clone(), asset.to_owned());
         async move {
             let closing = |_| ServiceError::Unavailable { what: "the service is closing" };
@@ -83,7 +80,7 @@ impl Service {
     }
 
     fn permits(&self, batch: &Batch) -> Result<u32, ServiceError> {
-        let limit = self.inner.limits.batch_samples.min(self.inner.limits.in_flight_samples);
+        let limit = self.inner.limits.longest_batch();
         if batch.rows.len() > limit {
             return Err(ServiceError::TooMany { what: "samples in one batch", limit });
         }
@@ -104,9 +101,9 @@ fn take_job(
     let job: Job = Box::new(move |shard| {
         let _judging = tracing::debug_span!(parent: &request, "judge").entered();
         let act = |context: &Context, running: &mut Running, work: &mut Work| {
-            Ok((take(context, running, batch, importing, work)?, permit))
+            take(context, running, batch, importing, work)
         };
-        shard.act(&asset, act, reply);
+        shard.act(&asset, act, Reply::with_permit(reply, permit));
     });
     (job, Pending { answer, begun: Instant::now() })
 }

@@ -28,6 +28,7 @@ use sqlx::migrate::Migrator;
 
 pub use access::{AccessWrite, AuditRow, LAST_ID, MAX_LOGINS, TokenRow};
 pub use backup::{back_up, restore};
+pub use expiry::Bulk;
 pub use place::Place;
 pub use read::{FaultFilter, FaultOrder, SessionFilter};
 pub use rows::{

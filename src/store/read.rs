@@ -46,14 +46,15 @@ pub(super) const SESSION: &str =
     n_samples, n_rejected, first_t_s, last_t_s, last_seq, verdict, verdict_hash FROM session
     WHERE ";
 
-/// Not given up by retention.
-const KEPT: &str = "expired_at IS NULL AND ";
+/// Not given up, nor its asset.
+const KEPT: &str = "expired_at IS NULL
+    AND asset NOT IN (SELECT name FROM asset WHERE deleted_at IS NOT NULL) AND ";
 
 impl Store {
     /// # Errors
     /// [`StoreError`], as for every question here, if the database fails.
     pub async fn asset(&self, name: &str) -> Result<Option<AssetRow>, StoreError> {
-        Ok(sqlx::query_as("SELECT * FROM asset WHERE name = $1")
+        Ok(sqlx::query_as("SELECT * FROM asset WHERE name = $1 AND deleted_at IS NULL")
             .bind(name)
             .fetch_optional(&self.pool)
             .await?)
@@ -61,15 +62,18 @@ impl Store {
 
     /// Assets in the order of their names, from the one after `after`.
     pub async fn assets(&self, after: &str, limit: u32) -> Result<Vec<AssetRow>, StoreError> {
-        Ok(sqlx::query_as("SELECT * FROM asset WHERE name > $1 ORDER BY name LIMIT $2")
-            .bind(after)
-            .bind(i64::from(limit))
-            .fetch_all(&self.pool)
-            .await?)
+        Ok(sqlx::query_as(
+            "SELECT * FROM asset WHERE name > $1 AND deleted_at IS NULL ORDER BY name LIMIT $2",
+        )
+        .bind(after)
+        .bind(i64::from(limit))
+        .fetch_all(&self.pool)
+        .await?)
     }
 
     pub async fn n_assets(&self) -> Result<i64, StoreError> {
-        Ok(sqlx::query_scalar("SELECT COUNT(*) FROM asset").fetch_one(&self.pool).await?)
+        let count = sqlx::query_scalar("SELECT COUNT(*) FROM asset WHERE deleted_at IS NULL");
+        Ok(count.fetch_one(&self.pool).await?)
     }
 
     /// The names of the assets that have an open session.
@@ -93,7 +97,7 @@ impl Store {
         self.session_row(query).await
     }
 
-    /// Also one that retention has given up: its name is taken until it is gone.
+    /// Also one that is given up: its name is taken until it is gone.
     pub async fn session_named(
         &self,
         asset: &str,

@@ -43,6 +43,11 @@ impl Tails {
         self.known.clear();
     }
 
+    /// Forgets `session`, which is deleted.
+    pub(super) fn remove(&mut self, session: &str) {
+        self.known.remove(session);
+    }
+
     /// Appends each run to its session; a session has one run at most.
     pub(super) async fn append(
         &mut self,

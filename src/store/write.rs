@@ -1,6 +1,8 @@
 //! The one writer: groups of changes, one transaction each, durable on return.
 
+mod deletion;
 mod fold;
+mod subject;
 
 use std::collections::HashSet;
 use std::time::Duration;
@@ -29,6 +31,12 @@ pub enum Write {
     CreateAsset(AssetRow),
     /// The document of an asset that is there.
     UpdateAsset(AssetRow),
+    /// An asset is given up: nobody sees it or its sessions any more.
+    GiveUpAsset {
+        name: String,
+        at: Micros,
+    },
+    /// An asset that is given up goes, with what is left of it.
     DeleteAsset {
         name: String,
     },
@@ -47,6 +55,7 @@ pub enum Write {
         verdict: String,
         hash: String,
     },
+    /// A session goes, with what is left of it.
     DeleteSession {
         session: String,
     },
@@ -57,6 +66,11 @@ pub enum Write {
     },
     /// The first chunks of a session that is given up, at most `limit`.
     DropChunks {
+        session: String,
+        limit: u32,
+    },
+    /// The first transitions of a session that is given up, at most `limit`.
+    DropTransitions {
         session: String,
         limit: u32,
     },
@@ -193,14 +207,25 @@ impl Writer {
     /// through after all. Nothing is in doubt afterwards.
     ///
     /// # Errors
-    /// [`StoreError`] if the database is still away, or not as it was left.
+    /// [`StoreError`] if the database is still away, takes no change, or is not as it was
+    /// left.
     pub async fn reconnect(&mut self) -> Result<bool, StoreError> {
         self.connection = None;
+        let late = |_| Err(sqlx::Error::Io(std::io::ErrorKind::TimedOut.into()).into());
+        let attempt = tokio::time::timeout(COMMIT_WAIT, self.connect_again());
+        attempt.await.unwrap_or_else(late)
+    }
+
+    async fn connect_again(&mut self) -> Result<bool, StoreError> {
         let mut connection = self.place.writer(!self.guest).await?;
-        // A change of nothing waits for what the lost connection may still do.
-        sqlx::query("UPDATE counter SET value = value WHERE name = 'commit'")
-            .execute(&mut connection)
-            .await?;
+        // It must take a change that is durable. Touching the other row waits for what the
+        // lost connection may still do.
+        sqlx::query(
+            "UPDATE counter SET value = CASE name WHEN 'probe' THEN value + 1 ELSE value END
+             WHERE name IN ('commit', 'probe')",
+        )
+        .execute(&mut connection)
+        .await?;
         let found = counter(&mut connection, "commit").await?;
         let came_through = self.in_doubt.is_some() && found == self.n_commits + 1;
         if found != self.n_commits && !came_through {
@@ -350,18 +375,16 @@ impl Group<'_> {
                 self.finish(db, session).await?;
                 end_session(db, session, *ended_at, verdict, hash).await
             }
-            Write::DeleteSession { session } => {
-                self.forget(session);
-                delete(db, "DELETE FROM session WHERE id = $1", session).await
+            Write::DeleteSession { session } => self.delete_session(db, session).await,
+            Write::ExpireSession { session, at } => deletion::expire(db, session, *at).await,
+            Write::DropChunks { session, limit } => {
+                deletion::drop_chunks(db, session, *limit).await
             }
-            Write::ExpireSession { session, at } => expire(db, session, *at).await,
-            Write::DropChunks { session, limit } => drop_chunks(db, session, *limit).await,
-            Write::DeleteAsset { name } => {
-                if let Some(session) = open_session_of(db, name).await? {
-                    self.forget(&session);
-                }
-                delete(db, "DELETE FROM asset WHERE name = $1", name).await
+            Write::DropTransitions { session, limit } => {
+                deletion::drop_transitions(db, session, *limit).await
             }
+            Write::GiveUpAsset { name, at } => self.give_up_asset(db, name, *at).await,
+            Write::DeleteAsset { name } => deletion::delete_asset(db, name).await,
         }
     }
 
@@ -401,11 +424,6 @@ async fn put_progress(db: &mut AnyConnection, runs: &[Run]) -> Result<(), StoreE
         }
         query.execute(&mut *db).await?;
     }
-    Ok(())
-}
-
-async fn delete(db: &mut AnyConnection, sql: &'static str, key: &str) -> Result<(), StoreError> {
-    sqlx::query(sql).bind(key).execute(db).await?;
     Ok(())
 }
 
@@ -451,14 +469,6 @@ async fn open_session(db: &mut AnyConnection, row: &SessionRow) -> Result<(), St
     Ok(())
 }
 
-async fn open_session_of(
-    db: &mut AnyConnection,
-    asset: &str,
-) -> Result<Option<String>, StoreError> {
-    let question = sqlx::query_scalar("SELECT id FROM session WHERE state = 'open' AND asset = $1");
-    Ok(question.bind(asset).fetch_optional(db).await?)
-}
-
 async fn end_session(
     db: &mut AnyConnection,
     session: &str,
@@ -476,27 +486,6 @@ async fn end_session(
     .bind(ended_at)
     .bind(verdict)
     .bind(hash)
-    .execute(db)
-    .await?;
-    Ok(())
-}
-
-async fn expire(db: &mut AnyConnection, session: &str, at: Micros) -> Result<(), StoreError> {
-    sqlx::query("UPDATE session SET expired_at = $2 WHERE id = $1 AND state = 'ended'")
-        .bind(session)
-        .bind(at)
-        .execute(db)
-        .await?;
-    Ok(())
-}
-
-async fn drop_chunks(db: &mut AnyConnection, session: &str, limit: u32) -> Result<(), StoreError> {
-    sqlx::query(
-        "DELETE FROM chunk WHERE session = $1 AND first_index IN
-         (SELECT first_index FROM chunk WHERE session = $1 ORDER BY first_index LIMIT $2)",
-    )
-    .bind(session)
-    .bind(i64::from(limit))
     .execute(db)
     .await?;
     Ok(())

@@ -107,7 +107,7 @@ impl Group<'_> {
     /// `session` is deleted: nothing of it is left to be folded.
     pub(super) fn forget(&mut self, session: &str) {
         self.pending.retain(|run| run.session != session);
-        self.tails.forget();
+        self.tails.remove(session);
         self.changes.gone.insert(session.to_owned());
     }
 
