@@ -76,7 +76,9 @@ pub(super) async fn put(
     Ok((if new { StatusCode::CREATED } else { StatusCode::OK }, Json(view)))
 }
 
-/// Deletes an asset with its sessions, recordings and faults.
+/// Deletes an asset with its sessions, recordings and faults. It is hidden at once; the
+/// answer comes when all of it is gone. A deletion that takes longer than an answer may
+/// is answered with 503 and goes on; until its end a new asset of the name gets 429.
 #[utoipa::path(delete, path = "/assets/{asset}", tag = "assets", operation_id = "delete_asset",
     params(("asset" = String, description = "Name of the asset")),
     responses((status = 204), (status = 404, body = Problem)))]

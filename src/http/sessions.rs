@@ -159,7 +159,9 @@ pub(super) async fn get(
 }
 
 /// Deletes a session with its recording and transitions; the asset's fault
-/// memory keeps what the session left in it.
+/// memory keeps what the session left in it. It is hidden at once; the answer comes
+/// when all of it is gone. A deletion that takes longer than an answer may is answered
+/// with 503 and goes on; until its end a new session of the name gets 409.
 #[utoipa::path(delete, path = "/sessions/{id}", tag = "sessions",
     operation_id = "delete_session",
     params(("id" = String, description = "The service's id of the session")),

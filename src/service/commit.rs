@@ -166,18 +166,16 @@ impl Committer {
     /// Commits each of `sets` on its own; returns whether the writer goes on.
     async fn commit_each(&mut self, sets: Vec<WriteSet>) -> bool {
         let mut goes_on = true;
-        for set in sets {
-            if !goes_on {
-                refuse(set, closing());
-                continue;
-            }
+        for mut set in sets {
             if set.life.is_broken() {
                 refuse_broken(set);
                 continue;
             }
-            let mut alone = [set];
-            let written = self.write(&mut alone).await;
-            let [set] = alone;
+            let written = if goes_on {
+                self.write(std::slice::from_mut(&mut set)).await
+            } else {
+                Err(Failure::Closing)
+            };
             match written {
                 Ok(()) => self.announce(set),
                 Err(Failure::OfTheSets) => refuse_alone(set),

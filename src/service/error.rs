@@ -53,7 +53,7 @@ pub enum ServiceError {
     /// The store failed, or what runs behind the service; come again.
     #[error("{what}; what was not acknowledged was not taken, send it again")]
     Unavailable { what: &'static str },
-    /// The database does not take it, though it takes other changes.
+    /// The database does not take it, also alone; other changes it takes.
     #[error("the store does not take {what}; see the log")]
     NotStored { what: String },
     /// Samples in flight are at their limit, and none becomes durable.

@@ -94,11 +94,7 @@ impl Store {
     }
 
     /// Some of the sessions of `asset`, seen or not.
-    pub async fn sessions_in_bulk(
-        &self,
-        asset: &str,
-        limit: u32,
-    ) -> Result<Vec<Bulk>, StoreError> {
+    pub async fn sessions_in_bulk(&self, asset: &str, limit: u32) -> Result<Vec<Bulk>, StoreError> {
         let mut question = Question::new(BULK);
         question.push("asset = ").bind(asset)?.push(" LIMIT ").bind(i64::from(limit))?;
         self.bulks(question).await

@@ -72,7 +72,11 @@ impl Store {
     }
 
     pub async fn n_assets(&self) -> Result<i64, StoreError> {
-        let count = sqlx::query_scalar("SELECT COUNT(*) FROM asset WHERE deleted_at IS NULL");
+        // Two counts that indexes answer, so that no document is read.
+        let count = sqlx::query_scalar(
+            "SELECT (SELECT COUNT(*) FROM asset) -
+             (SELECT COUNT(*) FROM asset WHERE deleted_at IS NOT NULL)",
+        );
         Ok(count.fetch_one(&self.pool).await?)
     }
 

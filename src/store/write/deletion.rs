@@ -27,7 +27,8 @@ impl Group<'_> {
         ] {
             sqlx::query(sql).bind(name).bind(at).execute(&mut *db).await?;
         }
-        for sql in ["DELETE FROM fault WHERE asset = $1", "DELETE FROM calibration WHERE asset = $1"]
+        for sql in
+            ["DELETE FROM fault WHERE asset = $1", "DELETE FROM calibration WHERE asset = $1"]
         {
             sqlx::query(sql).bind(name).execute(&mut *db).await?;
         }

@@ -8,7 +8,9 @@ impl Write {
     pub fn subject(&self) -> String {
         match self {
             Self::CreateAsset(row) | Self::UpdateAsset(row) => format!("asset `{}`", row.name),
-            Self::GiveUpAsset { name, .. } | Self::DeleteAsset { name } => format!("the deletion of asset `{name}`"),
+            Self::GiveUpAsset { name, .. } | Self::DeleteAsset { name } => {
+                format!("the deletion of asset `{name}`")
+            }
             Self::OpenSession(row) => format!("session {}", row.id),
             Self::Append { session, samples, .. } => {
                 format!("{} samples of session {session}", samples.len())
