@@ -88,7 +88,8 @@ mod tests {
 
     /// Two assets with `n` sessions each, that warn of both axes.
     const HISTORY: &str = "
-        INSERT INTO asset VALUES ('a', '{}', 1, 0, 0), ('b', '{}', 1, 0, 0);
+        INSERT INTO asset (name, document, revision, created_at, updated_at)
+            VALUES ('a', '{}', 1, 0, 0), ('b', '{}', 1, 0, 0);
         INSERT INTO session (id, asset, name, state, opened_at, ended_at, setup, baseline,
             n_samples, n_rejected)
         WITH RECURSIVE n (i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < $1)
