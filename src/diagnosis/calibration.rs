@@ -11,20 +11,46 @@ pub struct AxisCalibration {
     pub dead_time_s: f64,
     /// First-order lag of the servo, s.
     pub lag_s: f64,
-    /// Plate and horn off level, rad.
+    /// Plate and horn off level, rad: the mean over sessions.
     pub level_rad: f64,
+    /// Standard deviation of the level from session to session, rad.
+    pub level_spread_rad: f64,
+    /// Standard deviation of the gain from session to session, as a share of it.
+    pub gain_spread: f64,
     /// Deceleration of a rolling ball, m/s².
     pub resistance_m_s2: f64,
     /// Standard deviation of the readings about the fitted motion, m.
     pub noise_m: f64,
     /// Tilt below which a ball at rest stays at rest, rad.
     pub breakaway_rad: f64,
+    /// Longest time for which healthy readings were the same to the bit, s.
+    pub longest_repeat_s: f64,
+    /// Time for which the ball was seen at rest, s.
+    pub rest_s: f64,
     /// Robust standard deviation of the acceleration residual, m/s².
     pub residual_m_s2: f64,
+    /// Acceleration that the twin leaves out, over half a second, m/s².
+    pub model_error_m_s2: f64,
+    /// Most evidence against the servo while it was healthy, nats.
+    pub most_nats: f64,
     /// Acceleration that nineteen of twenty moments of the recording stayed below,
     /// m/s²: beyond it, gain and delay are not known as well. Infinite where it
     /// was not learnt.
     pub familiar_m_s2: f64,
+}
+
+/// What was learnt of the sensor, both axes of which are one look at the ball.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SensorCalibration {
+    /// Time between two readings of a sensor that is logged faster than it reads,
+    /// s; zero for one that is not.
+    pub refresh_s: f64,
+    /// Most outliers within some seconds; as counted by [`super::Stillness`].
+    pub most_outliers: f64,
+    /// Most scatter about the motion that lasted, m; zero where none stood out.
+    pub most_scatter_m: f64,
+    /// Longest time for which no ball was seen on the plate, s.
+    pub longest_unseen_s: f64,
 }
 
 /// How soon a fault of one axis' servo would be confirmed, and how small it may
@@ -64,6 +90,7 @@ pub struct Prospects {
 pub struct Calibration {
     /// Per axis; none where the rig has no such servo or no such reading.
     pub axes: PerAxis<Option<AxisCalibration>>,
+    pub sensor: SensorCalibration,
     /// SHA-256 of the data that it was learnt from, lower-case hexadecimal.
     pub data_sha256: String,
     /// Samples it was learnt from.

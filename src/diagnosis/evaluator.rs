@@ -4,8 +4,8 @@
 //! nothing about the ball, a ball that cannot move says nothing about the
 //! servos. A monitor that is out of its depth is *not tested*, never *passed*.
 
-use super::stillness::Stillness;
-use super::{AxisEvidence, Candidate, Evidence, Limits, Profile, Test};
+use super::stillness::{AxisStillness, Stillness};
+use super::{AxisEvidence, Candidate, Evidence, Limits, Profile, SensorLimits, Test};
 use crate::vocabulary::{Axis, FaultCode, FaultKind, PerAxis};
 
 /// The chapter's enable condition: command, rad, or measured acceleration,
@@ -17,24 +17,19 @@ const TEXTBOOK_ENABLE_M_S2: f64 = 0.5;
 /// on a rolling ball gives: longer than any refresh seen (0.2 s).
 const FROZEN_S: f64 = 0.3;
 
+/// Standard deviations of a reading by which a ball must have gone on, by its
+/// last velocity, for identical readings to be frozen.
+const MISSED: f64 = 20.0;
+
 /// Seconds in which a ball asked to move must have begun to.
 const PRESSED_S: f64 = 0.3;
-
-/// Seconds without a ball that a healthy tracker does not lose it for.
-const UNSEEN_S: f64 = 0.3;
 
 /// Share of samples without a ball that is too many.
 const MISSING_SHARE: f64 = 0.5;
 
-/// Outliers in ten seconds that are too many.
-const MANY_OUTLIERS: u32 = 6;
-
-/// Scatter over the healthy one that is noise. Readings in whole millimetres,
-/// coarser than the ball moves, scatter by up to four times it now and then.
-const NOISY: f64 = 5.0;
-
-/// Scatter that no sensor is blamed for, m: a tracker good to a pixel.
-const QUIET_M: f64 = 1e-3;
+/// Scatter over the healthy one that is noise, beside what healthy readings have
+/// been seen to scatter by for a while ([`SensorLimits::scatter_m`]).
+const NOISY: f64 = 3.5;
 
 /// Evidence against a servo that explains why a ball stands that was asked to
 /// move by it alone, nats: what makes it suspected.
@@ -104,12 +99,13 @@ impl Finding {
 pub struct Evaluator {
     profile: Profile,
     limits: PerAxis<Limits>,
+    sensor: SensorLimits,
 }
 
 impl Evaluator {
     #[must_use]
-    pub fn new(profile: Profile, limits: PerAxis<Limits>) -> Self {
-        Self { profile, limits }
+    pub fn new(profile: Profile, limits: PerAxis<Limits>, sensor: SensorLimits) -> Self {
+        Self { profile, limits, sensor }
     }
 
     /// The limits in force.
@@ -172,12 +168,19 @@ impl Evaluator {
     /// `blur_m` because of the ball's motion.
     #[must_use]
     pub fn noisy_m(&self, blur_m: f64) -> f64 {
-        let noise_m = self.limits.x.noise_m.max(self.limits.y.noise_m);
-        (NOISY * (noise_m * noise_m + blur_m * blur_m).sqrt()).max(QUIET_M)
+        let noise_m = self.noise_m();
+        (NOISY * noise_m.hypot(blur_m)).max(self.sensor.scatter_m)
+    }
+
+    /// Standard deviation of healthy readings, the worse of both axes, m.
+    #[must_use]
+    pub fn noise_m(&self) -> f64 {
+        let of = |axis: Axis| self.limits[axis].noise_m;
+        Axis::ALL.into_iter().filter_map(of).fold(0.0, f64::max)
     }
 
     fn sensor(&self, evidence: &Evidence, readings: &Stillness, around: &Surroundings) -> Finding {
-        if readings.unseen_s >= UNSEEN_S || readings.missing >= MISSING_SHARE {
+        if readings.unseen_s >= self.sensor.unseen_s || readings.missing >= MISSING_SHARE {
             return match around.at_edge {
                 true => Finding::default(),
                 false => Finding::fail(Some(FaultKind::Dropout)),
@@ -189,7 +192,7 @@ impl Evaluator {
         if around.since_jump_s < JUMP_S {
             return Finding::fail(Some(FaultKind::Jump));
         }
-        if readings.outliers() >= MANY_OUTLIERS {
+        if readings.outliers() >= self.sensor.outliers {
             return Finding::fail(Some(FaultKind::Spikes));
         }
         // A bounce off the rim is no parabola.
@@ -197,7 +200,38 @@ impl Evaluator {
         if rolls && evidence.scatter_m.is_some_and(|s| s > around.noisy_m) {
             return Finding::fail(Some(FaultKind::Noise));
         }
-        frozen(readings, around).unwrap_or(Finding::PASS)
+        self.frozen(readings, around).unwrap_or(Finding::PASS)
+    }
+
+    /// Bit-identical readings although the ball is asked to move, did move, or has
+    /// always read otherwise, even at rest.
+    fn frozen(&self, readings: &Stillness, around: &Surroundings) -> Option<Finding> {
+        if around.at_edge {
+            return None;
+        }
+        let axes = &readings.axes;
+        let seen = |axis: Axis| axes[axis].seen();
+        let dead = |axis: Axis| seen(axis) && self.dead(axis, &axes[axis]);
+        let any = |of: &dyn Fn(Axis) -> bool| Axis::ALL.into_iter().any(of);
+        let both =
+            Axis::ALL.into_iter().filter(|&a| seen(a)).all(|a| axes[a].identical_s >= FROZEN_S);
+        if both && any(&dead) {
+            let moved = any(&|a| axes[a].missed_m() > MISSED * self.noise_m());
+            let rival = Candidate { code: FaultCode::StuckBall, kind: None, weight: 0.3 };
+            let rival = (!moved).then_some(rival);
+            return Some(Finding { rival, ..Finding::fail(Some(FaultKind::Frozen)) });
+        }
+        let alone = |axis: Axis| dead(axis) && axes[axis.other()].identical_s < FROZEN_S / 2.0;
+        any(&alone).then(|| Finding::fail(Some(FaultKind::Frozen)))
+    }
+
+    /// Whether readings of `axis` have been the same for longer than any that
+    /// live are.
+    fn dead(&self, axis: Axis, still: &AxisStillness) -> bool {
+        let limits = &self.limits[axis];
+        let asked = still.pressed_s >= FROZEN_S || still.missed_m() > MISSED * self.noise_m();
+        let resting = limits.rest_repeat_s.is_some_and(|s| still.identical_s >= s);
+        resting || asked && still.identical_s >= limits.repeat_s
     }
 }
 
@@ -242,21 +276,6 @@ fn textbook(axis: Axis, evidence: &Evidence) -> Finding {
         (true, true) => Finding::fail(None),
         (true, false) => Finding::PASS,
     }
-}
-
-/// Bit-identical readings although the ball is asked to move.
-fn frozen(readings: &Stillness, around: &Surroundings) -> Option<Finding> {
-    if around.at_edge {
-        return None;
-    }
-    let axes = &readings.axes;
-    let dead = |axis: Axis| axes[axis].identical_s >= FROZEN_S && axes[axis].pressed_s >= FROZEN_S;
-    if readings.identical_s() >= FROZEN_S && Axis::ALL.into_iter().any(dead) {
-        let rival = Candidate { code: FaultCode::StuckBall, kind: None, weight: 0.3 };
-        return Some(Finding { rival: Some(rival), ..Finding::fail(Some(FaultKind::Frozen)) });
-    }
-    let alone = |axis: Axis| dead(axis) && axes[axis.other()].identical_s < FROZEN_S / 2.0;
-    Axis::ALL.into_iter().any(alone).then(|| Finding::fail(Some(FaultKind::Frozen)))
 }
 
 /// The ball hardly moves, and neither servo is answered.
@@ -312,7 +331,8 @@ mod tests {
     fn at_the_rim(twin: f64, identical_s: f64) -> Test {
         let evaluator = Evaluator::new(
             Profile::Default,
-            PerAxis::from_fn(|_| Limits::new(Profile::Default, None, 7.0)),
+            PerAxis::from_fn(|_| Limits::new(Profile::Default, None, false, 7.0)),
+            SensorLimits::new(None),
         );
         let mut readings = Stillness::default();
         readings.axes.x.identical_s = identical_s;
@@ -360,9 +380,10 @@ mod tests {
     /// Readings that scatter by 2 mm, of a ball that is clear of the edge and
     /// moves `blur_m` within the uncertainty of a reading's time.
     fn scattered(noise_m: f64, clear_s: f64, blur_m: f64) -> Test {
-        let mut limit = Limits::new(Profile::Default, None, 7.0);
-        limit.noise_m = noise_m;
-        let evaluator = Evaluator::new(Profile::Default, PerAxis::from_fn(|_| limit));
+        let mut limit = Limits::new(Profile::Default, None, false, 7.0);
+        limit.noise_m = Some(noise_m);
+        let evaluator =
+            Evaluator::new(Profile::Default, PerAxis::from_fn(|_| limit), SensorLimits::new(None));
         let around = Surroundings { clear_s, noisy_m: evaluator.noisy_m(blur_m), ..CLEAR };
         let evidence = Evidence { scatter_m: Some(2e-3), window_s: 0.5, ..Evidence::default() };
         evaluator.sensor(&evidence, &Stillness::default(), &around).test

@@ -17,15 +17,15 @@ mod status;
 mod stillness;
 pub mod trend;
 
-pub use calibration::{AxisCalibration, Calibration, Prospects, ServoProspects};
+pub use calibration::{AxisCalibration, Calibration, Prospects, SensorCalibration, ServoProspects};
 pub use debounce::{Debounce, Pace, Qualified, Test};
 pub use evaluator::{Evaluator, Finding, Surroundings};
 pub use evidence::{AxisEvidence, Candidate, Evidence, Suspicion, Transition};
-pub use limits::Limits;
+pub use limits::{Limits, SensorLimits};
 pub use memory::{FaultMemory, FaultRecord, InUse, MemoryRules};
 pub use outlier::{Gated, OutlierGate};
 pub use scatter::Scatter;
-pub use servo::{Answer, AxisNature, Course, Servo, ServoEstimate};
+pub use servo::{Answer, AxisNature, Course, LearntNature, Servo, ServoEstimate};
 pub use settings::{Profile, Settings};
 pub use status::StatusByte;
 pub use stillness::{AxisStillness, Reading, Stillness};

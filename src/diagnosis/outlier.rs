@@ -64,6 +64,10 @@ struct Elsewhere {
 }
 
 impl Elsewhere {
+    fn velocity_m_s(&self) -> Vector2<f64> {
+        (self.position_m - self.first_m) / (self.at_s - self.since_s)
+    }
+
     fn differs(&self, position_m: Vector2<f64>) -> u32 {
         u32::from(position_m != self.position_m)
     }
@@ -84,9 +88,20 @@ impl Track {
         Self { at_s, position_m, velocity_m_s: Vector2::zeros(), n }
     }
 
-    /// Distance of a reading from where the ball is expected, m.
+    /// From where the ball is expected to a reading, m.
+    fn off(&self, t_s: f64, position_m: Vector2<f64>) -> Vector2<f64> {
+        position_m - self.position_m - self.velocity_m_s * (t_s - self.at_s)
+    }
+
+    /// The larger part of that, m.
     fn off_m(&self, t_s: f64, position_m: Vector2<f64>) -> f64 {
-        (position_m - self.position_m - self.velocity_m_s * (t_s - self.at_s)).amax()
+        self.off(t_s, position_m).amax()
+    }
+
+    fn shifted(mut self, t_s: f64, position_m: Vector2<f64>, velocity_m_s: Vector2<f64>) -> Self {
+        self.position_m += position_m + velocity_m_s * (self.at_s - t_s);
+        self.velocity_m_s += velocity_m_s;
+        self
     }
 
     fn followed_by(&self, t_s: f64, position_m: Vector2<f64>) -> Self {
@@ -101,6 +116,46 @@ impl Track {
     }
 }
 
+/// A reading that was accepted far off the track: by a push, after which the
+/// ball goes on elsewhere, or by a step of the readings, after which it goes on
+/// beside.
+#[derive(Clone, Copy, Debug)]
+struct Leap {
+    before: Track,
+    at_s: f64,
+    off_m: Vector2<f64>,
+}
+
+impl Leap {
+    /// Whether the readings are back on the track before.
+    fn was_outlier(&self, t_s: f64, position_m: Vector2<f64>) -> bool {
+        self.share(t_s, position_m).abs() < STEP_SHARE
+    }
+
+    /// How far a reading is off the track before, as a share of the first one.
+    fn share(&self, t_s: f64, position_m: Vector2<f64>) -> f64 {
+        let k = self.off_m.iamax();
+        self.before.off(t_s, position_m)[k] / self.off_m[k]
+    }
+
+    /// Whether a reading at `t_s` is as far off the track before as the first one
+    /// was, and not as far as a push would have carried it since.
+    fn is_step(&self, t_s: f64, position_m: Vector2<f64>) -> bool {
+        let off_m = self.share(t_s, position_m);
+        let carried = (t_s - self.at_s) / (self.at_s - self.before.at_s);
+        let least = carried.min(1.0) * STEP_SHARE;
+        let aside =
+            (self.before.off(t_s, position_m) - self.off_m * off_m).amax() / self.off_m.amax();
+        (1.0 - STEP_SHARE..1.0 + least).contains(&off_m) && aside < STEP_SHARE
+    }
+}
+
+/// A step that is shorter than the change of velocity beside it makes in this
+/// time, s, is a ball that a hand puts elsewhere, or takes the place of the hand.
+const BENT_S: f64 = 0.2;
+/// Share of a step by which later readings may be off it.
+const STEP_SHARE: f64 = 0.4;
+
 /// The gate. Both axes come from one look at the ball and are judged as one.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct OutlierGate {
@@ -111,6 +166,8 @@ pub struct OutlierGate {
     /// Outliers not yet told.
     outliers: u32,
     elsewhere: Option<Elsewhere>,
+    /// The last reading that was far off the track and yet accepted.
+    leap: Option<Leap>,
 }
 
 impl OutlierGate {
@@ -133,8 +190,18 @@ impl OutlierGate {
         };
         let staying = self.elsewhere.filter(stays);
         if staying.is_none() && off_m <= reach(track.at_s) {
+            if let Some(leap) = self.leap.filter(|l| l.was_outlier(t_s, position_m)) {
+                self.leap = None;
+                self.outliers += 1;
+                let outliers = self.follow(leap.before.followed_by(t_s, position_m));
+                return Gated::Accepted { outliers, undone: true };
+            }
             let doubtful = off_m > reach(track.at_s) / 2.0;
             self.before = doubtful.then_some(track);
+            if self.stepped(&track, t_s, position_m, noise_m) {
+                self.follow(Track::start(t_s, position_m, BELIEVED_AFTER));
+                return Gated::Stepped;
+            }
             return self.accept(track.followed_by(t_s, position_m));
         }
         if let Some(before) = self.before.take()
@@ -145,6 +212,40 @@ impl OutlierGate {
             return Gated::Accepted { outliers, undone: true };
         }
         self.refuse(t_s, position_m, staying, &track, noise_m)
+    }
+
+    /// Whether accepted readings have stayed beside the track that they left.
+    fn stepped(&mut self, track: &Track, t_s: f64, position_m: Vector2<f64>, noise_m: f64) -> bool {
+        if let Some(leap) = self.leap {
+            let stays = leap.is_step(t_s, position_m);
+            let long = t_s - leap.at_s >= BELIEVED_AFTER_S;
+            if long || !stays {
+                self.leap = None;
+            }
+            return stays && long;
+        }
+        let off_m = track.off(t_s, position_m);
+        let unseen_s = t_s - track.at_s;
+        let allowed_m = NOISE_FACTOR * noise_m + STEP_M + SHOVE_M_S2 / 8.0 * unseen_s * unseen_s;
+        if off_m.amax() > allowed_m && track.n >= BELIEVED_AFTER {
+            self.leap = Some(Leap { before: *track, at_s: t_s, off_m });
+        }
+        false
+    }
+
+    /// Adds the straight line through (`t_s`, `position_m`) with slope
+    /// `velocity_m_s` to all that is remembered.
+    pub fn shift(&mut self, t_s: f64, position_m: Vector2<f64>, velocity_m_s: Vector2<f64>) {
+        let shifted = |track: Track| track.shifted(t_s, position_m, velocity_m_s);
+        self.track = self.track.map(shifted);
+        self.before = self.before.map(shifted);
+        if let Some(leap) = &mut self.leap {
+            leap.before = shifted(leap.before);
+        }
+        if let Some(there) = &mut self.elsewhere {
+            there.first_m += position_m + velocity_m_s * (there.since_s - t_s);
+            there.position_m += position_m + velocity_m_s * (there.at_s - t_s);
+        }
     }
 
     /// A reading where there is no track yet: refused until the next one agrees,
@@ -188,7 +289,9 @@ impl OutlierGate {
         let unseen_s = there.since_s - track.at_s;
         let bent_m = SHOVE_M_S2 * unseen_s * unseen_s;
         let apart = step_m(track, &there) > NOISE_FACTOR * noise_m + STEP_M + bent_m;
-        let stepped = apart && track.n >= BELIEVED_AFTER;
+        let bent_m_s = (there.velocity_m_s() - track.velocity_m_s).amax();
+        let straight = bent_m_s * BENT_S < step_m(track, &there);
+        let stepped = apart && straight && track.n >= BELIEVED_AFTER;
         if stepped { Gated::Stepped } else { accepted }
     }
 

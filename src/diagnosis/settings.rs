@@ -4,7 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::MemoryRules;
-use crate::vocabulary::{Invalid, UnknownWord, in_range, positive};
+use crate::vocabulary::{FaultCode, FaultKind, Invalid, UnknownWord, in_range, positive};
 
 /// A named set of [`Settings`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -164,6 +164,14 @@ impl Settings {
         let window_s = needed_s(NOISE_SHARE).clamp(self.window_s, LONGEST_WINDOW_S);
         let fail_s = (self.fail_s + window_s - self.window_s).max(0.0);
         Self { window_s, fail_s, learnt: true, ..*self }
+    }
+
+    /// Whether a failure of `code` may be confirmed: on a rig that is not learnt
+    /// only what no healthy rig shows, and nothing of its servos or its ball.
+    #[must_use]
+    pub fn confirms(&self, code: FaultCode, kind: Option<FaultKind>) -> bool {
+        let known = self.learnt || self.profile == Profile::Textbook;
+        known || code == FaultCode::Sensor && kind != Some(FaultKind::Noise)
     }
 
     /// The same for a wanted number of false alarms per rig and year, in

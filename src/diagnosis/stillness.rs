@@ -42,7 +42,12 @@ pub struct AxisStillness {
     pub pressed_s: f64,
     /// Seconds for which every bit has been the same.
     pub identical_s: f64,
+    /// Velocity of the ball when the readings last changed, m/s.
+    velocity_m_s: f64,
 }
+
+/// Memory of the velocity, s: some readings of a camera.
+const VELOCITY_MEMORY_S: f64 = 0.1;
 
 impl AxisStillness {
     fn update(&mut self, position_m: f64, pressed: bool, reading: &Reading) {
@@ -56,9 +61,33 @@ impl AxisStillness {
             self.still_s += reading.dt;
         }
         self.pressed_s = if pressed && !moved { self.pressed_s + reading.dt } else { 0.0 };
-        let identical = self.last_m.is_some_and(|l| l.to_bits() == position_m.to_bits());
-        self.identical_s = if identical { self.identical_s + reading.dt } else { 0.0 };
-        self.last_m = Some(position_m);
+        self.repeat(position_m, reading.dt);
+    }
+
+    fn repeat(&mut self, position_m: f64, dt: f64) {
+        let last_m = self.last_m.replace(position_m);
+        if last_m.is_some_and(|l| l.to_bits() == position_m.to_bits()) {
+            self.identical_s += dt;
+            return;
+        }
+        let since_s = self.identical_s + dt;
+        if let (Some(last_m), true) = (last_m, since_s > 0.0) {
+            let gain = 1.0 - (-since_s / VELOCITY_MEMORY_S).exp();
+            self.velocity_m_s += gain * ((position_m - last_m) / since_s - self.velocity_m_s);
+        }
+        self.identical_s = 0.0;
+    }
+
+    /// Whether this axis has ever been read.
+    #[must_use]
+    pub const fn seen(&self) -> bool {
+        self.last_m.is_some()
+    }
+
+    /// How far the ball would have gone since the readings last changed, m.
+    #[must_use]
+    pub fn missed_m(&self) -> f64 {
+        self.velocity_m_s.abs() * self.identical_s
     }
 }
 
@@ -95,9 +124,8 @@ impl Stillness {
 
     /// Outliers of late, each fading over ten seconds.
     #[must_use]
-    pub fn outliers(&self) -> u32 {
-        // Non-negative and far below u32::MAX: one a sample at most.
-        self.outliers.round() as u32
+    pub const fn outliers(&self) -> f64 {
+        self.outliers
     }
 
     /// Seconds for which the ball has stood still in every direction seen.

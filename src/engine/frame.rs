@@ -11,6 +11,38 @@ pub struct Moment {
     pub position: PerAxis<Option<f64>>,
 }
 
+/// Tells readings that are those before, of a sensor that is logged faster than
+/// it reads: they say where the ball was, not where it is.
+#[derive(Clone, Debug)]
+pub struct Repeats {
+    /// Time between two readings of the sensor, s; zero where it keeps up.
+    refresh_s: f64,
+    last: Option<(SimTime, PerAxis<Option<f64>>)>,
+}
+
+/// Refreshes for which the same reading counts as a repeat; a ball at rest reads
+/// the same for longer.
+const REPEATED: f64 = 1.5;
+
+impl Repeats {
+    pub fn new(refresh_s: f64) -> Self {
+        Self { refresh_s, last: None }
+    }
+
+    /// Takes the next reading; whether it is the one before.
+    pub fn is_repeat(&mut self, at: SimTime, position: &PerAxis<Option<f64>>) -> bool {
+        if self.refresh_s == 0.0 {
+            return false;
+        }
+        let since_s = self.last.filter(|(_, p)| p == position).map(|(since, _)| at - since);
+        let repeats = since_s.is_some_and(|s| s < REPEATED * self.refresh_s);
+        if !repeats {
+            self.last = Some((at, *position));
+        }
+        repeats
+    }
+}
+
 /// The sample as `mapping` has it; none where its time is not finite.
 pub fn moment(mapping: &AxisMapping, sample: &Sample) -> Option<Moment> {
     let read = |axis: Axis| if mapping.swap { axis.other() } else { axis };

@@ -153,6 +153,16 @@ impl Engine {
         self.pipeline.evidence()
     }
 
+    /// Most evidence against each servo so far, nats.
+    fn most_nats(&self) -> PerAxis<f64> {
+        self.pipeline.most_nats()
+    }
+
+    /// How well the twin has foretold the readings of each axis, nats.
+    fn foretold_nats(&self) -> PerAxis<f64> {
+        self.pipeline.foretold_nats()
+    }
+
     /// How each servo has answered over this session; none where too little of
     /// it was seen.
     #[must_use]

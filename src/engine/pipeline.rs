@@ -5,16 +5,16 @@
 
 use nalgebra::Vector2;
 
-use super::frame::{self, Moment};
+use super::frame::{self, Moment, Repeats};
 use super::look::Look;
 use super::watch::Watch;
-use super::{MonitorState, Output, Readiness, Setup, State};
+use super::{MonitorState, Output, Readiness, Rig, Setup, State};
 use crate::diagnosis::{
-    AxisEvidence, AxisNature, Course, Evaluator, Evidence, FaultMemory, Finding, Gated, Limits,
-    OutlierGate, Profile, Qualified, Reading, Scatter, Servo, ServoEstimate, Settings, Stillness,
-    Surroundings, Test,
+    AxisEvidence, AxisNature, Course, Evaluator, Evidence, FaultMemory, Finding, Gated,
+    LearntNature, Limits, OutlierGate, Profile, Qualified, Reading, Scatter, SensorLimits, Servo,
+    ServoEstimate, Settings, Stillness, Surroundings, Test,
 };
-use crate::plant::{RollingState, Twin, TwinMotion};
+use crate::plant::{RollingState, Twin};
 use crate::vocabulary::{Axis, FaultCode, PerAxis, Sample, SimTime};
 
 /// Samples that a window holds at least: a filter over fewer is all noise.
@@ -28,8 +28,6 @@ const LONGEST_FIRST_PERIOD_S: f64 = 0.25;
 const PERIOD_GAIN: f64 = 0.02;
 /// Share of the window that must be covered before it is judged.
 const FULL_WINDOW: f64 = 0.8;
-/// Room between a ball and the edge where contact may begin, m.
-const EDGE_MARGIN_M: f64 = 0.006;
 /// Distance of the twin's free path from the ball at which it is re-anchored, m.
 const REBASE_M: f64 = 1.0;
 /// A ball at rest seems to move by less than this many noise deviations.
@@ -45,9 +43,9 @@ const TIMING_SHARE: f64 = 0.1;
 const SCATTER_LIMITS: f64 = 2.0;
 /// Stillness after which a ball counts as at rest, s.
 const RESTING_S: f64 = 0.25;
-/// Longer than any healthy sensor repeats itself, s: three of the slowest
-/// refreshes seen on a moving ball.
-const REPEATED_S: f64 = 0.12;
+/// Share of the time after which identical readings are frozen from which on
+/// they leave open whether they are alive.
+const REPEATED_SHARE: f64 = 0.4;
 
 /// The stages' state.
 #[derive(Clone, Debug)]
@@ -55,6 +53,8 @@ pub struct Pipeline {
     settings: Settings,
     twin: Twin,
     evaluator: Evaluator,
+    /// Evidence that confirms a fault of each servo, nats.
+    confirm_nats: PerAxis<f64>,
     now: Option<SimTime>,
     period_s: Option<f64>,
     gate: OutlierGate,
@@ -62,6 +62,7 @@ pub struct Pipeline {
     scatter: PerAxis<Scatter>,
     servos: PerAxis<Servo>,
     readings: Stillness,
+    repeats: Repeats,
     clear_s: f64,
     at_edge: bool,
     open_edge: bool,
@@ -83,19 +84,30 @@ impl Pipeline {
         let limits = PerAxis::from_fn(|axis| {
             let learnt = rig.calibration.as_ref().and_then(|c| c.axes[axis].as_ref());
             let gain = setup.twin.axes[axis].gain.abs();
-            Limits::new(settings.profile, learnt, gain * rig.ball.rolling_gravity())
+            // A rig that is learnt but for this axis has no readings along it.
+            let absent = rig.calibration.is_some() && learnt.is_none();
+            Limits::new(settings.profile, learnt, absent, gain * rig.ball.rolling_gravity())
         });
+        let sensor = SensorLimits::new(rig.calibration.as_ref().map(|c| &c.sensor));
         let needed_s = |share: f64| {
             let of = |axis: Axis| limits[axis].window_s(share, 1.0 / rig.sample_rate_hz);
             of(Axis::X).max(of(Axis::Y))
         };
         let adapts = settings.profile == Profile::Default && rig.calibration.is_some();
         let settings = if adapts { settings.through(needed_s) } else { settings };
+        let confirm_nats = PerAxis::from_fn(|axis| {
+            let learnt = rig.calibration.as_ref().and_then(|c| c.axes[axis].as_ref());
+            settings.confirm_nats.max(learnt.map_or(0.0, |l| EVIDENCE_FACTOR * l.most_nats))
+        });
         let servo = |axis: Axis| {
             let learnt = rig.calibration.as_ref().and_then(|c| c.axes[axis].as_ref());
             Servo::new(AxisNature {
-                noise_m: limits[axis].noise_m,
-                residual_m_s2: learnt.map(|l| l.residual_m_s2),
+                noise_m: limits[axis].noise_m.unwrap_or(0.0),
+                learnt: learnt.map(|l| LearntNature {
+                    model_error_m_s2: l.model_error_m_s2,
+                    offset_spread_m_s2: l.level_spread_rad * l.gain * rig.ball.rolling_gravity(),
+                    gain_spread: l.gain_spread,
+                }),
                 breakaway_m_s2: limits[axis].breakaway_m_s2,
                 gust_m_s2: GUST_M_S2 * rig.ball.sail_share().min(1.0),
                 familiar_m_s2: learnt.map_or(f64::INFINITY, |l| l.familiar_m_s2),
@@ -104,7 +116,8 @@ impl Pipeline {
         Self {
             settings,
             twin: Twin::new(setup.twin),
-            evaluator: Evaluator::new(settings.profile, limits),
+            confirm_nats,
+            evaluator: Evaluator::new(settings.profile, limits, sensor),
             now: None,
             period_s: None,
             gate: OutlierGate::default(),
@@ -112,6 +125,7 @@ impl Pipeline {
             scatter: PerAxis::default(),
             servos: PerAxis::from_fn(servo),
             readings: Stillness::default(),
+            repeats: Repeats::new(refresh_s(rig)),
             clear_s: 0.0,
             at_edge: false,
             open_edge: !rig.plate.rim(),
@@ -138,10 +152,11 @@ impl Pipeline {
         let Some(dt) = self.tick(moment.at) else { return };
         self.n_judged += 1;
         self.step_twin(&moment);
-        let (usable, outliers) = self.estimate(&moment, dt);
-        self.locate(setup, &moment, dt, usable);
+        let fresh = self.without_repeats(&moment);
+        let (usable, outliers) = self.estimate(&fresh, dt);
+        self.locate(setup, &fresh, dt, usable);
         self.watch_readings(&moment, dt, usable, outliers);
-        self.follow_servos(&moment, usable);
+        self.follow_servos(&fresh, usable);
         self.unjudged_s += dt;
         // Time stamps in milliseconds must not make a period a sample longer.
         if self.unjudged_s >= self.settings.period_s - 1e-3 {
@@ -153,6 +168,14 @@ impl Pipeline {
             let around = self.surroundings();
             let findings = self.evaluator.evaluate(&self.evidence, &self.readings, &around);
             self.remember(&moment, dt, &findings, memory, outputs);
+        }
+    }
+
+    /// The moment without its reading where that is the one before.
+    fn without_repeats(&mut self, moment: &Moment) -> Moment {
+        match self.repeats.is_repeat(moment.at, &moment.position) {
+            true => Moment { position: PerAxis::default(), ..*moment },
+            false => *moment,
         }
     }
 
@@ -188,7 +211,7 @@ impl Pipeline {
     /// Forgets the past motion; what the debounce has gathered stays.
     fn restart(&mut self) {
         self.twin.restart();
-        self.pause_servos();
+        Axis::ALL.into_iter().for_each(|axis| self.servos[axis].restart());
         self.readings = Stillness::default();
         self.clear_s = 0.0;
         self.rim_s = 0.0;
@@ -225,6 +248,7 @@ impl Pipeline {
         let away = self.twin.motion().position - observed.position;
         if away.amax() > REBASE_M {
             let shift = self.twin.rebase(observed.position, observed.velocity);
+            self.gate.shift(moment.at.seconds(), shift.position, shift.velocity);
             for (i, axis) in Axis::ALL.into_iter().enumerate() {
                 let (t, p, v) = (moment.at.seconds(), shift.position[i], shift.velocity[i]);
                 self.look.rebase(axis, t, p, v);
@@ -248,7 +272,9 @@ impl Pipeline {
         if Axis::ALL.iter().all(|&a| moment.position[a].is_none()) {
             return (true, 0);
         }
-        let gated = self.gate.take(t, moment.position, self.noise_m());
+        // Off the twin's path, a ball that obeys it goes straight.
+        let off = |axis: Axis| moment.position[axis].map(|p| p - predicted[axis as usize]);
+        let gated = self.gate.take(t, PerAxis::from_fn(off), self.gate_noise_m());
         match gated {
             Gated::Stepped => {
                 self.forget();
@@ -272,10 +298,14 @@ impl Pipeline {
         }
     }
 
+    /// Standard deviation by which the readings may leave their path, m.
+    fn gate_noise_m(&self) -> f64 {
+        if self.settings.learnt { self.noise_m() } else { self.noise_m().max(UNKNOWN_NOISE_M) }
+    }
+
     /// Standard deviation of healthy readings, the worse of both axes, m.
     fn noise_m(&self) -> f64 {
-        let limits = self.evaluator.limits();
-        limits.x.noise_m.max(limits.y.noise_m)
+        self.evaluator.noise_m()
     }
 
     /// Stage: how far the ball is from the edge, and for how long it has been
@@ -286,7 +316,7 @@ impl Pipeline {
         if usable && Axis::ALL.into_iter().any(|a| seen(a).is_some()) {
             let plate = &setup.rig.plate;
             let (x, y) = (seen(Axis::X).unwrap_or(0.0), seen(Axis::Y).unwrap_or(0.0));
-            let room = setup.rig.ball.radius_m() + EDGE_MARGIN_M;
+            let room = setup.rig.contact_room_m();
             self.at_edge = plate.edge_distance_m(x, y) < room;
             let rim = plate.edge_axis(x, y, room).filter(|_| plate.rim());
             self.rim_s = if rim.is_some() && rim == self.rim { self.rim_s + dt } else { 0.0 };
@@ -300,7 +330,7 @@ impl Pipeline {
         let limits = *self.evaluator.limits();
         let pressed = PerAxis::from_fn(|a| {
             let breakaway = limits[a].breakaway_m_s2.max(LEAST_PRESS_M_S2);
-            self.twin.motion().acceleration[a as usize].abs() > breakaway
+            self.pull_m_s2(a) > breakaway
         });
         self.readings.update(&Reading {
             dt,
@@ -313,19 +343,26 @@ impl Pipeline {
         });
     }
 
+    /// Acceleration that the plate asks of the ball along `axis` at least, m/s²,
+    /// for all that is known of this session's level.
+    fn pull_m_s2(&self, axis: Axis) -> f64 {
+        let (offset, error) = self.servos[axis].offset();
+        let asked = self.twin.motion().acceleration[axis as usize] + offset;
+        (asked.abs() - LEVEL_ERRORS * error).max(0.0)
+    }
+
     /// Stage: what the ball's answer says of each servo.
     fn follow_servos(&mut self, moment: &Moment, usable: bool) {
         if self.settings.profile == Profile::Textbook {
             return;
         }
         let motion = *self.twin.motion();
+        let answers = PerAxis::from_fn(|axis| self.answers(axis));
         for (i, axis) in Axis::ALL.into_iter().enumerate() {
             let servo = &mut self.servos[axis];
             match moment.position[axis] {
                 _ if self.at_edge => servo.pause(),
-                Some(_) if !answers(axis, &self.readings, &motion, &self.evaluator) => {
-                    servo.pause();
-                }
+                Some(_) if !answers[axis] => servo.pause(),
                 Some(position) if usable => {
                     let course = Course {
                         position_m: motion.position[i],
@@ -337,6 +374,25 @@ impl Pipeline {
                 _ => {}
             }
         }
+    }
+
+    /// Whether the ball rests within its breakaway angle.
+    fn rests(&self, axis: Axis) -> bool {
+        let held_m_s2 = self.evaluator.limits()[axis].breakaway_m_s2.max(LEAST_PRESS_M_S2);
+        self.readings.axes[axis].still_s > RESTING_S && self.pull_m_s2(axis) < held_m_s2
+    }
+
+    /// Whether the ball's motion along `axis` can answer its servo: not while it
+    /// rests within its breakaway angle, nor while readings that repeat themselves
+    /// although the ball is asked to move leave open whether they are alive, nor
+    /// while it stands still in every direction.
+    fn answers(&self, axis: Axis) -> bool {
+        let (readings, own) = (&self.readings, &self.readings.axes[axis]);
+        let repeated_s = self.evaluator.limits()[axis].repeat_s * REPEATED_SHARE;
+        let frozen = own.identical_s > repeated_s && own.pressed_s > 0.0;
+        let pressed = Axis::ALL.into_iter().any(|a| readings.axes[a].pressed_s > 0.0);
+        let stuck = pressed && readings.still_s() > RESTING_S;
+        !self.rests(axis) && !frozen && !stuck
     }
 
     /// Stage: residual, limit and gate of this moment.
@@ -362,7 +418,7 @@ impl Pipeline {
             unseen_s: self.readings.unseen_s,
             identical_s: self.readings.identical_s(),
             still_s: self.readings.still_s(),
-            outliers: self.readings.outliers(),
+            outliers: self.readings.outliers().round() as u32,
             scatter_m: Axis::ALL.into_iter().filter_map(scatter).reduce(f64::max),
         };
     }
@@ -424,7 +480,14 @@ impl Pipeline {
         for (&code, finding) in FaultCode::ALL.iter().zip(findings) {
             let watch = &mut self.watches[code as usize];
             let rising = code.axis().and_then(|axis| self.servos[axis].rising_since());
+            let share =
+                code.axis().map_or(1.0, |a| self.settings.confirm_nats / self.confirm_nats[a]);
+            let finding = &Finding { nats: finding.nats.map(|n| share * n), ..*finding };
             let qualified = watch.update(code, finding, moment.at, dt, &self.settings, rising);
+            let qualified = match self.settings.confirms(code, finding.kind) {
+                true => qualified,
+                false => qualified.min(Qualified::Failed),
+            };
             watch.apply(code, qualified, &self.settings, &self.evidence, memory, outputs);
             let failed = match qualified {
                 Qualified::Tripped => true,
@@ -454,6 +517,17 @@ impl Pipeline {
     /// How each servo has answered over this session.
     pub fn servo_estimates(&self) -> PerAxis<Option<ServoEstimate>> {
         PerAxis::from_fn(|axis| self.servos[axis].estimate())
+    }
+
+    /// Most evidence against each servo so far, nats, against what confirms a fault
+    /// of any.
+    pub fn most_nats(&self) -> PerAxis<f64> {
+        PerAxis::from_fn(|axis| self.watches[FaultCode::servo(axis) as usize].most_nats())
+    }
+
+    /// How well the healthy explanation has foretold the readings of each axis, nats.
+    pub fn foretold_nats(&self) -> PerAxis<f64> {
+        PerAxis::from_fn(|axis| self.servos[axis].foretold_nats())
     }
 
     /// The evidence of the last sample.
@@ -502,19 +576,22 @@ impl Pipeline {
     }
 }
 
-/// Whether the ball's motion along `axis` can answer its servo: not while it
-/// rests within its breakaway angle, nor while readings that repeat themselves
-/// although the ball is asked to move leave open whether they are alive, nor
-/// while it stands still in every direction.
-fn answers(axis: Axis, readings: &Stillness, motion: &TwinMotion, evaluator: &Evaluator) -> bool {
-    let own = &readings.axes[axis];
-    let asked = motion.acceleration[axis as usize].abs();
-    let held_m_s2 = evaluator.limits()[axis].breakaway_m_s2.max(LEAST_PRESS_M_S2);
-    let resting = own.still_s > RESTING_S && asked < held_m_s2;
-    let frozen = own.identical_s > REPEATED_S && own.pressed_s > 0.0;
-    let pressed = Axis::ALL.into_iter().any(|a| readings.axes[a].pressed_s > 0.0);
-    let stuck = pressed && readings.still_s() > RESTING_S;
-    !resting && !frozen && !stuck
+/// Times the most evidence that was found against a servo while it was healthy
+/// that it takes to confirm a fault: as the trials of a calibration allow for
+/// times.
+const EVIDENCE_FACTOR: f64 = 1.0 / 0.6;
+
+/// Noise that readings of a rig that is not learnt may have where a jump is
+/// looked for, m: ultrasonic sensors scatter by 8 to 15 mm, few others by more
+/// than 5.
+const UNKNOWN_NOISE_M: f64 = 5e-3;
+
+/// Standard errors of the session's level that are allowed.
+const LEVEL_ERRORS: f64 = 2.0;
+
+/// Time between two readings of a sensor that is logged faster than it reads, s.
+fn refresh_s(rig: &Rig) -> f64 {
+    rig.calibration.as_ref().map_or(0.0, |c| c.sensor.refresh_s)
 }
 
 /// Acceleration that counts as asking a ball to move on any rig, m/s²: one

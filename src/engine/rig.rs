@@ -68,6 +68,9 @@ pub struct Rig {
     pub calibration: Option<Calibration>,
 }
 
+/// Room between a ball and the edge where contact may begin, m.
+const EDGE_MARGIN_M: f64 = 0.006;
+
 /// Longest name of a rig, bytes.
 pub const MAX_NAME: usize = 128;
 
@@ -105,6 +108,13 @@ impl Rig {
         positive("/axes/command_unit_rad", self.mapping.command_unit_rad, 1000.0)?;
         self.settings(self.diagnostics.profile)?;
         Ok(())
+    }
+
+    /// Distance of the ball's centre from the edge, m, within which the edge may
+    /// act: a rim holds the ball by its side, without one its centre leaves.
+    pub(super) fn contact_room_m(&self) -> f64 {
+        let side_m = if self.plate.rim() { self.ball.radius_m() } else { 0.0 };
+        side_m + EDGE_MARGIN_M
     }
 
     fn servo_model(&self) -> Result<ServoModel, Invalid> {

@@ -19,6 +19,8 @@ pub struct Watch {
     since: Option<SimTime>,
     kind: Option<FaultKind>,
     rival: Option<Candidate>,
+    /// Most evidence by weight so far, nats.
+    most_nats: f64,
 }
 
 impl Watch {
@@ -30,6 +32,10 @@ impl Watch {
         } else {
             self.debounce.counter()
         }
+    }
+
+    pub const fn most_nats(&self) -> f64 {
+        self.most_nats
     }
 
     pub const fn test(&self) -> Test {
@@ -89,6 +95,7 @@ impl Watch {
             let failed = finding.gone && self.weight >= 1.0;
             return if failed { Qualified::Tripped } else { Qualified::No };
         };
+        self.most_nats = self.most_nats.max(nats);
         self.weight = nats / settings.suspect_nats;
         match nats {
             n if n >= settings.confirm_nats => Qualified::Tripped,

@@ -151,6 +151,18 @@ impl Filter {
         }
     }
 
+    /// The Kalman update for an innovation of variance `s` that covaries with the
+    /// state by `row`.
+    fn update(&mut self, row: &[f64; STATES], innovation: f64, s: f64) {
+        for i in 0..STATES {
+            let gain = row[i] / s;
+            self.state[i] += gain * innovation;
+            for j in 0..STATES {
+                self.covariance[i][j] -= gain * row[j];
+            }
+        }
+    }
+
     /// Takes the deviation `y` as read with variance `variance`, `dt` after the
     /// last. Returns the log-likelihood of the reading, nats, up to a constant.
     pub(super) fn correct(&mut self, y: f64, variance: f64, dt: f64) -> f64 {
@@ -169,15 +181,8 @@ impl Filter {
             p[1][0] += reach * dt / 2.0;
             p[1][1] += reach;
         }
-        let s = p[0][0] + variance;
         let row = p[0];
-        for i in 0..STATES {
-            let gain = row[i] / s;
-            self.state[i] += gain * innovation;
-            for j in 0..STATES {
-                p[i][j] -= gain * row[j];
-            }
-        }
+        self.update(&row, innovation, row[0] + variance);
         plain.max(pushed)
     }
 }

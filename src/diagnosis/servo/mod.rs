@@ -46,11 +46,8 @@ const UNKNOWN: Prior = Prior { deviation: [0.2, 0.4, 0.1], memory_s: [1000.0; PA
 /// Correlation time of what the twin leaves out, s: turns a deviation over the
 /// half second in which it is learnt into a spectral density.
 const MODEL_ERROR_S: f64 = 0.5;
-/// Deviation of the model that is assumed at least, and believed at most, of
-/// the healthy residual, m/s²: friction and pushes in the healthy recording
-/// widen what is learnt.
-const LEAST_ERROR_M_S2: f64 = 0.015;
-const MOST_ERROR_M_S2: f64 = 0.04;
+/// What the twin of a rig that is not learnt leaves out, m/s².
+const UNKNOWN_ERROR_M_S2: f64 = 0.04;
 /// How long after a change of its acceleration the twin may be wrong about it,
 /// s: what a lag of the first order leaves out of a servo.
 const SHAPE_S: f64 = 0.01;
@@ -64,6 +61,9 @@ const STICKING_M_S: f64 = 0.02;
 const STICKING_S: f64 = 0.1;
 /// Readings of a block that count as independent: sensors repeat themselves.
 const INDEPENDENT: u32 = 4;
+/// Motion after which the ball is followed well enough to weigh anything, s: a
+/// hand lets it go, and its speed is not known yet.
+const SETTLED_S: f64 = 1.0;
 /// Error of a block's mean that is always assumed, m: roughness of plate and
 /// panel.
 const ROUGHNESS_M: f64 = 1.4e-4;
@@ -80,8 +80,8 @@ const MOST_NATS: f64 = 40.0;
 pub struct AxisNature {
     /// Standard deviation of a reading, m.
     pub noise_m: f64,
-    /// Standard deviation of the healthy residual, m/s²; none if not learnt.
-    pub residual_m_s2: Option<f64>,
+    /// What was learnt; none if nothing was.
+    pub learnt: Option<LearntNature>,
     /// Acceleration that a ball at rest resists, m/s².
     pub breakaway_m_s2: f64,
     /// Acceleration that moving air gives the ball, m/s².
@@ -90,14 +90,31 @@ pub struct AxisNature {
     pub familiar_m_s2: f64,
 }
 
+/// What was learnt of an axis from healthy sessions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LearntNature {
+    /// Acceleration that the twin leaves out, over half a second, m/s².
+    pub model_error_m_s2: f64,
+    /// Standard deviation of the offset from session to session, m/s².
+    pub offset_spread_m_s2: f64,
+    /// Standard deviation of the gain from session to session, as a share.
+    pub gain_spread: f64,
+}
+
 impl AxisNature {
     fn prior(&self) -> Prior {
-        if self.residual_m_s2.is_none() {
-            return UNKNOWN;
-        }
+        let Some(learnt) = &self.learnt else { return UNKNOWN };
         let mut prior = LEARNT;
         if self.gust_m_s2 > prior.deviation[0] {
             (prior.deviation[0], prior.memory_s[0]) = (self.gust_m_s2, GUST_S);
+        }
+        let spread = [learnt.offset_spread_m_s2, learnt.gain_spread, 0.0];
+        for (k, spread) in spread.into_iter().enumerate() {
+            let wander = prior.deviation[k];
+            let deviation = wander.hypot(spread);
+            // Whatever its spread, it wanders as fast within a session.
+            prior.memory_s[k] *= (deviation / wander).powi(2);
+            prior.deviation[k] = deviation;
         }
         prior
     }
@@ -105,8 +122,7 @@ impl AxisNature {
     /// Spectral density of what the twin leaves out at a speed, at its own
     /// acceleration and at the rate of change of that, m/s³; in m²/s³.
     fn density(&self, speed_m_s: f64, pull_m_s2: f64, jerk_m_s3: f64) -> f64 {
-        let error = self.residual_m_s2.unwrap_or(MOST_ERROR_M_S2);
-        let error = error.clamp(LEAST_ERROR_M_S2, MOST_ERROR_M_S2);
+        let error = self.learnt.map_or(UNKNOWN_ERROR_M_S2, |l| l.model_error_m_s2);
         let stuck = self.breakaway_m_s2 * (1.0 - speed_m_s / STICKING_M_S).max(0.0);
         let late = SHAPE_S * jerk_m_s3;
         let strange = UNFAMILIAR * (pull_m_s2 - self.familiar_m_s2).max(0.0);
@@ -131,6 +147,10 @@ pub struct Servo {
     nats: f64,
     /// When it was last without any, s.
     rising_since: Option<f64>,
+    /// How well the healthy explanation has foretold the readings, nats.
+    foretold_nats: f64,
+    /// Motion followed since the session began or a gap ended, s.
+    followed_s: f64,
     session: Session,
 }
 
@@ -145,6 +165,8 @@ impl Servo {
             open: Filter::new(OPEN),
             nats: 0.0,
             rising_since: None,
+            foretold_nats: 0.0,
+            followed_s: 0.0,
             session: Session::default(),
         }
     }
@@ -175,6 +197,11 @@ impl Servo {
         self.open.predict(&step);
         let open = self.open.correct(y, variance, dt);
         let healthy = self.healthy.correct(y, variance, dt);
+        self.foretold_nats += healthy;
+        self.followed_s += dt;
+        if self.followed_s < SETTLED_S {
+            return;
+        }
         self.nats = (self.nats + open - healthy).clamp(0.0, MOST_NATS);
         self.rising_since = match self.nats > 0.0 {
             true => self.rising_since.or(Some(last.t)),
@@ -188,6 +215,12 @@ impl Servo {
     pub fn pause(&mut self) {
         self.gatherer.drop();
         self.last = None;
+    }
+
+    /// Begins anew after a gap, in which anything may have happened to the ball.
+    pub fn restart(&mut self) {
+        self.pause();
+        self.followed_s = 0.0;
     }
 
     /// Forgets all evidence: another cause accounts for it.
@@ -214,6 +247,21 @@ impl Servo {
     #[must_use]
     pub const fn nats(&self) -> f64 {
         self.nats
+    }
+
+    /// Log-likelihood of all readings under the healthy explanation, nats, up to a
+    /// constant.
+    #[must_use]
+    pub const fn foretold_nats(&self) -> f64 {
+        self.foretold_nats
+    }
+
+    /// Acceleration by which a healthy servo of this session is off the twin's,
+    /// and its standard error, m/s².
+    #[must_use]
+    pub fn offset(&self) -> (f64, f64) {
+        let (offset, variance) = self.healthy.parameter(0);
+        (offset, variance.sqrt())
     }
 
     /// When the evidence began to gather: Page's estimate of the onset.

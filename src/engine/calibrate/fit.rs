@@ -1,7 +1,7 @@
 //! Gain, level, dead time and lag of one axis: least trimmed squares over
 //! windows, inside a search.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
 use super::recording::{Recording, Stretch};
 use crate::diagnosis::Profile;
@@ -17,6 +17,7 @@ const KEPT: f64 = 0.8;
 /// the parabola t²/2 and what rolling resistance of 1 m/s² would add, all
 /// orthogonal to 1 and t.
 struct Window {
+    session: usize,
     yy: f64,
     normal: Matrix3<f64>,
     right: Vector3<f64>,
@@ -24,21 +25,25 @@ struct Window {
 }
 
 impl Window {
-    fn new(moments: &[Moment], path: &[f64], resisted: &[f64], axis: Axis) -> Self {
+    fn new(session: usize, moments: &[Moment], path: &[f64], resisted: &[f64], axis: Axis) -> Self {
         let t0 = moments[0].at;
-        let times: Vec<f64> = moments.iter().map(|m| m.at - t0).collect();
+        let read: Vec<usize> =
+            (0..moments.len()).filter(|&i| moments[i].position[axis].is_some()).collect();
+        let times: Vec<f64> = read.iter().map(|&i| moments[i].at - t0).collect();
         let straighten = |values: Vec<f64>| without_line(&times, values);
-        let y = straighten(moments.iter().map(|m| m.position[axis].unwrap_or(0.0)).collect());
-        let z = straighten(path.to_vec());
+        let of = |values: &[f64]| straighten(read.iter().map(|&i| values[i]).collect());
+        let y = straighten(read.iter().filter_map(|&i| moments[i].position[axis]).collect());
+        let z = of(path);
         let p = straighten(times.iter().map(|t| t * t / 2.0).collect());
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let r = straighten(resisted.to_vec());
+        let r = of(resisted);
         let causes = [&z, &p, &r];
         Self {
+            session,
             yy: dot(&y, &y),
             normal: Matrix3::from_fn(|i, j| dot(causes[i], causes[j])),
             right: Vector3::from_fn(|i, _| dot(causes[i], &y)),
-            n: moments.len(),
+            n: read.len(),
         }
     }
 
@@ -65,17 +70,30 @@ pub(super) fn without_line(times: &[f64], mut values: Vec<f64>) -> Vec<f64> {
     values
 }
 
-/// Gain, level (as an acceleration) and rolling resistance that explain the windows best.
-#[derive(Clone, Copy, Debug)]
+/// Gain and rolling resistance of the rig, and the level of each session, that
+/// explain the windows best.
+#[derive(Clone, Debug)]
 pub(super) struct Explained {
     pub(super) gain: f64,
-    pub(super) offset_m_s2: f64,
     pub(super) resistance_m_s2: f64,
+    /// Per session; none where it has no window.
+    pub(super) sessions: Vec<Option<SessionFit>>,
     /// Mean square left over in the kept windows, m².
     pub(super) left: f64,
     /// Share of the variance explained.
     pub(super) share: f64,
     /// Standard error of the gain.
+    pub(super) gain_error: f64,
+}
+
+/// What one session says by itself.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SessionFit {
+    /// Acceleration at a command of zero, under the rig's gain, m/s².
+    pub(super) offset_m_s2: f64,
+    pub(super) offset_error_m_s2: f64,
+    /// Gain of this session alone.
+    pub(super) gain: f64,
     pub(super) gain_error: f64,
 }
 
@@ -91,52 +109,118 @@ impl Explained {
     }
 }
 
+/// Least squares over windows with a gain and a resistance for all and an offset
+/// for each session: the offsets are eliminated first.
+#[derive(Clone, Debug, Default)]
+struct Solution {
+    gain: f64,
+    resistance: f64,
+    offsets: Vec<Option<f64>>,
+    /// Variance of the gain for readings of unit variance.
+    gain_variance: f64,
+}
+
+impl Solution {
+    fn of(&self, window: &Window) -> Vector3<f64> {
+        let offset = self.offsets[window.session].unwrap_or(0.0);
+        Vector3::new(self.gain, offset, self.resistance)
+    }
+
+    fn solve(windows: &[Window], n_sessions: usize) -> Option<Self> {
+        let sums = session_sums(windows, n_sessions);
+        let free = Self::solved(&sums, true)?;
+        // A resistance that would drive the ball is none.
+        if free.resistance > 0.0 { Some(free) } else { Self::solved(&sums, false) }
+    }
+
+    fn solved(sums: &[Option<Sums>], resisted: bool) -> Option<Self> {
+        let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
+        for (n, r) in sums.iter().flatten() {
+            let by_level = Vector2::new(n[(0, 1)], n[(2, 1)]) / n[(1, 1)];
+            normal += Matrix2::new(n[(0, 0)], n[(0, 2)], n[(2, 0)], n[(2, 2)])
+                - by_level * by_level.transpose() * n[(1, 1)];
+            right += Vector2::new(r.x, r.z) - by_level * r.y;
+        }
+        if !resisted {
+            normal = Matrix2::new(normal[(0, 0)], 0.0, 0.0, 1.0);
+            right.y = 0.0;
+        }
+        let inverse = normal.try_inverse()?;
+        let c = inverse * right;
+        let offset = |(n, r): &Sums| (r.y - n[(1, 0)] * c.x - n[(1, 2)] * c.y) / n[(1, 1)];
+        Some(Self {
+            gain: c.x,
+            resistance: c.y,
+            offsets: sums.iter().map(|s| s.as_ref().map(offset)).collect(),
+            gain_variance: inverse[(0, 0)],
+        })
+    }
+}
+
+type Sums = (Matrix3<f64>, Vector3<f64>);
+
+fn session_sums(windows: &[Window], n_sessions: usize) -> Vec<Option<Sums>> {
+    let mut sums = vec![None; n_sessions];
+    for w in windows {
+        let (n, r): &mut Sums = sums[w.session].get_or_insert_default();
+        *n += w.normal;
+        *r += w.right;
+    }
+    sums
+}
+
 /// Least trimmed squares over windows: fit, drop the worst, fit again.
-fn explain(windows: &mut [Window]) -> Option<Explained> {
+fn explain(windows: &mut [Window], n_sessions: usize) -> Option<Explained> {
     let keep = ((windows.len() as f64 * KEPT).ceil() as usize).min(windows.len());
     let mut kept = windows.len();
-    let mut c = Vector3::zeros();
+    let mut found = Solution::default();
     for _ in 0..4 {
-        let sums = |(n, r): (Matrix3<f64>, Vector3<f64>), w: &Window| (n + w.normal, r + w.right);
-        let (normal, right) = windows[..kept].iter().fold(Default::default(), sums);
-        c = solve(normal, right)?;
-        windows.sort_by(|a, b| a.unexplained(&c).total_cmp(&b.unexplained(&c)));
+        let next = Solution::solve(&windows[..kept], n_sessions)?;
+        // A session whose windows were all left out keeps its level.
+        let before = found.offsets.iter().chain(std::iter::repeat(&None));
+        let offsets = next.offsets.iter().zip(before).map(|(now, before)| now.or(*before));
+        found = Solution { offsets: offsets.collect(), ..next };
+        let left = |w: &Window| w.unexplained(&found.of(w));
+        windows.sort_by(|a, b| left(a).total_cmp(&left(b)));
         kept = keep;
     }
     let kept = &windows[..kept];
     let n: usize = kept.iter().map(|w| w.n).sum();
-    let left = kept.iter().map(|w| w.unexplained(&c) * w.n as f64).sum::<f64>() / n as f64;
+    let left =
+        kept.iter().map(|w| w.unexplained(&found.of(w)) * w.n as f64).sum::<f64>() / n as f64;
     let total = kept.iter().map(|w| w.yy).sum::<f64>() / n as f64;
-    let normal = kept.iter().fold(Matrix3::zeros(), |sum, w| sum + w.normal);
-    let normal = if c.z > 0.0 { normal } else { without_resistance(normal) };
     // What is left over is coloured: it counts as one reading a window, not n.
-    let gain_error = (left * n as f64 / kept.len() as f64 * normal.try_inverse()?[(0, 0)]).sqrt();
+    let variance = left * n as f64 / kept.len() as f64;
+    let sessions = session_sums(kept, n_sessions)
+        .into_iter()
+        .map(|sums| {
+            sums.and_then(|sums| session_fit(&sums, found.gain, found.resistance, variance))
+        })
+        .collect();
     Some(Explained {
-        gain: c.x,
-        offset_m_s2: c.y,
-        resistance_m_s2: c.z,
+        gain: found.gain,
+        resistance_m_s2: found.resistance,
+        sessions,
         left,
         share: 1.0 - left / total,
-        gain_error,
+        gain_error: (variance * found.gain_variance).sqrt(),
     })
 }
 
-/// The least squares; a resistance that would drive the ball is none.
-fn solve(normal: Matrix3<f64>, right: Vector3<f64>) -> Option<Vector3<f64>> {
-    let c = normal.try_inverse()? * right;
-    if c.z > 0.0 {
-        return Some(c);
-    }
-    let right = Vector3::new(right.x, right.y, 0.0);
-    Some(without_resistance(normal).try_inverse()? * right)
-}
-
-fn without_resistance(mut normal: Matrix3<f64>) -> Matrix3<f64> {
-    for k in 0..2 {
-        (normal[(2, k)], normal[(k, 2)]) = (0.0, 0.0);
-    }
-    normal[(2, 2)] = 1.0;
-    normal
+/// A session's level under the rig's gain, and its own gain, where `variance`
+/// is that of a reading.
+fn session_fit((n, r): &Sums, gain: f64, resistance: f64, variance: f64) -> Option<SessionFit> {
+    let offset = |k: f64| (r.y - n[(1, 0)] * k - n[(1, 2)] * resistance) / n[(1, 1)];
+    let own = n[(0, 0)] - n[(0, 1)] * n[(1, 0)] / n[(1, 1)];
+    let pulled =
+        r.x - n[(0, 2)] * resistance - n[(0, 1)] / n[(1, 1)] * (r.y - n[(1, 2)] * resistance);
+    let fit = SessionFit {
+        offset_m_s2: offset(gain),
+        offset_error_m_s2: (variance / n[(1, 1)]).sqrt(),
+        gain: pulled / own,
+        gain_error: (variance / own).sqrt(),
+    };
+    (n[(1, 1)] > 0.0 && own > 0.0).then_some(fit)
 }
 
 /// Step of dead time and lag at which the search ends, s.
@@ -187,14 +271,22 @@ impl Fitter<'_> {
     fn explain(&self, dead_time_s: f64, lag_s: f64) -> Option<Explained> {
         let model = self.model(dead_time_s, lag_s, 1.0, 0.0, 0.0)?;
         let mut windows = Vec::with_capacity(self.n_windows());
-        for (recording, stretches) in self.recordings.iter().zip(&self.stretches) {
+        for (session, (recording, stretches)) in
+            self.recordings.iter().zip(&self.stretches).enumerate()
+        {
             let path = recording.twin_path(&model, self.axis);
             windows.extend(stretches.iter().map(|s| {
                 let resisted = &recording.resisted[self.axis][s.clone()];
-                Window::new(&recording.moments[s.clone()], &path[s.clone()], resisted, self.axis)
+                Window::new(
+                    session,
+                    &recording.moments[s.clone()],
+                    &path[s.clone()],
+                    resisted,
+                    self.axis,
+                )
             }));
         }
-        explain(&mut windows)
+        explain(&mut windows, self.recordings.len())
     }
 
     /// Dead time and lag that leave the least: a coarse grid, then a pattern
@@ -206,7 +298,7 @@ impl Fitter<'_> {
                 return;
             }
             let Some(found) = self.explain(dead, lag) else { return };
-            if best.is_none_or(|(.., b)| found.cost() < b.cost()) {
+            if best.as_ref().is_none_or(|(.., b)| found.cost() < b.cost()) {
                 *best = Some((dead, lag, found));
             }
         };
@@ -217,11 +309,12 @@ impl Fitter<'_> {
         }
         let mut step = 0.02;
         while step >= FINEST_STEP_S {
-            let (dead, lag, before) = best?;
+            let (dead, lag, before) =
+                best.as_ref().map(|(dead, lag, found)| (*dead, *lag, found.cost()))?;
             for (d, l) in DIRECTIONS {
                 try_at(dead + d * step, lag + l * step, &mut best);
             }
-            if best.is_some_and(|(.., after)| after.cost() == before.cost()) {
+            if best.as_ref().is_some_and(|(.., after)| after.cost() == before) {
                 step /= 2.0;
             }
         }

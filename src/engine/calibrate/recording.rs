@@ -8,7 +8,7 @@ use nalgebra::Vector2;
 
 use crate::diagnosis::OutlierGate;
 use crate::engine::Rig;
-use crate::engine::frame::{Moment, moment};
+use crate::engine::frame::{Moment, Repeats, moment};
 use crate::maths::median;
 use crate::plant::{RollingState, Twin, TwinModel, resisting};
 use crate::vocabulary::{Axis, PerAxis, Sample, SimTime};
@@ -18,6 +18,10 @@ const WINDOW_SAMPLES: usize = 10;
 /// A longer step between samples ends a window, s; and that many periods.
 const GAP_S: f64 = 0.3;
 const GAP_PERIODS: f64 = 4.0;
+/// Periods without a reading that end a window.
+const MISSING_PERIODS: f64 = 2.5;
+/// Periods from which on a sensor is slower than its log.
+const SLOWER: f64 = 1.4;
 /// A window counts as motion when the readings of each third span this, m: a
 /// ball that sticks for part of it answers no gain.
 const MOVING_M: f64 = 0.002;
@@ -37,6 +41,11 @@ pub(super) struct Recording {
     velocity: Vec<Vector2<f64>>,
     /// Path that a rolling resistance of 1 m/s² adds at every moment, m.
     pub(super) resisted: PerAxis<Vec<f64>>,
+    /// Longest time for which readings were the same to the bit, s.
+    pub(super) longest_repeat_s: PerAxis<f64>,
+    /// Time between two readings of a sensor that is logged faster than it reads,
+    /// s; zero for one that is not.
+    pub(super) refresh_s: f64,
     /// Median time between samples, s.
     pub(super) period_s: f64,
 }
@@ -51,17 +60,32 @@ impl Recording {
         let period_s = median(&mut steps).unwrap_or(0.0);
         let gap_s = GAP_S.max(GAP_PERIODS * period_s);
         let (velocity, resisted) = Default::default();
-        let mut recording = Self { moments, gap_s, velocity, resisted, period_s };
+        let longest_repeat_s = PerAxis::from_fn(|axis| longest_repeat_s(&moments, axis, gap_s));
+        let refresh_s = refresh_s(&moments, period_s);
+        let mut recording =
+            Self { moments, gap_s, velocity, resisted, longest_repeat_s, refresh_s, period_s };
+        recording.drop_repeats();
         recording.drop_unusable(rig);
         recording.velocity = recording.velocities();
         recording.resisted = PerAxis::from_fn(|axis| recording.resisted_path(axis));
         recording
     }
 
+    /// Takes away readings that are those before, of a sensor that is logged
+    /// faster than it reads.
+    fn drop_repeats(&mut self) {
+        let mut repeats = Repeats::new(self.refresh_s);
+        for m in &mut self.moments {
+            if repeats.is_repeat(m.at, &m.position) {
+                m.position = PerAxis::default();
+            }
+        }
+    }
+
     /// Takes away readings at the edge and outliers: no ball rolls there.
     fn drop_unusable(&mut self, rig: &Rig) {
         let mut gate = OutlierGate::default();
-        let reach = rig.ball.radius_m() + 0.006;
+        let reach = rig.contact_room_m();
         for m in
             self.moments.iter_mut().filter(|m| Axis::ALL.iter().any(|&a| m.position[a].is_some()))
         {
@@ -74,25 +98,35 @@ impl Recording {
         }
     }
 
-    /// Velocities as slopes over [`SLOPE_S`]; zero where an end is not measured.
+    /// Velocities as slopes over [`SLOPE_S`], the last one where nothing is read;
+    /// zero along an axis that is not measured.
     fn velocities(&self) -> Vec<Vector2<f64>> {
-        let moments = &self.moments;
+        let is_read = |m: &&Moment| m.position != PerAxis::default();
+        let read: Vec<&Moment> = self.moments.iter().filter(is_read).collect();
         let (mut early, mut late) = (0, 0);
         let mut slope = |i: usize| {
-            while moments[i].at - moments[early].at > SLOPE_S / 2.0 {
+            while read[i].at - read[early].at > SLOPE_S / 2.0 {
                 early += 1;
             }
-            while late + 1 < moments.len() && moments[late].at - moments[i].at < SLOPE_S / 2.0 {
+            while late + 1 < read.len() && read[late].at - read[i].at < SLOPE_S / 2.0 {
                 late += 1;
             }
-            let (a, b) = (&moments[early], &moments[late.max(i)]);
+            let (a, b) = (read[early], read[late.max(i)]);
             let along = |axis: Axis| match (a.position[axis], b.position[axis]) {
                 (Some(from), Some(to)) if b.at > a.at => (to - from) / (b.at - a.at),
                 _ => 0.0,
             };
             Vector2::new(along(Axis::X), along(Axis::Y))
         };
-        (0..moments.len()).map(&mut slope).collect()
+        let (mut n_read, mut velocity) = (0, Vector2::zeros());
+        let mut at = |m: &Moment| {
+            if is_read(&m) {
+                velocity = slope(n_read);
+                n_read += 1;
+            }
+            velocity
+        };
+        self.moments.iter().map(&mut at).collect()
     }
 
     fn resisted_path(&self, axis: Axis) -> Vec<f64> {
@@ -123,17 +157,16 @@ impl Recording {
     /// moves throughout, found from the left without overlap.
     pub(super) fn stretches(&self, axis: Axis, window_s: f64) -> Vec<Stretch> {
         let mut found = Vec::new();
-        let mut start = 0;
+        let (mut start, mut last) = (0, None);
         for i in 0..self.moments.len() {
-            let broken = i > start && self.moments[i].at - self.moments[i - 1].at > self.gap_s;
-            if broken {
-                start = i;
-            }
             if self.moments[i].position[axis].is_none() {
-                start = i + 1;
                 continue;
             }
-            let span_s = self.moments[i].at - self.moments[start].at;
+            let at = self.moments[i].at;
+            if last.replace(at).is_none_or(|l: SimTime| at - l > self.break_s()) {
+                start = i;
+            }
+            let span_s = at - self.moments[start].at;
             if span_s >= window_s && i - start >= WINDOW_SAMPLES {
                 let third = (i + 1 - start).div_ceil(3);
                 let moves = |c: &[Moment]| span_m(c, axis) > MOVING_M;
@@ -146,6 +179,11 @@ impl Recording {
             }
         }
         found
+    }
+
+    /// Longest time without a reading within a stretch, s.
+    fn break_s(&self) -> f64 {
+        MISSING_PERIODS * self.period_s.max(self.refresh_s)
     }
 
     /// The twin's free path along `axis` at every moment.
@@ -168,6 +206,38 @@ impl Recording {
         };
         self.moments.iter().zip(&self.velocity).map(step).collect()
     }
+}
+
+/// Time between two readings that differ, s, where that is longer than from one
+/// sample to the next.
+fn refresh_s(moments: &[Moment], period_s: f64) -> f64 {
+    let mut last: Option<&Moment> = None;
+    let mut steps = Vec::new();
+    for m in moments.iter().filter(|m| m.position != PerAxis::default()) {
+        match last {
+            Some(l) if l.position == m.position => continue,
+            Some(l) => steps.push(m.at - l.at),
+            None => {}
+        }
+        last = Some(m);
+    }
+    median(&mut steps).filter(|&step_s| step_s > SLOWER * period_s).unwrap_or(0.0)
+}
+
+/// Longest time for which readings of `axis` were the same to the bit, s.
+fn longest_repeat_s(moments: &[Moment], axis: Axis, gap_s: f64) -> f64 {
+    let (mut longest_s, mut repeated_s): (f64, f64) = (0.0, 0.0);
+    for pair in moments.windows(2) {
+        let dt = pair[1].at - pair[0].at;
+        let (Some(a), Some(b)) = (pair[0].position[axis], pair[1].position[axis]) else {
+            repeated_s = 0.0;
+            continue;
+        };
+        let same = a.to_bits() == b.to_bits() && dt <= gap_s;
+        repeated_s = if same { repeated_s + dt } else { 0.0 };
+        longest_s = longest_s.max(repeated_s);
+    }
+    longest_s
 }
 
 /// From the smallest to the largest reading, m.
