@@ -39,6 +39,31 @@ pub struct AxisCalibration {
     pub familiar_m_s2: f64,
 }
 
+impl AxisCalibration {
+    /// Standard deviation of the level from session to session over rigs, rad: 1.1°
+    /// within a day on one real rig, 0.9° between days on another.
+    pub const POPULATION_LEVEL_SPREAD_RAD: f64 = 0.02;
+    /// Standard deviation of the gain from session to session over rigs, as a
+    /// share. Assumed: no rig with enough sessions under a known gain is at hand.
+    pub const POPULATION_GAIN_SPREAD: f64 = 0.07;
+    /// What the twin leaves out on a rig of which only `residual_m_s2` is known,
+    /// m/s²: between the best simulated rigs and the worst.
+    #[must_use]
+    pub const fn assumed_model_error_m_s2(residual_m_s2: f64) -> f64 {
+        residual_m_s2.clamp(0.015, 0.04)
+    }
+}
+
+/// What one session says of one axis by itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SessionEstimate {
+    /// Plate and horn off level, rad, and its standard error.
+    pub level_rad: f64,
+    pub level_error_rad: f64,
+    /// Gain and its standard error; none where the ball did not move.
+    pub gain: Option<(f64, f64)>,
+}
+
 /// What was learnt of the sensor, both axes of which are one look at the ball.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SensorCalibration {
@@ -91,6 +116,8 @@ pub struct Calibration {
     /// Per axis; none where the rig has no such servo or no such reading.
     pub axes: PerAxis<Option<AxisCalibration>>,
     pub sensor: SensorCalibration,
+    /// What each session says by itself, in the order in which they were given.
+    pub sessions: Vec<PerAxis<Option<SessionEstimate>>>,
     /// SHA-256 of the data that it was learnt from, lower-case hexadecimal.
     pub data_sha256: String,
     /// Samples it was learnt from.

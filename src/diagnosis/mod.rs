@@ -17,7 +17,9 @@ mod status;
 mod stillness;
 pub mod trend;
 
-pub use calibration::{AxisCalibration, Calibration, Prospects, SensorCalibration, ServoProspects};
+pub use calibration::{
+    AxisCalibration, Calibration, Prospects, SensorCalibration, ServoProspects, SessionEstimate,
+};
 pub use debounce::{Debounce, Pace, Qualified, Test};
 pub use evaluator::{Evaluator, Finding, Surroundings};
 pub use evidence::{AxisEvidence, Candidate, Evidence, Suspicion, Transition};

@@ -4,7 +4,10 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use utoipa::ToSchema;
 
-use crate::diagnosis::{AxisCalibration, Calibration, Profile, Prospects, ServoProspects};
+use crate::diagnosis::{
+    AxisCalibration, Calibration, Profile, Prospects, SensorCalibration, ServoProspects,
+    SessionEstimate,
+};
 use crate::engine::{AxisMapping, DiagnosticsSpec, Rig, ServoSpec};
 use crate::plant::{Ball, Contact, Plate, PlateShape};
 use crate::vocabulary::{Axis, Invalid, PerAxis, in_range, positive};
@@ -212,9 +215,58 @@ pub struct CalibrationView {
     pub x: Option<AxisCalibrationView>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub y: Option<AxisCalibrationView>,
+    /// What was learnt of the sensor.
+    #[serde(default)]
+    pub sensor: SensorCalibrationView,
+    /// What each session says by itself, in the order in which they were given.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sessions: Vec<SessionEstimatesView>,
     /// What can be found, how soon.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prospects: Option<ProspectsView>,
+}
+
+/// What was learnt of the sensor.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct SensorCalibrationView {
+    /// Time between two readings of a sensor that is logged faster than it reads,
+    /// in [0, 10] s; 0 for one that is not.
+    #[schema(minimum = 0, maximum = 10)]
+    pub refresh_s: f64,
+    /// Most lone readings within ten seconds that were set aside, in [0, 1e6].
+    #[schema(minimum = 0, maximum = 1e6)]
+    pub most_outliers: f64,
+    /// Most scatter about the motion that lasted, in [0, 1] m; 0 if not known.
+    #[schema(minimum = 0, maximum = 1)]
+    pub most_scatter_m: f64,
+    /// Longest time for which no ball was seen on the plate, in [0, 60] s.
+    #[schema(minimum = 0, maximum = 60)]
+    pub longest_unseen_s: f64,
+}
+
+/// What one session says of each axis; none where it says nothing.
+#[derive(Clone, Debug, Default, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SessionEstimatesView {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub x: Option<SessionEstimateView>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub y: Option<SessionEstimateView>,
+}
+
+/// What one session says of one axis.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SessionEstimateView {
+    /// Plate and horn off level, rad, and its standard error.
+    pub level_rad: f64,
+    pub level_error_rad: f64,
+    /// Gain and its standard error; none where the ball did not move.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gain: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gain_error: Option<f64>,
 }
 
 /// How soon a fault would have been confirmed, had it come during the sessions
@@ -262,7 +314,17 @@ pub struct AxisCalibrationView {
     pub gain: f64,
     pub dead_time_s: f64,
     pub lag_s: f64,
+    /// Plate and horn off level, rad: the mean over sessions.
     pub level_rad: f64,
+    /// Standard deviation of the level from session to session, in [0, 1] rad.
+    #[schema(minimum = 0, maximum = 1)]
+    #[serde(default = "default_level_spread")]
+    pub level_spread_rad: f64,
+    /// Standard deviation of the gain from session to session, as a share of it,
+    /// in [0, 10].
+    #[schema(minimum = 0, maximum = 10)]
+    #[serde(default = "default_gain_spread")]
+    pub gain_spread: f64,
     /// Deceleration of a rolling ball, m/s²; zero where it was not learnt.
     #[serde(default)]
     pub resistance_m_s2: f64,
@@ -273,6 +335,38 @@ pub struct AxisCalibrationView {
     /// is not known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub familiar_m_s2: Option<f64>,
+    /// Longest time for which healthy readings were the same to the bit, in
+    /// [0, 60] s.
+    #[schema(minimum = 0, maximum = 60)]
+    #[serde(default = "default_repeat")]
+    pub longest_repeat_s: f64,
+    /// Time for which the ball was seen at rest, in [0, 1e9] s; where it was not,
+    /// the breakaway angle is unknown.
+    #[schema(minimum = 0, maximum = 1e9)]
+    #[serde(default)]
+    pub rest_s: f64,
+    /// Acceleration that the twin leaves out, over half a second, in (0, 100]
+    /// m/s²; assumed from the residual where it was not learnt.
+    #[schema(exclusive_minimum = 0, maximum = 100)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model_error_m_s2: Option<f64>,
+    /// Most evidence against the servo while it was healthy, in [0, 1000] nats.
+    #[schema(minimum = 0, maximum = 1000)]
+    #[serde(default)]
+    pub most_nats: f64,
+}
+
+const fn default_level_spread() -> f64 {
+    AxisCalibration::POPULATION_LEVEL_SPREAD_RAD
+}
+
+const fn default_gain_spread() -> f64 {
+    AxisCalibration::POPULATION_GAIN_SPREAD
+}
+
+/// Healthy readings are known to repeat themselves for this long, s.
+const fn default_repeat() -> f64 {
+    0.15
 }
 
 /// Parses and checks an asset file.
@@ -414,12 +508,43 @@ fn calibration(view: &CalibrationView) -> Result<Calibration, Invalid> {
     };
     Ok(Calibration {
         axes: PerAxis { x: learn(Axis::X, &view.x)?, y: learn(Axis::Y, &view.y)? },
+        sensor: sensor_calibration(&view.sensor)?,
+        sessions: view.sessions.iter().map(session_estimates).collect(),
         data_sha256: view.data_sha256.clone(),
         n_samples: view.samples,
         duration_s: view.duration_s,
         made_at: view.made_at.clone(),
         prospects: view.prospects.as_ref().map(prospects),
     })
+}
+
+fn sensor_calibration(view: &SensorCalibrationView) -> Result<SensorCalibration, Invalid> {
+    let at = |field: &str| format!("/calibration/sensor/{field}");
+    Ok(SensorCalibration {
+        refresh_s: in_range(&at("refresh_s"), view.refresh_s, 0.0..=10.0)?,
+        most_outliers: in_range(&at("most_outliers"), view.most_outliers, 0.0..=1e6)?,
+        most_scatter_m: in_range(&at("most_scatter_m"), view.most_scatter_m, 0.0..=1.0)?,
+        longest_unseen_s: in_range(&at("longest_unseen_s"), view.longest_unseen_s, 0.0..=60.0)?,
+    })
+}
+
+fn session_estimates(view: &SessionEstimatesView) -> PerAxis<Option<SessionEstimate>> {
+    let estimate = |v: SessionEstimateView| SessionEstimate {
+        level_rad: v.level_rad,
+        level_error_rad: v.level_error_rad,
+        gain: v.gain.zip(v.gain_error),
+    };
+    PerAxis { x: view.x.map(estimate), y: view.y.map(estimate) }
+}
+
+fn session_estimates_view(session: &PerAxis<Option<SessionEstimate>>) -> SessionEstimatesView {
+    let estimate = |s: SessionEstimate| SessionEstimateView {
+        level_rad: s.level_rad,
+        level_error_rad: s.level_error_rad,
+        gain: s.gain.map(|(gain, _)| gain),
+        gain_error: s.gain.map(|(_, error)| error),
+    };
+    SessionEstimatesView { x: session.x.map(estimate), y: session.y.map(estimate) }
 }
 
 fn prospects(view: &ProspectsView) -> Prospects {
@@ -471,6 +596,15 @@ fn axis_calibration(axis: Axis, view: &AxisCalibrationView) -> Result<AxisCalibr
         familiar_m_s2: view.familiar_m_s2.map_or(Ok(f64::INFINITY), |familiar| {
             in_range(&at("familiar_m_s2"), familiar, 0.0..=1e3)
         })?,
+        level_spread_rad: in_range(&at("level_spread_rad"), view.level_spread_rad, 0.0..=1.0)?,
+        gain_spread: in_range(&at("gain_spread"), view.gain_spread, 0.0..=10.0)?,
+        longest_repeat_s: in_range(&at("longest_repeat_s"), view.longest_repeat_s, 0.0..=60.0)?,
+        rest_s: in_range(&at("rest_s"), view.rest_s, 0.0..=1e9)?,
+        model_error_m_s2: match view.model_error_m_s2 {
+            Some(error) => positive(&at("model_error_m_s2"), error, 100.0)?,
+            None => AxisCalibration::assumed_model_error_m_s2(view.residual_m_s2),
+        },
+        most_nats: in_range(&at("most_nats"), view.most_nats, 0.0..=1e3)?,
     })
 }
 
@@ -544,6 +678,12 @@ pub fn calibration_view(calibration: &Calibration) -> CalibrationView {
         breakaway_rad: c.breakaway_rad,
         residual_m_s2: c.residual_m_s2,
         familiar_m_s2: c.familiar_m_s2.is_finite().then_some(c.familiar_m_s2),
+        level_spread_rad: c.level_spread_rad,
+        gain_spread: c.gain_spread,
+        longest_repeat_s: c.longest_repeat_s,
+        rest_s: c.rest_s,
+        model_error_m_s2: Some(c.model_error_m_s2),
+        most_nats: c.most_nats,
     };
     CalibrationView {
         id: calibration_id(calibration),
@@ -553,6 +693,13 @@ pub fn calibration_view(calibration: &Calibration) -> CalibrationView {
         duration_s: calibration.duration_s,
         x: calibration.axes.x.as_ref().map(axis),
         y: calibration.axes.y.as_ref().map(axis),
+        sensor: SensorCalibrationView {
+            refresh_s: calibration.sensor.refresh_s,
+            most_outliers: calibration.sensor.most_outliers,
+            most_scatter_m: calibration.sensor.most_scatter_m,
+            longest_unseen_s: calibration.sensor.longest_unseen_s,
+        },
+        sessions: calibration.sessions.iter().map(session_estimates_view).collect(),
         prospects: calibration.prospects.as_ref().map(prospects_view),
     }
 }
@@ -574,9 +721,20 @@ pub fn calibration_id(calibration: &Calibration) -> String {
             learnt.breakaway_rad,
             learnt.residual_m_s2,
             learnt.familiar_m_s2,
+            learnt.level_spread_rad,
+            learnt.gain_spread,
+            learnt.longest_repeat_s,
+            learnt.rest_s,
+            learnt.model_error_m_s2,
+            learnt.most_nats,
         ] {
             hash.update(number.to_bits().to_le_bytes());
         }
+    }
+    let SensorCalibration { refresh_s, most_outliers, most_scatter_m, longest_unseen_s } =
+        calibration.sensor;
+    for number in [refresh_s, most_outliers, most_scatter_m, longest_unseen_s] {
+        hash.update(number.to_bits().to_le_bytes());
     }
     super::verdict::hex(&hash.finalize()[..8])
 }
@@ -602,13 +760,28 @@ mod tests {
             breakaway_rad: 0.005,
             residual_m_s2: 0.02,
             familiar_m_s2: 0.4,
+            level_spread_rad: 0.01,
+            gain_spread: 0.03,
+            longest_repeat_s: 0.4,
+            rest_s: 12.0,
+            model_error_m_s2: 0.03,
+            most_nats: 4.5,
         };
+        let estimate =
+            SessionEstimate { level_rad: -0.02, level_error_rad: 1e-3, gain: Some((0.8, 0.02)) };
         let mut rig = Rig::chapter("b");
         rig.plate = Plate::new(PlateShape::Round { diameter_m: 0.3 }, 0.005, false).unwrap();
         rig.mapping.swap = true;
         rig.diagnostics.debounce_s = Some(2.0);
         rig.calibration = Some(Calibration {
             axes: PerAxis { x: Some(learnt), y: None },
+            sensor: SensorCalibration {
+                refresh_s: 0.05,
+                most_outliers: 2.0,
+                most_scatter_m: 1e-3,
+                longest_unseen_s: 0.4,
+            },
+            sessions: vec![PerAxis { x: Some(estimate), y: None }, PerAxis::default()],
             data_sha256: "00".to_owned(),
             n_samples: 12,
             duration_s: 1.5,

@@ -1,6 +1,6 @@
 //! What the twin leaves out, by maximum likelihood.
 
-use super::trial::judge;
+use super::self_test::judge;
 use crate::diagnosis::{AxisCalibration, Calibration};
 use crate::engine::{Rig, Setup};
 use crate::vocabulary::{Axis, PerAxis, Sample};

@@ -14,9 +14,9 @@ mod likelihood;
 mod proof;
 mod prospects;
 mod recording;
+mod self_test;
 mod sessions;
 mod spread;
-mod trial;
 mod widening;
 
 use fit::{Fitter, SessionFit};
@@ -26,7 +26,7 @@ use sessions::{Estimate, Population, between, combined};
 use spread::{healthy_spread, level_at_rest};
 
 use super::Rig;
-use crate::diagnosis::{AxisCalibration, Calibration, SensorCalibration};
+use crate::diagnosis::{AxisCalibration, Calibration, SensorCalibration, SessionEstimate};
 use crate::vocabulary::{Axis, FaultCode, FaultKind, PerAxis, Sample};
 
 /// Lengths of a window, s, the better first: a ball that sticks every other
@@ -39,11 +39,13 @@ const WORST_GAIN_ERROR: f64 = 0.2;
 /// Least share of the paths' variance that the fit must explain.
 const LEAST_EXPLAINED: f64 = 0.5;
 
-/// How far levels lie apart from session to session, rad: 1.1° within a day on
-/// one real rig, 0.9° between days on another. It counts as one session.
-const LEVELS: Population = Population { deviation: 0.02, n_sessions: 1.0 };
+/// How far levels lie apart from session to session, rad. It counts as one
+/// session: levels differ between rigs by more than gains do.
+const LEVELS: Population =
+    Population { deviation: AxisCalibration::POPULATION_LEVEL_SPREAD_RAD, n_sessions: 1.0 };
 /// How far gains lie apart from session to session, as a share.
-const GAINS: Population = Population { deviation: 0.07, n_sessions: 2.0 };
+const GAINS: Population =
+    Population { deviation: AxisCalibration::POPULATION_GAIN_SPREAD, n_sessions: 2.0 };
 
 /// Why nothing can be learnt.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -118,14 +120,18 @@ fn teach(rig: &Rig, sessions: &[Vec<Sample>]) -> Result<Calibration, CannotCalib
         let present = recordings.iter().any(|r| r.has(axis));
         present.then(|| learn_axis(rig, &recordings, axis)).transpose()
     };
-    let axes = PerAxis { x: learn(Axis::X)?, y: learn(Axis::Y)? };
-    if axes.x.is_none() && axes.y.is_none() {
+    let learnt = PerAxis { x: learn(Axis::X)?, y: learn(Axis::Y)? };
+    if learnt.x.is_none() && learnt.y.is_none() {
         return Err(CannotCalibrate::NoAxis);
     }
+    let axes = PerAxis::from_fn(|axis| learnt[axis].as_ref().map(|l| l.calibration));
+    let of_session =
+        |i: usize| PerAxis::from_fn(|axis| learnt[axis].as_ref().and_then(|l| l.sessions[i]));
     let refresh_s = recordings.iter().map(|r| r.refresh_s).fold(0.0, f64::max);
     let learnt = Calibration {
         axes,
         sensor: SensorCalibration { refresh_s, ..SensorCalibration::default() },
+        sessions: (0..recordings.len()).map(of_session).collect(),
         data_sha256: String::new(),
         n_samples: 0,
         duration_s: recordings.iter().map(Recording::duration_s).sum(),
@@ -151,12 +157,18 @@ pub fn calibrate_and_foresee(
     Ok(calibration)
 }
 
+/// What was learnt of one axis, and what each session says of it by itself.
+struct LearntAxis {
+    calibration: AxisCalibration,
+    sessions: Vec<Option<SessionEstimate>>,
+}
+
 /// Learns from long windows, or from short ones where there are too few.
 fn learn_axis(
     rig: &Rig,
     recordings: &[Recording],
     axis: Axis,
-) -> Result<AxisCalibration, CannotCalibrate> {
+) -> Result<LearntAxis, CannotCalibrate> {
     let [long_s, short_s] = WINDOWS_S;
     learn_in_windows(rig, recordings, axis, long_s)
         .or_else(|_| learn_in_windows(rig, recordings, axis, short_s))
@@ -167,7 +179,7 @@ fn learn_in_windows(
     recordings: &[Recording],
     axis: Axis,
     window_s: f64,
-) -> Result<AxisCalibration, CannotCalibrate> {
+) -> Result<LearntAxis, CannotCalibrate> {
     let stretches: Vec<Vec<Stretch>> =
         recordings.iter().map(|r| r.stretches(axis, window_s)).collect();
     let fitter = Fitter { rig, recordings, stretches, axis };
@@ -215,7 +227,7 @@ fn learn_in_windows(
         let levels: Vec<f64> = levels.iter().map(|l| l.map_or(level.mean, |l| l.value)).collect();
         healthy_spread(&fitter, dead_time_s, lag_s, gain, &levels, resistance)
     };
-    Ok(AxisCalibration {
+    let calibration = AxisCalibration {
         gain: found.gain,
         dead_time_s,
         lag_s,
@@ -228,10 +240,18 @@ fn learn_in_windows(
         longest_repeat_s: healthy.longest_repeat_s,
         rest_s: healthy.rest_s,
         residual_m_s2: healthy.residual_m_s2.max(1e-4),
-        model_error_m_s2: healthy.residual_m_s2.clamp(0.015, 0.04),
+        model_error_m_s2: AxisCalibration::assumed_model_error_m_s2(healthy.residual_m_s2),
         familiar_m_s2: healthy.familiar_m_s2,
         most_nats: 0.0,
-    })
+    };
+    let estimate = |level: Estimate, fit: Option<SessionFit>| SessionEstimate {
+        level_rad: level.value,
+        level_error_rad: level.error,
+        gain: fit.map(|f| (f.gain, f.gain_error)),
+    };
+    let sessions = levels.into_iter().zip(found.sessions);
+    let sessions = sessions.map(|(level, fit)| level.map(|level| estimate(level, fit))).collect();
+    Ok(LearntAxis { calibration, sessions })
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 //! varies more than the others showed: the limit in question is widened until it
 //! is quiet, or the calibration is refused.
 
-use super::trial::{Trial, judge};
+use super::self_test::{SelfTest, judge};
 use super::widening::Widening;
 use super::{CannotCalibrate, teach};
 use crate::diagnosis::{AxisCalibration, Calibration, Settings};
@@ -19,7 +19,7 @@ const PATIENCE: f64 = 0.6;
 const MOST_STEPS: usize = 40;
 /// Length of a session of which half need not teach anything by itself, s.
 const LONG_S: f64 = 60.0;
-/// Most scatter that is taken over from the trials, m: more is no noise but a
+/// Most scatter that is taken over from the tests, m: more is no noise but a
 /// motion that the fit does not follow.
 const MOST_SCATTER_M: f64 = 1e-3;
 
@@ -36,27 +36,27 @@ pub(super) fn prove(
 ) -> Result<Calibration, CannotCalibrate> {
     let folds = folds(rig, &learnt, sessions)?;
     let mut widening = Widening::default();
-    let mut trials = Vec::new();
+    let mut tests = Vec::new();
     for _ in 0..MOST_STEPS {
-        trials = folds.iter().flat_map(|fold| fold.trials(rig, &widening)).collect();
-        let asked = trials.iter().filter(|trial| widening.widen(trial)).count();
+        tests = folds.iter().flat_map(|fold| fold.tests(rig, &widening)).collect();
+        let asked = tests.iter().filter(|test| widening.widen(test)).count();
         if asked == 0 {
-            return Ok(with_most(widening.of(&learnt), &trials));
+            return Ok(with_most(widening.of(&learnt), &tests));
         }
         if widening.is_beyond(&learnt) {
             break;
         }
     }
-    Err(accusation(&trials))
+    Err(accusation(&tests))
 }
 
-/// `learnt` with the most that any trial has shown of what is only counted.
-fn with_most(mut learnt: Calibration, trials: &[Trial]) -> Calibration {
+/// `learnt` with the most that any test has shown of what is only counted.
+fn with_most(mut learnt: Calibration, tests: &[SelfTest]) -> Calibration {
     for axis in Axis::ALL {
-        let most_nats = trials.iter().map(|t| t.most_nats[axis].0).fold(0.0, f64::max);
+        let most_nats = tests.iter().map(|t| t.most_nats[axis].0).fold(0.0, f64::max);
         learnt.axes[axis] = learnt.axes[axis].map(|a| AxisCalibration { most_nats, ..a });
     }
-    let most = |of: fn(&Trial) -> f64| trials.iter().map(of).fold(0.0, f64::max);
+    let most = |of: fn(&SelfTest) -> f64| tests.iter().map(of).fold(0.0, f64::max);
     let scatter_m = most(|t| t.most_scatter_m).min(MOST_SCATTER_M);
     let sensor = &mut learnt.sensor;
     sensor.most_outliers = sensor.most_outliers.max(most(|t| t.most_outliers));
@@ -64,16 +64,16 @@ fn with_most(mut learnt: Calibration, trials: &[Trial]) -> Calibration {
     learnt
 }
 
-/// What the first trial that was not quiet accuses its session of: where nothing
+/// What the first test that was not quiet accuses its session of: where nothing
 /// is confirmed, of the servo with the most evidence against it.
-fn accusation(trials: &[Trial]) -> CannotCalibrate {
-    let alarmed = trials.iter().find_map(|t| Some((t.session, t.alarm?)));
+fn accusation(tests: &[SelfTest]) -> CannotCalibrate {
+    let alarmed = tests.iter().find_map(|t| Some((t.session, t.alarm?)));
     if let Some((session, alarm)) = alarmed {
         let (code, kind, at_s) = (alarm.code, alarm.kind, alarm.at_s);
         return CannotCalibrate::AccusesItself { session, code, kind, at_s };
     }
-    let servo = |t: &Trial, axis: Axis| (t.session, FaultCode::servo(axis), t.most_nats[axis]);
-    let (session, code, (_, at_s)) = trials
+    let servo = |t: &SelfTest, axis: Axis| (t.session, FaultCode::servo(axis), t.most_nats[axis]);
+    let (session, code, (_, at_s)) = tests
         .iter()
         .flat_map(|t| Axis::ALL.map(|axis| servo(t, axis)))
         .max_by(|(.., a), (.., b)| a.0.total_cmp(&b.0))
@@ -88,7 +88,7 @@ struct Fold {
 }
 
 impl Fold {
-    fn trials(&self, rig: &Rig, widening: &Widening) -> Vec<Trial> {
+    fn tests(&self, rig: &Rig, widening: &Widening) -> Vec<SelfTest> {
         let rig = Rig { calibration: Some(widening.of(&self.taught)), ..rig.clone() };
         let Ok(mut setup) = Setup::new(rig, None) else { return Vec::new() };
         setup.settings = impatient(&setup.settings);

@@ -169,9 +169,11 @@ impl<'a> Trials<'a> {
         }
     }
 
-    /// The smallest of `sizes` of which at least half are found.
+    /// The smallest of `sizes`, in rising order, from which on half of the trials
+    /// find every one; none where they do not find the largest.
     fn least(&self, sizes: &[f64], fault: impl Fn(f64) -> Fault) -> Option<f64> {
-        sizes.iter().copied().find(|&size| self.median_s(fault(size)).is_some())
+        let found = |&size: &f64| self.median_s(fault(size)).is_some();
+        sizes.iter().rev().copied().take_while(found).last()
     }
 
     /// Seconds within which half of the trials find it; none where fewer do.

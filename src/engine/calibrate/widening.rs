@@ -1,8 +1,8 @@
 //! By how much a rig varies more than its recordings taught: factors on what was
 //! learnt, widened step by step until a healthy session is quiet.
 
+use super::self_test::{Accusation, SelfTest};
 use super::spread::MOST_BREAKAWAY_RAD;
-use super::trial::{Alarm, Trial};
 use crate::diagnosis::{AxisCalibration, Calibration};
 use crate::vocabulary::{Axis, FaultCode, FaultKind, PerAxis};
 
@@ -90,22 +90,22 @@ impl Widening {
         wide
     }
 
-    /// Widens what `trial` asks for. Returns whether it asked for anything.
-    pub(super) fn widen(&mut self, trial: &Trial) -> bool {
+    /// Widens what `test` asks for. Returns whether it asked for anything.
+    pub(super) fn widen(&mut self, test: &SelfTest) -> bool {
         let mut asked = false;
         for axis in Axis::ALL {
-            if trial.most_nats[axis].0 > MOST_HEALTHY_NATS {
+            if test.most_nats[axis].0 > MOST_HEALTHY_NATS {
                 self.axes[axis].model_error *= STEP;
                 asked = true;
             }
         }
-        if let Some(alarm) = &trial.alarm {
+        if let Some(alarm) = &test.alarm {
             self.silence(alarm);
         }
-        asked || trial.alarm.is_some()
+        asked || test.alarm.is_some()
     }
 
-    fn silence(&mut self, alarm: &Alarm) {
+    fn silence(&mut self, alarm: &Accusation) {
         let axes = &mut self.axes;
         let mut each =
             |f: fn(&mut AxisWidening)| Axis::ALL.into_iter().for_each(|a| f(&mut axes[a]));

@@ -11,11 +11,11 @@ use crate::vocabulary::{Axis, FaultCode, FaultKind, FaultStatus, PerAxis, Sample
 const LASTING_S: f64 = 0.2;
 
 /// How one session was judged.
-pub(super) struct Trial {
+pub(super) struct SelfTest {
     /// Number of the session among those that were learnt from, from 1 on.
     pub(super) session: usize,
     /// The first fault that was confirmed.
-    pub(super) alarm: Option<Alarm>,
+    pub(super) alarm: Option<Accusation>,
     /// Most evidence against each servo, nats, and when that was, s.
     pub(super) most_nats: PerAxis<(f64, f64)>,
     pub(super) most_outliers: f64,
@@ -27,7 +27,7 @@ pub(super) struct Trial {
 
 /// A fault that a healthy session was accused of.
 #[derive(Clone, Copy)]
-pub(super) struct Alarm {
+pub(super) struct Accusation {
     pub(super) at_s: f64,
     pub(super) code: FaultCode,
     pub(super) kind: Option<FaultKind>,
@@ -36,7 +36,7 @@ pub(super) struct Alarm {
 }
 
 /// Judges `samples`, the session with that number, by `setup`.
-pub(super) fn judge(setup: &Setup, session: usize, samples: &[Sample]) -> Trial {
+pub(super) fn judge(setup: &Setup, session: usize, samples: &[Sample]) -> SelfTest {
     let mut engine = Engine::new(setup.clone(), FaultMemory::default());
     let (mut outputs, mut alarm, mut most_outliers) = (Vec::new(), None, 0.0_f64);
     let (mut scatter, mut nats) = (Lasting::default(), PerAxis::<(f64, f64)>::default());
@@ -54,7 +54,7 @@ pub(super) fn judge(setup: &Setup, session: usize, samples: &[Sample]) -> Trial 
         alarm = alarm.or_else(|| outputs.iter().find_map(confirmed));
         outputs.clear();
     }
-    Trial {
+    SelfTest {
         session,
         alarm,
         most_nats: nats,
@@ -64,18 +64,18 @@ pub(super) fn judge(setup: &Setup, session: usize, samples: &[Sample]) -> Trial 
     }
 }
 
-fn confirmed(output: &Output) -> Option<Alarm> {
+fn confirmed(output: &Output) -> Option<Accusation> {
     let Output::Transition(t) = output else { return None };
     let Evidence { still_s, unseen_s, .. } = t.evidence;
     let (at_s, code, kind) = (t.at.seconds(), t.code, t.suspicion.kind);
-    let alarm = Alarm { at_s, code, kind, still_s, unseen_s };
+    let alarm = Accusation { at_s, code, kind, still_s, unseen_s };
     (t.status == FaultStatus::Confirmed).then_some(alarm)
 }
 
 /// The most that a quantity has stayed above for [`LASTING_S`].
 #[derive(Default)]
 struct Lasting {
-    /// Times, s, and values that no later one has undercut.
+    /// The values that no later one has undercut, and when each was last seen, s.
     low: VecDeque<(f64, f64)>,
     since_s: Option<f64>,
     most: f64,
@@ -87,7 +87,7 @@ impl Lasting {
             self.low.pop_back();
         }
         self.low.push_back((t_s, value));
-        while self.low.len() > 1 && self.low[1].0 <= t_s - LASTING_S {
+        while self.low.len() > 1 && self.low[0].0 <= t_s - LASTING_S {
             self.low.pop_front();
         }
         if t_s - *self.since_s.get_or_insert(t_s) >= LASTING_S {
