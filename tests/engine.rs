@@ -3,6 +3,9 @@
 
 #![cfg(feature = "service")]
 
+#[path = "engine/real_world.rs"]
+mod real_world;
+
 use offbd::diagnosis::{FaultMemory, Profile};
 use offbd::engine::{Admission, Engine, Input, Output, Rejection, Rig, Setup, calibrate};
 use offbd::simulation::{Disturbances, Fault, Preset, Reference, SimulatedRig};

@@ -9,9 +9,9 @@ use sha2::{Digest, Sha256};
 use super::judge::{load_rig, read_samples};
 use super::unusable::{Unusable, read};
 use super::{output, table};
-use crate::diagnosis::{AxisCalibration, Calibration, Prospects, ServoProspects};
+use crate::diagnosis::{AxisCalibration, Calibration, Prospects, ServoProspects, SessionEstimate};
 use crate::engine::{Rig, calibrate_and_foresee};
-use crate::vocabulary::{Axis, Sample};
+use crate::vocabulary::{Axis, PerAxis, Sample};
 use crate::wire::{asset, session_csv, verdict};
 
 /// Learns a rig from recordings in which it was healthy.
@@ -121,7 +121,66 @@ pub(super) fn report(rig: &Rig, calibration: &Calibration) {
     for line in table::lines(&learnt) {
         anstream::eprintln!("{line}");
     }
+    if calibration.sessions.len() > 1 {
+        report_sessions(&calibration.sessions);
+    }
     calibration.prospects.iter().for_each(foresee);
+}
+
+/// What each session says by itself, on stderr.
+fn report_sessions(sessions: &[PerAxis<Option<SessionEstimate>>]) {
+    anstream::eprintln!("\nby session");
+    let heading = ["session", "level x", "gain x", "level y", "gain y"];
+    let mut lines = table::table(&heading, &[0, 1, 2, 3, 4]);
+    for (i, session) in sessions.iter().enumerate() {
+        let level = |axis: Axis| session[axis].map(|s| angle(s.level_rad, s.level_error_rad));
+        let gain = |axis: Axis| {
+            session[axis]
+                .and_then(|s| s.gain)
+                .map(|(gain, error)| format!("{gain:.2} ± {error:.2}"))
+        };
+        let cells = Axis::ALL.into_iter().flat_map(|axis| [level(axis), gain(axis)]);
+        let row = std::iter::once(Some((i + 1).to_string())).chain(cells);
+        lines.add_row(row.map(|cell| cell.unwrap_or_else(|| "-".to_owned())));
+    }
+    for line in table::lines(&lines) {
+        anstream::eprintln!("{line}");
+    }
+    for axis in Axis::ALL {
+        if let Some(warning) = disagreement(sessions, axis) {
+            anstream::eprintln!("{}", table::wrapped("warning: ", &warning));
+        }
+    }
+}
+
+fn angle(rad: f64, error_rad: f64) -> String {
+    format!("{:.2}° ± {:.2}°", rad.to_degrees(), error_rad.to_degrees())
+}
+
+/// A sentence about `axis` if its sessions lie farther apart than most rigs' do.
+fn disagreement(sessions: &[PerAxis<Option<SessionEstimate>>], axis: Axis) -> Option<String> {
+    let seen = || sessions.iter().filter_map(|s| s[axis]);
+    let levels = range(seen().map(|s| s.level_rad))?;
+    let gains = range(seen().filter_map(|s| s.gain).map(|(gain, _)| gain.ln()));
+    let far = levels > WIDE_LEVELS_RAD;
+    let off = gains.is_some_and(|g| g > WIDE_GAINS.ln());
+    (far || off).then(|| {
+        format!(
+            "along {axis} the sessions disagree: levels differ by {levels:.1}° and gains by a \
+             factor of {gains:.2}; small faults of the servo of {command} cannot be told from that. \
+             Check that plate, horn and linkage are tight and that all sessions were healthy.",
+            axis = axis.as_str(),
+            levels = levels.to_degrees(),
+            gains = gains.unwrap_or(0.0).exp(),
+            command = axis.command(),
+        )
+    })
+}
+
+/// Distance between the least and the largest of `values`.
+fn range(values: impl Iterator<Item = f64> + Clone) -> Option<f64> {
+    let least = values.clone().reduce(f64::min)?;
+    values.reduce(f64::max).map(|most| most - least)
 }
 
 /// What can be found how soon, on stderr.
@@ -164,22 +223,43 @@ fn degrees(angle_rad: Option<f64>) -> String {
     angle_rad.map_or("-".to_owned(), |a| format!("{:.1}°", a.to_degrees()))
 }
 
+/// Levels farther apart are worth a warning, rad: twice the spread of the worst
+/// real rig seen within a day.
+const WIDE_LEVELS_RAD: f64 = 2.0 * AxisCalibration::POPULATION_LEVEL_SPREAD_RAD;
+/// Gains farther apart by this factor are, too: twice the population's spread to
+/// either side.
+const WIDE_GAINS: f64 = 1.3;
+
 type Row = (&'static str, fn(&AxisCalibration) -> String, &'static str);
 type ServoRow = (&'static str, fn(&ServoProspects) -> String, &'static str);
 
-fn rows() -> [Row; 8] {
+/// The breakaway angle is unknown where the ball never rested.
+fn breakaway(axis: &AxisCalibration) -> String {
+    match axis.rest_s > 0.0 {
+        true => format!("{:.2}°", axis.breakaway_rad.to_degrees()),
+        false => "unknown".to_owned(),
+    }
+}
+
+fn rows() -> [Row; 10] {
     [
         ("gain", |a| format!("{:.3}", a.gain), "measured over modelled acceleration"),
         ("dead time", |a| format!("{:.0} ms", a.dead_time_s * 1e3), "command to first movement"),
         ("lag", |a| format!("{:.0} ms", a.lag_s * 1e3), "time constant of the servo"),
         ("level", |a| format!("{:.2}°", a.level_rad.to_degrees()), "plate angle at command 0"),
         (
+            "level, ±",
+            |a| format!("{:.2}°", a.level_spread_rad.to_degrees()),
+            "from session to session, rms",
+        ),
+        (
             "resistance",
             |a| format!("{:.3} m/s²", a.resistance_m_s2),
             "a rolling ball slows down by",
         ),
         ("noise", |a| format!("{:.2} mm", a.noise_m * 1e3), "readings about the motion, rms"),
-        ("breakaway", |a| format!("{:.2}°", a.breakaway_rad.to_degrees()), "a ball at rest starts"),
+        ("breakaway", breakaway, "a ball at rest starts"),
+        ("repeats", |a| format!("{:.2} s", a.longest_repeat_s), "longest healthy repeat"),
         ("residual", |a| format!("{:.3} m/s²", a.residual_m_s2), "measured - twin, rms"),
     ]
 }

@@ -151,6 +151,7 @@ impl Pipeline {
         let Some(moment) = frame::moment(&setup.rig.mapping, sample) else { return };
         let Some(dt) = self.tick(moment.at) else { return };
         self.n_judged += 1;
+        let moment = self.without_readings_far_off(setup, moment);
         self.step_twin(&moment);
         let fresh = self.without_repeats(&moment);
         let (usable, outliers) = self.estimate(&fresh, dt);
@@ -168,6 +169,19 @@ impl Pipeline {
             let around = self.surroundings();
             let findings = self.evaluator.evaluate(&self.evidence, &self.readings, &around);
             self.remember(&moment, dt, &findings, memory, outputs);
+        }
+    }
+
+    /// The moment without its reading where that is farther beyond the edge than
+    /// the edge is from the middle, and the ball has not left the plate before: no
+    /// ball is there, whatever the sensor takes for one.
+    fn without_readings_far_off(&self, setup: &Setup, moment: Moment) -> Moment {
+        let plate = &setup.rig.plate;
+        let at = |axis: Axis| moment.position[axis].unwrap_or(0.0);
+        let beyond_m = -plate.edge_distance_m(at(Axis::X), at(Axis::Y));
+        match !self.at_edge && beyond_m > plate.edge_distance_m(0.0, 0.0) {
+            true => Moment { position: PerAxis::default(), ..moment },
+            false => moment,
         }
     }
 
