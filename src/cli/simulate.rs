@@ -1,5 +1,8 @@
 //! `offbd simulate`: a session of the simulated rig, or a labelled corpus.
 
+mod numbers;
+mod options;
+
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -8,12 +11,12 @@ use clap::Args;
 use super::calibrate::write_asset;
 use super::labels::{Label, class, labelled};
 use super::output::{self, words};
+use super::unusable::BadArgument;
 use super::{corpus, judge};
-use crate::simulation::{
-    Disturbances, Fault, Preset, Reference, RigModel, SimulatedRig, Transport, TransportFaults,
-};
-use crate::vocabulary::{Invalid, Sample};
+use crate::simulation::{Fault, Preset, Reference, RigModel, SimulatedRig, Transport, Variety};
+use crate::vocabulary::{Axis, Invalid, Sample};
 use crate::wire::session_csv;
+use options::{LineArgs, RigArgs, SensorArgs};
 
 /// Records a session of the simulated rig: PID control, servos, noise, faults.
 ///
@@ -30,11 +33,15 @@ use crate::wire::session_csv;
     offbd simulate --rig rig.json --reference circle -o healthy.csv\n  \
     offbd simulate --fault y_servo:gain=0.5@20 --truth truth.json -o weak.csv\n  \
     offbd simulate --preset touch --fault sensor:freeze@15-25 -o frozen.csv\n  \
+    offbd simulate --rig-seed 7 --seed 3 -o tuesday.csv
+  \
+    offbd simulate --level-deg -0.8,1.2 --whole-degrees --hold-rows 3 -o real.csv
+  \
     offbd simulate --late 0.1 --duplicates 0.05 --gap 12-14 --seq -o bad-line.csv\n  \
     offbd simulate --corpus mycorpus && offbd score mycorpus")]
 pub(super) struct SimulateArgs {
     /// Kind of rig: its servos, surface, sensor and controller
-    #[arg(long, default_value = "chapter",
+    #[arg(long, default_value = "chapter", conflicts_with = "rig_seed",
           value_parser = words::<Preset>(Preset::ALL.map(Preset::as_str)))]
     preset: Preset,
     /// Ball, plate, angle limit and sample rate from this asset file
@@ -67,63 +74,15 @@ pub(super) struct SimulateArgs {
     #[arg(long)]
     seq: bool,
     /// Write a labelled corpus here instead: every preset, healthy and faulty
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["output", "truth", "fault", "rig"])]
+    #[arg(long, value_name = "DIR",
+          conflicts_with_all = ["output", "truth", "fault", "rig", "RigArgs"])]
     corpus: Option<PathBuf>,
+    #[command(flatten)]
+    own: RigArgs,
     #[command(flatten)]
     sensor: SensorArgs,
     #[command(flatten)]
     line: LineArgs,
-}
-
-/// What the rig's sensor and surroundings are like, instead of the preset's.
-#[derive(Clone, Debug, Args)]
-#[command(next_help_heading = "Sensor and surroundings [default: the preset's]")]
-struct SensorArgs {
-    /// Standard deviation of a reading, m
-    #[arg(long, value_name = "M")]
-    noise_m: Option<f64>,
-    /// Step of the readings (pixel, count), m
-    #[arg(long, value_name = "M")]
-    quantum_m: Option<f64>,
-    /// New readings per second; between them rows repeat the last
-    #[arg(long, value_name = "HZ")]
-    refresh_hz: Option<f64>,
-    /// Standard deviation of the log's period, as a share of it
-    #[arg(long, value_name = "SHARE")]
-    jitter: Option<f64>,
-    /// Share of readings without a ball
-    #[arg(long, value_name = "SHARE")]
-    missing: Option<f64>,
-    /// Share of lone readings far off
-    #[arg(long, value_name = "SHARE")]
-    outliers: Option<f64>,
-    /// Hands pushing the ball, per minute
-    #[arg(long, value_name = "N", default_value_t = 0.0)]
-    pushes: f64,
-    /// Gusts of one to three seconds, per minute
-    #[arg(long, value_name = "N", default_value_t = 0.0)]
-    gusts: f64,
-}
-
-/// What happens to rows on the way.
-#[derive(Clone, Debug, Args)]
-#[command(next_help_heading = "Transport")]
-struct LineArgs {
-    /// Share of rows sent twice
-    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
-    duplicates: f64,
-    /// Share of rows held up, so that they come out of order
-    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
-    late: f64,
-    /// How long a row may be held up, s
-    #[arg(long, value_name = "S", default_value_t = 0.05)]
-    late_window_s: f64,
-    /// Share of rows lost
-    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
-    lost: f64,
-    /// A span of time in which every row is lost; may be given again
-    #[arg(long, value_name = "FROM-TO", value_parser = span)]
-    gap: Vec<(f64, f64)>,
 }
 
 /// Longest session that is simulated at once, s: a day.
@@ -136,14 +95,6 @@ pub(super) fn seconds(word: &str) -> Result<f64, String> {
     value.filter(in_range).ok_or_else(|| format!("not above 0 and at most {MAX_SECONDS} seconds"))
 }
 
-fn span(word: &str) -> Result<(f64, f64), String> {
-    let wrong = || "not a span of seconds as in 12-14".to_owned();
-    let (from, to) = word.split_once('-').ok_or_else(wrong)?;
-    let (from, to): (f64, f64) =
-        (from.parse().map_err(|_| wrong())?, to.parse().map_err(|_| wrong())?);
-    if from < to { Ok((from, to)) } else { Err(wrong()) }
-}
-
 pub(super) fn run(args: &SimulateArgs) -> anyhow::Result<()> {
     if let Some(dir) = &args.corpus {
         return corpus::write(dir, args.seconds, args.seed);
@@ -153,9 +104,10 @@ pub(super) fn run(args: &SimulateArgs) -> anyhow::Result<()> {
         write_asset(&model.rig, path)?;
     }
     let name = model.rig.name.clone();
-    let disturbances = args.disturbances();
+    args.servos_of_faults(&model)?;
+    let hands = args.sensor.disturbances();
     let mut rig =
-        SimulatedRig::new(model, args.reference, disturbances, args.seed).map_err(bad_argument)?;
+        SimulatedRig::new(model, args.reference, hands, args.seed).map_err(bad_argument)?;
     args.fault.iter().for_each(|fault| rig.inject(*fault));
     let samples = record(&mut rig, args.seconds);
     let rows = args.transported(&samples)?;
@@ -193,34 +145,31 @@ fn bad_argument(error: Invalid) -> anyhow::Error {
 }
 
 impl SimulateArgs {
+    /// The rig of this session.
     fn model(&self) -> anyhow::Result<RigModel> {
-        let mut model = self.preset.model().map_err(bad_argument)?;
+        let mut model = match self.own.rig_seed {
+            Some(seed) => Variety::Real.rig(seed),
+            None => self.preset.model(),
+        }
+        .map_err(bad_argument)?;
         if self.asset.is_some() {
             model = model.owned_as(judge::load_rig(self.asset.as_deref())?);
         }
-        let sensor = &mut model.sensor;
-        let SensorArgs { noise_m, quantum_m, refresh_hz, jitter, missing, outliers, .. } =
-            &self.sensor;
-        let set = |to: &mut f64, from: &Option<f64>| *to = from.unwrap_or(*to);
-        set(&mut sensor.noise_m, noise_m);
-        set(&mut sensor.quantum_m, quantum_m);
-        set(&mut sensor.jitter, jitter);
-        set(&mut sensor.missing, missing);
-        set(&mut sensor.outliers, outliers);
-        sensor.refresh_hz = refresh_hz.or(sensor.refresh_hz);
-        Ok(model)
+        self.own.change(&mut model);
+        self.sensor.change(&mut model.sensor);
+        Ok(model.of_session(self.seed))
     }
 
-    fn disturbances(&self) -> Disturbances {
-        let SensorArgs { pushes, gusts, .. } = self.sensor;
-        Disturbances { pushes_per_minute: pushes, gusts_per_minute: gusts }
+    /// Whether the rig has the servos that are to fail.
+    fn servos_of_faults(&self, model: &RigModel) -> Result<(), BadArgument> {
+        let missing = |fault: &&Fault| fault.effect.axis() == Some(Axis::Y) && model.one_axis;
+        self.fault.iter().find(missing).map_or(Ok(()), |fault| {
+            Err(BadArgument(format!("--fault {fault}: the rig has one axis, x")))
+        })
     }
 
     fn transported(&self, samples: &[Sample]) -> anyhow::Result<Vec<Sample>> {
-        let LineArgs { duplicates, late, late_window_s, lost, ref gap } = self.line;
-        let gaps = gap.clone();
-        let faults = TransportFaults { duplicates, late, window_s: late_window_s, lost, gaps };
-        let mut line = Transport::new(faults, self.seed).map_err(bad_argument)?;
+        let mut line = Transport::new(self.line.faults(), self.seed).map_err(bad_argument)?;
         let mut rows = Vec::with_capacity(samples.len());
         samples.iter().for_each(|sample| line.send(*sample, &mut rows));
         line.finish(&mut rows);

@@ -4,8 +4,9 @@
 //! The device runs one loop: look, command, log a row. At the chapter's 100 rows
 //! a second the loops close every 10 ms, as the chapter's do.
 
+use super::steps::{rounded, step_in};
 use crate::plant::Ball;
-use crate::vocabulary::{Axis, PerAxis};
+use crate::vocabulary::{Axis, Invalid, PerAxis, in_range, positive};
 
 /// A controller; immutable. Its gains follow from the loop it is to close.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,6 +21,10 @@ pub struct ControllerModel {
     pub derivative_filter_s: f64,
     /// Largest command, rad.
     pub limit_rad: f64,
+    /// Share of the wanted acceleration that is commanded ahead, 0 to 1.
+    pub feedforward: f64,
+    /// Largest bandwidth that a period of the log leaves, rad per period.
+    pub turn_per_period_rad: f64,
     /// Smallest step of the command, rad; 0: continuous.
     pub resolution_rad: f64,
 }
@@ -28,25 +33,50 @@ pub struct ControllerModel {
 /// is levelled. A lone missing reading must not make the plate twitch.
 const BLIND_S: f64 = 0.3;
 
-/// The gains of one axis: rad per m, per m·s, and per m/s.
+/// The gains of one axis: rad per m, per m·s, per m/s and per m/s².
 #[derive(Clone, Copy, Debug)]
 struct Gains {
     proportional: f64,
     integral: f64,
     derivative: f64,
+    feedforward: f64,
 }
 
 impl ControllerModel {
+    pub(super) fn check(&self) -> Result<(), Invalid> {
+        positive("/controller/limit_rad", self.limit_rad, 1.5)?;
+        positive("/controller/bandwidth_rad_s", self.bandwidth_rad_s, 100.0)?;
+        in_range("/controller/damping", self.damping, 0.0..=10.0)?;
+        in_range("/controller/integral", self.integral, 0.0..=10.0)?;
+        in_range("/controller/derivative_filter_s", self.derivative_filter_s, 0.0..=10.0)?;
+        in_range("/controller/feedforward", self.feedforward, 0.0..=1.0)?;
+        positive("/controller/turn_per_period_rad", self.turn_per_period_rad, 1.0)?;
+        step_in("/controller/resolution_rad", self.resolution_rad, 0.5)?;
+        Ok(())
+    }
+
+    /// What a loop holds that nobody has tuned to its rate, rad per period.
+    pub const UNTUNED_RAD: f64 = 0.1;
+
     /// Pole placement on ẍ = g/(1 + κ)·q. A slow loop gets a bandwidth that it
-    /// can hold: a tenth of a radian per period.
+    /// can hold.
     fn gains(&self, ball: &Ball, period_s: f64) -> Gains {
-        let (w, g) = (self.bandwidth_rad_s.min(0.1 / period_s), ball.rolling_gravity());
+        let (w, g) =
+            (self.bandwidth_rad_s.min(self.turn_per_period_rad / period_s), ball.rolling_gravity());
         Gains {
             proportional: w * w / g,
             integral: self.integral * w * w * w / g,
             derivative: 2.0 * self.damping * w / g,
+            feedforward: self.feedforward / g,
         }
     }
+}
+
+/// Where the ball is asked to be along one axis, m, and to accelerate, m/s².
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Wanted {
+    pub position: f64,
+    pub acceleration: f64,
 }
 
 /// What one axis remembers.
@@ -79,7 +109,7 @@ impl Controller {
     }
 
     /// One period: new commands from the last reading.
-    pub(super) fn update(&mut self, wanted: PerAxis<f64>, seen: PerAxis<Option<f64>>) {
+    pub(super) fn update(&mut self, wanted: PerAxis<Wanted>, seen: PerAxis<Option<f64>>) {
         for axis in Axis::ALL {
             let state = self.axes[axis];
             self.axes[axis] = match seen[axis] {
@@ -89,15 +119,16 @@ impl Controller {
         }
     }
 
-    fn closed(&self, state: AxisState, axis: Axis, wanted: f64, position: f64) -> AxisState {
+    fn closed(&self, state: AxisState, axis: Axis, wanted: Wanted, position: f64) -> AxisState {
         let (model, h) = (&self.model, self.period_s);
         let change = state.last.map_or(0.0, |last| (position - last) / h);
         let rate = state.rate + (change - state.rate) * h / (model.derivative_filter_s + h);
-        let error = wanted - position;
+        let error = wanted.position - position;
         let integral = state.integral + self.gains.integral * error * h;
         // The integral may not ask for more than half of the authority.
         let integral = integral.clamp(-model.limit_rad / 2.0, model.limit_rad / 2.0);
         let wish = self.gains.proportional * error + integral - self.gains.derivative * rate;
+        let wish = wish + self.gains.feedforward * wanted.acceleration;
         let command = self.quantise(wish * axis.drive_sign());
         AxisState { integral, rate, last: Some(position), unseen_s: 0.0, command }
     }
@@ -109,8 +140,7 @@ impl Controller {
     }
 
     fn quantise(&self, command: f64) -> f64 {
-        let (limit, step) = (self.model.limit_rad, self.model.resolution_rad);
-        let clamped = command.clamp(-limit, limit);
-        if step > 0.0 { (clamped / step).round() * step } else { clamped }
+        let limit = self.model.limit_rad;
+        rounded(command.clamp(-limit, limit), self.model.resolution_rad)
     }
 }

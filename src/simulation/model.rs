@@ -4,6 +4,7 @@ use super::ball::Surface;
 use super::controller::ControllerModel;
 use super::sensor::SensorModel;
 use super::servo::ServoTruth;
+use super::session::SessionSpread;
 use crate::engine::Rig;
 use crate::vocabulary::{Axis, Invalid, PerAxis, in_range, positive};
 
@@ -16,12 +17,17 @@ pub struct RigModel {
     pub surface: Surface,
     pub sensor: SensorModel,
     pub controller: ControllerModel,
+    /// Ball and beam: the ball stays on y = 0, and the log has neither commands nor
+    /// positions along y.
+    pub one_axis: bool,
+    /// How its sessions differ.
+    pub spread: SessionSpread,
 }
 
-/// Fastest log that is simulated, rows per second: the plant's step is 1 ms.
-pub const MAX_LOG_HZ: f64 = 1000.0;
-
 impl RigModel {
+    /// Fastest log that is simulated, rows per second: the plant's step is 1 ms.
+    pub const MAX_LOG_HZ: f64 = 1000.0;
+
     /// The same sensor, servos and surface under another owner's ball, plate,
     /// angle limit and sample rate.
     #[must_use]
@@ -37,17 +43,17 @@ impl RigModel {
     /// [`Invalid`] naming the element.
     pub fn check(&self) -> Result<(), Invalid> {
         self.rig.check()?;
-        positive("/sample_rate_hz", self.rig.sample_rate_hz, MAX_LOG_HZ)?;
+        positive("/sample_rate_hz", self.rig.sample_rate_hz, Self::MAX_LOG_HZ)?;
         self.surface.check()?;
         self.sensor.check()?;
-        let controller = &self.controller;
-        positive("/controller/limit_rad", controller.limit_rad, 1.5)?;
+        self.controller.check()?;
+        self.spread.check()?;
         for axis in Axis::ALL {
             let servo = &self.servos[axis];
             in_range("/servo/dead_time_s", servo.dead_time_s, 0.0..=1.0)?;
             in_range("/servo/play_rad", servo.play_rad, 0.0..=0.5)?;
-            in_range("/servo/gain", servo.gain, -10.0..=10.0)?;
-            in_range("/servo/level_rad", servo.level_rad, -0.5..=0.5)?;
+            in_range("/servo/gain", servo.gain, ServoTruth::GAIN)?;
+            in_range("/servo/level_rad", servo.level_rad, ServoTruth::LEVEL_RAD)?;
         }
         Ok(())
     }

@@ -18,6 +18,8 @@ pub(super) enum Purpose {
     SensorFault,
     Transport,
     Variety,
+    Session,
+    RealVariety,
 }
 
 /// A seeded source of random numbers.

@@ -8,8 +8,9 @@ use std::str::FromStr;
 use super::ball::Surface;
 use super::controller::ControllerModel;
 use super::model::RigModel;
-use super::sensor::SensorModel;
+use super::sensor::{Refresh, SensorModel};
 use super::servo::ServoTruth;
+use super::session::SessionSpread;
 use crate::engine::{Rig, ServoSpec};
 use crate::plant::{Ball, Plate, PlateShape};
 use crate::vocabulary::{Invalid, PerAxis, UnknownWord};
@@ -68,6 +69,9 @@ impl FromStr for Preset {
     }
 }
 
+/// Readings count from the plate's centre.
+const CENTRED: PerAxis<f64> = PerAxis { x: 0.0, y: 0.0 };
+
 /// A loop slower than the sensor and the servo by a factor of three or more,
 /// well damped; its derivative is filtered over a few readings.
 fn controller(limit_rad: f64, bandwidth_rad_s: f64, derivative_filter_s: f64) -> ControllerModel {
@@ -77,6 +81,8 @@ fn controller(limit_rad: f64, bandwidth_rad_s: f64, derivative_filter_s: f64) ->
         integral: 0.12,
         derivative_filter_s,
         limit_rad,
+        feedforward: 0.0,
+        turn_per_period_rad: ControllerModel::UNTUNED_RAD,
         resolution_rad: 0.0,
     }
 }
@@ -96,11 +102,15 @@ fn chapter() -> RigModel {
         rig,
         servos: PerAxis { x: servo, y: ServoTruth { gain: 0.96, level_rad: -0.005, ..servo } },
         surface: Surface { breakaway_rad: 0.004, rolling_rad: 0.001, restitution: 0.5 },
+        one_axis: false,
+        spread: SessionSpread::default(),
         sensor: SensorModel {
-            refresh_hz: None,
+            refresh: Refresh::Rows(1),
             latency_s: 0.005,
             noise_m: 2e-4,
             quantum_m: 1e-4,
+            dead_band_m: 0.0,
+            origin_m: CENTRED,
             missing: 0.001,
             outliers: 2e-4,
             jitter: 0.03,
@@ -131,11 +141,15 @@ fn pingpong() -> Result<RigModel, Invalid> {
         rig,
         servos: PerAxis { x: servo, y: ServoTruth { level_rad: 0.02, ..servo } },
         surface: Surface { breakaway_rad: 0.006, rolling_rad: 0.002, restitution: 0.6 },
+        one_axis: false,
+        spread: SessionSpread::default(),
         sensor: SensorModel {
-            refresh_hz: None,
+            refresh: Refresh::Rows(1),
             latency_s: 0.02,
             noise_m: 4e-4,
             quantum_m: 1e-3,
+            dead_band_m: 0.0,
+            origin_m: CENTRED,
             missing: 0.005,
             outliers: 1e-3,
             jitter: 0.1,
@@ -165,11 +179,15 @@ fn touch() -> Result<RigModel, Invalid> {
         rig,
         servos: PerAxis { x: servo, y: ServoTruth { level_rad: -0.0042, ..servo } },
         surface: Surface { breakaway_rad: 0.007, rolling_rad: 0.002, restitution: 0.4 },
+        one_axis: false,
+        spread: SessionSpread::default(),
         sensor: SensorModel {
-            refresh_hz: Some(60.0),
+            refresh: Refresh::Hz(60.0),
             latency_s: 0.004,
             noise_m: 3e-5,
             quantum_m: 3e-5,
+            dead_band_m: 0.0,
+            origin_m: CENTRED,
             missing: 5e-4,
             outliers: 2e-4,
             jitter: 0.05,

@@ -96,6 +96,16 @@ impl ReferenceState {
         }
     }
 
+    /// The acceleration that goes with it, m/s²; a step has none.
+    pub(super) fn acceleration(&self, wanted: Vector2<f64>) -> Vector2<f64> {
+        let square = Vector2::from(TURN_S.map(|period| (TAU / period).powi(2)));
+        match self.reference {
+            Reference::Hold | Reference::Steps => Vector2::zeros(),
+            Reference::Circle => wanted * -square[0],
+            Reference::Lissajous => -wanted.component_mul(&square),
+        }
+    }
+
     fn step(&mut self, t_s: f64) -> Vector2<f64> {
         while t_s >= self.next_step_s {
             self.next_step_s += STEP_S;

@@ -7,7 +7,7 @@
 use nalgebra::Vector2;
 
 use super::ball::{BallState, Table};
-use super::controller::Controller;
+use super::controller::{Controller, Wanted};
 use super::disturbance::{DisturbanceState, Disturbances};
 use super::fault::{BallFault, Fault, FaultEffect, SensorFault, ServoFault};
 use super::model::RigModel;
@@ -101,7 +101,7 @@ impl SimulatedRig {
             servos,
             plate: PerAxis::from_fn(|a| PlateAngle { angle: level(a), ..PlateAngle::default() }),
             healthy_rad: PerAxis::from_fn(level),
-            ball: start(reach, seed),
+            ball: start(reach, seed, model.one_axis),
             sensor: Sensor::new(model.sensor, reach, seed),
             reading: Reading::default(),
             controller: Controller::new(
@@ -176,10 +176,11 @@ impl SimulatedRig {
 
     fn step(&mut self, h: f64) {
         let faults = self.faults_in_force();
-        let start = tilt(&self.plate);
+        let start = self.tilt();
         let middle = self.turn_plate(self.now_s, h / 2.0, &faults);
         let end = self.turn_plate(self.now_s + h / 2.0, h / 2.0, &faults);
         let push = self.disturbances.at(self.now_s);
+        let push = self.on_the_beam(push);
         // The rate of a lag jumps with its command: the ball feels that too.
         let acceleration = (end.rate - start.rate) / h;
         let tilts = [start, middle, end].map(|tilt| Tilt { acceleration, ..tilt });
@@ -205,13 +206,30 @@ impl SimulatedRig {
             self.plate[axis] = self.servos[axis].advance(at_s, h, faults.servos[axis]);
             self.healthy_rad[axis] = self.healthy_servos[axis].advance(at_s, h, None).angle;
         }
-        tilt(&self.plate)
+        self.tilt()
+    }
+
+    /// The plate's tilt about (x, y): the servo of axis x turns it about y. A beam
+    /// turns about y only.
+    fn tilt(&self) -> Tilt {
+        let (x, y) =
+            (self.plate.x, if self.model.one_axis { PlateAngle::default() } else { self.plate.y });
+        Tilt {
+            angle: Vector2::new(y.angle, x.angle),
+            rate: Vector2::new(y.rate, x.rate),
+            acceleration: Vector2::new(y.acceleration, x.acceleration),
+        }
+    }
+
+    /// What of a push moves the ball: a beam guides it along x.
+    fn on_the_beam(&self, push: Vector2<f64>) -> Vector2<f64> {
+        if self.model.one_axis { Vector2::new(push.x, 0.0) } else { push }
     }
 
     fn watch(&mut self) {
-        let (truth, breakaway_rad) = (self.truth(), self.model.surface.breakaway_rad);
+        let truth = self.truth();
         for watch in &mut self.faults {
-            watch.observe(&truth, &self.reading, breakaway_rad);
+            watch.observe(&truth, &self.reading, &self.model);
         }
     }
 
@@ -223,17 +241,23 @@ impl SimulatedRig {
 
     /// One turn of the device's loop.
     fn row(&mut self) -> Sample {
-        if self.model.sensor.refresh_hz.is_none() {
+        if self.model.sensor.refresh.with_row(self.schedule.n_rows) {
             self.look();
         }
         self.reading = self.sensor.reading(self.now_s);
+        self.reading.y = self.reading.y.filter(|_| !self.model.one_axis);
         self.control();
         self.log()
     }
 
     fn control(&mut self) {
         let wanted = self.reference.at(self.now_s);
-        self.controller.update(PerAxis { x: wanted.x, y: wanted.y }, self.reading);
+        let ahead = self.reference.acceleration(wanted);
+        let wanted = PerAxis::from_fn(|axis| {
+            let i = axis as usize;
+            Wanted { position: wanted[i], acceleration: ahead[i] }
+        });
+        self.controller.update(wanted, self.reading);
         let commands = self.controller.commands();
         for axis in Axis::ALL {
             self.servos[axis].command(self.now_s, commands[axis]);
@@ -247,7 +271,7 @@ impl SimulatedRig {
         Sample {
             seq: Some(self.schedule.n_rows),
             t_s: logged(self.now_s, LOGGED_PER_S),
-            cmd_qx_rad: Some(logged(commands.y, LOGGED_PER_RAD)),
+            cmd_qx_rad: (!self.model.one_axis).then(|| logged(commands.y, LOGGED_PER_RAD)),
             cmd_qy_rad: Some(logged(commands.x, LOGGED_PER_RAD)),
             x_m: metres(self.reading.x),
             y_m: metres(self.reading.y),
@@ -263,7 +287,7 @@ impl Schedule {
 
     /// The next event and its time; at one moment a look comes before a row.
     fn next(&mut self, model: &RigModel) -> (Event, f64) {
-        let look_s = model.sensor.refresh_hz.map_or(f64::INFINITY, |hz| self.n_looks as f64 / hz);
+        let look_s = model.sensor.refresh.look_s(self.n_looks);
         if look_s <= self.next_row_s {
             self.n_looks += 1;
             return (Event::Look, look_s);
@@ -277,20 +301,14 @@ impl Schedule {
 }
 
 /// The ball at rest within a fifth of its reach of the centre.
-fn start(reach: Vector2<f64>, seed: u64) -> BallState {
+fn start(reach: Vector2<f64>, seed: u64, one_axis: bool) -> BallState {
     let mut noise = Noise::new(seed, Purpose::Start);
     let mut share = || noise.uniform(-0.2, 0.2);
-    let position = Vector2::new(share(), share()).component_mul(&reach);
-    BallState { rolling: RollingState { position, ..RollingState::default() }, lost: false }
-}
-
-/// The plate's tilt about (x, y): the servo of axis x turns it about y.
-fn tilt(plate: &PerAxis<PlateAngle>) -> Tilt {
-    Tilt {
-        angle: Vector2::new(plate.y.angle, plate.x.angle),
-        rate: Vector2::new(plate.y.rate, plate.x.rate),
-        acceleration: Vector2::new(plate.y.acceleration, plate.x.acceleration),
+    let mut position = Vector2::new(share(), share()).component_mul(&reach);
+    if one_axis {
+        position.y = 0.0;
     }
+    BallState { rolling: RollingState { position, ..RollingState::default() }, lost: false }
 }
 
 fn logged(value: f64, per_unit: f64) -> f64 {
@@ -298,5 +316,7 @@ fn logged(value: f64, per_unit: f64) -> f64 {
     (value * per_unit).round() / per_unit + 0.0
 }
 
+#[cfg(test)]
+mod real_tests;
 #[cfg(test)]
 mod tests;

@@ -2,23 +2,48 @@
 
 use std::collections::VecDeque;
 
+use std::ops::RangeInclusive;
+
 use nalgebra::Vector2;
 
 use super::fault::SensorFault;
 use super::noise::{Noise, Purpose};
+use super::steps::{rounded, step_in};
 use crate::vocabulary::{Axis, Invalid, PerAxis, in_range};
+
+/// When there is a new reading. Between two of them the rows of the log repeat
+/// the last one: a zero-order hold.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Refresh {
+    /// With every nth row, n from 1 to [`SensorModel::MAX_HOLD_ROWS`]: the
+    /// device's loop runs n times for each look of its camera.
+    Rows(u32),
+    /// So many times a second ([`SensorModel::REFRESH_HZ`]), in step with nothing.
+    Hz(f64),
+}
+
+impl Default for Refresh {
+    fn default() -> Self {
+        Self::Rows(1)
+    }
+}
 
 /// What is true of the sensor and of the device's log; immutable.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SensorModel {
-    /// New readings per second; none: one for every row of the log.
-    pub refresh_hz: Option<f64>,
+    pub refresh: Refresh,
     /// From a look to its reading, s.
     pub latency_s: f64,
     /// Standard deviation of a reading, m.
     pub noise_m: f64,
-    /// Step of the readings (a pixel, a count), m; 0: as fine as is logged.
+    /// Quantisation: step of the readings (a pixel, a count), m; 0: as fine as
+    /// is logged.
     pub quantum_m: f64,
+    /// Dead band: a reading that differs from the last by no more than this along
+    /// both axes repeats it, m; 0: none. So a tracker holds a ball at rest.
+    pub dead_band_m: f64,
+    /// Reading of a ball at the plate's centre, m: where the device has its origin.
+    pub origin_m: PerAxis<f64>,
     /// Share of readings in which no ball is seen.
     pub missing: f64,
     /// Share of lone readings far off.
@@ -28,11 +53,24 @@ pub struct SensorModel {
 }
 
 impl SensorModel {
+    /// A look every ten seconds to ten a plant's step.
+    pub const REFRESH_HZ: RangeInclusive<f64> = 0.1..=10_000.0;
+    /// Most rows that repeat one reading: a second of the fastest log.
+    pub const MAX_HOLD_ROWS: u32 = 1000;
+    /// Lengths in readings, m: noise, dead band and the steps that are not zero. The
+    /// largest is that of the plate.
+    pub const LENGTH_M: RangeInclusive<f64> = 0.0..=1.0;
+    /// The origin of the readings, m from the plate's centre.
+    pub const ORIGIN_M: RangeInclusive<f64> = -1.0..=1.0;
+
     pub(super) fn check(&self) -> Result<(), Invalid> {
-        in_range("/sensor/refresh_hz", self.refresh_hz.unwrap_or(1.0), 0.1..=10_000.0)?;
+        self.refresh.check()?;
         in_range("/sensor/latency_s", self.latency_s, 0.0..=1.0)?;
-        in_range("/sensor/noise_m", self.noise_m, 0.0..=1.0)?;
-        in_range("/sensor/quantum_m", self.quantum_m, 0.0..=1.0)?;
+        in_range("/sensor/noise_m", self.noise_m, Self::LENGTH_M)?;
+        step_in("/sensor/quantum_m", self.quantum_m, *Self::LENGTH_M.end())?;
+        in_range("/sensor/dead_band_m", self.dead_band_m, Self::LENGTH_M)?;
+        in_range("/sensor/origin_m", self.origin_m.x, Self::ORIGIN_M)?;
+        in_range("/sensor/origin_m", self.origin_m.y, Self::ORIGIN_M)?;
         in_range("/sensor/missing", self.missing, 0.0..=1.0)?;
         in_range("/sensor/outliers", self.outliers, 0.0..=1.0)?;
         in_range("/sensor/jitter", self.jitter, 0.0..=1.0)?;
@@ -43,6 +81,32 @@ impl SensorModel {
     /// twelfth root, so that a noiseless sensor can become noisy too.
     fn noise_floor_m(&self) -> f64 {
         self.noise_m.max(self.quantum_m / 12.0_f64.sqrt()).max(1e-4)
+    }
+}
+
+impl Refresh {
+    fn check(self) -> Result<(), Invalid> {
+        match self {
+            Self::Hz(hz) => in_range("/sensor/refresh_hz", hz, SensorModel::REFRESH_HZ),
+            Self::Rows(n) => {
+                let most = f64::from(SensorModel::MAX_HOLD_ROWS);
+                in_range("/sensor/hold_rows", f64::from(n), 1.0..=most)
+            }
+        }
+        .map(drop)
+    }
+
+    /// Whether there is a look for the row of this number, from 1 on.
+    pub(super) const fn with_row(self, n_row: u64) -> bool {
+        matches!(self, Self::Rows(n) if (n_row - 1).is_multiple_of(n as u64))
+    }
+
+    /// When the look of this number is due, from 0 on, s; never if rows call for it.
+    pub(super) fn look_s(self, n_look: u64) -> f64 {
+        match self {
+            Self::Hz(hz) => n_look as f64 / hz,
+            Self::Rows(_) => f64::INFINITY,
+        }
     }
 }
 
@@ -62,6 +126,8 @@ pub(super) struct Sensor {
     on_the_way: VecDeque<(f64, Reading)>,
     latest: Reading,
     last_seen: Reading,
+    /// What the dead band holds.
+    held: Reading,
 }
 
 impl Sensor {
@@ -74,6 +140,7 @@ impl Sensor {
             on_the_way: VecDeque::new(),
             latest: Reading::default(),
             last_seen: Reading::default(),
+            held: Reading::default(),
         }
     }
 
@@ -85,6 +152,7 @@ impl Sensor {
         fault: Option<SensorFault>,
     ) {
         let healthy = self.measure(ball);
+        let healthy = self.steadied(healthy);
         let reading = self.spoil(healthy, fault);
         if reading.x.is_some() || reading.y.is_some() {
             self.last_seen = reading;
@@ -112,9 +180,25 @@ impl Sensor {
         let far = if outlier { far } else { PerAxis::default() };
         PerAxis::from_fn(|axis| {
             let i = axis as usize;
-            Some(ball[i] + noise[axis] + far[axis] * self.reach[i])
+            let origin = self.model.origin_m[axis];
+            Some(ball[i] + noise[axis] + far[axis] * self.reach[i] + origin)
         })
         .map(|r| r.map(|m| self.quantise(m)))
+    }
+
+    /// The reading behind the dead band.
+    fn steadied(&mut self, reading: Reading) -> Reading {
+        let within = |axis: Axis| match (reading[axis], self.held[axis]) {
+            (Some(new), Some(held)) => (new - held).abs() <= self.model.dead_band_m,
+            _ => false,
+        };
+        if self.model.dead_band_m > 0.0 && Axis::ALL.into_iter().all(within) {
+            return self.held;
+        }
+        if reading.x.is_some() {
+            self.held = reading;
+        }
+        reading
     }
 
     /// Draws the same numbers whatever the fault.
@@ -145,8 +229,7 @@ impl Sensor {
     }
 
     fn quantise(&self, metres: f64) -> f64 {
-        let quantum = self.model.quantum_m;
-        if quantum > 0.0 { (metres / quantum).round() * quantum } else { metres }
+        rounded(metres, self.model.quantum_m)
     }
 }
 
@@ -159,10 +242,12 @@ mod tests {
     use super::*;
 
     const PANEL: SensorModel = SensorModel {
-        refresh_hz: None,
+        refresh: Refresh::Rows(1),
         latency_s: 0.0,
         noise_m: 1e-3,
         quantum_m: 1e-4,
+        dead_band_m: 0.0,
+        origin_m: PerAxis { x: 0.0, y: 0.0 },
         missing: 0.0,
         outliers: 0.0,
         jitter: 0.0,
@@ -222,5 +307,48 @@ mod tests {
         sensor.look(1.0, Some(Vector2::new(0.05, 0.0)), None);
         assert_eq!(sensor.reading(1.02).x, None);
         assert!((sensor.reading(1.03).x.unwrap() - 0.05).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_origin_is_added_to_every_reading() {
+        let origin_m = PerAxis { x: 0.02, y: -0.01 };
+        let mut off = Sensor::new(SensorModel { origin_m, ..PANEL }, Vector2::new(0.2, 0.1), 7);
+        off.look(0.0, Some(Vector2::zeros()), None);
+        let (reading, centred) = (off.reading(0.0), readings(None)[0]);
+        assert!((reading.x.unwrap() - centred.x.unwrap() - 0.02).abs() < 1e-12);
+        assert!((reading.y.unwrap() - centred.y.unwrap() + 0.01).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_dead_band_holds_a_ball_at_rest_and_lets_go_of_one_that_rolls() {
+        let model = SensorModel { noise_m: 2e-4, dead_band_m: 2e-3, ..PANEL };
+        let mut sensor = Sensor::new(model, Vector2::new(0.2, 0.1), 7);
+        let mut run = |speed: f64| -> Vec<Reading> {
+            let look = |i: u32| {
+                let at_s = f64::from(i);
+                sensor.look(at_s, Some(Vector2::new(at_s * speed, 0.0)), None);
+                sensor.reading(at_s)
+            };
+            (0..100).map(look).collect()
+        };
+        let resting = run(0.0);
+        assert!(resting.iter().all(|r| *r == resting[0]));
+        let rolling = run(1e-3);
+        let new = rolling.windows(2).filter(|w| w[0] != w[1]).count();
+        // 99 mm in steps of just over 2 mm, noise aside.
+        assert!((30..=50).contains(&new), "{new} new readings");
+        let lag = |(i, r): (usize, &Reading)| (r.x.unwrap() - i as f64 * 1e-3).abs();
+        assert!(rolling.iter().enumerate().map(lag).all(|m| m < 3.5e-3));
+    }
+
+    #[test]
+    fn what_no_sensor_can_be_is_refused_by_name() {
+        let tiny = SensorModel { quantum_m: 5e-324, ..PANEL };
+        let never = SensorModel { refresh: Refresh::Rows(0), ..PANEL };
+        let slow = SensorModel { refresh: Refresh::Hz(f64::NAN), ..PANEL };
+        let away = SensorModel { origin_m: PerAxis { x: 0.0, y: 2.0 }, ..PANEL };
+        let named = [tiny, never, slow, away].map(|model| model.check().unwrap_err().element);
+        let wanted = ["quantum_m", "hold_rows", "refresh_hz", "origin_m"];
+        assert_eq!(named, wanted.map(|name| format!("/sensor/{name}")));
     }
 }

@@ -5,6 +5,7 @@
 //! follow; the mechanics stay those of [`ServoModel`].
 
 use std::collections::VecDeque;
+use std::ops::RangeInclusive;
 
 use super::fault::ServoFault;
 use super::noise::Noise;
@@ -25,6 +26,13 @@ pub struct ServoTruth {
     pub level_rad: f64,
     /// Play between horn and plate, rad, from stop to stop.
     pub play_rad: f64,
+}
+
+impl ServoTruth {
+    /// Plate angle per horn angle.
+    pub const GAIN: RangeInclusive<f64> = -10.0..=10.0;
+    /// Plate angle at a command of zero, rad.
+    pub const LEVEL_RAD: RangeInclusive<f64> = -0.5..=0.5;
 }
 
 /// Angle of the plate about one axis with its rates: rad, rad/s, rad/s².

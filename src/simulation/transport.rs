@@ -4,6 +4,8 @@
 //! Works on rows in the order of the device's log; each comes out at most twice,
 //! and none more than the reorder window behind a newer one.
 
+use std::ops::RangeInclusive;
+
 use super::noise::{Noise, Purpose};
 use crate::vocabulary::{Invalid, Sample, in_range};
 
@@ -23,6 +25,9 @@ pub struct TransportFaults {
 }
 
 impl TransportFaults {
+    /// How long a row may be held up, s.
+    pub const WINDOW_S: RangeInclusive<f64> = 0.0..=60.0;
+
     /// Checks every number.
     ///
     /// # Errors
@@ -30,7 +35,7 @@ impl TransportFaults {
     pub fn check(&self) -> Result<(), Invalid> {
         in_range("/transport/duplicates", self.duplicates, 0.0..=1.0)?;
         in_range("/transport/late", self.late, 0.0..=1.0)?;
-        in_range("/transport/window_s", self.window_s, 0.0..=60.0)?;
+        in_range("/transport/window_s", self.window_s, Self::WINDOW_S)?;
         in_range("/transport/lost", self.lost, 0.0..=1.0)?;
         Ok(())
     }

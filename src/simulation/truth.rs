@@ -9,6 +9,7 @@ use std::collections::VecDeque;
 use nalgebra::Vector2;
 
 use super::fault::{Fault, FaultEffect, SensorFault};
+use super::model::RigModel;
 use super::sensor::Reading;
 use crate::vocabulary::{Axis, PerAxis};
 
@@ -41,8 +42,10 @@ const STANDS_OUT_RAD: f64 = 0.015;
 const WINDOW_S: f64 = 0.3;
 /// A tilt of this many breakaway tilts ought to move a ball.
 const MOVING_BREAKAWAYS: f64 = 2.0;
-/// A reading that is off by this much cannot be noise, m.
+/// A reading that is off by this much cannot be noise: m, and in standard
+/// deviations of it.
 const OFF_M: f64 = 0.003;
+const OFF_DEVIATIONS: f64 = 4.0;
 
 /// Watches one fault for its first chance.
 #[derive(Clone, Debug)]
@@ -74,13 +77,17 @@ impl Watch {
         }
     }
 
-    /// Looks at one moment.
-    pub(super) fn observe(&mut self, truth: &Truth, latest: &Reading, breakaway_rad: f64) {
+    /// Looks at one moment of `model`.
+    pub(super) fn observe(&mut self, truth: &Truth, latest: &Reading, model: &RigModel) {
         if self.truth.chance_s.is_some() || !self.truth.fault.active(truth.t_s) {
             return;
         }
-        let off =
-            |axis: Axis| latest[axis].map_or(0.0, |m| (m - truth.position[axis as usize]).abs());
+        let (sensor, breakaway_rad) = (&model.sensor, model.surface.breakaway_rad);
+        let off_m = OFF_M.max(OFF_DEVIATIONS * sensor.noise_m + sensor.dead_band_m);
+        let off = |axis: Axis| {
+            let centred = latest[axis].map(|m| m - sensor.origin_m[axis]);
+            centred.map_or(0.0, |m| (m - truth.position[axis as usize]).abs())
+        };
         let stands_out = match self.truth.fault.effect {
             FaultEffect::Servo(axis, _) => {
                 self.mean_error(truth.t_s, (truth.plate_rad[axis] - truth.healthy_rad[axis]).abs())
@@ -89,8 +96,8 @@ impl Watch {
             FaultEffect::Ball(_) => {
                 truth.plate_rad.x.hypot(truth.plate_rad.y) > MOVING_BREAKAWAYS * breakaway_rad
             }
-            FaultEffect::Sensor(SensorFault::Freeze) => off(Axis::X).hypot(off(Axis::Y)) > OFF_M,
-            FaultEffect::Sensor(SensorFault::FreezeAxis(axis)) => off(axis) > OFF_M,
+            FaultEffect::Sensor(SensorFault::Freeze) => off(Axis::X).hypot(off(Axis::Y)) > off_m,
+            FaultEffect::Sensor(SensorFault::FreezeAxis(axis)) => off(axis) > off_m,
             FaultEffect::Sensor(_) => true,
         };
         if stands_out {

@@ -9,6 +9,7 @@ mod scene;
 mod score;
 mod service;
 mod simulate;
+mod soak;
 mod token;
 mod trends;
 mod usage;

@@ -3,11 +3,12 @@ use std::process::{Command, Stdio};
 
 use crate::bench::Bench;
 
-const COMMANDS: [&str; 11] = [
+const COMMANDS: [&str; 12] = [
     "simulate",
     "calibrate",
     "replay",
     "score",
+    "soak",
     "scene",
     "chart",
     "demo",

@@ -5,8 +5,8 @@ use crate::diagnosis::{FaultMemory, Profile, Transition};
 use crate::engine::{Engine, Input, Output, Rig, Setup};
 use crate::plant::{Motion, Plate, PlateShape};
 use crate::simulation::{
-    ControllerModel, Disturbances, Reference, RigModel, SensorModel, ServoTruth, SimulatedRig,
-    Surface, Truth,
+    ControllerModel, Disturbances, Reference, Refresh, RigModel, SensorModel, ServoTruth,
+    SessionSpread, SimulatedRig, Surface, Truth,
 };
 use crate::vocabulary::{Axis, FaultStatus, Invalid, PerAxis, Sample};
 
@@ -87,16 +87,22 @@ fn model(bad_x: bool) -> Result<RigModel, Invalid> {
             integral: 0.0,
             derivative_filter_s: 0.03,
             limit_rad: rig.servo.angle_limit_rad,
+            feedforward: 0.0,
+            turn_per_period_rad: ControllerModel::UNTUNED_RAD,
             resolution_rad: 0.0,
         },
         rig,
         servos: PerAxis { x: if bad_x { late } else { servo }, y: servo },
         surface: Surface { breakaway_rad: 0.0, rolling_rad: 0.0, restitution: 0.5 },
+        one_axis: false,
+        spread: SessionSpread::default(),
         sensor: SensorModel {
-            refresh_hz: None,
+            refresh: Refresh::default(),
             latency_s: 0.0,
             noise_m: 0.0,
             quantum_m: 0.0,
+            dead_band_m: 0.0,
+            origin_m: PerAxis::default(),
             missing: 0.0,
             outliers: 0.0,
             jitter: 0.0,
