@@ -15,6 +15,7 @@ mod model;
 mod noise;
 mod presets;
 mod reference;
+mod refresh;
 mod rig;
 mod sensor;
 mod servo;
@@ -31,8 +32,9 @@ pub use fault::{BallFault, Fault, FaultEffect, FaultSyntax, SensorFault, ServoFa
 pub use model::RigModel;
 pub use presets::Preset;
 pub use reference::Reference;
+pub use refresh::Refresh;
 pub use rig::SimulatedRig;
-pub use sensor::{Refresh, SensorModel};
+pub use sensor::SensorModel;
 pub use servo::ServoTruth;
 pub use session::SessionSpread;
 pub use steps::{LEAST_STEP, is_step};

@@ -8,25 +8,9 @@ use nalgebra::Vector2;
 
 use super::fault::SensorFault;
 use super::noise::{Noise, Purpose};
+use super::refresh::Refresh;
 use super::steps::{rounded, step_in};
 use crate::vocabulary::{Axis, Invalid, PerAxis, in_range};
-
-/// When there is a new reading. Between two of them the rows of the log repeat
-/// the last one: a zero-order hold.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Refresh {
-    /// With every nth row, n from 1 to [`SensorModel::MAX_HOLD_ROWS`]: the
-    /// device's loop runs n times for each look of its camera.
-    Rows(u32),
-    /// So many times a second ([`SensorModel::REFRESH_HZ`]), in step with nothing.
-    Hz(f64),
-}
-
-impl Default for Refresh {
-    fn default() -> Self {
-        Self::Rows(1)
-    }
-}
 
 /// What is true of the sensor and of the device's log; immutable.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,10 +37,6 @@ pub struct SensorModel {
 }
 
 impl SensorModel {
-    /// A look every ten seconds to ten a plant's step.
-    pub const REFRESH_HZ: RangeInclusive<f64> = 0.1..=10_000.0;
-    /// Most rows that repeat one reading: a second of the fastest log.
-    pub const MAX_HOLD_ROWS: u32 = 1000;
     /// Lengths in readings, m: noise, dead band and the steps that are not zero. The
     /// largest is that of the plate.
     pub const LENGTH_M: RangeInclusive<f64> = 0.0..=1.0;
@@ -81,32 +61,6 @@ impl SensorModel {
     /// twelfth root, so that a noiseless sensor can become noisy too.
     fn noise_floor_m(&self) -> f64 {
         self.noise_m.max(self.quantum_m / 12.0_f64.sqrt()).max(1e-4)
-    }
-}
-
-impl Refresh {
-    fn check(self) -> Result<(), Invalid> {
-        match self {
-            Self::Hz(hz) => in_range("/sensor/refresh_hz", hz, SensorModel::REFRESH_HZ),
-            Self::Rows(n) => {
-                let most = f64::from(SensorModel::MAX_HOLD_ROWS);
-                in_range("/sensor/hold_rows", f64::from(n), 1.0..=most)
-            }
-        }
-        .map(drop)
-    }
-
-    /// Whether there is a look for the row of this number, from 1 on.
-    pub(super) const fn with_row(self, n_row: u64) -> bool {
-        matches!(self, Self::Rows(n) if (n_row - 1).is_multiple_of(n as u64))
-    }
-
-    /// When the look of this number is due, from 0 on, s; never if rows call for it.
-    pub(super) fn look_s(self, n_look: u64) -> f64 {
-        match self {
-            Self::Hz(hz) => n_look as f64 / hz,
-            Self::Rows(_) => f64::INFINITY,
-        }
     }
 }
 

@@ -72,11 +72,11 @@ pub(super) struct SensorArgs {
           value_parser = pair(SensorModel::ORIGIN_M))]
     origin_m: Option<PerAxis<f64>>,
     /// New readings per second; between them rows repeat the last
-    #[arg(long, value_name = "HZ", value_parser = within(SensorModel::REFRESH_HZ))]
+    #[arg(long, value_name = "HZ", value_parser = within(Refresh::HZ))]
     refresh_hz: Option<f64>,
     /// A new reading with every Nth row; the others repeat the last
     #[arg(long, value_name = "N", conflicts_with = "refresh_hz",
-          value_parser = clap::value_parser!(u32).range(1..=i64::from(SensorModel::MAX_HOLD_ROWS)))]
+          value_parser = clap::value_parser!(u32).range(1..=i64::from(Refresh::MAX_ROWS)))]
     hold_rows: Option<u32>,
     /// Standard deviation of the log's period, as a share of it
     #[arg(long, value_name = "SHARE", value_parser = within(0.0..=1.0))]

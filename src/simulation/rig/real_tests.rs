@@ -24,6 +24,7 @@ fn runs(samples: &[Sample]) -> Vec<usize> {
 fn a_rig_off_level_rests_under_a_command_of_minus_its_level() {
     for (level_deg, gain) in [(2.0_f64, 1.0), (-1.5, 0.8)] {
         let mut model = chapter();
+        model.sensor.outliers = 0.0;
         model.servos = model.servos.map(|servo| ServoTruth {
             level_rad: level_deg.to_radians(),
             gain,
@@ -84,6 +85,7 @@ fn a_beam_has_no_y() {
     }
 }
 
+/// Once its integral has balanced the plate, but for a bounce now and then.
 #[test]
 fn every_real_rig_keeps_its_ball_off_the_rim() {
     let kept = |seed: u64, reference: Reference| {
@@ -91,11 +93,11 @@ fn every_real_rig_keeps_its_ball_off_the_rim() {
         let mut rig = SimulatedRig::new(model, reference, Disturbances::default(), seed).unwrap();
         let reach = rig.table.reach();
         let (mut n, mut at_rim) = (0_u32, 0_u32);
-        while rig.now_s < 60.0 {
+        while rig.now_s < 80.0 {
             rig.next_sample();
             let share = rig.truth().position.component_div(&reach).amax();
-            n += u32::from(rig.now_s > 20.0);
-            at_rim += u32::from(rig.now_s > 20.0 && share > 0.99);
+            n += u32::from(rig.now_s > 40.0);
+            at_rim += u32::from(rig.now_s > 40.0 && share > 0.99);
         }
         f64::from(at_rim) / f64::from(n)
     };
@@ -104,7 +106,7 @@ fn every_real_rig_keeps_its_ball_off_the_rim() {
         .map(|(seed, reference)| (kept(seed, reference), seed, reference))
         .collect();
     worst.sort_by(|a, b| b.0.total_cmp(&a.0));
-    assert!(worst[0].0 < 0.02, "share of the time at the rim, seed, reference: {:?}", &worst[..5]);
+    assert!(worst[0].0 < 0.05, "share of the time at the rim, seed, reference: {:?}", &worst[..5]);
 }
 
 proptest! {
@@ -116,9 +118,16 @@ proptest! {
     ) {
         let mut model = chapter();
         let refresh = Refresh::Rows(k);
-        // So noisy that no two readings are alike.
-        model.sensor =
-            SensorModel { refresh, jitter, noise_m: 1e-2, quantum_m: 0.0, missing: 0.0, ..model.sensor };
+        // So noisy that no two readings are alike; in time for their row.
+        model.sensor = SensorModel {
+            refresh,
+            jitter,
+            latency_s: 0.0,
+            noise_m: 1e-2,
+            quantum_m: 0.0,
+            missing: 0.0,
+            ..model.sensor
+        };
         for length in runs(&run(model, Reference::Circle, 5.0)) {
             prop_assert_eq!(length, k as usize);
         }

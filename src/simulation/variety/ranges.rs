@@ -113,10 +113,12 @@ pub(super) const ROWS_PER_LOOK: Span = 1.1..=3.0;
 /// Fastest log that is drawn, rows per second.
 pub(super) const FASTEST_LOG_HZ: f64 = 200.0;
 /// Share of the sensors with a dead band, which is so many of their steps and
-/// standard deviations of noise. Healthy readings stand for 0.2 to 1.8 s, those of
+/// standard deviations of noise, and no wider than a limit, m: beyond that nobody
+/// could hold a ball by it. Healthy readings stand for 0.2 to 1.8 s, those of
 /// ultrasound for 6.6 s.
 pub(super) const STEADIED: f64 = 0.3;
 pub(super) const DEAD_BAND_DEVIATIONS: Span = 1.0..=3.0;
+pub(super) const WIDEST_DEAD_BAND_M: f64 = 0.02;
 /// Share of the readings in which no ball is seen, and of those far off.
 pub(super) const MISSING: Span = 0.0..=0.01;
 pub(super) const OUTLIERS: Span = 0.0..=1e-3;
@@ -173,8 +175,9 @@ pub(super) const TURN_PER_PERIOD_RAD: f64 = 0.25;
 /// Share of the wanted acceleration that is commanded ahead, on circles and the like.
 pub(super) const FEEDFORWARD: Span = 0.6..=1.0;
 pub(super) const DAMPING: Span = 0.8..=1.2;
-/// Integral action, share of the bandwidth. It balances the level.
-pub(super) const INTEGRAL: Span = 0.08..=0.2;
+/// Integral action, share of the bandwidth. It balances the level, in ten seconds to
+/// forty.
+pub(super) const INTEGRAL: Span = 0.15..=0.35;
 /// Filter of the derivative, s. Without one it makes the commands as noisy as the
 /// readings are.
 pub(super) const DERIVATIVE_FILTER_S: Span = 0.0..=0.1;
@@ -210,7 +213,7 @@ mod tests {
             ("noise", has(&kind.noise_m, sensor.noise_m)),
             ("quantum", has(&kind.quantum_m, sensor.quantum_m)),
             ("latency", has(&kind.latency_s, sensor.latency_s)),
-            ("dead band", band == 0.0 || has(&DEAD_BAND_DEVIATIONS, band)),
+            ("dead band", band <= 3.0 && sensor.dead_band_m <= 0.02),
             ("missing", has(&MISSING, sensor.missing)),
             ("outliers", has(&OUTLIERS, sensor.outliers)),
             ("jitter", has(&JITTER, sensor.jitter)),

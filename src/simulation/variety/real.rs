@@ -5,7 +5,8 @@ use super::super::ball::Surface;
 use super::super::controller::ControllerModel;
 use super::super::model::RigModel;
 use super::super::noise::Noise;
-use super::super::sensor::{Refresh, SensorModel};
+use super::super::refresh::Refresh;
+use super::super::sensor::SensorModel;
 use super::super::servo::ServoTruth;
 use super::super::session::SessionSpread;
 use super::ranges::{self, KINDS, Kind, by_factor, even};
@@ -122,7 +123,8 @@ fn refresh(looks_hz: f64, noise: &mut Noise) -> (Refresh, f64) {
 
 fn dead_band(scatter_m: f64, noise: &mut Noise) -> f64 {
     let deviations = even(noise, &ranges::DEAD_BAND_DEVIATIONS);
-    if noise.happens(ranges::STEADIED) { scatter_m * deviations } else { 0.0 }
+    let band_m = (scatter_m * deviations).min(ranges::WIDEST_DEAD_BAND_M);
+    if noise.happens(ranges::STEADIED) { band_m } else { 0.0 }
 }
 
 fn origin(kind: &Kind, rig: &Rig, noise: &mut Noise) -> PerAxis<f64> {
