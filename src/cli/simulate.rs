@@ -23,7 +23,9 @@ use options::{LineArgs, RigArgs, SensorArgs};
 /// Equal seeds give equal bytes. A fault is CODE:KIND[=SIZE]@START[-END] with
 /// times in seconds.
 #[derive(Clone, Debug, Args)]
-#[command(after_help = "Faults (sizes have defaults):\n  \
+#[command(
+    allow_negative_numbers = true,
+    after_help = "Faults (sizes have defaults):\n  \
     x_servo, y_servo  hold, dead, gain=FACTOR, reversed, offset=RAD,\n                    \
     slow=FACTOR, intermittent\n  \
     stuck_ball        glued, sticky=RAD\n  \
@@ -38,7 +40,8 @@ use options::{LineArgs, RigArgs, SensorArgs};
     offbd simulate --level-deg -0.8,1.2 --whole-degrees --hold-rows 3 -o real.csv
   \
     offbd simulate --late 0.1 --duplicates 0.05 --gap 12-14 --seq -o bad-line.csv\n  \
-    offbd simulate --corpus mycorpus && offbd score mycorpus")]
+    offbd simulate --corpus mycorpus && offbd score mycorpus"
+)]
 pub(super) struct SimulateArgs {
     /// Kind of rig: its servos, surface, sensor and controller
     #[arg(long, default_value = "chapter", conflicts_with = "rig_seed",
@@ -52,8 +55,7 @@ pub(super) struct SimulateArgs {
           value_parser = words::<Reference>(Reference::ALL.map(Reference::as_str)))]
     reference: Reference,
     /// Length of the session, s
-    #[arg(long, default_value_t = 60.0, value_name = "S", allow_negative_numbers = true,
-          value_parser = seconds)]
+    #[arg(long, default_value_t = 60.0, value_name = "S", value_parser = seconds)]
     seconds: f64,
     /// Seed of all that is random
     #[arg(long, default_value_t = 1)]

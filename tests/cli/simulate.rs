@@ -134,7 +134,7 @@ fn a_number_out_of_range_is_refused_by_its_option() {
         ("--quantum-m 5e-324", "1e-9 to 1"),
         ("--dead-band-m 2", "0 to 1"),
         ("--origin-m 0.1,7", "-1 to 1"),
-        ("--refresh-hz 0", "0.1 to 10000"),
+        ("--refresh-hz -5", "0.1 to 10000"),
         ("--hold-rows 0", "1..=1000"),
         ("--missing 1.5", "0 to 1"),
         ("--pushes inf", "0 to 600"),
