@@ -102,16 +102,18 @@ mod tests {
                 prop_assert!((share / gain - 1.0).abs() < 0.1, "{share}, not {gain}");
             }
         }
+    }
 
-        #[test]
-        fn no_session_is_beyond_three_deviations(seed in any::<u64>()) {
-            let rig = scattered(0.02, 0.05);
-            let session = rig.of_session(seed);
+    /// Of 8000 normal numbers 22 are beyond three deviations.
+    #[test]
+    fn no_session_is_beyond_three_deviations() {
+        let rig = scattered(0.02, 0.05);
+        for session in (0..2000).map(|seed| rig.of_session(seed)) {
             for axis in Axis::ALL {
                 let level = session.servos[axis].level_rad - rig.servos[axis].level_rad;
-                prop_assert!(level.abs() <= 3.0 * 0.02 + 1e-12);
+                assert!(level.abs() <= 3.0 * 0.02 + 1e-12, "{level} rad");
                 let gain = session.servos[axis].gain / rig.servos[axis].gain - 1.0;
-                prop_assert!(gain.abs() <= 3.0 * 0.05 + 1e-12);
+                assert!(gain.abs() <= 3.0 * 0.05 + 1e-12, "{gain}");
             }
         }
     }

@@ -39,7 +39,8 @@ fn a_rig_off_level_rests_under_a_command_of_minus_its_level() {
             // A ball at rest leaves the plate anywhere within its breakaway tilt.
             let plate_rad = gain * mean + level_deg.to_radians();
             assert!(plate_rad.abs() < 1.5 * breakaway_rad, "{axis:?}: {plate_rad} rad off");
-            assert!(last.iter().all(|s| s.position(axis).is_none_or(|m| m.abs() < 0.1)));
+            // Without an integral it would rest 26 mm off: 1.9°·g/ω².
+            assert!(last.iter().all(|s| s.position(axis).is_none_or(|m| m.abs() < 0.015)));
         }
     }
 }
