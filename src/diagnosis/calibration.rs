@@ -25,7 +25,7 @@ pub struct AxisCalibration {
     pub breakaway_rad: f64,
     /// Longest time for which healthy readings were the same to the bit, s.
     pub longest_repeat_s: f64,
-    /// Time for which the ball was seen at rest, s.
+    /// Longest time for which the ball was seen at rest, s.
     pub rest_s: f64,
     /// Robust standard deviation of the acceleration residual, m/s².
     pub residual_m_s2: f64,

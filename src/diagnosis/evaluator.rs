@@ -21,6 +21,10 @@ const FROZEN_S: f64 = 0.3;
 /// last velocity, for identical readings to be frozen.
 const MISSED: f64 = 20.0;
 
+/// How fast a ball that nothing drives rolls out, m/s²: half a degree of tilt
+/// keeps the light balls rolling that were seen on real rigs.
+const ROLLS_OUT_M_S2: f64 = 0.05;
+
 /// Seconds in which a ball asked to move must have begun to.
 const PRESSED_S: f64 = 0.3;
 
@@ -216,7 +220,7 @@ impl Evaluator {
         let both =
             Axis::ALL.into_iter().filter(|&a| seen(a)).all(|a| axes[a].identical_s >= FROZEN_S);
         if both && any(&dead) {
-            let moved = any(&|a| axes[a].missed_m() > MISSED * self.noise_m());
+            let moved = any(&|a| self.missed(&axes[a]));
             let rival = Candidate { code: FaultCode::StuckBall, kind: None, weight: 0.3 };
             let rival = (!moved).then_some(rival);
             return Some(Finding { rival, ..Finding::fail(Some(FaultKind::Frozen)) });
@@ -225,11 +229,16 @@ impl Evaluator {
         any(&alone).then(|| Finding::fail(Some(FaultKind::Frozen)))
     }
 
+    /// Whether a ball that moved when its readings last changed must have gone on.
+    fn missed(&self, still: &AxisStillness) -> bool {
+        still.missed_m(ROLLS_OUT_M_S2) > MISSED * self.noise_m()
+    }
+
     /// Whether readings of `axis` have been the same for longer than any that
     /// live are.
     fn dead(&self, axis: Axis, still: &AxisStillness) -> bool {
         let limits = &self.limits[axis];
-        let asked = still.pressed_s >= FROZEN_S || still.missed_m() > MISSED * self.noise_m();
+        let asked = still.pressed_s >= FROZEN_S || self.missed(still);
         let resting = limits.rest_repeat_s.is_some_and(|s| still.identical_s >= s);
         resting || asked && still.identical_s >= limits.repeat_s
     }

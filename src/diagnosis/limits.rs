@@ -78,6 +78,10 @@ pub struct Limits {
     pub rest_repeat_s: Option<f64>,
 }
 
+/// Acceleration that counts as asking a ball to move on any rig, m/s²: one
+/// degree of tilt.
+const LEAST_PRESS_M_S2: f64 = 0.12;
+
 /// Shortest time for which identical readings are believed to be frozen, s:
 /// longer than any refresh seen (0.2 s).
 const LEAST_REPEAT_S: f64 = 0.3;
@@ -88,8 +92,11 @@ const REPEAT_FACTOR: f64 = 2.0;
 const REST_REPEAT_FACTOR: f64 = 3.0;
 /// The same where nothing is learnt, s: healthy ones of 1.8 s have been seen.
 const UNKNOWN_REPEAT_S: f64 = 3.0;
-/// Rest that must have been seen to know how its readings repeat, s.
+/// Rest in one piece that must have been seen to know how its readings repeat, s,
+/// and as a multiple of the longest repeat: a sensor that holds its value while
+/// the ball rests repeats it for as long as that does.
 const REST_SEEN_S: f64 = 3.0;
+const REST_SEEN_REPEATS: f64 = 3.0;
 
 impl Limits {
     /// The limits of `profile` for an axis, learnt or not, on a rig where a
@@ -122,7 +129,7 @@ impl Limits {
             residual_m_s2: l.residual_m_s2,
             noise_m: Some(l.noise_m),
             repeat_s: (REPEAT_FACTOR * l.longest_repeat_s).max(LEAST_REPEAT_S),
-            rest_repeat_s: (l.rest_s >= REST_SEEN_S)
+            rest_repeat_s: (l.rest_s >= REST_SEEN_S.max(REST_SEEN_REPEATS * l.longest_repeat_s))
                 .then(|| (REST_REPEAT_FACTOR * l.longest_repeat_s).max(LEAST_REST_REPEAT_S)),
         });
         match profile {
@@ -131,6 +138,12 @@ impl Limits {
                 Self { floor_m_s2: TEXTBOOK_LIMIT_M_S2, share: 0.0, errors: 0.0, ..known }
             }
         }
+    }
+
+    /// Acceleration that asks a ball at rest to move, m/s².
+    #[must_use]
+    pub const fn pressing_m_s2(&self) -> f64 {
+        self.breakaway_m_s2.max(LEAST_PRESS_M_S2)
     }
 
     /// The window, s, in which noise adds `share` of the floor to the limit,

@@ -84,10 +84,13 @@ impl AxisStillness {
         self.last_m.is_some()
     }
 
-    /// How far the ball would have gone since the readings last changed, m.
+    /// How far the ball would have gone since the readings last changed, m, had
+    /// friction held it back by `held_m_s2`.
     #[must_use]
-    pub fn missed_m(&self) -> f64 {
-        self.velocity_m_s.abs() * self.identical_s
+    pub fn missed_m(&self, held_m_s2: f64) -> f64 {
+        let speed = self.velocity_m_s.abs();
+        let rolling_s = self.identical_s.min(speed / held_m_s2);
+        (speed - held_m_s2 * rolling_s / 2.0) * rolling_s
     }
 }
 

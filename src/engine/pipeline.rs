@@ -342,10 +342,7 @@ impl Pipeline {
     /// Stage: stillness, missing and identical readings.
     fn watch_readings(&mut self, moment: &Moment, dt: f64, usable: bool, outliers: u32) {
         let limits = *self.evaluator.limits();
-        let pressed = PerAxis::from_fn(|a| {
-            let breakaway = limits[a].breakaway_m_s2.max(LEAST_PRESS_M_S2);
-            self.pull_m_s2(a) > breakaway
-        });
+        let pressed = PerAxis::from_fn(|a| self.pull_m_s2(a) > limits[a].pressing_m_s2());
         self.readings.update(&Reading {
             dt,
             position_m: moment.position,
@@ -392,7 +389,7 @@ impl Pipeline {
 
     /// Whether the ball rests within its breakaway angle.
     fn rests(&self, axis: Axis) -> bool {
-        let held_m_s2 = self.evaluator.limits()[axis].breakaway_m_s2.max(LEAST_PRESS_M_S2);
+        let held_m_s2 = self.evaluator.limits()[axis].pressing_m_s2();
         self.readings.axes[axis].still_s > RESTING_S && self.pull_m_s2(axis) < held_m_s2
     }
 
@@ -607,7 +604,3 @@ const LEVEL_ERRORS: f64 = 2.0;
 fn refresh_s(rig: &Rig) -> f64 {
     rig.calibration.as_ref().map_or(0.0, |c| c.sensor.refresh_s)
 }
-
-/// Acceleration that counts as asking a ball to move on any rig, m/s²: one
-/// degree of tilt.
-const LEAST_PRESS_M_S2: f64 = 0.12;

@@ -340,7 +340,7 @@ pub struct AxisCalibrationView {
     #[schema(minimum = 0, maximum = 60)]
     #[serde(default = "default_repeat")]
     pub longest_repeat_s: f64,
-    /// Time for which the ball was seen at rest, in [0, 1e9] s; where it was not,
+    /// Longest time for which the ball was seen at rest, in [0, 1e9] s; where it was not,
     /// the breakaway angle is unknown.
     #[schema(minimum = 0, maximum = 1e9)]
     #[serde(default)]

@@ -41,7 +41,7 @@ pub(super) fn healthy_spread(
 ) -> Healthy {
     let (mut scatters, mut residuals, mut withstood) = (Vec::new(), Vec::new(), Vec::new());
     let mut driven = Vec::new();
-    let (mut rest_s, mut longest_repeat_s) = (0.0, 0.0_f64);
+    let (mut rest_s, mut longest_repeat_s) = (0.0_f64, 0.0_f64);
     let axis = fitter.axis;
     for (recording, &level) in fitter.recordings.iter().zip(levels) {
         let Some(model) = fitter.model(dead, lag, gain, level, resistance_m_s2) else { continue };
@@ -67,7 +67,7 @@ pub(super) fn healthy_spread(
         }
         let rest = Rest::of(recording, axis, Some(level), dead + lag);
         withstood.extend(rest.tilts);
-        rest_s += rest.seconds;
+        rest_s = rest.longest_s.max(rest_s);
         longest_repeat_s = longest_repeat_s.max(recording.longest_repeat_s[axis]);
     }
     Healthy {
@@ -101,6 +101,8 @@ struct Rest {
     commands: Vec<f64>,
     tilts: Vec<f64>,
     seconds: f64,
+    /// In one piece.
+    longest_s: f64,
 }
 
 impl Rest {
@@ -128,6 +130,8 @@ impl Rest {
                     rest.commands.push(command);
                     rest.tilts.push(tilt);
                     rest.seconds += dt;
+                    rest.longest_s =
+                        anchor_at.map_or(0.0, |since| m.at - since).max(rest.longest_s);
                 }
             }
         }
