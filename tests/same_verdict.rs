@@ -4,8 +4,9 @@ mod support;
 
 use futures_util::{SinkExt, StreamExt};
 use offbd::vocabulary::Sample;
+use offbd::wire::asset::view;
 use serde_json::{Value, json};
-use support::{Bench, Client, batch, csv, judged, packed, rig};
+use support::{Bench, Client, batch, csv, judged, learnt, packed, rig};
 use tokio_tungstenite::connect_async;
 use tokio_tungstenite::tungstenite::Message;
 
@@ -114,7 +115,10 @@ fn replayed_from_a_file(samples: &[Sample]) -> String {
     let file = tempfile::NamedTempFile::new().unwrap();
     std::fs::write(file.path(), csv(samples)).unwrap();
     let mut offbd = assert_cmd::Command::new(env!("CARGO_BIN_EXE_offbd"));
-    let run = offbd.args(["replay", "--format", "json"]).arg(file.path()).assert().success();
+    let asset = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(asset.path(), serde_json::to_vec(&view(&learnt("a"))).unwrap()).unwrap();
+    let offbd = offbd.args(["replay", "--format", "json", "--asset"]).arg(asset.path());
+    let run = offbd.arg(file.path()).assert().success();
     let printed = String::from_utf8(run.get_output().stdout.clone()).unwrap();
     let summary: Value = serde_json::from_str(printed.lines().last().unwrap()).unwrap();
     summary["verdict_hash"].as_str().unwrap().to_owned()

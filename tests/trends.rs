@@ -32,7 +32,7 @@ async fn import(client: &Client, asset: &str, name: &str, samples: &[Sample]) ->
 
 /// Registers `asset` and learns it from a healthy session.
 async fn learnt(client: &Client, asset: &str) {
-    client.asset(asset).await;
+    client.post("assets", &json!({ "name": asset })).await.expect(201);
     learn(client, asset, 1).await;
 }
 
@@ -140,7 +140,7 @@ async fn a_healthy_rig_is_not_warned_of() {
 async fn without_a_calibration_there_are_estimates_but_no_trends() {
     let bench = Bench::start().await;
     let client = &bench.client;
-    client.asset("new").await;
+    client.post("assets", &json!({ "name": "new" })).await.expect(201);
     assert_eq!(
         trends(client, "new").await,
         json!({

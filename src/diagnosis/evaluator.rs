@@ -119,16 +119,18 @@ impl Evaluator {
     }
 
     /// Whether the residual of `axis` may be judged: the enable condition.
+    /// `pull_m_s2` is what the plate asks of the ball at least.
     #[must_use]
     pub fn enabled(
         &self,
         axis: Axis,
         e: &AxisEvidence,
         window_s: f64,
+        pull_m_s2: f64,
         readings: &Stillness,
         around: &Surroundings,
     ) -> bool {
-        let (Some(measured), Some(twin), Some(command)) =
+        let (Some(measured), Some(_), Some(command)) =
             (e.measured_m_s2, e.twin_m_s2, e.command_rad)
         else {
             return false;
@@ -137,7 +139,7 @@ impl Evaluator {
             return command.abs() >= TEXTBOOK_ENABLE_RAD || measured.abs() >= TEXTBOOK_ENABLE_M_S2;
         }
         let resting = readings.axes[axis].still_s > PRESSED_S
-            && twin.abs() < self.limits[axis].breakaway_m_s2;
+            && pull_m_s2 < self.limits[axis].pressing_m_s2();
         let clear = around.clear_s >= window_s;
         let testable = clear || pinned(axis, e, window_s, readings, around);
         testable && readings.unseen_s == 0.0 && !resting
@@ -355,7 +357,7 @@ mod tests {
             limit_m_s2: 0.3,
             ..AxisEvidence::default()
         };
-        x.enabled = evaluator.enabled(Axis::X, &x, 0.5, &readings, &around);
+        x.enabled = evaluator.enabled(Axis::X, &x, 0.5, twin.abs(), &readings, &around);
         let evidence =
             Evidence { axes: PerAxis { x, y: AxisEvidence::default() }, ..Evidence::default() };
         servo(Axis::X, &evidence, &around).test

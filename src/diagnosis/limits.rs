@@ -96,7 +96,7 @@ const UNKNOWN_REPEAT_S: f64 = 3.0;
 /// and as a multiple of the longest repeat: a sensor that holds its value while
 /// the ball rests repeats it for as long as that does.
 const REST_SEEN_S: f64 = 3.0;
-const REST_SEEN_REPEATS: f64 = 3.0;
+const REST_SEEN_REPEATS: f64 = 5.0;
 
 impl Limits {
     /// The limits of `profile` for an axis, learnt or not, on a rig where a

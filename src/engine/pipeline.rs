@@ -412,7 +412,9 @@ impl Pipeline {
         let window_s = self.look.window_s(self.least_window_s());
         let see = |axis: Axis| {
             let mut e = self.axis_evidence(moment, axis, window_s);
-            e.enabled = self.evaluator.enabled(axis, &e, window_s, &self.readings, &around);
+            let pull_m_s2 = self.pull_m_s2(axis);
+            e.enabled =
+                self.evaluator.enabled(axis, &e, window_s, pull_m_s2, &self.readings, &around);
             e
         };
         let fits = &self.look.fits;
@@ -442,7 +444,11 @@ impl Pipeline {
                 && f.span_s >= FULL_WINDOW * window_s
                 && f.n as f64 >= LEAST_SAMPLES / 2.0
         });
-        let twin = full.map(|f| f.measured.acceleration - f.deviation.acceleration);
+        let of_session = |residual| self.of_session(axis, residual);
+        let twin = full.map(|f| {
+            let residual = f.deviation.acceleration;
+            f.measured.acceleration - residual + of_session(residual)
+        });
         let error = full.map_or(0.0, |f| f.acceleration_error);
         AxisEvidence {
             command_rad: moment.command[axis],
@@ -455,6 +461,15 @@ impl Pipeline {
             nats: servo.nats(),
             answer: (self.settings.profile == Profile::Default).then(|| servo.answer()),
         }
+    }
+
+    /// How much of a residual along `axis` is this session's level, m/s²: none where
+    /// the rig is not learnt. A level that is not known well explains no less than
+    /// the rig's own.
+    fn of_session(&self, axis: Axis, residual_m_s2: f64) -> f64 {
+        let offset = self.servos[axis].steady_m_s2();
+        let explains = self.settings.learnt && offset * residual_m_s2 > 0.0;
+        if explains { residual_m_s2.signum() * residual_m_s2.abs().min(offset.abs()) } else { 0.0 }
     }
 
     /// Scatter of the readings that is noise now, m: a reading blurs by as much

@@ -64,6 +64,9 @@ const INDEPENDENT: u32 = 4;
 /// Motion after which the ball is followed well enough to weigh anything, s: a
 /// hand lets it go, and its speed is not known yet.
 const SETTLED_S: f64 = 1.0;
+/// Memory of the offset that is this session's, s: many times what it takes to
+/// confirm a fault.
+const STEADY_S: f64 = 20.0;
 /// Error of a block's mean that is always assumed, m: roughness of plate and
 /// panel.
 const ROUGHNESS_M: f64 = 1.4e-4;
@@ -151,6 +154,7 @@ pub struct Servo {
     foretold_nats: f64,
     /// Motion followed since the session began or a gap ended, s.
     followed_s: f64,
+    steady_m_s2: f64,
     session: Session,
 }
 
@@ -167,6 +171,7 @@ impl Servo {
             rising_since: None,
             foretold_nats: 0.0,
             followed_s: 0.0,
+            steady_m_s2: 0.0,
             session: Session::default(),
         }
     }
@@ -199,6 +204,8 @@ impl Servo {
         let healthy = self.healthy.correct(y, variance, dt);
         self.foretold_nats += healthy;
         self.followed_s += dt;
+        let share = dt / self.followed_s.min(STEADY_S);
+        self.steady_m_s2 += share * (self.healthy.parameter(0).0 - self.steady_m_s2);
         if self.followed_s < SETTLED_S {
             return;
         }
@@ -262,6 +269,13 @@ impl Servo {
     pub fn offset(&self) -> (f64, f64) {
         let (offset, variance) = self.healthy.parameter(0);
         (offset, variance.sqrt())
+    }
+
+    /// The offset of this session over the last [`STEADY_S`], m/s²: a fault that
+    /// has just begun is hardly in it.
+    #[must_use]
+    pub const fn steady_m_s2(&self) -> f64 {
+        self.steady_m_s2
     }
 
     /// When the evidence began to gather: Page's estimate of the onset.

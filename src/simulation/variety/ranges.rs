@@ -209,7 +209,7 @@ mod tests {
         let mut checks = vec![
             ("one axis", model.one_axis == kind.one_axis),
             ("rate", has(&kind.looks_hz, looks_hz) && looks_hz <= log_hz * (1.0 + 1e-12)),
-            ("log", log_hz <= FASTEST_LOG_HZ),
+            ("log", log_hz <= FASTEST_LOG_HZ * (1.0 + 1e-12)),
             ("noise", has(&kind.noise_m, sensor.noise_m)),
             ("quantum", has(&kind.quantum_m, sensor.quantum_m)),
             ("latency", has(&kind.latency_s, sensor.latency_s)),
