@@ -13,11 +13,13 @@ mod coverage;
 mod frame;
 mod look;
 mod pipeline;
+mod plausibility;
 mod rig;
 mod types;
 mod watch;
 
 pub use calibrate::{CannotCalibrate, calibrate, calibrate_and_foresee};
+pub use plausibility::{Misfit, Plausibility};
 pub use rig::{AxisMapping, DiagnosticsSpec, MAX_NAME, Rig, ServoSpec, Setup};
 pub use types::{Admission, Input, MonitorState, Output, Readiness, Rejection, State};
 

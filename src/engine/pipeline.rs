@@ -14,7 +14,7 @@ use crate::diagnosis::{
     LearntNature, Limits, OutlierGate, Profile, Qualified, Reading, Scatter, SensorLimits, Servo,
     ServoEstimate, Settings, Stillness, Surroundings, Test,
 };
-use crate::plant::{RollingState, Twin};
+use crate::plant::{LONGEST_SPAN_S, RollingState, Twin};
 use crate::vocabulary::{Axis, FaultCode, PerAxis, Sample, SimTime};
 
 /// Samples that a window holds at least: a filter over fewer is all noise.
@@ -214,7 +214,8 @@ impl Pipeline {
     }
 
     fn gap_s(&self) -> f64 {
-        self.settings.gap_s.max(GAP_PERIODS * self.period_s.unwrap_or(0.0))
+        let gap_s = self.settings.gap_s.max(GAP_PERIODS * self.period_s.unwrap_or(0.0));
+        gap_s.min(LONGEST_SPAN_S)
     }
 
     /// The window that the least readings take, s.

@@ -31,4 +31,6 @@ pub use rolling::{Grip, Rolling, RollingState};
 pub use servo::{Servo, ServoModel};
 pub use sliding::{Hold, Phase, Sliding};
 pub use tilt::{PlateMotion, Tilt};
-pub use twin::{Twin, TwinAxis, TwinModel, TwinMotion, resisting};
+#[cfg(test)]
+pub(crate) use twin::steps;
+pub use twin::{LONGEST_SPAN_S, Twin, TwinAxis, TwinModel, TwinMotion, resisting};

@@ -25,6 +25,10 @@ const COMMAND_HISTORY: usize = 512;
 const LONGEST_STEP_S: f64 = 0.05;
 /// The same while the ball slides, whose spin takes Euler's steps.
 const SLIDING_STEP_S: f64 = 0.01;
+/// Longest span between two samples that the twin is carried over, s: the longest
+/// dead time that an asset file may state. After a longer one it starts afresh,
+/// so that no clock makes it take more steps than this.
+pub const LONGEST_SPAN_S: f64 = 5.0;
 /// Time that any servo takes to turn, s; one modelled as a lag starts at once.
 const LEAST_TURN_S: f64 = 1e-3;
 
@@ -154,14 +158,18 @@ impl Twin {
     /// commands that hold from `to` on. `observed` is the ball's motion as
     /// measured, for the terms that depend on it.
     ///
-    /// The first call, and any call after [`restart`](Self::restart), settles
-    /// the servos on the given commands instead.
+    /// The first call, any call after [`restart`](Self::restart), and one more
+    /// than [`LONGEST_SPAN_S`] after the last, settles the servos on the given
+    /// commands instead.
     pub fn advance(
         &mut self,
         to: SimTime,
         commands: PerAxis<Option<f64>>,
         observed: &RollingState,
     ) {
+        if self.now.is_some_and(|now| to - now > LONGEST_SPAN_S) {
+            self.restart();
+        }
         match self.now {
             Some(now) => self.integrate(now, to, observed),
             None => self.settle(commands),
@@ -224,6 +232,8 @@ impl Twin {
     /// One step of `h` seconds: what is linear in the servos' angles exactly,
     /// the rest at their mean.
     fn step(&mut self, start: f64, h: f64, observed: &RollingState) {
+        #[cfg(test)]
+        steps::count();
         let before = self.servos;
         let swept = PerAxis::from_fn(|axis| self.sweep(axis, start, h));
         self.servos = swept.map(|s| s.servo);
@@ -273,6 +283,32 @@ impl Twin {
     }
 }
 
+/// How many steps the twins of a thread have taken, for tests of what is bounded.
+#[cfg(test)]
+pub(crate) mod steps {
+    use std::cell::Cell;
+
+    thread_local! {
+        static TAKEN: Cell<u64> = const { Cell::new(0) };
+        static MOST: Cell<u64> = const { Cell::new(u64::MAX) };
+    }
+
+    pub(super) fn count() {
+        TAKEN.set(TAKEN.get() + 1);
+        assert!(TAKEN.get() <= MOST.get(), "the twins took more than {} steps", MOST.get());
+    }
+
+    /// Runs `work`, which may take `most` steps: one more is a panic. Returns how
+    /// many it took.
+    pub(crate) fn within<T>(most: u64, work: impl FnOnce() -> T) -> (T, u64) {
+        TAKEN.set(0);
+        MOST.set(most);
+        let done = work();
+        MOST.set(u64::MAX);
+        (done, TAKEN.get())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -319,6 +355,19 @@ mod tests {
         }
         assert!(twin.motion().position.y < -0.01);
         assert_eq!(twin.motion().position.x, 0.0);
+    }
+
+    /// A clock in milliseconds, or one that jumped by years, must not keep the
+    /// twin busy.
+    #[test]
+    fn a_long_span_is_not_integrated_but_starts_afresh() {
+        let commands = PerAxis { x: Some(0.1), y: Some(0.0) };
+        let mut twin = twin(0.05, 0.05);
+        for (t_s, most) in [(0.0, 0), (LONGEST_SPAN_S, 500), (10.001, 0), (1e12, 0)] {
+            let advance = || twin.advance(at(t_s), commands, &RollingState::default());
+            steps::within(most, advance);
+        }
+        assert_eq!(*twin.motion(), TwinMotion::default());
     }
 
     #[test]

@@ -225,6 +225,9 @@ fn session_fit((n, r): &Sums, gain: f64, resistance: f64, variance: f64) -> Opti
 
 /// Step of dead time and lag at which the search ends, s.
 const FINEST_STEP_S: f64 = 0.001;
+/// Steps of the search at most; a dozen are common. Beyond it the best so far is
+/// taken.
+const MOST_SEARCH_STEPS: usize = 200;
 /// Where the search looks next: dead time and lag trade off against each
 /// other along a narrow valley, so it also looks across both.
 const DIRECTIONS: [(f64, f64); 10] = [
@@ -308,13 +311,18 @@ impl Fitter<'_> {
             }
         }
         let mut step = 0.02;
-        while step >= FINEST_STEP_S {
+        for _ in 0..MOST_SEARCH_STEPS {
+            if step < FINEST_STEP_S {
+                break;
+            }
             let (dead, lag, before) =
                 best.as_ref().map(|(dead, lag, found)| (*dead, *lag, found.cost()))?;
             for (d, l) in DIRECTIONS {
                 try_at(dead + d * step, lag + l * step, &mut best);
             }
-            if best.as_ref().is_some_and(|(.., after)| after.cost() == before) {
+            // A cost that is no number is never undercut either.
+            let better = best.as_ref().is_some_and(|(.., after)| after.cost() < before);
+            if !better {
                 step /= 2.0;
             }
         }

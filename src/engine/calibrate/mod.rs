@@ -25,7 +25,7 @@ use recording::{Recording, Stretch};
 use sessions::{Estimate, Population, between, combined};
 use spread::{healthy_spread, level_at_rest};
 
-use super::Rig;
+use super::{Misfit, Plausibility, Rig};
 use crate::diagnosis::{AxisCalibration, Calibration, SensorCalibration, SessionEstimate};
 use crate::vocabulary::{Axis, FaultCode, FaultKind, PerAxis, Sample};
 
@@ -38,6 +38,9 @@ const LEAST_WINDOWS: usize = 6;
 const WORST_GAIN_ERROR: f64 = 0.2;
 /// Least share of the paths' variance that the fit must explain.
 const LEAST_EXPLAINED: f64 = 0.5;
+/// Standard deviation of commands that move a ball, rad: 0.3°. With less, what is
+/// not explained was not asked for.
+const MOVING_RAD: f64 = 0.005;
 
 /// How far levels lie apart from session to session, rad. It counts as one
 /// session: levels differ between rigs by more than gains do.
@@ -50,6 +53,8 @@ const GAINS: Population =
 /// Why nothing can be learnt.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CannotCalibrate {
+    #[error("session {session}: {misfit}")]
+    Implausible { session: usize, misfit: Misfit },
     #[error("no axis has both commands and positions: nothing to learn from")]
     NoAxis,
     #[error(
@@ -59,9 +64,9 @@ pub enum CannotCalibrate {
     )]
     TooShort { axis: Axis, n_windows: usize },
     #[error(
-        "{axis}: the commands of {command} move too little to tell the gain (it would be known to ±{percent:.0} %, \
+        "{axis}: the commands of {command} move too little to tell the gain ({known}, \
          ±20 % is needed); record steps or circles of a few degrees",
-        axis = axis.as_str(), command = axis.command()
+        axis = axis.as_str(), command = axis.command(), known = known(*percent)
     )]
     TooLittleExcitation { axis: Axis, percent: f64 },
     #[error(
@@ -71,8 +76,9 @@ pub enum CannotCalibrate {
     )]
     Reversed { axis: Axis, gain: f64 },
     #[error(
-        "{axis}: the command of {command} explains only {percent:.0} % of the ball's motion; \
-         check units and axis mapping, and that the recording is healthy",
+        "{axis}: the command of {command} explains only {percent:.0} % of the ball's motion, nor does that of \
+         the other axis or the opposite sign: it is noise, drag, stiction or somebody's hand; check the sensor, \
+         and that the recording is healthy",
         axis = axis.as_str(), command = axis.command()
     )]
     Unexplained { axis: Axis, percent: f64 },
@@ -103,7 +109,8 @@ pub fn calibrate(
     data_sha256: &str,
     made_at: &str,
 ) -> Result<Calibration, CannotCalibrate> {
-    let taught = teach(rig, sessions)?;
+    check_fit(rig, sessions)?;
+    let taught = teach(rig, sessions).map_err(|reason| with_cause(rig, sessions, reason))?;
     let learnt = Calibration {
         data_sha256: data_sha256.to_owned(),
         n_samples: sessions.iter().map(|s| s.len() as u64).sum(),
@@ -111,6 +118,43 @@ pub fn calibrate(
         ..taught
     };
     proof::prove(rig, learnt, sessions)
+}
+
+/// # Errors
+/// What in a session and the description of `rig` cannot be of one rig.
+fn check_fit(rig: &Rig, sessions: &[Vec<Sample>]) -> Result<(), CannotCalibrate> {
+    misfit(rig, sessions, Misfit::prevents_learning).map_or(Ok(()), Err)
+}
+
+/// The first of what does not fit that is `wanted`.
+fn misfit(
+    rig: &Rig,
+    sessions: &[Vec<Sample>],
+    wanted: impl Fn(Misfit) -> bool,
+) -> Option<CannotCalibrate> {
+    sessions.iter().zip(1..).find_map(|(samples, session)| {
+        let found = Plausibility::of(rig, samples).misfits().into_iter().find(|m| wanted(*m))?;
+        Some(CannotCalibrate::Implausible { session, misfit: found })
+    })
+}
+
+/// `reason`, or what explains it: axes that are swapped or have the wrong sign.
+fn with_cause(rig: &Rig, sessions: &[Vec<Sample>], reason: CannotCalibrate) -> CannotCalibrate {
+    let is_cause = |m: Misfit| matches!(m, Misfit::Swapped { .. } | Misfit::WrongSign { .. });
+    match reason {
+        CannotCalibrate::Unexplained { .. } | CannotCalibrate::TooLittleExcitation { .. } => {
+            misfit(rig, sessions, is_cause).unwrap_or(reason)
+        }
+        other => other,
+    }
+}
+
+/// How well a gain would be known.
+fn known(percent: f64) -> String {
+    match percent.is_finite() {
+        true => format!("it would be known to ±{percent:.0} %"),
+        false => "nothing is known of it".to_owned(),
+    }
 }
 
 /// What `sessions` teach of `rig`, not yet tested.
@@ -190,14 +234,19 @@ fn learn_in_windows(
     let still = CannotCalibrate::TooLittleExcitation { axis, percent: f64::INFINITY };
     let (dead_time_s, lag_s, found) = fitter.search().ok_or(still)?;
     let error = found.gain_error / found.gain.abs();
+    let unexplained = found.share.is_nan() || found.share < LEAST_EXPLAINED;
+    let percent = 100.0 * found.share.max(0.0);
+    if unexplained && recordings.iter().any(|r| r.swing_rad(axis) > MOVING_RAD) {
+        return Err(CannotCalibrate::Unexplained { axis, percent });
+    }
     if error.is_nan() || error > WORST_GAIN_ERROR {
         return Err(CannotCalibrate::TooLittleExcitation { axis, percent: 100.0 * error });
     }
     if found.gain <= 0.0 {
         return Err(CannotCalibrate::Reversed { axis, gain: found.gain });
     }
-    if found.share < LEAST_EXPLAINED {
-        return Err(CannotCalibrate::Unexplained { axis, percent: 100.0 * found.share });
+    if unexplained {
+        return Err(CannotCalibrate::Unexplained { axis, percent });
     }
     let slope = found.gain * axis.drive_sign() * rig.ball.rolling_gravity();
     let in_motion = |s: &SessionFit| Estimate {
@@ -255,7 +304,10 @@ fn learn_in_windows(
 }
 
 #[cfg(test)]
-mod tests {
+mod refusals;
+
+#[cfg(test)]
+pub(in crate::engine) mod tests {
     use super::fit::without_line;
     use super::*;
     use crate::diagnosis::Profile;
@@ -264,7 +316,7 @@ mod tests {
 
     /// A rig with known gain, dead time, lag and level under a sum of sines,
     /// made by the twin itself: the ball never rests and never leaves.
-    pub(super) fn session(seconds: f64, amplitude: f64, gain: f64) -> Vec<Sample> {
+    pub(in crate::engine) fn session(seconds: f64, amplitude: f64, gain: f64) -> Vec<Sample> {
         let rig = Rig::chapter("a");
         let servo = ServoModel::new(0.2, 0.05, 100.0).unwrap();
         let axis =

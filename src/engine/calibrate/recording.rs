@@ -10,7 +10,7 @@ use crate::diagnosis::OutlierGate;
 use crate::engine::Rig;
 use crate::engine::frame::{Moment, Repeats, moment};
 use crate::maths::median;
-use crate::plant::{RollingState, Twin, TwinModel, resisting};
+use crate::plant::{LONGEST_SPAN_S, RollingState, Twin, TwinModel, resisting};
 use crate::vocabulary::{Axis, PerAxis, Sample, SimTime};
 
 /// Samples that a window must hold; it grows where that takes longer.
@@ -58,7 +58,7 @@ impl Recording {
         moments.dedup_by_key(|m| m.at);
         let mut steps: Vec<f64> = moments.windows(2).map(|w| w[1].at - w[0].at).collect();
         let period_s = median(&mut steps).unwrap_or(0.0);
-        let gap_s = GAP_S.max(GAP_PERIODS * period_s);
+        let gap_s = GAP_S.max(GAP_PERIODS * period_s).min(LONGEST_SPAN_S);
         let (velocity, resisted) = Default::default();
         let longest_repeat_s = PerAxis::from_fn(|axis| longest_repeat_s(&moments, axis, gap_s));
         let refresh_s = refresh_s(&moments, period_s);
@@ -144,6 +144,14 @@ impl Recording {
     pub(super) fn has(&self, axis: Axis) -> bool {
         self.moments.iter().any(|m| m.position[axis].is_some())
             && self.moments.iter().any(|m| m.command[axis].is_some())
+    }
+
+    /// Standard deviation of the commands of `axis`, rad.
+    pub(super) fn swing_rad(&self, axis: Axis) -> f64 {
+        let commands = || self.moments.iter().filter_map(|m| m.command[axis]);
+        let n = commands().count().max(1) as f64;
+        let mean = commands().sum::<f64>() / n;
+        (commands().map(|c| (c - mean) * (c - mean)).sum::<f64>() / n).sqrt()
     }
 
     pub(super) fn duration_s(&self) -> f64 {
