@@ -6,15 +6,16 @@ use std::path::Path;
 
 use super::unusable::{Unusable, read};
 use crate::diagnosis::{FaultMemory, Profile, ServoEstimate, Transition};
-use crate::engine::{Admission, Engine, Input, Output, Rig, Setup};
+use crate::engine::{Admission, Engine, Input, Misfit, Output, Plausibility, Rig, Setup};
 use crate::vocabulary::{PerAxis, Sample};
 use crate::wire::asset;
 use crate::wire::basis::Basis;
 use crate::wire::session_csv::{Reader, RowError};
-use crate::wire::verdict::{FaultView, SummaryView, Verdict, fault_view};
+use crate::wire::verdict::{FaultView, SummaryView, Verdict, fault_view, warnings};
 
-/// Most bad rows of a file that are named one by one; more are counted.
-pub(super) const MAX_NAMED_ROWS: usize = 100;
+/// Most bad rows of a file that are named one by one; more are counted: what is
+/// wrong with a file shows in a few.
+pub(super) const MAX_NAMED_ROWS: usize = 5;
 
 /// What a session came to.
 #[derive(Debug)]
@@ -27,6 +28,8 @@ pub(super) struct Judged {
     pub n_set_aside: u64,
     /// How each servo has answered; none where too little motion was seen.
     pub estimates: PerAxis<Option<ServoEstimate>>,
+    /// In what the data and the asset file do not fit.
+    pub misfits: Vec<Misfit>,
 }
 
 /// The rig of an asset file; without one the chapter's.
@@ -56,7 +59,7 @@ pub(super) fn judge_file(setup: &Setup, path: &Path) -> Result<Judged, Unusable>
             Err(error) => bench.reject(error),
         }
     }
-    bench.end().ok_or_else(|| Unusable::file(path, "no usable row"))
+    bench.end().map_err(|reason| Unusable::file(path, reason))
 }
 
 /// The samples of the session file at `path`, bad rows left out and counted.
@@ -80,6 +83,7 @@ fn open(path: &Path) -> Result<Reader<File>, Unusable> {
 struct Bench {
     session: String,
     basis: Basis,
+    plausibility: Plausibility,
     engine: Engine,
     outputs: Vec<Output>,
     verdict: Verdict,
@@ -96,6 +100,7 @@ impl Bench {
         Self {
             session,
             basis: Basis::of(&setup),
+            plausibility: Plausibility::new(&setup.rig),
             engine: Engine::new(setup, FaultMemory::default()),
             outputs: Vec::new(),
             verdict: Verdict::default(),
@@ -116,6 +121,7 @@ impl Bench {
     }
 
     fn sample(&mut self, sample: Sample, line: u64) {
+        self.plausibility.take(&sample);
         self.engine.handle(Input::Sample(sample), &mut self.outputs);
         let mut outputs = std::mem::take(&mut self.outputs);
         for output in outputs.drain(..) {
@@ -150,8 +156,8 @@ impl Bench {
         self.faults.push(fault_view(&self.session, &self.basis, transition));
     }
 
-    /// The verdict; none when there was nothing to judge.
-    fn end(mut self) -> Option<Judged> {
+    /// The verdict, or why there was nothing to judge.
+    fn end(mut self) -> Result<Judged, String> {
         self.engine.handle(Input::End, &mut self.outputs);
         for output in std::mem::take(&mut self.outputs) {
             self.verdict.take(&output);
@@ -159,11 +165,20 @@ impl Bench {
                 self.transition(&transition);
             }
         }
-        let (first, last) = self.span_s?;
+        let misfits = self.plausibility.misfits();
+        let (first, last) = self.span_s.ok_or_else(|| no_row(&misfits))?;
         let summary =
             self.verdict.summary(&self.session, self.n_samples, self.n_rejected, last - first);
+        let summary = SummaryView { warnings: warnings(&misfits), ..summary };
         let estimates = self.engine.servo_estimates();
         let Self { faults, bad_rows, n_set_aside, .. } = self;
-        Some(Judged { faults, summary, bad_rows, n_set_aside, estimates })
+        Ok(Judged { faults, summary, bad_rows, n_set_aside, estimates, misfits })
     }
+}
+
+/// That no row could be used, and why if that shows.
+fn no_row(misfits: &[Misfit]) -> String {
+    let units = |m: &&Misfit| matches!(m, Misfit::Positions { .. } | Misfit::Commands { .. });
+    let why = misfits.iter().find(units).map_or_else(String::new, |m| format!(": {m}"));
+    format!("no usable row{why}")
 }

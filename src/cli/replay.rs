@@ -162,7 +162,7 @@ fn write_table(verdicts: &[&Verdicts]) -> anyhow::Result<()> {
         return Ok(());
     }
     let heading = ["session", "samples", "rejected", "seconds", "verdict"];
-    let mut summaries = table::table(&heading, &[1, 2, 3]);
+    let mut summaries = table::of_names(&heading, &[1, 2, 3]);
     for Verdicts { judged: session, .. } in verdicts {
         let s = &session.summary;
         summaries.add_row([
@@ -175,6 +175,9 @@ fn write_table(verdicts: &[&Verdicts]) -> anyhow::Result<()> {
     }
     for line in table::lines(&summaries) {
         writeln!(out, "{line}")?;
+    }
+    for Verdicts { judged, .. } in verdicts {
+        write_warnings(&mut out, judged, verdicts.len() > 1)?;
     }
     for Verdicts { judged, .. } in verdicts {
         write_sentences(&mut out, judged, verdicts.len() > 1)?;
@@ -201,6 +204,9 @@ fn verdict(session: &Judged) -> String {
     match (words.is_empty(), session.faults.is_empty()) {
         (false, _) => words.join(", "),
         (true, false) => "pending only".to_owned(),
+        (true, true) if session.misfits.iter().any(|m| m.prevents_judging()) => {
+            "not judged".to_owned()
+        }
         (true, true) => "no fault".to_owned(),
     }
 }
@@ -210,6 +216,19 @@ fn named(fault: &FaultView) -> String {
         .kind
         .as_ref()
         .map_or_else(|| fault.code.clone(), |kind| format!("{} ({kind})", fault.code))
+}
+
+/// A sentence for everything that does not fit.
+fn write_warnings(out: &mut impl Write, session: &Judged, several: bool) -> anyhow::Result<()> {
+    if session.misfits.is_empty() {
+        return Ok(());
+    }
+    let name = if several { session.summary.session.as_str() } else { "the data" };
+    writeln!(out, "\n{name} and the asset file do not fit:")?;
+    for misfit in &session.misfits {
+        writeln!(out, "{}", table::wrapped("  ", &misfit.to_string()))?;
+    }
+    Ok(())
 }
 
 /// A sentence for every change of a fault's status, under the session's name

@@ -1,5 +1,7 @@
 //! Tables for people: columns without rules, at most 80 characters wide.
 
+use std::io::IsTerminal;
+
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 
 /// Width of a table, characters: what every terminal has.
@@ -17,6 +19,16 @@ pub(super) fn table(heading: &[&str], right: &[usize]) -> Table {
         if right.contains(&i) {
             column.set_cell_alignment(CellAlignment::Right);
         }
+    }
+    table
+}
+
+/// The same of rows that begin with a file's name. Where stdout is no terminal
+/// nothing is broken over lines, however wide: programs look for the names.
+pub(super) fn of_names(heading: &[&str], right: &[usize]) -> Table {
+    let mut table = table(heading, right);
+    if !std::io::stdout().is_terminal() {
+        table.set_content_arrangement(ContentArrangement::Disabled);
     }
     table
 }

@@ -84,7 +84,7 @@ fn point(judged: &Judged, calibration_id: &str) -> TrendPointView {
 
 fn write_table(out: &mut impl Write, view: &TrendsView, judged: &[Judged]) -> anyhow::Result<()> {
     let heading = ["session", "axis", "gain", "offset, m/s²", "delay, ms", "motion, s"];
-    let mut points = table::table(&heading, &[2, 3, 4, 5]);
+    let mut points = table::of_names(&heading, &[2, 3, 4, 5]);
     for session in judged {
         for axis in Axis::ALL {
             points.add_row(row(session, axis));

@@ -7,14 +7,14 @@ use super::jobs::{Bench, Job};
 use super::playback::{Flow, play};
 use super::{Service, ServiceError, views};
 use crate::diagnosis::Profile;
-use crate::engine::{Engine, Input, Output, Rig, Setup};
+use crate::engine::{Engine, Input, Output, Plausibility, Rig, Setup};
 use crate::store::{JobState, Micros, ReplayRow, SessionRow, Store, Write};
 use crate::vocabulary::Invalid;
 use crate::wire::asset::{self, CalibrationView};
 use crate::wire::basis::Basis;
 use crate::wire::difference::{Compared, compare, tally};
 use crate::wire::service::{DifferenceView, ReplayResultView, ReplaySettingsView, ReplayView};
-use crate::wire::verdict::{FaultView, Verdict, fault_view};
+use crate::wire::verdict::{FaultView, SummaryView, Verdict, fault_view, warnings};
 
 /// Fault lines, and differences, in a result; more are left out, and it says so.
 const MAX_LINES: usize = 10_000;
@@ -196,6 +196,7 @@ fn judge(bench: &Bench, row: &ReplayRow) -> Result<Option<ReplayResultView>, Ser
     let setup = setup(&session, &settings, learnt.as_ref())?;
     let mut player = Player {
         basis: Basis::of(&setup),
+        plausibility: Plausibility::new(&setup.rig),
         engine: Engine::new(setup, views::memory(&session.baseline)?),
         session: &session,
         outputs: Vec::new(),
@@ -223,6 +224,7 @@ fn recorded(bench: &Bench, session: &SessionRow) -> Result<Vec<FaultView>, Servi
 
 struct Player<'a> {
     basis: Basis,
+    plausibility: Plausibility,
     engine: Engine,
     session: &'a SessionRow,
     outputs: Vec<Output>,
@@ -251,6 +253,9 @@ impl Player<'_> {
     }
 
     fn put(&mut self, input: Input) {
+        if let Input::Sample(sample) = &input {
+            self.plausibility.take(sample);
+        }
         self.outputs.clear();
         self.engine.handle(input, &mut self.outputs);
         for output in &self.outputs {
@@ -270,6 +275,8 @@ impl Player<'_> {
         let rejected = u64::try_from(progress.n_rejected).unwrap_or_default();
         let summary =
             self.verdict.summary(&self.session.name, self.n_samples, rejected, duration_s);
+        let warnings = warnings(&self.plausibility.misfits());
+        let summary = SummaryView { warnings, ..summary };
         let truncated = self.faults.len() > MAX_LINES || recorded.len() > MAX_LINES;
         let (mut faults, mut recorded) = (self.faults, recorded);
         faults.truncate(MAX_LINES);

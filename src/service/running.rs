@@ -10,7 +10,7 @@ use super::shard::Context;
 use super::telemetry::unjudged;
 use super::{ServiceError, trends, views};
 use crate::diagnosis::{FaultMemory, FaultRecord, MemoryRules};
-use crate::engine::{Admission, Engine, Input, Output, Rig, Setup};
+use crate::engine::{Admission, Engine, Input, Output, Plausibility, Rig, Setup};
 use crate::store::{
     ActionKind, ActionRow, AssetRow, FaultRow, Micros, Progress, SessionRow, TransitionRow, Write,
 };
@@ -19,7 +19,7 @@ use crate::wire::basis::Basis;
 use crate::wire::provenance::{ActView, OccurrenceView, ProvenanceView};
 use crate::wire::service::cleared_view;
 use crate::wire::telemetry::{AckView, RowView};
-use crate::wire::verdict::{SummaryView, Verdict, fault_view};
+use crate::wire::verdict::{SummaryView, Verdict, fault_view, warnings};
 use crate::wire::{asset, memory};
 
 /// How far a nameless device's clock must fall back to mean that it started
@@ -63,6 +63,8 @@ pub(super) struct OpenSession {
     pub(super) importing: bool,
     /// For those who watch.
     pub(super) recent: Recent,
+    /// Whether what comes can be of the rig that was described.
+    plausibility: Plausibility,
     verdict: Verdict,
     outputs: Vec<Output>,
     /// The latest time among the samples that were taken as they should be.
@@ -77,6 +79,7 @@ impl OpenSession {
             id,
             name,
             basis: Basis::of(&setup),
+            plausibility: Plausibility::new(&setup.rig),
             engine: Engine::new(setup, baseline),
             progress: Progress::default(),
             n_transitions: 0,
@@ -91,6 +94,7 @@ impl OpenSession {
 
     /// Puts one sample into the engine. Afterwards `outputs` is what followed.
     pub(super) fn take(&mut self, sample: &Sample) -> Option<Admission> {
+        self.plausibility.take(sample);
         self.outputs.clear();
         self.engine.handle(Input::Sample(*sample), &mut self.outputs);
         self.outputs.iter().for_each(|output| self.verdict.take(output));
@@ -178,7 +182,10 @@ impl OpenSession {
         let Progress { n_samples, n_rejected, first_t_s, last_t_s, .. } = self.progress;
         let duration_s = last_t_s.zip(first_t_s).map_or(0.0, |(last, first)| last - first);
         let count = |n: i64| u64::try_from(n).unwrap_or_default();
-        self.verdict.summary(&self.name, count(n_samples), count(n_rejected), duration_s)
+        let warnings = warnings(&self.plausibility.misfits());
+        let summary =
+            self.verdict.summary(&self.name, count(n_samples), count(n_rejected), duration_s);
+        SummaryView { warnings, ..summary }
     }
 }
 

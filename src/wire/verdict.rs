@@ -7,7 +7,7 @@ use utoipa::ToSchema;
 
 use super::basis::Basis;
 use crate::diagnosis::{Answer, AxisEvidence, Candidate, Evidence, Transition};
-use crate::engine::{Admission, Output};
+use crate::engine::{Admission, Misfit, Output};
 use crate::vocabulary::{Axis, FaultCode, FaultStatus};
 
 /// A change of a fault's status; or its kind, where that shows only after the
@@ -134,6 +134,28 @@ pub struct SummaryView {
     /// Codes confirmed in this session, in the order of confirmation.
     pub faults: Vec<String>,
     pub verdict_hash: String,
+    /// What in the data and the asset file cannot be of one rig; left out where
+    /// everything fits.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<WarningView>,
+}
+
+/// Something in which the data and the asset file do not fit.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct WarningView {
+    /// `rate`, `positions`, `commands`, `no_readings`, `no_commands`, `no_axis` or
+    /// `short`: no fault found means nothing then. `commands_held`, `one_axis`,
+    /// `swapped` or `wrong_sign`.
+    pub code: String,
+    /// The same in a sentence, with its numbers.
+    pub message: String,
+}
+
+/// The views of what does not fit.
+#[must_use]
+pub fn warnings(misfits: &[Misfit]) -> Vec<WarningView> {
+    let view = |m: &Misfit| WarningView { code: m.as_str().to_owned(), message: m.to_string() };
+    misfits.iter().map(view).collect()
 }
 
 /// The view of the transition of a status byte.
@@ -360,6 +382,7 @@ impl Verdict {
             duration_s,
             faults: self.confirmed.iter().map(ToString::to_string).collect(),
             verdict_hash: self.hash(),
+            warnings: Vec::new(),
         }
     }
 }

@@ -33,6 +33,32 @@ fn stdout_and_several_sessions_will_do() {
     assert_eq!(asset["calibration"]["data_sha256"].as_str().unwrap().len(), 64);
 }
 
+/// A healthy session with its columns changed: `t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m`.
+fn changed(bench: &Bench, name: &str, factors: [f64; 5]) {
+    bench.ok("simulate --rig rig.json --reference lissajous --seconds 30 --seed 7 -o healthy.csv");
+    let text = bench.read("healthy.csv");
+    let cell = |(field, factor): (&str, f64)| {
+        field.parse::<f64>().map_or_else(|_| field.to_owned(), |v| (v * factor).to_string())
+    };
+    let row = |line: &str| line.split(',').zip(factors).map(cell).collect::<Vec<_>>().join(",");
+    bench.write(name, &text.lines().map(row).collect::<Vec<_>>().join("\n"));
+}
+
+#[test]
+fn units_that_cannot_be_are_refused_and_suggested() {
+    let bench = Bench::new();
+    for (factors, words) in [
+        ([1e3, 1.0, 1.0, 1.0, 1.0], "is t_s in ms?"),
+        ([1.0, 57.3, 57.3, 1.0, 1.0], "is axes.command_unit_rad 0.0175?"),
+        ([1.0, 1.0, 1.0, 1e3, 1e3], "is axes.position_unit_m 0.001?"),
+    ] {
+        changed(&bench, "other.csv", factors);
+        let refused = bench.run(3, "calibrate --asset rig.json other.csv -o out.json");
+        assert!(refused.stderr.contains(words), "{}", refused.stderr);
+    }
+    assert!(!bench.path("out.json").exists());
+}
+
 #[test]
 fn what_cannot_be_learnt_is_refused_with_a_sentence_and_nothing_written() {
     let bench = Bench::new();

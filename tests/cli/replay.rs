@@ -107,6 +107,65 @@ fn bad_rows_are_named_and_counted_and_the_rest_is_judged() {
 }
 
 #[test]
+fn of_many_bad_rows_the_first_few_are_named_and_the_rest_is_counted() {
+    let bench = Bench::new();
+    bench.ok("simulate --seconds 5 -o good.csv");
+    let bad = "0,0,0,abc,0\n".repeat(112);
+    bench.write("bad.csv", &format!("{}{bad}", bench.read("good.csv")));
+    let told = bench.ok("replay bad.csv").stderr;
+    assert_eq!(told.lines().count(), 6, "{told}");
+    assert!(told.ends_with("bad.csv: 107 more rows rejected\n"), "{told}");
+}
+
+#[test]
+fn names_are_never_broken_where_stdout_is_no_terminal() {
+    let bench = Bench::new();
+    bench.ok("simulate --seconds 5 -o a.csv");
+    let long = format!("{}.csv", "a-session-with-quite-a-long-name-".repeat(4));
+    std::fs::copy(bench.path("a.csv"), bench.path(&long)).unwrap();
+    let table = bench.ok(&format!("replay a.csv {long}")).stdout;
+    assert_eq!(table.lines().filter(|line| line.contains(&long)).count(), 1, "{table}");
+    assert_eq!(table.lines().count(), 3, "{table}");
+}
+
+/// What was found of `name`: the codes of its warnings, and the text.
+fn warned(bench: &Bench, name: &str) -> (Vec<String>, String) {
+    let summary = bench.ok(&format!("replay --format json {name}")).summaries().remove(0);
+    let code = |w: &Value| w["code"].as_str().unwrap().to_owned();
+    let codes =
+        summary["warnings"].as_array().map_or_else(Vec::new, |w| w.iter().map(code).collect());
+    (codes, bench.ok(&format!("replay {name}")).stdout)
+}
+
+#[test]
+fn data_of_another_rig_is_not_judged_to_have_no_fault() {
+    let bench = Bench::new();
+    bench.ok("simulate --seconds 20 -o good.csv");
+    assert_eq!(warned(&bench, "good.csv").0, [""; 0]);
+    let rows = |change: &dyn Fn(&str) -> String| {
+        let text = bench.read("good.csv");
+        let (heading, rows) = text.split_once('\n').unwrap();
+        let rows: Vec<String> = rows.lines().map(change).collect();
+        bench.write("other.csv", &format!("{heading}\n{}\n", rows.join("\n")));
+    };
+    rows(&|row| {
+        let (t_s, rest) = row.split_once(',').unwrap();
+        format!("{},{rest}", 1e3 * t_s.parse::<f64>().unwrap())
+    });
+    let (codes, table) = warned(&bench, "other.csv");
+    assert_eq!(codes, ["rate"]);
+    assert!(table.contains("not judged") && table.contains("is t_s in ms?"), "{table}");
+    rows(&|row| row.split(',').take(3).chain(["1", "1"]).collect::<Vec<_>>().join(","));
+    let (codes, table) = warned(&bench, "other.csv");
+    assert_eq!(codes, ["positions"]);
+    assert!(table.contains("100 % of the positions lie outside the plate"), "{table}");
+    bench.ok("simulate --seconds 2 -o short.csv");
+    let (codes, table) = warned(&bench, "short.csv");
+    assert_eq!(codes, ["short"]);
+    assert!(table.contains("not judged") && !table.contains("no fault"), "{table}");
+}
+
+#[test]
 fn one_unusable_file_does_not_keep_the_others_from_being_judged() {
     let bench = Bench::new();
     bench.ok("simulate --seconds 3 -o a.csv");

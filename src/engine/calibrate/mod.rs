@@ -132,8 +132,10 @@ fn misfit(
     sessions: &[Vec<Sample>],
     wanted: impl Fn(Misfit) -> bool,
 ) -> Option<CannotCalibrate> {
+    // What an earlier calibration took for granted is open again.
+    let rig = Rig { calibration: None, ..rig.clone() };
     sessions.iter().zip(1..).find_map(|(samples, session)| {
-        let found = Plausibility::of(rig, samples).misfits().into_iter().find(|m| wanted(*m))?;
+        let found = Plausibility::of(&rig, samples).misfits().into_iter().find(|m| wanted(*m))?;
         Some(CannotCalibrate::Implausible { session, misfit: found })
     })
 }

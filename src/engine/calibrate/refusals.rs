@@ -53,8 +53,7 @@ fn motion_that_the_command_does_not_explain_is_told_by_its_cause() {
 #[test]
 fn no_refusal_shows_what_is_no_number() {
     for percent in [f64::NAN, f64::INFINITY] {
-        let words =
-            CannotCalibrate::TooLittleExcitation { axis: Axis::X, percent }.to_string();
+        let words = CannotCalibrate::TooLittleExcitation { axis: Axis::X, percent }.to_string();
         assert!(!words.contains("NaN") && !words.contains("inf"), "{words}");
     }
 }

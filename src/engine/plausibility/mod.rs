@@ -136,7 +136,10 @@ impl Misfit {
     pub const fn prevents_judging(self) -> bool {
         !matches!(
             self,
-            Self::CommandsHeld | Self::OneAxis { .. } | Self::Swapped { .. } | Self::WrongSign { .. }
+            Self::CommandsHeld
+                | Self::OneAxis { .. }
+                | Self::Swapped { .. }
+                | Self::WrongSign { .. }
         )
     }
 
@@ -230,6 +233,8 @@ struct Seen {
 #[derive(Clone, Debug)]
 pub struct Plausibility {
     rig: Rig,
+    /// The axes that the rig's calibration knows, if there is one.
+    learnt: Option<PerAxis<bool>>,
     span_s: Option<(f64, f64)>,
     periods: Periods,
     places: Places,
@@ -244,6 +249,7 @@ impl Plausibility {
     pub fn new(rig: &Rig) -> Self {
         Self {
             responses: Responses::new(rig.sample_rate_hz),
+            learnt: rig.calibration.as_ref().map(|c| c.axes.map(|axis| axis.is_some())),
             rig: Rig { calibration: None, ..rig.clone() },
             span_s: None,
             periods: Periods::default(),
@@ -387,14 +393,21 @@ impl Plausibility {
         (enough && !changed).then_some(Misfit::CommandsHeld)
     }
 
+    /// An axis that is not there, unless the rig is known to lack it.
     fn one_axis(&self) -> Option<Misfit> {
-        let lacks = |axis: &Axis| !self.seen[*axis].read || self.seen[*axis].command.is_none();
+        let known = |axis: Axis| self.learnt.is_none_or(|learnt| learnt[axis]);
+        let lacks = |&axis: &Axis| {
+            known(axis) && !(self.seen[axis].read && self.seen[axis].command.is_some())
+        };
         Axis::ALL.into_iter().find(lacks).map(|axis| Misfit::OneAxis { axis })
     }
 
     /// Axes that are swapped or have the wrong sign, where the data say so
-    /// clearly.
+    /// clearly. Of a rig that is learnt it is known: there it is the servo.
     fn answers(&self) -> Vec<Misfit> {
+        if self.learnt.is_some() {
+            return Vec::new();
+        }
         let answers = PerAxis::from_fn(|axis| self.responses.answers(axis));
         let are = |wanted: Answers| Axis::ALL.into_iter().filter(move |&a| answers[a] == wanted);
         let swap = self.rig.mapping.swap;

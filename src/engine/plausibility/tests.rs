@@ -60,10 +60,7 @@ fn positions_in_millimetres_or_centimetres_are_named() {
 #[test]
 fn positions_off_the_plate_are_named_without_a_guess_at_the_unit() {
     let off = changed(|s| s.x_m = s.x_m.map(|x| x + 0.3));
-    assert_eq!(
-        said(&off),
-        "100 % of the positions lie outside the plate of the asset file"
-    );
+    assert_eq!(said(&off), "100 % of the positions lie outside the plate of the asset file");
 }
 
 #[test]
@@ -99,6 +96,19 @@ fn swapped_axes_are_named_by_both() {
 fn a_wrong_sign_is_named_of_its_axis() {
     let wrong = changed(|s| scale(&mut s.y_m, -1.0));
     assert_eq!(misfits(&wrong), [Misfit::WrongSign { axis: Axis::Y, sign: 1.0 }]);
+}
+
+/// What is known of a rig is not asked again: a servo that answers the wrong way
+/// is then a fault, and an axis that is missing was never there.
+#[test]
+fn a_calibration_answers_for_the_axes() {
+    let mut rig = Rig::chapter("a");
+    let beam = changed(|s| s.y_m = None);
+    rig.calibration = Some(crate::engine::calibrate(&rig, &[beam.clone()], "", "").unwrap());
+    let found = |samples: &[Sample]| Plausibility::of(&rig, samples).misfits();
+    assert_eq!(found(&beam), []);
+    assert_eq!(found(&changed(|s| scale(&mut s.x_m, -1.0))), []);
+    assert_eq!(found(&changed(|s| s.x_m = None)), [Misfit::OneAxis { axis: Axis::X }]);
 }
 
 #[test]
