@@ -28,8 +28,8 @@ const RATE_FACTOR: f64 = 3.0;
 const MOST: f64 = 0.5;
 /// Share that must fit under another unit for that to be suggested.
 const FITS: f64 = 0.9;
-/// Share of the plate's half beyond which a position is in another unit rather
-/// than on a larger plate.
+/// How many times too small a plate must be entered for positions on it to count
+/// as far off: a plate measured wrong by as much is less likely than another unit.
 const FAR: f64 = 5.0;
 /// What a command may exceed its limit by: half a degree of rounding, rad.
 const ROUNDING_RAD: f64 = 0.009;
@@ -37,8 +37,9 @@ const ROUNDING_RAD: f64 = 0.009;
 const STEEP_RAD: f64 = std::f64::consts::FRAC_PI_4;
 /// Share of steep commands from which on they are not in radians.
 const SOME: f64 = 0.25;
-/// Length below which a session cannot confirm anything, s: a window, a failing
-/// second and its confirmation.
+/// Length below which "no fault" says nothing, s: a window must fill, and what
+/// fails must last, before most faults are confirmed (1 to 2 s, by `calibrate`'s own
+/// forecast on the chapter's rig).
 const LEAST_S: f64 = 3.0;
 /// Units of a position other than the stated one, in it: centimetres and
 /// millimetres for metres.
@@ -106,7 +107,8 @@ pub enum Misfit {
     )]
     Swapped { axis: Axis, swap: bool },
     #[error(
-        "{axis} moves against the command of {command}: is the sign wrong? (axes.{axis}_sign is {sign})",
+        "{axis} moves against the command of {command}: is the sign wrong (axes.{axis}_sign is {sign}), \
+         or does the servo answer the other way?",
         axis = axis.as_str(), command = axis.command()
     )]
     WrongSign { axis: Axis, sign: f64 },
