@@ -76,9 +76,9 @@ pub enum CannotCalibrate {
     )]
     Reversed { axis: Axis, gain: f64 },
     #[error(
-        "{axis}: the command of {command} explains only {percent:.0} % of the ball's motion, nor does that of \
-         the other axis or the opposite sign: it is noise, drag, stiction or somebody's hand; check the sensor, \
-         and that the recording is healthy",
+        "{axis}: the command of {command} explains only {percent:.0} % of the ball's motion, and neither the \
+         other axis nor the opposite sign clearly does: it is noise, drag, stiction or somebody's hand; \
+         check the sensor, and that the recording is healthy",
         axis = axis.as_str(), command = axis.command()
     )]
     Unexplained { axis: Axis, percent: f64 },

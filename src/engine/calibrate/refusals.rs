@@ -4,6 +4,8 @@ use proptest::prelude::*;
 
 use super::tests::session;
 use super::*;
+use crate::diagnosis::FaultMemory;
+use crate::engine::{Engine, Input, Setup};
 use crate::plant::steps;
 
 fn refused(rig: &Rig, sessions: &[Vec<Sample>]) -> String {
@@ -70,6 +72,19 @@ fn clock() -> impl Strategy<Value = (f64, Vec<(usize, f64)>)> {
         .prop_map(|(exponent, jumps)| (10_f64.powf(exponent), jumps))
 }
 
+/// The same of an engine that judges: five seconds in steps of a sliding ball.
+const MOST_JUDGED_STEPS: u64 = 500;
+
+/// A healthy session of 24 s at 25 Hz by such a clock.
+fn by_clock(scale: f64, jumps: &[(usize, f64)]) -> Vec<Sample> {
+    let mut samples: Vec<Sample> = session(24.0, 0.03, 1.0).into_iter().step_by(4).collect();
+    for (i, s) in samples.iter_mut().enumerate() {
+        s.t_s *= scale;
+        s.t_s += jumps.iter().filter(|(from, _)| i >= *from).map(|(_, by)| by).sum::<f64>();
+    }
+    samples
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 12, ..ProptestConfig::default() })]
 
@@ -78,12 +93,21 @@ proptest! {
         (scale, jumps) in clock(), is_scaled in any::<bool>(),
     ) {
         let rig = Rig { sample_rate_hz: 25.0, ..Rig::chapter("a") };
-        let mut samples: Vec<Sample> = session(24.0, 0.03, 1.0).into_iter().step_by(4).collect();
-        for (i, s) in samples.iter_mut().enumerate() {
-            s.t_s *= if is_scaled { scale } else { 1.0 };
-            s.t_s += jumps.iter().filter(|(from, _)| i >= *from).map(|(_, by)| by).sum::<f64>();
-        }
+        let samples = by_clock(if is_scaled { scale } else { 1.0 }, &jumps);
         let most = MOST_STEPS * samples.len() as u64;
         let _ = steps::within(most, || calibrate_and_foresee(&rig, &[samples], "", ""));
+    }
+
+    #[test]
+    fn judging_ends_whatever_the_clock_says((scale, jumps) in clock()) {
+        let rig = Rig { sample_rate_hz: 25.0, ..Rig::chapter("a") };
+        let samples = by_clock(scale, &jumps);
+        let mut engine = Engine::new(Setup::new(rig, None).unwrap(), FaultMemory::default());
+        let most = MOST_JUDGED_STEPS * samples.len() as u64;
+        steps::within(most, || {
+            let mut outputs = Vec::new();
+            samples.iter().for_each(|s| engine.handle(Input::Sample(*s), &mut outputs));
+            engine.handle(Input::End, &mut outputs);
+        });
     }
 }
