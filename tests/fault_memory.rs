@@ -59,10 +59,11 @@ async fn a_fault_says_all_that_is_known_of_it_and_a_restart_forgets_nothing() {
 async fn sessions_are_operation_cycles_and_the_in_use_ratio_outlives_clearing() {
     let mut bench = Bench::start().await;
     bench.client.asset("a").await;
-    // A minute of a ball that moves, a moment of one, and a minute without one.
+    // A minute of a ball that moves, a moment of one, shorter than the 0.4 s that any
+    // fault takes to be confirmed, and a minute without one.
     let unseen: Vec<Sample> =
         rig(6000, 6000).iter().map(|s| Sample { x_m: None, y_m: None, ..*s }).collect();
-    for (name, samples) in [("one", &rig(6000, 6000)), ("two", &rig(40, 40)), ("three", &unseen)] {
+    for (name, samples) in [("one", &rig(6000, 6000)), ("two", &rig(30, 30)), ("three", &unseen)] {
         bench.client.telemetry("a", Some(name), samples).await;
         bench.client.end("a", name).await;
     }

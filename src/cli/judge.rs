@@ -11,7 +11,7 @@ use crate::vocabulary::{PerAxis, Sample};
 use crate::wire::asset;
 use crate::wire::basis::Basis;
 use crate::wire::session_csv::{Reader, RowError};
-use crate::wire::verdict::{FaultView, SummaryView, Verdict, fault_view, warnings};
+use crate::wire::verdict::{FaultView, SummaryView, Verdict, fault_view};
 
 /// Most bad rows of a file that are named one by one; more are counted: what is
 /// wrong with a file shows in a few.
@@ -169,7 +169,9 @@ impl Bench {
         let (first, last) = self.span_s.ok_or_else(|| no_row(&misfits))?;
         let summary =
             self.verdict.summary(&self.session, self.n_samples, self.n_rejected, last - first);
-        let summary = SummaryView { warnings: warnings(&misfits), ..summary };
+        let summary = summary
+            .with_monitors(self.verdict.monitors(&self.engine.state()))
+            .with_misfits(&misfits);
         let estimates = self.engine.servo_estimates();
         let Self { faults, bad_rows, n_set_aside, .. } = self;
         Ok(Judged { faults, summary, bad_rows, n_set_aside, estimates, misfits })

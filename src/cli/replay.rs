@@ -1,6 +1,7 @@
 //! `offbd replay`: judges recordings.
 
 mod against;
+mod verdict;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -15,8 +16,6 @@ use super::table;
 use super::unusable::Unusable;
 use crate::diagnosis::Profile;
 use crate::engine::Setup;
-use crate::vocabulary::FaultStatus;
-use crate::wire::verdict::FaultView;
 
 /// Judges recorded sessions: which faults, when, on what evidence.
 ///
@@ -170,10 +169,14 @@ fn write_table(verdicts: &[&Verdicts]) -> anyhow::Result<()> {
             s.samples.to_string(),
             s.rejected.to_string(),
             format!("{:.1}", s.duration_s),
-            verdict(session),
+            verdict::words(session),
         ]);
     }
     for line in table::lines(&summaries) {
+        writeln!(out, "{line}")?;
+    }
+    writeln!(out)?;
+    for line in table::lines(&verdict::judged(verdicts.iter().map(|v| &v.judged))) {
         writeln!(out, "{line}")?;
     }
     for Verdicts { judged, .. } in verdicts {
@@ -188,34 +191,6 @@ fn write_table(verdicts: &[&Verdicts]) -> anyhow::Result<()> {
         }
     }
     Ok(out.flush()?)
-}
-
-/// The verdict on a session in a few words.
-fn verdict(session: &Judged) -> String {
-    let confirmed = FaultStatus::Confirmed.as_str();
-    let mut words: Vec<String> = Vec::new();
-    for code in &session.summary.faults {
-        let of_code = || session.faults.iter().filter(|f| f.code == *code && f.status == confirmed);
-        let Some(first) = of_code().next() else { continue };
-        // The kind may have shown only later.
-        let kind = of_code().find(|f| f.kind.is_some());
-        words.push(format!("{} at {:.2} s", named(kind.unwrap_or(first)), first.t_s));
-    }
-    match (words.is_empty(), session.faults.is_empty()) {
-        (false, _) => words.join(", "),
-        (true, false) => "pending only".to_owned(),
-        (true, true) if session.misfits.iter().any(|m| m.prevents_judging()) => {
-            "not judged".to_owned()
-        }
-        (true, true) => "no fault".to_owned(),
-    }
-}
-
-fn named(fault: &FaultView) -> String {
-    fault
-        .kind
-        .as_ref()
-        .map_or_else(|| fault.code.clone(), |kind| format!("{} ({kind})", fault.code))
 }
 
 /// A sentence for everything that does not fit.

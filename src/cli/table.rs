@@ -33,6 +33,11 @@ pub(super) fn of_names(heading: &[&str], right: &[usize]) -> Table {
     table
 }
 
+/// How much of a session was judged: its share, and the seconds.
+pub(super) fn judged(share: f64, seconds: f64) -> String {
+    format!("{:.0} % {seconds:.1} s", 100.0 * share)
+}
+
 /// The table as lines without trailing blanks.
 pub(super) fn lines(table: &Table) -> impl Iterator<Item = String> {
     table.lines().map(|line| line.trim_end().to_owned())

@@ -17,7 +17,7 @@ use tokio_tungstenite::tungstenite::http::header::AUTHORIZATION;
 
 use super::unusable::{self, Unusable};
 use super::{output, table};
-use crate::wire::service::StateView;
+use crate::wire::service::{MonitorView, StateView};
 use crate::wire::verdict::{AxisEvidenceView, FaultView};
 
 /// Follows an asset live: residuals against their limits, monitors, faults.
@@ -148,15 +148,19 @@ fn line(state: &StateView) -> String {
         None => format!("{name} -"),
     };
     let evidence = &state.evidence;
-    format!("{}  {}  {}", head(state), axis("x", &evidence.x), axis("y", &evidence.y))
+    let share = |m: &MonitorView| format!("{} {:.0} %", m.code, 100.0 * m.judged_share);
+    let judged: Vec<String> = state.monitors.iter().map(share).collect();
+    let (x, y) = (axis("x", &evidence.x), axis("y", &evidence.y));
+    format!("{}  {x}  {y}  judged {}", head(state), judged.join(", "))
 }
 
 /// A block that is drawn anew: a bar for each residual, the monitors.
 fn block(state: &StateView) -> Vec<String> {
     let evidence = &state.evidence;
-    let monitor = |m: &crate::wire::service::MonitorView| {
+    let monitor = |m: &MonitorView| {
         let off = if m.enabled { "" } else { " (not tested now)" };
-        format!("           {:<11} {:>4}{off}", m.code, m.counter)
+        let judged = table::judged(m.judged_share, m.judged_s);
+        format!("           {:<11} {:>4}  judged {judged}{off}", m.code, m.counter)
     };
     let mut lines = vec![head(state), bar("x", &evidence.x), bar("y", &evidence.y)];
     lines.extend(state.monitors.iter().map(monitor));

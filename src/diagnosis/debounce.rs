@@ -59,6 +59,16 @@ impl Pace {
     }
 }
 
+impl Pace {
+    /// Time that a lasting failure of `code` takes to be confirmed by `settings`,
+    /// where nothing else reads alike, s: debounce and confirmation.
+    #[must_use]
+    pub fn needed_s(code: FaultCode, settings: &Settings) -> f64 {
+        let Self { fail_s, confirm_s, .. } = Self::of(code, false, settings);
+        fail_s + confirm_s
+    }
+}
+
 /// What the counter came to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Qualified {

@@ -5,7 +5,7 @@
 //! servos. A monitor that is out of its depth is *not tested*, never *passed*.
 
 use super::stillness::{AxisStillness, Stillness};
-use super::{AxisEvidence, Candidate, Evidence, Limits, Profile, SensorLimits, Test};
+use super::{AxisEvidence, Candidate, Evidence, Limits, Profile, SensorLimits, Settings, Test};
 use crate::vocabulary::{Axis, FaultCode, FaultKind, PerAxis};
 
 /// The chapter's enable condition: command, rad, or measured acceleration,
@@ -35,9 +35,11 @@ const MISSING_SHARE: f64 = 0.5;
 /// been seen to scatter by for a while ([`SensorLimits::scatter_m`]).
 const NOISY: f64 = 3.5;
 
-/// Evidence against a servo that explains why a ball stands that was asked to
-/// move by it alone, nats: what makes it suspected.
-const EXPLAINED_NATS: f64 = 10.0;
+/// Share of a cause that reads alike, where nothing else tells the two apart: a
+/// ball that stands may do so because its servo is dead, identical readings may be
+/// those of a ball that stands. Chosen, not measured: either is rarer.
+const SERVO_SHARE: f64 = 0.4;
+const STUCK_SHARE: f64 = 0.3;
 
 /// Evidence against both servos at once that speaks for what they share, nats.
 const SHARED_NATS: f64 = 9.0;
@@ -46,9 +48,6 @@ const SHARED_NATS: f64 = 9.0;
 const BOTH_NATS: f64 = 30.0;
 /// Speed below which a ball counts as held back, m/s.
 const HELD_BACK_M_S: f64 = 0.03;
-
-/// Seconds for which a jump of the readings counts as evidence.
-const JUMP_S: f64 = 2.0;
 
 /// What the monitors look at besides the evidence.
 #[derive(Clone, Copy, Debug)]
@@ -63,8 +62,8 @@ pub struct Surroundings {
     pub rim_s: f64,
     /// Whether it was last seen at an edge without a rim: it is falling.
     pub over_the_edge: bool,
-    /// Seconds since readings stepped as no ball can; infinite if never.
-    pub since_jump_s: f64,
+    /// Whether readings have stepped of late as no ball can.
+    pub jumped: bool,
     /// Scatter of the readings that is noise, m.
     pub noisy_m: f64,
 }
@@ -104,12 +103,23 @@ pub struct Evaluator {
     profile: Profile,
     limits: PerAxis<Limits>,
     sensor: SensorLimits,
+    /// Evidence that makes each servo suspected, nats: it explains why a ball
+    /// stands that was asked to move by it alone.
+    suspect_nats: PerAxis<f64>,
 }
 
 impl Evaluator {
+    /// The monitors by these limits, with the evidence that [`Settings`] ask for.
     #[must_use]
     pub fn new(profile: Profile, limits: PerAxis<Limits>, sensor: SensorLimits) -> Self {
-        Self { profile, limits, sensor }
+        let suspect_nats = PerAxis::from_fn(|_| Settings::of(profile).suspect_nats);
+        Self { profile, limits, sensor, suspect_nats }
+    }
+
+    /// The same where it takes `suspect_nats` to suspect each servo, nats.
+    #[must_use]
+    pub fn with_suspicion(self, suspect_nats: PerAxis<f64>) -> Self {
+        Self { suspect_nats, ..self }
     }
 
     /// The limits in force.
@@ -160,7 +170,7 @@ impl Evaluator {
         let sensor = self.sensor(evidence, readings, around);
         let stuck = match sensor.test {
             Test::Prefailed => Finding::default(),
-            _ => stuck_ball(evidence, readings, around).or(held_back(evidence, around)),
+            _ => self.stuck_ball(evidence, readings, around).or(held_back(evidence, around)),
         };
         let blind = [sensor, stuck].iter().any(|f| f.test == Test::Prefailed);
         let servo = |axis| match blind {
@@ -195,7 +205,7 @@ impl Evaluator {
         if readings.unseen_s > 0.0 {
             return Finding::default();
         }
-        if around.since_jump_s < JUMP_S {
+        if around.jumped {
             return Finding::fail(Some(FaultKind::Jump));
         }
         if readings.outliers() >= self.sensor.outliers {
@@ -223,8 +233,8 @@ impl Evaluator {
             Axis::ALL.into_iter().filter(|&a| seen(a)).all(|a| axes[a].identical_s >= FROZEN_S);
         if both && any(&dead) {
             let moved = any(&|a| self.missed(&axes[a]));
-            let rival = Candidate { code: FaultCode::StuckBall, kind: None, weight: 0.3 };
-            let rival = (!moved).then_some(rival);
+            let stuck = Candidate { code: FaultCode::StuckBall, kind: None, weight: STUCK_SHARE };
+            let rival = (!moved).then_some(stuck);
             return Some(Finding { rival, ..Finding::fail(Some(FaultKind::Frozen)) });
         }
         let alone = |axis: Axis| dead(axis) && axes[axis.other()].identical_s < FROZEN_S / 2.0;
@@ -243,6 +253,41 @@ impl Evaluator {
         let asked = still.pressed_s >= FROZEN_S || self.missed(still);
         let resting = limits.rest_repeat_s.is_some_and(|s| still.identical_s >= s);
         resting || asked && still.identical_s >= limits.repeat_s
+    }
+
+    /// The ball stands still although it is asked to move. Asked along one axis
+    /// alone, it may stand because that servo does not answer: evidence gathered
+    /// while the ball still rolled says so.
+    fn stuck_ball(
+        &self,
+        evidence: &Evidence,
+        readings: &Stillness,
+        around: &Surroundings,
+    ) -> Finding {
+        if around.at_edge || readings.unseen_s > 0.0 {
+            return Finding::default();
+        }
+        let pressed = |axis: Axis| readings.axes[axis].pressed_s >= PRESSED_S;
+        match (pressed(Axis::X), pressed(Axis::Y)) {
+            _ if readings.still_s() < PRESSED_S => Finding::PASS,
+            (true, true) => Finding::fail(None),
+            (false, false) => Finding::default(),
+            (true, false) => self.stuck_or_servo(Axis::X, evidence),
+            (false, true) => self.stuck_or_servo(Axis::Y, evidence),
+        }
+    }
+
+    /// A ball that stands though it is asked to move along `axis` alone. The
+    /// servo's weight rises with the evidence against it, up to all of it at what
+    /// makes it suspected: then it explains why the ball stands.
+    fn stuck_or_servo(&self, axis: Axis, evidence: &Evidence) -> Finding {
+        let share = (evidence.axes[axis].nats / self.suspect_nats[axis]).max(0.0);
+        if share >= 1.0 {
+            return Finding::default();
+        }
+        let weight = SERVO_SHARE + (1.0 - SERVO_SHARE) * share;
+        let servo = Candidate { code: FaultCode::servo(axis), kind: Some(FaultKind::Dead), weight };
+        Finding { rival: Some(servo), ..Finding::fail(None) }
     }
 }
 
@@ -298,30 +343,6 @@ fn held_back(evidence: &Evidence, around: &Surroundings) -> Option<Finding> {
         .then(|| Finding { nats: Some(x.nats + y.nats), ..Finding::fail(None) })
 }
 
-/// The ball stands still although it is asked to move. Asked along one axis
-/// alone, it may stand because that servo does not answer: evidence gathered
-/// while the ball still rolled says so.
-fn stuck_ball(evidence: &Evidence, readings: &Stillness, around: &Surroundings) -> Finding {
-    if around.at_edge || readings.unseen_s > 0.0 {
-        return Finding::default();
-    }
-    let pressed = |axis: Axis| readings.axes[axis].pressed_s >= PRESSED_S;
-    match (pressed(Axis::X), pressed(Axis::Y)) {
-        _ if readings.still_s() < PRESSED_S => Finding::PASS,
-        (true, true) => Finding::fail(None),
-        (false, false) => Finding::default(),
-        (x_pressed, _) => {
-            let axis = if x_pressed { Axis::X } else { Axis::Y };
-            if evidence.axes[axis].nats >= EXPLAINED_NATS {
-                return Finding::default();
-            }
-            let kind = Some(FaultKind::Dead);
-            let rival = Candidate { code: FaultCode::servo(axis), kind, weight: 0.4 };
-            Finding { rival: Some(rival), ..Finding::fail(None) }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::stillness::Reading;
@@ -334,7 +355,7 @@ mod tests {
         rim: None,
         rim_s: 0.0,
         over_the_edge: false,
-        since_jump_s: f64::INFINITY,
+        jumped: false,
         noisy_m: 1.0,
     };
 
@@ -364,8 +385,8 @@ mod tests {
     }
 
     /// A ball that stands in the middle and is asked to move along x alone, by a
-    /// servo that has so much evidence against it.
-    fn standing(nats: f64) -> Test {
+    /// servo that has `nats` against it where `suspect_nats` make it suspected.
+    fn standing(nats: f64, suspect_nats: f64) -> Finding {
         let reading = Reading {
             dt: 0.5,
             position_m: PerAxis { x: Some(0.0), y: Some(0.0) },
@@ -379,13 +400,29 @@ mod tests {
         let x = AxisEvidence { nats, ..AxisEvidence::default() };
         let evidence =
             Evidence { axes: PerAxis { x, y: AxisEvidence::default() }, ..Evidence::default() };
-        stuck_ball(&evidence, &readings, &CLEAR).test
+        let wide = Limits::new(Profile::Default, None, false, 7.0);
+        let evaluator =
+            Evaluator::new(Profile::Default, PerAxis::from_fn(|_| wide), SensorLimits::new(None));
+        let evaluator = evaluator.with_suspicion(PerAxis::from_fn(|_| suspect_nats));
+        evaluator.stuck_ball(&evidence, &readings, &CLEAR)
     }
 
     #[test]
     fn a_servo_that_was_suspected_while_the_ball_rolled_explains_why_it_stands() {
-        assert_eq!(standing(0.0), Test::Prefailed);
-        assert_eq!(standing(EXPLAINED_NATS), Test::NotTested);
+        assert_eq!(standing(0.0, 10.0).test, Test::Prefailed);
+        assert_eq!(standing(10.0, 10.0).test, Test::NotTested);
+    }
+
+    /// An owner who asks for more evidence has the servo suspected later.
+    #[test]
+    fn a_rival_weighs_by_the_evidence_that_is_asked_for() {
+        let weight = |nats, suspect| standing(nats, suspect).rival.map_or(1.0, |r| r.weight);
+        let found = [(0.0, 10.0), (5.0, 10.0), (5.0, 20.0), (10.0, 20.0), (20.0, 20.0)];
+        let wanted = [0.4, 0.7, 0.55, 0.7, 1.0];
+        for ((nats, suspect), wanted) in found.into_iter().zip(wanted) {
+            let found = weight(nats, suspect);
+            assert!((found - wanted).abs() < 1e-12, "{nats} of {suspect}: {found}");
+        }
     }
 
     /// Readings that scatter by 2 mm, of a ball that is clear of the edge and

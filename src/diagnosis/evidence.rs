@@ -1,7 +1,7 @@
 //! What speaks for a fault: the numbers at one moment, and the suspicion that
 //! they lead to.
 
-use super::Answer;
+use super::{Answer, Step};
 use crate::vocabulary::{Axis, FaultCode, FaultKind, PerAxis, SimTime};
 
 /// One axis at one moment. Accelerations are over the estimation window.
@@ -26,6 +26,8 @@ pub struct AxisEvidence {
     pub nats: f64,
     /// How the servo has answered its command of late.
     pub answer: Option<Answer>,
+    /// Seconds for which the readings along this axis have been bit-identical.
+    pub identical_s: f64,
 }
 
 impl AxisEvidence {
@@ -53,6 +55,8 @@ pub struct Evidence {
     pub axes: PerAxis<AxisEvidence>,
     /// Seconds for which no ball has been seen.
     pub unseen_s: f64,
+    /// Share of the samples of the last seconds without a ball, 0 to 1.
+    pub missing_share: f64,
     /// Seconds for which the readings have been bit-identical.
     pub identical_s: f64,
     /// Seconds for which the ball has stood still within the noise.
@@ -61,6 +65,11 @@ pub struct Evidence {
     pub outliers: u32,
     /// Standard deviation of the readings about their fit, m.
     pub scatter_m: Option<f64>,
+    /// The same of healthy readings, the worse of both axes, m: learnt, or
+    /// assumed on a rig that is not.
+    pub healthy_scatter_m: f64,
+    /// The step of the readings that the sensor is blamed for, if one is.
+    pub jump: Option<Step>,
 }
 
 /// One possible cause and how much of the evidence speaks for it.

@@ -50,15 +50,22 @@ impl InUse {
     const DATA_FACTOR: f64 = 10.0;
 
     /// Counts a cycle that ends, with `data_s` seconds of data and the gate
-    /// open for `enabled_s` of them, for a fault that takes `needed_s` to be
+    /// open for `judged_s` of them, for a fault that takes `needed_s` to be
     /// confirmed. A cycle that judged had enough data, so that
     /// `judged` ≤ `with_data` ≤ `cycles`.
-    pub fn count(&mut self, data_s: f64, enabled_s: f64, needed_s: f64) {
-        let judged = enabled_s > 0.0 && enabled_s >= needed_s;
+    pub fn count(&mut self, data_s: f64, judged_s: f64, needed_s: f64) {
+        let judged = Self::judges(judged_s, needed_s);
         let with_data = judged || (data_s > 0.0 && data_s >= Self::DATA_FACTOR * needed_s);
         self.cycles = self.cycles.saturating_add(1);
         self.with_data = self.with_data.saturating_add(u32::from(with_data));
         self.judged = self.judged.saturating_add(u32::from(judged));
+    }
+
+    /// Whether `judged_s` seconds with the gate open are long enough to have found
+    /// a fault that takes `needed_s` to be confirmed.
+    #[must_use]
+    pub fn judges(judged_s: f64, needed_s: f64) -> bool {
+        judged_s > 0.0 && judged_s >= needed_s
     }
 
     /// Judged cycles over those with data, 0 to 1; none before there is one.
@@ -255,8 +262,8 @@ impl FaultMemory {
 
     /// Takes note of how much of the cycle that ends `code` could be judged;
     /// see [`InUse::count`].
-    pub fn count_use(&mut self, code: FaultCode, data_s: f64, enabled_s: f64, needed_s: f64) {
-        self.record_mut(code).in_use.count(data_s, enabled_s, needed_s);
+    pub fn count_use(&mut self, code: FaultCode, data_s: f64, judged_s: f64, needed_s: f64) {
+        self.record_mut(code).in_use.count(data_s, judged_s, needed_s);
     }
 
     /// Erases everything stored of `code`: it has never run. How often its

@@ -25,7 +25,7 @@ pub use evaluator::{Evaluator, Finding, Surroundings};
 pub use evidence::{AxisEvidence, Candidate, Evidence, Suspicion, Transition};
 pub use limits::{Limits, SensorLimits};
 pub use memory::{FaultMemory, FaultRecord, InUse, MemoryRules};
-pub use outlier::{Gated, OutlierGate};
+pub use outlier::{Gated, OutlierGate, Step};
 pub use scatter::Scatter;
 pub use servo::{Answer, AxisNature, Course, LearntNature, Servo, ServoEstimate};
 pub use settings::{Profile, Settings};

@@ -29,6 +29,15 @@ const SHOVE_M_S2: f64 = 2.0;
 const BELIEVED_AFTER: u32 = 4;
 const BELIEVED_AFTER_S: f64 = 0.12;
 
+/// A step of the readings that no ball can make.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Step {
+    /// The first reading beyond it, s on the device's clock.
+    pub at_s: f64,
+    /// How far the readings went, m.
+    pub size_m: f64,
+}
+
 /// What became of a reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Gated {
@@ -39,7 +48,7 @@ pub enum Gated {
     /// Not to be used: an outlier, or the first of a new path.
     Refused,
     /// Accepted after all, on a path that does not meet the old one.
-    Stepped,
+    Stepped(Step),
 }
 
 impl Gated {
@@ -198,9 +207,9 @@ impl OutlierGate {
             }
             let doubtful = off_m > reach(track.at_s) / 2.0;
             self.before = doubtful.then_some(track);
-            if self.stepped(&track, t_s, position_m, noise_m) {
+            if let Some(step) = self.stepped(&track, t_s, position_m, noise_m) {
                 self.follow(Track::start(t_s, position_m, BELIEVED_AFTER));
-                return Gated::Stepped;
+                return Gated::Stepped(step);
             }
             return self.accept(track.followed_by(t_s, position_m));
         }
@@ -214,15 +223,22 @@ impl OutlierGate {
         self.refuse(t_s, position_m, staying, &track, noise_m)
     }
 
-    /// Whether accepted readings have stayed beside the track that they left.
-    fn stepped(&mut self, track: &Track, t_s: f64, position_m: Vector2<f64>, noise_m: f64) -> bool {
+    /// The step, if accepted readings have stayed beside the track that they left.
+    fn stepped(
+        &mut self,
+        track: &Track,
+        t_s: f64,
+        position_m: Vector2<f64>,
+        noise_m: f64,
+    ) -> Option<Step> {
         if let Some(leap) = self.leap {
             let stays = leap.is_step(t_s, position_m);
             let long = t_s - leap.at_s >= BELIEVED_AFTER_S;
             if long || !stays {
                 self.leap = None;
             }
-            return stays && long;
+            let step = Step { at_s: leap.at_s, size_m: leap.off_m.norm() };
+            return (stays && long).then_some(step);
         }
         let off_m = track.off(t_s, position_m);
         let unseen_s = t_s - track.at_s;
@@ -230,7 +246,7 @@ impl OutlierGate {
         if off_m.amax() > allowed_m && track.n >= BELIEVED_AFTER {
             self.leap = Some(Leap { before: *track, at_s: t_s, off_m });
         }
-        false
+        None
     }
 
     /// Adds the straight line through (`t_s`, `position_m`) with slope
@@ -288,11 +304,13 @@ impl OutlierGate {
         let accepted = self.accept(Track::start(t_s, position_m, n));
         let unseen_s = there.since_s - track.at_s;
         let bent_m = SHOVE_M_S2 * unseen_s * unseen_s;
-        let apart = step_m(track, &there) > NOISE_FACTOR * noise_m + STEP_M + bent_m;
+        let step_m = step_m(track, &there);
+        let apart = step_m.amax() > NOISE_FACTOR * noise_m + STEP_M + bent_m;
         let bent_m_s = (there.velocity_m_s() - track.velocity_m_s).amax();
-        let straight = bent_m_s * BENT_S < step_m(track, &there);
+        let straight = bent_m_s * BENT_S < step_m.amax();
         let stepped = apart && straight && track.n >= BELIEVED_AFTER;
-        if stepped { Gated::Stepped } else { accepted }
+        let step = Step { at_s: there.since_s, size_m: step_m.norm() };
+        if stepped { Gated::Stepped(step) } else { accepted }
     }
 
     /// Forgets where the ball was, as after a gap.
@@ -313,14 +331,14 @@ impl OutlierGate {
 }
 
 /// Least distance between the old path, carried on, and the new one, carried
-/// back, over the time between them: zero for a push.
-fn step_m(track: &Track, there: &Elsewhere) -> f64 {
+/// back, over the time between them, along each axis: zero for a push.
+fn step_m(track: &Track, there: &Elsewhere) -> Vector2<f64> {
     let velocity = (there.position_m - there.first_m) / (there.at_s - there.since_s);
     let between_s = there.since_s - track.at_s;
     let early = there.first_m - velocity * between_s - track.position_m;
     let late = there.first_m - (track.position_m + track.velocity_m_s * between_s);
     let apart = |e: f64, l: f64| if e * l <= 0.0 { 0.0 } else { e.abs().min(l.abs()) };
-    early.zip_map(&late, apart).amax()
+    early.zip_map(&late, apart)
 }
 
 #[cfg(test)]
@@ -350,7 +368,8 @@ mod tests {
         for i in 3..9 {
             assert_eq!(take(i, 0.2), Gated::Refused, "{i}");
         }
-        assert_eq!(take(9, 0.2), Gated::Stepped);
+        let Gated::Stepped(step) = take(9, 0.2) else { panic!("it has stayed there") };
+        assert!((step.at_s - 0.06).abs() < 1e-12 && (step.size_m - 0.2).abs() < 2e-3, "{step:?}");
         assert_eq!(take(10, 0.2), Gated::Accepted { outliers: 0, undone: false });
     }
 
@@ -370,7 +389,7 @@ mod tests {
         gate.take(0.0, along_x(0.1), 1e-3);
         for i in 1..100 {
             let gated = gate.take(f64::from(i) * 0.02, along_x(0.0), 1e-3);
-            assert_ne!(gated, Gated::Stepped, "{i}");
+            assert!(!matches!(gated, Gated::Stepped(_)), "{i}");
         }
     }
 
@@ -416,7 +435,7 @@ mod tests {
             let t = f64::from(i) * 0.01;
             // From rest to 1.2 m/s at once, between two readings.
             let gated = gate.take(t, along_x(1.2 * (t - 0.504).max(0.0)), 1e-4);
-            assert_ne!(gated, Gated::Stepped, "{t}");
+            assert!(!matches!(gated, Gated::Stepped(_)), "{t}");
         }
     }
 }

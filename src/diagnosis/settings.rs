@@ -187,13 +187,14 @@ impl Settings {
         Ok(Self { confirm_nats, suspect_nats, ..self })
     }
 
-    /// The same with the debounce before a failure set to `fail_s` in [0, 60] s.
+    /// The same with the debounce before a failure set to `fail_s` in [0, 60] s,
+    /// for every monitor: servos, ball and sensor.
     ///
     /// # Errors
     /// [`Invalid`] naming `/diagnostics/debounce_s`.
     pub fn with_debounce(self, fail_s: f64) -> Result<Self, Invalid> {
         let fail_s = in_range("/diagnostics/debounce_s", fail_s, 0.0..=60.0)?;
-        Ok(Self { fail_s, gather_s: fail_s, ..self })
+        Ok(Self { fail_s, readings_fail_s: fail_s, gather_s: fail_s, ..self })
     }
 }
 

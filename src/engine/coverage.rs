@@ -5,6 +5,7 @@ use crate::vocabulary::{Axis, FaultCode, Sample};
 /// Seconds of data so far. A gap between two samples does not count.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Coverage {
+    first_s: Option<f64>,
     last_s: Option<f64>,
     /// With a sample, s.
     sampled_s: f64,
@@ -16,6 +17,7 @@ impl Coverage {
     /// Takes the next sample in order; one more than `gap_s` seconds after the
     /// last begins anew.
     pub fn take(&mut self, sample: &Sample, gap_s: f64) {
+        self.first_s.get_or_insert(sample.t_s);
         let dt = self.last_s.replace(sample.t_s).map_or(0.0, |last_s| sample.t_s - last_s);
         if !(0.0..=gap_s).contains(&dt) {
             return;
@@ -24,6 +26,14 @@ impl Coverage {
         if Axis::ALL.into_iter().any(|axis| sample.position(axis).is_some()) {
             self.seen_s += dt;
         }
+    }
+
+    /// `judged_s` seconds as a share of the session from its first sample to its
+    /// last, gaps included: in a gap nothing is judged either. A judgement counts
+    /// for the period before it, which may begin before the first sample.
+    pub fn share(&self, judged_s: f64) -> f64 {
+        let session_s = self.last_s.zip(self.first_s).map_or(0.0, |(last, first)| last - first);
+        if session_s > 0.0 { (judged_s / session_s).min(1.0) } else { 0.0 }
     }
 
     /// Seconds that the monitor of `code` could have judged, had its gate
@@ -50,5 +60,6 @@ mod tests {
         }
         assert_eq!(coverage.data_s(FaultCode::Sensor), 0.75);
         assert_eq!(coverage.data_s(FaultCode::XServo), 0.5);
+        assert_eq!([0.0, 3.7, 99.0].map(|s| coverage.share(s)), [0.0, 0.4, 1.0]);
     }
 }

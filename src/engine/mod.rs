@@ -21,7 +21,7 @@ mod watch;
 pub use calibrate::{CannotCalibrate, calibrate, calibrate_and_foresee};
 pub use plausibility::{Misfit, Plausibility};
 pub use rig::{AxisMapping, DiagnosticsSpec, MAX_NAME, Rig, ServoSpec, Setup};
-pub use types::{Admission, Input, MonitorState, Output, Readiness, Rejection, State};
+pub use types::{Admission, Input, MonitorState, Output, Reach, Readiness, Rejection, State};
 
 use admit::Admit;
 use align::Align;
@@ -137,7 +137,7 @@ impl Engine {
         while let Some(next) = self.align.flush() {
             self.judge(&next, outputs, seen);
         }
-        self.count_use();
+        self.pipeline.count_use(&self.coverage, &mut self.memory);
         let before = self.memory.clone();
         self.memory.end_cycle(&self.setup.settings.memory);
         let Some(at) = self.pipeline.now() else { return };
@@ -172,19 +172,9 @@ impl Engine {
         self.pipeline.servo_estimates()
     }
 
-    /// Takes note of how much of this session each monitor could judge.
-    fn count_use(&mut self) {
-        let (state, settings) = (self.state(), &self.setup.settings);
-        let needed_s = settings.fail_s + settings.confirm_s;
-        for (&code, monitor) in FaultCode::ALL.iter().zip(&state.monitors) {
-            let data_s = self.coverage.data_s(code);
-            self.memory.count_use(code, data_s, monitor.enabled_s, needed_s);
-        }
-    }
-
     /// Where the engine stands after the last judged sample.
     #[must_use]
     pub fn state(&self) -> State {
-        self.pipeline.state(&self.memory, self.align.n_waiting())
+        self.pipeline.state(&self.memory, &self.coverage, self.align.n_waiting())
     }
 }

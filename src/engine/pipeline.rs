@@ -5,14 +5,15 @@
 
 use nalgebra::Vector2;
 
+use super::coverage::Coverage;
 use super::frame::{self, Moment, Repeats};
 use super::look::Look;
 use super::watch::Watch;
-use super::{MonitorState, Output, Readiness, Rig, Setup, State};
+use super::{MonitorState, Output, Reach, Readiness, Rig, Setup, State};
 use crate::diagnosis::{
-    AxisEvidence, AxisNature, Course, Evaluator, Evidence, FaultMemory, Finding, Gated,
-    LearntNature, Limits, OutlierGate, Profile, Qualified, Reading, Scatter, SensorLimits, Servo,
-    ServoEstimate, Settings, Stillness, Surroundings, Test,
+    AxisEvidence, AxisNature, Course, Evaluator, Evidence, FaultMemory, Finding, Gated, InUse,
+    LearntNature, Limits, OutlierGate, Pace, Profile, Qualified, Reading, Scatter, SensorLimits,
+    Servo, ServoEstimate, Settings, Step, Stillness, Surroundings, Test,
 };
 use crate::plant::{LONGEST_SPAN_S, RollingState, Twin};
 use crate::vocabulary::{Axis, FaultCode, PerAxis, Sample, SimTime};
@@ -41,6 +42,9 @@ const GUST_M_S2: f64 = 0.03;
 const TIMING_SHARE: f64 = 0.1;
 /// What one reading may add to the scatter, in limits of it.
 const SCATTER_LIMITS: f64 = 2.0;
+/// Seconds for which a jump of the readings counts as evidence, beyond the
+/// debounce that the owner asks for.
+const JUMP_S: f64 = 2.0;
 /// Stillness after which a ball counts as at rest, s.
 const RESTING_S: f64 = 0.25;
 /// Share of the time after which identical readings are frozen from which on
@@ -70,6 +74,8 @@ pub struct Pipeline {
     rim: Option<Axis>,
     rim_s: f64,
     since_jump_s: f64,
+    /// The last step of the readings, if there was one.
+    jump: Option<Step>,
     /// Scatter of the readings that is noise now, m.
     noisy_m: f64,
     unjudged_s: f64,
@@ -117,7 +123,12 @@ impl Pipeline {
             settings,
             twin: Twin::new(setup.twin),
             confirm_nats,
-            evaluator: Evaluator::new(settings.profile, limits, sensor),
+            // What makes each servo suspected goes with what confirms its fault.
+            evaluator: Evaluator::new(settings.profile, limits, sensor).with_suspicion(
+                PerAxis::from_fn(|a| {
+                    settings.suspect_nats * confirm_nats[a] / settings.confirm_nats
+                }),
+            ),
             now: None,
             period_s: None,
             gate: OutlierGate::default(),
@@ -132,6 +143,7 @@ impl Pipeline {
             rim: None,
             rim_s: 0.0,
             since_jump_s: f64::INFINITY,
+            jump: None,
             noisy_m: 0.0,
             unjudged_s: f64::INFINITY,
             evidence: Evidence::default(),
@@ -291,9 +303,10 @@ impl Pipeline {
         let off = |axis: Axis| moment.position[axis].map(|p| p - predicted[axis as usize]);
         let gated = self.gate.take(t, PerAxis::from_fn(off), self.gate_noise_m());
         match gated {
-            Gated::Stepped => {
+            Gated::Stepped(step) => {
                 self.forget();
                 self.since_jump_s = 0.0;
+                self.jump = Some(step);
             }
             // The window holds a reading that should not be in it.
             Gated::Accepted { undone: true, .. } => self.forget(),
@@ -343,7 +356,9 @@ impl Pipeline {
     /// Stage: stillness, missing and identical readings.
     fn watch_readings(&mut self, moment: &Moment, dt: f64, usable: bool, outliers: u32) {
         let limits = *self.evaluator.limits();
-        let pressed = PerAxis::from_fn(|a| self.pull_m_s2(a) > limits[a].pressing_m_s2());
+        let pressed = PerAxis::from_fn(|a| {
+            moment.command[a].is_some() && self.pull_m_s2(a) > limits[a].pressing_m_s2()
+        });
         self.readings.update(&Reading {
             dt,
             position_m: moment.position,
@@ -373,7 +388,7 @@ impl Pipeline {
         for (i, axis) in Axis::ALL.into_iter().enumerate() {
             let servo = &mut self.servos[axis];
             match moment.position[axis] {
-                _ if self.at_edge => servo.pause(),
+                _ if self.at_edge || moment.command[axis].is_none() => servo.pause(),
                 Some(_) if !answers[axis] => servo.pause(),
                 Some(position) if usable => {
                     let course = Course {
@@ -430,10 +445,13 @@ impl Pipeline {
             window_s,
             axes: PerAxis::from_fn(see),
             unseen_s: self.readings.unseen_s,
+            missing_share: self.readings.missing,
             identical_s: self.readings.identical_s(),
             still_s: self.readings.still_s(),
             outliers: self.readings.outliers().round() as u32,
             scatter_m: Axis::ALL.into_iter().filter_map(scatter).reduce(f64::max),
+            healthy_scatter_m: self.noise_m(),
+            jump: self.jump.filter(|_| self.jumped()),
         };
     }
 
@@ -461,6 +479,7 @@ impl Pipeline {
             enabled: false,
             nats: servo.nats(),
             answer: (self.settings.profile == Profile::Default).then(|| servo.answer()),
+            identical_s: self.readings.axes[axis].identical_s,
         }
     }
 
@@ -482,14 +501,19 @@ impl Pipeline {
         self.evaluator.noisy_m((x * x + y * y).sqrt() * within_s)
     }
 
-    const fn surroundings(&self) -> Surroundings {
+    /// Whether readings have stepped of late as no ball can.
+    fn jumped(&self) -> bool {
+        self.since_jump_s < JUMP_S + self.settings.gather_s
+    }
+
+    fn surroundings(&self) -> Surroundings {
         Surroundings {
             clear_s: self.clear_s,
             at_edge: self.at_edge,
             rim: self.rim,
             rim_s: self.rim_s,
             over_the_edge: self.at_edge && self.open_edge,
-            since_jump_s: self.since_jump_s,
+            jumped: self.jumped(),
             noisy_m: self.noisy_m,
         }
     }
@@ -567,7 +591,25 @@ impl Pipeline {
         self.now
     }
 
-    pub fn state(&self, memory: &FaultMemory, n_waiting: usize) -> State {
+    /// How far the monitor of `code` has got.
+    fn reach(&self, code: FaultCode) -> Reach {
+        let judged_s = self.watches[code as usize].judged_s();
+        match InUse::judges(judged_s, Pace::needed_s(code, &self.settings)) {
+            false => Reach::NotJudged,
+            true if !self.settings.confirms(code, None) => Reach::NotLearnt,
+            true => Reach::Judged,
+        }
+    }
+
+    /// Takes note of how much of this session each monitor could judge.
+    pub fn count_use(&self, coverage: &Coverage, memory: &mut FaultMemory) {
+        for (&code, watch) in FaultCode::ALL.iter().zip(&self.watches) {
+            let needed_s = Pace::needed_s(code, &self.settings);
+            memory.count_use(code, coverage.data_s(code), watch.judged_s(), needed_s);
+        }
+    }
+
+    pub fn state(&self, memory: &FaultMemory, coverage: &Coverage, n_waiting: usize) -> State {
         let monitors = std::array::from_fn(|i| {
             let (watch, status) = (&self.watches[i], memory.record(FaultCode::ALL[i]).status);
             MonitorState {
@@ -577,7 +619,9 @@ impl Pipeline {
                     complete_this_cycle: status.completed_this_cycle(),
                     complete_since_clear: status.completed_since_clear(),
                 },
-                enabled_s: watch.enabled_s(),
+                judged_s: watch.judged_s(),
+                judged_share: coverage.share(watch.judged_s()),
+                reach: self.reach(FaultCode::ALL[i]),
             }
         });
         let ghost = |a: Axis| {

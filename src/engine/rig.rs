@@ -49,7 +49,7 @@ pub struct DiagnosticsSpec {
     pub profile: Profile,
     /// Wanted false alarms per rig and year, above zero.
     pub false_alarms_per_rig_year: Option<f64>,
-    /// Continuous failure before a test fails, s.
+    /// Continuous failure before a test fails, s: of servos, ball and sensor.
     pub debounce_s: Option<f64>,
 }
 

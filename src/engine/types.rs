@@ -76,6 +76,19 @@ pub struct Readiness {
     pub complete_since_clear: bool,
 }
 
+/// How far a monitor has got in a session, whatever it has found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Reach {
+    /// It could judge for less time than a fault takes to be confirmed.
+    #[default]
+    NotJudged,
+    /// It has judged, but on a rig that is not learnt a fault of its code is
+    /// never confirmed, and agreement is no proof of health.
+    NotLearnt,
+    /// It has judged for long enough to have confirmed a fault.
+    Judged,
+}
+
 /// One monitor at one moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MonitorState {
@@ -83,7 +96,11 @@ pub struct MonitorState {
     pub counter: i8,
     pub readiness: Readiness,
     /// Seconds of this session in which it could judge.
-    pub enabled_s: f64,
+    pub judged_s: f64,
+    /// The same as a share of the session, from its first sample to its last,
+    /// 0 to 1.
+    pub judged_share: f64,
+    pub reach: Reach,
 }
 
 /// Where an engine stands; see [`super::Engine::state`].

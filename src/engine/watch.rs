@@ -14,7 +14,8 @@ pub struct Watch {
     /// Evidence by weight, as a share of what makes the test fail.
     weight: f64,
     test: Test,
-    enabled_s: f64,
+    /// Seconds of this session in which it could judge.
+    judged_s: f64,
     /// When the run of failures began.
     since: Option<SimTime>,
     kind: Option<FaultKind>,
@@ -42,8 +43,8 @@ impl Watch {
         self.test
     }
 
-    pub const fn enabled_s(&self) -> f64 {
-        self.enabled_s
+    pub const fn judged_s(&self) -> f64 {
+        self.judged_s
     }
 
     /// Takes what the monitor says of the last `dt` seconds. A servo fails by
@@ -60,7 +61,7 @@ impl Watch {
     ) -> Qualified {
         self.test = finding.test;
         if finding.test != Test::NotTested {
-            self.enabled_s += dt;
+            self.judged_s += dt;
         }
         let test = match finding.gone && self.debounce.failed() {
             true => Test::Prefailed,
@@ -127,11 +128,13 @@ impl Watch {
         outputs: &mut Vec<Output>,
     ) {
         let record = memory.record(code);
-        let failed = record.status.test_failed();
+        let failing = record.status.test_failed();
+        // One that goes on from the session before is told in this one too.
+        let failed = failing && record.status.failed_this_cycle();
         match qualified {
             Qualified::No => {}
             Qualified::Passed => {
-                if memory.passed(code) && failed {
+                if memory.passed(code) && failing {
                     self.announce(code, evidence, memory, outputs);
                 }
             }
@@ -182,7 +185,8 @@ impl Watch {
         let candidates = match (self.rival, code.axis()) {
             (Some(rival), _) => {
                 let own = Candidate { code, kind: self.kind, weight: 1.0 - rival.weight };
-                vec![own, rival]
+                let own_first = own.weight >= rival.weight;
+                if own_first { vec![own, rival] } else { vec![rival, own] }
             }
             (None, Some(axis)) => kinds(code, evidence.axes[axis].answer),
             (None, None) => Vec::new(),

@@ -14,7 +14,7 @@ use crate::wire::asset::{self, CalibrationView};
 use crate::wire::basis::Basis;
 use crate::wire::difference::{Compared, compare, tally};
 use crate::wire::service::{DifferenceView, ReplayResultView, ReplaySettingsView, ReplayView};
-use crate::wire::verdict::{FaultView, SummaryView, Verdict, fault_view, warnings};
+use crate::wire::verdict::{FaultView, Verdict, fault_view};
 
 /// Fault lines, and differences, in a result; more are left out, and it says so.
 const MAX_LINES: usize = 10_000;
@@ -275,8 +275,9 @@ impl Player<'_> {
         let rejected = u64::try_from(progress.n_rejected).unwrap_or_default();
         let summary =
             self.verdict.summary(&self.session.name, self.n_samples, rejected, duration_s);
-        let warnings = warnings(&self.plausibility.misfits());
-        let summary = SummaryView { warnings, ..summary };
+        let summary = summary
+            .with_monitors(self.verdict.monitors(&self.engine.state()))
+            .with_misfits(&self.plausibility.misfits());
         let truncated = self.faults.len() > MAX_LINES || recorded.len() > MAX_LINES;
         let (mut faults, mut recorded) = (self.faults, recorded);
         faults.truncate(MAX_LINES);

@@ -19,7 +19,7 @@ use crate::wire::basis::Basis;
 use crate::wire::provenance::{ActView, OccurrenceView, ProvenanceView};
 use crate::wire::service::cleared_view;
 use crate::wire::telemetry::{AckView, RowView};
-use crate::wire::verdict::{SummaryView, Verdict, fault_view, warnings};
+use crate::wire::verdict::{SummaryView, Verdict, fault_view};
 use crate::wire::{asset, memory};
 
 /// How far a nameless device's clock must fall back to mean that it started
@@ -182,10 +182,12 @@ impl OpenSession {
         let Progress { n_samples, n_rejected, first_t_s, last_t_s, .. } = self.progress;
         let duration_s = last_t_s.zip(first_t_s).map_or(0.0, |(last, first)| last - first);
         let count = |n: i64| u64::try_from(n).unwrap_or_default();
-        let warnings = warnings(&self.plausibility.misfits());
-        let summary =
-            self.verdict.summary(&self.name, count(n_samples), count(n_rejected), duration_s);
-        SummaryView { warnings, ..summary }
+        let monitors = self.verdict.monitors(&self.engine.state());
+        let (samples, rejected) = (count(n_samples), count(n_rejected));
+        self.verdict
+            .summary(&self.name, samples, rejected, duration_s)
+            .with_monitors(monitors)
+            .with_misfits(&self.plausibility.misfits())
     }
 }
 

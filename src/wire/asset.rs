@@ -191,7 +191,8 @@ pub struct DiagnosticsView {
     /// Wanted false alarms per rig and year, above 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub false_alarms_per_rig_year: Option<f64>,
-    /// Continuous failure before a test fails, in [0, 60] s.
+    /// Continuous failure before a test fails, in [0, 60] s: of servos, ball and
+    /// sensor.
     #[schema(minimum = 0, maximum = 60)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub debounce_s: Option<f64>,

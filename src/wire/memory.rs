@@ -8,7 +8,7 @@ use super::verdict::{
 };
 use crate::diagnosis::{
     Answer, AxisEvidence, Candidate, Evidence, FaultMemory, FaultRecord, InUse, MemoryRules,
-    StatusByte, Suspicion,
+    StatusByte, Step, Suspicion,
 };
 use crate::vocabulary::{FaultCode, FaultKind, PerAxis, SimTime, UnknownWord};
 
@@ -238,10 +238,13 @@ fn evidence(view: &EvidenceView) -> Evidence {
         window_s: view.window_s,
         axes: PerAxis { x: axis_evidence(&view.x), y: axis_evidence(&view.y) },
         unseen_s: view.unseen_s,
+        missing_share: view.missing_share,
         identical_s: view.identical_s,
         still_s: view.still_s,
         outliers: view.outliers,
         scatter_m: view.scatter_m,
+        healthy_scatter_m: view.healthy_scatter_m,
+        jump: view.jump.map(|step| Step { at_s: step.t_s, size_m: step.size_m }),
     }
 }
 
@@ -256,6 +259,7 @@ fn axis_evidence(view: &AxisEvidenceView) -> AxisEvidence {
         enabled: view.enabled,
         nats: view.nats,
         answer: view.answer.as_ref().map(answer),
+        identical_s: view.identical_s,
     }
 }
 
@@ -284,6 +288,7 @@ mod tests {
                 x: AxisEvidence {
                     measured_m_s2: Some(-0.1),
                     limit_m_s2: 0.2,
+                    identical_s: 0.5,
                     ..AxisEvidence::default()
                 },
                 y: AxisEvidence {
@@ -295,6 +300,9 @@ mod tests {
                 },
             },
             outliers: 3,
+            missing_share: 0.25,
+            healthy_scatter_m: 2e-4,
+            jump: Some(Step { at_s: 1.25, size_m: 0.1 }),
             ..Evidence::default()
         };
         let suspicion = Suspicion {

@@ -203,6 +203,13 @@ pub struct MonitorView {
     /// Whether it has come to a result since the code was last cleared.
     pub complete_since_clear: bool,
     /// Seconds of this session in which it could judge.
+    #[serde(default)]
+    pub judged_s: f64,
+    /// The same as a share of the session, from its first sample to its last,
+    /// 0 to 1.
+    #[serde(default)]
+    pub judged_share: f64,
+    /// The same as `judged_s`, by the name that it had before.
     pub enabled_s: f64,
 }
 
@@ -278,7 +285,9 @@ fn monitor_view((code, monitor): (&FaultCode, &MonitorState)) -> MonitorView {
         enabled: monitor.readiness.enabled,
         complete_this_cycle: monitor.readiness.complete_this_cycle,
         complete_since_clear: monitor.readiness.complete_since_clear,
-        enabled_s: monitor.enabled_s,
+        judged_s: monitor.judged_s,
+        judged_share: monitor.judged_share,
+        enabled_s: monitor.judged_s,
     }
 }
 
@@ -306,7 +315,8 @@ pub struct ReplaySettingsView {
     /// to be used instead of the one in force when the session was opened.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration: Option<String>,
-    /// Continuous failure before a test fails, in [0, 60] s.
+    /// Continuous failure before a test fails, in [0, 60] s: of servos, ball and
+    /// sensor.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub debounce_s: Option<f64>,
     /// Wanted false alarms per rig and year, above 0.

@@ -1,14 +1,20 @@
 //! The lines of a verdict: faults as they change, a summary, and a hash that
 //! is the same for the same recording however it was delivered.
 
+mod outcome;
+mod sentence;
+
+pub use outcome::{JudgedView, Outcome};
+pub use sentence::sentence;
+
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use utoipa::ToSchema;
 
 use super::basis::Basis;
-use crate::diagnosis::{Answer, AxisEvidence, Candidate, Evidence, Transition};
+use crate::diagnosis::{Answer, AxisEvidence, Candidate, Evidence, Suspicion, Transition};
 use crate::engine::{Admission, Misfit, Output};
-use crate::vocabulary::{Axis, FaultCode, FaultStatus};
+use crate::vocabulary::{FaultCode, FaultStatus};
 
 /// A change of a fault's status; or its kind, where that shows only after the
 /// confirmation: the status is then the same as before.
@@ -67,6 +73,9 @@ pub struct EvidenceView {
     pub y: AxisEvidenceView,
     /// Seconds without a ball seen.
     pub unseen_s: f64,
+    /// Share of the samples of the last seconds without a ball, 0 to 1.
+    #[serde(default)]
+    pub missing_share: f64,
     /// Seconds of bit-identical readings.
     pub identical_s: f64,
     /// Seconds for which the ball has stood still.
@@ -75,6 +84,22 @@ pub struct EvidenceView {
     pub outliers: u32,
     /// Standard deviation of the readings about their fit, m.
     pub scatter_m: Option<f64>,
+    /// The same of healthy readings, the worse of both axes, m: learnt, or
+    /// assumed on a rig that is not.
+    #[serde(default)]
+    pub healthy_scatter_m: f64,
+    /// The step of the readings that the sensor is blamed for, if one is.
+    #[serde(default)]
+    pub jump: Option<StepView>,
+}
+
+/// A step of the readings that no ball can make.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize, ToSchema)]
+pub struct StepView {
+    /// The first reading beyond it, s on the device's clock.
+    pub t_s: f64,
+    /// How far the readings went, m.
+    pub size_m: f64,
 }
 
 /// One axis at one moment.
@@ -100,6 +125,9 @@ pub struct AxisEvidenceView {
     /// does not ask.
     #[serde(default)]
     pub answer: Option<AnswerView>,
+    /// Seconds for which the readings along this axis have been bit-identical.
+    #[serde(default)]
+    pub identical_s: f64,
 }
 
 /// A servo's effective parameters against the twin's, with standard errors.
@@ -133,6 +161,13 @@ pub struct SummaryView {
     pub duration_s: f64,
     /// Codes confirmed in this session, in the order of confirmation.
     pub faults: Vec<String>,
+    /// What the session came to; null in a record of before it was said.
+    #[serde(default)]
+    pub outcome: Option<Outcome>,
+    /// For each monitor how much it judged and what it came to; none in a record
+    /// of before it was said.
+    #[serde(default)]
+    pub monitors: Vec<JudgedView>,
     pub verdict_hash: String,
     /// What in the data and the asset file cannot be of one rig; left out where
     /// everything fits.
@@ -200,10 +235,13 @@ pub fn evidence_view(evidence: &Evidence) -> EvidenceView {
         x: axis_evidence_view(&evidence.axes.x),
         y: axis_evidence_view(&evidence.axes.y),
         unseen_s: evidence.unseen_s,
+        missing_share: evidence.missing_share,
         identical_s: evidence.identical_s,
         still_s: evidence.still_s,
         outliers: evidence.outliers,
         scatter_m: evidence.scatter_m,
+        healthy_scatter_m: evidence.healthy_scatter_m,
+        jump: evidence.jump.map(|step| StepView { t_s: step.at_s, size_m: step.size_m }),
     }
 }
 
@@ -219,6 +257,7 @@ fn axis_evidence_view(axis: &AxisEvidence) -> AxisEvidenceView {
         enabled: axis.enabled,
         nats: axis.nats,
         answer: axis.answer.as_ref().map(answer_view),
+        identical_s: axis.identical_s,
     }
 }
 
@@ -234,86 +273,6 @@ const fn answer_view(answer: &Answer) -> AnswerView {
     }
 }
 
-/// What was seen, in one sentence.
-#[must_use]
-pub fn sentence(transition: &Transition) -> String {
-    let evidence = &transition.evidence;
-    let kind = transition.suspicion.kind.map(|k| format!(" ({k})")).unwrap_or_default();
-    let name = format!("{}{kind}", transition.code);
-    match transition.status {
-        FaultStatus::Cleared => return format!("{name} cleared: nothing of it is on record"),
-        FaultStatus::Healed => return format!("{name} healed: enough good sessions followed"),
-        status if !transition.byte.test_failed() => {
-            let byte = transition.byte;
-            return format!("{name} no longer fails its test; on record as {status} ({byte})");
-        }
-        FaultStatus::Pending | FaultStatus::Confirmed => {}
-    }
-    let since = transition
-        .suspicion
-        .onset
-        .map(|t| format!(" since {:.2} s", t.seconds()))
-        .unwrap_or_default();
-    let what = match transition.code.axis() {
-        Some(axis) => servo_sentence(axis, evidence),
-        None if transition.code == FaultCode::StuckBall => {
-            format!(
-                "the ball has stood still for {:.1} s while the plate asks it to move",
-                evidence.still_s
-            )
-        }
-        None => sensor_sentence(evidence),
-    };
-    format!("{name} {}{since}: {what}", transition.status)
-}
-
-/// Standard error of a gain beyond which it is better not said.
-const SAYABLE_GAIN_ERROR: f64 = 0.3;
-
-fn servo_sentence(axis: Axis, evidence: &Evidence) -> String {
-    let e = &evidence.axes[axis];
-    let answer = e.answer.map(|answer| answer_words(axis, &answer)).unwrap_or_default();
-    // A residual within its limit is not what raised it.
-    let ground = match e.violates() {
-        true => format!("limit {:.2}", e.limit_m_s2),
-        false => format!("weight of evidence {:.0} nats", e.nats),
-    };
-    let seen = match (e.measured_m_s2, e.twin_m_s2) {
-        (Some(measured), Some(twin)) => format!(
-            "the ball accelerates by {measured:.2} m/s² along {} where {} asks for {twin:.2} m/s² ({ground})",
-            axis.as_str(),
-            axis.command(),
-        ),
-        _ => format!("the ball's acceleration along {} is not testable now", axis.as_str()),
-    };
-    format!("{answer}{seen}")
-}
-
-/// How much of its command the servo answers, where that can be said.
-fn answer_words(axis: Axis, answer: &Answer) -> String {
-    if answer.gain_error > SAYABLE_GAIN_ERROR {
-        return String::new();
-    }
-    let off = answer.offset_m_s2;
-    let offset = match off.abs() > 2.0 * answer.offset_error_m_s2 {
-        true => format!(" with {off:+.2} m/s² that nobody asked for"),
-        false => String::new(),
-    };
-    let (gain, error) = (100.0 * answer.gain, 100.0 * answer.gain_error);
-    format!("the servo answers {gain:.0} ± {error:.0} % of {}{offset}; ", axis.command())
-}
-
-fn sensor_sentence(evidence: &Evidence) -> String {
-    if evidence.unseen_s > 0.0 {
-        return format!("no ball seen for {:.1} s", evidence.unseen_s);
-    }
-    let scatter = evidence.scatter_m.map_or("unknown".to_owned(), |s| format!("{:.2} mm", s * 1e3));
-    format!(
-        "readings identical for {:.1} s, {} set aside in 10 s, scatter {scatter}",
-        evidence.identical_s, evidence.outliers,
-    )
-}
-
 /// A verdict as it grows: which codes were confirmed, and the hash.
 ///
 /// The hash covers how many samples were judged and every transition that they
@@ -324,6 +283,8 @@ pub struct Verdict {
     hash: Sha256,
     n_accepted: u64,
     confirmed: Vec<FaultCode>,
+    /// What was suspected when each test failed last in this session.
+    suspected: [Option<Suspicion>; FaultCode::COUNT],
 }
 
 impl Verdict {
@@ -346,9 +307,19 @@ impl Verdict {
             transition.byte.bits(),
         ]);
         self.hash.update(transition.suspicion.onset.map_or([0xff; 8], |t| time(t.seconds())));
-        if transition.status == FaultStatus::Confirmed && !self.confirmed.contains(&transition.code)
-        {
-            self.confirmed.push(transition.code);
+        self.note(transition);
+    }
+
+    /// A test that passes again says how a fault stands, not that there is one.
+    fn note(&mut self, transition: &Transition) {
+        let Transition { code, status, byte, suspicion, .. } = transition;
+        if byte.test_failed() {
+            self.suspected[*code as usize] = Some(suspicion.clone());
+            if *status == FaultStatus::Confirmed && !self.confirmed.contains(code) {
+                self.confirmed.push(*code);
+            }
+        } else if *status == FaultStatus::Cleared {
+            self.suspected[*code as usize] = None;
         }
     }
 
@@ -381,6 +352,8 @@ impl Verdict {
             rejected,
             duration_s,
             faults: self.confirmed.iter().map(ToString::to_string).collect(),
+            outcome: None,
+            monitors: Vec::new(),
             verdict_hash: self.hash(),
             warnings: Vec::new(),
         }

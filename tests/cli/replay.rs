@@ -219,3 +219,29 @@ fn two_verdicts_are_compared_transition_by_transition() {
     let textbook = bench.ok("replay --asset learnt.json --against-profile textbook sick.csv");
     assert!(textbook.stdout.contains("there only"), "{}", textbook.stdout);
 }
+
+/// All words of what a command printed, one blank between two.
+fn unwrapped(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[test]
+fn what_was_not_judged_is_said() {
+    let bench = Bench::new();
+    bench.calibrated().ok("simulate --seconds 0.3 -o moment.csv");
+    bench.ok("simulate --seconds 20 -o healthy.csv");
+    let moment = bench.ok("replay --asset learnt.json moment.csv").stdout;
+    assert!(unwrapped(&moment).contains(" 0.3 not judged judged x_servo "), "{moment}");
+    assert!(!moment.contains("no fault"), "{moment}");
+    let unlearnt = bench.ok("replay healthy.csv").stdout;
+    let words = "no fault of sensor; not learnt: x_servo, y_servo, stuck_ball";
+    assert!(unwrapped(&unlearnt).contains(words), "{unlearnt}");
+    let lines = bench.ok("replay --asset learnt.json --format json healthy.csv moment.csv").json();
+    let summaries: Vec<&Value> = lines.iter().filter(|l| l["type"] == "summary").collect();
+    assert_eq!([&summaries[0]["outcome"], &summaries[1]["outcome"]], ["no fault", "not judged"]);
+    for monitor in summaries[0]["monitors"].as_array().unwrap() {
+        let (seconds, share) = (&monitor["judged_s"], monitor["judged_share"].as_f64().unwrap());
+        assert!((0.5..=1.0).contains(&share), "{monitor}");
+        assert!((seconds.as_f64().unwrap() / 20.0 - share).abs() < 0.02, "{monitor}");
+    }
+}

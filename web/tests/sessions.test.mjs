@@ -119,3 +119,18 @@ test("played back, scrubbed, judged again, recorded, downloaded, deleted", async
   assert.deepEqual(view.errors, []);
   await view.done();
 });
+
+test("what was not judged is said, of a moment and of what was judged again", async () => {
+  // Three tenths of a second: less than any fault takes to be confirmed.
+  const moment = rig.healthy.split("\n").slice(0, 31).join("\n");
+  const { session } = await ask(service.url, "POST", "/assets/bench/sessions/import?name=moment", moment, "text/csv");
+  const view = await page(chromium);
+  await view.goto(`${service.url}/sessions/${session.id}`);
+  await view.getByText("Not judged", { exact: true }).waitFor();
+  const shares = view.getByRole("table", { name: "Judged, of the session" });
+  assert.equal(await shares.getByRole("cell", { name: "not judged" }).count(), 4);
+  await view.goto(`${service.url}/sessions`);
+  await view.getByRole("row", { name: /moment/ }).getByText("Not judged").waitFor();
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});

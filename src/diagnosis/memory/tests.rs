@@ -189,8 +189,8 @@ fn healing_comes_before_aging_and_both_are_counted() {
 fn validate_the_in_use_ratio_outlives_a_clear() {
     let mut memory = FaultMemory::default();
     // Seconds of data, seconds of open gate, for a fault that takes 0.8 s.
-    for (data_s, enabled_s) in [(60.0, 30.0), (60.0, 0.5), (60.0, 0.0), (3.0, 0.5), (3.0, 0.8)] {
-        memory.count_use(CODE, data_s, enabled_s, 0.8);
+    for (data_s, judged_s) in [(60.0, 30.0), (60.0, 0.5), (60.0, 0.0), (3.0, 0.5), (3.0, 0.8)] {
+        memory.count_use(CODE, data_s, judged_s, 0.8);
     }
     let wanted = InUse { cycles: 5, with_data: 4, judged: 2 };
     assert_eq!(memory.record(CODE).in_use, wanted);
@@ -208,7 +208,7 @@ mod properties {
     enum Event {
         Failed,
         Passed,
-        Cycle { data_s: f64, enabled_s: f64 },
+        Cycle { data_s: f64, judged_s: f64 },
         Clear,
     }
 
@@ -216,8 +216,7 @@ mod properties {
         prop_oneof![
             Just(Event::Failed),
             Just(Event::Passed),
-            (0.0..100.0, 0.0..2.0)
-                .prop_map(|(data_s, enabled_s)| Event::Cycle { data_s, enabled_s }),
+            (0.0..100.0, 0.0..2.0).prop_map(|(data_s, judged_s)| Event::Cycle { data_s, judged_s }),
             Just(Event::Clear),
         ]
     }
@@ -235,9 +234,9 @@ mod properties {
                     Event::Failed => drop(bench.failed()),
                     Event::Passed => drop(bench.passed()),
                     Event::Clear => bench.memory.clear(CODE),
-                    Event::Cycle { data_s, enabled_s } => {
+                    Event::Cycle { data_s, judged_s } => {
                         n_cycles += 1;
-                        bench.memory.count_use(CODE, data_s, enabled_s, 0.8);
+                        bench.memory.count_use(CODE, data_s, judged_s, 0.8);
                         bench.end();
                         bench.start();
                     }

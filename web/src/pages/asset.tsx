@@ -12,7 +12,7 @@ import { RigView } from "../parts/rig-view";
 import { TrendsCard, TrendWarnings, useTrends } from "../parts/trends";
 import { XyTrace } from "../parts/xy-trace";
 import { at, go, Link } from "../router";
-import { clock, codeMeaning, codeTitle, count, degrees, millimetres, number, seconds, severity } from "../words";
+import { clock, codeMeaning, codeTitle, count, degrees, isFailing, judged, millimetres, number, seconds, severity } from "../words";
 
 /** States a second; the trace that comes with each has every judged sample. */
 const STATE_HZ = 20;
@@ -74,7 +74,7 @@ function Live({ asset, faults, changed }: { asset: Asset; faults: FaultEntry[]; 
       },
       fault: (line) => {
         void changed();
-        marks.current = [...marks.current, { t: line.t_s, label: `${codeTitle(line.code)} ${line.status}`, colour: line.status === "confirmed" ? "bad" : line.status === "pending" ? "warn" : "quiet" }];
+        marks.current = [...marks.current, { t: line.t_s, label: `${codeTitle(line.code)} ${line.status}`, colour: !isFailing(line) ? "quiet" : line.status === "confirmed" ? "bad" : line.status === "pending" ? "warn" : "quiet" }];
         group.setMarks(marks.current);
       },
     });
@@ -160,7 +160,7 @@ function Monitors({ monitors }: { monitors: Monitor[] }) {
           return (
             <li class={`monitor monitor-${m.counter === 127 ? "bad" : m.counter > 0 ? "warn" : "ok"}${m.enabled ? "" : " off"}`}>
               <span>{codeTitle(m.code)}</span>
-              <meter class="counter" min={-128} max={127} value={m.counter} aria-label={`${codeTitle(m.code)}: fault detection counter`} title={`fault detection counter ${m.counter}; ${ready}; could judge for ${number(m.enabled_s, 1, "s")}`}>{Math.round(share * 100)} %</meter>
+              <meter class="counter" min={-128} max={127} value={m.counter} aria-label={`${codeTitle(m.code)}: fault detection counter`} title={`fault detection counter ${m.counter}; ${ready}; judged ${judged(m)} of the session`}>{Math.round(share * 100)} %</meter>
               <span class="quiet">{word}</span>
               <span class="ready" title={ready} aria-label={ready}>{m.complete_this_cycle ? "✓" : "…"}</span>
             </li>

@@ -13,7 +13,7 @@ import type { Mark } from "../parts/line-chart";
 import { ChartGroup, RigCharts } from "../parts/rig-charts";
 import { save } from "../parts/rig-view";
 import { at, Link } from "../router";
-import { clock, codeMeaning, codeTitle, faultTitle, kindMeaning, seconds, sentence, STATUS_BITS } from "../words";
+import { clock, codeMeaning, codeTitle, faultTitle, judged, kindMeaning, seconds, sentence, STATUS_BITS } from "../words";
 
 /** Seconds shown before and after the occurrence. */
 const BEFORE_S = 6;
@@ -137,7 +137,7 @@ function Monitor({ fault }: { fault: FaultEntry }) {
     <section class="card">
       <h2>Its monitor</h2>
       <Facts of={[
-        ["In this session", m ? `${m.complete_this_cycle ? "has come to a result" : "no result yet"}; could judge for ${seconds(m.enabled_s, 1)}` : "none is open"],
+        ["In this session", m ? `${m.complete_this_cycle ? "has come to a result" : "no result yet"}; judged ${judged(m)} of it` : "none is open"],
         ...(m ? [["Fault detection counter", `${m.counter}, of −128 (passed) to 127 (failed)`.replace("-", "−")] as Fact] : []),
         ["In-use ratio", use?.ratio == null ? "no session with enough data has ended yet" : `${Math.round(use.ratio * 100)} %: could have found it in ${use.cycles_judged} of ${plural(cycles, "session")} with enough data`],
       ]} />

@@ -7,7 +7,7 @@ import { TraceBuffer } from "../live/buffer";
 import { Act, Facts, Loading, Trouble } from "../parts/bits";
 import { ChartGroup, RigCharts } from "../parts/rig-charts";
 import { at, Link } from "../router";
-import { codeTitle, count, duration, kindMeaning, number } from "../words";
+import { codeTitle, count, duration, kindMeaning, number, verdict } from "../words";
 
 export function LearnPage({ demo }: { demo: boolean }) {
   useTitle(demo ? "Demo" : "Learn");
@@ -115,7 +115,7 @@ function Judged({ session, profile }: { session: Session; profile: string }) {
         ["Beyond the limit", percent(share?.beyond)],
         ["Judged: the gate is open", percent(share?.judged)],
         ["Beyond the limit, of what is judged", share && !share.judged ? "nothing: the gate never opened" : percent(share?.false)],
-        ["Whole session", found ? (found.summary.faults.length ? found.summary.faults.map(codeTitle).join(", ") : "no fault") : replay ? "judging…" : <Act act={judge}>Judge it all</Act>],
+        ["Whole session", found ? verdict(found.summary).text : replay ? "judging…" : <Act act={judge}>Judge it all</Act>],
         ["Changes of status", found ? count(found.faults.length) : "–"],
       ]} />
       <p class="quiet small-text">The first {duration(Math.min(SHOWN_S, session.last_t_s! - from))}, x axis.</p>

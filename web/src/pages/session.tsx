@@ -1,7 +1,7 @@
 /** One session: played back in pictures and charts, judged again with other settings. */
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { api, isSettled, until } from "../api/client";
-import type { Asset, FaultLine, Replay, Session } from "../api/types";
+import type { Asset, FaultLine, Judged, Replay, Session } from "../api/types";
 import { useAsk, useFrames, useTitle } from "../hooks";
 import { TraceBuffer } from "../live/buffer";
 import { Act, Dialogue, Facts, Loading, Trouble } from "../parts/bits";
@@ -10,7 +10,7 @@ import { ChartGroup, RigCharts } from "../parts/rig-charts";
 import { RigView, save } from "../parts/rig-view";
 import { XyTrace } from "../parts/xy-trace";
 import { at, go, Link, usePlace } from "../router";
-import { clock, codeTitle, count, duration, faultTitle, seconds, sentence } from "../words";
+import { alike, clock, codeTitle, count, duration, faultTitle, isFailing, judged, seconds, sentence, verdict } from "../words";
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10] as const;
 const SPANS = [10, 30, 60, 0] as const;
@@ -33,7 +33,7 @@ export function SessionPage({ id }: { id: string }) {
 }
 
 const marksOf = (faults: FaultLine[]): Mark[] => faults.map((line) => ({
-  t: line.t_s, label: `${codeTitle(line.code)} ${line.status}`, colour: line.status === "confirmed" ? "bad" : line.status === "pending" ? "warn" : "quiet",
+  t: line.t_s, label: `${codeTitle(line.code)} ${line.status}`, colour: !isFailing(line) ? "quiet" : line.status === "confirmed" ? "bad" : line.status === "pending" ? "warn" : "quiet",
 }));
 
 function Player({ session, asset, faults, again }: { session: Session; asset: Asset; faults: FaultLine[]; again: () => Promise<void> }) {
@@ -167,14 +167,26 @@ function Found({ session, faults, seek }: { session: Session; faults: FaultLine[
         ["State", session.state === "open" ? "open" : `ended ${clock(session.ended_at)}`],
         ["Samples", `${count(session.samples)}${session.rejected ? `, ${count(session.rejected)} rejected` : ""}`],
         ["Length", duration(session.first_t_s != null && session.last_t_s != null ? session.last_t_s - session.first_t_s : null)],
-        ["Verdict", session.verdict ? <code title={session.verdict.verdict_hash}>{session.verdict.verdict_hash.slice(0, 12)}</code> : "once it has ended"],
+        ["Hash", session.verdict ? <code title={session.verdict.verdict_hash}>{session.verdict.verdict_hash.slice(0, 12)}</code> : "once it has ended"],
       ]} />
-      {faults.length === 0
-        ? <p class="status-ok">No fault</p>
-        : <ol class="found">{faults.map((line) => (
-            <li><button type="button" class="link n" onClick={() => seek((line.onset_s ?? line.t_s) - 0.5)} aria-label={`Go to ${seconds(line.t_s)}`}>{seconds(line.t_s)}</button> <span><b>{faultTitle(line.code, line.kind)}</b> <span class={`status-${line.status}`}>{line.status}</span><br /><span class="quiet">{sentence(line.summary)}</span></span></li>
+      {session.verdict ? <p class={verdict(session.verdict).look}>{verdict(session.verdict).text}</p> : faults.length === 0 && <p class="quiet">No fault so far</p>}
+      {faults.length > 0 && <ol class="found">{faults.map((line) => (
+            <li><button type="button" class="link n" onClick={() => seek((line.onset_s ?? line.t_s) - 0.5)} aria-label={`Go to ${seconds(line.t_s)}`}>{seconds(line.t_s)}</button> <span><b>{alike(line.candidates) || faultTitle(line.code, line.kind)}</b> <span class={isFailing(line) ? `status-${line.status}` : "quiet"}>{isFailing(line) || line.status === "cleared" || line.status === "healed" ? line.status : "passes again"}</span><br /><span class="quiet">{sentence(line.summary)}</span></span></li>
           ))}</ol>}
+      {session.verdict && <JudgedShares monitors={session.verdict.monitors ?? []} />}
     </section>
+  );
+}
+
+/** How much of the session each monitor could judge, and what it came to. */
+function JudgedShares({ monitors }: { monitors: Judged[] }) {
+  if (monitors.length === 0) return null;
+  return (
+    <table class="list">
+      <caption class="quiet small-text">Judged, of the session</caption>
+      <thead><tr><th scope="col">Monitor</th><th scope="col" class="n">Judged</th><th scope="col">Outcome</th></tr></thead>
+      <tbody>{monitors.map((m) => <tr><th scope="row">{codeTitle(m.code)}</th><td class="n">{judged(m)}</td><td>{m.outcome}</td></tr>)}</tbody>
+    </table>
   );
 }
 
@@ -206,8 +218,8 @@ function JudgeAgain({ session }: { session: Session }) {
         <div class="verdicts">
           <p role="status" class={result.same ? "status-ok" : "status-pending"}>{result.same ? "The same verdict, transition by transition." : `Another verdict: ${count(result.differences.length)} differences.`}</p>
           <div class="pair">
-            <Facts of={[["Recorded", session.verdict?.faults.map(codeTitle).join(", ") || "no fault"], ["Hash", <code>{result.recorded_hash?.slice(0, 12) ?? "–"}</code>]]} />
-            <Facts of={[["Judged again", result.summary.faults.map(codeTitle).join(", ") || "no fault"], ["Hash", <code>{result.summary.verdict_hash.slice(0, 12)}</code>]]} />
+            <Facts of={[["Recorded", session.verdict ? verdict(session.verdict).text : "once it has ended"], ["Hash", <code>{result.recorded_hash?.slice(0, 12) ?? "–"}</code>]]} />
+            <Facts of={[["Judged again", verdict(result.summary).text], ["Hash", <code>{result.summary.verdict_hash.slice(0, 12)}</code>]]} />
           </div>
           {result.differences.length > 0 && (
             <div class="scroll differences" tabIndex={0} role="region" aria-label="Differences">

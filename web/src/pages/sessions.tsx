@@ -5,7 +5,7 @@ import type { Session } from "../api/types";
 import { useAsk, useTitle } from "../hooks";
 import { Act, Empty, Loading, Trouble } from "../parts/bits";
 import { at, go, Link, usePlace } from "../router";
-import { clock, codeTitle, count, duration } from "../words";
+import { clock, count, duration, verdict } from "../words";
 import { ImportDialogue } from "./import-dialogue";
 
 const PAGE = 100;
@@ -55,7 +55,7 @@ export function SessionsPage() {
 }
 
 function Row({ session }: { session: Session }) {
-  const faults = session.verdict?.faults ?? [];
+  const came = session.verdict && verdict(session.verdict);
   const length = session.first_t_s != null && session.last_t_s != null ? session.last_t_s - session.first_t_s : null;
   return (
     <tr>
@@ -64,7 +64,7 @@ function Row({ session }: { session: Session }) {
       <td>{clock(session.opened_at)}</td>
       <td class="n">{duration(length)}</td>
       <td class="n">{count(session.samples)}</td>
-      <td>{session.state === "open" ? <span class="status-open">● open</span> : faults.length ? <span class="status-confirmed">{faults.map(codeTitle).join(", ")}</span> : <span class="status-ok">no fault</span>}</td>
+      <td>{session.state === "open" ? <span class="status-open">● open</span> : came && <span class={came.look}>{came.text}</span>}</td>
     </tr>
   );
 }

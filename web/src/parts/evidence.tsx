@@ -36,7 +36,7 @@ export function EvidenceTable({ of }: { of: Evidence }) {
       </div>
       <p class="quiet small-text">
         Window {seconds(of.window_s)}; no ball seen for {seconds(of.unseen_s)}; readings identical for {seconds(of.identical_s)};
-        ball at rest for {seconds(of.still_s)}; {of.outliers} readings set aside in 10 s; scatter {millimetres(of.scatter_m, 2)}.
+        ball at rest for {seconds(of.still_s)}; {of.outliers} readings set aside in 10 s; scatter {millimetres(of.scatter_m, 2)}{of.healthy_scatter_m ? `, of healthy readings ${millimetres(of.healthy_scatter_m, 2)}` : ""}{of.jump ? `; readings stepped by ${millimetres(of.jump.size_m, 0)} at ${seconds(of.jump.t_s)}` : ""}.
       </p>
     </>
   );

@@ -1,0 +1,84 @@
+//! A verdict in a few words, and how much of each session was judged.
+
+use comfy_table::Table;
+
+use crate::cli::judge::Judged;
+use crate::cli::table;
+use crate::vocabulary::{FaultCode, FaultStatus};
+use crate::wire::verdict::{CandidateView, FaultView, JudgedView, Outcome};
+
+/// The verdict on a session in a few words: what was found, or else what was not;
+/// and what was not learnt or not judged.
+pub(super) fn words(session: &Judged) -> String {
+    if session.summary.outcome == Some(Outcome::NotJudged) {
+        return Outcome::NotJudged.as_str().to_owned();
+    }
+    let of = |outcome| codes(session, outcome);
+    let (judged, pending) = (of(Outcome::NoFault), of(Outcome::Pending));
+    let (unlearnt, unjudged) = (of(Outcome::NotLearnt), of(Outcome::NotJudged));
+    let found = found(session);
+    let all = unlearnt.len() + unjudged.len() == 0;
+    let mut words = Vec::new();
+    match (found.is_empty(), pending.is_empty()) {
+        (false, _) => words.push(found.join(", ")),
+        (true, false) => words.push(format!("pending only: {}", pending.join(", "))),
+        (true, true) if judged.is_empty() => {}
+        (true, true) if all => words.push(Outcome::NoFault.as_str().to_owned()),
+        (true, true) => words.push(format!("no fault of {}", judged.join(", "))),
+    }
+    for (outcome, codes) in [(Outcome::NotLearnt, unlearnt), (Outcome::NotJudged, unjudged)] {
+        if !codes.is_empty() {
+            words.push(format!("{}: {}", outcome.as_str(), codes.join(", ")));
+        }
+    }
+    words.join("; ")
+}
+
+fn codes(session: &Judged, outcome: Outcome) -> Vec<&str> {
+    let monitors = session.summary.monitors.iter();
+    monitors.filter(|m| m.outcome == outcome).map(|m| m.code.as_str()).collect()
+}
+
+/// The confirmed faults, each with its moment.
+fn found(session: &Judged) -> Vec<String> {
+    let one = |code: &String| {
+        let confirmed = FaultStatus::Confirmed.as_str();
+        let of_code = || session.faults.iter().filter(|f| f.code == *code && f.status == confirmed);
+        let first = of_code().next()?;
+        // The kind may have shown only later.
+        let kind = of_code().find(|f| f.kind.is_some()).unwrap_or(first);
+        let monitor = session.summary.monitors.iter().find(|m| m.code == *code);
+        Some(format!("{} at {:.2} s", blamed(monitor, kind), first.t_s))
+    };
+    session.summary.faults.iter().filter_map(one).collect()
+}
+
+/// The cause, or all of them where several read alike.
+fn blamed(monitor: Option<&JudgedView>, fault: &FaultView) -> String {
+    let alike = monitor.filter(|m| m.outcome == Outcome::CannotTell);
+    let Some(monitor) = alike else {
+        return named(&fault.code, fault.kind.as_deref());
+    };
+    let word = |c: &CandidateView| {
+        format!("{} {:.0} %", named(&c.code, c.kind.as_deref()), 100.0 * c.weight)
+    };
+    let causes: Vec<String> = monitor.candidates.iter().map(word).collect();
+    format!("cannot tell {}", causes.join(" from "))
+}
+
+fn named(code: &str, kind: Option<&str>) -> String {
+    kind.map_or_else(|| code.to_owned(), |kind| format!("{code} ({kind})"))
+}
+
+/// How much of each session each monitor judged.
+pub(super) fn judged<'a>(sessions: impl Iterator<Item = &'a Judged>) -> Table {
+    let mut heading = vec!["judged"];
+    heading.extend(FaultCode::ALL.iter().map(|code| code.as_str()));
+    let mut rows = table::table(&heading, &[1, 2, 3, 4]);
+    for Judged { summary, .. } in sessions {
+        let cell = |m: &JudgedView| table::judged(m.judged_share, m.judged_s);
+        let cells = summary.monitors.iter().map(cell);
+        rows.add_row(std::iter::once(summary.session.clone()).chain(cells));
+    }
+    rows
+}

@@ -1,0 +1,197 @@
+//! What was seen when a fault changed, in one sentence that follows its kind.
+
+use super::outcome::read_alike;
+use crate::diagnosis::{Answer, AxisEvidence, Candidate, Evidence, Suspicion, Transition};
+use crate::vocabulary::{Axis, FaultCode, FaultKind, FaultStatus};
+
+/// What was seen, in one sentence.
+#[must_use]
+pub fn sentence(transition: &Transition) -> String {
+    let Transition { code, status, byte, suspicion, .. } = transition;
+    let name = named(*code, suspicion.kind);
+    match status {
+        FaultStatus::Cleared => format!("{name} cleared: nothing of it is on record"),
+        FaultStatus::Healed => format!("{name} healed: enough good sessions followed"),
+        status if !byte.test_failed() => {
+            let since = transition.at.seconds();
+            format!(
+                "{name} passes its test again since {since:.2} s; on record as {status} ({byte})"
+            )
+        }
+        FaultStatus::Pending | FaultStatus::Confirmed => {
+            let onset = suspicion.onset.map(|t| format!(" since {:.2} s", t.seconds()));
+            let since = onset.unwrap_or_default();
+            format!("{name} {status}{since}: {}{}", open(suspicion), seen(transition))
+        }
+    }
+}
+
+fn named(code: FaultCode, kind: Option<FaultKind>) -> String {
+    kind.map_or_else(|| code.to_string(), |kind| format!("{code} ({kind})"))
+}
+
+/// What the evidence leaves open: causes in different parts of the rig, or kinds
+/// of one part none of which stands out.
+fn open(suspicion: &Suspicion) -> String {
+    let candidates = &suspicion.candidates;
+    let weighed = |word: String, c: &Candidate| format!("{word} {:.0} %", 100.0 * c.weight);
+    let causes = || candidates.iter().map(|c| weighed(named(c.code, c.kind), c));
+    let kinds = || candidates.iter().filter_map(|c| Some(weighed(c.kind?.to_string(), c)));
+    match (read_alike(suspicion), suspicion.kind) {
+        (true, _) => format!("cannot tell {}; ", causes().collect::<Vec<_>>().join(" from ")),
+        (false, None) if candidates.len() > 1 => {
+            format!("cannot tell which kind: {}; ", kinds().collect::<Vec<_>>().join(", "))
+        }
+        (false, _) => String::new(),
+    }
+}
+
+fn seen(transition: &Transition) -> String {
+    let (evidence, kind) = (&transition.evidence, transition.suspicion.kind);
+    match transition.code.axis() {
+        Some(axis) => servo(axis, kind, evidence),
+        None if transition.code == FaultCode::StuckBall => stuck_ball(evidence),
+        None => sensor(kind, evidence),
+    }
+}
+
+/// Stillness that is said to be some, s: what the monitor of the ball asks for.
+const SAYABLE_STILL_S: f64 = 0.3;
+
+fn stuck_ball(evidence: &Evidence) -> String {
+    if evidence.still_s < SAYABLE_STILL_S {
+        let nats = evidence.axes.x.nats + evidence.axes.y.nats;
+        return format!(
+            "the ball hardly moves although the plate asks it to along both axes (weight of \
+             evidence {nats:.0} nats)"
+        );
+    }
+    format!(
+        "the ball has stood still for {:.1} s while the plate asks it to move",
+        evidence.still_s
+    )
+}
+
+fn sensor(kind: Option<FaultKind>, evidence: &Evidence) -> String {
+    match (kind, evidence.jump, evidence.scatter_m) {
+        (Some(FaultKind::Jump), Some(step), _) => {
+            format!("readings stepped by {:.0} mm at {:.2} s", 1e3 * step.size_m, step.at_s)
+        }
+        (Some(FaultKind::Noise), _, Some(scatter_m)) => format!(
+            "readings scatter by {:.2} mm where healthy ones do by {:.2} mm",
+            1e3 * scatter_m,
+            1e3 * evidence.healthy_scatter_m
+        ),
+        (Some(FaultKind::Spikes), ..) => {
+            format!("{} lone readings far off the ball's path in 10 s", evidence.outliers)
+        }
+        (Some(FaultKind::Dropout), ..) => unseen(evidence),
+        (Some(FaultKind::Frozen), ..) => repeated(evidence),
+        _ => anything(evidence),
+    }
+}
+
+fn unseen(evidence: &Evidence) -> String {
+    let share = format!("in {:.0} % of the samples of late", 100.0 * evidence.missing_share);
+    match evidence.unseen_s > 0.0 {
+        true => format!("no ball seen for {:.1} s, and {share}", evidence.unseen_s),
+        false => format!("no ball seen {share}"),
+    }
+}
+
+/// Along one axis alone, or along each that is read.
+fn repeated(evidence: &Evidence) -> String {
+    if evidence.identical_s > 0.0 {
+        return format!("readings have been the same to the bit for {:.1} s", evidence.identical_s);
+    }
+    let of = |axis: Axis| evidence.axes[axis].identical_s;
+    let axis = if of(Axis::X) >= of(Axis::Y) { Axis::X } else { Axis::Y };
+    let (own, other) = (axis.as_str(), axis.other().as_str());
+    format!(
+        "readings along {own} have been the same to the bit for {:.1} s while those along {other} \
+         change",
+        of(axis)
+    )
+}
+
+/// All that is known of the readings, where no kind says what matters.
+fn anything(evidence: &Evidence) -> String {
+    let scatter = evidence.scatter_m.map_or("unknown".to_owned(), |s| format!("{:.2} mm", s * 1e3));
+    format!(
+        "no ball seen for {:.1} s, readings identical for {:.1} s, {} set aside in 10 s, scatter \
+         {scatter}",
+        evidence.unseen_s, evidence.identical_s, evidence.outliers,
+    )
+}
+
+fn servo(axis: Axis, kind: Option<FaultKind>, evidence: &Evidence) -> String {
+    let e = &evidence.axes[axis];
+    let answer = e.answer.and_then(|answer| answered(axis, kind, &answer));
+    let answer = answer.map(|words| format!("{words}; ")).unwrap_or_default();
+    format!("{answer}{}", accelerated(axis, e))
+}
+
+fn accelerated(axis: Axis, e: &AxisEvidence) -> String {
+    // A residual within its limit is not what raised it.
+    let ground = match e.violates() {
+        true => format!("limit {:.2}", e.limit_m_s2),
+        false => format!("weight of evidence {:.0} nats", e.nats),
+    };
+    let (along, command) = (axis.as_str(), axis.command());
+    match (e.measured_m_s2, e.twin_m_s2) {
+        (Some(measured), Some(twin)) => format!(
+            "the ball accelerates by {measured:.2} m/s² along {along} where {command} asks for \
+             {twin:.2} m/s² ({ground})"
+        ),
+        _ => format!("the ball's acceleration along {along} is not testable now ({ground})"),
+    }
+}
+
+/// Standard error of a gain beyond which it is better not said.
+const SAYABLE_GAIN_ERROR: f64 = 0.3;
+
+/// How the servo answers its command, by what is wrong with it.
+fn answered(axis: Axis, kind: Option<FaultKind>, answer: &Answer) -> Option<String> {
+    let command = axis.command();
+    let share = share(answer);
+    let known = share.as_ref().map(|share| format!(" ({share})")).unwrap_or_default();
+    let (off, off_error) = (answer.offset_m_s2, answer.offset_error_m_s2);
+    let words = match kind {
+        Some(FaultKind::Dead) => format!("the servo does not answer {command}{known}"),
+        Some(FaultKind::Held) => {
+            format!("the servo stays where it is whatever {command} asks for{known}")
+        }
+        Some(FaultKind::Reversed) => {
+            format!("the servo answers {command} the wrong way round{known}")
+        }
+        Some(FaultKind::Offset) => {
+            format!("the servo is off by as much as gives the ball {off:+.2} ± {off_error:.2} m/s²")
+        }
+        Some(FaultKind::Slow) if answer.delay_s > answer.delay_error_s => format!(
+            "the servo answers {command} {:.2} ± {:.2} s late",
+            answer.delay_s, answer.delay_error_s
+        ),
+        Some(FaultKind::Slow) => format!("the servo answers {command} late"),
+        Some(FaultKind::Intermittent) => format!("the servo answers {command} now and then"),
+        _ => format!("the servo answers {} of {command}{}", share?, unasked(answer)),
+    };
+    Some(words)
+}
+
+/// How much of its command the servo answers, where that can be said.
+fn share(answer: &Answer) -> Option<String> {
+    let (gain, error) = (100.0 * answer.gain, 100.0 * answer.gain_error);
+    (answer.gain_error <= SAYABLE_GAIN_ERROR).then(|| format!("{gain:.0} ± {error:.0} %"))
+}
+
+/// What the ball does that no command explains, where it surely does.
+fn unasked(answer: &Answer) -> String {
+    let off = answer.offset_m_s2;
+    match off.abs() > 2.0 * answer.offset_error_m_s2 {
+        true => format!(" with {off:+.2} m/s² that nobody asked for"),
+        false => String::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests;

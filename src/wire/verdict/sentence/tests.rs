@@ -1,0 +1,145 @@
+use super::*;
+use crate::diagnosis::{StatusByte, Step};
+use crate::vocabulary::{PerAxis, SimTime};
+
+/// A moment in which all that can be said is known.
+fn evidence() -> Evidence {
+    let answer = Answer {
+        offset_m_s2: 0.3,
+        offset_error_m_s2: 0.02,
+        gain: 0.52,
+        gain_error: 0.06,
+        delay_s: 0.25,
+        delay_error_s: 0.03,
+        ..Answer::default()
+    };
+    let x = AxisEvidence {
+        measured_m_s2: Some(0.05),
+        twin_m_s2: Some(-0.2),
+        limit_m_s2: 0.21,
+        enabled: true,
+        nats: 14.0,
+        answer: Some(answer),
+        identical_s: 1.25,
+        ..AxisEvidence::default()
+    };
+    Evidence {
+        axes: PerAxis { x, y: AxisEvidence { nats: 9.0, ..AxisEvidence::default() } },
+        unseen_s: 0.75,
+        missing_share: 0.62,
+        identical_s: 1.25,
+        still_s: 1.5,
+        outliers: 7,
+        scatter_m: Some(3e-3),
+        healthy_scatter_m: 2e-4,
+        jump: Some(Step { at_s: 4.97, size_m: 0.1 }),
+        ..Evidence::default()
+    }
+}
+
+/// A failure of `code` in the way of `kind`, on `evidence`.
+fn failure(code: FaultCode, kind: Option<FaultKind>, evidence: Evidence) -> Transition {
+    let mut byte = StatusByte::default();
+    byte.failed();
+    byte.confirm(false);
+    let suspicion = Suspicion { onset: SimTime::new(4.5), kind, candidates: Vec::new() };
+    let at = SimTime::new(5.25).unwrap();
+    Transition { at, code, status: FaultStatus::Confirmed, byte, suspicion, evidence }
+}
+
+/// What is said after the name, the status and the onset.
+fn said(code: FaultCode, kind: Option<FaultKind>, evidence: Evidence) -> String {
+    let sentence = sentence(&failure(code, kind, evidence));
+    let (head, said) = sentence.split_once(": ").unwrap();
+    assert_eq!(head, format!("{} confirmed since 4.50 s", named(code, kind)));
+    said.to_owned()
+}
+
+#[test]
+fn regress_a_sensor_fault_is_said_by_its_kind() {
+    let cases = [
+        (FaultKind::Jump, "readings stepped by 100 mm at 4.97 s"),
+        (FaultKind::Noise, "readings scatter by 3.00 mm where healthy ones do by 0.20 mm"),
+        (FaultKind::Spikes, "7 lone readings far off the ball's path in 10 s"),
+        (FaultKind::Dropout, "no ball seen for 0.8 s, and in 62 % of the samples of late"),
+        (FaultKind::Frozen, "readings have been the same to the bit for 1.2 s"),
+    ];
+    for (kind, wanted) in cases {
+        assert_eq!(said(FaultCode::Sensor, Some(kind), evidence()), wanted);
+    }
+    let one = Evidence { identical_s: 0.0, ..evidence() };
+    assert_eq!(
+        said(FaultCode::Sensor, Some(FaultKind::Frozen), one),
+        "readings along x have been the same to the bit for 1.2 s while those along y change"
+    );
+    let seen = Evidence { unseen_s: 0.0, ..evidence() };
+    assert_eq!(
+        said(FaultCode::Sensor, Some(FaultKind::Dropout), seen),
+        "no ball seen in 62 % of the samples of late"
+    );
+}
+
+#[test]
+fn regress_a_servo_fault_is_said_by_its_kind() {
+    let cases = [
+        (Some(FaultKind::Dead), "does not answer qy (52 ± 6 %)"),
+        (Some(FaultKind::Held), "stays where it is whatever qy asks for (52 ± 6 %)"),
+        (Some(FaultKind::Reversed), "answers qy the wrong way round (52 ± 6 %)"),
+        (Some(FaultKind::Gain), "answers 52 ± 6 % of qy with +0.30 m/s² that nobody asked for"),
+        (Some(FaultKind::Offset), "is off by as much as gives the ball +0.30 ± 0.02 m/s²"),
+        (Some(FaultKind::Slow), "answers qy 0.25 ± 0.03 s late"),
+        (Some(FaultKind::Intermittent), "answers qy now and then"),
+        (None, "answers 52 ± 6 % of qy with +0.30 m/s² that nobody asked for"),
+    ];
+    for (kind, wanted) in cases {
+        let rest = "the ball accelerates by 0.05 m/s² along x where qy asks for -0.20 m/s² \
+                    (limit 0.21)";
+        let wanted = format!("the servo {wanted}; {rest}");
+        assert_eq!(said(FaultCode::XServo, kind, evidence()), wanted);
+    }
+}
+
+#[test]
+fn regress_a_ball_that_stands_is_told_from_one_that_hardly_moves() {
+    assert_eq!(
+        said(FaultCode::StuckBall, None, evidence()),
+        "the ball has stood still for 1.5 s while the plate asks it to move"
+    );
+    let slow = Evidence { still_s: 0.1, ..evidence() };
+    assert_eq!(
+        said(FaultCode::StuckBall, None, slow),
+        "the ball hardly moves although the plate asks it to along both axes (weight of evidence \
+         23 nats)"
+    );
+}
+
+#[test]
+fn regress_causes_that_read_alike_are_all_named_the_heaviest_first() {
+    let servo = Candidate { code: FaultCode::XServo, kind: Some(FaultKind::Dead), weight: 0.7 };
+    let ball = Candidate { code: FaultCode::StuckBall, kind: None, weight: 0.3 };
+    let mut alike = failure(FaultCode::StuckBall, None, evidence());
+    alike.suspicion.candidates = vec![servo, ball];
+    assert_eq!(
+        sentence(&alike),
+        "stuck_ball confirmed since 4.50 s: cannot tell x_servo (dead) 70 % from stuck_ball 30 %; \
+         the ball has stood still for 1.5 s while the plate asks it to move"
+    );
+    let kind = |kind, weight| Candidate { code: FaultCode::XServo, kind: Some(kind), weight };
+    let mut kinds = failure(FaultCode::XServo, None, evidence());
+    kinds.suspicion.candidates =
+        vec![kind(FaultKind::Dead, 0.4), kind(FaultKind::Held, 0.35), kind(FaultKind::Gain, 0.25)];
+    let said = sentence(&kinds);
+    let wanted =
+        "x_servo confirmed since 4.50 s: cannot tell which kind: dead 40 %, held 35 %, gain 25 %; ";
+    assert!(said.starts_with(wanted), "{said}");
+}
+
+#[test]
+fn regress_a_test_that_passes_again_is_no_alarm() {
+    let mut passing = failure(FaultCode::Sensor, Some(FaultKind::Jump), evidence());
+    passing.byte.passed();
+    assert_eq!(
+        sentence(&passing),
+        "sensor (jump) passes its test again since 5.25 s; on record as confirmed (2E)"
+    );
+}
