@@ -157,8 +157,8 @@ impl Filter {
         for i in 0..STATES {
             let gain = row[i] / s;
             self.state[i] += gain * innovation;
-            for j in 0..STATES {
-                self.covariance[i][j] -= gain * row[j];
+            for (covariance, shared) in self.covariance[i].iter_mut().zip(row) {
+                *covariance -= gain * shared;
             }
         }
     }
