@@ -223,6 +223,12 @@ impl OutlierGate {
         self.refuse(t_s, position_m, staying, &track, noise_m)
     }
 
+    /// Whether the last readings may have stepped: later ones will tell.
+    #[must_use]
+    pub const fn doubts(&self) -> bool {
+        self.leap.is_some()
+    }
+
     /// The step, if accepted readings have stayed beside the track that they left.
     fn stepped(
         &mut self,

@@ -390,7 +390,7 @@ impl Pipeline {
             match moment.position[axis] {
                 _ if self.at_edge || moment.command[axis].is_none() => servo.pause(),
                 Some(_) if !answers[axis] => servo.pause(),
-                Some(position) if usable => {
+                Some(position) if usable && !self.gate.doubts() => {
                     let course = Course {
                         position_m: motion.position[i],
                         velocity_m_s: motion.velocity[i],

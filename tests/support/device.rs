@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use tokio::sync::watch;
 use tokio::task::JoinHandle;
 
-use super::{Answer, Client, batch, connection, eventually, judgement, rig};
+use super::{Answer, Client, batch, connection, eventually, judgement, registration, rig};
 
 /// The way to the service, which may move to another address.
 #[derive(Clone)]
@@ -131,7 +131,7 @@ pub fn device(
         }
         for lap in 1.. {
             let asset = format!("{name}-{lap}");
-            let made = line.ask(Method::POST, "assets", &json!({ "name": asset })).await;
+            let made = line.ask(Method::POST, "assets", &registration(&asset)).await;
             assert!([201, 409].contains(&made.status.as_u16()), "{}", made.text);
             line.stream(&asset, &samples, &mut random).await;
             check(&line, &asset, &samples, &url).await;

@@ -227,8 +227,7 @@ impl Client {
     }
 
     pub async fn asset(&self, name: &str) {
-        let asset = serde_json::to_value(view(&learnt(name))).unwrap();
-        self.post("assets", &asset).await.expect(201);
+        self.post("assets", &registration(name)).await.expect(201);
     }
 
     /// Sends a batch that must be taken.
@@ -346,6 +345,11 @@ pub fn learnt(name: &str) -> Rig {
     };
     let calibration = Some(LEARNT.get_or_init(learn).clone());
     Rig { calibration, ..Rig::chapter(name) }
+}
+
+/// What registers [`learnt`].
+pub fn registration(name: &str) -> Value {
+    serde_json::to_value(view(&learnt(name))).unwrap()
 }
 
 /// The verdict hash of a recording of an asset learnt so, and what was confirmed.

@@ -74,7 +74,7 @@ fn named(code: &str, kind: Option<&str>) -> String {
 pub(super) fn judged<'a>(sessions: impl Iterator<Item = &'a Judged>) -> Table {
     let mut heading = vec!["judged"];
     heading.extend(FaultCode::ALL.iter().map(|code| code.as_str()));
-    let mut rows = table::table(&heading, &[1, 2, 3, 4]);
+    let mut rows = table::of_names(&heading, &[1, 2, 3, 4]);
     for Judged { summary, .. } in sessions {
         let cell = |m: &JudgedView| table::judged(m.judged_share, m.judged_s);
         let cells = summary.monitors.iter().map(cell);
