@@ -72,7 +72,7 @@ export function recordings(where) {
 }
 
 /** Registers a learnt rig whose x servo loses 2 % of its gain in each of `n` sessions. */
-export async function drifting(base, where, learnt, name = "weak", n = 10) {
+export async function drifting(base, where, learnt, name = "weak", n = 12) {
   await ask(base, "POST", "/assets", { ...learnt, name });
   for (let i = 0; i < n; i++) {
     const path = join(where, "drifting.csv");

@@ -30,8 +30,8 @@ test("the fleet warns of a fault on its way, and the rig's page shows why", asyn
   await view.getByRole("list", { name: "Faults on their way" }).getByText(/gain is .* and falls; at this slope it reaches/).waitFor();
   const drift = view.locator("#drift");
   assert.equal(await drift.getByRole("img").count(), 6, "three parameters of two servos");
-  const chart = drift.getByRole("img", { name: /Gain of the x servo over 10 sessions.*it is warned of/ });
-  assert.equal(await chart.locator("circle").count(), 10);
+  const chart = drift.getByRole("img", { name: /Gain of the x servo over 12 sessions.*it is warned of/ });
+  assert.equal(await chart.locator("circle").count(), 12);
   assert.equal(await drift.getByText(/at the limit in \d+ sessions/).count(), 1);
   assert.deepEqual(view.errors, []);
   await view.done();

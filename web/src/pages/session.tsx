@@ -182,7 +182,7 @@ function Found({ session, faults, seek }: { session: Session; faults: FaultLine[
 function JudgedShares({ monitors }: { monitors: Judged[] }) {
   if (monitors.length === 0) return null;
   return (
-    <table class="list">
+    <table class="list judged">
       <caption class="quiet small-text">Judged, of the session</caption>
       <thead><tr><th scope="col">Monitor</th><th scope="col" class="n">Judged</th><th scope="col">Outcome</th></tr></thead>
       <tbody>{monitors.map((m) => <tr><th scope="row">{codeTitle(m.code)}</th><td class="n">{judged(m)}</td><td>{m.outcome}</td></tr>)}</tbody>
