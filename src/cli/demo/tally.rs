@@ -3,6 +3,7 @@
 use std::io::Write;
 
 use crate::cli::table;
+use crate::diagnosis::StatusByte;
 use crate::simulation::FaultTruth;
 use crate::vocabulary::{FaultCode, FaultStatus};
 use crate::wire::verdict::FaultView;
@@ -28,10 +29,12 @@ impl Tally {
     }
 
     /// Takes note of a fault line; the first confirmation of a code in a
-    /// session counts.
+    /// session counts. One that is on record from before and passes its test again
+    /// is none.
     pub(super) fn heard(&mut self, fault: &FaultView) {
         let same = |f: &&FaultView| f.session == fault.session && f.code == fault.code;
-        if fault.status == FaultStatus::Confirmed.as_str() && !self.found.iter().any(|f| same(&f)) {
+        let confirmed = fault.status == FaultStatus::Confirmed.as_str() && fails(fault);
+        if confirmed && !self.found.iter().any(|f| same(&f)) {
             self.found.push(fault.clone());
         }
     }
@@ -105,6 +108,12 @@ fn explains(injected: &Injected, found: &FaultView) -> bool {
         && found.t_s >= fault.onset_s
 }
 
+/// Whether the fault's test fails at this moment.
+fn fails(fault: &FaultView) -> bool {
+    let byte = u8::from_str_radix(&fault.status_byte, 16).map(StatusByte::from_bits);
+    byte.is_ok_and(StatusByte::test_failed)
+}
+
 fn named(fault: &FaultView) -> String {
     fault.kind.as_ref().map_or_else(|| fault.code.clone(), |k| format!("{} ({k})", fault.code))
 }
@@ -112,7 +121,7 @@ fn named(fault: &FaultView) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnosis::{Evidence, StatusByte, Suspicion, Transition};
+    use crate::diagnosis::{Evidence, Suspicion, Transition};
     use crate::simulation::Fault;
     use crate::vocabulary::SimTime;
     use crate::wire::basis::Basis;
@@ -124,7 +133,8 @@ mod tests {
 
     fn found(session: &str, code: FaultCode, t_s: f64, status: FaultStatus) -> FaultView {
         let at = SimTime::new(t_s).unwrap();
-        let (byte, suspicion) = (StatusByte::default(), Suspicion::default());
+        let (mut byte, suspicion) = (StatusByte::default(), Suspicion::default());
+        byte.failed();
         let evidence = Evidence::default();
         let transition = Transition { at, code, status, byte, suspicion, evidence };
         fault_view(session, &Basis::default(), &transition)
@@ -147,6 +157,9 @@ mod tests {
         assert!(!tally(&[found("a", XServo, 13.0, Pending)]).agrees(), "only pending");
         assert!(!tally(&[found("a", XServo, 9.0, Confirmed)]).agrees(), "too early");
         assert!(!tally(&[found("b", XServo, 13.0, Confirmed)]).agrees(), "another session");
+        let passes =
+            FaultView { status_byte: "2C".to_owned(), ..found("b", XServo, 3.0, Confirmed) };
+        assert!(tally(&[right.clone(), passes]).agrees(), "on record from before");
         assert!(!tally(&[right, found("a", Sensor, 14.0, Confirmed)]).agrees(), "one too many");
     }
 

@@ -271,7 +271,7 @@ impl Servo {
         (offset, variance.sqrt())
     }
 
-    /// The offset of this session over the last [`STEADY_S`], m/s²: a fault that
+    /// The offset of this session over the last 20 s, m/s²: a fault that
     /// has just begun is hardly in it.
     #[must_use]
     pub const fn steady_m_s2(&self) -> f64 {
