@@ -150,12 +150,12 @@ impl Leap {
     /// Whether a reading at `t_s` is as far off the track before as the first one
     /// was, and not as far as a push would have carried it since.
     fn is_step(&self, t_s: f64, position_m: Vector2<f64>) -> bool {
-        let off_m = self.share(t_s, position_m);
+        let share = self.share(t_s, position_m);
         let carried = (t_s - self.at_s) / (self.at_s - self.before.at_s);
         let least = carried.min(1.0) * STEP_SHARE;
         let aside =
-            (self.before.off(t_s, position_m) - self.off_m * off_m).amax() / self.off_m.amax();
-        (1.0 - STEP_SHARE..1.0 + least).contains(&off_m) && aside < STEP_SHARE
+            (self.before.off(t_s, position_m) - self.off_m * share).amax() / self.off_m.amax();
+        (1.0 - STEP_SHARE..1.0 + least).contains(&share) && aside < STEP_SHARE
     }
 }
 

@@ -653,8 +653,8 @@ impl Pipeline {
 const EVIDENCE_FACTOR: f64 = 1.0 / 0.6;
 
 /// Noise that readings of a rig that is not learnt may have where a jump is
-/// looked for, m: ultrasonic sensors scatter by 8 to 15 mm, few others by more
-/// than 5.
+/// looked for, m. Assumed: ultrasonic sensors scatter by 8 to 15 mm, cameras by up
+/// to 2.
 const UNKNOWN_NOISE_M: f64 = 5e-3;
 
 /// Standard errors of the session's level that are allowed.

@@ -19,7 +19,7 @@ mod sessions;
 mod spread;
 mod widening;
 
-use fit::{Fitter, SessionFit};
+use fit::{Explained, Fitter, SessionFit};
 use prospects::prospects;
 use recording::{Recording, Stretch};
 use sessions::{Estimate, Population, between, combined};
@@ -235,44 +235,12 @@ fn learn_in_windows(
     }
     let still = CannotCalibrate::TooLittleExcitation { axis, percent: f64::INFINITY };
     let (dead_time_s, lag_s, found) = fitter.search().ok_or(still)?;
-    let error = found.gain_error / found.gain.abs();
-    let unexplained = found.share.is_nan() || found.share < LEAST_EXPLAINED;
-    let percent = 100.0 * found.share.max(0.0);
-    if unexplained && recordings.iter().any(|r| r.swing_rad(axis) > MOVING_RAD) {
-        return Err(CannotCalibrate::Unexplained { axis, percent });
-    }
-    if error.is_nan() || error > WORST_GAIN_ERROR {
-        return Err(CannotCalibrate::TooLittleExcitation { axis, percent: 100.0 * error });
-    }
-    if found.gain <= 0.0 {
-        return Err(CannotCalibrate::Reversed { axis, gain: found.gain });
-    }
-    if unexplained {
-        return Err(CannotCalibrate::Unexplained { axis, percent });
-    }
+    let swings = recordings.iter().any(|r| r.swing_rad(axis) > MOVING_RAD);
+    check_explained(axis, &found, swings)?;
     let slope = found.gain * axis.drive_sign() * rig.ball.rolling_gravity();
-    let in_motion = |s: &SessionFit| Estimate {
-        value: s.offset_m_s2 / slope,
-        error: (s.offset_error_m_s2 / slope).abs(),
-    };
-    let levels: Vec<Option<Estimate>> = found
-        .sessions
-        .iter()
-        .zip(recordings)
-        .map(|(s, recording)| {
-            let at_rest = level_at_rest(recording, axis, dead_time_s + lag_s);
-            combined(s.as_ref().map(in_motion), at_rest)
-        })
-        .collect();
+    let levels = levels(recordings, axis, dead_time_s + lag_s, slope, &found);
     let known: Vec<Estimate> = levels.iter().flatten().copied().collect();
     let level = between(&known, &LEVELS).ok_or(CannotCalibrate::TooShort { axis, n_windows })?;
-    let gains: Vec<Estimate> = found
-        .sessions
-        .iter()
-        .flatten()
-        .map(|s| Estimate { value: s.gain / found.gain, error: (s.gain_error / found.gain).abs() })
-        .collect();
-    let gain_spread = between(&gains, &GAINS).map_or(GAINS.deviation, |g| g.deviation);
     let healthy = {
         let (gain, resistance) = (found.gain, found.resistance_m_s2);
         let levels: Vec<f64> = levels.iter().map(|l| l.map_or(level.mean, |l| l.value)).collect();
@@ -284,7 +252,7 @@ fn learn_in_windows(
         lag_s,
         level_rad: level.mean,
         level_spread_rad: level.deviation,
-        gain_spread,
+        gain_spread: gain_spread(&found),
         resistance_m_s2: found.resistance_m_s2,
         noise_m: healthy.noise_m.max(1e-5),
         breakaway_rad: healthy.breakaway_rad,
@@ -295,14 +263,67 @@ fn learn_in_windows(
         familiar_m_s2: healthy.familiar_m_s2,
         most_nats: 0.0,
     };
-    let estimate = |level: Estimate, fit: Option<SessionFit>| SessionEstimate {
-        level_rad: level.value,
-        level_error_rad: level.error,
-        gain: fit.map(|f| (f.gain, f.gain_error)),
+    Ok(LearntAxis { calibration, sessions: by_session(&levels, &found) })
+}
+
+/// That the command of `axis`, which `swings` or is nearly held, explains the
+/// ball's motion, and by a gain that is known well enough.
+fn check_explained(axis: Axis, found: &Explained, swings: bool) -> Result<(), CannotCalibrate> {
+    let error = found.gain_error / found.gain.abs();
+    let unexplained = found.share.is_nan() || found.share < LEAST_EXPLAINED;
+    let percent = 100.0 * found.share.max(0.0);
+    if unexplained && swings {
+        return Err(CannotCalibrate::Unexplained { axis, percent });
+    }
+    if error.is_nan() || error > WORST_GAIN_ERROR {
+        return Err(CannotCalibrate::TooLittleExcitation { axis, percent: 100.0 * error });
+    }
+    if found.gain <= 0.0 {
+        return Err(CannotCalibrate::Reversed { axis, gain: found.gain });
+    }
+    if unexplained {
+        return Err(CannotCalibrate::Unexplained { axis, percent });
+    }
+    Ok(())
+}
+
+/// The level of each session, rad, by the ball's motion and by where it rested,
+/// where one radian accelerates the ball by `slope` m/s².
+fn levels(
+    recordings: &[Recording],
+    axis: Axis,
+    delay_s: f64,
+    slope: f64,
+    found: &Explained,
+) -> Vec<Option<Estimate>> {
+    let in_motion = |s: &SessionFit| Estimate {
+        value: s.offset_m_s2 / slope,
+        error: (s.offset_error_m_s2 / slope).abs(),
     };
-    let sessions = levels.into_iter().zip(found.sessions);
-    let sessions = sessions.map(|(level, fit)| level.map(|level| estimate(level, fit))).collect();
-    Ok(LearntAxis { calibration, sessions })
+    let level = |(s, recording): (&Option<SessionFit>, &Recording)| {
+        combined(s.as_ref().map(in_motion), level_at_rest(recording, axis, delay_s))
+    };
+    found.sessions.iter().zip(recordings).map(level).collect()
+}
+
+/// Standard deviation of the gain from session to session, as a share of it.
+fn gain_spread(found: &Explained) -> f64 {
+    let share = |s: &SessionFit| Estimate {
+        value: s.gain / found.gain,
+        error: (s.gain_error / found.gain).abs(),
+    };
+    let gains: Vec<Estimate> = found.sessions.iter().flatten().map(share).collect();
+    between(&gains, &GAINS).map_or(GAINS.deviation, |g| g.deviation)
+}
+
+/// What each session says by itself; none where it has no level.
+fn by_session(levels: &[Option<Estimate>], found: &Explained) -> Vec<Option<SessionEstimate>> {
+    let estimate = |(level, fit): (&Option<Estimate>, &Option<SessionFit>)| {
+        let level = (*level)?;
+        let gain = fit.map(|f| (f.gain, f.gain_error));
+        Some(SessionEstimate { level_rad: level.value, level_error_rad: level.error, gain })
+    };
+    levels.iter().zip(&found.sessions).map(estimate).collect()
 }
 
 #[cfg(test)]
