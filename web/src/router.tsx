@@ -1,6 +1,6 @@
 /** The page's own addresses: a path picks a view, links change it without loading anew. */
 import type { ComponentChildren } from "preact";
-import { useEffect, useState } from "preact/hooks";
+import { useLayoutEffect, useState } from "preact/hooks";
 
 const CHANGED = "offbd:moved";
 
@@ -12,7 +12,7 @@ export function go(path: string, replace = false): void {
 /** Where the page is: its path in parts, decoded, and its query. */
 export function usePlace(): { parts: string[]; query: URLSearchParams; path: string } {
   const [path, set] = useState(location.pathname + location.search);
-  useEffect(() => {
+  useLayoutEffect(() => {
     const moved = () => set(location.pathname + location.search);
     addEventListener("popstate", moved);
     addEventListener(CHANGED, moved);

@@ -1,5 +1,5 @@
 /** Recordings: the list, and the door by which others come in. */
-import { useEffect, useRef, useState } from "preact/hooks";
+import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import { api } from "../api/client";
 import type { Session } from "../api/types";
 import { useAsk, useTitle } from "../hooks";
@@ -72,7 +72,8 @@ function Row({ session }: { session: Session }) {
 function DropZone({ take }: { take: (file: File) => void }) {
   const [over, setOver] = useState(false);
   const input = useRef<HTMLInputElement>(null);
-  useEffect(() => {
+  // Listening from the moment the words are there: an effect after the paint loses a file dropped at once.
+  useLayoutEffect(() => {
     const has = (event: DragEvent) => event.dataTransfer?.types.includes("Files") ?? false;
     const enter = (event: DragEvent) => { if (has(event)) { event.preventDefault(); setOver(true); } };
     const leave = (event: DragEvent) => { if (!event.relatedTarget) setOver(false); };
