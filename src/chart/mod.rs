@@ -9,6 +9,7 @@
 //! To add a chart: a module here whose `make` returns a [`Chart`], and its name
 //! in `src/cli/chart.rs`.
 
+pub mod certificate;
 mod dash;
 pub mod detectors;
 mod draw;

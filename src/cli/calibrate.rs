@@ -9,9 +9,11 @@ use sha2::{Digest, Sha256};
 use super::judge::{load_rig, read_samples};
 use super::unusable::{Unusable, read};
 use super::{output, table};
-use crate::diagnosis::{AxisCalibration, Calibration, Prospects, ServoProspects, SessionEstimate};
+use crate::diagnosis::{
+    AxisCalibration, Calibration, MonitorCertificate, Prospects, ServoProspects, SessionEstimate,
+};
 use crate::engine::{Rig, calibrate_and_foresee};
-use crate::vocabulary::{Axis, PerAxis, Sample};
+use crate::vocabulary::{Axis, FaultCode, PerAxis, Sample};
 use crate::wire::{asset, session_csv, verdict};
 
 /// Learns a rig from recordings in which it was healthy.
@@ -124,6 +126,7 @@ pub(super) fn report(rig: &Rig, calibration: &Calibration) {
     if calibration.sessions.len() > 1 {
         report_sessions(&calibration.sessions);
     }
+    calibration.certificate.iter().for_each(|certificate| promise(certificate));
     calibration.prospects.iter().for_each(foresee);
 }
 
@@ -181,6 +184,34 @@ fn disagreement(sessions: &[PerAxis<Option<SessionEstimate>>], axis: Axis) -> Op
 fn range(values: impl Iterator<Item = f64> + Clone) -> Option<f64> {
     let least = values.clone().reduce(f64::min)?;
     values.reduce(f64::max).map(|most| most - least)
+}
+
+/// How often each monitor will alarm on the healthy rig, on stderr.
+fn promise(certificate: &[MonitorCertificate]) {
+    anstream::eprintln!("\non the healthy rig, by tests on recordings not learnt from");
+    let heading = ["monitor", "judged", "nearest to an alarm", "false alarms to expect"];
+    let mut lines = table::table(&heading, &[1, 2, 3]);
+    for (code, monitor) in FaultCode::ALL.iter().zip(certificate) {
+        lines.add_row([
+            code.to_string(),
+            format!("{:.0} s", monitor.judged_s),
+            format!("{:.0} %", 100.0 * monitor.nearest),
+            monitor.alarms_per_hour.map_or("unknown".to_owned(), expected),
+        ]);
+    }
+    for line in table::lines(&lines) {
+        anstream::eprintln!("{line}");
+    }
+}
+
+/// A rate per hour in the unit in which it is easiest to imagine.
+fn expected(per_hour: f64) -> String {
+    let per_day = 24.0 * per_hour;
+    match per_day {
+        d if d >= 24.0 => format!("{per_hour:.1} an hour"),
+        d if d >= 1.0 => format!("{d:.1} a day"),
+        d => format!("one in {:.0} days", 1.0 / d),
+    }
 }
 
 /// What can be found how soon, on stderr.

@@ -47,6 +47,8 @@ enum Name {
     Stability,
     /// Detectors of servo faults: delay against false alarms
     Detectors,
+    /// Calibrations: false alarms and delays, promised against what comes
+    Certificate,
 }
 
 impl Name {
@@ -65,6 +67,7 @@ impl Name {
             Self::Fidelity => chart::fidelity::make(effort),
             Self::Stability => chart::stability::make(effort),
             Self::Detectors => chart::detectors::make(effort),
+            Self::Certificate => chart::certificate::make(effort),
         }
     }
 }

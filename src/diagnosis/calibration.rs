@@ -1,6 +1,6 @@
 //! What was learnt of one rig from healthy sessions.
 
-use crate::vocabulary::PerAxis;
+use crate::vocabulary::{FaultCode, PerAxis};
 
 /// One axis as learnt.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -110,6 +110,19 @@ pub struct Prospects {
     pub unseen_s: Option<f64>,
 }
 
+/// What the tests of a calibration showed of one monitor on healthy recordings
+/// that it had not learnt from, and what follows.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MonitorCertificate {
+    /// Seconds that it could judge.
+    pub judged_s: f64,
+    /// The nearest it came to an alarm, as a share of what confirms a fault, 0 to
+    /// 1.
+    pub nearest: f64,
+    /// False alarms to expect per hour of operation; none where it judged nothing.
+    pub alarms_per_hour: Option<f64>,
+}
+
 /// A calibration: what was learnt per axis, from which data, when.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibration {
@@ -126,6 +139,10 @@ pub struct Calibration {
     pub duration_s: f64,
     /// When it was made, RFC 3339; told by the caller.
     pub made_at: String,
+    /// What its tests showed of each monitor, in the order of
+    /// [`FaultCode::ALL`](crate::vocabulary::FaultCode::ALL); none where it was not
+    /// tested.
+    pub certificate: Option<[MonitorCertificate; FaultCode::COUNT]>,
     /// What can be found by it, how soon; none where that was not tried.
     pub prospects: Option<Prospects>,
 }

@@ -112,6 +112,15 @@ impl Debounce {
         self.level >= 1.0
     }
 
+    /// How far it has come on the way to a trip, 0 to 1.
+    #[must_use]
+    pub fn progress(&self, pace: &Pace) -> f64 {
+        let Pace { fail_s, confirm_s, .. } = *pace;
+        let needed_s = fail_s + confirm_s;
+        let came_s = self.level.max(0.0) * fail_s + self.failing_s;
+        if needed_s > 0.0 { (came_s / needed_s).min(1.0) } else { self.level.max(0.0) }
+    }
+
     /// Takes suspicion back: another cause accounts for what was seen.
     pub fn exonerate(&mut self) {
         self.level = self.level.min(0.0);

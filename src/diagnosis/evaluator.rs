@@ -233,7 +233,7 @@ impl Evaluator {
         let both =
             Axis::ALL.into_iter().filter(|&a| seen(a)).all(|a| axes[a].identical_s >= FROZEN_S);
         if both && any(&dead) {
-            let moved = any(&|a| self.missed(&axes[a]));
+            let moved = any(&|a| self.missed(a, &axes[a]));
             let stuck = Candidate { code: FaultCode::StuckBall, kind: None, weight: STUCK_SHARE };
             let rival = (!moved).then_some(stuck);
             return Some(Finding { rival, ..Finding::fail(Some(FaultKind::Frozen)) });
@@ -243,15 +243,17 @@ impl Evaluator {
     }
 
     /// Whether a ball that moved when its readings last changed must have gone on.
-    fn missed(&self, still: &AxisStillness) -> bool {
-        still.missed_m(ROLLS_OUT_M_S2) > MISSED * self.noise_m()
+    fn missed(&self, axis: Axis, still: &AxisStillness) -> bool {
+        // A ball that stands on a tilt is stopped by as much at least.
+        let stops_m_s2 = ROLLS_OUT_M_S2.max(self.limits[axis].breakaway_m_s2);
+        still.missed_m(stops_m_s2) > MISSED * self.noise_m()
     }
 
     /// Whether readings of `axis` have been the same for longer than any that
     /// live are.
     fn dead(&self, axis: Axis, still: &AxisStillness) -> bool {
         let limits = &self.limits[axis];
-        let asked = still.pressed_s >= FROZEN_S || self.missed(still);
+        let asked = still.pressed_s >= FROZEN_S || self.missed(axis, still);
         let resting = limits.rest_repeat_s.is_some_and(|s| still.identical_s >= s);
         resting || asked && still.identical_s >= limits.repeat_s
     }

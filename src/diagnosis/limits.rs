@@ -15,9 +15,9 @@ const ERROR_FACTOR: f64 = 6.0;
 const HEALTHY_FACTOR: f64 = 5.0;
 
 /// Outliers of late that are too many: those of a healthy sensor, twice, and
-/// some. Not learnt: of six in ten seconds no healthy sensor is known.
+/// some. Not learnt: of four in ten seconds no healthy sensor is known.
 const FEW_OUTLIERS: f64 = 4.0;
-const UNKNOWN_OUTLIERS: f64 = 6.0;
+const UNKNOWN_OUTLIERS: f64 = 4.0;
 const OUTLIERS_FACTOR: f64 = 2.0;
 /// Seconds without a ball for which no healthy tracker that is not learnt loses
 /// it; one that is learnt may for longer than it ever did.

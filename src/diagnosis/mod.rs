@@ -18,7 +18,8 @@ mod stillness;
 pub mod trend;
 
 pub use calibration::{
-    AxisCalibration, Calibration, Prospects, SensorCalibration, ServoProspects, SessionEstimate,
+    AxisCalibration, Calibration, MonitorCertificate, Prospects, SensorCalibration, ServoProspects,
+    SessionEstimate,
 };
 pub use debounce::{Debounce, Pace, Qualified, Test};
 pub use evaluator::{Evaluator, Finding, Surroundings};

@@ -22,6 +22,10 @@ const NOISE_FACTOR: f64 = 8.0;
 /// what the velocity found from a few readings may be off by.
 const STEP_M: f64 = 0.012;
 
+/// Share by which that velocity may be off: readings come at uneven times, and
+/// slow sensors stamp them when they are sent.
+const UNSURE_VELOCITY: f64 = 0.5;
+
 /// What a hand gives a ball while nobody looks, m/s².
 const SHOVE_M_S2: f64 = 2.0;
 
@@ -70,6 +74,8 @@ struct Elsewhere {
     /// Those that differ from the one before: a sensor that is logged faster
     /// than it reads repeats itself, outliers and all.
     distinct: u32,
+    /// Whether something may have turned the ball where they began.
+    turned: bool,
 }
 
 impl Elsewhere {
@@ -77,8 +83,14 @@ impl Elsewhere {
         (self.position_m - self.first_m) / (self.at_s - self.since_s)
     }
 
-    fn differs(&self, position_m: Vector2<f64>) -> u32 {
-        u32::from(position_m != self.position_m)
+    fn start(t_s: f64, position_m: Vector2<f64>, turned: bool) -> Self {
+        let (since_s, first_m, at_s) = (t_s, position_m, t_s);
+        Self { since_s, first_m, at_s, position_m, n: 1, distinct: 1, turned }
+    }
+
+    fn with(self, t_s: f64, position_m: Vector2<f64>) -> Self {
+        let distinct = self.distinct + u32::from(position_m != self.position_m);
+        Self { at_s: t_s, position_m, n: self.n + 1, distinct, ..self }
     }
 }
 
@@ -183,6 +195,27 @@ impl OutlierGate {
     /// Judges the reading `position_m` at `t_s` on a sensor with `noise_m`. An
     /// axis without a reading counts as unmoved.
     pub fn take(&mut self, t_s: f64, position_m: PerAxis<Option<f64>>, noise_m: f64) -> Gated {
+        self.judge(t_s, position_m, noise_m, false)
+    }
+
+    /// [`take`](Self::take) where a rim may have turned the ball: readings that
+    /// leave its path are no step.
+    pub fn take_at_rim(
+        &mut self,
+        t_s: f64,
+        position_m: PerAxis<Option<f64>>,
+        noise_m: f64,
+    ) -> Gated {
+        self.judge(t_s, position_m, noise_m, true)
+    }
+
+    fn judge(
+        &mut self,
+        t_s: f64,
+        position_m: PerAxis<Option<f64>>,
+        noise_m: f64,
+        may_turn: bool,
+    ) -> Gated {
         let held = self.track.map_or(Vector2::zeros(), |t| t.position_m);
         let position_m =
             Vector2::new(position_m.x.unwrap_or(held.x), position_m.y.unwrap_or(held.y));
@@ -199,28 +232,32 @@ impl OutlierGate {
         };
         let staying = self.elsewhere.filter(stays);
         if staying.is_none() && off_m <= reach(track.at_s) {
-            if let Some(leap) = self.leap.filter(|l| l.was_outlier(t_s, position_m)) {
-                self.leap = None;
-                self.outliers += 1;
-                let outliers = self.follow(leap.before.followed_by(t_s, position_m));
-                return Gated::Accepted { outliers, undone: true };
+            let leap = self.leap.filter(|l| l.was_outlier(t_s, position_m));
+            let step_m = NOISE_FACTOR * noise_m + STEP_M;
+            // What falls back to the track before is no step off the last reading.
+            let falls_back = |before: &Track| {
+                off_m > step_m && before.off_m(t_s, position_m) < STEP_SHARE * off_m
+            };
+            let before = self.before.take().filter(falls_back);
+            if let Some(before) = leap.map(|l| l.before).or(before) {
+                return self.undo(&before, t_s, position_m);
             }
-            let doubtful = off_m > reach(track.at_s) / 2.0;
+            let doubtful = off_m > reach(track.at_s).min(step_m) / 2.0;
             self.before = doubtful.then_some(track);
-            if let Some(step) = self.stepped(&track, t_s, position_m, noise_m) {
+            if let Some(step) = self.stepped(&track, t_s, position_m, noise_m, may_turn) {
                 self.follow(Track::start(t_s, position_m, BELIEVED_AFTER));
                 return Gated::Stepped(step);
             }
-            return self.accept(track.followed_by(t_s, position_m));
+            let next = track.followed_by(t_s, position_m);
+            // A path that was turned is new.
+            return self.accept(if may_turn { Track { n: 1, ..next } } else { next });
         }
         if let Some(before) = self.before.take()
             && before.off_m(t_s, position_m) <= reach(before.at_s)
         {
-            self.outliers += 1;
-            let outliers = self.follow(before.followed_by(t_s, position_m));
-            return Gated::Accepted { outliers, undone: true };
+            return self.undo(&before, t_s, position_m);
         }
-        self.refuse(t_s, position_m, staying, &track, noise_m)
+        self.refuse(t_s, position_m, staying, &track, noise_m, may_turn)
     }
 
     /// Whether the last readings may have stepped: later ones will tell.
@@ -236,6 +273,7 @@ impl OutlierGate {
         t_s: f64,
         position_m: Vector2<f64>,
         noise_m: f64,
+        may_turn: bool,
     ) -> Option<Step> {
         if let Some(leap) = self.leap {
             let stays = leap.is_step(t_s, position_m);
@@ -248,8 +286,10 @@ impl OutlierGate {
         }
         let off_m = track.off(t_s, position_m);
         let unseen_s = t_s - track.at_s;
-        let allowed_m = NOISE_FACTOR * noise_m + STEP_M + SHOVE_M_S2 / 8.0 * unseen_s * unseen_s;
-        if off_m.amax() > allowed_m && track.n >= BELIEVED_AFTER {
+        let unsure_m = UNSURE_VELOCITY * track.velocity_m_s.amax() * unseen_s;
+        let allowed_m =
+            NOISE_FACTOR * noise_m + STEP_M + unsure_m + SHOVE_M_S2 / 8.0 * unseen_s * unseen_s;
+        if off_m.amax() > allowed_m && !may_turn && track.n >= BELIEVED_AFTER {
             self.leap = Some(Leap { before: *track, at_s: t_s, off_m });
         }
         None
@@ -280,8 +320,7 @@ impl OutlierGate {
         if n >= BELIEVED_AFTER || before.is_some_and(agrees) {
             return self.accept(Track::start(t_s, position_m, n));
         }
-        let (since_s, first_m, at_s) = (t_s, position_m, t_s);
-        self.elsewhere = Some(Elsewhere { since_s, first_m, at_s, position_m, n, distinct: 1 });
+        self.elsewhere = Some(Elsewhere { n, ..Elsewhere::start(t_s, position_m, false) });
         Gated::Refused
     }
 
@@ -293,15 +332,16 @@ impl OutlierGate {
         staying: Option<Elsewhere>,
         track: &Track,
         noise_m: f64,
+        may_turn: bool,
     ) -> Gated {
-        let (since_s, first_m, n, distinct) = match staying {
-            Some(e) => (e.since_s, e.first_m, e.n + 1, e.distinct + e.differs(position_m)),
+        let there = match staying {
+            Some(e) => e.with(t_s, position_m),
             None => {
                 self.outliers += self.elsewhere.map_or(0, |e| e.distinct);
-                (t_s, position_m, 1, 1)
+                Elsewhere::start(t_s, position_m, may_turn)
             }
         };
-        let there = Elsewhere { since_s, first_m, at_s: t_s, position_m, n, distinct };
+        let (n, since_s) = (there.n, there.since_s);
         if n < BELIEVED_AFTER || t_s - since_s < BELIEVED_AFTER_S {
             self.elsewhere = Some(there);
             return Gated::Refused;
@@ -314,7 +354,7 @@ impl OutlierGate {
         let apart = step_m.amax() > NOISE_FACTOR * noise_m + STEP_M + bent_m;
         let bent_m_s = (there.velocity_m_s() - track.velocity_m_s).amax();
         let straight = bent_m_s * BENT_S < step_m.amax();
-        let stepped = apart && straight && track.n >= BELIEVED_AFTER;
+        let stepped = apart && straight && !there.turned && track.n >= BELIEVED_AFTER;
         let step = Step { at_s: there.since_s, size_m: step_m.norm() };
         if stepped { Gated::Stepped(step) } else { accepted }
     }
@@ -322,6 +362,14 @@ impl OutlierGate {
     /// Forgets where the ball was, as after a gap.
     pub fn restart(&mut self) {
         *self = Self::default();
+    }
+
+    /// Goes back to the track `before` the last reading, which was an outlier.
+    fn undo(&mut self, before: &Track, t_s: f64, position_m: Vector2<f64>) -> Gated {
+        self.leap = None;
+        self.outliers += 1;
+        let outliers = self.follow(before.followed_by(t_s, position_m));
+        Gated::Accepted { outliers, undone: true }
     }
 
     fn accept(&mut self, track: Track) -> Gated {
@@ -353,6 +401,38 @@ mod tests {
 
     fn along_x(x: f64) -> PerAxis<Option<f64>> {
         PerAxis { x: Some(x), y: None }
+    }
+
+    /// Where a long gap before an outlier leaves open whether the ball has rolled
+    /// there, it has not if the next reading is back on the path.
+    #[test]
+    fn the_return_from_an_outlier_is_no_step() {
+        let mut gate = OutlierGate::default();
+        let mut take = |t: f64, x: f64| gate.take(t, along_x(x), 1e-3);
+        for (t, x) in [(0.0, 0.02), (0.08, 0.02), (0.16, 0.02), (0.24, 0.02), (0.32, 0.02)] {
+            take(t, x);
+        }
+        assert!(take(0.56, -0.015).usable());
+        assert_eq!(take(0.64, 0.021), Gated::Accepted { outliers: 1, undone: true });
+        for i in 1..20 {
+            let gated = take(0.64 + 0.08 * f64::from(i), 0.021);
+            assert!(!matches!(gated, Gated::Stepped(_)), "{i}: {gated:?}");
+        }
+    }
+
+    /// The same change of place, where a rim may have turned the ball, is none.
+    #[test]
+    fn what_leaves_its_path_at_a_rim_has_not_stepped() {
+        let stepped = |is_at_rim: bool| {
+            let mut gate = resting(0.1);
+            let take = |i: i32| match is_at_rim && i == 0 {
+                true => gate.take_at_rim(f64::from(i) * 0.1, along_x(0.05), 1e-3),
+                false => gate.take(f64::from(i) * 0.1, along_x(0.05), 1e-3),
+            };
+            (0..10).map(take).any(|gated| matches!(gated, Gated::Stepped(_)))
+        };
+        assert!(stepped(false));
+        assert!(!stepped(true));
     }
 
     /// A gate that has seen a ball at rest at 0 until a period before t = 0.

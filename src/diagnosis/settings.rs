@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::MemoryRules;
+use super::{AxisCalibration, MemoryRules};
 use crate::vocabulary::{FaultCode, FaultKind, Invalid, UnknownWord, in_range, positive};
 
 /// A named set of [`Settings`].
@@ -64,6 +64,11 @@ const LEAST_NATS: f64 = 6.0;
 const MOST_NATS: f64 = 36.0;
 /// Share of what confirms that makes the test fail.
 const SUSPECT_SHARE: f64 = 2.0 / 3.0;
+
+/// Times the most evidence that was found against a servo while it was healthy
+/// that it takes to confirm a fault: as the trials of a calibration allow for
+/// times.
+const EVIDENCE_FACTOR: f64 = 1.0 / 0.6;
 
 /// How a rig is judged; immutable while a session runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -164,6 +169,13 @@ impl Settings {
         let window_s = needed_s(NOISE_SHARE).clamp(self.window_s, LONGEST_WINDOW_S);
         let fail_s = (self.fail_s + window_s - self.window_s).max(0.0);
         Self { window_s, fail_s, learnt: true, ..*self }
+    }
+
+    /// Evidence that confirms a fault of an axis' servo, nats: more on a rig that
+    /// has come near to it while it was healthy.
+    #[must_use]
+    pub fn confirming_nats(&self, learnt: Option<&AxisCalibration>) -> f64 {
+        self.confirm_nats.max(learnt.map_or(0.0, |l| EVIDENCE_FACTOR * l.most_nats))
     }
 
     /// Whether a failure of `code` may be confirmed: on a rig that is not learnt

@@ -50,7 +50,8 @@ pub fn moment(mapping: &AxisMapping, sample: &Sample) -> Option<Moment> {
         at: SimTime::new(sample.t_s)?,
         command: PerAxis::from_fn(|a| sample.command(a).map(|c| c * mapping.command_unit_rad)),
         position: PerAxis::from_fn(|a| {
-            sample.position(read(a)).map(|p| p * mapping.position_unit_m * mapping.sign[a])
+            let factor = mapping.position_unit_m * mapping.sign[a];
+            sample.position(read(a)).map(|p| p * factor - mapping.origin_m[a])
         }),
     })
 }

@@ -10,6 +10,7 @@ mod admit;
 mod align;
 mod calibrate;
 mod coverage;
+mod edge;
 mod frame;
 mod look;
 mod pipeline;
@@ -158,6 +159,12 @@ impl Engine {
     /// Most evidence against each servo so far, nats.
     fn most_nats(&self) -> PerAxis<f64> {
         self.pipeline.most_nats()
+    }
+
+    /// The nearest that each monitor has come to an alarm by the time of its
+    /// failures, 0 to 1, and the seconds that it could judge.
+    fn nearest(&self) -> [(f64, f64); FaultCode::COUNT] {
+        self.pipeline.nearest()
     }
 
     /// How well the twin has foretold the readings of each axis, nats.

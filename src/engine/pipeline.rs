@@ -6,6 +6,7 @@
 use nalgebra::Vector2;
 
 use super::coverage::Coverage;
+use super::edge::Edge;
 use super::frame::{self, Moment, Repeats};
 use super::look::Look;
 use super::watch::Watch;
@@ -67,12 +68,7 @@ pub struct Pipeline {
     servos: PerAxis<Servo>,
     readings: Stillness,
     repeats: Repeats,
-    clear_s: f64,
-    at_edge: bool,
-    open_edge: bool,
-    /// The axis across whose rim the ball lies, and for how long, s.
-    rim: Option<Axis>,
-    rim_s: f64,
+    edge: Edge,
     since_jump_s: f64,
     /// The last step of the readings, if there was one.
     jump: Option<Step>,
@@ -103,7 +99,7 @@ impl Pipeline {
         let settings = if adapts { settings.through(needed_s) } else { settings };
         let confirm_nats = PerAxis::from_fn(|axis| {
             let learnt = rig.calibration.as_ref().and_then(|c| c.axes[axis].as_ref());
-            settings.confirm_nats.max(learnt.map_or(0.0, |l| EVIDENCE_FACTOR * l.most_nats))
+            settings.confirming_nats(learnt)
         });
         let servo = |axis: Axis| {
             let learnt = rig.calibration.as_ref().and_then(|c| c.axes[axis].as_ref());
@@ -137,11 +133,7 @@ impl Pipeline {
             servos: PerAxis::from_fn(servo),
             readings: Stillness::default(),
             repeats: Repeats::new(refresh_s(rig)),
-            clear_s: 0.0,
-            at_edge: false,
-            open_edge: !rig.plate.rim(),
-            rim: None,
-            rim_s: 0.0,
+            edge: Edge::new(rig),
             since_jump_s: f64::INFINITY,
             jump: None,
             noisy_m: 0.0,
@@ -163,11 +155,11 @@ impl Pipeline {
         let Some(moment) = frame::moment(&setup.rig.mapping, sample) else { return };
         let Some(dt) = self.tick(moment.at) else { return };
         self.n_judged += 1;
-        let moment = self.without_readings_far_off(setup, moment);
+        let moment = self.without_readings_far_off(moment);
         self.step_twin(&moment);
         let fresh = self.without_repeats(&moment);
         let (usable, outliers) = self.estimate(&fresh, dt);
-        self.locate(setup, &fresh, dt, usable);
+        self.edge.take(&fresh, dt, usable);
         self.watch_readings(&moment, dt, usable, outliers);
         self.follow_servos(&fresh, usable);
         self.unjudged_s += dt;
@@ -184,14 +176,9 @@ impl Pipeline {
         }
     }
 
-    /// The moment without its reading where that is farther beyond the edge than
-    /// the edge is from the middle, and the ball has not left the plate before: no
-    /// ball is there, whatever the sensor takes for one.
-    fn without_readings_far_off(&self, setup: &Setup, moment: Moment) -> Moment {
-        let plate = &setup.rig.plate;
-        let at = |axis: Axis| moment.position[axis].unwrap_or(0.0);
-        let beyond_m = -plate.edge_distance_m(at(Axis::X), at(Axis::Y));
-        match !self.at_edge && beyond_m > plate.edge_distance_m(0.0, 0.0) {
+    /// The moment without its reading where no ball can be.
+    fn without_readings_far_off(&self, moment: Moment) -> Moment {
+        match self.edge.is_far_off(&moment) {
             true => Moment { position: PerAxis::default(), ..moment },
             false => moment,
         }
@@ -240,8 +227,7 @@ impl Pipeline {
         self.twin.restart();
         Axis::ALL.into_iter().for_each(|axis| self.servos[axis].restart());
         self.readings = Stillness::default();
-        self.clear_s = 0.0;
-        self.rim_s = 0.0;
+        self.edge.restart();
         self.gate.restart();
         self.forget();
     }
@@ -301,7 +287,11 @@ impl Pipeline {
         }
         // Off the twin's path, a ball that obeys it goes straight.
         let off = |axis: Axis| moment.position[axis].map(|p| p - predicted[axis as usize]);
-        let gated = self.gate.take(t, PerAxis::from_fn(off), self.gate_noise_m());
+        let (off_m, noise_m) = (PerAxis::from_fn(off), self.gate_noise_m());
+        let gated = match self.edge.may_have_bounced(moment.at) {
+            true => self.gate.take_at_rim(t, off_m, noise_m),
+            false => self.gate.take(t, off_m, noise_m),
+        };
         match gated {
             Gated::Stepped(step) => {
                 self.forget();
@@ -336,23 +326,6 @@ impl Pipeline {
         self.evaluator.noise_m()
     }
 
-    /// Stage: how far the ball is from the edge, and for how long it has been
-    /// clear of it. An axis that is not measured does not count, nor does an
-    /// outlier.
-    fn locate(&mut self, setup: &Setup, moment: &Moment, dt: f64, usable: bool) {
-        let seen = |a: Axis| moment.position[a];
-        if usable && Axis::ALL.into_iter().any(|a| seen(a).is_some()) {
-            let plate = &setup.rig.plate;
-            let (x, y) = (seen(Axis::X).unwrap_or(0.0), seen(Axis::Y).unwrap_or(0.0));
-            let room = setup.rig.contact_room_m();
-            self.at_edge = plate.edge_distance_m(x, y) < room;
-            let rim = plate.edge_axis(x, y, room).filter(|_| plate.rim());
-            self.rim_s = if rim.is_some() && rim == self.rim { self.rim_s + dt } else { 0.0 };
-            self.rim = rim;
-        }
-        self.clear_s = if self.at_edge { 0.0 } else { self.clear_s + dt };
-    }
-
     /// Stage: stillness, missing and identical readings.
     fn watch_readings(&mut self, moment: &Moment, dt: f64, usable: bool, outliers: u32) {
         let limits = *self.evaluator.limits();
@@ -366,7 +339,7 @@ impl Pipeline {
             still_m: STILL_FACTOR * self.noise_m(),
             usable,
             // Bounces off the rim look like outliers.
-            outliers: if self.clear_s < self.settings.window_s { 0 } else { outliers },
+            outliers: if self.edge.clear_s < self.settings.window_s { 0 } else { outliers },
         });
     }
 
@@ -388,7 +361,7 @@ impl Pipeline {
         for (i, axis) in Axis::ALL.into_iter().enumerate() {
             let servo = &mut self.servos[axis];
             match moment.position[axis] {
-                _ if self.at_edge || moment.command[axis].is_none() => servo.pause(),
+                _ if self.edge.at_edge || moment.command[axis].is_none() => servo.pause(),
                 Some(_) if !answers[axis] => servo.pause(),
                 Some(position) if usable && !self.gate.doubts() => {
                     let course = Course {
@@ -508,11 +481,11 @@ impl Pipeline {
 
     fn surroundings(&self) -> Surroundings {
         Surroundings {
-            clear_s: self.clear_s,
-            at_edge: self.at_edge,
-            rim: self.rim,
-            rim_s: self.rim_s,
-            over_the_edge: self.at_edge && self.open_edge,
+            clear_s: self.edge.clear_s,
+            at_edge: self.edge.at_edge,
+            rim: self.edge.rim,
+            rim_s: self.edge.rim_s,
+            over_the_edge: self.edge.at_edge && self.edge.is_open(),
             jumped: self.jumped(),
             noisy_m: self.noisy_m,
         }
@@ -574,6 +547,12 @@ impl Pipeline {
     /// of any.
     pub fn most_nats(&self) -> PerAxis<f64> {
         PerAxis::from_fn(|axis| self.watches[FaultCode::servo(axis) as usize].most_nats())
+    }
+
+    /// The nearest that each monitor has come to an alarm by the time of its
+    /// failures, 0 to 1, and the seconds that it could judge.
+    pub fn nearest(&self) -> [(f64, f64); FaultCode::COUNT] {
+        std::array::from_fn(|i| (self.watches[i].nearest(), self.watches[i].judged_s()))
     }
 
     /// How well the healthy explanation has foretold the readings of each axis, nats.
@@ -646,11 +625,6 @@ impl Pipeline {
         }
     }
 }
-
-/// Times the most evidence that was found against a servo while it was healthy
-/// that it takes to confirm a fault: as the trials of a calibration allow for
-/// times.
-const EVIDENCE_FACTOR: f64 = 1.0 / 0.6;
 
 /// Noise that readings of a rig that is not learnt may have where a jump is
 /// looked for, m. Assumed: ultrasonic sensors scatter by 8 to 15 mm, cameras by up

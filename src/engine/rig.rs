@@ -14,6 +14,9 @@ pub struct AxisMapping {
     pub sign: PerAxis<f64>,
     /// Metres per unit of the readings.
     pub position_unit_m: f64,
+    /// What is read where the middle of the plate is, m in the plate frame, −10 to
+    /// 10: taken off every reading.
+    pub origin_m: PerAxis<f64>,
     /// Radians per unit of the commands.
     pub command_unit_rad: f64,
 }
@@ -21,7 +24,8 @@ pub struct AxisMapping {
 impl Default for AxisMapping {
     fn default() -> Self {
         let sign = PerAxis { x: 1.0, y: 1.0 };
-        Self { swap: false, sign, position_unit_m: 1.0, command_unit_rad: 1.0 }
+        let origin_m = PerAxis::default();
+        Self { swap: false, sign, position_unit_m: 1.0, origin_m, command_unit_rad: 1.0 }
     }
 }
 
@@ -105,6 +109,8 @@ impl Rig {
         in_range("/servo/dead_time_s", self.servo.dead_time_s, 0.0..=5.0)?;
         self.servo_model()?;
         positive("/axes/position_unit_m", self.mapping.position_unit_m, 1000.0)?;
+        in_range("/axes/x_offset_m", self.mapping.origin_m.x, -10.0..=10.0)?;
+        in_range("/axes/y_offset_m", self.mapping.origin_m.y, -10.0..=10.0)?;
         positive("/axes/command_unit_rad", self.mapping.command_unit_rad, 1000.0)?;
         self.settings(self.diagnostics.profile)?;
         Ok(())

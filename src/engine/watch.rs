@@ -22,6 +22,8 @@ pub struct Watch {
     rival: Option<Candidate>,
     /// Most evidence by weight so far, nats.
     most_nats: f64,
+    /// The nearest that failures came to a trip by their time, 0 to 1.
+    nearest: f64,
 }
 
 impl Watch {
@@ -37,6 +39,10 @@ impl Watch {
 
     pub const fn most_nats(&self) -> f64 {
         self.most_nats
+    }
+
+    pub const fn nearest(&self) -> f64 {
+        self.nearest
     }
 
     pub const fn test(&self) -> Test {
@@ -67,8 +73,9 @@ impl Watch {
             true => Test::Prefailed,
             false => finding.test,
         };
-        let timed =
-            self.debounce.update(test, dt, &Pace::of(code, finding.rival.is_some(), settings));
+        let pace = Pace::of(code, finding.rival.is_some(), settings);
+        let timed = self.debounce.update(test, dt, &pace);
+        self.nearest = self.nearest.max(self.debounce.progress(&pace));
         let gathered_s = rising.map_or(0.0, |since| at - since);
         let weighed = match gathered_s >= settings.gather_s {
             true => self.weigh(finding, settings),

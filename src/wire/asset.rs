@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use utoipa::ToSchema;
 
+use super::certificate::{self, MonitorCertificateView};
 use crate::diagnosis::{
     AxisCalibration, Calibration, Profile, Prospects, SensorCalibration, ServoProspects,
     SessionEstimate,
@@ -170,13 +171,21 @@ pub struct AxesView {
     pub y_sign: f64,
     /// Metres per unit of the readings, 0.001 for millimetres.
     pub position_unit_m: f64,
+    /// What is read along the plate's x in its middle, m after sign and unit, −10
+    /// to 10; between end stops, the middle of what they leave.
+    #[schema(minimum = -10, maximum = 10)]
+    pub x_offset_m: f64,
+    /// What is read along the plate's y in its middle, m after sign and unit, −10
+    /// to 10; between end stops, the middle of what they leave.
+    #[schema(minimum = -10, maximum = 10)]
+    pub y_offset_m: f64,
     /// Radians per unit of the commands, 0.01745 for degrees.
     pub command_unit_rad: f64,
 }
 
 impl Default for AxesView {
     fn default() -> Self {
-        Self { swap: false, x_sign: 1.0, y_sign: 1.0, position_unit_m: 1.0, command_unit_rad: 1.0 }
+        axes_view(&AxisMapping::default())
     }
 }
 
@@ -222,6 +231,10 @@ pub struct CalibrationView {
     /// What each session says by itself, in the order in which they were given.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sessions: Vec<SessionEstimatesView>,
+    /// How near each monitor came to an alarm in the tests of the calibration, and
+    /// how often it will; empty where it was not tested.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub certificate: Vec<MonitorCertificateView>,
     /// What can be found, how soon.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prospects: Option<ProspectsView>,
@@ -485,8 +498,21 @@ fn mapping(view: &AxesView) -> Result<AxisMapping, Invalid> {
         swap: view.swap,
         sign: PerAxis { x: view.x_sign, y: view.y_sign },
         position_unit_m: view.position_unit_m,
+        origin_m: PerAxis { x: view.x_offset_m, y: view.y_offset_m },
         command_unit_rad: view.command_unit_rad,
     })
+}
+
+fn axes_view(mapping: &AxisMapping) -> AxesView {
+    AxesView {
+        swap: mapping.swap,
+        x_sign: mapping.sign.x,
+        y_sign: mapping.sign.y,
+        position_unit_m: mapping.position_unit_m,
+        x_offset_m: mapping.origin_m.x,
+        y_offset_m: mapping.origin_m.y,
+        command_unit_rad: mapping.command_unit_rad,
+    }
 }
 
 fn diagnostics(view: &DiagnosticsView) -> Result<DiagnosticsSpec, Invalid> {
@@ -515,6 +541,7 @@ fn calibration(view: &CalibrationView) -> Result<Calibration, Invalid> {
         n_samples: view.samples,
         duration_s: view.duration_s,
         made_at: view.made_at.clone(),
+        certificate: certificate::certificate(&view.certificate)?,
         prospects: view.prospects.as_ref().map(prospects),
     })
 }
@@ -623,13 +650,7 @@ pub fn view(rig: &Rig) -> AssetView {
         plate: plate_view(&rig.plate),
         contact: (rig.contact != Contact::default()).then(|| contact_view(&rig.contact)),
         servo: servo_view(&rig.servo),
-        axes: (rig.mapping != AxisMapping::default()).then_some(AxesView {
-            swap: rig.mapping.swap,
-            x_sign: rig.mapping.sign.x,
-            y_sign: rig.mapping.sign.y,
-            position_unit_m: rig.mapping.position_unit_m,
-            command_unit_rad: rig.mapping.command_unit_rad,
-        }),
+        axes: (rig.mapping != AxisMapping::default()).then(|| axes_view(&rig.mapping)),
         diagnostics: (rig.diagnostics != DiagnosticsSpec::default()).then(|| DiagnosticsView {
             profile: Some(rig.diagnostics.profile.to_string()),
             false_alarms_per_rig_year: rig.diagnostics.false_alarms_per_rig_year,
@@ -701,6 +722,7 @@ pub fn calibration_view(calibration: &Calibration) -> CalibrationView {
             longest_unseen_s: calibration.sensor.longest_unseen_s,
         },
         sessions: calibration.sessions.iter().map(session_estimates_view).collect(),
+        certificate: calibration.certificate.as_ref().map_or(Vec::new(), certificate::view),
         prospects: calibration.prospects.as_ref().map(prospects_view),
     }
 }
@@ -743,6 +765,7 @@ pub fn calibration_id(calibration: &Calibration) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnosis::MonitorCertificate;
 
     #[test]
     fn a_name_is_enough() {
@@ -773,6 +796,7 @@ mod tests {
         let mut rig = Rig::chapter("b");
         rig.plate = Plate::new(PlateShape::Round { diameter_m: 0.3 }, 0.005, false).unwrap();
         rig.mapping.swap = true;
+        rig.mapping.origin_m.y = -0.02;
         rig.diagnostics.debounce_s = Some(2.0);
         rig.calibration = Some(Calibration {
             axes: PerAxis { x: Some(learnt), y: None },
@@ -787,6 +811,11 @@ mod tests {
             n_samples: 12,
             duration_s: 1.5,
             made_at: "2026-01-01T00:00:00Z".to_owned(),
+            certificate: Some(std::array::from_fn(|i| MonitorCertificate {
+                judged_s: 300.0,
+                nearest: 0.25 * i as f64,
+                alarms_per_hour: (i > 0).then_some(0.01),
+            })),
             prospects: Some(Prospects {
                 n_trials: 12,
                 servos: PerAxis {
@@ -811,6 +840,7 @@ mod tests {
             (r#"{"ball":{}}"#, "", "missing field `name`"),
             (r#"{"name":"a","plate":{"diameter_m":1,"width_m":1}}"#, "/plate/diameter_m", "round"),
             (r#"{"name":"a","axes":{"x_sign":2}}"#, "/axes/x_sign", "neither"),
+            (r#"{"name":"a","axes":{"y_offset_m":20}}"#, "/axes/y_offset_m", "outside"),
             (r#"{"name":"a","diagnostics":{"profile":"best"}}"#, "/diagnostics/profile", "best"),
             (r#"{"name":"a","servo":{"lag_s":-0.1}}"#, "/servo/lag_s", "outside"),
             (r#"{"name":"a","sample_rate_hz":1e999}"#, "/sample_rate_hz", "number out of range"),

@@ -8,6 +8,7 @@
 pub mod access;
 pub mod asset;
 pub mod basis;
+pub mod certificate;
 pub mod difference;
 pub mod memory;
 mod preset;

@@ -9,6 +9,7 @@
 //! do not count. Fitting the path instead of its second difference explains
 //! 94–98 % of real recordings where differences explain 10–60 %.
 
+mod certificate;
 mod fit;
 mod likelihood;
 mod proof;
@@ -182,6 +183,7 @@ fn teach(rig: &Rig, sessions: &[Vec<Sample>]) -> Result<Calibration, CannotCalib
         n_samples: 0,
         duration_s: recordings.iter().map(Recording::duration_s).sum(),
         made_at: String::new(),
+        certificate: None,
         prospects: None,
     };
     Ok(likelihood::with_model_errors(rig, learnt, sessions))

@@ -5,7 +5,7 @@
 
 use super::self_test::{SelfTest, judge};
 use super::widening::Widening;
-use super::{CannotCalibrate, teach};
+use super::{CannotCalibrate, certificate, teach};
 use crate::diagnosis::{AxisCalibration, Calibration, Settings};
 use crate::engine::{Rig, Setup};
 use crate::vocabulary::{Axis, FaultCode, Sample};
@@ -14,7 +14,7 @@ use crate::vocabulary::{Axis, FaultCode, Sample};
 const MOST_GROUPS: usize = 4;
 /// Share of the time that confirms a fault later which no healthy session may
 /// reach.
-const PATIENCE: f64 = 0.6;
+pub(super) const PATIENCE: f64 = 0.6;
 /// Times that anything is widened at most.
 const MOST_STEPS: usize = 40;
 /// Length of a session of which half need not teach anything by itself, s.
@@ -61,6 +61,7 @@ fn with_most(mut learnt: Calibration, tests: &[SelfTest]) -> Calibration {
     let sensor = &mut learnt.sensor;
     sensor.most_outliers = sensor.most_outliers.max(most(|t| t.most_outliers));
     sensor.most_scatter_m = sensor.most_scatter_m.max(scatter_m);
+    learnt.certificate = Some(certificate::of(&learnt, tests));
     learnt
 }
 

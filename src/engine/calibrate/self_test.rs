@@ -21,6 +21,9 @@ pub(super) struct SelfTest {
     pub(super) most_outliers: f64,
     /// Most scatter that lasted, m.
     pub(super) most_scatter_m: f64,
+    /// The nearest that each monitor came to an alarm by the time of its failures,
+    /// 0 to 1, and the seconds that it could judge.
+    pub(super) nearest: [(f64, f64); FaultCode::COUNT],
     /// How well the readings of each axis were foretold, nats.
     pub(super) foretold_nats: PerAxis<f64>,
 }
@@ -60,6 +63,7 @@ pub(super) fn judge(setup: &Setup, session: usize, samples: &[Sample]) -> SelfTe
         most_nats: nats,
         most_outliers,
         most_scatter_m: scatter.most,
+        nearest: engine.nearest(),
         foretold_nats: engine.foretold_nats(),
     }
 }

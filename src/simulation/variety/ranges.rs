@@ -128,6 +128,8 @@ pub(super) const JITTER: Span = 0.0..=0.15;
 /// sides: a corner of the picture taken for the plate's.
 pub(super) const OFF_CENTRE: f64 = 0.5;
 pub(super) const ORIGIN_SHARE: Span = -0.06..=0.06;
+/// By how much their owners measure it wrong, by hand, m.
+pub(super) const ORIGIN_ERROR_M: Span = -0.003..=0.003;
 
 /// Command to first movement, and lag, s: together the 80 to 300 ms of real rigs
 /// from command to acceleration, less the sensor's part.

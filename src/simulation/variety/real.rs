@@ -33,6 +33,7 @@ pub(super) fn rig(seed: u64, noise: &mut Noise) -> Result<RigModel, Invalid> {
     let sensor = sensor(kind, &rig, refresh, noise);
     let controller = controller(limit_rad, looks_hz, &servos.x, sensor.latency_s, noise);
     let spread = spread(limit_rad, noise);
+    let rig = with_origin(rig, &sensor, noise);
     let model =
         RigModel { rig, servos, surface, sensor, controller, one_axis: kind.one_axis, spread };
     Ok(if kind.one_axis { model.along_x() } else { model })
@@ -134,6 +135,16 @@ fn origin(kind: &Kind, rig: &Rig, noise: &mut Noise) -> PerAxis<f64> {
         let measured = off && !(kind.one_axis && axis == Axis::Y);
         if measured { share * 2.0 * rig.plate.half_extent_m(axis) } else { 0.0 }
     })
+}
+
+/// The rig as its owner describes it, who has measured where the middle of the
+/// plate lies in the readings, by hand.
+fn with_origin(mut rig: Rig, sensor: &SensorModel, noise: &mut Noise) -> Rig {
+    rig.mapping.origin_m = sensor.origin_m.map(|origin_m| {
+        let measured_m = origin_m + even(noise, &ranges::ORIGIN_ERROR_M);
+        if origin_m == 0.0 { 0.0 } else { measured_m }
+    });
+    rig
 }
 
 /// Whoever builds a rig tunes its loop to its delays: those of the servo, of the

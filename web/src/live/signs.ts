@@ -32,7 +32,7 @@ export function compare(buffer: TraceBuffer): Signs {
   return { x, y, verdict: { x: judge(x), y: judge(y) }, seconds: asked * period };
 }
 
-export const PLAIN: AssetAxes = { swap: false, x_sign: 1, y_sign: 1, position_unit_m: 1, command_unit_rad: 1 };
+export const PLAIN: AssetAxes = { swap: false, x_sign: 1, y_sign: 1, position_unit_m: 1, x_offset_m: 0, y_offset_m: 0, command_unit_rad: 1 };
 
 /** The axes with which the rig would do what the twin says. */
 export function mended(axes: AssetAxes, signs: Signs): AssetAxes {
@@ -43,11 +43,15 @@ export function mended(axes: AssetAxes, signs: Signs): AssetAxes {
       swap: !axes.swap,
       x_sign: axes.y_sign * (signs.y.other < 0 ? -1 : 1),
       y_sign: axes.x_sign * (signs.x.other < 0 ? -1 : 1),
+      x_offset_m: axes.y_offset_m * (signs.y.other < 0 ? -1 : 1),
+      y_offset_m: axes.x_offset_m * (signs.x.other < 0 ? -1 : 1),
     };
   }
   return {
     ...axes,
     x_sign: signs.verdict.x === "reversed" ? -axes.x_sign : axes.x_sign,
     y_sign: signs.verdict.y === "reversed" ? -axes.y_sign : axes.y_sign,
+    x_offset_m: signs.verdict.x === "reversed" ? -axes.x_offset_m : axes.x_offset_m,
+    y_offset_m: signs.verdict.y === "reversed" ? -axes.y_offset_m : axes.y_offset_m,
   };
 }
