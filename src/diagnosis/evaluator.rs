@@ -244,8 +244,7 @@ impl Evaluator {
 
     /// Whether a ball that moved when its readings last changed must have gone on.
     fn missed(&self, axis: Axis, still: &AxisStillness) -> bool {
-        // A ball that stands on a tilt is stopped by as much at least.
-        let stops_m_s2 = ROLLS_OUT_M_S2.max(self.limits[axis].breakaway_m_s2);
+        let stops_m_s2 = ROLLS_OUT_M_S2.max(self.limits[axis].rolls_out_m_s2);
         still.missed_m(stops_m_s2) > MISSED * self.noise_m()
     }
 
@@ -254,8 +253,15 @@ impl Evaluator {
     fn dead(&self, axis: Axis, still: &AxisStillness) -> bool {
         let limits = &self.limits[axis];
         let asked = still.pressed_s >= FROZEN_S || self.missed(axis, still);
-        let resting = limits.rest_repeat_s.is_some_and(|s| still.identical_s >= s);
+        let resting = self.rest_repeat_s().is_some_and(|s| still.identical_s >= s);
         resting || asked && still.identical_s >= limits.repeat_s
+    }
+
+    /// Time for which readings of a ball at rest may be the same, s: both axes are
+    /// one look at it. None if that of an axis that is measured is not known.
+    fn rest_repeat_s(&self) -> Option<f64> {
+        let measured = Axis::ALL.into_iter().filter(|&a| self.limits[a].noise_m.is_some());
+        measured.map(|a| self.limits[a].rest_repeat_s).try_fold(0.0, |most, s| Some(s?.max(most)))
     }
 
     /// The ball stands still although it is asked to move. Asked along one axis

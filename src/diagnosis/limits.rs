@@ -66,6 +66,9 @@ pub struct Limits {
     errors: f64,
     /// Acceleration that a ball at rest resists, m/s².
     pub breakaway_m_s2: f64,
+    /// Deceleration of a ball that rolls out as far as it is known, m/s²: half of
+    /// what holds it.
+    pub rolls_out_m_s2: f64,
     /// Standard deviation of the healthy residual, m/s².
     pub residual_m_s2: f64,
     /// Standard deviation of healthy readings, m; none where the axis has no
@@ -115,6 +118,7 @@ impl Limits {
             share: 0.5,
             errors: ERROR_FACTOR,
             breakaway_m_s2: 0.0175 * slope_m_s2,
+            rolls_out_m_s2: 0.0,
             residual_m_s2: 0.0,
             noise_m: (!absent).then_some(2e-3),
             repeat_s: UNKNOWN_REPEAT_S,
@@ -126,6 +130,7 @@ impl Limits {
             errors: ERROR_FACTOR,
             // Half again as much as learnt: friction varies over a plate.
             breakaway_m_s2: 1.5 * l.breakaway_rad * slope_m_s2,
+            rolls_out_m_s2: 0.5 * l.breakaway_rad * slope_m_s2,
             residual_m_s2: l.residual_m_s2,
             noise_m: Some(l.noise_m),
             repeat_s: (REPEAT_FACTOR * l.longest_repeat_s).max(LEAST_REPEAT_S),

@@ -22,10 +22,6 @@ const NOISE_FACTOR: f64 = 8.0;
 /// what the velocity found from a few readings may be off by.
 const STEP_M: f64 = 0.012;
 
-/// Share by which that velocity may be off: readings come at uneven times, and
-/// slow sensors stamp them when they are sent.
-const UNSURE_VELOCITY: f64 = 0.5;
-
 /// What a hand gives a ball while nobody looks, m/s².
 const SHOVE_M_S2: f64 = 2.0;
 
@@ -286,9 +282,7 @@ impl OutlierGate {
         }
         let off_m = track.off(t_s, position_m);
         let unseen_s = t_s - track.at_s;
-        let unsure_m = UNSURE_VELOCITY * track.velocity_m_s.amax() * unseen_s;
-        let allowed_m =
-            NOISE_FACTOR * noise_m + STEP_M + unsure_m + SHOVE_M_S2 / 8.0 * unseen_s * unseen_s;
+        let allowed_m = NOISE_FACTOR * noise_m + STEP_M + SHOVE_M_S2 / 8.0 * unseen_s * unseen_s;
         if off_m.amax() > allowed_m && !may_turn && track.n >= BELIEVED_AFTER {
             self.leap = Some(Leap { before: *track, at_s: t_s, off_m });
         }
