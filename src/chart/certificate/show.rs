@@ -6,6 +6,8 @@ use crate::maths::median;
 
 /// Monitors of rigs are put together in so many groups, by what they promise.
 const GROUPS: usize = 6;
+/// Alarms below which a factor of two is chance.
+const FEW: f64 = 3.0;
 /// Rates and delays drawn.
 const PER_H: (f64, f64) = (1e-3, 10.0);
 const DELAYS_S: (f64, f64) = (0.2, 10.0);
@@ -166,14 +168,18 @@ pub(super) fn table(measured: &[Measured]) -> Table {
 }
 
 fn row(name: &str, group: &Group) -> Vec<String> {
-    let came = f64::from(group.came);
-    let is_kept = (0.5..=2.0).contains(&(came / group.promised));
-    let kept = if is_kept { "yes" } else { "no" };
+    let ratio = f64::from(group.came) / group.promised;
+    let kept = match (0.5..=2.0).contains(&ratio) {
+        _ if group.promised.max(f64::from(group.came)) < FEW => "too few to tell",
+        true => "yes",
+        false => "no",
+    };
     vec![
         name.to_owned(),
-        format!("{:.1}", group.promised),
+        // A sum of nothing is −0.
+        format!("{:.1}", group.promised + 0.0),
         group.came.to_string(),
-        format!("in {:.0} h", group.watched_h),
+        format!("in {:.0} h", group.watched_h + 0.0),
         kept.to_owned(),
     ]
 }

@@ -7,6 +7,7 @@ export type Asset = Schemas["AssetView"];
 export type AssetAxes = Schemas["AxesView"];
 export type Axis = "x" | "y";
 export type AxisCalibration = Schemas["AxisCalibrationView"];
+export type MonitorCertificate = Schemas["MonitorCertificateView"];
 export type Prospects = Schemas["ProspectsView"];
 export type ServoProspects = Schemas["ServoProspectsView"];
 export type AxisTrace = Schemas["AxisTraceView"];

@@ -2,7 +2,7 @@
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { api, isSettled, until } from "../api/client";
 import { follow } from "../api/stream";
-import type { Asset, AssetAxes, AxisCalibration, CalibrationJob, Prospects, ServoProspects, Session, State } from "../api/types";
+import type { Asset, AssetAxes, AxisCalibration, CalibrationJob, MonitorCertificate, Prospects, ServoProspects, Session, State } from "../api/types";
 import { useAsk, useNow, useTitle } from "../hooks";
 import { PlayoutClock, TraceBuffer } from "../live/buffer";
 import { compare, mended, PLAIN, type Signs } from "../live/signs";
@@ -11,7 +11,7 @@ import { Act, Code, Facts, Loading, Trouble } from "../parts/bits";
 import { DeviceToken, useCaller } from "../parts/door";
 import { XyTrace } from "../parts/xy-trace";
 import { at, go, Link, usePlace } from "../router";
-import { clock, count, degrees, duration, millimetres, number, seconds } from "../words";
+import { clock, codeTitle, count, degrees, duration, millimetres, number, seconds } from "../words";
 
 const STEPS = [
   { key: "describe", word: "Describe" }, { key: "connect", word: "Connect" }, { key: "check", word: "Check" }, { key: "learn", word: "Learn" },
@@ -303,13 +303,14 @@ function Learnt({ asset, job }: { asset: Asset; job?: CalibrationJob }) {
                 ["Lag of the servo", (a) => number(a.lag_s * 1e3, 0, "ms")],
                 ["Plate angle at command 0", (a) => degrees(a.level_rad, 2)],
                 ["Noise of the readings", (a) => millimetres(a.noise_m, 2)],
-                ["Tilt at which a resting ball starts", (a) => degrees(a.breakaway_rad, 2)],
+                ["Tilt at which a resting ball starts", (a) => (a.rest_s ? degrees(a.breakaway_rad, 2) : "unknown")],
                 ["Residual of a healthy rig, rms", (a) => number(a.residual_m_s2, 3, "m/s²")],
               ] as [string, (a: AxisCalibration) => string][]).map(([word, show]) => (
                 <tr><th scope="row">{word}</th><td class="n">{c.x ? show(c.x) : "–"}</td><td class="n">{c.y ? show(c.y) : "–"}</td></tr>
               ))}
             </tbody>
           </table>
+          {!!c.certificate?.length && <Promised certificate={c.certificate} />}
           <h3>What can be found, how fast</h3>
           {c.prospects ? <Found prospects={c.prospects} /> : <p class="quiet">Not tried: the sessions are too short for it.</p>}
           <p>Slower changes are followed over the sessions and warned of before they are faults.</p>
@@ -317,6 +318,31 @@ function Learnt({ asset, job }: { asset: Asset; job?: CalibrationJob }) {
         </>
       )}
     </section>
+  );
+}
+
+/** A rate per hour in the unit in which it is easiest to imagine. */
+function rate(perHour?: number | null): string {
+  if (perHour == null) return "unknown";
+  const perDay = 24 * perHour;
+  if (perDay >= 24) return `${number(perHour, 1)} an hour`;
+  return perDay >= 1 ? `${number(perDay, 1)} a day` : `one in ${number(1 / perDay, 0)} days`;
+}
+
+/** How near each monitor came to an alarm on healthy recordings that it had not learnt from, and how often it will. */
+function Promised({ certificate }: { certificate: MonitorCertificate[] }) {
+  return (
+    <>
+      <h3>False alarms to expect</h3>
+      <table class="numbers">
+        <thead><tr><th scope="col">tested on recordings not learnt from</th><th scope="col" class="n">judged</th><th scope="col" class="n">nearest to an alarm</th><th scope="col" class="n">false alarms</th></tr></thead>
+        <tbody>
+          {certificate.map((m) => (
+            <tr><th scope="row">{codeTitle(m.code)}</th><td class="n">{seconds(m.judged_s, 0)}</td><td class="n">{number(m.nearest * 100, 0, "%")}</td><td class="n">{rate(m.alarms_per_hour)}</td></tr>
+          ))}
+        </tbody>
+      </table>
+    </>
   );
 }
 
