@@ -15,6 +15,8 @@ mod crash;
 mod fault_memory;
 #[path = "journal.rs"]
 mod journal;
+#[path = "learning.rs"]
+mod learning;
 #[path = "liveness.rs"]
 mod liveness;
 #[path = "main_job.rs"]

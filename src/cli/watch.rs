@@ -17,6 +17,7 @@ use tokio_tungstenite::tungstenite::http::header::AUTHORIZATION;
 
 use super::unusable::{self, Unusable};
 use super::{output, table};
+use crate::wire::learning::LearningView;
 use crate::wire::service::{MonitorView, StateView};
 use crate::wire::verdict::{AxisEvidenceView, FaultView};
 
@@ -151,7 +152,10 @@ fn line(state: &StateView) -> String {
     let share = |m: &MonitorView| format!("{} {:.0} %", m.code, 100.0 * m.judged_share);
     let judged: Vec<String> = state.monitors.iter().map(share).collect();
     let (x, y) = (axis("x", &evidence.x), axis("y", &evidence.y));
-    format!("{}  {x}  {y}  judged {}", head(state), judged.join(", "))
+    let learning =
+        state.learning.as_ref().map(|l| format!("  {}: {}", l.state.as_str(), l.summary));
+    let learning = learning.unwrap_or_default();
+    format!("{}  {x}  {y}  judged {}{learning}", head(state), judged.join(", "))
 }
 
 /// A block that is drawn anew: a bar for each residual, the monitors.
@@ -165,7 +169,15 @@ fn block(state: &StateView) -> Vec<String> {
     let mut lines = vec![head(state), bar("x", &evidence.x), bar("y", &evidence.y)];
     lines.extend(state.monitors.iter().map(monitor));
     lines.push(format!("           twin: {}", state.fidelity));
+    lines.extend(state.learning.iter().flat_map(learning));
     lines
+}
+
+/// How far a rig is on its way to being learnt, a line for each line of the screen:
+/// what is drawn over must be counted.
+fn learning(learning: &LearningView) -> Vec<String> {
+    let words = table::wrapped("           learning: ", &learning.summary);
+    words.lines().map(str::to_owned).collect()
 }
 
 /// The residual on a scale on which `|` is the limit, two thirds to the right.
@@ -193,6 +205,9 @@ fn bar(name: &str, axis: &AxisEvidenceView) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::State;
+    use crate::wire::learning::LearningState;
+    use crate::wire::service::state_view;
 
     fn axis(residual: Option<f64>) -> AxisEvidenceView {
         AxisEvidenceView {
@@ -201,6 +216,37 @@ mod tests {
             enabled: true,
             ..AxisEvidenceView::default()
         }
+    }
+
+    fn gathering(summary: &str) -> StateView {
+        let mut state = state_view("new", None, &State::default());
+        state.learning = Some(LearningView {
+            asset: "new".to_owned(),
+            state: LearningState::Gathering,
+            summary: summary.to_owned(),
+            wanted_s: 60.0,
+            x_s: Some(23.0),
+            y_s: None,
+            sessions: Vec::new(),
+            n_sessions: 0,
+            calibration: None,
+            refused: None,
+            by_itself: false,
+            refines: false,
+        });
+        state
+    }
+
+    #[test]
+    fn a_rig_that_is_not_learnt_says_how_far_it_is() {
+        let words = "Gathering motion: x 23 of 60 s.";
+        let state = gathering(words);
+        assert!(line(&state).ends_with(&format!("gathering: {words}")), "{}", line(&state));
+        assert_eq!(block(&state).last().unwrap().trim(), format!("learning: {words}"));
+        let long = block(&gathering(&"record steps or circles, ".repeat(9)));
+        assert!(long.iter().all(|line| !line.contains('\n')), "each line is counted");
+        let learnt = StateView { learning: None, ..state };
+        assert!(!line(&learnt).contains("Gathering") && block(&learnt).len() < long.len());
     }
 
     #[test]

@@ -13,6 +13,7 @@ mod coverage;
 mod edge;
 mod frame;
 mod look;
+mod motion;
 mod pipeline;
 mod plausibility;
 mod rig;
@@ -20,6 +21,7 @@ mod types;
 mod watch;
 
 pub use calibrate::{CannotCalibrate, calibrate, calibrate_and_foresee};
+pub use motion::{UsableMotion, WANTED_MOTION_S};
 pub use plausibility::{Misfit, Plausibility};
 pub use rig::{AxisMapping, DiagnosticsSpec, MAX_NAME, Rig, ServoSpec, Setup};
 pub use types::{Admission, Input, MonitorState, Output, Reach, Readiness, Rejection, State};

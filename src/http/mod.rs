@@ -12,6 +12,7 @@ mod faults;
 mod guard;
 mod headers;
 mod layers;
+mod learning;
 mod login;
 mod metrics;
 mod operations;
@@ -184,6 +185,9 @@ fn api() -> Guarded {
         .routes(Operate, routes!(calibrations::create))
         .routes(Read, routes!(calibrations::get))
         .routes(Operate, routes!(calibrations::activate))
+        .routes(ReadAsset, routes!(learning::get))
+        .routes(Operate, routes!(learning::accept))
+        .routes(Operate, routes!(learning::discard))
         .routes(Administer, routes!(tokens::list, tokens::create))
         .routes(Administer, routes!(tokens::get, tokens::revoke))
         .routes(Administer, routes!(tokens::audit))

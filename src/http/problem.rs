@@ -102,6 +102,8 @@ impl From<ServiceError> for Problem {
             E::SessionEnded { .. } => conflict("session-ended", "The session has ended"),
             E::NothingToAcknowledge { .. } => conflict("nothing-to-acknowledge", "No occurrence"),
             E::NotDone { .. } => conflict("not-done", "Not done yet"),
+            E::NothingOffered { .. } => conflict("nothing-offered", "Nothing is offered"),
+            E::AlreadyLearnt { .. } => conflict("already-learnt", "The rig is learnt already"),
             E::Invalid(invalid) => Self::from(invalid),
             E::Batch(batch) => Self::from(batch),
             E::TooMany { .. } => new(StatusCode::PAYLOAD_TOO_LARGE, "too-large", "Too large"),

@@ -20,10 +20,14 @@ fn parse(document: &[u8]) -> Result<Rig, Invalid> {
 }
 
 fn state_of(asset: &str, running: &Running) -> StateView {
-    let Some(open) = &running.open else { return state_view(asset, None, &State::default()) };
+    let not_learnt = running.rig.calibration.is_none();
+    let learning = not_learnt.then(|| running.learning_view());
+    let Some(open) = &running.open else {
+        return StateView { learning, ..state_view(asset, None, &State::default()) };
+    };
     let samples = u64::try_from(open.progress.n_samples).unwrap_or_default();
     let session = (open.id.as_str(), open.name.as_str(), samples);
-    state_view(asset, Some(session), &open.engine.state())
+    StateView { learning, ..state_view(asset, Some(session), &open.engine.state()) }
 }
 
 impl Service {
@@ -112,15 +116,19 @@ impl Service {
 
     async fn replace(&self, rig: Rig) -> Result<(), ServiceError> {
         let name = rig.name.clone();
-        self.call(&name, move |_, running, work| {
+        self.call(&name, move |context, running, work| {
             running.update(views::to_json(&asset::view(&rig))?, work);
             if running.rig.calibration != rig.calibration {
                 // The file's own calibration is none of those on record.
                 let (asset, id) = (running.row.name.clone(), String::new());
                 work.writes.push(Write::ActivateCalibration { asset, id });
+                running.learning.replaced();
+            } else if running.rig.calibration.is_none() && running.rig != rig {
+                running.learning.described();
             }
             running.rig = rig;
-            Ok(())
+            running.keep_learning(work)?;
+            running.learn_if_due(context, work)
         })
         .await
     }

@@ -1,14 +1,18 @@
 //! Learning a rig from sessions that were recorded of it.
 
 use sha2::{Digest, Sha256};
+use tokio::runtime::Handle;
 use uuid::Uuid;
 
 use super::clock::rfc3339;
 use super::jobs::{Bench, Job};
+use super::learning::{Record, Teaching};
+use super::running::{Running, Work};
+use super::shard::Context;
 use super::{Service, ServiceError, views};
 use crate::diagnosis::Calibration;
 use crate::engine::{Rig, Setup, calibrate_and_foresee};
-use crate::store::{CalibrationRow, JobState, Write};
+use crate::store::{CalibrationRow, JobState, Store, Write};
 use crate::vocabulary::{Invalid, Sample};
 use crate::wire::asset::{self, CalibrationView};
 use crate::wire::service::{CalibrationJobView, Page};
@@ -16,10 +20,10 @@ use crate::wire::session_csv;
 use crate::wire::verdict::hex;
 
 /// Sessions that one calibration learns from; more are refused.
-const MAX_SESSIONS: usize = 32;
+pub(super) const MAX_SESSIONS: usize = 32;
 
 /// Samples that one calibration learns from; with more it fails, and says so.
-const MAX_SAMPLES: usize = 2_000_000;
+pub(super) const MAX_SAMPLES: usize = 2_000_000;
 
 impl Service {
     /// Begins to learn `asset` from `sessions` of it.
@@ -70,7 +74,11 @@ impl Service {
         view(self.calibration_row(asset, id).await?)
     }
 
-    async fn calibration_row(&self, asset: &str, id: &str) -> Result<CalibrationRow, ServiceError> {
+    pub(super) async fn calibration_row(
+        &self,
+        asset: &str,
+        id: &str,
+    ) -> Result<CalibrationRow, ServiceError> {
         let row = self.inner.store.calibration(id).await?.filter(|row| row.asset == asset);
         let (asset, id) = (asset.to_owned(), id.to_owned());
         row.ok_or(ServiceError::UnknownCalibration { asset, id })
@@ -109,16 +117,7 @@ impl Service {
         };
         let learnt: CalibrationView = views::from_json(&document)?;
         let id = row.id.clone();
-        self.call(asset, move |_, running, work| {
-            let mut file = asset::view(&running.rig);
-            file.calibration = Some(learnt);
-            running.rig = asset::rig(&file)?;
-            running.update(views::to_json(&file)?, work);
-            let asset = running.row.name.clone();
-            work.writes.push(Write::ActivateCalibration { asset, id });
-            Ok(())
-        })
-        .await?;
+        self.call(asset, move |_, running, work| running.activate(learnt, &id, work)).await?;
         self.calibration(asset, &row.id).await
     }
 }
@@ -136,13 +135,18 @@ fn view(row: CalibrationRow) -> Result<CalibrationJobView, ServiceError> {
     })
 }
 
-/// Runs a calibration to its end.
+/// Runs a calibration to its end, or until the service closes: then it begins anew
+/// with the next start.
 pub(super) async fn run(bench: &Bench, id: &str) -> Result<(), ServiceError> {
     let Some(mut row) = bench.store.calibration(id).await? else { return Ok(()) };
     row.state = JobState::Running.to_string();
     bench.write(Write::PutCalibration(row.clone())).await?;
-    let (worker, job) = (bench.clone(), row.clone());
-    let learnt = tokio::task::spawn_blocking(move || learn(&worker, &job)).await;
+    let (store, runtime, job) = (bench.store.clone(), bench.runtime.clone(), row.clone());
+    let learning = tokio::task::spawn_blocking(move || learn(&store, &runtime, &job));
+    let learnt = tokio::select! {
+        () = bench.closing.cancelled() => return Ok(()),
+        learnt = learning => learnt,
+    };
     match learnt.unwrap_or_else(|_| Err("the calibration has failed".to_owned())) {
         Ok(calibration) => {
             row.state = JobState::Done.to_string();
@@ -153,41 +157,97 @@ pub(super) async fn run(bench: &Bench, id: &str) -> Result<(), ServiceError> {
             row.error = Some(reason);
         }
     }
-    bench.write(Write::PutCalibration(row)).await
+    let asset = row.asset.clone();
+    let settled = move |context: &Context, running: &mut Running, work: &mut Work| {
+        running.calibrated(context, row, work)
+    };
+    match bench.shards.call_in_turn(&asset, settled).await {
+        // It has been deleted meanwhile.
+        Err(ServiceError::UnknownAsset { .. }) => Ok(()),
+        settled => settled,
+    }
 }
 
 /// What is learnt, or the sentence that says what is missing.
-fn learn(bench: &Bench, row: &CalibrationRow) -> Result<Calibration, String> {
+fn learn(store: &Store, runtime: &Handle, row: &CalibrationRow) -> Result<Calibration, String> {
     let say = |error: ServiceError| error.to_string();
-    let rig = bench.runtime.block_on(rig(bench, &row.asset)).map_err(say)?;
-    let ids: Vec<String> = views::from_json(&row.sessions).map_err(say)?;
+    let rig = runtime.block_on(rig(store, &row.asset)).map_err(say)?;
+    let refines = rig.calibration.is_some();
+    let sessions = runtime.block_on(recordings(store, row, refines)).map_err(say)?;
     let mut hash = Sha256::new();
-    let mut sessions = Vec::new();
-    let mut room = MAX_SAMPLES;
-    for id in &ids {
-        let samples = bench.runtime.block_on(recording(bench, id, room)).map_err(say)?;
-        room -= samples.len();
-        hash.update(csv(&samples));
-        sessions.push(samples);
-    }
+    sessions.iter().for_each(|samples| hash.update(csv(samples)));
     let sha256 = hex(&hash.finalize());
     let made_at = rfc3339(row.made_at);
     calibrate_and_foresee(&rig, &sessions, &sha256, &made_at).map_err(|e| e.to_string())
 }
 
+/// The recordings that a calibration learns from: whole sessions where somebody asked
+/// for them, else what the rig's own record says of each. One that is deleted is left
+/// out, but nothing `refines` what was learnt from sessions of which one is gone.
+async fn recordings(
+    store: &Store,
+    row: &CalibrationRow,
+    refines: bool,
+) -> Result<Vec<Vec<Sample>>, ServiceError> {
+    let record = store.learning(&row.asset).await?;
+    let record: Record = record.as_deref().map(views::from_json).transpose()?.unwrap_or_default();
+    let (mut room, mut sessions) = (MAX_SAMPLES, Vec::new());
+    if let Some(lesson) = record.lesson(&row.id) {
+        for teaching in lesson {
+            if !refines && store.session(&teaching.id).await?.is_none() {
+                continue;
+            }
+            let samples = latest(store, teaching, room).await?;
+            room -= samples.len();
+            sessions.push(samples);
+        }
+        return Ok(sessions);
+    }
+    let ids: Vec<String> = views::from_json(&row.sessions)?;
+    for id in &ids {
+        let samples = recording(store, id, room).await?;
+        room -= samples.len();
+        sessions.push(samples);
+    }
+    Ok(sessions)
+}
+
+/// The last samples, at most `room`, of what of a session teaches.
+///
+/// # Errors
+/// [`ServiceError::UnknownSession`] if it has been deleted.
+async fn latest(
+    store: &Store,
+    teaching: &Teaching,
+    room: usize,
+) -> Result<Vec<Sample>, ServiceError> {
+    let Teaching { id, n_samples, .. } = teaching;
+    if store.session(id).await?.is_none() {
+        return Err(ServiceError::UnknownSession { id: id.clone() });
+    }
+    let mut next = (n_samples - i64::try_from(room).unwrap_or(i64::MAX)).max(0);
+    let mut samples: Vec<Sample> = Vec::new();
+    while let Some(chunk) = store.samples_from(id, next).await?.filter(|_| next < *n_samples) {
+        let wanted = usize::try_from(n_samples - next).unwrap_or(usize::MAX);
+        next += i64::try_from(chunk.len()).unwrap_or(i64::MAX);
+        samples.extend(chunk.into_iter().take(wanted));
+    }
+    Ok(samples)
+}
+
 /// The asset's rig, of which the set-up can be made.
-async fn rig(bench: &Bench, asset: &str) -> Result<Rig, ServiceError> {
-    let row = bench.store.asset(asset).await?;
+async fn rig(store: &Store, asset: &str) -> Result<Rig, ServiceError> {
+    let row = store.asset(asset).await?;
     let row = row.ok_or_else(|| ServiceError::UnknownAsset { name: asset.to_owned() })?;
     let rig = views::rig(&row.document)?;
     Setup::new(rig.clone(), None)?;
     Ok(rig)
 }
 
-async fn recording(bench: &Bench, id: &str, room: usize) -> Result<Vec<Sample>, ServiceError> {
+async fn recording(store: &Store, id: &str, room: usize) -> Result<Vec<Sample>, ServiceError> {
     let mut samples: Vec<Sample> = Vec::new();
     let next = |n: usize| i64::try_from(n).unwrap_or(i64::MAX);
-    while let Some(chunk) = bench.store.samples_from(id, next(samples.len())).await? {
+    while let Some(chunk) = store.samples_from(id, next(samples.len())).await? {
         samples.extend(chunk);
         if samples.len() > room {
             let (what, limit) = ("samples in the sessions of a calibration", MAX_SAMPLES);

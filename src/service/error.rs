@@ -39,6 +39,12 @@ pub enum ServiceError {
     NoRecording { asset: String, code: String },
     #[error("calibration `{id}` is not done: {state}")]
     NotDone { id: String, state: String },
+    #[error(
+        "asset `{asset}` offers no calibration: GET /api/v1/assets/{asset}/learning says how far it is"
+    )]
+    NothingOffered { asset: String },
+    #[error("asset `{asset}` is learnt: take the calibration out of its file to learn it anew")]
+    AlreadyLearnt { asset: String },
     #[error(transparent)]
     Invalid(#[from] Invalid),
     #[error(transparent)]

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::clock::rfc3339;
+use super::learning::Record;
 use super::{Service, ServiceError, views};
 use crate::store::{AssetRow, FaultRow, Micros, SessionRow, WarningRow};
 use crate::wire::asset::AssetView;
@@ -16,6 +17,7 @@ struct Known {
     last: BTreeMap<String, Micros>,
     faults: BTreeMap<String, Vec<FleetFaultView>>,
     warnings: BTreeMap<String, Vec<Warned>>,
+    learning: BTreeMap<String, Record>,
 }
 
 /// Warnings, and the calibration by which they came about.
@@ -57,11 +59,16 @@ impl Service {
             let warned = Warned { calibration_id, warnings: views::from_json(&json)? };
             warnings.entry(asset).or_default().push(warned);
         }
+        let mut learning = BTreeMap::new();
+        for (asset, document) in store.learning_of(first, last).await? {
+            learning.insert(asset, views::from_json(&document)?);
+        }
         Ok(Known {
             open: open.into_iter().map(|row| (row.asset.clone(), row)).collect(),
             last: store.last_sessions_of(first, last).await?.into_iter().collect(),
             faults,
             warnings,
+            learning,
         })
     }
 
@@ -74,10 +81,12 @@ impl Service {
         let calibration_id = file.calibration.as_ref().map(|c| &c.id);
         let mut warned = known.warnings.remove(&row.name).unwrap_or_default();
         warned.retain(|warned| warned.calibration_id.as_ref() == calibration_id);
+        let learning = known.learning.remove(&row.name).unwrap_or_default();
         Ok(FleetEntryView {
             warnings: warned.into_iter().flat_map(|warned| warned.warnings).collect(),
             faults: known.faults.remove(&row.name).unwrap_or_default(),
             calibrated: file.calibration.is_some(),
+            learning: learning.state(file.calibration.is_some()),
             session_id: open.as_ref().map(|open| open.id.clone()),
             session: open.map(|open| open.name),
             samples: u64::try_from(progress.n_samples).unwrap_or_default(),

@@ -10,6 +10,7 @@ use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
 
 use super::commit::{Life, WriteSet};
+use super::shard::Shards;
 use super::{Clock, Service, ServiceError, calibrations, replays};
 use crate::store::{Store, Write};
 
@@ -52,6 +53,7 @@ pub(super) struct Bench {
     pub(super) runtime: Handle,
     pub(super) progress: Progress,
     pub(super) closing: CancellationToken,
+    pub(super) shards: Shards,
     writer: mpsc::Sender<WriteSet>,
 }
 
@@ -60,10 +62,11 @@ impl Bench {
         store: Store,
         clock: Clock,
         writer: mpsc::Sender<WriteSet>,
+        shards: Shards,
         closing: CancellationToken,
     ) -> Self {
         let (runtime, progress) = (Handle::current(), Progress::default());
-        Self { store, clock, runtime, progress, closing, writer }
+        Self { store, clock, runtime, progress, closing, shards, writer }
     }
 
     /// Makes `write` durable.

@@ -24,6 +24,7 @@ mod fleet;
 mod history;
 mod import;
 mod jobs;
+mod learning;
 mod limits;
 mod playback;
 mod presence;
@@ -41,7 +42,6 @@ mod trends;
 mod views;
 mod watchdog;
 
-use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
@@ -67,7 +67,7 @@ use self::deletion::Deleter;
 use self::events::Events;
 use self::presence::Presences;
 use self::running::{Running, Work};
-use self::shard::{Context, Job, Shard};
+use self::shard::{Context, Job, Shard, Shards};
 use self::watchdog::{STALLED_AFTER, Watchdog};
 use crate::store::{Store, StoreError, Writer};
 
@@ -84,7 +84,7 @@ struct Inner {
     presences: Presences,
     passes: Passes,
     provider: Option<Provider>,
-    shards: Vec<mpsc::Sender<Job>>,
+    shards: Shards,
     writer: mpsc::Sender<WriteSet>,
     outage: watch::Receiver<Outage>,
     deleter: Deleter,
@@ -189,17 +189,19 @@ impl Service {
         };
         let committer = committer.spawn()?;
         let presences = Presences::default();
+        let (jobs, jobs_queue) = mpsc::channel(jobs::MAX_QUEUED);
         let mut shards = Vec::new();
         let mut threads = Vec::new();
         for number in 0..limits.shards {
-            let (jobs, queue) = mpsc::channel(limits.shard_queue);
-            let context = Context::new(store.clone(), clock, presences.clone(), sets.clone());
+            let (way, queue) = mpsc::channel(limits.shard_queue);
+            let (presences, jobs) = (presences.clone(), jobs.clone());
+            let context = Context::new(store.clone(), clock, presences, jobs, sets.clone());
             threads.push(Shard::spawn(number, context, queue)?);
-            shards.push(jobs);
+            shards.push(way);
         }
-        let bench = jobs::Bench::new(store.clone(), clock, sets.clone(), closing.clone());
-        let (jobs, queue) = mpsc::channel(jobs::MAX_QUEUED);
-        let mut workers = jobs::spawn(limits.jobs, &bench, queue);
+        let (shards, closed) = (Shards::from(shards), closing.clone());
+        let bench = jobs::Bench::new(store.clone(), clock, sets.clone(), shards.clone(), closed);
+        let mut workers = jobs::spawn(limits.jobs, &bench, jobs_queue);
         let deleter = Deleter::new(store.clone(), sets.clone());
         let sweeper = retention::Sweeper {
             store: store.clone(),
@@ -302,11 +304,7 @@ impl Service {
     }
 
     fn shard(&self, asset: &str) -> &mpsc::Sender<Job> {
-        let mut hasher = DefaultHasher::new();
-        asset.hash(&mut hasher);
-        let shards = &self.inner.shards;
-        let number = hasher.finish() % shards.len().max(1) as u64;
-        &shards[usize::try_from(number).unwrap_or_default()]
+        self.inner.shards.of(asset)
     }
 
     /// Does `act` on the shard of `asset` and gives its answer once what

@@ -2,6 +2,7 @@
 //! its recording, and so comes to the state it was in.
 
 use super::commit::Life;
+use super::learning::Record;
 use super::playback::{Flow, play};
 use super::running::{OpenSession, Running};
 use super::shard::Context;
@@ -16,14 +17,19 @@ pub(super) fn load(context: &Context, name: &str) -> Result<Running, ServiceErro
     let rig = views::rig(&row.document)?;
     let (memory, provenance) = context.wait(views::stored_memory(&context.store, name))?;
     let session = context.wait(context.store.open_session(name))?;
-    let open = session.map(|session| reopen(context, &session)).transpose()?;
-    Ok(Running { row, rig, memory, provenance, open, life: Life::default(), deleted: false })
+    let learning = context.wait(context.store.learning(name))?;
+    let learning: Record =
+        learning.as_deref().map(views::from_json).transpose()?.unwrap_or_default();
+    let refines = learning.refines();
+    let open = session.map(|session| reopen(context, &session, refines)).transpose()?;
+    let (life, deleted) = (Life::default(), false);
+    Ok(Running { row, rig, memory, provenance, open, learning, life, deleted })
 }
 
-fn reopen(context: &Context, row: &SessionRow) -> Result<OpenSession, ServiceError> {
+fn reopen(context: &Context, row: &SessionRow, refines: bool) -> Result<OpenSession, ServiceError> {
     let setup = Setup::new(views::rig(&row.setup)?, None)?;
     let baseline = views::memory(&row.baseline)?;
-    let mut open = OpenSession::new(row.id.clone(), row.name.clone(), setup, baseline);
+    let mut open = OpenSession::new(row.id.clone(), row.name.clone(), setup, baseline, refines);
     play(&context.store, &context.runtime, &row.id, |input| {
         match input {
             Input::Sample(sample) => drop(open.take(&sample)),

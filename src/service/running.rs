@@ -1,16 +1,21 @@
 //! A running asset: its rig, its fault memory and the engine of its open
 //! session. Says what is to be written; writes nothing.
 
+use tokio::sync::mpsc::OwnedPermit;
 use uuid::Uuid;
 
 use super::clock::rfc3339;
 use super::commit::Life;
+use super::jobs::Job;
+use super::learning::Record;
 use super::recent::Recent;
 use super::shard::Context;
 use super::telemetry::unjudged;
 use super::{ServiceError, trends, views};
 use crate::diagnosis::{FaultMemory, FaultRecord, MemoryRules};
-use crate::engine::{Admission, Engine, Input, Output, Plausibility, Rig, Setup};
+use crate::engine::{
+    Admission, Engine, Input, Misfit, Output, Plausibility, Rig, Setup, UsableMotion,
+};
 use crate::store::{
     ActionKind, ActionRow, AssetRow, FaultRow, Micros, Progress, SessionRow, TransitionRow, Write,
 };
@@ -30,11 +35,13 @@ pub(super) const RESTART_S: f64 = 10.0;
 pub(super) struct Work {
     pub(super) at: Micros,
     pub(super) writes: Vec<Write>,
+    /// Begun once the writes are durable, each with its place in the queue.
+    pub(super) jobs: Vec<(OwnedPermit<Job>, Job)>,
 }
 
 impl Work {
     pub(super) const fn at(at: Micros) -> Self {
-        Self { at, writes: Vec::new() }
+        Self { at, writes: Vec::new(), jobs: Vec::new() }
     }
 }
 
@@ -47,6 +54,8 @@ pub(super) struct Running {
     /// What is known beside it, as last written.
     pub(super) provenance: Provenance,
     pub(super) open: Option<OpenSession>,
+    /// What its learning by itself has come to.
+    pub(super) learning: Record,
     pub(super) life: Life,
     pub(super) deleted: bool,
 }
@@ -63,6 +72,8 @@ pub(super) struct OpenSession {
     pub(super) importing: bool,
     /// For those who watch.
     pub(super) recent: Recent,
+    /// Motion that the rig can be learnt from; none where that is not wanted.
+    pub(super) motion: Option<UsableMotion>,
     /// Whether what comes can be of the rig that was described.
     plausibility: Plausibility,
     verdict: Verdict,
@@ -74,8 +85,17 @@ pub(super) struct OpenSession {
 }
 
 impl OpenSession {
-    pub(super) fn new(id: String, name: String, setup: Setup, baseline: FaultMemory) -> Self {
+    /// Motion is counted for a rig that is not learnt, or that `refines` what is.
+    pub(super) fn new(
+        id: String,
+        name: String,
+        setup: Setup,
+        baseline: FaultMemory,
+        refines: bool,
+    ) -> Self {
+        let counts = refines || setup.rig.calibration.is_none();
         Self {
+            motion: counts.then(|| UsableMotion::new(&setup.rig)),
             id,
             name,
             basis: Basis::of(&setup),
@@ -102,6 +122,9 @@ impl OpenSession {
             Output::Admitted(admission) => Some(*admission),
             Output::Transition(_) => None,
         });
+        if let (Some(Admission::Accepted), Some(motion)) = (admission, &mut self.motion) {
+            motion.take(sample);
+        }
         if matches!(admission, Some(Admission::Accepted | Admission::SetAside(_))) {
             self.note(sample, admission == Some(Admission::Accepted));
         }
@@ -178,6 +201,16 @@ impl OpenSession {
         }
     }
 
+    /// Whether a fault has been confirmed in it.
+    pub(super) fn has_confirmed(&self) -> bool {
+        !self.verdict.confirmed().is_empty()
+    }
+
+    /// What in the data and the asset file cannot be of one rig.
+    pub(super) fn misfits(&self) -> Vec<Misfit> {
+        self.plausibility.misfits()
+    }
+
     fn summary(&self) -> SummaryView {
         let Progress { n_samples, n_rejected, first_t_s, last_t_s, .. } = self.progress;
         let duration_s = last_t_s.zip(first_t_s).map_or(0.0, |(last, first)| last - first);
@@ -217,7 +250,8 @@ impl Running {
             verdict: None,
             verdict_hash: None,
         }));
-        self.open = Some(OpenSession::new(id, name, setup, self.memory.clone()));
+        let refines = self.learning.refines();
+        self.open = Some(OpenSession::new(id, name, setup, self.memory.clone(), refines));
         self.remember(None, work)
     }
 
@@ -236,11 +270,16 @@ impl Running {
             session: open.id.clone(),
             ended_at: work.at,
             verdict: views::to_json(&summary)?,
-            hash: summary.verdict_hash,
+            hash: summary.verdict_hash.clone(),
         });
-        work.writes.append(&mut trends::ended(context, &self.row.name, &open, work.at)?);
+        let mut trends = trends::ended(context, &self.row.name, &open, work.at)?;
+        let warned = |write: &Write| matches!(write, Write::Trend(row) if row.warnings.is_some());
+        let warned = trends.iter().any(warned);
+        work.writes.append(&mut trends);
+        self.gather(&open, &summary, warned, work)?;
         let memory = open.engine.memory().clone();
-        self.remember_as(memory, Some(&open.occurrence(work.at)), None, work)
+        self.remember_as(memory, Some(&open.occurrence(work.at)), None, work)?;
+        self.learn_if_due(context, work)
     }
 
     /// Puts `samples`, each with its index in the batch, into the open session;

@@ -121,7 +121,11 @@ impl Service {
         let deletion = async move {
             let session = id.clone();
             this.call(&asset, move |context, running, work| {
-                if running.open.as_ref().is_some_and(|open| open.id == session) {
+                let open = running.open.as_ref().is_some_and(|open| open.id == session);
+                if running.learning.forget(&session, open) {
+                    running.keep_learning(work)?;
+                }
+                if open {
                     running.end(context, work)?;
                 }
                 work.writes.push(Write::ExpireSession { session, at: work.at });

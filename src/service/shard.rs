@@ -2,7 +2,9 @@
 
 use std::collections::BTreeMap;
 use std::future::Future;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
 
 use tokio::runtime::Handle;
 use tokio::sync::{OwnedSemaphorePermit, mpsc, oneshot};
@@ -10,11 +12,49 @@ use tokio::sync::{OwnedSemaphorePermit, mpsc, oneshot};
 use super::commit::{Life, WriteSet};
 use super::presence::Presences;
 use super::running::{Running, Work};
-use super::{Clock, ServiceError, rebuild};
+use super::{Clock, ServiceError, jobs, rebuild, settled};
 use crate::store::{Store, Write};
 
 /// Something to do on a shard.
 pub(super) type Job = Box<dyn FnOnce(&mut Shard) + Send>;
+
+/// The ways to the shards; each asset has one.
+#[derive(Clone)]
+pub(super) struct Shards(Arc<[mpsc::Sender<Job>]>);
+
+impl Shards {
+    pub(super) fn iter(&self) -> impl Iterator<Item = &mpsc::Sender<Job>> {
+        self.0.iter()
+    }
+
+    pub(super) fn of(&self, asset: &str) -> &mpsc::Sender<Job> {
+        let mut hasher = DefaultHasher::new();
+        asset.hash(&mut hasher);
+        let number = hasher.finish() % self.0.len().max(1) as u64;
+        &self.0[usize::try_from(number).unwrap_or_default()]
+    }
+
+    /// Does `act` on the shard of `asset`, when it is its turn, and gives its answer
+    /// once what follows from it is durable.
+    pub(super) async fn call_in_turn<T: Send + 'static>(
+        &self,
+        asset: &str,
+        act: impl FnOnce(&Context, &mut Running, &mut Work) -> Result<T, ServiceError> + Send + 'static,
+    ) -> Result<T, ServiceError> {
+        let (reply, answer) = oneshot::channel();
+        let name = asset.to_owned();
+        let job: Job = Box::new(move |shard| shard.act(&name, act, reply.into()));
+        let closing = |_| ServiceError::Unavailable { what: "the service is closing" };
+        self.of(asset).send(job).await.map_err(closing)?;
+        settled(answer.await)
+    }
+}
+
+impl From<Vec<mpsc::Sender<Job>>> for Shards {
+    fn from(shards: Vec<mpsc::Sender<Job>>) -> Self {
+        Self(shards.into())
+    }
+}
 
 /// Who waits for an outcome, and what is given back with it whether or not
 /// anybody reads it.
@@ -52,6 +92,8 @@ pub(super) struct Context {
     pub(super) clock: Clock,
     pub(super) presences: Presences,
     pub(super) runtime: Handle,
+    /// For work in the background.
+    pub(super) jobs: mpsc::Sender<jobs::Job>,
     writer: mpsc::Sender<WriteSet>,
 }
 
@@ -60,9 +102,10 @@ impl Context {
         store: Store,
         clock: Clock,
         presences: Presences,
+        jobs: mpsc::Sender<jobs::Job>,
         writer: mpsc::Sender<WriteSet>,
     ) -> Self {
-        Self { store, clock, presences, runtime: Handle::current(), writer }
+        Self { store, clock, presences, runtime: Handle::current(), jobs, writer }
     }
 
     /// Waits for a question to the store; only on a shard's thread.
@@ -89,15 +132,14 @@ impl Context {
         }
     }
 
-    /// Hands over `writes`; `reply` gets `answer` once they are durable.
-    fn settle<T: Send + 'static>(
-        &self,
-        writes: Vec<Write>,
-        life: Life,
-        answer: T,
-        reply: Reply<T>,
-    ) {
+    /// Hands over what follows; once it is durable, `reply` gets `answer` and the jobs
+    /// are begun.
+    fn settle<T: Send + 'static>(&self, work: Work, life: Life, answer: T, reply: Reply<T>) {
+        let Work { writes, jobs, .. } = work;
         let done = Box::new(move |outcome: Result<(), ServiceError>| {
+            if outcome.is_ok() {
+                jobs.into_iter().for_each(|(place, job)| drop(place.send(job)));
+            }
             reply.send(outcome.map(|()| answer));
         });
         self.write(WriteSet { writes, life, done });
@@ -154,7 +196,7 @@ impl Shard {
             catch_unwind(AssertUnwindSafe(|| act(&self.context, &mut running, &mut work)));
         match outcome {
             Ok(Ok(answer)) => {
-                self.context.settle(work.writes, life, answer, reply);
+                self.context.settle(work, life, answer, reply);
                 if running.deleted {
                     self.context.presences.forget(name);
                 } else {
@@ -207,7 +249,10 @@ impl Shard {
             Err(error) => Err(error),
         };
         match absent {
-            Ok(write) => self.context.settle(vec![write], Life::default(), (), reply.into()),
+            Ok(write) => {
+                let work = Work { writes: vec![write], ..Work::at(self.context.clock.now()) };
+                self.context.settle(work, Life::default(), (), reply.into());
+            }
             Err(error) => drop(reply.send(Err(error))),
         }
     }

@@ -143,6 +143,7 @@ fn take(
         context.presences.note(&running.row.name, &open.id, work.at, last.t_s);
     }
     running.count_rejected(ack.rejected.len(), work);
+    running.learn_if_due(context, work)?;
     ack.rejected.sort_by_key(|row| row.index);
     count(&ack);
     Ok(ack)

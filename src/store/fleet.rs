@@ -62,6 +62,20 @@ impl Store {
         .await?)
     }
 
+    /// What the learning of the assets from `first` to `last` has come to, by name;
+    /// without those of which nothing is known.
+    pub async fn learning_of(
+        &self,
+        first: &str,
+        last: &str,
+    ) -> Result<Vec<(String, String)>, StoreError> {
+        let rows = sqlx::query_as(
+            "SELECT name, learning FROM asset
+             WHERE name >= $1 AND name <= $2 AND learning IS NOT NULL",
+        );
+        Ok(rows.bind(first).bind(last).fetch_all(&self.pool).await?)
+    }
+
     /// The warnings of the assets from `first` to `last`, as of the last session that
     /// estimated the axis.
     pub async fn warnings_of(

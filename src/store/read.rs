@@ -60,6 +60,12 @@ impl Store {
             .await?)
     }
 
+    /// What the learning of asset `name` by itself has come to, if anything.
+    pub async fn learning(&self, name: &str) -> Result<Option<String>, StoreError> {
+        let question = "SELECT learning FROM asset WHERE name = $1 AND learning IS NOT NULL";
+        Ok(sqlx::query_scalar(question).bind(name).fetch_optional(&self.pool).await?)
+    }
+
     /// Assets in the order of their names, from the one after `after`.
     pub async fn assets(&self, after: &str, limit: u32) -> Result<Vec<AssetRow>, StoreError> {
         Ok(sqlx::query_as(

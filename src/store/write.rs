@@ -84,6 +84,11 @@ pub enum Write {
         asset: String,
         id: String,
     },
+    /// What an asset's learning by itself has come to.
+    PutLearning {
+        asset: String,
+        document: String,
+    },
     Access(AccessWrite),
 }
 
@@ -367,6 +372,7 @@ impl Group<'_> {
             Write::PutReplay(row) => put_replay(db, row).await,
             Write::PutCalibration(row) => put_calibration(db, row).await,
             Write::ActivateCalibration { asset, id } => activate(db, asset, id).await,
+            Write::PutLearning { asset, document } => put_learning(db, asset, document).await,
             Write::Access(write) => write.apply(db).await,
             Write::CreateAsset(row) => create_asset(db, row).await,
             Write::UpdateAsset(row) => update_asset(db, row).await,
@@ -622,5 +628,18 @@ async fn activate(db: &mut AnyConnection, asset: &str, id: &str) -> Result<(), S
     .bind(id)
     .execute(db)
     .await?;
+    Ok(())
+}
+
+async fn put_learning(
+    db: &mut AnyConnection,
+    asset: &str,
+    document: &str,
+) -> Result<(), StoreError> {
+    sqlx::query("UPDATE asset SET learning = $2 WHERE name = $1")
+        .bind(asset)
+        .bind(document)
+        .execute(db)
+        .await?;
     Ok(())
 }

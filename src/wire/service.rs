@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::difference::{ComparedView, TallyView};
+use super::learning::{LearningState, LearningView};
 use super::memory::FaultRecordView;
 use super::provenance::ProvenanceView;
 use super::trace::TraceView;
@@ -132,6 +133,8 @@ pub struct FleetEntryView {
     pub asset: String,
     /// Whether it has been learnt from healthy sessions.
     pub calibrated: bool,
+    /// How far it is on its way there.
+    pub learning: LearningState,
     /// The open session; null if there is none.
     pub session: Option<String>,
     pub session_id: Option<String>,
@@ -245,6 +248,9 @@ pub struct StateView {
     /// The plant model in use, and why that one.
     pub fidelity: String,
     pub fidelity_reason: String,
+    /// How far the rig is on its way to being learnt; null once it is.
+    #[serde(default)]
+    pub learning: Option<LearningView>,
 }
 
 /// The view of an engine's state.
@@ -265,6 +271,7 @@ pub fn state_view(asset: &str, session: Option<(&str, &str, u64)>, state: &State
         monitors: monitor_views(state),
         fidelity: state.fidelity.rung.name().to_owned(),
         fidelity_reason: state.fidelity.to_string(),
+        learning: None,
     }
 }
 

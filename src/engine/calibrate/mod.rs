@@ -22,6 +22,7 @@ mod widening;
 
 use fit::{Explained, Fitter, SessionFit};
 use prospects::prospects;
+pub(super) use recording::MOVING_M;
 use recording::{Recording, Stretch};
 use sessions::{Estimate, Population, between, combined};
 use spread::{healthy_spread, level_at_rest};
@@ -32,7 +33,7 @@ use crate::vocabulary::{Axis, FaultCode, FaultKind, PerAxis, Sample};
 
 /// Lengths of a window, s, the better first: a ball that sticks every other
 /// second offers only short stretches of motion.
-const WINDOWS_S: [f64; 2] = [1.2, 0.6];
+pub(super) const WINDOWS_S: [f64; 2] = [1.2, 0.6];
 /// Least windows with a moving ball to learn from.
 const LEAST_WINDOWS: usize = 6;
 /// Largest relative standard error of the gain.
@@ -41,7 +42,7 @@ const WORST_GAIN_ERROR: f64 = 0.2;
 const LEAST_EXPLAINED: f64 = 0.5;
 /// Standard deviation of commands that move a ball, rad: 0.3°. With less, what is
 /// not explained was not asked for.
-const MOVING_RAD: f64 = 0.005;
+pub(super) const MOVING_RAD: f64 = 0.005;
 
 /// How far levels lie apart from session to session, rad. It counts as one
 /// session: levels differ between rigs by more than gains do.

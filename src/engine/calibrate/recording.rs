@@ -24,7 +24,7 @@ const MISSING_PERIODS: f64 = 2.5;
 const SLOWER: f64 = 1.4;
 /// A window counts as motion when the readings of each third span this, m: a
 /// ball that sticks for part of it answers no gain.
-const MOVING_M: f64 = 0.002;
+pub(in crate::engine) const MOVING_M: f64 = 0.002;
 /// Time over which a velocity is the slope of the path, s.
 const SLOPE_S: f64 = 0.16;
 /// Noise assumed by the outlier gate before anything is known, m.

@@ -146,7 +146,8 @@ impl Misfit {
     }
 
     /// Whether nothing can be learnt, however long the session.
-    pub(super) const fn prevents_learning(self) -> bool {
+    #[must_use]
+    pub const fn prevents_learning(self) -> bool {
         matches!(
             self,
             Self::NoReadings

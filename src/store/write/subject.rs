@@ -29,6 +29,7 @@ impl Write {
             Self::ActivateCalibration { asset, .. } => {
                 format!("the active calibration of asset `{asset}`")
             }
+            Self::PutLearning { asset, .. } => format!("the learning of asset `{asset}`"),
             Self::Access(_) => "a change of who may come in".to_owned(),
         }
     }

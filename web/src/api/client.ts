@@ -1,7 +1,7 @@
 /** Requests to the interface. What goes wrong is a `ProblemError` with the service's own words. */
 import { actor, authorised, shut } from "./access";
 import type {
-  Around, Asset, CalibrationJob, Caller, Demo, FaultEntry, FaultLine, FleetEntry, Health, History, Import, MadeToken,
+  Around, Asset, CalibrationJob, Caller, Demo, FaultEntry, FaultLine, FleetEntry, Health, History, Import, Learning, MadeToken,
   Page, Problem, Replay, ReplaySettings, Session, State, Trace, Trends,
 } from "./types";
 
@@ -110,6 +110,9 @@ export const api = {
   calibrate: (asset: string, sessions: string[]) =>
     send<CalibrationJob>("POST", `/assets/${id(asset)}/calibrations`, { sessions }),
   calibration: (asset: string, job: string) => get<CalibrationJob>(`/assets/${id(asset)}/calibrations/${id(job)}`),
+  learning: (asset: string) => get<Learning>(`/assets/${id(asset)}/learning`),
+  acceptLearning: (asset: string) => send<Learning>("POST", `/assets/${id(asset)}/learning/accept`),
+  discardLearning: (asset: string) => send<Learning>("POST", `/assets/${id(asset)}/learning/discard`),
   activate: (asset: string, job: string) =>
     send<CalibrationJob>("POST", `/assets/${id(asset)}/calibrations/${id(job)}/activate`),
   /** The recording as a file; asked for like all else, so that it needs no other way to be allowed. */

@@ -22,6 +22,7 @@ export type FleetFault = Schemas["FleetFaultView"];
 export type Health = Schemas["HealthView"];
 export type History = Schemas["HistoryView"];
 export type Import = Schemas["ImportView"];
+export type Learning = Schemas["LearningView"];
 export type MadeToken = Schemas["MadeTokenView"];
 export type Judged = Schemas["JudgedView"];
 export type Monitor = Schemas["MonitorView"];

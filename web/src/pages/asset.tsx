@@ -6,6 +6,7 @@ import type { Asset, FaultEntry, Monitor, State } from "../api/types";
 import { useAsk, useFrames, useNow, useTitle } from "../hooks";
 import { PlayoutClock, TraceBuffer } from "../live/buffer";
 import { Act, Facts, FaultChip, HealthMark, Loading, Trouble, type Health } from "../parts/bits";
+import { LearningCard } from "../parts/learning";
 import type { Mark } from "../parts/line-chart";
 import { ChartGroup, RigCharts } from "../parts/rig-charts";
 import { RigView } from "../parts/rig-view";
@@ -123,7 +124,7 @@ function Live({ asset, faults, changed }: { asset: Asset; faults: FaultEntry[]; 
         </ul>
       )}
       <TrendWarnings trends={trends.data} />
-      {!asset.calibration && <p class="note">Nothing has been learnt of this rig yet, so only large faults are found. <Link to={at("rigs", asset.name, "set-up")}>Calibrate it</Link> from a healthy minute.</p>}
+      <LearningCard name={asset.name} state={state} changed={changed} />
       {state && !state.session_id && <p class="note">No session is open. As soon as the rig sends, it is shown here. <Link to={`${at("rigs", asset.name, "set-up")}?step=connect`}>How to send</Link></p>}
       <div class="live-top">
         <RigView asset={asset} pose={pose} name={`${asset.name}-live`} />

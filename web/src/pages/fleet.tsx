@@ -144,11 +144,19 @@ export function FleetPage() {
   );
 }
 
+/** What is said of a rig that is not learnt. */
+const UNLEARNT: Record<FleetEntry["learning"], { word: string; meaning: string }> = {
+  gathering: { word: "not learnt", meaning: "It learns by itself as soon as enough motion has come; until then only faults of the sensor are confirmed" },
+  learning: { word: "being learnt", meaning: "Enough motion has come" },
+  offered: { word: "was it healthy?", meaning: "What was learnt waits for somebody to say that the rig was healthy" },
+  learnt: { word: "", meaning: "" },
+};
+
 function FleetRow({ row: { entry, health }, now }: { row: Row; now: number }) {
   const faults = [...entry.faults].sort((a, b) => severity(b) - severity(a));
   return (
     <Link to={at("rigs", entry.asset)} class={`fleet-row row-${health}`}>
-      <span class="name">{entry.asset}{!entry.calibrated && <span class="quiet small-text" title="Nothing has been learnt of this rig yet: only large faults are seen"> not learnt</span>}</span>
+      <span class="name">{entry.asset}{!entry.calibrated && <span class="quiet small-text" title={UNLEARNT[entry.learning].meaning}> {UNLEARNT[entry.learning].word}</span>}</span>
       <HealthMark health={health} />
       <span class="faults">{faults.map((fault) => <FaultChip {...fault} />)}<DriftChips warnings={entry.warnings} />{!faults.length && !entry.warnings.length && <span class="quiet">none</span>}</span>
       <span class="quiet clip">{entry.session ?? "–"}</span>

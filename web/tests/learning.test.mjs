@@ -1,0 +1,68 @@
+// A rig that learns by itself, from its registration to a click.
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import { ask, browser, directory, page, recordings, remove, serve } from "./support.mjs";
+
+let work, service, chromium, rig;
+
+before(async () => {
+  work = directory();
+  chromium = await browser();
+  service = await serve(`${work}/store`);
+  rig = recordings(work);
+});
+
+after(async () => {
+  await chromium?.close();
+  await service?.stop();
+  remove(work);
+});
+
+/** Sends the lines of the healthy recording from one to another as a device does. */
+function send(asset, from, to) {
+  const [head, ...lines] = rig.healthy.trim().split("\n");
+  const body = `${head}\n${lines.slice(from, to).join("\n")}\n`;
+  return ask(service.url, "POST", `/assets/${asset}/telemetry?session=first`, body, "text/csv");
+}
+
+const panel = (view) => view.getByRole("region", { name: "Learning" });
+
+test("gathered, offered, confirmed with a click", async () => {
+  await ask(service.url, "POST", "/assets", { name: "new" });
+  const view = await page(chromium);
+  await view.goto(`${service.url}/rigs/new`);
+  await panel(view).getByText("Waiting for motion").waitFor();
+
+  await send("new", 0, 3000);
+  const bar = panel(view).getByRole("progressbar", { name: "Motion along x" });
+  await panel(view).getByText(/^2\d of 60 s$/).first().waitFor();
+  const early = Number(await bar.getAttribute("value"));
+  await send("new", 3000, 5000);
+  await panel(view).getByText(/^4\d of 60 s$/).first().waitFor();
+  assert.ok(Number(await bar.getAttribute("value")) > early, "the bar follows");
+
+  await send("new", 5000, 7000);
+  await view.getByRole("heading", { name: "Ready: was the rig healthy?" }).waitFor();
+  await panel(view).getByRole("link", { name: "first" }).waitFor();
+  await panel(view).getByRole("button", { name: "Yes, use what was learnt" }).click();
+  await view.getByRole("heading", { name: "Learnt by itself" }).waitFor();
+  await panel(view).getByText(/Learnt from 1 session; the next healthy ones refine it until 5 have taught/).waitFor();
+  const { calibration } = await ask(service.url, "GET", "/assets/new");
+  assert.ok(Math.abs(calibration.x.gain - rig.learnt.calibration.x.gain) < 0.05, "as learnt by hand");
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});
+
+test("somebody who says no starts again", async () => {
+  await ask(service.url, "POST", "/assets", { name: "odd" });
+  await send("odd", 0, 7000);
+  const view = await page(chromium);
+  await view.goto(service.url);
+  await view.getByRole("link", { name: /odd.*was it healthy\?/ }).click();
+  await panel(view).getByRole("button", { name: "No, start again" }).click();
+  await view.getByRole("heading", { name: "This rig is not learnt yet" }).waitFor();
+  const learning = await ask(service.url, "GET", "/assets/odd/learning");
+  assert.deepEqual([learning.state, learning.sessions], ["gathering", []]);
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});
