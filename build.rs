@@ -9,13 +9,15 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// What the page is made of; a change of anything else builds nothing anew.
-const SOURCES: [&str; 6] = [
+const SOURCES: [&str; 7] = [
     "web/src",
     "web/public",
     "web/index.html",
     "web/package-lock.json",
     "web/tsconfig.json",
     "web/vite.config.ts",
+    // What a device runs stands on the page too.
+    "src/wire/drive_cycle/run.py",
 ];
 
 /// The oldest Node that the page's tools run on, as `web/package.json` has it.

@@ -10,7 +10,7 @@ use offbd::vocabulary::Sample;
 use reqwest::Method;
 use serde_json::{Value, json};
 use sqlx::Executor;
-use support::{Bench, Client, Events, batch, csv, rig};
+use support::{Bench, Client, Events, batch, csv, read_csv, registration, rig};
 use tokio_tungstenite::connect_async;
 use tokio_tungstenite::tungstenite::Message;
 
@@ -639,4 +639,32 @@ async fn a_replay_says_what_other_settings_would_have_changed() {
         let answer = client.post(&format!("sessions/{sick}/replays"), &settings).await;
         assert_eq!(answer.problem(422)["pointer"], pointer);
     }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_drive_cycle_is_worked_out_for_a_rig_that_is_learnt() {
+    let bench = Bench::start().await;
+    let client = &bench.client;
+    client.post("assets", &registration("a")).await.expect(201);
+    let cycle = client.get("assets/a/drive-cycle").await.expect(200);
+    assert_eq!((&cycle["asset"], cycle["faults"].as_array().unwrap().len()), (&json!("a"), 9));
+    let times = cycle["rows"]["t_s"].as_array().unwrap();
+    assert!(times.last().unwrap().as_f64() >= cycle["duration_s"].as_f64());
+
+    let request = client.request(Method::GET, "assets/a/drive-cycle").header("accept", "text/csv");
+    let answer = client.send(request).await;
+    let name = "attachment; filename=\"a-drive-cycle.csv\"";
+    assert_eq!(
+        (answer.status.as_u16(), &answer.headers["content-disposition"]),
+        (200, &name.parse().unwrap())
+    );
+    let rows = read_csv(&answer.text);
+    assert_eq!(rows.len(), times.len());
+    assert_eq!(json!(rows[7].cmd_qy_rad), cycle["rows"]["cmd_qy_rad"][7]);
+
+    client.post("assets", &json!({ "name": "new" })).await.expect(201);
+    let problem = client.get("assets/new/drive-cycle").await.problem(409);
+    assert!(problem["detail"].as_str().unwrap().contains("not learnt"), "{problem}");
+    assert_eq!(problem["type"], "urn:offbd:problem:no-drive-cycle");
+    client.get("assets/nobody/drive-cycle").await.problem(404);
 }

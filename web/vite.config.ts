@@ -30,5 +30,6 @@ export default defineConfig({
   build: { assetsDir: "static", emptyOutDir: true, modulePreload: { polyfill: false }, chunkSizeWarningLimit: 1000 },
   plugins: [brotli()],
   // `npx vite` shows changes at once, against a service on its usual port.
-  server: { proxy: { "/api": { target: "http://127.0.0.1:8087", ws: true }, "/healthz": "http://127.0.0.1:8087" } },
+  // The program of the drive cycle lies beside the service's sources.
+  server: { fs: { allow: [".."] }, proxy: { "/api": { target: "http://127.0.0.1:8087", ws: true }, "/healthz": "http://127.0.0.1:8087" } },
 });

@@ -9,6 +9,7 @@ mod calibrate;
 mod chart;
 mod corpus;
 mod demo;
+mod drive_cycle;
 mod judge;
 mod labels;
 mod logging;
@@ -60,6 +61,7 @@ enum Command {
     Calibrate(calibrate::CalibrateArgs),
     Replay(replay::ReplayArgs),
     Trends(trends::TrendsArgs),
+    DriveCycle(drive_cycle::DriveCycleArgs),
     Score(score::ScoreArgs),
     Soak(soak::SoakArgs),
     Scene(scene::SceneArgs),
@@ -99,6 +101,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Trends(args) => trends::run(&args),
+        Command::DriveCycle(args) => drive_cycle::run(&args),
         Command::Score(args) => score::run(&args),
         Command::Soak(args) => soak::run(&args),
         Command::Scene(args) => scene::run(&args),

@@ -10,6 +10,7 @@ mod admit;
 mod align;
 mod calibrate;
 mod coverage;
+mod drive_cycle;
 mod edge;
 mod frame;
 mod look;
@@ -21,6 +22,10 @@ mod types;
 mod watch;
 
 pub use calibrate::{CannotCalibrate, calibrate, calibrate_and_foresee};
+pub use drive_cycle::{
+    DriveCycle, DriveLaw, FaultVerdict, Feedback, MonitorVerdict, NoDriveCycle, NotReached, Order,
+    TriedFault, drive_cycle,
+};
 pub use motion::{UsableMotion, WANTED_MOTION_S};
 pub use plausibility::{Misfit, Plausibility};
 pub use rig::{AxisMapping, DiagnosticsSpec, MAX_NAME, Rig, ServoSpec, Setup};

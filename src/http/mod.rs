@@ -7,6 +7,7 @@ mod assets;
 mod body;
 mod calibrations;
 mod description;
+mod drive_cycles;
 mod events;
 mod faults;
 mod guard;
@@ -159,6 +160,7 @@ fn api() -> Guarded {
         .routes(Administer, routes!(assets::delete))
         .routes(ReadAsset, routes!(assets::state))
         .routes(Read, routes!(assets::trends))
+        .routes(ReadAsset, routes!(drive_cycles::get))
         .routes(Read, routes!(assets::fleet))
         .routes(Feed, routes!(telemetry::post))
         .routes(ReadAsset, routes!(stream::stream))

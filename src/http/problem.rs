@@ -101,6 +101,7 @@ impl From<ServiceError> for Problem {
             E::SessionExists { .. } => conflict("session-exists", "The session is there already"),
             E::SessionEnded { .. } => conflict("session-ended", "The session has ended"),
             E::NothingToAcknowledge { .. } => conflict("nothing-to-acknowledge", "No occurrence"),
+            E::NoDriveCycle(_) => conflict("no-drive-cycle", "No drive cycle"),
             E::NotDone { .. } => conflict("not-done", "Not done yet"),
             E::NothingOffered { .. } => conflict("nothing-offered", "Nothing is offered"),
             E::AlreadyLearnt { .. } => conflict("already-learnt", "The rig is learnt already"),

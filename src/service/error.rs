@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use tokio::sync::mpsc::error::TrySendError;
 
+use crate::engine::NoDriveCycle;
 use crate::store::StoreError;
 use crate::vocabulary::{Invalid, UnknownWord};
 use crate::wire::telemetry::BatchError;
@@ -37,6 +38,8 @@ pub enum ServiceError {
         "{code} of asset `{asset}` has no recording: nothing is on record, or its session is gone"
     )]
     NoRecording { asset: String, code: String },
+    #[error(transparent)]
+    NoDriveCycle(NoDriveCycle),
     #[error("calibration `{id}` is not done: {state}")]
     NotDone { id: String, state: String },
     #[error(

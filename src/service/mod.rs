@@ -17,6 +17,7 @@ mod calibrations;
 mod clock;
 mod commit;
 mod deletion;
+mod drive_cycles;
 mod error;
 mod events;
 mod faults;
@@ -98,6 +99,8 @@ struct Inner {
     recordings: Arc<Semaphore>,
     /// One permit for each trace that is being made.
     traces: Arc<Semaphore>,
+    /// One permit for each drive cycle that is being computed.
+    drive_cycles: Arc<Semaphore>,
 }
 
 /// What waits for something to be done with it.
@@ -224,6 +227,7 @@ impl Service {
         workers.push(tokio::spawn(watchdog.run()));
         let recordings = Arc::new(Semaphore::new(recordings::MAX_AT_ONCE));
         let traces = Arc::new(Semaphore::new(traces::MAX_AT_ONCE));
+        let drive_cycles = Arc::new(Semaphore::new(drive_cycles::MAX_AT_ONCE));
         let inner = Inner {
             store,
             limits,
@@ -241,6 +245,7 @@ impl Service {
             stalled,
             recordings,
             traces,
+            drive_cycles,
         };
         let workers = Workers { shards: threads, jobs: workers, closing, committer };
         Ok((Self { inner: Arc::new(inner) }, workers))

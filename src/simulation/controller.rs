@@ -108,6 +108,15 @@ impl Controller {
         self.axes.map(|a| a.command)
     }
 
+    /// Takes commands from outside; an axis without one keeps its own.
+    pub(super) fn command(&mut self, commands: PerAxis<Option<f64>>) {
+        for axis in Axis::ALL {
+            if let Some(command) = commands[axis] {
+                self.axes[axis].command = self.quantise(command);
+            }
+        }
+    }
+
     /// One period: new commands from the last reading.
     pub(super) fn update(&mut self, wanted: PerAxis<Wanted>, seen: PerAxis<Option<f64>>) {
         for axis in Axis::ALL {

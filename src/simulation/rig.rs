@@ -155,12 +155,29 @@ impl SimulatedRig {
     /// The next row of the device's log. Rows are numbered from 1; their times
     /// rise strictly.
     pub fn next_sample(&mut self) -> Sample {
+        self.next_row(Self::control)
+    }
+
+    /// The same where `device` commands in place of the rig's own controller: it is
+    /// shown the row with its reading and the commands of the row before.
+    pub fn next_sample_by(
+        &mut self,
+        device: impl FnOnce(&Sample) -> PerAxis<Option<f64>>,
+    ) -> Sample {
+        self.next_row(|rig| {
+            let commands = device(&rig.log());
+            rig.controller.command(commands);
+            rig.pass_on();
+        })
+    }
+
+    fn next_row(&mut self, control: impl FnOnce(&mut Self)) -> Sample {
         loop {
             let (event, at_s) = self.schedule.next(&self.model);
             self.advance_to(at_s);
             match event {
                 Event::Look => self.look(),
-                Event::Row => return self.row(),
+                Event::Row => return self.row(control),
             }
         }
     }
@@ -240,13 +257,13 @@ impl SimulatedRig {
     }
 
     /// One turn of the device's loop.
-    fn row(&mut self) -> Sample {
+    fn row(&mut self, control: impl FnOnce(&mut Self)) -> Sample {
         if self.model.sensor.refresh.with_row(self.schedule.n_rows) {
             self.look();
         }
         self.reading = self.sensor.reading(self.now_s);
         self.reading.y = self.reading.y.filter(|_| !self.model.one_axis);
-        self.control();
+        control(self);
         self.log()
     }
 
@@ -258,6 +275,11 @@ impl SimulatedRig {
             Wanted { position: wanted[i], acceleration: ahead[i] }
         });
         self.controller.update(wanted, self.reading);
+        self.pass_on();
+    }
+
+    /// The servos take the commands in force.
+    fn pass_on(&mut self) {
         let commands = self.controller.commands();
         for axis in Axis::ALL {
             self.servos[axis].command(self.now_s, commands[axis]);

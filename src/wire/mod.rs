@@ -10,6 +10,7 @@ pub mod asset;
 pub mod basis;
 pub mod certificate;
 pub mod difference;
+pub mod drive_cycle;
 pub mod learning;
 pub mod memory;
 mod preset;

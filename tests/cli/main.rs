@@ -4,6 +4,7 @@ mod bench;
 mod calibrate;
 mod chart;
 mod demo;
+mod drive_cycle;
 mod replay;
 mod scene;
 mod score;

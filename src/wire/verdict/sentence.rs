@@ -21,7 +21,8 @@ pub fn sentence(transition: &Transition) -> String {
         FaultStatus::Pending | FaultStatus::Confirmed => {
             let onset = suspicion.onset.map(|t| format!(" since {:.2} s", t.seconds()));
             let since = onset.unwrap_or_default();
-            format!("{name} {status}{since}: {}{}", open(suspicion), seen(transition))
+            let (open, seen) = (open(suspicion), seen(transition));
+            format!("{name} {status}{since}: {open}{seen}{}", decides(transition))
         }
     }
 }
@@ -44,6 +45,29 @@ fn open(suspicion: &Suspicion) -> String {
         }
         (false, _) => String::new(),
     }
+}
+
+/// The motion that would decide between causes that read alike; nothing where there is
+/// but one.
+fn decides(transition: &Transition) -> String {
+    let suspicion = &transition.suspicion;
+    if !read_alike(suspicion) {
+        return String::new();
+    }
+    let servo = suspicion.candidates.iter().find_map(|c| c.code.axis());
+    let motion = match servo.map(Axis::other) {
+        // The other servo's ball rolls if it is not stuck.
+        Some(axis) if transition.evidence.axes[axis].command_rad.is_some() => format!(
+            "tilting by {} would decide, as the drive cycle does: a ball that then rolls along {} \
+             is not stuck",
+            axis.command(),
+            axis.as_str()
+        ),
+        Some(_) => "a push by hand would decide: a ball that then rolls is not stuck".to_owned(),
+        None => "moving the ball by hand would decide: readings that then stay the same are frozen"
+            .to_owned(),
+    };
+    format!("; {motion}")
 }
 
 fn seen(transition: &Transition) -> String {

@@ -1,7 +1,7 @@
 /** Requests to the interface. What goes wrong is a `ProblemError` with the service's own words. */
 import { actor, authorised, shut } from "./access";
 import type {
-  Around, Asset, CalibrationJob, Caller, Demo, FaultEntry, FaultLine, FleetEntry, Health, History, Import, Learning, MadeToken,
+  Around, Asset, CalibrationJob, Caller, Demo, DriveCycle, FaultEntry, FaultLine, FleetEntry, Health, History, Import, Learning, MadeToken,
   Page, Problem, Replay, ReplaySettings, Session, State, Trace, Trends,
 } from "./types";
 
@@ -80,6 +80,7 @@ export const api = {
   putAsset: (asset: Asset) => send<Asset>("PUT", `/assets/${id(asset.name)}`, asset),
   deleteAsset: (name: string) => send<void>("DELETE", `/assets/${id(name)}`),
   state: (name: string) => get<State>(`/assets/${id(name)}/state`),
+  driveCycle: (name: string) => get<DriveCycle>(`/assets/${id(name)}/drive-cycle`),
   trends: (name: string) => get<Trends>(`/assets/${id(name)}/trends`),
   faultsOf: (name: string, status = "all") =>
     get<Page<FaultEntry>>(`/assets/${id(name)}/faults${query({ status })}`).then((page) => page.items),

@@ -14,6 +14,7 @@ export type AxisTrace = Schemas["AxisTraceView"];
 export type Calibration = Schemas["CalibrationView"];
 export type CalibrationJob = Schemas["CalibrationJobView"];
 export type Caller = Schemas["CallerView"];
+export type DriveCycle = Schemas["DriveCycleView"];
 export type Evidence = Schemas["EvidenceView"];
 export type FaultEntry = Schemas["FaultEntryView"];
 export type FaultLine = Schemas["FaultView"] & { asset?: string; session_id?: string };

@@ -7,6 +7,7 @@ import { useAsk, useFrames, useNow, useTitle } from "../hooks";
 import { PlayoutClock, TraceBuffer } from "../live/buffer";
 import { Act, Facts, FaultChip, HealthMark, Loading, Trouble, type Health } from "../parts/bits";
 import { LearningCard } from "../parts/learning";
+import { DriveCycleCard } from "../parts/drive-cycle";
 import type { Mark } from "../parts/line-chart";
 import { ChartGroup, RigCharts } from "../parts/rig-charts";
 import { RigView } from "../parts/rig-view";
@@ -143,6 +144,7 @@ function Live({ asset, faults, changed }: { asset: Asset; faults: FaultEntry[]; 
         <p class="quiet small-text">Time on the device's clock, s. The residual counts only while the ground is tinted (the gate is open); the band is the limit.</p>
       </section>}
       <Numbers asset={asset} state={state} />
+      <DriveCycleCard asset={asset} />
       <TrendsCard asked={trends} />
     </main>
   );

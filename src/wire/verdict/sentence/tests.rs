@@ -119,11 +119,24 @@ fn regress_causes_that_read_alike_are_all_named_the_heaviest_first() {
     let ball = Candidate { code: FaultCode::StuckBall, kind: None, weight: 0.3 };
     let mut alike = failure(FaultCode::StuckBall, None, evidence());
     alike.suspicion.candidates = vec![servo, ball];
+    alike.evidence.axes.y.command_rad = Some(0.0);
     assert_eq!(
         sentence(&alike),
         "stuck_ball confirmed since 4.50 s: cannot tell x_servo (dead) 70 % from stuck_ball 30 %; \
-         the ball has stood still for 1.5 s while the plate asks it to move"
+         the ball has stood still for 1.5 s while the plate asks it to move; tilting by qx would \
+         decide, as the drive cycle does: a ball that then rolls along y is not stuck"
     );
+    alike.evidence.axes.y.command_rad = None;
+    assert!(
+        sentence(&alike)
+            .ends_with("; a push by hand would decide: a ball that then rolls is not stuck")
+    );
+    let frozen = Candidate { code: FaultCode::Sensor, kind: Some(FaultKind::Frozen), weight: 0.7 };
+    let mut readings = failure(FaultCode::Sensor, Some(FaultKind::Frozen), evidence());
+    readings.suspicion.candidates = vec![frozen, ball];
+    assert!(sentence(&readings).ends_with(
+        "; moving the ball by hand would decide: readings that then stay the same are frozen"
+    ));
     let kind = |kind, weight| Candidate { code: FaultCode::XServo, kind: Some(kind), weight };
     let mut kinds = failure(FaultCode::XServo, None, evidence());
     kinds.suspicion.candidates =

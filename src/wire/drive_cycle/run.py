@@ -1,0 +1,62 @@
+"""Runs the drive cycle of drive-cycle.json and records it in drive-cycle-run.csv.
+
+Put the ball near the middle, then start this. Judge what it records:
+    offbd replay --asset learnt.json drive-cycle-run.csv
+"""
+import json, time
+
+def read_rig():
+    """Yours: where the ball is, x and y in the device's unit; None where it is not seen."""
+    return 0.0, 0.0
+
+def move_rig(qx, qy):
+    """Yours: command the plate angles; None where the rig has no such servo."""
+
+class Correction:
+    """What is added to one command, by how far the ball is from its set point."""
+
+    def __init__(self, gains):
+        self.gains, self.error, self.rate, self.sum, self.unseen, self.last = gains, None, 0.0, 0.0, 0.0, 0.0
+
+    def __call__(self, error, dt):
+        if error is None:
+            self.error, self.rate, self.unseen = None, 0.0, self.unseen + dt
+            if self.unseen > 0.3:              # no ball: the commands alone
+                self.last = 0.0
+            return self.last
+        change = (error - self.error) / dt if self.error is not None and dt > 0 else 0.0
+        self.rate += (change - self.rate) * dt / (cycle["filter_s"] + dt)
+        most = 0.5 * cycle["limit"]
+        self.sum = max(-most, min(most, self.sum + self.gains["integral"] * error * dt))
+        self.error, self.unseen = error, 0.0
+        self.last = self.gains["proportional"] * error + self.sum + self.gains["derivative"] * self.rate
+        return self.last
+
+cycle = json.load(open("drive-cycle.json"))
+rows = cycle["rows"]
+corrections = {"qx": cycle["correct_qx"], "qy": cycle["correct_qy"]}
+corrections = {name: Correction(gains) for name, gains in corrections.items() if gains}
+
+def command(name, i, read, dt):
+    """The command of row i, corrected, within the servo's limit."""
+    if name not in corrections:
+        return None
+    place = "x_m" if corrections[name].gains["reads_x"] else "y_m"
+    error = None if read[place] is None else rows[place][i] - read[place]
+    wish = rows["cmd_%s_rad" % name][i] + corrections[name](error, dt)
+    return max(-cycle["limit"], min(cycle["limit"], wish))
+
+def field(value):
+    return "" if value is None else "%.6f" % value
+
+with open("drive-cycle-run.csv", "w") as record:
+    record.write("t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n")
+    start, last = time.monotonic(), 0.0
+    for i, t in enumerate(rows["t_s"]):
+        time.sleep(max(0.0, start + t - time.monotonic()))
+        now = time.monotonic() - start
+        x, y = read_rig()
+        qx, qy = (command(name, i, {"x_m": x, "y_m": y}, now - last) for name in ("qx", "qy"))
+        move_rig(qx, qy)
+        record.write(",".join(field(value) for value in (now, qx, qy, x, y)) + "\n")
+        last = now
