@@ -28,6 +28,10 @@ const ROLLS_OUT_M_S2: f64 = 0.05;
 
 /// Seconds in which a ball asked to move must have begun to.
 const PRESSED_S: f64 = 0.3;
+/// How far a ball at rest must have been asked to roll, in widths of what counts as
+/// still: one that turns round stays within a width for as long as one at rest takes
+/// for (1 + √2)² = 5.8 of them.
+const TURNING_WIDTHS: f64 = 6.0;
 
 /// Share of samples without a ball that is too many.
 const MISSING_SHARE: f64 = 0.5;
@@ -276,7 +280,10 @@ impl Evaluator {
         if around.at_edge || readings.unseen_s > 0.0 {
             return Finding::default();
         }
-        let pressed = |axis: Axis| readings.axes[axis].pressed_s >= PRESSED_S;
+        let pressed = |axis: Axis| {
+            let still = &readings.axes[axis];
+            still.pressed_s >= PRESSED_S && still.asked_widths >= TURNING_WIDTHS
+        };
         match (pressed(Axis::X), pressed(Axis::Y)) {
             _ if readings.still_s() < PRESSED_S => Finding::PASS,
             (true, true) => Finding::fail(None),
@@ -399,7 +406,7 @@ mod tests {
         let reading = Reading {
             dt: 0.5,
             position_m: PerAxis { x: Some(0.0), y: Some(0.0) },
-            pressed: PerAxis { x: true, y: false },
+            asked_m_s2: PerAxis { x: 1.0, y: 0.0 },
             still_m: 1e-3,
             usable: true,
             outliers: 0,

@@ -128,8 +128,12 @@ impl Limits {
             floor_m_s2: (HEALTHY_FACTOR * l.residual_m_s2).max(0.15),
             share: 0.2,
             errors: ERROR_FACTOR,
-            // Half again as much as learnt: friction varies over a plate.
-            breakaway_m_s2: 1.5 * l.breakaway_rad * slope_m_s2,
+            // Half again as much as learnt: friction varies over a plate. Of a ball
+            // that never rested it is not known.
+            breakaway_m_s2: match l.rest_s > 0.0 {
+                true => 1.5 * l.breakaway_rad * slope_m_s2,
+                false => wide.breakaway_m_s2,
+            },
             rolls_out_m_s2: 0.5 * l.breakaway_rad * slope_m_s2,
             residual_m_s2: l.residual_m_s2,
             noise_m: Some(l.noise_m),

@@ -18,8 +18,9 @@ pub struct Reading {
     /// Seconds since the sample before.
     pub dt: f64,
     pub position_m: PerAxis<Option<f64>>,
-    /// Whether the commands ask the ball to move along each axis.
-    pub pressed: PerAxis<bool>,
+    /// Acceleration by which the commands ask the ball to move along each axis,
+    /// m/s²; zero where they do not ask for more than what may hold it.
+    pub asked_m_s2: PerAxis<f64>,
     /// How far a ball at rest may seem to move, m.
     pub still_m: f64,
     /// Whether the outlier gate let the reading through.
@@ -40,6 +41,11 @@ pub struct AxisStillness {
     pub still_s: f64,
     /// Seconds of those in which the ball was asked to move, in a row.
     pub pressed_s: f64,
+    /// How fast a free ball would go by now that was at rest when it was first
+    /// asked to move, m/s, and how far it would have come, in widths of what counts
+    /// as still.
+    asked_m_s: f64,
+    pub asked_widths: f64,
     /// Seconds for which every bit has been the same.
     pub identical_s: f64,
     /// Velocity of the ball when the readings last changed, m/s.
@@ -50,7 +56,7 @@ pub struct AxisStillness {
 const VELOCITY_MEMORY_S: f64 = 0.1;
 
 impl AxisStillness {
-    fn update(&mut self, position_m: f64, pressed: bool, reading: &Reading) {
+    fn update(&mut self, position_m: f64, asked_m_s2: f64, reading: &Reading) {
         let strays = self.anchor_m.is_none_or(|a| (position_m - a).abs() > reading.still_m);
         let moved = strays && (self.strayed || self.anchor_m.is_none());
         self.strayed = strays;
@@ -60,7 +66,13 @@ impl AxisStillness {
         } else {
             self.still_s += reading.dt;
         }
-        self.pressed_s = if pressed && !moved { self.pressed_s + reading.dt } else { 0.0 };
+        if asked_m_s2 > 0.0 && !moved {
+            self.pressed_s += reading.dt;
+            self.asked_m_s += asked_m_s2 * reading.dt;
+            self.asked_widths += self.asked_m_s * reading.dt / reading.still_m;
+        } else {
+            (self.pressed_s, self.asked_m_s, self.asked_widths) = (0.0, 0.0, 0.0);
+        }
         self.repeat(position_m, reading.dt);
     }
 
@@ -120,7 +132,7 @@ impl Stillness {
         }
         for axis in Axis::ALL {
             if let Some(position_m) = reading.position_m[axis] {
-                self.axes[axis].update(position_m, reading.pressed[axis], reading);
+                self.axes[axis].update(position_m, reading.asked_m_s2[axis], reading);
             }
         }
     }
@@ -162,7 +174,7 @@ mod tests {
         Reading {
             dt: 0.01,
             position_m: PerAxis { x, y: None },
-            pressed: PerAxis { x: pressed, y: false },
+            asked_m_s2: PerAxis { x: if pressed { 1.0 } else { 0.0 }, y: 0.0 },
             still_m: 0.002,
             usable: true,
             outliers: 0,
@@ -189,6 +201,20 @@ mod tests {
             let wanted = if i < 6 { 0.01 * i as f64 } else { 0.0 };
             assert!((watch.still_s() - wanted).abs() < 1e-9, "{i}: {}", watch.still_s());
         }
+    }
+
+    /// A ball that a pull of 0.5 m/s² turns round seems to stand for a while, but
+    /// not for as long as one that is held has been asked to roll six widths.
+    #[test]
+    fn a_ball_that_turns_round_is_not_held() {
+        let mut watch = Stillness::default();
+        let mut most_widths = 0.0_f64;
+        for i in -100..100 {
+            let t = 0.01 * f64::from(i);
+            watch.update(&reading(Some(0.25 * t * t), true));
+            most_widths = most_widths.max(watch.axes.x.asked_widths / 2.0);
+        }
+        assert!((1.0..6.5).contains(&most_widths), "{most_widths}");
     }
 
     #[test]

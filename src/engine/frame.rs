@@ -29,6 +29,11 @@ impl Repeats {
         Self { refresh_s, last: None }
     }
 
+    /// Whether the sensor is logged faster than it reads.
+    pub fn are_expected(&self) -> bool {
+        self.refresh_s > 0.0
+    }
+
     /// Takes the next reading; whether it is the one before.
     pub fn is_repeat(&mut self, at: SimTime, position: &PerAxis<Option<f64>>) -> bool {
         if self.refresh_s == 0.0 {

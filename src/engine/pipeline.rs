@@ -41,6 +41,9 @@ const GUST_M_S2: f64 = 0.03;
 /// Uncertainty of the time of a reading, in sample periods. Assumed: the varied
 /// rigs that are soaked draw one of up to 0.15 (`simulation::variety`).
 const TIMING_SHARE: f64 = 0.1;
+/// The same of a sensor that is logged faster than it reads: its readings wait for
+/// the next row, any share of a period, of which 1/√12 is the standard deviation.
+const HELD_SHARE: f64 = 0.29;
 /// What one reading may add to the scatter, in limits of it.
 const SCATTER_LIMITS: f64 = 2.0;
 /// Seconds for which a jump of the readings counts as evidence, beyond the
@@ -168,7 +171,7 @@ impl Pipeline {
             let dt = self.unjudged_s.min(self.settings.period_s + dt);
             self.unjudged_s = 0.0;
             self.look.fit();
-            self.noisy_m = self.noise_limit_m();
+            self.noisy_m = self.evaluator.noisy_m(self.blur_m());
             self.collect_evidence(&moment);
             let around = self.surroundings();
             let findings = self.evaluator.evaluate(&self.evidence, &self.readings, &around);
@@ -318,7 +321,11 @@ impl Pipeline {
 
     /// Standard deviation by which the readings may leave their path, m.
     fn gate_noise_m(&self) -> f64 {
-        if self.settings.learnt { self.noise_m() } else { self.noise_m().max(UNKNOWN_NOISE_M) }
+        let noise_m = match self.repeats.are_expected() {
+            true => self.noise_m().hypot(self.blur_m()),
+            false => self.noise_m(),
+        };
+        if self.settings.learnt { noise_m } else { noise_m.max(UNKNOWN_NOISE_M) }
     }
 
     /// Standard deviation of healthy readings, the worse of both axes, m.
@@ -329,13 +336,14 @@ impl Pipeline {
     /// Stage: stillness, missing and identical readings.
     fn watch_readings(&mut self, moment: &Moment, dt: f64, usable: bool, outliers: u32) {
         let limits = *self.evaluator.limits();
-        let pressed = PerAxis::from_fn(|a| {
-            moment.command[a].is_some() && self.pull_m_s2(a) > limits[a].pressing_m_s2()
+        let asked_m_s2 = PerAxis::from_fn(|a| {
+            let pull_m_s2 = moment.command[a].map_or(0.0, |_| self.pull_m_s2(a));
+            if pull_m_s2 > limits[a].pressing_m_s2() { pull_m_s2 } else { 0.0 }
         });
         self.readings.update(&Reading {
             dt,
             position_m: moment.position,
-            pressed,
+            asked_m_s2,
             still_m: STILL_FACTOR * self.noise_m(),
             usable,
             // Bounces off the rim look like outliers.
@@ -465,13 +473,14 @@ impl Pipeline {
         if explains { residual_m_s2.signum() * residual_m_s2.abs().min(offset.abs()) } else { 0.0 }
     }
 
-    /// Scatter of the readings that is noise now, m: a reading blurs by as much
-    /// as the ball moves within the uncertainty of its time.
-    fn noise_limit_m(&self) -> f64 {
+    /// By how much a reading blurs, m: as far as the ball moves within the
+    /// uncertainty of its time.
+    fn blur_m(&self) -> f64 {
         let speed = |axis: Axis| self.look.fits[axis].map_or(0.0, |f| f.measured.velocity);
         let (x, y) = (speed(Axis::X), speed(Axis::Y));
-        let within_s = TIMING_SHARE * self.period_s.unwrap_or(0.0);
-        self.evaluator.noisy_m((x * x + y * y).sqrt() * within_s)
+        let share = if self.repeats.are_expected() { HELD_SHARE } else { TIMING_SHARE };
+        let within_s = share * self.period_s.unwrap_or(0.0);
+        (x * x + y * y).sqrt() * within_s
     }
 
     /// Whether readings have stepped of late as no ball can.

@@ -29,8 +29,8 @@ impl Plan {
     }
 }
 
-/// Seeds of the rigs: others than those of `offbd soak`.
-const FIRST_SEED: u64 = 77_000_000;
+/// Seeds of the rigs: others than those that the promises were made by.
+const FIRST_SEED: u64 = 91_000_000;
 
 /// Measures and draws.
 ///
