@@ -30,8 +30,9 @@ const ROLLS_OUT_M_S2: f64 = 0.05;
 const PRESSED_S: f64 = 0.3;
 /// How far a ball at rest must have been asked to roll, in widths of what counts as
 /// still: one that turns round stays within a width for as long as one at rest takes
-/// for (1 + √2)² = 5.8 of them.
-const TURNING_WIDTHS: f64 = 6.0;
+/// for up to (1 + √2)² = 5.8 of them, and mostly for fewer. More than four would leave
+/// a coarse rig's drive cycle without a verdict on its ball.
+const TURNING_WIDTHS: f64 = 4.0;
 
 /// Share of samples without a ball that is too many.
 const MISSING_SHARE: f64 = 0.5;

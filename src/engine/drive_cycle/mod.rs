@@ -39,7 +39,7 @@ pub struct Feedback {
     pub derivative: f64,
 }
 
-/// What one monitor comes to on a healthy rig.
+/// Why a monitor comes to no result on the healthy rig.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NotReached {
     /// The rig has no such servo, or no readings along its axis.
