@@ -15,7 +15,7 @@ pub enum TriedFault {
     Frozen,
     /// No ball is seen.
     Unseen,
-    /// The readings scatter [`NOISE`] times as far as healthy ones.
+    /// The readings scatter `NOISE` times as far as healthy ones.
     Noise,
     /// One reading in five is anywhere on the plate.
     Spikes,
