@@ -9,7 +9,7 @@ mod record;
 
 use uuid::Uuid;
 
-use self::record::{Outcome, REFINED_SESSIONS};
+use self::record::{CalibrationEnd, REFINED_SESSIONS};
 pub(super) use self::record::{Record, Teaching};
 use super::access::Deed;
 use super::jobs::Job;
@@ -20,7 +20,7 @@ use crate::store::{AccessWrite, CalibrationRow, JobState, Write};
 use crate::vocabulary::Axis;
 use crate::wire::asset::{self, CalibrationView};
 use crate::wire::learning::{LearningState, LearningView, TeachingSessionView};
-use crate::wire::verdict::{Outcome as Verdict, SummaryView};
+use crate::wire::verdict::{Outcome, SummaryView};
 
 /// Who refines, in the audit log.
 const ITSELF: &str = "offbd";
@@ -131,7 +131,7 @@ impl Running {
     ) -> Result<(), ServiceError> {
         let learnt = self.rig.calibration.is_some();
         let healthy = match learnt {
-            true => summary.outcome == Some(Verdict::NoFault) && !warned,
+            true => summary.outcome == Some(Outcome::NoFault) && !warned,
             false => summary.faults.is_empty(),
         };
         let Some(session) = teaching(open).filter(|_| healthy) else { return Ok(()) };
@@ -154,8 +154,8 @@ impl Running {
         let outcome = self.learning.ended(learnt, &id, row.error.as_deref());
         work.writes.push(Write::PutCalibration(row));
         match (outcome, document) {
-            (Outcome::NotAsked, _) => return Ok(()),
-            (Outcome::Refines, Some(calibration)) => {
+            (CalibrationEnd::NotAsked, _) => return Ok(()),
+            (CalibrationEnd::Refines, Some(calibration)) => {
                 self.put_in_force(calibration, &id, work)?;
                 let target = format!("/api/v1/assets/{}/calibrations/{id}", self.row.name);
                 let deed = Deed { act: "refine_calibration".to_owned(), target, address: None };

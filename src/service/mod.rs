@@ -68,7 +68,7 @@ use self::deletion::Deleter;
 use self::events::Events;
 use self::presence::Presences;
 use self::running::{Running, Work};
-use self::shard::{Context, Job, Shard, Shards};
+use self::shard::{Context, Job, Shards};
 use self::watchdog::{STALLED_AFTER, Watchdog};
 use crate::store::{Store, StoreError, Writer};
 
@@ -193,16 +193,10 @@ impl Service {
         let committer = committer.spawn()?;
         let presences = Presences::default();
         let (jobs, jobs_queue) = mpsc::channel(jobs::MAX_QUEUED);
-        let mut shards = Vec::new();
-        let mut threads = Vec::new();
-        for number in 0..limits.shards {
-            let (way, queue) = mpsc::channel(limits.shard_queue);
-            let (presences, jobs) = (presences.clone(), jobs.clone());
-            let context = Context::new(store.clone(), clock, presences, jobs, sets.clone());
-            threads.push(Shard::spawn(number, context, queue)?);
-            shards.push(way);
-        }
-        let (shards, closed) = (Shards::from(shards), closing.clone());
+        let context =
+            Context::new(store.clone(), clock, presences.clone(), jobs.clone(), sets.clone());
+        let (shards, threads) = Shards::start(&limits, context)?;
+        let closed = closing.clone();
         let bench = jobs::Bench::new(store.clone(), clock, sets.clone(), shards.clone(), closed);
         let mut workers = jobs::spawn(limits.jobs, &bench, jobs_queue);
         let deleter = Deleter::new(store.clone(), sets.clone());
@@ -319,11 +313,7 @@ impl Service {
         asset: &str,
         act: impl FnOnce(&Context, &mut Running, &mut Work) -> Result<T, ServiceError> + Send + 'static,
     ) -> Result<T, ServiceError> {
-        let (reply, answer) = oneshot::channel();
-        let name = asset.to_owned();
-        let job: Job = Box::new(move |shard| shard.act(&name, act, reply.into()));
-        self.shard(asset).try_send(job).map_err(ServiceError::from_full)?;
-        settled(answer.await)
+        self.inner.shards.call(asset, act).await
     }
 }
 

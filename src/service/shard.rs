@@ -5,6 +5,7 @@ use std::future::Future;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
+use std::thread::JoinHandle;
 
 use tokio::runtime::Handle;
 use tokio::sync::{OwnedSemaphorePermit, mpsc, oneshot};
@@ -12,7 +13,7 @@ use tokio::sync::{OwnedSemaphorePermit, mpsc, oneshot};
 use super::commit::{Life, WriteSet};
 use super::presence::Presences;
 use super::running::{Running, Work};
-use super::{Clock, ServiceError, jobs, rebuild, settled};
+use super::{Clock, Limits, ServiceError, jobs, rebuild, settled};
 use crate::store::{Store, Write};
 
 /// Something to do on a shard.
@@ -41,19 +42,49 @@ impl Shards {
         asset: &str,
         act: impl FnOnce(&Context, &mut Running, &mut Work) -> Result<T, ServiceError> + Send + 'static,
     ) -> Result<T, ServiceError> {
-        let (reply, answer) = oneshot::channel();
-        let name = asset.to_owned();
-        let job: Job = Box::new(move |shard| shard.act(&name, act, reply.into()));
+        let (job, answer) = acting(asset, act);
         let closing = |_| ServiceError::Unavailable { what: "the service is closing" };
         self.of(asset).send(job).await.map_err(closing)?;
         settled(answer.await)
     }
+
+    /// The same now, or not at all.
+    ///
+    /// # Errors
+    /// [`ServiceError`] at once if the shard's queue is full.
+    pub(super) async fn call<T: Send + 'static>(
+        &self,
+        asset: &str,
+        act: impl FnOnce(&Context, &mut Running, &mut Work) -> Result<T, ServiceError> + Send + 'static,
+    ) -> Result<T, ServiceError> {
+        let (job, answer) = acting(asset, act);
+        self.of(asset).try_send(job).map_err(ServiceError::from_full)?;
+        settled(answer.await)
+    }
+
+    /// Starts a thread for each shard; returns the ways to them and the threads.
+    pub(super) fn start(
+        limits: &Limits,
+        context: Context,
+    ) -> Result<(Self, Vec<JoinHandle<()>>), ServiceError> {
+        let start = |number| {
+            let (way, queue) = mpsc::channel(limits.shard_queue);
+            Shard::spawn(number, context.clone(), queue).map(|thread| (way, thread))
+        };
+        let started: Vec<_> = (0..limits.shards).map(start).collect::<Result<_, _>>()?;
+        let (ways, threads): (Vec<_>, Vec<_>) = started.into_iter().unzip();
+        Ok((Self(ways.into()), threads))
+    }
 }
 
-impl From<Vec<mpsc::Sender<Job>>> for Shards {
-    fn from(shards: Vec<mpsc::Sender<Job>>) -> Self {
-        Self(shards.into())
-    }
+/// The job that does `act` with `asset`, and where its answer comes.
+fn acting<T: Send + 'static>(
+    asset: &str,
+    act: impl FnOnce(&Context, &mut Running, &mut Work) -> Result<T, ServiceError> + Send + 'static,
+) -> (Job, oneshot::Receiver<Result<T, ServiceError>>) {
+    let (reply, answer) = oneshot::channel();
+    let name = asset.to_owned();
+    (Box::new(move |shard| shard.act(&name, act, reply.into())), answer)
 }
 
 /// Who waits for an outcome, and what is given back with it whether or not
@@ -87,6 +118,7 @@ impl<T> From<oneshot::Sender<Result<T, ServiceError>>> for Reply<T> {
 }
 
 /// What a shard works with, apart from the engines.
+#[derive(Clone)]
 pub(super) struct Context {
     pub(super) store: Store,
     pub(super) clock: Clock,
@@ -153,11 +185,11 @@ pub(super) struct Shard {
 }
 
 impl Shard {
-    pub(super) fn spawn(
+    fn spawn(
         number: usize,
         context: Context,
         mut queue: mpsc::Receiver<Job>,
-    ) -> Result<std::thread::JoinHandle<()>, ServiceError> {
+    ) -> Result<JoinHandle<()>, ServiceError> {
         let work = move || {
             let mut shard = Self { context, running: BTreeMap::new() };
             let engines = metrics::gauge!("offbd_engines", "shard" => number.to_string());

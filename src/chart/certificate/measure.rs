@@ -38,14 +38,11 @@ pub(super) struct Measured {
 /// False alarms of one monitor.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Alarms {
-    pub(super) code: FaultCodeWord,
+    pub(super) code: &'static str,
     pub(super) promised_per_h: f64,
     pub(super) came: u32,
     pub(super) watched_h: f64,
 }
-
-/// The word of a fault code in the records.
-pub(super) type FaultCodeWord = &'static str;
 
 /// Median delay of one fault; none where fewer than half were found in time.
 #[derive(Clone, Debug, Serialize)]

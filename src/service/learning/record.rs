@@ -90,7 +90,7 @@ enum Phase {
 
 /// What a calibration that has ended comes to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Outcome {
+pub(super) enum CalibrationEnd {
     /// It is none of this record's, or not any more.
     NotAsked,
     Offered,
@@ -239,12 +239,17 @@ impl Record {
     }
 
     /// The calibration `job` has ended: done, or refused for a reason.
-    pub(super) fn ended(&mut self, learnt: bool, job: &str, refused: Option<&str>) -> Outcome {
+    pub(super) fn ended(
+        &mut self,
+        learnt: bool,
+        job: &str,
+        refused: Option<&str>,
+    ) -> CalibrationEnd {
         if self.lesson(job).is_none() {
-            return Outcome::NotAsked;
+            return CalibrationEnd::NotAsked;
         }
         let Phase::Learning { job, teaching, least_s } = std::mem::take(&mut self.phase) else {
-            return Outcome::NotAsked;
+            return CalibrationEnd::NotAsked;
         };
         match refused {
             Some(reason) => {
@@ -254,16 +259,16 @@ impl Record {
                     // They do not go together with what taught.
                     self.sessions.retain(|s| !teaching.iter().any(|t| t.id == s.id));
                 }
-                Outcome::Refused
+                CalibrationEnd::Refused
             }
             None if learnt => {
                 self.sessions.retain(|s| !teaching.iter().any(|t| t.id == s.id));
                 (self.taught, self.refusal) = (teaching, None);
-                Outcome::Refines
+                CalibrationEnd::Refines
             }
             None => {
                 self.phase = Phase::Offered { job, teaching };
-                Outcome::Offered
+                CalibrationEnd::Offered
             }
         }
     }

@@ -16,7 +16,7 @@ fn offered() -> Record {
     record.gather(false, session(2, 40.0));
     let due = record.due(false, None).expect("80 s are enough");
     record.begin("job".to_owned(), due, None);
-    assert_eq!(record.ended(false, "job", None), Outcome::Offered);
+    assert_eq!(record.ended(false, "job", None), CalibrationEnd::Offered);
     record
 }
 
@@ -49,8 +49,8 @@ fn nothing_more_is_begun_while_a_calibration_is_under_way_or_offered() {
     record.gather(false, session(3, 200.0));
     assert_eq!(record.due(false, None), None);
     assert_eq!(record.state(false), LearningState::Offered);
-    assert_eq!(record.ended(false, "job", None), Outcome::NotAsked, "told twice");
-    assert_eq!(record.ended(false, "other", None), Outcome::NotAsked);
+    assert_eq!(record.ended(false, "job", None), CalibrationEnd::NotAsked, "told twice");
+    assert_eq!(record.ended(false, "other", None), CalibrationEnd::NotAsked);
 }
 
 #[test]
@@ -59,7 +59,7 @@ fn after_a_refusal_half_as_much_again_is_wanted() {
     record.gather(false, session(1, 80.0));
     let due = record.due(false, None).unwrap();
     record.begin("job".to_owned(), due, None);
-    assert_eq!(record.ended(false, "job", Some("too still")), Outcome::Refused);
+    assert_eq!(record.ended(false, "job", Some("too still")), CalibrationEnd::Refused);
     assert_eq!((record.wanted_s(), record.state(false)), (120.0, LearningState::Gathering));
     assert_eq!(record.refusal().unwrap().reason, "too still");
     record.gather(false, session(2, 39.0));
@@ -78,7 +78,7 @@ fn what_was_discarded_does_not_teach_nor_does_the_rest_of_its_session() {
     assert_eq!((record.due(false, Some(&open)), record.motion(Some(&open))), Default::default());
     record.gather(false, open);
     assert_eq!(record, Record::default(), "it has ended, and nothing of it is left");
-    assert_eq!(record.ended(false, "job", None), Outcome::NotAsked);
+    assert_eq!(record.ended(false, "job", None), CalibrationEnd::NotAsked);
     record.gather(false, session(4, 60.0));
     assert_eq!(ids(&record.due(false, None).unwrap()), ["4"]);
 }
@@ -94,7 +94,7 @@ fn an_accepted_calibration_is_refined_until_five_sessions_have_taught() {
         let due = record.due(true, None).unwrap();
         assert_eq!(due.len(), id as usize);
         record.begin(id.to_string(), due, None);
-        assert_eq!(record.ended(true, &id.to_string(), None), Outcome::Refines);
+        assert_eq!(record.ended(true, &id.to_string(), None), CalibrationEnd::Refines);
     }
     assert!(!record.refines() && record.by_itself());
     record.gather(true, session(6, 100.0));
@@ -107,7 +107,7 @@ fn a_refused_refinement_changes_nothing_and_its_session_is_left_out() {
     record.gather(true, session(3, 40.0));
     let due = record.due(true, None).unwrap();
     record.begin("more".to_owned(), due, None);
-    assert_eq!(record.ended(true, "more", Some("it accuses itself")), Outcome::Refused);
+    assert_eq!(record.ended(true, "more", Some("it accuses itself")), CalibrationEnd::Refused);
     assert_eq!(ids(&record.taught), ["1", "2"]);
     assert_eq!(record.due(true, None), None);
     record.gather(true, session(4, 40.0));
