@@ -314,12 +314,13 @@ impl Evaluator {
 fn servo(axis: Axis, evidence: &Evidence, around: &Surroundings) -> Finding {
     let (e, other) = (&evidence.axes[axis], &evidence.axes[axis.other()]);
     let nats = if other.nats < BOTH_NATS { (e.nats - other.nats).max(0.0) } else { e.nats };
-    let test = match (e.enabled, e.violates()) {
-        (true, true) if other.violates() && e.nats.min(other.nats) < BOTH_NATS => Test::NotTested,
-        (true, true) => Test::Prefailed,
+    let fails = |e: &AxisEvidence| e.violates() || e.is_off_path();
+    let test = match fails(e) {
+        true if fails(other) && e.nats.min(other.nats) < BOTH_NATS => Test::NotTested,
+        true => Test::Prefailed,
         // The rim may hold what a servo would not.
-        (true, false) if !around.at_edge => Test::Prepassed,
-        _ => Test::NotTested,
+        false if e.enabled && !around.at_edge => Test::Prepassed,
+        false => Test::NotTested,
     };
     let kind = e.answer.and_then(|answer| answer.kind());
     Finding { test, nats: Some(nats), gone: around.over_the_edge, kind, rival: None }
@@ -422,6 +423,24 @@ mod tests {
             Evaluator::new(Profile::Default, PerAxis::from_fn(|_| wide), SensorLimits::new(None));
         let evaluator = evaluator.with_suspicion(PerAxis::from_fn(|_| suspect_nats));
         evaluator.stuck_ball(&evidence, &readings, &CLEAR)
+    }
+
+    /// A path that bends from the twin's accuses its servo, where the other axis goes by
+    /// its own: what both share is another's.
+    #[test]
+    fn a_path_off_the_twins_accuses_its_servo_alone() {
+        let bent = |error_m: f64| AxisEvidence {
+            path_error_m: Some(error_m),
+            path_limit_m: Some(5e-3),
+            ..AxisEvidence::default()
+        };
+        let test = |x: f64, y: f64| {
+            let axes = PerAxis { x: bent(x), y: bent(y) };
+            servo(Axis::X, &Evidence { axes, ..Evidence::default() }, &CLEAR).test
+        };
+        assert_eq!(test(6e-3, 1e-3), Test::Prefailed);
+        assert_eq!(test(4e-3, 1e-3), Test::NotTested);
+        assert_eq!(test(6e-3, 6e-3), Test::NotTested);
     }
 
     #[test]

@@ -24,6 +24,11 @@ pub struct AxisEvidence {
     /// Evidence for a fault of the servo: logarithm of how much likelier the
     /// motion is if it is broken, nats.
     pub nats: f64,
+    /// How far the path of the last two seconds bends from the twin's, root mean
+    /// square, m; none where that is not testable.
+    pub path_error_m: Option<f64>,
+    /// The most that it bends on the healthy rig, m; none where that is not known.
+    pub path_limit_m: Option<f64>,
     /// How the servo has answered its command of late.
     pub answer: Option<Answer>,
     /// Seconds for which the readings along this axis have been bit-identical.
@@ -35,6 +40,12 @@ impl AxisEvidence {
     #[must_use]
     pub fn residual_m_s2(&self) -> Option<f64> {
         Some(self.measured_m_s2? - self.twin_m_s2?)
+    }
+
+    /// Whether the path bends from the twin's by more than the limit.
+    #[must_use]
+    pub fn is_off_path(&self) -> bool {
+        self.path_error_m.zip(self.path_limit_m).is_some_and(|(error, limit)| error >= limit)
     }
 
     /// Whether the axis is enabled and its residual beyond the limit.

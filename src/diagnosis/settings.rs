@@ -65,10 +65,12 @@ const MOST_NATS: f64 = 36.0;
 /// Share of what confirms that makes the test fail.
 const SUSPECT_SHARE: f64 = 2.0 / 3.0;
 
-/// Times the most evidence that was found against a servo while it was healthy
-/// that it takes to confirm a fault: as the trials of a calibration allow for
-/// times.
-const EVIDENCE_FACTOR: f64 = 1.0 / 0.6;
+/// What it takes to confirm a fault of a servo against which evidence was found while
+/// it was healthy: so many times that, and so many nats more. The tail is the longer,
+/// the worse the twin fits; without it real rigs were accused two to three times an
+/// hour by their ball creeping within its breakaway angle.
+const EVIDENCE_FACTOR: f64 = 2.0;
+const EVIDENCE_MARGIN_NATS: f64 = 4.0;
 
 /// How a rig is judged; immutable while a session runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -175,7 +177,9 @@ impl Settings {
     /// has come near to it while it was healthy.
     #[must_use]
     pub fn confirming_nats(&self, learnt: Option<&AxisCalibration>) -> f64 {
-        self.confirm_nats.max(learnt.map_or(0.0, |l| EVIDENCE_FACTOR * l.most_nats))
+        let most_nats = learnt.map_or(0.0, |l| l.most_nats);
+        let beyond = EVIDENCE_FACTOR * most_nats + EVIDENCE_MARGIN_NATS;
+        self.confirm_nats.max(beyond.min(MOST_NATS))
     }
 
     /// Whether a failure of `code` may be confirmed: on a rig that is not learnt

@@ -164,6 +164,10 @@ impl Engine {
     }
 
     /// Most evidence against each servo so far, nats.
+    fn most_path_error_m(&self) -> PerAxis<f64> {
+        self.pipeline.most_path_error_m()
+    }
+
     fn most_nats(&self) -> PerAxis<f64> {
         self.pipeline.most_nats()
     }

@@ -44,6 +44,9 @@ const TIMING_SHARE: f64 = 0.1;
 /// The same of a sensor that is logged faster than it reads: its readings wait for
 /// the next row, any share of a period, of which 1/√12 is the standard deviation.
 const HELD_SHARE: f64 = 0.29;
+/// Share of a·T² that is scatter, for readings T apart on a path that bends by a
+/// between three of them: 0.41 if it did so all the time.
+const BEND_SHARE: f64 = 0.25;
 /// What one reading may add to the scatter, in limits of it.
 const SCATTER_LIMITS: f64 = 2.0;
 /// Seconds for which a jump of the readings counts as evidence, beyond the
@@ -171,7 +174,7 @@ impl Pipeline {
             let dt = self.unjudged_s.min(self.settings.period_s + dt);
             self.unjudged_s = 0.0;
             self.look.fit();
-            self.noisy_m = self.evaluator.noisy_m(self.blur_m());
+            self.noisy_m = self.evaluator.noisy_m(self.blur_m().hypot(self.bend_m()));
             self.collect_evidence(&moment);
             let around = self.surroundings();
             let findings = self.evaluator.evaluate(&self.evidence, &self.readings, &around);
@@ -459,6 +462,8 @@ impl Pipeline {
             limit_m_s2: self.evaluator.limits()[axis].at(twin.unwrap_or(0.0), error),
             enabled: false,
             nats: servo.nats(),
+            path_error_m: servo.path_error_m(),
+            path_limit_m: self.evaluator.limits()[axis].path_m,
             answer: (self.settings.profile == Profile::Default).then(|| servo.answer()),
             identical_s: self.readings.axes[axis].identical_s,
         }
@@ -481,6 +486,14 @@ impl Pipeline {
         let share = if self.repeats.are_expected() { HELD_SHARE } else { TIMING_SHARE };
         let within_s = share * self.period_s.unwrap_or(0.0);
         (x * x + y * y).sqrt() * within_s
+    }
+
+    /// By how much the path may bend between three readings, m, where the ball's
+    /// acceleration is off the twin's by as much as no servo is blamed for.
+    fn bend_m(&self) -> f64 {
+        let period_s = self.period_s.unwrap_or(0.0);
+        let off_m_s2 = |axis: Axis| self.evaluator.limits()[axis].at(0.0, 0.0);
+        BEND_SHARE * off_m_s2(Axis::X).max(off_m_s2(Axis::Y)) * period_s * period_s
     }
 
     /// Whether readings have stepped of late as no ball can.
@@ -556,6 +569,11 @@ impl Pipeline {
     /// of any.
     pub fn most_nats(&self) -> PerAxis<f64> {
         PerAxis::from_fn(|axis| self.watches[FaultCode::servo(axis) as usize].most_nats())
+    }
+
+    /// The most that the path of each axis has bent from the twin's, m.
+    pub fn most_path_error_m(&self) -> PerAxis<f64> {
+        PerAxis::from_fn(|axis| self.servos[axis].most_path_error_m())
     }
 
     /// The nearest that each monitor has come to an alarm by the time of its

@@ -4,6 +4,7 @@
 
 mod adaptive;
 pub mod estimators;
+mod kinked_parabola;
 mod linear;
 mod rosenbrock;
 mod runge_kutta;
@@ -13,6 +14,7 @@ mod statistics;
 mod system;
 
 pub use adaptive::StepControl;
+pub use kinked_parabola::off_kinked_parabola;
 pub use rosenbrock::{RODAS3, RODAS4, Rosenbrock};
 pub use runge_kutta::{
     DOPRI5, EULER, Estimated, MIDPOINT, RK4, RungeKutta, dopri5, semi_implicit_euler,

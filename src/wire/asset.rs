@@ -368,6 +368,12 @@ pub struct AxisCalibrationView {
     #[schema(minimum = 0, maximum = 1000)]
     #[serde(default)]
     pub most_nats: f64,
+    /// The most that the path bent from the twin's over two seconds while the servo was
+    /// healthy, root mean square, in [0, 1] m; zero where that is not known, and then
+    /// no path is judged.
+    #[schema(minimum = 0, maximum = 1)]
+    #[serde(default)]
+    pub most_path_error_m: f64,
 }
 
 const fn default_level_spread() -> f64 {
@@ -632,6 +638,7 @@ fn axis_calibration(axis: Axis, view: &AxisCalibrationView) -> Result<AxisCalibr
             Some(error) => positive(&at("model_error_m_s2"), error, 100.0)?,
             None => AxisCalibration::assumed_model_error_m_s2(view.residual_m_s2),
         },
+        most_path_error_m: in_range(&at("most_path_error_m"), view.most_path_error_m, 0.0..=1.0)?,
         most_nats: in_range(&at("most_nats"), view.most_nats, 0.0..=1e3)?,
     })
 }
@@ -706,6 +713,7 @@ pub fn calibration_view(calibration: &Calibration) -> CalibrationView {
         rest_s: c.rest_s,
         model_error_m_s2: Some(c.model_error_m_s2),
         most_nats: c.most_nats,
+        most_path_error_m: c.most_path_error_m,
     };
     CalibrationView {
         id: calibration_id(calibration),
@@ -753,6 +761,10 @@ pub fn calibration_id(calibration: &Calibration) -> String {
         ] {
             hash.update(number.to_bits().to_le_bytes());
         }
+        // Calibrations without it keep their ids.
+        if learnt.most_path_error_m > 0.0 {
+            hash.update(learnt.most_path_error_m.to_bits().to_le_bytes());
+        }
     }
     let SensorCalibration { refresh_s, most_outliers, most_scatter_m, longest_unseen_s } =
         calibration.sensor;
@@ -790,6 +802,7 @@ mod tests {
             rest_s: 12.0,
             model_error_m_s2: 0.03,
             most_nats: 4.5,
+            most_path_error_m: 3e-3,
         };
         let estimate =
             SessionEstimate { level_rad: -0.02, level_error_rad: 1e-3, gain: Some((0.8, 0.02)) };

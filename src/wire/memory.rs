@@ -258,6 +258,8 @@ fn axis_evidence(view: &AxisEvidenceView) -> AxisEvidence {
         limit_m_s2: view.limit_m_s2,
         enabled: view.enabled,
         nats: view.nats,
+        path_error_m: view.path_error_m,
+        path_limit_m: view.path_limit_m,
         answer: view.answer.as_ref().map(answer),
         identical_s: view.identical_s,
     }

@@ -121,6 +121,13 @@ pub struct AxisEvidenceView {
     /// motion is if it is broken, nats.
     #[serde(default)]
     pub nats: f64,
+    /// How far the path of the last two seconds bends from the twin's, root mean
+    /// square, m; none where that is not testable.
+    #[serde(default)]
+    pub path_error_m: Option<f64>,
+    /// The most that it bends on the healthy rig, m; none where that is not known.
+    #[serde(default)]
+    pub path_limit_m: Option<f64>,
     /// How the servo has answered its command of late; none where the profile
     /// does not ask.
     #[serde(default)]
@@ -256,6 +263,8 @@ fn axis_evidence_view(axis: &AxisEvidence) -> AxisEvidenceView {
         limit_m_s2: axis.limit_m_s2,
         enabled: axis.enabled,
         nats: axis.nats,
+        path_error_m: axis.path_error_m,
+        path_limit_m: axis.path_limit_m,
         answer: axis.answer.as_ref().map(answer_view),
         identical_s: axis.identical_s,
     }

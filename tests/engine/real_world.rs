@@ -266,3 +266,25 @@ fn a_breakaway_that_was_not_observed_is_not_zero() {
     let found = confirmed(&outputs);
     assert!(found.iter().all(|&(code, _)| code != FaultCode::StuckBall), "{found:?}");
 }
+
+/// A rig that its twin fits so badly that neither accelerations nor likelihoods say
+/// anything: the path itself does, where it is known how far a healthy one bends.
+#[test]
+fn on_a_rig_that_is_fitted_badly_the_path_accuses_the_servo() {
+    let mut learnt = learnt_from(
+        &rig(Preset::Chapter),
+        &[healthy(Preset::Chapter, 2), healthy(Preset::Chapter, 3)],
+    );
+    let calibration = learnt.rig.calibration.as_mut().unwrap();
+    let axis = calibration.axes.x.as_mut().unwrap();
+    assert!((1e-4..0.02).contains(&axis.most_path_error_m), "{axis:?}");
+    (axis.model_error_m_s2, axis.residual_m_s2) = (1.0, 1.0);
+    let fault = "x_servo:gain=0.3@20";
+    let judged = |setup: &Setup| {
+        confirmed(&outputs(setup, &session(Preset::Chapter, Reference::Circle, 60.0, 6, fault)))
+    };
+    assert_eq!(judged(&learnt).first().map(|f| f.0), Some(FaultCode::XServo));
+    let axes = &mut learnt.rig.calibration.as_mut().unwrap().axes;
+    axes.x.as_mut().unwrap().most_path_error_m = 0.0;
+    assert!(judged(&learnt).iter().all(|f| f.0 != FaultCode::XServo));
+}

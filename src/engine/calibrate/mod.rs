@@ -265,6 +265,7 @@ fn learn_in_windows(
         model_error_m_s2: AxisCalibration::assumed_model_error_m_s2(healthy.residual_m_s2),
         familiar_m_s2: healthy.familiar_m_s2,
         most_nats: 0.0,
+        most_path_error_m: 0.0,
     };
     Ok(LearntAxis { calibration, sessions: by_session(&levels, &found) })
 }

@@ -54,7 +54,9 @@ pub(super) fn prove(
 fn with_most(mut learnt: Calibration, tests: &[SelfTest]) -> Calibration {
     for axis in Axis::ALL {
         let most_nats = tests.iter().map(|t| t.most_nats[axis].0).fold(0.0, f64::max);
-        learnt.axes[axis] = learnt.axes[axis].map(|a| AxisCalibration { most_nats, ..a });
+        let most_path_error_m = tests.iter().map(|t| t.most_path_error_m[axis]).fold(0.0, f64::max);
+        let with = |a| AxisCalibration { most_nats, most_path_error_m, ..a };
+        learnt.axes[axis] = learnt.axes[axis].map(with);
     }
     let most = |of: fn(&SelfTest) -> f64| tests.iter().map(of).fold(0.0, f64::max);
     let scatter_m = most(|t| t.most_scatter_m).min(MOST_SCATTER_M);

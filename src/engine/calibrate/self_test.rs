@@ -18,6 +18,8 @@ pub(super) struct SelfTest {
     pub(super) alarm: Option<Accusation>,
     /// Most evidence against each servo, nats, and when that was, s.
     pub(super) most_nats: PerAxis<(f64, f64)>,
+    /// The most that the path of each axis bent from the twin's, m.
+    pub(super) most_path_error_m: PerAxis<f64>,
     pub(super) most_outliers: f64,
     /// Most scatter that lasted, m.
     pub(super) most_scatter_m: f64,
@@ -61,6 +63,7 @@ pub(super) fn judge(setup: &Setup, session: usize, samples: &[Sample]) -> SelfTe
         session,
         alarm,
         most_nats: nats,
+        most_path_error_m: engine.most_path_error_m(),
         most_outliers,
         most_scatter_m: scatter.most,
         nearest: engine.nearest(),

@@ -22,6 +22,7 @@ const GOOD: AxisCalibration = AxisCalibration {
     residual_m_s2: 0.004,
     model_error_m_s2: 0.01,
     most_nats: 0.5,
+    most_path_error_m: 0.0,
     familiar_m_s2: 0.3,
 };
 

@@ -157,9 +157,14 @@ fn servo(axis: Axis, kind: Option<FaultKind>, evidence: &Evidence) -> String {
 
 fn accelerated(axis: Axis, e: &AxisEvidence) -> String {
     // A residual within its limit is not what raised it.
-    let ground = match e.violates() {
-        true => format!("limit {:.2}", e.limit_m_s2),
-        false => format!("weight of evidence {:.0} nats", e.nats),
+    let ground = match (e.violates(), e.path_error_m.zip(e.path_limit_m)) {
+        (true, _) => format!("limit {:.2}", e.limit_m_s2),
+        (false, Some((error, limit))) if error >= limit => format!(
+            "over two seconds its path bends {:.1} mm from the twin's, limit {:.1} mm",
+            error * 1e3,
+            limit * 1e3
+        ),
+        (false, _) => format!("weight of evidence {:.0} nats", e.nats),
     };
     let (along, command) = (axis.as_str(), axis.command());
     match (e.measured_m_s2, e.twin_m_s2) {
