@@ -27,8 +27,10 @@ const BREAK_S: f64 = 0.6;
 #[derive(Clone, Debug, Default)]
 pub(super) struct PathError {
     points: VecDeque<(f64, f64)>,
-    /// The blocks since the last point.
-    gathered: Vec<(f64, f64)>,
+    /// Number and sums of time and deviation of the blocks since the last point, and
+    /// when the first of them was, s.
+    gathered: (u32, f64, f64),
+    since_s: f64,
     /// Time of the last block, s.
     last_s: Option<f64>,
     /// What is left now, m; none where that is not known.
@@ -44,18 +46,19 @@ impl PathError {
             self.clear();
         }
         let block_s = self.last_s.replace(t).map_or(0.0, |last| t - last);
-        self.gathered.push((t, deviation_m));
-        if t - self.gathered[0].0 + block_s >= POINT_S {
+        let (n, times, deviations) = self.gathered;
+        self.gathered = (n + 1, times + t, deviations + deviation_m);
+        self.since_s = if n == 0 { t } else { self.since_s };
+        if t - self.since_s + block_s >= POINT_S {
             self.close();
         }
     }
 
     /// Makes a point of the blocks gathered.
     fn close(&mut self) {
-        let n = self.gathered.len() as f64;
-        let t = self.gathered.iter().map(|b| b.0).sum::<f64>() / n;
-        let deviation_m = self.gathered.drain(..).map(|b| b.1).sum::<f64>() / n;
-        self.points.push_back((t, deviation_m));
+        let (n, times, deviations) = std::mem::take(&mut self.gathered);
+        let t = times / f64::from(n);
+        self.points.push_back((t, deviations / f64::from(n)));
         while self.points[0].0 < t - WINDOW_S {
             self.points.pop_front();
         }
@@ -68,7 +71,7 @@ impl PathError {
 
     /// The ball cannot answer now; it may go on within a moment.
     pub(super) fn pause(&mut self) {
-        self.gathered.clear();
+        self.gathered = Default::default();
         (self.last_s, self.error_m) = (None, None);
     }
 
@@ -81,9 +84,12 @@ impl PathError {
     /// The twin was moved by the line through `position` m at `t` with slope
     /// `velocity` m/s: the deviation grows by as much.
     pub(super) fn rebase(&mut self, t: f64, position: f64, velocity: f64) {
-        for (at, deviation_m) in self.points.iter_mut().chain(&mut self.gathered) {
-            *deviation_m += position + velocity * (*at - t);
+        let line = |at: f64| position + velocity * (at - t);
+        for (at, deviation_m) in &mut self.points {
+            *deviation_m += line(*at);
         }
+        let (n, times, deviations) = &mut self.gathered;
+        *deviations += f64::from(*n) * line(0.0) + velocity * *times;
     }
 
     /// What is left now, m; none where that is not known.
