@@ -66,9 +66,9 @@ const MOST_NATS: f64 = 36.0;
 const SUSPECT_SHARE: f64 = 2.0 / 3.0;
 
 /// What it takes to confirm a fault of a servo against which evidence was found while
-/// it was healthy: so many times that, and so many nats more. The tail is the longer,
-/// the worse the twin fits; without it real rigs were accused two to three times an
-/// hour by their ball creeping within its breakaway angle.
+/// it was healthy: so many times that, and so many nats more, for the tail is the
+/// longer, the worse the twin fits. With 1.7 times and none more, and friction that acts
+/// for 0.1 s (`servo`), 2 of 378 healthy runs of real rigs were accused, with these none.
 const EVIDENCE_FACTOR: f64 = 2.0;
 const EVIDENCE_MARGIN_NATS: f64 = 4.0;
 

@@ -159,7 +159,7 @@ fn accelerated(axis: Axis, e: &AxisEvidence) -> String {
     // A residual within its limit is not what raised it.
     let ground = match (e.violates(), e.path_error_m.zip(e.path_limit_m)) {
         (true, _) => format!("limit {:.2}", e.limit_m_s2),
-        (false, Some((error, limit))) if error >= limit => format!(
+        (false, Some((error, limit))) if e.is_off_path() => format!(
             "over two seconds its path bends {:.1} mm from the twin's, limit {:.1} mm",
             error * 1e3,
             limit * 1e3

@@ -17,7 +17,7 @@ export function EvidenceTable({ of }: { of: Evidence }) {
     ["Limit", axes.map((a) => number(a.limit_m_s2, 3, "m/s²"))],
     ["Gate", axes.map((a) => (a.enabled ? "open" : "closed"))],
     ["Evidence against the servo", axes.map((a) => number(a.nats, 1, "nats"))],
-    ["Path off the twin’s", axes.map((a) => number(a.path_error_m, 4, "m"))],
+    ["Path off the twin's over 2 s", axes.map((a) => millimetres(a.path_error_m))],
     ...(axes.some((a) => a.answer) ? [
       ["Answers this share of its command", answer((a) => about(a.gain, a.gain_error, 2))] as [string, string[]],
       ["Acceleration that nothing asks for", answer((a) => about(a.offset_m_s2, a.offset_error_m_s2, 2, "m/s²"))] as [string, string[]],
