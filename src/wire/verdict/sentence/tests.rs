@@ -156,3 +156,19 @@ fn regress_a_test_that_passes_again_is_no_alarm() {
         "sensor (jump) passes its test again since 5.25 s; on record as confirmed (2E)"
     );
 }
+
+/// A path off the twin's is the ground only where it is beyond its limit and no
+/// residual is.
+#[test]
+fn a_path_off_the_twins_is_said_where_it_is_the_ground() {
+    let ground = |enabled: bool, error_m: f64| {
+        let mut evidence = evidence();
+        let x = &mut evidence.axes.x;
+        (x.enabled, x.path_error_m, x.path_limit_m) = (enabled, Some(error_m), Some(6e-3));
+        said(FaultCode::XServo, None, evidence)
+    };
+    let bends = "(over two seconds its path bends 9.1 mm from the twin's, limit 6.0 mm)";
+    assert!(ground(false, 9.1e-3).ends_with(bends), "{}", ground(false, 9.1e-3));
+    assert!(ground(false, 5e-3).ends_with("(weight of evidence 14 nats)"));
+    assert!(ground(true, 9.1e-3).ends_with("(limit 0.21)"));
+}
