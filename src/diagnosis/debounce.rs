@@ -8,7 +8,7 @@
 //! A silent rig is judged by time, not by counts, so the rates are per second.
 
 use super::Settings;
-use crate::vocabulary::FaultCode;
+use crate::vocabulary::{FaultCode, FaultKind};
 
 /// What a monitor says of one moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -38,9 +38,9 @@ impl Pace {
     /// and a ball are given up on sooner, for a disturbance shows in them too.
     /// The ball of a learnt rig that stands fails as soon as readings do, unless
     /// it has a `rival`: another cause that reads alike, which has to have its
-    /// time to show.
+    /// time to show. Of readings that scatter the `kind` is noise.
     #[must_use]
-    pub const fn of(code: FaultCode, rival: bool, settings: &Settings) -> Self {
+    pub fn of(code: FaultCode, kind: Option<FaultKind>, rival: bool, settings: &Settings) -> Self {
         let Settings { fail_s, confirm_s, pass_s, .. } = *settings;
         match code {
             FaultCode::XServo | FaultCode::YServo => {
@@ -50,7 +50,10 @@ impl Pace {
                 Self { fail_s, confirm_s, pass_s, leak_s: pass_s }
             }
             FaultCode::StuckBall | FaultCode::Sensor => Self {
-                fail_s: settings.readings_fail_s,
+                fail_s: match kind {
+                    Some(FaultKind::Noise) => settings.noise_fail_s,
+                    _ => settings.readings_fail_s,
+                },
                 confirm_s: settings.readings_confirm_s,
                 pass_s,
                 leak_s: pass_s,
@@ -64,7 +67,7 @@ impl Pace {
     /// where nothing else reads alike, s: debounce and confirmation.
     #[must_use]
     pub fn needed_s(code: FaultCode, settings: &Settings) -> f64 {
-        let Self { fail_s, confirm_s, .. } = Self::of(code, false, settings);
+        let Self { fail_s, confirm_s, .. } = Self::of(code, None, false, settings);
         fail_s + confirm_s
     }
 }
@@ -201,8 +204,11 @@ mod tests {
             let mut take = |test, seconds: f64| {
                 let n = (seconds / 0.01).round() as usize;
                 let tripped = |_| {
-                    debounce.update(test, 0.01, &Pace::of(FaultCode::XServo, false, &settings))
-                        == Qualified::Tripped
+                    debounce.update(
+                        test,
+                        0.01,
+                        &Pace::of(FaultCode::XServo, None, false, &settings),
+                    ) == Qualified::Tripped
                 };
                 (0..n).any(tripped)
             };
@@ -219,11 +225,22 @@ mod tests {
         let settings = Settings { learnt: true, ..Settings::default() };
         let fails = |rival, after_s: f64| {
             let mut debounce = Debounce::default();
-            let pace = Pace::of(FaultCode::StuckBall, rival, &settings);
+            let pace = Pace::of(FaultCode::StuckBall, None, rival, &settings);
             debounce.update(Test::Prefailed, after_s, &pace) == Qualified::Failed
         };
         assert_eq!([0.25, 0.35].map(|s| fails(false, s)), [false, true]);
         assert_eq!([0.55, 0.65].map(|s| fails(true, s)), [false, true]);
+    }
+
+    /// Two outliers scatter the readings for 0.4 s.
+    #[test]
+    fn noise_takes_longer_than_what_one_reading_shows() {
+        let fails = |kind, after_s: f64| {
+            let pace = Pace::of(FaultCode::Sensor, Some(kind), false, &Settings::default());
+            Debounce::default().update(Test::Prefailed, after_s, &pace) == Qualified::Failed
+        };
+        assert_eq!([0.25, 0.35].map(|s| fails(FaultKind::Frozen, s)), [false, true]);
+        assert_eq!([0.4, 0.5].map(|s| fails(FaultKind::Noise, s)), [false, true]);
     }
 
     #[test]
@@ -231,7 +248,11 @@ mod tests {
         let mut debounce = Debounce::default();
         let settings = Settings::of(Profile::Textbook);
         assert_eq!(
-            debounce.update(Test::Prefailed, 0.0, &Pace::of(FaultCode::XServo, false, &settings)),
+            debounce.update(
+                Test::Prefailed,
+                0.0,
+                &Pace::of(FaultCode::XServo, None, false, &settings)
+            ),
             Qualified::Tripped
         );
         assert_eq!(debounce.counter(), 127);

@@ -45,7 +45,14 @@ impl AxisEvidence {
     /// Whether the path bends from the twin's by more than the limit.
     #[must_use]
     pub fn is_off_path(&self) -> bool {
-        self.path_error_m.zip(self.path_limit_m).is_some_and(|(error, limit)| error >= limit)
+        self.path_share().is_some_and(|share| share >= 1.0)
+    }
+
+    /// How far the path bends from the twin's, as a share of the limit; none where
+    /// either is not known.
+    #[must_use]
+    pub fn path_share(&self) -> Option<f64> {
+        Some(self.path_error_m? / self.path_limit_m?)
     }
 
     /// Whether the axis is enabled and its residual beyond the limit.

@@ -91,6 +91,8 @@ pub struct Settings {
     /// The same for what the readings themselves show, and for a ball that
     /// stands where it can be nothing else, s.
     pub readings_fail_s: f64,
+    /// The same for readings that scatter, s.
+    pub noise_fail_s: f64,
     /// Continuous agreement before the test passes, s.
     pub pass_s: f64,
     /// Agreement that takes back all the evidence against a servo, s; for the
@@ -129,6 +131,8 @@ impl Settings {
             fail_s: 0.6,
             // A push shows in no reading by itself, nor does it stop a ball.
             readings_fail_s: 0.3,
+            // Two outliers show in the scatter for its memory of 0.4 s.
+            noise_fail_s: 0.45,
             pass_s: 1.0,
             // Two hardest pushes confirm nothing unless within half a second.
             leak_s: 3.0,
@@ -149,6 +153,7 @@ impl Settings {
                 twin_accuracy_m_s2: 0.0005,
                 fail_s: 0.0,
                 readings_fail_s: 0.0,
+                noise_fail_s: 0.0,
                 pass_s: 0.0,
                 leak_s: 0.0,
                 confirm_s: 0.0,
@@ -210,7 +215,8 @@ impl Settings {
     /// [`Invalid`] naming `/diagnostics/debounce_s`.
     pub fn with_debounce(self, fail_s: f64) -> Result<Self, Invalid> {
         let fail_s = in_range("/diagnostics/debounce_s", fail_s, 0.0..=60.0)?;
-        Ok(Self { fail_s, readings_fail_s: fail_s, gather_s: fail_s, ..self })
+        let (readings_fail_s, noise_fail_s, gather_s) = (fail_s, fail_s, fail_s);
+        Ok(Self { fail_s, readings_fail_s, noise_fail_s, gather_s, ..self })
     }
 }
 

@@ -121,16 +121,14 @@ impl Pipeline {
                 familiar_m_s2: learnt.map_or(f64::INFINITY, |l| l.familiar_m_s2),
             })
         };
+        // What makes each servo suspected goes with what confirms its fault.
+        let factor = PerAxis::from_fn(|a| confirm_nats[a] / settings.confirm_nats);
         Self {
             settings,
             twin: Twin::new(setup.twin),
             confirm_nats,
-            // What makes each servo suspected goes with what confirms its fault.
-            evaluator: Evaluator::new(settings.profile, limits, sensor).with_suspicion(
-                PerAxis::from_fn(|a| {
-                    settings.suspect_nats * confirm_nats[a] / settings.confirm_nats
-                }),
-            ),
+            evaluator: Evaluator::new(settings.profile, limits, sensor)
+                .with_suspicion(settings.suspect_nats, factor),
             now: None,
             period_s: None,
             gate: OutlierGate::default(),

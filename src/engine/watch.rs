@@ -73,7 +73,7 @@ impl Watch {
             true => Test::Prefailed,
             false => finding.test,
         };
-        let pace = Pace::of(code, finding.rival.is_some(), settings);
+        let pace = Pace::of(code, finding.kind, finding.rival.is_some(), settings);
         let timed = self.debounce.update(test, dt, &pace);
         self.nearest = self.nearest.max(self.debounce.progress(&pace));
         let gathered_s = rising.map_or(0.0, |since| at - since);

@@ -138,7 +138,7 @@ struct AxisWatch {
 
 impl Watch {
     pub(super) fn new(detector: Detector, healthy_m_s2: PerAxis<f64>) -> Self {
-        let pace = Pace::of(FaultCode::XServo, false, &Settings::of(Profile::Default));
+        let pace = Pace::of(FaultCode::XServo, None, false, &Settings::of(Profile::Default));
         Self { detector, healthy_m_s2, pace, last_s: None, axes: PerAxis::default() }
     }
 
