@@ -128,7 +128,7 @@ fn a_sensor_that_repeats_its_readings_teaches_the_same() {
     let (own, repeated) = (learnt_from(&rig, &sessions), learnt_from(&rig, &slow));
     let of = |setup: &Setup| x_of(setup.rig.calibration.as_ref().unwrap());
     let (own, repeated_x) = (of(&own), of(&repeated));
-    assert!((repeated_x.gain / own.gain - 1.0).abs() < 0.05, "{repeated_x:?}");
+    assert!((repeated_x.gain / own.gain - 1.0).abs() < 0.08, "{repeated_x:?} {own:?}");
     let delay = |a: offbd::diagnosis::AxisCalibration| a.dead_time_s + a.lag_s;
     assert!((delay(repeated_x) - delay(own)).abs() < 0.015, "{repeated_x:?} {own:?}");
     let found = confirmed(&outputs(&repeated, &refreshed(&healthy(Preset::Chapter, 5), 3)));

@@ -8,10 +8,11 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use offbd::vocabulary::{FaultCode, Sample};
 use reqwest::Method;
 use serde_json::{Value, json};
+use sqlx::ConnectOptions;
 use tokio::sync::watch;
 use tokio::task::JoinHandle;
 
-use super::{Answer, Client, batch, connection, eventually, judgement, registration, rig};
+use super::{Answer, Client, batch, eventually, judgement, registration, rig};
 
 /// The way to the service, which may move to another address.
 #[derive(Clone)]
@@ -162,16 +163,23 @@ async fn check(line: &Line, asset: &str, samples: &[Sample], url: &str) {
         let record = wanted.memory.record(code);
         assert_eq!(fault["status"], record.word().to_string(), "{asset} {code}");
     }
-    let told: (i64, i64, i64) = sqlx::query_as(
-        "SELECT COUNT(*), COUNT(DISTINCT ordinal), MAX(ordinal) + 1 FROM transition
-         WHERE session = $1",
-    )
-    .bind(id)
-    .fetch_one(&mut connection(url).await)
-    .await
-    .unwrap();
+    let told = told_transitions(url, id).await;
     let n = i64::try_from(wanted.n_transitions).unwrap();
     assert_eq!(told, (n, n, n), "{asset}");
+}
+
+/// Number of the transitions stored of a session, of their different ordinals, and the
+/// highest ordinal plus one; asked again while the server is away.
+async fn told_transitions(url: &str, session: &str) -> (i64, i64, i64) {
+    sqlx::any::install_default_drivers();
+    let options: sqlx::any::AnyConnectOptions = url.parse().unwrap();
+    let query = "SELECT COUNT(*), COUNT(DISTINCT ordinal), MAX(ordinal) + 1 FROM transition
+                 WHERE session = $1";
+    eventually(|| async {
+        let mut connection = options.connect().await.ok()?;
+        sqlx::query_as(query).bind(session.to_owned()).fetch_one(&mut connection).await.ok()
+    })
+    .await
 }
 
 /// Numbers that look random and are the same each time.
