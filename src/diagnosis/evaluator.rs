@@ -26,6 +26,9 @@ const MISSED: f64 = 20.0;
 /// value at rest was called frozen 37 times an hour, with it never.
 const ROLLS_OUT_M_S2: f64 = 0.05;
 
+/// A ball at rest seems to move by less than this many noise deviations.
+const STILL_FACTOR: f64 = 6.0;
+
 /// Seconds in which a ball asked to move must have begun to.
 const PRESSED_S: f64 = 0.3;
 /// How far a ball at rest must have been asked to roll, in widths of what counts as
@@ -222,6 +225,12 @@ impl Evaluator {
     pub fn noisy_m(&self, blur_m: f64) -> f64 {
         let noise_m = self.noise_m();
         (NOISY * noise_m.hypot(blur_m)).max(self.sensor.scatter_m)
+    }
+
+    /// How far a ball at rest may seem to move, m.
+    #[must_use]
+    pub fn still_m(&self) -> f64 {
+        STILL_FACTOR * self.noise_m()
     }
 
     /// Standard deviation of healthy readings, the worse of both axes, m.

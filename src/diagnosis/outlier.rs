@@ -18,6 +18,10 @@ const VELOCITY_MEMORY_S: f64 = 0.06;
 /// Standard deviations of the noise that are always allowed.
 const NOISE_FACTOR: f64 = 8.0;
 
+/// Noise that readings of a rig that is not learnt may have, m. Assumed: ultrasonic
+/// sensors scatter by 8 to 15 mm, cameras by up to 2.
+pub const UNKNOWN_NOISE_M: f64 = 5e-3;
+
 /// Distance between the old and the new path that is a step, m, beyond noise:
 /// what the velocity found from a few readings may be off by.
 const STEP_M: f64 = 0.012;

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use super::servo::GATHERED_NATS;
 use super::{AxisCalibration, MemoryRules};
 use crate::vocabulary::{FaultCode, FaultKind, Invalid, UnknownWord, in_range, positive};
 
@@ -45,6 +46,13 @@ impl FromStr for Profile {
     }
 }
 
+/// Periods without a sample that make a gap, where that is longer than `gap_s`.
+const GAP_PERIODS: f64 = 4.0;
+
+/// Time for which a step of the readings counts as evidence, beyond the debounce that
+/// the owner asks for, s.
+const JUMP_S: f64 = 2.0;
+
 /// Longest window that is judged, s: beyond it the ball has crossed the plate.
 const LONGEST_WINDOW_S: f64 = 1.0;
 
@@ -59,9 +67,9 @@ const SOAKED_NATS: f64 = 7.5;
 const SOAKED_PER_YEAR: f64 = 6300.0;
 const NATS_PER_E: f64 = 1.0;
 /// Evidence that confirms at least, and at most: healthy rigs pass the one some
-/// times an hour, and more than the other is not kept.
+/// times an hour, and a monitor keeps little more than the other.
 const LEAST_NATS: f64 = 6.0;
-const MOST_NATS: f64 = 36.0;
+const MOST_NATS: f64 = 0.9 * GATHERED_NATS;
 /// Share of what confirms that makes the test fail.
 const SUSPECT_SHARE: f64 = 2.0 / 3.0;
 
@@ -163,6 +171,19 @@ impl Settings {
                 ..default
             },
         }
+    }
+
+    /// Time without a sample beyond which nothing is differenced, of samples `period_s`
+    /// apart, s.
+    #[must_use]
+    pub fn gap_after_s(&self, period_s: f64) -> f64 {
+        self.gap_s.max(GAP_PERIODS * period_s)
+    }
+
+    /// Time for which a step of the readings counts as evidence, s.
+    #[must_use]
+    pub fn jump_lasts_s(&self) -> f64 {
+        JUMP_S + self.gather_s
     }
 
     /// The same through the window, s, that `needed_s` says for a share of

@@ -9,6 +9,12 @@ use crate::vocabulary::{Axis, PerAxis};
 /// Half-life of the count of outliers and of the share of missing readings, s.
 const MEMORY_S: f64 = 2.0;
 
+/// Stillness after which a ball counts as at rest, s.
+const RESTING_S: f64 = 0.25;
+/// Share of the time after which identical readings are frozen from which on
+/// they leave open whether they are alive.
+const REPEATED_SHARE: f64 = 0.4;
+
 /// Longest that outliers are counted back, s.
 const OUTLIER_MEMORY_S: f64 = 10.0;
 
@@ -90,6 +96,19 @@ impl AxisStillness {
         self.identical_s = 0.0;
     }
 
+    /// Whether it has been still for long enough to be at rest.
+    #[must_use]
+    pub const fn rests(&self) -> bool {
+        self.still_s > RESTING_S
+    }
+
+    /// Whether readings that may be the same for `repeat_s` have been so for long
+    /// enough, while the ball was asked to move, to doubt that they are alive.
+    #[must_use]
+    pub fn repeats(&self, repeat_s: f64) -> bool {
+        self.identical_s > REPEATED_SHARE * repeat_s && self.pressed_s > 0.0
+    }
+
     /// Whether this axis has ever been read.
     #[must_use]
     pub const fn seen(&self) -> bool {
@@ -147,6 +166,13 @@ impl Stillness {
     #[must_use]
     pub fn still_s(&self) -> f64 {
         self.least(|a| a.still_s)
+    }
+
+    /// Whether the ball stands although it is asked to move.
+    #[must_use]
+    pub fn is_held(&self) -> bool {
+        let pressed = Axis::ALL.into_iter().any(|a| self.axes[a].pressed_s > 0.0);
+        pressed && self.still_s() > RESTING_S
     }
 
     /// Seconds for which every reading has been the same to the bit.

@@ -1,26 +1,25 @@
 //! A look at the ball: the filter of each axis over one window, and its fit.
 
-use crate::diagnosis::Settings;
 use crate::maths::{Fit, SlidingQuadratic};
 use crate::vocabulary::{Axis, PerAxis};
 
 /// Readings and predictions of both axes through windows of one length.
 #[derive(Clone, Debug)]
 pub(super) struct Look {
-    /// The window's length and how long what is seen through it must last.
-    pub(super) settings: Settings,
+    /// Length of the windows, s.
+    window_s: f64,
     windows: PerAxis<SlidingQuadratic>,
     pub(super) fits: PerAxis<Option<Fit>>,
 }
 
 impl Look {
-    pub(super) fn new(settings: Settings) -> Self {
-        Self { settings, windows: PerAxis::default(), fits: PerAxis::default() }
+    pub(super) fn new(window_s: f64) -> Self {
+        Self { window_s, windows: PerAxis::default(), fits: PerAxis::default() }
     }
 
     /// Length of the window, s, where it takes `least_s` to hold enough readings.
     pub(super) fn window_s(&self, least_s: f64) -> f64 {
-        self.settings.window_s.max(least_s)
+        self.window_s.max(least_s)
     }
 
     /// Takes a reading of `axis` and what was predicted for it, m, at `t`.

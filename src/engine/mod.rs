@@ -124,8 +124,7 @@ impl Engine {
         outputs: &mut Vec<Output>,
         seen: &mut impl FnMut(&Evidence),
     ) {
-        let gap_s =
-            self.setup.settings.gap_s.max(pipeline::GAP_PERIODS / self.setup.rig.sample_rate_hz);
+        let gap_s = self.setup.settings.gap_after_s(1.0 / self.setup.rig.sample_rate_hz);
         self.coverage.take(sample, gap_s);
         self.pipeline.judge(&self.setup, sample, &mut self.memory, outputs);
         seen(self.pipeline.evidence());

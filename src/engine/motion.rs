@@ -8,8 +8,8 @@
 
 use super::calibrate::{MOVING_M, MOVING_RAD, WINDOWS_S};
 use super::frame::moment;
-use super::pipeline::GAP_PERIODS;
 use super::{AxisMapping, Rig};
+use crate::diagnosis::Settings;
 use crate::plant::Plate;
 use crate::vocabulary::{Axis, PerAxis, Sample};
 
@@ -28,8 +28,6 @@ const PIECE_READINGS: u32 = 4;
 /// Time for which a ball still answers a change of its command, s: at a tilt of a
 /// degree it crosses a plate in about as long.
 const ANSWER_S: f64 = 2.0;
-/// A longer step between samples or readings ends a stretch, s; or that many periods.
-const GAP_S: f64 = 0.3;
 
 /// Counts the seconds of usable motion along each axis of one session.
 #[derive(Clone, Debug)]
@@ -51,7 +49,7 @@ impl UsableMotion {
             mapping: rig.mapping,
             plate: rig.plate,
             edge_m: rig.contact_room_m(),
-            gap_s: GAP_S.max(GAP_PERIODS / rig.sample_rate_hz),
+            gap_s: Settings::default().gap_after_s(1.0 / rig.sample_rate_hz),
             last_s: None,
             axes: PerAxis::default(),
         }

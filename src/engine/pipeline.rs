@@ -14,49 +14,22 @@ use super::{MonitorState, Output, Reach, Readiness, Rig, Setup, State};
 use crate::diagnosis::{
     AxisEvidence, AxisNature, Course, Evaluator, Evidence, FaultMemory, Finding, Gated, InUse,
     LearntNature, Limits, OutlierGate, Pace, Profile, Qualified, Reading, Scatter, SensorLimits,
-    Servo, ServoEstimate, Settings, Step, Stillness, Surroundings, Test,
+    Servo, ServoEstimate, Settings, Step, Stillness, Surroundings, Test, UNKNOWN_NOISE_M, bend_m,
+    blur_m,
 };
 use crate::plant::{LONGEST_SPAN_S, RollingState, Twin};
 use crate::vocabulary::{Axis, FaultCode, PerAxis, Sample, SimTime};
 
 /// Samples that a window holds at least: a filter over fewer is all noise.
-const LEAST_SAMPLES: f64 = 8.0;
-/// Periods without a sample that make a gap, where that is longer than the
-/// settings' gap.
-pub(super) const GAP_PERIODS: f64 = 4.0;
+pub(super) const LEAST_SAMPLES: f64 = 8.0;
 /// Longest period assumed before a second one has been seen, s.
 const LONGEST_FIRST_PERIOD_S: f64 = 0.25;
 /// How fast the period is followed, share per sample.
 const PERIOD_GAIN: f64 = 0.02;
 /// Share of the window that must be covered before it is judged.
-const FULL_WINDOW: f64 = 0.8;
+pub(super) const FULL_WINDOW: f64 = 0.8;
 /// Distance of the twin's free path from the ball at which it is re-anchored, m.
 const REBASE_M: f64 = 1.0;
-/// A ball at rest seems to move by less than this many noise deviations.
-const STILL_FACTOR: f64 = 6.0;
-
-/// Acceleration that moving air gives a ping-pong ball, m/s²: half of what a
-/// fan at arm's length does.
-const GUST_M_S2: f64 = 0.03;
-/// Uncertainty of the time of a reading, in sample periods. Assumed: the varied
-/// rigs that are soaked draw one of up to 0.15 (`simulation::variety`).
-const TIMING_SHARE: f64 = 0.1;
-/// The same of a sensor that is logged faster than it reads: its readings wait for
-/// the next row, any share of a period, of which 1/√12 is the standard deviation.
-const HELD_SHARE: f64 = 0.29;
-/// Share of a·T² that is scatter, for readings T apart on a path that bends by a
-/// between three of them: 0.41 if it did so all the time.
-const BEND_SHARE: f64 = 0.25;
-/// What one reading may add to the scatter, in limits of it.
-const SCATTER_LIMITS: f64 = 2.0;
-/// Seconds for which a jump of the readings counts as evidence, beyond the
-/// debounce that the owner asks for.
-const JUMP_S: f64 = 2.0;
-/// Stillness after which a ball counts as at rest, s.
-const RESTING_S: f64 = 0.25;
-/// Share of the time after which identical readings are frozen from which on
-/// they leave open whether they are alive.
-const REPEATED_SHARE: f64 = 0.4;
 
 /// The stages' state.
 #[derive(Clone, Debug)]
@@ -117,7 +90,7 @@ impl Pipeline {
                     gain_spread: l.gain_spread,
                 }),
                 breakaway_m_s2: limits[axis].breakaway_m_s2,
-                gust_m_s2: GUST_M_S2 * rig.ball.sail_share().min(1.0),
+                sail_share: rig.ball.sail_share().min(1.0),
                 familiar_m_s2: learnt.map_or(f64::INFINITY, |l| l.familiar_m_s2),
             })
         };
@@ -132,7 +105,7 @@ impl Pipeline {
             now: None,
             period_s: None,
             gate: OutlierGate::default(),
-            look: Look::new(settings),
+            look: Look::new(settings.window_s),
             scatter: PerAxis::default(),
             servos: PerAxis::from_fn(servo),
             readings: Stillness::default(),
@@ -217,8 +190,7 @@ impl Pipeline {
     }
 
     fn gap_s(&self) -> f64 {
-        let gap_s = self.settings.gap_s.max(GAP_PERIODS * self.period_s.unwrap_or(0.0));
-        gap_s.min(LONGEST_SPAN_S)
+        self.settings.gap_after_s(self.period_s.unwrap_or(0.0)).min(LONGEST_SPAN_S)
     }
 
     /// The window that the least readings take, s.
@@ -310,8 +282,7 @@ impl Pipeline {
             if let (true, Some(position)) = (gated.usable(), moment.position[axis]) {
                 let least_s = self.least_window_s();
                 self.look.push(axis, t, position, predicted[i], least_s);
-                let most_m = SCATTER_LIMITS * self.noisy_m;
-                self.scatter[axis].take(t, position - predicted[i], most_m);
+                self.scatter[axis].take(t, position - predicted[i], self.noisy_m);
             }
         }
         match gated {
@@ -345,7 +316,7 @@ impl Pipeline {
             dt,
             position_m: moment.position,
             asked_m_s2,
-            still_m: STILL_FACTOR * self.noise_m(),
+            still_m: self.evaluator.still_m(),
             usable,
             // Bounces off the rim look like outliers.
             outliers: if self.edge.clear_s < self.settings.window_s { 0 } else { outliers },
@@ -355,9 +326,7 @@ impl Pipeline {
     /// Acceleration that the plate asks of the ball along `axis` at least, m/s²,
     /// for all that is known of this session's level.
     fn pull_m_s2(&self, axis: Axis) -> f64 {
-        let (offset, error) = self.servos[axis].offset();
-        let asked = self.twin.motion().acceleration[axis as usize] + offset;
-        (asked.abs() - LEVEL_ERRORS * error).max(0.0)
+        self.servos[axis].least_pull_m_s2(self.twin.motion().acceleration[axis as usize])
     }
 
     /// Stage: what the ball's answer says of each servo.
@@ -388,7 +357,7 @@ impl Pipeline {
     /// Whether the ball rests within its breakaway angle.
     fn rests(&self, axis: Axis) -> bool {
         let held_m_s2 = self.evaluator.limits()[axis].pressing_m_s2();
-        self.readings.axes[axis].still_s > RESTING_S && self.pull_m_s2(axis) < held_m_s2
+        self.readings.axes[axis].rests() && self.pull_m_s2(axis) < held_m_s2
     }
 
     /// Whether the ball's motion along `axis` can answer its servo: not while it
@@ -396,12 +365,8 @@ impl Pipeline {
     /// although the ball is asked to move leave open whether they are alive, nor
     /// while it stands still in every direction.
     fn answers(&self, axis: Axis) -> bool {
-        let (readings, own) = (&self.readings, &self.readings.axes[axis]);
-        let repeated_s = self.evaluator.limits()[axis].repeat_s * REPEATED_SHARE;
-        let frozen = own.identical_s > repeated_s && own.pressed_s > 0.0;
-        let pressed = Axis::ALL.into_iter().any(|a| readings.axes[a].pressed_s > 0.0);
-        let stuck = pressed && readings.still_s() > RESTING_S;
-        !self.rests(axis) && !frozen && !stuck
+        let may_be_dead = self.readings.axes[axis].repeats(self.evaluator.limits()[axis].repeat_s);
+        !self.rests(axis) && !may_be_dead && !self.readings.is_held()
     }
 
     /// Stage: residual, limit and gate of this moment.
@@ -481,22 +446,20 @@ impl Pipeline {
     fn blur_m(&self) -> f64 {
         let speed = |axis: Axis| self.look.fits[axis].map_or(0.0, |f| f.measured.velocity);
         let (x, y) = (speed(Axis::X), speed(Axis::Y));
-        let share = if self.repeats.are_expected() { HELD_SHARE } else { TIMING_SHARE };
-        let within_s = share * self.period_s.unwrap_or(0.0);
-        (x * x + y * y).sqrt() * within_s
+        let (period_s, held) = (self.period_s.unwrap_or(0.0), self.repeats.are_expected());
+        blur_m((x * x + y * y).sqrt(), period_s, held)
     }
 
     /// By how much the path may bend between three readings, m, where the ball's
     /// acceleration is off the twin's by as much as no servo is blamed for.
     fn bend_m(&self) -> f64 {
-        let period_s = self.period_s.unwrap_or(0.0);
         let off_m_s2 = |axis: Axis| self.evaluator.limits()[axis].at(0.0, 0.0);
-        BEND_SHARE * off_m_s2(Axis::X).max(off_m_s2(Axis::Y)) * period_s * period_s
+        bend_m(off_m_s2(Axis::X).max(off_m_s2(Axis::Y)), self.period_s.unwrap_or(0.0))
     }
 
     /// Whether readings have stepped of late as no ball can.
     fn jumped(&self) -> bool {
-        self.since_jump_s < JUMP_S + self.settings.gather_s
+        self.since_jump_s < self.settings.jump_lasts_s()
     }
 
     fn surroundings(&self) -> Surroundings {
@@ -650,14 +613,6 @@ impl Pipeline {
         }
     }
 }
-
-/// Noise that readings of a rig that is not learnt may have where a jump is
-/// looked for, m. Assumed: ultrasonic sensors scatter by 8 to 15 mm, cameras by up
-/// to 2.
-const UNKNOWN_NOISE_M: f64 = 5e-3;
-
-/// Standard errors of the session's level that are allowed.
-const LEVEL_ERRORS: f64 = 2.0;
 
 /// Time between two readings of a sensor that is logged faster than it reads, s.
 fn refresh_s(rig: &Rig) -> f64 {

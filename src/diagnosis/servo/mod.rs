@@ -78,12 +78,18 @@ const STEADY_S: f64 = 20.0;
 /// panel.
 const ROUGHNESS_M: f64 = 1.4e-4;
 
+/// Standard errors of the session's level that are allowed.
+const LEVEL_ERRORS: f64 = 2.0;
+
+/// Acceleration that moving air gives a ping-pong ball, m/s²: half of what a
+/// fan at arm's length does.
+const GUST_M_S2: f64 = 0.03;
 /// How long a gust lasts, s.
 const GUST_S: f64 = 2.0;
 
 /// Most nats that a monitor keeps: how far it may run ahead of a servo that is
 /// well again.
-const MOST_NATS: f64 = 40.0;
+pub(super) const GATHERED_NATS: f64 = 40.0;
 
 /// What is known of an axis before the session; immutable.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -94,8 +100,9 @@ pub struct AxisNature {
     pub learnt: Option<LearntNature>,
     /// Acceleration that a ball at rest resists, m/s².
     pub breakaway_m_s2: f64,
-    /// Acceleration that moving air gives the ball, m/s².
-    pub gust_m_s2: f64,
+    /// How much moving air drives the ball, over what it does to a ping-pong ball, in
+    /// [0, 1].
+    pub sail_share: f64,
     /// Acceleration up to which gain and delay were learnt, m/s².
     pub familiar_m_s2: f64,
 }
@@ -115,8 +122,9 @@ impl AxisNature {
     fn prior(&self) -> Prior {
         let Some(learnt) = &self.learnt else { return UNKNOWN };
         let mut prior = LEARNT;
-        if self.gust_m_s2 > prior.deviation[0] {
-            (prior.deviation[0], prior.memory_s[0]) = (self.gust_m_s2, GUST_S);
+        let gust_m_s2 = GUST_M_S2 * self.sail_share;
+        if gust_m_s2 > prior.deviation[0] {
+            (prior.deviation[0], prior.memory_s[0]) = (gust_m_s2, GUST_S);
         }
         let spread = [learnt.offset_spread_m_s2, learnt.gain_spread, 0.0];
         for (k, spread) in spread.into_iter().enumerate() {
@@ -154,7 +162,7 @@ pub struct Servo {
     last: Option<Block>,
     healthy: Filter,
     open: Filter,
-    /// Evidence for a fault, nats, in [0, [`MOST_NATS`]].
+    /// Evidence for a fault, nats, in [0, [`GATHERED_NATS`]].
     nats: f64,
     /// When it was last without any, s.
     rising_since: Option<f64>,
@@ -220,7 +228,7 @@ impl Servo {
         if self.followed_s < SETTLED_S {
             return;
         }
-        self.nats = (self.nats + open - healthy).clamp(0.0, MOST_NATS);
+        self.nats = (self.nats + open - healthy).clamp(0.0, GATHERED_NATS);
         self.rising_since = match self.nats > 0.0 {
             true => self.rising_since.or(Some(last.t)),
             false => None,
@@ -291,12 +299,12 @@ impl Servo {
         self.foretold_nats
     }
 
-    /// Acceleration by which a healthy servo of this session is off the twin's,
-    /// and its standard error, m/s².
+    /// Acceleration that the plate asks of the ball at least, m/s², where the twin's is
+    /// `twin_m_s2`, for all that is known of the level of this session.
     #[must_use]
-    pub fn offset(&self) -> (f64, f64) {
+    pub fn least_pull_m_s2(&self, twin_m_s2: f64) -> f64 {
         let (offset, variance) = self.healthy.parameter(0);
-        (offset, variance.sqrt())
+        ((twin_m_s2 + offset).abs() - LEVEL_ERRORS * variance.sqrt()).max(0.0)
     }
 
     /// The offset of this session over the last 20 s, m/s²: a fault that

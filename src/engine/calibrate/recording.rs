@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use nalgebra::Vector2;
 
-use crate::diagnosis::OutlierGate;
+use crate::diagnosis::{OutlierGate, Settings};
 use crate::engine::Rig;
 use crate::engine::edge::Edge;
 use crate::engine::frame::{Moment, Repeats, moment};
@@ -16,9 +16,6 @@ use crate::vocabulary::{Axis, PerAxis, Sample, SimTime};
 
 /// Samples that a window must hold; it grows where that takes longer.
 const WINDOW_SAMPLES: usize = 10;
-/// A longer step between samples ends a window, s; and that many periods.
-const GAP_S: f64 = 0.3;
-const GAP_PERIODS: f64 = 4.0;
 /// Periods without a reading that end a window.
 const MISSING_PERIODS: f64 = 2.5;
 /// Periods from which on a sensor is slower than its log.
@@ -62,7 +59,7 @@ impl Recording {
         moments.dedup_by_key(|m| m.at);
         let mut steps: Vec<f64> = moments.windows(2).map(|w| w[1].at - w[0].at).collect();
         let period_s = median(&mut steps).unwrap_or(0.0);
-        let gap_s = GAP_S.max(GAP_PERIODS * period_s).min(LONGEST_SPAN_S);
+        let gap_s = Settings::default().gap_after_s(period_s).min(LONGEST_SPAN_S);
         let (velocity, resisted, bounced) = Default::default();
         let longest_repeat_s = PerAxis::from_fn(|axis| longest_repeat_s(&moments, axis, gap_s));
         let refresh_s = refresh_s(&moments, period_s);

@@ -4,6 +4,8 @@
 use super::fit::Fitter;
 use super::recording::Recording;
 use super::sessions::Estimate;
+use crate::diagnosis::Settings;
+use crate::engine::pipeline::{FULL_WINDOW, LEAST_SAMPLES};
 use crate::maths::{SlidingQuadratic, median, quantile, robust_deviation};
 use crate::vocabulary::Axis;
 
@@ -20,10 +22,6 @@ pub(super) struct Healthy {
     pub(super) rest_s: f64,
 }
 
-/// Window of the residual, s: the one that the default profile judges by.
-const RESIDUAL_WINDOW_S: f64 = 0.5;
-/// Samples that a window holds at least, as when it is judged.
-const LEAST_SAMPLES: f64 = 8.0;
 /// Rest after which the plate's tilt counts as withstood, s.
 const REST_S: f64 = 0.5;
 /// Share of the withstood tilts that the breakaway angle covers.
@@ -47,7 +45,7 @@ pub(super) fn healthy_spread(
         let Some(model) = fitter.model(dead, lag, gain, level, resistance_m_s2) else { continue };
         let path = recording.twin_path(&model, axis);
         let mut filter = SlidingQuadratic::default();
-        let window_s = RESIDUAL_WINDOW_S.max(LEAST_SAMPLES * recording.period_s);
+        let window_s = Settings::default().window_s.max(LEAST_SAMPLES * recording.period_s);
         for (m, &z) in recording.moments.iter().zip(&path) {
             let stale = filter.newest().is_some_and(|n| m.at.seconds() - n > recording.gap_s);
             if stale {
@@ -55,7 +53,7 @@ pub(super) fn healthy_spread(
             }
             let Some(position) = m.position[axis] else { continue };
             filter.push(m.at.seconds(), position, z, window_s);
-            let Some(fit) = filter.fit().filter(|f| f.span_s > 0.8 * window_s) else {
+            let Some(fit) = filter.fit().filter(|f| f.span_s > FULL_WINDOW * window_s) else {
                 continue;
             };
             // A ball at rest answers nothing, and its readings err least.
