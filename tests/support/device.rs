@@ -4,6 +4,7 @@
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::Duration;
 
 use offbd::vocabulary::{FaultCode, Sample};
 use reqwest::Method;
@@ -72,7 +73,7 @@ impl Line {
             client.address = address.borrow_and_update().clone();
             let request = client.request(method.clone(), path).json(body);
             let Ok(response) = request.send().await else {
-                address.changed().await.unwrap();
+                comes_back(&mut address).await;
                 continue;
             };
             let (status, headers) = (response.status(), response.headers().clone());
@@ -85,7 +86,7 @@ impl Line {
             }
             match response.text().await {
                 Ok(text) => return Answer { status, headers, text },
-                Err(_) => address.changed().await.unwrap(),
+                Err(_) => comes_back(&mut address).await,
             }
         }
     }
@@ -110,6 +111,13 @@ impl Line {
             at = end;
         }
     }
+}
+
+/// Waits for the service to move, or a moment: a connection may also be lost to one
+/// that goes on.
+async fn comes_back(address: &mut watch::Receiver<String>) {
+    let moment = Duration::from_millis(50);
+    let _ = tokio::time::timeout(moment, address.changed()).await;
 }
 
 /// A device that sends one recording after the other, each as a new asset, and
