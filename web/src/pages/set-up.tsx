@@ -247,9 +247,10 @@ function Learn({ asset, changed }: { asset: Asset; changed: () => Promise<void> 
   const usable = sessions.data?.find((s) => length(s) >= MINUTE_S && !s.verdict?.faults.length);
   const picked = chosen ?? new Set(usable ? [usable.id] : []);
   const total = (sessions.data ?? []).filter((s) => picked.has(s.id)).reduce((sum, s) => sum + length(s), 0);
-  const toggle = (id: string) => {
+  // As the box shows it: what is proposed may have changed since it was drawn.
+  const pick = (id: string, wanted: boolean) => {
     const next = new Set(picked);
-    next.has(id) ? next.delete(id) : next.add(id);
+    wanted ? next.add(id) : next.delete(id);
     setChosen(next);
   };
   const learn = async () => {
@@ -271,7 +272,7 @@ function Learn({ asset, changed }: { asset: Asset; changed: () => Promise<void> 
         {sessions.data?.length === 0 && <p class="note">There is no session yet. <Link to={`${at("rigs", asset.name, "set-up")}?step=connect`}>Connect the rig</Link> first, or <Link to={`/sessions?asset=${encodeURIComponent(asset.name)}`}>import a recording</Link>.</p>}
         <ul class="choose">
           {sessions.data?.map((session) => (
-            <li><label class="check"><input type="checkbox" checked={picked.has(session.id)} onChange={() => toggle(session.id)} />
+            <li><label class="check"><input type="checkbox" checked={picked.has(session.id)} onChange={(event) => pick(session.id, event.currentTarget.checked)} />
               <span><b>{session.name}</b>{session.state === "open" && <span class="status-open"> ● recording</span>}<br /><span class="quiet">{clock(session.opened_at)}, {duration(length(session))}{session.verdict?.faults.length ? `, found: ${session.verdict.faults.join(", ")}` : ""}</span></span></label></li>
           ))}
         </ul>
