@@ -33,8 +33,9 @@ pub struct AxisCalibration {
     pub model_error_m_s2: f64,
     /// Most evidence against the servo while it was healthy, nats.
     pub most_nats: f64,
-    /// The most that the path bent from the twin's over two seconds while the servo was
-    /// healthy, root mean square, m; zero where that is not known.
+    /// The most that the path is expected to bend from the twin's over two seconds while
+    /// the servo is healthy, root mean square, m: what tests have shown, and more where
+    /// they were few. Zero where that is not known.
     pub most_path_error_m: f64,
     /// Acceleration that nineteen of twenty moments of the recording stayed below,
     /// m/s²: beyond it, gain and delay are not known as well. Infinite where it

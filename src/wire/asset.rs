@@ -368,9 +368,9 @@ pub struct AxisCalibrationView {
     #[schema(minimum = 0, maximum = 1000)]
     #[serde(default)]
     pub most_nats: f64,
-    /// The most that the path bent from the twin's over two seconds while the servo was
-    /// healthy, root mean square, in [0, 1] m; zero where that is not known, and then
-    /// no path is judged.
+    /// The most that the path is expected to bend from the twin's over two seconds while
+    /// the servo is healthy, root mean square, in [0, 1] m: what tests have shown, and
+    /// more where they were few. Zero where that is not known, and then no path is judged.
     #[schema(minimum = 0, maximum = 1)]
     #[serde(default)]
     pub most_path_error_m: f64,

@@ -9,11 +9,10 @@ use std::time::Duration;
 use offbd::vocabulary::{FaultCode, Sample};
 use reqwest::Method;
 use serde_json::{Value, json};
-use sqlx::ConnectOptions;
 use tokio::sync::watch;
 use tokio::task::JoinHandle;
 
-use super::{Answer, Client, batch, eventually, judgement, registration, rig};
+use super::{Answer, Client, batch, eventually, judgement, registration, rig, try_connection};
 
 /// The way to the service, which may move to another address.
 #[derive(Clone)]
@@ -179,12 +178,10 @@ async fn check(line: &Line, asset: &str, samples: &[Sample], url: &str) {
 /// Number of the transitions stored of a session, of their different ordinals, and the
 /// highest ordinal plus one; asked again while the server is away.
 async fn told_transitions(url: &str, session: &str) -> (i64, i64, i64) {
-    sqlx::any::install_default_drivers();
-    let options: sqlx::any::AnyConnectOptions = url.parse().unwrap();
     let query = "SELECT COUNT(*), COUNT(DISTINCT ordinal), MAX(ordinal) + 1 FROM transition
                  WHERE session = $1";
     eventually(|| async {
-        let mut connection = options.connect().await.ok()?;
+        let mut connection = try_connection(url).await.ok()?;
         sqlx::query_as(query).bind(session.to_owned()).fetch_one(&mut connection).await.ok()
     })
     .await

@@ -58,8 +58,13 @@ pub fn url(data: &Path) -> String {
 }
 
 pub async fn connection(url: &str) -> sqlx::AnyConnection {
+    try_connection(url).await.unwrap()
+}
+
+/// The same with a server that may be away.
+pub async fn try_connection(url: &str) -> sqlx::Result<sqlx::AnyConnection> {
     sqlx::any::install_default_drivers();
-    url.parse::<sqlx::any::AnyConnectOptions>().unwrap().connect().await.unwrap()
+    url.parse::<sqlx::any::AnyConnectOptions>().unwrap().connect().await
 }
 
 /// All that the store below `data` holds, as bytes to search in: its files, or
