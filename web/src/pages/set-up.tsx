@@ -244,8 +244,10 @@ function Learn({ asset, changed }: { asset: Asset; changed: () => Promise<void> 
   const [chosen, setChosen] = useState<Set<string>>();
   const [job, setJob] = useState<CalibrationJob>();
   const length = (s: Session) => (s.first_t_s != null && s.last_t_s != null ? s.last_t_s - s.first_t_s : 0);
-  const usable = sessions.data?.find((s) => length(s) >= MINUTE_S && !s.verdict?.faults.length);
-  const picked = chosen ?? new Set(usable ? [usable.id] : []);
+  // Only the newest is proposed: an earlier one may have come before the axes were put right.
+  const newest = sessions.data?.[0];
+  const usable = newest && length(newest) >= MINUTE_S && !newest.verdict?.faults.length;
+  const picked = chosen ?? new Set(usable ? [newest.id] : []);
   const total = (sessions.data ?? []).filter((s) => picked.has(s.id)).reduce((sum, s) => sum + length(s), 0);
   // As the box shows it: what is proposed may have changed since it was drawn.
   const pick = (id: string, wanted: boolean) => {
