@@ -9,19 +9,22 @@ RUN apt-get update && apt-get install -y --no-install-recommends nodejs npm \
     && rm -rf /var/lib/apt/lists/*
 WORKDIR /src
 COPY Cargo.toml Cargo.lock build.rs ./
+COPY crates crates
 COPY migrations migrations
 COPY benches benches
 COPY examples examples
 COPY src src
+COPY tests tests
 COPY docs/charts docs/charts
 COPY web web
-# Benchmarks and examples are there because Cargo.toml names them.
+# Benchmarks, examples and tests are there because Cargo.toml names them. The
+# laboratory (scenes, charts, simulated rigs) is left out.
 # Packages and compiled dependencies stay in the cache mounts from build to
 # build; the program is copied out, for a mount is no part of the image.
 RUN --mount=type=cache,target=/usr/local/cargo/registry \
     --mount=type=cache,target=/src/target \
-    cargo build --release --locked --bin offbd \
-    && cp target/release/offbd /usr/local/bin/offbd
+    cargo build --profile dist --no-default-features --locked --package offbd --bin offbd \
+    && cp target/dist/offbd /usr/local/bin/offbd
 
 FROM debian:bookworm-slim
 RUN useradd --system --uid 10001 --home-dir /var/lib/offbd --create-home offbd

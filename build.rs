@@ -1,6 +1,5 @@
-//! Tells the crate which compiler builds it (charts name it beside their
-//! numbers), and builds the page under `web/` where Node is there. Without Node
-//! the service is built all the same, and its `/` says how to get the page.
+//! Builds the page under `web/` where Node is there. Without Node the service
+//! is built all the same, and its `/` says how to get the page.
 
 use std::env;
 use std::error::Error;
@@ -25,21 +24,10 @@ const NODE: (u32, u32) = (18, 19);
 
 fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rerun-if-changed=build.rs");
-    println!("cargo::rustc-env=BUILD_RUSTC_VERSION={}", compiler());
-    if env::var_os("CARGO_FEATURE_SERVICE").is_some() {
-        for source in SOURCES {
-            println!("cargo::rerun-if-changed={source}");
-        }
-        page(&PathBuf::from(env::var("OUT_DIR")?).join("page"))?;
+    for source in SOURCES {
+        println!("cargo::rerun-if-changed={source}");
     }
-    Ok(())
-}
-
-fn compiler() -> String {
-    let compiler = env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
-    let said = Command::new(compiler).arg("--version").output();
-    let said = said.map(|o| String::from_utf8_lossy(&o.stdout).into_owned()).unwrap_or_default();
-    said.split_whitespace().nth(1).unwrap_or("unknown").to_owned()
+    page(&PathBuf::from(env::var("OUT_DIR")?).join("page"))
 }
 
 /// Leaves the page in `out`, or `out` empty where it cannot be built here.

@@ -13,7 +13,7 @@ check:
 
 # The floors, and the paths that the documents name
 rules:
-    cargo test --test architecture
+    cargo test --test it architecture
 
 # A minute of a simulated rig with faults, against the real service
 demo:
@@ -25,7 +25,7 @@ serve *ARGS:
 
 # openapi.yaml as the code has it
 openapi:
-    UPDATE_OPENAPI=1 cargo test --test openapi
+    UPDATE_OPENAPI=1 cargo test --test it openapi
 
 # The output that README.md shows, anew
 tour:
@@ -53,7 +53,7 @@ picture:
 # How fast samples go through
 bench:
     cargo bench --bench ingest
-    cargo bench --no-default-features --bench batch
+    cargo bench -p offbd-lab --bench batch
 
 # Other people's engines and solvers on the scenes of `offbd chart work-precision`
 peers *ARGS:

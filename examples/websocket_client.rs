@@ -12,8 +12,8 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 use futures_util::{SinkExt, StreamExt};
-use offbd::vocabulary::Sample;
 use offbd::wire::session_csv::Reader;
+use offbd_core::vocabulary::Sample;
 use serde_json::{Value, json};
 use tokio_tungstenite::tungstenite::Message;
 

@@ -11,31 +11,14 @@
 //! - [`diagnosis`]: residuals, monitors, fault memory (floor 2);
 //! - [`engine`]: one rig's pipeline (floor 3).
 
-#[cfg(feature = "service")]
-pub mod chart;
-#[cfg(feature = "service")]
 pub mod cli;
-pub mod diagnosis;
-pub mod engine;
-pub mod maths;
-pub mod plant;
-pub mod scene;
-#[cfg(feature = "service")]
-pub mod simulation;
-pub mod vocabulary;
-#[cfg(feature = "service")]
 pub mod wire;
 
-#[cfg(feature = "service")]
 pub mod store;
 
-#[cfg(feature = "service")]
 pub mod service;
 
-#[cfg(feature = "service")]
 pub mod http;
 
-#[cfg(feature = "service")]
 pub mod config;
-#[cfg(feature = "service")]
 pub mod server;

@@ -139,7 +139,7 @@ fn lock(place: &Place) -> Result<Option<File>> {
     }
 }
 
-async fn open(place: &Place) -> Result<(Store, crate::store::Writer)> {
+async fn open(place: &Place) -> Result<(Store, store::Writer)> {
     Store::open(place).await.with_context(|| format!("cannot open the store {place}"))
 }
 

@@ -1,17 +1,18 @@
 //! What runs for every sample or step does not touch the heap.
 
+#![expect(unsafe_code, reason = "a counting allocator is one")]
+
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-use offbd::diagnosis::FaultMemory;
-use offbd::engine::{Engine, Input, Rig, Setup};
-use offbd::plant::{
-    Ball, Contact, Instructions, Motion, Plate, PlateColumns, RollingBatch, RollingConstants,
-};
-use offbd::scene::{
+use offbd_core::diagnosis::FaultMemory;
+use offbd_core::engine::{Engine, Input, Rig, Setup};
+use offbd_core::plant::{Ball, Contact, Motion, Plate};
+use offbd_core::vocabulary::Sample;
+use offbd_lab::batch::{Instructions, PlateColumns, RollingBatch, RollingConstants};
+use offbd_lab::scene::{
     Configuration, Law, Laws, Method, Model, Pace, Samples, Scene, Subject, Term, run,
 };
-use offbd::vocabulary::Sample;
 
 struct Counting;
 
@@ -94,7 +95,6 @@ fn an_engine_is_small() {
     assert!((1..13 << 10).contains(&held), "{held} bytes");
 }
 
-#[cfg(feature = "service")]
 #[test]
 fn a_length_that_is_only_announced_takes_no_room() {
     use offbd::wire::telemetry::msgpack;
@@ -151,7 +151,7 @@ fn swinging() -> (Scene, Laws) {
     let step = Term::Smoothstep { to: 0.1, start: 0.3, duration: 0.2 };
     let laws = Laws::new(Law::new(&[sine]), Law::new(&[step, Term::Constant(0.01)]), Vec::new());
     let ball = Subject::Ball(Ball::default());
-    (Scene::new(ball, Plate::default(), Contact::CHAPTER, 1.0).unwrap(), laws)
+    (Scene::new(ball, Plate::default(), Contact::CHAPTER, 1.0).expect("a valid scene"), laws)
 }
 
 /// Every model by every method, sampled.

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail, ensure};
 use axum::body::Bytes;
 use futures_util::{SinkExt, StreamExt};
-use offbd::vocabulary::Sample;
+use offbd_core::vocabulary::Sample;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 use tokio_tungstenite::WebSocketStream;

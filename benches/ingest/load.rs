@@ -2,9 +2,9 @@
 
 use anyhow::Result;
 use axum::body::Bytes;
-use offbd::simulation::{Disturbances, Fault, Preset, Reference, SimulatedRig};
-use offbd::vocabulary::Sample;
 use offbd::wire::telemetry::{RowsView, sample_view};
+use offbd_core::vocabulary::Sample;
+use offbd_lab::simulation::{Disturbances, Fault, Preset, Reference, SimulatedRig};
 
 /// Devices that stream at once, each on a connection of its own.
 pub(crate) const DEVICES: usize = 100;

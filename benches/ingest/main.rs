@@ -36,11 +36,11 @@ use axum::body::Bytes;
 use axum::routing::post;
 use futures_util::future::try_join_all;
 use offbd::config::Config;
-use offbd::diagnosis::FaultMemory;
-use offbd::engine::{Engine, Input, Rig, Setup};
 use offbd::server::{self, Server};
-use offbd::vocabulary::Sample;
 use offbd::wire::session_csv;
+use offbd_core::diagnosis::FaultMemory;
+use offbd_core::engine::{Engine, Input, Rig, Setup};
+use offbd_core::vocabulary::Sample;
 use rustix::time::{ClockId, clock_gettime};
 
 use client::{Client, Socket};

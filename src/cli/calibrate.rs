@@ -1,5 +1,6 @@
 //! `offbd calibrate`: learns a rig from healthy sessions.
 
+use data_encoding::HEXLOWER;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -9,12 +10,12 @@ use sha2::{Digest, Sha256};
 use super::judge::{load_rig, read_samples};
 use super::unusable::{Unusable, read};
 use super::{output, table};
-use crate::diagnosis::{
+use crate::wire::asset;
+use offbd_core::diagnosis::{
     AxisCalibration, Calibration, MonitorCertificate, Prospects, ServoProspects, SessionEstimate,
 };
-use crate::engine::{Rig, calibrate_and_foresee};
-use crate::vocabulary::{Axis, FaultCode, PerAxis, Sample};
-use crate::wire::{asset, session_csv, verdict};
+use offbd_core::engine::{Rig, calibrate_and_foresee};
+use offbd_core::vocabulary::{Axis, FaultCode, PerAxis, Sample};
 
 /// Learns a rig from recordings in which it was healthy.
 ///
@@ -76,7 +77,7 @@ pub(super) fn learn(
     rig: &Rig,
     sessions: &[Vec<Sample>],
     data_sha256: &str,
-) -> Result<Calibration, crate::engine::CannotCalibrate> {
+) -> Result<Calibration, offbd_core::engine::CannotCalibrate> {
     let now = jiff::Timestamp::now();
     let made_at = now.round(jiff::Unit::Second).unwrap_or(now).to_string();
     calibrate_and_foresee(rig, sessions, data_sha256, &made_at)
@@ -88,14 +89,7 @@ pub(super) fn data_hash(paths: &[PathBuf]) -> Result<String, Unusable> {
     for path in paths {
         hash.update(read(path)?);
     }
-    Ok(verdict::hex(&hash.finalize()))
-}
-
-/// SHA-256 of a session that never was a file, as if it were.
-pub(super) fn samples_hash(samples: &[Sample]) -> anyhow::Result<String> {
-    let mut bytes = Vec::new();
-    session_csv::write(&mut bytes, samples)?;
-    Ok(verdict::hex(&Sha256::digest(&bytes)))
+    Ok(HEXLOWER.encode(&hash.finalize()))
 }
 
 /// Writes the asset file of `rig` to `path`.

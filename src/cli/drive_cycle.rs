@@ -7,8 +7,8 @@ use clap::Args;
 
 use super::unusable::Unusable;
 use super::{judge, output, table};
-use crate::engine::drive_cycle;
 use crate::wire::drive_cycle::{DriveCycleView, PYTHON, view, write_csv};
+use offbd_core::engine::drive_cycle;
 
 /// The drive cycle of a learnt rig: the shortest motion, within its plate and its
 /// servos' limits, in which every monitor comes to a result.

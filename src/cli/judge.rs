@@ -5,13 +5,13 @@ use std::fs::File;
 use std::path::Path;
 
 use super::unusable::{Unusable, read};
-use crate::diagnosis::{FaultMemory, Profile, ServoEstimate, Transition};
-use crate::engine::{Admission, Engine, Input, Misfit, Output, Plausibility, Rig, Setup};
-use crate::vocabulary::{PerAxis, Sample};
 use crate::wire::asset;
 use crate::wire::basis::Basis;
 use crate::wire::session_csv::{Reader, RowError};
 use crate::wire::verdict::{FaultView, SummaryView, Verdict, fault_view};
+use offbd_core::diagnosis::{FaultMemory, Profile, ServoEstimate, Transition};
+use offbd_core::engine::{Admission, Engine, Input, Misfit, Output, Plausibility, Rig, Setup};
+use offbd_core::vocabulary::{PerAxis, Sample};
 
 /// Most bad rows of a file that are named one by one; more are counted: what is
 /// wrong with a file shows in a few.

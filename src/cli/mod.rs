@@ -6,20 +6,14 @@
 
 mod backup;
 mod calibrate;
-mod chart;
-mod corpus;
-mod demo;
 mod drive_cycle;
 mod judge;
-mod labels;
+#[cfg(feature = "lab")]
+mod lab;
 mod logging;
 mod output;
 mod replay;
-mod scene;
-mod score;
 mod serve;
-mod simulate;
-mod soak;
 mod table;
 mod token;
 mod trends;
@@ -57,16 +51,13 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    Simulate(Box<simulate::SimulateArgs>),
+    #[cfg(feature = "lab")]
+    #[command(flatten)]
+    Lab(lab::LabCommand),
     Calibrate(calibrate::CalibrateArgs),
     Replay(replay::ReplayArgs),
     Trends(trends::TrendsArgs),
     DriveCycle(drive_cycle::DriveCycleArgs),
-    Score(score::ScoreArgs),
-    Soak(soak::SoakArgs),
-    Scene(scene::SceneArgs),
-    Chart(chart::ChartArgs),
-    Demo(demo::DemoArgs),
     Serve(serve::ServeArgs),
     Watch(watch::WatchArgs),
     Token(token::TokenArgs),
@@ -90,23 +81,20 @@ fn run(cli: Cli) -> anyhow::Result<()> {
     match &cli.command {
         // The service's configuration says how it logs.
         Command::Serve(_) => {}
-        // The service inside the demo speaks up when something is wrong only.
-        Command::Demo(_) => {
-            logging.start(&LogConfig { level: "warn".to_owned(), ..LogConfig::default() }, None)
+        #[cfg(feature = "lab")]
+        Command::Lab(command) if command.log_level().is_some() => {
+            let level = command.log_level().unwrap_or_default().to_owned();
+            logging.start(&LogConfig { level, ..LogConfig::default() }, None);
         }
         _ => logging.start(&LogConfig::default(), None),
     }
     match cli.command {
-        Command::Simulate(args) => simulate::run(&args),
+        #[cfg(feature = "lab")]
+        Command::Lab(command) => command.run(),
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Trends(args) => trends::run(&args),
         Command::DriveCycle(args) => drive_cycle::run(&args),
-        Command::Score(args) => score::run(&args),
-        Command::Soak(args) => soak::run(&args),
-        Command::Scene(args) => scene::run(&args),
-        Command::Chart(args) => chart::run(&args),
-        Command::Demo(args) => demo::run(&args),
         Command::Serve(args) => serve::serve(&args, &logging),
         Command::Watch(args) => watch::run(&args),
         Command::Token(args) => token::run(&args),

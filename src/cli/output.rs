@@ -53,7 +53,7 @@ pub(super) fn words<T>(
     words: impl IntoIterator<Item = &'static str>,
 ) -> impl TypedValueParser<Value = T>
 where
-    T: std::str::FromStr<Err = crate::vocabulary::UnknownWord> + Clone + Send + Sync + 'static,
+    T: std::str::FromStr<Err = offbd_core::vocabulary::UnknownWord> + Clone + Send + Sync + 'static,
 {
     PossibleValuesParser::new(words).try_map(|word| word.parse::<T>())
 }

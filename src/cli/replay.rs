@@ -14,8 +14,8 @@ use super::judge::{self, Judged};
 use super::output::{self, Format, words};
 use super::table;
 use super::unusable::Unusable;
-use crate::diagnosis::Profile;
-use crate::engine::Setup;
+use offbd_core::diagnosis::Profile;
+use offbd_core::engine::Setup;
 
 /// Judges recorded sessions: which faults, when, on what evidence.
 ///

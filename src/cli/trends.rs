@@ -10,11 +10,11 @@ use super::judge::{self, Judged};
 use super::output::{self, Format};
 use super::table;
 use super::unusable::Unusable;
-use crate::diagnosis::ServoEstimate;
-use crate::diagnosis::trend::{LEAST_SESSIONS, MAX_SESSIONS};
-use crate::vocabulary::{Axis, PerAxis};
 use crate::wire::basis::Basis;
 use crate::wire::trend::{TrendPointView, TrendView, TrendsView, estimate_view, trend_views};
+use offbd_core::diagnosis::ServoEstimate;
+use offbd_core::diagnosis::trend::{LEAST_SESSIONS, MAX_SESSIONS};
+use offbd_core::vocabulary::{Axis, PerAxis};
 
 /// How the servos of one rig drift from session to session, and which fault is
 /// on its way.

@@ -205,9 +205,9 @@ fn bar(name: &str, axis: &AxisEvidenceView) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::State;
     use crate::wire::learning::LearningState;
     use crate::wire::service::state_view;
+    use offbd_core::engine::State;
 
     fn axis(residual: Option<f64>) -> AxisEvidenceView {
         AxisEvidenceView {

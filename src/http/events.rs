@@ -16,7 +16,7 @@ use utoipa::ToSchema;
 use super::{App, Problem, Query};
 use crate::service::access::Caller;
 use crate::service::{EventFeed, Service};
-use crate::vocabulary::Invalid;
+use offbd_core::vocabulary::Invalid;
 
 /// Silence after which a comment is sent, so that nobody between takes the
 /// connection for dead.

@@ -16,7 +16,7 @@ use metrics_exporter_prometheus::{BuildError, Matcher, PrometheusBuilder, Promet
 use tokio_util::sync::CancellationToken;
 
 use super::App;
-use crate::vocabulary::{FaultCode, FaultStatus};
+use offbd_core::vocabulary::{FaultCode, FaultStatus};
 
 /// What a metric is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,7 +4,7 @@
 //! page itself is asked for each time, by its hash. A browser that asks for an
 //! address of the page's own gets the page, which knows what to show there.
 
-use std::fmt::Write as _;
+use data_encoding::HEXLOWER;
 
 use axum::body::Body;
 use axum::http::header::{
@@ -99,10 +99,5 @@ fn file(path: &str, found: EmbeddedFile, headers: &HeaderMap) -> Response {
 
 /// The first half of the content's SHA-256, in quotes.
 fn tag(file: &EmbeddedFile) -> String {
-    let half = &file.metadata.sha256_hash()[..16];
-    half.iter().fold("\"".to_owned(), |mut text, byte| {
-        // A string takes all that is written to it.
-        let _ = write!(text, "{byte:02x}");
-        text
-    }) + "\""
+    format!("\"{}\"", HEXLOWER.encode(&file.metadata.sha256_hash()[..16]))
 }

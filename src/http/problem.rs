@@ -9,8 +9,8 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::service::{RETRY_AFTER_S, ServiceError};
-use crate::vocabulary::Invalid;
 use crate::wire::telemetry::BatchError;
+use offbd_core::vocabulary::Invalid;
 
 /// An error (`application/problem+json`, RFC 9457).
 #[derive(Clone, Debug, Serialize, ToSchema)]

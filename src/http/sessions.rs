@@ -12,11 +12,11 @@ use serde::Deserialize;
 use super::telemetry::Format;
 use super::{App, Asset, PageQuery, Path, Problem, Query, body, page_limit};
 use crate::service::{Recording, Service, ServiceError};
-use crate::vocabulary::{Invalid, Sample};
 use crate::wire::service::{ImportView, Page, SessionView};
 use crate::wire::session_csv::{write_header, write_rows};
 use crate::wire::telemetry::sample_view;
 use crate::wire::verdict::FaultView;
+use offbd_core::vocabulary::{Invalid, Sample};
 
 /// Most rows of an imported file; a longer one is refused.
 const MAX_IMPORT_ROWS: usize = 2_000_000;

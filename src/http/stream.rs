@@ -25,9 +25,9 @@ use super::telemetry::Format;
 use super::{App, Asset, Problem, Query};
 use crate::service::access::{Caller, Right};
 use crate::service::{Event, EventFeed, Pending, Service, ServiceError};
-use crate::vocabulary::Invalid;
 use crate::wire::telemetry::AckView;
 use crate::wire::trace::TraceView;
+use offbd_core::vocabulary::Invalid;
 
 /// Batches whose acknowledgement is owed; then nothing more is read.
 const MAX_PENDING: usize = 32;

@@ -8,8 +8,8 @@ use axum::http::{HeaderMap, StatusCode};
 use serde::Deserialize;
 
 use super::{App, Asset, Problem, Query, body};
-use crate::vocabulary::Invalid;
 use crate::wire::telemetry::{self, AckView, Batch, BatchError, RowsView};
+use offbd_core::vocabulary::Invalid;
 
 /// How a batch is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

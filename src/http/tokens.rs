@@ -12,9 +12,9 @@ use super::{App, PageQuery, Path, Problem, Query, page_limit};
 use crate::service::Service;
 use crate::service::access::{Caller, NewToken};
 use crate::service::moment;
-use crate::vocabulary::Invalid;
 use crate::wire::access::{AuditView, MadeTokenView, NewTokenView, TokenView};
 use crate::wire::service::Page;
+use offbd_core::vocabulary::Invalid;
 
 fn wanted(view: NewTokenView) -> Result<NewToken, Invalid> {
     let NewTokenView { name, role, asset, expires_at } = view;

@@ -5,11 +5,11 @@ use tokio::sync::oneshot;
 use super::running::Running;
 use super::shard::Job;
 use super::{Service, ServiceError, settled, views};
-use crate::engine::{Rig, State};
 use crate::store::{AccessWrite, AssetRow, Write};
-use crate::vocabulary::Invalid;
 use crate::wire::asset::{self, AssetView};
 use crate::wire::service::{Page, StateView, WatchView, state_view};
+use offbd_core::engine::{Rig, State};
+use offbd_core::vocabulary::Invalid;
 
 /// The rig of an asset file. What is no JSON at all is wrong as a whole, not in
 /// the element at which reading stopped.

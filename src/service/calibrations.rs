@@ -1,5 +1,6 @@
 //! Learning a rig from sessions that were recorded of it.
 
+use data_encoding::HEXLOWER;
 use sha2::{Digest, Sha256};
 use tokio::runtime::Handle;
 use uuid::Uuid;
@@ -10,14 +11,13 @@ use super::learning::{Record, Teaching};
 use super::running::{Running, Work};
 use super::shard::Context;
 use super::{Service, ServiceError, views};
-use crate::diagnosis::Calibration;
-use crate::engine::{Rig, Setup, calibrate_and_foresee};
 use crate::store::{CalibrationRow, JobState, Store, Write};
-use crate::vocabulary::{Invalid, Sample};
 use crate::wire::asset::{self, CalibrationView};
 use crate::wire::service::{CalibrationJobView, Page};
 use crate::wire::session_csv;
-use crate::wire::verdict::hex;
+use offbd_core::diagnosis::Calibration;
+use offbd_core::engine::{Rig, Setup, calibrate_and_foresee};
+use offbd_core::vocabulary::{Invalid, Sample};
 
 /// Sessions that one calibration learns from; more are refused.
 pub(super) const MAX_SESSIONS: usize = 32;
@@ -176,7 +176,7 @@ fn learn(store: &Store, runtime: &Handle, row: &CalibrationRow) -> Result<Calibr
     let sessions = runtime.block_on(recordings(store, row, refines)).map_err(say)?;
     let mut hash = Sha256::new();
     sessions.iter().for_each(|samples| hash.update(csv(samples)));
-    let sha256 = hex(&hash.finalize());
+    let sha256 = HEXLOWER.encode(&hash.finalize());
     let made_at = rfc3339(row.made_at);
     calibrate_and_foresee(&rig, &sessions, &sha256, &made_at).map_err(|e| e.to_string())
 }

@@ -27,7 +27,7 @@ pub fn moment(text: &str) -> Result<Micros, String> {
 /// A moment as RFC 3339, UTC, to the microsecond: always of one length, so that
 /// text sorts as time does.
 #[must_use]
-pub fn rfc3339(moment: Micros) -> String {
+pub(super) fn rfc3339(moment: Micros) -> String {
     jiff::Timestamp::from_microsecond(moment)
         .map(|timestamp| format!("{timestamp:.6}"))
         .unwrap_or_default()

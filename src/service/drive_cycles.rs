@@ -1,7 +1,7 @@
 //! The drive cycle of a rig, computed where nothing waits for it. Nothing is stored.
 
 use super::{Service, ServiceError, views};
-use crate::engine::{DriveCycle, drive_cycle};
+use offbd_core::engine::{DriveCycle, drive_cycle};
 
 /// Drive cycles that are computed at a time; the next is told to come again. Each takes
 /// up to some seconds of a core.

@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use tokio::sync::mpsc::error::TrySendError;
 
-use crate::engine::NoDriveCycle;
 use crate::store::StoreError;
-use crate::vocabulary::{Invalid, UnknownWord};
 use crate::wire::telemetry::BatchError;
+use offbd_core::engine::NoDriveCycle;
+use offbd_core::vocabulary::{Invalid, UnknownWord};
 
 /// Why the service will not or cannot. Knows no status codes.
 #[derive(Clone, Debug, thiserror::Error)]

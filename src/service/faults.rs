@@ -2,8 +2,8 @@
 
 use super::{Service, ServiceError, views};
 use crate::store::{ActionKind, FaultFilter, FaultOrder};
-use crate::vocabulary::{FaultCode, Invalid};
 use crate::wire::service::{FaultEntryView, MonitorView, Page, monitor_views};
+use offbd_core::vocabulary::{FaultCode, Invalid};
 
 /// The statuses that a word of a query stands for; none: all.
 fn statuses(word: &str) -> Result<Vec<&'static str>, ServiceError> {

@@ -3,9 +3,9 @@
 use super::clock::rfc3339;
 use super::{Service, ServiceError, views};
 use crate::store::{ActionRow, TransitionRow};
-use crate::vocabulary::FaultCode;
 use crate::wire::service::{HistoryView, Page};
 use crate::wire::verdict::FaultView;
+use offbd_core::vocabulary::FaultCode;
 
 impl Service {
     /// What happened to a code of an asset, newest first.

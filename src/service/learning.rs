@@ -17,10 +17,10 @@ use super::running::{OpenSession, Running, Work};
 use super::shard::Context;
 use super::{Service, ServiceError, views};
 use crate::store::{AccessWrite, CalibrationRow, JobState, Write};
-use crate::vocabulary::Axis;
 use crate::wire::asset::{self, CalibrationView};
 use crate::wire::learning::{LearningState, LearningView, TeachingSessionView};
 use crate::wire::verdict::{Outcome, SummaryView};
+use offbd_core::vocabulary::Axis;
 
 /// Who refines, in the audit log.
 const ITSELF: &str = "offbd";

@@ -65,4 +65,4 @@ impl Limits {
 pub const RETRY_AFTER_S: u64 = 1;
 
 /// Longest name of a session, bytes.
-pub const MAX_SESSION_NAME: usize = 200;
+pub(super) const MAX_SESSION_NAME: usize = 200;

@@ -4,9 +4,9 @@ use tokio::runtime::Handle;
 
 use super::ServiceError;
 use super::running::input;
-use crate::engine::Input;
 use crate::store::{ActionKind, Store};
-use crate::vocabulary::FaultCode;
+use offbd_core::engine::Input;
+use offbd_core::vocabulary::FaultCode;
 
 /// Gives the inputs of `session` to `take`, in the order in which they came,
 /// until it says that it is enough. Waits for the store on the calling thread,

@@ -7,8 +7,8 @@ use super::playback::{Flow, play};
 use super::running::{OpenSession, Running};
 use super::shard::Context;
 use super::{ServiceError, views};
-use crate::engine::{Input, Setup};
 use crate::store::SessionRow;
+use offbd_core::engine::{Input, Setup};
 
 /// The asset `name` as the store has it.
 pub(super) fn load(context: &Context, name: &str) -> Result<Running, ServiceError> {

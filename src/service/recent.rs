@@ -3,8 +3,8 @@
 use std::cell::Cell;
 use std::collections::VecDeque;
 
-use crate::engine::State;
 use crate::wire::trace::{TracePoint, TraceView};
+use offbd_core::engine::State;
 
 /// Moments that are kept: 20 s of a rig at 100 Hz; the oldest go first.
 const MAX_POINTS: usize = 2000;
@@ -55,7 +55,7 @@ impl Recent {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vocabulary::SimTime;
+    use offbd_core::vocabulary::SimTime;
 
     fn at(t_s: f64) -> State {
         State { at: SimTime::new(t_s), ..State::default() }

@@ -5,13 +5,13 @@
 
 use super::playback::{Flow, play};
 use super::{Service, ServiceError, jobs, views};
-use crate::diagnosis::{Evidence, StatusByte};
-use crate::engine::{Engine, Input, Setup};
 use crate::store::SessionRow;
-use crate::vocabulary::{FaultCode, FaultStatus, Invalid, Sample};
 use crate::wire::basis::Basis;
 use crate::wire::recording::{ColumnsView, RecordingRow, RecordingView};
 use crate::wire::verdict::FaultView;
+use offbd_core::diagnosis::{Evidence, StatusByte};
+use offbd_core::engine::{Engine, Input, Setup};
+use offbd_core::vocabulary::{FaultCode, FaultStatus, Invalid, Sample};
 
 /// Longest time before the onset or after the confirmation, s.
 const MAX_AROUND_S: f64 = 60.0;
@@ -241,9 +241,9 @@ impl Stretch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnosis::{Suspicion, Transition};
-    use crate::vocabulary::SimTime;
     use crate::wire::verdict::fault_view;
+    use offbd_core::diagnosis::{Suspicion, Transition};
+    use offbd_core::vocabulary::SimTime;
 
     fn fault(code: FaultCode, t_s: f64, bits: u8) -> FaultView {
         let byte = StatusByte::from_bits(bits);

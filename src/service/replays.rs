@@ -6,15 +6,15 @@ use super::clock::rfc3339;
 use super::jobs::{Bench, Job};
 use super::playback::{Flow, play};
 use super::{Service, ServiceError, views};
-use crate::diagnosis::Profile;
-use crate::engine::{Engine, Input, Output, Plausibility, Rig, Setup};
 use crate::store::{JobState, Micros, ReplayRow, SessionRow, Store, Write};
-use crate::vocabulary::Invalid;
 use crate::wire::asset::{self, CalibrationView};
 use crate::wire::basis::Basis;
 use crate::wire::difference::{Compared, compare, tally};
 use crate::wire::service::{DifferenceView, ReplayResultView, ReplaySettingsView, ReplayView};
 use crate::wire::verdict::{FaultView, Verdict, fault_view};
+use offbd_core::diagnosis::Profile;
+use offbd_core::engine::{Engine, Input, Output, Plausibility, Rig, Setup};
+use offbd_core::vocabulary::Invalid;
 
 /// Fault lines, and differences, in a result; more are left out, and it says so.
 const MAX_LINES: usize = 10_000;

@@ -12,20 +12,20 @@ use super::recent::Recent;
 use super::shard::Context;
 use super::telemetry::unjudged;
 use super::{ServiceError, trends, views};
-use crate::diagnosis::{FaultMemory, FaultRecord, MemoryRules};
-use crate::engine::{
-    Admission, Engine, Input, Misfit, Output, Plausibility, Rig, Setup, UsableMotion,
-};
 use crate::store::{
     ActionKind, ActionRow, AssetRow, FaultRow, Micros, Progress, SessionRow, TransitionRow, Write,
 };
-use crate::vocabulary::{FaultCode, FaultStatus, Sample};
 use crate::wire::basis::Basis;
 use crate::wire::provenance::{ActView, OccurrenceView, ProvenanceView};
 use crate::wire::service::cleared_view;
 use crate::wire::telemetry::{AckView, RowView};
 use crate::wire::verdict::{SummaryView, Verdict, fault_view};
 use crate::wire::{asset, memory};
+use offbd_core::diagnosis::{FaultMemory, FaultRecord, MemoryRules};
+use offbd_core::engine::{
+    Admission, Engine, Input, Misfit, Output, Plausibility, Rig, Setup, UsableMotion,
+};
+use offbd_core::vocabulary::{FaultCode, FaultStatus, Sample};
 
 /// How far a nameless device's clock must fall back to mean that it started
 /// anew, s. Below, samples are late.

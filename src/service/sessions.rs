@@ -5,8 +5,8 @@ use super::limits::MAX_SESSION_NAME;
 use super::telemetry::{Switched, switch};
 use super::{Service, ServiceError, views};
 use crate::store::{SessionFilter, SessionRow, Store, Write};
-use crate::vocabulary::{Invalid, Sample};
 use crate::wire::service::{Page, SessionView};
+use offbd_core::vocabulary::{Invalid, Sample};
 
 /// A session's name must be text that fits a line.
 pub(super) fn check_name(name: &str) -> Result<(), ServiceError> {

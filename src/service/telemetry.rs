@@ -10,8 +10,8 @@ use super::running::{Running, Work};
 use super::shard::{Context, Job, Reply};
 use super::{Service, ServiceError, settled};
 use crate::store::SessionRow;
-use crate::vocabulary::Sample;
 use crate::wire::telemetry::{AckView, Batch, RowView, key, keys};
+use offbd_core::vocabulary::Sample;
 
 /// Chunks of an ended session, or of the past of an open one, that are looked
 /// through for a retransmitted batch; older samples are not found.

@@ -3,10 +3,10 @@
 
 use super::playback::{Flow, play};
 use super::{Service, ServiceError, jobs, replays, views};
-use crate::engine::{Engine, Input, Output};
 use crate::store::SessionRow;
 use crate::wire::service::ReplaySettingsView;
 use crate::wire::trace::{TracePoint, TraceView};
+use offbd_core::engine::{Engine, Input, Output};
 
 /// Samples that are judged for one trace; a session with more before the end
 /// of the stretch is refused. Some seconds of one core.

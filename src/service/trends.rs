@@ -4,13 +4,13 @@ use super::clock::rfc3339;
 use super::running::OpenSession;
 use super::shard::Context;
 use super::{Service, ServiceError, views};
-use crate::diagnosis::ServoEstimate;
-use crate::diagnosis::trend::MAX_SESSIONS;
 use crate::store::{Micros, TrendEntry, TrendRow, Write};
-use crate::vocabulary::{Axis, PerAxis};
 use crate::wire::trend::{
     TrendPointView, TrendWarningView, TrendsView, estimate_view, trend_views,
 };
+use offbd_core::diagnosis::ServoEstimate;
+use offbd_core::diagnosis::trend::MAX_SESSIONS;
+use offbd_core::vocabulary::{Axis, PerAxis};
 
 /// Rows that are looked at: one for each axis of a session.
 const MAX_ROWS: u32 = 2 * MAX_SESSIONS as u32;

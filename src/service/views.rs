@@ -1,20 +1,20 @@
 //! Rows to views and back: the documents inside the store's rows.
 
+use data_encoding::{HEXLOWER, HEXLOWER_PERMISSIVE};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::ServiceError;
 use super::clock::rfc3339;
 use super::running::Provenance;
-use crate::diagnosis::{FaultMemory, FaultRecord, MemoryRules};
-use crate::engine::Rig;
 use crate::store::{FaultFilter, FaultRow, SessionRow, Store};
-use crate::vocabulary::{FaultCode, Invalid};
 use crate::wire::asset;
 use crate::wire::memory::{self, FaultRecordView, MemoryView};
 use crate::wire::provenance::ProvenanceView;
 use crate::wire::service::{FaultEntryView, Page, SessionView};
-use crate::wire::verdict::hex;
+use offbd_core::diagnosis::{FaultMemory, FaultRecord, MemoryRules};
+use offbd_core::engine::Rig;
+use offbd_core::vocabulary::{FaultCode, Invalid};
 
 pub(super) fn to_json<T: Serialize>(view: &T) -> Result<String, ServiceError> {
     serde_json::to_string(view).map_err(ServiceError::corrupt)
@@ -110,7 +110,7 @@ pub(super) fn page<R, V, K: Serialize>(
     let more = rows.len() > limit as usize;
     rows.truncate(limit as usize);
     let next = match rows.last().filter(|_| more) {
-        Some(last) => Some(hex(to_json(&key(last))?.as_bytes())),
+        Some(last) => Some(HEXLOWER.encode(to_json(&key(last))?.as_bytes())),
         None => None,
     };
     let items = rows.into_iter().map(view).collect::<Result<_, _>>()?;
@@ -120,9 +120,7 @@ pub(super) fn page<R, V, K: Serialize>(
 /// The key in a cursor that [`page`] gave.
 pub(super) fn cursor<K: DeserializeOwned>(cursor: &str) -> Result<K, ServiceError> {
     let invalid = || Invalid::new("?cursor", "is not one that a page gave as `next`");
-    let digits = cursor.as_bytes().chunks(2);
-    let byte = |pair: &[u8]| u8::from_str_radix(std::str::from_utf8(pair).ok()?, 16).ok();
-    let bytes: Option<Vec<u8>> = digits.map(byte).collect();
+    let bytes = HEXLOWER_PERMISSIVE.decode(cursor.as_bytes()).ok();
     let key = bytes.and_then(|bytes| serde_json::from_slice(&bytes).ok());
     Ok(key.ok_or_else(invalid)?)
 }

@@ -11,7 +11,7 @@ use pco::data_types::Number;
 use pco::standalone::{simple_compress, simple_decompress};
 use pco::{ChunkConfig, DeltaSpec};
 
-use crate::vocabulary::Sample;
+use offbd_core::vocabulary::Sample;
 
 /// Most samples in one chunk; a longer run is a caller's mistake and is cut by
 /// nobody: [`encode`] takes it, [`decode`] refuses it.

@@ -16,7 +16,7 @@ use sqlx::AnyConnection;
 use super::codec::{self, Stay};
 use super::tail::{FULL_CHUNK_SAMPLES, Run};
 use super::{Progress, SessionRow, StoreError};
-use crate::vocabulary::Sample;
+use offbd_core::vocabulary::Sample;
 
 /// Samples in a run from which on it is folded at once: it fills pages of its own.
 const LARGE_RUN: usize = 1024;

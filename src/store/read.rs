@@ -5,7 +5,7 @@ use super::{
     ActionRow, AssetRow, CalibrationRow, EventRow, FaultRow, Micros, ReplayRow, SessionRow, Store,
     StoreError, TransitionRow, TrendEntry, codec,
 };
-use crate::vocabulary::Sample;
+use offbd_core::vocabulary::Sample;
 
 /// Which sessions; newest first, `before` excluded.
 #[derive(Clone, Debug, Default)]

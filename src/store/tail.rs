@@ -8,7 +8,7 @@ use sqlx::AnyConnection;
 use super::codec::Stay;
 use super::rows_at_once::{RowsAtOnce, in_parts};
 use super::{Progress, StoreError, codec};
-use crate::vocabulary::Sample;
+use offbd_core::vocabulary::Sample;
 
 /// Samples in a full chunk; a longer run is cut into several.
 pub const FULL_CHUNK_SAMPLES: usize = 8192;

@@ -18,7 +18,7 @@ use super::{
     AccessWrite, ActionRow, AssetRow, CalibrationRow, FaultRow, MIGRATIONS, Micros, Place,
     Progress, ReplayRow, SessionRow, StoreError, TransitionRow, TrendRow,
 };
-use crate::vocabulary::Sample;
+use offbd_core::vocabulary::Sample;
 
 /// How long a commit may take before its connection is given up. A disk that
 /// is slower than this cannot carry the service.

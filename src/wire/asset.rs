@@ -1,17 +1,18 @@
 //! The asset file: a rig as JSON.
 
+use data_encoding::HEXLOWER;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use utoipa::ToSchema;
 
 use super::certificate::{self, MonitorCertificateView};
-use crate::diagnosis::{
+use offbd_core::diagnosis::{
     AxisCalibration, Calibration, Profile, Prospects, SensorCalibration, ServoProspects,
     SessionEstimate,
 };
-use crate::engine::{AxisMapping, DiagnosticsSpec, Rig, ServoSpec};
-use crate::plant::{Ball, Contact, Plate, PlateShape};
-use crate::vocabulary::{Axis, Invalid, PerAxis, in_range, positive};
+use offbd_core::engine::{AxisMapping, DiagnosticsSpec, Rig, ServoSpec};
+use offbd_core::plant::{Ball, Contact, Plate, PlateShape};
+use offbd_core::vocabulary::{Axis, Invalid, PerAxis, in_range, positive};
 
 /// A rig as its owner describes it. Everything but `name` has a default: the
 /// rig of the book chapter.
@@ -524,7 +525,7 @@ fn axes_view(mapping: &AxisMapping) -> AxesView {
 fn diagnostics(view: &DiagnosticsView) -> Result<DiagnosticsSpec, Invalid> {
     let profile = match &view.profile {
         None => Profile::default(),
-        Some(word) => word.parse().map_err(|e: crate::vocabulary::UnknownWord| {
+        Some(word) => word.parse().map_err(|e: offbd_core::vocabulary::UnknownWord| {
             Invalid::new("/diagnostics/profile", e.to_string())
         })?,
     };
@@ -771,13 +772,13 @@ pub fn calibration_id(calibration: &Calibration) -> String {
     for number in [refresh_s, most_outliers, most_scatter_m, longest_unseen_s] {
         hash.update(number.to_bits().to_le_bytes());
     }
-    super::verdict::hex(&hash.finalize()[..8])
+    HEXLOWER.encode(&hash.finalize()[..8])
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnosis::MonitorCertificate;
+    use offbd_core::diagnosis::MonitorCertificate;
 
     #[test]
     fn a_name_is_enough() {

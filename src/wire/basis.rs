@@ -1,10 +1,10 @@
 //! By what a verdict was reached, as short ids: the calibration, and the rest.
 
+use data_encoding::HEXLOWER;
 use sha2::{Digest, Sha256};
 
 use super::asset::{calibration_id, view};
-use super::verdict::hex;
-use crate::engine::Setup;
+use offbd_core::engine::Setup;
 
 /// The ids that a fault carries of what judged it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -32,7 +32,7 @@ impl Basis {
         hash.update(format!("{:?}", setup.settings));
         Self {
             calibration_id: setup.rig.calibration.as_ref().map(calibration_id),
-            settings_id: hex(&hash.finalize()[..8]),
+            settings_id: HEXLOWER.encode(&hash.finalize()[..8]),
         }
     }
 }
@@ -40,8 +40,8 @@ impl Basis {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnosis::Profile;
-    use crate::engine::Rig;
+    use offbd_core::diagnosis::Profile;
+    use offbd_core::engine::Rig;
 
     fn settings_id(rig: &Rig, profile: Option<Profile>) -> String {
         Basis::of(&Setup::new(rig.clone(), profile).unwrap()).settings_id

@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::diagnosis::MonitorCertificate;
-use crate::vocabulary::{FaultCode, Invalid, in_range};
+use offbd_core::diagnosis::MonitorCertificate;
+use offbd_core::vocabulary::{FaultCode, Invalid, in_range};
 
 /// What the tests of a calibration showed of one monitor, on healthy recordings
 /// that it had not learnt from, and how often it will alarm on the healthy rig.
@@ -49,10 +49,10 @@ pub(super) fn certificate(
     let mut certificate = Certificate::default();
     for (i, view) in views.iter().enumerate() {
         let at = |field: &str| format!("/calibration/certificate/{i}/{field}");
-        let code: FaultCode = view
-            .code
-            .parse()
-            .map_err(|e: crate::vocabulary::UnknownWord| Invalid::new(at("code"), e.to_string()))?;
+        let code: FaultCode =
+            view.code.parse().map_err(|e: offbd_core::vocabulary::UnknownWord| {
+                Invalid::new(at("code"), e.to_string())
+            })?;
         let rate = |rate: f64| in_range(&at("alarms_per_hour"), rate, 0.0..=1e6);
         certificate[code as usize] = MonitorCertificate {
             judged_s: in_range(&at("judged_s"), view.judged_s, 0.0..=1e9)?,

@@ -174,10 +174,10 @@ fn nearest(left: &[f64], right: &[f64]) -> Option<(usize, usize)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnosis::{Evidence, StatusByte, Suspicion, Transition};
-    use crate::vocabulary::{FaultCode, FaultStatus, SimTime};
     use crate::wire::basis::Basis;
     use crate::wire::verdict::fault_view;
+    use offbd_core::diagnosis::{Evidence, StatusByte, Suspicion, Transition};
+    use offbd_core::vocabulary::{FaultCode, FaultStatus, SimTime};
     use proptest::prelude::*;
 
     fn fault(code: FaultCode, status: FaultStatus, t_s: f64) -> FaultView {

@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::session_csv;
-use crate::engine::{DriveCycle, FaultVerdict, Feedback, MonitorVerdict, NotReached, Order};
-use crate::vocabulary::{Axis, PerAxis, Sample};
+use offbd_core::engine::{DriveCycle, FaultVerdict, Feedback, MonitorVerdict, NotReached, Order};
+use offbd_core::vocabulary::{Axis, PerAxis, Sample};
 
 /// The program that runs a cycle beside which it lies, for a device with Python.
 pub const PYTHON: &str = include_str!("drive_cycle/run.py");

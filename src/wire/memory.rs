@@ -6,11 +6,11 @@ use utoipa::ToSchema;
 use super::verdict::{
     AnswerView, AxisEvidenceView, CandidateView, EvidenceView, candidate_view, evidence_view,
 };
-use crate::diagnosis::{
+use offbd_core::diagnosis::{
     Answer, AxisEvidence, Candidate, Evidence, FaultMemory, FaultRecord, InUse, MemoryRules,
     StatusByte, Step, Suspicion,
 };
-use crate::vocabulary::{FaultCode, FaultKind, PerAxis, SimTime, UnknownWord};
+use offbd_core::vocabulary::{FaultCode, FaultKind, PerAxis, SimTime, UnknownWord};
 
 /// The fault memory of one rig, one record per code.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, ToSchema)]

@@ -13,9 +13,11 @@ pub mod difference;
 pub mod drive_cycle;
 pub mod learning;
 pub mod memory;
+#[cfg(feature = "lab")]
 mod preset;
 pub mod provenance;
 pub mod recording;
+#[cfg(feature = "lab")]
 pub mod scene;
 pub mod service;
 pub mod session_csv;

@@ -6,7 +6,7 @@ use std::marker::PhantomData;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, Visitor};
 
-use crate::vocabulary::Invalid;
+use offbd_core::vocabulary::Invalid;
 
 /// A preset's name, or an object that says all.
 #[derive(Clone, Debug)]

@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::diagnosis::{AxisEvidence, Evidence};
-use crate::vocabulary::Sample;
+use offbd_core::diagnosis::{AxisEvidence, Evidence};
+use offbd_core::vocabulary::Sample;
 
 /// The seconds around the last occurrence of a fault.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]

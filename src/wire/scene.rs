@@ -5,9 +5,9 @@ use serde::Deserialize;
 
 use super::asset::{BallView, ContactView, check_object, contact, outline, pointer};
 use super::preset::PresetOr;
-use crate::plant::{Ball, Contact, Motion, Plate};
-use crate::scene::{LONGEST_SCENE_S, Law, Laws, Push, Scene, Subject, Term};
-use crate::vocabulary::{Invalid, in_range, positive};
+use offbd_core::plant::{Ball, Contact, Motion, Plate};
+use offbd_core::vocabulary::{Invalid, in_range, positive};
+use offbd_lab::scene::{LONGEST_SCENE_S, Law, Laws, Push, Scene, Subject, Term};
 
 /// A scene as it is written. What is left out is the chapter's.
 #[derive(Clone, Debug, Deserialize)]

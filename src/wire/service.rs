@@ -11,9 +11,9 @@ use super::provenance::ProvenanceView;
 use super::trace::TraceView;
 use super::trend::TrendWarningView;
 use super::verdict::{EvidenceView, FaultView, SummaryView, evidence_view};
-use crate::diagnosis::StatusByte;
-use crate::engine::{MonitorState, State};
-use crate::vocabulary::{Axis, FaultCode, FaultStatus, PerAxis};
+use offbd_core::diagnosis::StatusByte;
+use offbd_core::engine::{MonitorState, State};
+use offbd_core::vocabulary::{Axis, FaultCode, FaultStatus, PerAxis};
 
 /// A page of a list.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]

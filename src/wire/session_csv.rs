@@ -6,7 +6,7 @@
 
 use std::io::{self, Read, Write};
 
-use crate::vocabulary::Sample;
+use offbd_core::vocabulary::Sample;
 
 /// The columns of a session file, in the order in which they are written.
 pub const COLUMNS: [&str; 5] = ["t_s", "cmd_qx_rad", "cmd_qy_rad", "x_m", "y_m"];

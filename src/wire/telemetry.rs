@@ -16,7 +16,7 @@ use utoipa::ToSchema;
 
 use self::cells::{Document, Row};
 use super::session_csv::Reader;
-use crate::vocabulary::Sample;
+use offbd_core::vocabulary::Sample;
 
 /// Largest `seq`: what the store's whole numbers hold. A row beyond is rejected.
 pub const MAX_SEQ: u64 = i64::MAX as u64;

@@ -3,9 +3,9 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::diagnosis::AxisEvidence;
-use crate::engine::State;
-use crate::vocabulary::Axis;
+use offbd_core::diagnosis::AxisEvidence;
+use offbd_core::engine::State;
+use offbd_core::vocabulary::Axis;
 
 /// A stretch of a session as it was judged, one entry for each moment, for
 /// drawing: all but the times are rounded to seven digits.

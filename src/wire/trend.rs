@@ -4,9 +4,9 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::diagnosis::ServoEstimate;
-use crate::diagnosis::trend::{Drift, Parameter, Warning, drift};
-use crate::vocabulary::{Axis, FaultCode, PerAxis};
+use offbd_core::diagnosis::ServoEstimate;
+use offbd_core::diagnosis::trend::{Drift, Parameter, Warning, drift};
+use offbd_core::vocabulary::{Axis, FaultCode, PerAxis};
 
 /// The servos of a rig over its sessions.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]

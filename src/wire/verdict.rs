@@ -7,14 +7,15 @@ mod sentence;
 pub use outcome::{JudgedView, Outcome};
 pub use sentence::sentence;
 
+use data_encoding::HEXLOWER;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use utoipa::ToSchema;
 
 use super::basis::Basis;
-use crate::diagnosis::{Answer, AxisEvidence, Candidate, Evidence, Suspicion, Transition};
-use crate::engine::{Admission, Misfit, Output};
-use crate::vocabulary::{FaultCode, FaultStatus};
+use offbd_core::diagnosis::{Answer, AxisEvidence, Candidate, Evidence, Suspicion, Transition};
+use offbd_core::engine::{Admission, Misfit, Output};
+use offbd_core::vocabulary::{FaultCode, FaultStatus};
 
 /// A change of a fault's status; or its kind, where that shows only after the
 /// confirmation: the status is then the same as before.
@@ -342,7 +343,7 @@ impl Verdict {
     #[must_use]
     pub fn hash(&self) -> String {
         let hash = self.hash.clone().chain_update(self.n_accepted.to_le_bytes());
-        hex(&hash.finalize())
+        HEXLOWER.encode(&hash.finalize())
     }
 
     /// The summary line of a session.
@@ -367,10 +368,4 @@ impl Verdict {
             warnings: Vec::new(),
         }
     }
-}
-
-/// Lower-case hexadecimal digits of `bytes`.
-#[must_use]
-pub fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|b| format!("{b:02x}")).collect()
 }

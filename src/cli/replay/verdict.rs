@@ -4,8 +4,8 @@ use comfy_table::Table;
 
 use crate::cli::judge::Judged;
 use crate::cli::table;
-use crate::vocabulary::{FaultCode, FaultStatus};
 use crate::wire::verdict::{CandidateView, FaultView, JudgedView, Outcome};
+use offbd_core::vocabulary::{FaultCode, FaultStatus};
 
 /// The verdict on a session in a few words: what was found, or else what was not;
 /// and what was not learnt or not judged.

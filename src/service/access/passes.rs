@@ -4,6 +4,7 @@
 //! A secret is looked up by its SHA-256, never compared: what the time of an
 //! answer tells is about the hash, which nobody can steer towards another's.
 
+use data_encoding::HEXLOWER;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -15,7 +16,6 @@ use super::tokens::{PREFIX, random};
 use super::{Caller, Pass, jwt};
 use crate::service::{Service, ServiceError};
 use crate::store::{AccessWrite, Micros, TokenRow, Write};
-use crate::wire::verdict::hex;
 
 /// For how long a token is taken as it was found. What another process does to
 /// it, such as `offbd token revoke`, is noticed after that.
@@ -69,7 +69,7 @@ impl Credential {
 
     pub(super) fn digest(&self) -> String {
         let (Self::Token(digest) | Self::Login(digest) | Self::Jwt(digest)) = self;
-        hex(digest)
+        HEXLOWER.encode(digest)
     }
 }
 

@@ -1,15 +1,15 @@
 //! Tokens: made, listed, revoked.
 
+use data_encoding::HEXLOWER;
 use uuid::Uuid;
 
 use super::{Credential, Role};
 use crate::service::clock::rfc3339;
 use crate::service::{Service, ServiceError, views};
 use crate::store::{AccessWrite, LAST_ID, Micros, TokenRow, Write};
-use crate::vocabulary::Invalid;
 use crate::wire::access::{MadeTokenView, TokenView};
 use crate::wire::service::Page;
-use crate::wire::verdict::hex;
+use offbd_core::vocabulary::Invalid;
 
 /// How every token begins, so that scanners for leaked secrets find it.
 pub const PREFIX: &str = "offbd_";
@@ -86,7 +86,7 @@ pub(super) fn random() -> Result<String, ServiceError> {
     let mut bytes = [0; SECRET_BYTES];
     getrandom::fill(&mut bytes)
         .map_err(|_| ServiceError::Unavailable { what: "the system has no random numbers" })?;
-    Ok(hex(&bytes))
+    Ok(HEXLOWER.encode(&bytes))
 }
 
 /// A token as it is shown.

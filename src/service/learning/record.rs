@@ -7,10 +7,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::engine::WANTED_MOTION_S;
 use crate::service::calibrations::{MAX_SAMPLES, MAX_SESSIONS};
-use crate::vocabulary::PerAxis;
 use crate::wire::learning::LearningState;
+use offbd_core::engine::WANTED_MOTION_S;
+use offbd_core::vocabulary::PerAxis;
 
 /// Sessions with which a calibration is refined no further: later drift is measured
 /// against what a rig was like at first, not against what it has become. Level and

@@ -7,8 +7,8 @@ use serde::de::{Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 
 use super::{BatchError, MAX_SEQ};
-use crate::vocabulary::{Brief, Sample};
 use crate::wire::asset::pointer;
+use offbd_core::vocabulary::{Brief, Sample};
 
 /// Deepest nesting of a MessagePack document; one beyond is refused. As in
 /// `serde_json`.

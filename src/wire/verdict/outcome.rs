@@ -8,9 +8,9 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::{CandidateView, SummaryView, Verdict, candidate_view, warnings};
-use crate::diagnosis::Suspicion;
-use crate::engine::{Misfit, MonitorState, Reach, State};
-use crate::vocabulary::FaultCode;
+use offbd_core::diagnosis::Suspicion;
+use offbd_core::engine::{Misfit, MonitorState, Reach, State};
+use offbd_core::vocabulary::FaultCode;
 
 /// What a session came to, or one monitor in it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -146,9 +146,9 @@ impl SummaryView {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnosis::{Candidate, Evidence, StatusByte, Transition};
-    use crate::engine::Output;
-    use crate::vocabulary::{FaultKind, FaultStatus, SimTime};
+    use offbd_core::diagnosis::{Candidate, Evidence, StatusByte, Transition};
+    use offbd_core::engine::Output;
+    use offbd_core::vocabulary::{FaultKind, FaultStatus, SimTime};
 
     /// A confirmed stuck ball with these causes, as the verdict takes it.
     fn stuck(candidates: Vec<Candidate>) -> JudgedView {

@@ -1,8 +1,8 @@
 //! What was seen when a fault changed, in one sentence that follows its kind.
 
 use super::outcome::read_alike;
-use crate::diagnosis::{Answer, AxisEvidence, Candidate, Evidence, Suspicion, Transition};
-use crate::vocabulary::{Axis, FaultCode, FaultKind, FaultStatus};
+use offbd_core::diagnosis::{Answer, AxisEvidence, Candidate, Evidence, Suspicion, Transition};
+use offbd_core::vocabulary::{Axis, FaultCode, FaultKind, FaultStatus};
 
 /// What was seen, in one sentence.
 #[must_use]

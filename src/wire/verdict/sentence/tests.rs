@@ -1,6 +1,6 @@
 use super::*;
-use crate::diagnosis::{StatusByte, Step};
-use crate::vocabulary::{PerAxis, SimTime};
+use offbd_core::diagnosis::{StatusByte, Step};
+use offbd_core::vocabulary::{PerAxis, SimTime};
 
 /// A moment in which all that can be said is known.
 fn evidence() -> Evidence {

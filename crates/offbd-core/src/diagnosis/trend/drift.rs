@@ -1,0 +1,102 @@
+//! Which parameters of a servo are followed, and the limits of each.
+
+use super::{Band, MAX_SESSIONS, MEDIAN_ERROR, Trend, Warning, warning};
+use crate::diagnosis::ServoEstimate;
+use crate::maths::{median, robust_deviation};
+#[cfg(not(feature = "std"))]
+use crate::no_std::*;
+
+/// How far ahead a warning looks, sessions: in time to plan a repair, and no
+/// further than a line through as many sessions can be believed.
+pub const HORIZON_SESSIONS: f64 = 20.0;
+
+/// The first sessions, which say what is usual: few, for a drift begins at once.
+const USUAL_SESSIONS: usize = 5;
+
+/// A servo's parameter that is followed from session to session.
+///
+/// The limits are the changes from which on one that comes in the midst of a
+/// session was confirmed in every one of four on the quiet simulated rig: a gain
+/// of 0.7 or 1.5, a horn slipped by 0.015 rad (0.1 m/s²), a servo three times as
+/// slow (0.1 s). A slower change is not: the monitors take it for the rig's nature.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Parameter {
+    /// Share of the command that the ball answers.
+    Gain,
+    /// Acceleration that no command explains, m/s².
+    Offset,
+    /// Delay beyond the twin's, s.
+    Delay,
+}
+
+impl Parameter {
+    pub const ALL: [Self; 3] = [Self::Gain, Self::Offset, Self::Delay];
+
+    /// `"gain"`, `"offset"` or `"delay"`.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Gain => "gain",
+            Self::Offset => "offset",
+            Self::Delay => "delay",
+        }
+    }
+
+    /// Its limits on a servo that answers as the twin's.
+    #[must_use]
+    pub const fn band(self) -> Band {
+        match self {
+            Self::Gain => Band { low: 0.7, nominal: 1.0, high: 1.5 },
+            Self::Offset => Band { low: -0.1, nominal: 0.0, high: 0.1 },
+            Self::Delay => Band { low: -0.1, nominal: 0.0, high: 0.1 },
+        }
+    }
+
+    const fn of(self, estimate: &ServoEstimate) -> f64 {
+        match self {
+            Self::Gain => estimate.gain,
+            Self::Offset => estimate.offset_m_s2,
+            Self::Delay => estimate.delay_s,
+        }
+    }
+}
+
+/// How a parameter of a servo goes over the sessions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Drift {
+    pub parameter: Parameter,
+    /// The line through the estimates.
+    pub trend: Trend,
+    /// Its limits about what is usual for this rig.
+    pub band: Band,
+    pub warning: Option<Warning>,
+}
+
+/// How `parameter` goes over sessions, oldest first, each with what was
+/// estimated in it; none for too few of them.
+///
+/// Estimates repeat far better than they are right: stiction and control loop
+/// shift them all alike, by up to their standard error. Hence the first
+/// sessions, not the calibration, say what is usual, and those that follow
+/// should ask the rig for motions of the same kind.
+#[must_use]
+pub fn drift(parameter: Parameter, sessions: &[Option<ServoEstimate>]) -> Option<Drift> {
+    let sessions = &sessions[sessions.len().saturating_sub(MAX_SESSIONS)..];
+    let value = |e: &Option<ServoEstimate>| e.as_ref().map_or(f64::NAN, |e| parameter.of(e));
+    let values: Vec<f64> = sessions.iter().map(value).collect();
+    let mut trend = Trend::of(&values)?;
+    let (usual, error) = usual(&values)?;
+    trend.level_error = trend.level_error.hypot(error);
+    let band = parameter.band().about(usual);
+    let warning = warning(&trend, &band, HORIZON_SESSIONS);
+    Some(Drift { parameter, trend, band, warning })
+}
+
+/// What is usual, and its standard error: the median of the first estimates.
+fn usual(values: &[f64]) -> Option<(f64, f64)> {
+    let estimated = values.iter().copied().filter(|value| value.is_finite());
+    let mut first: Vec<f64> = estimated.take(USUAL_SESSIONS).collect();
+    let usual = median(&mut first)?;
+    let error = MEDIAN_ERROR * robust_deviation(&mut first)? / (first.len() as f64).sqrt();
+    Some((usual, error))
+}

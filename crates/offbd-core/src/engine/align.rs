@@ -1,0 +1,103 @@
+//! Second stage: samples in the order of their time.
+//!
+//! A sample waits for an earlier one at most the reorder window, counted in
+//! the samples' own time. One whose `seq` follows on from the last released
+//! does not wait at all. The order depends on the samples alone.
+
+use alloc::collections::VecDeque;
+
+use crate::vocabulary::Sample;
+
+/// Most samples that wait; beyond it the earliest is released early. Half a
+/// second at 8 kHz.
+const MAX_WAITING: usize = 4096;
+
+/// The stage.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Align {
+    /// Ascending in time.
+    waiting: VecDeque<Sample>,
+    newest_s: f64,
+    released: Option<Sample>,
+}
+
+impl Align {
+    /// Takes a sample later than any released.
+    pub(super) fn push(&mut self, sample: Sample) {
+        let first = self.waiting.is_empty() && self.released.is_none();
+        self.newest_s = if first { sample.t_s } else { self.newest_s.max(sample.t_s) };
+        // Mostly it is the latest; a sort by halves would first look elsewhere.
+        let after = self.waiting.iter().rev().take_while(|s| s.t_s > sample.t_s).count();
+        self.waiting.insert(self.waiting.len() - after, sample);
+    }
+
+    /// The next sample in order whose turn has come.
+    pub(super) fn pop(&mut self, reorder_s: f64) -> Option<Sample> {
+        let next = self.waiting.front()?;
+        let follows = match (self.released.and_then(|r| r.seq), next.seq) {
+            (Some(last), Some(seq)) => last.checked_add(1) == Some(seq),
+            _ => false,
+        };
+        let due = self.newest_s - next.t_s >= reorder_s || self.waiting.len() > MAX_WAITING;
+        if follows || due { self.flush() } else { None }
+    }
+
+    /// The next sample in order, due or not.
+    pub(super) fn flush(&mut self) -> Option<Sample> {
+        let next = self.waiting.pop_front()?;
+        self.released = Some(next);
+        Some(next)
+    }
+
+    /// Time of the last released sample, s.
+    pub(super) fn released_s(&self) -> Option<f64> {
+        self.released.map(|s| s.t_s)
+    }
+
+    pub(super) fn n_waiting(&self) -> usize {
+        self.waiting.len()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample(seq: Option<u64>, t_s: f64) -> Sample {
+        Sample { seq, t_s, ..Sample::default() }
+    }
+
+    fn released(samples: &[Sample]) -> Vec<f64> {
+        let mut align = Align::default();
+        let mut out = Vec::new();
+        for &s in samples {
+            align.push(s);
+            while let Some(s) = align.pop(0.1) {
+                out.push(s.t_s);
+            }
+        }
+        while let Some(s) = align.flush() {
+            out.push(s.t_s);
+        }
+        out
+    }
+
+    #[test]
+    fn out_of_order_within_the_window_is_put_in_order() {
+        let times = [0.0, 0.02, 0.01, 0.05, 0.04, 0.2, 0.15];
+        let samples: Vec<Sample> = times.iter().map(|&t| sample(None, t)).collect();
+        assert_eq!(released(&samples), [0.0, 0.01, 0.02, 0.04, 0.05, 0.15, 0.2]);
+    }
+
+    #[test]
+    fn what_follows_on_does_not_wait() {
+        let mut align = Align::default();
+        for (seq, t) in [(7, 0.0), (8, 0.01), (9, 0.15)] {
+            align.push(sample(Some(seq), t));
+        }
+        let out: Vec<f64> = core::iter::from_fn(|| align.pop(0.1)).map(|s| s.t_s).collect();
+        assert_eq!(out, [0.0, 0.01, 0.15]);
+        align.push(sample(Some(11), 0.16));
+        assert!(align.pop(0.1).is_none(), "seq 10 may still come");
+    }
+}

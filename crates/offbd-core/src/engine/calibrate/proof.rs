@@ -1,0 +1,166 @@
+//! A calibration proves itself: each of its sessions is judged, with less
+//! patience than later, by what the others taught. Where that alarms, the rig
+//! varies more than the others showed: the limit in question is widened until it
+//! is quiet, or the calibration is refused.
+
+use super::self_test::{SelfTest, judge};
+use super::widening::Widening;
+use super::{CannotCalibrate, certificate, teach};
+use crate::diagnosis::{AxisCalibration, Calibration, Settings};
+use crate::engine::{Rig, Setup};
+#[cfg(not(feature = "std"))]
+use crate::no_std::*;
+use crate::vocabulary::{Axis, FaultCode, Sample};
+
+/// Sessions are judged in so many groups at most: each costs a calibration.
+const MOST_GROUPS: usize = 4;
+/// Share of the time that confirms a fault later which no healthy session may
+/// reach.
+pub(super) const PATIENCE: f64 = 0.6;
+/// Times that anything is widened at most.
+const MOST_STEPS: usize = 40;
+/// Length of a session of which half need not teach anything by itself, s.
+const LONG_S: f64 = 60.0;
+/// By how much more than in the tests a path may bend where there was one test, as a
+/// share: the most of few tests is likely to be exceeded. Chosen, not measured: a fifth
+/// more of three tests, hardly anything of twenty.
+const FEW_TESTS: f64 = 0.6;
+/// Most scatter that is taken over from the tests, m: more is no noise but a
+/// motion that the fit does not follow.
+const MOST_SCATTER_M: f64 = 1e-3;
+
+/// `learnt` as widened until `sessions` are quiet, each judged by what the others
+/// teach; of one session, each half by what the other does.
+///
+/// # Errors
+/// [`CannotCalibrate::Untested`] if there is too little to judge by, and
+/// [`CannotCalibrate::AccusesItself`] if nothing that can be widened helps.
+pub(super) fn prove(
+    rig: &Rig,
+    learnt: Calibration,
+    sessions: &[Vec<Sample>],
+) -> Result<Calibration, CannotCalibrate> {
+    let folds = folds(rig, &learnt, sessions)?;
+    let mut widening = Widening::default();
+    let mut tests = Vec::new();
+    for _ in 0..MOST_STEPS {
+        tests = folds.iter().flat_map(|fold| fold.tests(rig, &widening)).collect();
+        let asked = tests.iter().filter(|test| widening.widen(test)).count();
+        if asked == 0 {
+            return Ok(with_most(widening.of(&learnt), &tests));
+        }
+        if widening.is_beyond(&learnt) {
+            break;
+        }
+    }
+    Err(accusation(&tests))
+}
+
+/// `learnt` with the most that any test has shown of what is only counted.
+fn with_most(mut learnt: Calibration, tests: &[SelfTest]) -> Calibration {
+    for axis in Axis::ALL {
+        let most_nats = tests.iter().map(|t| t.most_nats[axis].0).fold(0.0, f64::max);
+        let seen_m = tests.iter().map(|t| t.most_path_error_m[axis]).fold(0.0, f64::max);
+        let most_path_error_m = seen_m * (1.0 + FEW_TESTS / tests.len() as f64);
+        let with = |a| AxisCalibration { most_nats, most_path_error_m, ..a };
+        learnt.axes[axis] = learnt.axes[axis].map(with);
+    }
+    let most = |of: fn(&SelfTest) -> f64| tests.iter().map(of).fold(0.0, f64::max);
+    let scatter_m = most(|t| t.most_scatter_m).min(MOST_SCATTER_M);
+    let sensor = &mut learnt.sensor;
+    sensor.most_outliers = sensor.most_outliers.max(most(|t| t.most_outliers));
+    sensor.most_scatter_m = sensor.most_scatter_m.max(scatter_m);
+    learnt.certificate = Some(certificate::of(&learnt, tests));
+    learnt
+}
+
+/// What the first test that was not quiet accuses its session of: where nothing
+/// is confirmed, of the servo with the most evidence against it.
+fn accusation(tests: &[SelfTest]) -> CannotCalibrate {
+    let alarmed = tests.iter().find_map(|t| Some((t.session, t.alarm?)));
+    if let Some((session, alarm)) = alarmed {
+        let (code, kind, at_s) = (alarm.code, alarm.kind, alarm.at_s);
+        return CannotCalibrate::AccusesItself { session, code, kind, at_s };
+    }
+    let servo = |t: &SelfTest, axis: Axis| (t.session, FaultCode::servo(axis), t.most_nats[axis]);
+    let (session, code, (_, at_s)) = tests
+        .iter()
+        .flat_map(|t| Axis::ALL.map(|axis| servo(t, axis)))
+        .max_by(|(.., a), (.., b)| a.0.total_cmp(&b.0))
+        .expect("every fold has judged a session");
+    CannotCalibrate::AccusesItself { session, code, kind: None, at_s }
+}
+
+/// Sessions to judge by what the others teach.
+struct Fold {
+    taught: Calibration,
+    judged: Vec<(usize, Vec<Sample>)>,
+}
+
+impl Fold {
+    fn tests(&self, rig: &Rig, widening: &Widening) -> Vec<SelfTest> {
+        let rig = Rig { calibration: Some(widening.of(&self.taught)), ..rig.clone() };
+        let Ok(mut setup) = Setup::new(rig, None) else { return Vec::new() };
+        setup.settings = impatient(&setup.settings);
+        self.judged.iter().map(|(session, samples)| judge(&setup, *session, samples)).collect()
+    }
+}
+
+/// `settings` that alarm sooner than they will later, and not by the weight of
+/// evidence, which is only measured.
+fn impatient(settings: &Settings) -> Settings {
+    Settings {
+        fail_s: PATIENCE * settings.fail_s,
+        confirm_s: PATIENCE * settings.confirm_s,
+        readings_fail_s: PATIENCE * settings.readings_fail_s,
+        noise_fail_s: PATIENCE * settings.noise_fail_s,
+        readings_confirm_s: PATIENCE * settings.readings_confirm_s,
+        suspect_nats: f64::MAX,
+        confirm_nats: f64::MAX,
+        ..*settings
+    }
+}
+
+fn folds(
+    rig: &Rig,
+    learnt: &Calibration,
+    sessions: &[Vec<Sample>],
+) -> Result<Vec<Fold>, CannotCalibrate> {
+    if let [session] = sessions {
+        return halves(rig, session).or_else(|reason| match learnt.duration_s >= LONG_S {
+            // Long enough to be judged by what it taught itself.
+            true => Ok(vec![Fold { taught: learnt.clone(), judged: vec![(1, session.clone())] }]),
+            false => Err(reason),
+        });
+    }
+    let n_groups = sessions.len().min(MOST_GROUPS);
+    let fold = |group: usize| {
+        let of_group = |i: &usize| i % n_groups == group;
+        let (judged, teaching): (Vec<usize>, Vec<usize>) = (0..sessions.len()).partition(of_group);
+        let teaching: Vec<Vec<Sample>> = teaching.iter().map(|&i| sessions[i].clone()).collect();
+        let judged = judged.iter().map(|&i| (i + 1, sessions[i].clone())).collect();
+        taught(rig, "one group of sessions", &teaching, judged)
+    };
+    (0..n_groups).map(fold).collect()
+}
+
+/// Each half of a session, to be judged by what the other teaches.
+fn halves(rig: &Rig, session: &[Sample]) -> Result<Vec<Fold>, CannotCalibrate> {
+    let (first, second) = session.split_at(session.len() / 2);
+    let fold = |teaching: &[Sample], judged: &[Sample]| {
+        taught(rig, "half of the recording", &[teaching.to_vec()], vec![(1, judged.to_vec())])
+    };
+    Ok(vec![fold(first, second)?, fold(second, first)?])
+}
+
+fn taught(
+    rig: &Rig,
+    what: &'static str,
+    teaching: &[Vec<Sample>],
+    judged: Vec<(usize, Vec<Sample>)>,
+) -> Result<Fold, CannotCalibrate> {
+    match teach(rig, teaching) {
+        Ok(taught) => Ok(Fold { taught, judged }),
+        Err(reason) => Err(CannotCalibrate::Untested { what, reason: Box::new(reason) }),
+    }
+}

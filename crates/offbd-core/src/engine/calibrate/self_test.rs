@@ -1,0 +1,126 @@
+//! A healthy session judged by what was learnt: how well it is foretold, and how
+//! near each monitor came to an alarm.
+
+#[cfg(not(feature = "std"))]
+use crate::no_std::*;
+use alloc::collections::VecDeque;
+
+use crate::diagnosis::{Evidence, FaultMemory};
+use crate::engine::{Engine, Input, Output, Setup};
+use crate::vocabulary::{Axis, FaultCode, FaultKind, FaultStatus, PerAxis, Sample};
+
+/// Time for which scatter must last to count, s.
+const LASTING_S: f64 = 0.2;
+
+/// How one session was judged.
+pub(super) struct SelfTest {
+    /// Number of the session among those that were learnt from, from 1 on.
+    pub(super) session: usize,
+    /// The first fault that was confirmed.
+    pub(super) alarm: Option<Accusation>,
+    /// Most evidence against each servo, nats, and when that was, s.
+    pub(super) most_nats: PerAxis<(f64, f64)>,
+    /// The most that the path of each axis bent from the twin's, m.
+    pub(super) most_path_error_m: PerAxis<f64>,
+    pub(super) most_outliers: f64,
+    /// Most scatter that lasted, m.
+    pub(super) most_scatter_m: f64,
+    /// The nearest that each monitor came to an alarm by the time of its failures,
+    /// 0 to 1, and the seconds that it could judge.
+    pub(super) nearest: [(f64, f64); FaultCode::COUNT],
+    /// How well the readings of each axis were foretold, nats.
+    pub(super) foretold_nats: PerAxis<f64>,
+}
+
+/// A fault that a healthy session was accused of.
+#[derive(Clone, Copy)]
+pub(super) struct Accusation {
+    pub(super) at_s: f64,
+    pub(super) code: FaultCode,
+    pub(super) kind: Option<FaultKind>,
+    pub(super) still_s: f64,
+    pub(super) unseen_s: f64,
+}
+
+/// Judges `samples`, the session with that number, by `setup`.
+pub(super) fn judge(setup: &Setup, session: usize, samples: &[Sample]) -> SelfTest {
+    let mut engine = Engine::new(setup.clone(), FaultMemory::default());
+    let (mut outputs, mut alarm, mut most_outliers) = (Vec::new(), None, 0.0_f64);
+    let (mut scatter, mut nats) = (Lasting::default(), PerAxis::<(f64, f64)>::default());
+    for &sample in samples {
+        engine.handle(Input::Sample(sample), &mut outputs);
+        let seen = engine.evidence();
+        most_outliers = most_outliers.max(f64::from(seen.outliers));
+        scatter.take(sample.t_s, seen.scatter_m.unwrap_or(0.0));
+        let reached = engine.most_nats();
+        for axis in Axis::ALL {
+            if reached[axis] > nats[axis].0 {
+                nats[axis] = (reached[axis], sample.t_s);
+            }
+        }
+        alarm = alarm.or_else(|| outputs.iter().find_map(confirmed));
+        outputs.clear();
+    }
+    SelfTest {
+        session,
+        alarm,
+        most_nats: nats,
+        most_path_error_m: engine.most_path_error_m(),
+        most_outliers,
+        most_scatter_m: scatter.most,
+        nearest: engine.nearest(),
+        foretold_nats: engine.foretold_nats(),
+    }
+}
+
+fn confirmed(output: &Output) -> Option<Accusation> {
+    let Output::Transition(t) = output else { return None };
+    let Evidence { still_s, unseen_s, .. } = t.evidence;
+    let (at_s, code, kind) = (t.at.seconds(), t.code, t.suspicion.kind);
+    let alarm = Accusation { at_s, code, kind, still_s, unseen_s };
+    (t.status == FaultStatus::Confirmed).then_some(alarm)
+}
+
+/// The most that a quantity has stayed above for [`LASTING_S`].
+#[derive(Default)]
+struct Lasting {
+    /// The values that no later one has undercut, and when each was last seen, s.
+    low: VecDeque<(f64, f64)>,
+    since_s: Option<f64>,
+    most: f64,
+}
+
+impl Lasting {
+    fn take(&mut self, t_s: f64, value: f64) {
+        while self.low.back().is_some_and(|&(_, v)| v >= value) {
+            self.low.pop_back();
+        }
+        self.low.push_back((t_s, value));
+        while self.low.len() > 1 && self.low[0].0 <= t_s - LASTING_S {
+            self.low.pop_front();
+        }
+        if t_s - *self.since_s.get_or_insert(t_s) >= LASTING_S {
+            self.most = self.most.max(self.low[0].1);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_lasts_counts() {
+        let mut lasting = Lasting::default();
+        for i in 0..200 {
+            // A peak of 0.1 s, a plateau of 0.3 s.
+            let value = match i {
+                50..60 => 9.0,
+                100..130 => 3.0,
+                _ => 1.0,
+            };
+            lasting.take(f64::from(i) * 0.01, value);
+        }
+        assert_eq!(lasting.most, 3.0);
+    }
+}

@@ -1,0 +1,65 @@
+//! How much data a session has brought, in seconds, whatever the gates say.
+
+use crate::vocabulary::{Axis, FaultCode, Sample};
+
+/// Seconds of data so far. A gap between two samples does not count.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Coverage {
+    first_s: Option<f64>,
+    last_s: Option<f64>,
+    /// With a sample, s.
+    sampled_s: f64,
+    /// With a ball seen, s.
+    seen_s: f64,
+}
+
+impl Coverage {
+    /// Takes the next sample in order; one more than `gap_s` seconds after the
+    /// last begins anew.
+    pub(super) fn take(&mut self, sample: &Sample, gap_s: f64) {
+        self.first_s.get_or_insert(sample.t_s);
+        let dt = self.last_s.replace(sample.t_s).map_or(0.0, |last_s| sample.t_s - last_s);
+        if !(0.0..=gap_s).contains(&dt) {
+            return;
+        }
+        self.sampled_s += dt;
+        if Axis::ALL.into_iter().any(|axis| sample.position(axis).is_some()) {
+            self.seen_s += dt;
+        }
+    }
+
+    /// `judged_s` seconds as a share of the session from its first sample to its
+    /// last, gaps included: in a gap nothing is judged either. A judgement counts
+    /// for the period before it, which may begin before the first sample.
+    pub(super) fn share(&self, judged_s: f64) -> f64 {
+        let session_s = self.last_s.zip(self.first_s).map_or(0.0, |(last, first)| last - first);
+        if session_s > 0.0 { (judged_s / session_s).min(1.0) } else { 0.0 }
+    }
+
+    /// Seconds that the monitor of `code` could have judged, had its gate
+    /// always been open: samples for the sensor's, a ball for the others.
+    pub(super) const fn data_s(&self, code: FaultCode) -> f64 {
+        match code {
+            FaultCode::Sensor => self.sampled_s,
+            _ => self.seen_s,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gaps_do_not_count_and_only_the_sensor_needs_no_ball() {
+        let mut coverage = Coverage::default();
+        for (t_s, x_m) in
+            [(0.0, Some(0.0)), (0.25, Some(0.0)), (0.5, None), (9.0, Some(0.0)), (9.25, Some(0.1))]
+        {
+            coverage.take(&Sample { t_s, x_m, ..Sample::default() }, 0.3);
+        }
+        assert_eq!(coverage.data_s(FaultCode::Sensor), 0.75);
+        assert_eq!(coverage.data_s(FaultCode::XServo), 0.5);
+        assert_eq!([0.0, 3.7, 99.0].map(|s| coverage.share(s)), [0.0, 0.4, 1.0]);
+    }
+}

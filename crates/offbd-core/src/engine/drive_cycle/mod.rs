@@ -1,0 +1,162 @@
+//! The drive cycle of a rig: the shortest motion in which every monitor comes to a
+//! result and every fault that can be found is found.
+//!
+//! Vehicles have drive cycles for readiness. Here the motion is chosen from a small
+//! family ([`motion`]) by trying its members, the shortest first, on the learnt rig
+//! itself ([`trial`]): healthy, in sessions as different as were learnt, no test may
+//! fail and the ball may not come to the edge; then with every fault that is there
+//! from the start ([`fault`]). The member in which the most monitors pass and the
+//! most faults are found is taken, of equally good ones the shortest. What none
+//! reaches is named. Nothing of it is chance, and the work has a bound.
+
+mod fault;
+mod law;
+mod motion;
+mod noise;
+mod search;
+mod table;
+mod trial;
+
+#[cfg(not(feature = "std"))]
+use crate::no_std::*;
+pub use fault::TriedFault;
+pub use law::DriveLaw;
+pub use motion::Order;
+
+use search::{Best, Search};
+
+use super::Rig;
+use crate::vocabulary::{Axis, FaultCode, Invalid, PerAxis, Sample};
+
+/// How a correction follows from one reading, in the numbers of the device.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Feedback {
+    /// Which of the device's readings: the plate's axes may be swapped.
+    pub reading: Axis,
+    /// Command per distance from the set point (set point − reading); signed.
+    pub proportional: f64,
+    /// Command per distance and second; signed.
+    pub integral: f64,
+    /// Command per rate of that distance, s; signed.
+    pub derivative: f64,
+}
+
+/// Why a monitor comes to no result on the healthy rig.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NotReached {
+    /// The rig has no such servo, or no readings along its axis.
+    NoSuchAxis,
+    /// No motion within the plate and the servos' limits lets it judge for long
+    /// enough.
+    TooLittleMotion,
+}
+
+/// When the monitor of a code passes on the healthy rig, s after the start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MonitorVerdict {
+    pub code: FaultCode,
+    pub passed: Result<f64, NotReached>,
+}
+
+/// How a fault that is there from the start is found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FaultVerdict {
+    pub fault: TriedFault,
+    /// When it is confirmed, s after the start, in the slowest trial; none where
+    /// not every trial did.
+    pub after_s: Option<f64>,
+    /// A cause that reads alike and is named beside it.
+    pub beside: Option<FaultCode>,
+}
+
+/// A drive cycle, in the numbers of the device: its axes, signs and units.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DriveCycle {
+    pub duration_s: f64,
+    /// Duration of one motion to both sides and back, s.
+    pub period_s: f64,
+    /// Such motions along each axis.
+    pub repeats: u32,
+    pub order: Order,
+    /// Largest distance of the set points from the plate's middle, m, per plate
+    /// axis; zero along one that the rig has not.
+    pub amplitude_m: PerAxis<f64>,
+    /// Largest tilt that is commanded beforehand, rad, per plate axis.
+    pub tilt_rad: PerAxis<f64>,
+    /// How far a session's level may be from the learnt one, rad, per plate axis: so
+    /// far it was tried.
+    pub level_within_rad: PerAxis<f64>,
+    /// Rows a second.
+    pub rate_hz: f64,
+    /// Commands and set points over time, evenly spaced from zero to the end.
+    pub rows: Vec<Sample>,
+    /// How to correct each command; none for an axis without a servo.
+    pub feedback: PerAxis<Option<Feedback>>,
+    /// Time constant of the filter of the correction's rate, s.
+    pub filter_s: f64,
+    /// Largest command, either way.
+    pub limit: f64,
+    /// One per code, in the order of [`FaultCode::ALL`].
+    pub monitors: Vec<MonitorVerdict>,
+    /// Those hardest to find first.
+    pub faults: Vec<FaultVerdict>,
+}
+
+/// Why there is no drive cycle for a rig.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum NoDriveCycle {
+    #[error(transparent)]
+    Invalid(#[from] Invalid),
+    #[error(
+        "/calibration: the rig is not learnt, so neither its servos nor its ball can be tested; \
+         learn it from a minute or two in which the ball rolls, then ask again"
+    )]
+    NotLearnt,
+    #[error(
+        "/plate: it leaves the ball {:.1} mm along {axis}, less than a motion takes",
+        1e3 * room_m, axis = axis.as_str()
+    )]
+    NoRoom { axis: Axis, room_m: f64 },
+    #[error(
+        "/servo/angle_limit_rad: within it and within the plate no motion moves the ball enough to \
+         overcome its friction"
+    )]
+    TooLittleTilt,
+    #[error(
+        "of the motions that plate and servos allow none keeps a healthy ball clear of the edge and \
+         every test of it from failing"
+    )]
+    NotSafe,
+}
+
+impl DriveCycle {
+    /// The commands before the first reading.
+    fn first_commands(&self) -> PerAxis<Option<f64>> {
+        let first = self.rows.first();
+        PerAxis::from_fn(|axis| first.and_then(|row| row.command(axis)))
+    }
+
+    /// The axes that the rig has.
+    fn axes(&self) -> PerAxis<bool> {
+        PerAxis::from_fn(|axis| self.feedback[axis].is_some())
+    }
+}
+
+/// The drive cycle of `rig`.
+///
+/// # Errors
+/// [`NoDriveCycle`], which says what to change.
+pub fn drive_cycle(rig: &Rig) -> Result<DriveCycle, NoDriveCycle> {
+    let search = Search::new(rig)?;
+    let family = search.family()?;
+    let Best { motion, spread, found } = search.best(&family).ok_or(NoDriveCycle::NotSafe)?;
+    let mut cycle = search.cycle(&motion, &rig.mapping);
+    cycle.level_within_rad = PerAxis::from_fn(|axis| {
+        search.learnt(axis).map_or(0.0, |learnt| spread * learnt.level_spread_rad)
+    });
+    (cycle.monitors, cycle.faults) = (found.monitors, found.faults);
+    Ok(cycle)
+}
+
+#[cfg(test)]
+mod tests;

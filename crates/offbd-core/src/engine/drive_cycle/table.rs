@@ -1,0 +1,94 @@
+//! A motion as a table of commands and set points, with the corrections that keep the
+//! ball on it, for a device whose numbers are those of a mapping.
+
+use super::motion::Motion;
+use super::search::Search;
+use super::{DriveCycle, Feedback};
+use crate::engine::AxisMapping;
+#[cfg(not(feature = "std"))]
+use crate::no_std::*;
+use crate::vocabulary::{Axis, PerAxis, Sample};
+
+/// Most rows of a cycle a second; a device that turns faster uses each for longer.
+const MAX_ROWS_HZ: f64 = 100.0;
+/// The bandwidth of the correction times all delays of the loop, and its largest,
+/// rad/s: as the simulated rigs' loops have it.
+const LOOP_SHARE: f64 = 0.25;
+const MOST_RAD_S: f64 = 3.0;
+/// Periods that a loop takes: one to answer, half of one in which a command holds.
+const LOOP_PERIODS: f64 = 1.5;
+/// Its damping ratio, and its integral action as a share of the bandwidth.
+const DAMPING: f64 = 0.9;
+const INTEGRAL: f64 = 0.25;
+/// Shortest filter of the correction's rate, s, and in periods.
+const FILTER_S: f64 = 0.05;
+const FILTER_PERIODS: f64 = 2.0;
+
+impl Search {
+    /// `motion` as a table for a device whose numbers are those of `mapping`.
+    pub(super) fn cycle(&self, motion: &Motion, mapping: &AxisMapping) -> DriveCycle {
+        let rig = &self.setup.rig;
+        let rate_hz = rig.sample_rate_hz.min(MAX_ROWS_HZ);
+        let duration_s = motion.duration_s();
+        let n = (duration_s * rate_hz).ceil() as u32;
+        let row = |i: u32| self.row(motion, mapping, f64::from(i) / rate_hz);
+        DriveCycle {
+            duration_s,
+            period_s: motion.period_s,
+            repeats: motion.repeats,
+            order: motion.order,
+            amplitude_m: motion.amplitude_m,
+            tilt_rad: PerAxis::from_fn(|axis| self.tilt_rad(motion, axis)),
+            rate_hz,
+            rows: (0..=n).map(row).collect(),
+            feedback: self.feedback(mapping),
+            filter_s: FILTER_S.max(FILTER_PERIODS / rig.sample_rate_hz),
+            level_within_rad: PerAxis::default(),
+            limit: rig.servo.angle_limit_rad / mapping.command_unit_rad,
+            monitors: Vec::new(),
+            faults: Vec::new(),
+        }
+    }
+
+    fn row(&self, motion: &Motion, mapping: &AxisMapping, t_s: f64) -> Sample {
+        let command = |axis: Axis| {
+            let learnt = self.learnt(axis)?;
+            // The servo is late by this much.
+            let ahead_s = learnt.dead_time_s + learnt.lag_s;
+            let wanted = motion.acceleration_m_s2(axis, t_s + ahead_s) / self.slope_m_s2(axis);
+            Some((wanted - learnt.level_rad) / mapping.command_unit_rad)
+        };
+        let position = PerAxis::from_fn(|axis| {
+            self.learnt(axis)?;
+            let unit_m = mapping.position_unit_m * mapping.sign[axis];
+            Some((motion.position_m(axis, t_s) + mapping.origin_m[axis]) / unit_m)
+        });
+        let (x_m, y_m) = match mapping.swap {
+            true => (position.y, position.x),
+            false => (position.x, position.y),
+        };
+        let (cmd_qx_rad, cmd_qy_rad) = (command(Axis::Y), command(Axis::X));
+        Sample { seq: None, t_s, cmd_qx_rad, cmd_qy_rad, x_m, y_m }
+    }
+
+    /// Pole placement on ẍ = slope·command, as fast as the delays allow.
+    fn feedback(&self, mapping: &AxisMapping) -> PerAxis<Option<Feedback>> {
+        let rig = &self.setup.rig;
+        let refresh_s = rig.calibration.as_ref().map_or(0.0, |c| c.sensor.refresh_s);
+        let late_s = |axis: Axis| self.learnt(axis).map_or(0.0, |l| l.dead_time_s + l.lag_s);
+        let late_s = late_s(Axis::X).max(late_s(Axis::Y));
+        let delay_s = late_s + refresh_s + LOOP_PERIODS / rig.sample_rate_hz;
+        let w = (LOOP_SHARE / delay_s).min(MOST_RAD_S);
+        PerAxis::from_fn(|axis| {
+            self.learnt(axis)?;
+            let metres = mapping.position_unit_m * mapping.sign[axis];
+            let per_m = metres / self.slope_m_s2(axis) / mapping.command_unit_rad;
+            Some(Feedback {
+                reading: if mapping.swap { axis.other() } else { axis },
+                proportional: w * w * per_m,
+                integral: INTEGRAL * w * w * w * per_m,
+                derivative: 2.0 * DAMPING * w * per_m,
+            })
+        })
+    }
+}

@@ -1,0 +1,135 @@
+//! How far the ball is from the edge of the plate, and since when.
+
+use super::Rig;
+use super::frame::Moment;
+use crate::plant::Plate;
+use crate::vocabulary::{Axis, PerAxis, SimTime};
+
+/// The stage.
+#[derive(Clone, Debug)]
+pub(super) struct Edge {
+    plate: Plate,
+    /// Distance from the edge within which it may act, m.
+    room_m: f64,
+    /// Acceleration that the steepest plate gives the ball, m/s².
+    most_m_s2: f64,
+    /// Whether the ball was last read within that room, or may have been there
+    /// between the last two readings.
+    pub at_edge: bool,
+    /// For how long it has not been, s.
+    pub clear_s: f64,
+    /// The axis across whose rim the ball lies, and for how long, s.
+    pub rim: Option<Axis>,
+    pub rim_s: f64,
+    /// The last two readings, the newest last: where the ball is going.
+    course: [Option<(SimTime, PerAxis<f64>)>; 2],
+}
+
+impl Edge {
+    pub(super) fn new(rig: &Rig) -> Self {
+        Self {
+            plate: rig.plate,
+            room_m: rig.contact_room_m(),
+            most_m_s2: rig.ball.rolling_gravity() * rig.servo.angle_limit_rad,
+            at_edge: false,
+            clear_s: 0.0,
+            rim: None,
+            rim_s: 0.0,
+            course: [None; 2],
+        }
+    }
+
+    /// Forgets the past, as after a gap.
+    pub(super) fn restart(&mut self) {
+        self.clear_s = 0.0;
+        self.rim_s = 0.0;
+        self.course = [None; 2];
+    }
+
+    /// Whether there is no rim that would keep the ball on the plate.
+    pub(super) fn is_open(&self) -> bool {
+        !self.plate.rim()
+    }
+
+    /// Whether the ball, going on as by the last two readings or as the plate may
+    /// have hurried it, would by `at` have met a rim: a slow sensor sees it before
+    /// and after, and never at it.
+    pub(super) fn may_have_bounced(&self, at: SimTime) -> bool {
+        let [Some((earlier, from)), Some((newest, to))] = self.course else { return false };
+        let share = (at - newest) / (newest - earlier);
+        let ahead = |axis: Axis| to[axis] + share * (to[axis] - from[axis]);
+        let hurried_m = self.most_m_s2 / 2.0 * (at - newest) * (at - earlier);
+        let left_m = self.plate.edge_distance_m(ahead(Axis::X), ahead(Axis::Y));
+        self.plate.rim() && left_m < self.room_m + hurried_m
+    }
+
+    /// Whether the readings of `moment` are farther beyond the edge than the edge
+    /// is from the middle, and the ball has not left the plate before: no ball is
+    /// there, whatever the sensor takes for one.
+    pub(super) fn is_far_off(&self, moment: &Moment) -> bool {
+        let PerAxis { x, y } = moment.position.map(Option::unwrap_or_default);
+        let beyond_m = -self.plate.edge_distance_m(x, y);
+        !self.at_edge && beyond_m > self.plate.edge_distance_m(0.0, 0.0)
+    }
+
+    /// Takes a moment, `dt` after the one before; its readings if they are
+    /// `usable`. An axis that is not measured does not count.
+    pub(super) fn take(&mut self, moment: &Moment, dt: f64, usable: bool) {
+        let PerAxis { x, y } = moment.position;
+        if usable && x.or(y).is_some() {
+            let place = PerAxis { x: x.unwrap_or(0.0), y: y.unwrap_or(0.0) };
+            self.at_edge = self.is_near(place.x, place.y) || self.may_have_bounced(moment.at);
+            let rim = self.plate.edge_axis(place.x, place.y, self.room_m);
+            let rim = rim.filter(|_| self.plate.rim());
+            self.rim_s = if rim.is_some() && rim == self.rim { self.rim_s + dt } else { 0.0 };
+            self.rim = rim;
+            self.course = [self.course[1], Some((moment.at, place))];
+        }
+        self.clear_s = if self.at_edge { 0.0 } else { self.clear_s + dt };
+    }
+
+    fn is_near(&self, x_m: f64, y_m: f64) -> bool {
+        self.plate.edge_distance_m(x_m, y_m) < self.room_m
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A ball along x on the chapter's plate, 0.38 m long, read at 10 Hz.
+    fn moments(places: &[f64]) -> Vec<Moment> {
+        let at = |i: usize| SimTime::new(0.1 * i as f64).unwrap();
+        let moment = |(i, &x): (usize, &f64)| Moment {
+            at: at(i),
+            command: PerAxis::default(),
+            position: PerAxis { x: Some(x), y: Some(0.0) },
+        };
+        places.iter().enumerate().map(moment).collect()
+    }
+
+    fn at_edge(rig: &Rig, places: &[f64]) -> bool {
+        let mut edge = Edge::new(rig);
+        moments(places).iter().for_each(|m| edge.take(m, 0.1, true));
+        edge.at_edge
+    }
+
+    #[test]
+    fn a_ball_that_would_have_met_the_rim_between_two_readings_may_have_bounced() {
+        let rig = Rig::chapter("a");
+        assert!(at_edge(&rig, &[0.08, 0.13, 0.14]), "it was at 0.18 m in between");
+        assert!(!at_edge(&rig, &[0.08, 0.11, 0.10]), "it would have got to 0.14 m");
+        let open = Plate::new(rig.plate.shape(), 0.02, false).unwrap();
+        assert!(!at_edge(&Rig { plate: open, ..rig }, &[0.08, 0.13, 0.14]), "there is no rim");
+    }
+
+    #[test]
+    fn a_restart_forgets_where_the_ball_was_going() {
+        let mut edge = Edge::new(&Rig::chapter("a"));
+        let moments = moments(&[0.08, 0.13, 0.14]);
+        moments[..2].iter().for_each(|m| edge.take(m, 0.1, true));
+        assert!(edge.may_have_bounced(moments[2].at));
+        edge.restart();
+        assert!(!edge.may_have_bounced(moments[2].at));
+    }
+}

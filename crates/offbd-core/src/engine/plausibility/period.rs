@@ -1,0 +1,85 @@
+//! The median time between samples, in bounded memory: a histogram over times
+//! that grow by a quarter from one class to the next.
+
+#[cfg(not(feature = "std"))]
+use crate::no_std::*;
+
+/// Shortest and longest time that are told apart, as powers of ten of a second:
+/// faster than any sensor, and a clock in microseconds that ticks once a second.
+const FROM_DECADE: i32 = -6;
+const TO_DECADE: i32 = 7;
+/// Classes to a decade.
+const PER_DECADE: i32 = 10;
+const CLASSES: usize = ((TO_DECADE - FROM_DECADE) * PER_DECADE) as usize;
+
+/// Times of one class.
+#[derive(Clone, Copy, Debug, Default)]
+struct Class {
+    n: u32,
+    sum_s: f64,
+}
+
+/// Times between samples.
+#[derive(Clone, Debug)]
+pub(super) struct Periods {
+    classes: [Class; CLASSES],
+    n: u32,
+}
+
+impl Default for Periods {
+    fn default() -> Self {
+        Self { classes: [Class::default(); CLASSES], n: 0 }
+    }
+}
+
+impl Periods {
+    /// Takes the time since the newest sample; one that came late says nothing.
+    pub(super) fn take(&mut self, dt_s: f64) {
+        if dt_s > 0.0 && dt_s.is_finite() {
+            let place = (dt_s.log10() - f64::from(FROM_DECADE)) * f64::from(PER_DECADE);
+            let class = &mut self.classes[(place.max(0.0) as usize).min(CLASSES - 1)];
+            class.n = class.n.saturating_add(1);
+            class.sum_s += dt_s;
+            self.n = self.n.saturating_add(1);
+        }
+    }
+
+    /// The mean of the class that holds the median; none of fewer than `least`.
+    pub(super) fn median_s(&self, least: u32) -> Option<f64> {
+        if self.n < least {
+            return None;
+        }
+        let mut below = 0_u32;
+        let class = self.classes.iter().find(|class| {
+            below = below.saturating_add(class.n);
+            below > self.n / 2
+        })?;
+        Some(class.sum_s / f64::from(class.n))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_median_is_that_of_its_class() {
+        let mut periods = Periods::default();
+        for i in 0..100 {
+            periods.take(if i % 10 == 0 { 4000.0 } else { 0.01 });
+        }
+        periods.take(-5.0);
+        periods.take(f64::INFINITY);
+        assert!((periods.median_s(20).unwrap() - 0.01).abs() < 1e-12);
+        assert_eq!(periods.median_s(101), None);
+    }
+
+    #[test]
+    fn what_is_beyond_the_classes_goes_into_the_outer_ones() {
+        let mut periods = Periods::default();
+        (0..30).for_each(|_| periods.take(1e12));
+        assert_eq!(periods.median_s(20), Some(1e12));
+        (0..60).for_each(|_| periods.take(1e-12));
+        assert!((periods.median_s(20).unwrap() - 1e-12).abs() < 1e-20);
+    }
+}

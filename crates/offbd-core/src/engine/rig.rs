@@ -1,0 +1,198 @@
+//! A rig as its owner describes it, and the set-up that an engine runs on.
+
+use crate::diagnosis::{Calibration, Profile, Settings};
+#[cfg(not(feature = "std"))]
+use crate::no_std::*;
+use crate::plant::{Ball, Contact, Ladder, Plate, ServoModel, TwinAxis, TwinModel};
+use crate::vocabulary::{Axis, Invalid, PerAxis, in_range, positive};
+
+/// How a device's numbers relate to the plate frame. Applied when a sample is
+/// judged; the recording keeps what was sent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisMapping {
+    /// Whether the device's x is the plate's y and the reverse.
+    pub swap: bool,
+    /// Sign of the readings along each plate axis, +1 or −1.
+    pub sign: PerAxis<f64>,
+    /// Metres per unit of the readings.
+    pub position_unit_m: f64,
+    /// What is read where the middle of the plate is, m in the plate frame, −10 to
+    /// 10: taken off every reading.
+    pub origin_m: PerAxis<f64>,
+    /// Radians per unit of the commands.
+    pub command_unit_rad: f64,
+}
+
+impl Default for AxisMapping {
+    fn default() -> Self {
+        let sign = PerAxis { x: 1.0, y: 1.0 };
+        let origin_m = PerAxis::default();
+        Self { swap: false, sign, position_unit_m: 1.0, origin_m, command_unit_rad: 1.0 }
+    }
+}
+
+/// What the owner knows of the servos; both are of one kind.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ServoSpec {
+    pub angle_limit_rad: f64,
+    pub dead_time_s: f64,
+    pub lag_s: f64,
+    pub rate_limit_rad_s: f64,
+}
+
+impl Default for ServoSpec {
+    /// ±0.2 rad as in the chapter; a dead time of 40 ms and a lag of 60 ms are
+    /// the middle of the 80–300 ms seen on real rigs' low side; 10 rad/s is a
+    /// standard hobby servo (0.1 s per 60°).
+    fn default() -> Self {
+        Self { angle_limit_rad: 0.2, dead_time_s: 0.04, lag_s: 0.06, rate_limit_rad_s: 10.0 }
+    }
+}
+
+/// What the owner asks of the diagnosis.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DiagnosticsSpec {
+    pub profile: Profile,
+    /// Wanted false alarms per rig and year, above zero.
+    pub false_alarms_per_rig_year: Option<f64>,
+    /// Continuous failure before a test fails, s: of servos, ball and sensor.
+    pub debounce_s: Option<f64>,
+}
+
+/// A rig as described by its asset file, checked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rig {
+    pub name: String,
+    pub sample_rate_hz: f64,
+    pub ball: Ball,
+    pub plate: Plate,
+    /// How the ball touches the plate; the lockstep twin asks for its friction.
+    pub contact: Contact,
+    pub servo: ServoSpec,
+    pub mapping: AxisMapping,
+    pub diagnostics: DiagnosticsSpec,
+    pub calibration: Option<Calibration>,
+}
+
+/// Room between a ball and the edge where contact may begin, m.
+const EDGE_MARGIN_M: f64 = 0.006;
+
+/// Longest name of a rig, bytes.
+pub const MAX_NAME: usize = 128;
+
+impl Rig {
+    /// The chapter's rig under another name.
+    #[must_use]
+    pub fn chapter(name: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            sample_rate_hz: 100.0,
+            ball: Ball::default(),
+            plate: Plate::default(),
+            contact: Contact::default(),
+            servo: ServoSpec::default(),
+            mapping: AxisMapping::default(),
+            diagnostics: DiagnosticsSpec::default(),
+            calibration: None,
+        }
+    }
+
+    /// Checks what the parts' own constructors have not.
+    ///
+    /// # Errors
+    /// [`Invalid`] naming the element.
+    pub fn check(&self) -> Result<(), Invalid> {
+        let plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+        if self.name.is_empty() || self.name.len() > MAX_NAME || !self.name.chars().all(plain) {
+            let reason = format!("must be 1 to {MAX_NAME} letters, digits, `-`, `_` or `.`");
+            return Err(Invalid::new("/name", reason));
+        }
+        positive("/sample_rate_hz", self.sample_rate_hz, 100_000.0)?;
+        in_range("/servo/dead_time_s", self.servo.dead_time_s, 0.0..=5.0)?;
+        self.servo_model()?;
+        positive("/axes/position_unit_m", self.mapping.position_unit_m, 1000.0)?;
+        in_range("/axes/x_offset_m", self.mapping.origin_m.x, -10.0..=10.0)?;
+        in_range("/axes/y_offset_m", self.mapping.origin_m.y, -10.0..=10.0)?;
+        positive("/axes/command_unit_rad", self.mapping.command_unit_rad, 1000.0)?;
+        self.settings(self.diagnostics.profile)?;
+        Ok(())
+    }
+
+    /// Distance of the ball's centre from the edge, m, within which the edge may
+    /// act: a rim holds the ball by its side, without one its centre leaves.
+    pub(super) fn contact_room_m(&self) -> f64 {
+        let side_m = if self.plate.rim() { self.ball.radius_m() } else { 0.0 };
+        side_m + EDGE_MARGIN_M
+    }
+
+    fn servo_model(&self) -> Result<ServoModel, Invalid> {
+        ServoModel::new(self.servo.angle_limit_rad, self.servo.lag_s, self.servo.rate_limit_rad_s)
+    }
+
+    /// The models of this rig's ball, as near as `profile` asks for.
+    pub(super) fn ladder(&self, profile: Profile) -> Ladder {
+        let accuracy_m_s2 = Settings::of(profile).twin_accuracy_m_s2;
+        Ladder::new(&self.ball, &self.plate, self.contact.friction(), accuracy_m_s2)
+    }
+
+    /// The settings of `profile` with what this rig's owner asks for.
+    ///
+    /// # Errors
+    /// [`Invalid`] naming the element under `/diagnostics`.
+    pub fn settings(&self, profile: Profile) -> Result<Settings, Invalid> {
+        let settings = Settings::of(profile);
+        if profile != Profile::Default {
+            return Ok(settings);
+        }
+        let DiagnosticsSpec { false_alarms_per_rig_year, debounce_s, .. } = self.diagnostics;
+        let settings = match false_alarms_per_rig_year {
+            Some(per_year) => settings.with_false_alarms(per_year)?,
+            None => settings,
+        };
+        debounce_s.map_or(Ok(settings), |debounce_s| settings.with_debounce(debounce_s))
+    }
+}
+
+/// Everything an engine needs to judge one rig; immutable.
+#[derive(Clone, Debug)]
+pub struct Setup {
+    pub rig: Rig,
+    pub settings: Settings,
+    pub twin: TwinModel,
+}
+
+impl Setup {
+    /// The set-up for `rig`, judged by `profile` or, without one, by the
+    /// profile that its owner chose.
+    ///
+    /// # Errors
+    /// [`Invalid`] naming the first element of the rig that cannot be.
+    pub fn new(rig: Rig, profile: Option<Profile>) -> Result<Self, Invalid> {
+        rig.check()?;
+        let settings = rig.settings(profile.unwrap_or(rig.diagnostics.profile))?;
+        let mut twin = TwinModel::new(rig.ladder(settings.profile), nominal_axis(&rig)?);
+        for axis in Axis::ALL {
+            let learnt = rig.calibration.as_ref().and_then(|c| c.axes[axis]);
+            if let Some(learnt) = learnt {
+                twin.axes[axis] = TwinAxis {
+                    servo: ServoModel::new(
+                        rig.servo.angle_limit_rad,
+                        learnt.lag_s,
+                        rig.servo.rate_limit_rad_s,
+                    )?,
+                    dead_time_s: learnt.dead_time_s,
+                    gain: learnt.gain,
+                    level_rad: learnt.level_rad,
+                    resistance_m_s2: learnt.resistance_m_s2,
+                };
+            }
+        }
+        Ok(Self { rig, settings, twin })
+    }
+}
+
+/// Both axes before anything is learnt.
+fn nominal_axis(rig: &Rig) -> Result<TwinAxis, Invalid> {
+    let (servo, dead_time_s) = (rig.servo_model()?, rig.servo.dead_time_s);
+    Ok(TwinAxis { servo, dead_time_s, gain: 1.0, level_rad: 0.0, resistance_m_s2: 0.0 })
+}

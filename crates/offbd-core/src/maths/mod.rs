@@ -1,0 +1,18 @@
+//! Explicit integrators, least-squares filters and robust statistics.
+//!
+//! Pure and deterministic: numbers in, numbers out. Knows nothing of rigs.
+
+mod kinked_parabola;
+mod runge_kutta;
+pub mod sine;
+mod sliding_quadratic;
+mod statistics;
+mod system;
+
+pub use kinked_parabola::off_kinked_parabola;
+pub use runge_kutta::{
+    DOPRI5, EULER, Estimated, MIDPOINT, RK4, RungeKutta, dopri5, semi_implicit_euler,
+};
+pub use sliding_quadratic::{Fit, SlidingQuadratic, window_for};
+pub use statistics::{median, quantile, robust_deviation};
+pub use system::{System, moved};

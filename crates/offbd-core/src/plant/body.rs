@@ -1,0 +1,209 @@
+//! The bodies: a ball, and the plate it rolls on.
+
+#[cfg(not(feature = "std"))]
+use crate::no_std::*;
+use crate::vocabulary::{Axis, Invalid, in_range, positive};
+
+/// Standard gravity as the chapter rounds it, m/s².
+pub const GRAVITY_M_S2: f64 = 9.81;
+
+/// A homogeneous or hollow ball.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ball {
+    radius_m: f64,
+    mass_kg: f64,
+    inertia_factor: f64,
+}
+
+impl Ball {
+    /// A ball of `radius_m` in (0, 1], `mass_kg` in (0, 100] and
+    /// `inertia_factor` κ in [0, 1], where I = κ m r² (solid 2/5, hollow 2/3).
+    ///
+    /// # Errors
+    /// [`Invalid`] naming the element under `/ball`.
+    pub fn new(radius_m: f64, mass_kg: f64, inertia_factor: f64) -> Result<Self, Invalid> {
+        Ok(Self {
+            radius_m: positive("/ball/radius_m", radius_m, 1.0)?,
+            mass_kg: positive("/ball/mass_kg", mass_kg, 100.0)?,
+            inertia_factor: in_range("/ball/inertia_factor", inertia_factor, 0.0..=1.0)?,
+        })
+    }
+
+    #[must_use]
+    pub const fn radius_m(&self) -> f64 {
+        self.radius_m
+    }
+
+    #[must_use]
+    pub const fn mass_kg(&self) -> f64 {
+        self.mass_kg
+    }
+
+    /// κ of I = κ m r².
+    #[must_use]
+    pub const fn inertia_factor(&self) -> f64 {
+        self.inertia_factor
+    }
+
+    /// How easily air moves it: its area over its mass, a ping-pong ball's being
+    /// one.
+    #[must_use]
+    pub fn sail_share(&self) -> f64 {
+        const PING_PONG: f64 = 0.02 * 0.02 / 0.0027;
+        self.radius_m * self.radius_m / self.mass_kg / PING_PONG
+    }
+
+    /// Acceleration per unit of slope while rolling, g/(1 + κ), m/s²:
+    /// 5/7 g for a solid ball, 3/5 g for a hollow one.
+    #[must_use]
+    pub fn rolling_gravity(&self) -> f64 {
+        GRAVITY_M_S2 / (1.0 + self.inertia_factor)
+    }
+}
+
+impl Default for Ball {
+    /// The chapter's ball: steel, one inch across, 51 g.
+    fn default() -> Self {
+        Self { radius_m: 0.0127, mass_kg: 0.051, inertia_factor: 0.4 }
+    }
+}
+
+/// The outline of the plate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PlateShape {
+    /// `length_m` along x, `width_m` along y.
+    Rectangle { length_m: f64, width_m: f64 },
+    /// A disc.
+    Round { diameter_m: f64 },
+}
+
+/// The plate: outline, thickness, and whether a rim keeps the ball on it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plate {
+    shape: PlateShape,
+    thickness_m: f64,
+    rim: bool,
+}
+
+impl Plate {
+    /// The chapter's plate as its hardware and its text have it:
+    /// 0.38 × 0.24 × 0.02 m.
+    pub const CHAPTER: Self = Self::rectangle(0.38, 0.24);
+
+    /// The plate that step 12 of the chapter types in: 0.38 × 0.25 × 0.02 m.
+    pub const STEP_12: Self = Self::rectangle(0.38, 0.25);
+
+    /// The plate of the chapter's section 4.8: 0.35 × 0.24 m; the thickness,
+    /// which it leaves out, is that of the others.
+    pub const SECTION_4_8: Self = Self::rectangle(0.35, 0.24);
+
+    /// The sizes between which the chapter contradicts itself, by name.
+    pub const PRESETS: [(&'static str, Self); 3] = [
+        ("chapter", Self::CHAPTER),
+        ("step-12", Self::STEP_12),
+        ("section-4.8", Self::SECTION_4_8),
+    ];
+
+    const fn rectangle(length_m: f64, width_m: f64) -> Self {
+        let shape = PlateShape::Rectangle { length_m, width_m };
+        Self { shape, thickness_m: 0.02, rim: true }
+    }
+
+    /// A plate with sides or diameter in (0, 10] m and a thickness in [0, 1] m.
+    ///
+    /// # Errors
+    /// [`Invalid`] naming the element under `/plate`.
+    pub fn new(shape: PlateShape, thickness_m: f64, rim: bool) -> Result<Self, Invalid> {
+        match shape {
+            PlateShape::Rectangle { length_m, width_m } => {
+                positive("/plate/length_m", length_m, 10.0)?;
+                positive("/plate/width_m", width_m, 10.0)?;
+            }
+            PlateShape::Round { diameter_m } => {
+                positive("/plate/diameter_m", diameter_m, 10.0)?;
+            }
+        }
+        in_range("/plate/thickness_m", thickness_m, 0.0..=1.0)?;
+        Ok(Self { shape, thickness_m, rim })
+    }
+
+    #[must_use]
+    pub const fn shape(&self) -> PlateShape {
+        self.shape
+    }
+
+    #[must_use]
+    pub const fn thickness_m(&self) -> f64 {
+        self.thickness_m
+    }
+
+    /// Whether a rim stops the ball at the edge.
+    #[must_use]
+    pub const fn rim(&self) -> bool {
+        self.rim
+    }
+
+    /// Height of the resting ball's centre above the joint, m.
+    #[must_use]
+    pub fn centre_gap_m(&self, ball: &Ball) -> f64 {
+        self.thickness_m / 2.0 + ball.radius_m()
+    }
+
+    /// Distance from the centre to the edge along one axis, m.
+    #[must_use]
+    pub fn half_extent_m(&self, axis: Axis) -> f64 {
+        match (self.shape, axis) {
+            (PlateShape::Rectangle { length_m, .. }, Axis::X) => length_m / 2.0,
+            (PlateShape::Rectangle { width_m, .. }, Axis::Y) => width_m / 2.0,
+            (PlateShape::Round { diameter_m }, _) => diameter_m / 2.0,
+        }
+    }
+
+    /// Distance of the point (x, y) from the nearest edge, m; negative beyond it.
+    #[must_use]
+    pub fn edge_distance_m(&self, x_m: f64, y_m: f64) -> f64 {
+        match self.shape {
+            PlateShape::Rectangle { length_m, width_m } => {
+                (length_m / 2.0 - x_m.abs()).min(width_m / 2.0 - y_m.abs())
+            }
+            PlateShape::Round { diameter_m } => diameter_m / 2.0 - x_m.hypot(y_m),
+        }
+    }
+
+    /// The axis across whose edge, and no other, the point (x, y) is within
+    /// `room_m`. None on a disc, whose edge lies across both axes at once.
+    #[must_use]
+    pub fn edge_axis(&self, x_m: f64, y_m: f64, room_m: f64) -> Option<Axis> {
+        let PlateShape::Rectangle { length_m, width_m } = self.shape else { return None };
+        let (at_x, at_y) =
+            (length_m / 2.0 - x_m.abs() < room_m, width_m / 2.0 - y_m.abs() < room_m);
+        match (at_x, at_y) {
+            (true, false) => Some(Axis::X),
+            (false, true) => Some(Axis::Y),
+            _ => None,
+        }
+    }
+}
+
+impl Default for Plate {
+    /// The chapter's plate: 0.38 × 0.24 × 0.02 m, with a rim.
+    fn default() -> Self {
+        Self::CHAPTER
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_edge_lies_across_one_axis_but_in_a_corner_and_on_a_disc() {
+        let plate = Plate::CHAPTER;
+        assert_eq!(plate.edge_axis(0.18, 0.0, 0.02), Some(Axis::X));
+        assert_eq!(plate.edge_axis(0.0, -0.11, 0.02), Some(Axis::Y));
+        assert_eq!(plate.edge_axis(0.18, 0.11, 0.02), None);
+        assert_eq!(plate.edge_axis(0.1, 0.0, 0.02), None);
+        let disc = Plate::new(PlateShape::Round { diameter_m: 0.3 }, 0.02, true).unwrap();
+        assert_eq!(disc.edge_axis(0.14, 0.0, 0.02), None);
+    }
+}

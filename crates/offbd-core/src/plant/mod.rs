@@ -1,0 +1,28 @@
+//! The rig as physics: ball, plate, servos and a ladder of models of the ball's
+//! motion, each in a file of its own with its equations and where it holds.
+//!
+//! One idea: a model is immutable data, its state is a small copyable value,
+//! and a step is a pure function of both. Knows no faults, no sensors, no
+//! clock. Notation and signs: `ARCHITECTURE.md`, "Frames and signs".
+
+mod body;
+mod contact;
+mod lockstep;
+mod planar;
+mod rolling;
+mod servo;
+mod sliding;
+mod tilt;
+mod twin;
+
+pub use body::{Ball, GRAVITY_M_S2, Plate, PlateShape};
+pub use contact::{Body, Contact, Ground, Motion};
+pub use lockstep::{Fidelity, Ladder, Rung};
+pub use planar::Planar;
+pub use rolling::{Grip, Rolling, RollingState};
+pub use servo::{Servo, ServoModel};
+pub use sliding::{Hold, Phase, Sliding};
+pub use tilt::{PlateMotion, Tilt};
+#[cfg(test)]
+pub(crate) use twin::steps;
+pub use twin::{LONGEST_SPAN_S, Twin, TwinAxis, TwinModel, TwinMotion, resisting};

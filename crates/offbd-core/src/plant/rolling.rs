@@ -1,0 +1,260 @@
+//! The rolling ball: what is left of the contact when slip and penetration
+//! vanish (2 + 2 states and a spin).
+//!
+//! With `Ω`, `α` the plate's angular velocity and acceleration in the plate
+//! frame, κ the inertia factor and `f = g_P − 2Ω×v − Ω×(Ω×p) − α×p + F/m`:
+//!
+//! ```text
+//! (1 + κ)·v̇x = f_x − κ r·(α + Ω×w)_y
+//! (1 + κ)·v̇y = f_y + κ r·(α + Ω×w)_x
+//! ẇz = −α_z − (Ω×w)_z          vx = r wy,  vy = −r wx,  pz = cgap
+//! ```
+//!
+//! Valid while friction can hold the ball without slip, for constant tilt
+//! about one axis up to tan(angle) = (1 + 1/κ)·μ, and while the plate pushes.
+
+use nalgebra::{Vector2, Vector3};
+
+use super::contact::Motion;
+use super::tilt::PlateMotion;
+use super::{Ball, Plate};
+use crate::maths::{MIDPOINT, RK4, System};
+
+/// Where a rolling ball is and how it moves, relative to the plate.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RollingState {
+    /// (x, y) in the plate frame, m.
+    pub position: Vector2<f64>,
+    /// Rate of the position, m/s.
+    pub velocity: Vector2<f64>,
+    /// Spin about the plate's normal, rad/s.
+    pub spin: f64,
+}
+
+impl RollingState {
+    /// (x, y, vx, vy, wz) in one row.
+    #[must_use]
+    pub fn to_row(&self) -> [f64; 5] {
+        [self.position.x, self.position.y, self.velocity.x, self.velocity.y, self.spin]
+    }
+
+    #[must_use]
+    pub fn from_row(y: &[f64; 5]) -> Self {
+        Self { position: Vector2::new(y[0], y[1]), velocity: Vector2::new(y[2], y[3]), spin: y[4] }
+    }
+}
+
+/// What the contact has to bear for the ball to roll, per kilogram of ball.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grip {
+    /// Friction force along x and y over mass, m/s².
+    pub friction: [f64; 2],
+    /// Normal force over mass, m/s²; negative where the ball would leave.
+    pub normal: f64,
+}
+
+impl Grip {
+    /// Larger part of the friction limit μ·F_z in use along one axis: up to 1
+    /// the ball rolls. Infinite where the plate would have to pull.
+    #[must_use]
+    pub fn demand(&self, friction: f64) -> f64 {
+        let worst = self.friction[0].abs().max(self.friction[1].abs());
+        if self.normal > 0.0 { worst / (friction * self.normal) } else { f64::INFINITY }
+    }
+}
+
+/// The rolling model of one ball on one plate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rolling {
+    radius: f64,
+    kappa: f64,
+    centre_gap: f64,
+}
+
+impl Rolling {
+    #[must_use]
+    pub fn new(ball: &Ball, plate: &Plate) -> Self {
+        Self {
+            radius: ball.radius_m(),
+            kappa: ball.inertia_factor(),
+            centre_gap: plate.centre_gap_m(ball),
+        }
+    }
+
+    /// Rates of (x, y, vx, vy, wz).
+    #[must_use]
+    #[inline]
+    pub fn rate(&self, y: &[f64; 5], plate: &PlateMotion) -> [f64; 5] {
+        let (a, _, spin) = self.forced(y, plate);
+        [y[2], y[3], a[0], a[1], spin]
+    }
+
+    /// The state of a ball that moves as `from`, whatever slips.
+    #[must_use]
+    pub fn enter(&self, from: &Motion) -> [f64; 5] {
+        let (p, v) = (&from.position, &from.velocity);
+        [p.x, p.y, v.x, v.y, from.spin.z]
+    }
+
+    /// The ball's motion in the state `y`.
+    #[must_use]
+    pub fn leave(&self, y: &[f64; 5]) -> Motion {
+        Motion {
+            position: Vector3::new(y[0], y[1], self.centre_gap),
+            velocity: Vector3::new(y[2], y[3], 0.0),
+            spin: Vector3::new(-y[3] / self.radius, y[2] / self.radius, y[4]),
+        }
+    }
+
+    /// Acceleration along x and y, that of the free ball, and the rate of the
+    /// spin about the normal.
+    #[inline]
+    fn forced(&self, y: &[f64; 5], plate: &PlateMotion) -> ([f64; 2], Vector3<f64>, f64) {
+        let p = Vector3::new(y[0], y[1], self.centre_gap);
+        let v = Vector3::new(y[2], y[3], 0.0);
+        let w = Vector3::new(-v.y / self.radius, v.x / self.radius, y[4]);
+        let (free, turn) = (plate.free(&p, &v), plate.free_turn(&w));
+        let lever = self.kappa * self.radius;
+        let share = 1.0 / (1.0 + self.kappa);
+        let a = [(free.x + lever * turn.y) * share, (free.y - lever * turn.x) * share];
+        (a, free, turn.z)
+    }
+
+    /// Acceleration in the plate frame, m/s², and the rate of the spin, rad/s².
+    #[must_use]
+    pub fn acceleration(&self, state: &RollingState, plate: &PlateMotion) -> (Vector2<f64>, f64) {
+        let (a, _, spin) = self.forced(&state.to_row(), plate);
+        (Vector2::from(a), spin)
+    }
+
+    /// What friction and the normal force have to be for the ball to roll on.
+    #[must_use]
+    pub fn grip(&self, y: &[f64; 5], plate: &PlateMotion) -> Grip {
+        self.grip_and_rate(y, plate).0
+    }
+
+    /// [`grip`](Self::grip) and the rate of `y`, which it is found with.
+    #[inline]
+    #[must_use]
+    pub fn grip_and_rate(&self, y: &[f64; 5], plate: &PlateMotion) -> (Grip, [f64; 5]) {
+        let (a, free, spin) = self.forced(y, plate);
+        let grip = Grip { friction: [a[0] - free.x, a[1] - free.y], normal: -free.z };
+        (grip, [y[2], y[3], a[0], a[1], spin])
+    }
+
+    /// One step of `h` seconds by the midpoint rule (order 2); `plate` is the
+    /// plate at the start and at the middle of the step.
+    #[must_use]
+    pub fn midpoint(&self, state: &RollingState, plate: [&PlateMotion; 2], h: f64) -> RollingState {
+        let held = Held { rolling: self, plate: [plate[0], plate[1], plate[1]], h };
+        RollingState::from_row(&MIDPOINT.step(&held, 0.0, &state.to_row(), h))
+    }
+
+    /// One step of `h` seconds by the classical Runge–Kutta method (order 4);
+    /// `plate` is the plate at the start, the middle and the end of the step.
+    #[must_use]
+    pub fn rk4(&self, state: &RollingState, plate: [&PlateMotion; 3], h: f64) -> RollingState {
+        let held = Held { rolling: self, plate, h };
+        RollingState::from_row(&RK4.step(&held, 0.0, &state.to_row(), h))
+    }
+}
+
+/// The rolling ball over one step from 0 to `h`, whose plate is known at the
+/// start, the middle and the end.
+struct Held<'a> {
+    rolling: &'a Rolling,
+    plate: [&'a PlateMotion; 3],
+    h: f64,
+}
+
+impl System<5> for Held<'_> {
+    const POSITIONS: usize = 2;
+
+    fn rate(&self, t: f64, y: &[f64; 5]) -> [f64; 5] {
+        let plate = if t <= 0.0 {
+            0
+        } else if t < self.h {
+            1
+        } else {
+            2
+        };
+        self.rolling.rate(y, self.plate[plate])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::{GRAVITY_M_S2, Tilt};
+    use core::f64::consts::TAU;
+
+    fn chapter() -> Rolling {
+        Rolling::new(&Ball::default(), &Plate::default())
+    }
+
+    /// S2 of the reference trajectories: both angles sinusoidal.
+    fn sines(t: f64) -> Tilt {
+        let wave = |f: f64, phase: f64| {
+            let (w, arg) = (TAU * f, TAU * f * t + phase);
+            (0.05 * arg.sin(), 0.05 * w * arg.cos(), -0.05 * w * w * arg.sin())
+        };
+        let (x, y) = (wave(0.7, 0.0), wave(0.9, 0.5));
+        Tilt {
+            angle: Vector2::new(x.0, y.0),
+            rate: Vector2::new(x.1, y.1),
+            acceleration: Vector2::new(x.2, y.2),
+        }
+    }
+
+    fn run_rk4(h: f64, seconds: f64) -> RollingState {
+        let (model, n) = (chapter(), (seconds / h).round() as usize);
+        (0..n).fold(RollingState::default(), |s, i| {
+            let t = i as f64 * h;
+            let plate = [t, t + h / 2.0, t + h].map(|t| sines(t).motion());
+            model.rk4(&s, plate.each_ref(), h)
+        })
+    }
+
+    fn run_midpoint(h: f64, seconds: f64) -> RollingState {
+        let (model, n) = (chapter(), (seconds / h).round() as usize);
+        (0..n).fold(RollingState::default(), |s, i| {
+            let t = i as f64 * h;
+            let plate = [t, t + h / 2.0].map(|t| sines(t).motion());
+            model.midpoint(&s, plate.each_ref(), h)
+        })
+    }
+
+    #[test]
+    fn validate_constant_tilt_against_the_closed_form() {
+        let (qx, qy) = (core::f64::consts::PI / 20.0, core::f64::consts::PI / 20.0);
+        let (a, _) =
+            chapter().acceleration(&RollingState::default(), &Tilt::constant(qx, qy).motion());
+        let g = 5.0 / 7.0 * GRAVITY_M_S2;
+        assert!((a.x - g * qx.cos() * qy.sin()).abs() < 1e-14);
+        assert!((a.y + g * qx.sin()).abs() < 1e-14);
+    }
+
+    /// Angular momentum about the joint's z axis: a plate that only turns fast
+    /// about a fixed tilt axis exerts the centrifugal force ω² p on the ball.
+    #[test]
+    fn validate_centrifugal_and_coriolis_terms() {
+        let tilt = Tilt { rate: Vector2::new(0.0, 2.0), ..Tilt::default() };
+        let state = RollingState { position: Vector2::new(0.1, 0.0), ..Default::default() };
+        let (a, _) = chapter().acceleration(&state, &tilt.motion());
+        assert!((a.x - 4.0 * 0.1 / 1.4).abs() < 1e-14, "ω² p/(1 + κ), got {}", a.x);
+    }
+
+    #[test]
+    fn validate_orders_of_convergence() {
+        let truth = run_rk4(2.5e-4, 2.0).position;
+        let order = |run: fn(f64, f64) -> RollingState| {
+            let errors: Vec<f64> = [0.02, 0.01, 0.005]
+                .iter()
+                .map(|&h| (run(h, 2.0).position - truth).norm())
+                .collect();
+            (errors[0] / errors[2]).log2() / 2.0
+        };
+        assert!((order(run_rk4) - 4.0).abs() < 0.2, "RK4 has order {}", order(run_rk4));
+        assert!((order(run_midpoint) - 2.0).abs() < 0.2, "midpoint {}", order(run_midpoint));
+    }
+}

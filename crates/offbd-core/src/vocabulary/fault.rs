@@ -1,0 +1,133 @@
+//! What can be wrong with a rig, and how far the evidence has come.
+
+#[cfg(not(feature = "std"))]
+use crate::no_std::*;
+use core::fmt;
+use core::str::FromStr;
+
+use super::Axis;
+
+/// A word that is none of those expected in its place.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{word}` is not one of {expected}")]
+pub struct UnknownWord {
+    pub word: String,
+    pub expected: String,
+}
+
+macro_rules! words {
+    ($(#[$doc:meta])* $name:ident { $($(#[$vdoc:meta])* $variant:ident = $word:literal),+ $(,)? }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        pub enum $name { $($(#[$vdoc])* $variant),+ }
+
+        impl $name {
+            /// All of them, in the order of declaration.
+            pub const ALL: &'static [Self] = &[$(Self::$variant),+];
+
+            /// The word used on the wire, in the store and in logs.
+            #[must_use]
+            pub const fn as_str(self) -> &'static str {
+                match self { $(Self::$variant => $word),+ }
+            }
+        }
+
+        impl fmt::Display for $name {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.pad(self.as_str())
+            }
+        }
+
+        impl FromStr for $name {
+            type Err = UnknownWord;
+            fn from_str(word: &str) -> Result<Self, UnknownWord> {
+                Self::ALL.iter().copied().find(|v| v.as_str() == word).ok_or_else(|| UnknownWord {
+                    word: word.to_owned(),
+                    expected: Self::ALL.iter().map(|v| v.as_str()).collect::<Vec<_>>().join(", "),
+                })
+            }
+        }
+    };
+}
+
+words! {
+    /// A fault code: the part of the rig that is to blame.
+    FaultCode {
+        /// The servo that moves the ball along x (it turns qy).
+        XServo = "x_servo",
+        /// The servo that moves the ball along y (it turns qx).
+        YServo = "y_servo",
+        /// The ball does not move although it should.
+        StuckBall = "stuck_ball",
+        /// The position readings cannot be trusted.
+        Sensor = "sensor",
+    }
+}
+
+impl FaultCode {
+    /// Number of codes; code `c` has index `c as usize`.
+    pub const COUNT: usize = Self::ALL.len();
+
+    /// The axis of a servo code, none for the others.
+    #[must_use]
+    pub const fn axis(self) -> Option<Axis> {
+        match self {
+            Self::XServo => Some(Axis::X),
+            Self::YServo => Some(Axis::Y),
+            Self::StuckBall | Self::Sensor => None,
+        }
+    }
+
+    /// The code of the servo that drives `axis`.
+    #[must_use]
+    pub const fn servo(axis: Axis) -> Self {
+        match axis {
+            Axis::X => Self::XServo,
+            Axis::Y => Self::YServo,
+        }
+    }
+}
+
+words! {
+    /// In which way it is wrong, where the evidence says.
+    FaultKind {
+        /// A servo that does not answer at all.
+        Dead = "dead",
+        /// A servo that stays where it is.
+        Held = "held",
+        /// A servo that answers with a wrong factor.
+        Gain = "gain",
+        /// A servo that answers the wrong way round.
+        Reversed = "reversed",
+        /// A servo off by a constant angle (a slipped horn).
+        Offset = "offset",
+        /// A servo that lags behind.
+        Slow = "slow",
+        /// A servo that fails now and then.
+        Intermittent = "intermittent",
+        /// Readings that repeat, bit-identical, while the ball must be moving.
+        Frozen = "frozen",
+        /// Readings missing.
+        Dropout = "dropout",
+        /// Readings scattered far beyond the calibrated noise.
+        Noise = "noise",
+        /// Lone readings far off.
+        Spikes = "spikes",
+        /// A step in the readings that no ball can make.
+        Jump = "jump",
+    }
+}
+
+words! {
+    /// How far a fault has come; the ISO 14229 status byte says it bit by bit.
+    FaultStatus {
+        /// The test failed in this operation cycle; not yet confirmed.
+        Pending = "pending",
+        /// The test failed in as many operation cycles as confirmation asks for.
+        Confirmed = "confirmed",
+        /// Good operation cycles have followed; still on record.
+        Healed = "healed",
+        /// Nothing is on record: never failed, aged, or cleared by a person.
+        Cleared = "cleared",
+    }
+}

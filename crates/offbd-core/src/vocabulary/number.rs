@@ -1,0 +1,63 @@
+//! Checked numbers: a range check that NaN does not pass.
+
+#[cfg(not(feature = "std"))]
+use crate::no_std::*;
+use core::fmt;
+use core::ops::RangeInclusive;
+
+/// A value that cannot be, with the element that holds it.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{element}: {reason}")]
+pub struct Invalid {
+    /// JSON pointer (RFC 6901) of the offending element, `/ball/radius_m`.
+    pub element: String,
+    /// What is wrong with it, with the admissible range.
+    pub reason: String,
+}
+
+impl Invalid {
+    /// An error for `element` because of `reason`.
+    pub fn new(element: impl Into<String>, reason: impl Into<String>) -> Self {
+        Self { element: element.into(), reason: reason.into() }
+    }
+}
+
+/// A number as people write it, in a reason: `1.5`, but `1e308` rather than 309
+/// digits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Brief(pub f64);
+
+impl fmt::Display for Brief {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        /// Up to here every whole number is exact (2^53), and has 16 digits.
+        const EXACT: f64 = 9_007_199_254_740_992.0;
+        let Self(value) = *self;
+        let short = value == 0.0 || (EXACT.recip()..=EXACT).contains(&value.abs());
+        if short || !value.is_finite() { write!(f, "{value}") } else { write!(f, "{value:e}") }
+    }
+}
+
+/// `value` if it lies in `range`; NaN never does.
+///
+/// # Errors
+/// [`Invalid`] naming `element` and the range.
+pub fn in_range(element: &str, value: f64, range: RangeInclusive<f64>) -> Result<f64, Invalid> {
+    if range.contains(&value) {
+        return Ok(value);
+    }
+    Err(Invalid::new(
+        element,
+        format!("{} is outside {} to {}", Brief(value), range.start(), range.end()),
+    ))
+}
+
+/// `value` if it is above zero and at most `most`.
+///
+/// # Errors
+/// [`Invalid`] naming `element` and the range.
+pub fn positive(element: &str, value: f64, most: f64) -> Result<f64, Invalid> {
+    if value > 0.0 && value <= most {
+        return Ok(value);
+    }
+    Err(Invalid::new(element, format!("{} is not above 0 and at most {most}", Brief(value))))
+}

@@ -1,0 +1,45 @@
+//! Charts: measurements as records, a drawing and a table of them.
+//!
+//! A chart measures, keeps what it measured as records beside the machine and
+//! the versions they belong to, and draws them: SVG, whose text stays text, and
+//! the same as PNG. Drawings are described as data ([`Figure`], [`Panel`],
+//! [`Series`], [`Regions`]) and drawn by one routine, so that all charts share
+//! axes, legend, colours and markers.
+//!
+//! To add a chart: a module here whose `make` returns a [`Chart`], and its name
+//! in `src/cli/lab/chart.rs`.
+
+pub mod certificate;
+mod dash;
+pub mod detectors;
+mod draw;
+mod equal;
+mod error;
+pub mod estimators;
+pub mod fidelity;
+mod figure;
+mod front;
+mod legend;
+mod look;
+mod machine;
+mod marker;
+mod raster;
+mod regions;
+mod scale;
+pub mod stability;
+#[cfg(test)]
+mod tests;
+pub mod work_precision;
+mod write;
+
+pub use draw::svg;
+pub use equal::equal_scales;
+pub use error::ChartError;
+pub use figure::{Axis, Figure, Mark, Panel, Series, Stroke};
+pub use front::{Front, front};
+pub use look::{Look, Marker};
+pub use machine::{Document, Machine, versions};
+pub use raster::png;
+pub use regions::{Category, Regions};
+pub use scale::Scale;
+pub use write::{Chart, Effort, Table, write};

@@ -1,0 +1,174 @@
+//! How a plate angle goes with time: a sum of terms, each known in closed form
+//! with its two rates.
+
+use std::f64::consts::TAU;
+
+use offbd_core::maths::sine::{self, sin_cos};
+use offbd_core::vocabulary::{Invalid, in_range, positive};
+
+/// One term of an angle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Term {
+    /// A constant angle, rad.
+    Constant(f64),
+    /// `amplitude·sin(2π·frequency·t + phase)`; rad, Hz, rad.
+    Sine { amplitude: f64, frequency: f64, phase: f64 },
+    /// From 0 to `to` rad as 3s² − 2s³, s from 0 at `start` to 1 after `duration`, s.
+    Smoothstep { to: f64, start: f64, duration: f64 },
+}
+
+impl Term {
+    /// Checks the term, named `element` in errors: angles within ±2π rad,
+    /// frequencies in [0, 1000] Hz, times within ±1e6 s, durations above 0.
+    ///
+    /// # Errors
+    /// [`Invalid`] naming the element.
+    pub fn checked(self, element: &str) -> Result<Self, Invalid> {
+        let angle = |name: &str, value| in_range(&format!("{element}/{name}"), value, -TAU..=TAU);
+        match self {
+            Self::Constant(value) => {
+                angle("constant_rad", value)?;
+            }
+            Self::Sine { amplitude, frequency, phase } => {
+                angle("sine/amplitude_rad", amplitude)?;
+                in_range(&format!("{element}/sine/frequency_hz"), frequency, 0.0..=1000.0)?;
+                in_range(&format!("{element}/sine/phase_rad"), phase, -1e6..=1e6)?;
+            }
+            Self::Smoothstep { to, start, duration } => {
+                angle("smoothstep/to_rad", to)?;
+                in_range(&format!("{element}/smoothstep/start_s"), start, -1e6..=1e6)?;
+                positive(&format!("{element}/smoothstep/duration_s"), duration, 1e6)?;
+            }
+        }
+        Ok(self)
+    }
+}
+
+/// An angle as a sum of terms. Between two breaks it is smooth.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Law {
+    constant: f64,
+    varying: Vec<Term>,
+}
+
+impl Law {
+    #[must_use]
+    pub fn new(terms: &[Term]) -> Self {
+        let mut law = Self::default();
+        for term in terms {
+            match *term {
+                Term::Constant(value) => law.constant += value,
+                other => law.varying.push(other),
+            }
+        }
+        law
+    }
+
+    /// Angle, rate and acceleration at `t`, within a smooth piece that holds
+    /// `inside`: at a break it is the limit from that side.
+    #[must_use]
+    #[inline]
+    pub fn at(&self, t: f64, inside: f64) -> [f64; 3] {
+        let mut sum = [self.constant, 0.0, 0.0];
+        for term in &self.varying {
+            let value = varying(term, t, inside);
+            for i in 0..3 {
+                sum[i] += value[i];
+            }
+        }
+        sum
+    }
+
+    /// Whether the angle stands still in the piece that holds `inside`.
+    #[must_use]
+    pub fn is_still(&self, inside: f64) -> bool {
+        self.varying.iter().all(|term| match *term {
+            Term::Smoothstep { start, duration, .. } => {
+                inside <= start || inside >= start + duration
+            }
+            _ => false,
+        })
+    }
+
+    /// The first moment after `t` at which the law is not smooth.
+    #[must_use]
+    pub fn next_break(&self, t: f64) -> f64 {
+        let edges = self.varying.iter().flat_map(|term| match *term {
+            Term::Smoothstep { start, duration, .. } => [start, start + duration],
+            _ => [f64::INFINITY; 2],
+        });
+        edges.filter(|&edge| edge > t).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The shortest time in which the angle does something of its own, s.
+    #[must_use]
+    pub fn shortest_time_s(&self) -> f64 {
+        let times = self.varying.iter().map(|term| match *term {
+            Term::Sine { frequency, .. } => 1.0 / frequency,
+            Term::Smoothstep { duration, .. } => duration,
+            Term::Constant(_) => f64::INFINITY,
+        });
+        times.fold(f64::INFINITY, f64::min)
+    }
+}
+
+#[inline]
+fn varying(term: &Term, t: f64, inside: f64) -> [f64; 3] {
+    match *term {
+        Term::Constant(value) => [value, 0.0, 0.0],
+        Term::Sine { amplitude, frequency, phase } => {
+            let omega = TAU * frequency;
+            let at = omega * t + phase;
+            let (sin, cos) = if at.abs() <= sine::LIMIT_RAD { sin_cos(at) } else { at.sin_cos() };
+            [amplitude * sin, amplitude * omega * cos, -amplitude * omega * omega * sin]
+        }
+        Term::Smoothstep { start, .. } if inside <= start => [0.0; 3],
+        Term::Smoothstep { to, start, duration } if inside >= start + duration => [to, 0.0, 0.0],
+        Term::Smoothstep { to, start, duration } => {
+            let (s, rate) = ((t - start) / duration, 1.0 / duration);
+            [
+                to * s * s * (3.0 - 2.0 * s),
+                to * 6.0 * s * (1.0 - s) * rate,
+                to * (6.0 - 12.0 * s) * rate * rate,
+            ]
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn law() -> Law {
+        Law::new(&[
+            Term::Constant(0.01),
+            Term::Sine { amplitude: 0.05, frequency: 0.7, phase: 0.3 },
+            Term::Smoothstep { to: 1.2, start: 0.1, duration: 0.15 },
+        ])
+    }
+
+    #[test]
+    fn a_break_has_two_sides() {
+        let law = Law::new(&[Term::Smoothstep { to: 1.0, start: 0.0, duration: 0.5 }]);
+        assert_eq!(law.at(0.5, 0.4), [1.0, 0.0, -24.0]);
+        assert_eq!(law.at(0.5, 0.6), [1.0, 0.0, 0.0]);
+        assert_eq!([law.next_break(-1.0), law.next_break(0.0)], [0.0, 0.5]);
+        assert_eq!(law.next_break(0.5), f64::INFINITY);
+        assert!(law.is_still(0.6) && !law.is_still(0.4));
+    }
+
+    proptest! {
+        /// Rates are the differences of what they are rates of.
+        #[test]
+        fn rates_are_derivatives(t in 0.0..0.4_f64) {
+            let (law, d) = (law(), 1e-5);
+            let inside = t.clamp(0.1 + 2.0 * d, 0.25 - 2.0 * d);
+            let [before, now, after] = [inside - d, inside, inside + d].map(|t| law.at(t, inside));
+            for i in 0..2 {
+                let difference = (after[i] - before[i]) / (2.0 * d);
+                prop_assert!((difference - now[i + 1]).abs() < 1e-4 * (1.0 + now[i + 1].abs()));
+            }
+        }
+    }
+}

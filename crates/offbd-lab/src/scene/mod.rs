@@ -1,0 +1,106 @@
+//! Scenes: a body on a plate that moves by a law or a controller, run by any
+//! rung of the ladder of models and any method that fits it.
+//!
+//! One idea: a run is a model, a method and a pace, all data; the loops below
+//! know none of them by name. Knows no files, no clock, no faults.
+
+mod candidates;
+mod configuration;
+mod controlled;
+mod drive;
+mod events;
+mod ladder;
+mod law;
+mod reference;
+mod run;
+mod rungs;
+mod samples;
+mod stepping;
+mod still_rolls;
+mod survey;
+
+pub use configuration::{Configuration, LONGEST_STEP_S, Method, Model, Pace, SHORTEST_STEP_S};
+pub use controlled::{Controlled, Loop, Turn};
+pub use drive::{Drive, Laws, Push};
+pub use events::{Event, MOST_EVENTS};
+pub use ladder::{Choice, OutOfReach, Tried, choose};
+pub use law::{Law, Term};
+pub use run::{Outcome, run, suits};
+pub use samples::{Samples, Sink};
+pub use stepping::{Failure, MOST_STEPS, Tally};
+pub use survey::Survey;
+
+use offbd_core::plant::{Ball, Body, Contact, Ground, Motion, Plate};
+use offbd_core::vocabulary::{Invalid, positive};
+
+/// What is on the plate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Subject {
+    Ball(Ball),
+    Block(Block),
+}
+
+/// A cube that slides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Block {
+    pub edge_m: f64,
+    pub mass_kg: f64,
+    body: Body,
+}
+
+/// Longest scene, s: an hour.
+pub const LONGEST_SCENE_S: f64 = 3600.0;
+
+/// A scene without its drive.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    pub subject: Subject,
+    pub plate: Plate,
+    pub contact: Contact,
+    /// Whether the plate ends at its edges.
+    pub edges: bool,
+    pub initial: Motion,
+    pub duration_s: f64,
+}
+
+impl Scene {
+    /// `subject` on `plate`, at rest at its centre, for `duration_s` in
+    /// (0, 3600] s.
+    ///
+    /// # Errors
+    /// [`Invalid`] naming the element.
+    pub fn new(
+        subject: Subject,
+        plate: Plate,
+        contact: Contact,
+        duration_s: f64,
+    ) -> Result<Self, Invalid> {
+        let duration_s = positive("/duration_s", duration_s, LONGEST_SCENE_S)?;
+        let initial = Motion::default();
+        let mut scene = Self { subject, plate, contact, edges: false, initial, duration_s };
+        scene.initial = Motion::at_rest(&scene.body());
+        Ok(scene)
+    }
+
+    /// A block with an edge in (0, 1] m and a mass in (0, 100] kg.
+    ///
+    /// # Errors
+    /// [`Invalid`] naming the element.
+    pub fn block(edge_m: f64, mass_kg: f64, plate: &Plate) -> Result<Subject, Invalid> {
+        let body = Body::block(edge_m, mass_kg, plate)?;
+        Ok(Subject::Block(Block { edge_m, mass_kg, body }))
+    }
+
+    #[must_use]
+    pub fn body(&self) -> Body {
+        match &self.subject {
+            Subject::Ball(ball) => Body::ball(ball, &self.plate),
+            Subject::Block(block) => block.body,
+        }
+    }
+
+    #[must_use]
+    pub fn ground(&self) -> Ground {
+        if self.edges { Ground::Plate(self.plate) } else { Ground::Endless }
+    }
+}

@@ -1,0 +1,132 @@
+//! Samples between the steps: what a method leaves at its own times, seen at
+//! regular ones.
+
+use super::configuration::SHORTEST_STEP_S;
+use offbd_core::plant::Motion;
+
+/// Where samples go: their time, s, and the motion.
+pub type Sink<'a> = dyn FnMut(f64, &Motion) + 'a;
+
+/// Regular samples of a run, from 0 on.
+pub struct Samples<'a> {
+    every_s: f64,
+    taken: u64,
+    sink: &'a mut Sink<'a>,
+}
+
+/// A sample this near a step's end, as a part of the interval, is that end.
+const SAME_TIME: f64 = 1e-9;
+
+impl<'a> Samples<'a> {
+    /// A sample each `every_s` seconds, handed to `sink`. An interval that is
+    /// no number or below [`SHORTEST_STEP_S`] would never come to an end: then
+    /// the start alone is sampled.
+    pub fn new(every_s: f64, sink: &'a mut Sink<'a>) -> Self {
+        let every_s = if every_s >= SHORTEST_STEP_S { every_s } else { f64::MAX };
+        let every_s = every_s.min(f64::MAX);
+        Self { every_s, taken: 0, sink }
+    }
+
+    fn next(&self) -> f64 {
+        self.taken as f64 * self.every_s
+    }
+
+    /// Takes the samples due up to `t1`, by `motion` of their time; `None`
+    /// stands for the step's end.
+    pub(super) fn take(&mut self, t1: f64, mut motion: impl FnMut(Option<f64>) -> Motion) {
+        while self.next() <= t1 + SAME_TIME * self.every_s {
+            let t = self.next();
+            let at_end = (t - t1).abs() <= SAME_TIME * self.every_s;
+            let motion = motion(if at_end { None } else { Some(t) });
+            (self.sink)(t, &motion);
+            self.taken += 1;
+        }
+    }
+}
+
+/// One step's two ends with their rates.
+pub(super) struct Span<'a, const N: usize> {
+    pub t: [f64; 2],
+    pub y: [&'a [f64; N]; 2],
+    pub rate: [[f64; N]; 2],
+}
+
+impl<const N: usize> Span<'_, N> {
+    /// The state within the step: positions, of which there are `P`, by the
+    /// polynomial of degree five through both ends with rates and second
+    /// rates where the motion is `smooth`, and of degree three through both
+    /// ends with rates where a stiff contact makes the second rates jump;
+    /// their rates by its derivative; the rest by degree three.
+    pub(super) fn at(&self, t: f64, positions: usize, smooth: bool) -> [f64; N] {
+        let h = self.t[1] - self.t[0];
+        let s = (t - self.t[0]) / h;
+        let mut to = [0.0; N];
+        for i in 0..N {
+            let ends = [self.y[0][i], self.y[1][i]];
+            let rates = [self.rate[0][i] * h, self.rate[1][i] * h];
+            if i < positions {
+                let seconds = if smooth {
+                    [self.rate[0][i + positions], self.rate[1][i + positions]].map(|a| a * h * h)
+                } else {
+                    cubic_seconds(ends, rates)
+                };
+                let (value, rate) = quintic(s, ends, rates, seconds);
+                to[i] = value;
+                to[i + positions] = rate / h;
+            } else if i >= 2 * positions {
+                to[i] = quintic(s, ends, rates, cubic_seconds(ends, rates)).0;
+            }
+        }
+        to
+    }
+}
+
+/// Second rates of the cubic through both ends with rates, over a unit step.
+fn cubic_seconds(y: [f64; 2], v: [f64; 2]) -> [f64; 2] {
+    let rise = y[1] - y[0];
+    [6.0 * rise - 4.0 * v[0] - 2.0 * v[1], -6.0 * rise + 2.0 * v[0] + 4.0 * v[1]]
+}
+
+/// Value and rate at s in [0, 1] of the quintic through both ends.
+fn quintic(s: f64, y: [f64; 2], v: [f64; 2], a: [f64; 2]) -> (f64, f64) {
+    let rise = y[1] - y[0] - v[0] - a[0] / 2.0;
+    let turn = v[1] - v[0] - a[0];
+    let bend = a[1] - a[0];
+    let (c3, c4, c5) = (
+        10.0 * rise - 4.0 * turn + bend / 2.0,
+        -15.0 * rise + 7.0 * turn - bend,
+        6.0 * rise - 3.0 * turn + bend / 2.0,
+    );
+    let value = y[0] + s * (v[0] + s * (a[0] / 2.0 + s * (c3 + s * (c4 + s * c5))));
+    let rate = v[0] + s * (a[0] + s * (3.0 * c3 + s * (4.0 * c4 + s * 5.0 * c5)));
+    (value, rate)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn validate_the_quintic_on_a_polynomial() {
+        let p = |t: f64| 1.0 + t - 2.0 * t.powi(3) + 0.5 * t.powi(5);
+        let v = |t: f64| 1.0 - 6.0 * t * t + 2.5 * t.powi(4);
+        let a = |t: f64| -12.0 * t + 10.0 * t.powi(3);
+        let (y0, y1) = ([p(0.2), v(0.2)], [p(0.6), v(0.6)]);
+        let span =
+            Span { t: [0.2, 0.6], y: [&y0, &y1], rate: [[v(0.2), a(0.2)], [v(0.6), a(0.6)]] };
+        let y = span.at(0.33, 1, true);
+        assert!((y[0] - p(0.33)).abs() < 1e-14 && (y[1] - v(0.33)).abs() < 1e-13);
+    }
+
+    #[test]
+    fn samples_come_once_and_at_the_end_too() {
+        let mut times = Vec::new();
+        let mut sink = |t: f64, _: &Motion| times.push(t);
+        let mut samples = Samples::new(0.1, &mut sink);
+        for end in [0.0, 0.05, 0.25, 0.3 - 1e-12] {
+            samples.take(end, |_| Motion::default());
+        }
+        assert_eq!(times.len(), 4);
+        assert!((times[3] - 0.3).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,60 @@
+//! All that is true of one simulated rig, beside what its owner knows of it.
+
+use super::ball::Surface;
+use super::controller::ControllerModel;
+use super::sensor::SensorModel;
+use super::servo::ServoTruth;
+use super::session::SessionSpread;
+use offbd_core::engine::Rig;
+use offbd_core::vocabulary::{Axis, Invalid, PerAxis, in_range, positive};
+
+/// A rig to be simulated; immutable.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RigModel {
+    /// What the owner knows: the asset file.
+    pub rig: Rig,
+    pub servos: PerAxis<ServoTruth>,
+    pub surface: Surface,
+    pub sensor: SensorModel,
+    pub controller: ControllerModel,
+    /// Ball and beam: the ball stays on y = 0, and the log has neither commands nor
+    /// positions along y.
+    pub one_axis: bool,
+    /// How its sessions differ.
+    pub spread: SessionSpread,
+}
+
+impl RigModel {
+    /// Fastest log that is simulated, rows per second: the plant's step is 1 ms.
+    pub const MAX_LOG_HZ: f64 = 1000.0;
+
+    /// The same sensor, servos and surface under another owner's ball, plate,
+    /// angle limit and sample rate.
+    #[must_use]
+    pub fn owned_as(mut self, rig: Rig) -> Self {
+        self.controller.limit_rad = rig.servo.angle_limit_rad;
+        self.rig = rig;
+        self
+    }
+
+    /// Checks every number.
+    ///
+    /// # Errors
+    /// [`Invalid`] naming the element.
+    pub fn check(&self) -> Result<(), Invalid> {
+        self.rig.check()?;
+        positive("/sample_rate_hz", self.rig.sample_rate_hz, Self::MAX_LOG_HZ)?;
+        self.surface.check()?;
+        self.sensor.check()?;
+        self.controller.check()?;
+        self.spread.check()?;
+        for axis in Axis::ALL {
+            let servo = &self.servos[axis];
+            in_range("/servo/dead_time_s", servo.dead_time_s, 0.0..=1.0)?;
+            in_range("/servo/play_rad", servo.play_rad, 0.0..=0.5)?;
+            in_range("/servo/gain", servo.gain, ServoTruth::GAIN)?;
+            in_range("/servo/level_rad", servo.level_rad, ServoTruth::LEVEL_RAD)?;
+        }
+        Ok(())
+    }
+}

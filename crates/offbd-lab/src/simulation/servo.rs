@@ -1,0 +1,213 @@
+//! A servo with what a data sheet leaves out: dead time, play, a horn that is
+//! off level, and faults.
+//!
+//! One idea: a fault changes what the servo is asked for, or how fast it can
+//! follow; the mechanics stay those of [`ServoModel`].
+
+use std::collections::VecDeque;
+use std::ops::RangeInclusive;
+
+use super::fault::ServoFault;
+use super::noise::Noise;
+use offbd_core::plant::{Servo, ServoModel};
+use offbd_core::vocabulary::Invalid;
+
+/// What is true of one servo, known to nobody; immutable.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ServoTruth {
+    /// Command to first movement, s.
+    pub dead_time_s: f64,
+    /// First-order lag, s.
+    pub lag_s: f64,
+    pub rate_limit_rad_s: f64,
+    /// Plate angle per horn angle.
+    pub gain: f64,
+    /// Plate angle at a command of zero, rad.
+    pub level_rad: f64,
+    /// Play between horn and plate, rad, from stop to stop.
+    pub play_rad: f64,
+}
+
+impl ServoTruth {
+    /// Plate angle per horn angle.
+    pub const GAIN: RangeInclusive<f64> = -10.0..=10.0;
+    /// Plate angle at a command of zero, rad.
+    pub const LEVEL_RAD: RangeInclusive<f64> = -0.5..=0.5;
+}
+
+/// Angle of the plate about one axis with its rates: rad, rad/s, rad/s².
+pub(super) type PlateAngle = Servo;
+
+/// A horn that slips settles within tens of milliseconds; a jump in no time
+/// would hit the ball with an infinite angular acceleration.
+const SLIP_LAG_S: f64 = 0.02;
+
+/// A loose contact holds and fails for times drawn evenly from here, s.
+const CONTACT_S: [f64; 2] = [0.3, 1.2];
+
+/// A loose contact: whether it holds, and until when.
+#[derive(Clone, Debug)]
+struct Contact {
+    holds: bool,
+    until_s: f64,
+    noise: Noise,
+}
+
+impl Contact {
+    /// Whether it holds at `at_s`; the first failure comes at once.
+    fn holds(&mut self, at_s: f64) -> bool {
+        while at_s >= self.until_s {
+            self.holds = !self.holds;
+            self.until_s = at_s + self.noise.uniform(CONTACT_S[0], CONTACT_S[1]);
+        }
+        self.holds
+    }
+}
+
+/// One servo with the plate behind it, in motion.
+#[derive(Clone, Debug)]
+pub(super) struct SimulatedServo {
+    truth: ServoTruth,
+    limit_rad: f64,
+    commands: VecDeque<(f64, f64)>,
+    horn: Servo,
+    slip: Servo,
+    linkage_rad: f64,
+    contact: Contact,
+}
+
+impl SimulatedServo {
+    pub(super) fn new(truth: ServoTruth, limit_rad: f64, noise: Noise) -> Result<Self, Invalid> {
+        mechanics(truth.lag_s, truth.rate_limit_rad_s)?;
+        let contact = Contact { holds: true, until_s: 0.0, noise };
+        let (commands, horn, slip) = (VecDeque::new(), Servo::default(), Servo::default());
+        Ok(Self { truth, limit_rad, commands, horn, slip, linkage_rad: 0.0, contact })
+    }
+
+    /// Takes note of a command given at `at_s`.
+    pub(super) fn command(&mut self, at_s: f64, command: f64) {
+        if self.commands.back().is_none_or(|&(_, last)| last != command) {
+            self.commands.push_back((at_s, command));
+        }
+    }
+
+    /// Moves by `h` seconds from `at_s` on under `fault`.
+    pub(super) fn advance(&mut self, at_s: f64, h: f64, fault: Option<ServoFault>) -> PlateAngle {
+        let command = self.in_force(at_s).clamp(-self.limit_rad, self.limit_rad);
+        let slip = if let Some(ServoFault::Offset(angle)) = fault { angle } else { 0.0 };
+        self.turn_horn(at_s, h, command, fault);
+        if slip != 0.0 || self.slip.angle != 0.0 {
+            self.slip = settle(SLIP_LAG_S, f64::MAX).advance(&self.slip, slip, h);
+        }
+        self.plate()
+    }
+
+    /// The command that has come through the dead time; forgets older ones.
+    fn in_force(&mut self, at_s: f64) -> f64 {
+        let arrived = at_s - self.truth.dead_time_s;
+        while self.commands.get(1).is_some_and(|&(from, _)| from <= arrived) {
+            self.commands.pop_front();
+        }
+        self.commands.front().filter(|&&(from, _)| from <= arrived).map_or(0.0, |&(_, c)| c)
+    }
+
+    fn turn_horn(&mut self, at_s: f64, h: f64, command: f64, fault: Option<ServoFault>) {
+        let slower = if let Some(ServoFault::Slow(factor)) = fault { factor } else { 1.0 };
+        let target = match fault {
+            None | Some(ServoFault::Offset(_) | ServoFault::Slow(_)) => Some(command),
+            Some(ServoFault::Hold) => None,
+            Some(ServoFault::Dead) => Some(0.0),
+            Some(ServoFault::Gain(factor)) => Some(factor * command),
+            Some(ServoFault::Reversed) => Some(-command),
+            Some(ServoFault::Intermittent) => self.contact.holds(at_s).then_some(command),
+        };
+        let (lag, rate) = (self.truth.lag_s * slower, self.truth.rate_limit_rad_s / slower);
+        self.horn = match target {
+            Some(target) => settle(lag, rate).advance(&self.horn, target, h),
+            None => Servo { angle: self.horn.angle, ..Servo::default() },
+        };
+    }
+
+    /// The plate follows the horn with the play between them.
+    fn plate(&mut self) -> PlateAngle {
+        let truth = &self.truth;
+        let wanted = truth.gain * self.horn.angle + self.slip.angle;
+        let play = truth.play_rad / 2.0;
+        let before = self.linkage_rad;
+        self.linkage_rad = before.clamp(wanted - play, wanted + play);
+        let pushed = self.linkage_rad != before || play == 0.0;
+        let moving = |horn: f64, slip: f64| if pushed { truth.gain * horn + slip } else { 0.0 };
+        PlateAngle {
+            angle: self.linkage_rad + truth.level_rad,
+            rate: moving(self.horn.rate, self.slip.rate),
+            acceleration: moving(self.horn.acceleration, self.slip.acceleration),
+        }
+    }
+}
+
+/// Largest horn angle, rad: the stops of a hobby servo are far outside what
+/// the controller commands.
+const STOP_RAD: f64 = std::f64::consts::FRAC_PI_2;
+
+fn mechanics(lag_s: f64, rate_limit_rad_s: f64) -> Result<ServoModel, Invalid> {
+    ServoModel::new(STOP_RAD, lag_s, rate_limit_rad_s)
+}
+
+/// Mechanics with numbers brought into the admissible range.
+fn settle(lag_s: f64, rate_limit_rad_s: f64) -> ServoModel {
+    let model = mechanics(lag_s.clamp(0.0, 10.0), rate_limit_rad_s.clamp(1e-3, 1000.0));
+    model.unwrap_or_else(|_| unreachable!("both numbers are in range"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulation::noise::Purpose;
+
+    const TRUTH: ServoTruth = ServoTruth {
+        dead_time_s: 0.05,
+        lag_s: 0.02,
+        rate_limit_rad_s: 100.0,
+        gain: 1.0,
+        level_rad: 0.01,
+        play_rad: 0.0,
+    };
+
+    /// The plate's angle one second after a command of 0.1 rad.
+    fn after_a_second(truth: ServoTruth, fault: Option<ServoFault>) -> f64 {
+        let noise = Noise::new(1, Purpose::ServoX);
+        let mut servo = SimulatedServo::new(truth, 0.2, noise).unwrap();
+        servo.command(0.0, 0.1);
+        (0..1000).map(|i| servo.advance(f64::from(i) * 1e-3, 1e-3, fault).angle).last().unwrap()
+    }
+
+    #[test]
+    fn each_fault_leaves_its_angle() {
+        let settled = |fault| after_a_second(TRUTH, fault) - TRUTH.level_rad;
+        let close = |got: f64, wanted: f64| (got - wanted).abs() < 1e-9;
+        assert!(close(settled(None), 0.1));
+        assert!(close(settled(Some(ServoFault::Hold)), 0.0));
+        assert!(close(settled(Some(ServoFault::Dead)), 0.0));
+        assert!(close(settled(Some(ServoFault::Gain(0.4))), 0.04));
+        assert!(close(settled(Some(ServoFault::Reversed)), -0.1));
+        assert!(close(settled(Some(ServoFault::Offset(0.05))), 0.15));
+        let slow = settled(Some(ServoFault::Slow(20.0)));
+        let expected = 0.1 * (1.0 - (-0.95_f64 / 0.4).exp());
+        assert!(close(slow, expected), "{slow} is not {expected}");
+    }
+
+    #[test]
+    fn play_is_lost_before_the_plate_follows() {
+        let loose = ServoTruth { play_rad: 0.02, ..TRUTH };
+        let angle = after_a_second(loose, None);
+        assert!((angle - (0.1 - 0.01 + 0.01)).abs() < 1e-9, "{angle}");
+    }
+
+    #[test]
+    fn a_loose_contact_fails_and_recovers() {
+        let mut contact =
+            Contact { holds: true, until_s: 0.0, noise: Noise::new(3, Purpose::ServoX) };
+        let held: Vec<bool> = (0..60).map(|i| contact.holds(f64::from(i) * 0.1)).collect();
+        assert!(!held[0] && held.contains(&true));
+    }
+}

@@ -1,0 +1,120 @@
+//! What changes from one session of a rig to the next: it stands elsewhere, its
+//! linkage was put on again, its supply is another.
+
+use super::model::RigModel;
+use super::noise::{Noise, Purpose};
+use offbd_core::vocabulary::{Axis, Invalid, PerAxis, in_range};
+
+/// Standard deviations between the sessions of one rig; immutable.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SessionSpread {
+    /// Of the level of each axis, rad, 0 to 0.1. One real rig: 1.1° within a day.
+    pub level_rad: f64,
+    /// Of the gain of each axis, as a share of it, 0 to 0.3.
+    pub gain: f64,
+}
+
+/// No session is farther from its rig than this, standard deviations: a controller
+/// has to balance every one.
+const FARTHEST: f64 = 3.0;
+
+impl SessionSpread {
+    pub(super) fn check(&self) -> Result<(), Invalid> {
+        in_range("/spread/level_rad", self.level_rad, 0.0..=0.1)?;
+        in_range("/spread/gain", self.gain, 0.0..=0.3)?;
+        Ok(())
+    }
+}
+
+impl RigModel {
+    /// This rig as it is in the session of `seed`: levels and gains drawn around
+    /// its own, from a normal distribution that ends at three standard deviations.
+    #[must_use]
+    pub fn of_session(&self, seed: u64) -> Self {
+        let mut noise = Noise::new(seed, Purpose::Session);
+        let mut normal = || noise.normal().clamp(-FARTHEST, FARTHEST);
+        let (levels, gains) = (PerAxis::from_fn(|_| normal()), PerAxis::from_fn(|_| normal()));
+        let mut model = self.clone();
+        for axis in Axis::ALL {
+            let servo = &mut model.servos[axis];
+            servo.level_rad += self.spread.level_rad * levels[axis];
+            servo.gain *= 1.0 + self.spread.gain * gains[axis];
+        }
+        if self.one_axis { model.along_x() } else { model }
+    }
+
+    /// The same rig with one axis: a beam along x, which has no level across.
+    #[must_use]
+    pub fn along_x(mut self) -> Self {
+        self.one_axis = true;
+        self.servos.y.level_rad = 0.0;
+        self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulation::Preset;
+    use proptest::prelude::*;
+
+    fn scattered(level_rad: f64, gain: f64) -> RigModel {
+        let spread = SessionSpread { level_rad, gain };
+        RigModel { spread, ..Preset::Chapter.model().unwrap() }
+    }
+
+    /// Standard deviation of `of` over 600 sessions about the rig's own.
+    fn scatter(rig: &RigModel, of: impl Fn(&RigModel) -> f64) -> f64 {
+        let squares = (0..600).map(|seed| (of(&rig.of_session(seed)) - of(rig)).powi(2));
+        (squares.sum::<f64>() / 600.0).sqrt()
+    }
+
+    #[test]
+    fn a_rig_without_spread_is_the_same_to_the_bit() {
+        for preset in Preset::ALL {
+            let rig = preset.model().unwrap();
+            assert_eq!(rig.of_session(7), rig);
+        }
+    }
+
+    #[test]
+    fn a_beam_has_no_level_across() {
+        let beam = scattered(0.02, 0.02).along_x();
+        let session = beam.of_session(3);
+        assert_eq!(session.servos.y.level_rad, 0.0);
+        assert_ne!(session.servos.x.level_rad, beam.servos.x.level_rad);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(16))]
+        /// The standard error of a deviation from 600 is 2.9 %; what is cut at three
+        /// deviations takes 0.7 % away. A tenth is three errors and more.
+        #[test]
+        fn levels_and_gains_scatter_as_much_as_is_said(
+            level_rad in 0.001..0.1_f64,
+            gain in 0.001..0.3_f64,
+        ) {
+            let rig = scattered(level_rad, gain);
+            for axis in Axis::ALL {
+                let level = scatter(&rig, |rig| rig.servos[axis].level_rad);
+                prop_assert!((level / level_rad - 1.0).abs() < 0.1, "{level} rad, not {level_rad}");
+                let share = scatter(&rig, |rig| rig.servos[axis].gain) / rig.servos[axis].gain;
+                prop_assert!((share / gain - 1.0).abs() < 0.1, "{share}, not {gain}");
+            }
+        }
+    }
+
+    /// Of 8000 normal numbers 22 are beyond three deviations.
+    #[test]
+    fn no_session_is_beyond_three_deviations() {
+        let rig = scattered(0.02, 0.05);
+        for session in (0..2000).map(|seed| rig.of_session(seed)) {
+            for axis in Axis::ALL {
+                let level = session.servos[axis].level_rad - rig.servos[axis].level_rad;
+                assert!(level.abs() <= 3.0 * 0.02 + 1e-12, "{level} rad");
+                let gain = session.servos[axis].gain / rig.servos[axis].gain - 1.0;
+                assert!(gain.abs() <= 3.0 * 0.05 + 1e-12, "{gain}");
+            }
+        }
+    }
+}

@@ -1,0 +1,119 @@
+//! What is really the case: where the ball is, where the plate stands, and
+//! when a fault first had a chance to be seen.
+//!
+//! A fault that has no effect yet (a dead servo that nobody commands) cannot be
+//! found; delays are fair only from its *first chance* on.
+
+use std::collections::VecDeque;
+
+use nalgebra::Vector2;
+
+use super::fault::{Fault, FaultEffect, SensorFault};
+use super::model::RigModel;
+use super::sensor::Reading;
+use offbd_core::vocabulary::{Axis, PerAxis};
+
+/// The rig at one moment, as nobody but the simulation knows it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Truth {
+    /// The rig's clock, s.
+    pub t_s: f64,
+    /// The ball's centre in the plate frame, m.
+    pub position: Vector2<f64>,
+    pub velocity: Vector2<f64>,
+    /// It has fallen off the plate.
+    pub lost: bool,
+    /// The plate's angle behind the servo of each axis, rad.
+    pub plate_rad: PerAxis<f64>,
+    /// The angle that a healthy servo would have under the same commands, rad.
+    pub healthy_rad: PerAxis<f64>,
+}
+
+/// A fault and the first chance to see it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FaultTruth {
+    pub fault: Fault,
+    /// When its effect first stood out, s; none: it never did so far.
+    pub chance_s: Option<f64>,
+}
+
+/// A plate angle wrong by this much on average over [`WINDOW_S`] stands out.
+const STANDS_OUT_RAD: f64 = 0.015;
+const WINDOW_S: f64 = 0.3;
+/// A tilt of this many breakaway tilts ought to move a ball.
+const MOVING_BREAKAWAYS: f64 = 2.0;
+/// A reading that is off by this much cannot be noise: m, and in standard
+/// deviations of it.
+const OFF_M: f64 = 0.003;
+const OFF_DEVIATIONS: f64 = 4.0;
+
+/// Watches one fault for its first chance.
+#[derive(Clone, Debug)]
+pub(super) struct Watch {
+    truth: FaultTruth,
+    errors: VecDeque<(f64, f64)>,
+    sum: f64,
+}
+
+impl Watch {
+    pub(super) fn new(fault: Fault) -> Self {
+        let truth = FaultTruth { fault, chance_s: None };
+        Self { truth, errors: VecDeque::new(), sum: 0.0 }
+    }
+
+    pub(super) const fn truth(&self) -> &FaultTruth {
+        &self.truth
+    }
+
+    pub(super) const fn fault(&self) -> &Fault {
+        &self.truth.fault
+    }
+
+    /// Ends the fault at `at_s`; one still to come never begins.
+    pub(super) fn end(&mut self, at_s: f64) {
+        let fault = &mut self.truth.fault;
+        if fault.end_s.is_none_or(|end_s| end_s > at_s) {
+            fault.end_s = Some(at_s.max(fault.onset_s));
+        }
+    }
+
+    /// Looks at one moment of `model`.
+    pub(super) fn observe(&mut self, truth: &Truth, latest: &Reading, model: &RigModel) {
+        if self.truth.chance_s.is_some() || !self.truth.fault.active(truth.t_s) {
+            return;
+        }
+        let (sensor, breakaway_rad) = (&model.sensor, model.surface.breakaway_rad);
+        let off_m = OFF_M.max(OFF_DEVIATIONS * sensor.noise_m + sensor.dead_band_m);
+        let off = |axis: Axis| {
+            let centred = latest[axis].map(|m| m - sensor.origin_m[axis]);
+            centred.map_or(0.0, |m| (m - truth.position[axis as usize]).abs())
+        };
+        let stands_out = match self.truth.fault.effect {
+            FaultEffect::Servo(axis, _) => {
+                self.mean_error(truth.t_s, (truth.plate_rad[axis] - truth.healthy_rad[axis]).abs())
+                    > STANDS_OUT_RAD
+            }
+            FaultEffect::Ball(_) => {
+                truth.plate_rad.x.hypot(truth.plate_rad.y) > MOVING_BREAKAWAYS * breakaway_rad
+            }
+            FaultEffect::Sensor(SensorFault::Freeze) => off(Axis::X).hypot(off(Axis::Y)) > off_m,
+            FaultEffect::Sensor(SensorFault::FreezeAxis(axis)) => off(axis) > off_m,
+            FaultEffect::Sensor(_) => true,
+        };
+        if stands_out {
+            self.truth.chance_s = Some(truth.t_s);
+        }
+    }
+
+    /// Mean over the window that ends at `at_s`; zero until it is full.
+    fn mean_error(&mut self, at_s: f64, error: f64) -> f64 {
+        self.errors.push_back((at_s, error));
+        self.sum += error;
+        let mut full = false;
+        while self.errors.front().is_some_and(|&(t, _)| at_s - t > WINDOW_S) {
+            self.sum -= self.errors.pop_front().map_or(0.0, |(_, e)| e);
+            full = true;
+        }
+        if full { self.sum / self.errors.len() as f64 } else { 0.0 }
+    }
+}

@@ -1,0 +1,110 @@
+//! CPU time of a piece of work: that of this thread, so that other processes
+//! on the machine disturb it little.
+
+/// CPU seconds that one measurement takes at least: short runs are repeated
+/// within it, so that the clock's resolution (tens of ns to 1 µs) does not show.
+const LEAST_S: f64 = 5e-3;
+
+/// Most runs within one measurement: what costs less than a picosecond was
+/// optimised away.
+const MOST_RUNS: u32 = 1 << 28;
+
+/// CPU time of one run, s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CpuTime {
+    /// The least of the repeated measurements: what the work itself costs.
+    pub minimum_s: f64,
+    /// Their median.
+    pub median_s: f64,
+}
+
+impl CpuTime {
+    /// Median over minimum: 1 on a quiet machine.
+    #[must_use]
+    pub fn spread(&self) -> f64 {
+        self.median_s / self.minimum_s
+    }
+
+    /// CPU microseconds per simulated second, for a run that simulates
+    /// `simulated_s` seconds.
+    #[must_use]
+    pub fn us_per_s(&self, simulated_s: f64) -> f64 {
+        self.minimum_s * 1e6 / simulated_s
+    }
+}
+
+/// Measures `run` `repeats` times (at least once), each over as many runs as
+/// fill 5 ms. Wrap what `run` computes in [`std::hint::black_box`].
+pub fn cpu_time(repeats: usize, mut run: impl FnMut()) -> CpuTime {
+    let mut n = 1;
+    let mut first_s = batch(n, &mut run);
+    while first_s < LEAST_S && n < MOST_RUNS {
+        n = grown(n, first_s);
+        first_s = batch(n, &mut run);
+    }
+    let mut each_s = vec![first_s];
+    each_s.extend((1..repeats).map(|_| batch(n, &mut run)));
+    for s in &mut each_s {
+        *s /= f64::from(n);
+    }
+    let median_s = offbd_core::maths::median(&mut each_s).unwrap_or(f64::NAN);
+    CpuTime { minimum_s: each_s.into_iter().fold(f64::INFINITY, f64::min), median_s }
+}
+
+/// How many runs should last a little longer than the least.
+fn grown(n: u32, took_s: f64) -> u32 {
+    let wanted = f64::from(n) * 1.3 * LEAST_S / took_s.max(1e-9);
+    (wanted.ceil() as u32).clamp(n.saturating_mul(2), MOST_RUNS)
+}
+
+fn batch(n: u32, run: &mut impl FnMut()) -> f64 {
+    let start_s = now_s();
+    for _ in 0..n {
+        run();
+    }
+    now_s() - start_s
+}
+
+/// CPU time that `run` takes once, s, beside what it returns.
+pub fn cpu_once<T>(run: impl FnOnce() -> T) -> (T, f64) {
+    let start_s = now_s();
+    let done = run();
+    (done, now_s() - start_s)
+}
+
+/// CPU time of this thread so far, s.
+#[cfg(unix)]
+#[expect(clippy::disallowed_methods, reason = "charts measure cost; no verdict sees it")]
+fn now_s() -> f64 {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
+}
+
+/// Elsewhere the time that passes stands in for it, s.
+#[cfg(not(unix))]
+#[expect(clippy::disallowed_methods, reason = "charts measure cost; no verdict sees it")]
+fn now_s() -> f64 {
+    use std::{sync::OnceLock, time::Instant};
+    static START: OnceLock<Instant> = OnceLock::new();
+    START.get_or_init(Instant::now).elapsed().as_secs_f64()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::hint::black_box;
+
+    fn spin(n: u64) {
+        for i in 0..n {
+            black_box(i);
+        }
+    }
+
+    #[test]
+    fn ten_times_the_work_costs_about_ten_times_as_much() {
+        let (short, long) = (cpu_time(5, || spin(2_000)), cpu_time(5, || spin(20_000)));
+        let ratio = long.minimum_s / short.minimum_s;
+        assert!((5.0..20.0).contains(&ratio), "{short:?} {long:?}");
+        assert!(short.spread() >= 1.0 && short.us_per_s(1.0) > 0.0);
+    }
+}

@@ -1,0 +1,130 @@
+//! `offbd chart`: measures, draws, and keeps the records.
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::cli::unusable::Unusable;
+use crate::cli::{output, table};
+use crate::wire::scene;
+use offbd_lab::chart::work_precision::{self, Charted, Peers};
+use offbd_lab::chart::{self, Chart, ChartError, Effort};
+
+/// Measures a trade-off on this machine: SVG, PNG and the records as JSON.
+///
+/// A short table goes to stdout, the names of the files to stderr. Costs are
+/// CPU time: leave the machine alone meanwhile.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    offbd chart work-precision\n  \
+    offbd chart work-precision --with peers.json\n  \
+    offbd chart estimators -o measured --quick\n  \
+    offbd chart detectors")]
+pub(in crate::cli) struct ChartArgs {
+    /// Which chart
+    #[arg(value_enum)]
+    name: Name,
+    /// Where the files go; made if need be
+    #[arg(short, long, value_name = "DIR", default_value = "charts")]
+    output: PathBuf,
+    /// Records of other engines to draw beside ours, for work-precision
+    #[arg(long, value_name = "FILE")]
+    with: Vec<PathBuf>,
+    /// Measure a few points only
+    #[arg(long)]
+    quick: bool,
+}
+
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum Name {
+    /// Acceleration estimators: error against delay and cost
+    Estimators,
+    /// Models and methods: error against CPU time per simulated second
+    WorkPrecision,
+    /// Models: error over the plate's motion, and what is chosen
+    Fidelity,
+    /// Methods: the largest stable step, measured and predicted
+    Stability,
+    /// Detectors of servo faults: delay against false alarms
+    Detectors,
+    /// Calibrations: false alarms and delays, promised against what comes
+    Certificate,
+}
+
+impl Name {
+    fn make(self, effort: Effort, with: &[PathBuf]) -> Result<Chart, ChartError> {
+        match self {
+            Self::Estimators => chart::estimators::make(effort),
+            Self::WorkPrecision => {
+                let mut peers = Peers::default();
+                for path in with {
+                    let more = work_precision::read(path)?;
+                    peers.records.extend(more.records);
+                    peers.versions.extend(more.versions);
+                }
+                work_precision::make(effort, charted()?, &peers)
+            }
+            Self::Fidelity => chart::fidelity::make(effort),
+            Self::Stability => chart::stability::make(effort),
+            Self::Detectors => chart::detectors::make(effort),
+            Self::Certificate => chart::certificate::make(effort),
+        }
+    }
+}
+
+pub(super) fn run(args: &ChartArgs) -> anyhow::Result<()> {
+    let effort = if args.quick { Effort::Quick } else { Effort::Full };
+    let chart = args.name.make(effort, &args.with).map_err(unusable)?;
+    let written = chart::write(&chart, &args.output)?;
+    write_table(&chart.table)?;
+    for path in written {
+        anstream::eprintln!("{}", path.display());
+    }
+    Ok(())
+}
+
+/// Records that cannot be read are unusable input.
+fn unusable(error: ChartError) -> anyhow::Error {
+    match error {
+        ChartError::Peers { path, reason } => Unusable::file(&path, reason).into(),
+        other => other.into(),
+    }
+}
+
+fn write_table(rows: &chart::Table) -> anyhow::Result<()> {
+    let mut out = output::stdout();
+    let mut table = table::table(&rows.heading, &rows.right);
+    for row in &rows.rows {
+        table.add_row(row);
+    }
+    for line in table::lines(&table) {
+        writeln!(out, "{line}")?;
+    }
+    Ok(out.flush()?)
+}
+
+macro_rules! scene {
+    ($name:literal) => {
+        include_str!(concat!("../../../examples/scenes/", $name, ".json"))
+    };
+}
+
+/// The scenes of the chart of speed against accuracy: a constant slope, a sine,
+/// and a plate that turns so steep that the ball slips, flies and lands; each on
+/// a hard and a soft contact.
+const CHARTED: [&str; 6] = [
+    scene!("slope"),
+    scene!("sine"),
+    scene!("steep"),
+    scene!("slope-soft"),
+    scene!("sine-soft"),
+    scene!("steep-soft"),
+];
+
+fn charted() -> Result<Vec<Charted>, ChartError> {
+    let parsed = CHARTED.iter().map(|file| scene::parse(file.as_bytes()));
+    Ok(parsed
+        .map(|named| named.map(|n| Charted { name: n.name, scene: n.scene, laws: n.laws }))
+        .collect::<Result<_, _>>()?)
+}

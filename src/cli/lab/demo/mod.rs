@@ -1,0 +1,177 @@
+//! `offbd demo`: the service on its embedded store, and a simulated rig that
+//! streams to it in real time, as a device would, over HTTP and WebSocket.
+//!
+//! What is found is read from the interface (Server-Sent Events), never from
+//! memory: the demo is a client like any other, in the same process.
+
+mod client;
+mod events;
+mod hands;
+mod plan;
+mod show;
+mod tally;
+
+use std::net::{Ipv4Addr, SocketAddr};
+use std::path::PathBuf;
+
+use anyhow::{Context, bail};
+use clap::Args;
+use data_encoding::HEXLOWER;
+
+use super::simulate;
+use crate::cli::calibrate;
+use crate::config::Config;
+use crate::server;
+use crate::wire::session_csv;
+use client::Client;
+use hands::Hands;
+use offbd_core::engine::Rig;
+use offbd_lab::simulation::{Disturbances, Fault, Preset, Reference, SimulatedRig};
+use sha2::{Digest, Sha256};
+use show::Show;
+
+/// Shows it all: the service, a simulated rig streaming to it, faults found.
+///
+/// Starts the service on its embedded store, registers and calibrates a
+/// simulated rig with PID control, streams it in real time over WebSocket and
+/// HTTP, injects faults, and prints what is found. Open the address it prints.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    offbd demo\n  \
+    offbd demo --seconds 60\n  \
+    offbd demo --seconds 90 --fault y_servo:gain=0.3@20 --fault sensor:freeze@60\n  \
+    offbd demo --seconds 120 --speed 10 --port 0\n\n\
+    A fault is CODE:KIND[=SIZE]@START[-END]; `offbd simulate --help` lists them. Exit\n\
+    status with --seconds: 0 if what was injected and what was found agree, else 1.")]
+pub(in crate::cli) struct DemoArgs {
+    /// Port of the service on 127.0.0.1; 0 takes one that is free
+    #[arg(long, default_value_t = 8087, value_name = "P")]
+    port: u16,
+    /// Directory of the store [default: a temporary one]
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// End after this long on the rig's clock, s [default: until Ctrl-C]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = simulate::seconds)]
+    seconds: Option<f64>,
+    /// A fault to inject; may be given again [default: one after the other]
+    #[arg(long, value_name = "CODE:KIND@T")]
+    fault: Vec<Fault>,
+    /// Seconds of the rig's clock in one second
+    #[arg(long, default_value_t = 1.0, value_name = "X", allow_negative_numbers = true,
+          value_parser = speed)]
+    speed: f64,
+    /// Seed of the simulated rig
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+/// The name of the demo's rig.
+const ASSET: &str = "demo-rig";
+/// A day: the demo's end where none is asked for.
+const ENDLESS_S: f64 = 86_400.0;
+/// Healthy seconds from which the rig is learnt; simulated in moments.
+const HEALTHY_S: f64 = 120.0;
+/// Fastest show: the rig's simulation alone is some hundreds of times faster
+/// than real.
+const MAX_SPEED: f64 = 100.0;
+
+fn speed(word: &str) -> Result<f64, String> {
+    let value: Option<f64> = word.parse().ok();
+    let in_range = |v: &f64| (0.1..=MAX_SPEED).contains(v);
+    value.filter(in_range).ok_or_else(|| format!("not from 0.1 to {MAX_SPEED}"))
+}
+
+pub(super) fn run(args: &DemoArgs) -> anyhow::Result<()> {
+    crate::cli::runtime()?.block_on(demo(args))
+}
+
+async fn demo(args: &DemoArgs) -> anyhow::Result<()> {
+    let store = StoreDirectory::new(args.data.as_ref());
+    let listen = SocketAddr::from((Ipv4Addr::LOCALHOST, args.port));
+    let data = store.path.clone();
+    let config = Config { listen, data, ..Config::default() };
+    let (hands, routes) = hands::hands(ASSET);
+    let server = server::start_with(config, Some(routes));
+    let server = server.await.context("cannot start; --port 0 takes a free port")?;
+    let result = show(args, &server.address.to_string(), &store, hands).await;
+    server.shutdown().await?;
+    let outcome = result?;
+    if args.seconds.is_some() && !outcome.interrupted && !outcome.agreed {
+        bail!("what was injected and what was found do not agree");
+    }
+    Ok(())
+}
+
+/// How a show went.
+struct Outcome {
+    agreed: bool,
+    interrupted: bool,
+}
+
+async fn show(
+    args: &DemoArgs,
+    address: &str,
+    store: &StoreDirectory,
+    hands: Hands,
+) -> anyhow::Result<Outcome> {
+    let seconds = args.seconds.unwrap_or(ENDLESS_S);
+    let asked = args.fault.clone();
+    let faults = if asked.is_empty() { plan::shown(seconds) } else { asked };
+    anstream::println!("dashboard  http://{address}/");
+    anstream::println!("interface  http://{address}/docs");
+    anstream::println!("store      {}", store.path.display());
+    if store.temporary {
+        anstream::println!("           removed at the end; --data DIR keeps one");
+    }
+    let rig = learnt_rig(args.seed)?;
+    let client = Client::new(address.to_owned(), &rig.name)?;
+    client.register(&rig).await?;
+    let simulated = simulated_rig(Reference::Steps, args.seed)?;
+    let mut show = Show::new(client, simulated, args.speed, hands).await?;
+    let interrupted = show.run(plan::episodes(faults, seconds)).await?;
+    let agreed = show.conclude()?;
+    Ok(Outcome { agreed, interrupted })
+}
+
+fn simulated_rig(reference: Reference, seed: u64) -> anyhow::Result<SimulatedRig> {
+    let model = Preset::Chapter.model()?;
+    Ok(SimulatedRig::new(model, reference, Disturbances::default(), seed)?)
+}
+
+/// The rig as its owner knows it, with what a healthy session teaches.
+fn learnt_rig(seed: u64) -> anyhow::Result<Rig> {
+    let model = Preset::Chapter.model()?;
+    let mut rig = Rig { name: ASSET.to_owned(), ..model.rig };
+    let mut healthy = simulated_rig(Reference::Lissajous, seed.wrapping_add(1))?;
+    let samples = simulate::record(&mut healthy, HEALTHY_S);
+    let mut file = Vec::new();
+    session_csv::write(&mut file, &samples)?;
+    let sha256 = HEXLOWER.encode(&Sha256::digest(&file));
+    let calibration = calibrate::learn(&rig, &[samples], &sha256)?;
+    calibrate::report(&rig, &calibration);
+    rig.calibration = Some(calibration);
+    Ok(rig)
+}
+
+/// The store's directory; a temporary one goes with the demo.
+struct StoreDirectory {
+    path: PathBuf,
+    temporary: bool,
+}
+
+impl StoreDirectory {
+    fn new(asked: Option<&PathBuf>) -> Self {
+        let temporary =
+            || std::env::temp_dir().join(format!("offbd-demo-{}", uuid::Uuid::now_v7()));
+        Self { path: asked.cloned().unwrap_or_else(temporary), temporary: asked.is_none() }
+    }
+}
+
+impl Drop for StoreDirectory {
+    fn drop(&mut self) {
+        if self.temporary {
+            // What cannot be removed is left to the system.
+            let _ = std::fs::remove_dir_all(&self.path);
+        }
+    }
+}

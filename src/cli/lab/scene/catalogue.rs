@@ -1,0 +1,157 @@
+//! The scenes that have a name, and scene files.
+
+use std::path::Path;
+
+use crate::cli::unusable::{BadArgument, Unusable, read};
+use crate::cli::{output, table};
+use crate::wire::scene::{NamedScene, parse};
+use offbd_core::vocabulary::Invalid;
+
+/// What there is to run.
+pub(super) enum Exercise {
+    /// Scenes by laws of time, beside each other; the first is the scene's own.
+    Laws {
+        scenes: Vec<NamedScene>,
+        /// What there is to be seen asks for this accuracy, m, if for any.
+        tolerance_m: Option<f64>,
+    },
+    /// The plate in closed loop.
+    Control { impulse: bool },
+    /// A simulated rig with its twin.
+    Rig { bad_x: bool },
+}
+
+struct Entry {
+    name: &'static str,
+    about: &'static str,
+    what: What,
+}
+
+enum What {
+    /// Scene files.
+    Laws(&'static [&'static str]),
+    /// Scene files, with the accuracy that shows what there is to see, m.
+    Fine(f64, &'static [&'static str]),
+    Control(bool),
+    Rig(bool),
+}
+
+macro_rules! file {
+    ($name:literal) => {
+        include_str!(concat!("../../../../examples/scenes/", $name, ".json"))
+    };
+}
+
+const ENTRIES: [Entry; 12] = [
+    Entry {
+        name: "tilt",
+        about: "steps 48-50: both angles pi/20 from rest; leaves by the near side, y, and falls",
+        what: What::Laws(&[file!("tilt")]),
+    },
+    Entry {
+        name: "pid",
+        about: "application 1: two PID loops every 10 ms bring the ball to the centre, 30 s",
+        what: What::Control(false),
+    },
+    Entry {
+        name: "pid-impulse",
+        about: "the same, and at 10 s a push of 10 % of the ball's weight along x for 0.1 s",
+        what: What::Control(true),
+    },
+    Entry {
+        name: "block",
+        about: "application 2: a cube that slides, at pi/20 on both axes, beside the ball",
+        what: What::Fine(1e-7, &[file!("block"), file!("tilt")]),
+    },
+    Entry {
+        name: "good-asset",
+        about: "application 3: a rig and its twin side by side; nothing is reported",
+        what: What::Rig(false),
+    },
+    Entry {
+        name: "bad-x-servo",
+        about: "application 3: its x servo obeys 0.5 s late; x_servo is reported",
+        what: What::Rig(true),
+    },
+    Entry {
+        name: "slope",
+        about: "both angles pi/20 on an endless plate, 0.4 s",
+        what: What::Laws(&[file!("slope")]),
+    },
+    Entry {
+        name: "sine",
+        about: "both angles swing by 0.05 rad at 0.7 and 0.9 Hz, 10 s",
+        what: What::Laws(&[file!("sine")]),
+    },
+    Entry {
+        name: "steep",
+        about: "qy turns to 1.2 rad within 0.15 s: the ball slips, 0.4 s",
+        what: What::Laws(&[file!("steep")]),
+    },
+    Entry {
+        name: "slope-soft",
+        about: "slope on the soft contact of section 4.8",
+        what: What::Laws(&[file!("slope-soft")]),
+    },
+    Entry {
+        name: "sine-soft",
+        about: "sine on the soft contact",
+        what: What::Laws(&[file!("sine-soft")]),
+    },
+    Entry {
+        name: "steep-soft",
+        about: "steep on the soft contact",
+        what: What::Laws(&[file!("steep-soft")]),
+    },
+];
+
+/// One line for each named scene.
+pub(super) fn list() -> anyhow::Result<()> {
+    let mut rows = table::table(&["scene", "what happens"], &[]);
+    for entry in &ENTRIES {
+        rows.add_row([entry.name, entry.about]);
+    }
+    output::line(&table::lines(&rows).collect::<Vec<_>>().join("\n"))
+}
+
+/// The scene of this name, or the file.
+pub(super) fn find(word: &str) -> anyhow::Result<Exercise> {
+    if let Some(entry) = ENTRIES.iter().find(|entry| entry.name == word) {
+        return Ok(match entry.what {
+            What::Laws(files) => Exercise::Laws { scenes: parsed(files)?, tolerance_m: None },
+            What::Fine(tolerance, files) => {
+                Exercise::Laws { scenes: parsed(files)?, tolerance_m: Some(tolerance) }
+            }
+            What::Control(impulse) => Exercise::Control { impulse },
+            What::Rig(bad_x) => Exercise::Rig { bad_x },
+        });
+    }
+    let path = Path::new(word);
+    let looks_like_a_file = path.extension().is_some() || path.components().count() > 1;
+    if !looks_like_a_file && !path.exists() {
+        let names = ENTRIES.map(|entry| entry.name).join(", ");
+        let text = format!("no scene is called {word}; there are {names}, and scene files");
+        return Err(BadArgument(text).into());
+    }
+    let scene = parse(&read(path)?).map_err(|e| Unusable::file(path, e))?;
+    Ok(Exercise::Laws { scenes: vec![scene], tolerance_m: None })
+}
+
+fn parsed(files: &[&str]) -> Result<Vec<NamedScene>, Invalid> {
+    files.iter().map(|text| parse(text.as_bytes())).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_named_scene_can_be_found_and_has_its_files_name() {
+        for entry in &ENTRIES {
+            if let Exercise::Laws { scenes, .. } = find(entry.name).unwrap() {
+                assert_eq!(scenes[0].name, entry.name);
+            }
+            assert!(entry.name.len() + entry.about.len() < 160, "{}", entry.name);
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! The files of a scene: trajectories as CSV, drawings as SVG and PNG.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+
+use super::course::Sampled;
+use crate::cli::calibrate::write_asset;
+use crate::cli::output;
+use crate::wire::session_csv;
+use offbd_core::engine::Rig;
+use offbd_core::vocabulary::Sample;
+use offbd_lab::chart::{Figure, png, svg};
+
+/// The header of a trajectory, plate frame.
+const HEADER: &str = "t_s,x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s,wx_rad_s,wy_rad_s,wz_rad_s";
+
+/// Where the files go; each one's name is said on stderr.
+pub(super) struct Folder(PathBuf);
+
+impl Folder {
+    /// The folder `dir`, made if need be; none where none is wanted.
+    pub(super) fn new(dir: Option<&Path>) -> anyhow::Result<Option<Self>> {
+        let Some(dir) = dir else { return Ok(None) };
+        std::fs::create_dir_all(dir).with_context(|| dir.display().to_string())?;
+        Ok(Some(Self(dir.to_owned())))
+    }
+
+    fn said(&self, name: &str) -> PathBuf {
+        let path = self.0.join(name);
+        anstream::eprintln!("{}", path.display());
+        path
+    }
+
+    /// Each number with as many digits as it takes to read it back the same.
+    pub(super) fn trajectory(&self, name: &str, samples: &[Sampled]) -> anyhow::Result<()> {
+        let mut out = output::create(&self.said(name))?;
+        writeln!(out, "{HEADER}")?;
+        for (t, at) in samples {
+            write!(out, "{t}")?;
+            for value in at.to_row() {
+                // Adding zero turns −0 into 0.
+                write!(out, ",{}", value + 0.0)?;
+            }
+            writeln!(out)?;
+        }
+        Ok(out.flush()?)
+    }
+
+    /// What a device would have recorded, for `offbd replay`.
+    pub(super) fn session(&self, samples: &[Sample]) -> anyhow::Result<()> {
+        let mut out = output::create(&self.said("session.csv"))?;
+        session_csv::write(&mut out, samples)?;
+        Ok(out.flush()?)
+    }
+
+    /// What the owner of a rig knows of it, for `offbd replay --asset`.
+    pub(super) fn asset(&self, rig: &Rig) -> anyhow::Result<()> {
+        write_asset(rig, &self.said("asset.json"))
+    }
+
+    pub(super) fn figure(&self, name: &str, figure: &Figure) -> anyhow::Result<()> {
+        let drawing = svg(figure)?;
+        put(&self.said(&format!("{name}.svg")), drawing.as_bytes())?;
+        put(&self.said(&format!("{name}.png")), &png(&drawing)?)
+    }
+}
+
+fn put(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
+    std::fs::write(path, bytes).with_context(|| path.display().to_string())
+}

@@ -1,0 +1,72 @@
+//! `offbd scene`: one scene by any model and method; the chapter's exercises.
+
+mod catalogue;
+mod control;
+mod course;
+mod decide;
+mod files;
+mod laws;
+mod plots;
+mod polyline;
+mod report;
+mod rig;
+mod words;
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::cli::output::Format;
+use catalogue::Exercise;
+use decide::HowArgs;
+
+/// Runs a scene: a ball or block on a plate that moves by a law.
+///
+/// By itself it takes the cheapest model and method that meet the wanted
+/// accuracy, and says why.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    offbd scene --list\n  \
+    offbd scene tilt -o out\n  \
+    offbd scene sine --tolerance 1e-6\n  \
+    offbd scene steep --model compliant --method rodas4 --tolerance 1e-9\n  \
+    offbd scene my.json --model rolling --method rk4 --step 0.005 --format json\n\n\
+    A scene file says what differs from the chapter's rig:\n  \
+    { \"duration_s\": 2, \"contact\": { \"friction\": 0.3 },\n    \
+    \"qy\": [ { \"sine\": { \"amplitude_rad\": 0.1, \"frequency_hz\": 0.5 } } ] }\n\
+    Beside sine there are constant_rad (a number) and smoothstep (to_rad, start_s,\n\
+    duration_s); beside ball there is block (edge_m, mass_kg); pushes are\n\
+    { \"force_n\": [0.05, 0], \"start_s\": 1, \"duration_s\": 0.1 }.\n\n\
+    Exit status: 0 done, 1 the run failed or no model meets the tolerance, 2 bad\n\
+    arguments, 3 unusable scene file.")]
+pub(in crate::cli) struct SceneArgs {
+    /// A scene of --list, or a file
+    #[arg(value_name = "NAME|FILE.json", required_unless_present = "list")]
+    scene: Option<String>,
+    /// Lists the scenes that have a name
+    #[arg(long)]
+    list: bool,
+    #[command(flatten)]
+    how: HowArgs,
+    /// Time between two samples, s [default: 0.01, or a 200th of the scene where
+    /// that is shorter]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = decide::positive_number)]
+    sample: Option<f64>,
+    /// Writes trajectory.csv and plots here; made if need be
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// For people, or one JSON object
+    #[arg(long, value_enum, default_value = "table")]
+    format: Format,
+}
+
+pub(super) fn run(args: &SceneArgs) -> anyhow::Result<()> {
+    let Some(word) = args.scene.as_deref().filter(|_| !args.list) else {
+        return catalogue::list();
+    };
+    match catalogue::find(word)? {
+        Exercise::Laws { scenes, tolerance_m } => laws::run(args, &scenes, tolerance_m),
+        Exercise::Control { impulse } => control::run(args, impulse),
+        Exercise::Rig { bad_x } => rig::run(args, bad_x),
+    }
+}

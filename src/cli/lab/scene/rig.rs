@@ -1,0 +1,85 @@
+//! Application 3: a rig beside its twin, judged by the chapter's rule.
+
+mod bench;
+mod plot;
+
+use serde_json::json;
+
+use super::SceneArgs;
+use super::files::Folder;
+use super::report::row;
+use crate::cli::output::{self, Format};
+use crate::cli::table;
+use crate::cli::unusable::BadArgument;
+use bench::{Judged, judge, record};
+use offbd_core::diagnosis::Profile;
+
+/// Runs the good rig, or the one with a bad x servo.
+pub(super) fn run(args: &SceneArgs, bad_x: bool) -> anyhow::Result<()> {
+    let name = if bad_x { "bad-x-servo" } else { "good-asset" };
+    if !args.how.is_plain() || args.sample.is_some() {
+        let text = format!(
+            "{name} is a rig with its own twin: no --model, --method, --step, --tolerance or --sample"
+        );
+        return Err(BadArgument(text).into());
+    }
+    let recording = record(bad_x)?;
+    let judged: Vec<Judged> = [Profile::Textbook, Profile::Default]
+        .into_iter()
+        .map(|profile| judge(&recording, profile))
+        .collect::<Result<_, _>>()?;
+    if let Some(folder) = Folder::new(args.output.as_deref())? {
+        folder.trajectory("trajectory.csv", &recording.truth)?;
+        folder.session(&recording.samples)?;
+        folder.asset(&recording.rig)?;
+        folder.figure("deviation", &plot::deviation(name, &judged[0]))?;
+    }
+    show(args.format, name, &judged)
+}
+
+fn show(format: Format, name: &str, judged: &[Judged]) -> anyhow::Result<()> {
+    match format {
+        Format::Table => output::line(&lines(name, judged).join("\n")),
+        Format::Json => {
+            let verdicts = judged.iter().map(|judged| {
+                let faults = judged.faults.iter();
+                let faults: Vec<_> = faults
+                    .map(|f| json!({ "code": f.code, "kind": f.kind, "t_s": f.t_s }))
+                    .collect();
+                json!({ "profile": judged.profile.as_str(), "faults": faults })
+            });
+            let verdicts: Vec<_> = verdicts.collect();
+            output::line(&json!({ "scene": name, "verdicts": verdicts }).to_string())
+        }
+    }
+}
+
+fn lines(name: &str, judged: &[Judged]) -> Vec<String> {
+    let what = if name == "bad-x-servo" {
+        "its x servo obeys 0.5 s late; x_servo is to be reported, and nothing else"
+    } else {
+        "nothing is to be reported"
+    };
+    let mut lines = vec![
+        row("scene", &format!("{name}, {} s", bench::DURATION_S)),
+        row(
+            "rig",
+            &format!(
+                "the chapter's without noise, on a plate of 1 m (its models have no edge), in \
+                 closed loop beside its twin; {what}"
+            ),
+        ),
+        String::new(),
+    ];
+    let mut rows = table::table(&["profile", "reports", "largest deviation x, y"], &[]);
+    for one in judged {
+        let [x, y] = one.largest();
+        rows.add_row([
+            one.profile.as_str().to_owned(),
+            one.words(),
+            format!("{x:.1e}, {y:.1e} m/s²"),
+        ]);
+    }
+    lines.extend(table::lines(&rows));
+    lines
+}

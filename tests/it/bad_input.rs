@@ -1,0 +1,271 @@
+//! Whatever comes in: a problem that names the element, the rest of the batch
+//! kept, the process alive.
+
+use crate::support::{Bench, Client, csv, rig};
+use reqwest::Method;
+use serde_json::{Value, json};
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+
+const TELEMETRY: &str = "assets/a/telemetry";
+
+async fn bench() -> Bench {
+    let bench = Bench::start().await;
+    bench.client.asset("a").await;
+    bench
+}
+
+/// The process lives: it takes a sample.
+async fn alive(client: &Client) {
+    let ack = client.telemetry("a", Some("alive"), &rig(1, 1)).await;
+    assert_eq!(ack["accepted"].as_u64().unwrap() + ack["duplicate"].as_u64().unwrap(), 1);
+}
+
+#[tokio::test]
+async fn unknown_things_are_named() {
+    let bench = bench().await;
+    let client = &bench.client;
+    for path in
+        ["assets/nobody/state", "assets/nobody", "assets/nobody/faults", "events?asset=nobody"]
+    {
+        let problem = client.get(path).await.problem(404);
+        assert!(problem["detail"].as_str().unwrap().contains("`nobody`"), "{problem}");
+    }
+    let problem = client.post("assets/nobody/telemetry", &json!({"samples":[]})).await.problem(404);
+    assert_eq!(problem["type"], "urn:offbd:problem:unknown-asset");
+    client.get("sessions/0").await.problem(404);
+    client.get("replays/0").await.problem(404);
+    client.get("assets/a/calibrations/0").await.problem(404);
+    let problem = client.get("assets/a/faults/z_servo").await.problem(404);
+    assert!(problem["detail"].as_str().unwrap().contains("x_servo, y_servo"), "{problem}");
+    client.get("/nowhere").await.problem(404);
+    let answer = client.send(client.request(Method::PATCH, "assets")).await;
+    answer.problem(405);
+    assert!(answer.headers.contains_key("allow"), "{:?}", answer.headers);
+    alive(client).await;
+}
+
+#[tokio::test]
+async fn asset_files_that_cannot_be() {
+    let bench = bench().await;
+    let client = &bench.client;
+    for (file, status, pointer) in [
+        (json!({"name":"b","ball":{"radius_m":-0.01}}), 422, "/ball/radius_m"),
+        (json!({"name":"b","ball":{"radius_m":"big"}}), 422, "/ball/radius_m"),
+        (json!({"name":"b","plate":{"diameter_m":0.3,"length_m":0.2}}), 422, "/plate/diameter_m"),
+        (json!({"name":"b","servo":{"angle_limit_rad":9}}), 422, "/servo/angle_limit_rad"),
+        (json!({"name":"../b"}), 422, "/name"),
+        (json!({"name":""}), 422, "/name"),
+        (json!({"name":"b","color":"red"}), 422, "/color"),
+        (json!({"name":"b","diagnostics":{"profile":"odd"}}), 422, "/diagnostics/profile"),
+        (json!([]), 400, ""),
+        (json!({}), 400, ""),
+    ] {
+        let problem = client.post("assets", &file).await.problem(status);
+        assert_eq!(problem["pointer"], pointer, "{file}: {problem}");
+    }
+    let answer = client.post_text("assets", "application/json", "{\"name\":").await;
+    assert!(answer.problem(400)["detail"].as_str().unwrap().contains("line 1"));
+    client.post("assets", &json!({"name":"a"})).await.problem(409);
+    client.put("assets/c", &json!({"name":"a"})).await.problem(422);
+    let long = format!("{{\"name\":\"{}\"}}", "x".repeat(70_000));
+    client.post_text("assets", "application/json", long).await.problem(413);
+    alive(client).await;
+}
+
+#[tokio::test]
+async fn documents_that_are_no_batch() {
+    let bench = bench().await;
+    let client = &bench.client;
+    for (kind, body, status, pointer) in [
+        ("application/json", "{\"samples\":[{\"t_s\":0}", 400, json!("/samples")),
+        ("application/json", "", 400, json!("")),
+        ("application/json", "[]", 400, json!("")),
+        ("application/json", "{}", 400, json!("/t_s")),
+        ("application/json", "{\"samples\":{}}", 400, json!("/samples")),
+        ("application/json", "{\"session\":1,\"samples\":[]}", 400, json!("/session")),
+        ("application/json", "{\"t_s\":[0,1],\"y_m\":[0]}", 400, json!("/y_m")),
+        (
+            "application/json",
+            "{\"session\":\"\",\"samples\":[{\"t_s\":0}]}",
+            422,
+            json!("/session"),
+        ),
+        ("text/csv", "t_s,x_m\n0,0\n", 400, json!("")),
+        ("application/xml", "<t_s>0</t_s>", 415, Value::Null),
+        ("application/x-www-form-urlencoded", "{\"samples\":[]}", 415, Value::Null),
+    ] {
+        let problem = client.post_text(TELEMETRY, kind, body).await.problem(status);
+        assert_eq!(problem["pointer"], pointer, "{body}: {problem}");
+    }
+    for (body, pointer) in [
+        (&[][..], ""),
+        (b"{\"samples\":[]}", ""),
+        (b"\x81\xa7samples\xdd\xff\xff\xff\xff", "/samples/0"),
+        (b"\x81\xa3t_s\x92\x00", "/t_s/1"),
+    ] {
+        let request = client.request(Method::POST, TELEMETRY);
+        let request = request.header("content-type", "application/msgpack").body(body.to_vec());
+        let problem = client.send(request).await.problem(400);
+        assert_eq!(problem["pointer"], pointer, "{body:x?}: {problem}");
+    }
+    let named = r#"{"session":"b","samples":[]}"#;
+    let answer = client.post_text("assets/a/telemetry?session=c", "application/json", named).await;
+    assert_eq!(answer.problem(422)["pointer"], "/session");
+    alive(client).await;
+}
+
+#[tokio::test]
+async fn rows_that_are_no_samples_spoil_themselves_alone() {
+    let bench = bench().await;
+    let client = &bench.client;
+    let body = r#"{"session":"odd","samples":[{"t_s":0,"x_m":0},{"t_s":"1"},{"t_s":null},{},7,
+        {"t_s":NaN},{"t_s":1,"x_m":-Infinity},{"t_s":2,"x_m":1e300},{"t_s":1e300},{"t_s":1e999},
+        {"t_s":3,"seq":-4},{"t_s":0.01,"x_m":0}]}"#;
+    let ack = client.post_text(TELEMETRY, "application/json", body).await.expect(200);
+    let rejected = ack["rejected"].as_array().unwrap();
+    let indices: Vec<u64> = rejected.iter().map(|r| r["index"].as_u64().unwrap()).collect();
+    assert_eq!(indices, [1, 2, 3, 4, 5, 6, 7, 8, 9, 10], "{ack}");
+    assert_eq!(ack["accepted"], 2);
+    assert!(rejected.iter().all(|r| !r["reason"].as_str().unwrap().is_empty()));
+    assert_eq!(client.recording("a", "odd").await.len(), 2);
+    assert_eq!(client.session("a", "odd").await["rejected"], 10);
+
+    let lines = "{\"t_s\":0}\nnot json\n{\"t_s\":0.01}\n";
+    let path = "assets/a/telemetry?session=lines";
+    let ack = client.post_text(path, "application/x-ndjson", lines).await.expect(200);
+    assert_eq!((&ack["accepted"], &ack["rejected"][0]["index"]), (&json!(2), &json!(1)));
+
+    let table = "t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n0,0,0,0,0\n1,0,oops,0,0\n0.02,,,,\n";
+    let path = "assets/a/telemetry?session=table";
+    let ack = client.post_text(path, "text/csv", table).await.expect(200);
+    assert_eq!(ack["accepted"], 2);
+    assert!(ack["rejected"][0]["reason"].as_str().unwrap().contains("line 3"), "{ack}");
+}
+
+#[tokio::test]
+async fn clocks_that_go_wrong() {
+    let bench = bench().await;
+    let client = &bench.client;
+    let good = rig(300, 300);
+    client.telemetry("a", Some("clock"), &good[..200]).await;
+    let mut back = good[200];
+    (back.t_s, back.seq) = (good[200].t_s - 3600.0, Some(5_000));
+    let mut ahead = good[200];
+    (ahead.t_s, ahead.seq) = (good[200].t_s + 365.0 * 86_400.0, Some(5_001));
+    let ack = client.telemetry("a", Some("clock"), &[back, ahead]).await;
+    assert_eq!((&ack["accepted"], ack["late"].as_array().unwrap().len()), (&json!(2), 2), "{ack}");
+    let ack = client.telemetry("a", Some("clock"), &good[200..]).await;
+    assert_eq!((&ack["accepted"], &ack["late"]), (&json!(100), &json!([])));
+    assert_eq!(client.recording("a", "clock").await.len(), 302);
+}
+
+#[tokio::test]
+async fn empty_and_huge_batches() {
+    let bench = Bench::start_with(|config| {
+        config.limits.batch_samples = 50;
+        config.limits.batch_bytes = 20_000;
+    })
+    .await;
+    let client = &bench.client;
+    client.asset("a").await;
+    let ack = client.post(TELEMETRY, &json!({"samples":[]})).await.expect(200);
+    assert_eq!((&ack["accepted"], &ack["session"]), (&json!(0), &Value::Null));
+    let many =
+        client.post(TELEMETRY, &crate::support::batch(None, &rig(51, 51))).await.problem(413);
+    assert!(many["detail"].as_str().unwrap().contains("51"), "{many}");
+    client.post_text(TELEMETRY, "application/json", " ".repeat(20_001)).await.problem(413);
+    client.post_text(TELEMETRY, "text/csv", csv(&rig(51, 51))).await.problem(413);
+    assert_eq!(client.get("sessions").await.expect(200)["items"], json!([]));
+    alive(client).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_body_that_never_ends() {
+    let bench = Bench::start_with(|config| config.limits.body_timeout_s = 1).await;
+    bench.client.asset("a").await;
+    let mut socket = tokio::net::TcpStream::connect(&bench.client.address).await.unwrap();
+    let head = "POST /api/v1/assets/a/telemetry HTTP/1.1\r\nHost: localhost\r\n\
+        Content-Type: application/json\r\nContent-Length: 1000\r\n\r\n{\"samples\":[";
+    socket.write_all(head.as_bytes()).await.unwrap();
+    let mut answer = vec![0; 4096];
+    let read = tokio::time::timeout(crate::support::DEADLINE, socket.read(&mut answer)).await;
+    let n = read.unwrap().unwrap();
+    let answer = String::from_utf8_lossy(&answer[..n]).into_owned();
+    assert!(answer.starts_with("HTTP/1.1 408"), "{answer}");
+    alive(&bench.client).await;
+}
+
+#[tokio::test]
+async fn recordings_that_are_none() {
+    let bench = bench().await;
+    let client = &bench.client;
+    let path = "assets/a/sessions/import?name=broken";
+    let text = format!("{}9.99,broken\n", csv(&rig(100, 100)));
+    let imported = client.post_text(path, "text/csv", text).await.expect(201);
+    assert_eq!((&imported["accepted"], &imported["rejected"]), (&json!(100), &json!(1)));
+    assert!(imported["rejections"][0]["reason"].as_str().unwrap().contains("line 102"));
+    assert_eq!(imported["session"]["state"], "ended");
+    client.post_text(path, "text/csv", csv(&rig(10, 10))).await.problem(409);
+    let path = "assets/a/sessions/import";
+    client.post_text(path, "text/csv", "nothing,here\n1,2\n").await.problem(400);
+    client.post_text(path, "application/json", "{}").await.problem(415);
+    let path = "assets/nobody/sessions/import";
+    client.post_text(path, "text/csv", csv(&rig(10, 10))).await.problem(404);
+    alive(client).await;
+}
+
+#[tokio::test]
+async fn questions_that_cannot_be() {
+    let bench = bench().await;
+    let client = &bench.client;
+    for (path, parameter) in [
+        ("faults?status=odd", "status"),
+        ("faults?sort=odd", "sort"),
+        ("faults?cursor=odd", "cursor"),
+        ("faults?cursor=é", "cursor"),
+        ("sessions?cursor=00", "cursor"),
+        ("sessions?state=odd", "state"),
+        ("assets?cursor=7", "cursor"),
+    ] {
+        let problem = client.get(path).await.problem(400);
+        assert_eq!(problem["parameter"], parameter, "{path}: {problem}");
+    }
+    client.get("assets?limit=many").await.problem(400);
+    client.get("assets/a/stream").await.problem(426);
+    let request = client.request(Method::GET, "events").header("last-event-id", "x");
+    client.send(request).await.problem(400);
+    client.telemetry("a", Some("s"), &rig(10, 10)).await;
+    let id = client.session("a", "s").await["id"].as_str().unwrap().to_owned();
+    let path = format!("sessions/{id}/telemetry");
+    let request = client.request(Method::GET, &path).header("accept", "image/png");
+    let problem = client.send(request).await.problem(406);
+    assert!(problem["detail"].as_str().unwrap().contains("text/csv"), "{problem}");
+    let replays = format!("sessions/{id}/replays");
+    let wrong = client.post(&replays, &json!({"profile":"odd"})).await.problem(422);
+    assert_eq!(wrong["pointer"], "/profile");
+    let wrong = client.post(&replays, &json!({"asset":{"ball":{"mass_kg":-1}}})).await.problem(422);
+    assert_eq!(wrong["pointer"], "/asset/ball/mass_kg");
+    let wrong = client.post("assets/a/calibrations", &json!({"sessions":["x"]})).await.problem(422);
+    assert_eq!(wrong["pointer"], "/sessions/0");
+    client.post("assets/a/calibrations", &json!({})).await.problem(422);
+    client.post("assets/a/faults/sensor/acknowledge", &Value::Null).await.problem(409);
+    alive(client).await;
+}
+
+#[tokio::test]
+async fn a_name_that_was_used_takes_nothing_new() {
+    let bench = bench().await;
+    let client = &bench.client;
+    let samples = rig(300, 300);
+    client.telemetry("a", Some("one"), &samples[..200]).await;
+    client.telemetry("a", Some("two"), &samples[..10]).await;
+    assert_eq!(client.session("a", "one").await["state"], "ended");
+    let again = client.telemetry("a", Some("one"), &samples[100..200]).await;
+    assert_eq!((&again["accepted"], &again["duplicate"]), (&json!(0), &json!(100)));
+    let body = crate::support::batch(Some("one"), &samples[150..250]);
+    let problem = client.post(TELEMETRY, &body).await.problem(409);
+    assert_eq!(problem["type"], "urn:offbd:problem:session-ended");
+    assert_eq!(client.session("a", "two").await["state"], "open");
+    client.post("assets/a/sessions", &json!({"name":"one"})).await.problem(409);
+    client.post("assets/a/sessions", &json!({"name":"two"})).await.problem(409);
+}

@@ -1,0 +1,115 @@
+//! `kill -9` in the middle of a stream: every acknowledged sample is there once,
+//! the faults too, and the verdict is that of an uninterrupted run.
+
+use std::path::Path;
+use std::process::Command;
+
+use crate::support::device::{Line, Random, device};
+use crate::support::process::Process;
+use crate::support::{judged, rig};
+use serde_json::json;
+
+/// How often the process is killed; KILLS says otherwise.
+const KILLS: usize = 10;
+
+/// What the journal may hold, one after the other: nothing, so that every commit
+/// is followed by a folding; a few batches; all there is.
+const JOURNAL_BYTES: [&str; 3] = ["1", "20000", "16777216"];
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn killed_many_times_under_load() {
+    let n_kills = std::env::var("KILLS").map_or(KILLS, |n| n.parse().unwrap());
+    let data = tempfile::tempdir().unwrap();
+    let start = |bytes: &str| {
+        Process::start_with(data.path(), &[("OFFBD_LIMITS__JOURNAL_BYTES", Path::new(bytes))])
+    };
+    let mut process = start(JOURNAL_BYTES[0]);
+    let line = Line::to(&process.client);
+    let devices = [("counts", true), ("does-not", false), ("counts-too", true)]
+        .map(|(name, counts)| device(&line, name, counts, data.path(), None));
+    let mut random = Random(1);
+    for kill in 0..n_kills {
+        line.progress(random.below(600) as u64).await;
+        drop(process);
+        if kill % 5 == 4 {
+            Process::stillborn(data.path(), random.below(60_000) as u64);
+        }
+        process = start(JOURNAL_BYTES[kill % JOURNAL_BYTES.len()]);
+        line.moves(&process.client);
+    }
+    line.hang_up();
+    let mut laps = 0;
+    for device in devices {
+        laps += device.await.unwrap();
+    }
+    println!(
+        "{n_kills} kills under load, {} at start; {laps} recordings, {} samples: each stored once",
+        n_kills / 5,
+        line.acknowledged()
+    );
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn killed_in_the_middle_and_started_again() {
+    let data = tempfile::tempdir().unwrap();
+    let samples = rig(4000, 1200);
+    let (hash, faults) = judged("a", &samples);
+    assert!(faults.contains(&"x_servo".to_owned()), "{faults:?}");
+
+    let mut process = Process::start(data.path());
+    process.client.asset("a").await;
+    for (i, part) in samples.chunks(40).enumerate() {
+        process.client.telemetry("a", Some("s"), part).await;
+        if i == 20 || i == 45 || i == 70 {
+            let known = process.client.get("assets/a/faults?status=all").await.expect(200);
+            let state = process.client.get("assets/a/state").await.expect(200);
+            // A batch whose acknowledgement nobody reads: it may be lost, or not.
+            let (client, unread) = (
+                process.client.clone(),
+                crate::support::batch(Some("s"), &samples[(i + 1) * 40..][..40]),
+            );
+            let sending = tokio::spawn(async move {
+                let request = client.request(reqwest::Method::POST, "assets/a/telemetry");
+                let _ = request.json(&unread).send().await;
+            });
+            drop(process);
+            sending.await.unwrap();
+            process = Process::start(data.path());
+            let acknowledged = (i + 1) * 40;
+            let recording = process.client.recording("a", "s").await;
+            assert!([acknowledged, acknowledged + 40].contains(&recording.len()));
+            assert_eq!(recording, samples[..recording.len()]);
+            if recording.len() == acknowledged {
+                let again = process.client.get("assets/a/faults?status=all").await.expect(200);
+                assert_eq!(again, known);
+                assert_eq!(process.client.get("assets/a/state").await.expect(200), state);
+            }
+        }
+    }
+    let events = process.client.get("sessions?asset=a").await.expect(200);
+    assert_eq!(events["items"].as_array().unwrap().len(), 1);
+    let session = process.client.end("a", "s").await;
+    assert_eq!(session["verdict"]["verdict_hash"], hash);
+    assert_eq!(session["verdict"]["faults"], json!(faults));
+    assert_eq!(process.client.recording("a", "s").await, samples);
+}
+
+#[cfg(unix)]
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn asked_to_stop_it_stops_well() {
+    let data = tempfile::tempdir().unwrap();
+    let mut process = Process::start(data.path());
+    process.client.asset("a").await;
+    let samples = rig(500, 500);
+    process.client.telemetry("a", Some("s"), &samples).await;
+    let pid = process.child.id().to_string();
+    assert!(Command::new("kill").args(["-TERM", &pid]).status().unwrap().success());
+    let status = crate::support::eventually(|| {
+        let status = process.child.try_wait().unwrap();
+        async move { status }
+    })
+    .await;
+    assert!(status.success(), "{status}");
+    process = Process::start(data.path());
+    assert_eq!(process.client.recording("a", "s").await, samples);
+}

@@ -1,0 +1,253 @@
+//! The fault memory through the interface: all of it is there, across sessions
+//! and restarts, and each change is told.
+
+use crate::support::{Bench, Client, Events, rig};
+use offbd_core::vocabulary::Sample;
+use serde_json::{Value, json};
+
+async fn fault(client: &Client, asset: &str, code: &str) -> Value {
+    client.get(&format!("assets/{asset}/faults/{code}")).await.expect(200)
+}
+
+/// Keys that say the same whatever the moment: all but the wall clock's.
+fn lasting(fault: &Value) -> Value {
+    let mut fault = fault.clone();
+    fault.as_object_mut().unwrap().remove("changed_at");
+    fault
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_fault_says_all_that_is_known_of_it_and_a_restart_forgets_nothing() {
+    let mut bench = Bench::start().await;
+    bench.client.asset("a").await;
+    bench.client.telemetry("a", Some("s"), &rig(2000, 300)).await;
+    let session = bench.client.session("a", "s").await;
+    let x = fault(&bench.client, "a", "x_servo").await;
+    assert_eq!(x["status_byte"], "2F");
+    let bits = &x["status_bits"];
+    for (bit, set) in [
+        ("test_failed", true),
+        ("confirmed", true),
+        ("test_not_completed_since_last_clear", false),
+        ("warning_indicator_requested", false),
+    ] {
+        assert_eq!(bits[bit], set, "{bit}: {bits}");
+    }
+    assert_eq!((&x["occurrences"], &x["failed_cycles"]), (&json!(1), &json!(1)));
+    assert_eq!(x["first_onset_s"], x["last_onset_s"]);
+    assert!((2.5..6.0).contains(&x["first_onset_s"].as_f64().unwrap()), "{x}");
+    assert_eq!(x["first_occurrence"], x["last_occurrence"]);
+    assert_eq!(x["last_occurrence"]["session"], "s");
+    assert_eq!(x["last_occurrence"]["session_id"], session["id"]);
+    assert_eq!((&x["healing_counter"], &x["healing_cycles"]), (&json!(0), &json!(3)));
+    assert_eq!((&x["aging_counter"], &x["aging_cycles"]), (&json!(0), &json!(40)));
+    assert_eq!((&x["acknowledgement"], &x["cleared"]), (&Value::Null, &Value::Null));
+    assert_eq!((&x["monitor"]["counter"], &x["monitor"]["code"]), (&json!(127), &json!("x_servo")));
+    assert_eq!(x["monitor"]["complete_this_cycle"], true);
+    let path = "assets/a/faults/x_servo/acknowledge?by=";
+    bench.client.post(&format!("{path}ann"), &Value::Null).await.expect(200);
+    let again = bench.client.post(&format!("{path}bob"), &Value::Null).await.expect(200);
+    assert_eq!(again["acknowledgement"]["by"], "ann", "who came second has nothing to say");
+    let before = fault(&bench.client, "a", "x_servo").await;
+    bench.restart().await;
+    assert_eq!(fault(&bench.client, "a", "x_servo").await, before);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn sessions_are_operation_cycles_and_the_in_use_ratio_outlives_clearing() {
+    let mut bench = Bench::start().await;
+    bench.client.asset("a").await;
+    // A minute of a ball that moves, a moment of one, shorter than the 0.4 s that any
+    // fault takes to be confirmed, and a minute without one.
+    let unseen: Vec<Sample> =
+        rig(6000, 6000).iter().map(|s| Sample { x_m: None, y_m: None, ..*s }).collect();
+    for (name, samples) in [("one", &rig(6000, 6000)), ("two", &rig(30, 30)), ("three", &unseen)] {
+        bench.client.telemetry("a", Some(name), samples).await;
+        bench.client.end("a", name).await;
+    }
+    let ratio = |fault: &Value| {
+        let in_use = &fault["in_use"];
+        let count = |key: &str| in_use[key].as_u64().unwrap();
+        let counts = ["operation_cycles", "cycles_with_data", "cycles_judged"].map(count);
+        (counts, in_use["ratio"].as_f64())
+    };
+    let x = fault(&bench.client, "a", "x_servo").await;
+    assert_eq!(ratio(&x), ([3, 1, 1], Some(1.0)));
+    assert_eq!(x["monitor"], Value::Null, "no session is open");
+    let sensor = fault(&bench.client, "a", "sensor").await;
+    assert_eq!(ratio(&sensor), ([3, 2, 2], Some(1.0)), "it needs no ball");
+    bench.client.delete("assets/a/faults/x_servo?by=ann").await.expect(204);
+    bench.restart().await;
+    let x = fault(&bench.client, "a", "x_servo").await;
+    assert_eq!(ratio(&x), ([3, 1, 1], Some(1.0)));
+    assert_eq!((&x["status_byte"], &x["cleared"]["by"]), (&json!("50"), &json!("ann")));
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_second_session_is_a_second_occurrence_and_counts_towards_nothing_good() {
+    let bench = Bench::start().await;
+    let client = &bench.client;
+    client.asset("a").await;
+    client.telemetry("a", Some("sick"), &rig(2000, 300)).await;
+    client.end("a", "sick").await;
+    let sick = fault(client, "a", "x_servo").await;
+    client.telemetry("a", Some("well"), &rig(6000, 6000)).await;
+    client.end("a", "well").await;
+    let well = fault(client, "a", "x_servo").await;
+    assert_eq!((&well["status"], &well["healing_counter"]), (&json!("confirmed"), &json!(1)));
+    assert_eq!(well["freeze_frame"], sick["freeze_frame"]);
+    client.telemetry("a", Some("sick again"), &rig(2000, 600)).await;
+    let again = fault(client, "a", "x_servo").await;
+    assert_eq!((&again["occurrences"], &again["healing_counter"]), (&json!(2), &json!(0)));
+    assert_eq!(again["first_occurrence"], sick["first_occurrence"]);
+    assert_eq!(again["last_occurrence"]["session"], "sick again");
+    assert_eq!(again["first_onset_s"], sick["first_onset_s"]);
+    assert!(again["last_onset_s"].as_f64() > again["first_onset_s"].as_f64());
+    assert_ne!(again["freeze_frame"], sick["freeze_frame"]);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_code_cleared_while_no_session_is_open_is_an_event() {
+    let mut bench = Bench::start().await;
+    bench.client.asset("a").await;
+    bench.client.telemetry("a", Some("s"), &rig(2000, 300)).await;
+    bench.client.end("a", "s").await;
+    let stream = bench.client.request(reqwest::Method::GET, "events?asset=a").send().await;
+    let mut live = Events::new(stream.unwrap());
+    bench.client.delete("assets/a/faults/sensor?by=ann").await.expect(204);
+    bench.client.delete("assets/a/faults/x_servo?by=ann").await.expect(204);
+    let cleared = live.next().await;
+    assert_eq!((&cleared["type"], &cleared["asset"]), (&json!("fault"), &json!("a")));
+    assert_eq!(cleared["code"], "x_servo", "the sensor had nothing to clear");
+    assert_eq!((&cleared["status"], &cleared["status_byte"]), (&json!("cleared"), &json!("50")));
+    for key in ["session", "session_id", "t_s"] {
+        assert_eq!(cleared.get(key), Some(&Value::Null), "{key}");
+    }
+    assert_eq!(cleared["by"], "ann");
+    bench.client.delete("assets/a/faults/x_servo?by=bob").await.expect(204);
+    bench.restart().await;
+    // Those who were away are told once, in its place among the others.
+    let after = cleared["id"].as_i64().unwrap() - 1;
+    let path = format!("events?asset=a&after={after}");
+    let stream = bench.client.request(reqwest::Method::GET, &path).send().await;
+    let mut missed = Events::new(stream.unwrap());
+    assert_eq!(missed.next().await, cleared);
+    bench.client.telemetry("a", Some("t"), &rig(2000, 300)).await;
+    assert_eq!(missed.next().await["session"], "t", "clearing nothing is no event");
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_fault_names_the_calibration_and_the_settings_that_judged_it() {
+    let bench = Bench::start().await;
+    let client = &bench.client;
+    let judged = |asset: Value| {
+        let client = client.clone();
+        async move {
+            let name = asset["name"].as_str().unwrap().to_owned();
+            client.post("assets", &asset).await.expect(201);
+            client.telemetry(&name, Some("s"), &rig(2000, 300)).await;
+            let fault = fault(&client, &name, "x_servo").await;
+            lasting(&fault)["last_occurrence"].clone()
+        }
+    };
+    let plain = judged(json!({"name": "plain"})).await;
+    assert_eq!(plain["calibration_id"], Value::Null);
+    let same = judged(json!({"name": "same"})).await;
+    assert_eq!(same["settings_id"], plain["settings_id"]);
+    let slow = judged(json!({"name": "slow", "diagnostics": {"debounce_s": 1.0}})).await;
+    assert_ne!(slow["settings_id"], plain["settings_id"]);
+    let axis = json!({"gain": 1.0, "dead_time_s": 0.04, "lag_s": 0.06, "level_rad": 0.0,
+        "noise_m": 2e-4, "breakaway_rad": 0.001, "residual_m_s2": 0.02});
+    let learnt = json!({"made_at": "2026-01-01T00:00:00Z", "data_sha256": "00", "samples": 1,
+        "duration_s": 1.0, "x": axis, "y": axis});
+    let calibrated = judged(json!({"name": "learnt", "calibration": learnt})).await;
+    let asset = client.get("assets/learnt").await.expect(200);
+    assert_eq!(calibrated["calibration_id"], asset["calibration"]["id"]);
+    assert_eq!(calibrated["settings_id"], plain["settings_id"]);
+    // The events say the same.
+    let stream = client.request(reqwest::Method::GET, "events?asset=learnt&after=0").send().await;
+    let event = Events::new(stream.unwrap()).next().await;
+    assert_eq!(event["calibration_id"], calibrated["calibration_id"]);
+    assert_eq!(event["settings_id"], calibrated["settings_id"]);
+}
+
+/// A column of a recording.
+fn column<'a>(recording: &'a Value, name: &str) -> &'a Vec<Value> {
+    recording["columns"][name].as_array().unwrap()
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn the_seconds_around_a_fault_are_those_that_were_judged() {
+    let mut bench = Bench::start().await;
+    bench.client.asset("a").await;
+    // Without a count: samples wait for earlier ones, the last ones too.
+    let samples: Vec<Sample> = rig(3000, 1500).iter().map(|s| Sample { seq: None, ..*s }).collect();
+    let events = bench.client.request(reqwest::Method::GET, "events?asset=a&after=0");
+    let mut events = Events::new(events.send().await.unwrap());
+    bench.client.telemetry("a", Some("s"), &samples[..2200]).await;
+    let path = "assets/a/faults/x_servo/recording";
+    let early = bench.client.get(path).await.expect(200);
+    assert_eq!(early["complete"], false, "it goes on");
+    bench.client.telemetry("a", Some("s"), &samples[2200..]).await;
+    bench.client.end("a", "s").await;
+    bench.restart().await;
+    let client = &bench.client;
+    let recording = client.get(path).await.expect(200);
+    assert_eq!((&recording["complete"], &recording["session"]), (&json!(true), &json!("s")));
+    let time = |name: &str| recording[name].as_f64().unwrap();
+    assert!(time("onset_s") < time("failed_s") && time("failed_s") < time("confirmed_s"));
+    assert_eq!(time("from_s"), time("onset_s") - 10.0);
+    assert_eq!(time("to_s"), time("confirmed_s") + 10.0);
+    let within = |s: &&Sample| (time("from_s")..=time("to_s")).contains(&s.t_s);
+    let wanted: Vec<&Sample> = samples.iter().filter(within).collect();
+    let sent = |of: fn(&Sample) -> Option<f64>| wanted.iter().map(|s| json!(of(s))).collect();
+    let sent: [Vec<Value>; 3] = [sent(|s| Some(s.t_s)), sent(|s| s.cmd_qy_rad), sent(|s| s.x_m)];
+    for (name, sent) in ["t_s", "cmd_qy_rad", "x_m"].iter().zip(&sent) {
+        assert_eq!(column(&recording, name), sent, "{name}");
+    }
+    let n_early = column(&early, "t_s").len();
+    assert_eq!(column(&early, "x_twin_m_s2")[..], column(&recording, "x_twin_m_s2")[..n_early]);
+    // What the events said at their moments stands in the rows of these moments.
+    for _ in 0..2 {
+        let event = loop {
+            let event = events.next().await;
+            if event["code"] == "x_servo" {
+                break event;
+            }
+        };
+        let at = sent[0].iter().position(|t_s| *t_s == event["t_s"]).unwrap();
+        let seen = &event["evidence"]["x"];
+        for name in ["measured_m_s2", "twin_m_s2", "residual_m_s2", "limit_m_s2", "enabled"] {
+            assert_eq!(column(&recording, &format!("x_{name}"))[at], seen[name], "{name}");
+        }
+        let number = |name: &str| seen[name].as_f64().unwrap();
+        let beyond = number("residual_m_s2").abs() > number("limit_m_s2");
+        assert!(beyond || number("nats") >= 10.0, "{seen}");
+    }
+    let request = client.request(reqwest::Method::GET, &format!("{path}?before_s=0&after_s=1"));
+    let csv = client.send(request.header("accept", "text/csv")).await;
+    assert_eq!(csv.headers["content-type"], "text/csv; charset=utf-8");
+    let mut lines = csv.text.lines();
+    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
+    assert_eq!(header.len(), recording["columns"].as_object().unwrap().len());
+    let n =
+        wanted.iter().filter(|s| (time("onset_s")..=time("confirmed_s") + 1.0).contains(&s.t_s));
+    assert_eq!(lines.clone().count(), n.count());
+    let first: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let at = wanted.iter().position(|s| s.t_s == first[0].parse::<f64>().unwrap()).unwrap();
+    for (name, cell) in header.iter().zip(first) {
+        let value = &column(&recording, name)[at];
+        assert_eq!(if value.is_null() { String::new() } else { value.to_string() }, cell, "{name}");
+    }
+    assert_eq!(
+        client.get(&format!("{path}?before_s=61")).await.problem(400)["parameter"],
+        "before_s"
+    );
+    assert_eq!(
+        client.get("assets/a/faults/sensor/recording").await.problem(404)["type"],
+        "urn:offbd:problem:no-recording"
+    );
+    let session = client.session("a", "s").await;
+    client.delete(&format!("sessions/{}", session["id"].as_str().unwrap())).await.expect(204);
+    client.get(path).await.problem(404);
+}

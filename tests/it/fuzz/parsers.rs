@@ -1,0 +1,198 @@
+//! What is tried out. Each reads an input, checks what it takes, and says how it
+//! was answered.
+
+use offbd::service::access::Role;
+use offbd::service::access::jwt::{KeySet, MAX_SUBJECT, verify};
+use offbd::wire::telemetry::{self, Batch, BatchError};
+use offbd::wire::{asset, scene, session_csv};
+use offbd_core::diagnosis::FaultMemory;
+use offbd_core::engine::{Engine, Input, Rig, Setup, calibrate};
+use offbd_core::vocabulary::Sample;
+
+use crate::support::provider::{self, Key};
+
+pub type Parser = fn(&[u8]) -> String;
+
+/// Every parser by the directory of its corpus.
+pub const PARSERS: [(&str, Parser); 11] = [
+    ("json", |input| batch(telemetry::json(input, LIMIT))),
+    ("msgpack", |input| batch(telemetry::msgpack(input, LIMIT))),
+    ("ndjson", |input| batch(telemetry::ndjson(input, LIMIT))),
+    ("csv", |input| batch(telemetry::csv(input, LIMIT))),
+    ("calibration", calibration),
+    ("asset", asset_file),
+    ("scene", scene_file),
+    ("chunk", chunk),
+    ("moment", moment),
+    ("jwt", jwt),
+    ("jwks", jwks),
+];
+
+/// Samples in a batch.
+const LIMIT: usize = 200;
+
+/// Longest reason given for a row, bytes.
+const MAX_REASON: usize = 300;
+
+/// `text` without what is of this input alone.
+fn kind(text: &str) -> String {
+    let words = text.split(|c: char| !c.is_ascii_alphabetic() && c != '_');
+    words.filter(|word| word.len() > 1).take(12).collect::<Vec<_>>().join(" ")
+}
+
+fn batch(read: Result<Batch, BatchError>) -> String {
+    let batch = match read {
+        Ok(batch) => batch,
+        Err(error) => return kind(&error.to_string()),
+    };
+    assert!(batch.rows.len() <= LIMIT);
+    let refused: Vec<&String> = batch.rows.iter().filter_map(|row| row.as_ref().err()).collect();
+    assert!(refused.iter().all(|reason| reason.len() <= MAX_REASON), "{refused:?}");
+    let samples: Vec<Sample> =
+        batch.rows.iter().filter_map(|row| row.as_ref().ok()).copied().collect();
+    if samples.iter().all(is_finite) {
+        assert_eq!(written_and_read(&samples), samples);
+    }
+    judge(&samples);
+    let first = refused.first().map_or(String::new(), |reason| kind(reason));
+    let named = (batch.session.is_some(), batch.id.is_some());
+    format!("taken {named:?} {} {first}", samples.len().min(3))
+}
+
+fn is_finite(sample: &Sample) -> bool {
+    let Sample { t_s, cmd_qx_rad, cmd_qy_rad, x_m, y_m, .. } = *sample;
+    t_s.is_finite() && [cmd_qx_rad, cmd_qy_rad, x_m, y_m].into_iter().flatten().all(f64::is_finite)
+}
+
+fn written_and_read(samples: &[Sample]) -> Vec<Sample> {
+    let mut text = Vec::new();
+    session_csv::write(&mut text, samples).unwrap();
+    session_csv::Reader::new(text.as_slice()).unwrap().map(|row| row.unwrap()).collect()
+}
+
+/// The engine never fails on data.
+fn judge(samples: &[Sample]) {
+    let setup = Setup::new(Rig::chapter("fuzz"), None).unwrap();
+    let mut engine = Engine::new(setup, FaultMemory::default());
+    let mut outputs = Vec::new();
+    for sample in samples {
+        engine.handle(Input::Sample(*sample), &mut outputs);
+    }
+    engine.handle(Input::End, &mut outputs);
+}
+
+/// A recording that a rig is learnt from.
+fn calibration(input: &[u8]) -> String {
+    let reader = match session_csv::Reader::new(input) {
+        Ok(reader) => reader,
+        Err(error) => return kind(&error.to_string()),
+    };
+    let samples: Vec<Sample> = reader.filter_map(Result::ok).collect();
+    match calibrate(&Rig::chapter("fuzz"), &[samples], "", "") {
+        Ok(learnt) => {
+            let rig = Rig { calibration: Some(learnt), ..Rig::chapter("fuzz") };
+            let file = serde_json::to_vec(&asset::view(&rig)).unwrap();
+            let again = asset::parse(&file).map(|rig| asset::view(&rig));
+            format!("learnt {}", again.is_ok())
+        }
+        Err(error) => kind(&error.to_string()),
+    }
+}
+
+fn asset_file(input: &[u8]) -> String {
+    let rig = match asset::parse(input) {
+        Ok(rig) => rig,
+        Err(error) => return kind(&error.to_string()),
+    };
+    let file = serde_json::to_string(&asset::view(&rig)).unwrap();
+    let again = asset::parse(file.as_bytes()).unwrap();
+    assert_eq!(serde_json::to_string(&asset::view(&again)).unwrap(), file);
+    match Setup::new(rig, None) {
+        Ok(setup) => {
+            let mut engine = Engine::new(setup, FaultMemory::default());
+            let mut outputs = Vec::new();
+            for i in 0..20 {
+                let t_s = f64::from(i) * 0.01;
+                let (x_m, y_m) = (Some(0.01), Some(-0.01));
+                let sample = Sample {
+                    seq: None,
+                    t_s,
+                    cmd_qx_rad: Some(0.0),
+                    cmd_qy_rad: Some(0.0),
+                    x_m,
+                    y_m,
+                };
+                engine.handle(Input::Sample(sample), &mut outputs);
+            }
+            format!("a rig {}", again.calibration.is_some())
+        }
+        Err(error) => kind(&error.to_string()),
+    }
+}
+
+fn scene_file(input: &[u8]) -> String {
+    match scene::parse(input) {
+        Ok(scene) => {
+            assert!(!scene.name.is_empty());
+            assert_eq!(scene::parse(input), Ok(scene));
+            "a scene".to_owned()
+        }
+        Err(error) => kind(&error.to_string()),
+    }
+}
+
+/// What the store compresses samples into.
+fn chunk(input: &[u8]) -> String {
+    match offbd::store::codec::decode(input) {
+        Ok(samples) => format!("{} samples", samples.len().min(3)),
+        Err(error) => kind(&error.to_string()),
+    }
+}
+
+/// A moment, as a query or a body names one.
+fn moment(input: &[u8]) -> String {
+    match offbd::service::moment(&String::from_utf8_lossy(input)) {
+        Ok(moment) => format!("a moment {}", moment < 0),
+        Err(reason) => kind(&reason),
+    }
+}
+
+/// In 2027, when the tokens of the corpus are in force.
+const NOW: i64 = 1_800_000_000_000_000;
+
+/// A token of an identity provider, whose key signs whatever is in it: the header
+/// up to the first line's end, the claims behind it.
+fn jwt(input: &[u8]) -> String {
+    let key = Key::new("k");
+    let end = input.iter().position(|byte| *byte == b'\n').unwrap_or(input.len());
+    let (header, claims) = input.split_at(end);
+    let claims = claims.strip_prefix(b"\n").unwrap_or(claims);
+    let message = format!("{}.{}", provider::base64(header), provider::base64(claims));
+    let token = format!("{message}.{}", provider::base64(key.sign(message.as_bytes())));
+    let keys = KeySet::parse(provider::jwks(&[&key]).as_bytes()).unwrap();
+    match verify(&token, &keys, &provider::config("").expected(), NOW) {
+        Ok(verified) => {
+            assert!((1..=MAX_SUBJECT).contains(&verified.subject.len()));
+            assert!(verified.expires_at > NOW);
+            assert_eq!(verified.role == Role::Device, verified.asset.is_some());
+            format!("{} {}", verified.role, verified.expires_at == i64::MAX)
+        }
+        Err(refusal) => kind(&refusal.to_string()),
+    }
+}
+
+/// The keys of an identity provider, and tokens that none of them has signed.
+fn jwks(input: &[u8]) -> String {
+    let keys = match KeySet::parse(input) {
+        Ok(keys) => keys,
+        Err(error) => return kind(&error.to_string()),
+    };
+    let claims = provider::claims("s", "admin");
+    let told = ["EdDSA", "ES256", "ES384", "RS256", "PS512"].map(|algorithm| {
+        let header = serde_json::json!({ "alg": algorithm, "kid": "k" });
+        let forged = provider::token(&header, &claims, |_| vec![1; 64]);
+        let refusal = verify(&forged, &keys, &provider::config("").expected(), NOW).unwrap_err();
+        kind(&refusal.to_string())
+    });
+    format!("{} {}", keys.n_keys().min(3), told.join(" "))
+}

@@ -1,0 +1,31 @@
+//! offbd from outside: over sockets, as a process, in a real database. With
+//! `OFFBD_TEST_DATABASE=postgres` what starts a service starts it on a private
+//! server of PostgreSQL.
+
+#![allow(unreachable_pub, clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod access;
+mod architecture;
+mod arrival;
+mod backup;
+mod bad_input;
+mod cli;
+mod crash;
+mod fault_memory;
+mod fuzz;
+mod journal;
+mod jwt;
+mod learning;
+mod liveness;
+mod main_job;
+mod monitoring;
+mod network;
+mod openapi;
+mod outage;
+mod outcome;
+mod retention;
+mod same_verdict;
+mod service;
+mod support;
+mod trends;
+mod views;

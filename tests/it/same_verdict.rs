@@ -1,0 +1,220 @@
+//! The same session by every way in: the same recording, the same verdict.
+
+use crate::support::{Bench, Client, batch, csv, judged, learnt, packed, rig};
+use futures_util::{SinkExt, StreamExt};
+use offbd::wire::asset::view;
+use offbd_core::vocabulary::Sample;
+use serde_json::{Value, json};
+use tokio_tungstenite::connect_async;
+use tokio_tungstenite::tungstenite::Message;
+
+/// The hash of session `s` of `asset`, which is ended, and its recording.
+async fn settled(client: &Client, asset: &str) -> (String, Vec<Sample>) {
+    let session = client.end(asset, "s").await;
+    let hash = session["verdict"]["verdict_hash"].as_str().unwrap().to_owned();
+    (hash, client.recording(asset, "s").await)
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn whatever_the_way_in() {
+    let bench = Bench::start().await;
+    let client = &bench.client;
+    let samples = rig(3000, 1500);
+    let (hash, faults) = judged("a", &samples);
+    assert!(faults.contains(&"x_servo".to_owned()), "{faults:?}");
+    let assets = [
+        "ones",
+        "hundreds",
+        "columns",
+        "packed",
+        "lines",
+        "csv",
+        "socket",
+        "packed-socket",
+        "imported",
+    ];
+    for asset in assets {
+        client.asset(asset).await;
+    }
+    for sample in &samples {
+        client.telemetry("ones", Some("s"), std::slice::from_ref(sample)).await;
+    }
+    for part in samples.chunks(100) {
+        client.telemetry("hundreds", Some("s"), part).await;
+    }
+    for part in samples.chunks(777) {
+        let said = client.post("assets/columns/telemetry", &columns(part)).await.expect(200);
+        let packed = client.post_packed("assets/packed/telemetry", &columns(part)).await;
+        assert_eq!(outcome(packed.expect(200)), outcome(said));
+        let path = "assets/csv/telemetry?session=s";
+        client.post_text(path, "text/csv", csv(part)).await.expect(200);
+        let path = "assets/lines/telemetry?session=s";
+        client.post_text(path, "application/x-ndjson", lines(part)).await.expect(200);
+    }
+    over_websocket(client, "socket", &samples, |frame| Message::text(frame.to_string())).await;
+    over_websocket(client, "packed-socket", &samples, |frame| Message::binary(packed(frame))).await;
+    let path = "assets/imported/sessions/import?name=s";
+    let imported = client.post_text(path, "text/csv", csv(&samples)).await.expect(201);
+    assert_eq!(imported["accepted"], 3000);
+    for asset in assets {
+        let (found, recording) = settled(client, asset).await;
+        assert_eq!(found, hash, "{asset}");
+        assert_eq!(recording, samples, "{asset}");
+    }
+    assert_eq!(replayed_from_a_file(&samples), hash);
+}
+
+/// An acknowledgement without the id, which is a session's own.
+fn outcome(mut ack: Value) -> Value {
+    ack.as_object_mut().unwrap().remove("session_id");
+    ack
+}
+
+/// Rows of which some are no samples, some there already and some late get the
+/// same answer in both formats.
+#[tokio::test]
+async fn an_acknowledgement_is_the_same_in_both_formats() {
+    let bench = Bench::start().await;
+    let client = &bench.client;
+    for asset in ["text", "packed"] {
+        client.asset(asset).await;
+    }
+    let good = rig(300, 300);
+    let row =
+        |i: usize| serde_json::to_value(offbd::wire::telemetry::sample_view(&good[i])).unwrap();
+    let mut odd: Vec<Value> = (0..200).map(row).collect();
+    odd.extend([json!(7), json!({}), json!({ "t_s": "1" }), json!({ "t_s": null }), row(3)]);
+    odd.extend([json!({ "t_s": 2.0, "seq": -1 }), json!({ "t_s": 1e300 }), row(290), row(250)]);
+    odd.extend([json!({ "t_s": 0.001, "seq": 9000 }), json!({ "t_s": 9e5, "seq": 9001 })]);
+    for batch in [
+        json!({ "session": "s", "samples": odd }),
+        json!({ "session": "s", "samples": [] }),
+        json!({ "session": 3, "samples": [] }),
+        json!({ "session": "s", "t_s": [0, 1], "x_m": [0] }),
+        json!([]),
+    ] {
+        let text = client.post("assets/text/telemetry", &batch).await;
+        let packed = client.post_packed("assets/packed/telemetry", &batch).await;
+        assert_eq!(packed.status, text.status, "{}", packed.text);
+        let (packed, text) = (packed.json(), text.json());
+        if text["status"].is_number() {
+            assert_eq!((&packed["type"], &packed["pointer"]), (&text["type"], &text["pointer"]));
+        } else {
+            assert_eq!(outcome(packed), outcome(text));
+        }
+    }
+    let (said, packed) = (settled(client, "text").await, settled(client, "packed").await);
+    assert_eq!(said, packed);
+    assert_eq!(said.1.len(), 204);
+}
+
+/// The hash that the command line gives for the session as a file.
+fn replayed_from_a_file(samples: &[Sample]) -> String {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(file.path(), csv(samples)).unwrap();
+    let mut offbd = assert_cmd::Command::new(env!("CARGO_BIN_EXE_offbd"));
+    let asset = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(asset.path(), serde_json::to_vec(&view(&learnt("a"))).unwrap()).unwrap();
+    let offbd = offbd.args(["replay", "--format", "json", "--asset"]).arg(asset.path());
+    let run = offbd.arg(file.path()).assert().success();
+    let printed = String::from_utf8(run.get_output().stdout.clone()).unwrap();
+    let summary: Value = serde_json::from_str(printed.lines().last().unwrap()).unwrap();
+    summary["verdict_hash"].as_str().unwrap().to_owned()
+}
+
+fn columns(samples: &[Sample]) -> Value {
+    let column = |get: fn(&Sample) -> Value| samples.iter().map(get).collect::<Value>();
+    json!({
+        "session": "s",
+        "seq": column(|s| json!(s.seq)),
+        "t_s": column(|s| json!(s.t_s)),
+        "cmd_qx_rad": column(|s| json!(s.cmd_qx_rad)),
+        "cmd_qy_rad": column(|s| json!(s.cmd_qy_rad)),
+        "x_m": column(|s| json!(s.x_m)),
+        "y_m": column(|s| json!(s.y_m)),
+    })
+}
+
+fn lines(samples: &[Sample]) -> String {
+    let line = |s: &Sample| serde_json::to_string(&offbd::wire::telemetry::sample_view(s)).unwrap();
+    samples.iter().map(line).collect::<Vec<_>>().join("\n")
+}
+
+/// Sends everything before it reads an answer, then reads them all.
+async fn over_websocket(
+    client: &Client,
+    asset: &str,
+    samples: &[Sample],
+    frame_of: impl Fn(&Value) -> Message,
+) {
+    let url = format!("ws://{}/api/v1/assets/{asset}/stream?state=20", client.address);
+    let (mut socket, _) = connect_async(url).await.unwrap();
+    let parts: Vec<_> = samples.chunks(50).collect();
+    for (i, part) in parts.iter().enumerate() {
+        let mut frame = batch(Some("s"), part);
+        frame["id"] = json!(i);
+        socket.send(frame_of(&frame)).await.unwrap();
+    }
+    socket.send(Message::text("{\"samples\":[")).await.unwrap();
+    let (mut next, mut faults, mut states, mut errors) = (0, 0, 0, 0);
+    while faults == 0 || states == 0 || errors == 0 {
+        let frame = tokio::time::timeout(crate::support::DEADLINE, socket.next()).await.unwrap();
+        let Message::Text(text) = frame.unwrap().unwrap() else { continue };
+        let frame: Value = serde_json::from_str(&text).unwrap();
+        match frame["type"].as_str().unwrap() {
+            "ack" => {
+                assert_eq!(frame["id"], next.to_string());
+                assert_eq!(frame["accepted"], 50);
+                next += 1;
+            }
+            "fault" => faults += 1,
+            "state" => states += 1,
+            "error" => {
+                assert_eq!(frame["problem"]["status"], 400);
+                assert_eq!(next, parts.len(), "answers come in order");
+                errors += 1;
+            }
+            other => panic!("{other}: {frame}"),
+        }
+    }
+    socket.close(None).await.unwrap();
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_replay_says_the_same_unless_asked_otherwise() {
+    let bench = Bench::start().await;
+    let client = &bench.client;
+    client.asset("a").await;
+    let samples = rig(3000, 1500);
+    client.telemetry("a", Some("s"), &samples[..2500]).await;
+    client.delete("assets/a/faults/x_servo?by=me").await.expect(204);
+    client.telemetry("a", Some("s"), &samples[2500..]).await;
+    let session = client.end("a", "s").await;
+    let path = format!("sessions/{}/replays", session["id"].as_str().unwrap());
+
+    let replay = replayed(client, &path, &Value::Null).await;
+    let result = &replay["result"];
+    assert_eq!(result["same"], true, "{replay}");
+    assert_eq!(result["summary"]["verdict_hash"], session["verdict"]["verdict_hash"]);
+    assert_eq!(result["recorded_hash"], session["verdict"]["verdict_hash"]);
+    assert_eq!(result["differences"], json!([]));
+    assert!(!result["faults"].as_array().unwrap().is_empty());
+
+    let settings = json!({"profile":"textbook","asset":{"ball":{"mass_kg":0.1}}});
+    let replay = replayed(client, &path, &settings).await;
+    assert_eq!(replay["result"]["same"], false);
+    assert!(!replay["result"]["differences"].as_array().unwrap().is_empty());
+    assert_eq!(replay["settings"], settings);
+}
+
+async fn replayed(client: &Client, path: &str, settings: &Value) -> Value {
+    let answer = client.post(path, settings).await;
+    let id = answer.expect(202)["id"].as_str().unwrap().to_owned();
+    assert_eq!(answer.headers["location"], format!("/api/v1/replays/{id}"));
+    crate::support::eventually(|| async {
+        let replay = client.get(&format!("replays/{id}")).await.expect(200);
+        assert_ne!(replay["state"], "failed", "{replay}");
+        (replay["state"] == "done").then_some(replay)
+    })
+    .await
+}

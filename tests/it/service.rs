@@ -1,0 +1,668 @@
+//! The rest of the interface over a real socket: sessions, faults, events,
+//! calibrations, back-pressure, a failing store, a graceful stop.
+
+use std::collections::BTreeSet;
+
+use crate::support::{Bench, Client, Events, batch, csv, read_csv, registration, rig};
+use futures_util::{SinkExt, StreamExt};
+use offbd_core::vocabulary::Sample;
+use reqwest::Method;
+use serde_json::{Value, json};
+use sqlx::Executor;
+use tokio_tungstenite::connect_async;
+use tokio_tungstenite::tungstenite::Message;
+
+async fn sessions(client: &Client, asset: &str) -> Vec<Value> {
+    let page = client.get(&format!("sessions?asset={asset}")).await.expect(200);
+    page["items"].as_array().unwrap().clone()
+}
+
+#[tokio::test]
+async fn sessions_are_listed_by_state_newest_first() {
+    let bench = Bench::start().await;
+    let client = &bench.client;
+    for asset in ["a", "b"] {
+        client.asset(asset).await;
+        for session in ["1", "2", "3"] {
+            client.telemetry(asset, Some(session), &rig(10, usize::MAX)).await;
+        }
+    }
+    for (query, wanted) in [
+        ("state=open", vec!["b3", "a3"]),
+        ("state=ended", vec!["b2", "b1", "a2", "a1"]),
+        ("asset=a&state=open", vec!["a3"]),
+        ("asset=a&state=ended", vec!["a2", "a1"]),
+        ("asset=a", vec!["a3", "a2", "a1"]),
+    ] {
+        let page = client.get(&format!("sessions?{query}")).await.expect(200);
+        let word = |s: &Value, key: &str| s[key].as_str().unwrap().to_owned();
+        let name = |s: &Value| word(s, "asset") + &word(s, "name");
+        let listed: Vec<_> = page["items"].as_array().unwrap().iter().map(name).collect();
+        assert_eq!(listed, wanted, "{query}");
+    }
+}
+
+/// Waits until nothing is left in the journal.
+async fn folded(store: &mut sqlx::AnyConnection) {
+    loop {
+        let left: i64 = sqlx::query_scalar("SELECT count(*) FROM journal")
+            .fetch_one(&mut *store)
+            .await
+            .unwrap();
+        if left == 0 {
+            return;
+        }
+        tokio::task::yield_now().await;
+    }
+}
+
+/// Makes the store refuse chunks of the session `id`.
+fn broken(id: &str) -> String {
+    if crate::support::on_postgres() {
+        let rule = format!("CHECK (session <> '{id}') NOT VALID");
+        return format!("ALTER TABLE chunk ADD CONSTRAINT broken {rule}");
+    }
+    format!(
+        "CREATE TRIGGER broken BEFORE INSERT ON chunk WHEN NEW.session = '{id}'
+         BEGIN SELECT RAISE(ABORT, 'broken on purpose'); END"
+    )
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn what_the_store_does_not_take_is_not_acknowledged() {
+    let bench = Bench::start_with(|config| config.limits.journal_bytes = 1).await;
+    let client = &bench.client;
+    client.asset("a").await;
+    client.asset("b").await;
+    let samples = rig(1000, 300);
+    client.telemetry("a", Some("s"), &samples[..500]).await;
+    let mut store = bench.store().await;
+    folded(&mut store).await;
+    let session = client.session("a", "s").await;
+    let id = session["id"].as_str().unwrap();
+    store.execute(sqlx::AssertSqlSafe(broken(id))).await.unwrap();
+    // One batch goes to the journal and, since it cannot leave it, is the last.
+    assert_eq!(client.telemetry("a", Some("s"), &samples[500..600]).await["accepted"], 100);
+    client.telemetry("b", Some("s"), &samples[..100]).await;
+    let known = client.get("assets/a/faults?status=all").await.expect(200);
+    for part in samples[600..].chunks(100) {
+        let answer = client.post("assets/a/telemetry", &batch(Some("s"), part)).await;
+        answer.problem(503);
+        assert_eq!(answer.headers["retry-after"], "1");
+    }
+    assert_eq!(client.get("assets/a/faults?status=all").await.expect(200), known);
+    client.telemetry("b", Some("s"), &samples[100..200]).await;
+    assert_eq!(client.recording("a", "s").await, samples[..600]);
+    let mended = if crate::support::on_postgres() {
+        "ALTER TABLE chunk DROP CONSTRAINT broken"
+    } else {
+        "DROP TRIGGER broken"
+    };
+    store.execute(mended).await.unwrap();
+    for part in samples[600..].chunks(100) {
+        assert_eq!(client.telemetry("a", Some("s"), part).await["accepted"], 100);
+    }
+    assert_eq!(client.recording("a", "s").await, samples);
+    let ended = client.end("a", "s").await;
+    assert_eq!(ended["verdict"]["verdict_hash"], crate::support::judged("a", &samples).0);
+}
+
+#[tokio::test]
+async fn small_batches_become_few_chunks() {
+    let bench = Bench::start().await;
+    bench.client.asset("a").await;
+    let samples = rig(9_000, 9_000);
+    for part in samples.chunks(3) {
+        bench.client.telemetry("a", Some("s"), part).await;
+    }
+    let mut store = bench.store().await;
+    let mut chunks = async || -> i64 {
+        sqlx::query_scalar("SELECT COUNT(*) FROM chunk").fetch_one(&mut store).await.unwrap()
+    };
+    let most = i64::try_from(offbd::store::MAX_TAIL_CHUNKS).unwrap();
+    assert!(chunks().await <= most + 1, "{}", chunks().await);
+    assert_eq!(bench.client.recording("a", "s").await, samples);
+    bench.client.end("a", "s").await;
+    assert_eq!(chunks().await, 2);
+    assert_eq!(bench.client.recording("a", "s").await, samples);
+}
+
+#[tokio::test]
+async fn a_store_has_one_server() {
+    let bench = Bench::start().await;
+    let second = offbd::server::start(crate::support::config(bench.data.path())).await;
+    let error = format!("{:#}", second.err().expect("the store is taken"));
+    assert!(error.contains("another process"), "{error}");
+}
+
+#[tokio::test]
+async fn a_guest_writes_beside_the_service() {
+    use offbd::store::{Place, Store, Write};
+    let bench = Bench::start().await;
+    bench.client.asset("a").await;
+    let place = Place::of_url(&crate::support::url(bench.data.path())).unwrap();
+    let (store, mut writer) = Store::open_beside(&place).await.unwrap();
+    let mut row = store.asset("a").await.unwrap().unwrap();
+    row.name = "b".to_owned();
+    for _ in 0..2 {
+        let name = row.name.clone();
+        let mut set = vec![
+            Write::CreateAsset(row.clone()),
+            Write::GiveUpAsset { name: name.clone(), at: 1 },
+            Write::DeleteAsset { name },
+        ];
+        writer.commit(&mut [&mut set]).await.unwrap();
+        bench.client.telemetry("a", None, &rig(10, 10)).await;
+    }
+    writer.close().await.unwrap();
+    bench.client.get("/readyz").await.expect(200);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn too_much_at_once_is_turned_away_and_nothing_is_lost() {
+    let bench = Bench::start_with(|config| {
+        config.limits.batch_samples = 50;
+        config.limits.in_flight_samples = 100;
+    })
+    .await;
+    let client = bench.client.clone();
+    client.asset("a").await;
+    client.telemetry("a", Some("s"), &rig(1, 1)).await;
+    let samples = rig(400, 400);
+    let hold = bench.hold().await;
+    let send = |part: &[Sample]| {
+        let (client, body) = (client.clone(), batch(Some("s"), part));
+        tokio::spawn(async move { client.post("assets/a/telemetry", &body).await })
+    };
+    let mut sent: Vec<_> = samples.chunks(50).map(send).collect();
+    // The store is held, so no batch is acknowledged: six of the eight must be
+    // turned away at once, and the two that are under way wait.
+    let mut turned_away = 0;
+    while turned_away < 6 {
+        let (answer, _, rest) = futures_util::future::select_all(sent).await;
+        let answer = answer.unwrap();
+        let problem = answer.problem(429);
+        assert_eq!(problem["type"], "urn:offbd:problem:busy");
+        assert_eq!(answer.headers["retry-after"], "1");
+        (sent, turned_away) = (rest, turned_away + 1);
+    }
+    hold.let_go().await;
+    for waiting in sent {
+        waiting.await.unwrap().expect(200);
+    }
+    for part in samples.chunks(50) {
+        client.telemetry("a", Some("s"), part).await;
+    }
+    let recorded: BTreeSet<u64> =
+        client.recording("a", "s").await.iter().filter_map(|s| s.seq).collect();
+    assert_eq!(recorded.len(), 400);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_stop_finishes_what_is_under_way() {
+    let mut bench = Bench::start().await;
+    let client = bench.client.clone();
+    client.asset("a").await;
+    let samples = rig(200, 200);
+    client.telemetry("a", Some("s"), &samples[..100]).await;
+    let events = client.request(Method::GET, "events").send().await.unwrap();
+    let url = format!("ws://{}/api/v1/assets/a/stream", client.address);
+    let (mut socket, _) = connect_async(url).await.unwrap();
+    let hold = bench.hold().await;
+    socket.send(Message::text(batch(Some("s"), &samples[100..]).to_string())).await.unwrap();
+    // The batch is in the engine, not yet in the store.
+    crate::support::eventually(|| async {
+        let state = client.get("assets/a/state").await;
+        (state.status == 200 && state.json()["samples"] == 200).then_some(())
+    })
+    .await;
+    let stopping = tokio::spawn(bench.server.take().unwrap().shutdown());
+    hold.let_go().await;
+    let mut acknowledged = false;
+    while let Some(Ok(frame)) = socket.next().await {
+        match frame {
+            Message::Text(text) => acknowledged |= text.contains("\"accepted\":100"),
+            Message::Close(_) => break,
+            _ => {}
+        }
+    }
+    assert!(acknowledged);
+    stopping.await.unwrap().unwrap();
+    assert!(events.text().await.is_ok(), "the stream of events ends well");
+    let server = offbd::server::start(crate::support::config(bench.data.path())).await.unwrap();
+    let client = Client::new(server.address.to_string());
+    assert_eq!(client.recording("a", "s").await, samples);
+    server.shutdown().await.unwrap();
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn events_missed_come_first_and_each_comes_once() {
+    let bench = Bench::start().await;
+    let client = &bench.client;
+    client.asset("a").await;
+    client.asset("b").await;
+    let samples = rig(2000, 300);
+    let all = client.request(Method::GET, "events?after=0").send().await.unwrap();
+    assert_eq!(all.headers()["content-type"], "text/event-stream");
+    let mut live = Events::new(all);
+    client.telemetry("a", Some("s"), &samples[..1000]).await;
+    client.telemetry("b", Some("s"), &samples[..1000]).await;
+    client.end("a", "s").await;
+    client.end("b", "s").await;
+    assert_eq!(live.any().await, ("begin".to_owned(), json!({"id":0})));
+    let first = live.next().await;
+    let id = first["id"].as_i64().unwrap();
+    let request = client.request(Method::GET, "events?asset=b").header("last-event-id", id);
+    let mut caught_up = Events::new(request.send().await.unwrap());
+    assert_eq!(caught_up.any().await, ("begin".to_owned(), json!({"id":id})), "where it goes on");
+    let of_b = caught_up.next().await;
+    assert_eq!((&of_b["asset"], &of_b["type"]), (&json!("b"), &json!("fault")));
+    let mut ids = vec![id];
+    loop {
+        let event = live.next().await;
+        ids.push(event["id"].as_i64().unwrap());
+        if event["id"] == of_b["id"] {
+            assert_eq!(event, of_b, "live and caught up say the same");
+            break;
+        }
+    }
+    assert!(ids.windows(2).all(|pair| pair[0] < pair[1]), "{ids:?}");
+    client.telemetry("b", Some("t"), &samples).await;
+    let mut last = of_b["id"].as_i64().unwrap();
+    for _ in 0..2 {
+        let event = caught_up.next().await;
+        assert_eq!(event["asset"], "b");
+        assert!(event["id"].as_i64().unwrap() > last);
+        last = event["id"].as_i64().unwrap();
+    }
+}
+
+fn without_seq(samples: &[Sample], shift_s: f64) -> Vec<Sample> {
+    samples.iter().map(|s| Sample { seq: None, t_s: s.t_s + shift_s, ..*s }).collect()
+}
+
+#[tokio::test]
+async fn samples_without_a_session_find_one() {
+    let bench = Bench::start().await;
+    let client = &bench.client;
+    client.asset("a").await;
+    let samples = rig(3000, 3000);
+    let first = client.telemetry("a", None, &samples[..2000]).await;
+    let second = client.telemetry("a", None, &samples[2000..]).await;
+    assert_eq!(first["session_id"], second["session_id"]);
+    let again = client.telemetry("a", None, &samples[..1000]).await;
+    assert_eq!(again["duplicate"], 1000, "sent again is not started anew");
+    let mut anew = rig(500, 500);
+    anew.iter_mut().for_each(|s| s.x_m = s.x_m.map(|x| x + 0.001));
+    let anew = client.telemetry("a", None, &anew).await;
+    assert_eq!((&anew["accepted"], &anew["late"]), (&json!(500), &json!([])));
+    assert_ne!(anew["session_id"], first["session_id"]);
+    let found = sessions(client, "a").await;
+    let states: Vec<_> = found.iter().map(|s| s["state"].as_str().unwrap()).collect();
+    assert_eq!(states, ["open", "ended"]);
+    assert_eq!(found[1]["samples"], 3000);
+}
+
+#[tokio::test]
+async fn devices_that_do_not_count_may_start_anew_too() {
+    let mut bench = Bench::start().await;
+    bench.client.asset("a").await;
+    let samples = rig(3000, 3000);
+    bench.client.telemetry("a", None, &without_seq(&samples, 100.0)).await;
+    // One slip of the clock is no new start, whatever the batches.
+    bench.client.telemetry("a", None, &without_seq(&samples[..1], 0.0)).await;
+    bench.client.telemetry("a", None, &without_seq(&samples[..1], 130.0)).await;
+    assert_eq!(sessions(&bench.client, "a").await.len(), 1);
+    bench.client.telemetry("a", None, &without_seq(&samples[10..11], 0.0)).await;
+    bench.restart().await;
+    let ack = bench.client.telemetry("a", None, &without_seq(&samples[11..500], 0.0)).await;
+    assert_eq!((&ack["accepted"], &ack["late"]), (&json!(489), &json!([])), "{ack}");
+    assert_eq!(sessions(&bench.client, "a").await.len(), 2);
+}
+
+#[tokio::test]
+async fn faults_are_acknowledged_cleared_and_listed_across_the_fleet() {
+    let bench = Bench::start().await;
+    let client = &bench.client;
+    let samples = rig(2000, 300);
+    for asset in ["a", "b", "c"] {
+        client.asset(asset).await;
+        client.telemetry(asset, Some("s"), &samples).await;
+    }
+    let fault = client.get("assets/a/faults/x_servo").await.expect(200);
+    assert_eq!((&fault["status"], &fault["acknowledged"]), (&json!("confirmed"), &json!(false)));
+    assert!(fault["freeze_frame"].is_object() && fault["onset_s"].is_number(), "{fault}");
+    let path = "assets/a/faults/x_servo/acknowledge?by=ann";
+    assert_eq!(client.post(path, &Value::Null).await.expect(200)["acknowledged"], true);
+    let open = client.get("faults?code=x_servo&acknowledged=false&sort=asset").await.expect(200);
+    let assets = |page: &Value| -> Vec<String> {
+        let items = page["items"].as_array().unwrap();
+        items.iter().map(|f| f["asset"].as_str().unwrap().to_owned()).collect()
+    };
+    assert_eq!(assets(&open), ["b", "c"]);
+    let mut seen = Vec::new();
+    let mut cursor = String::new();
+    loop {
+        let page = client.get(&format!("faults?code=x_servo&limit=1{cursor}")).await.expect(200);
+        seen.extend(assets(&page));
+        let Some(next) = page["next"].as_str() else { break };
+        cursor = format!("&cursor={next}");
+    }
+    assert_eq!(seen.len(), 3);
+    assert_eq!(seen.iter().collect::<BTreeSet<_>>().len(), 3);
+    client.delete("assets/a/faults/x_servo?by=ann").await.expect(204);
+    let cleared = client.get("assets/a/faults/x_servo").await.expect(200);
+    assert_eq!((&cleared["status"], &cleared["occurrences"]), (&json!("cleared"), &json!(0)));
+    assert_eq!(client.get("assets/c/faults?status=all").await.expect(200)["next"], Value::Null);
+    assert_eq!(client.get("assets/a/faults/sensor").await.expect(200)["status"], "cleared");
+}
+
+#[tokio::test]
+async fn clearing_outlives_a_restart_and_needs_no_session() {
+    let mut bench = Bench::start().await;
+    bench.client.asset("a").await;
+    bench.client.telemetry("a", Some("s"), &rig(2000, 300)).await;
+    bench.client.delete("assets/a/faults/x_servo").await.expect(204);
+    let before = bench.client.get("assets/a/faults?status=all").await.expect(200);
+    let state = bench.client.get("assets/a/state").await.expect(200);
+    bench.restart().await;
+    assert_eq!(bench.client.get("assets/a/faults?status=all").await.expect(200), before);
+    assert_eq!(bench.client.get("assets/a/state").await.expect(200), state);
+    bench.client.telemetry("a", Some("t"), &rig(2000, 300)).await;
+    bench.client.end("a", "t").await;
+    assert!(
+        !bench.client.get("assets/a/faults").await.expect(200)["items"]
+            .as_array()
+            .unwrap()
+            .is_empty()
+    );
+    for code in ["x_servo", "y_servo", "stuck_ball", "sensor"] {
+        bench.client.delete(&format!("assets/a/faults/{code}")).await.expect(204);
+    }
+    bench.restart().await;
+    assert_eq!(bench.client.get("assets/a/faults").await.expect(200)["items"], json!([]));
+}
+
+#[tokio::test]
+async fn assets_come_change_and_go() {
+    let bench = Bench::start().await;
+    let client = &bench.client;
+    let new = client.put("assets/a", &json!({"name":"a"})).await.expect(201);
+    assert_eq!(new["sample_rate_hz"], 100.0);
+    client.telemetry("a", Some("one"), &rig(100, 100)).await;
+    let heavy = json!({"name":"a","ball":{"mass_kg":0.2}});
+    client.put("assets/a", &heavy).await.expect(200);
+    assert_eq!(client.get("assets/a").await.expect(200)["ball"]["mass_kg"], 0.2);
+    let session = client.session("a", "one").await;
+    assert_eq!(session["state"], "open", "an open session goes on");
+    for name in ["b", "c", "d"] {
+        client.asset(name).await;
+    }
+    let page = client.get("assets?limit=2").await.expect(200);
+    let next = page["next"].as_str().unwrap();
+    let rest = client.get(&format!("assets?limit=2&cursor={next}")).await.expect(200);
+    assert_eq!((&rest["items"][0]["name"], &rest["next"]), (&json!("c"), &Value::Null));
+    client.delete("assets/a").await.expect(204);
+    client.get("assets/a").await.problem(404);
+    client.get(&format!("sessions/{}", session["id"].as_str().unwrap())).await.problem(404);
+    client.post("assets/a/telemetry", &batch(None, &rig(1, 1))).await.problem(404);
+    client.asset("a").await;
+    let ack = client.telemetry("a", Some("one"), &rig(100, 100)).await;
+    assert_eq!(ack["accepted"], 100, "a new asset of the same name knows nothing of the old one");
+}
+
+#[tokio::test]
+async fn sessions_are_opened_ended_deleted_and_exported() {
+    let bench = Bench::start().await;
+    let client = &bench.client;
+    client.asset("a").await;
+    let opened = client.post("assets/a/sessions", &json!({"name":"Mäandern 1"})).await;
+    let session = opened.expect(201);
+    let at = format!("sessions/{}", session["id"].as_str().unwrap());
+    assert_eq!(opened.headers["location"], format!("/api/v1/{at}"));
+    let samples = rig(20_000, 20_000);
+    for part in samples.chunks(9_000) {
+        client.telemetry("a", None, part).await;
+    }
+    assert_eq!(client.get(&at).await.expect(200)["samples"], 20_000);
+    assert_eq!(client.recording("a", "Mäandern 1").await, samples);
+    let packed = client.request(Method::GET, &format!("{at}/telemetry"));
+    let packed = packed.header("accept-encoding", "gzip").send().await.unwrap();
+    assert_eq!(packed.headers()["content-encoding"], "gzip");
+    assert!(packed.bytes().await.is_ok(), "it ends well when it is packed, too");
+    let request = client.request(Method::GET, &format!("{at}/telemetry"));
+    let exported = client.send(request.header("accept", "application/json")).await.expect(200);
+    assert_eq!(exported["session"], "Mäandern 1");
+    assert_eq!(exported["samples"].as_array().unwrap().len(), 20_000);
+    // What was exported can be sent again as it is.
+    let again =
+        json!({"session":"Mäandern 1","samples":&exported["samples"].as_array().unwrap()[..500]});
+    assert_eq!(client.post("assets/a/telemetry", &again).await.expect(200)["duplicate"], 500);
+    let ended = client.post(&format!("{at}/end"), &Value::Null).await.expect(200);
+    assert_eq!(client.post(&format!("{at}/end"), &Value::Null).await.expect(200), ended);
+    client.delete(&at).await.expect(204);
+    client.get(&at).await.problem(404);
+    client.get(&format!("{at}/telemetry")).await.problem(404);
+    client.post("assets/a/sessions", &json!({"name":"Mäandern 1"})).await.expect(201);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn many_streams_at_once_lose_nothing() {
+    let bench = Bench::start().await;
+    let samples = rig(2000, 2000);
+    let mut streams = tokio::task::JoinSet::new();
+    for i in 0..8 {
+        let asset = format!("rig{i}");
+        bench.client.asset(&asset).await;
+        let (address, samples) = (bench.client.address.clone(), samples.clone());
+        streams.spawn(async move {
+            let url = format!("ws://{address}/api/v1/assets/{asset}/stream");
+            let (socket, _) = connect_async(url).await.unwrap();
+            let (mut up, mut down) = socket.split();
+            let flood = tokio::spawn(async move {
+                for part in samples.chunks(5) {
+                    up.send(Message::text(batch(Some("s"), part).to_string())).await.unwrap();
+                }
+                up
+            });
+            let mut accepted = 0;
+            while accepted < 2000 {
+                let Message::Text(text) = down.next().await.unwrap().unwrap() else { continue };
+                let frame: Value = serde_json::from_str(&text).unwrap();
+                accepted += frame["accepted"].as_u64().unwrap_or(0);
+            }
+            drop(flood.await.unwrap());
+        });
+    }
+    while let Some(done) = streams.join_next().await {
+        done.unwrap();
+    }
+    for i in 0..8 {
+        assert_eq!(bench.client.recording(&format!("rig{i}"), "s").await, samples);
+    }
+}
+
+#[tokio::test]
+async fn a_frame_that_is_too_long_ends_its_stream_alone() {
+    let bench = Bench::start_with(|config| config.limits.batch_bytes = 10_000).await;
+    bench.client.asset("a").await;
+    let url = format!("ws://{}/api/v1/assets/a/stream", bench.client.address);
+    let (mut socket, _) = connect_async(url).await.unwrap();
+    socket.send(Message::text("x".repeat(5_000))).await.unwrap();
+    let text = loop {
+        if let Message::Text(text) = socket.next().await.unwrap().unwrap() {
+            break text;
+        }
+    };
+    assert_eq!(serde_json::from_str::<Value>(&text).unwrap()["type"], "error");
+    let _ = socket.send(Message::text("x".repeat(20_000))).await;
+    while let Some(Ok(frame)) = socket.next().await {
+        if let Message::Close(Some(frame)) = frame {
+            assert_eq!(u16::from(frame.code), 1009);
+        }
+    }
+    bench.client.telemetry("a", None, &rig(10, 10)).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_rig_is_learnt_from_its_sessions() {
+    let mut bench = Bench::start().await;
+    bench.client.asset("a").await;
+    let import = |name: &str| format!("assets/a/sessions/import?name={name}");
+    let good = csv(&rig(9000, 9000));
+    bench.client.post_text(&import("good"), "text/csv", good).await.expect(201);
+    bench.client.post_text(&import("short"), "text/csv", csv(&rig(50, 50))).await.expect(201);
+    let mut ids = Vec::new();
+    for name in ["good", "short"] {
+        let session = bench.client.session("a", name).await;
+        let wanted = json!({ "sessions": [session["id"]] });
+        let answer = bench.client.post("assets/a/calibrations", &wanted).await;
+        let id = answer.expect(202)["id"].as_str().unwrap().to_owned();
+        assert_eq!(answer.headers["location"], format!("/api/v1/assets/a/calibrations/{id}"));
+        ids.push(format!("assets/a/calibrations/{id}"));
+    }
+    bench.restart().await;
+    let client = &bench.client;
+    let mut settled = Vec::new();
+    for path in &ids {
+        settled.push(
+            crate::support::eventually(|| async {
+                let job = client.get(path).await.expect(200);
+                let state = job["state"].as_str().unwrap();
+                (state == "done" || state == "failed").then_some(job)
+            })
+            .await,
+        );
+    }
+    assert_eq!(settled[0]["state"], "done", "{}", settled[0]);
+    assert_eq!(settled[1]["state"], "failed");
+    assert!(settled[1]["error"].as_str().unwrap().contains("are needed"), "{}", settled[1]);
+    client.post(&format!("{}/activate", ids[1]), &Value::Null).await.problem(409);
+    let active = client.post(&format!("{}/activate", ids[0]), &Value::Null).await.expect(200);
+    assert_eq!(active["active"], true);
+    let asset = client.get("assets/a").await.expect(200);
+    let learnt = &asset["calibration"];
+    assert_eq!(learnt["data_sha256"], active["calibration"]["data_sha256"]);
+    let page = client.get("assets/a/calibrations").await.expect(200);
+    assert_eq!(page["items"].as_array().unwrap().len(), 2);
+    client.put("assets/a", &json!({"name":"a"})).await.expect(200);
+    assert_eq!(client.get(&ids[0]).await.expect(200)["active"], false);
+}
+
+#[tokio::test]
+async fn operation() {
+    let bench = Bench::start().await;
+    let client = &bench.client;
+    client.asset("a").await;
+    client.telemetry("a", None, &rig(10, 10)).await;
+    assert_eq!(client.get("/healthz").await.expect(200)["status"], "ok");
+    assert_eq!(client.get("/readyz").await.expect(200)["status"], "ok");
+    let metrics = client.get("/metrics").await.text;
+    assert!(metrics.contains("offbd_samples_total{outcome=\"accepted\"}"), "{metrics}");
+    assert!(metrics.contains("path=\"/api/v1/assets/{asset}/telemetry\""), "{metrics}");
+    let yaml = client.get("/openapi.yaml").await;
+    assert_eq!(yaml.text, offbd::http::openapi_yaml());
+    let docs = client.get("/docs/").await;
+    assert!(docs.status == 200 && docs.text.contains("swagger"), "{docs:?}");
+    let page = client.get("/").await;
+    assert!(page.headers["content-type"].to_str().unwrap().starts_with("text/html"));
+    assert!(!page.text.contains("http://") && !page.text.contains("https://"), "all from here");
+    let request = client.request(Method::GET, "/openapi.yaml").header("accept-encoding", "gzip");
+    assert_eq!(request.send().await.unwrap().headers()["content-encoding"], "gzip");
+    let request = client.request(Method::GET, "/healthz").header("x-request-id", "mine");
+    assert_eq!(request.send().await.unwrap().headers()["x-request-id"], "mine");
+}
+
+/// A replay of the session `id` with `settings`, once it is done.
+async fn replayed(client: &Client, id: &str, settings: Value) -> Value {
+    let answer = client.post(&format!("sessions/{id}/replays"), &settings).await.expect(202);
+    let path = format!("replays/{}", answer["id"].as_str().unwrap());
+    crate::support::eventually(|| async {
+        let replay = client.get(&path).await.expect(200);
+        assert_ne!(replay["state"], "failed", "{replay}");
+        (replay["state"] == "done").then(|| replay["result"].clone())
+    })
+    .await
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_replay_says_what_other_settings_would_have_changed() {
+    let bench = Bench::start().await;
+    let client = &bench.client;
+    client.asset("a").await;
+    let import = |name: &str| format!("assets/a/sessions/import?name={name}");
+    client.post_text(&import("good"), "text/csv", csv(&rig(9000, 9000))).await.expect(201);
+    client.post_text(&import("sick"), "text/csv", csv(&rig(3000, 1500))).await.expect(201);
+    let good = client.session("a", "good").await["id"].clone();
+    let learning = client.post("assets/a/calibrations", &json!({ "sessions": [good] })).await;
+    let path = format!("assets/a/calibrations/{}", learning.expect(202)["id"].as_str().unwrap());
+    let learnt = crate::support::eventually(|| async {
+        let job = client.get(&path).await.expect(200);
+        (job["state"] == "done").then_some(job)
+    })
+    .await;
+    let sick = client.session("a", "sick").await["id"].as_str().unwrap().to_owned();
+    let recorded = client.get("assets/a/faults/x_servo").await.expect(200);
+
+    let same = replayed(client, &sick, json!({})).await;
+    let n_faults = same["faults"].as_array().unwrap().len();
+    assert_eq!(same["tally"]["same"], n_faults);
+    assert_eq!(same["transitions"].as_array().unwrap().len(), n_faults);
+    assert_eq!((&same["same"], &same["differences"]), (&json!(true), &json!([])));
+    assert_eq!(same["settings_id"], recorded["last_occurrence"]["settings_id"]);
+
+    let slow = replayed(client, &sick, json!({ "debounce_s": 1.1 })).await;
+    let failed = slow["transitions"].as_array().unwrap();
+    let failed = failed.iter().find(|t| t["code"] == "x_servo").unwrap();
+    assert_eq!(failed["change"], "moved", "{failed}");
+    assert!(failed["moved_s"].as_f64().unwrap() > 0.3, "{failed}");
+    assert_ne!(slow["settings_id"], same["settings_id"]);
+    let lines = slow["differences"].as_array().unwrap();
+    let line = lines.iter().find(|d| d["recorded"]["code"] == "x_servo").unwrap();
+    assert_eq!((&line["change"], &line["moved_s"]), (&failed["change"], &failed["moved_s"]));
+    assert_eq!(line["replayed"]["t_s"], failed["replayed_t_s"]);
+
+    for id in [&learnt["id"], &learnt["calibration"]["id"]] {
+        let on_learnt = replayed(client, &sick, json!({ "calibration": id })).await;
+        assert_eq!(on_learnt["calibration_id"], learnt["calibration"]["id"]);
+        assert_ne!(on_learnt["faults"][0]["evidence"], same["faults"][0]["evidence"]);
+        assert_eq!(on_learnt["faults"][0]["calibration_id"], learnt["calibration"]["id"]);
+    }
+    for (settings, pointer) in [
+        (json!({ "calibration": "none such" }), "/calibration"),
+        (json!({ "debounce_s": -1 }), "/debounce_s"),
+        (json!({ "false_alarms_per_rig_year": 0 }), "/false_alarms_per_rig_year"),
+        (json!({ "asset": { "ball": { "mass_kg": -1 } } }), "/asset/ball/mass_kg"),
+    ] {
+        let answer = client.post(&format!("sessions/{sick}/replays"), &settings).await;
+        assert_eq!(answer.problem(422)["pointer"], pointer);
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_drive_cycle_is_worked_out_for_a_rig_that_is_learnt() {
+    let bench = Bench::start().await;
+    let client = &bench.client;
+    client.post("assets", &registration("a")).await.expect(201);
+    let cycle = client.get("assets/a/drive-cycle").await.expect(200);
+    assert_eq!((&cycle["asset"], cycle["faults"].as_array().unwrap().len()), (&json!("a"), 9));
+    let times = cycle["rows"]["t_s"].as_array().unwrap();
+    assert!(times.last().unwrap().as_f64() >= cycle["duration_s"].as_f64());
+
+    let request = client.request(Method::GET, "assets/a/drive-cycle").header("accept", "text/csv");
+    let answer = client.send(request).await;
+    let name = "attachment; filename=\"a-drive-cycle.csv\"";
+    assert_eq!(
+        (answer.status.as_u16(), &answer.headers["content-disposition"]),
+        (200, &name.parse().unwrap())
+    );
+    let rows = read_csv(&answer.text);
+    assert_eq!(rows.len(), times.len());
+    assert_eq!(json!(rows[7].cmd_qy_rad), cycle["rows"]["cmd_qy_rad"][7]);
+
+    client.post("assets", &json!({ "name": "new" })).await.expect(201);
+    let problem = client.get("assets/new/drive-cycle").await.problem(409);
+    assert!(problem["detail"].as_str().unwrap().contains("not learnt"), "{problem}");
+    assert_eq!(problem["type"], "urn:offbd:problem:no-drive-cycle");
+    client.get("assets/nobody/drive-cycle").await.problem(404);
+}
