@@ -18,12 +18,12 @@ COPY tests tests
 COPY docs/charts docs/charts
 COPY web web
 # Benchmarks, examples and tests are there because Cargo.toml names them. The
-# laboratory (scenes, charts, simulated rigs) is left out.
+# laboratory (scenes, charts, simulated rigs) is left out, OpenTelemetry is in.
 # Packages and compiled dependencies stay in the cache mounts from build to
 # build; the program is copied out, for a mount is no part of the image.
 RUN --mount=type=cache,target=/usr/local/cargo/registry \
     --mount=type=cache,target=/src/target \
-    cargo build --profile dist --no-default-features --locked --package offbd --bin offbd \
+    cargo build --profile dist --no-default-features --features otel --locked --package offbd --bin offbd \
     && cp target/dist/offbd /usr/local/bin/offbd
 
 FROM debian:bookworm-slim

@@ -198,7 +198,11 @@ impl TracesConfig {
         }
         match &self.endpoint {
             Some(endpoint) if !endpoint.starts_with("http://") => {
-                invalid("traces.endpoint", "is no `http://HOST:PORT`".to_owned())
+                invalid("traces.endpoint", "is not `http://HOST:PORT`".to_owned())
+            }
+            Some(_) if !cfg!(feature = "otel") => {
+                let reason = "needs a build with OpenTelemetry: cargo build --features otel";
+                invalid("traces.endpoint", reason.to_owned())
             }
             _ => Ok(()),
         }

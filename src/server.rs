@@ -7,6 +7,7 @@ mod listen;
 mod places;
 mod tls;
 pub mod tokens;
+#[cfg_attr(not(feature = "otel"), path = "server/no_traces.rs")]
 mod traces;
 
 use std::fs::{File, TryLockError};

@@ -11,9 +11,6 @@ use axum::http::header::CONTENT_LENGTH;
 use axum::http::{HeaderName, StatusCode};
 use axum::middleware::{Next, from_fn};
 use axum::response::{IntoResponse, Response};
-use opentelemetry::propagation::TextMapPropagator;
-use opentelemetry_http::HeaderExtractor;
-use opentelemetry_sdk::propagation::TraceContextPropagator;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::compression::CompressionLayer;
 use tower_http::request_id::{
@@ -22,7 +19,6 @@ use tower_http::request_id::{
 use tower_http::trace::TraceLayer;
 use tracing::Span;
 use tracing::field::Empty;
-use tracing_opentelemetry::OpenTelemetrySpanExt;
 
 use super::{Policy, Problem, headers};
 
@@ -51,19 +47,15 @@ pub(super) fn around(router: Router, policy: &Policy) -> Router {
     ))
 }
 
-/// The request's span, within the trace of its caller
-/// (<https://www.w3.org/TR/trace-context/>), if it has one.
+/// The request's span, within the trace of its caller, if it has one.
 fn span(request: &Request<Body>) -> Span {
     let id = request_id(request).unwrap_or_default();
     let (method, path) = (request.method(), request.uri().path());
     let span = tracing::info_span!(
         "request", %method, path, request_id = id, asset = Empty, status = Empty
     );
-    if request.headers().contains_key("traceparent") {
-        let caller = TraceContextPropagator::new().extract(&HeaderExtractor(request.headers()));
-        // Where nothing is traced, there is nothing to belong to.
-        let _ = span.set_parent(caller);
-    }
+    #[cfg(feature = "otel")]
+    super::trace_parent::join(&span, request.headers());
     span
 }
 

@@ -26,6 +26,8 @@ mod sessions;
 mod stream;
 mod telemetry;
 mod tokens;
+#[cfg(feature = "otel")]
+mod trace_parent;
 mod traces;
 
 use std::sync::Arc;

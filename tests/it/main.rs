@@ -27,5 +27,7 @@ mod retention;
 mod same_verdict;
 mod service;
 mod support;
+#[cfg(feature = "otel")]
+mod traces;
 mod trends;
 mod views;
