@@ -19,6 +19,7 @@ pub mod store;
 pub mod service;
 
 pub mod http;
+pub mod judging;
 
 pub mod config;
 pub mod server;

@@ -5,12 +5,12 @@ use std::fs::File;
 use std::path::Path;
 
 use super::unusable::{Unusable, read};
+use crate::judging::Judging;
 use crate::wire::asset;
-use crate::wire::basis::Basis;
 use crate::wire::session_csv::{Reader, RowError};
-use crate::wire::verdict::{FaultView, SummaryView, Verdict, fault_view};
-use offbd_core::diagnosis::{FaultMemory, Profile, ServoEstimate, Transition};
-use offbd_core::engine::{Admission, Engine, Input, Misfit, Output, Plausibility, Rig, Setup};
+use crate::wire::verdict::{FaultView, SummaryView, fault_view};
+use offbd_core::diagnosis::{FaultMemory, Profile, ServoEstimate};
+use offbd_core::engine::{Admission, Input, Misfit, Rig, Setup};
 use offbd_core::vocabulary::{PerAxis, Sample};
 
 /// Most bad rows of a file that are named one by one; more are counted: what is
@@ -52,14 +52,14 @@ pub(super) fn session_name(path: &Path) -> String {
 /// Judges the session file at `path`.
 pub(super) fn judge_file(setup: &Setup, path: &Path) -> Result<Judged, Unusable> {
     let mut rows = open(path)?;
-    let mut bench = Bench::new(setup.clone(), session_name(path));
+    let mut session = FileSession::new(setup.clone(), session_name(path));
     while let Some(row) = rows.next() {
         match row {
-            Ok(sample) => bench.sample(sample, rows.line()),
-            Err(error) => bench.reject(error),
+            Ok(sample) => session.sample(sample, rows.line()),
+            Err(error) => session.reject(error),
         }
     }
-    bench.end().map_err(|reason| Unusable::file(path, reason))
+    session.end().map_err(|reason| Unusable::file(path, reason))
 }
 
 /// The samples of the session file at `path`, bad rows left out and counted.
@@ -79,38 +79,19 @@ fn open(path: &Path) -> Result<Reader<File>, Unusable> {
     Reader::new(file).map_err(|e| Unusable::file(path, e))
 }
 
-/// An engine with what comes out of it for one session.
-struct Bench {
-    session: String,
-    basis: Basis,
-    plausibility: Plausibility,
-    engine: Engine,
-    outputs: Vec<Output>,
-    verdict: Verdict,
+/// One session of a file.
+struct FileSession {
+    name: String,
+    judging: Judging,
     faults: Vec<FaultView>,
     bad_rows: Vec<RowError>,
-    n_samples: u64,
     n_rejected: u64,
-    n_set_aside: u64,
-    span_s: Option<(f64, f64)>,
 }
 
-impl Bench {
-    fn new(setup: Setup, session: String) -> Self {
-        Self {
-            session,
-            basis: Basis::of(&setup),
-            plausibility: Plausibility::new(&setup.rig),
-            engine: Engine::new(setup, FaultMemory::default()),
-            outputs: Vec::new(),
-            verdict: Verdict::default(),
-            faults: Vec::new(),
-            bad_rows: Vec::new(),
-            n_samples: 0,
-            n_rejected: 0,
-            n_set_aside: 0,
-            span_s: None,
-        }
+impl FileSession {
+    fn new(setup: Setup, name: String) -> Self {
+        let judging = Judging::new(setup, FaultMemory::default());
+        Self { name, judging, faults: Vec::new(), bad_rows: Vec::new(), n_rejected: 0 }
     }
 
     fn reject(&mut self, error: RowError) {
@@ -121,59 +102,30 @@ impl Bench {
     }
 
     fn sample(&mut self, sample: Sample, line: u64) {
-        self.plausibility.take(&sample);
-        self.engine.handle(Input::Sample(sample), &mut self.outputs);
-        let mut outputs = std::mem::take(&mut self.outputs);
-        for output in outputs.drain(..) {
-            self.verdict.take(&output);
-            match output {
-                Output::Admitted(admission) => self.admitted(admission, sample.t_s, line),
-                Output::Transition(transition) => self.transition(&transition),
-            }
+        if let Admission::Rejected(reason) = self.judging.sample(sample) {
+            self.reject(RowError { line, reason: reason.to_string() });
         }
-        self.outputs = outputs;
+        self.note_faults();
     }
 
-    fn admitted(&mut self, admission: Admission, t_s: f64, line: u64) {
-        match admission {
-            Admission::Accepted => {
-                let (first, last) = self.span_s.unwrap_or((t_s, t_s));
-                self.span_s = Some((first.min(t_s), last.max(t_s)));
-                self.n_samples += 1;
-            }
-            Admission::SetAside(_) => {
-                self.n_samples += 1;
-                self.n_set_aside += 1;
-            }
-            Admission::Duplicate => {}
-            Admission::Rejected(reason) => {
-                self.reject(RowError { line, reason: reason.to_string() });
-            }
-        }
-    }
-
-    fn transition(&mut self, transition: &Transition) {
-        self.faults.push(fault_view(&self.session, &self.basis, transition));
+    fn note_faults(&mut self) {
+        let view = |t| fault_view(&self.name, self.judging.basis(), t);
+        self.faults.extend(self.judging.transitions().map(view));
     }
 
     /// The verdict, or why there was nothing to judge.
     fn end(mut self) -> Result<Judged, String> {
-        self.engine.handle(Input::End, &mut self.outputs);
-        for output in std::mem::take(&mut self.outputs) {
-            self.verdict.take(&output);
-            if let Output::Transition(transition) = output {
-                self.transition(&transition);
-            }
+        self.judging.input(Input::End);
+        self.note_faults();
+        let misfits = self.judging.misfits();
+        let counts = *self.judging.counts();
+        if counts.span_s.is_none() {
+            return Err(no_row(&misfits));
         }
-        let misfits = self.plausibility.misfits();
-        let (first, last) = self.span_s.ok_or_else(|| no_row(&misfits))?;
-        let summary =
-            self.verdict.summary(&self.session, self.n_samples, self.n_rejected, last - first);
-        let summary = summary
-            .with_monitors(self.verdict.monitors(&self.engine.state()))
-            .with_misfits(&misfits);
-        let estimates = self.engine.servo_estimates();
-        let Self { faults, bad_rows, n_set_aside, .. } = self;
+        let summary = self.judging.summary(&self.name, self.n_rejected);
+        let estimates = self.judging.engine().servo_estimates();
+        let Self { faults, bad_rows, .. } = self;
+        let n_set_aside = counts.n_set_aside;
         Ok(Judged { faults, summary, bad_rows, n_set_aside, estimates, misfits })
     }
 }

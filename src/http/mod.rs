@@ -16,6 +16,7 @@ mod layers;
 mod learning;
 mod login;
 mod metrics;
+mod negotiate;
 mod operations;
 mod page;
 mod problem;
@@ -46,6 +47,7 @@ pub use body::Budget;
 pub use guard::Policy;
 pub use metrics::{gather_metrics, keep_metrics};
 pub use problem::Problem;
+pub(crate) use rates::subscriber;
 pub use rates::{Rate, Rates};
 pub use routes::More;
 

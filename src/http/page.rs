@@ -15,6 +15,7 @@ use axum::http::{HeaderMap, Method, StatusCode, Uri};
 use axum::response::{Html, IntoResponse, Response};
 use rust_embed::{EmbeddedFile, RustEmbed};
 
+use super::negotiate::weight_of_first;
 use super::problem;
 
 /// What the build left; nothing where it had no Node.
@@ -69,7 +70,7 @@ fn index(headers: &HeaderMap) -> Response {
 /// The file `path`, as brotli where the build made it and the browser takes it.
 fn file(path: &str, found: EmbeddedFile, headers: &HeaderMap) -> Response {
     let taken = headers.get(ACCEPT_ENCODING).and_then(|a| a.to_str().ok()).unwrap_or_default();
-    let brotli = taken.split(',').any(|coding| coding.trim().starts_with("br"));
+    let brotli = weight_of_first(taken, &["br", "*"]) > 0.0;
     let packed = Files::get(&format!("{path}.br")).filter(|_| brotli);
     let is_packed = packed.is_some();
     let found = packed.unwrap_or(found);

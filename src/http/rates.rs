@@ -3,6 +3,7 @@
 use std::hash::Hash;
 use std::net::{IpAddr, Ipv6Addr};
 use std::num::NonZeroU32;
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use governor::clock::{Clock, MonotonicClock};
@@ -14,6 +15,9 @@ use governor::{NotUntil, Quota, RateLimiter};
 /// could ask at their full rate again are dropped first; if there are as many
 /// that could not, all share the rate of one.
 const MAX_KEYS: usize = 16_384;
+
+/// Time between two looks through a full table.
+const SWEEP_EVERY: Duration = Duration::from_secs(1);
 
 /// Seconds' worth of requests that may come at once.
 const BURST_S: u32 = 10;
@@ -28,6 +32,8 @@ pub struct Rate(pub NonZeroU32);
 struct Limiter<K: Hash + Eq + Clone> {
     each: RateLimiter<K, HashMapStateStore<K>, MonotonicClock>,
     rest: RateLimiter<NotKeyed, InMemoryState, MonotonicClock>,
+    /// When a full table was last looked through.
+    swept: Mutex<Option<Instant>>,
 }
 
 impl<K: Hash + Eq + Clone> Limiter<K> {
@@ -35,12 +41,13 @@ impl<K: Hash + Eq + Clone> Limiter<K> {
         let burst = rate.0.saturating_mul(NonZeroU32::MIN.saturating_add(BURST_S - 1));
         let quota = Quota::per_second(rate.0).allow_burst(burst);
         let each = RateLimiter::hashmap_with_clock(quota, MonotonicClock);
-        Self { each, rest: RateLimiter::direct_with_clock(quota, MonotonicClock) }
+        let rest = RateLimiter::direct_with_clock(quota, MonotonicClock);
+        Self { each, rest, swept: Mutex::default() }
     }
 
     /// Counts a request; if it comes too early, for how long to wait.
     fn take(&self, key: &K) -> Result<(), Duration> {
-        if self.each.len() >= MAX_KEYS {
+        if self.each.len() >= MAX_KEYS && self.sweep_is_due(MonotonicClock.now()) {
             self.each.retain_recent();
         }
         let wait = |until: NotUntil<Instant>| until.wait_time_from(MonotonicClock.now());
@@ -48,6 +55,16 @@ impl<K: Hash + Eq + Clone> Limiter<K> {
             return self.rest.check().map_err(wait);
         }
         self.each.check_key(key).map_err(wait)
+    }
+
+    /// Whether a full table is to be looked through at `now`: not at every request.
+    fn sweep_is_due(&self, now: Instant) -> bool {
+        let mut swept = self.swept.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_due = swept.is_none_or(|last| now.duration_since(last) >= SWEEP_EVERY);
+        if is_due {
+            *swept = Some(now);
+        }
+        is_due
     }
 }
 
@@ -75,7 +92,7 @@ impl Rates {
 
 /// Who is behind an address: of IPv6 the first 64 bits, as a subscriber has all
 /// addresses that begin with them (RFC 6177).
-fn subscriber(address: IpAddr) -> IpAddr {
+pub(crate) fn subscriber(address: IpAddr) -> IpAddr {
     match address.to_canonical() {
         IpAddr::V6(address) => {
             IpAddr::V6(Ipv6Addr::from_bits(address.to_bits() & (u128::MAX << 64)))
@@ -99,6 +116,15 @@ mod tests {
         let wait = limiter.take(&1).unwrap_err();
         assert!(wait > Duration::ZERO && wait <= Duration::from_secs(1), "{wait:?}");
         limiter.take(&2).unwrap();
+    }
+
+    #[test]
+    fn a_full_table_is_looked_through_once_a_second() {
+        let limiter = Limiter::<u8>::new(ONE);
+        let now = MonotonicClock.now();
+        assert!(limiter.sweep_is_due(now));
+        assert!(!limiter.sweep_is_due(now + SWEEP_EVERY / 2));
+        assert!(limiter.sweep_is_due(now + SWEEP_EVERY));
     }
 
     #[test]

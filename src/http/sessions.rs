@@ -1,5 +1,7 @@
 //! `/sessions`: recordings.
 
+use std::cmp::Ordering;
+
 use axum::Json;
 use axum::body::{Body, Bytes};
 use axum::extract::State;
@@ -9,6 +11,7 @@ use axum::response::{IntoResponse, Response};
 use futures_util::{Stream, StreamExt};
 use serde::Deserialize;
 
+use super::negotiate::weight_of_first;
 use super::telemetry::Format;
 use super::{App, Asset, PageQuery, Path, Problem, Query, body, page_limit};
 use crate::service::{Recording, Service, ServiceError};
@@ -236,13 +239,14 @@ impl Form {
     pub(super) fn wanted(headers: &HeaderMap, usual: Self) -> Result<Self, Problem> {
         let Some(accept) = headers.get(ACCEPT) else { return Ok(usual) };
         let accept = accept.to_str().unwrap_or_default();
-        for range in accept.split(',') {
-            match range.split(';').next().unwrap_or_default().trim() {
-                "application/json" => return Ok(Self::Json),
-                "text/csv" | "text/*" => return Ok(Self::Csv),
-                "*/*" => return Ok(usual),
-                _ => {}
-            }
+        let json = weight_of_first(accept, &["application/json", "application/*", "*/*"]);
+        let csv = weight_of_first(accept, &["text/csv", "text/*", "*/*"]);
+        if json.max(csv) > 0.0 {
+            return Ok(match json.total_cmp(&csv) {
+                Ordering::Greater => Self::Json,
+                Ordering::Less => Self::Csv,
+                Ordering::Equal => usual,
+            });
         }
         let detail = format!("`{accept}` is not there; there are text/csv and application/json");
         Err(Problem::new(StatusCode::NOT_ACCEPTABLE, "not-acceptable", "No such format", detail))

@@ -9,6 +9,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::task::{Context, Poll};
 use std::time::Duration;
 
+use crate::http::subscriber;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::TcpStream;
 use tokio::time::{Sleep, sleep};
@@ -34,13 +35,15 @@ pub(super) struct Place {
 }
 
 impl Places {
-    /// Room for `most` connections, for `most_of_one` of one address.
+    /// Room for `most` connections, for `most_of_one` of one address, or of one
+    /// subscriber of IPv6.
     pub(super) fn new(most: usize, most_of_one: usize) -> Self {
         Self { most, most_of_one, taken: Arc::default() }
     }
 
-    /// A place for a connection of `address`; none where there is no room.
+    /// A place for a connection of `address`; `None` where there is no room.
     pub(super) fn take(&self, address: IpAddr) -> Option<Place> {
+        let address = subscriber(address);
         let mut taken = self.taken.lock().unwrap_or_else(PoisonError::into_inner);
         let of_one = taken.of.get(&address).copied().unwrap_or_default();
         if taken.all >= self.most || of_one >= self.most_of_one {
@@ -155,5 +158,15 @@ mod tests {
         drop(third);
         assert!(places.take(a).is_some());
         assert_eq!(places.taken.lock().unwrap().of.len(), 1, "nothing is kept of who is gone");
+    }
+
+    #[test]
+    fn a_subscriber_of_ipv6_is_one_whatever_the_address() {
+        let places = Places::new(3, 1);
+        let [a, b, c]: [IpAddr; 3] =
+            ["2001:db8::1", "2001:db8::2", "2001:db8:0:1::1"].map(|a| a.parse().unwrap());
+        let _first = places.take(a).unwrap();
+        assert!(places.take(b).is_none(), "the same first 64 bits");
+        assert!(places.take(c).is_some());
     }
 }

@@ -27,7 +27,7 @@ fn state_of(asset: &str, running: &Running) -> StateView {
     };
     let samples = u64::try_from(open.progress.n_samples).unwrap_or_default();
     let session = (open.id.as_str(), open.name.as_str(), samples);
-    StateView { learning, ..state_view(asset, Some(session), &open.engine.state()) }
+    StateView { learning, ..state_view(asset, Some(session), &open.judging.engine().state()) }
 }
 
 impl Service {

@@ -104,7 +104,7 @@ impl Service {
     /// asset's shard has no time to say.
     async fn monitors(&self, asset: &str) -> Vec<MonitorView> {
         let seen = self.look(asset, |running| {
-            running.open.as_ref().map(|open| monitor_views(&open.engine.state()))
+            running.open.as_ref().map(|open| monitor_views(&open.judging.engine().state()))
         });
         seen.await.ok().flatten().unwrap_or_default()
     }

@@ -114,7 +114,7 @@ impl Running {
 
     /// What the open session may teach so far.
     fn open_teaching(&self) -> Option<Teaching> {
-        let open = self.open.as_ref().filter(|open| !open.has_confirmed())?;
+        let open = self.open.as_ref().filter(|open| !open.judging.has_confirmed())?;
         teaching(open)
     }
 
@@ -247,7 +247,7 @@ impl Running {
 
     /// What is missing before the rig can be learnt.
     fn missing(&self, open: Option<&Teaching>) -> String {
-        let misfits = self.open.as_ref().map(OpenSession::misfits).unwrap_or_default();
+        let misfits = self.open.as_ref().map(|open| open.judging.misfits()).unwrap_or_default();
         if let Some(misfit) = misfits.into_iter().find(|misfit| misfit.prevents_learning()) {
             return format!("Nothing can be learnt from what comes: {misfit}.");
         }
@@ -295,7 +295,8 @@ impl Running {
         if let Some(refusal) = self.learning.refusal() {
             words += &format!(" The last refinement was refused: {}.", refusal.reason);
         }
-        let calibration = |open: &OpenSession| open.engine.setup().rig.calibration.clone();
+        let calibration =
+            |open: &OpenSession| open.judging.engine().setup().rig.calibration.clone();
         if self.open.as_ref().is_some_and(|open| calibration(open) != self.rig.calibration) {
             words +=
                 " The open session began before and is judged without it; the next one uses it.";

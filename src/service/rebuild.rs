@@ -32,8 +32,12 @@ fn reopen(context: &Context, row: &SessionRow, refines: bool) -> Result<OpenSess
     let mut open = OpenSession::new(row.id.clone(), row.name.clone(), setup, baseline, refines);
     play(&context.store, &context.runtime, &row.id, |input| {
         match input {
-            Input::Sample(sample) => drop(open.take(&sample)),
-            action => open.input(action),
+            Input::Sample(sample) => {
+                open.take(&sample);
+            }
+            action => {
+                open.judging.input(action);
+            }
         }
         Flow::More
     })?;

@@ -5,12 +5,13 @@
 
 use super::playback::{Flow, play};
 use super::{Service, ServiceError, jobs, views};
-use crate::store::SessionRow;
+use crate::judging::Judging;
+use crate::store::{SessionRow, Store};
 use crate::wire::basis::Basis;
 use crate::wire::recording::{ColumnsView, RecordingRow, RecordingView};
 use crate::wire::verdict::FaultView;
 use offbd_core::diagnosis::{Evidence, StatusByte};
-use offbd_core::engine::{Engine, Input, Setup};
+use offbd_core::engine::{Input, Setup};
 use offbd_core::vocabulary::{FaultCode, FaultStatus, Invalid, Sample};
 
 /// Longest time before the onset or after the confirmation, s.
@@ -27,8 +28,8 @@ const MAX_ROWS: usize = 200_000;
 /// Recordings that are made at a time; the next is told to come again.
 pub(super) const MAX_AT_ONCE: usize = 2;
 
-/// Transitions of the session that are looked through for the occurrence.
-const MAX_TRANSITIONS: u32 = 10_000;
+/// Transitions that are read at a time, from the latest back.
+const PAGE: u32 = 100;
 
 /// Samples between two looks at whether the service is closing.
 const LOOK_EVERY: usize = 1024;
@@ -78,15 +79,12 @@ impl Service {
         let occurrence = entry.provenance.last_occurrence.ok_or_else(gone)?;
         let session = self.inner.store.session(&occurrence.session_id).await?.ok_or_else(gone)?;
         let code: FaultCode = word.parse().map_err(ServiceError::UnknownCode)?;
-        let rows = self.inner.store.transitions(&session.id, 0, MAX_TRANSITIONS).await?;
-        let faults: Result<Vec<FaultView>, _> =
-            rows.iter().map(|row| views::from_json(&row.document)).collect();
-        let event = last_failure(code, &faults?).ok_or_else(gone)?;
+        let failure = last_failure(&self.inner.store, &session.id, code).await?.ok_or_else(gone)?;
         let busy = |_| ServiceError::Busy { what: "too many recordings are being made" };
         let permit = self.inner.recordings.clone().try_acquire_owned().map_err(busy)?;
         let bench = self.inner.bench.clone();
         let made = tokio::task::spawn_blocking(move || {
-            let made = make(&bench, &session, code, &event, around);
+            let made = make(&bench, &session, code, &failure, around);
             drop(permit);
             made
         });
@@ -103,24 +101,48 @@ struct Failure {
     confirmed_s: Option<f64>,
 }
 
-/// The last time that `code` failed anew among the changes of a session.
-fn last_failure(code: FaultCode, faults: &[FaultView]) -> Option<Failure> {
-    let (mut last, mut failing) = (None::<Failure>, false);
-    for fault in faults.iter().filter(|fault| fault.code == code.as_str()) {
-        let bits = u8::from_str_radix(&fault.status_byte, 16).unwrap_or_default();
-        let fails = StatusByte::from_bits(bits).test_failed();
-        if fails && !failing {
-            let (onset_s, failed_s) = (fault.onset_s, fault.t_s);
-            last = Some(Failure { onset_s, failed_s, confirmed_s: None });
-        }
-        failing = fails;
-        if let Some(last) = last.as_mut().filter(|_| fails)
-            && fault.status == FaultStatus::Confirmed.as_str()
-        {
-            last.confirmed_s.get_or_insert(fault.t_s);
+/// The last time that `code` failed anew in `session`.
+async fn last_failure(
+    store: &Store,
+    session: &str,
+    code: FaultCode,
+) -> Result<Option<Failure>, ServiceError> {
+    let (mut search, mut before) = (Backwards::default(), i64::MAX);
+    loop {
+        let rows = store.transitions_of(session, code.as_str(), before, PAGE).await?;
+        let Some(last) = rows.last() else { return Ok(search.found) };
+        before = last.ordinal;
+        for row in &rows {
+            if search.take(&views::from_json(&row.document)?) {
+                return Ok(search.found);
+            }
         }
     }
-    last
+}
+
+/// Goes back through the transitions of one code, to where it failed last.
+#[derive(Default)]
+struct Backwards {
+    found: Option<Failure>,
+}
+
+impl Backwards {
+    /// Takes the transition before the one taken last; returns whether that
+    /// one was the first of the failure.
+    fn take(&mut self, fault: &FaultView) -> bool {
+        let bits = u8::from_str_radix(&fault.status_byte, 16).unwrap_or_default();
+        if !StatusByte::from_bits(bits).test_failed() {
+            return self.found.is_some();
+        }
+        let confirmed = fault.status == FaultStatus::Confirmed.as_str();
+        let later = self.found.and_then(|found| found.confirmed_s);
+        self.found = Some(Failure {
+            onset_s: fault.onset_s,
+            failed_s: fault.t_s,
+            confirmed_s: if confirmed { Some(fault.t_s) } else { later },
+        });
+        false
+    }
 }
 
 fn make(
@@ -166,8 +188,8 @@ fn judged(
     // A sample is judged when none before it can come any more.
     let enough_s = to_s + 2.0 * setup.settings.reorder_s;
     let mut stretch = Stretch::new(from_s, to_s);
-    let mut engine = Engine::new(setup, views::memory(&session.baseline)?);
-    let (mut outputs, mut n_judged, mut ended) = (Vec::new(), 0, true);
+    let mut judging = Judging::new(setup, views::memory(&session.baseline)?);
+    let (mut n_judged, mut ended) = (0, true);
     play(&bench.store, &bench.runtime, &session.id, |input| {
         if let Input::Sample(sample) = &input {
             n_judged += 1;
@@ -178,8 +200,7 @@ fn judged(
                 return Flow::Enough;
             }
         }
-        outputs.clear();
-        engine.observe(input, &mut outputs, |evidence| stretch.evidence(evidence));
+        judging.observe(input, |evidence| stretch.evidence(evidence));
         Flow::More
     })?;
     if n_judged > MAX_JUDGED {
@@ -191,7 +212,7 @@ fn judged(
     }
     if ended {
         // An open session's last samples wait to be judged; here they need not.
-        engine.observe(Input::End, &mut outputs, |evidence| stretch.evidence(evidence));
+        judging.observe(Input::End, |evidence| stretch.evidence(evidence));
     }
     Ok(stretch.rows())
 }
@@ -258,24 +279,30 @@ mod tests {
         fault_view("s", &Basis::default(), &transition)
     }
 
+    /// What the search finds that meets these, the latest last.
+    fn found(faults: &[FaultView]) -> Option<Failure> {
+        let mut search = Backwards::default();
+        let _ = faults.iter().rev().find(|fault| search.take(fault));
+        search.found
+    }
+
     #[test]
-    fn the_last_failure_is_found_among_the_changes() {
-        let (x, y) = (FaultCode::XServo, FaultCode::YServo);
+    fn the_last_failure_is_found_from_the_latest_back() {
+        let x = FaultCode::XServo;
         let faults = [
             fault(x, 5.0, 0x27),
             fault(x, 5.5, 0x2F),
-            fault(y, 6.0, 0x27),
             fault(x, 9.0, 0x2E),
             fault(x, 20.0, 0x2F),
-            fault(y, 21.0, 0x26),
+            fault(x, 30.0, 0x2E),
         ];
         let failure = |onset_s, failed_s, confirmed_s| {
             Some(Failure { onset_s: Some(onset_s), failed_s, confirmed_s })
         };
-        assert_eq!(last_failure(x, &faults[..2]), failure(4.0, 5.0, Some(5.5)));
-        assert_eq!(last_failure(x, &faults[..4]), failure(4.0, 5.0, Some(5.5)));
-        assert_eq!(last_failure(x, &faults), failure(19.0, 20.0, Some(20.0)));
-        assert_eq!(last_failure(y, &faults), failure(5.0, 6.0, None));
-        assert_eq!(last_failure(FaultCode::Sensor, &faults), None);
+        assert_eq!(found(&faults[..1]), failure(4.0, 5.0, None));
+        assert_eq!(found(&faults[..2]), failure(4.0, 5.0, Some(5.5)));
+        assert_eq!(found(&faults[..3]), failure(4.0, 5.0, Some(5.5)));
+        assert_eq!(found(&faults), failure(19.0, 20.0, Some(20.0)));
+        assert_eq!(found(&[]), None);
     }
 }

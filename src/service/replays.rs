@@ -6,14 +6,14 @@ use super::clock::rfc3339;
 use super::jobs::{Bench, Job};
 use super::playback::{Flow, play};
 use super::{Service, ServiceError, views};
+use crate::judging::Judging;
 use crate::store::{JobState, Micros, ReplayRow, SessionRow, Store, Write};
 use crate::wire::asset::{self, CalibrationView};
-use crate::wire::basis::Basis;
 use crate::wire::difference::{Compared, compare, tally};
 use crate::wire::service::{DifferenceView, ReplayResultView, ReplaySettingsView, ReplayView};
-use crate::wire::verdict::{FaultView, Verdict, fault_view};
+use crate::wire::verdict::{FaultView, fault_view};
 use offbd_core::diagnosis::Profile;
-use offbd_core::engine::{Engine, Input, Output, Plausibility, Rig, Setup};
+use offbd_core::engine::{Input, Rig, Setup};
 use offbd_core::vocabulary::Invalid;
 
 /// Fault lines, and differences, in a result; more are left out, and it says so.
@@ -195,14 +195,10 @@ fn judge(bench: &Bench, row: &ReplayRow) -> Result<Option<ReplayResultView>, Ser
     let learnt = bench.runtime.block_on(learnt(&bench.store, &session.asset, &settings))?;
     let setup = setup(&session, &settings, learnt.as_ref())?;
     let mut player = Player {
-        basis: Basis::of(&setup),
-        plausibility: Plausibility::new(&setup.rig),
-        engine: Engine::new(setup, views::memory(&session.baseline)?),
+        judging: Judging::new(setup, views::memory(&session.baseline)?),
         session: &session,
-        outputs: Vec::new(),
-        verdict: Verdict::default(),
         faults: Vec::new(),
-        n_samples: 0,
+        n_played: 0,
         stopped: false,
     };
     play(&bench.store, &bench.runtime, &session.id, |input| player.take(bench, &row.id, input))?;
@@ -223,61 +219,42 @@ fn recorded(bench: &Bench, session: &SessionRow) -> Result<Vec<FaultView>, Servi
 }
 
 struct Player<'a> {
-    basis: Basis,
-    plausibility: Plausibility,
-    engine: Engine,
+    judging: Judging,
     session: &'a SessionRow,
-    outputs: Vec<Output>,
-    verdict: Verdict,
     faults: Vec<FaultView>,
-    n_samples: u64,
+    n_played: u64,
     stopped: bool,
 }
 
 impl Player<'_> {
     fn take(&mut self, bench: &Bench, id: &str, input: Input) -> Flow {
         let n_recorded = u64::try_from(self.session.progress.n_samples).unwrap_or_default();
-        if self.n_samples >= n_recorded && matches!(input, Input::Sample(_)) {
+        if self.n_played >= n_recorded && matches!(input, Input::Sample(_)) {
             return Flow::Enough;
         }
-        if self.n_samples.is_multiple_of(LOOK_EVERY) {
-            bench.progress.set(id, self.n_samples as f64 / n_recorded.max(1) as f64);
+        if self.n_played.is_multiple_of(LOOK_EVERY) {
+            bench.progress.set(id, self.n_played as f64 / n_recorded.max(1) as f64);
             self.stopped = bench.closing.is_cancelled();
         }
         if self.stopped {
             return Flow::Enough;
         }
-        self.n_samples += u64::from(matches!(input, Input::Sample(_)));
+        self.n_played += u64::from(matches!(input, Input::Sample(_)));
         self.put(input);
         Flow::More
     }
 
     fn put(&mut self, input: Input) {
-        if let Input::Sample(sample) = &input {
-            self.plausibility.take(sample);
-        }
-        self.outputs.clear();
-        self.engine.handle(input, &mut self.outputs);
-        for output in &self.outputs {
-            self.verdict.take(output);
-            if let Output::Transition(transition) = output
-                && self.faults.len() <= MAX_LINES
-            {
-                self.faults.push(fault_view(&self.session.name, &self.basis, transition));
-            }
-        }
+        self.judging.input(input);
+        let room = (MAX_LINES + 1).saturating_sub(self.faults.len());
+        let view = |t| fault_view(&self.session.name, self.judging.basis(), t);
+        self.faults.extend(self.judging.transitions().take(room).map(view));
     }
 
     fn result(self, recorded: Vec<FaultView>) -> ReplayResultView {
-        let progress = self.session.progress;
-        let duration_s =
-            progress.last_t_s.zip(progress.first_t_s).map_or(0.0, |(last, first)| last - first);
-        let rejected = u64::try_from(progress.n_rejected).unwrap_or_default();
-        let summary =
-            self.verdict.summary(&self.session.name, self.n_samples, rejected, duration_s);
-        let summary = summary
-            .with_monitors(self.verdict.monitors(&self.engine.state()))
-            .with_misfits(&self.plausibility.misfits());
+        let n_rejected = u64::try_from(self.session.progress.n_rejected).unwrap_or_default();
+        let summary = self.judging.summary(&self.session.name, n_rejected);
+        let basis = self.judging.basis().clone();
         let truncated = self.faults.len() > MAX_LINES || recorded.len() > MAX_LINES;
         let (mut faults, mut recorded) = (self.faults, recorded);
         faults.truncate(MAX_LINES);
@@ -293,8 +270,8 @@ impl Player<'_> {
             faults,
             summary,
             recorded_hash,
-            calibration_id: self.basis.calibration_id,
-            settings_id: self.basis.settings_id,
+            calibration_id: basis.calibration_id,
+            settings_id: basis.settings_id,
             truncated,
         }
     }

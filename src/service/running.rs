@@ -12,19 +12,17 @@ use super::recent::Recent;
 use super::shard::Context;
 use super::telemetry::unjudged;
 use super::{ServiceError, trends, views};
+use crate::judging::Judging;
 use crate::store::{
     ActionKind, ActionRow, AssetRow, FaultRow, Micros, Progress, SessionRow, TransitionRow, Write,
 };
-use crate::wire::basis::Basis;
 use crate::wire::provenance::{ActView, OccurrenceView, ProvenanceView};
 use crate::wire::service::cleared_view;
 use crate::wire::telemetry::{AckView, RowView};
-use crate::wire::verdict::{SummaryView, Verdict, fault_view};
+use crate::wire::verdict::{SummaryView, fault_view};
 use crate::wire::{asset, memory};
 use offbd_core::diagnosis::{FaultMemory, FaultRecord, MemoryRules};
-use offbd_core::engine::{
-    Admission, Engine, Input, Misfit, Output, Plausibility, Rig, Setup, UsableMotion,
-};
+use offbd_core::engine::{Admission, Input, Rig, Setup, UsableMotion};
 use offbd_core::vocabulary::{FaultCode, FaultStatus, Sample};
 
 /// How far a nameless device's clock must fall back to mean that it started
@@ -64,8 +62,7 @@ pub(super) struct Running {
 pub(super) struct OpenSession {
     pub(super) id: String,
     pub(super) name: String,
-    pub(super) engine: Engine,
-    pub(super) basis: Basis,
+    pub(super) judging: Judging,
     pub(super) progress: Progress,
     pub(super) n_transitions: i64,
     /// Whether a recording is being imported into it: no live telemetry then.
@@ -74,10 +71,6 @@ pub(super) struct OpenSession {
     pub(super) recent: Recent,
     /// Motion that the rig can be learnt from; none where that is not wanted.
     pub(super) motion: Option<UsableMotion>,
-    /// Whether what comes can be of the rig that was described.
-    plausibility: Plausibility,
-    verdict: Verdict,
-    outputs: Vec<Output>,
     /// The latest time among the samples that were taken as they should be.
     latest_t_s: f64,
     /// Whether the last sample was far behind the latest.
@@ -98,37 +91,26 @@ impl OpenSession {
             motion: counts.then(|| UsableMotion::new(&setup.rig)),
             id,
             name,
-            basis: Basis::of(&setup),
-            plausibility: Plausibility::new(&setup.rig),
-            engine: Engine::new(setup, baseline),
+            judging: Judging::new(setup, baseline),
             progress: Progress::default(),
             n_transitions: 0,
             importing: false,
             recent: Recent::default(),
-            verdict: Verdict::default(),
-            outputs: Vec::new(),
             latest_t_s: f64::NEG_INFINITY,
             fell_back: false,
         }
     }
 
-    /// Puts one sample into the engine. Afterwards `outputs` is what followed.
-    pub(super) fn take(&mut self, sample: &Sample) -> Option<Admission> {
-        self.plausibility.take(sample);
-        self.outputs.clear();
-        self.engine.handle(Input::Sample(*sample), &mut self.outputs);
-        self.outputs.iter().for_each(|output| self.verdict.take(output));
-        let admission = self.outputs.iter().find_map(|output| match output {
-            Output::Admitted(admission) => Some(*admission),
-            Output::Transition(_) => None,
-        });
-        if let (Some(Admission::Accepted), Some(motion)) = (admission, &mut self.motion) {
+    /// Judges one sample.
+    pub(super) fn take(&mut self, sample: &Sample) -> Admission {
+        let admission = self.judging.sample(*sample);
+        if let (Admission::Accepted, Some(motion)) = (admission, &mut self.motion) {
             motion.take(sample);
         }
-        if matches!(admission, Some(Admission::Accepted | Admission::SetAside(_))) {
-            self.note(sample, admission == Some(Admission::Accepted));
+        if matches!(admission, Admission::Accepted | Admission::SetAside(_)) {
+            self.note(sample, admission == Admission::Accepted);
         }
-        self.recent.take(|| self.engine.state());
+        self.recent.take(|| self.judging.engine().state());
         admission
     }
 
@@ -139,8 +121,7 @@ impl OpenSession {
         }
         let progress = &mut self.progress;
         progress.n_samples += 1;
-        progress.first_t_s.get_or_insert(sample.t_s);
-        progress.last_t_s = Some(sample.t_s);
+        (progress.first_t_s, progress.last_t_s) = self.judging.counts().span_s.unzip();
         let seq = sample.seq.and_then(|seq| i64::try_from(seq).ok());
         progress.last_seq = progress.last_seq.max(seq);
     }
@@ -162,18 +143,10 @@ impl OpenSession {
             }
     }
 
-    /// Puts in what is no sample.
-    pub(super) fn input(&mut self, input: Input) {
-        self.outputs.clear();
-        self.engine.handle(input, &mut self.outputs);
-        self.outputs.iter().for_each(|output| self.verdict.take(output));
-    }
-
     /// Appends what followed from the last input to `work`.
     fn report(&mut self, asset: &str, work: &mut Work) -> Result<(), ServiceError> {
-        for output in &self.outputs {
-            let Output::Transition(transition) = output else { continue };
-            let view = fault_view(&self.name, &self.basis, transition);
+        for transition in self.judging.transitions() {
+            let view = fault_view(&self.name, self.judging.basis(), transition);
             work.writes.push(Write::Transition(TransitionRow {
                 id: 0,
                 asset: asset.to_owned(),
@@ -196,31 +169,14 @@ impl OpenSession {
             session: self.name.clone(),
             session_id: self.id.clone(),
             noted_at: rfc3339(at),
-            calibration_id: self.basis.calibration_id.clone(),
-            settings_id: self.basis.settings_id.clone(),
+            calibration_id: self.judging.basis().calibration_id.clone(),
+            settings_id: self.judging.basis().settings_id.clone(),
         }
     }
 
-    /// Whether a fault has been confirmed in it.
-    pub(super) fn has_confirmed(&self) -> bool {
-        !self.verdict.confirmed().is_empty()
-    }
-
-    /// What in the data and the asset file cannot be of one rig.
-    pub(super) fn misfits(&self) -> Vec<Misfit> {
-        self.plausibility.misfits()
-    }
-
     fn summary(&self) -> SummaryView {
-        let Progress { n_samples, n_rejected, first_t_s, last_t_s, .. } = self.progress;
-        let duration_s = last_t_s.zip(first_t_s).map_or(0.0, |(last, first)| last - first);
-        let count = |n: i64| u64::try_from(n).unwrap_or_default();
-        let monitors = self.verdict.monitors(&self.engine.state());
-        let (samples, rejected) = (count(n_samples), count(n_rejected));
-        self.verdict
-            .summary(&self.name, samples, rejected, duration_s)
-            .with_monitors(monitors)
-            .with_misfits(&self.plausibility.misfits())
+        let n_rejected = u64::try_from(self.progress.n_rejected).unwrap_or_default();
+        self.judging.summary(&self.name, n_rejected)
     }
 }
 
@@ -263,7 +219,7 @@ impl Running {
     /// Ends the open session, if there is one.
     pub(super) fn end(&mut self, context: &Context, work: &mut Work) -> Result<(), ServiceError> {
         let Some(mut open) = self.open.take() else { return Ok(()) };
-        open.input(Input::End);
+        open.judging.input(Input::End);
         open.report(&self.row.name, work)?;
         let summary = open.summary();
         work.writes.push(Write::EndSession {
@@ -277,7 +233,7 @@ impl Running {
         let warned = trends.iter().any(warned);
         work.writes.append(&mut trends);
         self.gather(&open, &summary, warned, work)?;
-        let memory = open.engine.memory().clone();
+        let memory = open.judging.engine().memory().clone();
         self.remember_as(memory, Some(&open.occurrence(work.at)), None, work)?;
         self.learn_if_due(context, work)
     }
@@ -304,18 +260,17 @@ impl Running {
             n_taken += 1;
             let row = |reason: String| RowView { index: *index, reason };
             match open.take(sample) {
-                Some(Admission::Accepted) => recorded.push(*sample),
-                Some(Admission::SetAside(why)) => {
+                Admission::Accepted => recorded.push(*sample),
+                Admission::SetAside(why) => {
                     recorded.push(*sample);
                     unjudged(why.as_str());
                     ack.late.push(row(why.to_string()));
                 }
-                Some(Admission::Duplicate) => ack.duplicate += 1,
-                Some(Admission::Rejected(why)) => {
+                Admission::Duplicate => ack.duplicate += 1,
+                Admission::Rejected(why) => {
                     unjudged(why.as_str());
                     ack.rejected.push(row(why.to_string()));
                 }
-                None => ack.rejected.push(row("the engine did not take it".to_owned())),
             }
             open.report(&self.row.name, &mut transitions)?;
         }
@@ -376,7 +331,7 @@ impl Running {
         }));
         let act = Act { kind, code, view: ActView { by: actor, at: rfc3339(work.at) } };
         if let Some(open) = &mut self.open {
-            open.input(input(kind, code));
+            open.judging.input(input(kind, code));
             open.report(&self.row.name, work)?;
             return self.remember(Some(&act), work);
         }
@@ -385,16 +340,16 @@ impl Running {
 
     /// The fault memory as the engine has it, or as last written.
     pub(super) fn current_memory(&self) -> &FaultMemory {
-        self.open.as_ref().map_or(&self.memory, |open| open.engine.memory())
+        self.open.as_ref().map_or(&self.memory, |open| open.judging.engine().memory())
     }
 
     /// Writes what has changed in the engine's fault memory.
     fn remember(&mut self, act: Option<&Act>, work: &mut Work) -> Result<(), ServiceError> {
         let Some(open) = &self.open else { return Ok(()) };
-        if act.is_none() && *open.engine.memory() == self.memory {
+        if act.is_none() && *open.judging.engine().memory() == self.memory {
             return Ok(());
         }
-        let (memory, here) = (open.engine.memory().clone(), open.occurrence(work.at));
+        let (memory, here) = (open.judging.engine().memory().clone(), open.occurrence(work.at));
         self.remember_as(memory, Some(&here), act, work)
     }
 
@@ -434,7 +389,7 @@ impl Running {
     /// The rules in force: those of the open session, or of the asset file.
     fn rules(&self) -> MemoryRules {
         let of_file = || self.rig.settings(self.rig.diagnostics.profile).ok().map(|s| s.memory);
-        let open = self.open.as_ref().map(|open| open.engine.setup().settings.memory);
+        let open = self.open.as_ref().map(|open| open.judging.engine().setup().settings.memory);
         open.or_else(of_file).unwrap_or_default()
     }
 }

@@ -44,11 +44,11 @@ pub(super) fn ended(
     open: &OpenSession,
     at: Micros,
 ) -> Result<Vec<Write>, ServiceError> {
-    let estimates = open.engine.servo_estimates();
+    let estimates = open.judging.engine().servo_estimates();
     if estimates.x.is_none() && estimates.y.is_none() {
         return Ok(Vec::new());
     }
-    let calibration_id = open.basis.calibration_id.clone();
+    let calibration_id = open.judging.basis().calibration_id.clone();
     let mut known = Vec::new();
     if calibration_id.is_some() {
         context.fence()?;

@@ -243,6 +243,26 @@ impl Store {
         .await?)
     }
 
+    /// Transitions of `code` in `session` before `before` (an ordinal), latest first.
+    pub async fn transitions_of(
+        &self,
+        session: &str,
+        code: &str,
+        before: i64,
+        limit: u32,
+    ) -> Result<Vec<TransitionRow>, StoreError> {
+        Ok(sqlx::query_as(
+            "SELECT * FROM transition WHERE session = $1 AND code = $2 AND ordinal < $3
+             ORDER BY ordinal DESC LIMIT $4",
+        )
+        .bind(session)
+        .bind(code)
+        .bind(before)
+        .bind(i64::from(limit))
+        .fetch_all(&self.pool)
+        .await?)
+    }
+
     pub async fn n_transitions(&self, session: &str) -> Result<i64, StoreError> {
         Ok(sqlx::query_scalar("SELECT COUNT(*) FROM transition WHERE session = $1")
             .bind(session)

@@ -59,3 +59,22 @@ proptest! {
         });
     }
 }
+
+/// A sample that comes late within the reorder window is judged in its place; the
+/// session is as long as from its earliest to its latest sample.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_late_last_sample_does_not_shorten_a_session() {
+    let bench = Bench::start().await;
+    bench.client.asset("a").await;
+    let mut samples = rig(300, usize::MAX);
+    let late = samples.remove(295);
+    samples.push(late);
+    samples.iter_mut().for_each(|sample| sample.seq = None);
+    bench.client.telemetry("a", Some("s"), &samples).await;
+    let open = bench.client.get("sessions?asset=a").await.expect(200)["items"][0].clone();
+    assert_eq!(open["last_t_s"], json!(samples[298].t_s), "{open}");
+    let path = format!("sessions/{}/end", open["id"].as_str().unwrap());
+    let ended = bench.client.post(&path, &json!(null)).await.expect(200);
+    let seconds = samples[298].t_s - samples[0].t_s;
+    assert_eq!(ended["verdict"]["duration_s"], json!(seconds), "{ended}");
+}

@@ -157,8 +157,12 @@ impl<'a> Stage<'a> {
         drive: &mut D,
         samples: Option<&mut Samples<'_>>,
     ) -> Result<Outcome, Failure> {
-        let (Subject::Ball(ball), Pace::Step(h)) = (&self.scene.subject, self.pace) else {
-            return Err(Failure::NotFinite { at_s: 0.0 });
+        let Subject::Ball(ball) = &self.scene.subject else {
+            return Err(Failure::OutOfRange { at_s: 0.0, why: "a block does not roll" });
+        };
+        let Pace::Step(h) = self.pace else {
+            let why = "the planar model takes steps of one length only";
+            return Err(Failure::OutOfRange { at_s: 0.0, why });
         };
         let (model, rolling) = (Planar::new(ball, &self.scene.plate), self.scene.rolling(ball));
         let start = RollingState {
