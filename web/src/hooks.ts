@@ -19,7 +19,8 @@ export function useAsk<T>(ask: () => Promise<T>, key: unknown, every?: number): 
       const data = await latest.current();
       if (turn === alive.current) set({ key, data });
     } catch (error) {
-      if (turn === alive.current) set((before) => ({ key, data: before.key === key ? before.data : undefined, error }));
+      if (turn === alive.current)
+        set((before) => ({ key, data: before.key === key ? before.data : undefined, error }));
     }
   }, [key]);
   useEffect(() => {
@@ -36,7 +37,11 @@ export function useAsk<T>(ask: () => Promise<T>, key: unknown, every?: number): 
       clearTimeout(timer);
     };
   }, [again, every]);
-  return { data: answer.key === key ? answer.data : undefined, error: answer.key === key ? answer.error : undefined, again };
+  return {
+    data: answer.key === key ? answer.data : undefined,
+    error: answer.key === key ? answer.error : undefined,
+    again,
+  };
 }
 
 /** The time, so that "3 s ago" stays true. */

@@ -29,12 +29,26 @@ function view(parts: string[], demo: boolean) {
   if (first === "sessions" && name) return <SessionPage key={name} id={name} />;
   if (first === "sessions") return <SessionsPage />;
   if (first === "learn") return <LearnPage demo={demo} />;
-  return <main><Empty title="There is nothing here"><p><Link to="/">To the fleet</Link></p></Empty></main>;
+  return (
+    <main>
+      <Empty title="There is nothing here">
+        <p>
+          <Link to="/">To the fleet</Link>
+        </p>
+      </Empty>
+    </main>
+  );
 }
 
-const TITLES: Record<Connection, string> = { connecting: "connecting", live: "live", lost: "connection lost" };
+const TITLES: Record<Connection, string> = {
+  connecting: "connecting",
+  live: "live",
+  lost: "connection lost",
+};
 const THEMES: Record<Theme, { next: Theme; sign: string }> = {
-  system: { next: "light", sign: "◐" }, light: { next: "dark", sign: "☀" }, dark: { next: "system", sign: "☾" },
+  system: { next: "light", sign: "◐" },
+  light: { next: "dark", sign: "☀" },
+  dark: { next: "system", sign: "☾" },
 };
 
 function Frame() {
@@ -57,20 +71,59 @@ function Frame() {
   };
   return (
     <>
-      <a class="skip" href="#content">Skip to the content</a>
+      <a class="skip" href="#content">
+        Skip to the content
+      </a>
       <header class="top">
-        <Link to="/" class="brand"><img src="/icon.svg" alt="" width="24" height="24" />offbd</Link>
-        <nav aria-label="Views">{tabs.map(([to, word, here]) => <Link to={to} aria-current={here ? "page" : undefined}>{word}</Link>)}</nav>
-        <span class={`link-state link-${link}`} role="status">{TITLES[link]}</span>
+        <Link to="/" class="brand">
+          <img src="/icon.svg" alt="" width="24" height="24" />
+          offbd
+        </Link>
+        <nav aria-label="Views">
+          {tabs.map(([to, word, here]) => (
+            <Link to={to} aria-current={here ? "page" : undefined}>
+              {word}
+            </Link>
+          ))}
+        </nav>
+        <span class={`link-state link-${link}`} role="status">
+          {TITLES[link]}
+        </span>
         <Leave />
-        <button type="button" class="small" onClick={switchTheme} aria-label={`Colours: ${chosen}; change`} title={`Colours: ${chosen}`}>{THEMES[chosen].sign}</button>
+        <button
+          type="button"
+          class="small"
+          onClick={switchTheme}
+          aria-label={`Colours: ${chosen}; change`}
+          title={`Colours: ${chosen}`}
+        >
+          {THEMES[chosen].sign}
+        </button>
       </header>
       <div id="content" tabIndex={-1}>
-        <Suspense fallback={<main><Loading what="the view" /></main>}>{view(parts, demo)}</Suspense>
+        <Suspense
+          fallback={
+            <main>
+              <Loading what="the view" />
+            </main>
+          }
+        >
+          {view(parts, demo)}
+        </Suspense>
       </div>
-      <footer><a href="/docs/">Interface</a><a href="/openapi.yaml">openapi.yaml</a><a href="/metrics">Metrics</a><span class="quiet">offbd {health.data?.version}</span></footer>
+      <footer>
+        <a href="/docs/">Interface</a>
+        <a href="/openapi.yaml">openapi.yaml</a>
+        <a href="/metrics">Metrics</a>
+        <span class="quiet">offbd {health.data?.version}</span>
+      </footer>
     </>
   );
 }
 
-render(<Door><Frame /></Door>, document.getElementById("app")!);
+render(
+  <Door>
+    <Frame />
+  </Door>,
+  document.getElementById("app")!,
+);

@@ -38,5 +38,9 @@ export function Link({ to, children, ...rest }: LinkProps) {
     go(to);
     scrollTo(0, 0);
   };
-  return <a href={to} onClick={follow} {...rest}>{children}</a>;
+  return (
+    <a href={to} onClick={follow} {...rest}>
+      {children}
+    </a>
+  );
 }

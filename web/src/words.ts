@@ -31,11 +31,13 @@ const KIND: Record<string, string> = {
 
 export const codeTitle = (code: string) => CODE[code]?.title ?? code.replaceAll("_", " ");
 export const codeMeaning = (code: string) => CODE[code]?.what ?? "";
-export const kindMeaning = (kind?: string | null) => (kind ? KIND[kind] ?? kind.replaceAll("_", " ") : "the evidence does not say in which way");
+export const kindMeaning = (kind?: string | null) =>
+  kind ? (KIND[kind] ?? kind.replaceAll("_", " ")) : "the evidence does not say in which way";
 export const faultTitle = (code: string, kind?: string | null) => codeTitle(code) + (kind ? `, ${kind}` : "");
 
 /** How much of a session was judged: its share, and how long. */
-export const judged = (m: { judged_share?: number; judged_s?: number }) => `${Math.round((m.judged_share ?? 0) * 100)} %, ${duration(m.judged_s ?? 0)}`;
+export const judged = (m: { judged_share?: number; judged_s?: number }) =>
+  `${Math.round((m.judged_share ?? 0) * 100)} %, ${duration(m.judged_s ?? 0)}`;
 
 /** Whether the test of a fault line fails: one that passes again says how a fault stands. */
 export const isFailing = (line: { status_byte: string }) => (parseInt(line.status_byte, 16) & 1) === 1;
@@ -45,32 +47,96 @@ type Cause = { code: string; kind?: string | null; weight: number };
 /** Causes in different parts of the rig that read alike, the heaviest first; nothing where there is one. */
 export function alike(candidates: Cause[]): string {
   if (!candidates.some((c) => c.code !== candidates[0]!.code)) return "";
-  const [first, ...others] = candidates.map((c) => `${faultTitle(c.code, c.kind)} (${Math.round(c.weight * 100)} %)`);
+  const [first, ...others] = candidates.map(
+    (c) => `${faultTitle(c.code, c.kind)} (${Math.round(c.weight * 100)} %)`,
+  );
   return `Cannot tell: ${first} or ${others.join(" or ")}`;
 }
 
 /** What a session came to, what of it was not judged, and how that is to look. */
 export function verdict(of: Summary): { text: string; look: string } {
   const monitors = of.monitors ?? [];
-  const titles = (outcome: string) => monitors.filter((m) => m.outcome === outcome).map((m) => codeTitle(m.code)).join(", ");
-  const [pending, sound, unlearnt, unjudged] = ["pending", "no fault", "not learnt", "not judged"].map(titles);
+  const titles = (outcome: string) =>
+    monitors
+      .filter((m) => m.outcome === outcome)
+      .map((m) => codeTitle(m.code))
+      .join(", ");
+  const [pending, sound, unlearnt, unjudged] = ["pending", "no fault", "not learnt", "not judged"].map(
+    titles,
+  );
   const rest = [unlearnt && `not learnt: ${unlearnt}`, unjudged && `not judged: ${unjudged}`].filter(Boolean);
-  const found = of.faults.map((code) => alike(monitors.find((m) => m.code === code && m.outcome === "cannot tell")?.candidates ?? []) || codeTitle(code));
+  const found = of.faults.map(
+    (code) =>
+      alike(monitors.find((m) => m.code === code && m.outcome === "cannot tell")?.candidates ?? []) ||
+      codeTitle(code),
+  );
   if (of.outcome === "not judged") return { text: "Not judged", look: "quiet" };
-  const first = found.join(", ") || (pending ? `Pending only: ${pending}` : sound && rest.length ? `No fault of ${sound}` : rest.length ? "" : "No fault");
+  const first =
+    found.join(", ") ||
+    (pending
+      ? `Pending only: ${pending}`
+      : sound && rest.length
+        ? `No fault of ${sound}`
+        : rest.length
+          ? ""
+          : "No fault");
   const text = [first, ...rest].filter(Boolean).join("; ");
-  return { text: text.charAt(0).toUpperCase() + text.slice(1), look: found.length ? "status-confirmed" : pending ? "status-pending" : rest.length ? "quiet" : "status-ok" };
+  return {
+    text: text.charAt(0).toUpperCase() + text.slice(1),
+    look: found.length
+      ? "status-confirmed"
+      : pending
+        ? "status-pending"
+        : rest.length
+          ? "quiet"
+          : "status-ok",
+  };
 }
 
 /** Bits of the ISO 14229-1 status byte (annex D.2), from bit 7 down to bit 0. */
 export const STATUS_BITS = [
-  { bit: 7, name: "warningIndicatorRequested", on: "A warning lamp is asked for.", off: "No warning lamp is asked for." },
-  { bit: 6, name: "testNotCompletedThisOperationCycle", on: "The test has not come to a result in this session.", off: "The test has come to a result in this session." },
-  { bit: 5, name: "testFailedSinceLastClear", on: "The test has failed since the code was last cleared.", off: "The test has not failed since the code was last cleared." },
-  { bit: 4, name: "testNotCompletedSinceLastClear", on: "The test has not come to a result since the last clear.", off: "The test has come to a result since the last clear." },
-  { bit: 3, name: "confirmedDTC", on: "Confirmed: it failed often enough to be stored as a fault.", off: "Not confirmed." },
-  { bit: 2, name: "pendingDTC", on: "Pending: it failed in this session or the one before.", off: "Not pending." },
-  { bit: 1, name: "testFailedThisOperationCycle", on: "The test has failed in this session.", off: "The test has not failed in this session." },
+  {
+    bit: 7,
+    name: "warningIndicatorRequested",
+    on: "A warning lamp is asked for.",
+    off: "No warning lamp is asked for.",
+  },
+  {
+    bit: 6,
+    name: "testNotCompletedThisOperationCycle",
+    on: "The test has not come to a result in this session.",
+    off: "The test has come to a result in this session.",
+  },
+  {
+    bit: 5,
+    name: "testFailedSinceLastClear",
+    on: "The test has failed since the code was last cleared.",
+    off: "The test has not failed since the code was last cleared.",
+  },
+  {
+    bit: 4,
+    name: "testNotCompletedSinceLastClear",
+    on: "The test has not come to a result since the last clear.",
+    off: "The test has come to a result since the last clear.",
+  },
+  {
+    bit: 3,
+    name: "confirmedDTC",
+    on: "Confirmed: it failed often enough to be stored as a fault.",
+    off: "Not confirmed.",
+  },
+  {
+    bit: 2,
+    name: "pendingDTC",
+    on: "Pending: it failed in this session or the one before.",
+    off: "Not pending.",
+  },
+  {
+    bit: 1,
+    name: "testFailedThisOperationCycle",
+    on: "The test has failed in this session.",
+    off: "The test has not failed in this session.",
+  },
   { bit: 0, name: "testFailed", on: "The test fails right now.", off: "The test does not fail right now." },
 ] as const;
 
@@ -92,7 +158,8 @@ export function number(value: number | null | undefined, digits: number, unit = 
 
 export const degrees = (rad: number | null | undefined, digits = 1) =>
   rad === null || rad === undefined ? NONE : `${number((rad * 180) / Math.PI, digits)}°`;
-export const millimetres = (m: number | null | undefined, digits = 1) => number(m === null || m === undefined ? m : m * 1e3, digits, "mm");
+export const millimetres = (m: number | null | undefined, digits = 1) =>
+  number(m === null || m === undefined ? m : m * 1e3, digits, "mm");
 export const seconds = (s: number | null | undefined, digits = 2) => number(s, digits, "s");
 export const count = (n: number) => n.toLocaleString("en").replaceAll(",", "\u202f");
 

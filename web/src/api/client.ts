@@ -1,8 +1,28 @@
 /** Requests to the interface. What goes wrong is a `ProblemError` with the service's own words. */
 import { actor, authorised, shut } from "./access";
 import type {
-  Around, Asset, CalibrationJob, Caller, Demo, DriveCycle, FaultEntry, FaultLine, FleetEntry, Health, History, Import, Learning, MadeToken,
-  Page, Problem, Replay, ReplaySettings, Session, State, Trace, Trends,
+  Around,
+  Asset,
+  CalibrationJob,
+  Caller,
+  Demo,
+  DriveCycle,
+  FaultEntry,
+  FaultLine,
+  FleetEntry,
+  Health,
+  History,
+  Import,
+  Learning,
+  MadeToken,
+  Page,
+  Problem,
+  Replay,
+  ReplaySettings,
+  Session,
+  State,
+  Trace,
+  Trends,
 } from "./types";
 
 const BASE = "/api/v1";
@@ -12,7 +32,10 @@ const LOGIN = `${BASE}/login`;
 const TIMEOUT_MS = 70_000;
 
 export class ProblemError extends Error {
-  constructor(readonly status: number, readonly problem: Partial<Problem>) {
+  constructor(
+    readonly status: number,
+    readonly problem: Partial<Problem>,
+  ) {
     super(problem.detail ?? problem.title ?? `the service answered ${status}`);
   }
 }
@@ -34,7 +57,8 @@ async function ask<T>(path: string, init: RequestInit = {}): Promise<T> {
   const signal = init.signal ?? AbortSignal.timeout(TIMEOUT_MS);
   const answer = await fetch(path, authorised({ ...init, signal }));
   if (answer.status === 401 && path !== LOGIN) shut();
-  if (!answer.ok) throw new ProblemError(answer.status, await answer.json().catch(() => ({})));
+  if (!answer.ok)
+    throw new ProblemError(answer.status, (await answer.json().catch(() => ({}))) as Partial<Problem>);
   const isJson = answer.headers.get("content-type")?.includes("json");
   return (isJson ? await answer.json() : undefined) as T;
 }
@@ -43,13 +67,17 @@ const get = <T>(path: string) => ask<T>(BASE + path);
 const send = <T>(method: string, path: string, body?: unknown) =>
   ask<T>(BASE + path, {
     method,
-    ...(body === undefined ? {} : { body: JSON.stringify(body), headers: { "content-type": "application/json" } }),
+    ...(body === undefined
+      ? {}
+      : { body: JSON.stringify(body), headers: { "content-type": "application/json" } }),
   });
 
 type Query = Record<string, string | number | boolean | null | undefined>;
 
 function query(values: Query): string {
-  const set = Object.entries(values).filter(([, value]) => value !== null && value !== undefined && value !== "");
+  const set = Object.entries(values).filter(
+    ([, value]) => value !== null && value !== undefined && value !== "",
+  );
   return set.length ? `?${new URLSearchParams(set.map(([key, value]) => [key, String(value)]))}` : "";
 }
 
@@ -73,7 +101,11 @@ export const api = {
   logIn: (token: string) => send<Caller>("POST", "/login", { token }),
   logOut: () => send<void>("DELETE", "/login"),
   createDeviceToken: (asset: string) =>
-    send<MadeToken>("POST", "/tokens", { name: `${asset.slice(0, 70)} ${new Date().toISOString()}`, role: "device", asset }),
+    send<MadeToken>("POST", "/tokens", {
+      name: `${asset.slice(0, 70)} ${new Date().toISOString()}`,
+      role: "device",
+      asset,
+    }),
   fleet: () => all<FleetEntry>("/fleet", {}),
   asset: (name: string) => get<Asset>(`/assets/${id(name)}`),
   createAsset: (asset: Partial<Asset>) => send<Asset>("POST", "/assets", asset),
@@ -100,17 +132,24 @@ export const api = {
   sessionFaults: (session: string) => all<FaultLine>(`/sessions/${id(session)}/faults`, {}, 2000),
   endSession: (session: string) => send<Session>("POST", `/sessions/${id(session)}/end`),
   deleteSession: (session: string) => send<void>("DELETE", `/sessions/${id(session)}`),
-  trace: (session: string, stretch: { from_s?: number; to_s?: number; points?: number; profile?: string } = {}) =>
-    get<Trace>(`/sessions/${id(session)}/trace${query(stretch)}`),
+  trace: (
+    session: string,
+    stretch: { from_s?: number; to_s?: number; points?: number; profile?: string } = {},
+  ) => get<Trace>(`/sessions/${id(session)}/trace${query(stretch)}`),
   importCsv: (asset: string, name: string, csv: string) =>
     ask<Import>(`${BASE}/assets/${id(asset)}/sessions/import${query({ name })}`, {
-      method: "POST", body: csv, headers: { "content-type": "text/csv" }, signal: AbortSignal.timeout(900_000),
+      method: "POST",
+      body: csv,
+      headers: { "content-type": "text/csv" },
+      signal: AbortSignal.timeout(900_000),
     }),
-  replay: (session: string, settings: ReplaySettings) => send<Replay>("POST", `/sessions/${id(session)}/replays`, settings),
+  replay: (session: string, settings: ReplaySettings) =>
+    send<Replay>("POST", `/sessions/${id(session)}/replays`, settings),
   replayState: (replay: string) => get<Replay>(`/replays/${id(replay)}`),
   calibrate: (asset: string, sessions: string[]) =>
     send<CalibrationJob>("POST", `/assets/${id(asset)}/calibrations`, { sessions }),
-  calibration: (asset: string, job: string) => get<CalibrationJob>(`/assets/${id(asset)}/calibrations/${id(job)}`),
+  calibration: (asset: string, job: string) =>
+    get<CalibrationJob>(`/assets/${id(asset)}/calibrations/${id(job)}`),
   learning: (asset: string) => get<Learning>(`/assets/${id(asset)}/learning`),
   acceptLearning: (asset: string) => send<Learning>("POST", `/assets/${id(asset)}/learning/accept`),
   discardLearning: (asset: string) => send<Learning>("POST", `/assets/${id(asset)}/learning/discard`),
@@ -120,7 +159,8 @@ export const api = {
   recording: async (session: string) => {
     const init = authorised({ headers: { accept: "text/csv" } });
     const answer = await fetch(`${BASE}/sessions/${id(session)}/telemetry`, init);
-    if (!answer.ok) throw new ProblemError(answer.status, await answer.json().catch(() => ({})));
+    if (!answer.ok)
+      throw new ProblemError(answer.status, (await answer.json().catch(() => ({}))) as Partial<Problem>);
     return answer.blob();
   },
   demo: () => get<Demo>("/demo"),
@@ -132,7 +172,11 @@ export const api = {
 const POLL_MS = 300;
 
 /** Asks again until `done` says so. */
-export async function until<T>(look: () => Promise<T>, done: (seen: T) => boolean, show: (seen: T) => void = () => {}): Promise<T> {
+export async function until<T>(
+  look: () => Promise<T>,
+  done: (seen: T) => boolean,
+  show: (seen: T) => void = () => {},
+): Promise<T> {
   for (;;) {
     const seen = await look();
     show(seen);

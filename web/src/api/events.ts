@@ -46,7 +46,7 @@ class Events {
       this.wait = Math.min(this.wait * 2, RETRY_MS[1]);
     };
     source.addEventListener("begin", (message) => (this.last = Number(message.lastEventId)));
-    source.addEventListener("fault", (message) => {
+    source.addEventListener("fault", (message: MessageEvent<string>) => {
       this.last = Number(message.lastEventId);
       const line = { ...(JSON.parse(message.data) as FaultLine), event: this.last };
       this.listeners.forEach((listener) => listener(line));

@@ -32,7 +32,9 @@ export function follow(asset: string, hz: number, trace: boolean, teller: Teller
     const query = new URLSearchParams({ state: String(hz), trace: String(trace) });
     if (after !== undefined) query.set("after", String(after));
     const origin = location.origin.replace(/^http/, "ws");
-    const current = new WebSocket(streamUrl(`${origin}/api/v1/assets/${encodeURIComponent(asset)}/stream?${query}`));
+    const current = new WebSocket(
+      streamUrl(`${origin}/api/v1/assets/${encodeURIComponent(asset)}/stream?${query}`),
+    );
     socket = current;
     heard = performance.now();
     current.onopen = () => {

@@ -19,7 +19,16 @@ export interface AxisColumns {
 }
 
 const axis = (): AxisColumns => ({
-  command: [], plate: [], position: [], twinPosition: [], measured: [], twin: [], residual: [], limit: [], limitBelow: [], enabled: [],
+  command: [],
+  plate: [],
+  position: [],
+  twinPosition: [],
+  measured: [],
+  twin: [],
+  residual: [],
+  limit: [],
+  limitBelow: [],
+  enabled: [],
 });
 
 /** Moments that are kept: far more than a screen is wide, 100 s at 100 Hz. */
@@ -40,7 +49,9 @@ function drawable(columns: Around["columns"]): Around["columns"] {
     last = t;
     return [i];
   });
-  return Object.fromEntries(Object.entries(columns).map(([name, column]) => [name, kept.map((i) => column[i])])) as Around["columns"];
+  return Object.fromEntries(
+    Object.entries(columns).map(([name, column]) => [name, kept.map((i) => column[i])]),
+  ) as Around["columns"];
 }
 
 export class TraceBuffer {
@@ -58,9 +69,22 @@ export class TraceBuffer {
   static ofRecording({ columns }: Around): TraceBuffer {
     const c = drawable(columns);
     const none = c.t_s.map(() => null);
-    const trace = (command: Column, position: Column, measured: Column, twin: Column, limit: Column, enabled: (boolean | null)[]) => ({
-      command_rad: command, plate_angle_rad: none, position_m: position, twin_position_m: none,
-      measured_m_s2: measured, twin_m_s2: twin, limit_m_s2: limit, enabled: enabled.map(Boolean),
+    const trace = (
+      command: Column,
+      position: Column,
+      measured: Column,
+      twin: Column,
+      limit: Column,
+      enabled: (boolean | null)[],
+    ) => ({
+      command_rad: command,
+      plate_angle_rad: none,
+      position_m: position,
+      twin_position_m: none,
+      measured_m_s2: measured,
+      twin_m_s2: twin,
+      limit_m_s2: limit,
+      enabled: enabled.map(Boolean),
     });
     return TraceBuffer.of({
       t_s: c.t_s,
@@ -71,8 +95,12 @@ export class TraceBuffer {
 
   constructor(private readonly most = MOST) {}
 
-  get first(): number { return this.t[0] ?? 0; }
-  get last(): number { return this.t[this.t.length - 1] ?? 0; }
+  get first(): number {
+    return this.t[0] ?? 0;
+  }
+  get last(): number {
+    return this.t[this.t.length - 1] ?? 0;
+  }
 
   clear(): void {
     this.t = [];
@@ -83,13 +111,14 @@ export class TraceBuffer {
   append(trace: Trace): void {
     for (let i = 0; i < trace.t_s.length; i++) this.t.push(trace.t_s[i]!);
     for (const name of AXES) {
-      const from = trace[name], to = this[name];
+      const from = trace[name],
+        to = this[name];
       for (let i = 0; i < trace.t_s.length; i++) {
         const limit = from.limit_m_s2[i] ?? null;
         to.command.push(from.command_rad[i] ?? null);
         to.plate.push(from.plate_angle_rad[i] ?? null);
         to.position.push(from.position_m[i] ?? null);
-        to.twinPosition.push(from.position_m[i] == null ? null : from.twin_position_m[i] ?? null);
+        to.twinPosition.push(from.position_m[i] == null ? null : (from.twin_position_m[i] ?? null));
         to.measured.push(from.measured_m_s2[i] ?? null);
         to.twin.push(from.twin_m_s2[i] ?? null);
         to.residual.push(minus(from.measured_m_s2[i], from.twin_m_s2[i]));
@@ -104,12 +133,14 @@ export class TraceBuffer {
 
   private drop(n: number): void {
     this.t.splice(0, n);
-    for (const name of AXES) Object.values(this[name]).forEach((column) => column.splice(0, n));
+    for (const name of AXES)
+      (Object.values(this[name]) as unknown[][]).forEach((column) => column.splice(0, n));
   }
 
   /** The index of the last moment not after `t`. */
   index(t: number): number {
-    let low = 0, high = this.t.length - 1;
+    let low = 0,
+      high = this.t.length - 1;
     while (low < high) {
       const middle = (low + high + 1) >> 1;
       if (this.t[middle]! <= t) low = middle;

@@ -30,19 +30,34 @@ function changed(entry: FleetEntry, line: FaultLine): FleetEntry {
   const others = entry.faults.filter((fault) => fault.code !== line.code);
   const active = line.status === "pending" || line.status === "confirmed";
   const known = entry.faults.find((fault) => fault.code === line.code);
-  const fault = { code: line.code, kind: line.kind, status: line.status, acknowledged: known?.acknowledged ?? false, changed_at: new Date().toISOString() };
+  const fault = {
+    code: line.code,
+    kind: line.kind,
+    status: line.status,
+    acknowledged: known?.acknowledged ?? false,
+    changed_at: new Date().toISOString(),
+  };
   return { ...entry, faults: active ? [...others, fault] : others };
 }
 
 /** Whether an event tells of the same change again, as when its kind shows later. */
 function retold(known: FaultLine, line: FaultLine): boolean {
-  return known.asset === line.asset && known.session === line.session && known.code === line.code && known.status === line.status && known.onset_s === line.onset_s;
+  return (
+    known.asset === line.asset &&
+    known.session === line.session &&
+    known.code === line.code &&
+    known.status === line.status &&
+    known.onset_s === line.onset_s
+  );
 }
 
 export function useFleet() {
   const [every, setEvery] = useState(rhythm(0));
   const asked = useAsk(api.fleet, "fleet", every);
-  const [patches, setPatches] = useState<{ of: unknown; by: Map<string, FleetEntry> }>({ of: undefined, by: new Map() });
+  const [patches, setPatches] = useState<{ of: unknown; by: Map<string, FleetEntry> }>({
+    of: undefined,
+    by: new Map(),
+  });
   const [lines, setLines] = useState<(FaultLine & { event: number })[]>([]);
   const current = useRef<Map<string, FleetEntry>>(new Map());
 
@@ -59,14 +74,21 @@ export function useFleet() {
 
   const latest = useRef(asked.data);
   latest.current = asked.data;
-  useEffect(() => events.listen((line) => {
-    setLines((before) => [line, ...before.filter((known) => !retold(known, line))].slice(0, MOST_LINES));
-    const entry = current.current.get(line.asset ?? "");
-    if (!entry) return void asked.again();
-    const after = changed(entry, line);
-    current.current.set(entry.asset, after);
-    setPatches((before) => ({ of: latest.current, by: new Map(before.of === latest.current ? before.by : []).set(entry.asset, after) }));
-  }), []);
+  useEffect(
+    () =>
+      events.listen((line) => {
+        setLines((before) => [line, ...before.filter((known) => !retold(known, line))].slice(0, MOST_LINES));
+        const entry = current.current.get(line.asset ?? "");
+        if (!entry) return void asked.again();
+        const after = changed(entry, line);
+        current.current.set(entry.asset, after);
+        setPatches((before) => ({
+          of: latest.current,
+          by: new Map(before.of === latest.current ? before.by : []).set(entry.asset, after),
+        }));
+      }),
+    [],
+  );
 
   // What happened while the connection was lost is in the next look.
   useEffect(() => {

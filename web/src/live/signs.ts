@@ -16,23 +16,39 @@ const LEAST = 0.12;
 
 export function compare(buffer: TraceBuffer): Signs {
   const pairs = (a: Axis, b: Axis): [number[], number[]] => {
-    const measured: number[] = [], twin: number[] = [];
+    const measured: number[] = [],
+      twin: number[] = [];
     buffer.t.forEach((_, i) => {
-      const m = buffer[a].measured[i], t = buffer[b].twin[i];
+      const m = buffer[a].measured[i],
+        t = buffer[b].twin[i];
       if (m == null || t == null) return;
       measured.push(m);
       twin.push(t);
     });
     return [measured, twin];
   };
-  const axis = (a: Axis, b: Axis) => ({ own: correlation(...pairs(a, a)), other: correlation(...pairs(a, b)) });
-  const x = axis("x", "y"), y = axis("y", "x");
+  const axis = (a: Axis, b: Axis) => ({
+    own: correlation(...pairs(a, a)),
+    other: correlation(...pairs(a, b)),
+  });
+  const x = axis("x", "y"),
+    y = axis("y", "x");
   const period = buffer.t.length > 1 ? (buffer.last - buffer.first) / (buffer.t.length - 1) : 0;
-  const asked = buffer.t.filter((_, i) => Math.max(Math.abs(buffer.x.twin[i] ?? 0), Math.abs(buffer.y.twin[i] ?? 0)) > LEAST).length;
+  const asked = buffer.t.filter(
+    (_, i) => Math.max(Math.abs(buffer.x.twin[i] ?? 0), Math.abs(buffer.y.twin[i] ?? 0)) > LEAST,
+  ).length;
   return { x, y, verdict: { x: judge(x), y: judge(y) }, seconds: asked * period };
 }
 
-export const PLAIN: AssetAxes = { swap: false, x_sign: 1, y_sign: 1, position_unit_m: 1, x_offset_m: 0, y_offset_m: 0, command_unit_rad: 1 };
+export const PLAIN: AssetAxes = {
+  swap: false,
+  x_sign: 1,
+  y_sign: 1,
+  position_unit_m: 1,
+  x_offset_m: 0,
+  y_offset_m: 0,
+  command_unit_rad: 1,
+};
 
 /** The axes with which the rig would do what the twin says. */
 export function mended(axes: AssetAxes, signs: Signs): AssetAxes {

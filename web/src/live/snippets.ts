@@ -14,14 +14,19 @@ export function snippets(asset: string, origin: string, token?: string): Snippet
   const python = token ? `, "authorization": "Bearer ${token}"` : "";
   const arduino = token ? `\n  http.addHeader("authorization", "Bearer ${token}");` : "";
   return [
-    { word: "curl", text: `# One sample: seconds on the device's clock, commanded angles in rad, ball in m.
+    {
+      word: "curl",
+      text: `# One sample: seconds on the device's clock, commanded angles in rad, ball in m.
 curl ${curl}--json '{"samples":[{"seq":1,"t_s":0.00,"cmd_qx_rad":0.0,"cmd_qy_rad":0.02,"x_m":0.010,"y_m":-0.004}]}' \\
   ${url}
 
 # A whole recording with the header t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m
 curl ${curl}-H 'content-type: text/csv' --data-binary @recording.csv ${url}
-` },
-    { word: "Python", text: `import json, time, urllib.request
+`,
+    },
+    {
+      word: "Python",
+      text: `import json, time, urllib.request
 
 URL = "${url}"
 
@@ -49,8 +54,11 @@ while True:
             print("not sent:", error)
             batch = batch[-6000:]
     time.sleep(0.01)
-` },
-    { word: "Arduino / ESP32", text: `#include <WiFi.h>
+`,
+    },
+    {
+      word: "Arduino / ESP32",
+      text: `#include <WiFi.h>
 #include <HTTPClient.h>
 
 const char* URL = "${remote}";
@@ -81,6 +89,7 @@ void loop() {
   sample(/* qx */ 0, /* qy */ 0, /* x */ 0, /* y */ 0);   // yours
   delay(10);
 }
-` },
+`,
+    },
   ];
 }

@@ -6,7 +6,13 @@ import { useContext, useEffect, useState } from "preact/hooks";
 const Fallback = createContext<ComponentChildren>(null);
 
 /** What is shown while a view inside is loading. */
-export function Suspense({ fallback, children }: { fallback: ComponentChildren; children: ComponentChildren }) {
+export function Suspense({
+  fallback,
+  children,
+}: {
+  fallback: ComponentChildren;
+  children: ComponentChildren;
+}) {
   return <Fallback.Provider value={fallback}>{children}</Fallback.Provider>;
 }
 
@@ -17,10 +23,27 @@ export function lazy<P extends object>(load: () => Promise<ComponentType<P>>): (
     const [failed, setFailed] = useState(false);
     const fallback = useContext(Fallback);
     useEffect(() => {
-      if (!loaded) load().then((view) => { loaded = view; shown(1); }, () => setFailed(true));
+      if (!loaded)
+        load().then(
+          (view) => {
+            loaded = view;
+            shown(1);
+          },
+          () => setFailed(true),
+        );
     }, []);
     const View = loaded;
-    if (failed) return <main><p class="trouble" role="alert">This part of the page cannot be loaded; the service may have been replaced by a newer one. <button type="button" onClick={() => location.reload()}>Load the page anew</button></p></main>;
+    if (failed)
+      return (
+        <main>
+          <p class="trouble" role="alert">
+            This part of the page cannot be loaded; the service may have been replaced by a newer one.{" "}
+            <button type="button" onClick={() => location.reload()}>
+              Load the page anew
+            </button>
+          </p>
+        </main>
+      );
     return View ? <View {...props} /> : <>{fallback}</>;
   };
 }

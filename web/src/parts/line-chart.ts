@@ -46,12 +46,18 @@ export class LineChart {
   private head: number | null = null;
   private readonly stop: (() => void)[] = [];
 
-  constructor(private readonly element: HTMLElement, private readonly options: LineChartOptions) {
+  constructor(
+    private readonly element: HTMLElement,
+    private readonly options: LineChartOptions,
+  ) {
     this.data = [[], ...options.lines.map(() => [])] as Data;
     this.build();
     const resized = new ResizeObserver(() => this.plot?.setSize(this.size()));
     resized.observe(element);
-    this.stop.push(() => resized.disconnect(), onTheme(() => this.build()));
+    this.stop.push(
+      () => resized.disconnect(),
+      onTheme(() => this.build()),
+    );
   }
 
   destroy(): void {
@@ -77,7 +83,10 @@ export class LineChart {
   }
 
   private size() {
-    return { width: Math.max(this.element.clientWidth, 120), height: this.element.clientHeight || this.options.height };
+    return {
+      width: Math.max(this.element.clientWidth, 120),
+      height: this.element.clientHeight || this.options.height,
+    };
   }
 
   private build(): void {
@@ -85,7 +94,13 @@ export class LineChart {
     const { lines, digits = 1, band, sync, least = 0 } = this.options;
     const large = scale();
     const font = `${12 * large}px system-ui, sans-serif`;
-    const axis = { stroke: colour("quiet"), grid: { stroke: colour("grid"), width: 1 }, ticks: { show: false }, font, gap: 4 };
+    const axis = {
+      stroke: colour("quiet"),
+      grid: { stroke: colour("grid"), width: 1 },
+      ticks: { show: false },
+      font,
+      gap: 4,
+    };
     const plain = (n: number | null) => (n === null ? "" : n.toFixed(digits).replace("-", "−"));
     const series: uPlot.Series[] = [
       { label: "t" },
@@ -99,23 +114,40 @@ export class LineChart {
         spanGaps: false,
       })),
     ];
-    this.plot = new uPlot({
-      ...this.size(),
-      series,
-      ms: 1e-3,
-      legend: { show: false },
-      scales: {
-        x: { time: false, range: () => this.range },
-        y: { range: (_, low, high) => this.scale(low, high, least) },
+    this.plot = new uPlot(
+      {
+        ...this.size(),
+        series,
+        ms: 1e-3,
+        legend: { show: false },
+        scales: {
+          x: { time: false, range: () => this.range },
+          y: { range: (_, low, high) => this.scale(low, high, least) },
+        },
+        axes: [
+          {
+            ...axis,
+            size: 22 * large,
+            values: (_, ticks) => ticks.map((t) => `${Number(t.toFixed(2))}`.replace("-", "−")),
+            space: 60 * large,
+          },
+          { ...axis, size: 46 * large, values: (_, ticks) => ticks.map(plain), space: 26 * large },
+        ],
+        bands: band ? [{ series: [band[0] + 1, band[1] + 1], fill: colour("band") }] : [],
+        cursor: {
+          drag: { x: false, y: false },
+          points: { size: 6 },
+          ...(sync ? { sync: { key: sync, setSeries: false } } : {}),
+        },
+        hooks: {
+          drawClear: [(plot) => this.shade(plot)],
+          draw: [(plot) => this.mark(plot)],
+          ready: [(plot) => this.listen(plot)],
+        },
       },
-      axes: [
-        { ...axis, size: 22 * large, values: (_, ticks) => ticks.map((t) => `${Number(t.toFixed(2))}`.replace("-", "−")), space: 60 * large },
-        { ...axis, size: 46 * large, values: (_, ticks) => ticks.map(plain), space: 26 * large },
-      ],
-      bands: band ? [{ series: [band[0] + 1, band[1] + 1], fill: colour("band") }] : [],
-      cursor: { drag: { x: false, y: false }, points: { size: 6 }, ...(sync ? { sync: { key: sync, setSeries: false } } : {}) },
-      hooks: { drawClear: [(plot) => this.shade(plot)], draw: [(plot) => this.mark(plot)], ready: [(plot) => this.listen(plot)] },
-    }, this.data, this.element);
+      this.data,
+      this.element,
+    );
   }
 
   private scale(low: number, high: number, least: number): [number, number] {
@@ -155,7 +187,8 @@ export class LineChart {
 
   private mark(plot: uPlot): void {
     const { ctx, bbox } = plot;
-    const lines: Mark[] = this.head === null ? this.marks : [...this.marks, { t: this.head, label: "", colour: "ink" }];
+    const lines: Mark[] =
+      this.head === null ? this.marks : [...this.marks, { t: this.head, label: "", colour: "ink" }];
     ctx.save();
     const line = 12 * scale() * devicePixelRatio;
     ctx.font = `${line * 0.92}px system-ui, sans-serif`;

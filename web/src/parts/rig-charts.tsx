@@ -20,7 +20,11 @@ const COMMAND: Record<Axis, string> = { x: "qy", y: "qx" };
 
 export const KINDS: Record<"acceleration" | "residual" | "position" | "command", Kind> = {
   acceleration: {
-    title: (axis) => `Acceleration along ${axis}`, unit: "m/s²", digits: 1, least: 0.5, gates: false,
+    title: (axis) => `Acceleration along ${axis}`,
+    unit: "m/s²",
+    digits: 1,
+    least: 0.5,
+    gates: false,
     lines: [
       { of: "measured", label: "measured", colour: "measured" },
       { of: "twin", label: "twin", colour: "twin", dash: [6, 3] },
@@ -28,7 +32,12 @@ export const KINDS: Record<"acceleration" | "residual" | "position" | "command",
     about: "what the ball did, and what the twin says a healthy rig would have done",
   },
   residual: {
-    title: (axis) => `Residual along ${axis}`, unit: "m/s²", digits: 1, least: 0.3, gates: true, band: [1, 2],
+    title: (axis) => `Residual along ${axis}`,
+    unit: "m/s²",
+    digits: 1,
+    least: 0.3,
+    gates: true,
+    band: [1, 2],
     lines: [
       { of: "residual", label: "measured − twin", colour: "residual", width: 2 },
       { of: "limit", label: "limit", colour: "limit", width: 1 },
@@ -37,7 +46,11 @@ export const KINDS: Record<"acceleration" | "residual" | "position" | "command",
     about: "outside the band, while the ground is tinted, it counts against the servo",
   },
   position: {
-    title: (axis) => `Position ${axis}`, unit: "mm", digits: 0, least: 20, gates: false,
+    title: (axis) => `Position ${axis}`,
+    unit: "mm",
+    digits: 0,
+    least: 20,
+    gates: false,
     lines: [
       { of: "position", label: "measured", colour: "measured", factor: 1000 },
       { of: "twinPosition", label: "twin", colour: "twin", dash: [6, 3], factor: 1000 },
@@ -45,7 +58,11 @@ export const KINDS: Record<"acceleration" | "residual" | "position" | "command",
     about: "where the ball is, and where the twin would be",
   },
   command: {
-    title: (axis) => `Command ${COMMAND[axis]}`, unit: "°", digits: 0, least: 2, gates: false,
+    title: (axis) => `Command ${COMMAND[axis]}`,
+    unit: "°",
+    digits: 0,
+    least: 2,
+    gates: false,
     lines: [
       { of: "command", label: "command", colour: "command", factor: DEGREES },
       { of: "plate", label: "twin's plate", colour: "twin", dash: [6, 3], factor: DEGREES },
@@ -102,25 +119,63 @@ interface Props {
 }
 
 const TWINS_PLACE = ["twinPosition", "plate"];
-const without = (kind: Kind): Kind => ({ ...kind, lines: kind.lines.filter((line) => !TWINS_PLACE.includes(line.of)) });
+const without = (kind: Kind): Kind => ({
+  ...kind,
+  lines: kind.lines.filter((line) => !TWINS_PLACE.includes(line.of)),
+});
 
 export function RigCharts({ group, kinds, height = 150, axes = ["x", "y"], onSeek, measuredOnly }: Props) {
   return (
     <div class={`charts charts-${axes.length}`}>
-      {kinds.flatMap((kind) => axes.map((axis) => <OneChart key={kind + axis} group={group} kind={kind} axis={axis} height={height} onSeek={onSeek} measuredOnly={measuredOnly} />))}
+      {kinds.flatMap((kind) =>
+        axes.map((axis) => (
+          <OneChart
+            key={kind + axis}
+            group={group}
+            kind={kind}
+            axis={axis}
+            height={height}
+            onSeek={onSeek}
+            measuredOnly={measuredOnly}
+          />
+        )),
+      )}
     </div>
   );
 }
 
-function OneChart({ group, kind: name, axis, height, onSeek, measuredOnly }: { group: ChartGroup; kind: ChartKind; axis: Axis; height: number; onSeek?: (t: number) => void; measuredOnly?: boolean }) {
+function OneChart({
+  group,
+  kind: name,
+  axis,
+  height,
+  onSeek,
+  measuredOnly,
+}: {
+  group: ChartGroup;
+  kind: ChartKind;
+  axis: Axis;
+  height: number;
+  onSeek?: (t: number) => void;
+  measuredOnly?: boolean;
+}) {
   const element = useRef<HTMLDivElement>(null);
   const seek = useRef(onSeek);
   seek.current = onSeek;
   const kind = useMemo(() => (measuredOnly ? without(KINDS[name]) : KINDS[name]), [name, measuredOnly]);
-  const options = useMemo<LineChartOptions>(() => ({
-    lines: kind.lines, unit: kind.unit, digits: kind.digits, height, band: kind.band, least: kind.least, sync: "rig",
-    ...(onSeek ? { onSeek: (t: number) => seek.current?.(t) } : {}),
-  }), [kind, height]);
+  const options = useMemo<LineChartOptions>(
+    () => ({
+      lines: kind.lines,
+      unit: kind.unit,
+      digits: kind.digits,
+      height,
+      band: kind.band,
+      least: kind.least,
+      sync: "rig",
+      ...(onSeek ? { onSeek: (t: number) => seek.current?.(t) } : {}),
+    }),
+    [kind, height],
+  );
   useEffect(() => {
     const chart = new LineChart(element.current!, options);
     group.add(name + axis, chart, kind, axis);
@@ -134,11 +189,20 @@ function OneChart({ group, kind: name, axis, height, onSeek, measuredOnly }: { g
       <figcaption>
         <b>{kind.title(axis)}</b> <span class="quiet">{kind.unit}</span>
         <span class="keys" aria-hidden="true">
-          {kind.lines.filter((line) => line.label).map((line) => <span class={`key key-${line.colour}${line.dash ? " dashed" : ""}`}>{line.label}</span>)}
+          {kind.lines
+            .filter((line) => line.label)
+            .map((line) => (
+              <span class={`key key-${line.colour}${line.dash ? " dashed" : ""}`}>{line.label}</span>
+            ))}
           {kind.gates && <span class="key key-gate">judged</span>}
         </span>
       </figcaption>
-      <div ref={element} role="img" aria-label={`${kind.title(axis)} over time: ${kind.about}`} style={{ height: `${height / 16}rem` }} />
+      <div
+        ref={element}
+        role="img"
+        aria-label={`${kind.title(axis)} over time: ${kind.about}`}
+        style={{ height: `${height / 16}rem` }}
+      />
     </figure>
   );
 }

@@ -13,10 +13,11 @@ const STEP = 0.12;
 /** Longest wait for a moment in which the page has nothing else to do, ms. */
 const REST_MS = 1500;
 
-const rested = () => new Promise<void>((go) => {
-  if ("requestIdleCallback" in window) requestIdleCallback(() => go(), { timeout: REST_MS });
-  else setTimeout(go, REST_MS / 5);
-});
+const rested = () =>
+  new Promise<void>((go) => {
+    if ("requestIdleCallback" in window) requestIdleCallback(() => go(), { timeout: REST_MS });
+    else setTimeout(go, REST_MS / 5);
+  });
 
 interface Props {
   asset: Asset;
@@ -38,11 +39,14 @@ export function RigView({ asset, pose, name }: Props) {
   useEffect(() => {
     let gone = false;
     // First what can be read and pressed, then what takes long to load.
-    rested().then(() => import("./scene3d")).then(({ RigScene }) => {
-      if (gone) return;
-      scene.current = new RigScene(canvas.current!, asset);
-      setState("shown");
-    }).catch(() => setState("failed"));
+    rested()
+      .then(() => import("./scene3d"))
+      .then(({ RigScene }) => {
+        if (gone) return;
+        scene.current = new RigScene(canvas.current!, asset);
+        setState("shown");
+      })
+      .catch(() => setState("failed"));
     return () => {
       gone = true;
       scene.current?.destroy();
@@ -67,7 +71,12 @@ export function RigView({ asset, pose, name }: Props) {
     setView(wanted);
     scene.current?.look(wanted);
   };
-  const keys: Record<string, [number, number]> = { ArrowLeft: [-STEP, 0], ArrowRight: [STEP, 0], ArrowUp: [0, -STEP], ArrowDown: [0, STEP] };
+  const keys: Record<string, [number, number]> = {
+    ArrowLeft: [-STEP, 0],
+    ArrowRight: [STEP, 0],
+    ArrowUp: [0, -STEP],
+    ArrowDown: [0, STEP],
+  };
   const pressed = (event: KeyboardEvent) => {
     const step = keys[event.key];
     if (!step) return;
@@ -76,15 +85,41 @@ export function RigView({ asset, pose, name }: Props) {
   };
   return (
     <div class="stage">
-      <canvas ref={canvas} tabIndex={0} onKeyDown={pressed} role="img"
-        aria-label="Plate and ball in three dimensions; the twin is the see-through ball. Arrow keys turn the view." />
-      {state === "failed" && <p class="stage-note">This browser shows no 3D (WebGL). The charts have all of it.</p>}
+      <canvas
+        ref={canvas}
+        tabIndex={0}
+        onKeyDown={pressed}
+        role="img"
+        aria-label="Plate and ball in three dimensions; the twin is the see-through ball. Arrow keys turn the view."
+      />
+      {state === "failed" && (
+        <p class="stage-note">This browser shows no 3D (WebGL). The charts have all of it.</p>
+      )}
       {state === "loading" && <p class="stage-note">Loading 3D…</p>}
-      <output ref={readout} class="stage-tilt" aria-label="Tilt of the twin's plate">qx –  qy –</output>
-      <p class="stage-keys" aria-hidden="true"><span class="key key-measured">measured</span><span class="key key-twin">twin</span></p>
+      <output ref={readout} class="stage-tilt" aria-label="Tilt of the twin's plate">
+        qx – qy –
+      </output>
+      <p class="stage-keys" aria-hidden="true">
+        <span class="key key-measured">measured</span>
+        <span class="key key-twin">twin</span>
+      </p>
       <div class="stage-tools">
-        {VIEWS.map((each) => <button type="button" class="small" aria-pressed={view === each} onClick={() => choose(each)}>{each}</button>)}
-        <button type="button" class="small" aria-pressed={frames} onClick={() => { setFrames(!frames); scene.current?.setFrames(!frames); }}>frames</button>
+        {VIEWS.map((each) => (
+          <button type="button" class="small" aria-pressed={view === each} onClick={() => choose(each)}>
+            {each}
+          </button>
+        ))}
+        <button
+          type="button"
+          class="small"
+          aria-pressed={frames}
+          onClick={() => {
+            setFrames(!frames);
+            scene.current?.setFrames(!frames);
+          }}
+        >
+          frames
+        </button>
         <RecordButton canvas={() => canvas.current} name={name} />
       </div>
     </div>
@@ -103,16 +138,26 @@ function RecordButton({ canvas, name }: { canvas: () => HTMLCanvasElement | null
     if (recorder.current?.state === "recording") return recorder.current.stop();
     const type = FORMATS.find((format) => MediaRecorder.isTypeSupported(format));
     const parts: Blob[] = [];
-    const current = (recorder.current = new MediaRecorder(canvas()!.captureStream(VIDEO_HZ), { mimeType: type, videoBitsPerSecond: 8e6 }));
+    const current = (recorder.current = new MediaRecorder(canvas()!.captureStream(VIDEO_HZ), {
+      mimeType: type,
+      videoBitsPerSecond: 8e6,
+    }));
     current.ondataavailable = (event) => parts.push(event.data);
     current.onstop = () => {
       setRecording(false);
-      save(new Blob(parts, { type: current.mimeType }), `${name}.${current.mimeType.includes("mp4") ? "mp4" : "webm"}`);
+      save(
+        new Blob(parts, { type: current.mimeType }),
+        `${name}.${current.mimeType.includes("mp4") ? "mp4" : "webm"}`,
+      );
     };
     current.start(1000);
     setRecording(true);
   };
-  return <button type="button" class="small" aria-pressed={recording} onClick={toggle}>{recording ? "■ stop" : "● record"}</button>;
+  return (
+    <button type="button" class="small" aria-pressed={recording} onClick={toggle}>
+      {recording ? "■ stop" : "● record"}
+    </button>
+  );
 }
 
 export function save(content: Blob, name: string): void {

@@ -4,10 +4,34 @@
  * plate's upper face, world from plate = Rx(qx)·Ry(qy). Loaded only where it is shown.
  */
 import {
-  AmbientLight, ArrowHelper, BoxGeometry, BufferGeometry, CanvasTexture, CircleGeometry, Color, ConeGeometry, CylinderGeometry,
-  DirectionalLight, DoubleSide, EdgesGeometry, Float32BufferAttribute, Group, HemisphereLight, Line, LineBasicMaterial,
-  LineSegments, Mesh, MeshBasicMaterial, MeshStandardMaterial, PerspectiveCamera, Scene, SphereGeometry, Sprite,
-  SpriteMaterial, Vector3, WebGLRenderer,
+  AmbientLight,
+  ArrowHelper,
+  BoxGeometry,
+  BufferGeometry,
+  CanvasTexture,
+  CircleGeometry,
+  Color,
+  ConeGeometry,
+  CylinderGeometry,
+  DirectionalLight,
+  DoubleSide,
+  EdgesGeometry,
+  Float32BufferAttribute,
+  Group,
+  HemisphereLight,
+  Line,
+  LineBasicMaterial,
+  LineSegments,
+  Mesh,
+  MeshBasicMaterial,
+  MeshStandardMaterial,
+  PerspectiveCamera,
+  Scene,
+  SphereGeometry,
+  Sprite,
+  SpriteMaterial,
+  Vector3,
+  WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import type { Asset } from "../api/types";
@@ -45,7 +69,10 @@ export class RigScene {
   private isDirty = true;
   private readonly stop: (() => void)[] = [];
 
-  constructor(readonly canvas: HTMLCanvasElement, private asset: Asset) {
+  constructor(
+    readonly canvas: HTMLCanvasElement,
+    private asset: Asset,
+  ) {
     this.renderer = new WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: false });
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.camera.up.set(0, 0, 1);
@@ -56,7 +83,10 @@ export class RigScene {
     const resized = new ResizeObserver(() => this.resize());
     resized.observe(canvas.parentElement!);
     canvas.addEventListener("webglcontextrestored", () => this.build());
-    this.stop.push(() => resized.disconnect(), onTheme(() => this.build()));
+    this.stop.push(
+      () => resized.disconnect(),
+      onTheme(() => this.build()),
+    );
     this.build();
     this.look("free");
   }
@@ -77,8 +107,13 @@ export class RigScene {
     // A narrow picture needs more distance to show the whole width.
     const d = this.size * 1.45 * Math.max(1, 1.25 / this.camera.aspect);
     this.view = view;
-    const place = { free: [0.55 * d, -0.95 * d, 0.75 * d], top: [0, -0.001 * d, 1.35 * d], "along x": [-1.35 * d, 0, 0.12 * d], "along y": [0, -1.35 * d, 0.12 * d] }[view];
-    this.camera.position.set(place[0]!, place[1]!, place[2]!);
+    const place = {
+      free: [0.55 * d, -0.95 * d, 0.75 * d],
+      top: [0, -0.001 * d, 1.35 * d],
+      "along x": [-1.35 * d, 0, 0.12 * d],
+      "along y": [0, -1.35 * d, 0.12 * d],
+    }[view];
+    this.camera.position.set(place[0]!, place[1]!, place[2]);
     this.controls.target.set(0, 0, 0);
     this.controls.update();
     this.isDirty = true;
@@ -160,21 +195,37 @@ export class RigScene {
     const { plate, ball } = this.asset;
     const thickness = Math.max(plate?.thickness_m ?? 0, 0.004);
     const diameter = plate?.diameter_m;
-    const [length, width] = diameter ? [diameter, diameter] : [plate?.length_m ?? 0.38, plate?.width_m ?? 0.24];
+    const [length, width] = diameter
+      ? [diameter, diameter]
+      : [plate?.length_m ?? 0.38, plate?.width_m ?? 0.24];
     this.size = Math.max(length, width);
     this.radius = ball?.radius_m ?? 0.0127;
     const shape = diameter
       ? new CylinderGeometry(diameter / 2, diameter / 2, thickness, 96).rotateX(Math.PI / 2)
       : new BoxGeometry(length, width, thickness);
-    const slab = new Mesh(shape, new MeshStandardMaterial({ color: colour("plate"), roughness: 0.65, metalness: 0.1 }));
+    const slab = new Mesh(
+      shape,
+      new MeshStandardMaterial({ color: colour("plate"), roughness: 0.65, metalness: 0.1 }),
+    );
     slab.position.z = -thickness / 2;
-    const edges = new LineSegments(new EdgesGeometry(shape, 30), new LineBasicMaterial({ color: colour("edge") }));
+    const edges = new LineSegments(
+      new EdgesGeometry(shape, 30),
+      new LineBasicMaterial({ color: colour("edge") }),
+    );
     edges.position.copy(slab.position);
-    const foot = new Mesh(new ConeGeometry(this.size * 0.05, this.size * 0.22, 32), new MeshStandardMaterial({ color: colour("edge"), roughness: 0.8 }));
+    const foot = new Mesh(
+      new ConeGeometry(this.size * 0.05, this.size * 0.22, 32),
+      new MeshStandardMaterial({ color: colour("edge"), roughness: 0.8 }),
+    );
     foot.rotation.x = Math.PI / 2;
     foot.position.z = -thickness - this.size * 0.11;
     this.scene.add(foot);
-    this.plate.add(slab, edges, this.grid(length, width, Boolean(diameter)), frame(this.size * 0.22, "frame"));
+    this.plate.add(
+      slab,
+      edges,
+      this.grid(length, width, Boolean(diameter)),
+      frame(this.size * 0.22, "frame"),
+    );
     const material = new LineBasicMaterial({ color: colour("measured"), transparent: true, opacity: 0.7 });
     this.trail = new Line(new BufferGeometry().setAttribute("position", this.path), material);
     this.trail.frustumCulled = false;
@@ -183,7 +234,8 @@ export class RigScene {
   }
 
   private grid(length: number, width: number, round: boolean): LineSegments {
-    const step = 0.05, points: number[] = [];
+    const step = 0.05,
+      points: number[] = [];
     for (let x = -Math.floor(length / 2 / step) * step; x <= length / 2; x += step) {
       const reach = round ? Math.sqrt(Math.max((length / 2) ** 2 - x * x, 0)) : width / 2;
       points.push(x, -reach, 0.0002, x, reach, 0.0002);
@@ -193,16 +245,34 @@ export class RigScene {
       points.push(-reach, y, 0.0002, reach, y, 0.0002);
     }
     const geometry = new BufferGeometry().setAttribute("position", new Float32BufferAttribute(points, 3));
-    return new LineSegments(geometry, new LineBasicMaterial({ color: colour("edge"), transparent: true, opacity: 0.35 }));
+    return new LineSegments(
+      geometry,
+      new LineBasicMaterial({ color: colour("edge"), transparent: true, opacity: 0.35 }),
+    );
   }
 
   private buildBalls(): void {
     const make = (name: string, ghost: boolean) => {
       const group = new Group();
-      const material = new MeshStandardMaterial({ color: colour(name), roughness: ghost ? 0.9 : 0.25, metalness: ghost ? 0 : 0.35, transparent: ghost, opacity: ghost ? 0.45 : 1, depthWrite: !ghost });
+      const material = new MeshStandardMaterial({
+        color: colour(name),
+        roughness: ghost ? 0.9 : 0.25,
+        metalness: ghost ? 0 : 0.35,
+        transparent: ghost,
+        opacity: ghost ? 0.45 : 1,
+        depthWrite: !ghost,
+      });
       const sphere = new Mesh(new SphereGeometry(this.radius * (ghost ? 1.02 : 1), 40, 28), material);
       sphere.position.z = this.radius;
-      const shadow = new Mesh(new CircleGeometry(this.radius * 0.8, 32), new MeshBasicMaterial({ color: 0x000000, transparent: true, opacity: ghost ? 0.12 : 0.3, side: DoubleSide }));
+      const shadow = new Mesh(
+        new CircleGeometry(this.radius * 0.8, 32),
+        new MeshBasicMaterial({
+          color: 0x000000,
+          transparent: true,
+          opacity: ghost ? 0.12 : 0.3,
+          side: DoubleSide,
+        }),
+      );
       shadow.position.z = 0.0004;
       group.add(sphere, shadow);
       group.visible = false;
@@ -225,9 +295,20 @@ export class RigScene {
 function frame(length: number, name: string, opacity = 1): Group {
   const group = new Group();
   group.name = name;
-  const axes: [string, Vector3, number][] = [["x", new Vector3(1, 0, 0), 0xdc2626], ["y", new Vector3(0, 1, 0), 0x16a34a], ["z", new Vector3(0, 0, 1), 0x2563eb]];
+  const axes: [string, Vector3, number][] = [
+    ["x", new Vector3(1, 0, 0), 0xdc2626],
+    ["y", new Vector3(0, 1, 0), 0x16a34a],
+    ["z", new Vector3(0, 0, 1), 0x2563eb],
+  ];
   for (const [letter, direction, hue] of axes) {
-    const arrow = new ArrowHelper(direction, new Vector3(0, 0, 0.0008), length, hue, length * 0.14, length * 0.07);
+    const arrow = new ArrowHelper(
+      direction,
+      new Vector3(0, 0, 0.0008),
+      length,
+      hue,
+      length * 0.14,
+      length * 0.07,
+    );
     (arrow.line.material as LineBasicMaterial).opacity = opacity;
     const label = sign(name === "world" ? `${letter}₀` : letter, hue);
     label.position.copy(direction).multiplyScalar(length * 1.16);

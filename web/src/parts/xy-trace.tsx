@@ -23,16 +23,26 @@ export function XyTrace({ asset, moment }: Props) {
     drawn.current = key;
     draw(element, asset, now.buffer, now.t, now.tail);
   });
-  return <canvas ref={canvas} class="xy" role="img" aria-label="The ball's way over the plate seen from above, x to the right, y up" />;
+  return (
+    <canvas
+      ref={canvas}
+      class="xy"
+      role="img"
+      aria-label="The ball's way over the plate seen from above, x to the right, y up"
+    />
+  );
 }
 
 function draw(canvas: HTMLCanvasElement, asset: Asset, buffer: TraceBuffer, t: number, tail: number): void {
   const { clientWidth: width, clientHeight: height } = canvas;
   const ratio = devicePixelRatio;
-  if (canvas.width !== width * ratio || canvas.height !== height * ratio) Object.assign(canvas, { width: width * ratio, height: height * ratio });
+  if (canvas.width !== width * ratio || canvas.height !== height * ratio)
+    Object.assign(canvas, { width: width * ratio, height: height * ratio });
   const context = canvas.getContext("2d")!;
   const diameter = asset.plate?.diameter_m;
-  const [length, depth] = diameter ? [diameter, diameter] : [asset.plate?.length_m ?? 0.38, asset.plate?.width_m ?? 0.24];
+  const [length, depth] = diameter
+    ? [diameter, diameter]
+    : [asset.plate?.length_m ?? 0.38, asset.plate?.width_m ?? 0.24];
   const scale = Math.min((width - 24) / length, (height - 24) / depth);
   const place = (x: number, y: number): [number, number] => [width / 2 + x * scale, height / 2 - y * scale];
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
@@ -45,8 +55,12 @@ function draw(canvas: HTMLCanvasElement, asset: Asset, buffer: TraceBuffer, t: n
   context.clip();
   path(context, place, buffer, t, tail, "twinPosition", "twin", [5, 3]);
   path(context, place, buffer, t, tail, "position", "measured", []);
-  for (const [key, name] of [["twinPosition", "twin"], ["position", "measured"]] as const) {
-    const x = buffer.at("x", key, t), y = buffer.at("y", key, t);
+  for (const [key, name] of [
+    ["twinPosition", "twin"],
+    ["position", "measured"],
+  ] as const) {
+    const x = buffer.at("x", key, t),
+      y = buffer.at("y", key, t);
     if (x === null || y === null) continue;
     context.beginPath();
     context.arc(...place(x, y), Math.max((asset.ball?.radius_m ?? 0.0127) * scale, 4), 0, 2 * Math.PI);
@@ -58,7 +72,14 @@ function draw(canvas: HTMLCanvasElement, asset: Asset, buffer: TraceBuffer, t: n
   context.restore();
 }
 
-function outline(context: CanvasRenderingContext2D, place: (x: number, y: number) => [number, number], length: number, depth: number, round: boolean, scale: number): void {
+function outline(
+  context: CanvasRenderingContext2D,
+  place: (x: number, y: number) => [number, number],
+  length: number,
+  depth: number,
+  round: boolean,
+  scale: number,
+): void {
   context.strokeStyle = colour("edge");
   context.fillStyle = colour("plate");
   context.lineWidth = 1.5;
@@ -85,8 +106,14 @@ function outline(context: CanvasRenderingContext2D, place: (x: number, y: number
 }
 
 function path(
-  context: CanvasRenderingContext2D, place: (x: number, y: number) => [number, number], buffer: TraceBuffer,
-  t: number, tail: number, key: "position" | "twinPosition", name: string, dash: number[],
+  context: CanvasRenderingContext2D,
+  place: (x: number, y: number) => [number, number],
+  buffer: TraceBuffer,
+  t: number,
+  tail: number,
+  key: "position" | "twinPosition",
+  name: string,
+  dash: number[],
 ): void {
   context.strokeStyle = colour(name);
   context.lineWidth = 1.5;
@@ -94,7 +121,8 @@ function path(
   context.beginPath();
   let isDown = false;
   for (let i = buffer.index(t - tail); i <= buffer.index(t); i++) {
-    const x = buffer.x[key][i], y = buffer.y[key][i];
+    const x = buffer.x[key][i],
+      y = buffer.y[key][i];
     if (x == null || y == null) {
       isDown = false;
       continue;
