@@ -28,7 +28,7 @@ export function useAsk<T>(ask: () => Promise<T>, key: unknown, every?: number): 
     let stopped = false;
     const loop = async () => {
       await again();
-      if (every && !stopped) timer = setTimeout(loop, every);
+      if (every && !stopped) timer = setTimeout(() => void loop(), every);
     };
     void loop();
     return () => {

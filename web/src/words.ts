@@ -163,13 +163,25 @@ export const millimetres = (m: number | null | undefined, digits = 1) =>
 export const seconds = (s: number | null | undefined, digits = 2) => number(s, digits, "s");
 export const count = (n: number) => n.toLocaleString("en").replaceAll(",", "\u202f");
 
-/** A length of time in two parts at most: 3 min 20 s. */
+const MINUTE_S = 60;
+const HOUR_S = 3600;
+const DAY_S = 86_400;
+
+/**
+ * A length of time in two parts at most: 3 min 20 s. It is rounded to the smaller part before
+ * it is split, so that what comes to a whole of the larger part is carried into it.
+ */
 export function duration(s: number | null | undefined): string {
   if (s === null || s === undefined) return NONE;
-  if (s < 60) return `${s.toFixed(s < 10 ? 1 : 0)}\u202fs`;
-  if (s < 3600) return `${Math.floor(s / 60)}\u202fmin ${Math.round(s % 60)}\u202fs`;
-  if (s < 86_400) return `${Math.floor(s / 3600)}\u202fh ${Math.round((s % 3600) / 60)}\u202fmin`;
-  return `${Math.floor(s / 86_400)}\u202fd ${Math.round((s % 86_400) / 3600)}\u202fh`;
+  const tenths = s.toFixed(1);
+  if (Number(tenths) < 10) return `${tenths}\u202fs`;
+  const inSeconds = Math.round(s);
+  if (inSeconds < MINUTE_S) return `${inSeconds}\u202fs`;
+  if (inSeconds < HOUR_S) return `${Math.floor(inSeconds / 60)}\u202fmin ${inSeconds % 60}\u202fs`;
+  const inMinutes = Math.round(s / MINUTE_S);
+  if (inMinutes * MINUTE_S < DAY_S) return `${Math.floor(inMinutes / 60)}\u202fh ${inMinutes % 60}\u202fmin`;
+  const inHours = Math.round(s / HOUR_S);
+  return `${Math.floor(inHours / 24)}\u202fd ${inHours % 24}\u202fh`;
 }
 
 /** How long ago, as a person says it. */

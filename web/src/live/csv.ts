@@ -3,6 +3,8 @@
  * round; turned into the session file that the service takes.
  */
 
+import Papa from "papaparse";
+
 export const ROLES = ["t_s", "cmd_qx_rad", "cmd_qy_rad", "x_m", "y_m"] as const;
 export type Role = (typeof ROLES)[number];
 
@@ -57,17 +59,32 @@ export interface Column {
 
 export type Mapping = Record<Role, Column>;
 
-/** Splits by the separator that the first line has most of; quotes are taken off. */
-export function readTable(text: string): Table {
-  const lines = text
-    .replace(/^\uFEFF/, "")
-    .split(/\r?\n/)
-    .filter((line) => line.trim() && !line.startsWith("#"));
-  const first = lines[0] ?? "";
-  const separator = [",", ";", "\t"].reduce((best, each) =>
-    first.split(each).length > first.split(best).length ? each : best,
-  );
-  const cells = (line: string) => line.split(separator).map((cell) => cell.trim().replace(/^"|"$/g, ""));
+const SEPARATORS = [",", ";", "\t"];
+
+/** Lines among which the first with names is looked for: blank ones may stand before it. */
+const HEAD_LINES = 50;
+
+/** The rows of `text`, without comments and blank lines; at most `most` lines of it if given. */
+function parse(text: string, delimiter: string, most = 0): string[][] {
+  const { data, errors } = Papa.parse<string[]>(text, {
+    delimiter,
+    newline: "\n",
+    comments: "#",
+    preview: most,
+  });
+  const open = most ? undefined : errors.find(({ code }) => code === "MissingQuotes");
+  if (open) throw new Error(`In row ${(open.row ?? 0) + 1} a quote is opened that is never closed.`);
+  return data.filter((row) => row.join(delimiter).trim() !== "");
+}
+
+/** Splits by the separator that the first line has most of; those within quotes do not count. */
+export function readTable(file: string): Table {
+  const text = file.replace(/^\uFEFF/, "").replace(/\r\n?/g, "\n");
+  const nFirst = (delimiter: string) => parse(text, delimiter, HEAD_LINES)[0]?.length ?? 0;
+  const separator = SEPARATORS.reduce((best, each) => (nFirst(each) > nFirst(best) ? each : best));
+  // Quotes that stand behind a blank are none to the parser.
+  const cells = (row: string[]) => row.map((cell) => cell.trim().replace(/^"(.*)"$/s, "$1"));
+  const [first = [], ...rows] = parse(text, separator);
   const header = cells(first);
   if (header.length < 3)
     throw new Error(
@@ -75,14 +92,10 @@ export function readTable(text: string): Table {
     );
   if (header.every((name) => name !== "" && Number.isFinite(Number(name))))
     throw new Error("The first line has numbers; it should have the names of the columns.");
-  if (lines.length < 3) throw new Error("There are no rows below the first line.");
+  if (rows.length < 2) throw new Error("There are no rows below the first line.");
   const decimal = separator === ";";
-  return {
-    header,
-    rows: lines
-      .slice(1)
-      .map((line) => (decimal ? cells(line).map((cell) => cell.replace(",", ".")) : cells(line))),
-  };
+  const plain = (row: string[]) => (decimal ? cells(row).map((cell) => cell.replace(",", ".")) : cells(row));
+  return { header, rows: rows.map(plain) };
 }
 
 const GUESS: Record<Role, RegExp[]> = {
