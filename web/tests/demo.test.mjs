@@ -31,9 +31,9 @@ async function event(base, wanted) {
 }
 
 test("a fault is seen within two seconds of its event, on the fleet and on the rig", async () => {
-  const fleet = await page(chromium),
-    rig = await page(chromium),
-    buttons = await page(chromium);
+  const fleet = await page(chromium);
+  const rig = await page(chromium);
+  const buttons = await page(chromium);
   await fleet.goto(show.url);
   await fleet.getByRole("link", { name: /demo-rig/ }).waitFor();
   await rig.goto(`${show.url}/rigs/demo-rig`);

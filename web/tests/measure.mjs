@@ -36,18 +36,23 @@ async function frames(view, what) {
   );
   const client = await view.context().newCDPSession(view);
   await client.send("Performance.enable");
-  const of = async () =>
-    Object.fromEntries(
-      (await client.send("Performance.getMetrics")).metrics.map(({ name, value }) => [name, value]),
-    );
-  const before = await of();
+  const metrics = async () => {
+    const { metrics } = await client.send("Performance.getMetrics");
+    return Object.fromEntries(metrics.map(({ name, value }) => [name, value]));
+  };
+  const before = await metrics();
   await view.waitForTimeout(SECONDS * 1000);
-  const after = await of();
+  const after = await metrics();
   const seen = await view.evaluate(() => window.seen);
-  const per = (name) => ((1000 * (after[name] - before[name])) / seen.frames).toFixed(2);
-  console.log(
-    `${what}: ${(seen.frames / SECONDS).toFixed(1)} frames/s, ${seen.late} later than 25 ms; per frame: callbacks ${(seen.scripting / seen.frames).toFixed(2)} ms, all scripting ${per("ScriptDuration")} ms, layout ${per("LayoutDuration")} ms, style ${per("RecalcStyleDuration")} ms; long tasks ${seen.long}, longest ${seen.longest.toFixed(0)} ms`,
-  );
+  const perFrame = (name) => `${((1000 * (after[name] - before[name])) / seen.frames).toFixed(2)} ms`;
+  const figures = [
+    `${(seen.frames / SECONDS).toFixed(1)} frames/s, ${seen.late} later than 25 ms`,
+    `per frame: callbacks ${(seen.scripting / seen.frames).toFixed(2)} ms, ` +
+      `all scripting ${perFrame("ScriptDuration")}, layout ${perFrame("LayoutDuration")}, ` +
+      `style ${perFrame("RecalcStyleDuration")}`,
+    `long tasks ${seen.long}, longest ${seen.longest.toFixed(0)} ms`,
+  ];
+  console.log(`${what}: ${figures.join("; ")}`);
 }
 
 async function opened(of, url, what, ready) {

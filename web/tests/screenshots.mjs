@@ -110,11 +110,11 @@ try {
   await show.stop();
 }
 const empty = await serve(join(work, "empty"));
-const again = await browser();
+const emptyBrowser = await browser();
 try {
-  await shoot(again, "empty", `${empty.url}/`, (view) => view.getByText("No rig yet").waitFor());
+  await shoot(emptyBrowser, "empty", `${empty.url}/`, (view) => view.getByText("No rig yet").waitFor());
 } finally {
-  await again.close();
+  await emptyBrowser.close();
   await empty.stop();
   remove(work);
 }

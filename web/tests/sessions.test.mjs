@@ -20,7 +20,10 @@ after(async () => {
   remove(work);
 });
 
-/** The healthy recording as another would have written it: semicolons, degrees, millimetres, milliseconds, x the other way. */
+/**
+ * The healthy recording as another would have written it: semicolons and decimal commas, degrees,
+ * millimetres, milliseconds, x the other way round.
+ */
 function foreign() {
   const rows = rig.healthy
     .trim()
@@ -35,7 +38,7 @@ function foreign() {
   return ["time [ms];ball x (mm);ball y (mm);qx (deg);qy (deg)", ...lines].join("\n");
 }
 
-test("a foreign file is mapped, its sign is found wrong, mended, imported", async () => {
+test("a foreign file is mapped, its sign is found wrong, corrected, imported", async () => {
   const file = `${work}/foreign.csv`;
   writeFileSync(file, foreign());
   const view = await page(chromium);

@@ -38,7 +38,7 @@ function rows(from, to) {
     });
 }
 
-test("described, connected, mended, learnt", async () => {
+test("described, connected, corrected, learnt", async () => {
   const view = await page(chromium);
   await view.goto(`${service.url}/set-up`);
   await view.getByLabel("Name").fill("bench 1");

@@ -1,7 +1,10 @@
 // Tables of anybody's making, and the session file that is made of them.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { apply, guess, readTable, toCsv } from "../../src/live/csv.ts";
+import { toColumns, toCsv } from "../../src/pages/import/columns.ts";
+import { guessMapping } from "../../src/pages/import/mapping.ts";
+import { readTable } from "../../src/pages/import/table.ts";
+import { random } from "./random.mjs";
 
 const read = (...lines) => readTable(lines.join("\n"));
 
@@ -89,7 +92,7 @@ test("what is no table is refused in words", () => {
 });
 
 test("columns are known by their names, in whatever unit these say", () => {
-  const mapping = guess(
+  const mapping = guessMapping(
     read("time [ms];ball x (mm);ball y (mm);qx (deg);qy (deg)", "0;1;2;3;4", "10;1;2;3;4"),
   );
   const index = Object.fromEntries(Object.entries(mapping).map(([role, column]) => [role, column.index]));
@@ -99,34 +102,32 @@ test("columns are known by their names, in whatever unit these say", () => {
 });
 
 test("where the names say nothing, the sizes of the numbers do", () => {
-  const mapping = guess(read("t,qx,qy,x,y", "0,5,0,100,3", "10,2,1,50,4", "20,3,1,20,1"));
+  const mapping = guessMapping(read("t,qx,qy,x,y", "0,5,0,100,3", "10,2,1,50,4", "20,3,1,20,1"));
   assert.deepEqual([mapping.t_s.factor, mapping.x_m.factor, mapping.y_m.factor], [1e-3, 1e-3, 1e-3]);
-  const metric = guess(read("t,qx,qy,x,y", "0,0.1,0,0.1,0", "0.01,0.1,0,0.05,0"));
+  const metric = guessMapping(read("t,qx,qy,x,y", "0,0.1,0,0.1,0", "0.01,0.1,0,0.05,0"));
   for (const { factor } of Object.values(metric)) assert.equal(factor, 1);
 });
 
 test("cells that are no numbers are readings that are missing", () => {
   const table = read("t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m", "0,0,0,nan,", "1,0,0,None,lost", "2,0,0,-,0.5");
-  const columns = apply(table, guess(table));
+  const columns = toColumns(table, guessMapping(table));
   assert.deepEqual(columns.x_m, [null, null, null]);
   assert.deepEqual(columns.y_m, [null, null, 0.5]);
 });
 
 test("factor and sign are applied; a role without a column has no readings", () => {
   const table = read("t,x,y", "0,1,2", "1,2,-4");
-  const mapping = guess(table);
-  const columns = apply(table, { ...mapping, x_m: { index: 1, factor: 0.001, sign: -1 } });
+  const mapping = guessMapping(table);
+  const columns = toColumns(table, { ...mapping, x_m: { index: 1, factor: 0.001, sign: -1 } });
   assert.deepEqual(columns.x_m, [-0.001, -0.002]);
   assert.deepEqual(columns.cmd_qx_rad, [null, null]);
 });
 
 test("what is written is read again as it was", () => {
-  // A fixed sequence that looks random: the minimal standard generator.
-  let seed = 7;
-  const random = () => (seed = (seed * 48_271) % 2_147_483_647) / 2_147_483_647;
+  const next = random(7);
   for (let round = 0; round < 50; round++) {
-    const value = (scale) => (random() < 0.1 ? null : Number(((random() - 0.5) * scale).toPrecision(9)));
-    const make = (of) => Array.from({ length: 2 + Math.floor(random() * 40) }, of);
+    const value = (scale) => (next() < 0.1 ? null : Number(((next() - 0.5) * scale).toPrecision(9)));
+    const make = (of) => Array.from({ length: 2 + Math.floor(next() * 40) }, of);
     const t_s = make((_, i) => i * 0.01).map((t) => Number(t.toFixed(4)));
     const column = (scale) => t_s.map(() => value(scale));
     const columns = {
@@ -137,9 +138,9 @@ test("what is written is read again as it was", () => {
       y_m: column(0.3),
     };
     const table = readTable(toCsv(columns));
-    const mapping = guess(table);
+    const mapping = guessMapping(table);
     for (const { factor, sign } of Object.values(mapping)) assert.deepEqual([factor, sign], [1, 1]);
-    assert.deepEqual(apply(table, mapping), columns);
+    assert.deepEqual(toColumns(table, mapping), columns);
   }
 });
 

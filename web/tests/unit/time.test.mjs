@@ -1,7 +1,7 @@
 // How lengths of time are written: in two parts at most, rounded so that no part is a whole of the next.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { ago, duration } from "../../src/words.ts";
+import { duration, timeAgo } from "../../src/words/time.ts";
 
 /** The narrow space before a unit, as a plain one. */
 const plain = (text) => text.replaceAll("\u202f", " ");
@@ -59,12 +59,12 @@ test("a duration is never further from the truth than half of its smaller unit",
 
 test("how long ago something was", () => {
   const now = Date.parse("2026-01-01T12:00:00Z");
-  const before = (seconds) => plain(ago(new Date(now - seconds * 1000).toISOString(), now));
+  const before = (seconds) => plain(timeAgo(new Date(now - seconds * 1000).toISOString(), now));
   assert.equal(before(0.5), "now");
   assert.equal(before(-3), "now", "a clock that is ahead");
   assert.equal(before(5), "5 s ago");
   assert.equal(before(59.97), "1 min 0 s ago");
   assert.equal(before(119.6), "2 min 0 s ago");
   assert.equal(before(3599.6), "1 h 0 min ago");
-  assert.equal(ago(null), "never");
+  assert.equal(timeAgo(null), "never");
 });
