@@ -105,3 +105,14 @@ test("the clock follows bursts evenly, behind the newest moment, and jumps when 
   }
   assert.equal(clock.tick(3016, 100), 99.75);
 });
+
+test("a clock that is behind catches up half as fast again at most, one that is ahead slows down", () => {
+  const clock = new PlayoutClock(0.25);
+  clock.tick(0, 10);
+  // 1.5 s have come at once: the clock stands at 9.75 s and should be at 11.25 s.
+  assert.ok(Math.abs(clock.tick(100, 11.5) - 9.9) < 1e-9);
+  const ahead = new PlayoutClock(0.25);
+  ahead.tick(0, 10);
+  // Nothing has come for a second: the clock goes on, but never past what there is.
+  for (let now = 100; now <= 1000; now += 100) assert.ok(ahead.tick(now, 10) <= 10);
+});

@@ -28,7 +28,7 @@ const NAMES = new Intl.Collator("en", { numeric: true });
 
 /** The place of each name among `names`, as a person orders them. */
 export const placesByName = (names: string[]) =>
-  new Map([...names].sort(NAMES.compare).map((name, place) => [name, place]));
+  new Map([...names].sort((a, b) => NAMES.compare(a, b)).map((name, place) => [name, place]));
 
 export const rowOf = (entry: FleetEntry, places: Map<string, number>, now: number): FleetRow => ({
   entry,
