@@ -15,7 +15,7 @@ after(async () => {
   await show?.stop();
 });
 
-/** The first event of the fleet that `wanted` likes, as it arrives. */
+/** The first event of the fleet for which `wanted` is true, as it arrives; Node 18 has no EventSource. */
 async function event(base, wanted) {
   const answer = await fetch(`${base}/api/v1/events`);
   const found = (async () => {
