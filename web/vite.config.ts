@@ -19,7 +19,8 @@ function brotli(): Plugin {
         if (!entry.isFile() || path.endsWith(".br")) continue;
         const bytes = readFileSync(path);
         const quality = { [constants.BROTLI_PARAM_QUALITY]: 10 };
-        if (bytes.length > WORTH_PACKING) writeFileSync(`${path}.br`, brotliCompressSync(bytes, { params: quality }));
+        if (bytes.length > WORTH_PACKING)
+          writeFileSync(`${path}.br`, brotliCompressSync(bytes, { params: quality }));
       }
     },
   };
@@ -27,9 +28,17 @@ function brotli(): Plugin {
 
 export default defineConfig({
   esbuild: { jsx: "automatic", jsxImportSource: "preact" },
-  build: { assetsDir: "static", emptyOutDir: true, modulePreload: { polyfill: false }, chunkSizeWarningLimit: 1000 },
+  build: {
+    assetsDir: "static",
+    emptyOutDir: true,
+    modulePreload: { polyfill: false },
+    chunkSizeWarningLimit: 1000,
+  },
   plugins: [brotli()],
   // `npx vite` shows changes at once, against a service on its usual port.
   // The program of the drive cycle lies beside the service's sources.
-  server: { fs: { allow: [".."] }, proxy: { "/api": { target: "http://127.0.0.1:8087", ws: true }, "/healthz": "http://127.0.0.1:8087" } },
+  server: {
+    fs: { allow: [".."] },
+    proxy: { "/api": { target: "http://127.0.0.1:8087", ws: true }, "/healthz": "http://127.0.0.1:8087" },
+  },
 });

@@ -15,7 +15,7 @@ after(async () => {
   await show?.stop();
 });
 
-/** The first event of the fleet that `wanted` likes, as it arrives. */
+/** The first event of the fleet for which `wanted` is true, as it arrives; Node 18 has no EventSource. */
 async function event(base, wanted) {
   const answer = await fetch(`${base}/api/v1/events`);
   const found = (async () => {
@@ -31,7 +31,9 @@ async function event(base, wanted) {
 }
 
 test("a fault is seen within two seconds of its event, on the fleet and on the rig", async () => {
-  const fleet = await page(chromium), rig = await page(chromium), buttons = await page(chromium);
+  const fleet = await page(chromium);
+  const rig = await page(chromium);
+  const buttons = await page(chromium);
   await fleet.goto(show.url);
   await fleet.getByRole("link", { name: /demo-rig/ }).waitFor();
   await rig.goto(`${show.url}/rigs/demo-rig`);
@@ -55,11 +57,19 @@ test("a fault is seen within two seconds of its event, on the fleet and on the r
   // The rig's page moves: the twin's tilt and the session's samples change.
   const samples = rig.locator("dt:text-is('Samples') + dd");
   const before = await samples.textContent();
-  await rig.waitForFunction((was) => [...document.querySelectorAll("dt")].find((dt) => dt.textContent === "Samples").nextSibling.textContent !== was, before);
+  await rig.waitForFunction(
+    (was) =>
+      [...document.querySelectorAll("dt")].find((dt) => dt.textContent === "Samples").nextSibling
+        .textContent !== was,
+    before,
+  );
   assert.match(await rig.getByLabel("Tilt of the twin's plate").textContent(), /qx .*° +qy .*°/);
 
   // From there to the fault, its sentence, its bits, its charts.
-  await rig.getByRole("link", { name: /Look at it/ }).first().click();
+  await rig
+    .getByRole("link", { name: /Look at it/ })
+    .first()
+    .click();
   await rig.getByRole("heading", { name: /Status byte/ }).waitFor();
   await rig.getByText("The test fails right now.").waitFor();
   await rig.getByRole("img", { name: /Residual along y/ }).waitFor();
@@ -85,7 +95,8 @@ test("the script takes over again, and a visitor who ends the session does not s
   const before = await session.textContent();
   await view.getByRole("button", { name: "End session" }).click();
   await view.waitForFunction((was) => {
-    const now = [...document.querySelectorAll("dt")].find((dt) => dt.textContent === "Session").nextSibling.textContent;
+    const now = [...document.querySelectorAll("dt")].find((dt) => dt.textContent === "Session").nextSibling
+      .textContent;
     return now.startsWith("demo-") && now !== was;
   }, before);
   assert.deepEqual(view.errors, []);
@@ -97,9 +108,17 @@ test("the textbook's limit is broken by a rig that the default calls whole", asy
   await view.goto(`${show.url}/learn`);
   await view.getByRole("heading", { name: "textbook" }).waitFor();
   const share = view.locator("dt:text-is('Beyond the limit') + dd");
-  await view.waitForFunction(() => [...document.querySelectorAll("dt")].filter((dt) => dt.textContent === "Beyond the limit" && /\d/.test(dt.nextSibling.textContent)).length === 2);
+  await view.waitForFunction(
+    () =>
+      [...document.querySelectorAll("dt")].filter(
+        (dt) => dt.textContent === "Beyond the limit" && /\d/.test(dt.nextSibling.textContent),
+      ).length === 2,
+  );
   const [usual, textbook] = (await share.allTextContents()).map((text) => parseInt(text, 10));
   assert.ok(textbook > 10 && usual < textbook / 2, `default ${usual} %, textbook ${textbook} %`);
-  await view.getByRole("img", { name: /Speed against accuracy/ }).first().waitFor();
+  await view
+    .getByRole("img", { name: /Speed against accuracy/ })
+    .first()
+    .waitFor();
   await view.done();
 });

@@ -52,13 +52,19 @@ test("a learnt rig's cycle is shown with what it finds, downloaded, and run by i
   writeFileSync(join(work, "drive-cycle.json"), JSON.stringify(cycle));
   writeFileSync(join(work, "drive-cycle.py"), program.replace("return 0.0, 0.0\n", "return 0.01, None\n"));
   execFileSync("python3", ["drive-cycle.py"], { cwd: work });
-  const record = readFileSync(join(work, "drive-cycle-run.csv"), "utf8").trim().split("\n").map((line) => line.split(","));
+  const record = readFileSync(join(work, "drive-cycle-run.csv"), "utf8")
+    .trim()
+    .split("\n")
+    .map((line) => line.split(","));
   assert.equal(record.length, 11);
   const [, qx, qy, x, y] = record[1];
   assert.deepEqual([x, y], ["0.010000", ""]);
   const corrected = cycle.rows.cmd_qy_rad[0] + cycle.correct_qy.proportional * -0.01;
   assert.ok(Math.abs(Number(qy) - corrected) < 1e-4, `${qy} is not ${corrected}`);
-  assert.ok(Math.abs(Number(qx) - cycle.rows.cmd_qx_rad[0]) < 1e-6, "where nothing is seen nothing is corrected");
+  assert.ok(
+    Math.abs(Number(qx) - cycle.rows.cmd_qx_rad[0]) < 1e-6,
+    "where nothing is seen nothing is corrected",
+  );
   assert.deepEqual(view.errors, []);
   await view.done();
 });

@@ -35,7 +35,9 @@ const N = 3000;
 test("thousands of rigs: found, filtered, and only those in sight are in the document", async () => {
   service = await serve(`${work}/many`);
   for (let i = 0; i < N; i += 100) {
-    await Promise.all(Array.from({ length: 100 }, (_, k) => ask(service.url, "POST", "/assets", { name: `rig-${i + k}` })));
+    await Promise.all(
+      Array.from({ length: 100 }, (_, k) => ask(service.url, "POST", "/assets", { name: `rig-${i + k}` })),
+    );
   }
   await ask(service.url, "PUT", "/assets/rig-7", { ...rig.learnt, name: "rig-7" });
   const view = await page(chromium);
@@ -56,7 +58,10 @@ test("thousands of rigs: found, filtered, and only those in sight are in the doc
 
   // A fault shows at once, first of all, and can be filtered.
   await ask(service.url, "POST", "/assets/rig-7/telemetry?session=now", rig.sick, "text/csv");
-  await view.getByRole("region", { name: "Rigs" }).getByText(/X servo/).waitFor({ timeout: 2000 });
+  await view
+    .getByRole("region", { name: "Rigs" })
+    .getByText(/X servo/)
+    .waitFor({ timeout: 2000 });
   await view.getByRole("button", { name: /^Fault/ }).click();
   assert.equal(await rows.filter({ hasText: "rig-7" }).count(), 1);
   assert.deepEqual(view.errors, []);
@@ -66,7 +71,10 @@ test("thousands of rigs: found, filtered, and only those in sight are in the doc
 test("when the service comes back, the page catches up", async () => {
   const view = await page(chromium, { viewport: { width: 1500, height: 900 } });
   await view.goto(`${service.url}/?search=rig-8`);
-  await view.getByRole("link", { name: /rig-8\b/ }).first().waitFor();
+  await view
+    .getByRole("link", { name: /rig-8\b/ })
+    .first()
+    .waitFor();
   await view.getByText("live", { exact: true }).waitFor();
   const { port } = service;
   await service.stop();
@@ -76,7 +84,11 @@ test("when the service comes back, the page catches up", async () => {
   await ask(service.url, "PUT", "/assets/rig-8", { ...rig.learnt, name: "rig-8" });
   await ask(service.url, "POST", "/assets/rig-8/telemetry?session=later", rig.sick, "text/csv");
   await view.getByText("live", { exact: true }).waitFor();
-  await view.getByRole("region", { name: "Rigs" }).getByText(/X servo/).first().waitFor();
+  await view
+    .getByRole("region", { name: "Rigs" })
+    .getByText(/X servo/)
+    .first()
+    .waitFor();
   await view.getByText("The service does not answer").waitFor({ state: "detached" });
   // What was missed has come as events too, each once.
   const feed = view.getByRole("region", { name: "Events" });

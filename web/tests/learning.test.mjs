@@ -35,10 +35,16 @@ test("gathered, offered, confirmed with a click", async () => {
 
   await send("new", 0, 3000);
   const bar = panel(view).getByRole("progressbar", { name: "Motion along x" });
-  await panel(view).getByText(/^2\d of 60 s$/).first().waitFor();
+  await panel(view)
+    .getByText(/^2\d of 60 s$/)
+    .first()
+    .waitFor();
   const early = Number(await bar.getAttribute("value"));
   await send("new", 3000, 5000);
-  await panel(view).getByText(/^4\d of 60 s$/).first().waitFor();
+  await panel(view)
+    .getByText(/^4\d of 60 s$/)
+    .first()
+    .waitFor();
   assert.ok(Number(await bar.getAttribute("value")) > early, "the bar follows");
 
   await send("new", 5000, 7000);
@@ -46,7 +52,9 @@ test("gathered, offered, confirmed with a click", async () => {
   await panel(view).getByRole("link", { name: "first" }).waitFor();
   await panel(view).getByRole("button", { name: "Yes, use what was learnt" }).click();
   await view.getByRole("heading", { name: "Learnt by itself" }).waitFor();
-  await panel(view).getByText(/Learnt from 1 session; the next healthy ones refine it until 5 have taught/).waitFor();
+  await panel(view)
+    .getByText(/Learnt from 1 session; the next healthy ones refine it until 5 have taught/)
+    .waitFor();
   const { calibration } = await ask(service.url, "GET", "/assets/new");
   assert.ok(Math.abs(calibration.x.gain - rig.learnt.calibration.x.gain) < 0.05, "as learnt by hand");
   assert.deepEqual(view.errors, []);

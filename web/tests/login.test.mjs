@@ -29,9 +29,12 @@ after(async () => {
   remove(work);
 });
 
-const asks = (method, path, token, body) => fetch(`${service.url}/api/v1${path}`, {
-  method, headers: { authorization: `Bearer ${token}`, "content-type": "application/json" }, body: JSON.stringify(body),
-});
+const asks = (method, path, token, body) =>
+  fetch(`${service.url}/api/v1${path}`, {
+    method,
+    headers: { authorization: `Bearer ${token}`, "content-type": "application/json" },
+    body: JSON.stringify(body),
+  });
 
 test("whoever is not known finds the way in and nothing else", async () => {
   await view.getByLabel("Token").waitFor();
@@ -48,7 +51,12 @@ test("a token opens the page where it was asked for", async () => {
   await view.getByRole("button", { name: "Log in" }).click();
   await view.getByRole("heading", { name: "Set up bench-1" }).waitFor();
   await view.getByText("ann", { exact: true }).waitFor();
-  await view.getByRole("status").getByText("live", { exact: true }).or(view.locator(".link-live")).first().waitFor();
+  await view
+    .getByRole("status")
+    .getByText("live", { exact: true })
+    .or(view.locator(".link-live"))
+    .first()
+    .waitFor();
   const [cookie] = await view.context().cookies();
   assert.deepEqual([cookie.httpOnly, cookie.sameSite], [true, "Strict"]);
   assert.equal(await view.evaluate("document.cookie"), "");

@@ -11,16 +11,17 @@ const watch = () => {
   const seen = (window.seen = { frames: 0, late: 0, scripting: 0, long: 0, longest: 0, skip: false });
   const real = window.requestAnimationFrame.bind(window);
   let last = 0;
-  window.requestAnimationFrame = (draw) => real((now) => {
-    const begun = performance.now();
-    draw(now);
-    seen.scripting += performance.now() - begun;
-    if (now !== last) {
-      seen.frames++;
-      if (last && now - last > 25) seen.late++;
-      last = now;
-    }
-  });
+  window.requestAnimationFrame = (draw) =>
+    real((now) => {
+      const begun = performance.now();
+      draw(now);
+      seen.scripting += performance.now() - begun;
+      if (now !== last) {
+        seen.frames++;
+        if (last && now - last > 25) seen.late++;
+        last = now;
+      }
+    });
   new PerformanceObserver((list) => {
     for (const { duration } of list.getEntries()) {
       seen.long++;
@@ -30,16 +31,28 @@ const watch = () => {
 };
 
 async function frames(view, what) {
-  await view.evaluate(() => Object.assign(window.seen, { frames: 0, late: 0, scripting: 0, long: 0, longest: 0 }));
+  await view.evaluate(() =>
+    Object.assign(window.seen, { frames: 0, late: 0, scripting: 0, long: 0, longest: 0 }),
+  );
   const client = await view.context().newCDPSession(view);
   await client.send("Performance.enable");
-  const of = async () => Object.fromEntries((await client.send("Performance.getMetrics")).metrics.map(({ name, value }) => [name, value]));
-  const before = await of();
+  const metrics = async () => {
+    const { metrics } = await client.send("Performance.getMetrics");
+    return Object.fromEntries(metrics.map(({ name, value }) => [name, value]));
+  };
+  const before = await metrics();
   await view.waitForTimeout(SECONDS * 1000);
-  const after = await of();
+  const after = await metrics();
   const seen = await view.evaluate(() => window.seen);
-  const per = (name) => ((1000 * (after[name] - before[name])) / seen.frames).toFixed(2);
-  console.log(`${what}: ${(seen.frames / SECONDS).toFixed(1)} frames/s, ${seen.late} later than 25 ms; per frame: callbacks ${(seen.scripting / seen.frames).toFixed(2)} ms, all scripting ${per("ScriptDuration")} ms, layout ${per("LayoutDuration")} ms, style ${per("RecalcStyleDuration")} ms; long tasks ${seen.long}, longest ${seen.longest.toFixed(0)} ms`);
+  const perFrame = (name) => `${((1000 * (after[name] - before[name])) / seen.frames).toFixed(2)} ms`;
+  const figures = [
+    `${(seen.frames / SECONDS).toFixed(1)} frames/s, ${seen.late} later than 25 ms`,
+    `per frame: callbacks ${(seen.scripting / seen.frames).toFixed(2)} ms, ` +
+      `all scripting ${perFrame("ScriptDuration")}, layout ${perFrame("LayoutDuration")}, ` +
+      `style ${perFrame("RecalcStyleDuration")}`,
+    `long tasks ${seen.long}, longest ${seen.longest.toFixed(0)} ms`,
+  ];
+  console.log(`${what}: ${figures.join("; ")}`);
 }
 
 async function opened(of, url, what, ready) {
@@ -52,14 +65,18 @@ async function opened(of, url, what, ready) {
     times.push(performance.now() - begun);
     await view.done();
   }
-  console.log(`${what}: ${times.map((ms) => ms.toFixed(0)).join(", ")} ms from the address to the first interaction`);
+  console.log(
+    `${what}: ${times.map((ms) => ms.toFixed(0)).join(", ")} ms from the address to the first interaction`,
+  );
 }
 
 const of = await browser();
 const show = await demo();
 try {
   await opened(of, show.url, "fleet", (view) => view.getByRole("searchbox").fill("demo"));
-  await opened(of, `${show.url}/rigs/demo-rig`, "rig", (view) => view.getByRole("button", { name: "30 s" }).click());
+  await opened(of, `${show.url}/rigs/demo-rig`, "rig", (view) =>
+    view.getByRole("button", { name: "30 s" }).click(),
+  );
   const view = await page(of);
   await view.addInitScript(watch);
   await view.goto(`${show.url}/rigs/demo-rig`);
@@ -79,7 +96,9 @@ const data = directory();
 const service = await serve(data);
 try {
   for (let i = 0; i < RIGS; i += 100) {
-    await Promise.all(Array.from({ length: 100 }, (_, k) => ask(service.url, "POST", "/assets", { name: `rig-${i + k}` })));
+    await Promise.all(
+      Array.from({ length: 100 }, (_, k) => ask(service.url, "POST", "/assets", { name: `rig-${i + k}` })),
+    );
   }
   await opened(of, service.url, `fleet of ${RIGS}`, (view) => view.getByRole("searchbox").fill("rig-49"));
   const view = await page(of);
@@ -88,7 +107,10 @@ try {
   await view.getByRole("link", { name: /rig-1\b/ }).waitFor();
   await view.evaluate(() => {
     let y = 0;
-    const step = () => { scrollTo(0, (y += 97) % document.body.scrollHeight); requestAnimationFrame(step); };
+    const step = () => {
+      scrollTo(0, (y += 97) % document.body.scrollHeight);
+      requestAnimationFrame(step);
+    };
     requestAnimationFrame(step);
   });
   await frames(view, `fleet of ${RIGS} scrolling`);

@@ -20,7 +20,8 @@ before(async () => {
   service = await serve(work);
   const { learnt, sick } = recordings(work);
   await ask(service.url, "POST", "/assets", { ...learnt, name: "bench" });
-  session = (await ask(service.url, "POST", "/assets/bench/sessions/import?name=monday", sick, "text/csv")).session;
+  session = (await ask(service.url, "POST", "/assets/bench/sessions/import?name=monday", sick, "text/csv"))
+    .session;
 });
 
 after(async () => {
@@ -29,13 +30,16 @@ after(async () => {
   remove(work);
 });
 
-const fetched = (path, headers = {}) => new Promise((done, failed) => {
-  get(service.url + path, { headers }, (answer) => {
-    const parts = [];
-    answer.on("data", (part) => parts.push(part));
-    answer.on("end", () => done({ status: answer.statusCode, headers: answer.headers, body: Buffer.concat(parts) }));
-  }).on("error", failed);
-});
+const fetched = (path, headers = {}) =>
+  new Promise((done, failed) => {
+    get(service.url + path, { headers }, (answer) => {
+      const parts = [];
+      answer.on("data", (part) => parts.push(part));
+      answer.on("end", () =>
+        done({ status: answer.statusCode, headers: answer.headers, body: Buffer.concat(parts) }),
+      );
+    }).on("error", failed);
+  });
 
 test("the page is asked for by its hash, its parts are kept for ever", async () => {
   const html = await fetched("/", { accept: "text/html" });
@@ -58,7 +62,11 @@ test("the page is asked for by its hash, its parts are kept for ever", async () 
 test("the page's own addresses are the page, others are problems", async () => {
   const html = { accept: "text/html,*/*" };
   assert.match((await fetched("/rigs/bench", html)).headers["content-type"], /text\/html/);
-  for (const [path, headers] of [["/rigs/bench", {}], ["/api/v1/none", html], ["/static/none.js", html]]) {
+  for (const [path, headers] of [
+    ["/rigs/bench", {}],
+    ["/api/v1/none", html],
+    ["/static/none.js", html],
+  ]) {
     const answer = await fetched(path, headers);
     assert.equal(answer.status, 404, path);
     assert.match(answer.headers["content-type"], /problem\+json/, path);
@@ -85,10 +93,18 @@ test("the first load is small and asks nobody else", async () => {
 
 /** Views with the sign that they are there. */
 const VIEWS = () => [
-  ["/", "bench"], ["/rigs/bench", "Monitors"], ["/rigs/bench/faults/x_servo", "Freeze frame"], ["/rigs/bench/faults/sensor", "Nothing is on record"],
-  ["/sessions", "monday"], [`/sessions/${session.id}`, "Judge it again"], ["/set-up", "Units that the device sends"],
-  ["/rigs/bench/set-up?step=connect", "Waiting for the first sample"], ["/rigs/bench/set-up?step=check", "Signs and units"],
-  ["/rigs/bench/set-up?step=learn", "What was learnt"], ["/learn", "Why 0.01"], ["/nowhere", "There is nothing here"],
+  ["/", "bench"],
+  ["/rigs/bench", "Monitors"],
+  ["/rigs/bench/faults/x_servo", "Freeze frame"],
+  ["/rigs/bench/faults/sensor", "Nothing is on record"],
+  ["/sessions", "monday"],
+  [`/sessions/${session.id}`, "Judge it again"],
+  ["/set-up", "Units that the device sends"],
+  ["/rigs/bench/set-up?step=connect", "Waiting for the first sample"],
+  ["/rigs/bench/set-up?step=check", "Signs and units"],
+  ["/rigs/bench/set-up?step=learn", "What was learnt"],
+  ["/learn", "Why 0.01"],
+  ["/nowhere", "There is nothing here"],
 ];
 
 for (const colorScheme of ["light", "dark"]) {
@@ -101,7 +117,13 @@ for (const colorScheme of ["light", "dark"]) {
         await view.evaluate(AXE);
         const { violations } = await view.evaluate(() => window.axe.run());
         const serious = violations.filter(({ impact }) => ["serious", "critical"].includes(impact));
-        const words = serious.map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.html).join(" | ").slice(0, 400)}`);
+        const words = serious.map(
+          ({ id, nodes }) =>
+            `${id}: ${nodes
+              .map((node) => node.html)
+              .join(" | ")
+              .slice(0, 400)}`,
+        );
         assert.deepEqual(words, [], path);
         const over = await view.evaluate(() => document.documentElement.scrollWidth - innerWidth);
         assert.ok(over <= 0, `${path} is ${over} px too wide`);
@@ -114,11 +136,18 @@ for (const colorScheme of ["light", "dark"]) {
 
 test("a rig that is not there, a fault that is not, a session that is not: said in words", async () => {
   const view = await page(chromium);
-  for (const [path, words] of [["/rigs/nobody", "there is no asset `nobody`"], ["/rigs/bench/faults/none", "no such fault code"], ["/sessions/none", "there is no session `none`"]]) {
+  for (const [path, words] of [
+    ["/rigs/nobody", "there is no asset `nobody`"],
+    ["/rigs/bench/faults/none", "no such fault code"],
+    ["/sessions/none", "there is no session `none`"],
+  ]) {
     await view.goto(service.url + path);
     await view.getByRole("alert").getByText(words).waitFor();
   }
-  assert.ok(view.errors.every((error) => error.includes("404")), view.errors.join("\n"));
+  assert.ok(
+    view.errors.every((error) => error.includes("404")),
+    view.errors.join("\n"),
+  );
   await view.done();
 });
 

@@ -6,7 +6,11 @@ import { ask, browser, demo, directory, drifting, page, recordings, remove, serv
 
 const out = process.argv[2] ?? "screenshots";
 const only = process.argv[3]?.split(",");
-const SIZES = { phone: { width: 390, height: 844 }, laptop: { width: 1366, height: 850 }, wall: { width: 2560, height: 1440 } };
+const SIZES = {
+  phone: { width: 390, height: 844 },
+  laptop: { width: 1366, height: 850 },
+  wall: { width: 2560, height: 1440 },
+};
 const THEMES = ["light", "dark"];
 mkdirSync(out, { recursive: true });
 
@@ -44,12 +48,23 @@ try {
   for (let i = 2; i < 40; i++) {
     await ask(base, "POST", "/assets", { name: `bench-${i}` });
     const rows = sick.split("\n").slice(1, 200).join("\n");
-    if (i % 3) await ask(base, "POST", `/assets/bench-${i}/telemetry?session=run-${i}`, `${sick.split("\n")[0]}\n${rows}`, "text/csv");
+    if (i % 3)
+      await ask(
+        base,
+        "POST",
+        `/assets/bench-${i}/telemetry?session=run-${i}`,
+        `${sick.split("\n")[0]}\n${rows}`,
+        "text/csv",
+      );
   }
   const heading = (text) => (view) => view.getByRole("heading", { name: text }).first().waitFor();
   await ask(base, "POST", "/demo/faults", { fault: "x_servo:dead" });
-  await shoot(of, "fleet", `${base}/`, heading("Fleet"), (view) => view.getByText("X servo").first().waitFor());
-  await shoot(of, "fault", `${base}/rigs/bench-1/faults/x_servo`, heading("Status byte"), (view) => settle(view));
+  await shoot(of, "fleet", `${base}/`, heading("Fleet"), (view) =>
+    view.getByText("X servo").first().waitFor(),
+  );
+  await shoot(of, "fault", `${base}/rigs/bench-1/faults/x_servo`, heading("Status byte"), (view) =>
+    settle(view),
+  );
   await shoot(of, "asset", `${base}/rigs/demo-rig`, heading("Monitors"), async (view) => {
     // A healthy moment, then a servo dies.
     await ask(base, "DELETE", "/demo/faults");
@@ -63,12 +78,20 @@ try {
     await view.getByRole("heading", { name: "Drift over sessions" }).scrollIntoViewIfNeeded();
     await view.evaluate(() => scrollTo(0, document.body.scrollHeight));
   });
-  await shoot(of, "sessions", `${base}/sessions`, heading("Sessions"), (view) => view.getByText("monday").first().waitFor());
-  await shoot(of, "session", `${base}/sessions/${imported.session.id}?t=19`, heading("Judge it again"), async (view) => {
-    await view.getByRole("button", { name: "Play" }).waitFor();
-    await view.getByRole("button", { name: "Judge again" }).click();
-    await view.getByText("Another verdict").waitFor();
-  });
+  await shoot(of, "sessions", `${base}/sessions`, heading("Sessions"), (view) =>
+    view.getByText("monday").first().waitFor(),
+  );
+  await shoot(
+    of,
+    "session",
+    `${base}/sessions/${imported.session.id}?t=19`,
+    heading("Judge it again"),
+    async (view) => {
+      await view.getByRole("button", { name: "Play" }).waitFor();
+      await view.getByRole("button", { name: "Judge again" }).click();
+      await view.getByText("Another verdict").waitFor();
+    },
+  );
   await shoot(of, "import", `${base}/sessions`, heading("Sessions"), async (view) => {
     await view.getByText("monday").first().waitFor();
     await view.locator("input[type=file]").setInputFiles(path("sick.csv"));
@@ -76,7 +99,9 @@ try {
   });
   await shoot(of, "set-up", `${base}/set-up`, heading("Set up a rig"));
   await shoot(of, "connect", `${base}/rigs/bench-3/set-up?step=connect`, heading("Set up bench-3"));
-  await shoot(of, "check", `${base}/rigs/demo-rig/set-up?step=check`, heading("Signs and units"), (view) => settle(view, 5000));
+  await shoot(of, "check", `${base}/rigs/demo-rig/set-up?step=check`, heading("Signs and units"), (view) =>
+    settle(view, 5000),
+  );
   await shoot(of, "learn-rig", `${base}/rigs/bench-1/set-up?step=learn`, heading("What was learnt"));
   await shoot(of, "demo", `${base}/learn`, heading("Break it"), (view) => settle(view));
   await shoot(of, "missing", `${base}/rigs/nobody`, heading("nobody"));
@@ -85,11 +110,11 @@ try {
   await show.stop();
 }
 const empty = await serve(join(work, "empty"));
-const again = await browser();
+const emptyBrowser = await browser();
 try {
-  await shoot(again, "empty", `${empty.url}/`, (view) => view.getByText("No rig yet").waitFor());
+  await shoot(emptyBrowser, "empty", `${empty.url}/`, (view) => view.getByText("No rig yet").waitFor());
 } finally {
-  await again.close();
+  await emptyBrowser.close();
   await empty.stop();
   remove(work);
 }

@@ -20,16 +20,25 @@ after(async () => {
   remove(work);
 });
 
-/** The healthy recording as another would have written it: semicolons, degrees, millimetres, milliseconds, x the other way. */
+/**
+ * The healthy recording as another would have written it: semicolons and decimal commas, degrees,
+ * millimetres, milliseconds, x the other way round.
+ */
 function foreign() {
-  const rows = rig.healthy.trim().split("\n").slice(1).map((line) => line.split(","));
+  const rows = rig.healthy
+    .trim()
+    .split("\n")
+    .slice(1)
+    .map((line) => line.split(","));
   const scaled = (cell, factor) => (cell === "" ? "" : (Number(cell) * factor).toFixed(3).replace(".", ","));
   const degrees = 180 / Math.PI;
-  const lines = rows.map(([t, qx, qy, x, y]) => [scaled(t, 1000), scaled(x, -1000), scaled(y, 1000), scaled(qx, degrees), scaled(qy, degrees)].join(";"));
+  const lines = rows.map(([t, qx, qy, x, y]) =>
+    [scaled(t, 1000), scaled(x, -1000), scaled(y, 1000), scaled(qx, degrees), scaled(qy, degrees)].join(";"),
+  );
   return ["time [ms];ball x (mm);ball y (mm);qx (deg);qy (deg)", ...lines].join("\n");
 }
 
-test("a foreign file is mapped, its sign is found wrong, mended, imported", async () => {
+test("a foreign file is mapped, its sign is found wrong, corrected, imported", async () => {
   const file = `${work}/foreign.csv`;
   writeFileSync(file, foreign());
   const view = await page(chromium);
@@ -37,8 +46,14 @@ test("a foreign file is mapped, its sign is found wrong, mended, imported", asyn
   await view.locator("input[type=file]").setInputFiles(file);
   const dialogue = view.getByRole("dialog");
   await dialogue.getByText("the ball goes the other way").waitFor();
-  for (const [role, unit] of [["Time", "ms"], ["Command qx (about x)", "°"], ["Ball x", "mm"]]) {
-    const chosen = await dialogue.getByLabel(`Unit of ${role}`).evaluate((select) => select.selectedOptions[0].textContent);
+  for (const [role, unit] of [
+    ["Time", "ms"],
+    ["Command qx (about x)", "°"],
+    ["Ball x", "mm"],
+  ]) {
+    const chosen = await dialogue
+      .getByLabel(`Unit of ${role}`)
+      .evaluate((select) => select.selectedOptions[0].textContent);
     assert.equal(chosen, unit, role);
   }
   await dialogue.getByText("90.0\u202fs: 100.0\u202fHz").waitFor();
@@ -56,11 +71,15 @@ test("a file that is dropped opens the dialogue; one that is none is said to be 
   const view = await page(chromium);
   await view.goto(`${service.url}/sessions`);
   await view.getByText("Drop a recording").waitFor();
-  const drop = (name, text) => view.evaluate(([name, text]) => {
-    const files = new DataTransfer();
-    files.items.add(new File([text], name, { type: "text/csv" }));
-    dispatchEvent(new DragEvent("drop", { dataTransfer: files, bubbles: true, cancelable: true }));
-  }, [name, text]);
+  const drop = (name, text) =>
+    view.evaluate(
+      ([name, text]) => {
+        const files = new DataTransfer();
+        files.items.add(new File([text], name, { type: "text/csv" }));
+        dispatchEvent(new DragEvent("drop", { dataTransfer: files, bubbles: true, cancelable: true }));
+      },
+      [name, text],
+    );
   await drop("numbers.csv", "0,1,2,3\n1,2,3,4\n2,3,4,5\n");
   await view.getByRole("alert").getByText("it should have the names of the columns").waitFor();
   await view.keyboard.press("Escape");
@@ -76,7 +95,13 @@ test("a file that is dropped opens the dialogue; one that is none is said to be 
 });
 
 test("played back, scrubbed, judged again, recorded, downloaded, deleted", async () => {
-  const { session } = await ask(service.url, "POST", "/assets/bench/sessions/import?name=sick", rig.sick, "text/csv");
+  const { session } = await ask(
+    service.url,
+    "POST",
+    "/assets/bench/sessions/import?name=sick",
+    rig.sick,
+    "text/csv",
+  );
   const view = await page(chromium);
   await view.goto(`${service.url}/sessions/${session.id}`);
   const moment = view.getByRole("slider", { name: "Moment" });
@@ -88,8 +113,14 @@ test("played back, scrubbed, judged again, recorded, downloaded, deleted", async
 
   // At 25 s the ball has left the twin behind: the picture is of that moment.
   await view.getByText("Loading 3D").waitFor({ state: "detached" });
-  await view.getByLabel("Tilt of the twin's plate").filter({ hasText: /qy −1\d\.\d°/ }).waitFor();
-  await view.getByRole("button", { name: /Go to 2\d/ }).first().click();
+  await view
+    .getByLabel("Tilt of the twin's plate")
+    .filter({ hasText: /qy −1\d\.\d°/ })
+    .waitFor();
+  await view
+    .getByRole("button", { name: /Go to 2\d/ })
+    .first()
+    .click();
   await view.waitForFunction(() => Number(document.querySelector(".scrub").value) < 21);
 
   await view.getByRole("button", { name: "Judge again" }).click();
@@ -101,14 +132,25 @@ test("played back, scrubbed, judged again, recorded, downloaded, deleted", async
 
   await view.getByRole("button", { name: "Play" }).click();
   await view.getByRole("button", { name: /record/ }).click();
-  await view.waitForFunction((from) => Number(document.querySelector(".scrub").value) > Number(from) + 1, await moment.inputValue());
-  const [video] = await Promise.all([view.waitForEvent("download"), view.getByRole("button", { name: /stop/ }).click()]);
+  await view.waitForFunction(
+    (from) => Number(document.querySelector(".scrub").value) > Number(from) + 1,
+    await moment.inputValue(),
+  );
+  const [video] = await Promise.all([
+    view.waitForEvent("download"),
+    view.getByRole("button", { name: /stop/ }).click(),
+  ]);
   const bytes = readFileSync(await video.path());
   assert.match(video.suggestedFilename(), /^bench-sick\.(webm|mp4)$/);
   assert.ok(bytes.length > 5000, `a video of ${bytes.length} bytes`);
 
-  const [csv] = await Promise.all([view.waitForEvent("download"), view.getByRole("button", { name: "Download CSV" }).click()]);
-  const lines = readFileSync(await csv.path(), "utf8").trim().split("\n");
+  const [csv] = await Promise.all([
+    view.waitForEvent("download"),
+    view.getByRole("button", { name: "Download CSV" }).click(),
+  ]);
+  const lines = readFileSync(await csv.path(), "utf8")
+    .trim()
+    .split("\n");
   assert.equal(lines.length, rig.sick.trim().split("\n").length);
 
   await view.getByRole("button", { name: "Delete" }).click();
@@ -123,14 +165,23 @@ test("played back, scrubbed, judged again, recorded, downloaded, deleted", async
 test("what was not judged is said, of a moment and of what was judged again", async () => {
   // Three tenths of a second: less than any fault takes to be confirmed.
   const moment = rig.healthy.split("\n").slice(0, 31).join("\n");
-  const { session } = await ask(service.url, "POST", "/assets/bench/sessions/import?name=moment", moment, "text/csv");
+  const { session } = await ask(
+    service.url,
+    "POST",
+    "/assets/bench/sessions/import?name=moment",
+    moment,
+    "text/csv",
+  );
   const view = await page(chromium);
   await view.goto(`${service.url}/sessions/${session.id}`);
   await view.getByText("Not judged", { exact: true }).waitFor();
   const shares = view.getByRole("table", { name: "Judged, of the session" });
   assert.equal(await shares.getByRole("cell", { name: "not judged" }).count(), 4);
   await view.goto(`${service.url}/sessions`);
-  await view.getByRole("row", { name: /moment/ }).getByText("Not judged").waitFor();
+  await view
+    .getByRole("row", { name: /moment/ })
+    .getByText("Not judged")
+    .waitFor();
   assert.deepEqual(view.errors, []);
   await view.done();
 });

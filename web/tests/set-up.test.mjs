@@ -21,17 +21,31 @@ after(async () => {
 /** The healthy recording as rows of a device whose x and y are swapped, in mm, y the wrong way. */
 function rows(from, to) {
   const number = (cell) => (cell === "" ? null : Number(cell));
-  return rig.healthy.trim().split("\n").slice(1 + from, 1 + to).map((line, i) => {
-    const [t, qx, qy, x, y] = line.split(",").map(number);
-    return { seq: from + i + 1, t_s: t, cmd_qx_rad: qx, cmd_qy_rad: qy, x_m: y === null ? null : -y * 1000, y_m: x === null ? null : x * 1000 };
-  });
+  return rig.healthy
+    .trim()
+    .split("\n")
+    .slice(1 + from, 1 + to)
+    .map((line, i) => {
+      const [t, qx, qy, x, y] = line.split(",").map(number);
+      return {
+        seq: from + i + 1,
+        t_s: t,
+        cmd_qx_rad: qx,
+        cmd_qy_rad: qy,
+        x_m: y === null ? null : -y * 1000,
+        y_m: x === null ? null : x * 1000,
+      };
+    });
 }
 
-test("described, connected, mended, learnt", async () => {
+test("described, connected, corrected, learnt", async () => {
   const view = await page(chromium);
   await view.goto(`${service.url}/set-up`);
   await view.getByLabel("Name").fill("bench 1");
-  assert.ok(await view.getByRole("button", { name: "Register and go on" }).isDisabled(), "a name with a blank");
+  assert.ok(
+    await view.getByRole("button", { name: "Register and go on" }).isDisabled(),
+    "a name with a blank",
+  );
   await view.getByLabel("Name").fill("bench-1");
   await view.getByLabel("Ball's position").selectOption({ label: "mm" });
   await view.getByRole("button", { name: "Register and go on" }).click();
@@ -40,7 +54,8 @@ test("described, connected, mended, learnt", async () => {
     await view.getByRole("button", { name: word, exact: true }).click();
     await view.getByLabel(`${word} snippet`).getByText("/api/v1/assets/bench-1/telemetry").first().waitFor();
   }
-  const send = (from, to) => ask(service.url, "POST", "/assets/bench-1/telemetry", { samples: rows(from, to) });
+  const send = (from, to) =>
+    ask(service.url, "POST", "/assets/bench-1/telemetry", { samples: rows(from, to) });
   await send(0, 20);
   await view.getByText(/Samples (are coming|have come)/).waitFor();
   await view.getByRole("button", { name: "Check it" }).click();
@@ -67,8 +82,14 @@ test("described, connected, mended, learnt", async () => {
   await view.getByRole("button", { name: "Learn from it" }).click();
   await view.getByText("The next session is judged by it.").waitFor();
   const learnt = await ask(service.url, "GET", "/assets/bench-1");
-  assert.ok(Math.abs(learnt.calibration.x.gain - rig.learnt.calibration.x.gain) < 0.05, "as learnt from the plain recording");
-  await view.getByRole("cell", { name: `${learnt.calibration.x.gain.toFixed(3)}` }).first().waitFor();
+  assert.ok(
+    Math.abs(learnt.calibration.x.gain - rig.learnt.calibration.x.gain) < 0.05,
+    "as learnt from the plain recording",
+  );
+  await view
+    .getByRole("cell", { name: `${learnt.calibration.x.gain.toFixed(3)}` })
+    .first()
+    .waitFor();
   assert.deepEqual(view.errors, []);
   await view.done();
 });
@@ -76,7 +97,13 @@ test("described, connected, mended, learnt", async () => {
 test("a recording in which nothing moves is refused, in words", async () => {
   await ask(service.url, "POST", "/assets", { name: "still" });
   const lines = Array.from({ length: 3000 }, (_, i) => `${(i / 100).toFixed(2)},0,0,0.01,0.01`);
-  await ask(service.url, "POST", "/assets/still/sessions/import?name=rest", `t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n${lines.join("\n")}\n`, "text/csv");
+  await ask(
+    service.url,
+    "POST",
+    "/assets/still/sessions/import?name=rest",
+    `t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n${lines.join("\n")}\n`,
+    "text/csv",
+  );
   const view = await page(chromium);
   await view.goto(`${service.url}/rigs/still/set-up?step=learn`);
   await view.getByRole("checkbox").first().check();

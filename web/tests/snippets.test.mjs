@@ -39,7 +39,8 @@ async function run(program, args, done = () => false) {
   child.stderr.on("data", (bytes) => (said += bytes));
   const ended = new Promise((end) => child.once("exit", end));
   const late = AbortSignal.timeout(SOON);
-  while (child.exitCode === null && !late.aborted && !(await done())) await new Promise((go) => setTimeout(go, 100));
+  while (child.exitCode === null && !late.aborted && !(await done()))
+    await new Promise((go) => setTimeout(go, 100));
   if (child.exitCode === null && late.aborted) child.kill();
   const ok = child.exitCode === 0 || (await done());
   child.kill();
@@ -49,7 +50,10 @@ async function run(program, args, done = () => false) {
 
 test("curl sends a sample and a recording, and the page sees them come", async () => {
   const text = await snippet("curl");
-  writeFileSync(join(work, "recording.csv"), "t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n0.01,0,0.02,0.010,-0.004\n0.02,0,0.02,0.011,-0.004\n");
+  writeFileSync(
+    join(work, "recording.csv"),
+    "t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n0.01,0,0.02,0.010,-0.004\n0.02,0,0.02,0.011,-0.004\n",
+  );
   const { ok, said } = await run("sh", ["-ec", text]);
   assert.ok(ok, said);
   assert.equal(said.match(/"accepted":/g).length, 2, said);
@@ -75,7 +79,9 @@ test("the microcontroller's row and body are what the interface takes", async ()
   const values = [7, 0.07, 0, 0.02, 0.01, -0.004];
   const row = format.replace(/%[.\d]*[uf]/g, () => String(values.shift()));
   assert.equal(values.length, 0, "as many places as values");
-  const [, before, behind] = /POST\("(.*?)" \+ batch \+ "(.*?)"\)/.exec(text).map((part) => part.replaceAll('\\"', '"'));
+  const [, before, behind] = /POST\("(.*?)" \+ batch \+ "(.*?)"\)/
+    .exec(text)
+    .map((part) => part.replaceAll('\\"', '"'));
   const path = /URL = "http:\/\/[^/]+\/api\/v1([^"]+)"/.exec(text)[1];
   const answer = await ask(service.url, "POST", `${path}?session=esp32`, before + row + behind);
   assert.deepEqual([answer.accepted, answer.rejected, answer.last_seq], [1, [], 7]);

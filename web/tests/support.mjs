@@ -6,11 +6,18 @@ import { after } from "node:test";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { fileURLToPath } from "node:url";
+import { stripVTControlCharacters } from "node:util";
 import { chromium } from "playwright-core";
 
 const ROOT = fileURLToPath(new URL("../..", import.meta.url));
-export const BINARY = process.env.BINARY ?? join(process.env.CARGO_TARGET_DIR ?? join(ROOT, "target"), "debug/offbd");
-const BROWSERS = [process.env.CHROMIUM, "/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"];
+export const BINARY =
+  process.env.BINARY ?? join(process.env.CARGO_TARGET_DIR ?? join(ROOT, "target"), "debug/offbd");
+const BROWSERS = [
+  process.env.CHROMIUM,
+  "/usr/bin/chromium",
+  "/usr/bin/chromium-browser",
+  "/usr/bin/google-chrome",
+];
 
 /** Longest wait for anything that should be there in a moment, ms. */
 export const SOON = 20_000;
@@ -25,8 +32,10 @@ function address(child, stream) {
     child.once("exit", (code) => failed(new Error(`it ended with ${code}:\n${said}`)));
     child[stream].on("data", (bytes) => {
       if (said.length < 1e5) said += bytes;
-      const port = /(?:http:\/\/|address=)127\.0\.0\.1:(\d+)/.exec(said.replaceAll(/\u001b\[\d*m/g, ""))?.[1];
-      if (port) clearTimeout(late), found(Number(port));
+      const port = /(?:http:\/\/|address=)127\.0\.0\.1:(\d+)/.exec(stripVTControlCharacters(said))?.[1];
+      if (!port) return;
+      clearTimeout(late);
+      found(Number(port));
     });
   });
 }
@@ -41,7 +50,10 @@ after(() => {
 /** A running program; `stop` ends it as Ctrl-C would. */
 async function run(args, stream) {
   assert.ok(existsSync(BINARY), `${BINARY} is missing; build it with cargo build, or name another in BINARY`);
-  const child = spawn(BINARY, args, { env: { ...process.env, NO_COLOR: "1" }, stdio: ["ignore", "pipe", "pipe"] });
+  const child = spawn(BINARY, args, {
+    env: { ...process.env, NO_COLOR: "1" },
+    stdio: ["ignore", "pipe", "pipe"],
+  });
   running.add(child);
   child.once("exit", () => running.delete(child));
   child.stdout.resume();
@@ -55,20 +67,38 @@ async function run(args, stream) {
   return { port, url: `http://127.0.0.1:${port}`, stop };
 }
 
-export const serve = (data, port = 0, ...more) => run(["serve", "--data", data, "--listen", `127.0.0.1:${port}`, ...more], "stderr");
+export const serve = (data, port = 0, ...more) =>
+  run(["serve", "--data", data, "--listen", `127.0.0.1:${port}`, ...more], "stderr");
 export const demo = (...args) => run(["demo", "--port", "0", ...args], "stdout");
 
 /** Runs a command of the program to its end; what it prints. */
-export const offbd = (...args) => execFileSync(BINARY, args, { encoding: "utf8", stdio: ["ignore", "pipe", "pipe"] });
+export const offbd = (...args) =>
+  execFileSync(BINARY, args, { encoding: "utf8", stdio: ["ignore", "pipe", "pipe"] });
 
 /** A learnt rig, and a session in which its x servo dies at 20 s. */
 export function recordings(where) {
   const path = (name) => join(where, name);
-  offbd("simulate", "--reference", "lissajous", "--seconds", "90", "--rig", path("rig.json"), "-o", path("healthy.csv"));
+  offbd(
+    "simulate",
+    "--reference",
+    "lissajous",
+    "--seconds",
+    "90",
+    "--rig",
+    path("rig.json"),
+    "-o",
+    path("healthy.csv"),
+  );
   offbd("calibrate", "--asset", path("rig.json"), path("healthy.csv"), "-o", path("learnt.json"));
   offbd("simulate", "--seed", "2", "--seconds", "40", "--fault", "x_servo:dead@20", "-o", path("sick.csv"));
   const read = (name) => readFileSync(path(name), "utf8");
-  return { path, rig: JSON.parse(read("rig.json")), learnt: JSON.parse(read("learnt.json")), healthy: read("healthy.csv"), sick: read("sick.csv") };
+  return {
+    path,
+    rig: JSON.parse(read("rig.json")),
+    learnt: JSON.parse(read("learnt.json")),
+    healthy: read("healthy.csv"),
+    sick: read("sick.csv"),
+  };
 }
 
 /** Registers a learnt rig whose x servo loses 2 % of its gain in each of `n` sessions. */
@@ -76,16 +106,33 @@ export async function drifting(base, where, learnt, name = "weak", n = 12) {
   await ask(base, "POST", "/assets", { ...learnt, name });
   for (let i = 0; i < n; i++) {
     const path = join(where, "drifting.csv");
-    const args = ["simulate", "--reference", "lissajous", "--seed", `${100 + i}`, "--fault", `x_servo:gain=${1 - 0.02 * i}@0`, "-o", path];
+    const args = [
+      "simulate",
+      "--reference",
+      "lissajous",
+      "--seed",
+      `${100 + i}`,
+      "--fault",
+      `x_servo:gain=${1 - 0.02 * i}@0`,
+      "-o",
+      path,
+    ];
     offbd(...args);
-    await ask(base, "POST", `/assets/${name}/sessions/import?name=day-${i + 1}`, readFileSync(path, "utf8"), "text/csv");
+    await ask(
+      base,
+      "POST",
+      `/assets/${name}/sessions/import?name=day-${i + 1}`,
+      readFileSync(path, "utf8"),
+      "text/csv",
+    );
   }
 }
 
 /** Asks the interface; an answer that is no success is an error. */
 export async function ask(base, method, path, body, type = "application/json") {
   const answer = await fetch(`${base}/api/v1${path}`, {
-    method, headers: body === undefined ? {} : { "content-type": type },
+    method,
+    headers: body === undefined ? {} : { "content-type": type },
     body: body === undefined ? undefined : typeof body === "string" ? body : JSON.stringify(body),
   });
   const text = await answer.text();
@@ -96,15 +143,28 @@ export async function ask(base, method, path, body, type = "application/json") {
 export async function browser() {
   const executablePath = BROWSERS.find((path) => path && existsSync(path));
   assert.ok(executablePath, "no Chromium found; name one in CHROMIUM");
-  return chromium.launch({ executablePath, args: ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"] });
+  return chromium.launch({
+    executablePath,
+    args: [
+      "--no-sandbox",
+      "--use-angle=swiftshader",
+      "--enable-unsafe-swiftshader",
+      "--ignore-gpu-blocklist",
+    ],
+  });
 }
 
 /** What a browser says when it cannot reach a service that is down; all else is an error of the page. */
-const UNREACHABLE = /ERR_CONNECTION_REFUSED|ERR_CONNECTION_RESET|ERR_INCOMPLETE_CHUNKED_ENCODING|ERR_EMPTY_RESPONSE/;
+const UNREACHABLE =
+  /ERR_CONNECTION_REFUSED|ERR_CONNECTION_RESET|ERR_INCOMPLETE_CHUNKED_ENCODING|ERR_EMPTY_RESPONSE/;
 
 /** A page that remembers what went wrong in it. */
 export async function page(of, options = {}) {
-  const context = await of.newContext({ viewport: { width: 1280, height: 800 }, reducedMotion: "reduce", ...options });
+  const context = await of.newContext({
+    viewport: { width: 1280, height: 800 },
+    reducedMotion: "reduce",
+    ...options,
+  });
   const view = await context.newPage();
   view.setDefaultTimeout(SOON);
   const errors = [];

@@ -24,10 +24,16 @@ test("the fleet warns of a fault on its way, and the rig's page shows why", asyn
   const row = view.getByRole("list", { name: "Rigs" }).getByRole("listitem").filter({ hasText: "weak" });
   await row.getByText("drifting").waitFor();
   await row.getByText(/fault in \d+ sessions/).waitFor();
-  await view.getByRole("button", { name: /^Drifting/ }).getByText("1").click();
+  await view
+    .getByRole("button", { name: /^Drifting/ })
+    .getByText("1")
+    .click();
   await row.getByRole("link").click();
 
-  await view.getByRole("list", { name: "Faults on their way" }).getByText(/gain is .* and falls; at this slope it reaches/).waitFor();
+  await view
+    .getByRole("list", { name: "Faults on their way" })
+    .getByText(/gain is .* and falls; at this slope it reaches/)
+    .waitFor();
   const drift = view.locator("#drift");
   assert.equal(await drift.getByRole("img").count(), 6, "three parameters of two servos");
   const chart = drift.getByRole("img", { name: /Gain of the x servo over 12 sessions.*it is warned of/ });

@@ -6,7 +6,10 @@ import { after, before, test } from "node:test";
 import { browser, demo, offbd, page } from "./support.mjs";
 
 const README = readFileSync(new URL("../../README.md", import.meta.url), "utf8");
-const WALK = README.slice(README.indexOf("## A walk through the dashboard"), README.indexOf("## A tour in five minutes"));
+const WALK = README.slice(
+  README.indexOf("## A walk through the dashboard"),
+  README.indexOf("## A tour in five minutes"),
+);
 
 let show, chromium, view;
 
@@ -34,9 +37,13 @@ test("from the demo to understanding a fault", async () => {
   await press("Demo", "link");
   await press("dead", "button", "Break: X servo, dead");
   await press("Watch demo-rig", "link");
-  const monitor = view.getByRole("listitem").filter({ hasText: "X servo" }).filter({ has: view.getByRole("meter") });
+  const monitor = view
+    .getByRole("listitem")
+    .filter({ hasText: "X servo" })
+    .filter({ has: view.getByRole("meter") });
   await monitor.getByText("failed", { exact: true }).waitFor();
-  for (const chart of ["Residual along x", "Acceleration along x"]) await view.getByRole("img", { name: chart }).waitFor();
+  for (const chart of ["Residual along x", "Acceleration along x"])
+    await view.getByRole("img", { name: chart }).waitFor();
 
   await press("Look at it", "link", /X servo.*Look at it/);
   assert.match(await view.locator(".sentence").textContent(), /^[A-Z].*\.$/);

@@ -3,7 +3,7 @@
  * the service gives for a token and no script can read. It goes along with
  * requests and with streams alike.
  */
-export function authorised(init: RequestInit): RequestInit {
+export function withCredentials(init: RequestInit): RequestInit {
   return { ...init, credentials: "same-origin" };
 }
 
@@ -14,14 +14,14 @@ export function streamUrl(path: string): string {
 
 const listeners = new Set<() => void>();
 
-/** Calls `shut` when the service no longer knows who asks; the answer ends that. */
-export function whenShut(shut: () => void): () => void {
-  listeners.add(shut);
-  return () => listeners.delete(shut);
+/** Calls `listener` whenever the service does not know who asks; the answer ends that. */
+export function onUnauthenticated(listener: () => void): () => void {
+  listeners.add(listener);
+  return () => listeners.delete(listener);
 }
 
-/** The service does not know who asks. */
-export function shut(): void {
+/** Tells the page that the service does not know who asks, or no longer. */
+export function announceUnauthenticated(): void {
   listeners.forEach((listener) => listener());
 }
 

@@ -5,59 +5,66 @@
 import { streamUrl } from "./access";
 import type { FaultLine } from "./types";
 
-export type Link = "connecting" | "live" | "lost";
+export type ConnectionState = "connecting" | "live" | "lost";
 
-type Listener = (line: FaultLine & { event: number }) => void;
+export type FaultEvent = FaultLine & { event: number };
 
 /** First and longest wait before another attempt. */
 const RETRY_MS = [500, 5000] as const;
 
-class Events {
+class FaultEvents {
   private source?: EventSource;
-  private last?: number;
+  private lastEvent?: number;
   private wait: number = RETRY_MS[0];
-  private listeners = new Set<Listener>();
-  private watchers = new Set<(link: Link) => void>();
-  link: Link = "connecting";
+  private listeners = new Set<(line: FaultEvent) => void>();
+  private watchers = new Set<(state: ConnectionState) => void>();
+  state: ConnectionState = "connecting";
 
-  listen(listener: Listener): () => void {
+  /** Calls `listener` with every event from now on; the answer ends that. */
+  listen(listener: (line: FaultEvent) => void): () => void {
     this.listeners.add(listener);
     if (!this.source) this.open();
     return () => this.listeners.delete(listener);
   }
 
-  watch(watcher: (link: Link) => void): () => void {
+  /** Calls `watcher` with the state of the connection, now and whenever it changes. */
+  watch(watcher: (state: ConnectionState) => void): () => void {
     this.watchers.add(watcher);
-    watcher(this.link);
+    watcher(this.state);
     return () => this.watchers.delete(watcher);
   }
 
+  /**
+   * An EventSource reconnects by itself after a connection that broke, but gives up for good on
+   * an answer that is no stream, as a proxy's 502 while the service restarts, or a 401 before
+   * somebody logs in. So it is closed on any error, and opened anew here.
+   */
   private open() {
-    const after = this.last === undefined ? "" : `?after=${this.last}`;
+    const after = this.lastEvent === undefined ? "" : `?after=${this.lastEvent}`;
     const source = (this.source = new EventSource(streamUrl(`/api/v1/events${after}`)));
     source.onopen = () => {
       this.wait = RETRY_MS[0];
-      this.set("live");
+      this.setState("live");
     };
     source.onerror = () => {
       source.close();
-      this.set("lost");
+      this.setState("lost");
       setTimeout(() => this.open(), this.wait);
       this.wait = Math.min(this.wait * 2, RETRY_MS[1]);
     };
-    source.addEventListener("begin", (message) => (this.last = Number(message.lastEventId)));
-    source.addEventListener("fault", (message) => {
-      this.last = Number(message.lastEventId);
-      const line = { ...(JSON.parse(message.data) as FaultLine), event: this.last };
+    source.addEventListener("begin", (message) => (this.lastEvent = Number(message.lastEventId)));
+    source.addEventListener("fault", (message: MessageEvent<string>) => {
+      this.lastEvent = Number(message.lastEventId);
+      const line = { ...(JSON.parse(message.data) as FaultLine), event: this.lastEvent };
       this.listeners.forEach((listener) => listener(line));
     });
   }
 
-  private set(link: Link) {
-    if (this.link === link) return;
-    this.link = link;
-    this.watchers.forEach((watcher) => watcher(link));
+  private setState(state: ConnectionState) {
+    if (this.state === state) return;
+    this.state = state;
+    this.watchers.forEach((watcher) => watcher(state));
   }
 }
 
-export const events = new Events();
+export const faultEvents = new FaultEvents();

@@ -1,70 +1,92 @@
-/** The state and trace of one asset as they happen, over a WebSocket that comes back by itself. */
+/** The state and trace of one asset as they happen, over a WebSocket that reconnects by itself. */
 import { streamUrl } from "./access";
-import type { FaultLine, State, Trace } from "./types";
+import type { FaultEvent } from "./events";
+import type { State, Trace } from "./types";
 
-export interface Told {
-  state: State & { trace?: Trace };
-  fault: FaultLine & { event: number };
-  link: "live" | "lost";
+export type StateFrame = State & { trace?: Trace };
+
+export interface StreamListener {
+  state?: (state: StateFrame) => void;
+  fault?: (fault: FaultEvent) => void;
+  connection?: (state: "live" | "lost") => void;
 }
 
-export interface Teller {
-  state?: (state: Told["state"]) => void;
-  fault?: (fault: Told["fault"]) => void;
-  link?: (link: Told["link"]) => void;
-}
+type Frame = ({ type: "state" } & StateFrame) | ({ type: "fault" } & FaultEvent);
 
+/** First and longest wait before another attempt. */
 const RETRY_MS = [400, 5000] as const;
 
 /** Silence after which a connection counts as lost: states come many times a second. */
 const SILENCE_MS = 6000;
 
-/** Follows `asset`, `hz` states a second; the answer stops it. */
-export function follow(asset: string, hz: number, trace: boolean, teller: Teller): () => void {
-  let socket: WebSocket | undefined;
-  let wait: number = RETRY_MS[0];
-  let after: number | undefined;
-  let stopped = false;
-  let heard = 0;
-  let retry: ReturnType<typeof setTimeout> | undefined;
+/** How often silence is looked for. */
+const WATCH_MS = 1000;
 
-  const open = () => {
-    const query = new URLSearchParams({ state: String(hz), trace: String(trace) });
-    if (after !== undefined) query.set("after", String(after));
+class RigStream {
+  private socket?: WebSocket;
+  private wait: number = RETRY_MS[0];
+  private lastFault?: number;
+  private closed = false;
+  private heardAt = 0;
+  private retry?: ReturnType<typeof setTimeout>;
+  private readonly watchdog = setInterval(() => this.closeIfSilent(), WATCH_MS);
+
+  constructor(
+    private readonly asset: string,
+    private readonly statesPerSecond: number,
+    private readonly listener: StreamListener,
+  ) {
+    this.open();
+  }
+
+  close(): void {
+    this.closed = true;
+    clearInterval(this.watchdog);
+    clearTimeout(this.retry);
+    this.socket?.close();
+  }
+
+  private address(): string {
+    const query = new URLSearchParams({ state: String(this.statesPerSecond), trace: "true" });
+    if (this.lastFault !== undefined) query.set("after", String(this.lastFault));
     const origin = location.origin.replace(/^http/, "ws");
-    const current = new WebSocket(streamUrl(`${origin}/api/v1/assets/${encodeURIComponent(asset)}/stream?${query}`));
-    socket = current;
-    heard = performance.now();
-    current.onopen = () => {
-      wait = RETRY_MS[0];
-      teller.link?.("live");
-    };
-    current.onmessage = (message: MessageEvent<string>) => {
-      heard = performance.now();
-      const frame = JSON.parse(message.data) as { type: string };
-      if (frame.type === "state") teller.state?.(frame as unknown as Told["state"]);
-      if (frame.type === "fault") {
-        const fault = frame as unknown as Told["fault"];
-        after = fault.event;
-        teller.fault?.(fault);
-      }
-    };
-    current.onclose = () => {
-      if (stopped || socket !== current) return;
-      teller.link?.("lost");
-      retry = setTimeout(open, wait);
-      wait = Math.min(wait * 2, RETRY_MS[1]);
-    };
-  };
+    return streamUrl(`${origin}/api/v1/assets/${encodeURIComponent(this.asset)}/stream?${query}`);
+  }
 
-  const watchdog = setInterval(() => {
-    if (socket?.readyState === WebSocket.OPEN && performance.now() - heard > SILENCE_MS) socket.close();
-  }, 1000);
-  open();
-  return () => {
-    stopped = true;
-    clearInterval(watchdog);
-    clearTimeout(retry);
-    socket?.close();
-  };
+  private open(): void {
+    const socket = new WebSocket(this.address());
+    this.socket = socket;
+    this.heardAt = performance.now();
+    socket.onopen = () => {
+      this.wait = RETRY_MS[0];
+      this.listener.connection?.("live");
+    };
+    socket.onmessage = (message: MessageEvent<string>) => this.receive(JSON.parse(message.data) as Frame);
+    socket.onclose = () => {
+      if (this.closed || this.socket !== socket) return;
+      this.listener.connection?.("lost");
+      this.retry = setTimeout(() => this.open(), this.wait);
+      this.wait = Math.min(this.wait * 2, RETRY_MS[1]);
+    };
+  }
+
+  private receive(frame: Frame): void {
+    this.heardAt = performance.now();
+    if (frame.type === "state") this.listener.state?.(frame);
+    if (frame.type === "fault") {
+      this.lastFault = frame.event;
+      this.listener.fault?.(frame);
+    }
+  }
+
+  private closeIfSilent(): void {
+    const isOpen = this.socket?.readyState === WebSocket.OPEN;
+    if (isOpen && performance.now() - this.heardAt > SILENCE_MS) this.socket?.close();
+  }
+}
+
+/** Follows `asset` with `statesPerSecond` states and their traces; the answer ends that. */
+export function followRig(asset: string, statesPerSecond: number, listener: StreamListener): () => void {
+  const stream = new RigStream(asset, statesPerSecond, listener);
+  return () => stream.close();
 }

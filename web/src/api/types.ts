@@ -20,12 +20,12 @@ export type FaultEntry = Schemas["FaultEntryView"];
 export type FaultLine = Schemas["FaultView"] & { asset?: string; session_id?: string };
 export type FleetEntry = Schemas["FleetEntryView"];
 export type FleetFault = Schemas["FleetFaultView"];
-export type Health = Schemas["HealthView"];
-export type History = Schemas["HistoryView"];
-export type Import = Schemas["ImportView"];
+export type ServiceHealth = Schemas["HealthView"];
+export type HistoryEntry = Schemas["HistoryView"];
+export type ImportResult = Schemas["ImportView"];
 export type Learning = Schemas["LearningView"];
-export type MadeToken = Schemas["MadeTokenView"];
-export type Judged = Schemas["JudgedView"];
+export type NewToken = Schemas["MadeTokenView"];
+export type JudgedMonitor = Schemas["JudgedView"];
 export type Monitor = Schemas["MonitorView"];
 export type Problem = Schemas["Problem"];
 export type Replay = Schemas["ReplayView"];
@@ -37,7 +37,7 @@ export type Trace = Schemas["TraceView"];
 export type Trend = Schemas["TrendView"];
 export type TrendPoint = Schemas["TrendPointView"];
 export type Trends = Schemas["TrendsView"];
-export type Around = Schemas["RecordingView"];
+export type FaultRecording = Schemas["RecordingView"];
 
 export interface Page<T> {
   items: T[];

@@ -35,10 +35,22 @@ export function VirtualList<T>({ items, rowHeight, label, row, id }: Props<T>) {
   }, [rowHeight, items.length]);
   const [first, last] = range;
   return (
-    <div ref={element} class="virtual" style={{ height: `${items.length * rowHeight}px` }} role="list" aria-label={label}>
+    <div
+      ref={element}
+      class="virtual"
+      style={{ height: `${items.length * rowHeight}px` }}
+      role="list"
+      aria-label={label}
+    >
       {items.slice(first, last).map((item, i) => (
-        <div key={id(item)} class="virtual-row" role="listitem" aria-setsize={items.length} aria-posinset={first + i + 1}
-          style={{ height: `${rowHeight}px`, transform: `translateY(${(first + i) * rowHeight}px)` }}>
+        <div
+          key={id(item)}
+          class="virtual-row"
+          role="listitem"
+          aria-setsize={items.length}
+          aria-posinset={first + i + 1}
+          style={{ height: `${rowHeight}px`, transform: `translateY(${(first + i) * rowHeight}px)` }}
+        >
           {row(item)}
         </div>
       ))}

@@ -1,0 +1,80 @@
+/** Requests to the interface. What goes wrong is a `ProblemError` with the service's own words. */
+import { announceUnauthenticated, withCredentials } from "./access";
+import type { Page, Problem } from "./types";
+
+export const BASE = "/api/v1";
+export const LOGIN = `${BASE}/login`;
+
+/** Longest wait for an answer; an import may take longer. */
+const TIMEOUT_MS = 70_000;
+
+export class ProblemError extends Error {
+  constructor(
+    readonly status: number,
+    readonly problem: Partial<Problem>,
+  ) {
+    super(problem.detail ?? problem.title ?? `the service answered ${status}`);
+  }
+}
+
+/** What an answer that is no success says. */
+export async function failure(response: Response): Promise<ProblemError> {
+  const problem = (await response.json().catch(() => ({}))) as Partial<Problem>;
+  return new ProblemError(response.status, problem);
+}
+
+/** True where the service does not know who asks. */
+export const isUnauthenticated = (error: unknown) => error instanceof ProblemError && error.status === 401;
+
+/** True where the service could not be reached at all. */
+function isUnreachable(error: unknown): boolean {
+  return error instanceof TypeError || (error instanceof DOMException && error.name === "TimeoutError");
+}
+
+/** What a person is told of an error. */
+export function errorText(error: unknown): string {
+  if (isUnreachable(error)) return "The service does not answer. The page goes on as soon as it does.";
+  return error instanceof Error ? error.message : String(error);
+}
+
+export async function request<T>(path: string, init: RequestInit = {}): Promise<T> {
+  const signal = init.signal ?? AbortSignal.timeout(TIMEOUT_MS);
+  const response = await fetch(path, withCredentials({ ...init, signal }));
+  if (response.status === 401 && path !== LOGIN) announceUnauthenticated();
+  if (!response.ok) throw await failure(response);
+  const isJson = response.headers.get("content-type")?.includes("json");
+  return (isJson ? await response.json() : undefined) as T;
+}
+
+export const get = <T>(path: string) => request<T>(BASE + path);
+
+export const send = <T>(method: string, path: string, body?: unknown) =>
+  request<T>(BASE + path, {
+    method,
+    ...(body === undefined
+      ? {}
+      : { body: JSON.stringify(body), headers: { "content-type": "application/json" } }),
+  });
+
+type QueryValues = Record<string, string | number | boolean | null | undefined>;
+
+/** `values` as the query of an address; those that are missing or empty are left out. */
+export function query(values: QueryValues): string {
+  const given = Object.entries(values).filter(([, value]) => value != null && value !== "");
+  return given.length ? `?${new URLSearchParams(given.map(([key, value]) => [key, String(value)]))}` : "";
+}
+
+/** A name or id as one segment of a path. */
+export const segment = encodeURIComponent;
+
+/** Every page of a list, until there are `most` items. */
+export async function getAll<T>(path: string, values: QueryValues, most = 20_000): Promise<T[]> {
+  const items: T[] = [];
+  let cursor: string | null | undefined;
+  do {
+    const page: Page<T> = await get(path + query({ ...values, limit: 500, cursor }));
+    items.push(...page.items);
+    cursor = page.next;
+  } while (cursor && items.length < most);
+  return items;
+}

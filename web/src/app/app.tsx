@@ -1,0 +1,38 @@
+/** The page's frame: what is on top and at the bottom of every view. */
+import { api } from "../api/client";
+import { useQuery } from "../hooks/use-query";
+import { Suspense } from "../parts/lazy";
+import { Loading } from "../parts/loading";
+import { useLocation } from "../router/navigation";
+import { Header } from "./header";
+import { Route } from "./route";
+
+export function App() {
+  const { segments } = useLocation();
+  const health = useQuery(api.health, "health");
+  const isDemo = health.data?.demo ?? false;
+  const loading = (
+    <main>
+      <Loading what="the view" />
+    </main>
+  );
+  return (
+    <>
+      <a class="skip" href="#content">
+        Skip to the content
+      </a>
+      <Header segments={segments} isDemo={isDemo} />
+      <div id="content" tabIndex={-1}>
+        <Suspense fallback={loading}>
+          <Route segments={segments} isDemo={isDemo} />
+        </Suspense>
+      </div>
+      <footer>
+        <a href="/docs/">Interface</a>
+        <a href="/openapi.yaml">openapi.yaml</a>
+        <a href="/metrics">Metrics</a>
+        <span class="quiet">offbd {health.data?.version}</span>
+      </footer>
+    </>
+  );
+}

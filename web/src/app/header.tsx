@@ -1,0 +1,51 @@
+import { useEffect, useState } from "preact/hooks";
+import { faultEvents, type ConnectionState } from "../api/events";
+import { LoggedIn } from "../parts/login/logged-in";
+import { Link } from "../router/link";
+import { sessionsPath } from "../router/paths";
+import { ThemeButton } from "./theme-button";
+
+const CONNECTION: Record<ConnectionState, string> = {
+  connecting: "connecting",
+  live: "live",
+  lost: "connection lost",
+};
+
+/** The views, each with whether the address is one of its own. */
+function tabs([first, , third]: string[], isDemo: boolean) {
+  const isSetUp = first === "set-up" || third === "set-up";
+  return [
+    { to: "/", word: "Fleet", isHere: !first || (first === "rigs" && !isSetUp) },
+    { to: sessionsPath(), word: "Sessions", isHere: first === "sessions" },
+    { to: "/set-up", word: "Set up", isHere: isSetUp },
+    { to: "/learn", word: isDemo ? "Demo" : "Learn", isHere: first === "learn" },
+  ];
+}
+
+/** What is on top of every view. */
+export function Header({ segments, isDemo }: { segments: string[]; isDemo: boolean }) {
+  const [connection, setConnection] = useState(faultEvents.state);
+  useEffect(() => faultEvents.watch(setConnection), []);
+  // The connection is wanted on every view, though only some show its events.
+  useEffect(() => faultEvents.listen(() => {}), []);
+  return (
+    <header class="top">
+      <Link to="/" class="brand">
+        <img src="/icon.svg" alt="" width="24" height="24" />
+        offbd
+      </Link>
+      <nav aria-label="Views">
+        {tabs(segments, isDemo).map(({ to, word, isHere }) => (
+          <Link to={to} aria-current={isHere ? "page" : undefined}>
+            {word}
+          </Link>
+        ))}
+      </nav>
+      <span class={`link-state link-${connection}`} role="status">
+        {CONNECTION[connection]}
+      </span>
+      <LoggedIn />
+      <ThemeButton />
+    </header>
+  );
+}

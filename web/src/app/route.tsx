@@ -1,0 +1,36 @@
+/** Which view an address asks for. */
+import { EmptyState } from "../parts/empty-state";
+import { lazy } from "../parts/lazy";
+import { FleetPage } from "../pages/fleet";
+import { Link } from "../router/link";
+
+const AssetPage = lazy(() => import("../pages/asset").then((module) => module.AssetPage));
+const FaultPage = lazy(() => import("../pages/fault").then((module) => module.FaultPage));
+const SessionsPage = lazy(() => import("../pages/sessions").then((module) => module.SessionsPage));
+const SessionPage = lazy(() => import("../pages/session").then((module) => module.SessionPage));
+const SetUpPage = lazy(() => import("../pages/set-up").then((module) => module.SetUpPage));
+const LearnPage = lazy(() => import("../pages/learn").then((module) => module.LearnPage));
+
+/** The view at an address of `segments`; a service that is no demo has no demo to show. */
+export function Route({ segments, isDemo }: { segments: string[]; isDemo: boolean }) {
+  const [first, name, second, code] = segments;
+  if (!first) return <FleetPage />;
+  if (first === "rigs" && name) {
+    if (!second) return <AssetPage name={name} />;
+    if (second === "faults" && code) return <FaultPage name={name} code={code} />;
+    if (second === "set-up") return <SetUpPage key={name} name={name} />;
+  }
+  if (first === "set-up") return <SetUpPage />;
+  if (first === "sessions" && name) return <SessionPage key={name} id={name} />;
+  if (first === "sessions") return <SessionsPage />;
+  if (first === "learn") return <LearnPage isDemo={isDemo} />;
+  return (
+    <main>
+      <EmptyState title="There is nothing here">
+        <p>
+          <Link to="/">To the fleet</Link>
+        </p>
+      </EmptyState>
+    </main>
+  );
+}

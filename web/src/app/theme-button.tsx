@@ -1,0 +1,29 @@
+import { useState } from "preact/hooks";
+import { setTheme, theme, type Theme } from "../theme";
+
+const THEMES: Record<Theme, { next: Theme; symbol: string }> = {
+  system: { next: "light", symbol: "◐" },
+  light: { next: "dark", symbol: "☀" },
+  dark: { next: "system", symbol: "☾" },
+};
+
+/** Goes from the system's colours to the light ones, the dark ones, and back. */
+export function ThemeButton() {
+  const [chosen, setChosen] = useState(theme());
+  const { next, symbol } = THEMES[chosen];
+  const change = () => {
+    setTheme(next);
+    setChosen(next);
+  };
+  return (
+    <button
+      type="button"
+      class="small"
+      onClick={change}
+      aria-label={`Colours: ${chosen}; change`}
+      title={`Colours: ${chosen}`}
+    >
+      {symbol}
+    </button>
+  );
+}

@@ -1,0 +1,58 @@
+/** What is known along one axis, as flat columns of equal length: one value for each moment. */
+import type { Trace } from "../api/types";
+
+export type Column = (number | null)[];
+
+export interface AxisColumns {
+  command: Column;
+  plate: Column;
+  position: Column;
+  twinPosition: Column;
+  measured: Column;
+  twin: Column;
+  residual: Column;
+  limit: Column;
+  limitBelow: Column;
+  enabled: boolean[];
+}
+
+export type NumberColumn = Exclude<keyof AxisColumns, "enabled">;
+
+export const emptyColumns = (): AxisColumns => ({
+  command: [],
+  plate: [],
+  position: [],
+  twinPosition: [],
+  measured: [],
+  twin: [],
+  residual: [],
+  limit: [],
+  limitBelow: [],
+  enabled: [],
+});
+
+const difference = (a: number | null | undefined, b: number | null | undefined) =>
+  a == null || b == null ? null : a - b;
+
+/** Appends the first `n` moments of a trace along one axis. */
+export function appendTrace(to: AxisColumns, from: Trace["x"], n: number): void {
+  for (let i = 0; i < n; i++) {
+    const limit = from.limit_m_s2[i] ?? null;
+    to.command.push(from.command_rad[i] ?? null);
+    to.plate.push(from.plate_angle_rad[i] ?? null);
+    to.position.push(from.position_m[i] ?? null);
+    // Where no ball was seen, where the twin was says nothing.
+    to.twinPosition.push(from.position_m[i] == null ? null : (from.twin_position_m[i] ?? null));
+    to.measured.push(from.measured_m_s2[i] ?? null);
+    to.twin.push(from.twin_m_s2[i] ?? null);
+    to.residual.push(difference(from.measured_m_s2[i], from.twin_m_s2[i]));
+    to.limit.push(limit);
+    to.limitBelow.push(limit === null ? null : -limit);
+    to.enabled.push(from.enabled[i] ?? false);
+  }
+}
+
+/** Removes the oldest `n` moments. */
+export function dropOldest(columns: AxisColumns, n: number): void {
+  for (const column of Object.values(columns) as unknown[][]) column.splice(0, n);
+}

@@ -1,0 +1,37 @@
+import { api } from "../../api/client";
+import { ActionButton } from "../../parts/action-button";
+import { HealthMark } from "../../parts/health-mark";
+import { Link } from "../../router/link";
+import { sessionsPath, setUpPath } from "../../router/paths";
+import type { RigHealth } from "../../words/severity";
+
+interface Props {
+  name: string;
+  health: RigHealth;
+  /** The id of the open session, if there is one. */
+  session?: string | null;
+}
+
+export function AssetHeader({ name, health, session }: Props) {
+  return (
+    <header class="page-head">
+      <div>
+        <p class="crumbs">
+          <Link to="/">Fleet</Link>
+        </p>
+        <h1>
+          {name} <HealthMark health={health} />
+        </h1>
+      </div>
+      <div class="page-tools">
+        <Link class="button" to={sessionsPath(name)}>
+          Sessions
+        </Link>
+        <Link class="button" to={setUpPath(name)}>
+          Set-up
+        </Link>
+        {session && <ActionButton action={() => api.endSession(session)}>End session</ActionButton>}
+      </div>
+    </header>
+  );
+}

@@ -1,0 +1,12 @@
+import type { FaultEntry, State } from "../../api/types";
+import { healthByFaults, severity, type RigHealth } from "../../words/severity";
+
+export const activeFaults = (faults: FaultEntry[]) =>
+  faults.filter((fault) => severity(fault) > 0).sort((a, b) => severity(b) - severity(a));
+
+export function healthOf(faults: FaultEntry[], state: State | undefined, isSilent: boolean): RigHealth {
+  const byFaults = healthByFaults(faults);
+  if (byFaults) return byFaults;
+  if (!state?.session_id) return "idle";
+  return isSilent ? "silent" : "ok";
+}

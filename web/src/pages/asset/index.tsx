@@ -1,0 +1,19 @@
+/** One rig, live: the plate and ball, what was measured, what the twin says, what follows. */
+import { api } from "../../api/client";
+import { useQuery } from "../../hooks/use-query";
+import { useTitle } from "../../hooks/use-title";
+import { UnloadedPage } from "../../parts/unloaded-page";
+import { LiveRig } from "./live-rig";
+
+/** How often the rig's description and its faults are fetched, ms; events tell of changes before. */
+const ASSET_MS = 15_000;
+const FAULTS_MS = 5000;
+
+export function AssetPage({ name }: { name: string }) {
+  useTitle(name);
+  const asset = useQuery(() => api.asset(name), name, ASSET_MS);
+  const faults = useQuery(() => api.faultsOf(name), `${name} faults`, FAULTS_MS);
+  const refetch = () => Promise.all([faults.refetch(), asset.refetch()]);
+  if (!asset.data) return <UnloadedPage title={name} what={name} error={asset.error} retry={asset.refetch} />;
+  return <LiveRig key={name} asset={asset.data} faults={faults.data ?? []} refetch={refetch} />;
+}

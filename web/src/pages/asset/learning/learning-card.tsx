@@ -1,0 +1,67 @@
+import { useEffect } from "preact/hooks";
+import { api } from "../../../api/client";
+import type { Learning, State } from "../../../api/types";
+import { useQuery } from "../../../hooks/use-query";
+import { ActionButton } from "../../../parts/action-button";
+import { ErrorMessage } from "../../../parts/error-message";
+import { GatheringNote } from "./gathering-note";
+import { MotionProgress } from "./motion-progress";
+import { TeachingSessions } from "./teaching-sessions";
+
+const TITLES: Record<Learning["state"], string> = {
+  gathering: "This rig is not learnt yet",
+  learning: "Being learnt",
+  offered: "Ready: was the rig healthy?",
+  learnt: "Learnt by itself",
+};
+
+/** How often it is fetched once the rig is learnt: before, every state has it, ms. */
+const INTERVAL_MS = 15_000;
+
+interface Props {
+  name: string;
+  state?: State;
+  /** Called when what was learnt has been accepted or discarded. */
+  changed: () => Promise<unknown>;
+}
+
+/** A rig that learns by itself: how far it is, the question whether it was healthy, what was learnt. */
+export function LearningCard({ name, state, changed }: Props) {
+  const { data, error, refetch } = useQuery(() => api.learning(name), `${name} learning`, INTERVAL_MS);
+  const live = state?.learning;
+  const isSettled = state && !live;
+  useEffect(() => {
+    void refetch();
+  }, [refetch, live?.state, isSettled]);
+  const learning = live ?? data;
+  if (!learning) return <ErrorMessage error={error} retry={refetch} />;
+  if (learning.state === "learnt" && !learning.by_itself) return null;
+  const afterwards = (action: (name: string) => Promise<Learning>) => async () => {
+    await action(name);
+    await Promise.all([refetch(), changed()]);
+  };
+  const discard = afterwards(api.discardLearning);
+  const isGathering = learning.state === "gathering";
+  return (
+    <section class="card learning" aria-label="Learning">
+      <h2>{TITLES[learning.state]}</h2>
+      <p>{learning.summary}</p>
+      {isGathering && <MotionProgress learning={learning} />}
+      <TeachingSessions sessions={learning.sessions} />
+      {learning.state === "offered" && (
+        <p class="page-tools">
+          <ActionButton class="primary" action={afterwards(api.acceptLearning)}>
+            Yes, use what was learnt
+          </ActionButton>
+          <ActionButton action={discard}>No, start again</ActionButton>
+        </p>
+      )}
+      {isGathering && learning.refused && (
+        <p>
+          <ActionButton action={discard}>Start again</ActionButton>
+        </p>
+      )}
+      {isGathering && <GatheringNote name={name} />}
+    </section>
+  );
+}

@@ -1,0 +1,67 @@
+import type { Asset, FaultEntry } from "../../api/types";
+import { RigView } from "../../parts/rig-view/rig-view";
+import { XyTrace } from "../../parts/xy-trace/xy-trace";
+import { Link } from "../../router/link";
+import { setUpPath } from "../../router/paths";
+import { ActiveFaults } from "./active-faults";
+import { AssetHeader } from "./asset-header";
+import { DriveCycleCard } from "./drive-cycle/drive-cycle-card";
+import { activeFaults, healthOf } from "./health";
+import { LearningCard } from "./learning/learning-card";
+import { LiveChartsCard } from "./live-charts-card";
+import { Monitors } from "./monitors";
+import { NowCard } from "./now-card";
+import { TrendWarnings } from "./trends/trend-warnings";
+import { TrendsCard } from "./trends/trends-card";
+import { useTrends } from "./trends/use-trends";
+import { TwinCard } from "./twin-card";
+import { useLiveRig } from "./use-live-rig";
+
+interface Props {
+  asset: Asset;
+  faults: FaultEntry[];
+  /** Fetches the rig's description and its faults anew. */
+  refetch: () => Promise<unknown>;
+}
+
+export function LiveRig({ asset, faults, refetch }: Props) {
+  const { state, connection, isSilent, charts } = useLiveRig(asset.name, () => void refetch());
+  const trends = useTrends(asset.name);
+  const active = activeFaults(faults);
+  return (
+    <main class="asset">
+      <AssetHeader name={asset.name} health={healthOf(active, state, isSilent)} session={state?.session_id} />
+      {connection === "lost" && (
+        <p class="trouble" role="alert">
+          The connection is lost; trying again. What is shown is the last that came.
+        </p>
+      )}
+      <ActiveFaults asset={asset.name} faults={active} />
+      <TrendWarnings trends={trends.data} />
+      <LearningCard name={asset.name} state={state} changed={refetch} />
+      {state && !state.session_id && (
+        <p class="note">
+          No session is open. As soon as the rig sends, it is shown here.{" "}
+          <Link to={setUpPath(asset.name, "connect")}>How to send</Link>
+        </p>
+      )}
+      <div class="live-top">
+        <RigView asset={asset} pose={charts.pose} name={`${asset.name}-live`} />
+        <div class="live-side">
+          <section class="card">
+            <h2>From above</h2>
+            <XyTrace asset={asset} moment={charts.moment} />
+          </section>
+          <Monitors monitors={state?.monitors ?? []} />
+        </div>
+      </div>
+      {(!state || state.session_id) && <LiveChartsCard charts={charts} />}
+      <div class="pair">
+        <NowCard state={state} />
+        <TwinCard asset={asset} state={state} />
+      </div>
+      <DriveCycleCard asset={asset} />
+      <TrendsCard query={trends} />
+    </main>
+  );
+}

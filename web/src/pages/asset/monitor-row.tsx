@@ -1,0 +1,48 @@
+import type { Monitor } from "../../api/types";
+import { codeTitle } from "../../words/fault-names";
+import { judgedShare } from "../../words/verdict";
+
+/** The fault detection counter of ISO 14229-1 goes from here, passed, to there, failed. */
+const PASSED = -128;
+const FAILED = 127;
+
+function resultText({ counter, enabled }: Monitor): string {
+  if (counter === FAILED) return "failed";
+  if (counter === PASSED) return "passed";
+  return enabled ? "testing" : "not tested now";
+}
+
+function readinessText({ complete_this_cycle, complete_since_clear }: Monitor): string {
+  if (complete_this_cycle) return "has come to a result in this session";
+  return complete_since_clear ? "no result in this session yet" : "no result yet";
+}
+
+function rowClass({ counter, enabled }: Monitor): string {
+  const look = counter === FAILED ? "bad" : counter > 0 ? "warn" : "ok";
+  return `monitor monitor-${look}${enabled ? "" : " off"}`;
+}
+
+export function MonitorRow({ monitor }: { monitor: Monitor }) {
+  const { code, counter, complete_this_cycle } = monitor;
+  const readiness = readinessText(monitor);
+  const share = (counter - PASSED) / (FAILED - PASSED);
+  return (
+    <li class={rowClass(monitor)}>
+      <span>{codeTitle(code)}</span>
+      <meter
+        class="counter"
+        min={PASSED}
+        max={FAILED}
+        value={counter}
+        aria-label={`${codeTitle(code)}: fault detection counter`}
+        title={`fault detection counter ${counter}; ${readiness}; judged ${judgedShare(monitor)} of the session`}
+      >
+        {Math.round(share * 100)} %
+      </meter>
+      <span class="quiet">{resultText(monitor)}</span>
+      <span class="ready" title={readiness} aria-label={readiness}>
+        {complete_this_cycle ? "✓" : "…"}
+      </span>
+    </li>
+  );
+}

@@ -1,0 +1,20 @@
+import type { Monitor } from "../../api/types";
+import { MonitorRow } from "./monitor-row";
+
+export function Monitors({ monitors }: { monitors: Monitor[] }) {
+  return (
+    <section class="card">
+      <h2>Monitors</h2>
+      {monitors.length === 0 && <p class="quiet">Waiting for the first state.</p>}
+      <ul class="monitors">
+        {monitors.map((monitor) => (
+          <MonitorRow monitor={monitor} />
+        ))}
+      </ul>
+      <p class="quiet small-text">
+        The bar is the fault detection counter, −128 (passed) to 127 (failed). ✓: the monitor is ready, it has
+        come to a result in this session.
+      </p>
+    </section>
+  );
+}

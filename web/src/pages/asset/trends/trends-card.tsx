@@ -1,0 +1,17 @@
+import type { Trends } from "../../../api/types";
+import type { Query } from "../../../hooks/use-query";
+import { ErrorMessage } from "../../../parts/error-message";
+import { Loading } from "../../../parts/loading";
+import { TrendCharts } from "./trend-charts";
+
+/** Drift before fault: what each session estimated of both servos, the line through it, and its limits. */
+export function TrendsCard({ query: { data, error, refetch } }: { query: Query<Trends> }) {
+  return (
+    <section class="card" id="drift">
+      <h2>Drift over sessions</h2>
+      <ErrorMessage error={error} retry={refetch} />
+      {!data && !error && <Loading what="the trends" />}
+      {data && <TrendCharts trends={data} />}
+    </section>
+  );
+}

@@ -1,0 +1,43 @@
+import type { Asset, AxisCalibration, State } from "../../api/types";
+import { Facts, type Fact } from "../../parts/facts";
+import { navigate } from "../../router/navigation";
+import { setUpPath } from "../../router/paths";
+import { count, NONE, number } from "../../words/numbers";
+import { dateTime } from "../../words/time";
+
+/** What was learnt of both servos. */
+function servoFacts({ calibration }: Asset): Fact[] {
+  const { x, y } = calibration ?? {};
+  if (!x || !y) return [];
+  const delay = (axis: AxisCalibration) => number((axis.dead_time_s + axis.lag_s) * 1e3, 0, "ms");
+  return [
+    ["Gain x, y", `${number(x.gain, 3)}, ${number(y.gain, 3)}`],
+    ["Delay x, y", `${delay(x)}, ${delay(y)}`],
+  ];
+}
+
+/** The twin that the rig is compared with. */
+export function TwinCard({ asset, state }: { asset: Asset; state?: State }) {
+  const { calibration } = asset;
+  const learnt =
+    calibration && `${dateTime(calibration.made_at)}, from ${count(calibration.samples)} samples`;
+  return (
+    <section class="card">
+      <h2>The twin</h2>
+      <Facts
+        facts={[
+          ["Fidelity in use", state?.fidelity ?? NONE],
+          ["Why", state?.fidelity_reason ?? NONE],
+          ["Profile", asset.diagnostics?.profile ?? "default"],
+          ["Learnt", learnt ?? "not yet"],
+          ...servoFacts(asset),
+        ]}
+      />
+      <p>
+        <button type="button" class="link" onClick={() => navigate(setUpPath(asset.name))}>
+          Describe or calibrate this rig
+        </button>
+      </p>
+    </section>
+  );
+}

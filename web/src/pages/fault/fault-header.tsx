@@ -1,0 +1,24 @@
+import type { FaultEntry } from "../../api/types";
+import { StatusChip } from "../../parts/status-chip";
+import { Link } from "../../router/link";
+import { rigPath } from "../../router/paths";
+import { faultTitle } from "../../words/fault-names";
+import { FaultActions } from "./fault-actions";
+import { isActive } from "./is-active";
+
+export function FaultHeader({ fault, refetch }: { fault: FaultEntry; refetch: () => Promise<unknown> }) {
+  const { asset, code, kind } = fault;
+  return (
+    <header class="page-head">
+      <div>
+        <p class="crumbs">
+          <Link to="/">Fleet</Link> / <Link to={rigPath(asset)}>{asset}</Link>
+        </p>
+        <h1>
+          {faultTitle(code, kind)} <StatusChip fault={fault} />
+        </h1>
+      </div>
+      {isActive(fault) && <FaultActions fault={fault} refetch={refetch} />}
+    </header>
+  );
+}

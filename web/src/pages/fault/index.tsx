@@ -1,0 +1,31 @@
+/** One fault: what was seen, what it may be, since when, and what people did about it. */
+import { useEffect } from "preact/hooks";
+import { api } from "../../api/client";
+import { faultEvents } from "../../api/events";
+import { useLatest } from "../../hooks/use-latest";
+import { useQuery } from "../../hooks/use-query";
+import { useTitle } from "../../hooks/use-title";
+import { UnloadedPage } from "../../parts/unloaded-page";
+import { codeTitle } from "../../words/fault-names";
+import { FaultDetails } from "./fault-details";
+
+/** How often both are fetched, ms; events tell of changes before. */
+const INTERVAL_MS = 5000;
+
+export function FaultPage({ name, code }: { name: string; code: string }) {
+  useTitle(`${codeTitle(code)} of ${name}`);
+  const fault = useQuery(() => api.fault(name, code), `${name} ${code}`, INTERVAL_MS);
+  const fetchHistory = () => api.history(name, code).then((page) => page.items);
+  const history = useQuery(fetchHistory, `${name} ${code} history`, INTERVAL_MS);
+  const refetch = () => Promise.all([fault.refetch(), history.refetch()]);
+  const latestRefetch = useLatest(refetch);
+  useEffect(() => {
+    return faultEvents.listen((line) => {
+      if (line.asset === name && line.code === code) void latestRefetch.current();
+    });
+  }, [name, code, latestRefetch]);
+  if (!fault.data)
+    return <UnloadedPage title={codeTitle(code)} what="the fault" error={fault.error} retry={refetch} />;
+  const error = fault.error ?? history.error;
+  return <FaultDetails fault={fault.data} history={history.data ?? []} error={error} refetch={refetch} />;
+}

@@ -1,0 +1,38 @@
+import { VirtualList } from "../../parts/virtual-list";
+import { navigate } from "../../router/navigation";
+import { count } from "../../words/numbers";
+import { FleetRow } from "./fleet-row";
+import type { FleetView } from "./use-fleet-view";
+import { useRowHeight } from "./use-row-height";
+
+export function FleetList({ view: { rows, shown }, now }: { view: FleetView; now: number }) {
+  const rowHeight = useRowHeight();
+  return (
+    <section aria-label="Rigs">
+      <div class="fleet-row fleet-head" aria-hidden="true">
+        <span>Rig</span>
+        <span>State</span>
+        <span>Faults</span>
+        <span>Session</span>
+        <span class="n">Lag</span>
+        <span class="n">Last heard</span>
+      </div>
+      {shown.length ? (
+        <VirtualList
+          items={shown}
+          rowHeight={rowHeight}
+          label="Rigs"
+          id={(row) => row.entry.asset}
+          row={(row) => <FleetRow row={row} now={now} />}
+        />
+      ) : (
+        <p class="quiet">
+          No rig matches.{" "}
+          <button type="button" class="link" onClick={() => navigate("/", true)}>
+            Show all {count(rows.length)}
+          </button>
+        </p>
+      )}
+    </section>
+  );
+}

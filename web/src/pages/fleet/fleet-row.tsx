@@ -1,0 +1,62 @@
+import type { FleetEntry } from "../../api/types";
+import { DriftChip } from "../../parts/drift-chip";
+import { FaultChip } from "../../parts/fault-chip";
+import { HealthMark } from "../../parts/health-mark";
+import { Link } from "../../router/link";
+import { rigPath } from "../../router/paths";
+import { number } from "../../words/numbers";
+import { severity } from "../../words/severity";
+import { timeAgo } from "../../words/time";
+import type { FleetRow as Row } from "./rows";
+
+/** Later than this is worth a colour, s. */
+const LATE_S = 2;
+
+/** What is said of a rig that is not learnt. */
+const NOT_LEARNT: Record<FleetEntry["learning"], { word: string; meaning: string }> = {
+  gathering: {
+    word: "not learnt",
+    meaning:
+      "It learns by itself as soon as enough motion has come; until then only faults of the sensor are confirmed",
+  },
+  learning: { word: "being learnt", meaning: "Enough motion has come" },
+  offered: {
+    word: "was it healthy?",
+    meaning: "What was learnt waits for somebody to say that the rig was healthy",
+  },
+  learnt: { word: "", meaning: "" },
+};
+
+export function FleetRow({ row: { entry, health }, now }: { row: Row; now: number }) {
+  const faults = [...entry.faults].sort((a, b) => severity(b) - severity(a));
+  const { word, meaning } = NOT_LEARNT[entry.learning];
+  return (
+    <Link to={rigPath(entry.asset)} class={`fleet-row row-${health}`}>
+      <span class="name">
+        {entry.asset}
+        {!entry.calibrated && (
+          <span class="quiet small-text" title={meaning}>
+            {" "}
+            {word}
+          </span>
+        )}
+      </span>
+      <HealthMark health={health} />
+      <span class="faults">
+        {faults.map((fault) => (
+          <FaultChip fault={fault} />
+        ))}
+        {entry.warnings.map((warning) => (
+          <DriftChip warning={warning} />
+        ))}
+        {!faults.length && !entry.warnings.length && <span class="quiet">none</span>}
+      </span>
+      <span class="quiet clip">{entry.session ?? "–"}</span>
+      <span class={`n${(entry.lag_s ?? 0) > LATE_S ? " late" : ""}`}>
+        <span class="only-small">lag </span>
+        {number(entry.lag_s, 1, "s")}
+      </span>
+      <span class="n quiet">{timeAgo(entry.last_seen, now)}</span>
+    </Link>
+  );
+}

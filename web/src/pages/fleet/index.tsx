@@ -1,0 +1,31 @@
+/** All rigs: which is sick, which is silent, which lags. */
+import { useNow } from "../../hooks/use-now";
+import { useTitle } from "../../hooks/use-title";
+import { ErrorMessage } from "../../parts/error-message";
+import { UnloadedPage } from "../../parts/unloaded-page";
+import { EmptyFleet } from "./empty-fleet";
+import { EventFeed } from "./event-feed";
+import { FleetList } from "./fleet-list";
+import { FleetTools } from "./fleet-tools";
+import { useFleet } from "./use-fleet";
+import { useFleetView } from "./use-fleet-view";
+
+export function FleetPage() {
+  useTitle("Fleet");
+  const { fleet, error, refetch, lines } = useFleet();
+  const now = useNow();
+  const view = useFleetView(fleet, now);
+  if (!fleet) return <UnloadedPage title="Fleet" what="the fleet" error={error} retry={refetch} />;
+  if (!fleet.length) return <EmptyFleet error={error} />;
+  return (
+    <main class="fleet">
+      <h1>Fleet</h1>
+      <ErrorMessage error={error} />
+      <FleetTools view={view} />
+      <div class="fleet-columns">
+        <FleetList view={view} now={now} />
+        <EventFeed lines={lines} />
+      </div>
+    </main>
+  );
+}

@@ -1,0 +1,38 @@
+import { useEffect, useRef } from "preact/hooks";
+import { count, millimetres, number, seconds } from "../../words/numbers";
+import { extent, finite, type Columns } from "./columns";
+import { drawPreview } from "./draw-preview";
+
+/** From where to where a column goes. */
+function rangeText(column: (number | null)[]): string {
+  const [low, high] = extent(finite(column));
+  return `from ${millimetres(low, 0)} to ${millimetres(high, 0)}`;
+}
+
+/** What the file would be as a session: the ball's way, and a few numbers that show a wrong unit. */
+export function Preview({ columns }: { columns: Columns }) {
+  const canvas = useRef<HTMLCanvasElement>(null);
+  useEffect(() => drawPreview(canvas.current!, columns), [columns]);
+  const { t_s, x_m, y_m, cmd_qx_rad, cmd_qy_rad } = columns;
+  const t = finite(t_s);
+  const length = t.length > 1 ? t[t.length - 1]! - t[0]! : 0;
+  const rate = length > 0 ? (t.length - 1) / length : null;
+  const nSeen = x_m.filter((x, i) => x !== null && y_m[i] !== null).length;
+  const commands = [...finite(cmd_qx_rad), ...finite(cmd_qy_rad)].map(Math.abs);
+  const steepest = Math.max(extent(commands)[1], 0);
+  return (
+    <div class="preview">
+      <canvas ref={canvas} class="xy" role="img" aria-label="The ball's way in the file" />
+      <ul class="plain">
+        <li>
+          {count(t.length)} rows over {seconds(length, 1)}: {number(rate, 1, "Hz")}
+        </li>
+        <li>Ball seen in {number((100 * nSeen) / Math.max(t.length, 1), 0, "%")} of the rows</li>
+        <li>
+          x {rangeText(x_m)}, y {rangeText(y_m)}
+        </li>
+        <li>Steepest command {number((steepest * 180) / Math.PI, 1, "°")}</li>
+      </ul>
+    </div>
+  );
+}

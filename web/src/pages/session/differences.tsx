@@ -1,0 +1,39 @@
+import type { FaultLine, Replay } from "../../api/types";
+import { faultTitle } from "../../words/fault-names";
+import { NONE, seconds } from "../../words/numbers";
+
+/** Rows that are shown. */
+const SHOWN = 200;
+
+/** Where two verdicts of a session differ. */
+export function Differences({ differences }: Pick<NonNullable<Replay["result"]>, "differences">) {
+  return (
+    <div class="scroll differences" tabIndex={0} role="region" aria-label="Differences">
+      <table class="list">
+        <thead>
+          <tr>
+            <th class="n">At</th>
+            <th>Recorded</th>
+            <th>Judged again</th>
+          </tr>
+        </thead>
+        <tbody>
+          {differences.slice(0, SHOWN).map(({ recorded, replayed }) => (
+            <tr>
+              <td class="n">{seconds((recorded ?? replayed)?.t_s)}</td>
+              {[recorded, replayed].map((line) => (
+                <td>{line ? describe(line) : <span class="quiet">{NONE}</span>}</td>
+              ))}
+            </tr>
+          ))}
+        </tbody>
+      </table>
+    </div>
+  );
+}
+
+const describe = ({ code, kind, status }: FaultLine) => (
+  <>
+    {faultTitle(code, kind)} <span class={`status-${status}`}>{status}</span>
+  </>
+);

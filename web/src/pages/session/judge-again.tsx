@@ -1,0 +1,28 @@
+import { isFinished } from "../../api/poll";
+import type { Session } from "../../api/types";
+import { useReplay } from "../../hooks/use-replay";
+import { ReplayFields } from "./replay-fields";
+import { replaySettings } from "./replay-settings";
+import { ReplayVerdict } from "./replay-verdict";
+
+export function JudgeAgain({ session }: { session: Session }) {
+  const { replay, judge } = useReplay(session.id);
+  return (
+    <section class="card">
+      <h2>Judge it again</h2>
+      <p class="quiet">With other settings, on the same samples. Nothing of the session changes.</p>
+      <ReplayFields judge={(form) => judge(replaySettings(form))} />
+      {replay && !isFinished(replay) && (
+        <p role="status">
+          Judging… <progress value={replay.progress} max={1} aria-label="Share judged" />
+        </p>
+      )}
+      {replay?.error && (
+        <p class="trouble" role="alert">
+          {replay.error}
+        </p>
+      )}
+      {replay?.result && <ReplayVerdict session={session} result={replay.result} />}
+    </section>
+  );
+}

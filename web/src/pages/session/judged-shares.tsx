@@ -1,0 +1,31 @@
+import type { JudgedMonitor } from "../../api/types";
+import { codeTitle } from "../../words/fault-names";
+import { judgedShare } from "../../words/verdict";
+
+/** How much of the session each monitor could judge, and what it came to. */
+export function JudgedShares({ monitors }: { monitors: JudgedMonitor[] }) {
+  if (monitors.length === 0) return null;
+  return (
+    <table class="list judged">
+      <caption class="quiet small-text">Judged, of the session</caption>
+      <thead>
+        <tr>
+          <th scope="col">Monitor</th>
+          <th scope="col" class="n">
+            Judged
+          </th>
+          <th scope="col">Outcome</th>
+        </tr>
+      </thead>
+      <tbody>
+        {monitors.map((monitor) => (
+          <tr>
+            <th scope="row">{codeTitle(monitor.code)}</th>
+            <td class="n">{judgedShare(monitor)}</td>
+            <td>{monitor.outcome}</td>
+          </tr>
+        ))}
+      </tbody>
+    </table>
+  );
+}

@@ -1,0 +1,46 @@
+import { useMemo, useState } from "preact/hooks";
+import { api } from "../../api/client";
+import type { Asset, FaultLine, Session } from "../../api/types";
+import { useQuery } from "../../hooks/use-query";
+import { TraceBuffer } from "../../live/buffer";
+import { ErrorMessage } from "../../parts/error-message";
+import { Loading } from "../../parts/loading";
+import { JudgeAgain } from "./judge-again";
+import { Player } from "./player";
+import { SessionHeader } from "./session-header";
+
+/** Moments of a whole session that are drawn; a longer one is thinned out. */
+const POINTS = 12_000;
+
+interface Props {
+  session: Session;
+  asset: Asset;
+  faults: FaultLine[];
+  refetch: () => Promise<void>;
+}
+
+export function SessionDetails({ session, asset, faults, refetch }: Props) {
+  /** By which the session is judged for the charts; empty where as it was recorded. */
+  const [profile, setProfile] = useState("");
+  const fetchTrace = () => api.trace(session.id, { points: POINTS, profile: profile || undefined });
+  const trace = useQuery(fetchTrace, `${session.id} ${profile}`);
+  const { data } = trace;
+  const buffer = useMemo(() => (data ? TraceBuffer.of(data) : undefined), [data]);
+  return (
+    <main class="asset">
+      <SessionHeader session={session} refetch={refetch} />
+      <ErrorMessage error={trace.error} retry={trace.refetch} />
+      {!buffer && !trace.error && <Loading what="the recording" />}
+      {buffer?.t.length === 0 && <p class="note">Nothing has been recorded in this session.</p>}
+      <Player
+        session={session}
+        asset={asset}
+        faults={faults}
+        buffer={buffer}
+        profile={profile}
+        setProfile={setProfile}
+      />
+      <JudgeAgain session={session} />
+    </main>
+  );
+}

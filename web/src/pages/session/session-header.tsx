@@ -1,0 +1,38 @@
+import { useState } from "preact/hooks";
+import { api } from "../../api/client";
+import type { Session } from "../../api/types";
+import { ActionButton } from "../../parts/action-button";
+import { saveFile } from "../../parts/save-file";
+import { Link } from "../../router/link";
+import { rigPath, sessionsPath } from "../../router/paths";
+import { DeleteDialog } from "./delete-dialog";
+
+export function SessionHeader({ session, refetch }: { session: Session; refetch: () => Promise<void> }) {
+  const { id, name, asset, state } = session;
+  const [isDeleting, setDeleting] = useState(false);
+  const download = async () => saveFile(await api.recording(id), `${asset}-${name}.csv`);
+  const end = () => api.endSession(id).then(refetch);
+  return (
+    <>
+      <header class="page-head">
+        <div>
+          <p class="crumbs">
+            <Link to={sessionsPath()}>Sessions</Link> / <Link to={rigPath(asset)}>{asset}</Link>
+          </p>
+          <h1>{name}</h1>
+        </div>
+        <div class="page-tools">
+          <ActionButton action={download}>Download CSV</ActionButton>
+          {state === "open" ? (
+            <ActionButton action={end}>End session</ActionButton>
+          ) : (
+            <button type="button" onClick={() => setDeleting(true)}>
+              Delete
+            </button>
+          )}
+        </div>
+      </header>
+      {isDeleting && <DeleteDialog session={session} close={() => setDeleting(false)} />}
+    </>
+  );
+}

@@ -1,0 +1,33 @@
+import { useRef } from "preact/hooks";
+import { useFileDrop } from "./use-file-drop";
+
+/** Where a recording is dropped, or chosen, to be imported. */
+export function DropZone({ take }: { take: (file: File) => void }) {
+  const isOver = useFileDrop(take);
+  const input = useRef<HTMLInputElement>(null);
+  const chosen = ({ currentTarget }: { currentTarget: HTMLInputElement }) => {
+    const file = currentTarget.files?.[0];
+    // Emptied, so that the same file can be chosen once more.
+    currentTarget.value = "";
+    if (file) take(file);
+  };
+  return (
+    <div class={`drop${isOver ? " over" : ""}`}>
+      <input
+        ref={input}
+        type="file"
+        accept=".csv,.txt,.tsv,text/csv"
+        class="hidden"
+        aria-label="Recording to import"
+        tabIndex={-1}
+        onChange={chosen}
+      />
+      <span>{isOver ? "Let go to import" : "Drop a recording (CSV) here, or"}</span>{" "}
+      {!isOver && (
+        <button type="button" onClick={() => input.current?.click()}>
+          choose a file
+        </button>
+      )}
+    </div>
+  );
+}

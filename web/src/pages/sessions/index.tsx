@@ -1,0 +1,64 @@
+/** Recordings: the list, and the place where others are imported. */
+import { useState } from "preact/hooks";
+import { api } from "../../api/client";
+import { useQuery } from "../../hooks/use-query";
+import { useTitle } from "../../hooks/use-title";
+import { ActionButton } from "../../parts/action-button";
+import { EmptyState } from "../../parts/empty-state";
+import { ErrorMessage } from "../../parts/error-message";
+import { lazy, Suspense } from "../../parts/lazy";
+import { Loading } from "../../parts/loading";
+import { useLocation } from "../../router/navigation";
+import { DropZone } from "./drop-zone";
+import { RigChoice } from "./rig-choice";
+import { SessionTable } from "./session-table";
+import { useSessions } from "./use-sessions";
+
+/** Not loaded before a file is there: it brings the reader of CSV. */
+const ImportDialog = lazy(() => import("../import").then((module) => module.ImportDialog));
+
+const fetchNames = () => api.fleet().then((fleet) => fleet.map((entry) => entry.asset));
+
+export function SessionsPage() {
+  useTitle("Sessions");
+  const asset = useLocation().query.get("asset") ?? "";
+  const { sessions, error, refetch, loadMore } = useSessions(asset);
+  const { data: names = [] } = useQuery(fetchNames, "names");
+  const [file, setFile] = useState<File>();
+  const close = () => setFile((now) => (now === file ? undefined : now));
+  return (
+    <main>
+      <header class="page-head">
+        <h1>Sessions</h1>
+        <div class="page-tools">
+          <RigChoice names={names} chosen={asset} />
+        </div>
+      </header>
+      <DropZone take={setFile} />
+      {file && (
+        <Suspense fallback={null}>
+          <ImportDialog
+            key={file.name + file.lastModified}
+            file={file}
+            assets={names}
+            asset={asset || undefined}
+            close={close}
+          />
+        </Suspense>
+      )}
+      <ErrorMessage error={error} retry={refetch} />
+      {!sessions && !error && <Loading what="the sessions" />}
+      {sessions?.length === 0 && (
+        <EmptyState title="No session yet">
+          <p>A session begins when a rig sends its first sample, or when a recording is imported.</p>
+        </EmptyState>
+      )}
+      {sessions && sessions.length > 0 && <SessionTable sessions={sessions} />}
+      {loadMore && (
+        <p>
+          <ActionButton action={loadMore}>Show more</ActionButton>
+        </p>
+      )}
+    </main>
+  );
+}

@@ -1,0 +1,31 @@
+import type { Session } from "../../api/types";
+import { Link } from "../../router/link";
+import { rigPath, sessionPath } from "../../router/paths";
+import { count } from "../../words/numbers";
+import { sessionLength } from "../../words/session";
+import { dateTime, duration } from "../../words/time";
+import { verdict } from "../../words/verdict";
+
+export function SessionRow({ session }: { session: Session }) {
+  const result = session.verdict && verdict(session.verdict);
+  return (
+    <tr>
+      <th scope="row">
+        <Link to={sessionPath(session.id)}>{session.name}</Link>
+      </th>
+      <td>
+        <Link to={rigPath(session.asset)}>{session.asset}</Link>
+      </td>
+      <td>{dateTime(session.opened_at)}</td>
+      <td class="n">{duration(sessionLength(session))}</td>
+      <td class="n">{count(session.samples)}</td>
+      <td>
+        {session.state === "open" ? (
+          <span class="status-open">● open</span>
+        ) : (
+          result && <span class={result.look}>{result.text}</span>
+        )}
+      </td>
+    </tr>
+  );
+}

@@ -1,0 +1,51 @@
+import { useEffect, useMemo, useState } from "preact/hooks";
+import { api } from "../../api/client";
+import type { Asset, AssetAxes } from "../../api/types";
+import { PlayoutClock } from "../../live/playout-clock";
+import { compareSigns, DEFAULT_AXES, type Signs } from "../../live/signs";
+import { LiveCard } from "./live-card";
+import { SignsCard } from "./signs-card";
+import { useWatchedRig } from "./use-watched-rig";
+
+/** How often signs are compared, ms. */
+const COMPARE_MS = 1000;
+
+/** Seconds that a tail in the plan view is long. */
+const TAIL_S = 3;
+
+interface Props {
+  asset: Asset;
+  /** Fetches the rig's description anew. */
+  changed: () => Promise<void>;
+  next: () => void;
+}
+
+/** Whether the rig does what the twin says: signs, axes and units. */
+export function Check({ asset, changed, next }: Props) {
+  const { state, buffer, isSending } = useWatchedRig(asset.name);
+  const playout = useMemo(() => new PlayoutClock(), []);
+  const [signs, setSigns] = useState<Signs>();
+  useEffect(() => {
+    const timer = setInterval(() => setSigns(compareSigns(buffer)), COMPARE_MS);
+    return () => clearInterval(timer);
+  }, [buffer]);
+  const axes: AssetAxes = { ...DEFAULT_AXES, ...asset.axes };
+  // What came before had other axes: it says nothing of these, and is kept in a session of its own.
+  const change = async (part: Partial<AssetAxes>) => {
+    await api.putAsset({ ...asset, axes: { ...axes, ...part } });
+    if (state?.session_id) await api.endSession(state.session_id);
+    buffer.clear();
+    setSigns(undefined);
+    await changed();
+  };
+  const moment = () => {
+    if (!buffer.t.length) return null;
+    return { buffer, t: playout.tick(performance.now(), buffer.last), tail: TAIL_S };
+  };
+  return (
+    <div class="pair">
+      <LiveCard asset={asset} state={state} buffer={buffer} isSending={isSending} moment={moment} />
+      <SignsCard axes={axes} signs={signs} evidence={state?.evidence} change={change} next={next} />
+    </div>
+  );
+}

@@ -1,0 +1,85 @@
+/** What an owner says of a rig on day one, as the form has it, and the asset that it makes. */
+import type { Asset } from "../../api/types";
+import { DEFAULT_AXES } from "../../live/signs";
+
+/** A description in the units of the form: mm, g and degrees. */
+export interface Description {
+  name: string;
+  /** Samples a second. */
+  rate: number;
+  radius: number;
+  mass: number;
+  inertia: number;
+  isRound: boolean;
+  length: number;
+  width: number;
+  diameter: number;
+  hasRim: boolean;
+  /** Largest angle of the plate. */
+  limit: number;
+  /** Metres and radians for one of the device's units. */
+  positionUnit: number;
+  commandUnit: number;
+}
+
+/** The fields that are numbers somebody types. */
+export type NumberField = "rate" | "radius" | "mass" | "length" | "width" | "diameter" | "limit";
+
+/** Moments of inertia over mass times radius squared. */
+export const SOLID = 0.4;
+export const HOLLOW = 0.667;
+
+/** One degree in radians. */
+export const DEGREE = Math.PI / 180;
+
+/** Without the noise of binary fractions, which a form would show. */
+const rounded = (n: number) => Number(n.toPrecision(6));
+
+/** The rig of the book chapter, for what nobody has said. */
+const DEFAULT = {
+  rate: 100,
+  ball: { radius_m: 0.0127, mass_kg: 0.051, inertia_factor: SOLID },
+  plate: { length_m: 0.38, width_m: 0.24, diameter_m: 0.3, thickness_m: 0.003, rim: true },
+  angle_limit_rad: 0.2,
+};
+
+export function describeAsset(asset?: Asset): Description {
+  const { plate, ball, servo, axes } = asset ?? {};
+  const millimetres = (m: number | null | undefined, usual: number) => rounded((m ?? usual) * 1e3);
+  return {
+    name: asset?.name ?? "",
+    rate: asset?.sample_rate_hz ?? DEFAULT.rate,
+    radius: millimetres(ball?.radius_m, DEFAULT.ball.radius_m),
+    mass: rounded((ball?.mass_kg ?? DEFAULT.ball.mass_kg) * 1e3),
+    inertia: ball?.inertia_factor ?? DEFAULT.ball.inertia_factor,
+    isRound: plate?.diameter_m != null,
+    length: millimetres(plate?.length_m, DEFAULT.plate.length_m),
+    width: millimetres(plate?.width_m, DEFAULT.plate.width_m),
+    diameter: millimetres(plate?.diameter_m, DEFAULT.plate.diameter_m),
+    hasRim: plate?.rim ?? DEFAULT.plate.rim,
+    limit: rounded((servo?.angle_limit_rad ?? DEFAULT.angle_limit_rad) / DEGREE),
+    positionUnit: axes?.position_unit_m ?? DEFAULT_AXES.position_unit_m,
+    commandUnit: axes?.command_unit_rad ?? DEFAULT_AXES.command_unit_rad,
+  };
+}
+
+/** The asset of a description; what the form does not ask for stays as it was. */
+export function assetOf(description: Description, before?: Asset): Asset {
+  const { name, rate, radius, mass, inertia, isRound, length, width, diameter } = description;
+  const { hasRim, limit, positionUnit, commandUnit } = description;
+  const size = isRound ? { diameter_m: diameter / 1e3 } : { length_m: length / 1e3, width_m: width / 1e3 };
+  const thickness_m = before?.plate?.thickness_m ?? DEFAULT.plate.thickness_m;
+  const units = { position_unit_m: positionUnit, command_unit_rad: commandUnit };
+  return {
+    ...before,
+    name,
+    sample_rate_hz: rate,
+    plate: { thickness_m, rim: hasRim, ...size },
+    servo: { ...before?.servo, angle_limit_rad: limit * DEGREE },
+    axes: { ...DEFAULT_AXES, ...before?.axes, ...units },
+    ball: { radius_m: radius / 1e3, mass_kg: mass / 1e3, inertia_factor: inertia },
+  } as Asset;
+}
+
+/** Whether the service takes `name` for a rig. */
+export const isName = (name: string) => /^[A-Za-z0-9._-]{1,128}$/.test(name);

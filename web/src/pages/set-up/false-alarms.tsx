@@ -1,0 +1,39 @@
+import type { MonitorCertificate } from "../../api/types";
+import { codeTitle } from "../../words/fault-names";
+import { number, seconds } from "../../words/numbers";
+import { falseAlarmRate } from "./false-alarm-rate";
+
+/** How near each monitor came to an alarm on healthy recordings that it had not learnt from, and how often it will. */
+export function FalseAlarms({ certificate }: { certificate: MonitorCertificate[] }) {
+  return (
+    <>
+      <h3>False alarms to expect</h3>
+      <table class="numbers">
+        <thead>
+          <tr>
+            <th scope="col">tested on recordings not learnt from</th>
+            <th scope="col" class="n">
+              judged
+            </th>
+            <th scope="col" class="n">
+              nearest to an alarm
+            </th>
+            <th scope="col" class="n">
+              false alarms
+            </th>
+          </tr>
+        </thead>
+        <tbody>
+          {certificate.map(({ code, judged_s, nearest, alarms_per_hour }) => (
+            <tr>
+              <th scope="row">{codeTitle(code)}</th>
+              <td class="n">{seconds(judged_s, 0)}</td>
+              <td class="n">{number(nearest * 100, 0, "%")}</td>
+              <td class="n">{falseAlarmRate(alarms_per_hour)}</td>
+            </tr>
+          ))}
+        </tbody>
+      </table>
+    </>
+  );
+}

@@ -1,0 +1,50 @@
+/** A rig in five minutes: describe it, connect it, check its signs, learn it. */
+import { api } from "../../api/client";
+import { useQuery } from "../../hooks/use-query";
+import { useTitle } from "../../hooks/use-title";
+import { UnloadedPage } from "../../parts/unloaded-page";
+import { Link } from "../../router/link";
+import { navigate, useLocation } from "../../router/navigation";
+import { rigPath, setUpPath, type SetUpStep } from "../../router/paths";
+import { Check } from "./check";
+import { Connect } from "./connect";
+import { Describe } from "./describe";
+import { Learn } from "./learn";
+import { Steps } from "./steps";
+
+/** The step of the address; a rig that has no name yet is described first. */
+function useStep(name?: string): SetUpStep {
+  const { query } = useLocation();
+  return (name ? (query.get("step") ?? "describe") : "describe") as SetUpStep;
+}
+
+/** The set-up of a rig, or of a new one where `name` is missing. */
+export function SetUpPage({ name }: { name?: string }) {
+  const title = name ? `Set up ${name}` : "Set up a rig";
+  useTitle(title);
+  const fetchAsset = () => (name ? api.asset(name) : Promise.resolve(undefined));
+  const { data: asset, error, refetch } = useQuery(fetchAsset, name ?? "new");
+  const step = useStep(name);
+  if (name && !asset) return <UnloadedPage title={title} what={name} error={error} retry={refetch} />;
+  const goTo = (next: SetUpStep) => navigate(setUpPath(name!, next));
+  const connect = (created: string) => navigate(setUpPath(created, "connect"));
+  return (
+    <main class="set-up">
+      <header class="page-head">
+        <div>
+          {name && (
+            <p class="crumbs">
+              <Link to="/">Fleet</Link> / <Link to={rigPath(name)}>{name}</Link>
+            </p>
+          )}
+          <h1>{title}</h1>
+        </div>
+      </header>
+      <Steps current={step} goTo={name ? goTo : undefined} />
+      {step === "describe" && <Describe asset={asset} done={connect} />}
+      {step === "connect" && name && <Connect name={name} next={() => goTo("check")} />}
+      {step === "check" && asset && <Check asset={asset} changed={refetch} next={() => goTo("learn")} />}
+      {step === "learn" && asset && <Learn asset={asset} changed={refetch} />}
+    </main>
+  );
+}

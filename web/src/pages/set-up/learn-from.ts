@@ -1,0 +1,24 @@
+import { api } from "../../api/client";
+import { isFinished, poll } from "../../api/poll";
+import type { CalibrationJob, Session } from "../../api/types";
+
+/**
+ * Learns a rig from the sessions with `ids` and puts what was learnt into force; those of
+ * `sessions` among them that are open end by that. `show` is told how the job stands. True where
+ * it came to something.
+ */
+export async function learnFrom(
+  asset: string,
+  ids: string[],
+  sessions: Session[],
+  show: (job: CalibrationJob) => void,
+): Promise<boolean> {
+  const open = sessions.filter(({ id, state }) => ids.includes(id) && state === "open");
+  for (const { id } of open) await api.endSession(id);
+  const begun = await api.calibrate(asset, ids);
+  show(begun);
+  const finished = await poll(() => api.calibration(asset, begun.id), isFinished, show);
+  if (finished.state !== "done") return false;
+  show(await api.activate(asset, finished.id));
+  return true;
+}

@@ -1,0 +1,30 @@
+import { NumberInput, type FieldsProps } from "./number-input";
+
+/** What the rig is called, which cannot be changed later, and how often it sends. */
+export function NameFields({ isRegistered, ...fields }: FieldsProps & { isRegistered: boolean }) {
+  const { description, set } = fields;
+  return (
+    <fieldset>
+      <legend>The rig</legend>
+      <div class="form-row">
+        <label>
+          Name{" "}
+          <input
+            value={description.name}
+            disabled={isRegistered}
+            required
+            pattern="[A-Za-z0-9._\-]+"
+            maxLength={128}
+            placeholder="bench-1"
+            onInput={(e) => set({ name: e.currentTarget.value })}
+            aria-describedby="name-rule"
+          />
+        </label>
+        <NumberInput {...fields} field="rate" label="Samples a second" unit="Hz" />
+      </div>
+      <p id="name-rule" class="quiet small-text">
+        Letters, digits, “-”, “_” and “.”.
+      </p>
+    </fieldset>
+  );
+}

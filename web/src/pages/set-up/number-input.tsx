@@ -1,0 +1,29 @@
+import type { Description, NumberField } from "./description";
+
+export interface FieldsProps {
+  description: Description;
+  set: (part: Partial<Description>) => void;
+}
+
+interface Props extends FieldsProps {
+  field: NumberField;
+  label: string;
+  unit: string;
+}
+
+/** A number of the description, with its unit. */
+export function NumberInput({ description, set, field, label, unit }: Props) {
+  return (
+    <label>
+      {label}, {unit}{" "}
+      <input
+        type="number"
+        step="any"
+        min="0"
+        required
+        value={description[field]}
+        onInput={(e) => set({ [field]: e.currentTarget.valueAsNumber })}
+      />
+    </label>
+  );
+}

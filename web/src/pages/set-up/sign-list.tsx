@@ -1,0 +1,30 @@
+import type { SignVerdict } from "../../live/correlation";
+import type { Signs } from "../../live/signs";
+import { number } from "../../words/numbers";
+
+const VERDICTS: Record<SignVerdict, { text: string; look: string }> = {
+  agrees: { text: "moves as the command asks", look: "good" },
+  reversed: { text: "moves the wrong way round", look: "warn" },
+  swapped: { text: "follows the other command", look: "warn" },
+  unclear: { text: "cannot be told yet", look: "" },
+};
+
+/** Which way round the ball moves along each axis. */
+export function SignList({ signs }: { signs: Signs }) {
+  return (
+    <ul class="sanity" role="status">
+      {(["x", "y"] as const).map((axis) => {
+        const { own, other } = signs[axis];
+        const { text, look } = VERDICTS[signs.verdict[axis]];
+        return (
+          <li class={look}>
+            {axis}: {text}{" "}
+            <span class="quiet">
+              (correlation with its own command {number(own, 2)}, with the other {number(other, 2)})
+            </span>
+          </li>
+        );
+      })}
+    </ul>
+  );
+}

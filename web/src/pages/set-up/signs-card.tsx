@@ -1,0 +1,67 @@
+import type { AssetAxes, Evidence } from "../../api/types";
+import { correctedAxes, type Signs } from "../../live/signs";
+import { ActionButton } from "../../parts/action-button";
+import { number, seconds } from "../../words/numbers";
+import { SignList } from "./sign-list";
+import { UnitWarnings } from "./unit-warnings";
+
+/** Seconds of tilting after which the check has something to say. */
+const ENOUGH_S = 3;
+
+const isWrong = ({ verdict: { x, y } }: Signs) =>
+  [x, y].some((verdict) => verdict === "reversed" || verdict === "swapped");
+
+const sign = (n: number) => (n > 0 ? "+" : "−");
+
+interface Props {
+  axes: AssetAxes;
+  signs?: Signs;
+  evidence?: Evidence;
+  change: (axes: Partial<AssetAxes>) => Promise<void>;
+  next: () => void;
+}
+
+/** Which way round the rig's axes are, and what puts them right. */
+export function SignsCard({ axes, signs, evidence, change, next }: Props) {
+  const seen = signs?.seconds ?? 0;
+  const known = seen >= ENOUGH_S ? signs : undefined;
+  const agrees = signs?.verdict.x === "agrees" && signs.verdict.y === "agrees";
+  return (
+    <section class="card">
+      <h2>Signs and units</h2>
+      <p>
+        Let the rig move the ball about, by its controller or by hand. Tilt by +qy: the ball must go to the
+        right (+x). Tilt by +qx: it must go down (−y).
+      </p>
+      <UnitWarnings evidence={evidence} change={change} />
+      {!known && (
+        <p role="status">
+          {seen > 0
+            ? `Tilting seen for ${seconds(seen, 1)} of ${ENOUGH_S} s…`
+            : "Waiting for the ball to move…"}
+        </p>
+      )}
+      {known && <SignList signs={known} />}
+      {known && isWrong(known) && (
+        <p>
+          <ActionButton class="primary" action={() => change(correctedAxes(axes, known))}>
+            Put it right
+          </ActionButton>{" "}
+          <span class="quiet">
+            Changes the axes in the set-up and begins a new session; the device stays as it is.
+          </span>
+        </p>
+      )}
+      <p class="quiet small-text">
+        In the set-up: {axes.swap ? "x and y swapped, " : ""}x sign {sign(axes.x_sign)}, y sign{" "}
+        {sign(axes.y_sign)}, position unit {axes.position_unit_m} m, command unit{" "}
+        {number(axes.command_unit_rad, 4)} rad.
+      </p>
+      <div class="form-end">
+        <button type="button" class={agrees ? "primary" : ""} onClick={next}>
+          {agrees ? "Good: learn it" : "Go on without"}
+        </button>
+      </div>
+    </section>
+  );
+}

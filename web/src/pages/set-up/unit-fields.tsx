@@ -1,0 +1,43 @@
+import { DEGREE } from "./description";
+import type { FieldsProps } from "./number-input";
+
+const POSITION_UNITS = [
+  { word: "m", metres: 1 },
+  { word: "mm", metres: 0.001 },
+  { word: "cm", metres: 0.01 },
+];
+
+export function UnitFields({ description, set }: FieldsProps) {
+  return (
+    <fieldset>
+      <legend>Units that the device sends</legend>
+      <div class="form-row">
+        <label>
+          Ball's position{" "}
+          <select
+            value={description.positionUnit}
+            onChange={(e) => set({ positionUnit: Number(e.currentTarget.value) })}
+          >
+            {POSITION_UNITS.map(({ word, metres }) => (
+              <option value={metres}>{word}</option>
+            ))}
+          </select>
+        </label>
+        <label>
+          Commands{" "}
+          <select
+            value={description.commandUnit}
+            onChange={(e) => set({ commandUnit: Number(e.currentTarget.value) })}
+          >
+            <option value={1}>rad</option>
+            <option value={DEGREE}>degrees</option>
+          </select>
+        </label>
+      </div>
+      <p class="quiet small-text">
+        Commands are the angles of the plate, not those of the servo's horn. +qy moves the ball toward +x, +qx
+        toward −y; the check comes two steps on.
+      </p>
+    </fieldset>
+  );
+}

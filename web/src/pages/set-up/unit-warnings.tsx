@@ -1,0 +1,37 @@
+import type { AssetAxes, Evidence } from "../../api/types";
+import { ActionButton } from "../../parts/action-button";
+import { DEGREE } from "./description";
+
+/** Beyond these a unit must be wrong. */
+const LARGEST_POSITION_M = 2;
+const LARGEST_ANGLE_RAD = 1.6;
+
+interface Props {
+  evidence?: Evidence;
+  change: (axes: Partial<AssetAxes>) => Promise<void>;
+}
+
+/** Numbers that no rig has, with a button for the unit that they probably are in. */
+export function UnitWarnings({ evidence, change }: Props) {
+  const axes = evidence ? [evidence.x, evidence.y] : [];
+  const isFar = axes.some((axis) => Math.abs(axis.position_m ?? 0) > LARGEST_POSITION_M);
+  const isSteep = axes.some((axis) => Math.abs(axis.command_rad ?? 0) > LARGEST_ANGLE_RAD);
+  return (
+    <>
+      {isFar && (
+        <p class="trouble" role="alert">
+          The ball is metres away.{" "}
+          <ActionButton action={() => change({ position_unit_m: 0.001 })}>Positions are in mm</ActionButton>
+        </p>
+      )}
+      {isSteep && (
+        <p class="trouble" role="alert">
+          The plate tilts beyond 90°.{" "}
+          <ActionButton action={() => change({ command_unit_rad: DEGREE })}>
+            Commands are in degrees
+          </ActionButton>
+        </p>
+      )}
+    </>
+  );
+}

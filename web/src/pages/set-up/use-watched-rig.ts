@@ -1,0 +1,14 @@
+import { useNow } from "../../hooks/use-now";
+import { useRigStream } from "../../hooks/use-rig-stream";
+
+const STATES_PER_SECOND = 10;
+
+/** A device that has sent nothing for so long does not send any more, ms. */
+const SILENT_MS = 5000;
+
+/** The rig's stream for the steps that wait for it. */
+export function useWatchedRig(name: string) {
+  const { state, buffer, isSilent } = useRigStream(name, { statesPerSecond: STATES_PER_SECOND });
+  const now = useNow(1000);
+  return { state, buffer, isSending: !isSilent(now, SILENT_MS) };
+}

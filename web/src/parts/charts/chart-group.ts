@@ -1,0 +1,41 @@
+import type { Axis } from "../../api/types";
+import type { TraceBuffer } from "../../live/buffer";
+import type { ChartKind } from "./chart-kinds";
+import type { LineChart } from "./line-chart";
+import type { Mark } from "./overlays";
+
+/** Charts that are drawn together from one buffer; no component is rendered anew for it. */
+export class ChartGroup {
+  private charts = new Map<string, { chart: LineChart; kind: ChartKind; axis: Axis }>();
+  private marks: Mark[] = [];
+
+  add(key: string, chart: LineChart, kind: ChartKind, axis: Axis): void {
+    this.charts.set(key, { chart, kind, axis });
+    chart.setMarks(this.marks);
+  }
+
+  remove(key: string): void {
+    this.charts.delete(key);
+  }
+
+  setMarks(marks: Mark[]): void {
+    this.marks = marks;
+    this.charts.forEach(({ chart }) => chart.setMarks(marks));
+  }
+
+  /** Draws the moments of `range`; `playhead` is the moment shown elsewhere on the page. */
+  draw(buffer: TraceBuffer, range: [number, number], playhead: number | null = null): void {
+    const from = Math.max(buffer.index(range[0]) - 1, 0);
+    const to = buffer.index(range[1]) + 2;
+    const cut = <T>(column: T[]) => column.slice(from, to);
+    const t = cut(buffer.t);
+    this.charts.forEach(({ chart, kind, axis }) => {
+      const columns = buffer[axis];
+      const lines = kind.lines.map(({ column, factor }) => {
+        const values = cut(columns[column]);
+        return factor ? values.map((value) => (value === null ? null : value * factor)) : values;
+      });
+      chart.show([t, ...lines], range, kind.showsGates ? cut(columns.enabled) : [], playhead);
+    });
+  }
+}

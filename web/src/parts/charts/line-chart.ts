@@ -1,0 +1,96 @@
+/** A chart over time: uPlot with this page's colours, shaded gates, marks and a shared cursor. */
+import uPlot from "uplot";
+import "uplot/dist/uPlot.min.css";
+import { onTheme } from "../../theme";
+import { chartOptions, type LineChartOptions } from "./chart-options";
+import { drawMarks, shadeGates, type Mark } from "./overlays";
+
+export type ChartData = [number[], ...(number | null)[][]];
+
+export class LineChart {
+  private plot?: uPlot;
+  private data: ChartData;
+  private range: [number, number] = [0, 1];
+  private gates: boolean[] = [];
+  private marks: Mark[] = [];
+  /** The moment that is shown elsewhere on the page, marked by a line. */
+  private playhead: number | null = null;
+  private readonly cleanups: (() => void)[] = [];
+
+  constructor(
+    private readonly element: HTMLElement,
+    private readonly options: LineChartOptions,
+  ) {
+    this.data = [[], ...options.lines.map(() => [])];
+    this.build();
+    const resized = new ResizeObserver(() => this.plot?.setSize(this.size()));
+    resized.observe(element);
+    // Colours are part of what is built.
+    this.cleanups.push(
+      () => resized.disconnect(),
+      onTheme(() => this.build()),
+    );
+  }
+
+  destroy(): void {
+    this.cleanups.forEach((cleanup) => cleanup());
+    this.plot?.destroy();
+  }
+
+  /** Shows `data` over `range`; `gates` says of each moment whether the residual may be judged. */
+  show(
+    data: ChartData,
+    range: [number, number],
+    gates: boolean[] = [],
+    playhead: number | null = null,
+  ): void {
+    this.data = data;
+    this.range = range;
+    this.gates = gates;
+    this.playhead = playhead;
+    this.plot?.batch(() => {
+      this.plot?.setData(data, false);
+      this.plot?.setScale("x", { min: range[0], max: range[1] });
+    });
+  }
+
+  setMarks(marks: Mark[]): void {
+    this.marks = marks;
+    this.plot?.redraw(false);
+  }
+
+  private size() {
+    return {
+      width: Math.max(this.element.clientWidth, 120),
+      height: this.element.clientHeight || this.options.height,
+    };
+  }
+
+  private build(): void {
+    this.plot?.destroy();
+    const options = {
+      ...this.size(),
+      ...chartOptions(this.options, () => this.range),
+      hooks: {
+        drawClear: [(plot: uPlot) => shadeGates(plot, this.data[0], this.gates)],
+        draw: [(plot: uPlot) => this.drawMarks(plot)],
+        ready: [(plot: uPlot) => this.listen(plot)],
+      },
+    };
+    this.plot = new uPlot(options, this.data, this.element);
+  }
+
+  private drawMarks(plot: uPlot): void {
+    const playhead: Mark[] = this.playhead === null ? [] : [{ t: this.playhead, label: "", colour: "ink" }];
+    const [from, to] = this.range;
+    drawMarks(
+      plot,
+      [...this.marks, ...playhead].filter(({ t }) => t >= from && t <= to),
+    );
+  }
+
+  private listen(plot: uPlot): void {
+    const { onSeek } = this.options;
+    if (onSeek) plot.over.addEventListener("click", (event) => onSeek(plot.posToVal(event.offsetX, "x")));
+  }
+}

@@ -1,0 +1,25 @@
+import type { Axis } from "../../api/types";
+import type { ChartGroup } from "./chart-group";
+import type { ChartKindName } from "./chart-kinds";
+import { RigChart } from "./rig-chart";
+
+interface Props {
+  group: ChartGroup;
+  kinds: ChartKindName[];
+  height?: number;
+  axes?: Axis[];
+  onSeek?: (t: number) => void;
+  /** Leaves out the lines of where the twin was: a recording has none. */
+  measuredOnly?: boolean;
+}
+
+/** The charts of a rig over time, one for each kind and axis. */
+export function RigCharts({ kinds, axes = ["x", "y"], height = 150, ...rest }: Props) {
+  return (
+    <div class={`charts charts-${axes.length}`}>
+      {kinds.flatMap((kind) =>
+        axes.map((axis) => <RigChart key={kind + axis} kind={kind} axis={axis} height={height} {...rest} />),
+      )}
+    </div>
+  );
+}

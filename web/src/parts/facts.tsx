@@ -1,0 +1,17 @@
+import type { ComponentChildren } from "preact";
+
+export type Fact = [name: string, value: ComponentChildren];
+
+/** A definition list in columns: names and their values. */
+export function Facts({ facts }: { facts: Fact[] }) {
+  return (
+    <dl class="facts">
+      {facts.map(([name, value]) => (
+        <div>
+          <dt>{name}</dt>
+          <dd>{value}</dd>
+        </div>
+      ))}
+    </dl>
+  );
+}

@@ -1,0 +1,41 @@
+import {
+  CircleGeometry,
+  DoubleSide,
+  Group,
+  Mesh,
+  MeshBasicMaterial,
+  MeshStandardMaterial,
+  SphereGeometry,
+} from "three";
+import { colour } from "../../theme";
+
+/** The ball, and the twin's, which is seen through and a little larger so that neither hides the other. */
+const LOOKS = {
+  ball: { colour: "measured", scale: 1, roughness: 0.25, metalness: 0.35, opacity: 1, shadow: 0.3 },
+  ghost: { colour: "twin", scale: 1.02, roughness: 0.9, metalness: 0, opacity: 0.45, shadow: 0.12 },
+};
+
+/** A ball on the plate with its shadow; not seen until somebody says where it is. */
+export function buildBall(kind: keyof typeof LOOKS, radius: number): Group {
+  const look = LOOKS[kind];
+  const isGhost = kind === "ghost";
+  const material = new MeshStandardMaterial({
+    color: colour(look.colour),
+    roughness: look.roughness,
+    metalness: look.metalness,
+    transparent: isGhost,
+    opacity: look.opacity,
+    depthWrite: !isGhost,
+  });
+  const sphere = new Mesh(new SphereGeometry(radius * look.scale, 40, 28), material);
+  sphere.position.z = radius;
+  const shadow = new Mesh(
+    new CircleGeometry(radius * 0.8, 32),
+    new MeshBasicMaterial({ color: 0x000000, transparent: true, opacity: look.shadow, side: DoubleSide }),
+  );
+  shadow.position.z = 0.0004;
+  const group = new Group();
+  group.add(sphere, shadow);
+  group.visible = false;
+  return group;
+}

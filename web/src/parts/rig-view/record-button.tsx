@@ -1,0 +1,41 @@
+import { useRef, useState } from "preact/hooks";
+import { saveFile } from "../save-file";
+
+/** Frames a second of a video. */
+const VIDEO_HZ = 60;
+const BITS_PER_SECOND = 8e6;
+const FORMATS = ["video/webm;codecs=vp9", "video/webm", "video/mp4"];
+
+/** How often what is recorded is handed over, ms. */
+const PART_MS = 1000;
+
+/** Records what is drawn as a video, which is saved when it is stopped. */
+export function RecordButton({ canvas, name }: { canvas: () => HTMLCanvasElement | null; name: string }) {
+  const recorder = useRef<MediaRecorder | null>(null);
+  const [isRecording, setRecording] = useState(false);
+  if (typeof MediaRecorder === "undefined") return null;
+  const start = () => {
+    const mimeType = FORMATS.find((format) => MediaRecorder.isTypeSupported(format));
+    const stream = canvas()!.captureStream(VIDEO_HZ);
+    const current = new MediaRecorder(stream, { mimeType, videoBitsPerSecond: BITS_PER_SECOND });
+    const parts: Blob[] = [];
+    current.ondataavailable = (event) => parts.push(event.data);
+    current.onstop = () => {
+      setRecording(false);
+      const extension = current.mimeType.includes("mp4") ? "mp4" : "webm";
+      saveFile(new Blob(parts, { type: current.mimeType }), `${name}.${extension}`);
+    };
+    current.start(PART_MS);
+    recorder.current = current;
+    setRecording(true);
+  };
+  const toggle = () => {
+    if (recorder.current?.state === "recording") recorder.current.stop();
+    else start();
+  };
+  return (
+    <button type="button" class="small" aria-pressed={isRecording} onClick={toggle}>
+      {isRecording ? "■ stop" : "● record"}
+    </button>
+  );
+}

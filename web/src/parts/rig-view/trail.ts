@@ -1,0 +1,35 @@
+import { BufferGeometry, Float32BufferAttribute, Line, LineBasicMaterial } from "three";
+import type { PlanePoint } from "../../live/pose";
+import { colour } from "../../theme";
+
+/** Moments of the ball's trail: 3 s at 60 frames a second. */
+const LENGTH = 180;
+
+/** Above the plate by so much that it is seen, m. */
+const HEIGHT_M = 0.0006;
+
+/** The line that the ball leaves on the plate. */
+export class Trail {
+  /** Three numbers for each moment; one buffer for good, so that nothing piles up. */
+  private readonly points = new Float32BufferAttribute(new Float32Array(LENGTH * 3), 3);
+  private n = 0;
+  private line?: Line;
+
+  /** The line anew, in the colours of now; its points stay. */
+  build(): Line {
+    const material = new LineBasicMaterial({ color: colour("measured"), transparent: true, opacity: 0.7 });
+    const line = new Line(new BufferGeometry().setAttribute("position", this.points), material);
+    line.frustumCulled = false;
+    line.geometry.setDrawRange(0, this.n);
+    this.line = line;
+    return line;
+  }
+
+  add({ x, y }: PlanePoint): void {
+    if (this.n === LENGTH) this.points.array.copyWithin(0, 3);
+    else this.n++;
+    this.points.setXYZ(this.n - 1, x, y, HEIGHT_M);
+    this.points.needsUpdate = true;
+    this.line?.geometry.setDrawRange(0, this.n);
+  }
+}

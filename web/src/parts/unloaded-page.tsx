@@ -1,0 +1,27 @@
+import { ErrorMessage } from "./error-message";
+import { Loading } from "./loading";
+
+interface Props {
+  /** The heading that stands above an error. */
+  title?: string;
+  /** What is loading. */
+  what: string;
+  error: unknown;
+  retry: () => Promise<unknown>;
+}
+
+/** A page whose data is not there: still loading, or what went wrong. */
+export function UnloadedPage({ title, what, error, retry }: Props) {
+  return (
+    <main>
+      {error ? (
+        <>
+          {title && <h1>{title}</h1>}
+          <ErrorMessage error={error} retry={retry} />
+        </>
+      ) : (
+        <Loading what={what} />
+      )}
+    </main>
+  );
+}

@@ -1,0 +1,28 @@
+import { useRef } from "preact/hooks";
+import type { Asset } from "../../api/types";
+import { useAnimationFrame } from "../../hooks/use-animation-frame";
+import { drawXyTrace, type TraceMoment } from "./draw-xy-trace";
+
+interface Props {
+  asset: Asset;
+  /** What to draw now; asked before each frame. */
+  moment: () => TraceMoment | null;
+}
+
+/** The ball's way over the plate from above, with the twin's beside it. */
+export function XyTrace({ asset, moment }: Props) {
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const drawn = useRef("");
+  useAnimationFrame(() => {
+    const now = moment();
+    const element = canvas.current;
+    if (!now || !element) return;
+    const { theme } = document.documentElement.dataset;
+    const key = [now.t.toFixed(3), element.clientWidth, theme, now.buffer.t.length].join(" ");
+    if (key === drawn.current) return;
+    drawn.current = key;
+    drawXyTrace(element, asset, now);
+  });
+  const label = "The ball's way over the plate seen from above, x to the right, y up";
+  return <canvas ref={canvas} class="xy" role="img" aria-label={label} />;
+}

@@ -1,0 +1,20 @@
+import type { ComponentChildren } from "preact";
+import { navigate } from "./navigation";
+
+type Props = { to: string; children: ComponentChildren; class?: string; "aria-current"?: "page" };
+
+/** A link within the page: followed without loading anew, unless another tab or a download is asked for. */
+export function Link({ to, children, ...rest }: Props) {
+  const follow = (event: MouseEvent) => {
+    const hasModifier = event.metaKey || event.ctrlKey || event.shiftKey || event.altKey;
+    if (event.button !== 0 || hasModifier) return;
+    event.preventDefault();
+    navigate(to);
+    scrollTo(0, 0);
+  };
+  return (
+    <a href={to} onClick={follow} {...rest}>
+      {children}
+    </a>
+  );
+}

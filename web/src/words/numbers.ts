@@ -1,0 +1,26 @@
+/** How numbers are written: with a true minus sign and a narrow space before the unit. */
+
+/** What stands where there is no number. */
+export const NONE = "–";
+
+/** A number with `digits` after the point and its unit; a dash where there is none. */
+export function number(value: number | null | undefined, digits: number, unit = ""): string {
+  if (value === null || value === undefined || !Number.isFinite(value)) return NONE;
+  const rounded = value.toFixed(digits);
+  const text = Number(rounded) === 0 ? rounded.replace("-", "") : rounded.replace("-", "−");
+  return unit ? `${text}\u202f${unit}` : text;
+}
+
+export const degrees = (rad: number | null | undefined, digits = 1) =>
+  rad === null || rad === undefined ? NONE : `${number((rad * 180) / Math.PI, digits)}°`;
+
+export const millimetres = (m: number | null | undefined, digits = 1) =>
+  number(m === null || m === undefined ? m : m * 1e3, digits, "mm");
+
+export const seconds = (s: number | null | undefined, digits = 2) => number(s, digits, "s");
+
+/** A whole number in groups of three digits. */
+export const count = (n: number) => n.toLocaleString("en").replaceAll(",", "\u202f");
+
+/** A number of things: 1 session, 2 sessions. */
+export const plural = (n: number, noun: string) => `${n} ${noun}${n === 1 ? "" : "s"}`;

@@ -1,0 +1,51 @@
+/** The status byte of a fault: which of its bits say what. */
+
+/** Bits of the ISO 14229-1 status byte (annex D.2), from bit 7 down to bit 0. */
+export const STATUS_BITS = [
+  {
+    bit: 7,
+    name: "warningIndicatorRequested",
+    on: "A warning lamp is asked for.",
+    off: "No warning lamp is asked for.",
+  },
+  {
+    bit: 6,
+    name: "testNotCompletedThisOperationCycle",
+    on: "The test has not come to a result in this session.",
+    off: "The test has come to a result in this session.",
+  },
+  {
+    bit: 5,
+    name: "testFailedSinceLastClear",
+    on: "The test has failed since the code was last cleared.",
+    off: "The test has not failed since the code was last cleared.",
+  },
+  {
+    bit: 4,
+    name: "testNotCompletedSinceLastClear",
+    on: "The test has not come to a result since the last clear.",
+    off: "The test has come to a result since the last clear.",
+  },
+  {
+    bit: 3,
+    name: "confirmedDTC",
+    on: "Confirmed: it failed often enough to be stored as a fault.",
+    off: "Not confirmed.",
+  },
+  {
+    bit: 2,
+    name: "pendingDTC",
+    on: "Pending: it failed in this session or the one before.",
+    off: "Not pending.",
+  },
+  {
+    bit: 1,
+    name: "testFailedThisOperationCycle",
+    on: "The test has failed in this session.",
+    off: "The test has not failed in this session.",
+  },
+  { bit: 0, name: "testFailed", on: "The test fails right now.", off: "The test does not fail right now." },
+] as const;
+
+/** Whether the test of a fault line fails: one that passes again says how a fault stands. */
+export const isFailing = (line: { status_byte: string }) => (parseInt(line.status_byte, 16) & 1) === 1;

@@ -1,0 +1,36 @@
+/** How moments and lengths of time are written. */
+import { NONE } from "./numbers";
+
+const MINUTE_S = 60;
+const HOUR_S = 3600;
+const DAY_S = 86_400;
+
+/**
+ * A length of time in two parts at most: 3 min 20 s. It is rounded to the smaller part before
+ * it is split, so that what comes to a whole of the larger part is carried into it.
+ * Intl.DurationFormat would write it, but not every browser in use has that yet, and it does
+ * not round.
+ */
+export function duration(s: number | null | undefined): string {
+  if (s === null || s === undefined) return NONE;
+  const tenths = s.toFixed(1);
+  if (Number(tenths) < 10) return `${tenths}\u202fs`;
+  const inSeconds = Math.round(s);
+  if (inSeconds < MINUTE_S) return `${inSeconds}\u202fs`;
+  if (inSeconds < HOUR_S) return `${Math.floor(inSeconds / 60)}\u202fmin ${inSeconds % 60}\u202fs`;
+  const inMinutes = Math.round(s / MINUTE_S);
+  if (inMinutes * MINUTE_S < DAY_S) return `${Math.floor(inMinutes / 60)}\u202fh ${inMinutes % 60}\u202fmin`;
+  const inHours = Math.round(s / HOUR_S);
+  return `${Math.floor(inHours / 24)}\u202fd ${inHours % 24}\u202fh`;
+}
+
+/** How long ago `moment` was, in whole seconds below a minute. */
+export function timeAgo(moment: string | null | undefined, now = Date.now()): string {
+  if (!moment) return "never";
+  const s = Math.max(0, (now - Date.parse(moment)) / 1000);
+  return s < 2 ? "now" : `${duration(s < MINUTE_S ? Math.round(s) : s).replace(".0", "")} ago`;
+}
+
+/** A moment as date and time of day, the way the browser's language has it. */
+export const dateTime = (moment: string | null | undefined) =>
+  moment ? new Date(moment).toLocaleString(undefined, { dateStyle: "medium", timeStyle: "medium" }) : NONE;

@@ -1,0 +1,97 @@
+// The fleet's list without its page: health, events, search and order.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { afterEvent, healthOf, withLine } from "../../src/pages/fleet/fleet-state.ts";
+import { chosenRows, countRows, placesByName, rowOf } from "../../src/pages/fleet/rows.ts";
+
+const NOW = Date.parse("2026-01-01T12:00:00Z");
+const ago = (seconds) => new Date(NOW - seconds * 1000).toISOString();
+
+const rig = (asset, more = {}) => ({
+  asset,
+  faults: [],
+  warnings: [],
+  session_id: "1",
+  session: "run",
+  last_seen: ago(1),
+  ...more,
+});
+
+const fault = (status, code = "x_servo") => ({ code, status, acknowledged: false });
+const line = (status, more = {}) => ({
+  asset: "a",
+  code: "x_servo",
+  session: "run",
+  status,
+  onset_s: 1,
+  ...more,
+});
+
+test("a rig's health is its worst fault, then drift, then silence", () => {
+  assert.equal(healthOf(rig("a", { faults: [fault("pending"), fault("confirmed")] }), NOW), "fault");
+  assert.equal(healthOf(rig("a", { faults: [fault("pending")], warnings: [{}] }), NOW), "suspect");
+  assert.equal(healthOf(rig("a", { warnings: [{}] }), NOW), "drift");
+  assert.equal(healthOf(rig("a"), NOW), "ok");
+  assert.equal(healthOf(rig("a", { last_seen: ago(11) }), NOW), "silent");
+  assert.equal(healthOf(rig("a", { session_id: null }), NOW), "idle");
+});
+
+test("an event changes its fault alone, and keeps that it is acknowledged", () => {
+  const known = { ...fault("pending"), acknowledged: true };
+  const before = rig("a", { faults: [known, fault("confirmed", "sensor")] });
+  const confirmed = afterEvent(before, line("confirmed"), new Date(NOW));
+  assert.deepEqual(
+    confirmed.faults.map(({ code, status, acknowledged }) => [code, status, acknowledged]),
+    [
+      ["sensor", "confirmed", false],
+      ["x_servo", "confirmed", true],
+    ],
+  );
+  const healed = afterEvent(before, line("healed"));
+  assert.deepEqual(
+    healed.faults.map(({ code }) => code),
+    ["sensor"],
+  );
+  assert.equal(before.faults.length, 2, "as it was");
+});
+
+test("an event that tells of the same change replaces the one before, and there are fifty at most", () => {
+  const first = line("pending", { event: 1 });
+  const retold = line("pending", { event: 2, kind: "gain" });
+  assert.deepEqual(withLine([first], retold), [retold]);
+  const other = line("confirmed", { event: 3 });
+  assert.deepEqual(withLine([retold], other), [other, retold]);
+  let lines = [];
+  for (let event = 0; event < 80; event++)
+    lines = withLine(lines, line("pending", { event, onset_s: event }));
+  assert.deepEqual([lines.length, lines[0].event], [50, 79]);
+});
+
+const fleet = [
+  rig("bench-10", { lag_s: 3, last_seen: ago(1) }),
+  rig("bench-2", { lag_s: 1, last_seen: ago(3) }),
+  rig("lab", { faults: [fault("confirmed", "sensor")], last_seen: ago(2) }),
+  rig("attic", { session_id: null, last_seen: null }),
+];
+const places = placesByName(fleet.map(({ asset }) => asset));
+const rows = fleet.map((entry) => rowOf(entry, places, NOW));
+const names = (...choice) => chosenRows(rows, ...choice).map(({ entry }) => entry.asset);
+
+test("rigs are ordered as wanted, equal ones by name, and numbers in names count", () => {
+  assert.deepEqual(names("all", "", "name"), ["attic", "bench-2", "bench-10", "lab"]);
+  assert.deepEqual(names("all", "", "severity"), ["lab", "bench-2", "bench-10", "attic"]);
+  assert.deepEqual(names("all", "", "lag"), ["bench-10", "bench-2", "attic", "lab"]);
+  assert.deepEqual(names("all", "", "seen"), ["bench-10", "lab", "bench-2", "attic"]);
+  assert.deepEqual(names("all", "", "nonsense"), names("all", "", "severity"));
+});
+
+test("every word of a search must be found, in names, sessions or faults", () => {
+  assert.deepEqual(names("all", "bench", "name"), ["bench-2", "bench-10"]);
+  assert.deepEqual(names("all", "SENSOR position", "name"), ["lab"]);
+  assert.deepEqual(names("all", "bench no-such", "name"), []);
+});
+
+test("a filter leaves the rigs of one health, and they are counted", () => {
+  assert.deepEqual(names("fault", "", "name"), ["lab"]);
+  assert.deepEqual([countRows(rows, "all"), countRows(rows, "ok"), countRows(rows, "drift")], [4, 2, 0]);
+});

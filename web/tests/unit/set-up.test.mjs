@@ -1,0 +1,151 @@
+// The set-up without its page: what the form makes of a rig, what is learnt from, what is pasted.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { assetOf, DEGREE, describeAsset, isName } from "../../src/pages/set-up/description.ts";
+import { proposedSessions, totalLength, withChoice } from "../../src/pages/set-up/chosen-sessions.ts";
+import { falseAlarmRate } from "../../src/pages/set-up/false-alarm-rate.ts";
+import { learnFrom } from "../../src/pages/set-up/learn-from.ts";
+import { snippets } from "../../src/pages/set-up/snippets.ts";
+import { random } from "./random.mjs";
+
+test("a new rig is described as that of the book chapter", () => {
+  const description = describeAsset();
+  assert.equal(description.name, "");
+  assert.deepEqual([description.radius, description.mass, description.rate], [12.7, 51, 100]);
+  const { plate, axes } = assetOf({ ...description, name: "bench" });
+  assert.deepEqual(plate, { thickness_m: 0.003, rim: true, length_m: 0.38, width_m: 0.24 });
+  assert.deepEqual([axes.swap, axes.x_sign, axes.position_unit_m], [false, 1, 1]);
+});
+
+test("what the form makes is described as it was typed", () => {
+  const next = random(5);
+  const typed = (most) => Number((next() * most).toPrecision(4));
+  for (let i = 0; i < 200; i++) {
+    const description = {
+      name: `rig-${i}`,
+      rate: typed(500),
+      radius: typed(40),
+      mass: typed(300),
+      inertia: typed(1),
+      isRound: next() < 0.5,
+      length: typed(900),
+      width: typed(900),
+      diameter: typed(900),
+      hasRim: next() < 0.5,
+      limit: typed(60),
+      positionUnit: [1, 0.001, 0.01][i % 3],
+      commandUnit: [1, DEGREE][i % 2],
+    };
+    const back = describeAsset(assetOf(description));
+    // Only the sizes of the plate's own shape are kept.
+    const { length, width, diameter } = back;
+    const kept = description.isRound ? { length, width } : { diameter };
+    assert.deepEqual(back, { ...description, ...kept });
+  }
+});
+
+test("what the form does not ask for stays as it was", () => {
+  const before = {
+    name: "bench",
+    plate: { thickness_m: 0.005, diameter_m: 0.3, rim: false },
+    servo: { angle_limit_rad: 0.3, rate_limit_rad_s: 4 },
+    axes: { swap: true, x_sign: -1 },
+    diagnostics: { profile: "textbook" },
+  };
+  const after = assetOf({ ...describeAsset(before), limit: 10 }, before);
+  assert.deepEqual(after.plate, before.plate);
+  assert.deepEqual(after.servo, { angle_limit_rad: 10 * DEGREE, rate_limit_rad_s: 4 });
+  assert.deepEqual([after.axes.swap, after.axes.x_sign, after.axes.y_sign], [true, -1, 1]);
+  assert.equal(after.diagnostics, before.diagnostics);
+});
+
+test("a name has letters, digits, dash, underline and point", () => {
+  for (const name of ["bench-1", "A.b_c", "x".repeat(128)]) assert.ok(isName(name), name);
+  for (const name of ["", "bench 1", "a/b", "ä", "x".repeat(129)]) assert.ok(!isName(name), name);
+});
+
+const session = (id, length, more = {}) => ({ id, first_t_s: 0, last_t_s: length, state: "ended", ...more });
+
+test("the newest session is proposed if it is a minute long and nothing was found in it", () => {
+  const proposed = (...sessions) => [...proposedSessions(sessions)];
+  assert.deepEqual(proposed(session("new", 60), session("old", 90)), ["new"]);
+  assert.deepEqual(proposed(session("new", 59), session("old", 90)), []);
+  assert.deepEqual(proposed(session("new", 60, { verdict: { faults: ["sensor"] } })), []);
+  assert.deepEqual(proposed(session("new", null)), []);
+  assert.deepEqual([...proposedSessions()], []);
+});
+
+test("a choice changes by one session, and is as long as its sessions together", () => {
+  const chosen = new Set(["a", "b"]);
+  assert.deepEqual([...withChoice(chosen, "c", true)], ["a", "b", "c"]);
+  assert.deepEqual([...withChoice(chosen, "a", false)], ["b"]);
+  assert.deepEqual([...chosen], ["a", "b"], "as it was");
+  assert.equal(totalLength([session("a", 30), session("b", null), session("c", 40)], chosen), 30);
+});
+
+/** Answers requests in the place of a service; what was asked for. */
+function fakeService(answers) {
+  const requests = [];
+  globalThis.fetch = (path, { method = "GET", body } = {}) => {
+    requests.push([method, path.replace("/api/v1", ""), ...(body ? [JSON.parse(body)] : [])]);
+    return Promise.resolve(Response.json(answers.shift()));
+  };
+  return requests;
+}
+
+test("learning ends the open sessions, waits for the job, and puts it into force", async () => {
+  const job = (state) => ({ id: "7", state });
+  const requests = fakeService([{}, job("queued"), job("running"), job("done"), job("active")]);
+  const shown = [];
+  const sessions = [
+    session("a", 60, { state: "open" }),
+    session("b", 60),
+    session("c", 60, { state: "open" }),
+  ];
+  assert.equal(await learnFrom("bench", ["a", "b"], sessions, ({ state }) => shown.push(state)), true);
+  assert.deepEqual(requests, [
+    ["POST", "/sessions/a/end"],
+    ["POST", "/assets/bench/calibrations", { sessions: ["a", "b"] }],
+    ["GET", "/assets/bench/calibrations/7"],
+    ["GET", "/assets/bench/calibrations/7"],
+    ["POST", "/assets/bench/calibrations/7/activate"],
+  ]);
+  assert.deepEqual(shown, ["queued", "running", "done", "active"]);
+});
+
+test("what cannot be learnt is not put into force", async () => {
+  const requests = fakeService([
+    { id: "7", state: "queued" },
+    { id: "7", state: "failed", error: "it rested" },
+  ]);
+  let last;
+  assert.equal(await learnFrom("bench", ["b"], [session("b", 60)], (job) => (last = job)), false);
+  assert.equal(last.error, "it rested");
+  assert.equal(requests.length, 2);
+});
+
+test("rates of false alarms are in the unit that is easiest to imagine", () => {
+  assert.equal(falseAlarmRate(null), "unknown");
+  assert.equal(falseAlarmRate(2), "2.0 an hour");
+  assert.equal(falseAlarmRate(0.5), "12.0 a day");
+  assert.equal(falseAlarmRate(1 / 24 / 10), "one in 10 days");
+});
+
+test("snippets lead to the rig, from another machine if it is this one", () => {
+  const [curl, python, arduino] = snippets("bench 1", "http://127.0.0.1:8087");
+  for (const { text } of [curl, python]) {
+    assert.match(text, /http:\/\/127\.0\.0\.1:8087\/api\/v1\/assets\/bench%201\/telemetry/);
+  }
+  assert.match(arduino.text, /"http:\/\/SERVER:8087\/api\/v1\/assets\/bench%201\/telemetry"/);
+  const [, , elsewhere] = snippets("bench-1", "https://rigs.example");
+  assert.match(elsewhere.text, /"https:\/\/rigs\.example\/api/);
+});
+
+test("a token stands in each snippet exactly where the service asks for one", () => {
+  for (const { language, text } of snippets("bench-1", "http://host", "offbd_secret")) {
+    assert.match(text, /authorization"?[:,] ?"?Bearer offbd_secret/, language);
+  }
+  for (const { language, text } of snippets("bench-1", "http://host")) {
+    assert.doesNotMatch(text, /authorization|undefined/, language);
+  }
+});
