@@ -33,13 +33,16 @@ pub(super) const RESTART_S: f64 = 10.0;
 pub(super) struct Work {
     pub(super) at: Micros,
     pub(super) writes: Vec<Write>,
+    /// Whether an engine has taken something: if the rest fails, it is ahead of
+    /// the store.
+    pub(super) engine_moved: bool,
     /// Begun once the writes are durable, each with its place in the queue.
     pub(super) jobs: Vec<(OwnedPermit<Job>, Job)>,
 }
 
 impl Work {
     pub(super) const fn at(at: Micros) -> Self {
-        Self { at, writes: Vec::new(), jobs: Vec::new() }
+        Self { at, writes: Vec::new(), engine_moved: false, jobs: Vec::new() }
     }
 }
 
@@ -219,6 +222,7 @@ impl Running {
     /// Ends the open session, if there is one.
     pub(super) fn end(&mut self, context: &Context, work: &mut Work) -> Result<(), ServiceError> {
         let Some(mut open) = self.open.take() else { return Ok(()) };
+        work.engine_moved = true;
         open.judging.input(Input::End);
         open.report(&self.row.name, work)?;
         let summary = open.summary();
@@ -249,6 +253,7 @@ impl Running {
         ack: &mut AckView,
     ) -> Result<usize, ServiceError> {
         let Some(open) = &mut self.open else { return Ok(samples.len()) };
+        work.engine_moved = true;
         let first_index = open.progress.n_samples;
         let mut recorded = Vec::with_capacity(samples.len());
         let mut transitions = Work::at(work.at);
@@ -331,6 +336,7 @@ impl Running {
         }));
         let act = Act { kind, code, view: ActView { by: actor, at: rfc3339(work.at) } };
         if let Some(open) = &mut self.open {
+            work.engine_moved = true;
             open.judging.input(input(kind, code));
             open.report(&self.row.name, work)?;
             return self.remember(Some(&act), work);

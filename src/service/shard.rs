@@ -236,7 +236,7 @@ impl Shard {
                 }
             }
             Ok(Err(error)) => {
-                if work.writes.is_empty() {
+                if !work.engine_moved && work.writes.is_empty() {
                     self.running.insert(name.to_owned(), running);
                 } else {
                     life.break_off();
@@ -315,5 +315,65 @@ impl Shard {
                 })
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::{AssetRow, Place};
+    use offbd_core::engine::Rig;
+    use offbd_core::vocabulary::Sample;
+
+    fn running() -> Box<Running> {
+        let row = AssetRow {
+            name: "a".to_owned(),
+            document: String::new(),
+            revision: 1,
+            created_at: 0,
+            updated_at: 0,
+        };
+        Box::new(Running {
+            row,
+            rig: Rig::chapter("a"),
+            memory: Default::default(),
+            provenance: Default::default(),
+            open: None,
+            learning: Default::default(),
+            life: Life::default(),
+            deleted: false,
+        })
+    }
+
+    /// Whether the engine stays when `act` ends in an error.
+    async fn stays(act: impl FnOnce(&mut Running, &mut Work) -> Result<(), ServiceError>) -> bool {
+        let data = tempfile::tempdir().unwrap();
+        let place = Place::File(data.path().join("test.sqlite"));
+        let (store, _writer) = Store::open(&place).await.unwrap();
+        let ((jobs, _), (writer, _)) = (mpsc::channel(1), mpsc::channel(1));
+        let context = Context::new(store, Clock, Presences::default(), jobs, writer);
+        let mut shard = Shard { context, running: BTreeMap::from([("a".to_owned(), running())]) };
+        let (reply, answer) = oneshot::channel();
+        let act = |_: &Context, running: &mut Running, work: &mut Work| {
+            act(running, work)?;
+            Err::<(), _>(ServiceError::Unavailable { what: "a test" })
+        };
+        shard.act("a", act, reply.into());
+        answer.await.unwrap().unwrap_err();
+        shard.running.contains_key("a")
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn an_engine_that_is_ahead_of_the_store_does_not_stay() {
+        assert!(stays(|_, _| Ok(())).await, "nothing was done");
+        let ingest = |running: &mut Running, work: &mut Work| {
+            running.open_nameless(work)?;
+            let sample = Sample { t_s: 1.0, x_m: Some(0.0), ..Sample::default() };
+            running.ingest(&[(0, sample)], false, work, &mut Default::default())?;
+            // What follows from it was not said yet when the error came.
+            work.writes.clear();
+            Ok(())
+        };
+        assert!(!stays(ingest).await, "a sample was judged that is recorded nowhere");
     }
 }

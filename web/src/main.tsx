@@ -1,6 +1,6 @@
 import { render } from "preact";
 import { App } from "./app/app";
-import { LoginGate } from "./parts/door";
+import { LoginGate } from "./parts/login/login-gate";
 import "./style.css";
 
 render(

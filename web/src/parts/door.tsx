@@ -1,2 +1,0 @@
-/** Where ARCHITECTURE.md points: the login itself is beside this file. */
-export { LoginGate } from "./login/login-gate";
