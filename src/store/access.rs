@@ -1,10 +1,11 @@
 //! Tokens, logins and the audit log.
 
+use super::from_row::from_row;
 use sqlx::AnyConnection;
 
 use super::{Micros, Store, StoreError};
 
-#[derive(Clone, Debug, PartialEq, Eq, sqlx::FromRow)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TokenRow {
     pub id: String,
     /// SHA-256 of the secret, hexadecimal.
@@ -20,7 +21,20 @@ pub struct TokenRow {
     pub revoked_at: Option<Micros>,
 }
 
-#[derive(Clone, Debug, PartialEq, Eq, sqlx::FromRow)]
+from_row!(TokenRow {
+    id,
+    hash,
+    name,
+    role,
+    asset,
+    created_at,
+    created_by,
+    expires_at,
+    last_used_at,
+    revoked_at
+});
+
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AuditRow {
     pub id: String,
     pub at: Micros,
@@ -32,6 +46,8 @@ pub struct AuditRow {
     pub target: String,
     pub address: Option<String>,
 }
+
+from_row!(AuditRow { id, at, actor, token, act, target, address });
 
 /// A change of who may do what, or that something was done.
 #[derive(Clone, Debug)]

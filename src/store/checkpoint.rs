@@ -122,17 +122,17 @@ async fn copy_most(
 }
 
 /// Pages in the log as of a copy's beginning, and those of them that are copied now.
-#[derive(Debug, sqlx::FromRow)]
+#[derive(Debug)]
 pub(super) struct Copied {
-    #[sqlx(rename = "log")]
     pages: i64,
-    #[sqlx(rename = "checkpointed")]
     copied: i64,
 }
 
 /// Copies what is in the log and what no reader holds on to.
 pub(super) async fn copy(connection: &mut AnyConnection) -> Result<Copied, sqlx::Error> {
-    sqlx::query_as("PRAGMA wal_checkpoint(PASSIVE)").fetch_one(connection).await
+    let copy = sqlx::query_as("PRAGMA wal_checkpoint(PASSIVE)");
+    let (_busy, pages, copied): (i64, i64, i64) = copy.fetch_one(connection).await?;
+    Ok(Copied { pages, copied })
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@
 //! transaction. What is held is always what the journal says beyond the
 //! sessions' rows, so that a process that starts holds it again.
 
+use super::from_row::from_row;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -339,12 +340,12 @@ impl Unfolded {
 
 /// How far the rows of the open sessions have come. All else is folded.
 async fn folded(db: &mut AnyConnection) -> Result<HashMap<String, Progress>, StoreError> {
-    #[derive(sqlx::FromRow)]
     struct Folded {
         id: String,
-        #[sqlx(flatten)]
         progress: Progress,
     }
+
+    from_row!(Folded { id }[progress]);
     let rows: Vec<Folded> = sqlx::query_as(
         "SELECT id, n_samples, n_rejected, first_t_s, last_t_s, last_seq FROM session
          WHERE state = 'open'",

@@ -11,7 +11,9 @@ mod checkpoint;
 pub mod codec;
 mod expiry;
 mod fleet;
+mod from_row;
 mod journal;
+mod migrations;
 mod place;
 mod question;
 mod read;
@@ -23,8 +25,8 @@ mod write;
 use std::path::PathBuf;
 use std::time::Duration;
 
+use migrations::MIGRATIONS;
 use sqlx::AnyPool;
-use sqlx::migrate::Migrator;
 
 pub use access::{AccessWrite, AuditRow, LAST_ID, MAX_LOGINS, TokenRow};
 pub use backup::{back_up, restore};
@@ -37,8 +39,6 @@ pub use rows::{
 };
 pub use tail::{FULL_CHUNK_SAMPLES, MAX_TAIL_CHUNKS};
 pub use write::{Write, Writer};
-
-static MIGRATIONS: Migrator = sqlx::migrate!("./migrations");
 
 /// How long the database may take to say that it is there.
 const PING_WAIT: Duration = Duration::from_secs(2);

@@ -1,5 +1,6 @@
 //! The rows, as the tables have them. Documents are JSON text.
 
+use super::from_row::from_row;
 use std::fmt;
 use std::str::FromStr;
 
@@ -8,7 +9,7 @@ use super::StoreError;
 /// A moment: microseconds since 1970-01-01 UTC.
 pub type Micros = i64;
 
-#[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct AssetRow {
     pub name: String,
     /// The asset file.
@@ -19,8 +20,10 @@ pub struct AssetRow {
     pub updated_at: Micros,
 }
 
+from_row!(AssetRow { name, document, revision, created_at, updated_at });
+
 /// How far a session's recording has come.
-#[derive(Clone, Copy, Debug, Default, PartialEq, sqlx::FromRow)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Progress {
     pub n_samples: i64,
     /// Rows that were no samples.
@@ -32,6 +35,8 @@ pub struct Progress {
     pub last_seq: Option<i64>,
 }
 
+from_row!(Progress { n_samples, n_rejected, first_t_s, last_t_s, last_seq });
+
 impl Progress {
     /// Whether `other` is of an earlier moment of the same session.
     #[must_use]
@@ -40,7 +45,7 @@ impl Progress {
     }
 }
 
-#[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct SessionRow {
     pub id: String,
     pub asset: String,
@@ -53,12 +58,26 @@ pub struct SessionRow {
     pub setup: String,
     /// The fault memory as of opening.
     pub baseline: String,
-    #[sqlx(flatten)]
     pub progress: Progress,
     /// Once ended.
     pub verdict: Option<String>,
     pub verdict_hash: Option<String>,
 }
+
+from_row!(
+    SessionRow {
+        id,
+        asset,
+        name,
+        state,
+        opened_at,
+        ended_at,
+        setup,
+        baseline,
+        verdict,
+        verdict_hash
+    }[progress]
+);
 
 impl SessionRow {
     #[must_use]
@@ -95,7 +114,7 @@ impl FromStr for ActionKind {
     }
 }
 
-#[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ActionRow {
     /// Given by the writer.
     pub id: i64,
@@ -111,7 +130,9 @@ pub struct ActionRow {
     pub event: Option<String>,
 }
 
-#[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
+from_row!(ActionRow { id, asset, session, after_index, kind, code, actor, at, event });
+
+#[derive(Clone, Debug, PartialEq)]
 pub struct TransitionRow {
     /// Given by the writer; the id of the event.
     pub id: i64,
@@ -127,9 +148,11 @@ pub struct TransitionRow {
     pub document: String,
 }
 
+from_row!(TransitionRow { id, asset, session, ordinal, t_s, code, status, at, document });
+
 /// Something to be told: a transition, or an act that changed a code while no
 /// session was open.
-#[derive(Clone, Debug, PartialEq, Eq, sqlx::FromRow)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EventRow {
     /// Rises with every event, never given twice.
     pub id: i64,
@@ -138,7 +161,9 @@ pub struct EventRow {
     pub document: String,
 }
 
-#[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
+from_row!(EventRow { id, asset, session, document });
+
+#[derive(Clone, Debug, PartialEq)]
 pub struct FaultRow {
     pub asset: String,
     pub code: String,
@@ -150,6 +175,8 @@ pub struct FaultRow {
     /// What is known beside the record.
     pub provenance: String,
 }
+
+from_row!(FaultRow { asset, code, status, acknowledged, changed_at, record, provenance });
 
 /// Where a background job stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -178,7 +205,7 @@ impl fmt::Display for JobState {
     }
 }
 
-#[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ReplayRow {
     pub id: String,
     pub session: String,
@@ -192,7 +219,9 @@ pub struct ReplayRow {
     pub error: Option<String>,
 }
 
-#[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
+from_row!(ReplayRow { id, session, state, settings, created_at, finished_at, result, error });
+
+#[derive(Clone, Debug, PartialEq)]
 pub struct CalibrationRow {
     pub id: String,
     pub asset: String,
@@ -206,8 +235,10 @@ pub struct CalibrationRow {
     pub error: Option<String>,
 }
 
+from_row!(CalibrationRow { id, asset, state, sessions, made_at, active, document, error });
+
 /// What a session estimated of the servo behind an axis.
-#[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct TrendRow {
     pub session: String,
     /// `x` or `y`.
@@ -228,18 +259,38 @@ pub struct TrendRow {
     pub warnings: Option<String>,
 }
 
+from_row!(TrendRow {
+    session,
+    axis,
+    asset,
+    ended_at,
+    n_samples,
+    calibration_id,
+    gain,
+    gain_error,
+    offset_m_s2,
+    offset_error_m_s2,
+    delay_s,
+    delay_error_s,
+    motion_s,
+    warnings
+});
+
 /// The same with the session's name.
-#[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct TrendEntry {
     pub session_name: String,
-    #[sqlx(flatten)]
     pub row: TrendRow,
 }
 
+from_row!(TrendEntry { session_name }[row]);
+
 /// The warnings of an axis as of the last session that estimated it.
-#[derive(Clone, Debug, PartialEq, Eq, sqlx::FromRow)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct WarningRow {
     pub asset: String,
     pub calibration_id: Option<String>,
     pub warnings: String,
 }
+
+from_row!(WarningRow { asset, calibration_id, warnings });

@@ -1,7 +1,7 @@
 //! The fault memory through the interface: all of it is there, across sessions
 //! and restarts, and each change is told.
 
-use crate::support::{Bench, Client, Events, rig};
+use crate::support::{Bench, Client, Events, connection, rig, url};
 use offbd_core::vocabulary::Sample;
 use serde_json::{Value, json};
 
@@ -250,4 +250,26 @@ async fn the_seconds_around_a_fault_are_those_that_were_judged() {
     let session = client.session("a", "s").await;
     client.delete(&format!("sessions/{}", session["id"].as_str().unwrap())).await.expect(204);
     client.get(path).await.problem(404);
+}
+
+/// The failure is found however many changes of other codes came before it.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_recording_is_found_behind_ten_thousand_changes() {
+    let bench = Bench::start().await;
+    bench.client.asset("a").await;
+    bench.client.telemetry("a", Some("s"), &rig(1500, 500)).await;
+    bench.client.end("a", "s").await;
+    let path = "assets/a/faults/x_servo/recording";
+    let before = bench.client.get(path).await.expect(200);
+    let mut store = connection(&url(bench.data.path())).await;
+    for statement in [
+        "UPDATE transition SET ordinal = ordinal + 20000",
+        "WITH RECURSIVE count (n) AS (SELECT 1 UNION ALL SELECT n + 1 FROM count WHERE n < 10001)
+         INSERT INTO transition (id, asset, session, ordinal, t_s, code, status, at, document)
+         SELECT -n, asset, session, n, t_s, 'sensor', status, at, document
+         FROM count, (SELECT * FROM transition ORDER BY id LIMIT 1) AS first",
+    ] {
+        sqlx::query(statement).execute(&mut store).await.unwrap();
+    }
+    assert_eq!(bench.client.get(path).await.expect(200), before);
 }
