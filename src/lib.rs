@@ -3,23 +3,19 @@
 //! A device streams commands and measured positions; a physics twin runs
 //! beside it in lockstep; an enable-gated evaluator compares the measured
 //! with the twin's acceleration and raises faults. `ARCHITECTURE.md` has the
-//! map. Without the feature `service` the crate is the mathematics, the
-//! judgement and the engine alone:
+//! map.
 //!
-//! - [`vocabulary`]: axes, faults, times, samples (floor 0);
-//! - [`maths`], [`plant`]: estimation and physics (floor 1);
-//! - [`diagnosis`]: residuals, monitors, fault memory (floor 2);
-//! - [`engine`]: one rig's pipeline (floor 3).
+//! This crate is the service and the command line: formats ([`wire`]), the
+//! driver of a session ([`judging`]), storage ([`store`]), sessions and jobs
+//! ([`service`]), the interface ([`http`]), and what puts them together
+//! ([`config`], [`server`], [`cli`]). The twin and the diagnosis, to embed, are
+//! the crate `offbd-core`; scenes, simulated rigs and charts `offbd-lab`.
 
 pub mod cli;
-pub mod wire;
-
-pub mod store;
-
-pub mod service;
-
+pub mod config;
 pub mod http;
 pub mod judging;
-
-pub mod config;
 pub mod server;
+pub mod service;
+pub mod store;
+pub mod wire;
