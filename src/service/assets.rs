@@ -34,7 +34,7 @@ impl Service {
     /// # Errors
     /// [`ServiceError::UnknownAsset`].
     pub async fn asset(&self, name: &str) -> Result<AssetView, ServiceError> {
-        let row = self.inner.store.asset(name).await?;
+        let row = self.inner.handles.store.asset(name).await?;
         let row = row.ok_or_else(|| ServiceError::UnknownAsset { name: name.to_owned() })?;
         views::from_json(&row.document)
     }
@@ -49,7 +49,7 @@ impl Service {
         limit: u32,
     ) -> Result<Page<AssetView>, ServiceError> {
         let after = cursor.map(views::cursor::<String>).transpose()?.unwrap_or_default();
-        let rows = self.inner.store.assets(&after, limit + 1).await?;
+        let rows = self.inner.handles.store.assets(&after, limit + 1).await?;
         views::page(rows, limit, |row| row.name.clone(), |row| views::from_json(&row.document))
     }
 
@@ -66,7 +66,7 @@ impl Service {
 
     async fn create(&self, rig: &Rig) -> Result<(), ServiceError> {
         let limit = self.inner.limits.assets;
-        let n_assets = self.inner.store.n_assets().await?;
+        let n_assets = self.inner.handles.store.n_assets().await?;
         if usize::try_from(n_assets).is_ok_and(|n| n >= limit) {
             return Err(ServiceError::RegistryFull { limit });
         }
@@ -80,7 +80,8 @@ impl Service {
                 created_at: at,
                 updated_at: at,
             };
-            let make = |context: &super::Context| Ok(Write::CreateAsset(row(context.clock.now())));
+            let make =
+                |context: &super::Context| Ok(Write::CreateAsset(row(context.handles.clock.now())));
             shard.create(&name, make, reply);
         });
         self.shard(&rig.name).try_send(job).map_err(ServiceError::from_full)?;

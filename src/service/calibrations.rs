@@ -6,7 +6,7 @@ use tokio::runtime::Handle;
 use uuid::Uuid;
 
 use super::clock::rfc3339;
-use super::jobs::{Bench, Job};
+use super::jobs::{Job, JobContext};
 use super::learning::{Record, Teaching};
 use super::running::{Running, Work};
 use super::shard::Context;
@@ -42,7 +42,7 @@ impl Service {
             return Err(Invalid::new("/sessions", reason).into());
         }
         for (i, id) in sessions.iter().enumerate() {
-            let row = self.inner.store.session(id).await?;
+            let row = self.inner.handles.store.session(id).await?;
             if row.is_none_or(|row| row.asset != asset) {
                 let reason = format!("asset `{asset}` has no session `{id}`");
                 return Err(Invalid::new(format!("/sessions/{i}"), reason).into());
@@ -54,12 +54,12 @@ impl Service {
             asset: asset.to_owned(),
             state: JobState::Queued.to_string(),
             sessions: views::to_json(&sessions)?,
-            made_at: self.inner.bench.clock.now(),
+            made_at: self.inner.handles.clock.now(),
             active: 0,
             document: None,
             error: None,
         };
-        self.inner.bench.write(Write::PutCalibration(row.clone())).await?;
+        self.inner.handles.write(Write::PutCalibration(row.clone())).await?;
         place.send(Job::Calibration(row.id.clone()));
         view(row)
     }
@@ -79,7 +79,7 @@ impl Service {
         asset: &str,
         id: &str,
     ) -> Result<CalibrationRow, ServiceError> {
-        let row = self.inner.store.calibration(id).await?.filter(|row| row.asset == asset);
+        let row = self.inner.handles.store.calibration(id).await?.filter(|row| row.asset == asset);
         let (asset, id) = (asset.to_owned(), id.to_owned());
         row.ok_or(ServiceError::UnknownCalibration { asset, id })
     }
@@ -97,7 +97,7 @@ impl Service {
         self.asset(asset).await?;
         let before = cursor.map(views::cursor::<(i64, String)>).transpose()?;
         let before = before.as_ref().map(|(made_at, id)| (*made_at, id.as_str()));
-        let rows = self.inner.store.calibrations(asset, before, limit + 1).await?;
+        let rows = self.inner.handles.store.calibrations(asset, before, limit + 1).await?;
         views::page(rows, limit, |row| (row.made_at, row.id.clone()), view)
     }
 
@@ -137,14 +137,15 @@ fn view(row: CalibrationRow) -> Result<CalibrationJobView, ServiceError> {
 
 /// Runs a calibration to its end, or until the service closes: then it begins anew
 /// with the next start.
-pub(super) async fn run(bench: &Bench, id: &str) -> Result<(), ServiceError> {
-    let Some(mut row) = bench.store.calibration(id).await? else { return Ok(()) };
+pub(super) async fn run(context: &JobContext, id: &str) -> Result<(), ServiceError> {
+    let Some(mut row) = context.handles.store.calibration(id).await? else { return Ok(()) };
     row.state = JobState::Running.to_string();
-    bench.write(Write::PutCalibration(row.clone())).await?;
-    let (store, runtime, job) = (bench.store.clone(), bench.runtime.clone(), row.clone());
+    context.handles.write(Write::PutCalibration(row.clone())).await?;
+    let (store, runtime, job) =
+        (context.handles.store.clone(), context.handles.runtime.clone(), row.clone());
     let learning = tokio::task::spawn_blocking(move || learn(&store, &runtime, &job));
     let learnt = tokio::select! {
-        () = bench.closing.cancelled() => return Ok(()),
+        () = context.handles.closing.cancelled() => return Ok(()),
         learnt = learning => learnt,
     };
     match learnt.unwrap_or_else(|_| Err("the calibration has failed".to_owned())) {
@@ -161,7 +162,7 @@ pub(super) async fn run(bench: &Bench, id: &str) -> Result<(), ServiceError> {
     let settled = move |context: &Context, running: &mut Running, work: &mut Work| {
         running.calibrated(context, row, work)
     };
-    match bench.shards.call_in_turn(&asset, settled).await {
+    match context.shards.call_in_turn(&asset, settled).await {
         // It has been deleted meanwhile.
         Err(ServiceError::UnknownAsset { .. }) => Ok(()),
         settled => settled,

@@ -8,12 +8,11 @@
 
 use std::sync::Arc;
 
-use tokio::sync::{Mutex, mpsc};
+use tokio::sync::Mutex;
 
-use super::commit::WriteSet;
-use super::jobs::write_all;
+use super::handles::Handles;
 use super::{Service, ServiceError};
-use crate::store::{Bulk, Store, Write};
+use crate::store::{Bulk, Write};
 
 /// Chunks deleted in one transaction, some 50 kB each: on a disk with 100 µs a read
 /// 20 ms.
@@ -28,16 +27,15 @@ const SESSIONS_AT_ONCE: u32 = 64;
 /// Deletes what has been given up. Cheap to clone; all clones take turns.
 #[derive(Clone)]
 pub(super) struct Deleter {
-    store: Store,
-    writer: mpsc::Sender<WriteSet>,
+    handles: Handles,
     /// Whoever has it commits a piece: two deletions take no longer transactions than
     /// one.
     turn: Arc<Mutex<()>>,
 }
 
 impl Deleter {
-    pub(super) fn new(store: Store, writer: mpsc::Sender<WriteSet>) -> Self {
-        Self { store, writer, turn: Arc::default() }
+    pub(super) fn new(handles: Handles) -> Self {
+        Self { handles, turn: Arc::default() }
     }
 
     /// Deletes all that has been given up. What the store does not take is logged, and
@@ -46,12 +44,12 @@ impl Deleter {
     /// # Errors
     /// [`ServiceError::Store`] if the store cannot be read.
     pub(super) async fn all(&self) -> Result<(), ServiceError> {
-        for asset in self.store.deleted_assets().await? {
+        for asset in self.handles.store.deleted_assets().await? {
             if let Err(error) = self.asset(&asset).await {
                 tracing::warn!(asset, %error, "a deletion has to wait");
             }
         }
-        for session in self.store.expired_sessions().await? {
+        for session in self.handles.store.expired_sessions().await? {
             let id = session.id.clone();
             if let Err(error) = self.delete(vec![session]).await {
                 tracing::warn!(session = id, %error, "a deletion has to wait");
@@ -66,7 +64,7 @@ impl Deleter {
     /// [`ServiceError`] if the store cannot be read or does not take a piece.
     pub(super) async fn asset(&self, name: &str) -> Result<(), ServiceError> {
         loop {
-            let sessions = self.store.sessions_in_bulk(name, SESSIONS_AT_ONCE).await?;
+            let sessions = self.handles.store.sessions_in_bulk(name, SESSIONS_AT_ONCE).await?;
             if sessions.is_empty() {
                 break;
             }
@@ -80,7 +78,7 @@ impl Deleter {
     /// # Errors
     /// As for [`Deleter::asset`].
     pub(super) async fn session(&self, id: &str) -> Result<(), ServiceError> {
-        self.delete(self.store.session_in_bulk(id).await?.into_iter().collect()).await
+        self.delete(self.handles.store.session_in_bulk(id).await?.into_iter().collect()).await
     }
 
     async fn delete(&self, sessions: Vec<Bulk>) -> Result<(), ServiceError> {
@@ -92,7 +90,7 @@ impl Deleter {
 
     async fn piece(&self, writes: Vec<Write>) -> Result<(), ServiceError> {
         let _turn = self.turn.lock().await;
-        write_all(&self.writer, writes).await
+        self.handles.write_all(writes).await
     }
 }
 
@@ -134,7 +132,7 @@ impl Service {
         &self,
         deletion: impl Future<Output = Result<(), ServiceError>> + Send + 'static,
     ) -> Result<(), ServiceError> {
-        let closing = self.inner.bench.closing.clone();
+        let closing = self.inner.handles.closing.clone();
         let task = tokio::spawn(async move {
             tokio::select! {
                 () = closing.cancelled() => {

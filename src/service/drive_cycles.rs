@@ -14,7 +14,7 @@ impl Service {
     /// [`ServiceError::UnknownAsset`]; [`ServiceError::NoDriveCycle`], which says why;
     /// [`ServiceError::Busy`].
     pub async fn drive_cycle(&self, asset: &str) -> Result<DriveCycle, ServiceError> {
-        let row = self.inner.store.asset(asset).await?;
+        let row = self.inner.handles.store.asset(asset).await?;
         let row = row.ok_or_else(|| ServiceError::UnknownAsset { name: asset.to_owned() })?;
         let rig = views::rig(&row.document)?;
         let busy = |_| ServiceError::Busy { what: "another drive cycle is being computed" };

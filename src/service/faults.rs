@@ -74,7 +74,7 @@ impl Service {
             order: query.sort.as_deref().map(order).transpose()?.unwrap_or_default(),
             after: query.cursor.as_deref().map(views::cursor).transpose()?,
         };
-        let rows = self.inner.store.faults(&filter, limit + 1).await?;
+        let rows = self.inner.handles.store.faults(&filter, limit + 1).await?;
         let key =
             |row: &crate::store::FaultRow| (row.changed_at, row.asset.clone(), row.code.clone());
         views::page(rows, limit, key, views::fault)
@@ -116,9 +116,9 @@ impl Service {
     pub async fn fault(&self, asset: &str, word: &str) -> Result<FaultEntryView, ServiceError> {
         let code = code(word)?;
         self.asset(asset).await?;
-        let mut entry = match self.inner.store.fault(asset, code.as_str()).await? {
+        let mut entry = match self.inner.handles.store.fault(asset, code.as_str()).await? {
             Some(row) => views::fault(row)?,
-            None => views::never_failed(&self.inner.store, asset, code).await?,
+            None => views::never_failed(&self.inner.handles.store, asset, code).await?,
         };
         entry.monitor = take(&mut self.monitors(asset).await, code.as_str());
         Ok(entry)

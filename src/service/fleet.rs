@@ -37,7 +37,7 @@ impl Service {
         limit: u32,
     ) -> Result<Page<FleetEntryView>, ServiceError> {
         let after = cursor.map(views::cursor::<String>).transpose()?.unwrap_or_default();
-        let rows = self.inner.store.assets(&after, limit + 1).await?;
+        let rows = self.inner.handles.store.assets(&after, limit + 1).await?;
         let mut known = match (rows.first(), rows.last()) {
             (Some(first), Some(last)) => self.known(&first.name, &last.name).await?,
             _ => return Ok(Page { items: Vec::new(), next: None }),
@@ -46,7 +46,7 @@ impl Service {
     }
 
     async fn known(&self, first: &str, last: &str) -> Result<Known, ServiceError> {
-        let store = &self.inner.store;
+        let store = &self.inner.handles.store;
         let open = store.open_sessions_of(first, last).await?;
         let mut faults: BTreeMap<String, Vec<FleetFaultView>> = BTreeMap::new();
         for row in store.active_faults_of(first, last).await? {

@@ -23,7 +23,7 @@ impl Service {
         let code: FaultCode = word.parse().map_err(ServiceError::UnknownCode)?;
         self.asset(asset).await?;
         let before = cursor.map(views::cursor::<i64>).transpose()?.unwrap_or(i64::MAX);
-        let (store, code) = (&self.inner.store, code.as_str());
+        let (store, code) = (&self.inner.handles.store, code.as_str());
         let changes = store.transitions_before(asset, code, before, limit + 1).await?;
         let acts = store.actions_before(asset, code, before, limit + 1).await?;
         let changes: Result<Vec<HistoryView>, _> = changes.into_iter().map(change).collect();
@@ -48,7 +48,7 @@ impl Service {
         self.session_row(id).await?;
         let after = cursor.map(views::cursor::<i64>).transpose()?;
         let from = after.map_or(0, |ordinal| ordinal.saturating_add(1));
-        let rows = self.inner.store.transitions(id, from, limit + 1).await?;
+        let rows = self.inner.handles.store.transitions(id, from, limit + 1).await?;
         views::page(rows, limit, |row| row.ordinal, |row| views::from_json(&row.document))
     }
 }

@@ -4,15 +4,12 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use tokio::runtime::Handle;
-use tokio::sync::{mpsc, oneshot};
+use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
-use tokio_util::sync::CancellationToken;
 
-use super::commit::{Life, WriteSet};
+use super::handles::Handles;
 use super::shard::Shards;
-use super::{Clock, Service, ServiceError, calibrations, replays};
-use crate::store::{Store, Write};
+use super::{Service, ServiceError, calibrations, replays};
 
 /// Jobs that wait; the next is told to come again.
 pub(super) const MAX_QUEUED: usize = 64;
@@ -47,31 +44,15 @@ impl Progress {
 
 /// What a job works with.
 #[derive(Clone)]
-pub(super) struct Bench {
-    pub(super) store: Store,
-    pub(super) clock: Clock,
-    pub(super) runtime: Handle,
+pub(super) struct JobContext {
+    pub(super) handles: Handles,
     pub(super) progress: Progress,
-    pub(super) closing: CancellationToken,
     pub(super) shards: Shards,
-    writer: mpsc::Sender<WriteSet>,
 }
 
-impl Bench {
-    pub(super) fn new(
-        store: Store,
-        clock: Clock,
-        writer: mpsc::Sender<WriteSet>,
-        shards: Shards,
-        closing: CancellationToken,
-    ) -> Self {
-        let (runtime, progress) = (Handle::current(), Progress::default());
-        Self { store, clock, runtime, progress, closing, shards, writer }
-    }
-
-    /// Makes `write` durable.
-    pub(super) async fn write(&self, write: Write) -> Result<(), ServiceError> {
-        write_one(&self.writer, write).await
+impl JobContext {
+    pub(super) fn new(handles: Handles, shards: Shards) -> Self {
+        Self { handles, progress: Progress::default(), shards }
     }
 
     /// Runs jobs until the queue closes or the service does.
@@ -79,7 +60,7 @@ impl Bench {
         loop {
             let job = async { queue.lock().await.recv().await };
             let job = tokio::select! {
-                () = self.closing.cancelled() => return,
+                () = self.handles.closing.cancelled() => return,
                 job = job => job,
             };
             let Some(job) = job else { return };
@@ -97,41 +78,22 @@ impl Bench {
     }
 }
 
-/// Makes one change durable that belongs to no engine.
-pub(super) async fn write_one(
-    writer: &mpsc::Sender<WriteSet>,
-    write: Write,
-) -> Result<(), ServiceError> {
-    write_all(writer, vec![write]).await
-}
-
-/// Makes changes durable, together, that belong to no engine.
-pub(super) async fn write_all(
-    writer: &mpsc::Sender<WriteSet>,
-    writes: Vec<Write>,
-) -> Result<(), ServiceError> {
-    let (settled, wait) = oneshot::channel();
-    let done = Box::new(move |outcome| {
-        let _ = settled.send(outcome);
-    });
-    let set = WriteSet { writes, life: Life::default(), done };
-    let gone = ServiceError::Unavailable { what: "the service is closing" };
-    writer.send(set).await.map_err(|_| gone)?;
-    wait.await.unwrap_or(Err(ServiceError::Unavailable { what: "the writer is gone" }))
-}
-
 /// Starts `n` workers on `queue`.
-pub(super) fn spawn(n: usize, bench: &Bench, queue: mpsc::Receiver<Job>) -> Vec<JoinHandle<()>> {
+pub(super) fn spawn(
+    n: usize,
+    context: &JobContext,
+    queue: mpsc::Receiver<Job>,
+) -> Vec<JoinHandle<()>> {
     let queue = Arc::new(tokio::sync::Mutex::new(queue));
-    (0..n).map(|_| tokio::spawn(bench.clone().work(queue.clone()))).collect()
+    (0..n).map(|_| tokio::spawn(context.clone().work(queue.clone()))).collect()
 }
 
 impl Service {
     /// Puts what a former process left unfinished into the queue again, as far
     /// as there is room.
     pub(super) async fn resume_jobs(&self) -> Result<(), ServiceError> {
-        let replays = self.inner.store.unfinished_replays().await?;
-        let calibrations = self.inner.store.unfinished_calibrations().await?;
+        let replays = self.inner.handles.store.unfinished_replays().await?;
+        let calibrations = self.inner.handles.store.unfinished_calibrations().await?;
         let jobs = replays.into_iter().map(|row| Job::Replay(row.id));
         for job in jobs.chain(calibrations.into_iter().map(|row| Job::Calibration(row.id))) {
             if self.inner.jobs.try_send(job).is_err() {

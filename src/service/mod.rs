@@ -22,6 +22,7 @@ mod error;
 mod events;
 mod faults;
 mod fleet;
+mod handles;
 mod history;
 mod import;
 mod jobs;
@@ -63,10 +64,13 @@ pub use telemetry::Pending;
 pub use traces::{MAX_TRACE_POINTS, TraceQuery};
 
 use self::access::{Passes, Provider};
-use self::commit::{Committer, Outage, WriteSet};
+use self::commit::{Committer, Outage};
 use self::deletion::Deleter;
 use self::events::Events;
+use self::handles::Handles;
+use self::jobs::JobContext;
 use self::presence::Presences;
+use self::retention::Sweeper;
 use self::running::{Running, Work};
 use self::shard::{Context, Job, Shards};
 use self::watchdog::{STALLED_AFTER, Watchdog};
@@ -79,18 +83,17 @@ pub struct Service {
 }
 
 struct Inner {
-    store: Store,
+    handles: Handles,
     limits: Limits,
     events: Events,
     presences: Presences,
     passes: Passes,
     provider: Option<Provider>,
     shards: Shards,
-    writer: mpsc::Sender<WriteSet>,
     outage: watch::Receiver<Outage>,
     deleter: Deleter,
     jobs: mpsc::Sender<jobs::Job>,
-    bench: jobs::Bench,
+    job_context: JobContext,
     /// One permit for each sample between arrival and commit.
     in_flight: Arc<Semaphore>,
     /// Whether those are at their limit and none becomes durable.
@@ -175,7 +178,6 @@ impl Service {
         limits: Limits,
         provider: Option<Provider>,
     ) -> Result<(Self, Workers), ServiceError> {
-        let clock = Clock;
         let events = Events::new(store.clone());
         let (sets, queue) = mpsc::channel(limits.commit_queue);
         let (told, outage) = watch::channel(None);
@@ -193,19 +195,16 @@ impl Service {
         let committer = committer.spawn()?;
         let presences = Presences::default();
         let (jobs, jobs_queue) = mpsc::channel(jobs::MAX_QUEUED);
+        let handles = Handles::new(store, sets, closing.clone());
         let context =
-            Context::new(store.clone(), clock, presences.clone(), jobs.clone(), sets.clone());
+            Context { handles: handles.clone(), presences: presences.clone(), jobs: jobs.clone() };
         let (shards, threads) = Shards::start(&limits, context)?;
-        let closed = closing.clone();
-        let bench = jobs::Bench::new(store.clone(), clock, sets.clone(), shards.clone(), closed);
-        let mut workers = jobs::spawn(limits.jobs, &bench, jobs_queue);
-        let deleter = Deleter::new(store.clone(), sets.clone());
-        let sweeper = retention::Sweeper {
-            store: store.clone(),
-            clock,
-            writer: sets.clone(),
+        let job_context = JobContext::new(handles.clone(), shards.clone());
+        let mut workers = jobs::spawn(limits.jobs, &job_context, jobs_queue);
+        let deleter = Deleter::new(handles.clone());
+        let sweeper = Sweeper {
+            handles: handles.clone(),
             deleter: deleter.clone(),
-            closing: closing.clone(),
             retention: limits.retention.clone(),
         };
         workers.push(tokio::spawn(sweeper.run()));
@@ -223,18 +222,17 @@ impl Service {
         let traces = Arc::new(Semaphore::new(traces::MAX_AT_ONCE));
         let drive_cycles = Arc::new(Semaphore::new(drive_cycles::MAX_AT_ONCE));
         let inner = Inner {
-            store,
+            handles,
             limits,
             events,
             presences,
             passes: Passes::default(),
             provider,
             shards,
-            writer: sets,
             outage,
             deleter,
             jobs,
-            bench,
+            job_context,
             in_flight,
             stalled,
             recordings,
@@ -251,7 +249,7 @@ impl Service {
     /// # Errors
     /// [`ServiceError::Unavailable`] if the store cannot be read.
     pub async fn resume(&self) -> Result<usize, ServiceError> {
-        let assets = self.inner.store.assets_in_session().await?;
+        let assets = self.inner.handles.store.assets_in_session().await?;
         let touch = |asset: &String| {
             let (this, asset) = (self.clone(), asset.clone());
             async move {
@@ -277,7 +275,7 @@ impl Service {
     /// [`ServiceError::Unavailable`], [`ServiceError::Outage`] or
     /// [`ServiceError::Stalled`], naming what does not.
     pub async fn ready(&self) -> Result<(), ServiceError> {
-        if self.inner.writer.is_closed() {
+        if self.inner.handles.writer().is_closed() {
             return Err(ServiceError::Unavailable { what: "the writer has stopped" });
         }
         if self.inner.shards.iter().any(mpsc::Sender::is_closed) {
@@ -290,16 +288,16 @@ impl Service {
             return Err(ServiceError::Stalled { seconds: STALLED_AFTER.as_secs() });
         }
         let away = |error: StoreError| ServiceError::Outage { reason: error.to_string() };
-        self.inner.store.ping().await.map_err(away)
+        self.inner.handles.store.ping().await.map_err(away)
     }
 
     /// What waits now.
     #[must_use]
     pub fn load(&self) -> Load {
-        let Inner { shards, writer, in_flight, limits, .. } = &*self.inner;
+        let Inner { shards, handles, in_flight, limits, .. } = &*self.inner;
         let samples = limits.in_flight_samples - in_flight.available_permits();
         let shards = shards.iter().map(waiting).collect();
-        Load { samples, shards, writer: waiting(writer) }
+        Load { samples, shards, writer: waiting(handles.writer()) }
     }
 
     fn shard(&self, asset: &str) -> &mpsc::Sender<Job> {

@@ -12,12 +12,13 @@ use offbd_core::engine::{Input, Setup};
 
 /// The asset `name` as the store has it.
 pub(super) fn load(context: &Context, name: &str) -> Result<Running, ServiceError> {
-    let row = context.wait(context.store.asset(name))?;
+    let row = context.handles.wait(context.handles.store.asset(name))?;
     let row = row.ok_or_else(|| ServiceError::UnknownAsset { name: name.to_owned() })?;
     let rig = views::rig(&row.document)?;
-    let (memory, provenance) = context.wait(views::stored_memory(&context.store, name))?;
-    let session = context.wait(context.store.open_session(name))?;
-    let learning = context.wait(context.store.learning(name))?;
+    let (memory, provenance) =
+        context.handles.wait(views::stored_memory(&context.handles.store, name))?;
+    let session = context.handles.wait(context.handles.store.open_session(name))?;
+    let learning = context.handles.wait(context.handles.store.learning(name))?;
     let learning: Record =
         learning.as_deref().map(views::from_json).transpose()?.unwrap_or_default();
     let refines = learning.refines();
@@ -30,7 +31,7 @@ fn reopen(context: &Context, row: &SessionRow, refines: bool) -> Result<OpenSess
     let setup = Setup::new(views::rig(&row.setup)?, None)?;
     let baseline = views::memory(&row.baseline)?;
     let mut open = OpenSession::new(row.id.clone(), row.name.clone(), setup, baseline, refines);
-    play(&context.store, &context.runtime, &row.id, |input| {
+    play(&context.handles, &row.id, |input| {
         match input {
             Input::Sample(sample) => {
                 open.take(&sample);
@@ -41,7 +42,7 @@ fn reopen(context: &Context, row: &SessionRow, refines: bool) -> Result<OpenSess
         }
         Flow::More
     })?;
-    open.n_transitions = context.wait(context.store.n_transitions(&row.id))?;
+    open.n_transitions = context.handles.wait(context.handles.store.n_transitions(&row.id))?;
     if open.progress.n_samples != row.progress.n_samples {
         tracing::warn!(
             session = row.id,

@@ -3,8 +3,9 @@
 //! samples. Nothing is stored for it and nothing changes; it is there for as
 //! long as its session is.
 
+use super::handles::Handles;
 use super::playback::{Flow, play};
-use super::{Service, ServiceError, jobs, views};
+use super::{Service, ServiceError, views};
 use crate::judging::Judging;
 use crate::store::{SessionRow, Store};
 use crate::wire::basis::Basis;
@@ -77,14 +78,16 @@ impl Service {
         let entry = self.fault(asset, word).await?;
         let gone = || ServiceError::NoRecording { asset: asset.to_owned(), code: word.to_owned() };
         let occurrence = entry.provenance.last_occurrence.ok_or_else(gone)?;
-        let session = self.inner.store.session(&occurrence.session_id).await?.ok_or_else(gone)?;
+        let session =
+            self.inner.handles.store.session(&occurrence.session_id).await?.ok_or_else(gone)?;
         let code: FaultCode = word.parse().map_err(ServiceError::UnknownCode)?;
-        let failure = last_failure(&self.inner.store, &session.id, code).await?.ok_or_else(gone)?;
+        let failure =
+            last_failure(&self.inner.handles.store, &session.id, code).await?.ok_or_else(gone)?;
         let busy = |_| ServiceError::Busy { what: "too many recordings are being made" };
         let permit = self.inner.recordings.clone().try_acquire_owned().map_err(busy)?;
-        let bench = self.inner.bench.clone();
+        let handles = self.inner.handles.clone();
         let made = tokio::task::spawn_blocking(move || {
-            let made = make(&bench, &session, code, &failure, around);
+            let made = make(&handles, &session, code, &failure, around);
             drop(permit);
             made
         });
@@ -146,7 +149,7 @@ impl Backwards {
 }
 
 fn make(
-    bench: &jobs::Bench,
+    handles: &Handles,
     session: &SessionRow,
     code: FaultCode,
     failure: &Failure,
@@ -157,7 +160,7 @@ fn make(
     let from_s =
         failure.onset_s.unwrap_or(failure.failed_s).min(failure.failed_s) - around.before_s;
     let to_s = failure.confirmed_s.unwrap_or(failure.failed_s) + around.after_s;
-    let rows = judged(bench, session, setup, from_s, to_s)?;
+    let rows = judged(handles, session, setup, from_s, to_s)?;
     let view = RecordingView {
         asset: session.asset.clone(),
         code: code.to_string(),
@@ -179,7 +182,7 @@ fn make(
 /// The samples from `from_s` to `to_s` in order of time, each with what it was
 /// judged on.
 fn judged(
-    bench: &jobs::Bench,
+    handles: &Handles,
     session: &SessionRow,
     setup: Setup,
     from_s: f64,
@@ -190,11 +193,11 @@ fn judged(
     let mut stretch = Stretch::new(from_s, to_s);
     let mut judging = Judging::new(setup, views::memory(&session.baseline)?);
     let (mut n_judged, mut ended) = (0, true);
-    play(&bench.store, &bench.runtime, &session.id, |input| {
+    play(handles, &session.id, |input| {
         if let Input::Sample(sample) = &input {
             n_judged += 1;
             stretch.sample(sample);
-            let closing = n_judged % LOOK_EVERY == 0 && bench.closing.is_cancelled();
+            let closing = n_judged % LOOK_EVERY == 0 && handles.closing.is_cancelled();
             ended = sample.t_s <= enough_s && !closing;
             if !ended || n_judged > MAX_JUDGED || stretch.samples.len() > MAX_ROWS {
                 return Flow::Enough;

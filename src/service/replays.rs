@@ -3,7 +3,7 @@
 use uuid::Uuid;
 
 use super::clock::rfc3339;
-use super::jobs::{Bench, Job};
+use super::jobs::{Job, JobContext};
 use super::playback::{Flow, play};
 use super::{Service, ServiceError, views};
 use crate::judging::Judging;
@@ -37,7 +37,7 @@ impl Service {
         settings: ReplaySettingsView,
     ) -> Result<ReplayView, ServiceError> {
         let session = self.session_row(session).await?;
-        let learnt = learnt(&self.inner.store, &session.asset, &settings).await?;
+        let learnt = learnt(&self.inner.handles.store, &session.asset, &settings).await?;
         setup(&session, &settings, learnt.as_ref())?;
         let place = self.job_place()?;
         let row = ReplayRow {
@@ -45,12 +45,12 @@ impl Service {
             session: session.id,
             state: JobState::Queued.to_string(),
             settings: views::to_json(&settings)?,
-            created_at: self.inner.bench.clock.now(),
+            created_at: self.inner.handles.clock.now(),
             finished_at: None,
             result: None,
             error: None,
         };
-        self.inner.bench.write(Write::PutReplay(row.clone())).await?;
+        self.inner.handles.write(Write::PutReplay(row.clone())).await?;
         place.send(Job::Replay(row.id.clone()));
         view(row, 0.0)
     }
@@ -60,8 +60,8 @@ impl Service {
     /// # Errors
     /// [`ServiceError::UnknownReplay`].
     pub async fn replay_state(&self, id: &str) -> Result<ReplayView, ServiceError> {
-        let share = self.inner.bench.progress.of(id);
-        let row = self.inner.store.replay(id).await?;
+        let share = self.inner.job_context.progress.of(id);
+        let row = self.inner.handles.store.replay(id).await?;
         let row = row.ok_or_else(|| ServiceError::UnknownReplay { id: id.to_owned() })?;
         view(row, share.unwrap_or(0.0))
     }
@@ -163,11 +163,11 @@ fn merge(target: &mut serde_json::Value, patch: &serde_json::Value) {
 }
 
 /// Runs a replay to its end, or leaves it unfinished when the service closes.
-pub(super) async fn run(bench: &Bench, id: &str) -> Result<(), ServiceError> {
-    let Some(mut row) = bench.store.replay(id).await? else { return Ok(()) };
+pub(super) async fn run(context: &JobContext, id: &str) -> Result<(), ServiceError> {
+    let Some(mut row) = context.handles.store.replay(id).await? else { return Ok(()) };
     row.state = JobState::Running.to_string();
-    bench.write(Write::PutReplay(row.clone())).await?;
-    let (worker, job) = (bench.clone(), row.clone());
+    context.handles.write(Write::PutReplay(row.clone())).await?;
+    let (worker, job) = (context.clone(), row.clone());
     let judged = tokio::task::spawn_blocking(move || judge(&worker, &job)).await;
     let failed = ServiceError::Unavailable { what: "judging the recording has failed" };
     match judged.unwrap_or(Err(failed)) {
@@ -181,18 +181,18 @@ pub(super) async fn run(bench: &Bench, id: &str) -> Result<(), ServiceError> {
             row.error = Some(error.to_string());
         }
     }
-    row.finished_at = Some(bench.clock.now());
-    bench.write(Write::PutReplay(row)).await
+    row.finished_at = Some(context.handles.clock.now());
+    context.handles.write(Write::PutReplay(row)).await
 }
 
 /// The result; none if the service closes before.
-fn judge(bench: &Bench, row: &ReplayRow) -> Result<Option<ReplayResultView>, ServiceError> {
-    let session = bench.runtime.block_on(bench.store.session(&row.session))?;
+fn judge(context: &JobContext, row: &ReplayRow) -> Result<Option<ReplayResultView>, ServiceError> {
+    let session = context.handles.wait(context.handles.store.session(&row.session))?;
     let session =
         session.ok_or_else(|| ServiceError::UnknownSession { id: row.session.clone() })?;
-    let recorded = recorded(bench, &session)?;
+    let recorded = recorded(context, &session)?;
     let settings: ReplaySettingsView = views::from_json(&row.settings)?;
-    let learnt = bench.runtime.block_on(learnt(&bench.store, &session.asset, &settings))?;
+    let learnt = context.handles.wait(learnt(&context.handles.store, &session.asset, &settings))?;
     let setup = setup(&session, &settings, learnt.as_ref())?;
     let mut player = Player {
         judging: Judging::new(setup, views::memory(&session.baseline)?),
@@ -201,7 +201,7 @@ fn judge(bench: &Bench, row: &ReplayRow) -> Result<Option<ReplayResultView>, Ser
         n_played: 0,
         stopped: false,
     };
-    play(&bench.store, &bench.runtime, &session.id, |input| player.take(bench, &row.id, input))?;
+    play(&context.handles, &session.id, |input| player.take(context, &row.id, input))?;
     if player.stopped {
         return Ok(None);
     }
@@ -212,9 +212,9 @@ fn judge(bench: &Bench, row: &ReplayRow) -> Result<Option<ReplayResultView>, Ser
 }
 
 /// The transitions that the session's record has.
-fn recorded(bench: &Bench, session: &SessionRow) -> Result<Vec<FaultView>, ServiceError> {
+fn recorded(context: &JobContext, session: &SessionRow) -> Result<Vec<FaultView>, ServiceError> {
     let limit = u32::try_from(MAX_LINES + 1).unwrap_or(u32::MAX);
-    let rows = bench.runtime.block_on(bench.store.transitions(&session.id, 0, limit))?;
+    let rows = context.handles.wait(context.handles.store.transitions(&session.id, 0, limit))?;
     rows.iter().map(|row| views::from_json(&row.document)).collect()
 }
 
@@ -227,14 +227,14 @@ struct Player<'a> {
 }
 
 impl Player<'_> {
-    fn take(&mut self, bench: &Bench, id: &str, input: Input) -> Flow {
+    fn take(&mut self, context: &JobContext, id: &str, input: Input) -> Flow {
         let n_recorded = u64::try_from(self.session.progress.n_samples).unwrap_or_default();
         if self.n_played >= n_recorded && matches!(input, Input::Sample(_)) {
             return Flow::Enough;
         }
         if self.n_played.is_multiple_of(LOOK_EVERY) {
-            bench.progress.set(id, self.n_played as f64 / n_recorded.max(1) as f64);
-            self.stopped = bench.closing.is_cancelled();
+            context.progress.set(id, self.n_played as f64 / n_recorded.max(1) as f64);
+            self.stopped = context.handles.closing.is_cancelled();
         }
         if self.stopped {
             return Flow::Enough;

@@ -6,14 +6,10 @@
 
 use std::time::Duration;
 
-use tokio::sync::mpsc;
-use tokio_util::sync::CancellationToken;
-
-use super::commit::WriteSet;
+use super::ServiceError;
 use super::deletion::Deleter;
-use super::jobs::write_one;
-use super::{Clock, ServiceError};
-use crate::store::{Micros, Store, Write};
+use super::handles::Handles;
+use crate::store::{Micros, Write};
 
 /// Sessions given up by one sweep, for each reason; the next goes on. A clock
 /// that is far ahead for an hour does not cost everything.
@@ -41,11 +37,8 @@ impl Default for Retention {
 }
 
 pub(super) struct Sweeper {
-    pub(super) store: Store,
-    pub(super) clock: Clock,
-    pub(super) writer: mpsc::Sender<WriteSet>,
+    pub(super) handles: Handles,
     pub(super) deleter: Deleter,
-    pub(super) closing: CancellationToken,
     pub(super) retention: Retention,
 }
 
@@ -53,7 +46,7 @@ impl Sweeper {
     /// Sweeps every so often until the service closes. What a stop interrupts
     /// goes on with the next start.
     pub(super) async fn run(self) {
-        let closing = self.closing.clone();
+        let closing = self.handles.closing.clone();
         let forever = async {
             loop {
                 if let Err(error) = self.sweep().await {
@@ -72,7 +65,8 @@ impl Sweeper {
         let Retention { age, bytes_per_asset, fault_age, .. } = self.retention;
         for (age, around_fault) in [(age, false), (fault_age, true)] {
             let Some(moment) = age.and_then(|age| self.before(age)) else { continue };
-            let old = self.store.sessions_ended_before(moment, around_fault, MAX_EXPIRED).await?;
+            let old =
+                self.handles.store.sessions_ended_before(moment, around_fault, MAX_EXPIRED).await?;
             self.expire(old, "age").await?;
         }
         if let Some(bytes) = bytes_per_asset {
@@ -82,14 +76,14 @@ impl Sweeper {
     }
 
     fn before(&self, age: Duration) -> Option<Micros> {
-        self.clock.now().checked_sub(i64::try_from(age.as_micros()).ok()?)
+        self.handles.clock.now().checked_sub(i64::try_from(age.as_micros()).ok()?)
     }
 
     /// Gives up the oldest plain sessions of the assets above `bytes`.
     async fn shrink(&self, bytes: i64) -> Result<(), ServiceError> {
-        for (asset, held) in self.store.assets_above(bytes).await? {
+        for (asset, held) in self.handles.store.assets_above(bytes).await? {
             let mut above = held - bytes;
-            let plain = self.store.plain_sessions(&asset, MAX_EXPIRED).await?;
+            let plain = self.handles.store.plain_sessions(&asset, MAX_EXPIRED).await?;
             let enough = |(_, n): &(String, i64)| {
                 let wanted = above > 0;
                 above -= n;
@@ -108,8 +102,8 @@ impl Sweeper {
         for session in ids {
             tracing::info!(session, reason, "given up");
             metrics::counter!("offbd_sessions_expired_total", "reason" => reason).increment(1);
-            let at = self.clock.now();
-            write_one(&self.writer, Write::ExpireSession { session, at }).await?;
+            let at = self.handles.clock.now();
+            self.handles.write(Write::ExpireSession { session, at }).await?;
         }
         Ok(())
     }

@@ -86,7 +86,7 @@ impl Service {
     /// # Errors
     /// [`ServiceError::Store`] if the store cannot be read.
     pub async fn asset_of_session(&self, id: &str) -> Result<Option<String>, ServiceError> {
-        Ok(self.inner.store.session(id).await?.map(|row| row.asset))
+        Ok(self.inner.handles.store.session(id).await?.map(|row| row.asset))
     }
 
     /// Ends a session; one that has ended stays as it is.
@@ -144,7 +144,7 @@ impl Service {
     }
 
     pub(super) async fn session_row(&self, id: &str) -> Result<SessionRow, ServiceError> {
-        let row = self.inner.store.session(id).await?;
+        let row = self.inner.handles.store.session(id).await?;
         row.ok_or_else(|| ServiceError::UnknownSession { id: id.to_owned() })
     }
 
@@ -161,7 +161,7 @@ impl Service {
     ) -> Result<Page<SessionView>, ServiceError> {
         let before = cursor.map(views::cursor::<(i64, String)>).transpose()?;
         let filter = SessionFilter { asset, state, before };
-        let rows = self.inner.store.sessions(&filter, limit + 1).await?;
+        let rows = self.inner.handles.store.sessions(&filter, limit + 1).await?;
         views::page(rows, limit, |row| (row.opened_at, row.id.clone()), views::session)
     }
 
@@ -171,7 +171,7 @@ impl Service {
     /// [`ServiceError::UnknownSession`].
     pub async fn recording(&self, id: &str) -> Result<(SessionView, Recording), ServiceError> {
         let session = self.session(id).await?;
-        let store = self.inner.store.clone();
+        let store = self.inner.handles.store.clone();
         Ok((session, Recording { store, session: id.to_owned(), next: 0 }))
     }
 }

@@ -1,20 +1,19 @@
 //! A shard: the thread that owns the running engines of its assets.
 
 use std::collections::BTreeMap;
-use std::future::Future;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::thread::JoinHandle;
 
-use tokio::runtime::Handle;
 use tokio::sync::{OwnedSemaphorePermit, mpsc, oneshot};
 
 use super::commit::{Life, WriteSet};
+use super::handles::Handles;
 use super::presence::Presences;
 use super::running::{Running, Work};
-use super::{Clock, Limits, ServiceError, jobs, rebuild, settled};
-use crate::store::{Store, Write};
+use super::{Limits, ServiceError, jobs, rebuild, settled};
+use crate::store::Write;
 
 /// Something to do on a shard.
 pub(super) type Job = Box<dyn FnOnce(&mut Shard) + Send>;
@@ -120,50 +119,13 @@ impl<T> From<oneshot::Sender<Result<T, ServiceError>>> for Reply<T> {
 /// What a shard works with, apart from the engines.
 #[derive(Clone)]
 pub(super) struct Context {
-    pub(super) store: Store,
-    pub(super) clock: Clock,
+    pub(super) handles: Handles,
     pub(super) presences: Presences,
-    pub(super) runtime: Handle,
     /// For work in the background.
     pub(super) jobs: mpsc::Sender<jobs::Job>,
-    writer: mpsc::Sender<WriteSet>,
 }
 
 impl Context {
-    pub(super) fn new(
-        store: Store,
-        clock: Clock,
-        presences: Presences,
-        jobs: mpsc::Sender<jobs::Job>,
-        writer: mpsc::Sender<WriteSet>,
-    ) -> Self {
-        Self { store, clock, presences, runtime: Handle::current(), jobs, writer }
-    }
-
-    /// Waits for a question to the store; only on a shard's thread.
-    pub(super) fn wait<T>(&self, question: impl Future<Output = T>) -> T {
-        self.runtime.block_on(question)
-    }
-
-    /// Waits until everything sent to the writer so far is settled, so that
-    /// what is read next is what was written last.
-    pub(super) fn fence(&self) -> Result<(), ServiceError> {
-        let (settled, wait) = oneshot::channel();
-        let done = Box::new(move |_| {
-            let _ = settled.send(());
-        });
-        self.write(WriteSet { writes: Vec::new(), life: Life::default(), done });
-        wait.blocking_recv().map_err(|_| ServiceError::Unavailable { what: "the writer is gone" })
-    }
-
-    /// Hands `set` to the writer; waits while its queue is full. If the writer
-    /// is gone, dropping the set tells those who wait.
-    fn write(&self, set: WriteSet) {
-        if self.writer.blocking_send(set).is_err() {
-            tracing::error!("the writer is gone");
-        }
-    }
-
     /// Hands over what follows; once it is durable, `reply` gets `answer` and the jobs
     /// are begun.
     fn settle<T: Send + 'static>(&self, work: Work, life: Life, answer: T, reply: Reply<T>) {
@@ -174,7 +136,7 @@ impl Context {
             }
             reply.send(outcome.map(|()| answer));
         });
-        self.write(WriteSet { writes, life, done });
+        self.handles.hand_over(WriteSet { writes, life, done });
     }
 }
 
@@ -194,7 +156,7 @@ impl Shard {
             let mut shard = Self { context, running: BTreeMap::new() };
             let engines = metrics::gauge!("offbd_engines", "shard" => number.to_string());
             while let Some(job) = queue.blocking_recv() {
-                if shard.context.writer.is_closed() {
+                if shard.context.handles.writer().is_closed() {
                     // Nothing can become durable; dropping the job tells who waits for it.
                     continue;
                 }
@@ -223,7 +185,7 @@ impl Shard {
             Err(error) => return reply.send(Err(error)),
         };
         let life = running.life.clone();
-        let mut work = Work::at(self.context.clock.now());
+        let mut work = Work::at(self.context.handles.clock.now());
         let outcome =
             catch_unwind(AssertUnwindSafe(|| act(&self.context, &mut running, &mut work)));
         match outcome {
@@ -282,7 +244,8 @@ impl Shard {
         };
         match absent {
             Ok(write) => {
-                let work = Work { writes: vec![write], ..Work::at(self.context.clock.now()) };
+                let work =
+                    Work { writes: vec![write], ..Work::at(self.context.handles.clock.now()) };
                 self.context.settle(work, Life::default(), (), reply.into());
             }
             Err(error) => drop(reply.send(Err(error))),
@@ -295,7 +258,7 @@ impl Shard {
         name: &str,
         make: impl FnOnce(&Context) -> Result<Write, ServiceError>,
     ) -> Result<Write, ServiceError> {
-        if self.context.wait(self.context.store.is_being_deleted(name))? {
+        if self.context.handles.wait(self.context.handles.store.is_being_deleted(name))? {
             return Err(ServiceError::Busy { what: "the asset of this name is being deleted" });
         }
         make(&self.context)
@@ -307,7 +270,7 @@ impl Shard {
         match self.running.remove(name) {
             Some(running) if !running.life.is_broken() => Ok(running),
             _ => {
-                self.context.fence()?;
+                self.context.handles.fence()?;
                 let load = || rebuild::load(&self.context, name).map(Box::new);
                 catch_unwind(AssertUnwindSafe(load)).unwrap_or_else(|_| {
                     tracing::error!(asset = name, "rebuilding the engine failed");
@@ -321,9 +284,10 @@ impl Shard {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::store::{AssetRow, Place};
+    use crate::store::{AssetRow, Place, Store};
     use offbd_core::engine::Rig;
     use offbd_core::vocabulary::Sample;
+    use tokio_util::sync::CancellationToken;
 
     fn running() -> Box<Running> {
         let row = AssetRow {
@@ -351,7 +315,8 @@ mod tests {
         let place = Place::File(data.path().join("test.sqlite"));
         let (store, _writer) = Store::open(&place).await.unwrap();
         let ((jobs, _), (writer, _)) = (mpsc::channel(1), mpsc::channel(1));
-        let context = Context::new(store, Clock, Presences::default(), jobs, writer);
+        let handles = Handles::new(store, writer, CancellationToken::new());
+        let context = Context { handles, presences: Presences::default(), jobs };
         let mut shard = Shard { context, running: BTreeMap::from([("a".to_owned(), running())]) };
         let (reply, answer) = oneshot::channel();
         let act = |_: &Context, running: &mut Running, work: &mut Work| {

@@ -182,8 +182,10 @@ pub(super) fn switch(
         return Ok(Switched::Open);
     }
     super::sessions::check_name(name)?;
-    context.fence()?;
-    if let Some(row) = context.wait(context.store.session_named(&running.row.name, name))? {
+    context.handles.fence()?;
+    if let Some(row) =
+        context.handles.wait(context.handles.store.session_named(&running.row.name, name))?
+    {
         return Ok(Switched::Ended(Box::new(row)));
     }
     running.end(context, work)?;
@@ -201,8 +203,9 @@ fn retransmitted(
     let times = samples.iter().map(|(_, sample)| sample.t_s).filter(|t_s| t_s.is_finite());
     let first = times.clone().fold(f64::INFINITY, f64::min);
     let last = times.fold(f64::NEG_INFINITY, f64::max);
-    let question = context.store.chunks_between(&row.id, (first, last), MAX_CHUNKS_SEARCHED);
-    let known = keys(context.wait(question)?.iter().flatten());
+    let question =
+        context.handles.store.chunks_between(&row.id, (first, last), MAX_CHUNKS_SEARCHED);
+    let known = keys(context.handles.wait(question)?.iter().flatten());
     if !samples.iter().all(|(_, sample)| known.contains(&key(sample))) {
         let (asset, name) = (row.asset.clone(), row.name.clone());
         return Err(ServiceError::SessionEnded { asset, name });
@@ -243,6 +246,6 @@ fn nameless(
 /// Whether exactly this sample is in the recording: then it is sent again.
 fn is_recorded(context: &Context, session: &str, sample: &Sample) -> Result<bool, ServiceError> {
     let range = (sample.t_s, sample.t_s);
-    let question = context.store.chunks_between(session, range, MAX_CHUNKS_SEARCHED);
-    Ok(context.wait(question)?.iter().flatten().any(|recorded| recorded == sample))
+    let question = context.handles.store.chunks_between(session, range, MAX_CHUNKS_SEARCHED);
+    Ok(context.handles.wait(question)?.iter().flatten().any(|recorded| recorded == sample))
 }

@@ -1,8 +1,9 @@
 //! A session's trace: the recording is judged again, and what the pictures
 //! need is kept of it. Nothing is stored and nothing changes.
 
+use super::handles::Handles;
 use super::playback::{Flow, play};
-use super::{Service, ServiceError, jobs, replays, views};
+use super::{Service, ServiceError, replays, views};
 use crate::judging::Judging;
 use crate::store::SessionRow;
 use crate::wire::service::ReplaySettingsView;
@@ -45,9 +46,9 @@ impl Service {
         }
         let busy = |_| ServiceError::Busy { what: "too many traces are being made" };
         let permit = self.inner.traces.clone().try_acquire_owned().map_err(busy)?;
-        let bench = self.inner.bench.clone();
+        let handles = self.inner.handles.clone();
         let made = tokio::task::spawn_blocking(move || {
-            let trace = trace(&bench, &session, &query);
+            let trace = trace(&handles, &session, &query);
             drop(permit);
             trace
         });
@@ -57,21 +58,21 @@ impl Service {
 }
 
 fn trace(
-    bench: &jobs::Bench,
+    handles: &Handles,
     session: &SessionRow,
     query: &TraceQuery,
 ) -> Result<TraceView, ServiceError> {
     let setup = replays::setup(session, &query.settings, None)?;
     let mut judging = Judging::new(setup, views::memory(&session.baseline)?);
     let mut thinned = Thinned::new(query.points, expected(session, query));
-    play(&bench.store, &bench.runtime, &session.id, |input| {
+    play(handles, &session.id, |input| {
         let is_sample = matches!(input, Input::Sample(_));
         judging.input(input);
         let point = is_sample.then(|| TracePoint::of(&judging.engine().state())).flatten();
         let Some(point) = point.filter(|point| point.t_s() >= query.from_s) else {
-            return if bench.closing.is_cancelled() { Flow::Enough } else { Flow::More };
+            return if handles.closing.is_cancelled() { Flow::Enough } else { Flow::More };
         };
-        if point.t_s() > query.to_s || bench.closing.is_cancelled() {
+        if point.t_s() > query.to_s || handles.closing.is_cancelled() {
             return Flow::Enough;
         }
         thinned.take(point);

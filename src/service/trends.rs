@@ -23,7 +23,7 @@ impl Service {
     /// [`ServiceError::UnknownAsset`].
     pub async fn trends(&self, asset: &str) -> Result<TrendsView, ServiceError> {
         let calibration_id = self.asset(asset).await?.calibration.map(|c| c.id);
-        let points = points(self.inner.store.trend(asset, MAX_ROWS).await?);
+        let points = points(self.inner.handles.store.trend(asset, MAX_ROWS).await?);
         let learnt = calibration_id.is_some();
         let of_now = points.iter().filter(|p| learnt && p.calibration_id == calibration_id);
         let estimates: Vec<_> = of_now.map(|p| p.estimates).collect();
@@ -51,8 +51,8 @@ pub(super) fn ended(
     let calibration_id = open.judging.basis().calibration_id.clone();
     let mut known = Vec::new();
     if calibration_id.is_some() {
-        context.fence()?;
-        let points = points(context.wait(context.store.trend(asset, MAX_ROWS))?);
+        context.handles.fence()?;
+        let points = points(context.handles.wait(context.handles.store.trend(asset, MAX_ROWS))?);
         let alike = points.into_iter().filter(|p| p.calibration_id == calibration_id);
         known = alike.map(|p| p.estimates).chain([estimates]).collect();
     }

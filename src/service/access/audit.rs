@@ -42,8 +42,8 @@ impl Service {
     pub async fn note(&self, caller: &Caller, deed: Deed) -> Result<(), ServiceError> {
         let pass = caller.pass();
         let actor = (caller.name().unwrap_or(ANYONE), pass.map(|pass| pass.id.as_str()));
-        let row = deed.row(actor, self.inner.bench.clock.now());
-        self.inner.bench.write(Write::Access(AccessWrite::Audit(row))).await
+        let row = deed.row(actor, self.inner.handles.clock.now());
+        self.inner.handles.write(Write::Access(AccessWrite::Audit(row))).await
     }
 
     /// The audit log, the latest first.
@@ -57,7 +57,7 @@ impl Service {
     ) -> Result<Page<AuditView>, ServiceError> {
         let before = cursor.map(views::cursor::<String>).transpose()?;
         let before = before.as_deref().unwrap_or(LAST_ID);
-        let rows = self.inner.store.audit(before, limit + 1).await?;
+        let rows = self.inner.handles.store.audit(before, limit + 1).await?;
         views::page(rows, limit, |row| row.id.clone(), |row| Ok(view(row)))
     }
 }

@@ -142,7 +142,7 @@ impl Service {
     /// Whom `credential` belongs to, if that is known without asking the store.
     #[must_use]
     pub fn recall(&self, credential: &Credential) -> Option<Arc<Pass>> {
-        self.inner.passes.recall(credential, self.inner.bench.clock.now())
+        self.inner.passes.recall(credential, self.inner.handles.clock.now())
     }
 
     /// Whom `credential` belongs to; nobody if it is none, revoked or expired. A
@@ -155,14 +155,16 @@ impl Service {
         credential: &Credential,
     ) -> Result<Option<Arc<Pass>>, ServiceError> {
         let inner = &self.inner;
-        let now = inner.bench.clock.now();
+        let now = inner.handles.clock.now();
         if let Some(pass) = inner.passes.recall(credential, now) {
             return Ok(Some(pass));
         }
         let change = *inner.passes.changes.borrow();
         let row = match credential {
-            Credential::Token(_) => inner.store.token_by_hash(&credential.digest()).await?,
-            Credential::Login(_) => inner.store.token_by_login(&credential.digest(), now).await?,
+            Credential::Token(_) => inner.handles.store.token_by_hash(&credential.digest()).await?,
+            Credential::Login(_) => {
+                inner.handles.store.token_by_login(&credential.digest(), now).await?
+            }
             Credential::Jwt(_) => None,
         };
         let Some(row) = row else { return Ok(None) };
@@ -178,7 +180,7 @@ impl Service {
     /// Whom a JSON Web Token names; nobody if it is not in force, or none is taken.
     pub async fn verify(&self, token: &str) -> Option<Arc<Pass>> {
         let provider = self.inner.provider.as_ref()?;
-        let now = self.inner.bench.clock.now();
+        let now = self.inner.handles.clock.now();
         let verified = provider.verify(token, now).await;
         let refused = |reason| tracing::info!(%reason, "a JSON Web Token is refused");
         let jwt::Verified { subject, role, asset, expires_at, key } =
@@ -204,16 +206,16 @@ impl Service {
         let Some(key) = pass.signed_by else {
             return matches!(self.authenticate(&pass.credential).await, Ok(None));
         };
-        let now = self.inner.bench.clock.now();
+        let now = self.inner.handles.clock.now();
         let published = self.inner.provider.as_ref().is_some_and(|p| p.has(key, now));
         !published || pass.expires_at.is_some_and(|end| now >= end)
     }
 
     /// Notes that a token is used; nobody waits for it.
     fn note_use(&self, id: &str, at: Micros) {
-        let (bench, id) = (self.inner.bench.clone(), id.to_owned());
+        let (handles, id) = (self.inner.handles.clone(), id.to_owned());
         tokio::spawn(async move {
-            let written = bench.write(Write::Access(AccessWrite::TokenUsed { id, at })).await;
+            let written = handles.write(Write::Access(AccessWrite::TokenUsed { id, at })).await;
             if let Err(error) = written {
                 tracing::warn!(%error, "the use of a token was not noted");
             }
@@ -240,14 +242,14 @@ impl Service {
     /// [`ServiceError::Unavailable`] if the store does not take it.
     pub async fn log_in(&self, pass: &Pass) -> Result<(String, Duration), ServiceError> {
         let cookie = random()?;
-        let at = self.inner.bench.clock.now();
+        let at = self.inner.handles.clock.now();
         let write = AccessWrite::Login {
             hash: Credential::login(&cookie).digest(),
             token: pass.id.clone(),
             at,
             expires_at: at + micros(LOGIN),
         };
-        self.inner.bench.write(Write::Access(write)).await?;
+        self.inner.handles.write(Write::Access(write)).await?;
         Ok((cookie, LOGIN))
     }
 

@@ -116,15 +116,15 @@ impl Service {
         wanted: NewToken,
         by: &str,
     ) -> Result<MadeTokenView, ServiceError> {
-        let minted = mint(wanted, by, self.inner.bench.clock.now())?;
+        let minted = mint(wanted, by, self.inner.handles.clock.now())?;
         if let Some(asset) = &minted.row.asset {
             self.asset(asset).await?;
         }
-        if self.inner.store.token_named(&minted.row.name).await?.is_some() {
+        if self.inner.handles.store.token_named(&minted.row.name).await?.is_some() {
             return Err(ServiceError::TokenExists { name: minted.row.name });
         }
         let write = AccessWrite::CreateToken(minted.row.clone());
-        self.inner.bench.write(Write::Access(write)).await?;
+        self.inner.handles.write(Write::Access(write)).await?;
         Ok(MadeTokenView { token: token_view(minted.row), secret: minted.secret })
     }
 
@@ -139,14 +139,14 @@ impl Service {
     ) -> Result<Page<TokenView>, ServiceError> {
         let before = cursor.map(views::cursor::<String>).transpose()?;
         let before = before.as_deref().unwrap_or(LAST_ID);
-        let rows = self.inner.store.tokens(before, limit + 1).await?;
+        let rows = self.inner.handles.store.tokens(before, limit + 1).await?;
         views::page(rows, limit, |row| row.id.clone(), |row| Ok(token_view(row)))
     }
 
     /// # Errors
     /// [`ServiceError::UnknownToken`].
     pub async fn token(&self, id: &str) -> Result<TokenView, ServiceError> {
-        let row = self.inner.store.token(id).await?;
+        let row = self.inner.handles.store.token(id).await?;
         row.map(token_view).ok_or_else(|| ServiceError::UnknownToken { id: id.to_owned() })
     }
 
@@ -156,13 +156,13 @@ impl Service {
     /// [`ServiceError::UnknownToken`].
     pub async fn revoke_token(&self, id: &str) -> Result<(), ServiceError> {
         self.token(id).await?;
-        let at = self.inner.bench.clock.now();
+        let at = self.inner.handles.clock.now();
         self.change_access(AccessWrite::RevokeToken { id: id.to_owned(), at }).await
     }
 
     /// Makes `write` durable and forgets who was known by what was before.
     pub(super) async fn change_access(&self, write: AccessWrite) -> Result<(), ServiceError> {
-        let written = self.inner.bench.write(Write::Access(write)).await;
+        let written = self.inner.handles.write(Write::Access(write)).await;
         self.inner.passes.forget();
         written
     }
