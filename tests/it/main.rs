@@ -1,5 +1,5 @@
 //! offbd from outside: over sockets, as a process, in a real database. With
-//! `OFFBD_TEST_DATABASE=postgres` what starts a service starts it on a private
+//! `TEST_DATABASE=postgres` what starts a service starts it on a private
 //! server of PostgreSQL.
 
 #![allow(unreachable_pub, clippy::unwrap_used, reason = "a test fails by panicking")]

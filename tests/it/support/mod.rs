@@ -33,13 +33,13 @@ pub struct Bench {
     pub data: tempfile::TempDir,
 }
 
-/// Whether services under test use PostgreSQL: `OFFBD_TEST_DATABASE=postgres`.
+/// Whether services under test use PostgreSQL: `TEST_DATABASE=postgres`.
 pub fn on_postgres() -> bool {
-    match std::env::var("OFFBD_TEST_DATABASE") {
+    match std::env::var("TEST_DATABASE") {
         Ok(database) if database == "postgres" => true,
         Ok(database) if database == "sqlite" => false,
         Err(std::env::VarError::NotPresent) => false,
-        other => panic!("OFFBD_TEST_DATABASE is sqlite or postgres, not {other:?}"),
+        other => panic!("TEST_DATABASE is sqlite or postgres, not {other:?}"),
     }
 }
 

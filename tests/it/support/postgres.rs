@@ -1,7 +1,6 @@
 //! A private server of PostgreSQL, reached through a socket in a directory of
 //! its own. It ends with the process that started it, however that ends.
 
-use std::fs::File;
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
@@ -118,22 +117,14 @@ pub fn url(directory: &Path, name: &str) -> String {
 }
 
 /// The URL of a database on the one server that this process's tests share.
-/// This module may be in the process several times: the first takes the lock.
 pub fn shared_database(name: &str) -> String {
     static DIRECTORY: OnceLock<PathBuf> = OnceLock::new();
     let directory = DIRECTORY.get_or_init(|| {
-        let known = std::env::temp_dir().join(format!("offbd-postgres-{}", std::process::id()));
-        let lock = File::create(known.with_extension("lock")).unwrap();
-        lock.lock().unwrap();
-        if !known.exists() {
-            std::fs::create_dir(&known).unwrap();
-            // It lives as long as the process.
-            std::mem::forget(Postgres::in_directory(known.clone()));
-        }
-        // Whoever comes now sees the directory; somebody who has waited may
-        // have removed it before.
-        let _ = std::fs::remove_file(known.with_extension("lock"));
-        known
+        let directory = std::env::temp_dir().join(format!("offbd-postgres-{}", std::process::id()));
+        std::fs::create_dir(&directory).unwrap();
+        // It lives as long as the process.
+        std::mem::forget(Postgres::in_directory(directory.clone()));
+        directory
     });
     database(directory, name)
 }
