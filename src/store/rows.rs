@@ -28,7 +28,7 @@ pub struct Progress {
     pub n_samples: i64,
     /// Rows that were no samples.
     pub n_rejected: i64,
-    /// `t_s` of the first and the last sample in order of arrival.
+    /// The earliest and the latest `t_s` of the samples that were judged.
     pub first_t_s: Option<f64>,
     pub last_t_s: Option<f64>,
     /// The highest `seq`.
