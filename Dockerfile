@@ -1,10 +1,10 @@
 # Builds with BuildKit (the cache mounts need it): docker build -t offbd .
 # Runs: docker run -p 127.0.0.1:8087:8087 -v offbd:/var/lib/offbd offbd
-# It asks for a token; the first one:
+# The service requires a token; make the first one with
 # docker run --rm -v offbd:/var/lib/offbd offbd token create --name ann --role admin
 
 FROM rust:1-bookworm AS build
-# Node builds the dashboard; the program needs none to run.
+# Node builds the dashboard; it is not needed at run time.
 RUN apt-get update && apt-get install -y --no-install-recommends nodejs npm \
     && rm -rf /var/lib/apt/lists/*
 WORKDIR /src
@@ -17,10 +17,10 @@ COPY src src
 COPY tests tests
 COPY docs/charts docs/charts
 COPY web web
-# Benchmarks, examples and tests are there because Cargo.toml names them. The
-# laboratory (scenes, charts, simulated rigs) is left out, OpenTelemetry is in.
-# Packages and compiled dependencies stay in the cache mounts from build to
-# build; the program is copied out, for a mount is no part of the image.
+# Benchmarks, examples and tests are copied because Cargo.toml names them. The build
+# leaves out the laboratory (scenes, charts, simulated rigs) and includes OpenTelemetry.
+# Cache mounts keep packages and compiled dependencies from build to build; the
+# program is copied out of them, because a mount is not part of the image.
 RUN --mount=type=cache,target=/usr/local/cargo/registry \
     --mount=type=cache,target=/src/target \
     cargo build --profile dist --no-default-features --features otel --locked --package offbd --bin offbd \
@@ -36,10 +36,10 @@ ENV OFFBD_LISTEN=0.0.0.0:8087 \
     OFFBD_DATA=/var/lib/offbd \
     OFFBD_LOG__FORMAT=json
 EXPOSE 8087
-# Asks /readyz on port 8087 through bash, which the base image has and which
-# opens sockets by itself; no curl is needed. Another port needs another line.
+# Requests /readyz on port 8087 with bash, which can open sockets and is in the base
+# image, so that curl is not needed. If you change the port, change this line.
 HEALTHCHECK --interval=10s --timeout=3s --start-period=10s CMD ["bash", "-c", \
     "exec 3<>/dev/tcp/127.0.0.1/8087 && printf 'GET /readyz HTTP/1.0\\r\\n\\r\\n' >&3 && read -r answer <&3 && [[ $answer == *' 200 '* ]]"]
-# SIGTERM, which `docker stop` sends, is a graceful stop.
+# `docker stop` sends SIGTERM, on which the service stops gracefully.
 ENTRYPOINT ["offbd"]
 CMD ["serve"]

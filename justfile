@@ -1,17 +1,17 @@
-# What there is to do; `just` alone lists it.
+# Shortcuts; `just` without arguments lists them.
 
 _list:
     @just --list
 
-# Everything that must hold before a change goes in
+# All checks that a change must pass
 test:
     scripts/test
 
-# Quick: compile and lint
+# Compile and lint
 check:
     cargo clippy --all-targets -- -D warnings
 
-# The floors, and the paths that the documents name
+# The architecture rules, and the paths that the documents name
 rules:
     cargo test --test it architecture
 
@@ -23,38 +23,38 @@ demo:
 serve *ARGS:
     cargo run --release -- serve {{ARGS}}
 
-# openapi.yaml as the code has it
+# Regenerate openapi.yaml from the code
 openapi:
     UPDATE_OPENAPI=1 cargo test --test it openapi
 
-# The output that README.md shows, anew
+# Update the command output in README.md
 tour:
     cargo build --release
     scripts/tour --update
 
-# The dashboard while it is worked on: shows changes at once, beside `just serve`
+# Development server of the dashboard, for use with `just serve`
 web:
     cd web && npm ci && npx vite
 
-# The dashboard in a real browser
+# Test the dashboard in a browser
 browser:
     cargo build --bin offbd
     npm --prefix web test
 
-# The dashboard's pictures in README.md, anew
+# Update the dashboard's pictures in README.md
 screenshots:
     scripts/screenshots --docs
 
-# The picture in README.md, anew
+# Update the first picture in README.md
 picture:
     cargo build --release
     scripts/picture
 
-# How fast samples go through
+# Benchmarks of ingest and of many twins
 bench:
     cargo bench --bench ingest
     cargo bench -p offbd-lab --bench batch
 
-# Other people's engines and solvers on the scenes of `offbd chart work-precision`
+# Benchmark other engines and solvers on the scenes of `offbd chart work-precision`
 peers *ARGS:
     benches/peers/run {{ARGS}}

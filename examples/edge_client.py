@@ -4,11 +4,11 @@
     edge_client.py --asset my-rig session.csv
     my_logger | edge_client.py --asset my-rig --register rig.json -
 
-Python's standard library only. Rows go in numbered batches; a batch is sent
-again, with growing pauses, until the service acknowledges that it is stored.
-Sent twice it counts once, so nothing is lost and nothing is doubled, whatever
-happens to the line. The rows are CSV with the header
-t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m (and `seq`, if the device counts).
+Uses only Python's standard library. Rows are numbered and sent in batches. A batch
+is retried with growing delays until the service acknowledges that it is stored; a
+sample that arrives twice is stored once. So no row is lost or duplicated, whatever
+happens to the connection. The rows are CSV with the header
+t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m (and `seq`, if the device numbers its rows).
 """
 
 import argparse
@@ -24,7 +24,7 @@ import urllib.parse
 import urllib.request
 
 COLUMNS = ("t_s", "cmd_qx_rad", "cmd_qy_rad", "x_m", "y_m")
-LONGEST_PAUSE_S = 30.0
+MAX_DELAY_S = 30.0
 TIMEOUT_S = 30.0
 HEADERS = {"Content-Type": "application/json"}
 
@@ -57,18 +57,18 @@ def main():
 def parse_arguments():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("file", help="CSV file, or - for stdin")
-    parser.add_argument("--asset", required=True, help="the rig's name at the service")
+    parser.add_argument("--asset", required=True, help="name of the asset at the service")
     parser.add_argument("--url", default="http://127.0.0.1:8087")
-    parser.add_argument("--token-file", metavar="FILE", help="the device's token")
-    parser.add_argument("--session", help="name of the session [default: the time]")
+    parser.add_argument("--token-file", metavar="FILE", help="file with the device's token")
+    parser.add_argument("--session", help="name of the session [default: from the time]")
     parser.add_argument("--register", metavar="ASSET.json", help="register this asset file first")
-    parser.add_argument("--rows", type=int, default=100, help="most rows of a batch")
-    parser.add_argument("--seconds", type=float, default=0.5, help="longest a row waits")
+    parser.add_argument("--rows", type=int, default=100, help="largest number of rows per batch")
+    parser.add_argument("--seconds", type=float, default=0.5, help="longest time that a row waits for its batch")
     return parser.parse_args()
 
 
 def read(source, rows):
-    """Puts every row of the source into the queue, then None."""
+    """Puts every row of the source into the queue, and None at the end."""
     for number, row in enumerate(csv.DictReader(source), start=1):
         sample = {name: to_number(row.get(name)) for name in COLUMNS}
         sample["seq"] = int(row.get("seq") or number)
@@ -77,7 +77,7 @@ def read(source, rows):
 
 
 def to_number(field):
-    """An empty field is a value that is not there; the service judges the rest."""
+    """Converts a field: an empty one is a missing value; the service rejects invalid ones."""
     if field is None or not field.strip():
         return None
     try:
@@ -86,8 +86,8 @@ def to_number(field):
         return field
 
 
-def batches(rows, most, longest_s):
-    """Batches of at most `most` rows, none older than `longest_s`."""
+def batches(rows, max_rows, max_wait_s):
+    """Yields batches of at most `max_rows` rows; no row waits longer than `max_wait_s`."""
     batch, due = [], 0.0
     while True:
         try:
@@ -100,9 +100,9 @@ def batches(rows, most, longest_s):
         if row is None:
             break
         if not batch:
-            due = time.monotonic() + longest_s
+            due = time.monotonic() + max_wait_s
         batch.append(row)
-        if len(batch) >= most:
+        if len(batch) >= max_rows:
             yield batch
             batch = []
     if batch:
@@ -110,8 +110,8 @@ def batches(rows, most, longest_s):
 
 
 def deliver(method, url, body):
-    """Sends until it is acknowledged; returns the answer."""
-    pause = 0.2
+    """Sends a request until it succeeds; returns the response."""
+    delay = 0.2
     while True:
         request = urllib.request.Request(url, data=body, method=method, headers=HEADERS)
         try:
@@ -121,16 +121,16 @@ def deliver(method, url, body):
             if error.code not in (408, 425, 429) and error.code < 500:
                 sys.exit(f"edge_client: {error.code}: {error.read().decode(errors='replace')}")
             reason = f"{error.code} {error.reason}"
-            pause = max(pause, retry_after(error))
+            delay = max(delay, retry_after(error))
         except (OSError, ValueError) as error:
             reason = str(error)
-        say(f"{reason}; again in {pause:.1f} s")
-        time.sleep(pause * random.uniform(0.8, 1.2))
-        pause = min(2 * pause, LONGEST_PAUSE_S)
+        say(f"{reason}; retrying in {delay:.1f} s")
+        time.sleep(delay * random.uniform(0.8, 1.2))
+        delay = min(2 * delay, MAX_DELAY_S)
 
 
 def retry_after(error):
-    """Seconds that the service asks to wait."""
+    """Returns the delay that the service requests, in seconds."""
     try:
         return float(error.headers.get("Retry-After", 0))
     except ValueError:

@@ -1,5 +1,5 @@
-//! Streams a recorded session to a running service over one WebSocket and
-//! prints what comes back:
+//! Streams a recorded session to a running service over a WebSocket and prints the faults
+//! that it reports:
 //!
 //! ```text
 //! offbd serve &
@@ -12,12 +12,12 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 use futures_util::{SinkExt, StreamExt};
-use offbd::wire::session_csv::Reader;
+use offbd::wire::session_csv::SessionCsvReader;
 use offbd_core::vocabulary::Sample;
 use serde_json::{Value, json};
 use tokio_tungstenite::tungstenite::Message;
 
-/// Rows of a batch: a second at 100 Hz.
+/// Rows per batch: one second at 100 Hz.
 const ROWS: usize = 100;
 
 #[tokio::main]
@@ -31,9 +31,10 @@ async fn main() -> anyhow::Result<()> {
     let (socket, _) = tokio_tungstenite::connect_async(&url).await.context(url)?;
     let (mut up, mut down) = socket.split();
     let session = Path::new(file).file_stem().unwrap_or_default().to_string_lossy();
-    let rows: Vec<Sample> = Reader::new(File::open(file)?)?.filter_map(Result::ok).collect();
-    let mut n_owed = rows.chunks(ROWS).len();
-    // Batches go up while answers come down: neither waits for the other.
+    let rows: Vec<Sample> =
+        SessionCsvReader::new(File::open(file)?)?.filter_map(Result::ok).collect();
+    let mut n_pending = rows.chunks(ROWS).len();
+    // Sending and receiving run concurrently: neither waits for the other.
     let send = async {
         for (n, batch) in rows.chunks(ROWS).enumerate() {
             let samples: Vec<Value> =
@@ -44,13 +45,15 @@ async fn main() -> anyhow::Result<()> {
         anyhow::Ok(())
     };
     let receive = async {
-        while n_owed > 0 {
-            let Message::Text(text) = down.next().await.context("the service hung up")?? else {
+        while n_pending > 0 {
+            let Message::Text(text) =
+                down.next().await.context("the service closed the connection")??
+            else {
                 continue;
             };
             let frame: Value = serde_json::from_str(&text)?;
             match frame["type"].as_str() {
-                Some("ack") => n_owed -= 1,
+                Some("ack") => n_pending -= 1,
                 Some("fault") => println!("{}", frame["summary"].as_str().unwrap_or_default()),
                 Some("error") => bail!("{}", frame["problem"]),
                 _ => {}
@@ -63,7 +66,7 @@ async fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// A row with its number, by which the service knows it if it comes twice.
+/// Returns a row with its number, by which the service recognises a duplicate.
 fn row(seq: usize, sample: &Sample) -> Value {
     let Sample { t_s, cmd_qx_rad, cmd_qy_rad, x_m, y_m, .. } = sample;
     json!({ "seq": seq, "t_s": t_s, "cmd_qx_rad": cmd_qx_rad, "cmd_qy_rad": cmd_qy_rad,

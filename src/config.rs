@@ -1,8 +1,9 @@
-//! The configuration: defaults, below a TOML file, below the environment
-//! (`OFFBD_LISTEN`, `OFFBD_LOG__LEVEL`), below the command line.
+//! The configuration of the service: defaults, overridden by a TOML file, by the
+//! environment (`OFFBD_LISTEN`, `OFFBD_LOG__LEVEL`), and by the command line, in this
+//! order.
 //!
-//! One typed structure, checked as a whole at start; what is wrong is named by
-//! its key. A key that does not exist is an error, wherever it comes from.
+//! It is one typed structure, which is checked completely at the start. An error names
+//! the key. Unknown keys are errors in the file and in the environment.
 
 use std::net::{IpAddr, SocketAddr};
 use std::path::{Path, PathBuf};
@@ -11,32 +12,31 @@ use std::time::Duration;
 use config::{Environment, File, FileFormat};
 use serde::Deserialize;
 
-use crate::service::access::jwt::Expected;
+use crate::service::access::jwt::ExpectedClaims;
 use crate::service::{Limits, Retention};
-use crate::store::Place;
+use crate::store::Location;
 
 /// Name of the database file in the data directory.
-const DATABASE: &str = "offbd.sqlite";
+const DATABASE_FILE: &str = "offbd.sqlite";
 
 /// The configuration of the service.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Config {
-    /// Where to listen; port 0 takes any that is free.
+    /// The address to listen on; with port 0, any free port.
     pub listen: SocketAddr,
-    /// Directory of the embedded store; made if it is not there.
+    /// Directory of the embedded store; created if it is missing.
     pub data: PathBuf,
-    /// `sqlite:FILE` or `postgres://USER:PASSWORD@HOST/DATABASE`; without it a
+    /// `sqlite:FILE` or `postgres://USER:PASSWORD@HOST/DATABASE`; by default an SQLite
     /// file in `data`.
     pub database: Option<String>,
-    /// Whether a token is asked for; without it only where other machines can
-    /// connect.
+    /// Whether requests need a token; by default only if other machines can connect.
     pub auth: Option<Auth>,
-    /// Pages elsewhere that may use the interface, `https://HOST[:PORT]`.
+    /// Origins of other sites whose pages may use the interface, `https://HOST[:PORT]`.
     pub origins: Vec<String>,
-    /// Connections are encrypted if it is there.
+    /// Encryption of connections; `None` for none.
     pub tls: Option<TlsConfig>,
-    /// Tokens of an identity provider are taken if it is there.
+    /// The identity provider whose tokens are accepted, if any.
     pub jwt: Option<JwtConfig>,
     pub log: LogConfig,
     pub traces: TracesConfig,
@@ -46,40 +46,41 @@ pub struct Config {
     pub retention: RetentionConfig,
 }
 
-/// Whether a token is asked for.
+/// Whether requests need a token.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Auth {
     Required,
-    /// Only where no other machine can connect.
+    /// Allowed only if no other machine can connect.
     Off,
 }
 
-/// By what connections are encrypted; PEM files, read anew when they change.
+/// Certificate and key for TLS: PEM files, which are read again when they change.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TlsConfig {
-    /// The certificate, and those between it and the root.
+    /// The certificate, followed by the intermediate certificates.
     pub certificate: PathBuf,
     /// Its private key.
     pub key: PathBuf,
 }
 
-/// Whose JSON Web Tokens are taken beside the service's own.
+/// An identity provider whose JSON Web Tokens are accepted besides the service's own
+/// tokens.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct JwtConfig {
-    /// A token's `iss` is this.
+    /// The required `iss` claim.
     pub issuer: String,
-    /// A token's `aud` is this, or has it.
+    /// The required `aud` claim, or element of it.
     pub audience: String,
-    /// The provider's public keys (JWKS): a file, or a URL, `https://` or on this
-    /// machine `http://`.
+    /// The provider's public keys (JWKS): a file or an `https://` URL; `http://` is
+    /// allowed for this machine only.
     pub jwks: String,
-    /// Where the role is: a claim's name, or a JSON pointer.
+    /// The claim with the role: its name, or a JSON pointer.
     #[serde(default = "role_claim")]
     pub role_claim: String,
-    /// Where the one asset of a device is, likewise.
+    /// The claim with the asset of a device: its name, or a JSON pointer.
     #[serde(default = "asset_claim")]
     pub asset_claim: String,
 }
@@ -92,23 +93,25 @@ fn asset_claim() -> String {
     "offbd_asset".to_owned()
 }
 
-/// Where a provider's keys are.
+/// The location of a provider's keys.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum KeyPlace {
+pub enum KeyLocation {
     File(PathBuf),
     Url(hyper::Uri),
 }
 
 impl JwtConfig {
-    fn check(&self, asked: bool) -> Result<(), ConfigError> {
+    fn check(&self, requires_token: bool) -> Result<(), ConfigError> {
         let invalid = |key, reason: &str| Err(ConfigError::Invalid { key, reason: reason.into() });
-        if !asked {
-            let reason = "is set, but nobody is asked for a token: set `auth` to `required`";
+        if !requires_token {
+            let reason = "is set, but requests need no token: set `auth` to `required`";
             return invalid("jwt", reason);
         }
         let blank = |word: &str| word.is_empty() || word.contains(char::is_whitespace);
         match self {
-            Self { issuer, .. } if blank(issuer) => invalid("jwt.issuer", "is no URL"),
+            Self { issuer, .. } if blank(issuer) => {
+                invalid("jwt.issuer", "is empty or contains blanks")
+            }
             Self { audience, .. } if audience.is_empty() => invalid("jwt.audience", "is empty"),
             Self { role_claim, .. } if role_claim.is_empty() => {
                 invalid("jwt.role_claim", "is empty")
@@ -116,69 +119,74 @@ impl JwtConfig {
             Self { asset_claim, .. } if asset_claim.is_empty() => {
                 invalid("jwt.asset_claim", "is empty")
             }
-            _ => self.place().map(drop),
+            _ => self.location().map(drop),
         }
     }
 
-    /// Where the keys are.
+    /// The location of the keys.
     ///
     /// # Errors
-    /// [`ConfigError::Invalid`] if they would come unprotected, or nowhere from.
-    pub fn place(&self) -> Result<KeyPlace, ConfigError> {
+    /// [`ConfigError::Invalid`] if it is empty or invalid, or if another machine would
+    /// send the keys without encryption.
+    pub fn location(&self) -> Result<KeyLocation, ConfigError> {
         let invalid =
             |reason: &str| ConfigError::Invalid { key: "jwt.jwks", reason: reason.into() };
         if self.jwks.is_empty() {
             return Err(invalid("is empty"));
         }
         if !self.jwks.contains("://") {
-            return Ok(KeyPlace::File(PathBuf::from(&self.jwks)));
+            return Ok(KeyLocation::File(PathBuf::from(&self.jwks)));
         }
-        let url: hyper::Uri = self.jwks.parse().map_err(|_| invalid("is no URL"))?;
+        let url: hyper::Uri = self.jwks.parse().map_err(|_| invalid("is not a valid URL"))?;
         let host = url.host().unwrap_or_default().trim_matches(['[', ']']);
-        let alone = host == "localhost" || host.parse().is_ok_and(|ip: IpAddr| ip.is_loopback());
+        let is_local = host == "localhost" || host.parse().is_ok_and(|ip: IpAddr| ip.is_loopback());
         if url.authority().is_some_and(|authority| authority.as_str().contains('@')) {
-            return Err(invalid("has a password, which is not sent"));
+            return Err(invalid("contains a user or password, which is not supported"));
         }
         match url.scheme_str() {
-            Some("https") => Ok(KeyPlace::Url(url)),
-            Some("http") if alone => Ok(KeyPlace::Url(url)),
-            _ => Err(invalid("is no `https://…`; `http://…` is for this machine alone")),
+            Some("https") => Ok(KeyLocation::Url(url)),
+            Some("http") if is_local => Ok(KeyLocation::Url(url)),
+            _ => Err(invalid(
+                "must begin with `https://`; `http://` is allowed for this machine only",
+            )),
         }
     }
 
-    /// What a token must say.
+    /// The claims that a token must have.
     #[must_use]
-    pub fn expected(&self) -> Expected {
+    pub fn expected(&self) -> ExpectedClaims {
         let Self { issuer, audience, role_claim, asset_claim, .. } = self.clone();
-        Expected { issuer, audience, role_claim, asset_claim }
+        ExpectedClaims { issuer, audience, role_claim, asset_claim }
     }
 }
 
-/// Requests a second, where a token is asked for; ten seconds' worth may come
-/// at once. One too many is told when to come again.
+/// Rate limits, in requests per second, which apply if requests need a token. The
+/// requests of ten seconds may come at once; further ones are answered 429 with
+/// `Retry-After`.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RatesConfig {
-    /// With one token.
+    /// Requests with one token.
     pub token_per_s: u32,
-    /// From one address without a token, or with one not seen lately.
+    /// Requests from one address without a token, or with one that was not used recently.
     pub address_per_s: u32,
 }
 
-/// What is logged, to stderr.
+/// Logs, on stderr.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct LogConfig {
     pub format: LogFormat,
-    /// A filter of `tracing`: `info`, `offbd=debug,info`, …
+    /// A filter directive of `tracing`: `info`, `offbd=debug,info`, …
     pub level: String,
 }
 
-/// Where traces go, by OTLP over HTTP; nowhere without an endpoint.
+/// Traces for OpenTelemetry, by OTLP over HTTP; none without an endpoint.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct TracesConfig {
-    /// `http://HOST:PORT` of a collector, which encrypts what goes further.
+    /// `http://HOST:PORT` of a collector, which should run on this machine: the
+    /// connection to it is not encrypted.
     pub endpoint: Option<String>,
     /// The share of requests that are traced, 0 to 1.
     pub share: f64,
@@ -209,66 +217,66 @@ impl TracesConfig {
     }
 }
 
-/// How a line of the log is written.
+/// The format of log lines.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum LogFormat {
-    /// For people.
+    /// Text for people.
     #[default]
     Text,
-    /// One object a line.
+    /// One JSON object per line.
     Json,
 }
 
-/// How much is taken on; see [`Limits`].
+/// Limits of requests, memory and connections; see also [`Limits`].
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct LimitsConfig {
     pub batch_samples: usize,
     pub batch_bytes: usize,
     pub import_bytes: usize,
-    /// Bytes of request bodies in memory at a time.
+    /// Bytes of all request bodies in memory at a time.
     pub bodies_bytes: usize,
     pub in_flight_samples: usize,
     pub journal_bytes: usize,
     pub assets: usize,
     pub body_timeout_s: u64,
-    /// Seconds for a connection to be encrypted, and for the head of each
-    /// request to come; then the connection is closed.
+    /// Longest time for the TLS handshake, and for the head of each request to arrive, s;
+    /// then the connection is closed.
     pub header_timeout_s: u64,
-    /// Seconds for a client to take what is sent; then the connection is closed.
+    /// Longest time for which a client may stop reading, s; then the connection is closed.
     pub write_timeout_s: u64,
-    /// Connections at a time; the next is closed at once.
+    /// Connections at a time; further ones are closed at once.
     pub connections: usize,
-    /// Connections of one address at a time; the next is closed at once.
+    /// Connections of one address at a time; further ones are closed at once.
     pub connections_per_address: usize,
-    /// Seconds that a stop may take.
+    /// Longest time for a graceful stop, s.
     pub shutdown_s: u64,
 }
 
-/// What works in parallel, and what waits for it.
+/// Threads and queues.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct WorkersConfig {
     /// Threads that run engines.
     pub shards: usize,
-    /// Requests that wait for one of them.
+    /// Requests in the queue of one shard.
     pub queue: usize,
-    /// Replays and calibrations at a time.
+    /// Replays and calibrations that run at a time.
     pub jobs: usize,
 }
 
-/// How long recordings are kept; what is left out, for ever. See [`Retention`].
+/// How long recordings are kept; without a limit, for ever. See [`Retention`].
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RetentionConfig {
-    /// Days that an ended session is kept.
+    /// Days for which an ended session is kept in which no fault changed its status.
     pub days: Option<usize>,
-    /// Bytes that an asset's ended sessions may hold.
+    /// Stored bytes of the ended sessions of one asset.
     pub bytes_per_asset: Option<usize>,
-    /// Days that an ended session with a change of a fault is kept.
+    /// Days for which an ended session is kept in which a fault changed its status.
     pub fault_days: Option<usize>,
-    /// Seconds between two looks.
+    /// Interval between two sweeps, s.
     pub sweep_s: u64,
 }
 
@@ -363,7 +371,7 @@ impl Default for WorkersConfig {
     }
 }
 
-/// What the command line says; `None` where it says nothing.
+/// Settings from the command line; `None` where it has none.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Flags {
     pub listen: Option<SocketAddr>,
@@ -371,10 +379,10 @@ pub struct Flags {
     pub database: Option<String>,
 }
 
-/// Why a configuration cannot be.
+/// Why a configuration is invalid.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
-    /// Names the key and, where it is known, the file.
+    /// Names the key and, if known, the file.
     #[error("configuration: {0}")]
     Unreadable(#[from] config::ConfigError),
     #[error("configuration: `{key}` {reason}")]
@@ -382,11 +390,11 @@ pub enum ConfigError {
 }
 
 impl Config {
-    /// The configuration from `file` if there is one, the environment and
-    /// `flags`, each above the one before.
+    /// Loads and checks the configuration: the defaults, overridden by `file` if given,
+    /// by the environment and by `flags`, in this order.
     ///
     /// # Errors
-    /// [`ConfigError`] naming the first key that cannot be.
+    /// [`ConfigError`] with the first invalid key.
     pub fn load(file: Option<&Path>, flags: &Flags) -> Result<Self, ConfigError> {
         Self::from_sources(file, Environment::with_prefix("OFFBD"), flags)
     }
@@ -420,10 +428,10 @@ impl Config {
         }
     }
 
-    /// Checks what the types do not.
+    /// Checks ranges, and values that depend on each other.
     ///
     /// # Errors
-    /// [`ConfigError::Invalid`] naming the key.
+    /// [`ConfigError::Invalid`] with the first invalid key.
     pub fn check(&self) -> Result<(), ConfigError> {
         let limits = &self.limits;
         within("limits.batch_samples", limits.batch_samples, 1, 1_000_000)?;
@@ -451,8 +459,8 @@ impl Config {
         ] {
             within(key, usize::try_from(rate).unwrap_or(usize::MAX), 1, 1_000_000)?;
         }
-        let asked = self.asks_for_tokens()?;
-        self.jwt.as_ref().map_or(Ok(()), |jwt| jwt.check(asked))?;
+        let requires_token = self.requires_token()?;
+        self.jwt.as_ref().map_or(Ok(()), |jwt| jwt.check(requires_token))?;
         self.origins.iter().try_for_each(|origin| check_origin(origin))?;
         within("workers.shards", self.workers.shards, 1, 256)?;
         within("workers.queue", self.workers.queue, 1, 100_000)?;
@@ -462,34 +470,36 @@ impl Config {
         }
         self.traces.check()?;
         self.retention.check()?;
-        self.place().map(drop)
+        self.location().map(drop)
     }
 
-    /// Whether a token is asked for.
+    /// Returns whether requests need a token.
     ///
     /// # Errors
-    /// [`ConfigError::Invalid`] if none is, where other machines can connect.
-    pub fn asks_for_tokens(&self) -> Result<bool, ConfigError> {
-        let alone = self.listen.ip().to_canonical().is_loopback();
-        if self.auth == Some(Auth::Off) && !alone {
+    /// [`ConfigError::Invalid`] if `auth` is `off` although other machines can connect.
+    pub fn requires_token(&self) -> Result<bool, ConfigError> {
+        let is_local = self.listen.ip().to_canonical().is_loopback();
+        if self.auth == Some(Auth::Off) && !is_local {
             let reason = format!(
                 "is `off`, but other machines can connect to {}: set `auth` to `required` and \
-                 make a token with `offbd token create --name NAME --role admin`, or listen on \
+                 create a token with `offbd token create --name NAME --role admin`, or listen on \
                  127.0.0.1",
                 self.listen
             );
             return Err(ConfigError::Invalid { key: "auth", reason });
         }
-        Ok(self.auth.map_or(!alone, |auth| auth == Auth::Required))
+        Ok(self.auth.map_or(!is_local, |auth| auth == Auth::Required))
     }
 
-    /// Where the database is.
+    /// The location of the database.
     ///
     /// # Errors
-    /// [`ConfigError::Invalid`] if `database` is none that this version knows.
-    pub fn place(&self) -> Result<Place, ConfigError> {
-        let Some(url) = &self.database else { return Ok(Place::File(self.data.join(DATABASE))) };
-        Place::of_url(url).map_err(|reason| ConfigError::Invalid { key: "database", reason })
+    /// [`ConfigError::Invalid`] if `database` is not a supported URL.
+    pub fn location(&self) -> Result<Location, ConfigError> {
+        let Some(url) = &self.database else {
+            return Ok(Location::File(self.data.join(DATABASE_FILE)));
+        };
+        Location::of_url(url).map_err(|reason| ConfigError::Invalid { key: "database", reason })
     }
 
     /// The service's limits.
@@ -512,14 +522,14 @@ impl Config {
     }
 }
 
-/// An origin is as browsers write it (RFC 6454, section 6.1).
+/// Checks that `origin` is written as browsers do (RFC 6454, section 6.1).
 fn check_origin(origin: &str) -> Result<(), ConfigError> {
     let host = origin.strip_prefix("https://").or_else(|| origin.strip_prefix("http://"));
     let whole = |host: &str| !host.is_empty() && !host.contains(['/', '?', '#', '@', ' ', '*']);
     if host.is_some_and(whole) && origin.chars().all(|c| c.is_ascii() && !c.is_ascii_uppercase()) {
         return Ok(());
     }
-    let reason = format!("has `{origin}`; an origin is https://host or https://host:port");
+    let reason = format!("contains `{origin}`; an origin is https://host or https://host:port");
     Err(ConfigError::Invalid { key: "origins", reason })
 }
 
@@ -547,7 +557,7 @@ mod tests {
     }
 
     #[test]
-    fn each_source_is_above_the_one_before() {
+    fn each_source_overrides_the_previous_one() {
         let toml = "listen = '127.0.0.1:1'\ndata = 'file'\n[log]\nlevel = 'debug'\n";
         let environment = [
             ("OFFBD_DATA", "env"),
@@ -562,12 +572,12 @@ mod tests {
         assert_eq!(config.limits.assets, 7);
         assert_eq!(config.origins, ["https://a.example", "https://b.example"]);
         assert_eq!(config.limits.batch_samples, LimitsConfig::default().batch_samples);
-        assert_eq!(config.place().unwrap(), Place::File("env/offbd.sqlite".into()));
+        assert_eq!(config.location().unwrap(), Location::File("env/offbd.sqlite".into()));
     }
 
     #[test]
-    fn a_token_is_asked_for_where_other_machines_can_connect() {
-        for (listen, auth, asked) in [
+    fn a_token_is_required_if_other_machines_can_connect() {
+        for (listen, auth, required) in [
             ("127.0.0.1:1", None, Some(false)),
             ("[::1]:1", None, Some(false)),
             ("[::ffff:127.0.0.1]:1", None, Some(false)),
@@ -579,24 +589,25 @@ mod tests {
             ("0.0.0.0:1", Some(Auth::Off), None),
         ] {
             let config = Config { listen: listen.parse().unwrap(), auth, ..Config::default() };
-            assert_eq!(config.asks_for_tokens().ok(), asked, "{listen} {auth:?}");
+            assert_eq!(config.requires_token().ok(), required, "{listen} {auth:?}");
         }
     }
 
     #[test]
-    fn keys_come_from_a_file_or_protected() {
+    fn keys_come_from_a_file_or_an_encrypted_connection() {
         let jwks = |jwks: &str| {
             let toml = format!(
                 "auth = 'required'\n[jwt]\nissuer = 'https://i'\naudience = 'a'\njwks = '{jwks}'"
             );
-            load(&toml, &[], &Flags::default()).map(|config| config.jwt.unwrap().place().unwrap())
+            load(&toml, &[], &Flags::default())
+                .map(|config| config.jwt.unwrap().location().unwrap())
         };
-        assert_eq!(jwks("/etc/jwks.json"), Ok(KeyPlace::File("/etc/jwks.json".into())));
+        assert_eq!(jwks("/etc/jwks.json"), Ok(KeyLocation::File("/etc/jwks.json".into())));
         for url in ["https://i/jwks", "http://127.0.0.1:1/", "http://[::1]:1/", "http://localhost"]
         {
-            assert_eq!(jwks(url), Ok(KeyPlace::Url(url.parse().unwrap())));
+            assert_eq!(jwks(url), Ok(KeyLocation::Url(url.parse().unwrap())));
         }
-        for none in [
+        for invalid in [
             "",
             "http://i/jwks",
             "http://localhost.example/jwks",
@@ -604,13 +615,13 @@ mod tests {
             "https://",
             "https://u:secret@i/jwks",
         ] {
-            let error = jwks(none).unwrap_err();
-            assert!(error.contains("jwt.jwks") && !error.contains("secret"), "{none}: {error}");
+            let error = jwks(invalid).unwrap_err();
+            assert!(error.contains("jwt.jwks") && !error.contains("secret"), "{invalid}: {error}");
         }
     }
 
     #[test]
-    fn what_cannot_be_is_named() {
+    fn an_error_names_the_key() {
         let error = |toml: &str, environment: &[(&str, &str)]| {
             load(toml, environment, &Flags::default()).unwrap_err()
         };

@@ -1,30 +1,30 @@
-//! One session as it is judged, whichever way it comes: live, rebuilt after a
-//! crash, replayed, drawn, or from a file.
+//! The judgement of one session, the same for all callers: live, rebuilt after a crash,
+//! replayed, traced for the charts, or from a file.
 //!
-//! An engine, whether its data fit the rig that was described, the verdict, and
-//! the counts of what was taken. Knows no store and no formats but the summary's.
+//! It combines an engine, the check of the data against the rig's description, the
+//! verdict, and counts of the samples. It has no access to the store, and of the formats
+//! only that of the summary.
 
 use offbd_core::diagnosis::{Evidence, FaultMemory, Transition};
-use offbd_core::engine::{Admission, Engine, Input, Misfit, Output, Plausibility, Setup};
+use offbd_core::engine::{Admission, Engine, Input, Misfit, Plausibility, Setup};
 use offbd_core::vocabulary::Sample;
 
 use crate::wire::basis::Basis;
 use crate::wire::verdict::{SummaryView, Verdict};
 
-/// What was taken so far.
+/// Counts of the samples of a session.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Counts {
-    /// Samples that were taken, in time or not: no duplicates, none rejected.
+    /// Samples that were neither duplicates nor rejected.
     pub n_samples: u64,
-    /// Those of them that came too late, or too far ahead, to be judged.
+    /// Samples of these whose time was too late, or too far ahead, to be judged.
     pub n_set_aside: u64,
-    /// Earliest and latest time of those that were judged, s on the device's
-    /// clock.
+    /// Earliest and latest time of the judged samples, s on the device's clock.
     pub span_s: Option<(f64, f64)>,
 }
 
 impl Counts {
-    fn note(&mut self, t_s: f64, admission: Admission) {
+    fn count(&mut self, t_s: f64, admission: Admission) {
         match admission {
             Admission::Accepted => {
                 let (first, last) = self.span_s.unwrap_or((t_s, t_s));
@@ -39,7 +39,7 @@ impl Counts {
         }
     }
 
-    /// From the earliest to the latest sample that was judged, s.
+    /// Time from the earliest to the latest judged sample, s.
     #[must_use]
     pub fn duration_s(&self) -> f64 {
         self.span_s.map_or(0.0, |(first, last)| last - first)
@@ -54,12 +54,12 @@ pub struct Judging {
     plausibility: Plausibility,
     verdict: Verdict,
     counts: Counts,
-    /// What followed from the last input.
-    outputs: Vec<Output>,
+    /// The changes of faults that the last input caused.
+    transitions: Vec<Transition>,
 }
 
 impl Judging {
-    /// A session of `setup` that begins on what earlier ones left in `memory`.
+    /// Begins a session of `setup`, with the faults that earlier sessions left in `memory`.
     #[must_use]
     pub fn new(setup: Setup, memory: FaultMemory) -> Self {
         Self {
@@ -68,7 +68,7 @@ impl Judging {
             engine: Engine::new(setup, memory),
             verdict: Verdict::default(),
             counts: Counts::default(),
-            outputs: Vec::new(),
+            transitions: Vec::new(),
         }
     }
 
@@ -77,70 +77,64 @@ impl Judging {
         self.observe(Input::Sample(sample), |_| {}).unwrap_or(Admission::Duplicate)
     }
 
-    /// Takes one input; returns what became of it if it is a sample.
+    /// Takes one input. Returns the admission of a sample, `None` for other inputs.
     pub fn input(&mut self, input: Input) -> Option<Admission> {
         self.observe(input, |_| {})
     }
 
-    /// The same, and shows the evidence of every sample that is judged on the
-    /// way to `seen`, in order of time.
-    pub fn observe(&mut self, input: Input, seen: impl FnMut(&Evidence)) -> Option<Admission> {
+    /// Takes one input like [`Judging::input`], and calls `observer` with the evidence of
+    /// each sample that is judged thereby, in order of time.
+    pub fn observe(&mut self, input: Input, observer: impl FnMut(&Evidence)) -> Option<Admission> {
         let sample = if let Input::Sample(sample) = &input { Some(*sample) } else { None };
         if let Some(sample) = &sample {
             self.plausibility.take(sample);
         }
-        self.outputs.clear();
-        self.engine.observe(input, &mut self.outputs, seen);
-        self.outputs.iter().for_each(|output| self.verdict.take(output));
-        let admission = self.outputs.iter().find_map(|output| match output {
-            Output::Admitted(admission) => Some(*admission),
-            Output::Transition(_) => None,
-        });
+        self.transitions.clear();
+        let admission = self.engine.observe(input, &mut self.transitions, observer);
+        self.verdict.take(admission, &self.transitions);
         if let (Some(sample), Some(admission)) = (sample, admission) {
-            self.counts.note(sample.t_s, admission);
+            self.counts.count(sample.t_s, admission);
         }
         admission
     }
 
-    /// The changes of faults that followed from the last input.
-    pub fn transitions(&self) -> impl Iterator<Item = &Transition> {
-        self.outputs.iter().filter_map(|output| match output {
-            Output::Transition(transition) => Some(&**transition),
-            Output::Admitted(_) => None,
-        })
+    /// The changes of faults that the last input caused.
+    #[must_use]
+    pub fn transitions(&self) -> &[Transition] {
+        &self.transitions
     }
 
-    /// The engine, to look at.
+    /// The engine.
     #[must_use]
     pub const fn engine(&self) -> &Engine {
         &self.engine
     }
 
-    /// By what it is judged.
+    /// The ids of the calibration and of the settings that the session is judged with.
     #[must_use]
     pub const fn basis(&self) -> &Basis {
         &self.basis
     }
 
-    /// What was taken so far.
+    /// The counts of the samples so far.
     #[must_use]
     pub const fn counts(&self) -> &Counts {
         &self.counts
     }
 
-    /// Whether a fault has been confirmed in it.
+    /// Returns whether a fault has been confirmed in this session.
     #[must_use]
     pub fn has_confirmed(&self) -> bool {
         !self.verdict.confirmed().is_empty()
     }
 
-    /// In what the data and the rig's description do not fit.
+    /// Contradictions between the data and the rig's description.
     #[must_use]
     pub fn misfits(&self) -> Vec<Misfit> {
         self.plausibility.misfits()
     }
 
-    /// What the session of this name comes to, with so many rows rejected.
+    /// The summary of the session, with the name `session` and `n_rejected` rejected rows.
     #[must_use]
     pub fn summary(&self, session: &str, n_rejected: u64) -> SummaryView {
         let Counts { n_samples, .. } = self.counts;

@@ -1,15 +1,33 @@
 //! offbd: off-board diagnostics with a digital twin for ball-on-plate rigs.
 //!
-//! A device streams commands and measured positions; a physics twin runs
-//! beside it in lockstep; an enable-gated evaluator compares the measured
-//! with the twin's acceleration and raises faults. `ARCHITECTURE.md` has the
-//! map.
+//! A device streams its commands and the measured positions of the ball. A physical model
+//! of the rig, its twin, receives the same commands in lockstep. Differences between the
+//! measured motion and the twin's are the evidence for faults of the servos, the ball and
+//! the sensor.
 //!
-//! This crate is the service and the command line: formats ([`wire`]), the
-//! driver of a session ([`judging`]), storage ([`store`]), sessions and jobs
-//! ([`service`]), the interface ([`http`]), and what puts them together
-//! ([`config`], [`server`], [`cli`]). The twin and the diagnosis, to embed, are
-//! the crate `offbd-core`; scenes, simulated rigs and charts `offbd-lab`.
+//! With the profile `default`, a servo fault is raised by a likelihood-ratio test (CUSUM)
+//! of a broken against a healthy servo, or if the acceleration or the path of the ball
+//! deviates from the twin's by more than a limit for a debounce time. With the profile
+//! `textbook`, it is raised by a fixed limit on the residual, the measured minus the
+//! twin's acceleration, without debounce.
+//!
+//! This crate is the service and the command line. The twin and the diagnosis are the
+//! crate `offbd-core`, which other programs can embed; scenes, simulated rigs and charts
+//! are the crate `offbd-lab`. The modules, from the lowest layer to the highest:
+//!
+//! - [`wire`]: the formats of files and messages (assets, scenes, sessions, verdicts),
+//!   and their conversion to and from the types of `offbd-core`;
+//! - [`judging`]: the judgement of one session, shared by the service and the command
+//!   line;
+//! - [`store`]: assets, sessions, recordings and faults in a database (SQLite or
+//!   PostgreSQL);
+//! - [`service`]: the engines of all assets, sessions, jobs, access control and events;
+//! - [`http`]: the HTTP and WebSocket interface;
+//! - [`config`]: the configuration of the service;
+//! - [`server`]: the assembly of these parts, with TLS and limits on connections;
+//! - [`cli`]: the subcommands of the program `offbd`.
+//!
+//! `ARCHITECTURE.md` describes how they work together, `docs/notation.md` the terms.
 
 pub mod cli;
 pub mod config;

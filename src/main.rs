@@ -1,4 +1,4 @@
-//! The binary: all of it is in [`offbd::cli`].
+//! The binary `offbd`; its code is in [`offbd::cli`].
 
 fn main() -> std::process::ExitCode {
     offbd::cli::main()

@@ -1,10 +1,10 @@
-//! The server: configuration, store, service and sockets put together, from
-//! start to a graceful stop. Also what stands behind `migrate`, `check` and
-//! `token`.
+//! The server: assembles configuration, store, service and sockets, from the start to a
+//! graceful stop. Also the functions behind the commands `migrate`, `check`, `backup`,
+//! `restore` and `token`.
 
+mod connections;
 mod keys;
 mod listen;
-mod places;
 mod tls;
 pub mod tokens;
 #[cfg_attr(not(feature = "otel"), path = "server/no_traces.rs")]
@@ -22,52 +22,52 @@ use tokio::net::TcpListener;
 use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
 
-use self::keys::Keys;
-use self::listen::Connections;
+use self::keys::KeyRefresher;
+use self::listen::HttpListener;
 use self::tls::Tls;
 pub use self::traces::Traces;
 use crate::config::Config;
-use crate::http::{self, App, Budget, More, Policy, Rate, Rates};
+use crate::http::{self, AccessPolicy, App, BodyBudget, ExtraRoutes, RateLimit, RateLimits};
 use crate::service::{Clock, Service, Workers};
-use crate::store::{self, Place, Store};
+use crate::store::{self, Location, Store};
 
 /// A running server.
 pub struct Server {
-    /// Where it listens, the real port included.
+    /// The address that it listens on, with the actual port.
     pub address: SocketAddr,
     closing: CancellationToken,
     deadline: Duration,
     serving: JoinHandle<()>,
     store: Store,
     workers: Workers,
-    /// Held until the store is closed; none where the database keeps it.
+    /// The lock file of an SQLite database, locked until the store is closed. `None` for
+    /// PostgreSQL, which has a lock of its own.
     lock: Option<File>,
 }
 
 /// Opens the store, resumes open sessions, and listens.
 ///
 /// # Errors
-/// If the configuration cannot be, the store cannot be opened, or the address
-/// is taken.
+/// If the configuration is invalid, the store cannot be opened, or the address is in use.
 pub async fn start(config: Config) -> Result<Server> {
     start_with(config, None).await
 }
 
-/// The same for the demo, with `demo` beside the interface.
+/// Starts like [`start`], with the additional routes of the demo.
 ///
 /// # Errors
 /// As for [`start`].
-pub async fn start_with(config: Config, demo: Option<More>) -> Result<Server> {
+pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Server> {
     config.check()?;
     http::gather_metrics();
     let tls = config.tls.as_ref().map(Tls::read).transpose()?;
     let (provider, keys) = match &config.jwt {
-        Some(jwt) => Some(Keys::read(jwt).await?).unzip(),
+        Some(jwt) => Some(KeyRefresher::start(jwt).await?).unzip(),
         None => (None, None),
     };
-    let place = config.place()?;
-    let lock = lock(&place)?;
-    let (store, writer) = open(&place).await?;
+    let location = config.location()?;
+    let lock = lock(&location)?;
+    let (store, writer) = open(&location).await?;
     let listener = TcpListener::bind(config.listen)
         .await
         .with_context(|| format!("`listen`: cannot listen on {}", config.listen))?;
@@ -76,59 +76,60 @@ pub async fn start_with(config: Config, demo: Option<More>) -> Result<Server> {
     let (service, workers) = Service::start(store.clone(), writer, limits, provider).await?;
     let resumed = service.resume().await?;
     let closing = CancellationToken::new();
-    let budget = Budget::new(config.limits.bodies_bytes);
+    let budget = BodyBudget::new(config.limits.bodies_bytes);
     let policy = Arc::new(policy(&config)?);
-    advise(&config, &policy, &store).await?;
+    warn_of_access(&config, &policy, &store).await?;
     let app = App { service, budget, policy, closing: closing.clone(), demo: demo.is_some() };
     let router = http::router(app, demo.unwrap_or_default());
-    let connections = Connections::new(&config.limits, tls.clone(), closing.clone());
-    let serving = tokio::spawn(connections.serve(listener, router));
+    let http = HttpListener::new(&config.limits, tls.clone(), closing.clone());
+    let serving = tokio::spawn(http.serve(listener, router));
     tls.map(|tls| tokio::spawn(tls.watch(closing.clone())));
     keys.map(|keys| tokio::spawn(keys.watch(closing.clone())));
     tokio::spawn(http::keep_metrics(closing.clone()));
-    tracing::info!(%address, resumed, store = %store.place(), "serving");
+    tracing::info!(%address, resumed, store = %store.location(), "serving");
     let deadline = Duration::from_secs(config.limits.shutdown_s);
     Ok(Server { address, closing, deadline, serving, store, workers, lock })
 }
 
-/// Who is let in.
-fn policy(config: &Config) -> Result<Policy> {
-    let rate = |per_s| Rate(NonZeroU32::new(per_s).unwrap_or(NonZeroU32::MIN));
-    Ok(Policy {
-        required: config.asks_for_tokens()?,
+/// Which requests need a token, which origins are allowed, and the rate limits.
+fn policy(config: &Config) -> Result<AccessPolicy> {
+    let rate = |per_s| RateLimit(NonZeroU32::new(per_s).unwrap_or(NonZeroU32::MIN));
+    Ok(AccessPolicy {
+        required: config.requires_token()?,
         origins: config.origins.clone(),
         encrypted: config.tls.is_some(),
-        rates: Rates::new(rate(config.rates.token_per_s), rate(config.rates.address_per_s)),
+        rates: RateLimits::new(rate(config.rates.token_per_s), rate(config.rates.address_per_s)),
     })
 }
 
-/// Says what an operator should know of before somebody finds out.
-async fn advise(config: &Config, policy: &Policy, store: &Store) -> Result<()> {
+/// Logs warnings about an insecure or unusable configuration.
+async fn warn_of_access(config: &Config, policy: &AccessPolicy, store: &Store) -> Result<()> {
     if policy.required && config.jwt.is_none() && store.n_tokens(Clock.now()).await? == 0 {
         tracing::warn!(
-            "no token is in force, so nobody comes in; make one with \
+            "there is no valid token, so every request is refused; create one with \
              `offbd token create --name NAME --role admin`, with the same --data and --config"
         );
     }
     if policy.required && !policy.encrypted && !config.listen.ip().is_loopback() {
         tracing::warn!(
-            "tokens travel unencrypted; set `tls`, or let nobody in but a proxy that encrypts"
+            "tokens are sent without encryption; set `tls`, or allow connections only from a \
+             proxy that encrypts"
         );
     }
     Ok(())
 }
 
-/// Takes the store for this process: two writers would not know of each other.
-/// The lock goes with the process, however it ends. A server of PostgreSQL keeps
-/// one itself, as long as the writer is connected.
-fn lock(place: &Place) -> Result<Option<File>> {
-    let Some(file) = place.file() else { return Ok(None) };
+/// Locks an SQLite store for this process, because two main writers would not notice each
+/// other. The operating system releases the lock when the process ends. In PostgreSQL the
+/// writer's connection takes a lock instead.
+fn lock(location: &Location) -> Result<Option<File>> {
+    let Some(file) = location.file() else { return Ok(None) };
     let path = file.with_extension("lock");
     if let Some(directory) = path.parent() {
         std::fs::create_dir_all(directory)
-            .with_context(|| format!("`data`: cannot make {}", directory.display()))?;
+            .with_context(|| format!("`data`: cannot create {}", directory.display()))?;
     }
-    let lock = File::create(&path).with_context(|| format!("cannot make {}", path.display()))?;
+    let lock = File::create(&path).with_context(|| format!("cannot create {}", path.display()))?;
     match lock.try_lock() {
         Ok(()) => Ok(Some(lock)),
         Err(TryLockError::WouldBlock) => {
@@ -140,17 +141,17 @@ fn lock(place: &Place) -> Result<Option<File>> {
     }
 }
 
-async fn open(place: &Place) -> Result<(Store, store::Writer)> {
-    Store::open(place).await.with_context(|| format!("cannot open the store {place}"))
+async fn open(location: &Location) -> Result<(Store, store::Writer)> {
+    Store::open(location).await.with_context(|| format!("cannot open the store {location}"))
 }
 
 impl Server {
-    /// Stops: takes no new connection, ends long answers, finishes what is in
-    /// flight, commits it, and closes the store.
+    /// Stops gracefully: accepts no new connections, ends streams, finishes the requests
+    /// in progress, commits their changes, and closes the store.
     ///
     /// # Errors
-    /// If that takes longer than `limits.shutdown_s`; everything acknowledged
-    /// is durable all the same.
+    /// If that takes longer than `limits.shutdown_s`. Everything acknowledged is durable
+    /// in any case.
     pub async fn shutdown(self) -> Result<()> {
         let Self { closing, deadline, serving, store, workers, lock, .. } = self;
         closing.cancel();
@@ -196,60 +197,60 @@ async fn stop_signal() -> Result<()> {
     Ok(tokio::signal::ctrl_c().await?)
 }
 
-/// Brings the store to this version's schema; says which file and how many
-/// migrations it has.
+/// Brings the store's schema to this version. Returns a message with its location and the
+/// number of migrations.
 ///
 /// # Errors
 /// If the store cannot be opened or is newer than this version.
 pub async fn migrate(config: &Config) -> Result<String> {
     config.check()?;
-    let place = config.place()?;
-    let _lock = lock(&place)?;
-    let migrated = Store::migrate(&place).await;
-    let n = migrated.with_context(|| format!("cannot migrate the store {place}"))?;
-    Ok(format!("{place}: {n} migrations applied"))
+    let location = config.location()?;
+    let _lock = lock(&location)?;
+    let migrated = Store::migrate(&location).await;
+    let n = migrated.with_context(|| format!("cannot migrate the store {location}"))?;
+    Ok(format!("{location}: {n} migrations applied"))
 }
 
-/// Copies the embedded store to `file`, also while it is served; says what was
-/// made.
+/// Copies the embedded store to the new `file`, also while a service uses it. Returns a
+/// message.
 ///
 /// # Errors
-/// If there is no embedded store, `file` is there already, or cannot be written.
+/// If there is no embedded store, `file` exists, or it cannot be written.
 pub async fn back_up(config: &Config, file: &Path) -> Result<String> {
-    let place = config.place()?;
-    let made = store::back_up(&place, file).await;
-    made.with_context(|| format!("cannot back up the store {place}"))?;
-    Ok(format!("{}: a copy of {place}", file.display()))
+    let location = config.location()?;
+    let result = store::back_up(&location, file).await;
+    result.with_context(|| format!("cannot back up the store {location}"))?;
+    Ok(format!("{}: a copy of {location}", file.display()))
 }
 
-/// Makes the embedded store from the copy `file`; says what was made.
+/// Restores the embedded store from the copy `file`. Returns a message.
 ///
 /// # Errors
-/// If the copy cannot be, the store is in use, or is there without `replace`.
+/// If the copy is invalid, the store is in use, or it exists and `replace` is not set.
 pub async fn restore(config: &Config, file: &Path, replace: bool) -> Result<String> {
-    let place = config.place()?;
-    let _lock = lock(&place)?;
-    let made = store::restore(&place, file, replace).await;
-    made.with_context(|| format!("cannot restore the store {place}"))?;
-    Ok(format!("{place}: as in {}", file.display()))
+    let location = config.location()?;
+    let _lock = lock(&location)?;
+    let result = store::restore(&location, file, replace).await;
+    result.with_context(|| format!("cannot restore the store {location}"))?;
+    Ok(format!("{location}: restored from {}", file.display()))
 }
 
-/// Checks the configuration; says in a few lines what it comes to.
+/// Checks the configuration. Returns a summary of a few lines.
 ///
 /// # Errors
-/// Names the first key that cannot be.
+/// Names the first invalid key.
 pub fn check(config: &Config) -> Result<String> {
     config.check()?;
     Ok(format!(
         "listen   {}\naccess   {}, {}\nstore    {}\nlog      {:?}, {}\nworkers  {} shards",
         config.listen,
-        match (config.asks_for_tokens()?, &config.jwt) {
+        match (config.requires_token()?, &config.jwt) {
             (true, Some(jwt)) => format!("with a token, or one of {}", jwt.issuer),
             (true, None) => "with a token".to_owned(),
             (false, _) => "for everyone on this machine".to_owned(),
         },
         if config.tls.is_some() { "encrypted" } else { "not encrypted" },
-        config.place()?,
+        config.location()?,
         config.log.format,
         config.log.level,
         config.workers.shards,

@@ -1,6 +1,6 @@
-//! What runs for every sample or step does not touch the heap.
+//! Code that runs for every sample or step does not allocate memory.
 
-#![expect(unsafe_code, reason = "a counting allocator is one")]
+#![expect(unsafe_code, reason = "implementing an allocator requires it")]
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -14,27 +14,28 @@ use offbd_lab::scene::{
     Configuration, Law, Laws, Method, Model, Pace, Samples, Scene, Subject, Term, run,
 };
 
-struct Counting;
+struct CountingAllocator;
 
 thread_local! {
-    /// Of this thread alone: tests run beside each other.
+    /// Number of allocations of this thread; other threads run other tests.
     static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
-    /// Bytes that this thread holds, and most that it has held.
+    /// Bytes that this thread has allocated and not freed.
     static HELD: Cell<isize> = const { Cell::new(0) };
-    static MOST: Cell<isize> = const { Cell::new(0) };
+    /// Largest value of [`HELD`].
+    static PEAK: Cell<isize> = const { Cell::new(0) };
 }
 
 fn hold(bytes: isize) {
     HELD.set(HELD.get() + bytes);
-    MOST.set(MOST.get().max(HELD.get()));
+    PEAK.set(PEAK.get().max(HELD.get()));
 }
 
-// SAFETY: hands every call on to the system's allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
+// SAFETY: passes every call on to the system allocator unchanged.
+unsafe impl GlobalAlloc for CountingAllocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATIONS.set(ALLOCATIONS.get() + 1);
         hold(layout.size() as isize);
-        // SAFETY: the caller's contract is the system allocator's.
+        // SAFETY: the caller fulfils the contract of the system allocator.
         unsafe { System.alloc(layout) }
     }
 
@@ -46,9 +47,9 @@ unsafe impl GlobalAlloc for Counting {
 }
 
 #[global_allocator]
-static COUNTING: Counting = Counting;
+static ALLOCATOR: CountingAllocator = CountingAllocator;
 
-/// A ball that swings about the middle, as the commands ask it to.
+/// Sample `i` of a ball that oscillates about the middle as commanded.
 fn sample(i: u64) -> Sample {
     let t_s = i as f64 * 0.01;
     let (swing, gravity) = ((2.0 * t_s).sin(), 5.0 / 7.0 * 9.81);
@@ -66,11 +67,11 @@ fn sample(i: u64) -> Sample {
 fn a_warm_engine_does_not_allocate() {
     let setup = Setup::new(Rig::chapter("a"), None).unwrap();
     let mut engine = Engine::new(setup, FaultMemory::default());
-    let mut outputs = Vec::with_capacity(16);
+    let mut transitions = Vec::with_capacity(16);
     let mut run = |from: u64, to: u64| {
         for i in from..to {
-            engine.handle(Input::Sample(sample(i)), &mut outputs);
-            outputs.clear();
+            engine.handle(Input::Sample(sample(i)), &mut transitions);
+            transitions.clear();
         }
     };
     run(0, 2000);
@@ -80,23 +81,23 @@ fn a_warm_engine_does_not_allocate() {
     assert!(before > 0, "the counter counts");
 }
 
-/// Ten thousand rigs at 100 Hz must fit into a small machine.
+/// Ten thousand rigs must fit into the memory of a small machine.
 #[test]
 fn an_engine_is_small() {
     let before = HELD.get();
     let setup = Setup::new(Rig::chapter("a"), None).unwrap();
     let mut engine = Box::new(Engine::new(setup, FaultMemory::default()));
-    let mut outputs = Vec::new();
+    let mut transitions = Vec::new();
     for i in 0..6000 {
-        engine.handle(Input::Sample(sample(i)), &mut outputs);
-        outputs.clear();
+        engine.handle(Input::Sample(sample(i)), &mut transitions);
+        transitions.clear();
     }
     let held = HELD.get() - before;
     assert!((1..13 << 10).contains(&held), "{held} bytes");
 }
 
 #[test]
-fn a_length_that_is_only_announced_takes_no_room() {
+fn an_announced_array_length_reserves_little_memory() {
     use offbd::wire::telemetry::msgpack;
     const ARRAY: u8 = 0xdd;
     const STRING: u8 = 0xdb;
@@ -114,10 +115,10 @@ fn a_length_that_is_only_announced_takes_no_room() {
         let key = [&[0x81, 0xa0 | name.len() as u8], name.as_bytes()].concat();
         let document = [&key[..], &[marker, 0xff, 0xff, 0xff, 0xff, 0xc0]].concat();
         let before = HELD.get();
-        MOST.set(before);
+        PEAK.set(before);
         assert!(msgpack(&document, 1 << 20).is_err(), "{name}");
-        let most = MOST.get() - before;
-        assert!((1..32 << 10).contains(&most), "{name}: {most} bytes");
+        let peak = PEAK.get() - before;
+        assert!((1..32 << 10).contains(&peak), "{name}: {peak} bytes");
     }
 }
 
@@ -145,7 +146,7 @@ fn a_step_of_a_batch_does_not_allocate() {
     }
 }
 
-/// A second on a plate that swings about x and holds, then swings, about y.
+/// A scene of one second: the plate oscillates about x, and about y it tilts once.
 fn swinging() -> (Scene, Laws) {
     let sine = Term::Sine { amplitude: 0.05, frequency: 0.7, phase: 0.3 };
     let step = Term::Smoothstep { to: 0.1, start: 0.3, duration: 0.2 };
@@ -154,7 +155,7 @@ fn swinging() -> (Scene, Laws) {
     (Scene::new(ball, Plate::default(), Contact::CHAPTER, 1.0).expect("a valid scene"), laws)
 }
 
-/// Every model by every method, sampled.
+/// Every model with every method, with sampled output.
 #[test]
 fn a_run_of_a_scene_does_not_allocate() {
     let before = ALLOCATIONS.get();
@@ -170,12 +171,12 @@ fn a_run_of_a_scene_does_not_allocate() {
             let configuration = Configuration::new(model, method, pace).unwrap();
             let (mut sum, start) = (0.0, ALLOCATIONS.get());
             let mut sink = |_: f64, at: &Motion| sum += at.position.x;
-            // An explicit method may blow up at such a step: so much the better.
+            // An explicit method may diverge with such a step; that must not allocate either.
             let _ =
                 run(&scene, &mut laws, &configuration, Some(&mut Samples::new(0.01, &mut sink)));
-            // The sliding model keeps a list of its events: that it rolls.
-            let most = usize::from(model == Model::Sliding);
-            assert_eq!(ALLOCATIONS.get() - start, most, "{model} by {method}");
+            // The sliding model allocates its list of events, which has one: it rolls.
+            let expected = usize::from(model == Model::Sliding);
+            assert_eq!(ALLOCATIONS.get() - start, expected, "{model} by {method}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Devices: as little of HTTP and of WebSockets as it takes.
+//! Clients of the devices: minimal HTTP and WebSocket.
 
 use std::collections::VecDeque;
 use std::net::SocketAddr;
@@ -15,10 +15,10 @@ use tokio_tungstenite::tungstenite::Message;
 
 use crate::load::columns_as_msgpack;
 
-/// Batches of a WebSocket that wait for their acknowledgement.
-const UNDER_WAY: usize = 16;
+/// Largest number of batches of a WebSocket with a pending acknowledgement.
+const MAX_PENDING: usize = 16;
 
-/// A connection that sends requests, one after the other.
+/// An HTTP connection that sends one request after the other.
 pub(crate) struct Client {
     stream: TcpStream,
     bytes: Vec<u8>,
@@ -31,7 +31,7 @@ impl Client {
         Ok(Self { stream, bytes: Vec::new() })
     }
 
-    /// Posts `body` and waits for an answer that must be a success.
+    /// Posts `body` and waits for a successful response.
     pub(crate) async fn post(&mut self, path: &str, media_type: &str, body: &[u8]) -> Result<()> {
         let length = body.len();
         let head = format!(
@@ -44,7 +44,10 @@ impl Client {
         self.stream.write_all(&self.bytes).await?;
         self.bytes.clear();
         loop {
-            ensure!(self.stream.read_buf(&mut self.bytes).await? > 0, "the server is gone");
+            ensure!(
+                self.stream.read_buf(&mut self.bytes).await? > 0,
+                "the server closed the connection"
+            );
             let text = std::str::from_utf8(&self.bytes)?;
             let Some((head, rest)) = text.split_once("\r\n\r\n") else { continue };
             ensure!(head.starts_with("HTTP/1.1 2"), "{text}");
@@ -60,7 +63,7 @@ impl Client {
     }
 }
 
-/// A WebSocket that sends batches and hears of faults.
+/// A WebSocket that sends batches and receives fault events.
 pub(crate) struct Socket {
     stream: WebSocketStream<TcpStream>,
 }
@@ -74,34 +77,35 @@ impl Socket {
         Ok(Self { stream })
     }
 
-    /// Sends every body; waits for every acknowledgement.
+    /// Sends every body and waits for every acknowledgement.
     pub(crate) async fn send(&mut self, bodies: &[Bytes]) -> Result<()> {
-        let mut owed = 0;
+        let mut n_pending = 0;
         for body in bodies {
             self.stream.feed(Message::Binary(body.clone())).await?;
-            owed += 1;
-            // In halves, so that a write and a read carry several batches.
-            if owed == UNDER_WAY {
+            n_pending += 1;
+            // Waits for half of them, so that each write and read has several batches.
+            if n_pending == MAX_PENDING {
                 self.stream.flush().await?;
-                owed = self.hear(owed, UNDER_WAY / 2).await?;
+                n_pending = self.read_acknowledgements(n_pending, MAX_PENDING / 2).await?;
             }
         }
         self.stream.flush().await?;
-        self.hear(owed, 0).await.map(drop)
+        self.read_acknowledgements(n_pending, 0).await.map(drop)
     }
 
-    async fn hear(&mut self, mut owed: usize, until: usize) -> Result<usize> {
-        while owed > until {
+    /// Reads until at most `until` acknowledgements are pending; returns their number.
+    async fn read_acknowledgements(&mut self, mut n_pending: usize, until: usize) -> Result<usize> {
+        while n_pending > until {
             let text = self.frame().await?;
-            owed -= usize::from(text.contains(r#""type":"ack""#));
+            n_pending -= usize::from(text.contains(r#""type":"ack""#));
             ensure!(!text.contains(r#""type":"error""#), "{text}");
         }
-        Ok(owed)
+        Ok(n_pending)
     }
 
     async fn frame(&mut self) -> Result<String> {
         loop {
-            match self.stream.next().await.context("the server hung up")?? {
+            match self.stream.next().await.context("the server closed the connection")?? {
                 Message::Text(text) => return Ok(text.to_string()),
                 Message::Close(frame) => bail!("the server closed: {frame:?}"),
                 _ => {}
@@ -109,8 +113,8 @@ impl Socket {
         }
     }
 
-    /// Sends a batch every `period` from `begin` on; how long each fault event
-    /// took since the sample that it is about was sent.
+    /// Sends a batch every `period` from `begin` on. Returns the latency of each fault event,
+    /// from the sending of its sample.
     pub(crate) async fn pace(
         &mut self,
         samples: &[Sample],
@@ -119,23 +123,23 @@ impl Socket {
         period: Duration,
     ) -> Result<Vec<Duration>> {
         let mut sent: VecDeque<(f64, Instant)> = VecDeque::new();
-        let (mut latencies, mut owed) = (Vec::new(), 0);
+        let (mut latencies, mut n_pending) = (Vec::new(), 0);
         let mut due = begin;
         let mut parts = samples.chunks(batch);
         let mut next = parts.next();
-        while next.is_some() || owed > 0 {
+        while next.is_some() || n_pending > 0 {
             tokio::select! {
                 () = tokio::time::sleep_until(due.into()), if next.is_some() => {
                     let part = next.take().unwrap_or_default();
                     let last_s = part.last().context("chunks are not empty")?.t_s;
                     sent.push_back((last_s, Instant::now()));
                     self.stream.send(Message::Binary(columns_as_msgpack(part).into())).await?;
-                    (owed, due, next) = (owed + 1, due + period, parts.next());
+                    (n_pending, due, next) = (n_pending + 1, due + period, parts.next());
                 }
                 text = self.frame() => {
                     let frame: serde_json::Value = serde_json::from_str(&text?)?;
                     match frame["type"].as_str() {
-                        Some("ack") => owed -= 1,
+                        Some("ack") => n_pending -= 1,
                         Some("fault") => {
                             let t_s = frame["t_s"].as_f64().context("no t_s")?;
                             let of = sent.iter().find(|(last_s, _)| t_s <= *last_s);

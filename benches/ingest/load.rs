@@ -1,4 +1,4 @@
-//! What devices send: the same samples in every format.
+//! The loads: the same samples in every format.
 
 use anyhow::Result;
 use axum::body::Bytes;
@@ -6,14 +6,14 @@ use offbd::wire::telemetry::{RowsView, sample_view};
 use offbd_core::vocabulary::Sample;
 use offbd_lab::simulation::{Disturbances, Fault, Preset, Reference, SimulatedRig};
 
-/// Devices that stream at once, each on a connection of its own.
+/// Number of devices that send concurrently, each on its own connection.
 pub(crate) const DEVICES: usize = 100;
-/// Samples that each device sends a round.
+/// Number of samples that each device sends per round.
 pub(crate) const SAMPLES: usize = 20_000;
-/// The same in small batches.
+/// The same for small batches.
 const SAMPLES_IN_TENS: usize = 5_000;
 
-/// `n` samples of a rig of its own; with `fault` from 20 s to 30 s.
+/// Returns `n` samples of a simulated rig, with an optional fault.
 pub(crate) fn recording(n: usize, fault: Option<&str>) -> Result<Vec<Sample>> {
     let model = Preset::Chapter.model()?;
     let mut rig = SimulatedRig::new(model, Reference::Circle, Disturbances::default(), 1)?;
@@ -23,37 +23,37 @@ pub(crate) fn recording(n: usize, fault: Option<&str>) -> Result<Vec<Sample>> {
     Ok((0..n).map(|_| rig.next_sample()).collect())
 }
 
-/// By which way batches go.
+/// How batches are sent.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Way {
-    /// A request each, of this media type.
+pub(crate) enum Transport {
+    /// One HTTP request per batch, with this media type.
     Http(&'static str),
     /// Binary frames of a WebSocket.
     Socket,
 }
 
-/// What each device sends, one body after the other.
+/// The bodies that each device sends, one after the other.
 pub(crate) struct Load {
     pub(crate) name: &'static str,
-    pub(crate) way: Way,
+    pub(crate) transport: Transport,
     pub(crate) batch: usize,
-    /// The same for all, or one list for each device.
+    /// One list for all devices, or one for each.
     bodies: Vec<Vec<Bytes>>,
 }
 
 impl Load {
     pub(crate) fn new(
         name: &'static str,
-        way: Way,
+        transport: Transport,
         batch: usize,
         samples: &[Sample],
         write: fn(&[Sample]) -> Vec<u8>,
     ) -> Self {
         let bodies = samples.chunks(batch).map(|part| write(part).into()).collect();
-        Self { name, way, batch, bodies: vec![bodies] }
+        Self { name, transport, batch, bodies: vec![bodies] }
     }
 
-    /// In InfluxDB's line protocol, which says in each line of which device it is.
+    /// A load in InfluxDB's line protocol, which names the device in each line.
     pub(crate) fn lines(
         name: &'static str,
         batch: usize,
@@ -65,7 +65,7 @@ impl Load {
             samples.chunks(batch).map(write).collect()
         };
         let bodies = (0..DEVICES).map(of_device).collect();
-        Self { name, way: Way::Http("text/plain"), batch, bodies }
+        Self { name, transport: Transport::Http("text/plain"), batch, bodies }
     }
 
     pub(crate) fn bodies(&self, device: usize) -> &[Bytes] {
@@ -75,19 +75,20 @@ impl Load {
 
 pub(crate) fn loads(samples: &[Sample]) -> Vec<Load> {
     let few = &samples[..SAMPLES_IN_TENS];
-    let (json, msgpack) = (Way::Http("application/json"), Way::Http("application/msgpack"));
+    let (json, msgpack) =
+        (Transport::Http("application/json"), Transport::Http("application/msgpack"));
     vec![
         Load::new("JSON columns by 100", json, 100, samples, columns_as_json),
         Load::new("JSON rows by 100", json, 100, samples, rows_as_json),
         Load::new("MessagePack by 100", msgpack, 100, samples, columns_as_msgpack),
         Load::new("JSON columns by 10", json, 10, few, columns_as_json),
         Load::new("MessagePack by 10", msgpack, 10, few, columns_as_msgpack),
-        Load::new("WebSocket by 100", Way::Socket, 100, samples, columns_as_msgpack),
-        Load::new("WebSocket by 10", Way::Socket, 10, few, columns_as_msgpack),
+        Load::new("WebSocket by 100", Transport::Socket, 100, samples, columns_as_msgpack),
+        Load::new("WebSocket by 10", Transport::Socket, 10, few, columns_as_msgpack),
     ]
 }
 
-/// What a peer is sent, beginning at `begin_s` seconds since 1970.
+/// Returns the loads for another database; samples start at `begin_s`, s since 1970.
 pub(crate) fn loads_of_peer(samples: &[Sample], begin_s: f64) -> Vec<Load> {
     let few = &samples[..SAMPLES_IN_TENS];
     vec![
@@ -135,7 +136,8 @@ fn line_protocol(device: usize, batch: &[Sample], begin_s: f64) -> Vec<u8> {
             fields.iter().filter_map(|(name, value)| Some(format!("{name}={}", (*value)?)));
         let fields = fields.collect::<Vec<_>>().join(",");
         let at = ((begin_s + sample.t_s) * 1e9) as i64;
-        writeln!(text, "rig,device=d{device} {fields} {at}").expect("a string takes all");
+        writeln!(text, "rig,device=d{device} {fields} {at}")
+            .expect("writing to a string cannot fail");
     }
     text.into_bytes()
 }

@@ -1,26 +1,25 @@
-//! How fast samples go through, beside what the machine can do at most.
+//! Throughput of ingest, compared with the most that HTTP on this machine allows.
 //!
 //! `cargo bench --bench ingest [-- ROUNDS]` sends the same samples from the same
 //! clients, in one run, to:
 //!
-//! - *bare*: an axum handler that reads the body and answers, nothing else;
-//! - *offbd*: the whole path: parse, diagnose, store durably, acknowledge;
+//! - *bare*: an axum handler that only reads the body and responds;
+//! - *offbd*: the whole service: parse, diagnose, store durably, acknowledge;
 //!
-//! and judges with *engine* and *replay*: one core without HTTP, from memory and
-//! from CSV. Other words ask for other things:
+//! and measures *engine* and *replay*: diagnosis on one core without HTTP, from memory and
+//! from CSV. Other arguments:
 //!
-//! - `-- memory`: what an asset takes, with 10 000 of them;
-//! - `-- latency`: from a sample to its fault event, at half the rate;
-//! - `-- only WORD`: the loads whose name holds the word, without *bare*;
-//! - `-- peer URL`: another database that takes line protocol, see
+//! - `-- memory`: memory per asset, with 10 000 assets;
+//! - `-- latency`: time from a sample to its fault event, at half the maximum rate;
+//! - `-- only WORD`: only the loads with the word in their name, without *bare*;
+//! - `-- peer URL`: another database that accepts line protocol, see
 //!   `benches/ingest/peers`.
 //!
-//! A client is a bare TCP connection that writes a request and waits for its
-//! answer, or a WebSocket with up to 16 batches under way. Left out: TLS, tokens, a
-//! network. Unfair to all: the clients share the cores with the server. Samples per
-//! second are by the clock; *cores* is the processor time it took, clients included,
-//! over the clock: with other work beside it, rate / cores is what compares. Quote
-//! the ratios.
+//! A client is a TCP connection that writes a request and waits for its response, or a
+//! WebSocket with up to 16 pending acknowledgements. TLS, tokens and a network are not
+//! included. The clients use the same cores as the server. The rate is per second of wall
+//! clock time; *cores* is the processor time of server and clients divided by the wall clock
+//! time. If the machine has other work, compare rate / cores. Quote only ratios.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
 
@@ -44,9 +43,11 @@ use offbd_core::vocabulary::Sample;
 use rustix::time::{ClockId, clock_gettime};
 
 use client::{Client, Socket};
-use load::{DEVICES, Load, SAMPLES, Way, columns_as_msgpack, loads, loads_of_peer, recording};
+use load::{
+    DEVICES, Load, SAMPLES, Transport, columns_as_msgpack, loads, loads_of_peer, recording,
+};
 
-/// Assets whose memory is looked at.
+/// Number of assets for the measurement of memory.
 const ASSETS: usize = 10_000;
 
 fn main() -> Result<()> {
@@ -79,7 +80,7 @@ fn main() -> Result<()> {
         let (mut bare, mut whole) = (vec![], vec![]);
         for _ in 0..rounds {
             whole.push(runtime.block_on(service(load))?);
-            if word.is_none() && load.way != Way::Socket {
+            if word.is_none() && load.transport != Transport::Socket {
                 bare.push(runtime.block_on(bare_handler(load))?);
             }
         }
@@ -94,14 +95,14 @@ fn main() -> Result<()> {
 
 fn show(name: &str, rates: &mut [Rate], bare: &mut [Rate]) {
     let Some(rate) = median(rates) else { return };
-    let of = |r: Rate| format!("{:>14.0}{:>8.2}", r.rate, r.cores);
-    let beside = median(bare).map_or_else(String::new, |bare| {
-        format!("{}{:>10.3}", of(bare), rate.per_core() / bare.per_core())
+    let columns = |r: Rate| format!("{:>14.0}{:>8.2}", r.rate, r.cores);
+    let comparison = median(bare).map_or_else(String::new, |bare| {
+        format!("{}{:>10.3}", columns(bare), rate.per_core() / bare.per_core())
     });
-    println!("{name:24}{}{beside}", of(rate));
+    println!("{name:24}{}{comparison}", columns(rate));
 }
 
-/// Samples per second by the clock, and the processor time over it.
+/// Samples per second of wall clock time, and processor time per wall clock time.
 #[derive(Clone, Copy)]
 struct Rate {
     rate: f64,
@@ -136,7 +137,7 @@ fn processor_time() -> Duration {
     Duration::new(time.tv_sec as u64, time.tv_nsec as u32)
 }
 
-/// The round in the middle by what a core does; none of none.
+/// Returns the round with the median rate per core; `None` without rounds.
 fn median(rates: &mut [Rate]) -> Option<Rate> {
     rates.sort_by(|a, b| a.per_core().total_cmp(&b.per_core()));
     rates.get(rates.len() / 2).copied()
@@ -155,7 +156,7 @@ async fn bare_handler(load: &Load) -> Result<Rate> {
     rate
 }
 
-/// A service on a new store, with assets `device-0` and so on.
+/// Starts a service on a new store with the assets `device-0`, `device-1`, ….
 async fn start(data: &std::path::Path, assets: usize) -> Result<Server> {
     let mut config = Config { data: data.to_owned(), ..Config::default() };
     config.listen.set_port(0);
@@ -180,8 +181,8 @@ async fn service(load: &Load) -> Result<Rate> {
     rate
 }
 
-/// Every device sends every body, one after the other. The first opens the
-/// session and is not counted.
+/// Every device sends every body, one after the other. The first body opens the session and
+/// is not counted.
 async fn stream(
     address: SocketAddr,
     load: &Load,
@@ -206,13 +207,13 @@ async fn send_all(devices: Vec<Device>, part: fn(&[Bytes]) -> &[Bytes]) -> Resul
     Ok(devices)
 }
 
-/// A device on its connection.
+/// A device with its connection.
 struct Device {
-    line: Line,
+    connection: Connection,
     bodies: Vec<Bytes>,
 }
 
-enum Line {
+enum Connection {
     Http { client: Client, path: String, media_type: &'static str },
     Socket(Box<Socket>),
 }
@@ -224,19 +225,21 @@ impl Device {
         device: usize,
         path: String,
     ) -> Result<Self> {
-        let line = match load.way {
-            Way::Http(media_type) => {
-                Line::Http { client: Client::connect(address).await?, path, media_type }
+        let connection = match load.transport {
+            Transport::Http(media_type) => {
+                Connection::Http { client: Client::connect(address).await?, path, media_type }
             }
-            Way::Socket => Line::Socket(Box::new(Socket::connect(address, device).await?)),
+            Transport::Socket => {
+                Connection::Socket(Box::new(Socket::connect(address, device).await?))
+            }
         };
-        Ok(Self { line, bodies: load.bodies(device).to_vec() })
+        Ok(Self { connection, bodies: load.bodies(device).to_vec() })
     }
 
     async fn send(&mut self, part: fn(&[Bytes]) -> &[Bytes]) -> Result<()> {
-        match &mut self.line {
-            Line::Socket(socket) => socket.send(part(&self.bodies)).await,
-            Line::Http { client, path, media_type } => {
+        match &mut self.connection {
+            Connection::Socket(socket) => socket.send(part(&self.bodies)).await,
+            Connection::Http { client, path, media_type } => {
                 for body in part(&self.bodies) {
                     client.post(path, media_type, body).await?;
                 }
@@ -246,7 +249,7 @@ impl Device {
     }
 }
 
-/// Another database, at `HOST:PORT/PATH`. *cores* is that of the clients alone.
+/// Measures another database at `HOST:PORT/PATH`. *cores* includes only the clients.
 fn peer(
     runtime: &tokio::runtime::Runtime,
     url: &str,
@@ -258,7 +261,7 @@ fn peer(
     let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH)?.as_secs_f64();
     let mut rates = vec![vec![], vec![]];
     for round in 0..rounds {
-        // Each round is another time, so that nothing is there already.
+        // Each round uses other times, so that no sample exists already.
         let begin_s = now - 7200.0 * (round + 1) as f64;
         for (load, rates) in loads_of_peer(samples, begin_s).iter().zip(&mut rates) {
             rates.push(runtime.block_on(stream(address, load, &|_| path.clone()))?);
@@ -270,11 +273,11 @@ fn peer(
     Ok(())
 }
 
-/// How long a fault takes from its sample to its event on the WebSocket, while every
-/// device streams at half the rate at which all can.
+/// Measures the time from a sample to its fault event on the WebSocket, while every device
+/// sends at half the maximum rate.
 async fn latency(samples: &[Sample], load: &str, batch: usize) -> Result<()> {
-    /// Samples from the fault of one device to that of the next.
-    const APART: usize = 80;
+    /// Number of samples between the faults of two devices.
+    const OFFSET: usize = 80;
     let most = loads(samples).into_iter().find(|l| l.name == load);
     let rate = service(&most.context("no such load")?).await?.rate / 2.0;
     let sick = recording(SAMPLES, Some("x_servo:held@150-160"))?;
@@ -287,8 +290,8 @@ async fn latency(samples: &[Sample], load: &str, batch: usize) -> Result<()> {
         tokio::spawn(async move {
             let mut socket = Socket::connect(address, device).await?;
             let begin = begin + period.mul_f64(device as f64 / DEVICES as f64);
-            // No two devices fail at once.
-            socket.pace(&sick[device * APART..], batch, begin, period).await
+            // No two devices fail at the same time.
+            socket.pace(&sick[device * OFFSET..], batch, begin, period).await
         })
     };
     let mut latencies = Vec::new();
@@ -305,8 +308,8 @@ async fn latency(samples: &[Sample], load: &str, batch: usize) -> Result<()> {
     Ok(())
 }
 
-/// What the process holds more once each of many assets is in a session, after
-/// a first batch and after a minute at 100 Hz.
+/// Measures the memory per asset with many assets in a session: after a first batch and after
+/// a minute at 100 Hz.
 async fn memory() -> Result<()> {
     let data = tempfile::tempdir()?;
     let samples = recording(6000, None)?;
@@ -314,22 +317,22 @@ async fn memory() -> Result<()> {
     let mut client = Client::connect(server.address).await?;
     let before = resident()?;
     let mut sent = 0;
-    for upto in [10, 1000, 6000] {
-        for part in samples[sent..upto].chunks(1000) {
+    for end in [10, 1000, 6000] {
+        for part in samples[sent..end].chunks(1000) {
             let body = columns_as_msgpack(part);
             for device in 0..ASSETS {
                 let path = format!("/api/v1/assets/device-{device}/telemetry");
                 client.post(&path, "application/msgpack", &body).await?;
             }
         }
-        sent = upto;
+        sent = end;
         let each = (resident()? - before) / ASSETS as f64;
-        println!("{ASSETS} assets, {upto} samples each: {:.1} KiB an asset", each / 1024.0);
+        println!("{ASSETS} assets, {end} samples each: {:.1} KiB per asset", each / 1024.0);
     }
     server.shutdown().await
 }
 
-/// Bytes of memory that the process holds.
+/// Returns the resident memory of the process, bytes.
 fn resident() -> Result<f64> {
     let status = std::fs::read_to_string("/proc/self/status").context("only on Linux")?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).context("no VmRSS")?;
@@ -339,10 +342,10 @@ fn resident() -> Result<f64> {
 fn judge(samples: impl Iterator<Item = Sample>) -> Result<Rate> {
     let setup = Setup::new(Rig::chapter("a"), None)?;
     let mut engine = Engine::new(setup, FaultMemory::default());
-    let (mut outputs, mut n, clocks) = (Vec::new(), 0, Clocks::start());
+    let (mut transitions, mut n, clocks) = (Vec::new(), 0, Clocks::start());
     for sample in samples {
-        engine.handle(Input::Sample(sample), &mut outputs);
-        outputs.clear();
+        engine.handle(Input::Sample(sample), &mut transitions);
+        transitions.clear();
         n += 1;
     }
     ensure!(engine.state().n_judged > 0, "nothing was judged");
@@ -356,5 +359,5 @@ fn engine_alone(samples: &[Sample]) -> Result<Rate> {
 fn replay_csv(samples: &[Sample]) -> Result<Rate> {
     let mut file = Vec::new();
     session_csv::write(&mut file, samples)?;
-    judge(session_csv::Reader::new(file.as_slice())?.map_while(Result::ok))
+    judge(session_csv::SessionCsvReader::new(file.as_slice())?.map_while(Result::ok))
 }

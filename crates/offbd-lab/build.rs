@@ -1,5 +1,5 @@
-//! Tells the crate which compiler builds it: charts name it beside their
-//! numbers.
+//! Stores the compiler's version in `BUILD_RUSTC_VERSION`: charts record it with
+//! their measurements.
 
 use std::env;
 use std::process::Command;
@@ -11,7 +11,7 @@ fn main() {
 
 fn compiler() -> String {
     let compiler = env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
-    let said = Command::new(compiler).arg("--version").output();
-    let said = said.map(|o| String::from_utf8_lossy(&o.stdout).into_owned()).unwrap_or_default();
-    said.split_whitespace().nth(1).unwrap_or("unknown").to_owned()
+    let output = Command::new(compiler).arg("--version").output();
+    let text = output.map(|o| String::from_utf8_lossy(&o.stdout).into_owned()).unwrap_or_default();
+    text.split_whitespace().nth(1).unwrap_or("unknown").to_owned()
 }

@@ -1,4 +1,4 @@
-//! Puts `memory.x` where the linker looks for it.
+//! Adds this directory, which has `memory.x`, to the linker's search path.
 
 fn main() {
     println!("cargo::rustc-link-search={}", env!("CARGO_MANIFEST_DIR"));

@@ -1,10 +1,10 @@
 // Streams a ball-on-plate rig to offbd from an ESP32, in JSON batches over HTTP.
 //
-// The control loop never waits for the network: it puts samples into a queue,
-// and a task on the other core posts them in numbered batches, each again and
-// again until the service has stored it. A batch sent twice counts once. While
-// the line is down the queue holds 20 s at 100 Hz; what no longer fits is lost
-// and counted in `dropped`.
+// The control loop never waits for the network: it puts numbered samples into a
+// queue, and a task on the other core posts them in batches. Each batch is retried
+// until the service has stored it; a sample that arrives twice is stored once.
+// While the network is down, the queue holds 20 s of samples at 100 Hz; further
+// samples are lost and counted in `dropped`.
 //
 // Arduino IDE: board "ESP32 Dev Module", no libraries beyond the board's own.
 // Fill in the five settings and the three functions of your rig.
@@ -21,7 +21,7 @@ static const char *ASSET = "my-rig";
 static const int64_t PERIOD_US = 10000;  // 100 Hz
 
 // ---- your rig ---------------------------------------------------------------
-// Reads the ball's position in metres; false when no ball is seen.
+// Reads the ball's position in metres; returns false if no ball is seen.
 static bool readBall(float *x_m, float *y_m) {
   *x_m = 0.0f;
   *y_m = 0.0f;
@@ -80,12 +80,12 @@ static size_t writeBatch(const Row *batch, size_t n) {
   return used + snprintf(body + used, sizeof body - used, "]}");
 }
 
-// Posts `body` until it is acknowledged as stored. A batch that the service
-// will never take (400 to 499, but for "wait" and "too much") is given up.
+// Posts `body` until the service acknowledges that it is stored. A batch that the
+// service rejects for good (400 to 499, except 408 and 429) is given up.
 static void deliver(size_t length) {
   char url[128];
   snprintf(url, sizeof url, "%s/api/v1/assets/%s/telemetry", SERVICE, ASSET);
-  uint32_t pause_ms = 200;
+  uint32_t delay_ms = 200;
   for (;;) {
     int code = -1;
     if (WiFi.status() == WL_CONNECTED) {
@@ -96,13 +96,13 @@ static void deliver(size_t length) {
       code = http.POST((uint8_t *)body, length);
       http.end();
     }
-    bool again = code < 200 || code == 408 || code == 429 || code >= 500;
-    if (!again) {
-      if (code >= 300) Serial.printf("batch refused: %d\n", code);
+    bool retry = code < 200 || code == 408 || code == 429 || code >= 500;
+    if (!retry) {
+      if (code >= 300) Serial.printf("batch rejected: %d\n", code);
       return;
     }
-    vTaskDelay(pdMS_TO_TICKS(pause_ms));
-    pause_ms = pause_ms < 10000 ? pause_ms * 2 : 10000;
+    vTaskDelay(pdMS_TO_TICKS(delay_ms));
+    delay_ms = delay_ms < 10000 ? delay_ms * 2 : 10000;
   }
 }
 
@@ -110,7 +110,7 @@ static void uplink(void *) {
   static Row batch[BATCH_ROWS];
   for (;;) {
     size_t n = 0;
-    // A full batch, or what has come within half a second.
+    // A full batch, or fewer rows if none arrives for half a second.
     while (n < BATCH_ROWS && xQueueReceive(rows, &batch[n], pdMS_TO_TICKS(500)) == pdTRUE) n++;
     if (n > 0) deliver(writeBatch(batch, n));
   }
@@ -122,7 +122,7 @@ void setup() {
   WiFi.mode(WIFI_STA);
   WiFi.setAutoReconnect(true);
   WiFi.begin(WIFI_NAME, WIFI_PASSWORD);
-  // The clock and the numbers begin anew with every start: so does the session.
+  // The clock and the sequence numbers restart with every boot, hence the new session.
   snprintf(session, sizeof session, "boot-%08lx", (unsigned long)esp_random());
   rows = xQueueCreate(QUEUE_ROWS, sizeof(Row));
   xTaskCreatePinnedToCore(uplink, "uplink", 8192, NULL, 1, NULL, 0);

@@ -1,4 +1,4 @@
-//! `offbd calibrate`: learns a rig from healthy sessions.
+//! `offbd calibrate`: calibrates a rig from healthy sessions.
 
 use data_encoding::HEXLOWER;
 use std::io::Write;
@@ -7,30 +7,31 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use sha2::{Digest, Sha256};
 
+use super::errors::{InputError, read};
 use super::judge::{load_rig, read_samples};
-use super::unusable::{Unusable, read};
 use super::{output, table};
 use crate::wire::asset;
 use offbd_core::diagnosis::{
-    AxisCalibration, Calibration, MonitorCertificate, Prospects, ServoProspects, SessionEstimate,
+    AxisCalibration, Calibration, CalibrationOrigin, MonitorCertificate, Prospects, ServoProspects,
+    SessionEstimate,
 };
-use offbd_core::engine::{Rig, calibrate_and_foresee};
+use offbd_core::engine::{Rig, calibrate_with_prospects};
 use offbd_core::vocabulary::{Axis, FaultCode, PerAxis, Sample};
 
-/// Learns a rig from recordings in which it was healthy.
+/// Calibrates a rig from recordings in which it was healthy.
 ///
-/// Learns gain, delay, level, noise and stiction of each axis, and writes the
-/// asset file back with a `calibration` section: what was learnt, from which
-/// data, when. Refuses when the data cannot support it, and says what is missing.
+/// Estimates gain, delay, level, noise and stiction of each axis, and writes the
+/// asset file with a `calibration` section: the estimates, the hash of the data,
+/// and the date. If the data are not sufficient, the error says what is missing.
 #[derive(Clone, Debug, Args)]
 #[command(
     override_usage = "offbd calibrate --asset ASSET.json HEALTHY.csv... -o OUT.json",
-    after_help = "A minute or two with the ball rolling about the middle of the plate is enough; \
-    steps or circles of a few degrees. Hands may push the ball now and then.\n\n\
+    after_help = "One or two minutes with the ball rolling around the middle of the plate are enough, \
+    with steps or circles of a few degrees. The ball may be pushed by hand now and then.\n\n\
     Examples:\n  \
     offbd calibrate --asset rig.json healthy.csv -o learnt.json\n  \
     offbd calibrate --asset rig.json monday.csv tuesday.csv -o - | jq .calibration\n\n\
-    Exit status: 0 learnt, 3 the data cannot support it or a file is unusable."
+    Exit status: 0 calibrated, 3 the data are not sufficient or a file is unusable."
 )]
 pub(super) struct CalibrateArgs {
     /// The rig's asset file
@@ -39,7 +40,7 @@ pub(super) struct CalibrateArgs {
     /// Healthy sessions
     #[arg(required = true, value_name = "HEALTHY.csv")]
     sessions: Vec<PathBuf>,
-    /// Where the calibrated asset file goes; - is stdout
+    /// The calibrated asset file to write; - is stdout
     #[arg(short, long, value_name = "OUT.json")]
     output: PathBuf,
 }
@@ -48,14 +49,14 @@ pub(super) fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
     let mut rig = load_rig(Some(&args.asset))?;
     let sessions = load(&args.sessions)?;
     let calibration = learn(&rig, &sessions, &data_hash(&args.sessions)?)
-        .map_err(|e| Unusable::new("cannot calibrate", e))?;
+        .map_err(|e| InputError::new("cannot calibrate", e))?;
     report(&rig, &calibration);
     rig.calibration = Some(calibration);
     write_asset(&rig, &args.output)
 }
 
-/// The samples of healthy sessions; bad rows are named on stderr and left out.
-pub(super) fn load(paths: &[PathBuf]) -> Result<Vec<Vec<Sample>>, Unusable> {
+/// Loads the samples of healthy sessions. Invalid rows are left out and reported on stderr.
+pub(super) fn load(paths: &[PathBuf]) -> Result<Vec<Vec<Sample>>, InputError> {
     let mut sessions = Vec::with_capacity(paths.len());
     for path in paths {
         let (samples, bad_rows) = read_samples(path)?;
@@ -68,10 +69,10 @@ pub(super) fn load(paths: &[PathBuf]) -> Result<Vec<Vec<Sample>>, Unusable> {
     Ok(sessions)
 }
 
-/// Learns `rig` as of now.
+/// Calibrates `rig`, with the present time as the date of the calibration.
 #[expect(
     clippy::disallowed_methods,
-    reason = "the file says when it was learnt; no verdict depends on it"
+    reason = "the date of the calibration; no verdict depends on it"
 )]
 pub(super) fn learn(
     rig: &Rig,
@@ -80,11 +81,12 @@ pub(super) fn learn(
 ) -> Result<Calibration, offbd_core::engine::CannotCalibrate> {
     let now = jiff::Timestamp::now();
     let made_at = now.round(jiff::Unit::Second).unwrap_or(now).to_string();
-    calibrate_and_foresee(rig, sessions, data_sha256, &made_at)
+    let origin = CalibrationOrigin { data_sha256: data_sha256.to_owned(), made_at };
+    Ok(Calibration { origin, ..calibrate_with_prospects(rig, sessions)? })
 }
 
-/// SHA-256 over the files' bytes, one after the other.
-pub(super) fn data_hash(paths: &[PathBuf]) -> Result<String, Unusable> {
+/// SHA-256 over the contents of the files, one after the other.
+pub(super) fn data_hash(paths: &[PathBuf]) -> Result<String, InputError> {
     let mut hash = Sha256::new();
     for path in paths {
         hash.update(read(path)?);
@@ -100,7 +102,7 @@ pub(super) fn write_asset(rig: &Rig, path: &Path) -> anyhow::Result<()> {
     Ok(out.flush()?)
 }
 
-/// What was learnt, for the person who asked, on stderr.
+/// Prints the calibration on stderr.
 pub(super) fn report(rig: &Rig, calibration: &Calibration) {
     anstream::eprintln!(
         "{}: learnt from {} samples, {:.0} s",
@@ -110,7 +112,7 @@ pub(super) fn report(rig: &Rig, calibration: &Calibration) {
     );
     let heading = ["", "x", "y", "meaning"];
     let mut learnt = table::table(&heading, &[1, 2]);
-    for (name, number, meaning) in rows() {
+    for (name, number, meaning) in axis_table() {
         let of = |axis: Axis| calibration.axes[axis].as_ref().map_or("-".to_owned(), number);
         learnt.add_row([name.to_owned(), of(Axis::X), of(Axis::Y), meaning.to_owned()]);
     }
@@ -120,11 +122,11 @@ pub(super) fn report(rig: &Rig, calibration: &Calibration) {
     if calibration.sessions.len() > 1 {
         report_sessions(&calibration.sessions);
     }
-    calibration.certificate.iter().for_each(|certificate| promise(certificate));
-    calibration.prospects.iter().for_each(foresee);
+    calibration.certificate.iter().for_each(|certificate| report_certificate(certificate));
+    calibration.prospects.iter().for_each(report_prospects);
 }
 
-/// What each session says by itself, on stderr.
+/// Prints the estimates of each session on stderr.
 fn report_sessions(sessions: &[PerAxis<Option<SessionEstimate>>]) {
     anstream::eprintln!("\nby session");
     let heading = ["session", "level x", "gain x", "level y", "gain y"];
@@ -154,7 +156,8 @@ fn angle(rad: f64, error_rad: f64) -> String {
     format!("{:.2}° ± {:.2}°", rad.to_degrees(), error_rad.to_degrees())
 }
 
-/// A sentence about `axis` if its sessions lie farther apart than most rigs' do.
+/// A warning if the estimates of `axis` differ more between the sessions than for most
+/// rigs.
 fn disagreement(sessions: &[PerAxis<Option<SessionEstimate>>], axis: Axis) -> Option<String> {
     let seen = || sessions.iter().filter_map(|s| s[axis]);
     let levels = range(seen().map(|s| s.level_rad))?;
@@ -174,14 +177,14 @@ fn disagreement(sessions: &[PerAxis<Option<SessionEstimate>>], axis: Axis) -> Op
     })
 }
 
-/// Distance between the least and the largest of `values`.
+/// Difference of the largest and the smallest of `values`; `None` if there are none.
 fn range(values: impl Iterator<Item = f64> + Clone) -> Option<f64> {
     let least = values.clone().reduce(f64::min)?;
     values.reduce(f64::max).map(|most| most - least)
 }
 
-/// How often each monitor will alarm on the healthy rig, on stderr.
-fn promise(certificate: &[MonitorCertificate]) {
+/// Prints the false alarms to expect of each monitor on stderr.
+fn report_certificate(certificate: &[MonitorCertificate]) {
     anstream::eprintln!("\non the healthy rig, by tests on recordings not learnt from");
     let heading = ["monitor", "judged", "nearest to an alarm", "false alarms to expect"];
     let mut lines = table::table(&heading, &[1, 2, 3]);
@@ -190,7 +193,7 @@ fn promise(certificate: &[MonitorCertificate]) {
             code.to_string(),
             format!("{:.0} s", monitor.judged_s),
             format!("{:.0} %", 100.0 * monitor.nearest),
-            monitor.alarms_per_hour.map_or("unknown".to_owned(), expected),
+            monitor.alarms_per_hour.map_or("unknown".to_owned(), alarm_rate),
         ]);
     }
     for line in table::lines(&lines) {
@@ -198,8 +201,8 @@ fn promise(certificate: &[MonitorCertificate]) {
     }
 }
 
-/// A rate per hour in the unit in which it is easiest to imagine.
-fn expected(per_hour: f64) -> String {
+/// A rate of alarms with a suitable unit.
+fn alarm_rate(per_hour: f64) -> String {
     let per_day = 24.0 * per_hour;
     match per_day {
         d if d >= 24.0 => format!("{per_hour:.1} an hour"),
@@ -208,12 +211,12 @@ fn expected(per_hour: f64) -> String {
     }
 }
 
-/// What can be found how soon, on stderr.
-fn foresee(prospects: &Prospects) {
+/// Prints on stderr which faults would be found, and after what time.
+fn report_prospects(prospects: &Prospects) {
     anstream::eprintln!("\na fault during this recording would have been confirmed after");
     let heading = ["", "x", "y", "meaning"];
     let mut servos = table::table(&heading, &[1, 2]);
-    let numbers: [ServoRow; 5] = [
+    let numbers: [ServoTableRow; 5] = [
         ("dead", |s| seconds(s.dead_s), "the servo answers nothing"),
         ("half", |s| seconds(s.half_gain_s), "it answers half"),
         ("off by 1°", |s| seconds(s.offset_1deg_s), "its horn has slipped"),
@@ -248,17 +251,19 @@ fn degrees(angle_rad: Option<f64>) -> String {
     angle_rad.map_or("-".to_owned(), |a| format!("{:.1}°", a.to_degrees()))
 }
 
-/// Levels farther apart are worth a warning, rad: twice the spread of the worst
-/// real rig seen within a day.
+/// Difference of levels between sessions that causes a warning, rad: twice the spread of
+/// the worst real rig within a day.
 const WIDE_LEVELS_RAD: f64 = 2.0 * AxisCalibration::POPULATION_LEVEL_SPREAD_RAD;
-/// Gains farther apart by this factor are, too: twice the population's spread to
-/// either side.
+/// Ratio of gains between sessions that causes a warning: twice the population's spread
+/// to either side.
 const WIDE_GAINS: f64 = 1.3;
 
-type Row = (&'static str, fn(&AxisCalibration) -> String, &'static str);
-type ServoRow = (&'static str, fn(&ServoProspects) -> String, &'static str);
+/// Name, number and meaning of a line of the table of axes.
+type AxisTableRow = (&'static str, fn(&AxisCalibration) -> String, &'static str);
+/// Name, number and meaning of a line of the table of prospects.
+type ServoTableRow = (&'static str, fn(&ServoProspects) -> String, &'static str);
 
-/// The breakaway angle is unknown where the ball never rested.
+/// The breakaway angle, which is unknown if the ball never rested.
 fn breakaway(axis: &AxisCalibration) -> String {
     match axis.rest_s > 0.0 {
         true => format!("{:.2}°", axis.breakaway_rad.to_degrees()),
@@ -266,7 +271,7 @@ fn breakaway(axis: &AxisCalibration) -> String {
     }
 }
 
-fn rows() -> [Row; 10] {
+fn axis_table() -> [AxisTableRow; 10] {
     [
         ("gain", |a| format!("{:.3}", a.gain), "measured over modelled acceleration"),
         ("dead time", |a| format!("{:.0} ms", a.dead_time_s * 1e3), "command to first movement"),

@@ -1,44 +1,45 @@
-//! `offbd drive-cycle`: the motion in which every monitor comes to a result.
+//! `offbd drive-cycle`: computes the motion in which every monitor comes to a result.
 
 use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
 
-use super::unusable::Unusable;
+use super::errors::InputError;
 use super::{judge, output, table};
 use crate::wire::drive_cycle::{DriveCycleView, PYTHON, view, write_csv};
 use offbd_core::engine::drive_cycle;
 
-/// The drive cycle of a learnt rig: the shortest motion, within its plate and its
-/// servos' limits, in which every monitor comes to a result.
+/// Computes the drive cycle of a calibrated rig: the shortest motion, within the
+/// plate and the servos' limits, in which every monitor comes to a result.
 ///
-/// It is a table of commands and of set points that the ball follows, and the
-/// corrections by which the commands keep it there; a device with a controller of
-/// its own plays the set points alone. Run at the start of a day, or when a verdict
-/// says that it cannot tell, it ends every "not tested".
+/// The drive cycle is a table of commands, of the set points of the ball, and of
+/// the corrections that keep the ball on them. A device with its own controller
+/// uses only the set points. After a run no monitor is "not tested"; run it, for
+/// example, at the start of a day, or if a verdict cannot tell causes apart.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "Examples:\n  \
     offbd drive-cycle --asset learnt.json\n  \
     offbd drive-cycle --asset learnt.json --format json -o drive-cycle.json\n  \
     offbd drive-cycle --asset learnt.json --format python -o drive-cycle.py\n  \
     offbd replay --asset learnt.json drive-cycle-run.csv\n\n\
-    Exit status: 0 done, 3 there is no drive cycle for this rig.")]
+    Exit status: 0 done, 3 this rig has no drive cycle.")]
 pub(super) struct DriveCycleArgs {
     /// The rig's asset file, calibrated
     #[arg(long, value_name = "ASSET.json")]
     asset: PathBuf,
-    /// A table of what is found when, the rows, rows with corrections, or a program
-    /// that runs the JSON beside it
+    /// Output: a table of which fault is found after what time (table), the rows
+    /// (csv), the rows with corrections (json), or a program that runs the JSON file
+    /// (python)
     #[arg(long, value_enum, default_value = "table")]
-    format: Format,
-    /// Where it goes; `-` is stdout
+    format: DriveCycleFormat,
+    /// Output file; `-` is stdout
     #[arg(short, long, value_name = "FILE", default_value = "-")]
     output: PathBuf,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum Format {
+enum DriveCycleFormat {
     Table,
     Csv,
     Json,
@@ -47,20 +48,20 @@ enum Format {
 
 pub(super) fn run(args: &DriveCycleArgs) -> anyhow::Result<()> {
     let rig = judge::load_rig(Some(&args.asset))?;
-    let cycle = drive_cycle(&rig).map_err(|why| Unusable::file(&args.asset, why))?;
-    let shown = view(&rig.name, &cycle);
-    if args.format != Format::Table {
-        anstream::eprintln!("{}", headline(&shown));
+    let cycle = drive_cycle(&rig).map_err(|why| InputError::file(&args.asset, why))?;
+    let cycle_view = view(&rig.name, &cycle);
+    if args.format != DriveCycleFormat::Table {
+        anstream::eprintln!("{}", headline(&cycle_view));
     }
     let mut out = output::create(&args.output)?;
     match args.format {
-        Format::Table => write_table(&mut out, &shown)?,
-        Format::Csv => write_csv(&mut out, &cycle)?,
-        Format::Json => {
-            serde_json::to_writer(&mut out, &shown)?;
+        DriveCycleFormat::Table => write_table(&mut out, &cycle_view)?,
+        DriveCycleFormat::Csv => write_csv(&mut out, &cycle)?,
+        DriveCycleFormat::Json => {
+            serde_json::to_writer(&mut out, &cycle_view)?;
             writeln!(out)?;
         }
-        Format::Python => out.write_all(PYTHON.as_bytes())?,
+        DriveCycleFormat::Python => out.write_all(PYTHON.as_bytes())?,
     }
     Ok(out.flush()?)
 }
@@ -86,7 +87,7 @@ fn write_table(out: &mut impl Write, cycle: &DriveCycleView) -> anyhow::Result<(
     let mut monitors = table::table(&["healthy", "passes after"], &[1]);
     for monitor in &cycle.monitors {
         let after = seconds(monitor.passed_after_s, monitor.why_not.as_deref());
-        monitors.add_row([monitor.code.clone(), after]);
+        monitors.add_row([monitor.code.to_string(), after]);
     }
     write_lines(out, &monitors)?;
     writeln!(out)?;
@@ -94,7 +95,7 @@ fn write_table(out: &mut impl Write, cycle: &DriveCycleView) -> anyhow::Result<(
     for fault in &cycle.faults {
         let after = seconds(fault.after_s, Some("not for sure"));
         let beside = fault.beside.clone().unwrap_or_default();
-        faults.add_row([fault.fault.clone(), fault.code.clone(), after, beside]);
+        faults.add_row([fault.fault.clone(), fault.code.to_string(), after, beside]);
     }
     write_lines(out, &faults)
 }

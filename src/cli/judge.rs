@@ -1,56 +1,56 @@
-//! Judging one session file: rows in, verdict out. Shared by `replay` and
-//! `score`; the service judges the same way, sample by sample.
+//! Judges one session file. Used by `replay`, `trends` and `score`. The service judges in
+//! the same way, sample by sample.
 
 use std::fs::File;
 use std::path::Path;
 
-use super::unusable::{Unusable, read};
+use super::errors::{InputError, read};
 use crate::judging::Judging;
 use crate::wire::asset;
-use crate::wire::session_csv::{Reader, RowError};
+use crate::wire::session_csv::{RowError, SessionCsvReader};
 use crate::wire::verdict::{FaultView, SummaryView, fault_view};
 use offbd_core::diagnosis::{FaultMemory, Profile, ServoEstimate};
 use offbd_core::engine::{Admission, Input, Misfit, Rig, Setup};
 use offbd_core::vocabulary::{PerAxis, Sample};
 
-/// Most bad rows of a file that are named one by one; more are counted: what is
-/// wrong with a file shows in a few.
+/// Number of invalid rows of a file that are reported one by one; further ones are only
+/// counted.
 pub(super) const MAX_NAMED_ROWS: usize = 5;
 
-/// What a session came to.
+/// The result of judging a session.
 #[derive(Debug)]
-pub(super) struct Judged {
+pub(super) struct JudgedSession {
     pub faults: Vec<FaultView>,
     pub summary: SummaryView,
     /// The first [`MAX_NAMED_ROWS`] rejected rows.
     pub bad_rows: Vec<RowError>,
-    /// Rows that came too late, or too far ahead, to be judged.
+    /// Rows whose time was too late, or too far ahead, to be judged.
     pub n_set_aside: u64,
-    /// How each servo has answered; none where too little motion was seen.
+    /// The estimate of each servo; `None` if there was too little motion.
     pub estimates: PerAxis<Option<ServoEstimate>>,
-    /// In what the data and the asset file do not fit.
+    /// Contradictions between the data and the asset file.
     pub misfits: Vec<Misfit>,
 }
 
-/// The rig of an asset file; without one the chapter's.
-pub(super) fn load_rig(path: Option<&Path>) -> Result<Rig, Unusable> {
+/// Loads the rig of an asset file; without a path, the chapter's rig.
+pub(super) fn load_rig(path: Option<&Path>) -> Result<Rig, InputError> {
     let Some(path) = path else { return Ok(Rig::chapter("chapter")) };
-    asset::parse(&read(path)?).map_err(|e| Unusable::file(path, e))
+    asset::parse(&read(path)?).map_err(|e| InputError::file(path, e))
 }
 
-/// What an engine needs to judge `rig` by `profile`.
-pub(super) fn set_up(rig: Rig, profile: Option<Profile>) -> Result<Setup, Unusable> {
+/// The setup of an engine that judges `rig` by `profile`.
+pub(super) fn set_up(rig: Rig, profile: Option<Profile>) -> Result<Setup, InputError> {
     let name = rig.name.clone();
-    Setup::new(rig, profile).map_err(|e| Unusable::new(name, e))
+    Setup::new(rig, profile).map_err(|e| InputError::new(name, e))
 }
 
-/// The session's name: the file's.
+/// The name of a session: that of its file.
 pub(super) fn session_name(path: &Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
 /// Judges the session file at `path`.
-pub(super) fn judge_file(setup: &Setup, path: &Path) -> Result<Judged, Unusable> {
+pub(super) fn judge_file(setup: &Setup, path: &Path) -> Result<JudgedSession, InputError> {
     let mut rows = open(path)?;
     let mut session = FileSession::new(setup.clone(), session_name(path));
     while let Some(row) = rows.next() {
@@ -59,11 +59,11 @@ pub(super) fn judge_file(setup: &Setup, path: &Path) -> Result<Judged, Unusable>
             Err(error) => session.reject(error),
         }
     }
-    session.end().map_err(|reason| Unusable::file(path, reason))
+    session.end().map_err(|reason| InputError::file(path, reason))
 }
 
-/// The samples of the session file at `path`, bad rows left out and counted.
-pub(super) fn read_samples(path: &Path) -> Result<(Vec<Sample>, Vec<RowError>), Unusable> {
+/// Reads the samples of the session file at `path`, and the errors of its invalid rows.
+pub(super) fn read_samples(path: &Path) -> Result<(Vec<Sample>, Vec<RowError>), InputError> {
     let (mut samples, mut bad_rows) = (Vec::new(), Vec::new());
     for row in open(path)? {
         match row {
@@ -74,12 +74,12 @@ pub(super) fn read_samples(path: &Path) -> Result<(Vec<Sample>, Vec<RowError>), 
     Ok((samples, bad_rows))
 }
 
-fn open(path: &Path) -> Result<Reader<File>, Unusable> {
-    let file = File::open(path).map_err(|e| Unusable::file(path, e))?;
-    Reader::new(file).map_err(|e| Unusable::file(path, e))
+fn open(path: &Path) -> Result<SessionCsvReader<File>, InputError> {
+    let file = File::open(path).map_err(|e| InputError::file(path, e))?;
+    SessionCsvReader::new(file).map_err(|e| InputError::file(path, e))
 }
 
-/// One session of a file.
+/// The judgement of a session file.
 struct FileSession {
     name: String,
     judging: Judging,
@@ -110,11 +110,11 @@ impl FileSession {
 
     fn note_faults(&mut self) {
         let view = |t| fault_view(&self.name, self.judging.basis(), t);
-        self.faults.extend(self.judging.transitions().map(view));
+        self.faults.extend(self.judging.transitions().iter().map(view));
     }
 
-    /// The verdict, or why there was nothing to judge.
-    fn end(mut self) -> Result<Judged, String> {
+    /// Ends the session. Returns the result, or the reason why nothing could be judged.
+    fn end(mut self) -> Result<JudgedSession, String> {
         self.judging.input(Input::End);
         self.note_faults();
         let misfits = self.judging.misfits();
@@ -126,11 +126,11 @@ impl FileSession {
         let estimates = self.judging.engine().servo_estimates();
         let Self { faults, bad_rows, .. } = self;
         let n_set_aside = counts.n_set_aside;
-        Ok(Judged { faults, summary, bad_rows, n_set_aside, estimates, misfits })
+        Ok(JudgedSession { faults, summary, bad_rows, n_set_aside, estimates, misfits })
     }
 }
 
-/// That no row could be used, and why if that shows.
+/// The message that no row was usable, with the reason if it is known.
 fn no_row(misfits: &[Misfit]) -> String {
     let units = |m: &&Misfit| matches!(m, Misfit::Positions { .. } | Misfit::Commands { .. });
     let why = misfits.iter().find(units).map_or_else(String::new, |m| format!(": {m}"));

@@ -1,4 +1,4 @@
-//! Logs: on stderr, with time stamps, as text or one JSON object per line.
+//! Logging to stderr with time stamps, as text or one JSON object per line.
 
 use std::io::IsTerminal;
 
@@ -14,21 +14,21 @@ use crate::server::Traces;
 pub(super) struct LoggingArgs {
     /// How logs are written to stderr [default: text]
     #[arg(long, global = true, value_enum, value_name = "FORMAT", help_heading = "Logs")]
-    log_format: Option<Format>,
-    /// Which: error, warn, info, debug, trace, or module=level,...
+    log_format: Option<LogFormatArg>,
+    /// Which logs: error, warn, info, debug, trace, or module=level,...
     #[arg(long, global = true, value_name = "LEVEL", help_heading = "Logs")]
     log: Option<String>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum Format {
+enum LogFormatArg {
     Text,
     Json,
 }
 
 impl LoggingArgs {
-    /// Starts logging for this process: as the command line says, else as
-    /// `config` does; and `traces`, if there are any. A second start is ignored.
+    /// Starts logging for this process, by the arguments or else by `config`, and sends
+    /// `traces` if given. A second call has no effect.
     pub(super) fn start(&self, config: &LogConfig, traces: Option<&Traces>) {
         let level = self.log.as_deref().unwrap_or(&config.level);
         let filter = EnvFilter::try_new(level).unwrap_or_else(|_| EnvFilter::new("info"));
@@ -37,10 +37,11 @@ impl LoggingArgs {
             .with_writer(std::io::stderr)
             .with_ansi(colour)
             .with_target(false);
-        let json = self.log_format.map_or(config.format == LogFormat::Json, |f| f == Format::Json);
+        let json =
+            self.log_format.map_or(config.format == LogFormat::Json, |f| f == LogFormatArg::Json);
         let logs = if json { logs.json().flatten_event(true).boxed() } else { logs.boxed() };
         let registry = tracing_subscriber::registry().with(logs.with_filter(filter));
-        // Only a test that runs two commands in one process starts it twice.
+        // Fails only in a test that runs two commands in one process.
         let _ = registry.with(traces.map(Traces::layer)).try_init();
     }
 }

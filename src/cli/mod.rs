@@ -1,12 +1,14 @@
-//! The command line: one binary, one module per subcommand.
+//! The command line, with one module per subcommand.
 //!
-//! Data goes to stdout, all else to stderr. Exit codes: 0 done or judged (with
-//! faults or without), 2 bad arguments, 3 unusable input, 1 anything else. A
-//! reader that closes stdout early ends the command quietly.
+//! Data goes to stdout, everything else to stderr. Exit codes: 0 for success, whether
+//! faults were found or not, 2 for invalid arguments, 3 for unusable input, 1 for any
+//! other error. If the reader of stdout closes it early, the command ends without an
+//! error.
 
 mod backup;
 mod calibrate;
 mod drive_cycle;
+mod errors;
 mod judge;
 #[cfg(feature = "lab")]
 mod lab;
@@ -17,7 +19,6 @@ mod serve;
 mod table;
 mod token;
 mod trends;
-mod unusable;
 mod watch;
 
 use std::process::ExitCode;
@@ -28,8 +29,9 @@ use crate::config::{ConfigError, LogConfig};
 
 /// Off-board diagnostics with a digital twin, for ball-on-plate rigs.
 ///
-/// A device streams commands and measured positions; a twin runs beside it;
-/// faults of the servos, the ball and the sensor come out.
+/// A device streams commands and measured positions; a physical model of the
+/// rig, its twin, runs in parallel; deviations are diagnosed as faults of the
+/// servos, the ball or the sensor.
 #[derive(Debug, Parser)]
 #[command(name = "offbd", version, max_term_width = 80)]
 #[command(after_help = "Start here:\n  \
@@ -41,16 +43,16 @@ use crate::config::{ConfigError, LogConfig};
     offbd replay --asset learnt.json healthy.csv sick.csv\n\n\
     The chapter's exercises:\n  \
     offbd scene --list\n\n\
-    Exit status: 0 done or judged (faults or not), 2 bad arguments, 3 unusable input.")]
+    Exit status: 0 success (faults or not), 2 invalid arguments, 3 unusable input.")]
 struct Cli {
     #[command(subcommand)]
-    command: Command,
+    command: CliCommand,
     #[command(flatten)]
     logging: logging::LoggingArgs,
 }
 
 #[derive(Debug, Subcommand)]
-enum Command {
+enum CliCommand {
     #[cfg(feature = "lab")]
     #[command(flatten)]
     Lab(lab::LabCommand),
@@ -71,18 +73,18 @@ enum Command {
 #[must_use]
 pub fn main() -> ExitCode {
     match Cli::try_parse() {
-        Ok(cli) => run(cli).map_or_else(|error| failure(&error), |()| ExitCode::SUCCESS),
-        Err(error) => usage(&error),
+        Ok(cli) => run(cli).map_or_else(|error| report(&error), |()| ExitCode::SUCCESS),
+        Err(error) => print_usage(&error),
     }
 }
 
 fn run(cli: Cli) -> anyhow::Result<()> {
     let logging = cli.logging;
     match &cli.command {
-        // The service's configuration says how it logs.
-        Command::Serve(_) => {}
+        // Starts logging itself, as its configuration says.
+        CliCommand::Serve(_) => {}
         #[cfg(feature = "lab")]
-        Command::Lab(command) if command.log_level().is_some() => {
+        CliCommand::Lab(command) if command.log_level().is_some() => {
             let level = command.log_level().unwrap_or_default().to_owned();
             logging.start(&LogConfig { level, ..LogConfig::default() }, None);
         }
@@ -90,41 +92,42 @@ fn run(cli: Cli) -> anyhow::Result<()> {
     }
     match cli.command {
         #[cfg(feature = "lab")]
-        Command::Lab(command) => command.run(),
-        Command::Calibrate(args) => calibrate::run(&args),
-        Command::Replay(args) => replay::run(&args),
-        Command::Trends(args) => trends::run(&args),
-        Command::DriveCycle(args) => drive_cycle::run(&args),
-        Command::Serve(args) => serve::serve(&args, &logging),
-        Command::Watch(args) => watch::run(&args),
-        Command::Token(args) => token::run(&args),
-        Command::Backup(args) => backup::backup(&args),
-        Command::Restore(args) => backup::restore(&args),
-        Command::Migrate(args) => serve::migrate(&args),
-        Command::Check(args) => serve::check(&args),
+        CliCommand::Lab(command) => command.run(),
+        CliCommand::Calibrate(args) => calibrate::run(&args),
+        CliCommand::Replay(args) => replay::run(&args),
+        CliCommand::Trends(args) => trends::run(&args),
+        CliCommand::DriveCycle(args) => drive_cycle::run(&args),
+        CliCommand::Serve(args) => serve::serve(&args, &logging),
+        CliCommand::Watch(args) => watch::run(&args),
+        CliCommand::Token(args) => token::run(&args),
+        CliCommand::Backup(args) => backup::backup(&args),
+        CliCommand::Restore(args) => backup::restore(&args),
+        CliCommand::Migrate(args) => serve::migrate(&args),
+        CliCommand::Check(args) => serve::check(&args),
     }
 }
 
-/// A runtime for the commands that serve or talk to a service.
+/// The asynchronous runtime for commands that need one.
 fn runtime() -> std::io::Result<tokio::runtime::Runtime> {
     tokio::runtime::Builder::new_multi_thread().enable_all().build()
 }
 
-/// Help and version are asked for; anything else is a bad argument.
-fn usage(error: &clap::Error) -> ExitCode {
-    // A closed stdout is no reason to fail when help is asked for.
+/// Prints help, the version, or an error of the arguments.
+fn print_usage(error: &clap::Error) -> ExitCode {
+    // A closed stdout is not an error of the help.
     let _ = error.print();
     if error.use_stderr() { ExitCode::from(2) } else { ExitCode::SUCCESS }
 }
 
-fn failure(error: &anyhow::Error) -> ExitCode {
+/// Prints `error` and returns its exit code.
+fn report(error: &anyhow::Error) -> ExitCode {
     if output::is_closed_pipe(error) {
         return ExitCode::SUCCESS;
     }
     anstream::eprintln!("offbd: {error:#}");
-    if error.is::<unusable::BadArgument>() {
+    if error.is::<errors::BadArgument>() {
         return ExitCode::from(2);
     }
-    let unusable = error.is::<unusable::Unusable>() || error.is::<ConfigError>();
+    let unusable = error.is::<errors::InputError>() || error.is::<ConfigError>();
     ExitCode::from(if unusable { 3 } else { 1 })
 }

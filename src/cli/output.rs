@@ -1,5 +1,5 @@
-//! Where data goes: stdout or a file, buffered, with errors that tell a closed
-//! pipe from a full disk.
+//! Output to stdout or a file, buffered. An error of a closed pipe can be told from other
+//! errors.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -10,14 +10,14 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 /// How a command prints its result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub(super) enum Format {
-    /// For people.
+pub(super) enum OutputFormat {
+    /// A table for people.
     Table,
-    /// For programs: one JSON object per line.
+    /// One JSON object per line, for programs.
     Json,
 }
 
-/// Stdout for the path `-`, else a new file.
+/// Opens stdout for the path `-`, else a new file.
 pub(super) fn create(path: &Path) -> anyhow::Result<Box<dyn Write>> {
     if path == Path::new("-") {
         return Ok(Box::new(stdout()));
@@ -26,19 +26,19 @@ pub(super) fn create(path: &Path) -> anyhow::Result<Box<dyn Write>> {
     Ok(Box::new(BufWriter::new(file)))
 }
 
-/// Stdout, buffered whole.
+/// Stdout with a buffer that is not flushed at line ends.
 pub(super) fn stdout() -> BufWriter<io::StdoutLock<'static>> {
     BufWriter::new(io::stdout().lock())
 }
 
 /// Writes one line of text to stdout.
-pub(super) fn line(text: &str) -> anyhow::Result<()> {
+pub(super) fn print_line(text: &str) -> anyhow::Result<()> {
     let mut out = stdout();
     writeln!(out, "{text}")?;
     Ok(out.flush()?)
 }
 
-/// Whether the reader of our output went away.
+/// Returns whether `error` means that the reader of the output has closed it.
 pub(super) fn is_closed_pipe(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| {
         let io = cause.downcast_ref::<io::Error>().map(io::Error::kind);
@@ -48,8 +48,8 @@ pub(super) fn is_closed_pipe(error: &anyhow::Error) -> bool {
     })
 }
 
-/// A parser for a closed set of words, so that help and errors list them.
-pub(super) fn words<T>(
+/// A parser of arguments with a fixed set of values, which help and errors then list.
+pub(super) fn value_parser<T>(
     words: impl IntoIterator<Item = &'static str>,
 ) -> impl TypedValueParser<Value = T>
 where

@@ -1,4 +1,4 @@
-//! `offbd replay`: judges recordings.
+//! `offbd replay`: judges recorded sessions.
 
 mod against;
 mod verdict;
@@ -10,14 +10,14 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
-use super::judge::{self, Judged};
-use super::output::{self, Format, words};
+use super::errors::InputError;
+use super::judge::{self, JudgedSession};
+use super::output::{self, OutputFormat, value_parser};
 use super::table;
-use super::unusable::Unusable;
 use offbd_core::diagnosis::Profile;
 use offbd_core::engine::Setup;
 
-/// Judges recorded sessions: which faults, when, on what evidence.
+/// Judges recorded sessions: which faults occurred, when, and on what evidence.
 ///
 /// The same recording gives the same lines and the same verdict hash, whatever
 /// the number of threads or the load of the machine.
@@ -30,11 +30,12 @@ use offbd_core::engine::Setup;
     offbd replay --format json sick.csv | jq 'select(.status == \"confirmed\")'\n  \
     offbd replay --profile textbook sick.csv\n  \
     offbd replay --asset learnt.json --against relearnt.json monday.csv\n\n\
-    A bad row is rejected by line number on stderr and counted. Exit status: 0 all\n\
-    judged (faults or not), 3 a file could not be used; the others are judged."
+    Invalid rows are reported on stderr with their line number, and counted. Exit\n\
+    status: 0 all files judged (faults or not), 3 a file is unusable; the others are\n\
+    judged."
 )]
 pub(super) struct ReplayArgs {
-    /// The rig's asset file, better a calibrated one [default: the chapter's rig]
+    /// The rig's asset file, preferably calibrated [default: the chapter's rig]
     #[arg(long, value_name = "ASSET.json")]
     asset: Option<PathBuf>,
     /// Recorded sessions
@@ -42,16 +43,16 @@ pub(super) struct ReplayArgs {
     sessions: Vec<PathBuf>,
     /// A table for people, or one JSON object per line
     #[arg(long, value_enum, default_value = "table")]
-    format: Format,
+    format: OutputFormat,
     /// Judge by this profile instead of the asset's
-    #[arg(long, value_parser = words::<Profile>(Profile::ALL.map(Profile::as_str)))]
+    #[arg(long, value_parser = value_parser::<Profile>(Profile::ALL.map(Profile::as_str)))]
     profile: Option<Profile>,
-    /// Judge by this asset file too, and show where the two verdicts differ
+    /// Judge with this asset file too, and show where the two verdicts differ
     #[arg(long, value_name = "ASSET.json")]
     against: Option<PathBuf>,
-    /// Judge by this profile too (of `--against`, or else of the same asset
-    /// file), and show where the two verdicts differ
-    #[arg(long, value_name = "PROFILE", value_parser = words::<Profile>(Profile::ALL.map(Profile::as_str)))]
+    /// Judge by this profile too (with the asset file of `--against` or else
+    /// `--asset`), and show where the two verdicts differ
+    #[arg(long, value_name = "PROFILE", value_parser = value_parser::<Profile>(Profile::ALL.map(Profile::as_str)))]
     against_profile: Option<Profile>,
     /// Files judged at a time [default: one per core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
@@ -62,12 +63,12 @@ pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     let setup = judge::set_up(judge::load_rig(args.asset.as_deref())?, args.profile)?;
     let against = against_setup(args)?;
     let bar = progress(args.sessions.len());
-    let judge_all = || -> Vec<Result<Verdicts, Unusable>> {
+    let judge_all = || -> Vec<Result<ComparedSession, InputError>> {
         let judge = |path: &PathBuf| {
             let judged = judge::judge_file(&setup, path)?;
             let against = against.as_ref().map(|s| judge::judge_file(s, path)).transpose()?;
             bar.inc(1);
-            Ok(Verdicts { judged, against })
+            Ok(ComparedSession { judged, against })
         };
         args.sessions.par_iter().map(judge).collect()
     };
@@ -76,22 +77,22 @@ pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     for (path, result) in args.sessions.iter().zip(&results) {
         report_rows(path, result);
     }
-    let verdicts: Vec<&Verdicts> = results.iter().flatten().collect();
+    let verdicts: Vec<&ComparedSession> = results.iter().flatten().collect();
     match args.format {
-        Format::Json => write_json(&verdicts)?,
-        Format::Table => write_table(&verdicts)?,
+        OutputFormat::Json => write_json(&verdicts)?,
+        OutputFormat::Table => write_table(&verdicts)?,
     }
     outcome(results)
 }
 
-/// A session's verdict, and the other one where that is wanted.
-struct Verdicts {
-    judged: Judged,
-    against: Option<Judged>,
+/// A judged session and, for a comparison, the same session judged with other settings.
+struct ComparedSession {
+    judged: JudgedSession,
+    against: Option<JudgedSession>,
 }
 
-/// What the other verdict is reached by, if one is wanted.
-fn against_setup(args: &ReplayArgs) -> Result<Option<Setup>, Unusable> {
+/// The settings of the second judgement for a comparison; `None` without one.
+fn against_setup(args: &ReplayArgs) -> Result<Option<Setup>, InputError> {
     if args.against.is_none() && args.against_profile.is_none() {
         return Ok(None);
     }
@@ -100,8 +101,8 @@ fn against_setup(args: &ReplayArgs) -> Result<Option<Setup>, Unusable> {
     judge::set_up(rig, args.against_profile).map(Some)
 }
 
-/// A progress bar on stderr, hidden where that is no terminal or there is one
-/// piece of work only.
+/// A progress bar on stderr for `n` items, hidden if `n` is less than 2 or stderr is not a
+/// terminal.
 pub(super) fn progress(n: usize) -> ProgressBar {
     if n < 2 {
         return ProgressBar::hidden();
@@ -110,7 +111,7 @@ pub(super) fn progress(n: usize) -> ProgressBar {
     ProgressBar::new(n as u64).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
 }
 
-/// Runs `work` on `jobs` threads, or on as many as there are cores.
+/// Runs `work` on `jobs` threads; by default one per core.
 pub(super) fn in_threads<T: Send>(
     jobs: Option<u16>,
     work: impl FnOnce() -> T + Send,
@@ -120,10 +121,10 @@ pub(super) fn in_threads<T: Send>(
     Ok(pool.install(work))
 }
 
-/// Says on stderr what was not taken.
-fn report_rows(path: &Path, result: &Result<Verdicts, Unusable>) {
+/// Reports rejected rows and rows that were not judged, on stderr.
+fn report_rows(path: &Path, result: &Result<ComparedSession, InputError>) {
     let name = path.display();
-    let Ok(Verdicts { judged, .. }) = result else { return };
+    let Ok(ComparedSession { judged, .. }) = result else { return };
     for row in &judged.bad_rows {
         anstream::eprintln!("{name}: {row}; row rejected");
     }
@@ -139,9 +140,9 @@ fn report_rows(path: &Path, result: &Result<Verdicts, Unusable>) {
     }
 }
 
-fn write_json(verdicts: &[&Verdicts]) -> anyhow::Result<()> {
+fn write_json(verdicts: &[&ComparedSession]) -> anyhow::Result<()> {
     let mut out = output::stdout();
-    for Verdicts { judged: session, against } in verdicts {
+    for ComparedSession { judged: session, against } in verdicts {
         for fault in &session.faults {
             serde_json::to_writer(&mut out, fault)?;
             writeln!(out)?;
@@ -155,14 +156,14 @@ fn write_json(verdicts: &[&Verdicts]) -> anyhow::Result<()> {
     Ok(out.flush()?)
 }
 
-fn write_table(verdicts: &[&Verdicts]) -> anyhow::Result<()> {
+fn write_table(verdicts: &[&ComparedSession]) -> anyhow::Result<()> {
     let mut out = output::stdout();
     if verdicts.is_empty() {
         return Ok(());
     }
     let heading = ["session", "samples", "rejected", "seconds", "verdict"];
-    let mut summaries = table::of_names(&heading, &[1, 2, 3]);
-    for Verdicts { judged: session, .. } in verdicts {
+    let mut summaries = table::table_of_files(&heading, &[1, 2, 3]);
+    for ComparedSession { judged: session, .. } in verdicts {
         let s = &session.summary;
         summaries.add_row([
             s.session.clone(),
@@ -179,13 +180,13 @@ fn write_table(verdicts: &[&Verdicts]) -> anyhow::Result<()> {
     for line in table::lines(&verdict::judged(verdicts.iter().map(|v| &v.judged))) {
         writeln!(out, "{line}")?;
     }
-    for Verdicts { judged, .. } in verdicts {
+    for ComparedSession { judged, .. } in verdicts {
         write_warnings(&mut out, judged, verdicts.len() > 1)?;
     }
-    for Verdicts { judged, .. } in verdicts {
+    for ComparedSession { judged, .. } in verdicts {
         write_sentences(&mut out, judged, verdicts.len() > 1)?;
     }
-    for Verdicts { judged, against } in verdicts {
+    for ComparedSession { judged, against } in verdicts {
         if let Some(against) = against {
             against::write_table(&mut out, judged, against)?;
         }
@@ -193,8 +194,12 @@ fn write_table(verdicts: &[&Verdicts]) -> anyhow::Result<()> {
     Ok(out.flush()?)
 }
 
-/// A sentence for everything that does not fit.
-fn write_warnings(out: &mut impl Write, session: &Judged, several: bool) -> anyhow::Result<()> {
+/// Writes a sentence for each contradiction between the data and the asset file.
+fn write_warnings(
+    out: &mut impl Write,
+    session: &JudgedSession,
+    several: bool,
+) -> anyhow::Result<()> {
     if session.misfits.is_empty() {
         return Ok(());
     }
@@ -206,9 +211,13 @@ fn write_warnings(out: &mut impl Write, session: &Judged, several: bool) -> anyh
     Ok(())
 }
 
-/// A sentence for every change of a fault's status, under the session's name
-/// where there are several.
-fn write_sentences(out: &mut impl Write, session: &Judged, several: bool) -> anyhow::Result<()> {
+/// Writes a sentence for each change of a fault's status, below the session's name if
+/// there are several sessions.
+fn write_sentences(
+    out: &mut impl Write,
+    session: &JudgedSession,
+    several: bool,
+) -> anyhow::Result<()> {
     if session.faults.is_empty() {
         return Ok(());
     }
@@ -221,9 +230,9 @@ fn write_sentences(out: &mut impl Write, session: &Judged, several: bool) -> any
     Ok(())
 }
 
-/// All were judged, or else the files that were not.
-fn outcome<T>(results: Vec<Result<T, Unusable>>) -> anyhow::Result<()> {
-    let mut unusable: Vec<Unusable> = results.into_iter().filter_map(Result::err).collect();
+/// Returns an error if a file could not be judged, and prints all errors but the last.
+fn outcome<T>(results: Vec<Result<T, InputError>>) -> anyhow::Result<()> {
+    let mut unusable: Vec<InputError> = results.into_iter().filter_map(Result::err).collect();
     let Some(last) = unusable.pop() else { return Ok(()) };
     for error in unusable {
         anstream::eprintln!("offbd: {error}");

@@ -1,4 +1,4 @@
-//! `offbd serve`, `migrate` and `check`: thin shells over [`crate::server`].
+//! `offbd serve`, `migrate` and `check`, which call [`crate::server`].
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -10,14 +10,14 @@ use super::output;
 use crate::config::{Config, ConfigError, Flags};
 use crate::server::{self, Traces};
 
-/// Where the service's configuration comes from, lowest first: the defaults, a
-/// TOML file, the environment, the command line.
+/// The arguments of the service's configuration. They override the environment, which
+/// overrides the file, which overrides the defaults.
 #[derive(Clone, Debug, Args)]
 pub(super) struct ConfigArgs {
     /// A configuration file (TOML)
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Where to listen [default: 127.0.0.1:8087]
+    /// Address to listen on [default: 127.0.0.1:8087]
     #[arg(long, value_name = "ADDR:PORT")]
     listen: Option<SocketAddr>,
     /// Directory of the embedded store [default: offbd-data]
@@ -29,21 +29,21 @@ pub(super) struct ConfigArgs {
 }
 
 impl ConfigArgs {
-    /// The configuration, checked.
+    /// Loads and checks the configuration.
     pub(super) fn load(&self) -> Result<Config, ConfigError> {
         let Self { listen, data, database, .. } = self.clone();
         Config::load(self.config.as_deref(), &Flags { listen, data, database })
     }
 }
 
-/// Runs the service: telemetry in, faults out, everything stored.
+/// Runs the service, which receives telemetry, stores it and reports faults.
 ///
-/// Stops gracefully on SIGINT and SIGTERM: what is in flight is finished and
-/// committed first.
+/// On SIGINT and SIGTERM it stops gracefully: requests in progress are finished
+/// and committed first.
 #[derive(Clone, Debug, Args)]
 #[command(
     after_help = "Every key of the configuration can be set by the environment: OFFBD_LISTEN,\n\
-    OFFBD_LIMITS__BATCH_SAMPLES, ... `offbd check` shows what it comes to.\n\n\
+    OFFBD_LIMITS__BATCH_SAMPLES, ... `offbd check` shows the result.\n\n\
     Examples:\n  \
     offbd serve\n  \
     offbd serve --listen 0.0.0.0:8087 --data /var/lib/offbd --log-format json\n  \
@@ -56,7 +56,7 @@ pub(super) struct ServeArgs {
 
 /// Brings the store's schema up to this version.
 ///
-/// `serve` does so by itself; this is for those who want it apart.
+/// `serve` does this too; use this command to migrate without serving.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "Examples:\n  offbd migrate --data /var/lib/offbd")]
 pub(super) struct MigrateArgs {
@@ -64,10 +64,10 @@ pub(super) struct MigrateArgs {
     config: ConfigArgs,
 }
 
-/// Checks the configuration and says what it comes to.
+/// Checks the configuration and prints a summary.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "Examples:\n  offbd check --config offbd.toml\n\n\
-    Exit status: 0 it is in order, 3 it is not; the key is named.")]
+    Exit status: 0 valid, 3 invalid; the error names the key.")]
 pub(super) struct CheckArgs {
     #[command(flatten)]
     config: ConfigArgs,
@@ -77,17 +77,17 @@ pub(super) fn serve(args: &ServeArgs, logging: &LoggingArgs) -> anyhow::Result<(
     let config = args.config.load()?;
     let traces = Traces::start(&config.traces)?;
     logging.start(&config.log, traces.as_ref());
-    let served = super::runtime()?.block_on(server::serve(config));
+    let result = super::runtime()?.block_on(server::serve(config));
     traces.iter().for_each(Traces::stop);
-    served
+    result
 }
 
 pub(super) fn migrate(args: &MigrateArgs) -> anyhow::Result<()> {
     let config = args.config.load()?;
-    let told = super::runtime()?.block_on(server::migrate(&config))?;
-    output::line(&told)
+    let message = super::runtime()?.block_on(server::migrate(&config))?;
+    output::print_line(&message)
 }
 
 pub(super) fn check(args: &CheckArgs) -> anyhow::Result<()> {
-    output::line(&server::check(&args.config.load()?)?)
+    output::print_line(&server::check(&args.config.load()?)?)
 }

@@ -1,13 +1,14 @@
-//! Tables for people: columns without rules, at most 80 characters wide.
+//! Text tables: columns without lines between them, at most 80 characters wide.
 
 use std::io::IsTerminal;
 
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 
-/// Width of a table, characters: what every terminal has.
+/// Width of a table, characters: the default of terminals.
 const WIDTH: u16 = 80;
 
-/// A table with this heading, in which the columns of `right` are numbers.
+/// A table with this heading. The columns with an index in `right` are aligned to the
+/// right.
 pub(super) fn table(heading: &[&str], right: &[usize]) -> Table {
     let mut table = Table::new();
     table.load_style(presets::NOTHING);
@@ -23,9 +24,9 @@ pub(super) fn table(heading: &[&str], right: &[usize]) -> Table {
     table
 }
 
-/// The same of rows that begin with a file's name. Where stdout is no terminal
-/// nothing is broken over lines, however wide: programs look for the names.
-pub(super) fn of_names(heading: &[&str], right: &[usize]) -> Table {
+/// A table whose first column has file names. If stdout is not a terminal, no cell is
+/// wrapped, so that programs find the names.
+pub(super) fn table_of_files(heading: &[&str], right: &[usize]) -> Table {
     let mut table = table(heading, right);
     if !std::io::stdout().is_terminal() {
         table.set_content_arrangement(ContentArrangement::Disabled);
@@ -33,18 +34,17 @@ pub(super) fn of_names(heading: &[&str], right: &[usize]) -> Table {
     table
 }
 
-/// How much of a session was judged: its share, and the seconds.
+/// The text for the share (0 to 1) and the seconds of a session that were judged.
 pub(super) fn judged(share: f64, seconds: f64) -> String {
     format!("{:.0} % {seconds:.1} s", 100.0 * share)
 }
 
-/// The table as lines without trailing blanks.
+/// The lines of `table` without trailing blanks.
 pub(super) fn lines(table: &Table) -> impl Iterator<Item = String> {
     table.lines().map(|line| line.trim_end().to_owned())
 }
 
-/// `text` broken at blanks to follow `lead`: later lines are indented by as
-/// many blanks.
+/// Wraps `text` at blanks, after `lead`. Later lines are indented by the width of `lead`.
 pub(super) fn wrapped(lead: &str, text: &str) -> String {
     let indent = lead.chars().count();
     let room = usize::from(WIDTH).saturating_sub(indent);

@@ -1,23 +1,23 @@
-//! `offbd token`: who may use the service, said at the machine itself.
+//! `offbd token`: manages tokens on the machine of the store.
 
 use std::io::Write as _;
 
 use clap::{Args, Subcommand};
 
-use super::output::{self, Format};
+use super::errors::BadArgument;
+use super::output::{self, OutputFormat};
 use super::serve::ConfigArgs;
 use super::table;
-use super::unusable::BadArgument;
 use crate::server::tokens;
 use crate::service::access::{NewToken, Role};
 use crate::service::{Clock, ServiceError};
 use crate::store::Micros;
 use crate::wire::access::TokenView;
 
-/// Makes, lists and revokes tokens, in the store itself.
+/// Creates, lists and revokes tokens, directly in the store.
 ///
-/// For the first token, and wherever the service cannot be asked: it need not
-/// run, and may. A token that is revoked here is refused within seconds.
+/// Needed for the first token. The service may be running or not; it refuses a
+/// token that was revoked here within seconds.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "Examples:\n  \
     offbd token create --name ann --role admin\n  \
@@ -36,46 +36,42 @@ enum TokenCommand {
     Revoke(RevokeArgs),
 }
 
-/// Makes a token and prints it, this once: it is stored as a hash only.
+/// Creates a token and prints it. It is stored as a hash only, so it cannot be shown again.
 #[derive(Clone, Debug, Args)]
 struct CreateArgs {
-    /// What stands beside everything that is done with it
+    /// Name by which the audit log refers to the token
     #[arg(long)]
     name: String,
     /// device (one asset's own), viewer, operator or admin
-    #[arg(long, value_parser = role)]
+    #[arg(long)]
     role: Role,
-    /// The one asset of a device
+    /// The asset of a device
     #[arg(long, required_if_eq("role", "device"))]
     asset: Option<String>,
-    /// Days until it ends by itself [default: never]
+    /// Days until it expires [default: never]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=36500))]
     days: Option<u32>,
     #[command(flatten)]
     config: ConfigArgs,
 }
 
-/// Lists the tokens, the latest first, those revoked too.
+/// Lists all tokens, the latest first, including revoked ones.
 #[derive(Clone, Debug, Args)]
 struct ListArgs {
-    /// How to print
-    #[arg(long, value_enum, default_value_t = Format::Table)]
-    format: Format,
+    /// Output format
+    #[arg(long, value_enum, default_value_t = OutputFormat::Table)]
+    format: OutputFormat,
     #[command(flatten)]
     config: ConfigArgs,
 }
 
-/// Revokes a token, and ends the logins made with it.
+/// Revokes a token, and ends the logins with it.
 #[derive(Clone, Debug, Args)]
 struct RevokeArgs {
-    /// Its name or its id
+    /// Name or id of the token
     token: String,
     #[command(flatten)]
     config: ConfigArgs,
-}
-
-fn role(word: &str) -> Result<Role, String> {
-    word.parse()
 }
 
 pub(super) fn run(args: &TokenArgs) -> anyhow::Result<()> {
@@ -94,28 +90,28 @@ async fn create(args: &CreateArgs) -> anyhow::Result<()> {
     let expires_at = args.days.map(|days| Clock.now() + Micros::from(days) * DAY);
     let CreateArgs { name, role, asset, .. } = args.clone();
     let wanted = NewToken { name, role, asset, expires_at };
-    let made = tokens::create_token(&args.config.load()?, wanted).await;
-    let secret = made.map_err(|error| match error.downcast::<ServiceError>() {
+    let created = tokens::create_token(&args.config.load()?, wanted).await;
+    let secret = created.map_err(|error| match error.downcast::<ServiceError>() {
         Ok(error @ ServiceError::Invalid(_)) => BadArgument(error.to_string()).into(),
         Ok(error) => error.into(),
         Err(error) => error,
     })?;
-    anstream::eprintln!("keep it; it is shown this once");
-    output::line(&secret)
+    anstream::eprintln!("save this token now; it cannot be shown again");
+    output::print_line(&secret)
 }
 
 async fn list(args: &ListArgs) -> anyhow::Result<()> {
     let tokens = tokens::tokens(&args.config.load()?).await?;
     let mut out = output::stdout();
     match args.format {
-        Format::Table => {
-            let mut table = table::table(&["name", "role", "asset", "last used", "ends"], &[]);
+        OutputFormat::Table => {
+            let mut table = table::table(&["name", "role", "asset", "last used", "expires"], &[]);
             for token in &tokens {
                 table.add_row(row(token));
             }
             table::lines(&table).try_for_each(|line| writeln!(out, "{line}"))?;
         }
-        Format::Json => {
+        OutputFormat::Json => {
             for token in &tokens {
                 writeln!(out, "{}", serde_json::to_string(token)?)?;
             }
@@ -125,13 +121,13 @@ async fn list(args: &ListArgs) -> anyhow::Result<()> {
 }
 
 fn row(token: &TokenView) -> [String; 5] {
-    // To the second.
+    // Without fractions of a second.
     let short = |moment: &str| moment.split('.').next().unwrap_or(moment).replace('T', " ");
     let or_dash = |moment: &Option<String>| moment.as_deref().map_or("-".to_owned(), short);
-    let ends = match &token.revoked_at {
+    let expires = match &token.revoked_at {
         Some(at) => format!("revoked {}", short(at)),
         None => or_dash(&token.expires_at),
     };
     let asset = token.asset.clone().unwrap_or_else(|| "-".to_owned());
-    [token.name.clone(), token.role.clone(), asset, or_dash(&token.last_used_at), ends]
+    [token.name.clone(), token.role.to_string(), asset, or_dash(&token.last_used_at), expires]
 }

@@ -1,4 +1,4 @@
-//! `offbd trends`: drift before fault, over the sessions of one rig.
+//! `offbd trends`: the drift of the servos over the sessions of one rig.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -6,22 +6,23 @@ use std::path::PathBuf;
 use clap::Args;
 use rayon::prelude::*;
 
-use super::judge::{self, Judged};
-use super::output::{self, Format};
+use super::errors::InputError;
+use super::judge::{self, JudgedSession};
+use super::output::{self, OutputFormat};
 use super::table;
-use super::unusable::Unusable;
 use crate::wire::basis::Basis;
 use crate::wire::trend::{TrendPointView, TrendView, TrendsView, estimate_view, trend_views};
 use offbd_core::diagnosis::ServoEstimate;
 use offbd_core::diagnosis::trend::{LEAST_SESSIONS, MAX_SESSIONS};
 use offbd_core::vocabulary::{Axis, PerAxis};
 
-/// How the servos of one rig drift from session to session, and which fault is
-/// on its way.
+/// Shows how the servos of one rig drift from session to session, and warns of
+/// faults to come.
 ///
-/// The sessions are given oldest first. Each estimates the gain, offset and
-/// delay of both servos; a line through them that surely rises or falls, and
-/// meets its limit within 20 sessions, is warned of.
+/// The sessions are given oldest first. Each yields an estimate of gain, offset
+/// and delay of both servos. A line is fitted through the estimates; if it rises
+/// or falls significantly and will reach its limit within 20 sessions, there is a
+/// warning.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "Examples:\n  \
     offbd trends --asset learnt.json monday.csv tuesday.csv wednesday.csv …\n  \
@@ -36,7 +37,7 @@ pub(super) struct TrendsArgs {
     sessions: Vec<PathBuf>,
     /// A table for people, or one JSON object
     #[arg(long, value_enum, default_value = "table")]
-    format: Format,
+    format: OutputFormat,
 }
 
 pub(super) fn run(args: &TrendsArgs) -> anyhow::Result<()> {
@@ -44,10 +45,10 @@ pub(super) fn run(args: &TrendsArgs) -> anyhow::Result<()> {
     let asset = rig.name.clone();
     let setup = judge::set_up(rig, None)?;
     let Some(calibration_id) = Basis::of(&setup).calibration_id else {
-        let reason = "it has no calibration; a rig that is not learnt has no trends";
-        return Err(Unusable::file(&args.asset, reason).into());
+        let reason = "it has no calibration, which trends need";
+        return Err(InputError::file(&args.asset, reason).into());
     };
-    let judged: Result<Vec<Judged>, Unusable> =
+    let judged: Result<Vec<JudgedSession>, InputError> =
         args.sessions.par_iter().map(|path| judge::judge_file(&setup, path)).collect();
     let judged = judged?;
     let first = judged.len().saturating_sub(MAX_SESSIONS);
@@ -61,16 +62,16 @@ pub(super) fn run(args: &TrendsArgs) -> anyhow::Result<()> {
     };
     let mut out = output::stdout();
     match args.format {
-        Format::Json => {
+        OutputFormat::Json => {
             serde_json::to_writer(&mut out, &view)?;
             writeln!(out)?;
         }
-        Format::Table => write_table(&mut out, &view, &judged[first..])?,
+        OutputFormat::Table => write_table(&mut out, &view, &judged[first..])?,
     }
     Ok(out.flush()?)
 }
 
-fn point(judged: &Judged, calibration_id: &str) -> TrendPointView {
+fn point(judged: &JudgedSession, calibration_id: &str) -> TrendPointView {
     TrendPointView {
         session: judged.summary.session.clone(),
         session_id: None,
@@ -82,9 +83,13 @@ fn point(judged: &Judged, calibration_id: &str) -> TrendPointView {
     }
 }
 
-fn write_table(out: &mut impl Write, view: &TrendsView, judged: &[Judged]) -> anyhow::Result<()> {
+fn write_table(
+    out: &mut impl Write,
+    view: &TrendsView,
+    judged: &[JudgedSession],
+) -> anyhow::Result<()> {
     let heading = ["session", "axis", "gain", "offset, m/s²", "delay, ms", "motion, s"];
-    let mut points = table::of_names(&heading, &[2, 3, 4, 5]);
+    let mut points = table::table_of_files(&heading, &[2, 3, 4, 5]);
     for session in judged {
         for axis in Axis::ALL {
             points.add_row(row(session, axis));
@@ -110,7 +115,7 @@ fn write_table(out: &mut impl Write, view: &TrendsView, judged: &[Judged]) -> an
     write_warnings(out, view)
 }
 
-fn row(session: &Judged, axis: Axis) -> [String; 6] {
+fn row(session: &JudgedSession, axis: Axis) -> [String; 6] {
     let name = if axis == Axis::X { session.summary.session.clone() } else { String::new() };
     let dash = || "–".to_owned();
     let Some(e) = &session.estimates[axis] else {

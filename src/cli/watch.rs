@@ -1,59 +1,52 @@
-//! `offbd watch`: an asset in the terminal, live. A client of the interface as
-//! any other: states and fault lines over the WebSocket.
+//! `offbd watch`: shows an asset live in the terminal. An ordinary client of the
+//! interface: it receives states and fault lines over the WebSocket.
+
+mod connect;
 
 use std::io::{IsTerminal, Write};
-use std::path::PathBuf;
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 use clap::Args;
 use futures_util::StreamExt;
 use serde_json::Value;
-use tokio_tungstenite::connect_async;
 use tokio_tungstenite::tungstenite::Message;
-use tokio_tungstenite::tungstenite::client::IntoClientRequest;
-use tokio_tungstenite::tungstenite::handshake::client::Request;
-use tokio_tungstenite::tungstenite::http::HeaderValue;
-use tokio_tungstenite::tungstenite::http::header::AUTHORIZATION;
 
-use super::unusable::{self, Unusable};
+use self::connect::{ConnectArgs, connect};
 use super::{output, table};
 use crate::wire::learning::LearningView;
 use crate::wire::service::{MonitorView, StateView};
 use crate::wire::verdict::{AxisEvidenceView, FaultView};
 
-/// Follows an asset live: residuals against their limits, monitors, faults.
+/// Shows an asset live: residuals and their limits, monitors, faults.
 ///
-/// In a terminal the last lines are drawn anew; elsewhere a line is printed for
-/// each state. Changes of faults are printed as they happen. Ends with Ctrl-C or
-/// when the service stops.
+/// In a terminal the state is updated in place; otherwise each state is printed
+/// as a line. Changes of faults are printed when they happen. Ends with Ctrl-C
+/// or when the service stops.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "Examples:\n  \
     offbd watch demo-rig\n  \
     offbd watch bench-1 --address 192.168.1.5:8087 --hz 1\n  \
+    offbd watch bench-1 --address https://rigs.example --token-file token\n  \
     offbd watch bench-1 --states 1")]
 pub(super) struct WatchArgs {
     /// Name of the asset
     asset: String,
-    /// Where the service listens
-    #[arg(long, default_value = "127.0.0.1:8087", value_name = "HOST:PORT")]
-    address: String,
-    /// States a second, 0.1 to 50
+    #[command(flatten)]
+    connect: ConnectArgs,
+    /// States per second, 0.1 to 50
     #[arg(long, default_value_t = 4.0, value_name = "HZ", value_parser = rate)]
     hz: f64,
-    /// File with a token, where the service asks for one
-    #[arg(long, value_name = "FILE")]
-    token_file: Option<PathBuf>,
-    /// End after so many states [default: none]
+    /// End after this number of states [default: no limit]
     #[arg(long, value_name = "N")]
     states: Option<u64>,
 }
 
 fn rate(word: &str) -> Result<f64, String> {
     let value: Option<f64> = word.parse().ok();
-    value.filter(|v| (0.1..=50.0).contains(v)).ok_or_else(|| "not from 0.1 to 50".to_owned())
+    value.filter(|v| (0.1..=50.0).contains(v)).ok_or_else(|| "must be from 0.1 to 50".to_owned())
 }
 
-/// Characters of a bar.
+/// Width of a bar, characters.
 const BAR: usize = 24;
 
 pub(super) fn run(args: &WatchArgs) -> anyhow::Result<()> {
@@ -61,10 +54,7 @@ pub(super) fn run(args: &WatchArgs) -> anyhow::Result<()> {
 }
 
 async fn watch(args: &WatchArgs) -> anyhow::Result<()> {
-    let WatchArgs { asset, address, .. } = args;
-    let connected = connect_async(request(args)?).await;
-    let (mut socket, _) =
-        connected.with_context(|| format!("no stream of {asset} at {address}"))?;
+    let mut socket = connect(&args.connect, &args.asset, args.hz).await?;
     let mut screen = Screen { redraws: std::io::stdout().is_terminal(), drawn: 0 };
     let mut left = args.states.unwrap_or(u64::MAX);
     while left > 0 {
@@ -84,26 +74,11 @@ async fn watch(args: &WatchArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The request for the stream, with the token if there is one.
-fn request(args: &WatchArgs) -> anyhow::Result<Request> {
-    let WatchArgs { asset, address, hz, token_file, .. } = args;
-    let url = format!("ws://{address}/api/v1/assets/{asset}/stream?state={hz}");
-    let mut request = url.into_client_request()?;
-    if let Some(file) = token_file {
-        let token = String::from_utf8(unusable::read(file)?);
-        let token = token.map_err(|error| Unusable::file(file, error))?;
-        let value = HeaderValue::from_str(&format!("Bearer {}", token.trim()));
-        let mut value = value.map_err(|error| Unusable::file(file, error))?;
-        value.set_sensitive(true);
-        request.headers_mut().insert(AUTHORIZATION, value);
-    }
-    Ok(request)
-}
-
+/// The output, in a terminal or as plain lines.
 struct Screen {
-    /// Whether what was drawn last is drawn over.
+    /// Whether each state replaces the previous one.
     redraws: bool,
-    /// Lines drawn last.
+    /// Number of lines of the previous state.
     drawn: usize,
 }
 
@@ -126,7 +101,7 @@ impl Screen {
         out.flush()
     }
 
-    /// Goes up over what was drawn last and clears it (ECMA-48 CUU, ED).
+    /// Erases the lines of the previous state (ECMA-48 CUU, ED).
     fn erase(&self, out: &mut impl Write) -> std::io::Result<()> {
         if self.redraws && self.drawn > 0 {
             write!(out, "\x1b[{}A\x1b[J", self.drawn)
@@ -142,7 +117,7 @@ fn head(state: &StateView) -> String {
     format!("{t_s:>8.2} s  {}  {session}  {} samples", state.asset, state.samples)
 }
 
-/// One line for logs.
+/// A state as one line, for logs.
 fn line(state: &StateView) -> String {
     let axis = |name: &str, axis: &AxisEvidenceView| match axis.residual_m_s2 {
         Some(residual) => format!("{name} {residual:+.2}/{:.2}", axis.limit_m_s2),
@@ -158,7 +133,7 @@ fn line(state: &StateView) -> String {
     format!("{}  {x}  {y}  judged {}{learning}", head(state), judged.join(", "))
 }
 
-/// A block that is drawn anew: a bar for each residual, the monitors.
+/// A state as a block of lines: a bar for each residual, and the monitors.
 fn block(state: &StateView) -> Vec<String> {
     let evidence = &state.evidence;
     let monitor = |m: &MonitorView| {
@@ -173,14 +148,14 @@ fn block(state: &StateView) -> Vec<String> {
     lines
 }
 
-/// How far a rig is on its way to being learnt, a line for each line of the screen:
-/// what is drawn over must be counted.
+/// The progress of learning, as separate lines of the screen, because lines to erase are
+/// counted.
 fn learning(learning: &LearningView) -> Vec<String> {
     let words = table::wrapped("           learning: ", &learning.summary);
     words.lines().map(str::to_owned).collect()
 }
 
-/// The residual on a scale on which `|` is the limit, two thirds to the right.
+/// A bar for a residual; `|` marks the limit, at two thirds of the width.
 fn bar(name: &str, axis: &AxisEvidenceView) -> String {
     let Some(residual) = axis.residual_m_s2 else {
         return format!("         {name} [{:BAR$}] no residual", "");
@@ -238,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rig_that_is_not_learnt_says_how_far_it_is() {
+    fn the_progress_of_learning_is_shown() {
         let words = "Gathering motion: x 23 of 60 s.";
         let state = gathering(words);
         assert!(line(&state).ends_with(&format!("gathering: {words}")), "{}", line(&state));

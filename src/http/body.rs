@@ -1,4 +1,4 @@
-//! Reading a body that may be too long, may come too slowly, or may never end.
+//! Reading request bodies under limits of size, time and total memory.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -11,82 +11,84 @@ use tokio::time::timeout;
 
 use super::Problem;
 
-/// Bytes of request bodies that may be in memory at a time, over all requests;
-/// one more is told to come again.
+/// The limit of request body bytes in memory at a time, over all requests. A request
+/// that would exceed it is answered with 429.
 #[derive(Clone, Debug)]
-pub struct Budget {
+pub struct BodyBudget {
     bytes: Arc<Semaphore>,
-    all: usize,
+    limit: usize,
 }
 
-impl Budget {
+impl BodyBudget {
     #[must_use]
     pub fn new(bytes: usize) -> Self {
-        let all = bytes.min(Semaphore::MAX_PERMITS);
-        Self { bytes: Arc::new(Semaphore::new(all)), all }
+        let limit = bytes.min(Semaphore::MAX_PERMITS);
+        Self { bytes: Arc::new(Semaphore::new(limit)), limit }
     }
 
-    /// Bytes in memory now.
+    /// Returns the bytes in memory now.
     pub(super) fn used(&self) -> usize {
-        self.all - self.bytes.available_permits()
+        self.limit - self.bytes.available_permits()
     }
 }
 
-/// A body, and its share of the budget.
-pub(super) struct Bytes {
+/// A request body and its permits of the [`BodyBudget`], released on drop.
+pub(super) struct BudgetedBody {
     pub(super) bytes: Vec<u8>,
-    share: Option<OwnedSemaphorePermit>,
+    permit: Option<OwnedSemaphorePermit>,
 }
 
 /// Reads a body of at most `limit` bytes within `time`.
 ///
 /// # Errors
-/// 413, 408, 429 or, when the client breaks off, 400.
+/// 413 if it is longer, 408 if it takes longer, 429 if the budget is exhausted, and 400
+/// if the client aborts.
 pub(super) async fn read(
     body: Body,
     limit: usize,
     time: Duration,
-    budget: &Budget,
-) -> Result<Bytes, Problem> {
+    budget: &BodyBudget,
+) -> Result<BudgetedBody, Problem> {
     timeout(time, collect(body, limit, budget)).await.unwrap_or_else(|_| {
-        let detail = format!("the body did not end within {} s", time.as_secs());
-        Err(Problem::new(StatusCode::REQUEST_TIMEOUT, "slow-body", "The body is too slow", detail))
+        let detail = format!("the body was not complete within {} s", time.as_secs());
+        Err(Problem::new(StatusCode::REQUEST_TIMEOUT, "slow-body", "Request timeout", detail))
     })
 }
 
-async fn collect(body: Body, limit: usize, budget: &Budget) -> Result<Bytes, Problem> {
-    let mut read = Bytes { bytes: Vec::new(), share: None };
+async fn collect(body: Body, limit: usize, budget: &BodyBudget) -> Result<BudgetedBody, Problem> {
+    let mut read = BudgetedBody { bytes: Vec::new(), permit: None };
     let mut frames = body.into_data_stream();
     while let Some(frame) = frames.next().await {
         let frame = frame.map_err(|error| {
-            let detail = format!("the body broke off: {error}");
-            Problem::new(StatusCode::BAD_REQUEST, "malformed", "The body cannot be read", detail)
+            let detail = format!("the body was not received completely: {error}");
+            Problem::new(StatusCode::BAD_REQUEST, "malformed", "Malformed body", detail)
         })?;
         if read.bytes.len() + frame.len() > limit {
             let detail = format!("the body is longer than {limit} bytes");
             return Err(Problem::new(
                 StatusCode::PAYLOAD_TOO_LARGE,
                 "too-large",
-                "Too large",
+                "Content too large",
                 detail,
             ));
         }
-        read.take_share(frame.len(), budget)?;
+        read.reserve(frame.len(), budget)?;
         read.bytes.extend_from_slice(&frame);
     }
     Ok(read)
 }
 
-impl Bytes {
-    fn take_share(&mut self, n: usize, budget: &Budget) -> Result<(), Problem> {
+impl BudgetedBody {
+    fn reserve(&mut self, n: usize, budget: &BodyBudget) -> Result<(), Problem> {
         let n = u32::try_from(n).unwrap_or(u32::MAX);
-        let share = budget.bytes.clone().try_acquire_many_owned(n).map_err(|_| {
-            let detail = "too many bodies are under way; nothing was taken, send it again";
-            Problem::new(StatusCode::TOO_MANY_REQUESTS, "busy", "Too much at once", detail)
+        let permit = budget.bytes.clone().try_acquire_many_owned(n).map_err(|_| {
+            let detail = "the limit of request bodies in memory is reached; \
+                the request was not processed, retry it";
+            Problem::new(StatusCode::TOO_MANY_REQUESTS, "busy", "Too many requests", detail)
         })?;
-        match &mut self.share {
-            Some(held) => held.merge(share),
-            none => *none = Some(share),
+        match &mut self.permit {
+            Some(held) => held.merge(permit),
+            none => *none = Some(permit),
         }
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! `/assets/{asset}/calibrations`: learning a rig from its sessions.
+//! `/assets/{asset}/calibrations`: calibrating a rig from chosen sessions.
 
 use axum::Json;
 use axum::body::Body;
@@ -9,33 +9,34 @@ use axum::response::IntoResponse;
 use serde::Deserialize;
 use utoipa::ToSchema;
 
-use super::sessions::small;
-use super::{App, Asset, OfAsset, PageQuery, Problem, Query, page_limit};
+use super::sessions::small_json;
+use super::{App, AssetItemPath, AssetPath, PageQuery, Problem, Query, page_limit};
 use crate::service::Service;
 use crate::wire::service::{CalibrationJobView, Page};
 
-/// From what to learn.
+/// The sessions to calibrate from.
 #[derive(Debug, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct NewCalibration {
-    /// The service's ids of healthy sessions of the asset, 1 to 32.
+    /// Ids of 1 to 32 healthy sessions of the asset.
     sessions: Vec<String>,
 }
 
-/// Learns the rig from healthy sessions of it, in the background.
+/// Starts a background job that calibrates the rig from healthy sessions.
 #[utoipa::path(post, path = "/assets/{asset}/calibrations", tag = "assets",
     operation_id = "calibrate", params(("asset" = String, description = "Name of the asset")),
     request_body = NewCalibration,
-    responses((status = 202, body = CalibrationJobView, description = "`Location` says where to look"),
+    responses(
+        (status = 202, body = CalibrationJobView, description = "`Location` has the job's URL"),
         (status = 400, body = Problem), (status = 404, body = Problem),
         (status = 422, body = Problem), (status = 429, body = Problem)))]
 pub(super) async fn create(
     State(app): State<App>,
-    Asset(asset): Asset,
+    AssetPath(asset): AssetPath,
     body: Body,
 ) -> Result<impl IntoResponse, Problem> {
-    let wanted: NewCalibration = small(&app, body).await?;
-    let job = app.service.calibrate(&asset, wanted.sessions).await?;
+    let request: NewCalibration = small_json(&app, body).await?;
+    let job = app.service.calibrate(&asset, request.sessions).await?;
     let location = format!("/api/v1/assets/{asset}/calibrations/{}", job.id);
     Ok((StatusCode::ACCEPTED, [(LOCATION, location)], Json(job)))
 }
@@ -47,35 +48,37 @@ pub(super) async fn create(
     responses((status = 200, body = Page<CalibrationJobView>), (status = 404, body = Problem)))]
 pub(super) async fn list(
     State(service): State<Service>,
-    Asset(asset): Asset,
+    AssetPath(asset): AssetPath,
     Query(page): Query<PageQuery>,
 ) -> Result<Json<Page<CalibrationJobView>>, Problem> {
     let limit = page_limit(page.limit);
     Ok(Json(service.calibrations(&asset, page.cursor.as_deref(), limit).await?))
 }
 
-/// A calibration: where it stands, what was learnt, or what the data lack.
+/// Returns a calibration: its state, and its result or the reason why it failed.
 #[utoipa::path(get, path = "/assets/{asset}/calibrations/{id}", tag = "assets",
     operation_id = "get_calibration",
-    params(("asset" = String, description = "Name of the asset"), ("id" = String, description = "Its id")),
+    params(("asset" = String, description = "Name of the asset"),
+        ("id" = String, description = "Id of the calibration")),
     responses((status = 200, body = CalibrationJobView), (status = 404, body = Problem)))]
 pub(super) async fn get(
     State(service): State<Service>,
-    OfAsset(asset, id): OfAsset,
+    AssetItemPath(asset, id): AssetItemPath,
 ) -> Result<Json<CalibrationJobView>, Problem> {
     Ok(Json(service.calibration(&asset, &id).await?))
 }
 
-/// Puts a calibration into the asset file. An open session goes on with what
-/// it began with; the next session uses it.
+/// Writes a calibration to the asset file. An open session keeps the calibration that it
+/// started with; the next session uses the new one.
 #[utoipa::path(post, path = "/assets/{asset}/calibrations/{id}/activate", tag = "assets",
     operation_id = "activate_calibration",
-    params(("asset" = String, description = "Name of the asset"), ("id" = String, description = "Its id")),
+    params(("asset" = String, description = "Name of the asset"),
+        ("id" = String, description = "Id of the calibration")),
     responses((status = 200, body = CalibrationJobView), (status = 404, body = Problem),
-        (status = 409, body = Problem, description = "It is not done")))]
+        (status = 409, body = Problem, description = "The calibration is not done")))]
 pub(super) async fn activate(
     State(service): State<Service>,
-    OfAsset(asset, id): OfAsset,
+    AssetItemPath(asset, id): AssetItemPath,
 ) -> Result<Json<CalibrationJobView>, Problem> {
     Ok(Json(service.activate_calibration(&asset, &id).await?))
 }

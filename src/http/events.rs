@@ -18,39 +18,38 @@ use crate::service::access::Caller;
 use crate::service::{EventFeed, Service};
 use offbd_core::vocabulary::Invalid;
 
-/// Silence after which a comment is sent, so that nobody between takes the
-/// connection for dead.
+/// Interval without events after which a comment is sent, so that proxies do not close
+/// the connection as idle.
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
 
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
 #[into_params(parameter_in = Query)]
 pub(super) struct EventsQuery {
-    /// Events of this asset alone.
+    /// Only events of this asset.
     asset: Option<String>,
-    /// Events after the one with this id, as the header `Last-Event-ID`; 0 for
-    /// all that are stored.
+    /// Starts after the event with this id, as the header `Last-Event-ID` does; 0 for
+    /// all stored events.
     after: Option<i64>,
 }
 
-/// One event of the stream, as a browser's `EventSource` gives it.
+/// An event of the stream, as a browser's `EventSource` delivers it.
 #[derive(Debug, ToSchema)]
 #[allow(dead_code, reason = "describes the events for the interface's document")]
 pub(super) struct MessageView {
-    /// `fault`, or `begin` before all others.
+    /// `fault`, or `begin` for the first event.
     event: String,
-    /// Of the event, a whole number that rises.
+    /// Event id, an increasing integer.
     id: String,
-    /// In a `fault` the JSON of an `EventView`, in a `begin` that of an empty
-    /// object.
+    /// JSON: an `EventView` for `fault`, an empty object for `begin`.
     data: String,
 }
 
-/// Fault transitions as they become durable: events of the type `fault` whose
-/// data is a fault line with `asset` and `session_id`, each with an id. A code
-/// that is cleared while no session is open is an event without a session and
-/// without `t_s`. With the header `Last-Event-ID` the ones missed come first.
-/// Before all comes one of the type `begin`, whose id says after which event the
-/// others follow.
+/// Streams fault transitions as they become durable (Server-Sent Events). Each is an
+/// event of type `fault` with an id; its data is a fault line with `asset` and
+/// `session_id`. A code that is cleared while no session is open is an event without a
+/// session and without `t_s`. With the header `Last-Event-ID` the missed events are sent
+/// first. The first event of every stream has type `begin`; its id is the one after which
+/// the stream starts.
 #[utoipa::path(get, path = "/events", tag = "faults", operation_id = "stream_events",
     params(EventsQuery),
     responses((status = 200, body = MessageView, content_type = "text/event-stream"),
@@ -78,11 +77,11 @@ fn last_id(text: &str) -> Result<i64, Problem> {
     Ok(text.trim().parse().map_err(|_| reason())?)
 }
 
-/// Ends when the service stops, or the caller's token is no longer in force.
+/// Completes when the service stops, or the caller's token expires or is revoked.
 async fn ended(service: Service, caller: Caller, closing: CancellationToken) {
     tokio::select! {
         () = closing.cancelled() => {}
-        () = service.lapse(&caller) => {}
+        () = service.wait_for_revocation(&caller) => {}
     }
 }
 
@@ -96,7 +95,7 @@ fn messages(feed: EventFeed) -> impl Stream<Item = Result<Message, Infallible>> 
             }
             Ok(None) => None,
             Err(error) => {
-                tracing::error!(%error, "reading missed events");
+                tracing::error!(%error, "cannot read missed events");
                 None
             }
         }

@@ -1,4 +1,4 @@
-//! Fault memory: of one asset and across the fleet.
+//! `/faults` and `/assets/{asset}/faults`: the fault memory of the fleet and of an asset.
 
 use axum::extract::State;
 use axum::http::header::CONTENT_TYPE;
@@ -7,38 +7,38 @@ use axum::response::{IntoResponse, Response};
 use axum::{Extension, Json};
 use serde::Deserialize;
 
-use super::sessions::Form;
-use super::{Asset, OfAsset, PageQuery, Problem, Query, page_limit};
+use super::sessions::RecordingFormat;
+use super::{AssetItemPath, AssetPath, PageQuery, Problem, Query, page_limit, query_word};
 use crate::service::access::Caller;
-use crate::service::{Around, FaultQuery, Service};
+use crate::service::{FaultQuery, RecordingWindow, Service};
 use crate::wire::recording::{ColumnsView, RecordingView, write_csv};
 use crate::wire::service::{FaultEntryView, HistoryView, Page};
+use crate::wire::words::{CodeWord, FaultSort, StatusFilter};
 
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
 #[into_params(parameter_in = Query)]
 pub(super) struct StatusQuery {
-    /// `active` (pending or confirmed; the default), `pending`, `confirmed`,
-    /// `healed`, `cleared` or `all`.
-    #[param(pattern = "^(active|pending|confirmed|healed|cleared|all)$")]
+    /// `active` (pending or confirmed) by default.
+    #[param(inline, value_type = Option<StatusFilter>)]
     status: Option<String>,
 }
 
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
 #[into_params(parameter_in = Query)]
 pub(super) struct FleetQuery {
-    /// `active` (pending or confirmed; the default), `pending`, `confirmed`,
-    /// `healed`, `cleared` or `all`.
-    #[param(pattern = "^(active|pending|confirmed|healed|cleared|all)$")]
+    /// `active` (pending or confirmed) by default.
+    #[param(inline, value_type = Option<StatusFilter>)]
     status: Option<String>,
     asset: Option<String>,
+    #[param(value_type = Option<CodeWord>)]
     code: Option<String>,
     acknowledged: Option<bool>,
-    /// `-changed_at` (the default), `changed_at` or `asset`.
-    #[param(pattern = "^(-changed_at|changed_at|asset)$")]
+    /// `-changed_at` (the latest change first) by default.
+    #[param(inline, value_type = Option<FaultSort>)]
     sort: Option<String>,
-    /// `next` of the page before; with the same `sort`.
+    /// `next` of the previous page, which must have the same `sort`.
     cursor: Option<String>,
-    /// Items on the page, brought into 1 to 500; 50 without it.
+    /// Items per page, clamped to 1 to 500; 50 by default.
     #[param(format = Int64, maximum = 4_294_967_295_u32)]
     limit: Option<u32>,
 }
@@ -46,17 +46,18 @@ pub(super) struct FleetQuery {
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
 #[into_params(parameter_in = Query)]
 pub(super) struct ActorQuery {
-    /// Who does it; kept with the act. With a token it is the token's name.
+    /// Name of the person, stored with the action. Ignored if the request has a token,
+    /// whose name is stored instead.
     by: Option<String>,
 }
 
-/// Longest name of who did it, bytes; a longer one is cut.
+/// Longest stored name of a person, bytes; a longer one is truncated.
 const MAX_ACTOR: usize = 100;
 
 impl ActorQuery {
     fn actor(self, caller: &Caller) -> String {
-        let known = caller.name().map(str::to_owned).or(self.by);
-        let mut actor = known.unwrap_or_else(|| "unknown".to_owned());
+        let name = caller.name().map(str::to_owned).or(self.by);
+        let mut actor = name.unwrap_or_else(|| "unknown".to_owned());
         while actor.len() > MAX_ACTOR {
             actor.pop();
         }
@@ -64,7 +65,7 @@ impl ActorQuery {
     }
 }
 
-/// The fault memory of an asset.
+/// Lists the fault memory of an asset.
 #[utoipa::path(get, path = "/assets/{asset}/faults", tag = "faults",
     operation_id = "list_asset_faults",
     params(("asset" = String, description = "Name of the asset"), StatusQuery),
@@ -72,33 +73,36 @@ impl ActorQuery {
         (status = 404, body = Problem)))]
 pub(super) async fn of_asset(
     State(service): State<Service>,
-    Asset(asset): Asset,
+    AssetPath(asset): AssetPath,
     Query(query): Query<StatusQuery>,
 ) -> Result<Json<Page<FaultEntryView>>, Problem> {
-    Ok(Json(service.asset_faults(&asset, query.status).await?))
+    let status = query_word("?status", query.status.as_deref())?;
+    Ok(Json(service.asset_faults(&asset, status).await?))
 }
 
-/// What is remembered of one code.
+/// Returns the fault memory entry of one code.
 #[utoipa::path(get, path = "/assets/{asset}/faults/{code}", tag = "faults",
     operation_id = "get_fault",
-    params(("asset" = String, description = "Name of the asset"), ("code" = String, description = "Fault code")),
+    params(("asset" = String, description = "Name of the asset"),
+        ("code" = CodeWord, description = "Fault code")),
     responses((status = 200, body = FaultEntryView), (status = 404, body = Problem)))]
 pub(super) async fn get(
     State(service): State<Service>,
-    OfAsset(asset, code): OfAsset,
+    AssetItemPath(asset, code): AssetItemPath,
 ) -> Result<Json<FaultEntryView>, Problem> {
     Ok(Json(service.fault(&asset, &code).await?))
 }
 
-/// Clears a code: everything stored of it is erased.
+/// Clears a code: erases its fault memory entry.
 #[utoipa::path(delete, path = "/assets/{asset}/faults/{code}", tag = "faults",
     operation_id = "clear_fault",
-    params(("asset" = String, description = "Name of the asset"), ("code" = String, description = "Fault code"),
+    params(("asset" = String, description = "Name of the asset"),
+        ("code" = CodeWord, description = "Fault code"),
         ActorQuery),
     responses((status = 204), (status = 404, body = Problem)))]
 pub(super) async fn clear(
     State(service): State<Service>,
-    OfAsset(asset, code): OfAsset,
+    AssetItemPath(asset, code): AssetItemPath,
     Query(query): Query<ActorQuery>,
     Extension(caller): Extension<Caller>,
 ) -> Result<StatusCode, Problem> {
@@ -109,13 +113,14 @@ pub(super) async fn clear(
 /// Acknowledges the current occurrence of a code.
 #[utoipa::path(post, path = "/assets/{asset}/faults/{code}/acknowledge", tag = "faults",
     operation_id = "acknowledge_fault",
-    params(("asset" = String, description = "Name of the asset"), ("code" = String, description = "Fault code"),
+    params(("asset" = String, description = "Name of the asset"),
+        ("code" = CodeWord, description = "Fault code"),
         ActorQuery),
     responses((status = 200, body = FaultEntryView), (status = 404, body = Problem),
-        (status = 409, body = Problem, description = "There is no occurrence")))]
+        (status = 409, body = Problem, description = "No current occurrence")))]
 pub(super) async fn acknowledge(
     State(service): State<Service>,
-    OfAsset(asset, code): OfAsset,
+    AssetItemPath(asset, code): AssetItemPath,
     Query(query): Query<ActorQuery>,
     Extension(caller): Extension<Caller>,
 ) -> Result<Json<FaultEntryView>, Problem> {
@@ -124,75 +129,77 @@ pub(super) async fn acknowledge(
 
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
 #[into_params(parameter_in = Query)]
-pub(super) struct AroundQuery {
-    /// Seconds before the onset, 0 to 60; 10 without it.
+pub(super) struct WindowQuery {
+    /// Time before the onset, s, 0 to 60; 10 by default.
     #[param(minimum = 0, maximum = 60)]
     before_s: Option<f64>,
-    /// Seconds after the confirmation (or the failure that was none), 0 to 60;
-    /// 10 without it.
+    /// Time after the confirmation, or after the failure if it was not confirmed, s, 0 to
+    /// 60; 10 by default.
     #[param(minimum = 0, maximum = 60)]
     after_s: Option<f64>,
 }
 
-/// Seconds on either side where none are asked for.
-const AROUND_S: f64 = 10.0;
+/// Default time before the onset and after the confirmation, s.
+const DEFAULT_WINDOW_S: f64 = 10.0;
 
-/// The seconds before and after the last occurrence of a fault: what the device
-/// sent, and beside it measured and twin acceleration, residual, limit and
-/// gate, for which the recording is judged again from the beginning of its
-/// session (at most 10 million samples, two recordings at a time). JSON
-/// columns, or CSV if `Accept` asks for `text/csv`. It is there for as long as
-/// the session is, which nothing but `DELETE` removes.
+/// Returns the telemetry around the last occurrence of a fault, with measured and twin
+/// acceleration, residual, limit and gate. To compute them, the service evaluates the
+/// recording again from the start of its session (at most 10 million samples, two
+/// recordings at a time). JSON columns, or CSV if `Accept` prefers `text/csv`. Available
+/// until the session is deleted, by request or by retention.
 #[utoipa::path(get, path = "/assets/{asset}/faults/{code}/recording", tag = "faults",
     operation_id = "get_fault_recording",
-    params(("asset" = String, description = "Name of the asset"), ("code" = String, description = "Fault code"),
-        AroundQuery),
+    params(("asset" = String, description = "Name of the asset"),
+        ("code" = CodeWord, description = "Fault code"),
+        WindowQuery),
     responses((status = 200, content((RecordingView = "application/json"),
             (String = "text/csv"))),
         (status = 400, body = Problem), (status = 404, body = Problem),
         (status = 406, body = Problem),
-        (status = 413, body = Problem, description = "Too far into its session"),
+        (status = 413, body = Problem,
+            description = "Too many samples before the fault, or in the window"),
         (status = 429, body = Problem)))]
 pub(super) async fn recording(
     State(service): State<Service>,
-    OfAsset(asset, code): OfAsset,
-    Query(query): Query<AroundQuery>,
+    AssetItemPath(asset, code): AssetItemPath,
+    Query(query): Query<WindowQuery>,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let form = Form::wanted(&headers, Form::Json)?;
-    let around = Around {
-        before_s: query.before_s.unwrap_or(AROUND_S),
-        after_s: query.after_s.unwrap_or(AROUND_S),
+    let format = RecordingFormat::negotiate(&headers, RecordingFormat::Json)?;
+    let window = RecordingWindow {
+        before_s: query.before_s.unwrap_or(DEFAULT_WINDOW_S),
+        after_s: query.after_s.unwrap_or(DEFAULT_WINDOW_S),
     };
-    let (mut view, rows) = service.fault_recording(&asset, &code, around).await?;
-    if form == Form::Json {
+    let (mut view, rows) = service.fault_recording(&asset, &code, window).await?;
+    if format == RecordingFormat::Json {
         view.columns = ColumnsView::of(&rows);
         return Ok(Json(view).into_response());
     }
     let mut text = Vec::new();
-    // A vector takes everything that is written to it.
+    // Writing to a vector cannot fail.
     let _ = write_csv(&mut text, &rows);
-    Ok(([(CONTENT_TYPE, form.kind())], text).into_response())
+    Ok(([(CONTENT_TYPE, format.kind())], text).into_response())
 }
 
-/// What happened to a code, newest first: its changes of status, and who
-/// acknowledged or cleared it.
+/// Lists the history of a code, newest first: its transitions, and who acknowledged or
+/// cleared it.
 #[utoipa::path(get, path = "/assets/{asset}/faults/{code}/history", tag = "faults",
     operation_id = "get_fault_history",
-    params(("asset" = String, description = "Name of the asset"), ("code" = String, description = "Fault code"),
+    params(("asset" = String, description = "Name of the asset"),
+        ("code" = CodeWord, description = "Fault code"),
         PageQuery),
     responses((status = 200, body = Page<HistoryView>), (status = 400, body = Problem),
         (status = 404, body = Problem)))]
 pub(super) async fn history(
     State(service): State<Service>,
-    OfAsset(asset, code): OfAsset,
+    AssetItemPath(asset, code): AssetItemPath,
     Query(page): Query<PageQuery>,
 ) -> Result<Json<Page<HistoryView>>, Problem> {
     let limit = page_limit(page.limit);
     Ok(Json(service.history(&asset, &code, page.cursor.as_deref(), limit).await?))
 }
 
-/// Faults across the fleet.
+/// Lists the faults of the fleet.
 #[utoipa::path(get, path = "/faults", tag = "faults", operation_id = "list_faults",
     params(FleetQuery),
     responses((status = 200, body = Page<FaultEntryView>), (status = 400, body = Problem),
@@ -202,6 +209,8 @@ pub(super) async fn of_fleet(
     Query(query): Query<FleetQuery>,
 ) -> Result<Json<Page<FaultEntryView>>, Problem> {
     let FleetQuery { status, asset, code, acknowledged, sort, cursor, limit } = query;
+    let status = query_word("?status", status.as_deref())?;
+    let sort = query_word("?sort", sort.as_deref())?;
     let query = FaultQuery { status, asset, code, acknowledged, sort, cursor };
     Ok(Json(service.faults(query, page_limit(limit)).await?))
 }

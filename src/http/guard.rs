@@ -1,16 +1,16 @@
-//! Before every handler: who asks, how often, from which page, and whether the
-//! caller may; after it: a line in the audit log.
+//! Access control around every handler: host and origin checks, authentication, rate
+//! limits and authorization before it, the audit log entry after it.
 //!
-//! A route that states no right is refused, whoever asks.
+//! A route without a right is denied to every caller.
 
-use std::net::{IpAddr, SocketAddr};
+use std::net::IpAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
-use axum::extract::{ConnectInfo, MatchedPath, RawPathParams, Request, State};
+use axum::extract::{MatchedPath, RawPathParams, Request, State};
 use axum::http::header::{
-    ALLOW, AUTHORIZATION, COOKIE, HOST, HeaderName, HeaderValue, LOCATION, ORIGIN, RETRY_AFTER,
-    UPGRADE, WWW_AUTHENTICATE,
+    ALLOW, AUTHORIZATION, HOST, HeaderName, HeaderValue, LOCATION, ORIGIN, RETRY_AFTER, UPGRADE,
+    WWW_AUTHENTICATE,
 };
 use axum::http::request::Parts;
 use axum::http::uri::Authority;
@@ -20,41 +20,42 @@ use axum::response::{IntoResponse, Response};
 use axum::{RequestPartsExt, extract};
 use serde::Deserialize;
 
-use super::rates::Rates;
-use super::routes::{Rule, Rules};
-use super::{App, Problem, login, problem};
-use crate::service::access::{Caller, Credential, Deed, Pass, Reach, Right};
+use super::credential::{bearer, client_address, credential};
+use super::rates::RateLimits;
+use super::routes::{RouteRule, RouteRules};
+use super::{App, Problem, problem};
+use crate::service::access::{AccessScope, AuditEntry, Caller, Credential, Principal, Right};
 
-/// How callers are told apart, and what is asked of them.
-pub struct Policy {
-    /// Whether a token is asked for.
+/// The configured access policy.
+pub struct AccessPolicy {
+    /// Whether a token is required.
     pub required: bool,
-    /// Pages elsewhere that may use the interface: `https://HOST[:PORT]`.
+    /// Origins of other sites that may use the API: `https://HOST[:PORT]`.
     pub origins: Vec<String>,
-    /// Whether connections are encrypted.
+    /// Whether connections use TLS.
     pub encrypted: bool,
-    pub rates: Rates,
+    pub rates: RateLimits,
 }
 
-/// What the guard knows.
+/// The access control of all routes.
 pub(super) struct Guard {
     pub(super) app: App,
-    pub(super) rules: Rules,
+    pub(super) rules: RouteRules,
 }
 
-/// Why a request does not come through, with a header that belongs to it.
-struct Refusal {
+/// The response to a denied request, with an additional header.
+struct Denial {
     problem: Problem,
     header: Option<Box<(HeaderName, HeaderValue)>>,
 }
 
-impl From<Problem> for Refusal {
+impl From<Problem> for Denial {
     fn from(problem: Problem) -> Self {
         Self { problem, header: None }
     }
 }
 
-impl IntoResponse for Refusal {
+impl IntoResponse for Denial {
     fn into_response(self) -> Response {
         let mut response = self.problem.into_response();
         if let Some((name, value)) = self.header.map(|header| *header) {
@@ -69,15 +70,15 @@ pub(super) async fn guard(
     request: Request,
     next: Next,
 ) -> Response {
-    guard.through(request, next).await.unwrap_or_else(|refusal| {
-        let status = refusal.problem.status.to_string();
+    guard.handle(request, next).await.unwrap_or_else(|denial| {
+        let status = denial.problem.status.to_string();
         metrics::counter!("offbd_refused_total", "status" => status).increment(1);
-        refusal.into_response()
+        denial.into_response()
     })
 }
 
 impl Guard {
-    async fn through(&self, request: Request, next: Next) -> Result<Response, Refusal> {
+    async fn handle(&self, request: Request, next: Next) -> Result<Response, Denial> {
         let (mut parts, body) = request.into_parts();
         let path = parts.extensions.get::<MatchedPath>().map(MatchedPath::as_str);
         let rule = rule(&self.rules, path, &parts.method, &parts.uri)?;
@@ -88,98 +89,101 @@ impl Guard {
             self.check_right(caller, rule.right, &mut parts).await?;
             parts.extensions.insert(caller.clone());
         }
-        let deed = is_audited(rule.right, &parts.method).then(|| deed(rule.act, &parts));
+        let entry = is_audited(rule.right, &parts.method).then(|| audit_entry(rule.action, &parts));
         let response = next.run(Request::from_parts(parts, body)).await;
-        // What was done is in the audit log before the answer goes out.
-        if let (Some(caller), Some(deed)) = (caller, deed.and_then(|deed| done(deed, &response))) {
-            self.app.service.note(&caller, deed).await.map_err(Problem::from)?;
+        // The audit entry is durable before the response is sent.
+        if let (Some(caller), Some(entry)) =
+            (caller, entry.and_then(|entry| completed(entry, &response)))
+        {
+            self.app.service.audit_action(&caller, entry).await.map_err(Problem::from)?;
         }
         Ok(response)
     }
 
-    /// Where nobody is asked for a token, whoever can name this machine could
-    /// make a visitor's browser ask (DNS rebinding): it must be named by number.
-    fn check_host(&self, parts: &Parts) -> Result<(), Refusal> {
+    /// Without authentication, requires an IP address or `localhost` in `Host`, as a
+    /// defence against DNS rebinding.
+    fn check_host(&self, parts: &Parts) -> Result<(), Denial> {
         let Some(host) = host(&parts.headers) else { return Ok(()) };
         let policy = &self.app.policy;
         let name = host.host().trim_matches(['[', ']']);
-        let by_number = name == "localhost" || name.parse::<IpAddr>().is_ok();
-        if policy.required || by_number || policy.origins.iter().any(|o| is_of(o, &host)) {
+        let is_address = name == "localhost" || name.parse::<IpAddr>().is_ok();
+        if policy.required || is_address || policy.origins.iter().any(|o| has_host(o, &host)) {
             return Ok(());
         }
-        let detail = "without authentication the service answers to a number or to localhost; \
+        let detail = "without authentication `Host` must be an IP address or localhost; \
             list the page's origin in `origins`, or set `auth = \"required\"`";
         let status = StatusCode::MISDIRECTED_REQUEST;
-        Err(Problem::new(status, "misdirected", "Another host's name", detail).into())
+        Err(Problem::new(status, "misdirected", "Misdirected request", detail).into())
     }
 
-    /// What changes something must not come from another site's page. Browsers
-    /// say where a page is from; what says nothing is no page.
-    fn check_origin(&self, parts: &Parts) -> Result<(), Refusal> {
+    /// Denies unsafe requests from pages of other sites (cross-site request forgery), by
+    /// the header `Origin`. A request without it does not come from a browser, unless it
+    /// has a cookie.
+    fn check_origin(&self, parts: &Parts) -> Result<(), Denial> {
         if is_safe(&parts.method) && !parts.headers.contains_key(UPGRADE) {
             return Ok(());
         }
-        let foreign = || forbidden("the request comes from another site's page").into();
+        let cross_site = || forbidden("the request comes from a page of another site").into();
         let Some(origin) = parts.headers.get(ORIGIN) else {
-            // A cookie is a browser's, and a browser says where from.
+            // A cookie is sent by a browser, which also sends `Origin`.
             let by_cookie = credential(&parts.headers, self.app.policy.encrypted)
-                .is_some_and(|shown| matches!(shown, Some(Credential::Login(_))));
-            return if by_cookie { Err(foreign()) } else { Ok(()) };
+                .is_some_and(|credential| matches!(credential, Some(Credential::Login(_))));
+            return if by_cookie { Err(cross_site()) } else { Ok(()) };
         };
         let origin = origin.to_str().unwrap_or_default();
-        let own = host(&parts.headers).is_some_and(|host| is_of(origin, &host));
-        let known = self.app.policy.origins.iter().any(|known| known == origin);
-        if own || known { Ok(()) } else { Err(foreign()) }
+        let same_origin = host(&parts.headers).is_some_and(|host| has_host(origin, &host));
+        let permitted = self.app.policy.origins.iter().any(|permitted| permitted == origin);
+        if same_origin || permitted { Ok(()) } else { Err(cross_site()) }
     }
 
-    /// Who asks; nobody where nobody is asked.
-    async fn caller(&self, parts: &Parts, right: Right) -> Result<Option<Caller>, Refusal> {
+    /// Authenticates the caller and applies the rate limits; `None` for a public route.
+    async fn caller(&self, parts: &Parts, right: Right) -> Result<Option<Caller>, Denial> {
         let policy = &self.app.policy;
         if !policy.required {
-            return Ok((right != Right::Open).then_some(Caller::Anyone));
+            return Ok((right != Right::Public).then_some(Caller::Anonymous));
         }
-        if right == Right::Open {
-            self.take_address(parts)?;
+        if right == Right::Public {
+            self.check_address_rate(parts)?;
             return Ok(None);
         }
-        let Some(shown) = credential(&parts.headers, policy.encrypted) else {
-            self.take_address(parts)?;
-            let detail = "this takes a token: `Authorization: Bearer offbd_…`";
+        let Some(credential) = credential(&parts.headers, policy.encrypted) else {
+            self.check_address_rate(parts)?;
+            let detail = "a token is required: `Authorization: Bearer offbd_…`";
             return Err(unauthenticated(detail, None));
         };
-        let known = shown.and_then(|shown| self.app.service.recall(&shown));
-        let pass = match known {
-            Some(pass) => Some(pass),
+        let cached = credential.and_then(|given| self.app.service.cached_principal(&given));
+        let principal = match cached {
+            Some(principal) => Some(principal),
             None => {
-                self.take_address(parts)?;
-                self.find(&parts.headers, shown).await?
+                self.check_address_rate(parts)?;
+                self.authenticate(&parts.headers, credential).await?
             }
         };
-        let Some(pass) = pass else {
-            let detail = "the token is none of this service, revoked or expired";
+        let Some(principal) = principal else {
+            let detail = "the token is unknown, revoked or expired";
             return Err(unauthenticated(detail, Some("invalid_token")));
         };
-        policy.rates.take_token(&pass.id).map_err(too_often)?;
-        Ok(Some(Caller::Known(pass)))
+        policy.rates.check_token(&principal.id).map_err(rate_limited)?;
+        Ok(Some(Caller::Authenticated(principal)))
     }
 
-    /// Whom something belongs to that is not known yet.
-    async fn find(
+    /// Returns the principal of a credential that is not cached; `None` if it is invalid.
+    async fn authenticate(
         &self,
         headers: &HeaderMap,
-        shown: Option<Credential>,
-    ) -> Result<Option<Arc<Pass>>, Problem> {
+        credential: Option<Credential>,
+    ) -> Result<Option<Arc<Principal>>, Problem> {
         let service = &self.app.service;
-        match (shown, headers.get(AUTHORIZATION).and_then(bearer)) {
+        match (credential, headers.get(AUTHORIZATION).and_then(bearer)) {
             (Some(Credential::Jwt(_)), Some(token)) => Ok(service.verify(token).await),
-            (Some(shown), _) => Ok(service.authenticate(&shown).await?),
+            (Some(credential), _) => Ok(service.authenticate(&credential).await?),
             (None, _) => Ok(None),
         }
     }
 
-    fn take_address(&self, parts: &Parts) -> Result<(), Refusal> {
-        let Some(address) = address(parts) else { return Ok(()) };
-        self.app.policy.rates.take_address(address).map_err(too_often)
+    fn check_address_rate(&self, parts: &Parts) -> Result<(), Denial> {
+        let Some(address) = client_address(parts) else { return Ok(()) };
+        self.app.policy.rates.check_address(address).map_err(rate_limited)
     }
 
     async fn check_right(
@@ -187,11 +191,11 @@ impl Guard {
         caller: &Caller,
         right: Right,
         parts: &mut Parts,
-    ) -> Result<(), Refusal> {
-        let allowed = match caller.reach(right) {
-            Reach::Everything => true,
-            Reach::Nothing => false,
-            Reach::Own => {
+    ) -> Result<(), Denial> {
+        let allowed = match caller.scope(right) {
+            AccessScope::All => true,
+            AccessScope::None => false,
+            AccessScope::OwnAsset => {
                 let asset = self.asset_of(parts).await?;
                 asset.is_some_and(|asset| caller.may(right, &asset))
             }
@@ -199,22 +203,22 @@ impl Guard {
         if allowed {
             return Ok(());
         }
-        let role = caller.pass().map_or("", |pass| pass.role.as_str());
-        let detail = match caller.reach(right) {
-            Reach::Own => "the token of a device is for its own asset, named in the address",
-            _ => "the token's role is not allowed to do this",
+        let role = caller.principal().map_or("", |principal| principal.role.as_str());
+        let detail = match caller.scope(right) {
+            AccessScope::OwnAsset => "the token of a device is limited to its own asset",
+            _ => "the role of the token does not have the required right",
         };
-        tracing::info!(caller = caller.name(), role, right = right.as_str(), "refused");
+        tracing::info!(caller = caller.name(), role, right = right.as_str(), "access denied");
         let scope =
             HeaderValue::from_static("Bearer realm=\"offbd\", error=\"insufficient_scope\"");
-        Err(Refusal {
+        Err(Denial {
             problem: forbidden(detail),
             header: Some(Box::new((WWW_AUTHENTICATE, scope))),
         })
     }
 
-    /// The asset that a request is about: in its path, that of the session in
-    /// its path, or in its query.
+    /// Returns the asset that a request is about: the one in its path, that of the session
+    /// in its path, or the one in its query.
     async fn asset_of(&self, parts: &mut Parts) -> Result<Option<String>, Problem> {
         let params: Vec<(String, String)> = match parts.extract::<RawPathParams>().await {
             Ok(raw) => raw.iter().map(|(k, v)| (k.to_owned(), v.to_owned())).collect(),
@@ -237,28 +241,36 @@ impl Guard {
     }
 }
 
-/// The deed if it was done, with the address of what came of it.
-fn done(deed: Deed, response: &Response) -> Option<Deed> {
-    let made = response.headers().get(LOCATION).and_then(|at| at.to_str().ok());
-    let target = made.map_or_else(|| deed.target.clone(), str::to_owned);
-    response.status().is_success().then_some(Deed { target, ..deed })
+/// Returns the entry if the request succeeded; its target is the created resource if the
+/// response has a `Location`.
+fn completed(entry: AuditEntry, response: &Response) -> Option<AuditEntry> {
+    let created = response.headers().get(LOCATION).and_then(|at| at.to_str().ok());
+    let target = created.map_or_else(|| entry.target.clone(), str::to_owned);
+    response.status().is_success().then_some(AuditEntry { target, ..entry })
 }
 
-/// What a request for the route `path` takes. What no route has is the page's, or
-/// not there.
-fn rule(rules: &Rules, path: Option<&str>, method: &Method, uri: &Uri) -> Result<Rule, Refusal> {
-    let Some(path) = path else { return Ok(Rule { right: Right::Open, act: String::new() }) };
-    let Some(methods) = rules.of(path) else {
-        tracing::error!(path, "the route states no right");
-        return Err(forbidden("this path is not open to anybody").into());
+/// Returns the rule of a request for the route `path`. A request without a route is
+/// public: it gets the page or 404.
+fn rule(
+    rules: &RouteRules,
+    path: Option<&str>,
+    method: &Method,
+    uri: &Uri,
+) -> Result<RouteRule, Denial> {
+    let Some(path) = path else {
+        return Ok(RouteRule { right: Right::Public, action: String::new() });
     };
-    let wanted = if *method == Method::HEAD { &Method::GET } else { method };
-    let known = methods.iter().find(|(method, _)| method == wanted);
-    known.map(|(_, rule)| rule.clone()).ok_or_else(|| {
+    let Some(methods) = rules.of(path) else {
+        tracing::error!(path, "the route has no right");
+        return Err(forbidden("access to this path is not permitted").into());
+    };
+    let lookup = if *method == Method::HEAD { &Method::GET } else { method };
+    let found = methods.iter().find(|(method, _)| method == lookup);
+    found.map(|(_, rule)| rule.clone()).ok_or_else(|| {
         let allowed: Vec<_> = methods.iter().map(|(method, _)| method.as_str()).collect();
         let header = HeaderValue::from_str(&allowed.join(",")).ok();
         let header = header.map(|value| Box::new((ALLOW, value)));
-        Refusal { problem: problem::not_allowed(method, uri), header }
+        Denial { problem: problem::not_allowed(method, uri), header }
     })
 }
 
@@ -275,83 +287,58 @@ fn is_audited(right: Right, method: &Method) -> bool {
     matches!(right, Right::Operate | Right::Administer) && !is_safe(method)
 }
 
-fn deed(act: String, parts: &Parts) -> Deed {
-    let address = address(parts).map(|address| address.to_string());
-    Deed { act, target: parts.uri.path().to_owned(), address }
-}
-
-/// From where a request comes.
-pub(super) fn address(parts: &Parts) -> Option<IpAddr> {
-    let peer = parts.extensions.get::<ConnectInfo<SocketAddr>>();
-    peer.map(|peer| peer.0.ip().to_canonical())
+fn audit_entry(action: String, parts: &Parts) -> AuditEntry {
+    let address = client_address(parts).map(|address| address.to_string());
+    AuditEntry { action, target: parts.uri.path().to_owned(), address }
 }
 
 fn host(headers: &HeaderMap) -> Option<Authority> {
     headers.get(HOST)?.to_str().ok()?.parse().ok()
 }
 
-/// Whether a page of `origin` comes from `host`.
-fn is_of(origin: &str, host: &Authority) -> bool {
+/// Whether `origin` has the host and port `host`.
+fn has_host(origin: &str, host: &Authority) -> bool {
     let origin: Option<Uri> = origin.parse().ok();
     let authority = origin.as_ref().and_then(Uri::authority);
     authority.is_some_and(|authority| authority == host)
 }
 
-/// What a request shows of its caller: nothing, something that cannot be, or a
-/// credential. A header goes before a cookie.
-fn credential(headers: &HeaderMap, encrypted: bool) -> Option<Option<Credential>> {
-    if let Some(shown) = headers.get(AUTHORIZATION) {
-        return Some(bearer(shown).map(Credential::bearer));
-    }
-    let cookies = headers.get_all(COOKIE).iter().filter_map(|cookies| cookies.to_str().ok());
-    let mut cookies = cookies.flat_map(|cookies| cookies.split(';'));
-    let name = login::cookie_name(encrypted);
-    let login = cookies.find_map(|cookie| cookie.trim().strip_prefix(name)?.strip_prefix('='));
-    login.map(|login| Some(Credential::login(login)))
-}
-
-/// The secret of `Authorization: Bearer SECRET`.
-fn bearer(shown: &HeaderValue) -> Option<&str> {
-    let (scheme, secret) = shown.to_str().ok()?.split_once(' ')?;
-    scheme.eq_ignore_ascii_case("bearer").then(|| secret.trim())
-}
-
 fn forbidden(detail: &str) -> Problem {
-    Problem::new(StatusCode::FORBIDDEN, "forbidden", "Not allowed", detail)
+    Problem::new(StatusCode::FORBIDDEN, "forbidden", "Forbidden", detail)
 }
 
-fn unauthenticated(detail: &str, error: Option<&str>) -> Refusal {
-    let problem =
-        Problem::new(StatusCode::UNAUTHORIZED, "unauthenticated", "Not authenticated", detail);
+fn unauthenticated(detail: &str, error: Option<&str>) -> Denial {
+    let problem = Problem::new(StatusCode::UNAUTHORIZED, "unauthenticated", "Unauthorized", detail);
     let error = error.map(|error| format!(", error=\"{error}\"")).unwrap_or_default();
     let challenge = HeaderValue::from_str(&format!("Bearer realm=\"offbd\"{error}")).ok();
-    Refusal { problem, header: challenge.map(|challenge| Box::new((WWW_AUTHENTICATE, challenge))) }
+    Denial { problem, header: challenge.map(|challenge| Box::new((WWW_AUTHENTICATE, challenge))) }
 }
 
-fn too_often(wait: Duration) -> Refusal {
+fn rate_limited(wait: Duration) -> Denial {
     let seconds = wait.as_secs() + 1;
-    let detail = format!("too many requests; come again in {seconds} s");
-    let problem = Problem::new(StatusCode::TOO_MANY_REQUESTS, "rate", "Too often", detail);
-    Refusal { problem, header: Some(Box::new((RETRY_AFTER, HeaderValue::from(seconds)))) }
+    let detail = format!("too many requests; retry after {seconds} s");
+    let title = "Rate limit exceeded";
+    let problem = Problem::new(StatusCode::TOO_MANY_REQUESTS, "rate", title, detail);
+    Denial { problem, header: Some(Box::new((RETRY_AFTER, HeaderValue::from(seconds)))) }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::http::routes::More;
+    use crate::http::routes::ExtraRoutes;
 
     #[test]
-    fn what_states_no_right_is_refused() {
+    fn a_route_without_a_right_is_denied() {
         let mut document = crate::http::openapi();
         let item = document.paths.paths.get_mut("/api/v1/assets").unwrap();
         item.get.as_mut().unwrap().extensions = None;
         let item = document.paths.paths.get_mut("/metrics").unwrap();
         item.get.as_mut().unwrap().extensions = None;
-        let rules = Rules::new(&document, &More::default());
+        let rules = RouteRules::new(&document, &ExtraRoutes::default());
         let uri = Uri::from_static("/");
         let found = |path, method: Method| {
             let rule = rule(&rules, Some(path), &method, &uri);
-            rule.map(|rule| rule.right).map_err(|refusal| refusal.problem.status)
+            rule.map(|rule| rule.right).map_err(|denial| denial.problem.status)
         };
         assert_eq!(found("/metrics", Method::GET), Err(403));
         assert_eq!(found("/nowhere", Method::GET), Err(403));
@@ -364,9 +351,9 @@ mod tests {
     #[test]
     fn an_origin_is_its_host_and_port() {
         let host: Authority = "rig.example:8087".parse().unwrap();
-        assert!(is_of("http://rig.example:8087", &host));
+        assert!(has_host("http://rig.example:8087", &host));
         for other in ["http://rig.example", "http://rig.example:80", "null", "", "http://x@y:1"] {
-            assert!(!is_of(other, &host), "{other}");
+            assert!(!has_host(other, &host), "{other}");
         }
     }
 }

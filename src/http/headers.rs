@@ -1,5 +1,5 @@
-//! What browsers are told: which pages may use the interface, and what a page
-//! of ours may do.
+//! Response headers for browsers: cross-origin access (CORS) and the content security
+//! policy.
 
 use std::time::Duration;
 
@@ -13,35 +13,36 @@ use axum::middleware::Next;
 use axum::response::Response;
 use tower_http::cors::CorsLayer;
 
-/// For answers that are no pages.
-const NOTHING: &str = "default-src 'none'; frame-ancestors 'none'";
+/// The content security policy of responses that are not pages.
+const DENY_ALL: &str = "default-src 'none'; frame-ancestors 'none'";
 
-/// For the description of the interface, whose program writes styles.
+/// The content security policy of the API description; its viewer sets inline styles.
 const DOCS: &str = "default-src 'self'; style-src 'self' 'unsafe-inline'; \
     img-src 'self' data:; object-src 'none'; base-uri 'none'; frame-ancestors 'none'";
 
-/// For how long a browser need not ask again whether a page may ask.
-const PREFLIGHT: Duration = Duration::from_secs(3600);
+/// How long a browser may cache the result of a preflight request.
+const PREFLIGHT_MAX_AGE: Duration = Duration::from_secs(3600);
 
-/// Tells browsers to be strict, where the answer does not say how.
+/// Sets the security headers that the response does not set itself.
 pub(super) async fn secure(request: Request, next: Next) -> Response {
     let path = request.uri().path();
-    let policy = if path.starts_with("/docs") { DOCS } else { NOTHING };
-    let of_interface = path.starts_with("/api/");
+    let policy = if path.starts_with("/docs") { DOCS } else { DENY_ALL };
+    let is_api = path.starts_with("/api/");
     let mut response = next.run(request).await;
-    let mut usual = |name: HeaderName, value: &'static str| {
+    let mut set_default = |name: HeaderName, value: &'static str| {
         response.headers_mut().entry(name).or_insert(HeaderValue::from_static(value));
     };
-    usual(CONTENT_SECURITY_POLICY, policy);
-    usual(X_CONTENT_TYPE_OPTIONS, "nosniff");
-    usual(REFERRER_POLICY, "no-referrer");
-    if of_interface {
-        usual(CACHE_CONTROL, "no-store");
+    set_default(CONTENT_SECURITY_POLICY, policy);
+    set_default(X_CONTENT_TYPE_OPTIONS, "nosniff");
+    set_default(REFERRER_POLICY, "no-referrer");
+    if is_api {
+        set_default(CACHE_CONTROL, "no-store");
     }
     response
 }
 
-/// Lets pages of `origins` use the interface with a token, never with a cookie.
+/// Allows cross-origin requests from pages of `origins`, with a bearer token but never
+/// with a cookie.
 pub(super) fn cors(origins: &[String]) -> CorsLayer {
     if origins.is_empty() {
         return CorsLayer::new();
@@ -62,5 +63,5 @@ pub(super) fn cors(origins: &[String]) -> CorsLayer {
             WWW_AUTHENTICATE,
             HeaderName::from_static("x-request-id"),
         ])
-        .max_age(PREFLIGHT)
+        .max_age(PREFLIGHT_MAX_AGE)
 }

@@ -1,5 +1,5 @@
-//! What is around every handler: request ids, spans, metrics, time limits,
-//! panics, headers for browsers, compression.
+//! Middleware around every handler: request ids, spans, metrics, timeouts, panic
+//! handling, security headers, compression.
 
 use std::any::Any;
 use std::time::{Duration, Instant};
@@ -20,19 +20,19 @@ use tower_http::trace::TraceLayer;
 use tracing::Span;
 use tracing::field::Empty;
 
-use super::{Policy, Problem, headers};
+use super::{AccessPolicy, Problem, headers};
 
-/// Longest time until an answer begins; only an import may take longer.
+/// Longest time until a response starts, except for an import.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(60);
 
-/// Longest time for an import, whose file is judged before the answer.
+/// Longest time until the response to an import, whose samples are evaluated before.
 const IMPORT_TIMEOUT: Duration = Duration::from_secs(900);
 
 const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 
-/// Puts it around, from the outside in. As one layer: of several, the router would
-/// put each into a box of its own, for every request.
-pub(super) fn around(router: Router, policy: &Policy) -> Router {
+/// Adds the middleware to `router`, listed from the outside in. As one layer, because
+/// axum boxes each layer separately for every request.
+pub(super) fn add(router: Router, policy: &AccessPolicy) -> Router {
     router.layer((
         SetRequestIdLayer::new(REQUEST_ID, MakeRequestUuid),
         PropagateRequestIdLayer::new(REQUEST_ID),
@@ -40,14 +40,14 @@ pub(super) fn around(router: Router, policy: &Policy) -> Router {
         CompressionLayer::new(),
         headers::cors(&policy.origins),
         from_fn(headers::secure),
-        from_fn(name_instance),
+        from_fn(set_instance),
         CatchPanicLayer::custom(panicked),
         from_fn(count),
         from_fn(limit_time),
     ))
 }
 
-/// The request's span, within the trace of its caller, if it has one.
+/// Creates the request's span, as a child of the caller's trace if there is one.
 fn span(request: &Request<Body>) -> Span {
     let id = request_id(request).unwrap_or_default();
     let (method, path) = (request.method(), request.uri().path());
@@ -59,8 +59,8 @@ fn span(request: &Request<Body>) -> Span {
     span
 }
 
-/// Says in the request's span which asset it is about.
-pub(super) fn about(asset: &str) {
+/// Records the asset name in the request's span.
+pub(super) fn record_asset(asset: &str) {
     Span::current().record("asset", asset);
 }
 
@@ -73,29 +73,29 @@ async fn limit_time(request: Request, next: Next) -> Response {
     let import = request.uri().path().ends_with("/sessions/import");
     let limit = if import { IMPORT_TIMEOUT } else { ANSWER_TIMEOUT };
     tokio::time::timeout(limit, next.run(request)).await.unwrap_or_else(|_| {
-        let detail = format!("no answer within {} s; ask again", limit.as_secs());
-        Problem::new(StatusCode::SERVICE_UNAVAILABLE, "slow", "No answer in time", detail)
+        let detail = format!("no response within {} s; retry the request", limit.as_secs());
+        Problem::new(StatusCode::SERVICE_UNAVAILABLE, "slow", "Request timed out", detail)
             .into_response()
     })
 }
 
-#[expect(clippy::disallowed_methods, reason = "how long an answer took is a metric")]
+#[expect(clippy::disallowed_methods, reason = "the response time is a metric")]
 async fn count(request: Request, next: Next) -> Response {
     let path = request.extensions().get::<MatchedPath>().map(|path| path.as_str().to_owned());
     let path = path.unwrap_or_else(|| "unmatched".to_owned());
-    let begun = Instant::now();
+    let started = Instant::now();
     let response = next.run(request).await;
     let status = response.status().as_str().to_owned();
     Span::current().record("status", &status);
     metrics::counter!("offbd_http_requests_total", "path" => path.clone(), "status" => status)
         .increment(1);
     metrics::histogram!("offbd_http_request_seconds", "path" => path)
-        .record(begun.elapsed().as_secs_f64());
+        .record(started.elapsed().as_secs_f64());
     response
 }
 
-/// Gives problems the id of their request.
-async fn name_instance(request: Request, next: Next) -> Response {
+/// Sets `instance` of a problem to the id of its request.
+async fn set_instance(request: Request, next: Next) -> Response {
     let id = request_id(&request);
     let mut response = next.run(request).await;
     match response.extensions_mut().remove::<Problem>() {
@@ -114,8 +114,8 @@ async fn name_instance(request: Request, next: Next) -> Response {
 fn panicked(panic: Box<dyn Any + Send>) -> Response {
     let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
     let text = text.or_else(|| panic.downcast_ref::<String>().cloned());
-    tracing::error!(panic = text.unwrap_or_default(), "a handler failed");
-    let detail = "the service failed on this request; the log has more under the request's id";
-    Problem::new(StatusCode::INTERNAL_SERVER_ERROR, "failed", "The service failed", detail)
+    tracing::error!(panic = text.unwrap_or_default(), "a request handler panicked");
+    let detail = "the request failed with an internal error; see the log for the request id";
+    Problem::new(StatusCode::INTERNAL_SERVER_ERROR, "failed", "Internal error", detail)
         .into_response()
 }

@@ -1,9 +1,8 @@
-//! `/metrics`: what the service counts and measures, in the text format of
-//! Prometheus.
+//! `/metrics`: the service's metrics in the text format of Prometheus.
 //!
-//! [`METRICS`] names all of them. Whatever has no labels, or labels that are
-//! known beforehand, is there with 0 from the start, so that a first event is
-//! seen as a rise. No label takes a value from outside.
+//! [`METRICS`] lists all of them. Series without labels, or with labels known in advance,
+//! are exported as 0 from the start, so that `rate()` sees the first event. No label
+//! has a value from outside the service.
 
 use std::sync::OnceLock;
 use std::time::Duration;
@@ -18,100 +17,100 @@ use tokio_util::sync::CancellationToken;
 use super::App;
 use offbd_core::vocabulary::{FaultCode, FaultStatus};
 
-/// What a metric is.
+/// The kind of a metric.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
-    /// It rises.
+enum MetricKind {
+    /// A value that only increases.
     Counter,
-    /// It rises and falls.
+    /// A value that may decrease.
     Gauge,
-    /// Seconds, by [`SECONDS`].
+    /// A histogram of durations, s, with the buckets [`SECONDS`].
     Seconds,
-    /// Numbers of things, by [`NUMBERS`].
-    Numbers,
+    /// A histogram of counts with the buckets [`SIZES`].
+    Sizes,
 }
 
-use Kind::{Counter, Gauge, Numbers, Seconds};
+use MetricKind::{Counter, Gauge, Seconds, Sizes};
 
-/// Every metric with its kind and its meaning.
-const METRICS: [(&str, Kind, &str); 28] = [
-    ("offbd_ack_seconds", Seconds, "From the arrival of a batch until it was durable"),
+/// Every metric with its kind and its description.
+const METRICS: &[(&str, MetricKind, &str)] = &[
+    ("offbd_ack_seconds", Seconds, "Time from the arrival of a batch to its acknowledgement"),
     ("offbd_bodies_bytes", Gauge, "Bytes of request bodies in memory"),
-    ("offbd_build_info", Gauge, "1, with the version"),
-    ("offbd_commit_failures_total", Counter, "Commits that failed; those of an outage come again"),
-    ("offbd_commit_seconds", Seconds, "What a commit took"),
-    ("offbd_commit_sets", Numbers, "Sets of changes in one commit"),
-    ("offbd_commits_total", Counter, "Commits"),
-    ("offbd_connections", Gauge, "Connections"),
-    ("offbd_connections_refused_total", Counter, "Connections closed at once: there were too many"),
+    ("offbd_build_info", Gauge, "Always 1; the label has the version"),
+    ("offbd_commit_failures_total", Counter, "Failed commits, including retried ones"),
+    ("offbd_commit_seconds", Seconds, "Duration of a commit"),
+    ("offbd_commit_sets", Sizes, "Write sets in a commit"),
+    ("offbd_commits_total", Counter, "Successful commits"),
+    ("offbd_connections", Gauge, "Open connections"),
+    ("offbd_connections_refused_total", Counter, "Connections refused at the limit"),
     ("offbd_engines", Gauge, "Engines in memory, by shard"),
-    ("offbd_fault_changes_total", Counter, "Changes of status that became durable, by fault code"),
-    ("offbd_http_request_seconds", Seconds, "Until the answer to a request began, by path"),
-    ("offbd_http_requests_total", Counter, "Requests answered, by path and status"),
-    ("offbd_ingest_stalled", Gauge, "Whether nothing is taken and nothing committed"),
-    ("offbd_journal_bytes", Gauge, "Bytes in the journal, not folded into the recordings yet"),
-    ("offbd_process_resident_bytes", Gauge, "Memory of the process (Linux)"),
-    ("offbd_refused_total", Counter, "Requests refused before they were looked at, by status"),
+    ("offbd_fault_changes_total", Counter, "Durable fault transitions, by code and status"),
+    ("offbd_http_request_seconds", Seconds, "Time until a response starts, by path"),
+    ("offbd_http_requests_total", Counter, "Requests, by path and status"),
+    ("offbd_ingest_stalled", Gauge, "1 if ingest is full and nothing is committed"),
+    ("offbd_journal_bytes", Gauge, "Bytes in the journal, not yet folded into the recordings"),
+    ("offbd_process_resident_bytes", Gauge, "Resident memory of the process (Linux)"),
+    ("offbd_refused_total", Counter, "Requests denied by the guard, by status"),
     ("offbd_samples_in_flight", Gauge, "Samples between arrival and commit"),
-    ("offbd_samples_in_flight_limit", Gauge, "How many there may be: limits.in_flight_samples"),
-    ("offbd_samples_total", Counter, "Samples, by what became of them"),
+    ("offbd_samples_in_flight_limit", Gauge, "Limit of these: limits.in_flight_samples"),
+    ("offbd_samples_total", Counter, "Samples, by outcome"),
     ("offbd_samples_unjudged_total", Counter, "Samples rejected or set aside, by reason"),
-    ("offbd_sessions_expired_total", Counter, "Sessions given up, by reason"),
-    ("offbd_shard_queue", Gauge, "Requests that wait for a shard"),
-    ("offbd_store_writable", Gauge, "Whether the last commit went through"),
+    ("offbd_sessions_expired_total", Counter, "Sessions deleted by retention, by reason"),
+    ("offbd_shard_queue", Gauge, "Commands in the queue of a shard"),
+    ("offbd_store_writable", Gauge, "1 if the last commit succeeded"),
     ("offbd_streams", Gauge, "Open WebSockets"),
-    ("offbd_streams_cut_off_total", Counter, "WebSockets whose client did not read"),
-    ("offbd_turned_away_total", Counter, "Batches and requests told to come again, by full queue"),
-    ("offbd_writer_queue", Gauge, "Sets of changes that wait for the writer"),
+    ("offbd_streams_cut_off_total", Counter, "WebSockets closed because the client was too slow"),
+    ("offbd_turned_away_total", Counter, "Batches and requests answered with 429, by full queue"),
+    ("offbd_writer_queue", Gauge, "Write sets in the queue of the writer"),
 ];
 
-/// Bounds of durations, s: a commit to a good disk takes 1 ms, an answer is
-/// given up after 60 s.
-const SECONDS: [f64; 14] =
-    [0.001, 0.0025, 0.005, 0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 60.0];
+/// Bucket bounds of durations, s: a commit to a fast disk takes 1 ms, a request times out
+/// after 60 s.
+const SECONDS: &[f64] =
+    &[0.001, 0.0025, 0.005, 0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 60.0];
 
-/// Bounds of numbers, up to the most sets in a commit.
-const NUMBERS: [f64; 10] = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 256.0, 512.0];
+/// Bucket bounds of counts, up to the most write sets in a commit.
+const SIZES: &[f64] = &[1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 256.0, 512.0];
 
 static RECORDER: OnceLock<Option<PrometheusHandle>> = OnceLock::new();
 
-/// How often what was measured is folded into the metrics. Between, every single
-/// duration is kept: a moment's worth, whether anybody asks for the metrics or not.
-const UPKEEP: Duration = Duration::from_secs(5);
+/// Interval at which recorded durations are aggregated into histograms. Until then every
+/// single duration is in memory, whether or not the metrics are scraped.
+const UPKEEP_INTERVAL: Duration = Duration::from_secs(5);
 
-/// Begins to gather metrics, once for the process.
+/// Installs the metrics recorder, once per process.
 pub fn gather_metrics() {
     RECORDER.get_or_init(|| match install() {
         Ok(handle) => {
             describe();
-            begin_with_nothing();
+            initialize_series();
             Some(handle)
         }
         Err(error) => {
-            tracing::error!(%error, "no metrics");
+            tracing::error!(%error, "cannot install the metrics recorder");
             None
         }
     });
 }
 
-/// Folds what was measured into the metrics until the server stops.
+/// Aggregates recorded durations periodically until the server stops.
 pub async fn keep_metrics(closing: CancellationToken) {
     let Some(Some(handle)) = RECORDER.get() else { return };
     loop {
         tokio::select! {
             () = closing.cancelled() => return,
-            () = tokio::time::sleep(UPKEEP) => handle.run_upkeep(),
+            () = tokio::time::sleep(UPKEEP_INTERVAL) => handle.run_upkeep(),
         }
     }
 }
 
 fn install() -> Result<PrometheusHandle, BuildError> {
     let mut builder = PrometheusBuilder::new();
-    for (name, kind, _) in METRICS {
+    for &(name, ref kind, _) in METRICS {
         let name = Matcher::Full(name.to_owned());
         builder = match kind {
-            Seconds => builder.set_buckets_for_metric(name, &SECONDS)?,
-            Numbers => builder.set_buckets_for_metric(name, &NUMBERS)?,
+            Seconds => builder.set_buckets_for_metric(name, SECONDS)?,
+            Sizes => builder.set_buckets_for_metric(name, SIZES)?,
             Counter | Gauge => builder,
         };
     }
@@ -119,17 +118,17 @@ fn install() -> Result<PrometheusHandle, BuildError> {
 }
 
 fn describe() {
-    for (name, kind, meaning) in METRICS {
+    for &(name, ref kind, meaning) in METRICS {
         match kind {
             Counter => describe_counter!(name, meaning),
             Gauge => describe_gauge!(name, meaning),
-            Seconds | Numbers => describe_histogram!(name, meaning),
+            Seconds | Sizes => describe_histogram!(name, meaning),
         }
     }
 }
 
-/// Every series that is known before anything happens.
-fn begin_with_nothing() {
+/// Sets every series that is known in advance to its initial value.
+fn initialize_series() {
     let zero = |name: &'static str, label: &'static str, values: &[&'static str]| {
         values.iter().for_each(|value| counter!(name, label => *value).absolute(0));
     };
@@ -160,11 +159,11 @@ fn begin_with_nothing() {
     gauge!("offbd_build_info", "version" => env!("CARGO_PKG_VERSION")).set(1.0);
 }
 
-/// Metrics in the text format of Prometheus.
+/// Returns the metrics in the text format of Prometheus.
 #[utoipa::path(get, path = "/metrics", tag = "operation",
     responses((status = 200, body = String, content_type = "text/plain")))]
 pub(super) async fn metrics(State(app): State<App>) -> impl IntoResponse {
-    look(&app);
+    sample_gauges(&app);
     let handle = RECORDER.get().and_then(Option::as_ref);
     let text = handle.map(|handle| {
         handle.run_upkeep();
@@ -173,9 +172,9 @@ pub(super) async fn metrics(State(app): State<App>) -> impl IntoResponse {
     ([(CONTENT_TYPE, "text/plain; version=0.0.4")], text.unwrap_or_default())
 }
 
-/// What is looked up when somebody asks.
+/// Sets the gauges that are read on each scrape.
 #[expect(clippy::cast_precision_loss, reason = "no queue is as long as 2^52")]
-fn look(app: &App) {
+fn sample_gauges(app: &App) {
     let load = app.service.load();
     gauge!("offbd_samples_in_flight").set(load.samples as f64);
     gauge!("offbd_samples_in_flight_limit").set(app.service.limits().in_flight_samples as f64);
@@ -189,7 +188,7 @@ fn look(app: &App) {
     }
 }
 
-/// What the process holds in memory; none where the system does not say so.
+/// Returns the resident memory of the process, bytes; `None` except on Linux.
 fn resident_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;

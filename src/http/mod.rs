@@ -1,11 +1,17 @@
 //! The HTTP and WebSocket interface.
 //!
-//! Handlers read a request, ask the service, and show the answer; what goes
-//! wrong becomes a `problem+json` in one place. Knows no SQL and no engine.
+//! A handler parses a request, calls [`Service`] and serializes the result. Errors
+//! become `application/problem+json` in one place, `problem`. Contains no SQL and no
+//! access to the engine.
+//!
+//! A request passes, from the outside in: `layers` (request id, span, timeout),
+//! `guard` (authentication, authorization, rate limits, audit log), and the handler.
+//! The routes and the right that each requires are listed in `api`.
 
 mod assets;
 mod body;
 mod calibrations;
+mod credential;
 mod description;
 mod drive_cycles;
 mod events;
@@ -31,6 +37,7 @@ mod tokens;
 mod trace_parent;
 mod traces;
 
+use std::str::FromStr;
 use std::sync::Arc;
 
 use axum::Router;
@@ -43,30 +50,31 @@ use utoipa::openapi::OpenApi as Document;
 use utoipa_axum::routes;
 use utoipa_swagger_ui::SwaggerUi;
 
-pub use body::Budget;
-pub use guard::Policy;
+pub use body::BodyBudget;
+pub use guard::AccessPolicy;
 pub use metrics::{gather_metrics, keep_metrics};
 pub use problem::Problem;
 pub(crate) use rates::subscriber;
-pub use rates::{Rate, Rates};
-pub use routes::More;
+pub use rates::{RateLimit, RateLimits};
+pub use routes::ExtraRoutes;
 
 use self::guard::Guard;
-use self::routes::{Guarded, Rules};
+use self::routes::{GuardedRouter, RouteRules};
 use crate::service::Service;
 use crate::service::access::Right;
+use offbd_core::vocabulary::{Invalid, UnknownWord};
 
-/// What the handlers share.
+/// The state shared by all handlers.
 #[derive(Clone)]
 pub struct App {
     pub service: Service,
-    /// Bytes of request bodies in memory.
-    pub budget: Budget,
-    /// Who is let in.
-    pub policy: Arc<Policy>,
-    /// Cancelled when the server stops: long answers end then.
+    /// Limits the bytes of request bodies in memory.
+    pub budget: BodyBudget,
+    /// Authentication, permitted origins and rate limits.
+    pub policy: Arc<AccessPolicy>,
+    /// Cancelled when the server stops; long-lived responses end then.
     pub closing: CancellationToken,
-    /// Whether this is the demo, which mounts more than the interface.
+    /// Whether this is the demo, which adds routes of its own.
     pub demo: bool,
 }
 
@@ -82,13 +90,13 @@ impl FromRef<App> for Service {
         title = "offbd",
         description = "Off-board diagnostics with a digital twin for ball-on-plate rigs. \
             A rig streams commands and measured positions; faults come out. \
-            Lengths in metres, angles in radians, times in seconds on the device's clock; \
-            moments of the service in RFC 3339.",
+            Lengths are in metres, angles in radians, sample times in seconds on the device's \
+            clock. Timestamps of the service are RFC 3339.",
     ),
     components(schemas(crate::wire::service::EventView)),
     tags(
         (name = "assets", description = "The registry of rigs"),
-        (name = "telemetry", description = "Samples in"),
+        (name = "telemetry", description = "Ingest of samples"),
         (name = "faults", description = "Fault memory"),
         (name = "sessions", description = "Recordings"),
         (name = "access", description = "Tokens, logins, the audit log"),
@@ -97,66 +105,82 @@ impl FromRef<App> for Service {
 )]
 struct Api;
 
-/// Items on a page: `limit` is brought into 1 to `MAX`.
+/// Most items on a page; `limit` is clamped to 1..=`MAX_PAGE`.
 const MAX_PAGE: u32 = 500;
+
+/// Items on a page without a `limit`.
 const DEFAULT_PAGE: u32 = 50;
 
 fn page_limit(limit: Option<u32>) -> u32 {
     limit.unwrap_or(DEFAULT_PAGE).clamp(1, MAX_PAGE)
 }
 
-/// A query string; what is wrong with it becomes a problem.
+/// Parses the query parameter `name`, which has a closed set of values.
+///
+/// # Errors
+/// A [`Problem`] with the parameter and its permitted values.
+fn query_word<T: FromStr<Err = UnknownWord>>(
+    name: &str,
+    word: Option<&str>,
+) -> Result<Option<T>, Problem> {
+    let word = word.map(str::parse).transpose();
+    Ok(word.map_err(|error: UnknownWord| Invalid::new(name, error.to_string()))?)
+}
+
+/// The query parameters; rejected with a [`Problem`] if invalid.
 #[derive(FromRequestParts)]
 #[from_request(via(axum::extract::Query), rejection(Problem))]
 struct Query<T>(T);
 
-/// What is named in the path; what is wrong with it becomes a problem.
+/// The path parameters; rejected with a [`Problem`] if invalid.
 #[derive(FromRequestParts)]
 #[from_request(via(axum::extract::Path), rejection(Problem))]
 struct Path<T>(T);
 
-/// The asset in the path, noted in the request's span.
-struct Asset(String);
+/// The asset name in the path, recorded in the request's span.
+struct AssetPath(String);
 
-impl<S: Send + Sync> FromRequestParts<S> for Asset {
+impl<S: Send + Sync> FromRequestParts<S> for AssetPath {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
         let Path::<String>(asset) = Path::from_request_parts(parts, state).await?;
-        layers::about(&asset);
+        layers::record_asset(&asset);
         Ok(Self(asset))
     }
 }
 
-/// The same with what of it is meant: a fault code, the id of a calibration.
-struct OfAsset(String, String);
+/// The asset name and a second path parameter: a fault code or a calibration id.
+struct AssetItemPath(String, String);
 
-impl<S: Send + Sync> FromRequestParts<S> for OfAsset {
+impl<S: Send + Sync> FromRequestParts<S> for AssetItemPath {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
-        let Path((asset, of)): Path<(String, String)> =
+        let Path((asset, item)): Path<(String, String)> =
             Path::from_request_parts(parts, state).await?;
-        layers::about(&asset);
-        Ok(Self(asset, of))
+        layers::record_asset(&asset);
+        Ok(Self(asset, item))
     }
 }
 
-/// Which page of a list.
+/// The page of a list.
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
 #[into_params(parameter_in = Query)]
 struct PageQuery {
-    /// `next` of the page before.
+    /// `next` of the previous page.
     cursor: Option<String>,
-    /// Items on the page, brought into 1 to 500; 50 without it.
+    /// Items per page, clamped to 1 to 500; 50 by default.
     #[param(format = Int64, maximum = 4_294_967_295_u32)]
     limit: Option<u32>,
 }
 
-/// Every operation, with the right that it takes.
-fn api() -> Guarded {
-    use Right::{Administer, Conduct, Feed, Known, Open, Operate, Read, ReadAsset};
-    let v1 = Guarded::new(Document::default())
+/// Returns every operation with the right that it requires.
+fn api() -> GuardedRouter {
+    use Right::{
+        Administer, Authenticated, ControlSessions, Operate, Public, Read, ReadAsset, SendTelemetry,
+    };
+    let v1 = GuardedRouter::new(Document::default())
         .routes(Read, routes!(assets::list))
         .routes(Operate, routes!(assets::create))
         .routes(ReadAsset, routes!(assets::get))
@@ -166,7 +190,7 @@ fn api() -> Guarded {
         .routes(Read, routes!(assets::trends))
         .routes(ReadAsset, routes!(drive_cycles::get))
         .routes(Read, routes!(assets::fleet))
-        .routes(Feed, routes!(telemetry::post))
+        .routes(SendTelemetry, routes!(telemetry::post))
         .routes(ReadAsset, routes!(stream::stream))
         .routes(ReadAsset, routes!(faults::of_asset))
         .routes(ReadAsset, routes!(faults::get))
@@ -176,12 +200,12 @@ fn api() -> Guarded {
         .routes(Read, routes!(faults::history))
         .routes(Read, routes!(faults::of_fleet))
         .routes(ReadAsset, routes!(events::events))
-        .routes(Conduct, routes!(sessions::open))
+        .routes(ControlSessions, routes!(sessions::open))
         .routes(Operate, routes!(sessions::import))
         .routes(ReadAsset, routes!(sessions::list))
         .routes(ReadAsset, routes!(sessions::get))
         .routes(Administer, routes!(sessions::delete))
-        .routes(Conduct, routes!(sessions::end))
+        .routes(ControlSessions, routes!(sessions::end))
         .routes(Read, routes!(sessions::telemetry))
         .routes(ReadAsset, routes!(sessions::faults))
         .routes(Read, routes!(traces::trace))
@@ -197,36 +221,37 @@ fn api() -> Guarded {
         .routes(Administer, routes!(tokens::list, tokens::create))
         .routes(Administer, routes!(tokens::get, tokens::revoke))
         .routes(Administer, routes!(tokens::audit))
-        .routes(Open, routes!(login::log_in))
-        .routes(Known, routes!(login::get, login::log_out));
-    Guarded::new(Api::openapi())
-        .routes(Open, routes!(operations::healthz))
-        .routes(Open, routes!(operations::readyz))
+        .routes(Public, routes!(login::log_in))
+        .routes(Authenticated, routes!(login::get, login::log_out));
+    GuardedRouter::new(Api::openapi())
+        .routes(Public, routes!(operations::healthz))
+        .routes(Public, routes!(operations::readyz))
         .routes(Read, routes!(metrics::metrics))
         .nest("/api/v1", v1)
 }
 
-/// What else the router has; it is the same for everyone, everywhere.
+/// Public paths that are not operations: the API description and its viewer.
 const OPEN_PAGES: [&str; 5] =
     ["/openapi.yaml", "/openapi.json", "/docs", "/docs/", "/docs/{*rest}"];
 
-/// The description of the interface.
+/// Returns the OpenAPI document.
 #[must_use]
 pub fn openapi() -> Document {
     description::complete(api().split().1)
 }
 
-/// The description of the interface as YAML, as committed in `openapi.yaml`.
+/// Returns the OpenAPI document as YAML, as committed in `openapi.yaml`.
 #[must_use]
 pub fn openapi_yaml() -> String {
     openapi().to_yaml().unwrap_or_else(|error| format!("# {error}\n"))
 }
 
-/// The whole of what is served, with `more` beside the interface.
-pub fn router(app: App, more: More) -> Router {
+/// Returns the router of everything that is served: the API, its description, the
+/// dashboard, and `extra`.
+pub fn router(app: App, extra: ExtraRoutes) -> Router {
     let (router, document) = api().split();
     let document = description::complete(document);
-    let mut rules = Rules::new(&document, &more);
+    let mut rules = RouteRules::new(&document, &extra);
     OPEN_PAGES.iter().for_each(|path| rules.open(path));
     let yaml: Arc<str> = document.to_yaml().unwrap_or_default().into();
     let policy = app.policy.clone();
@@ -237,7 +262,7 @@ pub fn router(app: App, more: More) -> Router {
         .fallback(page::serve)
         .method_not_allowed_fallback(problem::method_not_allowed)
         .with_state(app)
-        .merge(more.router)
+        .merge(extra.router)
         .layer(axum::middleware::from_fn_with_state(guard, guard::guard));
-    layers::around(router, &policy)
+    layers::add(router, &policy)
 }

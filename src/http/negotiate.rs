@@ -1,11 +1,11 @@
-//! What a client wants most, by the weights in `Accept` and `Accept-Encoding`
+//! Content negotiation by the quality values in `Accept` and `Accept-Encoding`
 //! (RFC 9110, section 12.4.2).
 //!
-//! By hand, for one function serves both headers; the libraries there are parse
-//! one of them each.
+//! Written by hand because one function serves both headers; available crates parse only
+//! one of them.
 
-/// The weight, 0 to 1, that the list `header` gives to `word`; `None` if it does
-/// not name it. A weight that is not a number counts as 0.
+/// Returns the weight, 0 to 1, of `word` in the list `header`; `None` if the list does not
+/// contain it. A weight that is not a number counts as 0.
 pub(super) fn weight(header: &str, word: &str) -> Option<f64> {
     header.split(',').find_map(|element| {
         let mut parts = element.split(';').map(str::trim);
@@ -16,7 +16,8 @@ pub(super) fn weight(header: &str, word: &str) -> Option<f64> {
     })
 }
 
-/// The weight of the first of `words` that `header` names: the most specific first.
+/// Returns the weight of the first of `words` that `header` contains, 0 if it contains
+/// none. List the most specific word first.
 pub(super) fn weight_of_first(header: &str, words: &[&str]) -> f64 {
     words.iter().find_map(|word| weight(header, word)).unwrap_or(0.0)
 }
@@ -39,8 +40,8 @@ mod tests {
     }
 
     #[test]
-    fn a_weight_that_is_not_a_number_is_none_at_all() {
+    fn a_weight_that_is_not_a_number_counts_as_0() {
         assert_eq!(weight("br;q=much", "br"), Some(0.0));
-        assert_eq!(weight("brotli", "br"), None, "another word that begins like it");
+        assert_eq!(weight("brotli", "br"), None, "a longer word with the same prefix");
     }
 }

@@ -1,4 +1,4 @@
-//! Health, readiness and the description of the interface.
+//! Health, readiness and the OpenAPI document.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use utoipa::ToSchema;
 
 use super::{App, Problem};
 
-/// That the process lives.
+/// The health of the process.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct HealthView {
     /// Always `ok`.
@@ -25,20 +25,20 @@ const fn healthy(demo: bool) -> Json<HealthView> {
     Json(HealthView { status: "ok", version: env!("CARGO_PKG_VERSION"), demo })
 }
 
-/// Whether the process lives.
+/// Liveness: succeeds while the process runs.
 #[utoipa::path(get, path = "/healthz", tag = "operation",
     responses((status = 200, body = HealthView)))]
 pub(super) async fn healthz(State(app): State<App>) -> Json<HealthView> {
     healthy(app.demo)
 }
 
-/// Whether it can take telemetry now; if not, why.
+/// Readiness: succeeds if the service can accept telemetry now.
 #[utoipa::path(get, path = "/readyz", tag = "operation",
     responses((status = 200, body = HealthView),
-        (status = 503, body = Problem, description = "`detail` says why")))]
+        (status = 503, body = Problem, description = "Not ready; `detail` has the reason")))]
 pub(super) async fn readyz(State(app): State<App>) -> Result<Json<HealthView>, Problem> {
     if app.closing.is_cancelled() {
-        let what = "the service is closing";
+        let what = "the service is shutting down";
         return Err(crate::service::ServiceError::Unavailable { what }.into());
     }
     app.service.ready().await?;

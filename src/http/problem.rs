@@ -1,5 +1,5 @@
-//! What goes wrong, as RFC 9457 says it. The one place that knows which status
-//! an error has.
+//! Error responses as problem details (RFC 9457). The only place that maps an error to
+//! its status.
 
 use axum::extract::rejection::{PathRejection, QueryRejection};
 use axum::http::header::{CONTENT_TYPE, HeaderValue, RETRY_AFTER, WWW_AUTHENTICATE};
@@ -15,28 +15,28 @@ use offbd_core::vocabulary::Invalid;
 /// An error (`application/problem+json`, RFC 9457).
 #[derive(Clone, Debug, Serialize, ToSchema)]
 pub struct Problem {
-    /// Names the kind of problem.
+    /// URI of the problem type.
     #[serde(rename = "type")]
     pub kind: Box<str>,
-    /// The kind in words.
+    /// Summary of the problem type.
     #[schema(value_type = String)]
     pub title: &'static str,
     pub status: u16,
-    /// This one in words.
+    /// Explanation of this occurrence.
     pub detail: Box<str>,
-    /// JSON pointer (RFC 6901) of the offending element of the body.
+    /// JSON pointer (RFC 6901) to the invalid element of the body.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pointer: Option<Box<str>>,
-    /// Name of the offending query parameter.
+    /// Name of the invalid query parameter.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub parameter: Option<Box<str>>,
-    /// The request's id, as in `x-request-id` and in the log.
+    /// Id of the request, as in `x-request-id` and in the log.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub instance: Option<Box<str>>,
 }
 
 impl Problem {
-    /// A problem of the kind `slug`, in words `title`.
+    /// Returns a problem of the type `urn:offbd:problem:{slug}`.
     pub fn new(
         status: StatusCode,
         slug: &str,
@@ -96,56 +96,59 @@ impl From<ServiceError> for Problem {
             E::UnknownToken { .. } => missing("unknown-token", "No such token"),
             E::UnknownCode(_) => missing("unknown-code", "No such fault code"),
             E::NoRecording { .. } => missing("no-recording", "No recording"),
-            E::AssetExists { .. } => conflict("asset-exists", "The asset is there already"),
-            E::TokenExists { .. } => conflict("token-exists", "The name is taken"),
-            E::SessionExists { .. } => conflict("session-exists", "The session is there already"),
-            E::SessionEnded { .. } => conflict("session-ended", "The session has ended"),
-            E::NothingToAcknowledge { .. } => conflict("nothing-to-acknowledge", "No occurrence"),
+            E::AssetExists { .. } => conflict("asset-exists", "Asset already exists"),
+            E::TokenExists { .. } => conflict("token-exists", "Token name already in use"),
+            E::SessionExists { .. } => conflict("session-exists", "Session already exists"),
+            E::SessionEnded { .. } => conflict("session-ended", "Session has ended"),
+            E::NothingToAcknowledge { .. } => {
+                conflict("nothing-to-acknowledge", "No current occurrence")
+            }
             E::NoDriveCycle(_) => conflict("no-drive-cycle", "No drive cycle"),
-            E::NotDone { .. } => conflict("not-done", "Not done yet"),
-            E::NothingOffered { .. } => conflict("nothing-offered", "Nothing is offered"),
-            E::AlreadyLearnt { .. } => conflict("already-learnt", "The rig is learnt already"),
+            E::NotDone { .. } => conflict("not-done", "Calibration not done"),
+            E::NothingOffered { .. } => conflict("nothing-offered", "No calibration offered"),
+            E::AlreadyLearnt { .. } => conflict("already-learnt", "Rig already calibrated"),
             E::Invalid(invalid) => Self::from(invalid),
             E::Batch(batch) => Self::from(batch),
-            E::TooMany { .. } => new(StatusCode::PAYLOAD_TOO_LARGE, "too-large", "Too large"),
+            E::TooMany { .. } => {
+                new(StatusCode::PAYLOAD_TOO_LARGE, "too-large", "Content too large")
+            }
             E::RegistryFull { .. } => {
-                new(StatusCode::INSUFFICIENT_STORAGE, "registry-full", "The registry is full")
+                new(StatusCode::INSUFFICIENT_STORAGE, "registry-full", "Asset limit reached")
             }
-            E::Busy { .. } => new(StatusCode::TOO_MANY_REQUESTS, "busy", "Too much at once"),
+            E::Busy { .. } => new(StatusCode::TOO_MANY_REQUESTS, "busy", "Too many requests"),
             E::Unavailable { .. } | E::Outage { .. } | E::Stalled { .. } => {
-                new(StatusCode::SERVICE_UNAVAILABLE, "unavailable", "Not available now")
+                new(StatusCode::SERVICE_UNAVAILABLE, "unavailable", "Service unavailable")
             }
-            E::NotStored { .. } => {
-                new(StatusCode::SERVICE_UNAVAILABLE, "store", "The store failed")
-            }
+            E::NotStored { .. } => new(StatusCode::SERVICE_UNAVAILABLE, "store", "Store error"),
             E::Store(_) => {
                 tracing::error!(error = detail, "the store failed");
-                let detail = "the store failed; what was not acknowledged was not taken";
-                Self::new(StatusCode::SERVICE_UNAVAILABLE, "store", "The store failed", detail)
+                let detail = "the store failed; unacknowledged data were not stored, retry";
+                Self::new(StatusCode::SERVICE_UNAVAILABLE, "store", "Store error", detail)
             }
             E::Corrupt { .. } => {
                 tracing::error!(error = detail, "the store is corrupt");
-                new(StatusCode::INTERNAL_SERVER_ERROR, "corrupt", "The store cannot be read")
+                new(StatusCode::INTERNAL_SERVER_ERROR, "corrupt", "Corrupt data in the store")
             }
         }
     }
 }
 
 impl From<Invalid> for Problem {
-    /// `?name` stands for a query parameter, a pointer for an element of the
-    /// body, the empty one for the whole of a body that cannot be read.
+    /// The element `?name` is a query parameter (400), a JSON pointer is an element of
+    /// the body (422), and the empty pointer is a malformed body (400).
     fn from(invalid: Invalid) -> Self {
         let detail = invalid.to_string();
         if let Some(parameter) = invalid.element.strip_prefix('?') {
-            let problem = Self::new(StatusCode::BAD_REQUEST, "query", "Bad query", detail);
+            let title = "Invalid query parameter";
+            let problem = Self::new(StatusCode::BAD_REQUEST, "query", title, detail);
             return Self { parameter: Some(parameter.into()), ..problem };
         }
         if invalid.element.is_empty() {
-            let title = "The body cannot be read";
+            let title = "Malformed body";
             let detail = invalid.reason;
             return Self::new(StatusCode::BAD_REQUEST, "malformed", title, detail).at("");
         }
-        let title = "An element cannot be";
+        let title = "Invalid element";
         Self::new(StatusCode::UNPROCESSABLE_ENTITY, "invalid", title, detail).at(&invalid.element)
     }
 }
@@ -155,11 +158,11 @@ impl From<BatchError> for Problem {
         let detail = error.to_string();
         match error {
             BatchError::Malformed { pointer, .. } => {
-                let title = "The body cannot be read";
+                let title = "Malformed body";
                 Self::new(StatusCode::BAD_REQUEST, "malformed", title, detail).at(&pointer)
             }
             BatchError::TooMany { .. } => {
-                Self::new(StatusCode::PAYLOAD_TOO_LARGE, "too-large", "Too large", detail)
+                Self::new(StatusCode::PAYLOAD_TOO_LARGE, "too-large", "Content too large", detail)
             }
         }
     }
@@ -167,18 +170,19 @@ impl From<BatchError> for Problem {
 
 impl From<QueryRejection> for Problem {
     fn from(rejection: QueryRejection) -> Self {
-        Self::new(StatusCode::BAD_REQUEST, "query", "Bad query", rejection.body_text())
+        let title = "Invalid query parameter";
+        Self::new(StatusCode::BAD_REQUEST, "query", title, rejection.body_text())
     }
 }
 
 impl From<PathRejection> for Problem {
     fn from(rejection: PathRejection) -> Self {
-        Self::new(StatusCode::BAD_REQUEST, "path", "Bad path", rejection.body_text())
+        Self::new(StatusCode::BAD_REQUEST, "path", "Invalid path", rejection.body_text())
     }
 }
 
 pub(super) async fn not_found(uri: Uri) -> Problem {
-    let detail = format!("nothing is at {}; /openapi.yaml says what there is", uri.path());
+    let detail = format!("no route matches {}; see /openapi.yaml", uri.path());
     Problem::new(StatusCode::NOT_FOUND, "unknown-path", "No such path", detail)
 }
 
@@ -187,6 +191,6 @@ pub(super) async fn method_not_allowed(method: Method, uri: Uri) -> Problem {
 }
 
 pub(super) fn not_allowed(method: &Method, uri: &Uri) -> Problem {
-    let detail = format!("{} does not take {method}", uri.path());
+    let detail = format!("{} does not support {method}", uri.path());
     Problem::new(StatusCode::METHOD_NOT_ALLOWED, "method", "Method not allowed", detail)
 }

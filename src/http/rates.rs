@@ -1,4 +1,4 @@
-//! How often a token, or an address without one, may ask.
+//! Rate limits per token, and per client address for requests without a valid token.
 
 use std::hash::Hash;
 use std::net::{IpAddr, Ipv6Addr};
@@ -11,56 +11,60 @@ use governor::state::keyed::HashMapStateStore;
 use governor::state::{InMemoryState, NotKeyed};
 use governor::{NotUntil, Quota, RateLimiter};
 
-/// Tokens, and addresses, whose rate is kept at a time, each some 50 bytes. Those that
-/// could ask at their full rate again are dropped first; if there are as many
-/// that could not, all share the rate of one.
+/// Limit of tokens, and of addresses, that are tracked at a time, some 50 bytes each. Keys
+/// whose burst is full again are removed first; if all keys are in use, further ones
+/// share a single limit.
 const MAX_KEYS: usize = 16_384;
 
-/// Time between two looks through a full table.
-const SWEEP_EVERY: Duration = Duration::from_secs(1);
+/// Shortest interval between two sweeps of a full table.
+const SWEEP_INTERVAL: Duration = Duration::from_secs(1);
 
-/// Seconds' worth of requests that may come at once.
+/// Size of the burst, in seconds at the permitted rate.
 const BURST_S: u32 = 10;
 
-type Instant = <MonotonicClock as Clock>::Instant;
+type MonotonicInstant = <MonotonicClock as Clock>::Instant;
 
-/// Requests a second.
+/// A rate limit, requests per second.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Rate(pub NonZeroU32);
+pub struct RateLimit(pub NonZeroU32);
 
-/// Keeps a rate for each key.
+/// A rate limiter for each key.
 struct Limiter<K: Hash + Eq + Clone> {
-    each: RateLimiter<K, HashMapStateStore<K>, MonotonicClock>,
-    rest: RateLimiter<NotKeyed, InMemoryState, MonotonicClock>,
-    /// When a full table was last looked through.
-    swept: Mutex<Option<Instant>>,
+    keyed: RateLimiter<K, HashMapStateStore<K>, MonotonicClock>,
+    /// Shared by the keys that do not fit the table.
+    shared: RateLimiter<NotKeyed, InMemoryState, MonotonicClock>,
+    /// When the full table was last swept.
+    swept: Mutex<Option<MonotonicInstant>>,
 }
 
 impl<K: Hash + Eq + Clone> Limiter<K> {
-    fn new(rate: Rate) -> Self {
+    fn new(rate: RateLimit) -> Self {
         let burst = rate.0.saturating_mul(NonZeroU32::MIN.saturating_add(BURST_S - 1));
         let quota = Quota::per_second(rate.0).allow_burst(burst);
-        let each = RateLimiter::hashmap_with_clock(quota, MonotonicClock);
-        let rest = RateLimiter::direct_with_clock(quota, MonotonicClock);
-        Self { each, rest, swept: Mutex::default() }
+        let keyed = RateLimiter::hashmap_with_clock(quota, MonotonicClock);
+        let shared = RateLimiter::direct_with_clock(quota, MonotonicClock);
+        Self { keyed, shared, swept: Mutex::default() }
     }
 
-    /// Counts a request; if it comes too early, for how long to wait.
-    fn take(&self, key: &K) -> Result<(), Duration> {
-        if self.each.len() >= MAX_KEYS && self.sweep_is_due(MonotonicClock.now()) {
-            self.each.retain_recent();
+    /// Counts a request.
+    ///
+    /// # Errors
+    /// The time to wait if the limit is exceeded.
+    fn check(&self, key: &K) -> Result<(), Duration> {
+        if self.keyed.len() >= MAX_KEYS && self.sweep_is_due(MonotonicClock.now()) {
+            self.keyed.retain_recent();
         }
-        let wait = |until: NotUntil<Instant>| until.wait_time_from(MonotonicClock.now());
-        if self.each.len() >= MAX_KEYS {
-            return self.rest.check().map_err(wait);
+        let wait = |until: NotUntil<MonotonicInstant>| until.wait_time_from(MonotonicClock.now());
+        if self.keyed.len() >= MAX_KEYS {
+            return self.shared.check().map_err(wait);
         }
-        self.each.check_key(key).map_err(wait)
+        self.keyed.check_key(key).map_err(wait)
     }
 
-    /// Whether a full table is to be looked through at `now`: not at every request.
-    fn sweep_is_due(&self, now: Instant) -> bool {
+    /// Whether a full table is to be swept at `now`.
+    fn sweep_is_due(&self, now: MonotonicInstant) -> bool {
         let mut swept = self.swept.lock().unwrap_or_else(PoisonError::into_inner);
-        let is_due = swept.is_none_or(|last| now.duration_since(last) >= SWEEP_EVERY);
+        let is_due = swept.is_none_or(|last| now.duration_since(last) >= SWEEP_INTERVAL);
         if is_due {
             *swept = Some(now);
         }
@@ -68,30 +72,30 @@ impl<K: Hash + Eq + Clone> Limiter<K> {
     }
 }
 
-/// The rates of tokens and of addresses.
-pub struct Rates {
+/// The rate limits of tokens and of client addresses.
+pub struct RateLimits {
     tokens: Limiter<String>,
     addresses: Limiter<IpAddr>,
 }
 
-impl Rates {
-    /// Rates for a token, and for an address without one.
+impl RateLimits {
+    /// Returns limiters with the rate of a token, and that of an address without a token.
     #[must_use]
-    pub fn new(token: Rate, address: Rate) -> Self {
+    pub fn new(token: RateLimit, address: RateLimit) -> Self {
         Self { tokens: Limiter::new(token), addresses: Limiter::new(address) }
     }
 
-    pub(super) fn take_token(&self, id: &str) -> Result<(), Duration> {
-        self.tokens.take(&id.to_owned())
+    pub(super) fn check_token(&self, id: &str) -> Result<(), Duration> {
+        self.tokens.check(&id.to_owned())
     }
 
-    pub(super) fn take_address(&self, address: IpAddr) -> Result<(), Duration> {
-        self.addresses.take(&subscriber(address))
+    pub(super) fn check_address(&self, address: IpAddr) -> Result<(), Duration> {
+        self.addresses.check(&subscriber(address))
     }
 }
 
-/// Who is behind an address: of IPv6 the first 64 bits, as a subscriber has all
-/// addresses that begin with them (RFC 6177).
+/// Returns the address that identifies a subscriber: for IPv6 the first 64 bits, because
+/// a subscriber is assigned at least a /64 (RFC 6177).
 pub(crate) fn subscriber(address: IpAddr) -> IpAddr {
     match address.to_canonical() {
         IpAddr::V6(address) => {
@@ -105,40 +109,40 @@ pub(crate) fn subscriber(address: IpAddr) -> IpAddr {
 mod tests {
     use super::*;
 
-    const ONE: Rate = Rate(NonZeroU32::MIN);
+    const ONE: RateLimit = RateLimit(NonZeroU32::MIN);
 
     #[test]
     fn after_its_burst_a_key_waits_and_others_do_not() {
         let limiter = Limiter::new(ONE);
         for _ in 0..BURST_S {
-            limiter.take(&1).unwrap();
+            limiter.check(&1).unwrap();
         }
-        let wait = limiter.take(&1).unwrap_err();
+        let wait = limiter.check(&1).unwrap_err();
         assert!(wait > Duration::ZERO && wait <= Duration::from_secs(1), "{wait:?}");
-        limiter.take(&2).unwrap();
+        limiter.check(&2).unwrap();
     }
 
     #[test]
-    fn a_full_table_is_looked_through_once_a_second() {
+    fn a_full_table_is_swept_once_a_second() {
         let limiter = Limiter::<u8>::new(ONE);
         let now = MonotonicClock.now();
         assert!(limiter.sweep_is_due(now));
-        assert!(!limiter.sweep_is_due(now + SWEEP_EVERY / 2));
-        assert!(limiter.sweep_is_due(now + SWEEP_EVERY));
+        assert!(!limiter.sweep_is_due(now + SWEEP_INTERVAL / 2));
+        assert!(limiter.sweep_is_due(now + SWEEP_INTERVAL));
     }
 
     #[test]
-    fn what_is_kept_has_an_end() {
+    fn the_table_is_bounded() {
         let limiter = Limiter::new(ONE);
-        // However slow the machine is, most have asked just now and stay.
-        let taken = (0..2 * MAX_KEYS).filter(|key| limiter.take(key).is_ok()).count();
-        assert!(limiter.each.len() <= MAX_KEYS);
+        // Even on a slow machine most keys are recent and stay in the table.
+        let accepted = (0..2 * MAX_KEYS).filter(|key| limiter.check(key).is_ok()).count();
+        assert!(limiter.keyed.len() <= MAX_KEYS);
         let shared = MAX_KEYS + BURST_S as usize;
-        assert!((shared..2 * MAX_KEYS).contains(&taken), "{taken}");
+        assert!((shared..2 * MAX_KEYS).contains(&accepted), "{accepted}");
     }
 
     #[test]
-    fn an_address_is_that_of_its_subscriber() {
+    fn addresses_of_one_subscriber_share_a_limit() {
         let same =
             |a: &str, b: &str| subscriber(a.parse().unwrap()) == subscriber(b.parse().unwrap());
         assert!(same("2001:db8:1:2::1", "2001:db8:1:2:ffff::9"));

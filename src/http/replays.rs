@@ -1,4 +1,4 @@
-//! Judging a session again.
+//! `/sessions/{id}/replays` and `/replays`: evaluating a recorded session again.
 
 use axum::Json;
 use axum::body::Body;
@@ -7,18 +7,18 @@ use axum::http::StatusCode;
 use axum::http::header::LOCATION;
 use axum::response::IntoResponse;
 
-use super::sessions::small;
+use super::sessions::small_json;
 use super::{App, Path, Problem};
 use crate::service::Service;
 use crate::wire::service::{ReplaySettingsView, ReplayView};
 
-/// Judges a session again in the background, with other settings if the body
-/// has some. Nothing of the session or of the fault memory changes.
+/// Starts a background job that evaluates a recorded session again, with other settings
+/// if the body has any. The session and the fault memory are not changed.
 #[utoipa::path(post, path = "/sessions/{id}/replays", tag = "sessions",
     operation_id = "replay_session",
     params(("id" = String, description = "The service's id of the session")),
     request_body = Option<ReplaySettingsView>,
-    responses((status = 202, body = ReplayView, description = "`Location` says where to look"),
+    responses((status = 202, body = ReplayView, description = "`Location` has the replay's URL"),
         (status = 400, body = Problem), (status = 404, body = Problem),
         (status = 422, body = Problem), (status = 429, body = Problem)))]
 pub(super) async fn create(
@@ -26,14 +26,14 @@ pub(super) async fn create(
     Path(id): Path<String>,
     body: Body,
 ) -> Result<impl IntoResponse, Problem> {
-    let settings: ReplaySettingsView = small(&app, body).await?;
+    let settings: ReplaySettingsView = small_json(&app, body).await?;
     let replay = app.service.replay(&id, settings).await?;
     let location = format!("/api/v1/replays/{}", replay.id);
     Ok((StatusCode::ACCEPTED, [(LOCATION, location)], Json(replay)))
 }
 
-/// Where a replay stands; once done: its verdict, the hash, and how it differs
-/// from the recorded verdict.
+/// Returns the progress of a replay and, once it is done, its verdict, the verdict's hash,
+/// and the differences from the recorded verdict.
 #[utoipa::path(get, path = "/replays/{id}", tag = "sessions", operation_id = "get_replay",
     params(("id" = String, description = "Id of the replay")),
     responses((status = 200, body = ReplayView), (status = 404, body = Problem)))]

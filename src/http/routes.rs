@@ -1,8 +1,8 @@
-//! Routes, each with the right that it takes.
+//! Routes, each with the right that it requires.
 //!
-//! The right is an argument of [`Guarded::routes`], and stands in the
-//! interface's description as `x-right`; from there the guard knows it. A path
-//! without one is refused.
+//! The right is an argument of [`GuardedRouter::routes`] and is written to the OpenAPI
+//! document as `x-right`, from which [`RouteRules`] are built for the guard. A path
+//! without a right is denied to every caller.
 
 use std::collections::BTreeMap;
 
@@ -18,36 +18,36 @@ use utoipa::openapi::{ComponentsBuilder, OpenApi as Document};
 use utoipa_axum::router::{OpenApiRouter, UtoipaMethodRouter};
 
 use super::App;
-use super::login::COOKIE;
+use super::credential::COOKIE;
 use crate::service::access::Right;
 
-/// The name of the right in the description of an operation.
+/// The OpenAPI extension that holds the right of an operation.
 const X_RIGHT: &str = "x-right";
 
-/// The routes of the interface; there is no way in without a right.
-pub(super) struct Guarded {
+/// The routes of the API; none can be added without a right.
+pub(super) struct GuardedRouter {
     router: OpenApiRouter<App>,
 }
 
-impl Guarded {
+impl GuardedRouter {
     pub(super) fn new(document: Document) -> Self {
         Self { router: OpenApiRouter::with_openapi(document) }
     }
 
-    /// Adds routes, all of which take `right`.
+    /// Adds routes, all of which require `right`.
     pub(super) fn routes(self, right: Right, mut routes: UtoipaMethodRouter<App>) -> Self {
         for operation in routes.1.paths.values_mut().flat_map(operations_mut) {
-            state(operation, right);
+            set_right(operation, right);
         }
         Self { router: self.router.routes(routes) }
     }
 
-    /// Puts `other` below `path`.
+    /// Adds the routes of `other` below `path`.
     pub(super) fn nest(self, path: &str, other: Self) -> Self {
         Self { router: self.router.nest(path, other.router) }
     }
 
-    /// The router, and the description with the ways to show a token.
+    /// Returns the router, and the OpenAPI document with the security schemes.
     pub(super) fn split(self) -> (Router<App>, Document) {
         let (router, mut document) = self.router.split_for_parts();
         let bearer =
@@ -62,37 +62,38 @@ impl Guarded {
     }
 }
 
-/// Writes into an operation what it takes.
-fn state(operation: &mut Operation, right: Right) {
-    let stated = ExtensionsBuilder::new().add(X_RIGHT, right.as_str()).build();
-    operation.extensions.get_or_insert_default().merge(stated);
-    if right != Right::Open {
+/// Writes the right and the security schemes of an operation to its description.
+fn set_right(operation: &mut Operation, right: Right) {
+    let extension = ExtensionsBuilder::new().add(X_RIGHT, right.as_str()).build();
+    operation.extensions.get_or_insert_default().merge(extension);
+    if right != Right::Public {
         let scheme = |name: &str| SecurityRequirement::new::<_, [&str; 0], &str>(name, []);
         operation.security = Some(vec![scheme("token"), scheme("login")]);
     }
 }
 
-/// The operations of a path that the interface has.
+/// Returns the operations of a path.
 pub(super) fn operations_mut(item: &mut PathItem) -> impl Iterator<Item = &mut Operation> {
     [&mut item.get, &mut item.put, &mut item.post, &mut item.delete].into_iter().flatten()
 }
 
-/// What an operation takes, and what it is called in the audit log.
+/// The right that an operation requires, and its name in the audit log.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Rule {
+pub(super) struct RouteRule {
     pub(super) right: Right,
-    pub(super) act: String,
+    pub(super) action: String,
 }
 
-/// Routes beside the interface, each with the right that it takes.
+/// Routes that a caller of [`router`](super::router) adds to the API, each with the
+/// right that it requires.
 #[derive(Clone, Default)]
-pub struct More {
+pub struct ExtraRoutes {
     pub(super) router: Router,
     rules: Vec<(&'static str, Method, Right)>,
 }
 
-impl More {
-    /// Adds a route for `method`, which takes `right`.
+impl ExtraRoutes {
+    /// Adds a route for `method` that requires `right`.
     #[must_use]
     pub fn route(
         self,
@@ -107,15 +108,15 @@ impl More {
     }
 }
 
-/// What every operation takes.
+/// The rules of all routes, by path and method.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Rules {
-    paths: BTreeMap<String, Vec<(Method, Rule)>>,
+pub(super) struct RouteRules {
+    paths: BTreeMap<String, Vec<(Method, RouteRule)>>,
 }
 
-impl Rules {
-    /// The rules that `document` states, and those of `more`.
-    pub(super) fn new(document: &Document, more: &More) -> Self {
+impl RouteRules {
+    /// Collects the rules in `document` and those of `extra`.
+    pub(super) fn new(document: &Document, extra: &ExtraRoutes) -> Self {
         let mut rules = Self::default();
         for (path, item) in &document.paths.paths {
             let methods = [
@@ -130,30 +131,34 @@ impl Rules {
                 }
             }
         }
-        for (path, method, right) in &more.rules {
-            rules.add(path, method.clone(), Rule { right: *right, act: (*path).to_owned() });
+        for (path, method, right) in &extra.rules {
+            rules.add(
+                path,
+                method.clone(),
+                RouteRule { right: *right, action: (*path).to_owned() },
+            );
         }
         rules
     }
 
-    /// Opens `path` to everyone.
+    /// Makes `GET` of `path` public.
     pub(super) fn open(&mut self, path: &str) {
-        self.add(path, Method::GET, Rule { right: Right::Open, act: path.to_owned() });
+        self.add(path, Method::GET, RouteRule { right: Right::Public, action: path.to_owned() });
     }
 
-    fn add(&mut self, path: &str, method: Method, rule: Rule) {
+    fn add(&mut self, path: &str, method: Method, rule: RouteRule) {
         self.paths.entry(path.to_owned()).or_default().push((method, rule));
     }
 
-    /// The methods of `path` with what they take; none if nothing is stated.
-    pub(super) fn of(&self, path: &str) -> Option<&[(Method, Rule)]> {
+    /// Returns the methods of `path` with their rules; `None` if it has no rule.
+    pub(super) fn of(&self, path: &str) -> Option<&[(Method, RouteRule)]> {
         self.paths.get(path).map(Vec::as_slice)
     }
 }
 
-/// The rule that the description of an operation states.
-fn rule(operation: &Operation) -> Option<Rule> {
+/// Returns the rule in the description of an operation; `None` without a valid right.
+fn rule(operation: &Operation) -> Option<RouteRule> {
     let word = operation.extensions.as_ref()?.get(X_RIGHT)?.as_str()?;
     let right = Right::ALL.into_iter().find(|right| right.as_str() == word)?;
-    Some(Rule { right, act: operation.operation_id.clone().unwrap_or_default() })
+    Some(RouteRule { right, action: operation.operation_id.clone().unwrap_or_default() })
 }

@@ -1,4 +1,4 @@
-//! `/sessions`: recordings.
+//! `/sessions`: opening, ending, importing, listing and exporting sessions.
 
 use std::cmp::Ordering;
 
@@ -12,42 +12,42 @@ use futures_util::{Stream, StreamExt};
 use serde::Deserialize;
 
 use super::negotiate::weight_of_first;
-use super::telemetry::Format;
-use super::{App, Asset, PageQuery, Path, Problem, Query, body, page_limit};
-use crate::service::{Recording, Service, ServiceError};
+use super::telemetry::TelemetryFormat;
+use super::{App, AssetPath, PageQuery, Path, Problem, Query, body, page_limit, query_word};
+use crate::service::{RecordingReader, Service, ServiceError};
 use crate::wire::service::{ImportView, Page, SessionView};
 use crate::wire::session_csv::{write_header, write_rows};
 use crate::wire::telemetry::sample_view;
 use crate::wire::verdict::FaultView;
+use crate::wire::words::SessionState;
 use offbd_core::vocabulary::{Invalid, Sample};
 
-/// Most rows of an imported file; a longer one is refused.
+/// Row limit of an imported file.
 const MAX_IMPORT_ROWS: usize = 2_000_000;
 
-/// How many times as long as a batch a file may take to arrive.
-const FILE_TIMEOUT: u32 = 10;
+/// Time limit to receive an imported file, in multiples of the limit of a batch.
+const IMPORT_TIMEOUT_FACTOR: u32 = 10;
 
-/// Longest body that opens a session, bytes.
+/// Size limit of a small JSON body, bytes.
 const MAX_SMALL_BYTES: usize = 16 << 10;
 
 #[derive(Debug, Default, Deserialize, utoipa::ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct NewSession {
-    /// 1 to 200 bytes; without it the moment of opening is the name.
+    /// Name of the session, 1 to 200 bytes; the time of opening by default.
     name: Option<String>,
 }
 
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
 #[into_params(parameter_in = Query)]
 pub(super) struct SessionsQuery {
-    /// Sessions of this asset alone.
+    /// Only sessions of this asset.
     asset: Option<String>,
-    /// `open` or `ended`.
-    #[param(pattern = "^(open|ended)$")]
+    #[param(value_type = Option<SessionState>)]
     state: Option<String>,
-    /// `next` of the page before.
+    /// `next` of the previous page.
     cursor: Option<String>,
-    /// Items on the page, brought into 1 to 500; 50 without it.
+    /// Items per page, clamped to 1 to 500; 50 by default.
     #[param(format = Int64, maximum = 4_294_967_295_u32)]
     limit: Option<u32>,
 }
@@ -55,7 +55,7 @@ pub(super) struct SessionsQuery {
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
 #[into_params(parameter_in = Query)]
 pub(super) struct ImportQuery {
-    /// Name of the session; without it the moment of the import.
+    /// Name of the session; the time of the import by default.
     name: Option<String>,
 }
 
@@ -63,30 +63,30 @@ fn created<T: serde::Serialize>(id: &str, view: T) -> impl IntoResponse + use<T>
     (StatusCode::CREATED, [(LOCATION, format!("/api/v1/sessions/{id}"))], Json(view))
 }
 
-/// Opens a session; the asset's open one is ended. The body may be empty.
+/// Opens a session and ends the asset's open session. The body may be empty.
 #[utoipa::path(post, path = "/assets/{asset}/sessions", tag = "sessions",
     operation_id = "open_session", params(("asset" = String, description = "Name of the asset")),
     request_body = Option<NewSession>,
     responses((status = 201, body = SessionView), (status = 404, body = Problem),
-        (status = 409, body = Problem, description = "The name is taken"),
+        (status = 409, body = Problem, description = "A session of this name exists"),
         (status = 422, body = Problem)))]
 pub(super) async fn open(
     State(app): State<App>,
-    Asset(asset): Asset,
+    AssetPath(asset): AssetPath,
     body: Body,
 ) -> Result<impl IntoResponse, Problem> {
-    let wanted: NewSession = small(&app, body).await?;
-    let session = app.service.open_session(&asset, wanted.name).await?;
+    let request: NewSession = small_json(&app, body).await?;
+    let session = app.service.open_session(&asset, request.name).await?;
     Ok(created(&session.id.clone(), session))
 }
 
-/// A small JSON body, its default if it is empty or null.
-pub(super) async fn small<T: Default + serde::de::DeserializeOwned>(
+/// Reads a small JSON body; returns the default value if it is empty or `null`.
+pub(super) async fn small_json<T: Default + serde::de::DeserializeOwned>(
     app: &App,
     body: Body,
 ) -> Result<T, Problem> {
-    let time = app.service.limits().body_timeout;
-    let read = body::read(body, MAX_SMALL_BYTES, time, &app.budget).await?;
+    let timeout = app.service.limits().body_timeout;
+    let read = body::read(body, MAX_SMALL_BYTES, timeout, &app.budget).await?;
     if read.bytes.trim_ascii().is_empty() {
         return Ok(T::default());
     }
@@ -100,9 +100,9 @@ pub(super) async fn small<T: Default + serde::de::DeserializeOwned>(
     Ok(parsed.unwrap_or_default())
 }
 
-/// Imports a recorded CSV as a session, by the path that live samples take. It
-/// is ended with the file's end; the asset's open session is ended before, and
-/// live telemetry of the asset has to wait.
+/// Imports a recorded CSV file as a session. Its samples are processed like live
+/// telemetry. The asset's open session is ended first, and the new session is ended after
+/// the last row; live telemetry of the asset gets 429 until then.
 #[utoipa::path(post, path = "/assets/{asset}/sessions/import", tag = "sessions",
     operation_id = "import_session",
     params(("asset" = String, description = "Name of the asset"), ImportQuery),
@@ -112,23 +112,24 @@ pub(super) async fn small<T: Default + serde::de::DeserializeOwned>(
         (status = 413, body = Problem), (status = 415, body = Problem)))]
 pub(super) async fn import(
     State(app): State<App>,
-    Asset(asset): Asset,
+    AssetPath(asset): AssetPath,
     Query(query): Query<ImportQuery>,
     headers: HeaderMap,
     body: Body,
 ) -> Result<impl IntoResponse, Problem> {
-    if headers.contains_key(CONTENT_TYPE) && Format::of(&headers)? != Format::Csv {
-        let detail = "a recording is imported as text/csv";
+    if headers.contains_key(CONTENT_TYPE) && TelemetryFormat::of(&headers)? != TelemetryFormat::Csv
+    {
+        let detail = "the media type of an imported recording must be text/csv";
         let status = StatusCode::UNSUPPORTED_MEDIA_TYPE;
-        return Err(Problem::new(status, "media-type", "No such format", detail));
+        return Err(Problem::new(status, "media-type", "Unsupported media type", detail));
     }
     app.service.asset(&asset).await?;
     let limits = app.service.limits();
-    let time = limits.body_timeout * FILE_TIMEOUT;
-    let read = body::read(body, limits.import_bytes, time, &app.budget).await?;
-    let parse = move || Format::Csv.parse(&read.bytes, MAX_IMPORT_ROWS);
+    let timeout = limits.body_timeout * IMPORT_TIMEOUT_FACTOR;
+    let read = body::read(body, limits.import_bytes, timeout, &app.budget).await?;
+    let parse = move || TelemetryFormat::Csv.parse(&read.bytes, MAX_IMPORT_ROWS);
     let parsed = tokio::task::spawn_blocking(parse).await;
-    let failed = |_| ServiceError::Unavailable { what: "reading the file has failed" };
+    let failed = |_| ServiceError::Unavailable { what: "parsing the file failed" };
     let recording = parsed.map_err(failed)??;
     let imported = app.service.import(&asset, query.name, recording).await?;
     Ok(created(&imported.session.id.clone(), imported))
@@ -142,15 +143,12 @@ pub(super) async fn list(
     State(service): State<Service>,
     Query(query): Query<SessionsQuery>,
 ) -> Result<Json<Page<SessionView>>, Problem> {
-    if let Some(state) = query.state.as_deref().filter(|s| !matches!(*s, "open" | "ended")) {
-        let reason = format!("`{state}` is not one of open, ended");
-        return Err(Invalid::new("?state", reason).into());
-    }
+    let state = query_word("?state", query.state.as_deref())?;
     let limit = page_limit(query.limit);
-    Ok(Json(service.sessions(query.asset, query.state, query.cursor.as_deref(), limit).await?))
+    Ok(Json(service.sessions(query.asset, state, query.cursor.as_deref(), limit).await?))
 }
 
-/// A session, with its verdict once it has ended.
+/// Returns a session, with its verdict if it has ended.
 #[utoipa::path(get, path = "/sessions/{id}", tag = "sessions", operation_id = "get_session",
     params(("id" = String, description = "The service's id of the session")),
     responses((status = 200, body = SessionView), (status = 404, body = Problem)))]
@@ -161,10 +159,10 @@ pub(super) async fn get(
     Ok(Json(service.session(&id).await?))
 }
 
-/// Deletes a session with its recording and transitions; the asset's fault
-/// memory keeps what the session left in it. It is hidden at once; the answer comes
-/// when all of it is gone. A deletion that takes longer than an answer may is answered
-/// with 503 and goes on; until its end a new session of the name gets 409.
+/// Deletes a session with its recording and transitions. The asset's fault memory is
+/// not changed. The session is hidden immediately; the response is sent when all its data
+/// are deleted. A deletion that takes longer than 60 s is answered with 503 and continues.
+/// Opening a session of the same name before it has finished gets 409.
 #[utoipa::path(delete, path = "/sessions/{id}", tag = "sessions",
     operation_id = "delete_session",
     params(("id" = String, description = "The service's id of the session")),
@@ -177,8 +175,8 @@ pub(super) async fn delete(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Ends a session: what waits is judged, the verdict is settled. One that has
-/// ended stays as it is.
+/// Ends a session: evaluates the samples still in the reordering buffer and finalizes the
+/// verdict. Has no effect on a session that has ended.
 #[utoipa::path(post, path = "/sessions/{id}/end", tag = "sessions", operation_id = "end_session",
     params(("id" = String, description = "The service's id of the session")),
     responses((status = 200, body = SessionView), (status = 404, body = Problem)))]
@@ -189,7 +187,7 @@ pub(super) async fn end(
     Ok(Json(service.end_session(&id).await?))
 }
 
-/// The recording, in order of arrival: CSV, or JSON rows if `Accept` asks for
+/// Returns the recording in order of arrival: as CSV, or as JSON rows if `Accept` prefers
 /// `application/json`.
 #[utoipa::path(get, path = "/sessions/{id}/telemetry", tag = "sessions",
     operation_id = "get_recording",
@@ -202,17 +200,17 @@ pub(super) async fn telemetry(
     Path(id): Path<String>,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let form = Form::wanted(&headers, Form::Csv)?;
+    let format = RecordingFormat::negotiate(&headers, RecordingFormat::Csv)?;
     let (session, recording) = service.recording(&id).await?;
-    let file = format!("attachment; filename=\"{id}.{}\"", form.suffix());
+    let file = format!("attachment; filename=\"{id}.{}\"", format.suffix());
     let with_seq = session.last_seq.is_some();
-    let start = form.start(&session.name, with_seq);
-    let body = Body::from_stream(parts(recording, form, start, with_seq));
-    Ok(([(CONTENT_TYPE, form.kind().to_owned()), (CONTENT_DISPOSITION, file)], body)
+    let start = format.start(&session.name, with_seq);
+    let body = Body::from_stream(parts(recording, format, start, with_seq));
+    Ok(([(CONTENT_TYPE, format.kind().to_owned()), (CONTENT_DISPOSITION, file)], body)
         .into_response())
 }
 
-/// The changes of status in a session, in order.
+/// Lists the fault transitions of a session, in order.
 #[utoipa::path(get, path = "/sessions/{id}/faults", tag = "sessions",
     operation_id = "list_session_faults",
     params(("id" = String, description = "The service's id of the session"), PageQuery),
@@ -227,17 +225,20 @@ pub(super) async fn faults(
     Ok(Json(service.session_faults(&id, page.cursor.as_deref(), limit).await?))
 }
 
-/// How a recording is written.
+/// The format of an exported recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Form {
+pub(super) enum RecordingFormat {
     Csv,
     Json,
 }
 
-impl Form {
-    /// The form that `Accept` asks for, `usual` if any will do.
-    pub(super) fn wanted(headers: &HeaderMap, usual: Self) -> Result<Self, Problem> {
-        let Some(accept) = headers.get(ACCEPT) else { return Ok(usual) };
+impl RecordingFormat {
+    /// Returns the format that `Accept` prefers; `default` if it prefers neither.
+    ///
+    /// # Errors
+    /// 406 if it accepts neither.
+    pub(super) fn negotiate(headers: &HeaderMap, default: Self) -> Result<Self, Problem> {
+        let Some(accept) = headers.get(ACCEPT) else { return Ok(default) };
         let accept = accept.to_str().unwrap_or_default();
         let json = weight_of_first(accept, &["application/json", "application/*", "*/*"]);
         let csv = weight_of_first(accept, &["text/csv", "text/*", "*/*"]);
@@ -245,11 +246,11 @@ impl Form {
             return Ok(match json.total_cmp(&csv) {
                 Ordering::Greater => Self::Json,
                 Ordering::Less => Self::Csv,
-                Ordering::Equal => usual,
+                Ordering::Equal => default,
             });
         }
-        let detail = format!("`{accept}` is not there; there are text/csv and application/json");
-        Err(Problem::new(StatusCode::NOT_ACCEPTABLE, "not-acceptable", "No such format", detail))
+        let detail = format!("`{accept}` is not available; use text/csv or application/json");
+        Err(Problem::new(StatusCode::NOT_ACCEPTABLE, "not-acceptable", "Not acceptable", detail))
     }
 
     pub(super) const fn kind(self) -> &'static str {
@@ -269,7 +270,7 @@ impl Form {
     fn start(self, session: &str, with_seq: bool) -> Vec<u8> {
         let mut bytes = Vec::new();
         match self {
-            // A vector takes everything that is written to it.
+            // Writing to a vector cannot fail.
             Self::Csv => drop(write_header(&mut bytes, with_seq)),
             Self::Json => {
                 let name = serde_json::to_string(session).unwrap_or_default();
@@ -279,7 +280,7 @@ impl Form {
         bytes
     }
 
-    /// The rows; in JSON with a comma before each but the very first.
+    /// Serializes rows; in JSON with a comma before each, except the `first` row of all.
     fn rows(self, samples: &[Sample], with_seq: bool, first: bool) -> Vec<u8> {
         let mut bytes = Vec::new();
         match self {
@@ -304,39 +305,41 @@ impl Form {
     }
 }
 
-/// What of a recording has been sent.
-enum Part {
+/// The part of an export to send next.
+enum ExportPart {
     Start(Vec<u8>),
-    First,
-    More,
+    FirstRows,
+    Rows,
     Done,
 }
 
-/// The recording chunk by chunk. If the store fails in the middle, the answer
-/// breaks off rather than look complete.
+/// Streams the recording chunk by chunk. If the store fails, the response is aborted, so
+/// that the client does not take it for complete.
 fn parts(
-    recording: Recording,
-    form: Form,
+    recording: RecordingReader,
+    format: RecordingFormat,
     start: Vec<u8>,
     with_seq: bool,
 ) -> impl Stream<Item = Result<Bytes, std::io::Error>> + Send {
-    let begin = (recording, Part::Start(start));
+    let begin = (recording, ExportPart::Start(start));
     let parts = futures_util::stream::unfold(begin, move |(mut recording, part)| async move {
         let first = match part {
-            Part::Start(start) => return Some((Ok(start.into()), (recording, Part::First))),
-            Part::First => true,
-            Part::More => false,
-            Part::Done => return None,
+            ExportPart::Start(start) => {
+                return Some((Ok(start.into()), (recording, ExportPart::FirstRows)));
+            }
+            ExportPart::FirstRows => true,
+            ExportPart::Rows => false,
+            ExportPart::Done => return None,
         };
         match recording.next().await {
             Ok(Some(samples)) => {
-                let rows = form.rows(&samples, with_seq, first);
-                Some((Ok(rows.into()), (recording, Part::More)))
+                let rows = format.rows(&samples, with_seq, first);
+                Some((Ok(rows.into()), (recording, ExportPart::Rows)))
             }
-            Ok(None) => Some((Ok(Bytes::from_static(form.end())), (recording, Part::Done))),
-            Err(error) => Some((Err(std::io::Error::other(error)), (recording, Part::Done))),
+            Ok(None) => Some((Ok(Bytes::from_static(format.end())), (recording, ExportPart::Done))),
+            Err(error) => Some((Err(std::io::Error::other(error)), (recording, ExportPart::Done))),
         }
     });
-    // Compression asks once more after the end.
+    // The compression layer polls once more after the end.
     parts.fuse()
 }

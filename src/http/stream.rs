@@ -1,9 +1,9 @@
-//! `/assets/{asset}/stream`: batches up; acknowledgements, faults and state
-//! down, over one WebSocket.
+//! `/assets/{asset}/stream`: a WebSocket that receives batches and sends
+//! acknowledgements, fault transitions and states.
 //!
-//! Back-pressure is not reading: while `MAX_PENDING` batches wait for their
-//! commit, or one waits for room, the next frame stays in the socket; answers
-//! and all else go on. A client that does not read its answers is cut off.
+//! Backpressure: no frame is read while [`MAX_PENDING`] batches wait for their commit or
+//! one waits for its queue; sending continues. A client that does not read is
+//! disconnected.
 
 use std::collections::VecDeque;
 use std::pin::Pin;
@@ -21,70 +21,71 @@ use serde_json::json;
 use tokio::time::{Instant, Interval, MissedTickBehavior, interval_at, timeout};
 use utoipa::ToSchema;
 
-use super::telemetry::Format;
-use super::{App, Asset, Problem, Query};
+use super::telemetry::TelemetryFormat;
+use super::{App, AssetPath, Problem, Query};
 use crate::service::access::{Caller, Right};
-use crate::service::{Event, EventFeed, Pending, Service, ServiceError};
+use crate::service::{Event, EventFeed, PendingBatch, Service, ServiceError};
 use crate::wire::telemetry::AckView;
 use crate::wire::trace::TraceView;
 use offbd_core::vocabulary::Invalid;
 
-/// Batches whose acknowledgement is owed; then nothing more is read.
+/// Limit of batches with a pending acknowledgement; at the limit reading pauses.
 const MAX_PENDING: usize = 32;
 
-/// Rows of those batches, from which on nothing more is read either. An answer may
-/// list every row of its batch, some 100 bytes each, so a stream's answers are kept
-/// to some 5 MB, or to one batch.
+/// Limit of the rows of these batches; at the limit reading pauses. An acknowledgement may
+/// list every row of its batch, some 100 bytes each, so those of a stream take at most
+/// some 5 MB, or one batch.
 const MAX_PENDING_ROWS: usize = 50_000;
 
-/// Longest time to send one frame; a client slower than that is cut off.
+/// Longest time to send one frame; a slower client is disconnected.
 const SEND_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Bytes that may wait in the socket's buffer for a client that reads slowly.
+/// Limit of bytes in the socket's write buffer.
 const MAX_WRITE_BUFFER: usize = 1 << 20;
 
-/// Silence after which the client is asked whether it is there; after twice as
-/// long it is cut off.
-const PING_EVERY: Duration = Duration::from_secs(20);
+/// Interval between pings; a client that sends nothing for two intervals is disconnected.
+const PING_INTERVAL: Duration = Duration::from_secs(20);
 
-/// Most states a second; a higher wish gets this many.
+/// Highest rate of states, Hz; a higher requested rate is clamped.
 const MAX_STATE_HZ: f64 = 50.0;
 
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
 #[into_params(parameter_in = Query)]
 pub(super) struct StreamQuery {
-    /// States per second wanted, at most 50; none without it.
+    /// Rate of `state` frames, Hz, at most 50; no such frames by default.
     #[param(exclusive_minimum = 0)]
     state: Option<f64>,
-    /// Fault events after the one with this id come first; 0 for all.
+    /// Sends the stored fault events after this id first; 0 for all.
     after: Option<i64>,
-    /// Whether each state brings a `trace` of what was judged since the last.
+    /// Whether each `state` frame has a `trace` of the samples evaluated since the
+    /// previous one.
     #[serde(default)]
     trace: bool,
 }
 
-/// Frames from the service: `ack` answers a batch (with its `id`), `error` says
-/// why one was not taken, `fault` is a fault line, `state` where the twin is,
-/// with a `trace` if that was asked for.
+/// A frame from the service: `ack` acknowledges a batch (with its `id`), `error` rejects
+/// one, `fault` is a fault line, `state` is the state of the twin, with a `trace` if
+/// requested.
 #[derive(Debug, ToSchema)]
 #[allow(dead_code, reason = "describes the frames for the interface's document")]
 pub(super) struct FrameView {
     /// `ack`, `error`, `fault` or `state`.
     #[schema(rename = "type")]
     kind: String,
-    /// The `id` of the batch, for `ack` and `error`.
+    /// `id` of the batch, for `ack` and `error`.
     id: Option<String>,
     #[schema(inline)]
     ack: Option<AckView>,
-    /// With a `state`, if asked for: what was judged since the one before.
+    /// For `state`, if requested: the samples evaluated since the previous `state`.
     trace: Option<TraceView>,
 }
 
-/// A WebSocket: batches up, as JSON rows or columns in text frames or the same as
-/// MessagePack in binary frames, each with an optional `id`; down come `ack` (once durable), `error` (with a
-/// `problem`), `fault` and, if asked for, `state` frames, all JSON objects
-/// with a `type`. Batches are taken from whoever may send the asset's telemetry;
-/// others see. When the token ends, so does the stream.
+/// Opens a WebSocket for telemetry. The client sends batches, as JSON rows or columns in
+/// text frames or as MessagePack in binary frames, each with an optional `id`. The service
+/// sends JSON objects with a `type`: `ack` (once the batch is durable), `error` (with a
+/// `problem`), `fault` and, if requested, `state`. Sending batches requires the right
+/// `feed` for the asset; without it the stream is read-only. The stream is closed when
+/// the token expires or is revoked.
 #[utoipa::path(get, path = "/assets/{asset}/stream", tag = "telemetry",
     operation_id = "stream_telemetry",
     params(("asset" = String, description = "Name of the asset"), StreamQuery),
@@ -92,17 +93,17 @@ pub(super) struct FrameView {
         (status = 404, body = Problem), (status = 426, body = Problem)))]
 pub(super) async fn stream(
     State(app): State<App>,
-    Asset(asset): Asset,
+    AssetPath(asset): AssetPath,
     Query(query): Query<StreamQuery>,
     Extension(caller): Extension<Caller>,
     upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
 ) -> Result<Response, Problem> {
     let upgrade = upgrade.map_err(|rejection| {
-        let detail = format!("this address takes WebSockets: {}", rejection.body_text());
-        Problem::new(StatusCode::UPGRADE_REQUIRED, "websocket", "Not a WebSocket", detail)
+        let detail = format!("a WebSocket upgrade is required: {}", rejection.body_text());
+        Problem::new(StatusCode::UPGRADE_REQUIRED, "websocket", "Upgrade required", detail)
     })?;
     let period = query.state.map(period).transpose()?;
-    let watch = query.trace.then(Watched::default);
+    let cursor = query.trace.then(TraceCursor::default);
     let events = app.service.events(Some(asset.clone()), query.after).await?;
     let frame = app.service.limits().batch_bytes;
     let upgrade = upgrade
@@ -111,8 +112,8 @@ pub(super) async fn stream(
         .max_write_buffer_size(MAX_WRITE_BUFFER);
     Ok(upgrade.on_upgrade(move |socket| async move {
         metrics::gauge!("offbd_streams").increment(1.0);
-        let session = Session::new(socket, app, caller, asset, events, period, watch);
-        session.run().await;
+        let stream = StreamConnection::new(socket, app, caller, asset, events, period, cursor);
+        stream.run().await;
         metrics::gauge!("offbd_streams").decrement(1.0);
     }))
 }
@@ -121,88 +122,90 @@ fn period(hz: f64) -> Result<Duration, Problem> {
     if hz > 0.0 && hz.is_finite() {
         return Ok(Duration::from_secs_f64(1.0 / hz.clamp(0.01, MAX_STATE_HZ)));
     }
-    Err(Invalid::new("?state", format!("{hz} is not a rate above 0")).into())
+    Err(Invalid::new("?state", format!("{hz} is not a finite number above 0")).into())
 }
 
 /// Why a connection ends.
-enum End {
-    /// The other side is gone, or did not keep up.
+enum CloseReason {
+    /// The client has disconnected or is too slow; no close frame is sent.
     Gone,
-    /// We say why.
+    /// The service closes the connection with this code and reason.
     Close(u16, &'static str),
 }
 
-/// A batch whose acknowledgement is owed.
-struct Owed {
+/// A batch that is queued and not acknowledged yet.
+struct PendingAck {
     id: Option<String>,
     n_rows: usize,
-    answer: Outcome<AckView>,
+    ack: ServiceFuture<AckView>,
 }
 
-/// A batch that waits for room.
-struct Waiting {
+/// A batch that waits for room in the queue of its shard.
+struct QueuedBatch {
     id: Option<String>,
     n_rows: usize,
-    submitted: Outcome<Pending>,
+    submitted: ServiceFuture<PendingBatch>,
 }
 
-type Outcome<T> = Pin<Box<dyn Future<Output = Result<T, ServiceError>> + Send>>;
+type ServiceFuture<T> = Pin<Box<dyn Future<Output = Result<T, ServiceError>> + Send>>;
 
-fn answer(submitted: Result<Pending, ServiceError>) -> Outcome<AckView> {
+fn acknowledgement(submitted: Result<PendingBatch, ServiceError>) -> ServiceFuture<AckView> {
     match submitted {
         Ok(pending) => Box::pin(pending.acknowledged()),
         Err(error) => Box::pin(std::future::ready(Err(error))),
     }
 }
 
-/// The outcome of what is there; for ever without.
-async fn outcome<T>(of: Option<&mut Outcome<T>>) -> Result<T, ServiceError> {
-    match of {
-        Some(outcome) => outcome.as_mut().await,
+/// Waits for `future`; never completes if it is `None`.
+async fn wait<T>(future: Option<&mut ServiceFuture<T>>) -> Result<T, ServiceError> {
+    match future {
+        Some(future) => future.as_mut().await,
         None => std::future::pending().await,
     }
 }
 
-/// What a watcher has been told.
+/// The last point of the trace that was sent.
 #[derive(Default)]
-struct Watched {
+struct TraceCursor {
     session_id: Option<String>,
     seen: u64,
 }
 
-struct Session {
+struct StreamConnection {
     socket: WebSocket,
     app: App,
-    /// Whether batches are taken.
-    feeds: bool,
-    /// Ends with the caller's token.
-    lapse: Pin<Box<dyn Future<Output = ()> + Send>>,
+    /// Whether the caller may send batches.
+    may_send: bool,
+    /// Completes when the caller's token expires or is revoked.
+    revoked: Pin<Box<dyn Future<Output = ()> + Send>>,
     asset: String,
     events: EventFeed,
     states: Option<Interval>,
     pings: Interval,
-    heard: Instant,
-    owed: VecDeque<Owed>,
-    /// The last batch that was read, after those that are owed their answer.
-    waiting: Option<Waiting>,
-    /// None if no traces are asked for.
-    watched: Option<Watched>,
+    /// When the last frame was received.
+    received_at: Instant,
+    /// In the order in which the batches were received.
+    pending: VecDeque<PendingAck>,
+    /// The batch that was received last, if it is not queued yet.
+    waiting: Option<QueuedBatch>,
+    /// `None` if no trace is requested.
+    cursor: Option<TraceCursor>,
 }
 
-/// What happens next on a connection.
-enum Next {
+/// The next event on a connection.
+enum StreamEvent {
     Closing,
-    Lapsed,
-    Answer(Result<AckView, ServiceError>),
-    Submitted(Result<Pending, ServiceError>),
+    Revoked,
+    Acknowledged(Result<AckView, ServiceError>),
+    Submitted(Result<PendingBatch, ServiceError>),
     Frame(Option<Result<Message, axum::Error>>),
     Event(Result<Option<std::sync::Arc<Event>>, ServiceError>),
     State,
     Ping,
 }
 
-impl Session {
-    #[expect(clippy::disallowed_methods, reason = "a silent socket is closed by the clock")]
+impl StreamConnection {
+    #[expect(clippy::disallowed_methods, reason = "an idle socket is closed after a timeout")]
     fn new(
         socket: WebSocket,
         app: App,
@@ -210,50 +213,50 @@ impl Session {
         asset: String,
         events: EventFeed,
         period: Option<Duration>,
-        watched: Option<Watched>,
+        cursor: Option<TraceCursor>,
     ) -> Self {
         let ticks = |period| {
             let mut ticks = interval_at(Instant::now() + period, period);
             ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
             ticks
         };
-        let (states, pings) = (period.map(ticks), ticks(PING_EVERY));
-        let (owed, waiting, heard) = (VecDeque::new(), None, Instant::now());
-        let feeds = caller.may(Right::Feed, &asset);
+        let (states, pings) = (period.map(ticks), ticks(PING_INTERVAL));
+        let (pending, waiting, received_at) = (VecDeque::new(), None, Instant::now());
+        let may_send = caller.may(Right::SendTelemetry, &asset);
         let service = app.service.clone();
-        let lapse = Box::pin(async move { service.lapse(&caller).await });
+        let revoked = Box::pin(async move { service.wait_for_revocation(&caller).await });
         Self {
             socket,
             app,
-            feeds,
-            lapse,
+            may_send,
+            revoked,
             asset,
             events,
             states,
             pings,
-            heard,
-            owed,
+            received_at,
+            pending,
             waiting,
-            watched,
+            cursor,
         }
     }
 
     async fn run(mut self) {
-        let end = loop {
-            let next = self.next().await;
-            if let Err(end) = self.follow(next).await {
-                break end;
+        let reason = loop {
+            let event = self.next_event().await;
+            if let Err(reason) = self.handle(event).await {
+                break reason;
             }
         };
-        if let End::Close(code, reason) = end {
+        if let CloseReason::Close(code, reason) = reason {
             let frame = CloseFrame { code, reason: reason.into() };
             let _ = timeout(SEND_TIMEOUT, self.socket.send(Message::Close(Some(frame)))).await;
         }
     }
 
-    async fn next(&mut self) -> Next {
+    async fn next_event(&mut self) -> StreamEvent {
         let full = self.is_full();
-        let Self { socket, app, lapse, events, states, pings, owed, waiting, .. } = self;
+        let Self { socket, app, revoked, events, states, pings, pending, waiting, .. } = self;
         let state = async {
             match states {
                 Some(states) => states.tick().await,
@@ -262,158 +265,170 @@ impl Session {
         };
         tokio::select! {
             biased;
-            () = app.closing.cancelled() => Next::Closing,
-            () = lapse => Next::Lapsed,
-            answer = outcome(owed.front_mut().map(|owed| &mut owed.answer)) => Next::Answer(answer),
-            submitted = outcome(waiting.as_mut().map(|waiting| &mut waiting.submitted)) => {
-                Next::Submitted(submitted)
+            () = app.closing.cancelled() => StreamEvent::Closing,
+            () = revoked => StreamEvent::Revoked,
+            ack = wait(pending.front_mut().map(|pending| &mut pending.ack)) => {
+                StreamEvent::Acknowledged(ack)
             }
-            event = events.next() => Next::Event(event),
-            _ = pings.tick() => Next::Ping,
-            _ = state => Next::State,
-            frame = socket.recv(), if !full => Next::Frame(frame),
+            submitted = wait(waiting.as_mut().map(|waiting| &mut waiting.submitted)) => {
+                StreamEvent::Submitted(submitted)
+            }
+            event = events.next() => StreamEvent::Event(event),
+            _ = pings.tick() => StreamEvent::Ping,
+            _ = state => StreamEvent::State,
+            frame = socket.recv(), if !full => StreamEvent::Frame(frame),
         }
     }
 
-    /// Whether nothing more is read now.
+    /// Whether reading is paused.
     fn is_full(&self) -> bool {
-        let n_rows: usize = self.owed.iter().map(|owed| owed.n_rows).sum();
-        let n_pending = self.owed.len();
+        let n_rows: usize = self.pending.iter().map(|pending| pending.n_rows).sum();
+        let n_pending = self.pending.len();
         self.waiting.is_some() || n_pending >= MAX_PENDING || n_rows >= MAX_PENDING_ROWS
     }
 
-    async fn follow(&mut self, next: Next) -> Result<(), End> {
-        match next {
-            Next::Closing => self.close().await,
-            Next::Lapsed => Err(End::Close(close_code::POLICY, "the token is no longer in force")),
-            Next::Answer(answer) => self.answers(answer).await,
-            Next::Submitted(submitted) => {
+    async fn handle(&mut self, event: StreamEvent) -> Result<(), CloseReason> {
+        match event {
+            StreamEvent::Closing => self.close().await,
+            StreamEvent::Revoked => {
+                Err(CloseReason::Close(close_code::POLICY, "the token has expired or was revoked"))
+            }
+            StreamEvent::Acknowledged(ack) => self.send_acks(ack).await,
+            StreamEvent::Submitted(submitted) => {
                 let waiting = self.waiting.take();
-                self.owed.extend(waiting.map(|Waiting { id, n_rows, .. }| Owed {
+                self.pending.extend(waiting.map(|QueuedBatch { id, n_rows, .. }| PendingAck {
                     id,
                     n_rows,
-                    answer: answer(submitted),
+                    ack: acknowledgement(submitted),
                 }));
                 Ok(())
             }
-            Next::Event(Ok(Some(event))) => self.fault(&event).await,
-            Next::Event(Ok(None)) => Err(End::Close(close_code::AWAY, "the service is closing")),
-            Next::Event(Err(_)) => Err(End::Close(close_code::ERROR, "the store failed")),
-            Next::Ping => self.ping().await,
-            Next::State => self.state().await,
-            Next::Frame(Some(Ok(message))) => self.message(message).await,
-            Next::Frame(Some(Err(error))) => {
-                tracing::debug!(%error, asset = self.asset, "stream broke off");
-                Err(End::Close(close_code::SIZE, "a frame that is broken or too long"))
+            StreamEvent::Event(Ok(Some(event))) => self.send_fault(&event).await,
+            StreamEvent::Event(Ok(None)) => {
+                Err(CloseReason::Close(close_code::AWAY, "the service is shutting down"))
             }
-            Next::Frame(None) => Err(End::Gone),
+            StreamEvent::Event(Err(_)) => {
+                Err(CloseReason::Close(close_code::ERROR, "the store failed"))
+            }
+            StreamEvent::Ping => self.send_ping().await,
+            StreamEvent::State => self.send_state().await,
+            StreamEvent::Frame(Some(Ok(message))) => self.receive(message).await,
+            StreamEvent::Frame(Some(Err(error))) => {
+                tracing::debug!(%error, asset = self.asset, "the stream failed");
+                Err(CloseReason::Close(close_code::SIZE, "a malformed frame, or one too long"))
+            }
+            StreamEvent::Frame(None) => Err(CloseReason::Gone),
         }
     }
 
-    /// The service stops: what was taken is still acknowledged, a batch that waits
-    /// for room is not taken.
-    async fn close(&mut self) -> Result<(), End> {
+    /// Closes the connection when the service stops: queued batches are still
+    /// acknowledged, one that waits for room is dropped.
+    async fn close(&mut self) -> Result<(), CloseReason> {
         self.waiting = None;
-        while let Some(owed) = self.owed.pop_front() {
-            let answer = owed.answer.await;
-            self.send(answer_frame(owed.id.as_deref(), answer)).await?;
+        while let Some(pending) = self.pending.pop_front() {
+            let ack = pending.ack.await;
+            self.send(ack_frame(pending.id.as_deref(), ack)).await?;
         }
-        Err(End::Close(close_code::AWAY, "the service is closing"))
+        Err(CloseReason::Close(close_code::AWAY, "the service is shutting down"))
     }
 
-    #[expect(clippy::disallowed_methods, reason = "a silent socket is closed by the clock")]
-    async fn message(&mut self, message: Message) -> Result<(), End> {
-        self.heard = Instant::now();
+    #[expect(clippy::disallowed_methods, reason = "an idle socket is closed after a timeout")]
+    async fn receive(&mut self, message: Message) -> Result<(), CloseReason> {
+        self.received_at = Instant::now();
         match message {
-            Message::Text(text) => self.batch(Format::Json, text.as_bytes()).await,
-            Message::Binary(bytes) => self.batch(Format::of_bytes(&bytes), &bytes).await,
-            Message::Close(_) => Err(End::Gone),
+            Message::Text(text) => self.ingest(TelemetryFormat::Json, text.as_bytes()).await,
+            Message::Binary(bytes) => self.ingest(TelemetryFormat::of_bytes(&bytes), &bytes).await,
+            Message::Close(_) => Err(CloseReason::Gone),
             Message::Ping(_) | Message::Pong(_) => Ok(()),
         }
     }
 
-    /// Takes a batch, when there is room; its answer comes after those of the ones
-    /// before.
-    async fn batch(&mut self, format: Format, document: &[u8]) -> Result<(), End> {
-        if !self.feeds {
-            let detail = "the token's role does not send telemetry of this asset";
-            let title = "Not allowed";
-            let problem = Problem::new(StatusCode::FORBIDDEN, "forbidden", title, detail);
+    /// Submits a batch; acknowledgements are sent in the order of the batches.
+    async fn ingest(
+        &mut self,
+        format: TelemetryFormat,
+        document: &[u8],
+    ) -> Result<(), CloseReason> {
+        if !self.may_send {
+            let detail = "the token does not permit sending telemetry of this asset";
+            let problem = Problem::new(StatusCode::FORBIDDEN, "forbidden", "Forbidden", detail);
             return self.send(json!({ "type": "error", "problem": problem }).to_string()).await;
         }
         let parsed = format.parse(document, self.app.service.limits().batch_samples);
         match parsed {
             Ok(mut batch) => {
                 let (id, n_rows) = (batch.id.take(), batch.rows.len());
-                let submitted = self.app.service.submit_in_turn(&self.asset, batch, false);
-                self.waiting = Some(Waiting { id, n_rows, submitted: Box::pin(submitted) });
+                let submitted = self.app.service.submit_when_ready(&self.asset, batch, false);
+                self.waiting = Some(QueuedBatch { id, n_rows, submitted: Box::pin(submitted) });
             }
             Err(error) => {
-                let answer = answer(Err(error.into()));
-                self.owed.push_back(Owed { id: None, n_rows: 0, answer });
+                let ack = acknowledgement(Err(error.into()));
+                self.pending.push_back(PendingAck { id: None, n_rows: 0, ack });
             }
         }
         Ok(())
     }
 
-    /// Gives the answer to the first batch that is owed one, and to those after it
-    /// whose answers are there too, in one write.
-    async fn answers(&mut self, first: Result<AckView, ServiceError>) -> Result<(), End> {
+    /// Sends the first acknowledgement, and those after it that are ready, in one write.
+    async fn send_acks(&mut self, first: Result<AckView, ServiceError>) -> Result<(), CloseReason> {
         let mut frames = Vec::new();
         let mut next = Some(first);
-        while let Some(answer) = next {
-            let id = self.owed.pop_front().and_then(|owed| owed.id);
-            frames.push(Message::Text(answer_frame(id.as_deref(), answer).into()));
-            next = self.owed.front_mut().and_then(|owed| owed.answer.as_mut().now_or_never());
+        while let Some(ack) = next {
+            let id = self.pending.pop_front().and_then(|pending| pending.id);
+            frames.push(Message::Text(ack_frame(id.as_deref(), ack).into()));
+            next = self.pending.front_mut().and_then(|pending| pending.ack.as_mut().now_or_never());
         }
         self.send_messages(frames).await
     }
 
-    async fn fault(&mut self, event: &Event) -> Result<(), End> {
-        // A fault line has the type `fault` already.
+    async fn send_fault(&mut self, event: &Event) -> Result<(), CloseReason> {
+        // A fault line has a `type` already.
         let line = event.line();
         let rest = line.strip_prefix('{').unwrap_or(&line);
         self.send(format!(r#"{{"event":{},{rest}"#, event.id)).await
     }
 
-    async fn state(&mut self) -> Result<(), End> {
-        match self.look().await {
+    async fn send_state(&mut self) -> Result<(), CloseReason> {
+        match self.state().await {
             Ok(mut frame) => {
                 frame["type"] = "state".into();
                 self.send(frame.to_string()).await
             }
-            // Telemetry goes first; the next state comes when there is room.
+            // Telemetry has priority: this state is skipped.
             Err(ServiceError::Busy { .. }) => Ok(()),
-            Err(error) => self.send(answer_frame(None, Err(error))).await,
+            Err(error) => self.send(ack_frame(None, Err(error))).await,
         }
     }
 
-    /// The state and, for a watcher, the trace since the last.
-    async fn look(&mut self) -> Result<serde_json::Value, ServiceError> {
+    /// Returns the state and, if requested, the trace since the previous state.
+    async fn state(&mut self) -> Result<serde_json::Value, ServiceError> {
         let service: &Service = &self.app.service;
-        let Some(watched) = &mut self.watched else {
+        let Some(cursor) = &mut self.cursor else {
             let state = service.state(&self.asset).await?;
             return Ok(serde_json::to_value(&state).unwrap_or_default());
         };
-        let seen = service.watch(&self.asset, watched.session_id.clone(), watched.seen).await?;
-        *watched = Watched { session_id: seen.state.session_id.clone(), seen: seen.seen };
-        let mut frame = serde_json::to_value(&seen.state).unwrap_or_default();
-        frame["trace"] = serde_json::to_value(&seen.trace).unwrap_or_default();
+        let view = service.watch(&self.asset, cursor.session_id.clone(), cursor.seen).await?;
+        *cursor = TraceCursor { session_id: view.state.session_id.clone(), seen: view.seen };
+        let mut frame = serde_json::to_value(&view.state).unwrap_or_default();
+        frame["trace"] = serde_json::to_value(&view.trace).unwrap_or_default();
         Ok(frame)
     }
 
-    async fn ping(&mut self) -> Result<(), End> {
-        if self.heard.elapsed() > 2 * PING_EVERY {
-            return Err(End::Close(close_code::POLICY, "nothing heard for too long"));
+    async fn send_ping(&mut self) -> Result<(), CloseReason> {
+        if self.received_at.elapsed() > 2 * PING_INTERVAL {
+            return Err(CloseReason::Close(
+                close_code::POLICY,
+                "the client did not answer the pings",
+            ));
         }
         self.send_messages(vec![Message::Ping(axum::body::Bytes::new())]).await
     }
 
-    async fn send(&mut self, text: String) -> Result<(), End> {
+    async fn send(&mut self, text: String) -> Result<(), CloseReason> {
         self.send_messages(vec![Message::Text(text.into())]).await
     }
 
-    async fn send_messages(&mut self, messages: Vec<Message>) -> Result<(), End> {
+    async fn send_messages(&mut self, messages: Vec<Message>) -> Result<(), CloseReason> {
         let send = async {
             for message in messages {
                 self.socket.feed(message).await?;
@@ -422,16 +437,16 @@ impl Session {
         };
         match timeout(SEND_TIMEOUT, send).await {
             Ok(Ok(())) => Ok(()),
-            Ok(Err(_)) => Err(End::Gone),
+            Ok(Err(_)) => Err(CloseReason::Gone),
             Err(_) => {
                 metrics::counter!("offbd_streams_cut_off_total").increment(1);
-                Err(End::Gone)
+                Err(CloseReason::Gone)
             }
         }
     }
 }
 
-/// An acknowledgement as it goes out.
+/// The frame that acknowledges a batch.
 #[derive(Serialize)]
 struct AckFrame<'a> {
     #[serde(rename = "type")]
@@ -442,8 +457,9 @@ struct AckFrame<'a> {
     ack: &'a AckView,
 }
 
-fn answer_frame(id: Option<&str>, answer: Result<AckView, ServiceError>) -> String {
-    match answer {
+/// Returns an `ack` or an `error` frame.
+fn ack_frame(id: Option<&str>, ack: Result<AckView, ServiceError>) -> String {
+    match ack {
         Ok(ack) => {
             let frame = AckFrame { kind: "ack", id, ack: &ack };
             serde_json::to_string(&frame).unwrap_or_default()

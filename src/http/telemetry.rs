@@ -1,4 +1,4 @@
-//! `/assets/{asset}/telemetry`: samples in.
+//! `/assets/{asset}/telemetry`: ingest of samples.
 
 use axum::Json;
 use axum::body::Body;
@@ -7,21 +7,21 @@ use axum::http::header::CONTENT_TYPE;
 use axum::http::{HeaderMap, StatusCode};
 use serde::Deserialize;
 
-use super::{App, Asset, Problem, Query, body};
+use super::{App, AssetPath, Problem, Query, body};
 use crate::wire::telemetry::{self, AckView, Batch, BatchError, RowsView};
 use offbd_core::vocabulary::Invalid;
 
-/// How a batch is written.
+/// The format of a batch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Format {
+pub(super) enum TelemetryFormat {
     Json,
     Msgpack,
     Ndjson,
     Csv,
 }
 
-impl Format {
-    /// The format that a request's `Content-Type` says; JSON without one.
+impl TelemetryFormat {
+    /// Returns the format in `Content-Type`; JSON without the header.
     pub(super) fn of(headers: &HeaderMap) -> Result<Self, Problem> {
         let Some(header) = headers.get(CONTENT_TYPE) else { return Ok(Self::Json) };
         let text = header.to_str().unwrap_or_default();
@@ -37,8 +37,8 @@ impl Format {
         }
     }
 
-    /// The format of a binary frame: MessagePack begins with the mark of a map,
-    /// which no JSON begins with.
+    /// Returns the format of a binary frame: a MessagePack document starts with the tag of
+    /// a map, with which no JSON document starts.
     pub(super) fn of_bytes(document: &[u8]) -> Self {
         match document.first() {
             Some(0x80..=0x8f | 0xde | 0xdf) => Self::Msgpack,
@@ -58,67 +58,70 @@ impl Format {
 
 fn unsupported(found: &str) -> Problem {
     let detail = format!(
-        "`{found}` is not taken; take application/json, application/msgpack, \
+        "`{found}` is not supported; use application/json, application/msgpack, \
          application/x-ndjson or text/csv"
     );
-    let title = "No such format";
+    let title = "Unsupported media type";
     Problem::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, "media-type", title, detail)
 }
 
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
 #[into_params(parameter_in = Query)]
 pub(super) struct SessionQuery {
-    /// The device's name of the session, for formats that have no place for it.
+    /// The device's session name, for formats without a field for it.
     session: Option<String>,
 }
 
-/// Takes a batch of samples. Answered once it is durable.
+/// Ingests a batch of samples. The response is sent once the batch is durable.
 ///
-/// JSON rows as below, or columns (`{"t_s":[…],"x_m":[…],…}`), the same document
-/// as MessagePack, NDJSON with one sample a line, or CSV with the header of a
-/// session file. A row that is no sample is reported by its index and the others
-/// are taken. A sample is known by `seq` within its session, or by `t_s` where it
-/// has no `seq`; sent twice, it counts once.
+/// Formats: JSON rows as below; JSON columns (`{"t_s":[…],"x_m":[…],…}`); either document
+/// as MessagePack; NDJSON with one sample per line; CSV with the header of a session file.
+/// An invalid row is reported by its index; the valid rows are ingested. Within a session
+/// a sample is identified by `seq`, or by `t_s` if it has no `seq`; a sample that is sent
+/// again is counted as a duplicate and ignored, so that a batch can be retried safely.
 ///
-/// Without the name of a session the samples go to the asset's open session,
-/// or to a new one. When the clock of such a device falls back by more than
-/// 10 s, and with it its `seq`, it has started anew: a new session begins.
-/// Another name than that of the open session ends that and opens the other.
+/// Without a session name the samples are added to the asset's open session, or to a new
+/// one. If the clock of such a device goes back by more than 10 s, together with its
+/// `seq`, the device has restarted and a new session is opened. A session name other than
+/// that of the open session ends the open session and opens one of that name.
 #[utoipa::path(post, path = "/assets/{asset}/telemetry", tag = "telemetry",
     operation_id = "post_telemetry",
     params(("asset" = String, description = "Name of the asset"), SessionQuery),
     request_body(content((RowsView = "application/json"), (RowsView = "application/msgpack"),
         (String = "application/x-ndjson"), (String = "text/csv"))),
     responses((status = 200, body = AckView, description = "Durable"),
-        (status = 400, body = Problem, description = "Not a batch; `pointer` names the place"),
+        (status = 400, body = Problem,
+            description = "Malformed batch; `pointer` names the element"),
         (status = 404, body = Problem, description = "No such asset"),
-        (status = 408, body = Problem, description = "The body did not end in time"),
+        (status = 408, body = Problem, description = "The body was not received in time"),
         (status = 409, body = Problem, description = "The session has ended"),
-        (status = 413, body = Problem, description = "Too long"),
-        (status = 415, body = Problem, description = "Another format"),
-        (status = 422, body = Problem, description = "Not the name of a session"),
-        (status = 429, body = Problem, description = "Too much at once; `Retry-After` says when"),
-        (status = 503, body = Problem, description = "Not taken; `Retry-After` says when")))]
+        (status = 413, body = Problem, description = "The batch is too long"),
+        (status = 415, body = Problem, description = "Unsupported format"),
+        (status = 422, body = Problem, description = "Invalid session name"),
+        (status = 429, body = Problem, description = "Too many requests; see `Retry-After`"),
+        (status = 503, body = Problem,
+            description = "Not stored; retry after `Retry-After`")))]
 pub(super) async fn post(
     State(app): State<App>,
-    Asset(asset): Asset,
+    AssetPath(asset): AssetPath,
     Query(query): Query<SessionQuery>,
     headers: HeaderMap,
     body: Body,
 ) -> Result<Json<AckView>, Problem> {
-    let format = Format::of(&headers)?;
+    let format = TelemetryFormat::of(&headers)?;
     let limits = app.service.limits();
     let read = body::read(body, limits.batch_bytes, limits.body_timeout, &app.budget).await?;
     let mut batch = format.parse(&read.bytes, limits.batch_samples)?;
     drop(read);
-    batch.session = one_session(batch.session, query.session)?;
+    batch.session = session_name(batch.session, query.session)?;
     Ok(Json(app.service.submit(&asset, batch)?.acknowledged().await?))
 }
 
-fn one_session(body: Option<String>, query: Option<String>) -> Result<Option<String>, Problem> {
+/// Returns the session name in body or query; an error if both have one and they differ.
+fn session_name(body: Option<String>, query: Option<String>) -> Result<Option<String>, Problem> {
     match (body, query) {
         (Some(body), Some(query)) if body != query => {
-            let reason = format!("is `{body}`, but the address says `{query}`");
+            let reason = format!("`{body}` differs from `{query}` in the query");
             Err(Invalid::new("/session", reason).into())
         }
         (body, query) => Ok(body.or(query)),

@@ -1,4 +1,4 @@
-//! A request within its caller's trace: <https://www.w3.org/TR/trace-context/>.
+//! Joins the caller's distributed trace: <https://www.w3.org/TR/trace-context/>.
 
 use axum::http::HeaderMap;
 use opentelemetry::propagation::TextMapPropagator;
@@ -7,11 +7,11 @@ use opentelemetry_sdk::propagation::TraceContextPropagator;
 use tracing::Span;
 use tracing_opentelemetry::OpenTelemetrySpanExt;
 
-/// Makes `span` a part of the trace that `headers` name, if they name one.
+/// Makes `span` a child of the trace in `headers`, if they have one.
 pub(super) fn join(span: &Span, headers: &HeaderMap) {
     if headers.contains_key("traceparent") {
         let caller = TraceContextPropagator::new().extract(&HeaderExtractor(headers));
-        // Where nothing is traced, there is no trace to join.
+        // Fails if tracing is off, which is fine.
         let _ = span.set_parent(caller);
     }
 }

@@ -1,39 +1,40 @@
-//! `/sessions/{id}/trace`: a session to be drawn.
+//! `/sessions/{id}/trace`: the time series of a session for plotting.
 
+use crate::wire::words::ProfileWord;
 use axum::Json;
 use axum::extract::State;
 use serde::Deserialize;
 
-use super::{Path, Problem, Query};
+use super::{Path, Problem, Query, query_word};
 use crate::service::{MAX_TRACE_POINTS, Service, TraceQuery};
 use crate::wire::service::ReplaySettingsView;
 use crate::wire::trace::TraceView;
 
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
 #[into_params(parameter_in = Query)]
-pub(super) struct StretchQuery {
-    /// From this time on the device's clock, s; from the beginning without it.
+pub(super) struct TraceRangeQuery {
+    /// Start on the device's clock, s; the start of the session by default.
     from_s: Option<f64>,
-    /// Up to this time, s; to the end without it.
+    /// End on the device's clock, s; the end of the session by default.
     to_s: Option<f64>,
-    /// Moments wanted at most, brought into 1 to 20000; 5000 without it. A longer
-    /// stretch is thinned out.
+    /// Most points to return, clamped to 1 to 20000; 5000 by default. A range with more
+    /// points is decimated.
     #[param(format = Int64, maximum = 4_294_967_295_u32)]
     points: Option<u32>,
-    /// `default` or `textbook`; without it the one of the asset file.
-    #[param(pattern = "^(default|textbook)$")]
+    /// The profile of the asset file by default.
+    #[param(value_type = Option<ProfileWord>)]
     profile: Option<String>,
 }
 
-/// Moments of a trace where none are asked for.
+/// Points of a trace without `points`.
 const DEFAULT_POINTS: u32 = 5000;
 
-/// A stretch of a session as it is judged: positions, accelerations, limits and
-/// gates of rig and twin over time. The recording is judged again for it, from
-/// its beginning; nothing of it changes.
+/// Returns the time series of a session or of a part of it: positions, accelerations,
+/// limits and gates of rig and twin. The service evaluates the recording again from its
+/// start to compute them; nothing stored is changed.
 #[utoipa::path(get, path = "/sessions/{id}/trace", tag = "sessions",
     operation_id = "get_trace",
-    params(("id" = String, description = "The service's id of the session"), StretchQuery),
+    params(("id" = String, description = "The service's id of the session"), TraceRangeQuery),
     responses((status = 200, body = TraceView), (status = 400, body = Problem),
         (status = 404, body = Problem),
         (status = 413, body = Problem, description = "The session is too long"),
@@ -41,13 +42,14 @@ const DEFAULT_POINTS: u32 = 5000;
 pub(super) async fn trace(
     State(service): State<Service>,
     Path(id): Path<String>,
-    Query(query): Query<StretchQuery>,
+    Query(query): Query<TraceRangeQuery>,
 ) -> Result<Json<TraceView>, Problem> {
-    let stretch = TraceQuery {
+    let profile = query_word("?profile", query.profile.as_deref())?;
+    let range = TraceQuery {
         from_s: query.from_s.unwrap_or(f64::NEG_INFINITY),
         to_s: query.to_s.unwrap_or(f64::INFINITY),
         points: query.points.unwrap_or(DEFAULT_POINTS).clamp(1, MAX_TRACE_POINTS),
-        settings: ReplaySettingsView { profile: query.profile, ..Default::default() },
+        settings: ReplaySettingsView { profile, ..Default::default() },
     };
-    Ok(Json(service.trace(&id, stretch).await?))
+    Ok(Json(service.trace(&id, range).await?))
 }

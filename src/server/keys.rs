@@ -1,5 +1,6 @@
-//! The keys of the identity provider, read from a file or fetched, again and
-//! again. What cannot be read is reported, and the old go on.
+//! The public keys of the identity provider, read from a file or fetched from a URL at
+//! regular intervals. If that fails, the error is logged and the previous keys stay in
+//! use.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -17,98 +18,103 @@ use tokio_rustls::rustls::crypto::ring;
 use tokio_rustls::rustls::{ClientConfig, RootCertStore};
 use tokio_util::sync::CancellationToken;
 
-use crate::config::{JwtConfig, KeyPlace};
+use crate::config::{JwtConfig, KeyLocation};
 use crate::service::Clock;
 use crate::service::access::jwt::KeySet;
 use crate::service::access::{KeyFeed, Provider};
 
-/// How often the keys are read: a key that is withdrawn is refused after that.
-const READ_EVERY: Duration = Duration::from_secs(300);
+/// Interval at which the keys are read. A withdrawn key is refused after this time at most.
+const REFRESH_INTERVAL: Duration = Duration::from_secs(300);
 
-/// How often they are read at most because a token names one that is not there.
-const ASK_EVERY: Duration = Duration::from_secs(10);
+/// Shortest interval between two reads that are caused by tokens with an unknown key.
+const MIN_REQUEST_INTERVAL: Duration = Duration::from_secs(10);
 
-/// How long fetching them may take; then it has failed.
+/// Longest duration of a fetch.
 const FETCH_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Longest document, bytes; a longer one is not read. Providers have some kilobytes.
+/// Longest document with keys, bytes; a longer one is refused. Typical ones have some
+/// kilobytes.
 const MAX_DOCUMENT: usize = 256 * 1024;
 
-/// Where keys come from.
-enum Source {
+/// Where the keys are read from.
+enum KeySource {
     File(PathBuf),
     Url(Uri, Box<Client<HttpsConnector<HttpConnector>, Body>>),
 }
 
-/// Keeps the keys of the provider fresh.
-pub(super) struct Keys {
-    source: Source,
+/// Keeps the keys of the provider up to date.
+pub(super) struct KeyRefresher {
+    source: KeySource,
     feed: KeyFeed,
 }
 
-impl Keys {
-    /// The provider with its keys, and what keeps them fresh. A file must be there;
-    /// who is fetched from may come later.
-    pub(super) async fn read(config: &JwtConfig) -> Result<(Provider, Self)> {
-        let source = match config.place()? {
-            KeyPlace::File(path) => Source::File(path),
-            KeyPlace::Url(url) => {
-                let client = client(&url).context("`jwt.jwks`: no certificates to check it by")?;
-                Source::Url(url, Box::new(client))
+impl KeyRefresher {
+    /// Reads the keys. Returns the provider, and what keeps its keys up to date.
+    ///
+    /// # Errors
+    /// If a file cannot be read. A failed fetch is logged and repeated later.
+    pub(super) async fn start(config: &JwtConfig) -> Result<(Provider, Self)> {
+        let source = match config.location()? {
+            KeyLocation::File(path) => KeySource::File(path),
+            KeyLocation::Url(url) => {
+                let client = client(&url)
+                    .context("`jwt.jwks`: no root certificates to verify the server")?;
+                KeySource::Url(url, Box::new(client))
             }
         };
         let (provider, feed) = Provider::new(config.expected());
-        let keys = Self { source, feed };
-        match (keys.renew().await, &keys.source) {
-            (Err(error), Source::File(_)) => return Err(error),
-            (Err(error), Source::Url(..)) => {
-                tracing::error!("nobody comes in by a JSON Web Token yet: {error:#}");
+        let refresher = Self { source, feed };
+        match (refresher.refresh().await, &refresher.source) {
+            (Err(error), KeySource::File(_)) => return Err(error),
+            (Err(error), KeySource::Url(..)) => {
+                tracing::error!("no JSON Web Token is accepted yet: {error:#}");
             }
             (Ok(()), _) => {}
         }
-        Ok((provider, keys))
+        Ok((provider, refresher))
     }
 
-    /// Reads them again and again, until the server stops.
+    /// Reads the keys again at intervals and on request, until the server stops.
     pub(super) async fn watch(self, closing: CancellationToken) {
-        let _ = closing.run_until_cancelled(self.keep()).await;
+        let _ = closing.run_until_cancelled(self.refresh_forever()).await;
     }
 
-    #[expect(clippy::disallowed_methods, reason = "keys are read again by the clock")]
-    async fn keep(self) {
-        let mut asked: Option<Instant> = None;
-        let mut ticks = tokio::time::interval_at(Instant::now() + READ_EVERY, READ_EVERY);
+    #[expect(clippy::disallowed_methods, reason = "the keys are read at intervals")]
+    async fn refresh_forever(self) {
+        let mut last_request: Option<Instant> = None;
+        let mut ticks =
+            tokio::time::interval_at(Instant::now() + REFRESH_INTERVAL, REFRESH_INTERVAL);
         loop {
             tokio::select! {
                 _ = ticks.tick() => {}
-                () = self.feed.wanted() => {
-                    if asked.is_some_and(|at| at.elapsed() < ASK_EVERY) {
-                        self.feed.bring_nothing();
+                () = self.feed.refresh_requested() => {
+                    if last_request.is_some_and(|at| at.elapsed() < MIN_REQUEST_INTERVAL) {
+                        self.feed.publish_unchanged();
                         continue;
                     }
-                    asked = Some(Instant::now());
+                    last_request = Some(Instant::now());
                 }
             }
-            if let Err(error) = self.renew().await {
-                tracing::error!("the provider's keys are not renewed: {error:#}");
-                self.feed.bring_nothing();
+            if let Err(error) = self.refresh().await {
+                tracing::error!("cannot refresh the provider's keys: {error:#}");
+                self.feed.publish_unchanged();
             }
         }
     }
 
-    async fn renew(&self) -> Result<()> {
-        let (place, document) = match &self.source {
-            Source::File(path) => (path.display().to_string(), read(path).await),
-            Source::Url(url, client) => {
+    async fn refresh(&self) -> Result<()> {
+        let (location, document) = match &self.source {
+            KeySource::File(path) => (path.display().to_string(), read(path).await),
+            KeySource::Url(url, client) => {
                 let fetched = timeout(FETCH_TIMEOUT, fetch(client, url)).await;
-                let late = format!("no answer within {} s", FETCH_TIMEOUT.as_secs());
+                let late = format!("no response within {} s", FETCH_TIMEOUT.as_secs());
                 (url.to_string(), fetched.context(late).flatten())
             }
         };
-        let document = document.with_context(|| format!("`jwt.jwks`: cannot read {place}"))?;
-        let keys = KeySet::parse(&document).with_context(|| format!("`jwt.jwks`: {place}"))?;
-        tracing::debug!(place, keys = keys.n_keys(), "the provider's keys are read");
-        self.feed.bring(keys, Clock.now());
+        let document = document.with_context(|| format!("`jwt.jwks`: cannot read {location}"))?;
+        let keys = KeySet::parse(&document).with_context(|| format!("`jwt.jwks`: {location}"))?;
+        tracing::debug!(location, keys = keys.n_keys(), "the provider's keys are read");
+        self.feed.publish(keys, Clock.now());
         Ok(())
     }
 }
@@ -118,22 +124,22 @@ async fn read(path: &Path) -> Result<Bytes> {
     let mut document = Vec::new();
     let most = u64::try_from(MAX_DOCUMENT)? + 1;
     if file.take(most).read_to_end(&mut document).await? > MAX_DOCUMENT {
-        bail!("it has more than {MAX_DOCUMENT} bytes");
+        bail!("the file has more than {MAX_DOCUMENT} bytes");
     }
     Ok(document.into())
 }
 
-/// Follows nobody elsewhere: the answer is the keys, or none.
+/// Fetches a document. Redirects are not followed.
 async fn fetch(client: &Client<HttpsConnector<HttpConnector>, Body>, url: &Uri) -> Result<Bytes> {
-    let answer = client.get(url.clone()).await?;
-    if answer.status() != StatusCode::OK {
-        bail!("the answer is {}", answer.status());
+    let response = client.get(url.clone()).await?;
+    if response.status() != StatusCode::OK {
+        bail!("the status of the response is {}", response.status());
     }
-    let body = to_bytes(Body::new(answer.into_body()), MAX_DOCUMENT).await;
-    body.with_context(|| format!("it broke off, or has more than {MAX_DOCUMENT} bytes"))
+    let body = to_bytes(Body::new(response.into_body()), MAX_DOCUMENT).await;
+    body.with_context(|| format!("the response is incomplete or exceeds {MAX_DOCUMENT} bytes"))
 }
 
-/// A client that trusts whom the machine trusts, or SSL_CERT_FILE names.
+/// An HTTP client that trusts the root certificates of the machine, or of `SSL_CERT_FILE`.
 fn client(url: &Uri) -> Result<Client<HttpsConnector<HttpConnector>, Body>> {
     let builder = HttpsConnectorBuilder::new();
     let builder = if url.scheme_str() == Some("https") {

@@ -1,9 +1,9 @@
-//! Connections: taken up to a number, encrypted where that is wanted, each with
-//! a time in which the head of a request must come.
+//! Accepts connections up to a limit, encrypts them if TLS is configured, and serves
+//! HTTP.
 //!
-//! A connection over which nothing comes for that time is closed, between two
-//! requests too, so whoever only holds connections open loses them; and so is
-//! one whose answers are not read.
+//! A connection is closed if the head of the next request does not arrive in time, also
+//! between two requests, or if the client does not read its responses. So a client cannot
+//! occupy connections without using them.
 
 use std::io;
 use std::net::SocketAddr;
@@ -22,39 +22,40 @@ use tokio::time::timeout;
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 
-use super::places::{Held, Place, Places};
+use super::connections::{ConnectionLimits, ConnectionPermit, LimitedConnection};
 use super::tls::Tls;
 use crate::config::LimitsConfig;
 
 /// Longest head of a request, bytes; a longer one is answered 431.
 const MAX_HEAD_BYTES: usize = 64 << 10;
 
-/// Header fields of a request; one with more is answered 431.
+/// Most header fields of a request; a request with more is answered 431.
 const MAX_HEADERS: usize = 64;
 
-/// Pause after the system had no room for a connection.
-const OUT_OF_ROOM: Duration = Duration::from_millis(100);
+/// Pause after the operating system could not accept a connection, for example for lack
+/// of file descriptors.
+const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
-/// How connections are taken.
+/// Accepts connections and serves HTTP over them.
 #[derive(Clone)]
-pub(super) struct Connections {
+pub(super) struct HttpListener {
     header_timeout: Duration,
     write_timeout: Duration,
-    places: Places,
+    limits: ConnectionLimits,
     tls: Option<Tls>,
     closing: CancellationToken,
 }
 
-impl Connections {
+impl HttpListener {
     pub(super) fn new(limits: &LimitsConfig, tls: Option<Tls>, closing: CancellationToken) -> Self {
         let header_timeout = Duration::from_secs(limits.header_timeout_s);
         let write_timeout = Duration::from_secs(limits.write_timeout_s);
-        let places = Places::new(limits.connections, limits.connections_per_address);
-        Self { header_timeout, write_timeout, places, tls, closing }
+        let limits = ConnectionLimits::new(limits.connections, limits.connections_per_address);
+        Self { header_timeout, write_timeout, limits, tls, closing }
     }
 
-    /// Takes connections until the server stops, then waits until the requests
-    /// under way are answered.
+    /// Accepts connections until the server stops, then waits until the requests in
+    /// progress are answered.
     pub(super) async fn serve(self, listener: TcpListener, router: Router) {
         let tracker = TaskTracker::new();
         loop {
@@ -63,16 +64,21 @@ impl Connections {
                 accepted = listener.accept() => accepted,
             };
             match accepted {
-                Ok((socket, peer)) => match self.places.take(peer.ip().to_canonical()) {
-                    Some(place) => {
-                        tracker.spawn(self.clone().connection(socket, peer, place, router.clone()));
+                Ok((socket, peer)) => match self.limits.take(peer.ip().to_canonical()) {
+                    Some(permit) => {
+                        tracker.spawn(self.clone().connection(
+                            socket,
+                            peer,
+                            permit,
+                            router.clone(),
+                        ));
                     }
                     None => metrics::counter!("offbd_connections_refused_total").increment(1),
                 },
-                Err(error) if is_of_one_connection(&error) => {}
+                Err(error) if concerns_one_connection(&error) => {}
                 Err(error) => {
-                    tracing::error!(%error, "no connection can be taken");
-                    tokio::time::sleep(OUT_OF_ROOM).await;
+                    tracing::error!(%error, "cannot accept connections");
+                    tokio::time::sleep(ACCEPT_PAUSE).await;
                 }
             }
         }
@@ -81,10 +87,16 @@ impl Connections {
         tracker.wait().await;
     }
 
-    async fn connection(self, socket: TcpStream, peer: SocketAddr, place: Place, router: Router) {
-        // Without it an answer may wait for the acknowledgement of the one before.
+    async fn connection(
+        self,
+        socket: TcpStream,
+        peer: SocketAddr,
+        permit: ConnectionPermit,
+        router: Router,
+    ) {
+        // Otherwise a response may wait for the TCP acknowledgement of the previous one.
         let _ = socket.set_nodelay(true);
-        let socket = Held::new(socket, place, self.write_timeout);
+        let socket = LimitedConnection::new(socket, permit, self.write_timeout);
         match &self.tls {
             None => self.http(socket, peer, router).await,
             Some(tls) => {
@@ -94,8 +106,8 @@ impl Connections {
                 };
                 match encrypted {
                     Ok(Ok(socket)) => self.http(socket, peer, router).await,
-                    Ok(Err(error)) => tracing::debug!(%peer, %error, "no encryption"),
-                    Err(_) => tracing::debug!(%peer, "no encryption in time"),
+                    Ok(Err(error)) => tracing::debug!(%peer, %error, "TLS handshake failed"),
+                    Err(_) => tracing::debug!(%peer, "TLS handshake timed out"),
                 }
             }
         }
@@ -128,14 +140,14 @@ impl Connections {
             }
         };
         if let Err(error) = ended {
-            tracing::debug!(%peer, %error, "a connection broke off");
+            tracing::debug!(%peer, %error, "connection ended with an error");
         }
     }
 }
 
-/// Whether the error is about the connection that was to be taken, not about
-/// the taking.
-fn is_of_one_connection(error: &io::Error) -> bool {
+/// Returns whether the error concerns only the connection that was to be accepted, not the
+/// listener.
+fn concerns_one_connection(error: &io::Error) -> bool {
     use io::ErrorKind::{ConnectionAborted, ConnectionRefused, ConnectionReset};
     matches!(error.kind(), ConnectionAborted | ConnectionRefused | ConnectionReset)
 }

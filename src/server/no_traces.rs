@@ -1,16 +1,16 @@
-//! Traces in a build without the feature `otel`: there are none, and a
-//! configuration that names an endpoint is refused ([`TracesConfig`]).
+//! Replaces `traces.rs` in builds without the feature `otel`: nothing is traced, and a
+//! configuration with an endpoint is refused ([`TracesConfig`]).
 
 use anyhow::Result;
 use tracing_subscriber::layer::Identity;
 
 use crate::config::TracesConfig;
 
-/// What would send traces; there is no value of it.
+/// The sender of traces, a type without values in this build.
 pub enum Traces {}
 
 impl Traces {
-    /// `None`.
+    /// Returns `None`.
     ///
     /// # Errors
     /// Never.

@@ -1,5 +1,5 @@
-//! Encryption, by rustls: a certificate and a key from files, read again when
-//! they have changed, so that a renewed certificate needs no restart.
+//! TLS, by rustls. Certificate and key are read again when their files change, so that a
+//! renewed certificate needs no restart.
 
 use std::path::Path;
 use std::sync::{Arc, PoisonError, RwLock};
@@ -14,13 +14,13 @@ use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
 use tokio_rustls::server::TlsStream;
 use tokio_util::sync::CancellationToken;
 
-use super::places::Held;
+use super::connections::LimitedConnection;
 use crate::config::TlsConfig;
 
-/// How often the files are looked at.
-const LOOK_AGAIN: Duration = Duration::from_secs(60);
+/// Interval at which the files are checked for changes.
+const CHECK_INTERVAL: Duration = Duration::from_secs(60);
 
-/// What encrypts; all clones are one.
+/// The certificate and the key in use. Clones share them.
 #[derive(Clone)]
 pub(super) struct Tls {
     files: TlsConfig,
@@ -34,17 +34,20 @@ impl Tls {
         Ok(Self { files: files.clone(), config })
     }
 
-    /// Encrypts a connection by what the files held last.
-    pub(super) async fn accept(&self, socket: Held) -> std::io::Result<TlsStream<Held>> {
+    /// Makes the TLS handshake of a connection, with the latest certificate.
+    pub(super) async fn accept(
+        &self,
+        socket: LimitedConnection,
+    ) -> std::io::Result<TlsStream<LimitedConnection>> {
         let config = self.config.read().unwrap_or_else(PoisonError::into_inner).clone();
         TlsAcceptor::from(config).accept(socket).await
     }
 
-    /// Reads the files again whenever they have changed, until the server stops.
-    /// What cannot be used is reported, and the old goes on.
+    /// Reads the files again whenever they change, until the server stops. If they are
+    /// invalid, the error is logged and the previous certificate stays in use.
     pub(super) async fn watch(self, closing: CancellationToken) {
         let mut seen = self.changed_at();
-        while closing.run_until_cancelled(tokio::time::sleep(LOOK_AGAIN)).await.is_some() {
+        while closing.run_until_cancelled(tokio::time::sleep(CHECK_INTERVAL)).await.is_some() {
             let changed = self.changed_at();
             if changed != seen {
                 seen = changed;
@@ -56,11 +59,11 @@ impl Tls {
     fn reload(&self) {
         match server_config(&self.files) {
             Ok(config) => {
-                let mut held = self.config.write().unwrap_or_else(PoisonError::into_inner);
-                *held = Arc::new(config);
-                tracing::info!("the certificate is read anew");
+                let mut current = self.config.write().unwrap_or_else(PoisonError::into_inner);
+                *current = Arc::new(config);
+                tracing::info!("new TLS certificate in use");
             }
-            Err(error) => tracing::error!("the certificate is not renewed: {error:#}"),
+            Err(error) => tracing::error!("the previous TLS certificate stays in use: {error:#}"),
         }
     }
 
@@ -81,7 +84,7 @@ fn server_config(files: &TlsConfig) -> Result<ServerConfig> {
         .with_safe_default_protocol_versions()?
         .with_no_client_auth()
         .with_single_cert(chain, key)
-        .context("`tls`: the certificate and the key are no pair")?;
+        .context("`tls`: the key does not match the certificate")?;
     config.alpn_protocols = vec![b"http/1.1".to_vec()];
     Ok(config)
 }
@@ -96,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_used_is_named_and_the_old_goes_on() {
+    fn an_error_names_the_file_and_the_previous_certificate_stays() {
         let directory = tempfile::tempdir().unwrap();
         let files = TlsConfig {
             certificate: directory.path().join("certificate.pem"),
@@ -110,7 +113,7 @@ mod tests {
         let before = tls.config.read().unwrap().clone();
         std::fs::write(&files.key, pair().signing_key.serialize_pem()).unwrap();
         let wrong = Tls::read(&files).err().unwrap().to_string();
-        assert!(wrong.contains("no pair"), "{wrong}");
+        assert!(wrong.contains("does not match"), "{wrong}");
         tls.reload();
         assert!(Arc::ptr_eq(&before, &tls.config.read().unwrap()));
         write(&files, &pair());

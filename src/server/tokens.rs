@@ -1,5 +1,6 @@
-//! Tokens at the machine itself, beside a service that runs or without one: the
-//! store is written directly, as whoever can write it need not be asked.
+//! Management of tokens on the machine of the store, by direct access to the store,
+//! whether a service is running or not. No token is needed: whoever can write the store
+//! has every right.
 
 use std::path::Path;
 
@@ -7,47 +8,49 @@ use anyhow::{Context, Result, bail};
 
 use crate::config::Config;
 use crate::service::Clock;
-use crate::service::access::{Deed, NewToken, mint, token_view};
+use crate::service::access::{AuditEntry, NewToken, mint, token_view};
 use crate::store::{AccessWrite, LAST_ID, Store, Write, Writer};
 use crate::wire::access::TokenView;
 
-/// Who is said to have done it.
+/// The actor in the audit log.
 const ACTOR: &str = "command line";
 
-/// Tokens read at a time.
-const PAGE: u32 = 500;
+/// Tokens per query.
+const PAGE_SIZE: u32 = 500;
 
-/// The store of a configuration. It is not taken for this process: a service
-/// that runs on it goes on, and finds what is written here.
-async fn beside(config: &Config) -> Result<(Store, Writer)> {
+/// Opens the store with an auxiliary writer. It is not locked: a running service
+/// continues, and sees what is written here.
+async fn open_store(config: &Config) -> Result<(Store, Writer)> {
     config.check()?;
-    let place = config.place()?;
-    if let Some(directory) = place.file().and_then(Path::parent) {
+    let location = config.location()?;
+    if let Some(directory) = location.file().and_then(Path::parent) {
         std::fs::create_dir_all(directory)
-            .with_context(|| format!("`data`: cannot make {}", directory.display()))?;
+            .with_context(|| format!("`data`: cannot create {}", directory.display()))?;
     }
-    Store::open_beside(&place).await.with_context(|| format!("cannot open the store {place}"))
+    Store::open_auxiliary(&location)
+        .await
+        .with_context(|| format!("cannot open the store {location}"))
 }
 
 async fn write(mut writer: Writer, change: AccessWrite, act: &str, id: &str) -> Result<()> {
     let (act, target) = (act.to_owned(), format!("/api/v1/tokens/{id}"));
-    let entry = Deed { act, target, address: None }.row((ACTOR, None), Clock.now());
+    let entry = AuditEntry { action: act, target, address: None }.row((ACTOR, None), Clock.now());
     let changes = [change, AccessWrite::Audit(entry)];
     let mut set = changes.map(Write::Access).to_vec();
     writer.commit(&mut [&mut set]).await?;
     Ok(writer.close().await?)
 }
 
-/// Makes a token; returns its secret, which is nowhere else.
+/// Creates a token. Returns its secret, which is not stored anywhere.
 ///
 /// # Errors
-/// If the token cannot be, its name is taken, or the store cannot be written.
+/// If the token is invalid, its name is taken, or the store cannot be written.
 pub async fn create_token(config: &Config, wanted: NewToken) -> Result<String> {
     let minted = mint(wanted, ACTOR, Clock.now())?;
-    let (store, writer) = beside(config).await?;
+    let (store, writer) = open_store(config).await?;
     let name = &minted.row.name;
     if store.token_named(name).await?.is_some() {
-        bail!("there is a token `{name}` in force; revoke it first, or take another name");
+        bail!("a token `{name}` exists already; revoke it first, or choose another name");
     }
     if let Some(asset) = &minted.row.asset
         && store.asset(asset).await?.is_none()
@@ -59,35 +62,37 @@ pub async fn create_token(config: &Config, wanted: NewToken) -> Result<String> {
     Ok(minted.secret)
 }
 
-/// The tokens, the latest first.
+/// Lists all tokens, the latest first.
 ///
 /// # Errors
 /// If the store cannot be read.
 pub async fn tokens(config: &Config) -> Result<Vec<TokenView>> {
-    let (store, writer) = beside(config).await?;
+    let (store, writer) = open_store(config).await?;
     let mut tokens: Vec<TokenView> = Vec::new();
     loop {
         let before = tokens.last().map_or(LAST_ID, |token| token.id.as_str());
-        let page = store.tokens(before, PAGE).await?;
+        let page = store.tokens(before, PAGE_SIZE).await?;
         if page.is_empty() {
             writer.close().await?;
             return Ok(tokens);
         }
-        tokens.extend(page.into_iter().map(token_view));
+        for row in page {
+            tokens.push(token_view(row)?);
+        }
     }
 }
 
-/// Revokes the token of this name or id.
+/// Revokes the token with this name or id.
 ///
 /// # Errors
-/// If there is none in force, or the store cannot be written.
-pub async fn revoke_token(config: &Config, word: &str) -> Result<()> {
-    let (store, writer) = beside(config).await?;
-    let found = match store.token_named(word).await? {
+/// If there is none that is not revoked, or the store cannot be written.
+pub async fn revoke_token(config: &Config, name_or_id: &str) -> Result<()> {
+    let (store, writer) = open_store(config).await?;
+    let found = match store.token_named(name_or_id).await? {
         Some(row) => Some(row),
-        None => store.token(word).await?.filter(|row| row.revoked_at.is_none()),
+        None => store.token(name_or_id).await?.filter(|row| row.revoked_at.is_none()),
     };
-    let Some(row) = found else { bail!("no token `{word}` is in force") };
+    let Some(row) = found else { bail!("no token `{name_or_id}` is in force") };
     let change = AccessWrite::RevokeToken { id: row.id.clone(), at: Clock.now() };
     write(writer, change, "revoke_token", &row.id).await
 }

@@ -1,8 +1,9 @@
-//! Traces for OpenTelemetry: each request with what was done for it, sent to a
-//! collector by OTLP over HTTP. Nothing of it runs without an endpoint.
+//! Traces for OpenTelemetry: the spans of each request, sent to a collector by OTLP over
+//! HTTP. Inactive without an endpoint.
 //!
-//! Spans wait in memory, 2048 at most, and are sent by a thread of their own;
-//! while the collector is away, those beyond are dropped: nothing waits for it.
+//! At most 2048 spans are queued in memory; a thread of its own sends them. While the
+//! collector is unavailable, further spans are dropped, so that the service never waits
+//! for it.
 
 use anyhow::{Context, Result};
 use opentelemetry::KeyValue;
@@ -18,22 +19,22 @@ use tracing_subscriber::registry::LookupSpan;
 
 use crate::config::TracesConfig;
 
-/// What sends traces.
+/// The sender of traces.
 pub struct Traces {
     provider: SdkTracerProvider,
 }
 
 impl Traces {
-    /// Begins to send them, if there is an endpoint. Outside a runtime: its
-    /// sender brings its own.
+    /// Starts to send traces; returns `None` without an endpoint. Must be called outside
+    /// of an asynchronous runtime, because the exporter starts its own.
     ///
     /// # Errors
-    /// If the endpoint cannot be.
+    /// If the endpoint is invalid.
     pub fn start(config: &TracesConfig) -> Result<Option<Self>> {
         let Some(endpoint) = &config.endpoint else { return Ok(None) };
         let endpoint = format!("{}/v1/traces", endpoint.trim_end_matches('/'));
         let exporter = SpanExporter::builder().with_http().with_endpoint(endpoint).build();
-        let exporter = exporter.context("`traces.endpoint`: cannot be used")?;
+        let exporter = exporter.context("`traces.endpoint` is invalid")?;
         let version = KeyValue::new("service.version", env!("CARGO_PKG_VERSION"));
         let resource = Resource::builder().with_service_name("offbd").with_attribute(version);
         let sampler = Sampler::ParentBased(Box::new(Sampler::TraceIdRatioBased(config.share)));
@@ -45,7 +46,7 @@ impl Traces {
         Ok(Some(Self { provider }))
     }
 
-    /// What takes the service's own spans, however much is logged.
+    /// A layer that receives the service's own spans, independent of the log level.
     #[must_use]
     pub fn layer<S>(&self) -> impl Layer<S> + use<S>
     where
@@ -56,7 +57,7 @@ impl Traces {
         tracing_opentelemetry::layer().with_tracer(tracer).with_filter(own)
     }
 
-    /// Sends what waits.
+    /// Sends the queued spans.
     pub fn stop(&self) {
         if let Err(error) = self.provider.shutdown() {
             tracing::warn!(%error, "the last traces were not sent");

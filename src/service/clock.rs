@@ -1,4 +1,4 @@
-//! The wall clock, the only place that reads it.
+//! The wall clock. No other module of the service reads it.
 
 use crate::store::Micros;
 
@@ -7,28 +7,28 @@ use crate::store::Micros;
 pub struct Clock;
 
 impl Clock {
-    /// Now.
+    /// Returns the current time.
     #[must_use]
-    #[expect(clippy::disallowed_methods, reason = "this is the place")]
+    #[expect(clippy::disallowed_methods, reason = "the only place that reads the clock")]
     pub fn now(self) -> Micros {
         jiff::Timestamp::now().as_microsecond()
     }
 }
 
-/// The moment that RFC 3339 text says.
+/// Parses an RFC 3339 timestamp.
 ///
 /// # Errors
-/// Says what is wrong with it.
-pub fn moment(text: &str) -> Result<Micros, String> {
+/// The reason why it is invalid.
+pub fn parse_timestamp(text: &str) -> Result<Micros, String> {
     let parsed: Result<jiff::Timestamp, _> = text.parse();
     parsed.map(jiff::Timestamp::as_microsecond).map_err(|error| error.to_string())
 }
 
-/// A moment as RFC 3339, UTC, to the microsecond: always of one length, so that
-/// text sorts as time does.
+/// Formats a timestamp as RFC 3339, UTC, with microseconds. All results have the same
+/// length and sort in the order of time.
 #[must_use]
-pub(super) fn rfc3339(moment: Micros) -> String {
-    jiff::Timestamp::from_microsecond(moment)
+pub(super) fn rfc3339(at: Micros) -> String {
+    jiff::Timestamp::from_microsecond(at)
         .map(|timestamp| format!("{timestamp:.6}"))
         .unwrap_or_default()
 }

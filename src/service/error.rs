@@ -1,4 +1,4 @@
-//! Why the service will not or cannot.
+//! Errors of the service.
 
 use std::sync::Arc;
 
@@ -9,7 +9,8 @@ use crate::wire::telemetry::BatchError;
 use offbd_core::engine::NoDriveCycle;
 use offbd_core::vocabulary::{Invalid, UnknownWord};
 
-/// Why the service will not or cannot. Knows no status codes.
+/// An error of the service. The messages are shown to users; HTTP statuses are assigned
+/// by the HTTP interface.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum ServiceError {
     #[error("there is no asset `{name}`; register it with POST /api/v1/assets")]
@@ -24,18 +25,18 @@ pub enum ServiceError {
     UnknownToken { id: String },
     #[error("no such fault code: {0}")]
     UnknownCode(UnknownWord),
-    #[error("there is an asset `{name}` already; replace it with PUT /api/v1/assets/{name}")]
+    #[error("asset `{name}` already exists; replace it with PUT /api/v1/assets/{name}")]
     AssetExists { name: String },
-    #[error("there is a token `{name}` in force; revoke it first, or take another name")]
+    #[error("a token named `{name}` is in force; revoke it first, or use another name")]
     TokenExists { name: String },
-    #[error("asset `{asset}` has a session `{name}` already")]
+    #[error("asset `{asset}` already has a session `{name}`")]
     SessionExists { asset: String, name: String },
-    #[error("session `{name}` of asset `{asset}` has ended; new samples need another session")]
+    #[error("session `{name}` of asset `{asset}` has ended; send new samples to another session")]
     SessionEnded { asset: String, name: String },
-    #[error("{code} of asset `{asset}` has no occurrence to acknowledge")]
+    #[error("{code} of asset `{asset}` has no current occurrence to acknowledge")]
     NothingToAcknowledge { asset: String, code: String },
     #[error(
-        "{code} of asset `{asset}` has no recording: nothing is on record, or its session is gone"
+        "{code} of asset `{asset}` has no recording: it never failed, or its session was deleted"
     )]
     NoRecording { asset: String, code: String },
     #[error(transparent)]
@@ -43,39 +44,45 @@ pub enum ServiceError {
     #[error("calibration `{id}` is not done: {state}")]
     NotDone { id: String, state: String },
     #[error(
-        "asset `{asset}` offers no calibration: GET /api/v1/assets/{asset}/learning says how far it is"
+        "asset `{asset}` offers no calibration; see its progress at \
+         GET /api/v1/assets/{asset}/learning"
     )]
     NothingOffered { asset: String },
-    #[error("asset `{asset}` is learnt: take the calibration out of its file to learn it anew")]
+    #[error(
+        "asset `{asset}` is calibrated; remove the calibration from its asset file to learn it \
+         again"
+    )]
     AlreadyLearnt { asset: String },
     #[error(transparent)]
     Invalid(#[from] Invalid),
     #[error(transparent)]
     Batch(#[from] BatchError),
-    #[error("{what}: at most {limit}")]
+    #[error("too many {what}: the limit is {limit}")]
     TooMany { what: &'static str, limit: usize },
-    #[error("there are {limit} assets, and no more are taken")]
+    #[error("the limit of {limit} assets is reached")]
     RegistryFull { limit: usize },
-    /// Come again after `limits::RETRY_AFTER_S`; nothing was taken.
-    #[error("{what}; nothing was taken, send it again")]
+    /// A limit is reached. The request had no effect; retry after
+    /// [`RETRY_AFTER_S`](super::RETRY_AFTER_S).
+    #[error("{what}; the request was not processed, retry it")]
     Busy { what: &'static str },
-    /// The store failed, or what runs behind the service; come again.
-    #[error("{what}; what was not acknowledged was not taken, send it again")]
+    /// The store or a part of the service failed. Unacknowledged changes may not be
+    /// stored; retry.
+    #[error("{what}; unacknowledged data were not stored, retry")]
     Unavailable { what: &'static str },
-    /// The database does not take it, also alone; other changes it takes.
-    #[error("the store does not take {what}; see the log")]
+    /// The database rejects these changes, even alone, and accepts others.
+    #[error("the store does not accept {what}; see the log")]
     NotStored { what: String },
-    /// Samples in flight are at their limit, and none becomes durable.
+    /// The samples in flight are at their limit, and nothing is committed.
     #[error(
         "the samples in flight are at their limit, and nothing has been committed for {seconds} s"
     )]
     Stalled { seconds: u64 },
-    /// The database is away; what waits is kept, up to the limits.
-    #[error("the database takes nothing now: {reason}")]
+    /// The database is unavailable. Accepted changes wait, up to the limits.
+    #[error("the database is unavailable: {reason}")]
     Outage { reason: String },
-    #[error("the store: {0}")]
+    #[error("store error: {0}")]
     Store(Arc<StoreError>),
-    #[error("the store holds what this version cannot read: {what}")]
+    #[error("the store contains data that this version cannot read: {what}")]
     Corrupt { what: String },
 }
 
@@ -84,9 +91,9 @@ impl ServiceError {
         match error {
             TrySendError::Full(_) => {
                 metrics::counter!("offbd_turned_away_total", "queue" => "shard").increment(1);
-                Self::Busy { what: "too many requests wait for this asset" }
+                Self::Busy { what: "the queue of this asset is full" }
             }
-            TrySendError::Closed(_) => Self::Unavailable { what: "the service is closing" },
+            TrySendError::Closed(_) => Self::Unavailable { what: "the service is shutting down" },
         }
     }
 

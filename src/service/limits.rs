@@ -1,35 +1,38 @@
-//! How much the service takes on, and what happens at each bound.
+//! Limits of the service, and what happens when each is reached.
 
 use std::time::Duration;
 
-use super::retention::Retention;
+use super::ServiceError;
+use offbd_core::vocabulary::Invalid;
 
-/// The bounds that an operator may set.
+/// The configurable limits.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Threads that run engines.
     pub shards: usize,
-    /// Replays and calibrations at a time; others wait.
+    /// Replays and calibrations that run at a time; others wait in the queue.
     pub jobs: usize,
-    /// Requests that wait for one shard; the next is told to come again.
+    /// Commands in the queue of a shard; at the limit a request is refused with
+    /// [`ServiceError::Busy`].
     pub shard_queue: usize,
-    /// Write sets that wait for the writer; then the shards wait for it.
+    /// Write sets in the queue of the writer; at the limit the shards wait.
     pub commit_queue: usize,
-    /// Samples between arrival and commit; the next batch is told to come again.
+    /// Samples between arrival and commit; at the limit a batch is refused with
+    /// [`ServiceError::Busy`].
     pub in_flight_samples: usize,
-    /// Bytes of the journal, of which memory holds as many; above, what has been in
-    /// it longest is folded into the recordings after each commit. It stays below
-    /// twice this.
+    /// Bytes of the journal, which are also held in memory. Above this, the oldest entries
+    /// are folded into the recordings after each commit; the journal stays below twice
+    /// this.
     pub journal_bytes: usize,
-    /// Samples in one batch; a longer one is refused.
+    /// Samples in a batch; a longer batch is refused.
     pub batch_samples: usize,
-    /// Bytes of one batch; a longer one is refused.
+    /// Bytes of a batch; a longer batch is refused.
     pub batch_bytes: usize,
-    /// Bytes of one imported file; a longer one is refused.
+    /// Bytes of an imported file; a longer file is refused.
     pub import_bytes: usize,
-    /// Assets in the registry; the next is refused.
+    /// Assets in the registry; at the limit a new asset is refused.
     pub assets: usize,
-    /// Longest time for a request's body to arrive; then the request is given up.
+    /// Time limit to receive a request body; then the request is answered with 408.
     pub body_timeout: Duration,
     /// How long recordings are kept.
     pub retention: Retention,
@@ -55,14 +58,62 @@ impl Default for Limits {
 }
 
 impl Limits {
-    /// Samples in the longest batch that is taken.
+    /// Returns the number of samples in the longest batch that is accepted.
     pub(super) fn longest_batch(&self) -> usize {
         self.batch_samples.min(self.in_flight_samples)
     }
 }
 
-/// Seconds after which a caller who was turned away may come again.
+/// Time after which a client should retry, s (`Retry-After`).
 pub const RETRY_AFTER_S: u64 = 1;
 
 /// Longest name of a session, bytes.
 pub(super) const MAX_SESSION_NAME: usize = 200;
+
+/// Drive cycles that are computed at a time; further requests are refused meanwhile. Each
+/// takes up to several seconds of a core.
+pub(super) const MAX_DRIVE_CYCLES: usize = 1;
+
+/// Traces that are computed at a time; further requests are refused meanwhile.
+pub(super) const MAX_TRACES: usize = 2;
+
+/// Fault recordings that are computed at a time; further requests are refused meanwhile.
+pub(super) const MAX_RECORDINGS: usize = 2;
+
+/// Sessions that a calibration learns from; a request with more is refused.
+pub(super) const MAX_CALIBRATION_SESSIONS: usize = 32;
+
+/// Samples that a calibration learns from; a calibration with more fails.
+pub(super) const MAX_CALIBRATION_SAMPLES: usize = 2_000_000;
+
+/// How long recordings are kept; `None` means without limit.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Retention {
+    /// Age at which an ended session without a fault transition is deleted.
+    pub age: Option<Duration>,
+    /// Stored bytes of an asset's ended sessions above which the oldest ones without a
+    /// fault transition are deleted.
+    pub bytes_per_asset: Option<u64>,
+    /// Age at which an ended session with a fault transition is deleted.
+    pub fault_age: Option<Duration>,
+    /// Interval between two sweeps.
+    pub every: Duration,
+}
+
+impl Default for Retention {
+    /// Keeps everything.
+    fn default() -> Self {
+        let every = Duration::from_secs(600);
+        Self { age: None, bytes_per_asset: None, fault_age: None, every }
+    }
+}
+
+/// Checks that a session name has a valid length and no control characters.
+pub(super) fn check_session_name(name: &str) -> Result<(), ServiceError> {
+    let fits = (1..=MAX_SESSION_NAME).contains(&name.len());
+    if fits && !name.chars().any(char::is_control) {
+        return Ok(());
+    }
+    let reason = format!("must be 1 to {MAX_SESSION_NAME} bytes without control characters");
+    Err(Invalid::new("/session", reason).into())
+}

@@ -1,19 +1,19 @@
-//! A recorded session once more: its samples and what people did, in order.
+//! Plays a recorded session: its samples and actions, in their original order.
+
+use std::ops::ControlFlow;
 
 use super::ServiceError;
-use super::handles::Handles;
-use super::running::input;
+use super::writing::Handles;
 use crate::store::ActionKind;
 use offbd_core::engine::Input;
 use offbd_core::vocabulary::FaultCode;
 
-/// Gives the inputs of `session` to `take`, in the order in which they came,
-/// until it says that it is enough. Waits for the store on the calling thread,
-/// which must not be one of the runtime's.
+/// Passes the inputs of `session` to `take`, in their original order, until it breaks at a
+/// sample. Blocks on the store, so it must not run on a thread of the runtime.
 pub(super) fn play(
     handles: &Handles,
     session: &str,
-    mut take: impl FnMut(Input) -> Flow,
+    mut take: impl FnMut(Input) -> ControlFlow<()>,
 ) -> Result<(), ServiceError> {
     let mut actions = Vec::new();
     for row in handles.wait(handles.store.actions(session))? {
@@ -26,23 +26,24 @@ pub(super) fn play(
     while let Some(samples) = handles.wait(handles.store.samples_from(session, n_played))? {
         for sample in samples {
             while let Some((_, action)) = actions.next_if(|(after, _)| *after <= n_played) {
-                take(action);
+                let _ = take(action);
             }
-            if take(Input::Sample(sample)) == Flow::Enough {
+            if take(Input::Sample(sample)).is_break() {
                 return Ok(());
             }
             n_played += 1;
         }
     }
     actions.for_each(|(_, action)| {
-        take(action);
+        let _ = take(action);
     });
     Ok(())
 }
 
-/// Whether to go on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Flow {
-    More,
-    Enough,
+/// Returns the engine's input for an action.
+pub(super) const fn input(kind: ActionKind, code: FaultCode) -> Input {
+    match kind {
+        ActionKind::Clear => Input::Clear(code),
+        ActionKind::Acknowledge => Input::Acknowledge(code),
+    }
 }

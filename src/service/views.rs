@@ -1,20 +1,22 @@
-//! Rows to views and back: the documents inside the store's rows.
+//! Converts rows of the store, and the JSON documents in them, to views and back.
 
 use data_encoding::{HEXLOWER, HEXLOWER_PERMISSIVE};
+use std::str::FromStr;
+
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::ServiceError;
 use super::clock::rfc3339;
-use super::running::Provenance;
-use crate::store::{FaultFilter, FaultRow, SessionRow, Store};
+use crate::store::{FaultRow, SessionRow, Store};
 use crate::wire::asset;
-use crate::wire::memory::{self, FaultRecordView, MemoryView};
+use crate::wire::memory;
 use crate::wire::provenance::ProvenanceView;
 use crate::wire::service::{FaultEntryView, Page, SessionView};
+use crate::wire::stored::{StoredMemory, StoredProvenance, StoredRecord};
 use offbd_core::diagnosis::{FaultMemory, FaultRecord, MemoryRules};
 use offbd_core::engine::Rig;
-use offbd_core::vocabulary::{FaultCode, Invalid};
+use offbd_core::vocabulary::{FaultCode, Invalid, UnknownWord};
 
 pub(super) fn to_json<T: Serialize>(view: &T) -> Result<String, ServiceError> {
     serde_json::to_string(view).map_err(ServiceError::corrupt)
@@ -24,39 +26,29 @@ pub(super) fn from_json<T: DeserializeOwned>(document: &str) -> Result<T, Servic
     serde_json::from_str(document).map_err(ServiceError::corrupt)
 }
 
-/// The rig of a stored asset file.
+/// Parses a column with a closed set of values.
+pub(super) fn word<T: FromStr<Err = UnknownWord>>(column: &str) -> Result<T, ServiceError> {
+    column.parse().map_err(ServiceError::corrupt)
+}
+
+/// Parses the rig of a stored asset file.
 pub(super) fn rig(document: &str) -> Result<Rig, ServiceError> {
     asset::parse(document.as_bytes()).map_err(ServiceError::corrupt)
 }
 
-/// The fault memory of a stored document.
+/// Parses a stored fault memory.
 pub(super) fn memory(document: &str) -> Result<FaultMemory, ServiceError> {
-    let view: MemoryView = from_json(document)?;
-    memory::memory(&view).map_err(ServiceError::corrupt)
-}
-
-/// The fault memory that the store has for `asset`, and what it knows beside.
-pub(super) async fn stored_memory(
-    store: &Store,
-    asset: &str,
-) -> Result<(FaultMemory, Provenance), ServiceError> {
-    let filter = FaultFilter { asset: Some(asset.to_owned()), ..FaultFilter::default() };
-    let rows = store.faults(&filter, FaultCode::COUNT as u32).await?;
-    let mut provenance = Provenance::default();
-    for row in &rows {
-        let code: FaultCode = row.code.parse().map_err(ServiceError::corrupt)?;
-        provenance[code as usize] = from_json(&row.provenance)?;
-    }
-    let records: Result<Vec<FaultRecordView>, _> =
-        rows.iter().map(|row| from_json(&row.record)).collect();
-    let memory = memory::memory(&MemoryView { records: records? });
-    Ok((memory.map_err(ServiceError::corrupt)?, provenance))
+    let stored: StoredMemory = from_json(document)?;
+    stored.memory().map_err(ServiceError::corrupt)
 }
 
 pub(super) fn fault(row: FaultRow) -> Result<FaultEntryView, ServiceError> {
+    let stored: StoredRecord = from_json(&row.record)?;
+    let provenance: StoredProvenance = from_json(&row.provenance)?;
+    let record = stored.record().map_err(ServiceError::corrupt)?;
     Ok(FaultEntryView {
-        record: from_json(&row.record)?,
-        provenance: from_json(&row.provenance)?,
+        record: memory::record_view(stored.code.into(), &record, &MemoryRules::default()),
+        provenance: provenance.into(),
         asset: row.asset,
         changed_at: rfc3339(row.changed_at),
         monitor: None,
@@ -69,7 +61,7 @@ pub(super) fn session(row: SessionRow) -> Result<SessionView, ServiceError> {
         id: row.id,
         asset: row.asset,
         name: row.name,
-        state: row.state,
+        state: word(&row.state)?,
         opened_at: rfc3339(row.opened_at),
         ended_at: row.ended_at.map(rfc3339),
         samples: count(row.progress.n_samples),
@@ -81,7 +73,7 @@ pub(super) fn session(row: SessionRow) -> Result<SessionView, ServiceError> {
     })
 }
 
-/// What is said of a code that has no row: it never failed.
+/// Returns the entry of a code without a row, which has never failed.
 pub(super) async fn never_failed(
     store: &Store,
     name: &str,
@@ -99,17 +91,16 @@ pub(super) async fn never_failed(
     })
 }
 
-/// A page out of `rows`, of which there is one more than `limit` if another
-/// page follows.
+/// Returns a page of `rows`, which has one row more than `limit` if another page follows.
 pub(super) fn page<R, V, K: Serialize>(
     mut rows: Vec<R>,
     limit: u32,
     key: impl Fn(&R) -> K,
     view: impl FnMut(R) -> Result<V, ServiceError>,
 ) -> Result<Page<V>, ServiceError> {
-    let more = rows.len() > limit as usize;
+    let has_next = rows.len() > limit as usize;
     rows.truncate(limit as usize);
-    let next = match rows.last().filter(|_| more) {
+    let next = match rows.last().filter(|_| has_next) {
         Some(last) => Some(HEXLOWER.encode(to_json(&key(last))?.as_bytes())),
         None => None,
     };
@@ -117,9 +108,9 @@ pub(super) fn page<R, V, K: Serialize>(
     Ok(Page { items, next })
 }
 
-/// The key in a cursor that [`page`] gave.
+/// Decodes the key in a cursor that [`page`] returned.
 pub(super) fn cursor<K: DeserializeOwned>(cursor: &str) -> Result<K, ServiceError> {
-    let invalid = || Invalid::new("?cursor", "is not one that a page gave as `next`");
+    let invalid = || Invalid::new("?cursor", "not the `next` of a previous page");
     let bytes = HEXLOWER_PERMISSIVE.decode(cursor.as_bytes()).ok();
     let key = bytes.and_then(|bytes| serde_json::from_slice(&bytes).ok());
     Ok(key.ok_or_else(invalid)?)

@@ -1,4 +1,4 @@
-//! Tokens, logins and the audit log.
+//! Tables of tokens, logins and the audit log.
 
 use super::from_row::from_row;
 use sqlx::AnyConnection;
@@ -12,7 +12,7 @@ pub struct TokenRow {
     pub hash: String,
     pub name: String,
     pub role: String,
-    /// The one asset of a device.
+    /// The one asset that a device may use; `None` for other roles.
     pub asset: Option<String>,
     pub created_at: Micros,
     pub created_by: String,
@@ -38,9 +38,9 @@ from_row!(TokenRow {
 pub struct AuditRow {
     pub id: String,
     pub at: Micros,
-    /// Name of the token.
+    /// Name of the token that was used.
     pub actor: String,
-    /// Its id.
+    /// Id of that token.
     pub token: Option<String>,
     pub act: String,
     pub target: String,
@@ -49,16 +49,16 @@ pub struct AuditRow {
 
 from_row!(AuditRow { id, at, actor, token, act, target, address });
 
-/// A change of who may do what, or that something was done.
+/// A change of tokens or logins, or an entry of the audit log.
 #[derive(Clone, Debug)]
 pub enum AccessWrite {
-    /// A new token; a conflict if another in force has its name.
+    /// Creates a token. It is a conflict if a token that is not revoked has its name.
     CreateToken(TokenRow),
     RevokeToken {
         id: String,
         at: Micros,
     },
-    /// The tokens of an asset's devices.
+    /// Revokes the tokens of the devices of an asset.
     RevokeDevices {
         asset: String,
         at: Micros,
@@ -67,7 +67,7 @@ pub enum AccessWrite {
         id: String,
         at: Micros,
     },
-    /// A login; those that have expired go, and the oldest of a token that has
+    /// Creates a login. Expired logins are deleted, and the oldest ones of a token with
     /// more than [`MAX_LOGINS`].
     Login {
         hash: String,
@@ -81,11 +81,11 @@ pub enum AccessWrite {
     Audit(AuditRow),
 }
 
-/// What comes after every id, in whatever order of letters a database has: ids
-/// are made of hexadecimal digits and dashes.
+/// A string that sorts after every id in any collation: ids consist of hexadecimal digits
+/// and dashes.
 pub const LAST_ID: &str = "z";
 
-/// Logins of one token at a time; with one more, the oldest ends.
+/// Logins of one token at a time; one more ends the oldest.
 pub const MAX_LOGINS: i64 = 100;
 
 impl AccessWrite {
@@ -149,7 +149,7 @@ async fn create_token(db: &mut AnyConnection, row: &TokenRow) -> Result<(), Stor
     Ok(())
 }
 
-/// Leaves room for one more login of `token`.
+/// Deletes the oldest logins of `token`, so that there is room for one more.
 async fn make_room(db: &mut AnyConnection, token: &str) -> Result<(), StoreError> {
     sqlx::query(
         "DELETE FROM login WHERE token = $1 AND hash NOT IN
@@ -195,10 +195,10 @@ async fn audit(db: &mut AnyConnection, row: &AuditRow) -> Result<(), StoreError>
 }
 
 impl Store {
-    /// The token whose secret has this hash, revoked and expired ones too.
+    /// The token whose secret has this hash, also if it is revoked or expired.
     ///
     /// # Errors
-    /// [`StoreError`], as for every question here, if the database fails.
+    /// [`StoreError`] if the database fails; so do all queries here.
     pub async fn token_by_hash(&self, hash: &str) -> Result<Option<TokenRow>, StoreError> {
         Ok(sqlx::query_as("SELECT * FROM token WHERE hash = $1")
             .bind(hash)
@@ -206,8 +206,8 @@ impl Store {
             .await?)
     }
 
-    /// The token behind a login whose cookie has this hash; its end is the
-    /// login's where that comes first.
+    /// The token of the login whose cookie has this hash. If the login expires before the
+    /// token, `expires_at` is that of the login.
     pub async fn token_by_login(
         &self,
         hash: &str,
@@ -226,7 +226,7 @@ impl Store {
         .await?)
     }
 
-    /// A token, revoked ones too.
+    /// The token `id`, also if it is revoked.
     pub async fn token(&self, id: &str) -> Result<Option<TokenRow>, StoreError> {
         Ok(sqlx::query_as("SELECT * FROM token WHERE id = $1")
             .bind(id)
@@ -234,7 +234,7 @@ impl Store {
             .await?)
     }
 
-    /// The token in force of this name.
+    /// The token of this name that is not revoked.
     pub async fn token_named(&self, name: &str) -> Result<Option<TokenRow>, StoreError> {
         Ok(sqlx::query_as("SELECT * FROM token WHERE name = $1 AND revoked_at IS NULL")
             .bind(name)
@@ -242,7 +242,7 @@ impl Store {
             .await?)
     }
 
-    /// Tokens, the latest first, those made before the one with the id `before`.
+    /// Tokens with an id below `before`, the latest first.
     pub async fn tokens(&self, before: &str, limit: u32) -> Result<Vec<TokenRow>, StoreError> {
         Ok(sqlx::query_as("SELECT * FROM token WHERE id < $1 ORDER BY id DESC LIMIT $2")
             .bind(before)
@@ -251,7 +251,7 @@ impl Store {
             .await?)
     }
 
-    /// How many tokens are in force.
+    /// The number of tokens that are neither revoked nor expired.
     pub async fn n_tokens(&self, now: Micros) -> Result<i64, StoreError> {
         Ok(sqlx::query_scalar(
             "SELECT COUNT(*) FROM token
@@ -262,7 +262,7 @@ impl Store {
         .await?)
     }
 
-    /// The audit log, the latest first, before the entry with the id `before`.
+    /// Entries of the audit log with an id below `before`, the latest first.
     pub async fn audit(&self, before: &str, limit: u32) -> Result<Vec<AuditRow>, StoreError> {
         Ok(sqlx::query_as("SELECT * FROM audit WHERE id < $1 ORDER BY id DESC LIMIT $2")
             .bind(before)

@@ -1,5 +1,4 @@
-//! The whole database of SQLite in one file: copied while the service runs,
-//! and put back. PostgreSQL has its own tools for that.
+//! Backup and restore of an SQLite database as one file. PostgreSQL has its own tools.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -7,110 +6,110 @@ use std::path::{Path, PathBuf};
 use sqlx::any::AnyConnectOptions;
 use sqlx::{AnyConnection, ConnectOptions, Connection};
 
-use super::{MIGRATIONS, Place, StoreError};
+use super::{Location, MIGRATIONS, StoreError};
 
-/// Copies the database file at `place` to `copy`, which must not be there. The
-/// copy holds every commit up to some moment after the call, whole and on the
-/// disk; the service goes on meanwhile.
+/// Copies the database file at `location` to the new file `copy`, also while a service
+/// uses it. The copy is a consistent state of the database with all commits before the
+/// call, and is on the disk on return.
 ///
 /// # Errors
-/// [`StoreError`] if there is no such file, or the copy cannot be made.
-pub async fn back_up(place: &Place, copy: &Path) -> Result<(), StoreError> {
-    let file = place.file().ok_or(StoreError::OwnTools)?;
-    absent(copy)?;
-    let part = beside(copy, ".part");
-    remove(&part)?;
+/// [`StoreError`] if there is no such database, `copy` exists, or it cannot be written.
+pub async fn back_up(location: &Location, copy: &Path) -> Result<(), StoreError> {
+    let file = location.file().ok_or(StoreError::NotSqlite)?;
+    check_absent(copy)?;
+    let part = with_suffix(copy, ".part");
+    remove_if_exists(&part)?;
     let mut connection = open(file).await?;
     let target = part.to_string_lossy().into_owned();
     sqlx::query("VACUUM INTO $1").bind(target).execute(&mut connection).await?;
     connection.close().await?;
     let mut written = open(&part).await?;
-    sound(&mut written).await?;
+    check_integrity(&mut written).await?;
     written.close().await?;
-    settle(&part, copy)
+    publish(&part, copy)
 }
 
-/// Makes the database file at `place` from `copy`, brought to this version's
-/// schema. The one that is there is refused or, with `replace`, kept beside it
-/// with `.replaced` behind its name. No service may use it meanwhile.
+/// Replaces the database file at `location` by `copy`, with the schema brought to this
+/// version. An existing file is an error or, with `replace`, renamed to `*.replaced`. No
+/// service may use the database meanwhile.
 ///
 /// # Errors
-/// [`StoreError`] if the copy is not whole, not ours or newer than this
-/// version; then everything is as it was.
-pub async fn restore(place: &Place, copy: &Path, replace: bool) -> Result<(), StoreError> {
-    let file = place.file().ok_or(StoreError::OwnTools)?;
+/// [`StoreError`] if the copy is damaged, is not a database of offbd, or is newer than
+/// this version; then nothing is changed.
+pub async fn restore(location: &Location, copy: &Path, replace: bool) -> Result<(), StoreError> {
+    let file = location.file().ok_or(StoreError::NotSqlite)?;
     if !replace {
-        absent(file)?;
+        check_absent(file)?;
     }
-    let part = beside(file, ".part");
-    remove(&part)?;
-    std::fs::copy(copy, &part).map_err(at(copy))?;
+    let part = with_suffix(file, ".part");
+    remove_if_exists(&part)?;
+    std::fs::copy(copy, &part).map_err(file_error(copy))?;
     let mut connection = open(&part).await?;
-    sound(&mut connection).await?;
-    // A file that is none of ours has no migrations.
+    check_integrity(&mut connection).await?;
+    // Fails if the file is not a database of offbd.
     sqlx::query("SELECT version FROM _sqlx_migrations").execute(&mut connection).await?;
     MIGRATIONS.run_direct(None, &mut connection, false).await?;
     connection.close().await?;
     if file.exists() {
         set_aside(file)?;
     }
-    settle(&part, file)
+    publish(&part, file)
 }
 
-/// Moves the old file away, with the write-ahead log that belongs to it.
+/// Renames the old file and its write-ahead log to `*.replaced`.
 fn set_aside(file: &Path) -> Result<(), StoreError> {
-    let aside = beside(file, ".replaced");
+    let aside = with_suffix(file, ".replaced");
     for end in ["-shm", "-wal", ""] {
-        remove(&beside(&aside, end))?;
+        remove_if_exists(&with_suffix(&aside, end))?;
     }
     for end in ["-wal", ""] {
-        let from = beside(file, end);
+        let from = with_suffix(file, end);
         if from.exists() {
-            std::fs::rename(&from, beside(&aside, end)).map_err(at(&from))?;
+            std::fs::rename(&from, with_suffix(&aside, end)).map_err(file_error(&from))?;
         }
     }
-    remove(&beside(file, "-shm"))
+    remove_if_exists(&with_suffix(file, "-shm"))
 }
 
 async fn open(file: &Path) -> Result<AnyConnection, StoreError> {
     sqlx::any::install_default_drivers();
-    let url = super::place::file_url(file, "rw")?;
+    let url = super::location::file_url(file, "rw")?;
     Ok(url.parse::<AnyConnectOptions>()?.connect().await?)
 }
 
-async fn sound(connection: &mut AnyConnection) -> Result<(), StoreError> {
+async fn check_integrity(connection: &mut AnyConnection) -> Result<(), StoreError> {
     let found: String =
         sqlx::query_scalar("PRAGMA integrity_check(1)").fetch_one(connection).await?;
     if found == "ok" { Ok(()) } else { Err(StoreError::Damaged { found }) }
 }
 
-/// Gives the finished file its name; both are on the disk afterwards.
-fn settle(part: &Path, file: &Path) -> Result<(), StoreError> {
-    File::open(part).and_then(|file| file.sync_all()).map_err(at(part))?;
-    std::fs::rename(part, file).map_err(at(file))?;
+/// Renames the finished `part` to `file`; contents and name are on the disk on return.
+fn publish(part: &Path, file: &Path) -> Result<(), StoreError> {
+    File::open(part).and_then(|file| file.sync_all()).map_err(file_error(part))?;
+    std::fs::rename(part, file).map_err(file_error(file))?;
     let directory = file.parent().filter(|directory| !directory.as_os_str().is_empty());
     let directory = directory.unwrap_or(Path::new("."));
-    File::open(directory).and_then(|directory| directory.sync_all()).map_err(at(directory))
+    File::open(directory).and_then(|directory| directory.sync_all()).map_err(file_error(directory))
 }
 
-fn absent(file: &Path) -> Result<(), StoreError> {
-    let there = file.exists();
-    if there { Err(StoreError::Exists { file: file.to_owned() }) } else { Ok(()) }
+fn check_absent(file: &Path) -> Result<(), StoreError> {
+    let exists = file.exists();
+    if exists { Err(StoreError::Exists { file: file.to_owned() }) } else { Ok(()) }
 }
 
-fn remove(file: &Path) -> Result<(), StoreError> {
+fn remove_if_exists(file: &Path) -> Result<(), StoreError> {
     match std::fs::remove_file(file) {
-        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(at(file)(error)),
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(file_error(file)(error)),
         _ => Ok(()),
     }
 }
 
-fn beside(file: &Path, end: &str) -> PathBuf {
+fn with_suffix(file: &Path, suffix: &str) -> PathBuf {
     let mut name = file.as_os_str().to_owned();
-    name.push(end);
+    name.push(suffix);
     name.into()
 }
 
-fn at(file: &Path) -> impl Fn(std::io::Error) -> StoreError {
+fn file_error(file: &Path) -> impl Fn(std::io::Error) -> StoreError {
     move |source| StoreError::File { file: file.to_owned(), source }
 }

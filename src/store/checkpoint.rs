@@ -1,11 +1,13 @@
-//! The write-ahead log of a database file goes into the file beside the writer.
+//! Checkpoints of SQLite: copying the write-ahead log (WAL) into the database file.
 //!
-//! SQLite lets the commit that finds the log full copy it into the file, and
-//! everybody waits for that commit: 0.1 s for 64 MiB on a fast disk, and on a slow
-//! one longer than a commit may take. So another connection copies what it can
-//! while commits go on, until little is left. That little the writer copies itself,
-//! between two commits: for only where none comes between does the next one begin
-//! the log anew.
+//! SQLite writes each commit to the end of the log. By itself it copies the log into the
+//! file within the commit that makes the log too long, and every client waits for that
+//! commit: 0.1 s for 64 MiB on a fast disk, and longer than a commit may take on a slow
+//! one. So a second connection copies most of the log while commits go on. The small rest
+//! is copied by the writer itself between two commits, because SQLite writes to the
+//! beginning of the log again only if the whole log is copied when the next commit
+//! starts. Commits are durable before and after a checkpoint: checkpoints only limit the
+//! length of the log. If they fail, SQLite's own mechanism still works.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,80 +16,82 @@ use sqlx::{AnyConnection, Connection};
 use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
 
-use super::{Place, StoreError};
+use super::write::WriterRole;
+use super::{Location, StoreError};
 
-/// Pages in the log with which it is full, 64 MiB of them, and a commit copies it
-/// after all: when a reader has held on to it. SQLite's own are 4 MiB.
-pub(super) const FULL_PAGES: i64 = 16_384;
+/// Pages in the log (64 MiB) at which a commit of the writer copies it after all, which
+/// happens if a reader has prevented checkpoints for long. SQLite's default is 4 MiB.
+pub(super) const AUTOCHECKPOINT_PAGES: i64 = 16_384;
 
-/// Bytes committed until the log is copied. A page written again and again, as those
-/// of the journal are, goes into the file once each time.
-const EVERY_BYTES: usize = 16 << 20;
+/// Committed bytes between two checkpoints. A page that is written repeatedly, like
+/// those of the journal, is copied once per checkpoint.
+const CHECKPOINT_BYTES: usize = 16 << 20;
 
-/// Pages that the writer may copy itself: 4 MiB, some 15 ms at most on two busy cores.
-const LITTLE_PAGES: i64 = 1024;
+/// Pages that the writer may copy itself: 4 MiB, about 15 ms at most on two busy cores.
+const SMALL_REST_PAGES: i64 = 1024;
 
-/// Copies after which as little is left as ever will be: each has less to do than
-/// the one before, down to what comes meanwhile.
+/// Copies per checkpoint. Each has only the pages to copy that were committed during the
+/// previous one, so that further copies would not make the rest smaller.
 const COPIES: u32 = 4;
 
-/// Bytes that a commit takes of the log beside its samples, and each of those in the
-/// journal and later in a chunk: four pages, and some 45 and 20 bytes.
+/// Estimated bytes of the log per commit (four pages), and per sample: about 45 in the
+/// journal and later 20 in a chunk.
 const COMMIT_BYTES: usize = 4 << 12;
 const SAMPLE_BYTES: usize = 65;
 
-/// What runs beside a writer to a file; it ends with it.
+/// The task that copies the log of a database file for a writer.
 #[derive(Debug)]
-pub(super) struct Checkpoints {
+pub(super) struct Checkpointer {
     due: mpsc::Sender<()>,
     task: JoinHandle<()>,
+    /// Estimated bytes committed since the last checkpoint was requested.
     n_bytes: usize,
-    /// The rest is the writer's.
-    is_little_left: Arc<AtomicBool>,
+    /// Set by the task when the writer should copy the rest.
+    is_rest_small: Arc<AtomicBool>,
 }
 
-impl Checkpoints {
-    /// For a file; a server sees to it itself.
-    pub(super) fn beside(place: &Place) -> Option<Self> {
-        place.file()?;
+impl Checkpointer {
+    /// Starts the task; returns `None` for PostgreSQL, which makes its checkpoints itself.
+    pub(super) fn start(location: &Location) -> Option<Self> {
+        location.file()?;
         let (due, wake) = mpsc::channel(1);
-        let is_little_left = Arc::new(AtomicBool::new(false));
-        let task = tokio::spawn(run(place.clone(), wake, is_little_left.clone()));
-        Some(Self { due, task, n_bytes: 0, is_little_left })
+        let is_rest_small = Arc::new(AtomicBool::new(false));
+        let task = tokio::spawn(run(location.clone(), wake, is_rest_small.clone()));
+        Some(Self { due, task, n_bytes: 0, is_rest_small })
     }
 
-    /// Notes that a commit of so many samples is in the log.
-    pub(super) fn note(&mut self, n_samples: usize) {
+    /// Counts a commit of `n_samples` samples, and requests a checkpoint if one is due.
+    pub(super) fn count_commit(&mut self, n_samples: usize) {
         self.n_bytes += COMMIT_BYTES + n_samples * SAMPLE_BYTES;
-        if self.n_bytes >= EVERY_BYTES {
+        if self.n_bytes >= CHECKPOINT_BYTES {
             self.n_bytes = 0;
-            // Full when a copy is due already.
+            // Fails if a checkpoint is requested already.
             let _ = self.due.try_send(());
         }
     }
 
-    /// Whether the writer should [`copy`] now; true once.
-    pub(super) fn is_little_left(&self) -> bool {
-        self.is_little_left.swap(false, Ordering::Relaxed)
+    /// Returns whether the writer should [`copy`] the rest now, and resets the flag.
+    pub(super) fn take_is_rest_small(&self) -> bool {
+        self.is_rest_small.swap(false, Ordering::Relaxed)
     }
 
-    /// Waits for what is under way.
+    /// Ends the task, and waits for a checkpoint that is running.
     pub(super) async fn close(self) {
         drop(self.due);
         if self.task.await.is_err() {
-            tracing::error!("copying the write-ahead log ended by panic");
+            tracing::error!("the task that copies the write-ahead log has panicked");
         }
     }
 }
 
-async fn run(place: Place, mut due: mpsc::Receiver<()>, is_little_left: Arc<AtomicBool>) {
+async fn run(location: Location, mut due: mpsc::Receiver<()>, is_rest_small: Arc<AtomicBool>) {
     let mut connection = None;
     while due.recv().await.is_some() {
-        match copy_most(&place, &mut connection).await {
-            Ok(most) => is_little_left.store(most, Ordering::Relaxed),
+        match copy_most(&location, &mut connection).await {
+            Ok(is_small) => is_rest_small.store(is_small, Ordering::Relaxed),
             Err(error) => {
-                // The commit that finds it full does it.
-                tracing::warn!(%error, "the write-ahead log is not copied into the file");
+                // The log then grows until SQLite copies it within a commit.
+                tracing::warn!(%error, "cannot copy the write-ahead log into the database file");
                 connection = None;
             }
         }
@@ -97,23 +101,23 @@ async fn run(place: Place, mut due: mpsc::Receiver<()>, is_little_left: Arc<Atom
     }
 }
 
-/// Copies what is in the log, and what is committed meanwhile, until little is left;
-/// false if a reader still needs what would be written over.
+/// Copies the log until the rest is small. Returns `false` if a reader prevents that,
+/// because it still needs an older state of pages in the file.
 async fn copy_most(
-    place: &Place,
+    location: &Location,
     connection: &mut Option<AnyConnection>,
 ) -> Result<bool, StoreError> {
     let connection = match connection {
         Some(connection) => connection,
-        none => none.insert(place.writer(false).await?),
+        none => none.insert(location.writer(WriterRole::Auxiliary).await?),
     };
     let mut before = 0;
     for _ in 0..COPIES {
-        let Copied { pages, copied } = copy(connection).await?;
+        let LogPages { pages, copied } = copy(connection).await?;
         if copied < pages {
             return Ok(false);
         }
-        if pages - before <= LITTLE_PAGES {
+        if pages - before <= SMALL_REST_PAGES {
             break;
         }
         before = copied;
@@ -121,18 +125,19 @@ async fn copy_most(
     Ok(true)
 }
 
-/// Pages in the log as of a copy's beginning, and those of them that are copied now.
+/// Pages in the log at the beginning of a copy, and how many of them are in the file
+/// after it.
 #[derive(Debug)]
-pub(super) struct Copied {
+pub(super) struct LogPages {
     pages: i64,
     copied: i64,
 }
 
-/// Copies what is in the log and what no reader holds on to.
-pub(super) async fn copy(connection: &mut AnyConnection) -> Result<Copied, sqlx::Error> {
+/// Copies the log as far as no reader prevents it.
+pub(super) async fn copy(connection: &mut AnyConnection) -> Result<LogPages, sqlx::Error> {
     let copy = sqlx::query_as("PRAGMA wal_checkpoint(PASSIVE)");
     let (_busy, pages, copied): (i64, i64, i64) = copy.fetch_one(connection).await?;
-    Ok(Copied { pages, copied })
+    Ok(LogPages { pages, copied })
 }
 
 #[cfg(test)]
@@ -140,20 +145,21 @@ mod tests {
     use super::*;
     use crate::store::{AssetRow, Store, Write, Writer};
 
-    /// Assets in the file at `place` as it is without its log.
-    async fn without_log(place: &Place) -> i64 {
-        let file = place.file().unwrap();
+    /// Counts the assets in the database file without its log.
+    async fn without_log(location: &Location) -> i64 {
+        let file = location.file().unwrap();
         let copy = file.with_extension("copy");
         std::fs::copy(file, &copy).unwrap();
-        let mut connection = Place::File(copy).writer(false).await.unwrap();
+        let mut connection = Location::File(copy).writer(WriterRole::Auxiliary).await.unwrap();
         let count = sqlx::query_scalar("SELECT count(*) FROM asset");
         count.fetch_one(&mut connection).await.unwrap()
     }
 
-    /// How often the log at `place` has begun anew (bytes 12 to 16 of its header,
+    /// How often SQLite has restarted the log from its beginning (the checkpoint sequence
+    /// number, bytes 12 to 16 of the header,
     /// <https://www.sqlite.org/fileformat2.html#the_write_ahead_log>).
-    fn n_begun_anew(place: &Place) -> u32 {
-        let log = std::fs::read(place.file().unwrap().with_extension("db-wal")).unwrap();
+    fn n_restarts(location: &Location) -> u32 {
+        let log = std::fs::read(location.file().unwrap().with_extension("db-wal")).unwrap();
         u32::from_be_bytes(log[12..16].try_into().unwrap())
     }
 
@@ -172,37 +178,37 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn the_log_begins_anew_once_the_writer_has_copied_the_rest() {
+    async fn the_log_restarts_once_the_writer_has_copied_the_rest() {
         let folder = tempfile::tempdir().unwrap();
-        let place = Place::File(folder.path().join("offbd.db"));
-        let (_store, mut writer) = Store::open(&place).await.unwrap();
-        let before = n_begun_anew(&place);
+        let location = Location::File(folder.path().join("offbd.db"));
+        let (_store, mut writer) = Store::open(&location).await.unwrap();
+        let before = n_restarts(&location);
         commit(&mut writer, "a").await;
         writer.copy_log().await;
         commit(&mut writer, "b").await;
-        assert_eq!(n_begun_anew(&place), before, "it is not due yet");
-        let checkpoints = writer.checkpoints.as_ref().unwrap();
-        checkpoints.is_little_left.store(true, Ordering::Relaxed);
+        assert_eq!(n_restarts(&location), before, "no checkpoint is due yet");
+        let checkpointer = writer.checkpointer.as_ref().unwrap();
+        checkpointer.is_rest_small.store(true, Ordering::Relaxed);
         writer.copy_log().await;
         commit(&mut writer, "c").await;
-        assert_eq!(n_begun_anew(&place), before + 1);
-        assert_eq!(without_log(&place).await, 2, "c is in the log alone");
+        assert_eq!(n_restarts(&location), before + 1);
+        assert_eq!(without_log(&location).await, 2, "c is in the log only");
         writer.close().await.unwrap();
     }
 
     #[tokio::test]
-    async fn commits_wake_the_copying() {
+    async fn commits_trigger_a_checkpoint() {
         let folder = tempfile::tempdir().unwrap();
-        let place = Place::File(folder.path().join("offbd.db"));
-        let (_store, mut writer) = Store::open(&place).await.unwrap();
-        for n in 0..EVERY_BYTES / COMMIT_BYTES {
+        let location = Location::File(folder.path().join("offbd.db"));
+        let (_store, mut writer) = Store::open(&location).await.unwrap();
+        for n in 0..CHECKPOINT_BYTES / COMMIT_BYTES {
             commit(&mut writer, &n.to_string()).await;
         }
-        let checkpoints = writer.checkpoints.take().unwrap();
-        let is_little_left = checkpoints.is_little_left.clone();
-        checkpoints.close().await;
-        assert!(without_log(&place).await > 0);
-        assert!(is_little_left.load(Ordering::Relaxed), "the rest is the writer's");
+        let checkpointer = writer.checkpointer.take().unwrap();
+        let is_rest_small = checkpointer.is_rest_small.clone();
+        checkpointer.close().await;
+        assert!(without_log(&location).await > 0);
+        assert!(is_rest_small.load(Ordering::Relaxed), "the writer copies the rest");
         writer.close().await.unwrap();
     }
 }

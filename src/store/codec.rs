@@ -1,11 +1,10 @@
-//! A run of samples as bytes: columns, compressed, bit-exact.
+//! The format of a chunk: samples as bytes, by column, compressed without loss.
 //!
-//! A chunk is a format byte, the number of samples, then one column after the
-//! other (`seq`, `t_s`, the two commands, the two positions). A column says
-//! which samples have it (none, all, or a bitmap), and holds their values as
-//! plain little-endian words or packed by `pco`, whichever is shorter; of numbers
-//! that count up by one, the first. Every bit of a number survives, also of −0.0,
-//! subnormals and NaN.
+//! A chunk is a format byte, the number of samples, and then the columns `seq`, `t_s`,
+//! the two commands and the two positions. Each column states which samples have a value
+//! (none, all, or a bitmap). The values follow as plain little-endian words or, if that
+//! is shorter, compressed by `pco`; of numbers that increase by one, only the first is
+//! stored. Every bit of a number is kept, also of −0.0, subnormals and NaN.
 
 use pco::data_types::Number;
 use pco::standalone::{simple_compress, simple_decompress};
@@ -13,52 +12,58 @@ use pco::{ChunkConfig, DeltaSpec};
 
 use offbd_core::vocabulary::Sample;
 
-/// Most samples in one chunk; a longer run is a caller's mistake and is cut by
-/// nobody: [`encode`] takes it, [`decode`] refuses it.
+/// Largest number of samples in one chunk. Callers must not exceed it: [`encode`] does
+/// not check it, and [`decode`] refuses such a chunk.
 pub const MAX_CHUNK_SAMPLES: usize = 65_536;
 
-/// Fewest values worth packing; fewer are stored plain.
+/// Values from which on compression is worth it; fewer are stored plain.
 const MIN_PACKED: usize = 512;
 
-/// How hard `pco` tries, of 0 to 12, and that it takes differences of neighbours
-/// where that helps, and looks for no other regularity. On quantised commands and
-/// positions with the noise of a camera or a touch panel that takes 120 ns a sample
-/// for 5.9 and 3.1 bytes; with its search 160 ns for 5.8 and 3.2, at its default
-/// level of 8 200 to 300 ns for 5.7 and 2.9.
+/// Compression level of `pco`, 0 to 12, and its delta encoding: first differences where
+/// they help, without a search for other regularities. For quantised commands and
+/// positions with the noise of a camera or a touch panel this takes 120 ns per sample,
+/// for 5.9 and 3.1 bytes per sample; with the search 160 ns for 5.8 and 3.2, and at the
+/// default level of 8 200 to 300 ns for 5.7 and 2.9.
 const LEVEL: usize = 4;
 const DELTA: DeltaSpec = DeltaSpec::TryConsecutive(1);
 
-/// Whether a chunk is to stay. One that is merged into another soon is stored
-/// plain: packing is what takes the time.
+/// How the values of a chunk are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stay {
-    Short,
-    Long,
+pub enum Packing {
+    /// Without compression, which takes most of the time: for a chunk that will soon be
+    /// merged.
+    Plain,
+    /// Compressed where that is shorter: for a chunk that will not change any more.
+    Compact,
 }
 
+/// The format byte.
 const FORMAT: u8 = 1;
+/// Bytes of the header: format and number of samples.
 const HEADER: usize = 5;
+// Which samples have a value in a column.
 const NONE: u8 = 0;
 const ALL: u8 = 1;
 const SOME: u8 = 2;
+// How the values of a column are stored.
 const PLAIN: u8 = 0;
 const PACKED: u8 = 1;
 const COUNTING: u8 = 2;
 
-/// Bytes that are no chunk.
+/// Why bytes are not a valid chunk.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CodecError {
-    #[error("the chunk ends at byte {at}, in the middle of its {what}")]
+    #[error("the chunk ends at byte {at}, within its {what}")]
     Short { at: usize, what: &'static str },
     #[error("format {found} is unknown; this version reads format {FORMAT}")]
     Format { found: u8 },
-    #[error("{found} samples in one chunk, at most {MAX_CHUNK_SAMPLES} are allowed")]
+    #[error("the chunk has {found} samples; at most {MAX_CHUNK_SAMPLES} are allowed")]
     TooMany { found: usize },
-    #[error("a column's {what} has the unknown tag {found}")]
+    #[error("unknown tag {found} for the {what} of a column")]
     Tag { what: &'static str, found: u8 },
-    #[error("a packed column cannot be read: {0}")]
+    #[error("a compressed column cannot be read: {0}")]
     Packed(String),
-    #[error("a column holds {found} values where {expected} are announced")]
+    #[error("a column has {found} values instead of {expected}")]
     Count { found: usize, expected: usize },
     #[error("a sample has no t_s")]
     NoTime,
@@ -66,11 +71,11 @@ pub enum CodecError {
     Trailing(usize),
 }
 
-/// A value of eight bytes.
+/// A column value of eight bytes.
 trait Word: Number + Copy {
     fn word(self) -> [u8; 8];
     fn from_word(word: [u8; 8]) -> Self;
-    /// What follows it when counting; none for what does not count.
+    /// The next integer; `None` for the greatest one and for floating-point numbers.
     fn successor(self) -> Option<Self>;
 }
 
@@ -98,28 +103,28 @@ impl Word for f64 {
     }
 }
 
-/// The chunk of `samples`, at most [`MAX_CHUNK_SAMPLES`].
+/// Encodes `samples`, at most [`MAX_CHUNK_SAMPLES`], as a chunk.
 #[must_use]
-pub fn encode(samples: &[Sample], stay: Stay) -> Vec<u8> {
+pub fn encode(samples: &[Sample], packing: Packing) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(HEADER + samples.len() * size_of::<[u64; 6]>() + 12);
     bytes.push(FORMAT);
     let n = u32::try_from(samples.len()).unwrap_or(u32::MAX);
     bytes.extend_from_slice(&n.to_le_bytes());
-    put_column(&mut bytes, samples, stay, |s| s.seq);
-    put_column(&mut bytes, samples, stay, |s| Some(s.t_s));
-    put_column(&mut bytes, samples, stay, |s| s.cmd_qx_rad);
-    put_column(&mut bytes, samples, stay, |s| s.cmd_qy_rad);
-    put_column(&mut bytes, samples, stay, |s| s.x_m);
-    put_column(&mut bytes, samples, stay, |s| s.y_m);
+    put_column(&mut bytes, samples, packing, |s| s.seq);
+    put_column(&mut bytes, samples, packing, |s| Some(s.t_s));
+    put_column(&mut bytes, samples, packing, |s| s.cmd_qx_rad);
+    put_column(&mut bytes, samples, packing, |s| s.cmd_qy_rad);
+    put_column(&mut bytes, samples, packing, |s| s.x_m);
+    put_column(&mut bytes, samples, packing, |s| s.y_m);
     bytes
 }
 
-/// The samples of a chunk.
+/// Decodes a chunk.
 ///
 /// # Errors
-/// [`CodecError`] if `bytes` is not what [`encode`] makes.
+/// [`CodecError`] if `bytes` is not a result of [`encode`].
 pub fn decode(bytes: &[u8]) -> Result<Vec<Sample>, CodecError> {
-    let mut reader = Reader { bytes, at: 0 };
+    let mut reader = ByteReader { bytes, at: 0 };
     let n = header(&mut reader)?;
     let seq = column::<u64>(&mut reader, n)?;
     let t_s = column::<f64>(&mut reader, n)?;
@@ -143,12 +148,12 @@ pub fn decode(bytes: &[u8]) -> Result<Vec<Sample>, CodecError> {
     (0..n).map(|i| sample(i).ok_or(CodecError::NoTime)).collect()
 }
 
-/// How many samples a chunk says that it has.
+/// Returns the number of samples of a chunk according to its header.
 pub(super) fn n_samples(bytes: &[u8]) -> Result<usize, CodecError> {
-    header(&mut Reader { bytes, at: 0 })
+    header(&mut ByteReader { bytes, at: 0 })
 }
 
-fn header(reader: &mut Reader<'_>) -> Result<usize, CodecError> {
+fn header(reader: &mut ByteReader<'_>) -> Result<usize, CodecError> {
     let header = reader.take(HEADER, "header")?;
     if header[0] != FORMAT {
         return Err(CodecError::Format { found: header[0] });
@@ -163,7 +168,7 @@ fn header(reader: &mut Reader<'_>) -> Result<usize, CodecError> {
 fn put_column<T: Word>(
     bytes: &mut Vec<u8>,
     samples: &[Sample],
-    stay: Stay,
+    packing: Packing,
     get: impl Fn(&Sample) -> Option<T>,
 ) {
     let mut values: Vec<T> = Vec::with_capacity(samples.len());
@@ -178,7 +183,7 @@ fn put_column<T: Word>(
         bytes.push(SOME);
         put_bitmap(bytes, samples.iter().map(|s| get(s).is_some()));
     }
-    put_values(bytes, &values, stay);
+    put_values(bytes, &values, packing);
 }
 
 fn put_bitmap(bytes: &mut Vec<u8>, present: impl Iterator<Item = bool>) {
@@ -191,7 +196,7 @@ fn put_bitmap(bytes: &mut Vec<u8>, present: impl Iterator<Item = bool>) {
     }
 }
 
-fn put_values<T: Word>(bytes: &mut Vec<u8>, values: &[T], stay: Stay) {
+fn put_values<T: Word>(bytes: &mut Vec<u8>, values: &[T], packing: Packing) {
     let follows = |a: &T, b: &T| a.successor().is_some_and(|next| next.word() == b.word());
     if let Some(first) = values.first().filter(|_| values.is_sorted_by(follows)) {
         bytes.push(COUNTING);
@@ -199,7 +204,7 @@ fn put_values<T: Word>(bytes: &mut Vec<u8>, values: &[T], stay: Stay) {
         return;
     }
     let plain = values.len() * 8;
-    if let Some(packed) = pack(values, stay).filter(|packed| packed.len() + 4 < plain) {
+    if let Some(packed) = pack(values, packing).filter(|packed| packed.len() + 4 < plain) {
         bytes.push(PACKED);
         let length = u32::try_from(packed.len()).unwrap_or(u32::MAX);
         bytes.extend_from_slice(&length.to_le_bytes());
@@ -210,16 +215,16 @@ fn put_values<T: Word>(bytes: &mut Vec<u8>, values: &[T], stay: Stay) {
     values.iter().for_each(|v| bytes.extend_from_slice(&v.word()));
 }
 
-/// The values packed, where that is worth it.
-fn pack<T: Word>(values: &[T], stay: Stay) -> Option<Vec<u8>> {
-    if stay == Stay::Short || values.len() < MIN_PACKED {
+/// Compresses `values`; returns `None` if `packing` is plain or there are too few values.
+fn pack<T: Word>(values: &[T], packing: Packing) -> Option<Vec<u8>> {
+    if packing == Packing::Plain || values.len() < MIN_PACKED {
         return None;
     }
     let config = ChunkConfig::default().with_compression_level(LEVEL).with_delta_spec(DELTA);
     simple_compress(values, &config).ok()
 }
 
-fn column<T: Word>(reader: &mut Reader<'_>, n: usize) -> Result<Vec<Option<T>>, CodecError> {
+fn column<T: Word>(reader: &mut ByteReader<'_>, n: usize) -> Result<Vec<Option<T>>, CodecError> {
     match reader.take(1, "column")?[0] {
         NONE => Ok(vec![None; n]),
         ALL => Ok(values(reader, n)?.into_iter().map(Some).collect()),
@@ -234,7 +239,7 @@ fn column<T: Word>(reader: &mut Reader<'_>, n: usize) -> Result<Vec<Option<T>>, 
     }
 }
 
-fn values<T: Word>(reader: &mut Reader<'_>, expected: usize) -> Result<Vec<T>, CodecError> {
+fn values<T: Word>(reader: &mut ByteReader<'_>, expected: usize) -> Result<Vec<T>, CodecError> {
     match reader.take(1, "column")?[0] {
         PLAIN => {
             let words = reader.take(expected * 8, "values")?.as_chunks::<8>().0;
@@ -265,12 +270,12 @@ fn values<T: Word>(reader: &mut Reader<'_>, expected: usize) -> Result<Vec<T>, C
     }
 }
 
-struct Reader<'a> {
+struct ByteReader<'a> {
     bytes: &'a [u8],
     at: usize,
 }
 
-impl<'a> Reader<'a> {
+impl<'a> ByteReader<'a> {
     fn take(&mut self, n: usize, what: &'static str) -> Result<&'a [u8], CodecError> {
         let short = CodecError::Short { at: self.bytes.len(), what };
         let end = self.at.checked_add(n).ok_or(short.clone())?;
@@ -285,7 +290,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn awkward() -> impl Strategy<Value = f64> {
+    fn edge_case() -> impl Strategy<Value = f64> {
         prop_oneof![
             any::<u64>().prop_map(f64::from_bits),
             Just(-0.0),
@@ -296,8 +301,15 @@ mod tests {
     }
 
     fn sample() -> impl Strategy<Value = Sample> {
-        let reading = || proptest::option::of(awkward());
-        (proptest::option::of(any::<u64>()), awkward(), reading(), reading(), reading(), reading())
+        let reading = || proptest::option::of(edge_case());
+        (
+            proptest::option::of(any::<u64>()),
+            edge_case(),
+            reading(),
+            reading(),
+            reading(),
+            reading(),
+        )
             .prop_map(|(seq, t_s, cmd_qx_rad, cmd_qy_rad, x_m, y_m)| Sample {
                 seq,
                 t_s,
@@ -322,24 +334,23 @@ mod tests {
     proptest! {
         #[test]
         fn every_bit_survives(samples in proptest::collection::vec(sample(), 0..1200)) {
-            for stay in [Stay::Short, Stay::Long] {
-                let back = decode(&encode(&samples, stay)).expect("own bytes");
+            for packing in [Packing::Plain, Packing::Compact] {
+                let back = decode(&encode(&samples, packing)).expect("own bytes");
                 prop_assert_eq!(bits(&back), bits(&samples));
             }
         }
 
-        /// A device's count, from any number to the greatest there is, with or
-        /// without a number left out.
+        /// Consecutive sequence numbers up to the greatest integer, with or without a gap.
         #[test]
         fn a_count_survives_and_is_short(n in 2..300u64, after in 0..500u64, gap in 0..600u64) {
             let first = u64::MAX - n - after;
             let seq = |i| Some(first + i + u64::from(i >= gap));
             let sample = |i| Sample { seq: seq(i), t_s: i as f64, ..Sample::default() };
             let samples: Vec<_> = (0..n).map(sample).collect();
-            let bytes = encode(&samples, Stay::Short);
+            let bytes = encode(&samples, Packing::Plain);
             prop_assert_eq!(bits(&decode(&bytes).expect("own bytes")), bits(&samples));
             let nameless: Vec<_> = samples.iter().map(|s| Sample { seq: None, ..*s }).collect();
-            let extra = bytes.len() - encode(&nameless, Stay::Short).len();
+            let extra = bytes.len() - encode(&nameless, Packing::Plain).len();
             prop_assert_eq!(extra == 9, gap == 0 || gap >= n, "{} bytes", extra);
         }
 
@@ -353,7 +364,7 @@ mod tests {
             samples in proptest::collection::vec(sample(), 1..40),
             cut in 0.0..1.0f64,
         ) {
-            let bytes = encode(&samples, Stay::Long);
+            let bytes = encode(&samples, Packing::Compact);
             let keep = (bytes.len() as f64 * cut) as usize;
             prop_assert!(decode(&bytes[..keep]).is_err());
         }
@@ -375,7 +386,7 @@ mod tests {
                 }
             })
             .collect();
-        let bytes = encode(&samples, Stay::Long);
+        let bytes = encode(&samples, Packing::Compact);
         assert!(bytes.len() * 3 < samples.len() * 48, "{} bytes", bytes.len());
     }
 }

@@ -1,51 +1,51 @@
-//! What retention asks: which ended sessions are old, which assets keep too
-//! much, what is left of what was given up. A session in which a code changed
-//! its status is *around a fault*, all others are *plain*.
+//! Queries of retention and deletion: which ended sessions are old, which assets store
+//! too much, and what is left of hidden assets and sessions. A session in which a fault
+//! changed its status is *around a fault*, all others are *plain*.
 
-use super::question::Question;
+use super::query_builder::QueryBuilder;
 use super::{Micros, Store, StoreError};
 
-/// Whether a session is around a fault, as a condition on `session`.
+/// The condition that a row of `session` is around a fault.
 const AROUND_FAULT: &str =
     "EXISTS (SELECT 1 FROM transition WHERE transition.session = session.id)";
 
 const CANDIDATE: &str =
     "SELECT id, n_bytes FROM session WHERE state = 'ended' AND expired_at IS NULL AND ";
 
-const BULK: &str = "SELECT id,
+const SIZE: &str = "SELECT id,
     (SELECT COUNT(*) FROM chunk WHERE chunk.session = session.id),
     (SELECT COUNT(*) FROM transition WHERE transition.session = session.id)
     FROM session WHERE ";
 
-/// How much there is of a session.
+/// How many rows of chunks and transitions a session has.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Bulk {
+pub struct SessionSize {
     pub id: String,
     pub n_chunks: u64,
     pub n_transitions: u64,
 }
 
 impl Store {
-    /// The ids of ended sessions from before `moment`, the oldest first, plain
-    /// ones or those around a fault.
+    /// The ids of sessions that ended before `moment`, the oldest first: those around a
+    /// fault, or the plain ones.
     ///
     /// # Errors
-    /// [`StoreError`], as for every question here, if the database fails.
+    /// [`StoreError`] if the database fails; so do all queries here.
     pub async fn sessions_ended_before(
         &self,
         moment: Micros,
         around_fault: bool,
         limit: u32,
     ) -> Result<Vec<String>, StoreError> {
-        let mut question = Question::new(CANDIDATE);
-        question.push(if around_fault { "" } else { "NOT " }).push(AROUND_FAULT);
-        question.push(" AND ended_at < ").bind(moment)?;
-        question.push(" ORDER BY ended_at LIMIT ").bind(i64::from(limit))?;
-        let rows: Vec<(String, i64)> = question.rows().fetch_all(&self.pool).await?;
+        let mut query = QueryBuilder::new(CANDIDATE);
+        query.push(if around_fault { "" } else { "NOT " }).push(AROUND_FAULT);
+        query.push(" AND ended_at < ").bind(moment)?;
+        query.push(" ORDER BY ended_at LIMIT ").bind(i64::from(limit))?;
+        let rows: Vec<(String, i64)> = query.rows().fetch_all(&self.pool).await?;
         Ok(rows.into_iter().map(|(id, _)| id).collect())
     }
 
-    /// The assets whose ended sessions hold more than `bytes`, and how much.
+    /// The assets whose ended sessions have more than `bytes` bytes, with these bytes.
     pub async fn assets_above(&self, bytes: i64) -> Result<Vec<(String, i64)>, StoreError> {
         Ok(sqlx::query_as(
             "SELECT asset, CAST(SUM(n_bytes) AS BIGINT) FROM session
@@ -57,33 +57,33 @@ impl Store {
         .await?)
     }
 
-    /// Ids and bytes of plain ended sessions of `asset`, the oldest first.
+    /// Ids and bytes of the plain ended sessions of `asset`, the oldest first.
     pub async fn plain_sessions(
         &self,
         asset: &str,
         limit: u32,
     ) -> Result<Vec<(String, i64)>, StoreError> {
-        let mut question = Question::new(CANDIDATE);
-        question.push("NOT ").push(AROUND_FAULT).push(" AND asset = ").bind(asset)?;
-        question.push(" ORDER BY ended_at LIMIT ").bind(i64::from(limit))?;
-        Ok(question.rows().fetch_all(&self.pool).await?)
+        let mut query = QueryBuilder::new(CANDIDATE);
+        query.push("NOT ").push(AROUND_FAULT).push(" AND asset = ").bind(asset)?;
+        query.push(" ORDER BY ended_at LIMIT ").bind(i64::from(limit))?;
+        Ok(query.rows().fetch_all(&self.pool).await?)
     }
 
-    /// Sessions that are given up and still here.
-    pub async fn expired_sessions(&self) -> Result<Vec<Bulk>, StoreError> {
-        let mut question = Question::new(BULK);
-        question.push("expired_at IS NOT NULL ORDER BY expired_at");
-        self.bulks(question).await
+    /// Hidden sessions that are not deleted yet.
+    pub async fn hidden_sessions(&self) -> Result<Vec<SessionSize>, StoreError> {
+        let mut query = QueryBuilder::new(SIZE);
+        query.push("expired_at IS NOT NULL ORDER BY expired_at");
+        self.sizes(query).await
     }
 
-    /// Assets that are given up and still here.
-    pub async fn deleted_assets(&self) -> Result<Vec<String>, StoreError> {
+    /// Hidden assets that are not deleted yet.
+    pub async fn hidden_assets(&self) -> Result<Vec<String>, StoreError> {
         Ok(sqlx::query_scalar("SELECT name FROM asset WHERE deleted_at IS NOT NULL ORDER BY name")
             .fetch_all(&self.pool)
             .await?)
     }
 
-    /// Whether an asset `name` is given up and still here.
+    /// Returns whether the asset `name` is hidden and not deleted yet.
     pub async fn is_being_deleted(&self, name: &str) -> Result<bool, StoreError> {
         let found: Option<String> =
             sqlx::query_scalar("SELECT name FROM asset WHERE deleted_at IS NOT NULL AND name = $1")
@@ -93,27 +93,31 @@ impl Store {
         Ok(found.is_some())
     }
 
-    /// Some of the sessions of `asset`, seen or not.
-    pub async fn sessions_in_bulk(&self, asset: &str, limit: u32) -> Result<Vec<Bulk>, StoreError> {
-        let mut question = Question::new(BULK);
-        question.push("asset = ").bind(asset)?.push(" LIMIT ").bind(i64::from(limit))?;
-        self.bulks(question).await
+    /// Some sessions of `asset`, hidden or not, at most `limit`.
+    pub async fn session_sizes(
+        &self,
+        asset: &str,
+        limit: u32,
+    ) -> Result<Vec<SessionSize>, StoreError> {
+        let mut query = QueryBuilder::new(SIZE);
+        query.push("asset = ").bind(asset)?.push(" LIMIT ").bind(i64::from(limit))?;
+        self.sizes(query).await
     }
 
-    /// The session `id`, seen or not.
-    pub async fn session_in_bulk(&self, id: &str) -> Result<Option<Bulk>, StoreError> {
-        let mut question = Question::new(BULK);
-        question.push("id = ").bind(id)?;
-        Ok(self.bulks(question).await?.pop())
+    /// The size of the session `id`, hidden or not.
+    pub async fn session_size(&self, id: &str) -> Result<Option<SessionSize>, StoreError> {
+        let mut query = QueryBuilder::new(SIZE);
+        query.push("id = ").bind(id)?;
+        Ok(self.sizes(query).await?.pop())
     }
 
-    async fn bulks(&self, question: Question) -> Result<Vec<Bulk>, StoreError> {
-        let rows: Vec<(String, i64, i64)> = question.rows().fetch_all(&self.pool).await?;
-        let bulk = |(id, n_chunks, n_transitions): (String, i64, i64)| Bulk {
+    async fn sizes(&self, query: QueryBuilder) -> Result<Vec<SessionSize>, StoreError> {
+        let rows: Vec<(String, i64, i64)> = query.rows().fetch_all(&self.pool).await?;
+        let size = |(id, n_chunks, n_transitions): (String, i64, i64)| SessionSize {
             id,
             n_chunks: n_chunks.unsigned_abs(),
             n_transitions: n_transitions.unsigned_abs(),
         };
-        Ok(rows.into_iter().map(bulk).collect())
+        Ok(rows.into_iter().map(size).collect())
     }
 }

@@ -1,7 +1,7 @@
-//! What a stretch of the fleet, from one asset's name to another's, is asked at a
-//! glance: again and again, so that no question may cost more the longer the history.
+//! Queries for the list of the fleet, for a range of asset names. They are repeated
+//! often, so their cost must not grow with the number of stored sessions.
 
-use super::question::Question;
+use super::query_builder::QueryBuilder;
 use super::read::SESSION;
 use super::{FaultRow, Micros, SessionRow, Store, StoreError, WarningRow};
 
@@ -23,20 +23,20 @@ impl Store {
     /// The open sessions of the assets from `first` to `last`.
     ///
     /// # Errors
-    /// [`StoreError`], as for every question here, if the database fails.
+    /// [`StoreError`] if the database fails; so do all queries here.
     pub async fn open_sessions_of(
         &self,
         first: &str,
         last: &str,
     ) -> Result<Vec<SessionRow>, StoreError> {
-        let mut query = Question::new(SESSION);
+        let mut query = QueryBuilder::new(SESSION);
         query.push("state = 'open' AND asset >= ").bind(first)?;
         query.push(" AND asset <= ").bind(last)?;
         self.session_rows(query).await
     }
 
-    /// When the latest session of each asset from `first` to `last` was ended or,
-    /// if it is open, opened.
+    /// For each asset from `first` to `last`, the time at which its latest session ended
+    /// or, if it is open, was opened.
     pub async fn last_sessions_of(
         &self,
         first: &str,
@@ -62,8 +62,8 @@ impl Store {
         .await?)
     }
 
-    /// What the learning of the assets from `first` to `last` has come to, by name;
-    /// without those of which nothing is known.
+    /// The learning records of the assets from `first` to `last`, with the asset's name,
+    /// for those that have one.
     pub async fn learning_of(
         &self,
         first: &str,
@@ -76,8 +76,8 @@ impl Store {
         Ok(rows.bind(first).bind(last).fetch_all(&self.pool).await?)
     }
 
-    /// The warnings of the assets from `first` to `last`, as of the last session that
-    /// estimated the axis.
+    /// The drift warnings of the assets from `first` to `last`, each axis by the last
+    /// session that estimated it.
     pub async fn warnings_of(
         &self,
         first: &str,
@@ -97,10 +97,10 @@ mod tests {
     use sqlx::{Connection, Executor};
 
     use super::*;
-    use crate::store::Place;
-    use crate::store::place::file_url;
+    use crate::store::Location;
+    use crate::store::location::file_url;
 
-    /// Two assets with `n` sessions each, that warn of both axes.
+    /// Two assets with `$1` sessions each, which have warnings for both axes.
     const HISTORY: &str = "
         INSERT INTO asset (name, document, revision, created_at, updated_at)
             VALUES ('a', '{}', 1, 0, 0), ('b', '{}', 1, 0, 0);
@@ -113,26 +113,26 @@ mod tests {
             axis.name
             FROM session, (SELECT 'x' AS name UNION ALL SELECT 'y') axis";
 
-    /// The connection to a database with the history of `n` sessions.
+    /// A database with `n` sessions per asset, and a connection to it.
     async fn with_history(folder: &tempfile::TempDir, n: u32) -> (Store, SqliteConnection) {
-        let place = Place::File(folder.path().join(format!("{n}.db")));
-        let (store, writer) = Store::open(&place).await.unwrap();
+        let location = Location::File(folder.path().join(format!("{n}.db")));
+        let (store, writer) = Store::open(&location).await.unwrap();
         writer.close().await.unwrap();
-        let url = file_url(place.file().unwrap(), "rw").unwrap();
+        let url = file_url(location.file().unwrap(), "rw").unwrap();
         let mut db = SqliteConnection::connect(&url).await.unwrap();
         db.execute(sqlx::AssertSqlSafe(HISTORY.replace("$1", &n.to_string()))).await.unwrap();
         (store, db)
     }
 
-    /// Instructions of SQLite's machine that `question` takes.
-    async fn cost(db: &mut SqliteConnection, question: &'static str) -> u64 {
+    /// Instructions of SQLite's virtual machine that `query` executes.
+    async fn cost(db: &mut SqliteConnection, query: &'static str) -> u64 {
         let count = Arc::new(AtomicU64::new(0));
         let counted = count.clone();
         db.lock_handle().await.unwrap().set_progress_handler(1, move || {
             counted.fetch_add(1, Ordering::Relaxed);
             true
         });
-        let rows = sqlx::query(question).bind("a").bind("b").fetch_all(&mut *db).await.unwrap();
+        let rows = sqlx::query(query).bind("a").bind("b").fetch_all(&mut *db).await.unwrap();
         assert!(!rows.is_empty());
         db.lock_handle().await.unwrap().remove_progress_handler();
         count.load(Ordering::Relaxed)
@@ -143,9 +143,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (_, mut short) = with_history(&folder, 2).await;
         let (_, mut long) = with_history(&folder, 200).await;
-        for question in [LAST_SESSIONS, WARNINGS] {
-            let (short, long) = (cost(&mut short, question).await, cost(&mut long, question).await);
-            assert_eq!(short, long, "{question}");
+        for query in [LAST_SESSIONS, WARNINGS] {
+            let (short, long) = (cost(&mut short, query).await, cost(&mut long, query).await);
+            assert_eq!(short, long, "{query}");
         }
     }
 
@@ -160,7 +160,8 @@ mod tests {
         let of =
             |rows: Vec<WarningRow>| Vec::from_iter(rows.into_iter().map(|r| r.asset + &r.warnings));
         assert_eq!(of(warnings().await), ["ax", "ay", "bx", "by"]);
-        // What an earlier session warned of is over; one that did not see the axis says nothing.
+        // A later session without a warning ends it; one without an estimate of the axis
+        // does not.
         let over = "UPDATE trend SET warnings = NULL WHERE session = 'a3' AND axis = 'x';
                     DELETE FROM trend WHERE session = 'b3' AND axis = 'y'";
         db.execute(over).await.unwrap();

@@ -1,7 +1,7 @@
-//! Rows of the database as structs: each field is the column of its name, and
-//! one in brackets is a struct of further columns of the same row.
+//! Conversion of database rows to structs.
 
-/// Implements `sqlx::FromRow` by the names of the fields.
+/// Implements `sqlx::FromRow`: each field is read from the column of its name, and the
+/// field in brackets is a struct that is read from further columns of the same row.
 macro_rules! from_row {
     ($row:ident { $($field:ident),* $(,)? } $([$inner:ident])?) => {
         impl<'r> sqlx::FromRow<'r, sqlx::any::AnyRow> for $row {

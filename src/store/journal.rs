@@ -1,11 +1,16 @@
-//! What was committed of recordings and is not in their chunks yet.
+//! The journal: samples that are committed but not in the chunks of their session yet.
 //!
-//! A commit appends one row to the journal for all its sessions, where each of
-//! them would take a page of its chunks, one of its row and those of the index.
-//! The same is held in memory, for the readers and until it is *folded*: put
-//! into the session's chunks and its row, and removed from the journal, in one
-//! transaction. What is held is always what the journal says beyond the
-//! sessions' rows, so that a process that starts holds it again.
+//! Each commit appends one row to the table `journal`, with the new samples of all its
+//! sessions. Written to chunks directly, the samples of each session would change several
+//! pages: of its chunks, of its row and of the indexes. The writer also keeps the
+//! journal's contents in memory, where readers look before they query the tables. To
+//! *fold* a session is to move its samples from the journal to its chunks and to update
+//! its row, in one transaction: after a crash or an error they are in one of the two,
+//! never in both or in neither.
+//!
+//! The memory holds exactly those journal entries that are beyond the progress in the
+//! rows of the open sessions. So [`Journal::load`] restores it on a start, and entries
+//! that are folded already are skipped even if their journal row still exists.
 
 use super::from_row::from_row;
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -14,46 +19,48 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use serde::{Deserialize, Serialize, Serializer};
 use sqlx::AnyConnection;
 
-use super::codec::{self, Stay};
+use super::codec::{self, Packing};
 use super::tail::{FULL_CHUNK_SAMPLES, Run};
-use super::{Progress, SessionRow, StoreError};
+use super::{SessionProgress, SessionRow, StoreError};
 use offbd_core::vocabulary::Sample;
 
-/// Samples in a run from which on it is folded at once: it fills pages of its own.
-const LARGE_RUN: usize = 1024;
+/// Samples from which on a run is folded by its own commit: it fills whole pages anyway.
+const LARGE_RUN_SAMPLES: usize = 1024;
 
-/// Samples held of a session; with as many it is folded by the commit at hand.
-const MAX_HELD_SAMPLES: usize = 2 * FULL_CHUNK_SAMPLES;
+/// Samples of a session in the journal; the commit that reaches this number folds the
+/// session.
+const MAX_SESSION_SAMPLES: usize = 2 * FULL_CHUNK_SAMPLES;
 
-/// The journal of one database, held in memory; all clones are one.
+/// The journal of one database, as kept in memory. Clones share the contents.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Journal {
-    held: Arc<Mutex<Held>>,
+    contents: Arc<Mutex<JournalContents>>,
 }
 
 #[derive(Debug, Default)]
-struct Held {
-    sessions: HashMap<String, Unfolded>,
-    /// The bytes of each row of the table, and of all.
+struct JournalContents {
+    sessions: HashMap<String, UnfoldedSession>,
+    /// Bytes of each row of the table, by id.
     rows: BTreeMap<i64, usize>,
+    /// Bytes of all rows of the table.
     n_bytes: usize,
 }
 
-/// What the journal has of a session.
+/// The samples of one session in the journal.
 #[derive(Debug)]
-struct Unfolded {
-    /// The first row of the journal that has some of it.
-    row: i64,
+struct UnfoldedSession {
+    /// The first journal row with samples of the session.
+    first_row: i64,
     first_index: i64,
     n_samples: usize,
     n_bytes: usize,
-    progress: Progress,
+    progress: SessionProgress,
     chunks: Vec<Vec<u8>>,
 }
 
-/// A run in a row of the journal.
+/// One run in a row of the journal, as serialised.
 #[derive(Serialize, Deserialize)]
-struct Entry<'a> {
+struct JournalEntry<'a> {
     session: &'a str,
     first_index: i64,
     n_samples: i64,
@@ -69,92 +76,105 @@ fn as_bytes<S: Serializer>(bytes: &[u8], serializer: S) -> Result<S::Ok, S::Erro
     serializer.serialize_bytes(bytes)
 }
 
-impl Entry<'_> {
-    const fn progress(&self) -> Progress {
+impl JournalEntry<'_> {
+    const fn progress(&self) -> SessionProgress {
         let Self { n_samples, n_rejected, first_t_s, last_t_s, last_seq, .. } = *self;
-        Progress { n_samples, n_rejected, first_t_s, last_t_s, last_seq }
+        SessionProgress { n_samples, n_rejected, first_t_s, last_t_s, last_seq }
     }
 }
 
-/// What a transaction changes of the journal, to be held once it has come through.
+/// The changes of the journal by a transaction; [`Journal::apply`] takes them over into
+/// memory once the transaction is committed.
 #[derive(Debug, Default)]
-pub(super) struct Changes {
-    /// Sessions of which nothing is left in the journal.
-    pub(super) gone: HashSet<String>,
-    /// The row that it appended, its bytes, and what is in it.
-    row: Option<(i64, usize)>,
-    runs: Vec<(Encoded, String)>,
-    /// The first row that was not removed.
-    first_row: Option<i64>,
+pub(super) struct JournalChanges {
+    /// Sessions whose earlier samples are no longer in the journal.
+    pub(super) removed_sessions: HashSet<String>,
+    /// Id and bytes of the row that was appended.
+    appended_row: Option<(i64, usize)>,
+    /// The runs in that row, each with its session.
+    runs: Vec<(EncodedRun, String)>,
+    /// The first row that was kept; all earlier ones were removed.
+    first_kept_row: Option<i64>,
 }
 
-/// A run as it is held.
+/// A [`Run`] as a chunk.
 #[derive(Debug)]
-struct Encoded {
+struct EncodedRun {
     first_index: i64,
     n_samples: usize,
-    progress: Progress,
+    progress: SessionProgress,
     chunk: Vec<u8>,
 }
 
-impl Encoded {
+impl EncodedRun {
     fn of(run: &Run) -> Self {
         let Run { first_index, progress, ref samples, .. } = *run;
-        let chunk = codec::encode(samples, Stay::Short);
+        let chunk = codec::encode(samples, Packing::Plain);
         Self { first_index, n_samples: samples.len(), progress, chunk }
     }
 
-    fn entry<'a>(&'a self, session: &'a str) -> Entry<'a> {
-        let Progress { n_samples, n_rejected, first_t_s, last_t_s, last_seq } = self.progress;
+    fn entry<'a>(&'a self, session: &'a str) -> JournalEntry<'a> {
+        let SessionProgress { n_samples, n_rejected, first_t_s, last_t_s, last_seq } =
+            self.progress;
         let (first_index, chunk) = (self.first_index, &self.chunk[..]);
-        Entry { session, first_index, n_samples, n_rejected, first_t_s, last_t_s, last_seq, chunk }
+        JournalEntry {
+            session,
+            first_index,
+            n_samples,
+            n_rejected,
+            first_t_s,
+            last_t_s,
+            last_seq,
+            chunk,
+        }
     }
 }
 
-/// For the writer.
+/// Methods of the writer.
 impl Journal {
-    /// Reads what the table has beyond the sessions' rows.
+    /// Reads the entries of the table that are beyond the progress in the sessions' rows.
     pub(super) async fn load(db: &mut AnyConnection) -> Result<Self, StoreError> {
         let rows: Vec<(i64, Vec<u8>)> =
             sqlx::query_as("SELECT id, data FROM journal ORDER BY id").fetch_all(&mut *db).await?;
         let this = Self::default();
         if !rows.is_empty() {
-            let folded = folded(db).await?;
-            let mut held = this.lock();
+            let folded = folded_progress(db).await?;
+            let mut contents = this.lock();
             for (id, data) in &rows {
-                held.take_row(*id, data, &folded)?;
+                contents.load_row(*id, data, &folded)?;
             }
         }
         Ok(this)
     }
 
-    /// Bytes of the table's rows.
+    /// Bytes of all rows of the table.
     pub(super) fn n_bytes(&self) -> usize {
         self.lock().n_bytes
     }
 
-    /// Whether `run` is better folded at once than appended.
+    /// Returns whether `run` should be folded by its own commit instead of being appended.
     pub(super) fn is_large(&self, run: &Run) -> bool {
         let n = run.samples.len();
-        let held = || self.lock().sessions.get(&run.session).map_or(0, |held| held.n_samples);
-        n >= LARGE_RUN || n + held() >= MAX_HELD_SAMPLES
+        let before = || self.lock().sessions.get(&run.session).map_or(0, |known| known.n_samples);
+        n >= LARGE_RUN_SAMPLES || n + before() >= MAX_SESSION_SAMPLES
     }
 
-    /// What is held of `session`, as one run.
+    /// The samples of `session` in the journal, as one run.
     pub(super) fn run(&self, session: &str) -> Result<Option<Run>, StoreError> {
-        let held = self.lock();
-        let Some(unfolded) = held.sessions.get(session) else { return Ok(None) };
+        let contents = self.lock();
+        let Some(unfolded) = contents.sessions.get(session) else { return Ok(None) };
         let (first_index, progress) = (unfolded.first_index, unfolded.progress);
         let samples = unfolded.samples(session)?;
         Ok(Some(Run { session: session.to_owned(), first_index, samples, progress }))
     }
 
-    /// The sessions that wait longest, of those not in `except`, with `n_bytes`
-    /// or somewhat more.
+    /// Returns the sessions that have been in the journal longest, without those in
+    /// `except`: as many as are needed for `n_bytes` in total.
     pub(super) fn oldest(&self, n_bytes: usize, except: &HashSet<String>) -> Vec<String> {
-        let held = self.lock();
-        let wanted = held.sessions.iter().filter(|(id, _)| !except.contains(*id));
-        let mut all: Vec<_> = wanted.map(|(id, session)| (session.row, id, session)).collect();
+        let contents = self.lock();
+        let wanted = contents.sessions.iter().filter(|(id, _)| !except.contains(*id));
+        let mut all: Vec<_> =
+            wanted.map(|(id, session)| (session.first_row, id, session)).collect();
         all.sort_unstable_by_key(|(row, id, _)| (*row, *id));
         let mut oldest = Vec::new();
         let mut sum = 0;
@@ -168,21 +188,21 @@ impl Journal {
         oldest
     }
 
-    /// Appends `runs` as the row `id`.
+    /// Appends `runs` to the table as the row `id`.
     pub(super) async fn append(
         db: &mut AnyConnection,
         id: i64,
         runs: Vec<Run>,
-        changes: &mut Changes,
+        changes: &mut JournalChanges,
     ) -> Result<(), StoreError> {
         if runs.is_empty() {
             return Ok(());
         }
-        changes.runs = runs.into_iter().map(|run| (Encoded::of(&run), run.session)).collect();
+        changes.runs = runs.into_iter().map(|run| (EncodedRun::of(&run), run.session)).collect();
         let entries: Vec<_> =
             changes.runs.iter().map(|(run, session)| run.entry(session)).collect();
         let data = rmp_serde::to_vec(&entries).map_err(|e| StoreError::journal(id, &e))?;
-        changes.row = Some((id, data.len()));
+        changes.appended_row = Some((id, data.len()));
         sqlx::query("INSERT INTO journal (id, data) VALUES ($1, $2)")
             .bind(id)
             .bind(data)
@@ -191,94 +211,94 @@ impl Journal {
         Ok(())
     }
 
-    /// Removes the rows of which nothing is left after `changes`; `next` is the
-    /// row after the last one.
+    /// Removes from the table the oldest rows that are no longer needed after `changes`.
+    /// `next` is the id of the row after the last one.
     pub(super) async fn trim(
         &self,
         db: &mut AnyConnection,
         next: i64,
-        changes: &mut Changes,
+        changes: &mut JournalChanges,
     ) -> Result<(), StoreError> {
-        let first = self.lock().first_row(&changes.gone).unwrap_or(next);
+        let first = self.lock().first_needed_row(&changes.removed_sessions).unwrap_or(next);
         sqlx::query("DELETE FROM journal WHERE id < $1").bind(first).execute(db).await?;
-        changes.first_row = Some(first);
+        changes.first_kept_row = Some(first);
         Ok(())
     }
 
-    /// Holds what is in the journal after `changes`.
-    pub(super) fn apply(&self, changes: Changes) {
-        let mut held = self.lock();
-        for session in &changes.gone {
-            held.sessions.remove(session);
+    /// Applies the changes of a committed transaction to the contents in memory.
+    pub(super) fn apply(&self, changes: JournalChanges) {
+        let mut contents = self.lock();
+        for session in &changes.removed_sessions {
+            contents.sessions.remove(session);
         }
-        if let Some(first) = changes.first_row {
-            let left = held.rows.split_off(&first);
-            let removed = std::mem::replace(&mut held.rows, left);
-            held.n_bytes -= removed.values().sum::<usize>();
+        if let Some(first) = changes.first_kept_row {
+            let kept = contents.rows.split_off(&first);
+            let removed = std::mem::replace(&mut contents.rows, kept);
+            contents.n_bytes -= removed.values().sum::<usize>();
         }
-        let Some((row, n_bytes)) = changes.row else { return };
-        held.add_row(row, n_bytes);
+        let Some((row, n_bytes)) = changes.appended_row else { return };
+        contents.add_row(row, n_bytes);
         for (run, session) in changes.runs {
-            held.take(row, session, run);
+            contents.add_run(row, session, run);
         }
     }
 }
 
-/// For the readers, who ask before they look into the tables: what is folded
-/// meanwhile is then found there.
+/// Methods of the readers. They must be called before the tables are queried: samples
+/// that are folded in between are then found in the tables.
 impl Journal {
-    /// The samples of `session` from `index` on, if the first of them is here.
+    /// The samples of `session` from `index` on; `None` if the sample at `index` is not in
+    /// the journal.
     pub(super) fn samples_from(
         &self,
         session: &str,
         index: i64,
     ) -> Result<Option<Vec<Sample>>, StoreError> {
-        let held = self.lock();
-        let Some(unfolded) = held.sessions.get(session) else { return Ok(None) };
+        let contents = self.lock();
+        let Some(unfolded) = contents.sessions.get(session) else { return Ok(None) };
         let at = usize::try_from(index - unfolded.first_index).ok();
         let Some(at) = at.filter(|&at| at < unfolded.n_samples) else { return Ok(None) };
         let mut samples = unfolded.samples(session)?;
-        drop(held);
+        drop(contents);
         Ok(Some(samples.split_off(at)))
     }
 
-    /// How far `session` has come, if the journal knows better than its row.
-    pub(super) fn progress(&self, session: &str) -> Option<Progress> {
+    /// The progress of `session`; `None` if its row is up to date.
+    pub(super) fn progress(&self, session: &str) -> Option<SessionProgress> {
         self.lock().sessions.get(session).map(|unfolded| unfolded.progress)
     }
 
-    /// The same of all sessions.
-    pub(super) fn all_progress(&self) -> HashMap<String, Progress> {
-        let held = self.lock();
-        held.sessions.iter().map(|(id, unfolded)| (id.clone(), unfolded.progress)).collect()
+    /// The progress of all sessions whose row is not up to date, by session id.
+    pub(super) fn all_progress(&self) -> HashMap<String, SessionProgress> {
+        let contents = self.lock();
+        contents.sessions.iter().map(|(id, unfolded)| (id.clone(), unfolded.progress)).collect()
     }
 
-    fn lock(&self) -> MutexGuard<'_, Held> {
-        self.held.lock().unwrap_or_else(PoisonError::into_inner)
+    fn lock(&self) -> MutexGuard<'_, JournalContents> {
+        self.contents.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl SessionRow {
-    /// The same with how far the session has come by the journal, if that is `known`
-    /// and more.
-    pub(super) fn with(mut self, known: Option<&Progress>) -> Self {
-        if let Some(known) = known.filter(|known| known.is_beyond(&self.progress)) {
-            self.progress = *known;
+    /// The row with the progress that the journal has, if that is later than the row's own.
+    pub(super) fn with_progress(mut self, in_journal: Option<&SessionProgress>) -> Self {
+        if let Some(later) = in_journal.filter(|progress| progress.is_beyond(&self.progress)) {
+            self.progress = *later;
         }
         self
     }
 }
 
-impl Held {
+impl JournalContents {
     fn add_row(&mut self, id: i64, n_bytes: usize) {
         self.rows.insert(id, n_bytes);
         self.n_bytes += n_bytes;
     }
 
-    fn take(&mut self, row: i64, session: String, run: Encoded) {
-        let Encoded { first_index, n_samples, progress, chunk } = run;
-        let unfolded = self.sessions.entry(session).or_insert_with(|| Unfolded {
-            row,
+    fn add_run(&mut self, row: i64, session: String, run: EncodedRun) {
+        let EncodedRun { first_index, n_samples, progress, chunk } = run;
+        let unfolded = self.sessions.entry(session).or_insert_with(|| UnfoldedSession {
+            first_row: row,
             first_index,
             n_samples: 0,
             n_bytes: 0,
@@ -291,15 +311,15 @@ impl Held {
         unfolded.chunks.push(chunk);
     }
 
-    /// Takes from a row of the table what is beyond `folded`, how far the open
-    /// sessions' rows have come.
-    fn take_row(
+    /// Adds the entries of a row of the table that are beyond `folded`, the progress in the
+    /// rows of the open sessions.
+    fn load_row(
         &mut self,
         id: i64,
         data: &[u8],
-        folded: &HashMap<String, Progress>,
+        folded: &HashMap<String, SessionProgress>,
     ) -> Result<(), StoreError> {
-        let entries: Vec<Entry<'_>> =
+        let entries: Vec<JournalEntry<'_>> =
             rmp_serde::from_slice(data).map_err(|e| StoreError::journal(id, &e))?;
         self.add_row(id, data.len());
         for entry in entries {
@@ -310,20 +330,20 @@ impl Held {
             let n_samples =
                 codec::n_samples(entry.chunk).map_err(|e| StoreError::journal(id, &e))?;
             let chunk = entry.chunk.to_vec();
-            let run = Encoded { first_index: entry.first_index, n_samples, progress, chunk };
-            self.take(id, entry.session.to_owned(), run);
+            let run = EncodedRun { first_index: entry.first_index, n_samples, progress, chunk };
+            self.add_run(id, entry.session.to_owned(), run);
         }
         Ok(())
     }
 
-    /// The first row that has something of a session not in `gone`.
-    fn first_row(&self, gone: &HashSet<String>) -> Option<i64> {
-        let left = self.sessions.iter().filter(|(id, _)| !gone.contains(*id));
-        left.map(|(_, unfolded)| unfolded.row).min()
+    /// The first row with samples of a session that is not in `removed`.
+    fn first_needed_row(&self, removed: &HashSet<String>) -> Option<i64> {
+        let kept = self.sessions.iter().filter(|(id, _)| !removed.contains(*id));
+        kept.map(|(_, unfolded)| unfolded.first_row).min()
     }
 }
 
-impl Unfolded {
+impl UnfoldedSession {
     fn samples(&self, session: &str) -> Result<Vec<Sample>, StoreError> {
         let mut samples = Vec::with_capacity(self.n_samples);
         for chunk in &self.chunks {
@@ -338,15 +358,18 @@ impl Unfolded {
     }
 }
 
-/// How far the rows of the open sessions have come. All else is folded.
-async fn folded(db: &mut AnyConnection) -> Result<HashMap<String, Progress>, StoreError> {
-    struct Folded {
+/// The progress in the rows of the open sessions, by id. Other sessions are folded
+/// completely.
+async fn folded_progress(
+    db: &mut AnyConnection,
+) -> Result<HashMap<String, SessionProgress>, StoreError> {
+    struct SessionProgressRow {
         id: String,
-        progress: Progress,
+        progress: SessionProgress,
     }
 
-    from_row!(Folded { id }[progress]);
-    let rows: Vec<Folded> = sqlx::query_as(
+    from_row!(SessionProgressRow { id }[progress]);
+    let rows: Vec<SessionProgressRow> = sqlx::query_as(
         "SELECT id, n_samples, n_rejected, first_t_s, last_t_s, last_seq FROM session
          WHERE state = 'open'",
     )

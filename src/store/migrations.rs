@@ -1,8 +1,7 @@
-//! The migrations, embedded: `migrations/NUMBER_NAME.sql`, in order.
+//! The embedded migrations: `migrations/NUMBER_NAME.sql`, in the order of their numbers.
 //!
-//! Not by `sqlx::migrate!`, nor are rows read by `derive(FromRow)`: sqlx's
-//! macros bring its drivers into the build a second time, SQLite with them, a
-//! tenth of the first build.
+//! Neither `sqlx::migrate!` nor `derive(FromRow)` is used: the macros of sqlx compile its
+//! drivers, and SQLite with them, a second time, which is a tenth of a build from scratch.
 
 use std::sync::LazyLock;
 
@@ -11,15 +10,16 @@ use sqlx::{AssertSqlSafe, SqlSafeStr};
 
 #[derive(rust_embed::RustEmbed)]
 #[folder = "$CARGO_MANIFEST_DIR/migrations"]
-struct Files;
+struct MigrationFiles;
 
-pub(super) static MIGRATIONS: LazyLock<Migrator> =
-    LazyLock::new(|| Migrator::with_migrations(Files::iter().filter_map(|f| of(&f)).collect()));
+pub(super) static MIGRATIONS: LazyLock<Migrator> = LazyLock::new(|| {
+    Migrator::with_migrations(MigrationFiles::iter().filter_map(|f| migration(&f)).collect())
+});
 
-/// The migration in `file`; `None` if its name is not one of a migration.
-fn of(file: &str) -> Option<Migration> {
+/// Returns the migration in `file`; `None` if its name is not `NUMBER_NAME.sql`.
+fn migration(file: &str) -> Option<Migration> {
     let (number, name) = file.strip_suffix(".sql")?.split_once('_')?;
-    let sql = String::from_utf8(Files::get(file)?.data.into_owned()).ok()?;
+    let sql = String::from_utf8(MigrationFiles::get(file)?.data.into_owned()).ok()?;
     let (number, name) = (number.parse().ok()?, name.replace('_', " "));
     let sql = AssertSqlSafe(sql).into_sql_str();
     Some(Migration::new(number, name.into(), MigrationType::Simple, sql, false))
@@ -29,9 +29,9 @@ fn of(file: &str) -> Option<Migration> {
 mod tests {
     use super::*;
 
-    /// Checksums are kept in databases: theirs are those that sqlx itself makes.
+    /// Databases store the checksums, so they must equal those that sqlx computes itself.
     #[tokio::test]
-    async fn they_are_what_sqlx_reads_from_the_files() {
+    async fn embedded_migrations_equal_those_that_sqlx_reads() {
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/migrations");
         let read = Migrator::new(std::path::Path::new(folder)).await.unwrap();
         let key = |m: &Migration| (m.version, m.description.clone(), m.checksum.clone());

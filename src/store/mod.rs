@@ -1,9 +1,24 @@
-//! What outlives the process: assets, sessions, telemetry, faults.
+//! The store: assets, sessions, telemetry and faults in a database of SQLite or
+//! PostgreSQL.
 //!
-//! Many readers, one [`Writer`]: everything that changes goes through it in
-//! groups, one transaction each, and is durable when [`Writer::commit`]
-//! returns. Documents are JSON text that the store does not read. Knows SQL
-//! and the chunk format; knows no status codes, no engine and no clock.
+//! Many connections read, one [`Writer`] writes. It applies changes in groups, one
+//! transaction per group (group commit), and a change is durable when [`Writer::commit`]
+//! returns. The store has SQL and the chunk format; it does not interpret the JSON
+//! documents in its rows, and it knows neither engines nor HTTP status codes nor a clock.
+//!
+//! A recording, the samples of one session, is stored in two steps, because many sessions
+//! receive a few samples each at the same time:
+//!
+//! 1. A commit appends one row for all its sessions to the *journal* (`journal.rs`). This
+//!    costs a few pages however many sessions there are, and makes the samples durable.
+//! 2. Later the writer *folds* the journal (`write/fold.rs`): it moves the samples of a
+//!    session into *chunks* (`codec.rs`), rows that hold up to 8192 samples of one
+//!    session, and removes them from the journal in the same transaction. Small chunks at
+//!    the end of a session, its *tail* (`tail.rs`), are merged into larger ones.
+//!
+//! So every sample is in the journal or in a chunk, never in both or in neither, and
+//! readers combine the two. With SQLite, a second connection copies the write-ahead log
+//! into the database file while commits go on (`checkpoint.rs`).
 
 mod access;
 mod backup;
@@ -13,12 +28,12 @@ mod expiry;
 mod fleet;
 mod from_row;
 mod journal;
+mod location;
 mod migrations;
-mod place;
-mod question;
+mod multi_row;
+mod query_builder;
 mod read;
 mod rows;
-mod rows_at_once;
 mod tail;
 mod write;
 
@@ -27,46 +42,47 @@ use std::time::Duration;
 
 use migrations::MIGRATIONS;
 use sqlx::AnyPool;
+use write::WriterRole;
 
 pub use access::{AccessWrite, AuditRow, LAST_ID, MAX_LOGINS, TokenRow};
 pub use backup::{back_up, restore};
-pub use expiry::Bulk;
-pub use place::Place;
+pub use expiry::SessionSize;
+pub use location::Location;
 pub use read::{FaultFilter, FaultOrder, SessionFilter};
 pub use rows::{
-    ActionKind, ActionRow, AssetRow, CalibrationRow, EventRow, FaultRow, JobState, Micros,
-    Progress, ReplayRow, SessionRow, TransitionRow, TrendEntry, TrendRow, WarningRow,
+    ActionKind, ActionRow, AssetRow, CalibrationRow, EventRow, FaultRow, Micros, ReplayRow,
+    SessionProgress, SessionRow, TransitionRow, TrendEntry, TrendRow, WarningRow,
 };
 pub use tail::{FULL_CHUNK_SAMPLES, MAX_TAIL_CHUNKS};
 pub use write::{Write, Writer};
 
-/// How long the database may take to say that it is there.
-const PING_WAIT: Duration = Duration::from_secs(2);
+/// Longest time for the database to answer a ping.
+const PING_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Why the store could not do it.
+/// An error of the store.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
-    #[error("the database: {0}")]
+    #[error("database: {0}")]
     Database(#[from] sqlx::Error),
-    #[error("the migrations: {0}")]
+    #[error("database migration: {0}")]
     Migration(#[from] sqlx::migrate::MigrateError),
     #[error("chunk {first_index} of session {session}: {source}")]
     Chunk { session: String, first_index: i64, source: codec::CodecError },
-    #[error("row {id} of the journal: {reason}")]
+    #[error("journal row {id}: {reason}")]
     Journal { id: i64, reason: String },
-    #[error("{column} holds `{found}`, which this version does not know")]
-    Word { column: &'static str, found: String },
+    #[error("{column} has the value `{found}`, which is unknown to this version")]
+    UnknownValue { column: &'static str, found: String },
     #[error("another process uses this database")]
-    Taken,
-    /// Another process has written, or the database is an older copy of itself.
+    InUse,
+    /// Another process has written to the database, or it was replaced by an older copy.
     #[error(
         "the database is not as it was left: {found} commits instead of {expected}; \
-         restart to go on with what it holds"
+         restart the service to continue with the present contents"
     )]
-    Overtaken { expected: i64, found: i64 },
-    #[error("PostgreSQL is backed up and restored by its own pg_dump and pg_restore")]
-    OwnTools,
-    #[error("{} is there already", file.display())]
+    UnexpectedCommits { expected: i64, found: i64 },
+    #[error("a PostgreSQL database is backed up with pg_dump and restored with pg_restore")]
+    NotSqlite,
+    #[error("{} already exists", file.display())]
     Exists { file: PathBuf },
     #[error("{}: {source}", file.display())]
     File { file: PathBuf, source: std::io::Error },
@@ -75,7 +91,8 @@ pub enum StoreError {
 }
 
 impl StoreError {
-    /// Whether a row already there, or one missing, stands against the change.
+    /// Returns whether the change violates a unique or foreign key constraint: a row exists
+    /// already, or a row that it refers to is missing.
     #[must_use]
     pub fn is_conflict(&self) -> bool {
         let Self::Database(sqlx::Error::Database(error)) = self else { return false };
@@ -86,24 +103,24 @@ impl StoreError {
         Self::Journal { id, reason: error.to_string() }
     }
 
-    /// Whether the same change may go through later: the database is away,
-    /// locked or full. Otherwise the change itself cannot be.
+    /// Returns whether the same change may succeed later, because the database is
+    /// unavailable, locked or full. Otherwise the change itself is invalid.
     #[must_use]
     pub fn is_outage(&self) -> bool {
         match self {
             Self::Database(sqlx::Error::Database(error)) => {
-                error.code().is_none_or(|code| !is_of_the_change(&code))
+                error.code().is_none_or(|code| !is_invalid_change(&code))
             }
             Self::Database(error) => !matches!(
                 error,
                 sqlx::Error::Encode(_) | sqlx::Error::ColumnDecode { .. } | sqlx::Error::Decode(_)
             ),
-            Self::Taken | Self::Overtaken { .. } => true,
+            Self::InUse | Self::UnexpectedCommits { .. } => true,
             Self::Migration(_)
             | Self::Chunk { .. }
             | Self::Journal { .. }
-            | Self::Word { .. }
-            | Self::OwnTools
+            | Self::UnknownValue { .. }
+            | Self::NotSqlite
             | Self::Exists { .. }
             | Self::File { .. }
             | Self::Damaged { .. } => false,
@@ -111,80 +128,80 @@ impl StoreError {
     }
 }
 
-/// Whether an error's code means that the change cannot be. Of PostgreSQL the
-/// classes 22 (data), 23 (constraints) and 42 (SQL), in five characters; of
-/// SQLite, whose low byte is the primary code, 1 (SQL), 18 (too big),
+/// Returns whether a database's error code means that the change itself is invalid. For
+/// PostgreSQL, with codes of five characters: the classes 22 (data), 23 (constraints) and
+/// 42 (SQL). For SQLite, whose primary code is the low byte: 1 (SQL), 18 (too big),
 /// 19 (constraints), 20 (type) and 25 (range).
-fn is_of_the_change(code: &str) -> bool {
+fn is_invalid_change(code: &str) -> bool {
     if code.len() == 5 {
         return ["22", "23", "42"].iter().any(|class| code.starts_with(class));
     }
     code.parse::<i32>().is_ok_and(|code| [1, 18, 19, 20, 25].contains(&(code & 0xff)))
 }
 
-/// The readers' side of the store; cheap to clone.
+/// The store for reading. Clones share the connections.
 #[derive(Clone, Debug)]
 pub struct Store {
     pool: AnyPool,
-    place: Place,
+    location: Location,
     journal: journal::Journal,
 }
 
 impl Store {
-    /// Opens the database at `place`, migrated as needed; a file is made if it
-    /// is not there.
+    /// Opens the database at `location` and brings its schema to this version. A missing
+    /// SQLite file is created.
     ///
     /// # Errors
-    /// [`StoreError`] if it cannot be opened, is not ours, or another process
-    /// writes to it.
-    pub async fn open(place: &Place) -> Result<(Self, Writer), StoreError> {
-        Self::open_as(place, false).await
+    /// [`StoreError`] if the database cannot be opened, has other migrations than this
+    /// version, or (PostgreSQL) another process holds the writer's lock.
+    pub async fn open(location: &Location) -> Result<(Self, Writer), StoreError> {
+        Self::open_as(location, WriterRole::Main).await
     }
 
-    /// Opens the database at `place` beside a service that may be running on
-    /// it. This writer must write nothing that an event or an engine follows
-    /// from: the service would not know of it.
+    /// Opens the database at `location` with an auxiliary writer, while a service may be
+    /// running on it. This writer must not write anything that causes an event or that an
+    /// engine depends on, because the service would not notice.
     ///
     /// # Errors
     /// As for [`Store::open`].
-    pub async fn open_beside(place: &Place) -> Result<(Self, Writer), StoreError> {
-        Self::open_as(place, true).await
+    pub async fn open_auxiliary(location: &Location) -> Result<(Self, Writer), StoreError> {
+        Self::open_as(location, WriterRole::Auxiliary).await
     }
 
-    async fn open_as(place: &Place, guest: bool) -> Result<(Self, Writer), StoreError> {
-        let writer = Writer::open(place, guest).await?;
-        let (pool, place, journal) = (place.readers()?, place.clone(), writer.journal());
-        Ok((Self { pool, place, journal }, writer))
+    async fn open_as(location: &Location, role: WriterRole) -> Result<(Self, Writer), StoreError> {
+        let writer = Writer::open(location, role).await?;
+        let (pool, location, journal) = (location.readers()?, location.clone(), writer.journal());
+        Ok((Self { pool, location, journal }, writer))
     }
 
-    /// Brings the database at `place` to this version's schema; returns how
-    /// many migrations it has.
+    /// Brings the database at `location` to this version's schema. Returns the number of
+    /// migrations that it has.
     ///
     /// # Errors
-    /// As for [`Store::open`], or if it is newer than this version.
-    pub async fn migrate(place: &Place) -> Result<usize, StoreError> {
-        Writer::open(place, false).await?.close().await?;
+    /// As for [`Store::open`]; also if the schema is newer than this version.
+    pub async fn migrate(location: &Location) -> Result<usize, StoreError> {
+        Writer::open(location, WriterRole::Main).await?.close().await?;
         Ok(MIGRATIONS.iter().count())
     }
 
-    /// Where the database is.
+    /// The location of the database.
     #[must_use]
-    pub const fn place(&self) -> &Place {
-        &self.place
+    pub const fn location(&self) -> &Location {
+        &self.location
     }
 
-    /// Whether the database answers.
+    /// Checks that the database answers.
     ///
     /// # Errors
-    /// [`StoreError`] if it does not, or not soon.
+    /// [`StoreError`] if it does not answer, or not within 2 s.
     pub async fn ping(&self) -> Result<(), StoreError> {
         let ping = sqlx::query("SELECT 1").execute(&self.pool);
         let late = |_| sqlx::Error::Io(std::io::ErrorKind::TimedOut.into());
-        tokio::time::timeout(PING_WAIT, ping).await.map_err(late)??;
+        tokio::time::timeout(PING_TIMEOUT, ping).await.map_err(late)??;
         Ok(())
     }
 
-    /// Closes the readers' connections.
+    /// Closes the connections for reading.
     pub async fn close(&self) {
         self.pool.close().await;
     }

@@ -1,23 +1,23 @@
-//! What can be asked of the store.
+//! Queries of the store.
 
-use super::question::Question;
+use super::query_builder::QueryBuilder;
 use super::{
     ActionRow, AssetRow, CalibrationRow, EventRow, FaultRow, Micros, ReplayRow, SessionRow, Store,
     StoreError, TransitionRow, TrendEntry, codec,
 };
 use offbd_core::vocabulary::Sample;
 
-/// Which sessions; newest first, `before` excluded.
+/// A filter for a list of sessions, newest first.
 #[derive(Clone, Debug, Default)]
 pub struct SessionFilter {
     pub asset: Option<String>,
     /// `open` or `ended`.
     pub state: Option<String>,
-    /// The last one of the page before: its opening and id.
+    /// Opening time and id of the last session of the previous page.
     pub before: Option<(Micros, String)>,
 }
 
-/// In which order faults are listed.
+/// The order of a list of faults.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum FaultOrder {
     /// The latest change first.
@@ -28,16 +28,16 @@ pub enum FaultOrder {
     Asset,
 }
 
-/// Which faults of the fleet.
+/// A filter for a list of faults.
 #[derive(Clone, Debug, Default)]
 pub struct FaultFilter {
-    /// The words of the statuses wanted; empty: all.
+    /// The wanted statuses; all if empty.
     pub statuses: Vec<&'static str>,
     pub asset: Option<String>,
     pub code: Option<&'static str>,
     pub acknowledged: Option<bool>,
     pub order: FaultOrder,
-    /// The last one of the page before: its change, asset and code.
+    /// Time of the last change, asset and code of the last fault of the previous page.
     pub after: Option<(Micros, String, String)>,
 }
 
@@ -46,13 +46,15 @@ pub(super) const SESSION: &str =
     n_samples, n_rejected, first_t_s, last_t_s, last_seq, verdict, verdict_hash FROM session
     WHERE ";
 
-/// Not given up, nor its asset.
-const KEPT: &str = "expired_at IS NULL
+/// The condition that neither the session nor its asset is hidden.
+const VISIBLE: &str = "expired_at IS NULL
     AND asset NOT IN (SELECT name FROM asset WHERE deleted_at IS NOT NULL) AND ";
 
 impl Store {
+    /// The asset `name`.
+    ///
     /// # Errors
-    /// [`StoreError`], as for every question here, if the database fails.
+    /// [`StoreError`] if the database fails; so do all queries here.
     pub async fn asset(&self, name: &str) -> Result<Option<AssetRow>, StoreError> {
         Ok(sqlx::query_as("SELECT * FROM asset WHERE name = $1 AND deleted_at IS NULL")
             .bind(name)
@@ -60,13 +62,13 @@ impl Store {
             .await?)
     }
 
-    /// What the learning of asset `name` by itself has come to, if anything.
+    /// The learning record of the asset `name`, if it has one.
     pub async fn learning(&self, name: &str) -> Result<Option<String>, StoreError> {
-        let question = "SELECT learning FROM asset WHERE name = $1 AND learning IS NOT NULL";
-        Ok(sqlx::query_scalar(question).bind(name).fetch_optional(&self.pool).await?)
+        let query = "SELECT learning FROM asset WHERE name = $1 AND learning IS NOT NULL";
+        Ok(sqlx::query_scalar(query).bind(name).fetch_optional(&self.pool).await?)
     }
 
-    /// Assets in the order of their names, from the one after `after`.
+    /// Assets with a name after `after`, sorted by name.
     pub async fn assets(&self, after: &str, limit: u32) -> Result<Vec<AssetRow>, StoreError> {
         Ok(sqlx::query_as(
             "SELECT * FROM asset WHERE name > $1 AND deleted_at IS NULL ORDER BY name LIMIT $2",
@@ -77,8 +79,9 @@ impl Store {
         .await?)
     }
 
+    /// The number of assets.
     pub async fn n_assets(&self) -> Result<i64, StoreError> {
-        // Two counts that indexes answer, so that no document is read.
+        // Indexes answer both counts, so that no document is read.
         let count = sqlx::query_scalar(
             "SELECT (SELECT COUNT(*) FROM asset) -
              (SELECT COUNT(*) FROM asset WHERE deleted_at IS NOT NULL)",
@@ -93,44 +96,50 @@ impl Store {
             .await?)
     }
 
+    /// The session `id`.
     pub async fn session(&self, id: &str) -> Result<Option<SessionRow>, StoreError> {
         let progress = self.journal.progress(id);
-        let mut query = Question::new(SESSION);
-        query.push(KEPT).push("id = ").bind(id)?;
+        let mut query = QueryBuilder::new(SESSION);
+        query.push(VISIBLE).push("id = ").bind(id)?;
         let row: Option<SessionRow> = query.rows().fetch_optional(&self.pool).await?;
-        Ok(row.map(|row| row.with(progress.as_ref())))
+        Ok(row.map(|row| row.with_progress(progress.as_ref())))
     }
 
+    /// The open session of `asset`.
     pub async fn open_session(&self, asset: &str) -> Result<Option<SessionRow>, StoreError> {
-        let mut query = Question::new(SESSION);
+        let mut query = QueryBuilder::new(SESSION);
         query.push("state = 'open' AND asset = ").bind(asset)?;
         self.session_row(query).await
     }
 
-    /// Also one that is given up: its name is taken until it is gone.
+    /// The session of `asset` with this name, also if it is hidden: its name is taken
+    /// until it is deleted.
     pub async fn session_named(
         &self,
         asset: &str,
         name: &str,
     ) -> Result<Option<SessionRow>, StoreError> {
-        let mut query = Question::new(SESSION);
+        let mut query = QueryBuilder::new(SESSION);
         query.push("asset = ").bind(asset)?.push(" AND name = ").bind(name)?;
         self.session_row(query).await
     }
 
+    /// Sessions that match `filter`, newest first.
     pub async fn sessions(
         &self,
         filter: &SessionFilter,
         limit: u32,
     ) -> Result<Vec<SessionRow>, StoreError> {
-        let mut query = Question::new(SESSION);
-        query.push(KEPT).push("1 = 1");
+        let mut query = QueryBuilder::new(SESSION);
+        query.push(VISIBLE).push("1 = 1");
         if let Some(asset) = &filter.asset {
             query.push(" AND asset = ").bind(asset)?;
         }
         match filter.state.as_deref() {
-            // Few, and with an index of just those, which is for this text. Of the many others
-            // a page is best taken in its order, so their word is no text of the question.
+            // Open sessions are few and have a partial index, which is used only if the
+            // SQL has this literal. Ended ones are many: bound as a parameter, their
+            // state does not keep the database from reading a page in the order of
+            // opening.
             Some("open") => drop(query.push(" AND state = 'open'")),
             Some(state) => drop(query.push(" AND state = ").bind(state)?),
             None => {}
@@ -143,9 +152,9 @@ impl Store {
         self.session_rows(query).await
     }
 
-    /// The answer to `query`, which asks for one session. An open one is looked up
-    /// again by its id: only by that does the journal know it.
-    async fn session_row(&self, query: Question) -> Result<Option<SessionRow>, StoreError> {
+    /// The result of `query` for one session. An open session is queried again by its id,
+    /// because the journal is indexed by id and must be read before the tables.
+    async fn session_row(&self, query: QueryBuilder) -> Result<Option<SessionRow>, StoreError> {
         let row: Option<SessionRow> = query.rows().fetch_optional(&self.pool).await?;
         match row {
             Some(row) if row.is_open() => self.session(&row.id).await,
@@ -153,22 +162,22 @@ impl Store {
         }
     }
 
-    /// The answer to `query`, which asks for sessions.
+    /// The result of `query` for sessions.
     pub(super) async fn session_rows(
         &self,
-        query: Question,
+        query: QueryBuilder,
     ) -> Result<Vec<SessionRow>, StoreError> {
-        let known = self.journal.all_progress();
+        let in_journal = self.journal.all_progress();
         let rows: Vec<SessionRow> = query.rows().fetch_all(&self.pool).await?;
-        let noted = rows.into_iter().map(|row| {
-            let progress = known.get(&row.id);
-            row.with(progress)
+        let rows = rows.into_iter().map(|row| {
+            let progress = in_journal.get(&row.id);
+            row.with_progress(progress)
         });
-        Ok(noted.collect())
+        Ok(rows.collect())
     }
 
-    /// Samples of the recording of `session` from the one at `index` on, as many
-    /// as are together; none at its end.
+    /// Samples of `session` from `index` on, as many as are stored together (in one chunk
+    /// or in the journal); `None` at the end of the recording.
     pub async fn samples_from(
         &self,
         session: &str,
@@ -191,8 +200,9 @@ impl Store {
         Ok(Some(samples.split_off(usize::try_from(index - first_index).unwrap_or_default())))
     }
 
-    /// The chunks of `session` that may hold a sample with a `t_s` from `first`
-    /// to `last`, the latest first, at most `limit` and what the journal has.
+    /// The samples of `session` in the journal, and those of its chunks that may have a
+    /// sample with a `t_s` from `first` to `last`: the latest chunks first, at most
+    /// `limit` of them.
     pub async fn chunks_between(
         &self,
         session: &str,
@@ -217,7 +227,7 @@ impl Store {
         Ok(chunks)
     }
 
-    /// What people did in `session`, in order.
+    /// The actions of people in `session`, in order.
     pub async fn actions(&self, session: &str) -> Result<Vec<ActionRow>, StoreError> {
         Ok(sqlx::query_as("SELECT * FROM action WHERE session = $1 ORDER BY after_index, id")
             .bind(session)
@@ -243,7 +253,7 @@ impl Store {
         .await?)
     }
 
-    /// Transitions of `code` in `session` before `before` (an ordinal), latest first.
+    /// Transitions of `code` in `session` with an ordinal below `before`, latest first.
     pub async fn transitions_of(
         &self,
         session: &str,
@@ -263,6 +273,7 @@ impl Store {
         .await?)
     }
 
+    /// The number of transitions of `session`.
     pub async fn n_transitions(&self, session: &str) -> Result<i64, StoreError> {
         Ok(sqlx::query_scalar("SELECT COUNT(*) FROM transition WHERE session = $1")
             .bind(session)
@@ -270,14 +281,14 @@ impl Store {
             .await?)
     }
 
-    /// Events of `asset`, or of all, with an id above `after`.
+    /// Events with an id above `after`, of `asset` or, if `None`, of all assets.
     pub async fn events(
         &self,
         asset: Option<&str>,
         after: i64,
         limit: u32,
     ) -> Result<Vec<EventRow>, StoreError> {
-        let mut query = Question::new("");
+        let mut query = QueryBuilder::new("");
         for select in [
             "SELECT id, asset, session, document FROM transition WHERE id > ",
             " UNION ALL SELECT id, asset, session, event FROM action
@@ -292,8 +303,8 @@ impl Store {
         Ok(query.rows().fetch_all(&self.pool).await?)
     }
 
-    /// What the sessions of `asset` estimated, with their names, newest first:
-    /// at most `limit` rows, of which a session has one for each axis.
+    /// The servo estimates of the sessions of `asset`, newest first, at most `limit`. A
+    /// session has one for each axis.
     pub async fn trend(&self, asset: &str, limit: u32) -> Result<Vec<TrendEntry>, StoreError> {
         Ok(sqlx::query_as(
             "SELECT trend.*, session.name AS session_name FROM trend
@@ -306,7 +317,7 @@ impl Store {
         .await?)
     }
 
-    /// Changes of a code of `asset` with an id below `before`, newest first.
+    /// Transitions of `code` of `asset` with an id below `before`, newest first.
     pub async fn transitions_before(
         &self,
         asset: &str,
@@ -326,8 +337,7 @@ impl Store {
         .await?)
     }
 
-    /// What people did about a code of `asset`, with an id below `before`,
-    /// newest first.
+    /// Actions of people on `code` of `asset` with an id below `before`, newest first.
     pub async fn actions_before(
         &self,
         asset: &str,
@@ -354,12 +364,13 @@ impl Store {
             .await?)
     }
 
+    /// Faults that match `filter`.
     pub async fn faults(
         &self,
         filter: &FaultFilter,
         limit: u32,
     ) -> Result<Vec<FaultRow>, StoreError> {
-        let mut query = Question::new("SELECT * FROM fault WHERE 1 = 1");
+        let mut query = QueryBuilder::new("SELECT * FROM fault WHERE 1 = 1");
         if !filter.statuses.is_empty() {
             query.push(" AND status IN (");
             for (i, status) in filter.statuses.iter().enumerate() {
@@ -376,11 +387,12 @@ impl Store {
         if let Some(acknowledged) = filter.acknowledged {
             query.push(" AND acknowledged = ").bind(i64::from(acknowledged))?;
         }
-        page(&mut query, filter)?;
+        push_page(&mut query, filter)?;
         query.push(" LIMIT ").bind(i64::from(limit))?;
         Ok(query.rows().fetch_all(&self.pool).await?)
     }
 
+    /// The fault `code` of `asset`.
     pub async fn fault(&self, asset: &str, code: &str) -> Result<Option<FaultRow>, StoreError> {
         Ok(sqlx::query_as("SELECT * FROM fault WHERE asset = $1 AND code = $2")
             .bind(asset)
@@ -389,6 +401,7 @@ impl Store {
             .await?)
     }
 
+    /// The replay `id`.
     pub async fn replay(&self, id: &str) -> Result<Option<ReplayRow>, StoreError> {
         Ok(sqlx::query_as("SELECT * FROM replay WHERE id = $1")
             .bind(id)
@@ -396,13 +409,14 @@ impl Store {
             .await?)
     }
 
-    /// Jobs that a former process left unfinished.
+    /// Replays that an earlier process did not finish.
     pub async fn unfinished_replays(&self) -> Result<Vec<ReplayRow>, StoreError> {
         Ok(sqlx::query_as("SELECT * FROM replay WHERE state IN ('queued', 'running')")
             .fetch_all(&self.pool)
             .await?)
     }
 
+    /// The calibration `id`.
     pub async fn calibration(&self, id: &str) -> Result<Option<CalibrationRow>, StoreError> {
         Ok(sqlx::query_as("SELECT * FROM calibration WHERE id = $1")
             .bind(id)
@@ -410,14 +424,15 @@ impl Store {
             .await?)
     }
 
-    /// The calibrations of `asset`, newest first, `before` excluded.
+    /// The calibrations of `asset`, newest first, from the one after `before` (its time
+    /// and id).
     pub async fn calibrations(
         &self,
         asset: &str,
         before: Option<(Micros, &str)>,
         limit: u32,
     ) -> Result<Vec<CalibrationRow>, StoreError> {
-        let mut query = Question::new("SELECT * FROM calibration WHERE asset = ");
+        let mut query = QueryBuilder::new("SELECT * FROM calibration WHERE asset = ");
         query.bind(asset)?;
         if let Some((made_at, id)) = before {
             query.push(" AND (made_at, id) < (").bind(made_at)?;
@@ -427,7 +442,7 @@ impl Store {
         Ok(query.rows().fetch_all(&self.pool).await?)
     }
 
-    /// Jobs that a former process left unfinished.
+    /// Calibrations that an earlier process did not finish.
     pub async fn unfinished_calibrations(&self) -> Result<Vec<CalibrationRow>, StoreError> {
         Ok(sqlx::query_as("SELECT * FROM calibration WHERE state IN ('queued', 'running')")
             .fetch_all(&self.pool)
@@ -435,8 +450,8 @@ impl Store {
     }
 }
 
-/// The page's beginning and order.
-fn page(query: &mut Question, filter: &FaultFilter) -> Result<(), StoreError> {
+/// Appends the condition for the next page, and the order.
+fn push_page(query: &mut QueryBuilder, filter: &FaultFilter) -> Result<(), StoreError> {
     if let Some((changed_at, asset, code)) = &filter.after {
         match filter.order {
             FaultOrder::Newest => query.push(" AND (changed_at, asset, code) < ("),

@@ -1,20 +1,19 @@
-//! The rows, as the tables have them. Documents are JSON text.
+//! Row types, with the columns of the tables. Documents are JSON text.
 
 use super::from_row::from_row;
-use std::fmt;
 use std::str::FromStr;
 
 use super::StoreError;
 
-/// A moment: microseconds since 1970-01-01 UTC.
+/// A time: microseconds since 1970-01-01 UTC.
 pub type Micros = i64;
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct AssetRow {
     pub name: String,
-    /// The asset file.
+    /// The asset file (JSON).
     pub document: String,
-    /// Counts the changes of the document, from 1.
+    /// Number of the document's version, from 1.
     pub revision: i64,
     pub created_at: Micros,
     pub updated_at: Micros,
@@ -22,23 +21,24 @@ pub struct AssetRow {
 
 from_row!(AssetRow { name, document, revision, created_at, updated_at });
 
-/// How far a session's recording has come.
+/// The progress of a session's recording.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Progress {
+pub struct SessionProgress {
     pub n_samples: i64,
-    /// Rows that were no samples.
+    /// Rejected rows.
     pub n_rejected: i64,
-    /// The earliest and the latest `t_s` of the samples that were judged.
+    /// The earliest `t_s` of the judged samples.
     pub first_t_s: Option<f64>,
+    /// The latest `t_s` of the judged samples.
     pub last_t_s: Option<f64>,
     /// The highest `seq`.
     pub last_seq: Option<i64>,
 }
 
-from_row!(Progress { n_samples, n_rejected, first_t_s, last_t_s, last_seq });
+from_row!(SessionProgress { n_samples, n_rejected, first_t_s, last_t_s, last_seq });
 
-impl Progress {
-    /// Whether `other` is of an earlier moment of the same session.
+impl SessionProgress {
+    /// Returns whether this is later than `other` of the same session.
     #[must_use]
     pub(super) const fn is_beyond(&self, other: &Self) -> bool {
         self.n_samples + self.n_rejected > other.n_samples + other.n_rejected
@@ -54,12 +54,12 @@ pub struct SessionRow {
     pub state: String,
     pub opened_at: Micros,
     pub ended_at: Option<Micros>,
-    /// The asset file as of opening.
+    /// The asset file when the session was opened.
     pub setup: String,
-    /// The fault memory as of opening.
+    /// The fault memory when the session was opened.
     pub baseline: String,
-    pub progress: Progress,
-    /// Once ended.
+    pub progress: SessionProgress,
+    /// `None` while the session is open; so is the hash.
     pub verdict: Option<String>,
     pub verdict_hash: Option<String>,
 }
@@ -86,7 +86,7 @@ impl SessionRow {
     }
 }
 
-/// What a person did about a code.
+/// The kind of an action of a person on a fault code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ActionKind {
     Clear,
@@ -109,24 +109,25 @@ impl FromStr for ActionKind {
         match word {
             "clear" => Ok(Self::Clear),
             "acknowledge" => Ok(Self::Acknowledge),
-            _ => Err(StoreError::Word { column: "action.kind", found: word.to_owned() }),
+            _ => Err(StoreError::UnknownValue { column: "action.kind", found: word.to_owned() }),
         }
     }
 }
 
+/// An action of a person on a fault code.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ActionRow {
-    /// Given by the writer.
+    /// Assigned by the writer.
     pub id: i64,
     pub asset: String,
     pub session: Option<String>,
-    /// Samples of the session recorded by then.
+    /// Number of samples of the session that were recorded before the action.
     pub after_index: i64,
     pub kind: String,
     pub code: String,
     pub actor: String,
     pub at: Micros,
-    /// The event of a change that is in no session.
+    /// The event, if the action changed a fault while no session was open.
     pub event: Option<String>,
 }
 
@@ -134,27 +135,26 @@ from_row!(ActionRow { id, asset, session, after_index, kind, code, actor, at, ev
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct TransitionRow {
-    /// Given by the writer; the id of the event.
+    /// Assigned by the writer; also the id of the event.
     pub id: i64,
     pub asset: String,
     pub session: String,
-    /// Counts the session's transitions from 0.
+    /// Index among the session's transitions, from 0.
     pub ordinal: i64,
     pub t_s: f64,
     pub code: String,
     pub status: String,
     pub at: Micros,
-    /// The fault line.
+    /// The fault line (JSON).
     pub document: String,
 }
 
 from_row!(TransitionRow { id, asset, session, ordinal, t_s, code, status, at, document });
 
-/// Something to be told: a transition, or an act that changed a code while no
-/// session was open.
+/// An event: a transition, or an action that changed a fault while no session was open.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EventRow {
-    /// Rises with every event, never given twice.
+    /// Increases with every event, and is never used twice.
     pub id: i64,
     pub asset: String,
     pub session: Option<String>,
@@ -168,42 +168,15 @@ pub struct FaultRow {
     pub asset: String,
     pub code: String,
     pub status: String,
-    /// 1 once the current occurrence is acknowledged.
+    /// 1 if the current occurrence is acknowledged, else 0.
     pub acknowledged: i64,
     pub changed_at: Micros,
     pub record: String,
-    /// What is known beside the record.
+    /// What the service knows of the fault besides the engine's record (JSON).
     pub provenance: String,
 }
 
 from_row!(FaultRow { asset, code, status, acknowledged, changed_at, record, provenance });
-
-/// Where a background job stands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum JobState {
-    Queued,
-    Running,
-    Done,
-    Failed,
-}
-
-impl JobState {
-    #[must_use]
-    pub const fn as_str(self) -> &'static str {
-        match self {
-            Self::Queued => "queued",
-            Self::Running => "running",
-            Self::Done => "done",
-            Self::Failed => "failed",
-        }
-    }
-}
-
-impl fmt::Display for JobState {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.as_str())
-    }
-}
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReplayRow {
@@ -213,9 +186,9 @@ pub struct ReplayRow {
     pub settings: String,
     pub created_at: Micros,
     pub finished_at: Option<Micros>,
-    /// Once done.
+    /// The result of a job that is done.
     pub result: Option<String>,
-    /// Once failed.
+    /// The reason why a job has failed.
     pub error: Option<String>,
 }
 
@@ -226,10 +199,10 @@ pub struct CalibrationRow {
     pub id: String,
     pub asset: String,
     pub state: String,
-    /// JSON array of the sessions it learns from.
+    /// The sessions to learn from (JSON array).
     pub sessions: String,
     pub made_at: Micros,
-    /// 1 for the one in force.
+    /// 1 for the active calibration of the asset, else 0.
     pub active: i64,
     pub document: Option<String>,
     pub error: Option<String>,
@@ -237,7 +210,7 @@ pub struct CalibrationRow {
 
 from_row!(CalibrationRow { id, asset, state, sessions, made_at, active, document, error });
 
-/// What a session estimated of the servo behind an axis.
+/// The estimate of the servo of an axis from one session.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrendRow {
     pub session: String,
@@ -253,9 +226,9 @@ pub struct TrendRow {
     pub offset_error_m_s2: f64,
     pub delay_s: f64,
     pub delay_error_s: f64,
-    /// Motion that it rests on, s.
+    /// Duration of the motion that the estimate is based on, s.
     pub motion_s: f64,
-    /// What the sessions up to this one lead to.
+    /// The drift warnings from the sessions up to this one (JSON).
     pub warnings: Option<String>,
 }
 
@@ -276,7 +249,7 @@ from_row!(TrendRow {
     warnings
 });
 
-/// The same with the session's name.
+/// A [`TrendRow`] with the name of its session.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrendEntry {
     pub session_name: String,
@@ -285,7 +258,7 @@ pub struct TrendEntry {
 
 from_row!(TrendEntry { session_name }[row]);
 
-/// The warnings of an axis as of the last session that estimated it.
+/// The drift warnings of an axis from the last session that estimated it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct WarningRow {
     pub asset: String,

@@ -1,54 +1,62 @@
-//! The end of an open session's recording: many small chunks, merged into big
-//! ones before they become too many.
+//! The tail of an open session: the small chunks at the end of its recording.
+//!
+//! Each fold of the journal appends the samples of a session as one *run*. A short run
+//! makes a small chunk. Small chunks are always the last ones of their session; a run
+//! that would bring them to 128 chunks or to 2048 samples is merged with them, in the
+//! same transaction. So a recording consists of chunks with at least 2048 samples and a
+//! bounded tail, and appending never rewrites long chunks. When a session ends, its tail
+//! is merged a last time.
 
 use std::collections::BTreeMap;
 
 use sqlx::AnyConnection;
 
-use super::codec::Stay;
-use super::rows_at_once::{RowsAtOnce, in_parts};
-use super::{Progress, StoreError, codec};
+use super::codec::Packing;
+use super::multi_row::{MultiRowStatement, in_parts};
+use super::{SessionProgress, StoreError, codec};
 use offbd_core::vocabulary::Sample;
 
 /// Samples in a full chunk; a longer run is cut into several.
 pub const FULL_CHUNK_SAMPLES: usize = 8192;
 
-/// Samples in a chunk that stays as it is; smaller ones are all at the end of
-/// their session, and are merged as soon as they are as many together.
+/// Samples from which on a chunk is never merged again. Smaller chunks are in the tail,
+/// which is merged as soon as it has as many samples.
 const LONG_CHUNK_SAMPLES: usize = 2048;
 
-/// Small chunks at the end of a session; when there are as many, the writer
-/// merges them within the transaction at hand.
+/// Chunks in the tail of a session; the transaction that would reach this number merges
+/// them.
 pub const MAX_TAIL_CHUNKS: usize = 128;
 
-/// Open sessions whose tail is remembered; beyond, all are forgotten and
-/// counted again.
-const MAX_REMEMBERED: usize = 10_000;
+/// Tails whose size is cached. When there are more, the cache is emptied, and tails are
+/// counted in the database again.
+const MAX_CACHED: usize = 10_000;
 
+/// The size of the tail of a session: chunks shorter than [`LONG_CHUNK_SAMPLES`], all at
+/// the end of its recording.
 #[derive(Clone, Copy, Debug, Default)]
 struct Tail {
     n_chunks: usize,
     n_samples: usize,
 }
 
-/// What is known of the open sessions' tails.
+/// The tails of open sessions, with their sizes cached.
 #[derive(Debug, Default)]
 pub(super) struct Tails {
-    known: BTreeMap<String, Tail>,
+    cached: BTreeMap<String, Tail>,
 }
 
 impl Tails {
-    /// Forgets everything, after a transaction that failed.
-    pub(super) fn forget(&mut self) {
-        self.known.clear();
+    /// Empties the cache, which a failed transaction may have made wrong.
+    pub(super) fn forget_all(&mut self) {
+        self.cached.clear();
     }
 
-    /// Forgets `session`, which is deleted.
+    /// Removes the deleted `session` from the cache.
     pub(super) fn remove(&mut self, session: &str) {
-        self.known.remove(session);
+        self.cached.remove(session);
     }
 
-    /// Appends each run to its session; a session has one run at most.
+    /// Appends `runs`, at most one per session, to the chunks of their sessions.
     pub(super) async fn append(
         &mut self,
         connection: &mut AnyConnection,
@@ -59,12 +67,12 @@ impl Tails {
             let tail = self.tail(connection, &run.session).await?;
             let (n_chunks, n_samples) = (tail.n_chunks + 1, tail.n_samples + run.samples.len());
             let tail = if n_chunks < MAX_TAIL_CHUNKS && n_samples < LONG_CHUNK_SAMPLES {
-                small.extend(cut(&run.session, run.first_index, &run.samples, Stay::Short));
+                small.extend(cut(&run.session, run.first_index, &run.samples, Packing::Plain));
                 Tail { n_chunks, n_samples }
             } else {
-                merge(connection, run, tail, Stay::Short).await?
+                merge(connection, run, tail, Packing::Plain).await?
             };
-            self.remember(&run.session, tail);
+            self.cache(&run.session, tail);
         }
         insert(connection, &small).await
     }
@@ -74,72 +82,74 @@ impl Tails {
         connection: &mut AnyConnection,
         session: &str,
     ) -> Result<Tail, StoreError> {
-        match self.known.get(session) {
-            Some(known) => Ok(*known),
+        match self.cached.get(session) {
+            Some(cached) => Ok(*cached),
             None => count(connection, session).await,
         }
     }
 
-    /// Appends the last run of a session, which ends, and merges what is left.
+    /// Appends the last run of a session that ends, and merges its tail.
     pub(super) async fn finish(
         &mut self,
         connection: &mut AnyConnection,
         run: &Run,
     ) -> Result<(), StoreError> {
         let tail = self.tail(connection, &run.session).await?;
-        self.known.remove(&run.session);
-        merge(connection, run, tail, Stay::Long).await.map(drop)
+        self.cached.remove(&run.session);
+        merge(connection, run, tail, Packing::Compact).await.map(drop)
     }
 
-    fn remember(&mut self, session: &str, tail: Tail) {
-        if self.known.len() >= MAX_REMEMBERED {
-            self.known.clear();
+    fn cache(&mut self, session: &str, tail: Tail) {
+        if self.cached.len() >= MAX_CACHED {
+            self.cached.clear();
         }
-        self.known.insert(session.to_owned(), tail);
+        self.cached.insert(session.to_owned(), tail);
     }
 }
 
-/// Samples at the end of a session, and how far it has come with them.
+/// Consecutive samples to be appended to one session, and the session's progress with them.
 #[derive(Debug)]
 pub(super) struct Run {
     pub(super) session: String,
     pub(super) first_index: i64,
     pub(super) samples: Vec<Sample>,
-    pub(super) progress: Progress,
+    pub(super) progress: SessionProgress,
 }
 
 impl Run {
-    pub(super) fn nothing(session: &str) -> Self {
-        let (session, progress) = (session.to_owned(), Progress::default());
+    /// A run without samples.
+    pub(super) fn empty(session: &str) -> Self {
+        let (session, progress) = (session.to_owned(), SessionProgress::default());
         Self { session, first_index: 0, samples: Vec::new(), progress }
     }
 
-    /// This and the next run of the same session.
+    /// Joins this run and the next one of the same session.
     pub(super) fn followed_by(mut self, next: Self) -> Self {
         self.samples.extend(next.samples);
         Self { progress: next.progress, ..self }
     }
 }
 
-/// A chunk that is to be.
-struct Piece<'a> {
+/// A chunk to be inserted.
+struct NewChunk<'a> {
     session: &'a str,
     first_index: i64,
     samples: &'a [Sample],
-    stay: Stay,
+    packing: Packing,
 }
 
-/// Full chunks and a rest; long ones stay, and the `rest` as it says.
+/// Cuts `samples` into full chunks and a rest. Chunks that are never merged again are
+/// compressed, a shorter rest is packed as `rest` says.
 fn cut<'a>(
     session: &'a str,
     first_index: i64,
     samples: &'a [Sample],
-    rest: Stay,
-) -> impl Iterator<Item = Piece<'a>> {
+    rest: Packing,
+) -> impl Iterator<Item = NewChunk<'a>> {
     samples.chunks(FULL_CHUNK_SAMPLES).enumerate().map(move |(i, samples)| {
         let first_index = first_index + (i * FULL_CHUNK_SAMPLES) as i64;
-        let stay = if samples.len() >= LONG_CHUNK_SAMPLES { Stay::Long } else { rest };
-        Piece { session, first_index, samples, stay }
+        let packing = if samples.len() >= LONG_CHUNK_SAMPLES { Packing::Compact } else { rest };
+        NewChunk { session, first_index, samples, packing }
     })
 }
 
@@ -156,15 +166,15 @@ async fn count(connection: &mut AnyConnection, session: &str) -> Result<Tail, St
     Ok(Tail { n_chunks: count(n_chunks), n_samples: count(n_samples) })
 }
 
-async fn insert(connection: &mut AnyConnection, pieces: &[Piece<'_>]) -> Result<(), StoreError> {
-    static INSERT: RowsAtOnce = RowsAtOnce::new(
+async fn insert(connection: &mut AnyConnection, chunks: &[NewChunk<'_>]) -> Result<(), StoreError> {
+    static INSERT: MultiRowStatement = MultiRowStatement::new(
         "INSERT INTO chunk (session, first_index, n, min_t_s, max_t_s, data) VALUES ",
         6,
         "",
     );
-    for part in in_parts(pieces) {
+    for part in in_parts(chunks) {
         let mut query = sqlx::query(INSERT.sql(part.len()));
-        for Piece { session, first_index, samples, stay } in part {
+        for NewChunk { session, first_index, samples, packing } in part {
             let times = || samples.iter().map(|sample| sample.t_s);
             query = query
                 .bind(*session)
@@ -172,30 +182,29 @@ async fn insert(connection: &mut AnyConnection, pieces: &[Piece<'_>]) -> Result<
                 .bind(samples.len() as i64)
                 .bind(times().fold(f64::INFINITY, f64::min))
                 .bind(times().fold(f64::NEG_INFINITY, f64::max))
-                .bind(codec::encode(samples, *stay));
+                .bind(codec::encode(samples, *packing));
         }
         query.execute(&mut *connection).await?;
     }
     Ok(())
 }
 
-/// Makes one run of the small chunks of the `tail`, which are all at the end, and
-/// of `run`, and cuts it into full chunks and a rest. Returns the tail that this
-/// leaves.
+/// Joins the small chunks of `tail` with `run` and stores the result as full chunks and a
+/// rest. Returns the new tail.
 async fn merge(
     connection: &mut AnyConnection,
     run: &Run,
     tail: Tail,
-    rest: Stay,
+    rest: Packing,
 ) -> Result<Tail, StoreError> {
     let session = &run.session;
     let small = if tail.n_chunks > 0 { take_small(connection, session).await? } else { vec![] };
     let first_index = small.first().map_or(run.first_index, |(first_index, _)| *first_index);
     let mut samples = decode_all(session, &small)?;
     samples.extend_from_slice(&run.samples);
-    let pieces: Vec<_> = cut(session, first_index, &samples, rest).collect();
-    insert(connection, &pieces).await?;
-    let small = pieces.last().filter(|piece| piece.samples.len() < LONG_CHUNK_SAMPLES);
+    let chunks: Vec<_> = cut(session, first_index, &samples, rest).collect();
+    insert(connection, &chunks).await?;
+    let small = chunks.last().filter(|chunk| chunk.samples.len() < LONG_CHUNK_SAMPLES);
     Ok(small.map_or(Tail::default(), |last| Tail { n_chunks: 1, n_samples: last.samples.len() }))
 }
 
@@ -220,13 +229,13 @@ async fn take_small(
 }
 
 fn decode_all(session: &str, chunks: &[(i64, Vec<u8>)]) -> Result<Vec<Sample>, StoreError> {
-    let mut run = Vec::new();
+    let mut samples = Vec::new();
     for (first_index, data) in chunks {
-        run.extend(codec::decode(data).map_err(|source| StoreError::Chunk {
+        samples.extend(codec::decode(data).map_err(|source| StoreError::Chunk {
             session: session.to_owned(),
             first_index: *first_index,
             source,
         })?);
     }
-    Ok(run)
+    Ok(samples)
 }

@@ -1,4 +1,12 @@
-//! The one writer: groups of changes, one transaction each, durable on return.
+//! The writer: the one connection that changes the database.
+//!
+//! It applies a group of changes in one transaction, which is durable when
+//! [`Writer::commit`] returns. If a connection is lost during a commit, it is not known
+//! whether the database has committed the transaction. Therefore every transaction of the
+//! main writer increments a counter in the database; after reconnecting, the writer
+//! compares the counter with its own and knows the outcome, so that nothing is stored
+//! twice or lost. Any other value means that another process has written, or that the
+//! database was replaced; then the writer refuses all changes until a restart.
 
 mod deletion;
 mod fold;
@@ -9,45 +17,46 @@ use std::time::Duration;
 
 use sqlx::{AnyConnection, Connection};
 
-use self::fold::Moves;
-use super::checkpoint::{self, Checkpoints};
-use super::journal::{Changes, Journal};
-use super::rows_at_once::{RowsAtOnce, in_parts};
+use self::fold::Relocation;
+use super::checkpoint::{self, Checkpointer};
+use super::journal::{Journal, JournalChanges};
+use super::multi_row::{MultiRowStatement, in_parts};
 use super::tail::{Run, Tails};
 use super::{
-    AccessWrite, ActionRow, AssetRow, CalibrationRow, FaultRow, MIGRATIONS, Micros, Place,
-    Progress, ReplayRow, SessionRow, StoreError, TransitionRow, TrendRow,
+    AccessWrite, ActionRow, AssetRow, CalibrationRow, FaultRow, Location, MIGRATIONS, Micros,
+    ReplayRow, SessionProgress, SessionRow, StoreError, TransitionRow, TrendRow,
 };
 use offbd_core::vocabulary::Sample;
 
-/// How long a commit may take before its connection is given up. A disk that
-/// is slower than this cannot carry the service.
-const COMMIT_WAIT: Duration = Duration::from_secs(30);
+/// Longest duration of a commit; then its connection is dropped. A disk that is slower
+/// cannot support the service.
+const COMMIT_TIMEOUT: Duration = Duration::from_secs(30);
 
-/// One change.
+/// A change of the database.
 #[derive(Clone, Debug)]
 pub enum Write {
-    /// A new asset; a conflict if its name is taken.
+    /// Creates an asset. It is a conflict if its name is taken.
     CreateAsset(AssetRow),
-    /// The document of an asset that is there.
+    /// Replaces the document of an existing asset.
     UpdateAsset(AssetRow),
-    /// An asset is given up: nobody sees it or its sessions any more.
-    GiveUpAsset {
+    /// Hides an asset and its sessions from all readers, and ends its open session. The
+    /// first step of its deletion.
+    HideAsset {
         name: String,
         at: Micros,
     },
-    /// An asset that is given up goes, with what is left of it.
+    /// Deletes a hidden asset, with what is left of its sessions.
     DeleteAsset {
         name: String,
     },
     OpenSession(SessionRow),
-    /// Samples at the end of a session's recording, possibly none, and how far
-    /// it has come with them.
+    /// Appends samples, possibly none, to the recording of a session, and sets the
+    /// session's progress.
     Append {
         session: String,
         first_index: i64,
         samples: Vec<Sample>,
-        progress: Progress,
+        progress: SessionProgress,
     },
     EndSession {
         session: String,
@@ -55,26 +64,26 @@ pub enum Write {
         verdict: String,
         hash: String,
     },
-    /// A session goes, with what is left of it.
+    /// Deletes a session, with what is left of its chunks and transitions.
     DeleteSession {
         session: String,
     },
-    /// An ended session is given up: nobody sees it any more.
-    ExpireSession {
+    /// Hides an ended session from all readers. The first step of its deletion.
+    HideSession {
         session: String,
         at: Micros,
     },
-    /// The first chunks of a session that is given up, at most `limit`.
+    /// Deletes the first chunks of a hidden session, at most `limit`.
     DropChunks {
         session: String,
         limit: u32,
     },
-    /// The first transitions of a session that is given up, at most `limit`.
+    /// Deletes the first transitions of a hidden session, at most `limit`.
     DropTransitions {
         session: String,
         limit: u32,
     },
-    Act(ActionRow),
+    Action(ActionRow),
     Transition(TransitionRow),
     Fault(FaultRow),
     Trend(TrendRow),
@@ -84,7 +93,7 @@ pub enum Write {
         asset: String,
         id: String,
     },
-    /// What an asset's learning by itself has come to.
+    /// Stores the learning record of an asset (its automatic calibration).
     PutLearning {
         asset: String,
         document: String,
@@ -92,48 +101,57 @@ pub enum Write {
     Access(AccessWrite),
 }
 
-/// The one that changes things; a guest beside it may write what no event and
-/// no engine follows from. Every transaction counts itself in the
-/// database, so that after a loss of the connection the writer knows whether
-/// the last one came through, and notices if somebody else has written.
+/// What a writer may do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum WriterRole {
+    /// Everything. At most one writer of a database has this role.
+    Main,
+    /// Changes that neither cause an event nor concern an engine, such as tokens. It may
+    /// run beside a main writer of another process, and does not count its transactions.
+    Auxiliary,
+}
+
+/// The connection that changes the database.
 #[derive(Debug)]
 pub struct Writer {
-    place: Place,
-    /// None after a failure, until [`Writer::reconnect`].
+    location: Location,
+    /// `None` after a failure, until [`Writer::reconnect`].
     connection: Option<AnyConnection>,
     /// The last id given to an event.
     last_id: i64,
-    /// Transactions that the database has seen.
+    /// Transactions that the database has committed and counted.
     n_commits: i64,
-    /// Whether it writes beside the one that counts.
-    guest: bool,
-    pub(super) checkpoints: Option<Checkpoints>,
-    /// Of the transaction that may have come through and is not counted yet.
-    in_doubt: Option<Changes>,
+    role: WriterRole,
+    pub(super) checkpointer: Option<Checkpointer>,
+    /// The journal's changes by a transaction whose outcome is not known yet.
+    in_doubt: Option<JournalChanges>,
     tails: Tails,
     journal: Journal,
-    /// Sessions that the database did not let be folded. They take no more until
-    /// it does.
+    /// Sessions that could not be folded because the database refused their chunks. Until
+    /// it accepts them, it accepts no further samples of these sessions either.
     refused: HashSet<String>,
-    /// The journal's bytes at the last [`Writer::fold`].
+    /// The journal's bytes after the last [`Writer::fold`].
     n_bytes_before: usize,
 }
 
 impl Writer {
-    pub(super) async fn open(place: &Place, guest: bool) -> Result<Self, StoreError> {
-        let mut connection = place.writer(!guest).await?;
+    pub(super) async fn open(location: &Location, role: WriterRole) -> Result<Self, StoreError> {
+        let mut connection = location.writer(role).await?;
         MIGRATIONS.run_direct(None, &mut connection, false).await?;
         let last_id = counter(&mut connection, "event").await?;
         let n_commits = counter(&mut connection, "commit").await?;
         let journal = Journal::load(&mut connection).await?;
         let n_bytes_before = journal.n_bytes();
         Ok(Self {
-            place: place.clone(),
+            location: location.clone(),
             connection: Some(connection),
             last_id,
             n_commits,
-            guest,
-            checkpoints: if guest { None } else { Checkpoints::beside(place) },
+            role,
+            checkpointer: match role {
+                WriterRole::Main => Checkpointer::start(location),
+                WriterRole::Auxiliary => None,
+            },
             in_doubt: None,
             tails: Tails::default(),
             journal,
@@ -142,7 +160,7 @@ impl Writer {
         })
     }
 
-    /// Bytes in the journal.
+    /// Bytes of all rows of the journal.
     #[must_use]
     pub fn journal_bytes(&self) -> usize {
         self.journal.n_bytes()
@@ -152,13 +170,13 @@ impl Writer {
         self.journal.clone()
     }
 
-    /// Applies the sets, in order, in one transaction that is durable on
-    /// return; gives ids to their actions and transitions.
+    /// Applies `sets` in order, in one transaction that is durable on return, and assigns
+    /// ids to their actions and transitions.
     ///
     /// # Errors
-    /// [`StoreError`]. If [`StoreError::is_outage`], the transaction may have
-    /// come through all the same: [`Writer::reconnect`] knows. Otherwise
-    /// nothing of any set has been applied.
+    /// [`StoreError`]. If [`StoreError::is_outage`], the transaction may nevertheless be
+    /// committed; [`Writer::reconnect`] returns whether it is. Otherwise nothing has been
+    /// applied.
     pub async fn commit(&mut self, sets: &mut [&mut Vec<Write>]) -> Result<(), StoreError> {
         self.transact(sets, None).await
     }
@@ -166,65 +184,67 @@ impl Writer {
     async fn transact(
         &mut self,
         sets: &mut [&mut Vec<Write>],
-        moves: Option<&Moves>,
+        relocation: Option<&Relocation>,
     ) -> Result<(), StoreError> {
         if self.connection.is_none() && self.reconnect().await? {
-            // Whoever asked for that one has not waited for its outcome.
-            tracing::warn!("a commit came through that was given up");
+            // The caller of that commit did not call `reconnect`.
+            tracing::warn!("a commit whose outcome was unknown has succeeded");
         }
         let last_id = self.last_id;
         let late = |_| Err(sqlx::Error::Io(std::io::ErrorKind::TimedOut.into()).into());
-        let attempt = tokio::time::timeout(COMMIT_WAIT, self.attempt(sets, moves));
+        let attempt = tokio::time::timeout(COMMIT_TIMEOUT, self.attempt(sets, relocation));
         let result = attempt.await.unwrap_or_else(late);
         match &result {
             Ok(()) => {
-                self.came_through();
-                if let Some(checkpoints) = &mut self.checkpoints {
-                    checkpoints.note(n_samples(sets));
+                self.note_committed();
+                if let Some(checkpointer) = &mut self.checkpointer {
+                    checkpointer.count_commit(n_samples(sets));
                 }
             }
             Err(_) => {
-                // A connection that failed may be in any state: a new one is not.
+                // After a failure the connection may be in any state.
                 self.connection = None;
                 self.last_id = last_id;
-                self.tails.forget();
+                self.tails.forget_all();
             }
         }
         result
     }
 
-    /// Copies the rest of the log into the file, if it is little, so that the next
-    /// commit begins the log anew.
+    /// Copies the rest of SQLite's write-ahead log into the database file if the
+    /// checkpointer has left a small one, so that the next commit starts the log from its
+    /// beginning.
     pub async fn copy_log(&mut self) {
-        if !self.checkpoints.as_ref().is_some_and(Checkpoints::is_little_left) {
+        if !self.checkpointer.as_ref().is_some_and(Checkpointer::take_is_rest_small) {
             return;
         }
         let Some(connection) = &mut self.connection else { return };
         let late = |_| Err(sqlx::Error::Io(std::io::ErrorKind::TimedOut.into()));
-        let copied = tokio::time::timeout(COMMIT_WAIT, checkpoint::copy(connection)).await;
+        let copied = tokio::time::timeout(COMMIT_TIMEOUT, checkpoint::copy(connection)).await;
         if let Err(error) = copied.unwrap_or_else(late) {
-            tracing::warn!(%error, "the write-ahead log is not copied into the file");
+            tracing::warn!(%error, "cannot copy the write-ahead log into the database file");
             self.connection = None;
         }
     }
 
-    /// Connects anew; returns whether the last commit, which failed, has come
-    /// through after all. Nothing is in doubt afterwards.
+    /// Connects again. Returns whether the last commit, which returned an error, has been
+    /// committed nevertheless. Afterwards no outcome is in doubt.
     ///
     /// # Errors
-    /// [`StoreError`] if the database is still away, takes no change, or is not as it was
-    /// left.
+    /// [`StoreError`] if the database is still unavailable, does not accept changes, or has
+    /// been changed by another process.
     pub async fn reconnect(&mut self) -> Result<bool, StoreError> {
         self.connection = None;
         let late = |_| Err(sqlx::Error::Io(std::io::ErrorKind::TimedOut.into()).into());
-        let attempt = tokio::time::timeout(COMMIT_WAIT, self.connect_again());
+        let attempt = tokio::time::timeout(COMMIT_TIMEOUT, self.connect_again());
         attempt.await.unwrap_or_else(late)
     }
 
     async fn connect_again(&mut self) -> Result<bool, StoreError> {
-        let mut connection = self.place.writer(!self.guest).await?;
-        // It must take a change that is durable. Touching the other row waits for what the
-        // lost connection may still do.
+        let mut connection = self.location.writer(self.role).await?;
+        // The update of `probe` checks that the database accepts durable changes. The
+        // update of `commit`, with the same value, waits until the lost connection's
+        // transaction has ended.
         sqlx::query(
             "UPDATE counter SET value = CASE name WHEN 'probe' THEN value + 1 ELSE value END
              WHERE name IN ('commit', 'probe')",
@@ -232,36 +252,40 @@ impl Writer {
         .execute(&mut connection)
         .await?;
         let found = counter(&mut connection, "commit").await?;
-        let came_through = self.in_doubt.is_some() && found == self.n_commits + 1;
-        if found != self.n_commits && !came_through {
-            return Err(StoreError::Overtaken { expected: self.n_commits, found });
+        let was_committed = self.in_doubt.is_some() && found == self.n_commits + 1;
+        if found != self.n_commits && !was_committed {
+            return Err(StoreError::UnexpectedCommits { expected: self.n_commits, found });
         }
         self.last_id = counter(&mut connection, "event").await?;
-        if came_through {
-            self.came_through();
+        if was_committed {
+            self.note_committed();
         }
         self.in_doubt = None;
         self.connection = Some(connection);
-        Ok(came_through)
+        Ok(was_committed)
     }
 
-    /// Takes note of the last transaction.
-    fn came_through(&mut self) {
-        self.n_commits += i64::from(!self.guest);
+    /// Counts the last transaction, which is committed, and applies its changes of the
+    /// journal.
+    fn note_committed(&mut self) {
+        self.n_commits += i64::from(self.role == WriterRole::Main);
         if let Some(changes) = self.in_doubt.take() {
-            self.refused.retain(|session| !changes.gone.contains(session));
+            self.refused.retain(|session| !changes.removed_sessions.contains(session));
             self.journal.apply(changes);
         }
     }
 
-    /// Folds what is in the journal and closes the connection.
+    /// Folds the whole journal and closes the connection.
     ///
     /// # Errors
-    /// [`StoreError`] if that fails; all commits stay durable.
+    /// [`StoreError`] if that fails. All commits are durable in any case.
     pub async fn close(mut self) -> Result<(), StoreError> {
-        let folded = if self.guest { Ok(()) } else { self.fold_all().await };
-        if let Some(checkpoints) = self.checkpoints {
-            checkpoints.close().await;
+        let folded = match self.role {
+            WriterRole::Main => self.fold_all().await,
+            WriterRole::Auxiliary => Ok(()),
+        };
+        if let Some(checkpointer) = self.checkpointer {
+            checkpointer.close().await;
         }
         if let Some(connection) = self.connection {
             connection.close().await?;
@@ -272,30 +296,30 @@ impl Writer {
     async fn attempt(
         &mut self,
         sets: &mut [&mut Vec<Write>],
-        moves: Option<&Moves>,
+        relocation: Option<&Relocation>,
     ) -> Result<(), StoreError> {
         let Some(connection) = &mut self.connection else {
             return Err(sqlx::Error::PoolClosed.into());
         };
-        let mut transaction = connection.begin_with(self.place.begin()).await?;
-        let mut group = Group {
+        let mut transaction = connection.begin_with(self.location.begin()).await?;
+        let mut group = GroupCommit {
             number: self.n_commits + 1,
             last_id: &mut self.last_id,
             tails: &mut self.tails,
             journal: &self.journal,
             refused: &self.refused,
-            changes: Changes::default(),
+            changes: JournalChanges::default(),
             pending: Vec::new(),
         };
         for write in sets.iter_mut().flat_map(|set| set.iter_mut()) {
             group.apply(&mut transaction, write).await?;
         }
-        if let Some(moves) = moves {
-            group.relocate(&mut transaction, moves).await?;
+        if let Some(relocation) = relocation {
+            group.relocate(&mut transaction, relocation).await?;
         }
         group.flush(&mut transaction).await?;
         let changes = group.changes;
-        if !self.guest {
+        if self.role == WriterRole::Main {
             count(&mut transaction, self.n_commits, self.last_id).await?;
             self.in_doubt = Some(changes);
         }
@@ -310,11 +334,12 @@ fn n_samples(sets: &[&mut Vec<Write>]) -> usize {
 }
 
 async fn counter(db: &mut AnyConnection, name: &str) -> Result<i64, StoreError> {
-    let question = sqlx::query_scalar("SELECT value FROM counter WHERE name = $1").bind(name);
-    Ok(question.fetch_one(db).await?)
+    let query = sqlx::query_scalar("SELECT value FROM counter WHERE name = $1").bind(name);
+    Ok(query.fetch_one(db).await?)
 }
 
-/// Counts this transaction, and the events up to `last_id`.
+/// Increments the database's count of commits from `n_commits`, and stores the last id of
+/// an event.
 async fn count(db: &mut AnyConnection, n_commits: i64, last_id: i64) -> Result<(), StoreError> {
     let counted = sqlx::query(
         "UPDATE counter SET value = CASE name WHEN 'commit' THEN $1 ELSE $2 END
@@ -330,24 +355,24 @@ async fn count(db: &mut AnyConnection, n_commits: i64, last_id: i64) -> Result<(
         return Ok(());
     }
     let found = counter(db, "commit").await?;
-    Err(StoreError::Overtaken { expected: n_commits, found })
+    Err(StoreError::UnexpectedCommits { expected: n_commits, found })
 }
 
-/// The transaction at hand.
-struct Group<'a> {
-    /// Counts the transactions; the row of the journal.
+/// A group of changes while its transaction is open.
+struct GroupCommit<'a> {
+    /// The transaction's number, which is also the id of its journal row.
     number: i64,
     last_id: &'a mut i64,
     tails: &'a mut Tails,
     journal: &'a Journal,
     refused: &'a HashSet<String>,
-    changes: Changes,
-    /// Samples that wait for the end of the group, so that consecutive batches
-    /// of a session become one run.
+    changes: JournalChanges,
+    /// New samples, one run per session. They are written at the end of the group, so that
+    /// consecutive batches of a session become one run.
     pending: Vec<Run>,
 }
 
-impl Group<'_> {
+impl GroupCommit<'_> {
     const fn next_id(&mut self) -> i64 {
         *self.last_id += 1;
         *self.last_id
@@ -363,7 +388,7 @@ impl Group<'_> {
                 row.id = self.next_id();
                 insert_transition(db, row).await
             }
-            Write::Act(row) => {
+            Write::Action(row) => {
                 row.id = self.next_id();
                 insert_action(db, row).await
             }
@@ -378,23 +403,30 @@ impl Group<'_> {
             Write::UpdateAsset(row) => update_asset(db, row).await,
             Write::OpenSession(row) => open_session(db, row).await,
             Write::EndSession { session, ended_at, verdict, hash } => {
-                self.finish(db, session).await?;
+                self.fold_ended(db, session).await?;
                 end_session(db, session, *ended_at, verdict, hash).await
             }
             Write::DeleteSession { session } => self.delete_session(db, session).await,
-            Write::ExpireSession { session, at } => deletion::expire(db, session, *at).await,
+            Write::HideSession { session, at } => deletion::hide_session(db, session, *at).await,
             Write::DropChunks { session, limit } => {
                 deletion::drop_chunks(db, session, *limit).await
             }
             Write::DropTransitions { session, limit } => {
                 deletion::drop_transitions(db, session, *limit).await
             }
-            Write::GiveUpAsset { name, at } => self.give_up_asset(db, name, *at).await,
+            Write::HideAsset { name, at } => self.hide_asset(db, name, *at).await,
             Write::DeleteAsset { name } => deletion::delete_asset(db, name).await,
         }
     }
 
-    fn defer(&mut self, session: &str, first_index: i64, samples: &[Sample], progress: Progress) {
+    /// Adds samples to the run of their session.
+    fn defer(
+        &mut self,
+        session: &str,
+        first_index: i64,
+        samples: &[Sample],
+        progress: SessionProgress,
+    ) {
         let known = self.pending.iter_mut().find(|p| p.session == session);
         if let Some(pending) = known {
             pending.samples.extend_from_slice(samples);
@@ -406,10 +438,11 @@ impl Group<'_> {
     }
 }
 
-/// Absent values go as others that cannot be: their type is then the same in
-/// every execution of a statement, as PostgreSQL wants it.
+/// Updates the progress of the sessions of `runs`. Missing values are bound as values
+/// that do not occur otherwise, because PostgreSQL requires the same types in every
+/// execution of a statement, and NULL has another one.
 async fn put_progress(db: &mut AnyConnection, runs: &[Run]) -> Result<(), StoreError> {
-    static PUT: RowsAtOnce = RowsAtOnce::new(
+    static PUT: MultiRowStatement = MultiRowStatement::new(
         "UPDATE session SET n_samples = run.column2, n_rejected = run.column3,
          first_t_s = CASE WHEN run.column2 = 0 THEN NULL ELSE run.column4 END,
          last_t_s = CASE WHEN run.column2 = 0 THEN NULL ELSE run.column5 END,

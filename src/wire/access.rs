@@ -1,83 +1,82 @@
-//! Tokens, logins and the audit log as they are shown.
+//! Tokens, logins and audit entries, as the API returns them.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
+
+use super::words::{AuthenticationWord, Role};
 
 /// A token, without its secret.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct TokenView {
     pub id: String,
-    /// What stands beside everything that is done with it.
+    /// Name, recorded in the audit log with every action.
     pub name: String,
-    /// `device`, `viewer`, `operator` or `admin`.
-    pub role: String,
-    /// The one asset of a device.
+    pub role: Role,
+    /// The asset to which a device's token is restricted; null for other roles.
     pub asset: Option<String>,
-    /// RFC 3339.
+    /// Time of creation, RFC 3339.
     pub created_at: String,
-    /// The name of the token by which it was made.
+    /// Who created it, named like the `actor` of an audit entry.
     pub created_by: String,
-    /// RFC 3339; null if it does not end by itself.
+    /// Time of expiry, RFC 3339; null if the token does not expire.
     pub expires_at: Option<String>,
-    /// To the hour.
+    /// Time of the last use, RFC 3339, accurate to the hour; null if never used.
     pub last_used_at: Option<String>,
+    /// Time of revocation, RFC 3339; null if not revoked.
     pub revoked_at: Option<String>,
 }
 
-/// A token that is wanted.
+/// A token to create.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewTokenView {
-    /// 1 to 100 bytes; no other token in force has it.
+    /// Name, 1 to 100 bytes, different from those of all other valid tokens.
     #[schema(min_length = 1, max_length = 100)]
     pub name: String,
-    /// `device`, `viewer`, `operator` or `admin`.
-    #[schema(pattern = "^(device|viewer|operator|admin)$")]
-    pub role: String,
-    /// For a device: its one asset.
+    pub role: Role,
+    /// The asset of a device: required for the role `device`, not allowed for others.
     pub asset: Option<String>,
-    /// RFC 3339; without it the token does not end by itself.
+    /// Time of expiry, RFC 3339; if absent or null, the token does not expire.
     #[schema(format = DateTime)]
     pub expires_at: Option<String>,
 }
 
-/// A new token, with its secret, which is shown this once.
+/// A new token with its secret, which is returned only once.
 #[derive(Clone, Serialize, Deserialize, ToSchema)]
 pub struct MadeTokenView {
     #[serde(flatten)]
     pub token: TokenView,
-    /// What goes into `Authorization: Bearer …`.
+    /// The secret to send as `Authorization: Bearer …`.
     pub secret: String,
 }
 
-/// Something that was done.
+/// An audit entry: one action by one caller.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct AuditView {
     pub id: String,
-    /// RFC 3339.
+    /// Time of the action, RFC 3339.
     pub at: String,
-    /// The name of the token, of a JSON Web Token the subject; `anyone` where none
-    /// is asked for.
+    /// Name of the token, or the subject of a JSON Web Token; `anyone` if the service
+    /// requires no token, `command line` for the command line.
     pub actor: String,
-    /// The token's id; of a JSON Web Token the issuer and the subject.
+    /// Id of the token, or issuer and subject of a JSON Web Token; null without a token.
     pub token_id: Option<String>,
-    /// The operation, as in this description.
+    /// The operation's `operationId` in this description.
     pub act: String,
-    /// What it was done to.
+    /// What the operation was applied to: the path of the request.
     pub target: String,
-    /// From where; null at the machine itself.
+    /// IP address of the caller; null for the command line.
     pub address: Option<String>,
 }
 
-/// Who asks, and whether that matters.
+/// The caller of this request.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct CallerView {
-    /// `required` or `off`.
-    pub authentication: String,
-    /// The token's name; of a JSON Web Token the subject.
+    pub authentication: AuthenticationWord,
+    /// Name of the token, or the subject of a JSON Web Token; null without a token.
     pub name: Option<String>,
-    /// What the caller may do; `admin` where no token is asked for.
-    pub role: String,
-    /// The one asset of a device.
+    /// Role of the caller; `admin` if the service requires no token.
+    pub role: Role,
+    /// The asset to which a device's token is restricted; null for other roles.
     pub asset: Option<String>,
 }

@@ -6,40 +6,42 @@ use sha2::{Digest, Sha256};
 use utoipa::ToSchema;
 
 use super::certificate::{self, MonitorCertificateView};
+use super::words::ProfileWord;
 use offbd_core::diagnosis::{
-    AxisCalibration, Calibration, Profile, Prospects, SensorCalibration, ServoProspects,
+    AxisCalibration, Calibration, CalibrationOrigin, Prospects, SensorCalibration, ServoProspects,
     SessionEstimate,
 };
 use offbd_core::engine::{AxisMapping, DiagnosticsSpec, Rig, ServoSpec};
 use offbd_core::plant::{Ball, Contact, Plate, PlateShape};
 use offbd_core::vocabulary::{Axis, Invalid, PerAxis, in_range, positive};
 
-/// A rig as its owner describes it. Everything but `name` has a default: the
-/// rig of the book chapter.
+/// The description of a rig by its owner. Everything but `name` has a default, which is
+/// the rig of the chapter (see `docs/notation.md`).
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AssetView {
-    /// 1 to 128 letters, digits, `-`, `_` or `.`.
+    /// Name of the asset: 1 to 128 letters, digits, `-`, `_` or `.`.
     #[schema(pattern = "^[A-Za-z0-9._-]{1,128}$")]
     pub name: String,
-    /// Samples a second that the device sends, about.
+    /// Approximate number of samples that the device sends per second.
     #[serde(default = "default_rate")]
     pub sample_rate_hz: f64,
     #[serde(default)]
     pub ball: BallView,
     #[serde(default)]
     pub plate: PlateView,
-    /// How the ball touches the plate.
+    /// The contact between ball and plate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contact: Option<ContactView>,
     #[serde(default)]
     pub servo: ServoView,
-    /// How the device's numbers relate to the plate frame.
+    /// Axes, signs, units and origin of the device's numbers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axes: Option<AxesView>,
+    /// Settings of the diagnosis.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub diagnostics: Option<DiagnosticsView>,
-    /// Written by `calibrate`.
+    /// Learnt parameters, written by a calibration; absent on a rig that is not learnt.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration: Option<CalibrationView>,
 }
@@ -52,13 +54,14 @@ fn default_rate() -> f64 {
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct BallView {
-    /// In (0, 1] m.
+    /// Radius, in (0, 1] m.
     #[schema(exclusive_minimum = 0, maximum = 1)]
     pub radius_m: f64,
-    /// In (0, 100] kg.
+    /// Mass, in (0, 100] kg.
     #[schema(exclusive_minimum = 0, maximum = 100)]
     pub mass_kg: f64,
-    /// κ of I = κ m r², in [0, 1]: 0.4 solid, 0.667 hollow.
+    /// κ in the moment of inertia κ m r², in [0, 1]: 0.4 for a solid ball, 0.667 for a
+    /// hollow one.
     #[schema(minimum = 0, maximum = 1)]
     pub inertia_factor: f64,
 }
@@ -78,19 +81,19 @@ impl Default for BallView {
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlateView {
-    /// Along x, in (0, 10] m.
+    /// Length along x, in (0, 10] m; the chapter's if neither it nor a diameter is given.
     #[schema(exclusive_minimum = 0, maximum = 10)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub length_m: Option<f64>,
-    /// Along y, in (0, 10] m.
+    /// Width along y, in (0, 10] m; the chapter's if neither it nor a diameter is given.
     #[schema(exclusive_minimum = 0, maximum = 10)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub width_m: Option<f64>,
-    /// Of a round plate, in (0, 10] m.
+    /// Diameter of a round plate, in (0, 10] m; excludes length and width.
     #[schema(exclusive_minimum = 0, maximum = 10)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub diameter_m: Option<f64>,
-    /// In [0, 1] m.
+    /// Thickness, in [0, 1] m.
     #[schema(minimum = 0, maximum = 1)]
     #[serde(default = "default_thickness")]
     pub thickness_m: f64,
@@ -113,20 +116,20 @@ impl Default for PlateView {
     }
 }
 
-/// How a body touches the plate: spring, damper and friction.
+/// The contact between a body and the plate: spring, damper and friction.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ContactView {
-    /// K, in (0, 1e12] N/m.
+    /// Stiffness K, in (0, 1e12] N/m.
     #[schema(exclusive_minimum = 0, maximum = 1e12)]
     pub stiffness_n_per_m: f64,
-    /// D, in (0, 1e9] N·s/m.
+    /// Damping D, in (0, 1e9] N·s/m.
     #[schema(exclusive_minimum = 0, maximum = 1e9)]
     pub damping_n_s_per_m: f64,
-    /// μ, in (0, 100].
+    /// Coefficient of friction μ, in (0, 100].
     #[schema(exclusive_minimum = 0, maximum = 100)]
     pub friction: f64,
-    /// Slip speed at which friction saturates, in (0, 10] m/s.
+    /// Slip speed at and above which friction acts in full, in (0, 10] m/s.
     #[schema(exclusive_minimum = 0, maximum = 10)]
     pub slip_threshold_m_s: f64,
 }
@@ -137,19 +140,19 @@ impl Default for ContactView {
     }
 }
 
-/// The servos, both of one kind.
+/// The servos; both have the same parameters.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ServoView {
     /// Largest plate angle, in (0, π/2] rad.
     pub angle_limit_rad: f64,
-    /// From a command to the first movement, in [0, 5] s.
+    /// Time from a command to the first movement, in [0, 5] s.
     #[schema(minimum = 0, maximum = 5)]
     pub dead_time_s: f64,
-    /// First-order lag, in [0, 10] s.
+    /// Time constant of the first-order lag, in [0, 10] s.
     #[schema(minimum = 0, maximum = 10)]
     pub lag_s: f64,
-    /// Fastest turn, in (0, 1000] rad/s.
+    /// Largest angular rate, in (0, 1000] rad/s.
     #[schema(exclusive_minimum = 0, maximum = 1000)]
     pub rate_limit_rad_s: f64,
 }
@@ -160,27 +163,27 @@ impl Default for ServoView {
     }
 }
 
-/// How the device's numbers relate to the plate frame.
+/// Axes, signs, units and origin of the device's numbers, relative to the plate frame.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct AxesView {
-    /// Whether the device's x is the plate's y and the reverse.
+    /// Whether the device's x is the plate's y, and its y the plate's x.
     pub swap: bool,
     /// Sign of the readings along the plate's x, 1 or −1.
     pub x_sign: f64,
     /// Sign of the readings along the plate's y, 1 or −1.
     pub y_sign: f64,
-    /// Metres per unit of the readings, 0.001 for millimetres.
+    /// Metres per unit of the positions: 0.001 for millimetres.
     pub position_unit_m: f64,
-    /// What is read along the plate's x in its middle, m after sign and unit, −10
-    /// to 10; between end stops, the middle of what they leave.
+    /// Reading along the plate's x in the middle of the plate (or of the range that end
+    /// stops leave), after sign and unit, in [−10, 10] m.
     #[schema(minimum = -10, maximum = 10)]
     pub x_offset_m: f64,
-    /// What is read along the plate's y in its middle, m after sign and unit, −10
-    /// to 10; between end stops, the middle of what they leave.
+    /// Reading along the plate's y in the middle of the plate (or of the range that end
+    /// stops leave), after sign and unit, in [−10, 10] m.
     #[schema(minimum = -10, maximum = 10)]
     pub y_offset_m: f64,
-    /// Radians per unit of the commands, 0.01745 for degrees.
+    /// Radians per unit of the commands: 0.01745 for degrees.
     pub command_unit_rad: f64,
 }
 
@@ -190,69 +193,73 @@ impl Default for AxesView {
     }
 }
 
-/// What the owner asks of the diagnosis.
+/// Settings of the diagnosis.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DiagnosticsView {
-    /// `default` or `textbook`.
-    #[schema(pattern = "^(default|textbook)$")]
+    /// Profile of the diagnosis; `default` if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub profile: Option<String>,
-    /// Wanted false alarms per rig and year, above 0.
+    pub profile: Option<ProfileWord>,
+    /// Accepted false alarms per rig and year, above 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub false_alarms_per_rig_year: Option<f64>,
-    /// Continuous failure before a test fails, in [0, 60] s: of servos, ball and
-    /// sensor.
+    /// Debounce time of all monitors: how long a failure must last before the test fails, in
+    /// [0, 60] s.
     #[schema(minimum = 0, maximum = 60)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub debounce_s: Option<f64>,
 }
 
-/// What was learnt of a rig, from which data, when.
+/// A calibration: the learnt parameters of a rig and the data they come from.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CalibrationView {
-    /// Derived from the rest; every fault carries it. Ignored when read.
+    /// Id of the calibration, a hash of its content, given with every fault; ignored on
+    /// input.
     #[serde(default)]
     pub id: String,
-    /// RFC 3339.
+    /// Time of the calibration, RFC 3339.
     pub made_at: String,
-    /// SHA-256 of the data.
+    /// SHA-256 of the data, hexadecimal.
     pub data_sha256: String,
+    /// Number of samples of the data.
     pub samples: u64,
+    /// Duration of the data, s.
     pub duration_s: f64,
-    /// None where the rig has no such servo.
+    /// Parameters along x; absent if the rig has no such servo or no such readings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub x: Option<AxisCalibrationView>,
+    /// Parameters along y; absent if the rig has no such servo or no such readings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub y: Option<AxisCalibrationView>,
-    /// What was learnt of the sensor.
+    /// Learnt properties of the sensor.
     #[serde(default)]
     pub sensor: SensorCalibrationView,
-    /// What each session says by itself, in the order in which they were given.
+    /// Estimates of each session by itself, in the order in which the sessions were given.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sessions: Vec<SessionEstimatesView>,
-    /// How near each monitor came to an alarm in the tests of the calibration, and
-    /// how often it will; empty where it was not tested.
+    /// Test result and expected false alarms of each monitor; empty if the calibration was
+    /// not tested.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub certificate: Vec<MonitorCertificateView>,
-    /// What can be found, how soon.
+    /// How soon faults are expected to be found.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prospects: Option<ProspectsView>,
 }
 
-/// What was learnt of the sensor.
+/// Learnt properties of the sensor.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SensorCalibrationView {
-    /// Time between two readings of a sensor that is logged faster than it reads,
-    /// in [0, 10] s; 0 for one that is not.
+    /// Time between two readings of a sensor that is slower than its log, in [0, 10] s; 0
+    /// for one that is not.
     #[schema(minimum = 0, maximum = 10)]
     pub refresh_s: f64,
-    /// Most lone readings within ten seconds that were set aside, in [0, 1e6].
+    /// Largest number of recent outliers, each fading with a time constant of ten seconds,
+    /// in [0, 1e6].
     #[schema(minimum = 0, maximum = 1e6)]
     pub most_outliers: f64,
-    /// Most scatter about the motion that lasted, in [0, 1] m; 0 if not known.
+    /// Largest scatter about the motion that persisted, in [0, 1] m; 0 if unknown.
     #[schema(minimum = 0, maximum = 1)]
     pub most_scatter_m: f64,
     /// Longest time for which no ball was seen on the plate, in [0, 60] s.
@@ -260,118 +267,128 @@ pub struct SensorCalibrationView {
     pub longest_unseen_s: f64,
 }
 
-/// What one session says of each axis; none where it says nothing.
+/// Estimates of one session.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SessionEstimatesView {
+    /// Estimates along x; absent if the session yields none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub x: Option<SessionEstimateView>,
+    /// Estimates along y; absent if the session yields none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub y: Option<SessionEstimateView>,
 }
 
-/// What one session says of one axis.
+/// Estimates of one session for one axis.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SessionEstimateView {
-    /// Plate and horn off level, rad, and its standard error.
+    /// Angle by which plate or servo horn is off level, rad.
     pub level_rad: f64,
+    /// Standard error of the level, rad.
     pub level_error_rad: f64,
-    /// Gain and its standard error; none where the ball did not move.
+    /// Measured over modelled acceleration; absent if the ball did not move.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gain: Option<f64>,
+    /// Standard error of the gain; absent if the ball did not move.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gain_error: Option<f64>,
 }
 
-/// How soon a fault would have been confirmed, had it come during the sessions
-/// that were learnt from: medians over trials, in which the fault was put into
-/// the readings. Null where fewer than half of them found it within 10 s.
+/// How soon each fault would be confirmed if it occurred during the sessions that the
+/// calibration learnt from: the median over trials in which the fault was injected into the
+/// readings. Null if fewer than half of the trials confirmed it within 10 s.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ProspectsView {
-    /// Moments at which each fault was put in.
+    /// Number of times at which each fault was injected.
     pub trials: usize,
-    /// None where nothing was learnt of the axis.
+    /// The x servo; absent if the axis was not learnt.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub x: Option<ServoProspectsView>,
+    /// The y servo; absent if the axis was not learnt.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub y: Option<ServoProspectsView>,
-    /// A ball that sticks, s.
+    /// Median delay for a ball that sticks, s.
     pub stuck_s: Option<f64>,
-    /// Readings that freeze, s.
+    /// Median delay for readings that freeze, s.
     pub frozen_s: Option<f64>,
-    /// A ball that is not seen, s.
+    /// Median delay for a ball that is not seen, s.
     pub unseen_s: Option<f64>,
 }
 
-/// The same for one axis' servo.
+/// How soon faults of one servo would be confirmed, as in `ProspectsView`.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ServoProspectsView {
-    /// One that does not answer, s.
+    /// Median delay for a servo that does not respond, s.
     pub dead_s: Option<f64>,
-    /// One that answers half, s.
+    /// Median delay for a servo with half its gain, s.
     pub half_gain_s: Option<f64>,
-    /// One whose horn has slipped by 1°, s.
+    /// Median delay for a servo whose horn has slipped by 1°, s.
     pub offset_1deg_s: Option<f64>,
-    /// Smallest share of the gain, of those tried, whose loss is found.
+    /// Smallest tried loss of gain that is found, as a fraction of the gain; null if none is.
     pub least_gain_loss: Option<f64>,
-    /// Smallest slip of the horn, of those tried, that is found, rad.
+    /// Smallest tried slip of the horn that is found, rad; null if none is.
     pub least_offset_rad: Option<f64>,
 }
 
-/// One axis as learnt.
+/// Learnt parameters of one axis.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AxisCalibrationView {
     /// Measured over modelled acceleration, in [−100, 100].
     pub gain: f64,
+    /// Time from a command to the servo's first movement, in [0, 5] s.
     pub dead_time_s: f64,
+    /// Time constant of the servo's first-order lag, in [0, 10] s.
     pub lag_s: f64,
-    /// Plate and horn off level, rad: the mean over sessions.
+    /// Angle by which plate or servo horn is off level, the mean over sessions, in
+    /// [−1, 1] rad.
     pub level_rad: f64,
     /// Standard deviation of the level from session to session, in [0, 1] rad.
     #[schema(minimum = 0, maximum = 1)]
     #[serde(default = "default_level_spread")]
     pub level_spread_rad: f64,
-    /// Standard deviation of the gain from session to session, as a share of it,
-    /// in [0, 10].
+    /// Standard deviation of the gain from session to session, as a fraction of the gain, in
+    /// [0, 10].
     #[schema(minimum = 0, maximum = 10)]
     #[serde(default = "default_gain_spread")]
     pub gain_spread: f64,
-    /// Deceleration of a rolling ball, m/s²; zero where it was not learnt.
+    /// Deceleration of a rolling ball, in [0, 10] m/s²; 0 if it was not learnt.
     #[serde(default)]
     pub resistance_m_s2: f64,
+    /// Standard deviation of the readings about the fitted motion, in (0, 1] m.
     pub noise_m: f64,
+    /// Tilt below which a ball at rest stays at rest, in [0, 1] rad.
     pub breakaway_rad: f64,
+    /// Robust standard deviation of the acceleration residual, in (0, 100] m/s².
     pub residual_m_s2: f64,
-    /// Acceleration up to which gain and delay were learnt, m/s²; none where that
-    /// is not known.
+    /// Acceleration up to which gain and delay were learnt, in [0, 1000] m/s²; absent if
+    /// unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub familiar_m_s2: Option<f64>,
-    /// Longest time for which healthy readings were the same to the bit, in
-    /// [0, 60] s.
+    /// Longest time for which healthy readings were bit-identical, in [0, 60] s.
     #[schema(minimum = 0, maximum = 60)]
     #[serde(default = "default_repeat")]
     pub longest_repeat_s: f64,
-    /// Longest time for which the ball was seen at rest, in [0, 1e9] s; where it was not,
-    /// the breakaway angle is unknown.
+    /// Longest time for which the ball was seen at rest, in [0, 1e9] s; if 0, the breakaway
+    /// angle is unknown.
     #[schema(minimum = 0, maximum = 1e9)]
     #[serde(default)]
     pub rest_s: f64,
-    /// Acceleration that the twin leaves out, over half a second, in (0, 100]
-    /// m/s²; assumed from the residual where it was not learnt.
+    /// Acceleration that the twin does not explain, over half a second, in (0, 100] m/s²;
+    /// if absent, it is assumed from the residual.
     #[schema(exclusive_minimum = 0, maximum = 100)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model_error_m_s2: Option<f64>,
-    /// Most evidence against the servo while it was healthy, in [0, 1000] nats.
+    /// Largest evidence against the servo while it was healthy, in [0, 1000] nats.
     #[schema(minimum = 0, maximum = 1000)]
     #[serde(default)]
     pub most_nats: f64,
-    /// The most that the path is expected to bend from the twin's over two seconds while
-    /// the servo is healthy, root mean square, in [0, 1] m: what tests have shown, and
-    /// more where they were few. Zero where that is not known, and then no path is judged.
+    /// Largest root mean square deviation of the path from the twin's over two seconds that
+    /// is expected of a healthy servo, in [0, 1] m: the largest of the tests, plus a margin
+    /// if they were few. If 0, it is unknown and paths are not judged.
     #[schema(minimum = 0, maximum = 1)]
     #[serde(default)]
     pub most_path_error_m: f64,
@@ -385,7 +402,7 @@ const fn default_gain_spread() -> f64 {
     AxisCalibration::POPULATION_GAIN_SPREAD
 }
 
-/// Healthy readings are known to repeat themselves for this long, s.
+/// Time for which healthy readings may be bit-identical, s.
 const fn default_repeat() -> f64 {
     0.15
 }
@@ -404,36 +421,36 @@ pub fn parse(document: &[u8]) -> Result<Rig, Invalid> {
     rig(&view)
 }
 
-/// That a document is not a list: serde would take one of an object's values, in
-/// their order, for the object.
+/// Rejects a document that is an array: serde would accept an array of the field values
+/// in place of the object.
 ///
 /// # Errors
-/// [`Invalid`] about the whole document.
+/// [`Invalid`] with the empty pointer.
 pub fn check_object(document: &[u8]) -> Result<(), Invalid> {
     if document.trim_ascii_start().starts_with(b"[") {
-        return Err(Invalid::new("", "is a list, not an object"));
+        return Err(Invalid::new("", "is an array, not an object"));
     }
     Ok(())
 }
 
-/// JSON pointer (RFC 6901) of a path inside a document.
+/// Returns the JSON pointer (RFC 6901) of a path inside a document.
 #[must_use]
 pub fn pointer(path: &serde_path_to_error::Path) -> String {
     use serde_path_to_error::Segment;
     let token = |segment: &Segment| match segment {
         Segment::Seq { index } => Some(format!("/{index}")),
         Segment::Map { key } => Some(format!("/{}", key.replace('~', "~0").replace('/', "~1"))),
-        // The word of a choice is a key in the document.
+        // The name of an enum variant is a key in the document.
         Segment::Enum { variant } => Some(format!("/{variant}")),
         Segment::Unknown => None,
     };
     path.iter().filter_map(token).collect()
 }
 
-/// The rig that a view describes.
+/// Returns the rig that a view describes.
 ///
 /// # Errors
-/// [`Invalid`] with the JSON pointer of the first element that cannot be.
+/// [`Invalid`] with the JSON pointer of the first invalid element.
 pub fn rig(view: &AssetView) -> Result<Rig, Invalid> {
     let rig = Rig {
         name: view.name.clone(),
@@ -456,12 +473,12 @@ pub fn rig(view: &AssetView) -> Result<Rig, Invalid> {
 }
 
 fn plate(view: &PlateView) -> Result<Plate, Invalid> {
-    let shape = outline(view.length_m, view.width_m, view.diameter_m)?;
+    let shape = plate_shape(view.length_m, view.width_m, view.diameter_m)?;
     Plate::new(shape, view.thickness_m, view.rim)
 }
 
-/// The outline that these sizes stand for; what is missing is the chapter's.
-pub(super) fn outline(
+/// Returns the shape with these sizes; missing ones are the chapter's.
+pub(super) fn plate_shape(
     length_m: Option<f64>,
     width_m: Option<f64>,
     diameter_m: Option<f64>,
@@ -482,7 +499,7 @@ pub(super) fn outline(
     }
 }
 
-/// The contact that a view describes.
+/// Returns the contact that a view describes.
 ///
 /// # Errors
 /// [`Invalid`] naming the element under `/contact`.
@@ -523,31 +540,27 @@ fn axes_view(mapping: &AxisMapping) -> AxesView {
 }
 
 fn diagnostics(view: &DiagnosticsView) -> Result<DiagnosticsSpec, Invalid> {
-    let profile = match &view.profile {
-        None => Profile::default(),
-        Some(word) => word.parse().map_err(|e: offbd_core::vocabulary::UnknownWord| {
-            Invalid::new("/diagnostics/profile", e.to_string())
-        })?,
-    };
     Ok(DiagnosticsSpec {
-        profile,
+        profile: view.profile.map(Into::into).unwrap_or_default(),
         false_alarms_per_rig_year: view.false_alarms_per_rig_year,
         debounce_s: view.debounce_s,
     })
 }
 
 fn calibration(view: &CalibrationView) -> Result<Calibration, Invalid> {
-    let learn = |axis: Axis, view: &Option<AxisCalibrationView>| {
+    let of_axis = |axis: Axis, view: &Option<AxisCalibrationView>| {
         view.as_ref().map(|v| axis_calibration(axis, v)).transpose()
     };
     Ok(Calibration {
-        axes: PerAxis { x: learn(Axis::X, &view.x)?, y: learn(Axis::Y, &view.y)? },
+        axes: PerAxis { x: of_axis(Axis::X, &view.x)?, y: of_axis(Axis::Y, &view.y)? },
         sensor: sensor_calibration(&view.sensor)?,
         sessions: view.sessions.iter().map(session_estimates).collect(),
-        data_sha256: view.data_sha256.clone(),
+        origin: CalibrationOrigin {
+            data_sha256: view.data_sha256.clone(),
+            made_at: view.made_at.clone(),
+        },
         n_samples: view.samples,
         duration_s: view.duration_s,
-        made_at: view.made_at.clone(),
         certificate: certificate::certificate(&view.certificate)?,
         prospects: view.prospects.as_ref().map(prospects),
     })
@@ -644,7 +657,7 @@ fn axis_calibration(axis: Axis, view: &AxisCalibrationView) -> Result<AxisCalibr
     })
 }
 
-/// The view of a rig, as `calibrate` writes it and the registry returns it.
+/// Returns the view of a rig: the content of its asset file.
 #[must_use]
 pub fn view(rig: &Rig) -> AssetView {
     AssetView {
@@ -660,7 +673,7 @@ pub fn view(rig: &Rig) -> AssetView {
         servo: servo_view(&rig.servo),
         axes: (rig.mapping != AxisMapping::default()).then(|| axes_view(&rig.mapping)),
         diagnostics: (rig.diagnostics != DiagnosticsSpec::default()).then(|| DiagnosticsView {
-            profile: Some(rig.diagnostics.profile.to_string()),
+            profile: Some(rig.diagnostics.profile.into()),
             false_alarms_per_rig_year: rig.diagnostics.false_alarms_per_rig_year,
             debounce_s: rig.diagnostics.debounce_s,
         }),
@@ -695,7 +708,7 @@ fn servo_view(servo: &ServoSpec) -> ServoView {
     }
 }
 
-/// The view of a calibration.
+/// Returns the view of a calibration.
 #[must_use]
 pub fn calibration_view(calibration: &Calibration) -> CalibrationView {
     let axis = |c: &AxisCalibration| AxisCalibrationView {
@@ -718,8 +731,8 @@ pub fn calibration_view(calibration: &Calibration) -> CalibrationView {
     };
     CalibrationView {
         id: calibration_id(calibration),
-        made_at: calibration.made_at.clone(),
-        data_sha256: calibration.data_sha256.clone(),
+        made_at: calibration.origin.made_at.clone(),
+        data_sha256: calibration.origin.data_sha256.clone(),
         samples: calibration.n_samples,
         duration_s: calibration.duration_s,
         x: calibration.axes.x.as_ref().map(axis),
@@ -736,12 +749,12 @@ pub fn calibration_view(calibration: &Calibration) -> CalibrationView {
     }
 }
 
-/// The id by which faults name the calibration that judged them: the first 16
-/// hexadecimal digits of the SHA-256 of what was learnt and from what.
+/// Returns the id of a calibration, which is given with every fault: the first 16
+/// hexadecimal digits of the SHA-256 of its parameters and of the hash of its data.
 #[must_use]
 pub fn calibration_id(calibration: &Calibration) -> String {
     let mut hash = Sha256::new();
-    hash.update(calibration.data_sha256.as_bytes());
+    hash.update(calibration.origin.data_sha256.as_bytes());
     for learnt in Axis::ALL.into_iter().filter_map(|axis| calibration.axes[axis]) {
         for number in [
             learnt.gain,
@@ -762,7 +775,7 @@ pub fn calibration_id(calibration: &Calibration) -> String {
         ] {
             hash.update(number.to_bits().to_le_bytes());
         }
-        // Calibrations without it keep their ids.
+        // Added later: calibrations without it keep their ids.
         if learnt.most_path_error_m > 0.0 {
             hash.update(learnt.most_path_error_m.to_bits().to_le_bytes());
         }
@@ -781,12 +794,12 @@ mod tests {
     use offbd_core::diagnosis::MonitorCertificate;
 
     #[test]
-    fn a_name_is_enough() {
+    fn a_file_with_only_a_name_describes_the_chapters_rig() {
         assert_eq!(parse(br#"{"name":"a"}"#).unwrap(), Rig::chapter("a"));
     }
 
     #[test]
-    fn a_rig_survives_the_round_trip() {
+    fn a_rig_is_unchanged_after_serialising_and_parsing() {
         let learnt = AxisCalibration {
             gain: 0.9,
             dead_time_s: 0.03,
@@ -821,10 +834,12 @@ mod tests {
                 longest_unseen_s: 0.4,
             },
             sessions: vec![PerAxis { x: Some(estimate), y: None }, PerAxis::default()],
-            data_sha256: "00".to_owned(),
+            origin: CalibrationOrigin {
+                data_sha256: "00".to_owned(),
+                made_at: "2026-01-01T00:00:00Z".to_owned(),
+            },
             n_samples: 12,
             duration_s: 1.5,
-            made_at: "2026-01-01T00:00:00Z".to_owned(),
             certificate: Some(std::array::from_fn(|i| MonitorCertificate {
                 judged_s: 300.0,
                 nearest: 0.25 * i as f64,
@@ -845,7 +860,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_named() {
+    fn an_error_names_the_invalid_element_and_the_reason() {
         let cases = [
             (r#"{"name":"a","ball":{"radius_m":-1}}"#, "/ball/radius_m", "not above 0"),
             (r#"{"name":"a","ball":{"radius_m":"x"}}"#, "/ball/radius_m", "invalid type"),

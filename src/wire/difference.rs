@@ -1,7 +1,7 @@
-//! Two verdicts on one recording, transition by transition.
+//! Comparison of two verdicts on one recording, transition by transition.
 //!
-//! Transitions of one code to one status byte are the same event where they
-//! are near in time; the nearest pair goes first, and pairs never cross.
+//! Transitions of the same code to the same status byte are paired if they are near in
+//! time. The nearest pair is matched first, and pairs never cross.
 
 use std::collections::BTreeMap;
 
@@ -9,31 +9,35 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::verdict::FaultView;
+use super::words::{ChangeWord, CodeWord, KindWord, StatusWord};
 
-/// How far a transition may have moved to be the same one, s: the longest
-/// debounce that can be asked for.
+/// Largest difference of the times of two paired transitions, s: the longest debounce time
+/// that can be set.
 const MAX_MOVE_S: f64 = 60.0;
 
-/// One transition in two verdicts.
+/// One transition in the recorded and the replayed verdict.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct ComparedView {
-    /// `same`; `altered`: at the same moment, but of another kind or onset;
-    /// `moved`: earlier or later; `only_recorded` or `only_replayed`.
-    pub change: String,
-    pub code: String,
-    /// As recorded, or as replayed where the record does not have it.
-    pub kind: Option<String>,
-    pub status: String,
+    pub change: ChangeWord,
+    pub code: CodeWord,
+    /// Failure mode as recorded, or as replayed if only the replay has the transition; null
+    /// if not determined.
+    pub kind: Option<KindWord>,
+    pub status: StatusWord,
+    /// ISO 14229 status byte, two hexadecimal digits.
     pub status_byte: String,
-    /// Null where only the replay has it.
+    /// Time in the recorded verdict, s on the device's clock; null if only the replay has the
+    /// transition.
     pub recorded_t_s: Option<f64>,
-    /// Null where only the record has it.
+    /// Time in the replayed verdict, s on the device's clock; null if only the record has the
+    /// transition.
     pub replayed_t_s: Option<f64>,
-    /// Replayed − recorded, s; above 0 where the replay is later.
+    /// Replayed minus recorded time, s, positive if the replay is later; null if only one
+    /// verdict has the transition.
     pub moved_s: Option<f64>,
 }
 
-/// How many transitions there are of each change.
+/// The number of transitions of each change.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct TallyView {
     pub same: u64,
@@ -43,36 +47,30 @@ pub struct TallyView {
     pub only_replayed: u64,
 }
 
-/// One transition in two verdicts, by its places there.
+/// One transition in two verdicts, with its index in each.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Compared {
+pub struct ComparedTransition {
     pub recorded: Option<usize>,
     pub replayed: Option<usize>,
     pub view: ComparedView,
 }
 
-impl Compared {
-    /// Whether the two verdicts agree on it, the numbers behind it aside.
+impl ComparedTransition {
+    /// Returns whether both verdicts have the transition with equal time, kind and onset;
+    /// the evidence may differ.
     #[must_use]
     pub fn is_same(&self) -> bool {
-        self.view.change == SAME
+        self.view.change == ChangeWord::Same
     }
 }
 
-const SAME: &str = "same";
-const ALTERED: &str = "altered";
-const MOVED: &str = "moved";
-const ONLY_RECORDED: &str = "only_recorded";
-const ONLY_REPLAYED: &str = "only_replayed";
-
-/// Every transition of two verdicts on one recording, each once, in the order
-/// of time.
+/// Returns every transition of two verdicts on one recording once, in the order of time.
 #[must_use]
-pub fn compare(recorded: &[FaultView], replayed: &[FaultView]) -> Vec<Compared> {
-    let mut groups: BTreeMap<(&str, &str, &str), [Vec<usize>; 2]> = BTreeMap::new();
+pub fn compare(recorded: &[FaultView], replayed: &[FaultView]) -> Vec<ComparedTransition> {
+    let mut groups: BTreeMap<(CodeWord, StatusWord, &str), [Vec<usize>; 2]> = BTreeMap::new();
     for (side, faults) in [recorded, replayed].into_iter().enumerate() {
         for (i, fault) in faults.iter().enumerate() {
-            let key = (fault.code.as_str(), fault.status.as_str(), fault.status_byte.as_str());
+            let key = (fault.code, fault.status, fault.status_byte.as_str());
             groups.entry(key).or_default()[side].push(i);
         }
     }
@@ -83,71 +81,79 @@ pub fn compare(recorded: &[FaultView], replayed: &[FaultView]) -> Vec<Compared> 
         };
         for (l, r) in pair(&times(recorded, &left), &times(replayed, &right)) {
             let (l, r) = (l.map(|l| left[l]), r.map(|r| right[r]));
-            all.push(compared(l.map(|l| (l, &recorded[l])), r.map(|r| (r, &replayed[r]))));
+            all.extend(compared(l.map(|l| (l, &recorded[l])), r.map(|r| (r, &replayed[r]))));
         }
     }
-    let time = |one: &Compared| one.view.recorded_t_s.or(one.view.replayed_t_s).unwrap_or(0.0);
-    // At one moment, what the record has comes first, each in its own order.
-    let place = |one: &Compared| (one.recorded.is_none(), one.recorded, one.replayed);
-    all.sort_by(|a, b| time(a).total_cmp(&time(b)).then_with(|| place(a).cmp(&place(b))));
+    let time =
+        |one: &ComparedTransition| one.view.recorded_t_s.or(one.view.replayed_t_s).unwrap_or(0.0);
+    // At equal times, recorded transitions come first, each side in its own order.
+    let order = |one: &ComparedTransition| (one.recorded.is_none(), one.recorded, one.replayed);
+    all.sort_by(|a, b| time(a).total_cmp(&time(b)).then_with(|| order(a).cmp(&order(b))));
     all
 }
 
-/// How many there are of each change.
+/// Counts the transitions of each change.
 #[must_use]
-pub fn tally(all: &[Compared]) -> TallyView {
-    let count = |word: &str| all.iter().filter(|one| one.view.change == word).count() as u64;
+pub fn count_changes(all: &[ComparedTransition]) -> TallyView {
+    let count = |word| all.iter().filter(|one| one.view.change == word).count() as u64;
     TallyView {
-        same: count(SAME),
-        altered: count(ALTERED),
-        moved: count(MOVED),
-        only_recorded: count(ONLY_RECORDED),
-        only_replayed: count(ONLY_REPLAYED),
+        same: count(ChangeWord::Same),
+        altered: count(ChangeWord::Altered),
+        moved: count(ChangeWord::Moved),
+        only_recorded: count(ChangeWord::OnlyRecorded),
+        only_replayed: count(ChangeWord::OnlyReplayed),
     }
 }
 
-type Placed<'a> = Option<(usize, &'a FaultView)>;
+/// A transition and its index in its verdict.
+type IndexedFault<'a> = (usize, &'a FaultView);
 
-fn compared(recorded: Placed<'_>, replayed: Placed<'_>) -> Compared {
+/// Returns the comparison of a pair, or of a transition without a partner; `None` if both
+/// are `None`.
+fn compared(
+    recorded: Option<IndexedFault<'_>>,
+    replayed: Option<IndexedFault<'_>>,
+) -> Option<ComparedTransition> {
+    let (_, either) = recorded.or(replayed)?;
     let change = match (recorded, replayed) {
-        (Some((_, a)), Some((_, b))) if a.t_s != b.t_s => MOVED,
-        (Some((_, a)), Some((_, b))) if (&a.kind, a.onset_s) != (&b.kind, b.onset_s) => ALTERED,
-        (Some(_), Some(_)) => SAME,
-        (Some(_), None) => ONLY_RECORDED,
-        _ => ONLY_REPLAYED,
+        (Some((_, a)), Some((_, b))) if a.t_s != b.t_s => ChangeWord::Moved,
+        (Some((_, a)), Some((_, b))) if (a.kind, a.onset_s) != (b.kind, b.onset_s) => {
+            ChangeWord::Altered
+        }
+        (Some(_), Some(_)) => ChangeWord::Same,
+        (Some(_), None) => ChangeWord::OnlyRecorded,
+        _ => ChangeWord::OnlyReplayed,
     };
-    let t_s = |placed: Placed<'_>| placed.map(|(_, fault)| fault.t_s);
-    let shown = recorded.or(replayed).map(|(_, fault)| fault);
-    let word = |of: fn(&FaultView) -> &String| shown.map(|f| of(f).clone()).unwrap_or_default();
-    Compared {
+    let t_s = |indexed: Option<IndexedFault<'_>>| indexed.map(|(_, fault)| fault.t_s);
+    Some(ComparedTransition {
         recorded: recorded.map(|(i, _)| i),
         replayed: replayed.map(|(i, _)| i),
         view: ComparedView {
-            change: change.to_owned(),
-            code: word(|f| &f.code),
-            kind: shown.and_then(|f| f.kind.clone()),
-            status: word(|f| &f.status),
-            status_byte: word(|f| &f.status_byte),
+            change,
+            code: either.code,
+            kind: either.kind,
+            status: either.status,
+            status_byte: either.status_byte.clone(),
             recorded_t_s: t_s(recorded),
             replayed_t_s: t_s(replayed),
             moved_s: t_s(recorded).zip(t_s(replayed)).map(|(a, b)| b - a),
         },
-    }
+    })
 }
 
-/// Places in two ascending lists of times, paired where they are near: the
-/// nearest pair first, then what is left of it and what is right of it. What
-/// has no partner stands alone.
+/// Pairs the indices of two ascending lists of times: first the nearest pair, then
+/// recursively the ranges before and after it. An index without a partner is returned
+/// alone.
 fn pair(left: &[f64], right: &[f64]) -> Vec<(Option<usize>, Option<usize>)> {
     let mut found = Vec::new();
-    let mut stretches = vec![(0..left.len(), 0..right.len())];
-    while let Some((l, r)) = stretches.pop() {
+    let mut ranges = vec![(0..left.len(), 0..right.len())];
+    while let Some((l, r)) = ranges.pop() {
         match nearest(&left[l.clone()], &right[r.clone()]) {
             Some((i, j)) => {
                 let (i, j) = (l.start + i, r.start + j);
                 found.push((Some(i), Some(j)));
-                stretches.push((l.start..i, r.start..j));
-                stretches.push((i + 1..l.end, j + 1..r.end));
+                ranges.push((l.start..i, r.start..j));
+                ranges.push((i + 1..l.end, j + 1..r.end));
             }
             None => {
                 found.extend(l.map(|i| (Some(i), None)));
@@ -158,13 +164,14 @@ fn pair(left: &[f64], right: &[f64]) -> Vec<(Option<usize>, Option<usize>)> {
     found
 }
 
-/// The nearest two within reach, the first of several.
+/// Returns the indices of the nearest two times at most [`MAX_MOVE_S`] apart; of equally
+/// near ones, the first.
 fn nearest(left: &[f64], right: &[f64]) -> Option<(usize, usize)> {
     let (mut i, mut j, mut best) = (0, 0, None::<(f64, usize, usize)>);
     while let (Some(a), Some(b)) = (left.get(i), right.get(j)) {
-        let away = (a - b).abs();
-        if away <= MAX_MOVE_S && best.is_none_or(|(least, ..)| away < least) {
-            best = Some((away, i, j));
+        let distance = (a - b).abs();
+        if distance <= MAX_MOVE_S && best.is_none_or(|(least, ..)| distance < least) {
+            best = Some((distance, i, j));
         }
         if a <= b { i += 1 } else { j += 1 }
     }
@@ -192,23 +199,23 @@ mod tests {
         fault(FaultCode::XServo, FaultStatus::Pending, t_s)
     }
 
-    fn words(all: &[Compared]) -> Vec<(String, Option<f64>)> {
-        all.iter().map(|one| (one.view.change.clone(), one.view.moved_s)).collect()
+    fn changes(all: &[ComparedTransition]) -> Vec<(ChangeWord, Option<f64>)> {
+        all.iter().map(|one| (one.view.change, one.view.moved_s)).collect()
     }
 
     #[test]
-    fn the_nearest_are_the_same_one() {
-        let word = |word: &str, moved_s| (word.to_owned(), moved_s);
+    fn the_nearest_transitions_are_paired() {
+        use ChangeWord::{Altered, Moved, OnlyRecorded, OnlyReplayed};
         let found = compare(&[x(10.0), x(50.0)], &[x(50.25)]);
-        assert_eq!(words(&found), [word("only_recorded", None), word("moved", Some(0.25))]);
+        assert_eq!(changes(&found), [(OnlyRecorded, None), (Moved, Some(0.25))]);
         let found = compare(&[x(10.0)], &[x(70.5)]);
-        let alone = [word("only_recorded", None), word("only_replayed", None)];
-        assert_eq!(words(&found), alone, "too far apart to be one");
+        let alone = [(OnlyRecorded, None), (OnlyReplayed, None)];
+        assert_eq!(changes(&found), alone, "too far apart");
         let confirmed = fault(FaultCode::XServo, FaultStatus::Confirmed, 10.0);
-        assert_eq!(words(&compare(&[x(10.0)], &[confirmed])), alone, "another status");
+        assert_eq!(changes(&compare(&[x(10.0)], &[confirmed])), alone, "another status");
         let mut dead = x(10.0);
-        dead.kind = Some("dead".to_owned());
-        assert_eq!(words(&compare(&[x(10.0)], &[dead])), [word("altered", Some(0.0))]);
+        dead.kind = Some(KindWord::Dead);
+        assert_eq!(changes(&compare(&[x(10.0)], &[dead])), [(Altered, Some(0.0))]);
     }
 
     fn verdict() -> impl Strategy<Value = Vec<FaultView>> {
@@ -227,20 +234,20 @@ mod tests {
         #[test]
         fn a_verdict_is_the_same_as_itself(verdict in verdict()) {
             let found = compare(&verdict, &verdict);
-            prop_assert_eq!(tally(&found).same, verdict.len() as u64);
-            prop_assert!(found.iter().all(Compared::is_same));
+            prop_assert_eq!(count_changes(&found).same, verdict.len() as u64);
+            prop_assert!(found.iter().all(ComparedTransition::is_same));
         }
 
-        /// Each transition is there once, paired with one of its own code and
-        /// status within reach, and pairs do not cross.
+        /// Every transition is returned once, pairs have equal code and status and are near
+        /// enough, and pairs do not cross.
         #[test]
-        fn each_is_there_once_and_order_is_kept(a in verdict(), b in verdict()) {
+        fn every_transition_is_compared_once_and_pairs_do_not_cross(a in verdict(), b in verdict()) {
             let found = compare(&a, &b);
-            for (n, place) in [
+            for (n, indices) in [
                 (a.len(), found.iter().filter_map(|one| one.recorded).collect::<Vec<_>>()),
                 (b.len(), found.iter().filter_map(|one| one.replayed).collect()),
             ] {
-                let mut sorted = place;
+                let mut sorted = indices;
                 sorted.sort_unstable();
                 prop_assert_eq!(sorted, (0..n).collect::<Vec<_>>());
             }
@@ -256,10 +263,9 @@ mod tests {
             }
         }
 
-        /// The other way round, it is the same seen from the other side.
         #[test]
-        fn sides_may_be_changed(a in verdict(), b in verdict()) {
-            let (there, back) = (tally(&compare(&a, &b)), tally(&compare(&b, &a)));
+        fn exchanging_the_verdicts_exchanges_the_counts(a in verdict(), b in verdict()) {
+            let (there, back) = (count_changes(&compare(&a, &b)), count_changes(&compare(&b, &a)));
             prop_assert_eq!(there.same, back.same);
             prop_assert_eq!(there.only_recorded, back.only_replayed);
             prop_assert_eq!(there.only_replayed, back.only_recorded);

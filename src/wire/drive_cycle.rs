@@ -6,99 +6,103 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::session_csv;
-use offbd_core::engine::{DriveCycle, FaultVerdict, Feedback, MonitorVerdict, NotReached, Order};
+use super::words::{CodeWord, CycleOrderWord, KindWord};
+use offbd_core::engine::{DriveCycle, FaultVerdict, Feedback, MonitorVerdict, NotReached};
 use offbd_core::vocabulary::{Axis, PerAxis, Sample};
 
-/// The program that runs a cycle beside which it lies, for a device with Python.
+/// A Python program for the device that runs the cycle in `drive-cycle.json`.
 pub const PYTHON: &str = include_str!("drive_cycle/run.py");
 
-/// Digits of a second, a radian and a metre after which a device sees nothing.
+/// Numbers are rounded to 1/`PER_UNIT` of a second, radian or metre, which is finer than
+/// any device resolves.
 const PER_UNIT: f64 = 1e6;
 
-/// A drive cycle: the shortest motion in which every monitor comes to a result. Rows and
-/// corrections are in the device's own numbers: its axes, signs and units.
+/// A drive cycle: the shortest motion in which every monitor has a result. Rows and
+/// corrections use the device's axes, signs and units.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct DriveCycleView {
     pub asset: String,
     pub duration_s: f64,
     /// Duration of one motion to both sides and back, s.
     pub period_s: f64,
-    /// Such motions along each axis.
+    /// Number of such motions along each axis.
     pub repeats: u32,
-    /// `at_once`: both axes together; `staggered`: y a quarter of a period after x;
-    /// `in_turn`: first x, then y.
-    #[schema(pattern = "^(at_once|staggered|in_turn)$")]
-    pub order: String,
+    pub order: CycleOrderWord,
     /// Largest distance of the set points from the plate's middle, m, along the plate's
-    /// axes.
+    /// axes; zero along an axis that the rig lacks.
     pub amplitude_m: AlongAxes,
-    /// Largest tilt that is commanded beforehand, the level aside, rad.
+    /// Largest feedforward tilt, without the level, rad.
     pub tilt_rad: AlongAxes,
-    /// How far a session's level may be from the learnt one, rad.
+    /// Largest difference of a session's level from the learnt one that was tried, rad.
     pub level_within_rad: AlongAxes,
-    /// What each monitor comes to on the healthy rig.
+    /// Result of each monitor on the healthy rig.
     pub monitors: Vec<CycleMonitorView>,
-    /// What is found if it is there from the start, those hardest to find first.
+    /// Faults that are present from the start, the hardest to find first.
     pub faults: Vec<CycleFaultView>,
-    /// How to correct the command that moves the ball along each axis of the plate: qy
-    /// for x, qx for y. Null where the rig has no such servo.
+    /// Correction of the command qy, which moves the ball along the plate's x; null if the
+    /// rig has no such servo.
     pub correct_qy: Option<CorrectionView>,
+    /// Correction of the command qx, which moves the ball along the plate's y; null if the
+    /// rig has no such servo.
     pub correct_qx: Option<CorrectionView>,
-    /// Time constant of the filter of the rate of the distance, s.
+    /// Time constant of the filter of the derivative part, s.
     pub filter_s: f64,
-    /// Largest command, either way.
+    /// Largest command in either direction.
     pub limit: f64,
-    /// Rows a second.
+    /// Rows per second.
     pub rate_hz: f64,
     pub rows: CycleRowsView,
 }
 
-/// One value along each axis of the plate.
+/// One value for each axis of the plate.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize, ToSchema)]
 pub struct AlongAxes {
     pub x: f64,
     pub y: f64,
 }
 
-/// What one monitor comes to on the healthy rig.
+/// The result of one monitor on the healthy rig.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct CycleMonitorView {
-    pub code: String,
-    /// Seconds after the start; null where it comes to no result.
+    pub code: CodeWord,
+    /// Time at which its test passes, s after the start; null if it has no result.
     pub passed_after_s: Option<f64>,
-    /// Why it comes to none.
+    /// Why it has no result; null if it has one.
     pub why_not: Option<String>,
 }
 
-/// How a fault is found.
+/// Whether and when a fault is found.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct CycleFaultView {
-    pub code: String,
-    /// In which way it is wrong; null for the ball.
-    pub kind: Option<String>,
-    /// In words.
+    pub code: CodeWord,
+    /// Failure mode; null for the ball.
+    pub kind: Option<KindWord>,
+    /// The fault in words.
     pub fault: String,
-    /// Seconds after the start by which it is confirmed; null where it is not found for
-    /// sure.
+    /// Time by which it is confirmed in every trial, s after the start; null if a trial did
+    /// not confirm it.
     pub after_s: Option<f64>,
-    /// A cause that reads alike and is named beside it.
+    /// Code of another cause that would explain the same readings and is named as well;
+    /// null if there is none.
     pub beside: Option<String>,
 }
 
-/// What is added to a command: a distance is set point − reading.
+/// The gains of the correction added to a command, from the distance of the ball to its
+/// set point: set point − reading.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize, ToSchema)]
 pub struct CorrectionView {
-    /// Whether it follows the device's reading `x_m` or `y_m`.
+    /// Whether the distance is that of the device's reading `x_m`; if false, of `y_m`.
     pub reads_x: bool,
     /// Command per distance; signed.
     pub proportional: f64,
-    /// Command per distance and second; signed.
+    /// Command per integral of the distance over time, 1/s; signed.
     pub integral: f64,
-    /// Command per rate of the distance, s; signed.
+    /// Command per rate of change of the distance, s; signed.
     pub derivative: f64,
 }
 
-/// Commands and set points over time, as columns.
+/// Commands and set points over time, as columns of equal length. Positions are set
+/// points; values along an axis that the rig lacks are null.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, ToSchema)]
 pub struct CycleRowsView {
     pub t_s: Vec<f64>,
@@ -108,7 +112,7 @@ pub struct CycleRowsView {
     pub y_m: Vec<Option<f64>>,
 }
 
-/// The view of `cycle` of the rig called `asset`.
+/// Returns the view of the drive cycle of `asset`.
 #[must_use]
 pub fn view(asset: &str, cycle: &DriveCycle) -> DriveCycleView {
     let along = |of: PerAxis<f64>| AlongAxes { x: of.x, y: of.y };
@@ -117,7 +121,7 @@ pub fn view(asset: &str, cycle: &DriveCycle) -> DriveCycleView {
         duration_s: cycle.duration_s,
         period_s: cycle.period_s,
         repeats: cycle.repeats,
-        order: order(cycle.order).to_owned(),
+        order: cycle.order.into(),
         amplitude_m: along(cycle.amplitude_m),
         tilt_rad: along(cycle.tilt_rad),
         level_within_rad: along(cycle.level_within_rad),
@@ -132,17 +136,9 @@ pub fn view(asset: &str, cycle: &DriveCycle) -> DriveCycleView {
     }
 }
 
-const fn order(order: Order) -> &'static str {
-    match order {
-        Order::AtOnce => "at_once",
-        Order::Staggered => "staggered",
-        Order::InTurn => "in_turn",
-    }
-}
-
 fn monitor(verdict: &MonitorVerdict) -> CycleMonitorView {
     CycleMonitorView {
-        code: verdict.code.to_string(),
+        code: verdict.code.into(),
         passed_after_s: verdict.passed.ok(),
         why_not: verdict.passed.err().map(|why| reason(why).to_owned()),
     }
@@ -152,15 +148,16 @@ const fn reason(why: NotReached) -> &'static str {
     match why {
         NotReached::NoSuchAxis => "the rig has no such servo, or no readings along its axis",
         NotReached::TooLittleMotion => {
-            "no motion within the plate and the servos' limits lets it judge for long enough"
+            "no motion within the plate and the servos' limits lets the monitor judge for long \
+             enough"
         }
     }
 }
 
 fn fault(verdict: &FaultVerdict) -> CycleFaultView {
     CycleFaultView {
-        code: verdict.fault.code().to_string(),
-        kind: verdict.fault.kind().map(|kind| kind.to_string()),
+        code: verdict.fault.code().into(),
+        kind: verdict.fault.kind().map(KindWord::from),
         fault: verdict.fault.words().to_owned(),
         after_s: verdict.after_s,
         beside: verdict.beside.map(|code| code.to_string()),
@@ -174,7 +171,7 @@ fn correction(feedback: Feedback) -> CorrectionView {
 
 fn rows(cycle: &DriveCycle) -> CycleRowsView {
     let mut rows = CycleRowsView::default();
-    for row in cycle.rows.iter().map(written) {
+    for row in cycle.rows.iter().map(rounded_row) {
         rows.t_s.push(row.t_s);
         rows.cmd_qx_rad.push(row.cmd_qx_rad);
         rows.cmd_qy_rad.push(row.cmd_qy_rad);
@@ -184,26 +181,26 @@ fn rows(cycle: &DriveCycle) -> CycleRowsView {
     rows
 }
 
-/// The row as it is written.
-fn written(row: &Sample) -> Sample {
+/// Returns the row with its numbers rounded for output.
+fn rounded_row(row: &Sample) -> Sample {
     // Adding zero turns −0 into 0.
-    let short = |value: f64| (value * PER_UNIT).round() / PER_UNIT + 0.0;
+    let rounded = |value: f64| (value * PER_UNIT).round() / PER_UNIT + 0.0;
     Sample {
         seq: None,
-        t_s: short(row.t_s),
-        cmd_qx_rad: row.cmd_qx_rad.map(short),
-        cmd_qy_rad: row.cmd_qy_rad.map(short),
-        x_m: row.x_m.map(short),
-        y_m: row.y_m.map(short),
+        t_s: rounded(row.t_s),
+        cmd_qx_rad: row.cmd_qx_rad.map(rounded),
+        cmd_qy_rad: row.cmd_qy_rad.map(rounded),
+        x_m: row.x_m.map(rounded),
+        y_m: row.y_m.map(rounded),
     }
 }
 
-/// Writes the rows of `cycle` as a session file has them: the commands beforehand, and
-/// as readings the set points.
+/// Writes the rows of `cycle` as a session file, with the feedforward commands and, as
+/// positions, the set points.
 ///
 /// # Errors
-/// What `out` says.
+/// [`io::Error`] if `out` fails.
 pub fn write_csv(out: &mut impl Write, cycle: &DriveCycle) -> io::Result<()> {
-    let rows: Vec<Sample> = cycle.rows.iter().map(written).collect();
+    let rows: Vec<Sample> = cycle.rows.iter().map(rounded_row).collect();
     session_csv::write(out, &rows)
 }

@@ -1,24 +1,24 @@
-//! How far a rig is on its way from registration to learnt.
+//! The progress of a rig's automatic calibration.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// Where a rig stands on its way to being learnt.
+/// State of a rig's automatic calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum LearningState {
-    /// More motion is needed.
+    /// More motion is needed before a calibration can start.
     Gathering,
-    /// A calibration of what was gathered is under way.
+    /// A calibration from the gathered sessions is running.
     Learning,
-    /// A calibration is done; somebody must say that the rig was healthy.
+    /// A calibration is done and waits until a person confirms that the rig was healthy.
     Offered,
-    /// A calibration is in force.
+    /// A calibration is in use.
     Learnt,
 }
 
 impl LearningState {
-    /// The same word as on the wire.
+    /// Returns the word used in JSON.
     #[must_use]
     pub const fn as_str(self) -> &'static str {
         match self {
@@ -30,39 +30,40 @@ impl LearningState {
     }
 }
 
-/// How far a rig is on its way to being learnt.
+/// Progress of a rig's automatic calibration.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct LearningView {
     pub asset: String,
     pub state: LearningState,
-    /// The same in words: what is missing, what is offered, what was learnt.
+    /// The state in words: what is missing, offered or learnt.
     pub summary: String,
-    /// Motion along each axis with which the rig is learnt, s; more after a refusal.
+    /// Motion along each axis that a calibration requires, s; it increases after a failed
+    /// calibration.
     pub wanted_s: f64,
-    /// Usable motion along x so far, s; null while it has no commands or no positions.
+    /// Usable motion along x so far, s; null if there are no commands or no positions yet.
     pub x_s: Option<f64>,
-    /// The same along y.
+    /// Usable motion along y so far, s; null if there are no commands or no positions yet.
     pub y_s: Option<f64>,
-    /// The sessions that teach: gathered, offered, or of the calibration in force.
-    /// Empty on a rig that was learnt by hand.
+    /// The sessions gathered so far, or those of the calibration on offer or in use; empty
+    /// if a person made the calibration.
     pub sessions: Vec<TeachingSessionView>,
-    /// Sessions from which the calibration in force or on offer was learnt, by hand
-    /// too; while gathering, those that count so far.
+    /// Number of sessions of the calibration in use or on offer, also of one that a person
+    /// made; while gathering, the number of sessions so far.
     pub n_sessions: usize,
-    /// Id of the calibration that is under way or on offer.
+    /// Id of the calibration that is running or on offer; null otherwise.
     pub calibration: Option<String>,
-    /// Why the last calibration was refused, if it was.
+    /// Why the last calibration failed; null if it did not.
     pub refused: Option<String>,
-    /// Whether the calibration in force is one that the rig learnt by itself.
+    /// Whether the calibration in use was made automatically.
     pub by_itself: bool,
-    /// Whether later healthy sessions refine it.
+    /// Whether later healthy sessions refine the calibration in use.
     pub refines: bool,
 }
 
-/// A session that teaches.
+/// A session that a calibration uses.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct TeachingSessionView {
     pub id: String,
-    /// The device's name of it, or the moment of its opening.
+    /// The device's name for the session, or the time at which it was opened.
     pub name: String,
 }

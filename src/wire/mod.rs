@@ -1,9 +1,10 @@
-//! What crosses the boundary: asset files, scene files, session files,
-//! verdict lines.
+//! The formats of the API and of files: asset files, scene files, session files, telemetry
+//! batches, verdict lines.
 //!
-//! One idea: parse in two stages, a syntactic view that judges nothing, then a
-//! domain value that cannot be wrong. Views are `Serialize`, domain types are
-//! not; they are converted by hand. Knows no sockets and no SQL.
+//! Parsing has two stages: a document becomes a *view*, which is only checked for syntax,
+//! and the view becomes a domain value, whose constructor checks everything else. Views
+//! implement `Serialize`, domain types do not; conversions are written by hand. Nothing
+//! here uses sockets or SQL.
 
 pub mod access;
 pub mod asset;
@@ -21,7 +22,9 @@ pub mod recording;
 pub mod scene;
 pub mod service;
 pub mod session_csv;
+pub mod stored;
 pub mod telemetry;
 pub mod trace;
 pub mod trend;
 pub mod verdict;
+pub mod words;

@@ -1,4 +1,4 @@
-//! A value by its name, or in full.
+//! A value given by the name of a preset, or in full.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -8,16 +8,19 @@ use serde::de::{Deserialize, Deserializer, Error, MapAccess, Visitor};
 
 use offbd_core::vocabulary::Invalid;
 
-/// A preset's name, or an object that says all.
+/// The name of a preset, or a complete value.
 #[derive(Clone, Debug)]
 pub enum PresetOr<T> {
     Named(String),
-    Given(T),
+    Value(T),
 }
 
 impl<T> PresetOr<T> {
-    /// The preset of this name among `presets`, or what `full` makes of the
-    /// object.
+    /// Returns the preset of this name among `presets`, or the conversion of the value by
+    /// `full`.
+    ///
+    /// # Errors
+    /// [`Invalid`] at `element` for an unknown name, or the error of `full`.
     pub(super) fn resolve<V: Copy>(
         &self,
         element: &str,
@@ -25,27 +28,27 @@ impl<T> PresetOr<T> {
         full: impl Fn(&T) -> Result<V, Invalid>,
     ) -> Result<V, Invalid> {
         let name = match self {
-            Self::Given(view) => return full(view),
+            Self::Value(view) => return full(view),
             Self::Named(name) => name,
         };
         presets.iter().find(|(known, _)| known == name).map(|(_, value)| *value).ok_or_else(|| {
             let known: Vec<&str> = presets.iter().map(|(known, _)| *known).collect();
-            Invalid::new(element, format!("`{name}` is none of {}", known.join(", ")))
+            Invalid::new(element, format!("`{name}` is not one of {}", known.join(", ")))
         })
     }
 }
 
 impl<'de, T: Deserialize<'de>> Deserialize<'de> for PresetOr<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(Either(PhantomData))
+        deserializer.deserialize_any(PresetOrVisitor(PhantomData))
     }
 }
 
-/// Looks which of both it is. An untagged choice would lose the path of what is
-/// wrong inside.
-struct Either<T>(PhantomData<T>);
+/// Accepts a string or an object. An untagged enum would lose the path of an error inside
+/// the object.
+struct PresetOrVisitor<T>(PhantomData<T>);
 
-impl<'de, T: Deserialize<'de>> Visitor<'de> for Either<T> {
+impl<'de, T: Deserialize<'de>> Visitor<'de> for PresetOrVisitor<T> {
     type Value = PresetOr<T>;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -57,6 +60,6 @@ impl<'de, T: Deserialize<'de>> Visitor<'de> for Either<T> {
     }
 
     fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
-        T::deserialize(MapAccessDeserializer::new(map)).map(PresetOr::Given)
+        T::deserialize(MapAccessDeserializer::new(map)).map(PresetOr::Value)
     }
 }

@@ -1,47 +1,75 @@
-//! Where and when a fault came up, and what people did about it: what the
-//! engine cannot know of a code, for it knows neither sessions nor people.
+//! Sessions and people behind a fault record: where and when the fault occurred, who
+//! acknowledged or cleared it. The engine knows neither.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// What is known of a code beside its record.
+use super::stored::{StoredAct, StoredOccurrence, StoredProvenance};
+
+/// Where and when the fault occurred, and who acknowledged or cleared it.
 // Occurrences are boxed: most codes of most assets have none.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct ProvenanceView {
-    /// The first occurrence since the last clear; null without one.
+    /// The first occurrence since the last clear; null if there is none.
     #[serde(default)]
     pub first_occurrence: Option<Box<OccurrenceView>>,
-    /// The last one; it may be the first.
+    /// The last occurrence, which may be the first; null if there is none.
     #[serde(default)]
     pub last_occurrence: Option<Box<OccurrenceView>>,
-    /// Who acknowledged the current occurrence, and when; null until then.
+    /// Who acknowledged the current occurrence, and when; null if nobody has.
     #[serde(default)]
     pub acknowledgement: Option<ActView>,
-    /// Who last cleared the code, and when; null if nobody ever did.
+    /// Who last cleared the code, and when; null if nobody ever has.
     #[serde(default)]
     pub cleared: Option<ActView>,
 }
 
-/// Where and when a code failed anew.
+/// An occurrence of a fault.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct OccurrenceView {
     /// The session's name.
     pub session: String,
     /// The service's id of the session, which may have been deleted since.
     pub session_id: String,
-    /// RFC 3339: when the service judged the sample at which the test failed.
+    /// Time at which the service judged the sample at which the test failed, RFC 3339.
     pub noted_at: String,
-    /// Of the calibration that judged; null on a rig not learnt.
+    /// Id of the calibration that was used; null if the rig was not learnt.
     pub calibration_id: Option<String>,
-    /// Of the profile, the settings and the rig's description that judged.
+    /// Id of the profile, settings and rig description that were used.
     pub settings_id: String,
 }
 
-/// What a person did.
+/// An action of a person.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct ActView {
-    /// As `by` said.
+    /// Name of the principal, or the request's `by` if the service requires no token.
     pub by: String,
-    /// RFC 3339.
+    /// Time of the action, RFC 3339.
     pub at: String,
+}
+
+impl From<StoredProvenance> for ProvenanceView {
+    fn from(stored: StoredProvenance) -> Self {
+        let occurrence = |stored: Box<StoredOccurrence>| Box::new(OccurrenceView::from(*stored));
+        Self {
+            first_occurrence: stored.first_occurrence.map(occurrence),
+            last_occurrence: stored.last_occurrence.map(occurrence),
+            acknowledgement: stored.acknowledgement.map(ActView::from),
+            cleared: stored.cleared.map(ActView::from),
+        }
+    }
+}
+
+impl From<StoredOccurrence> for OccurrenceView {
+    fn from(stored: StoredOccurrence) -> Self {
+        let StoredOccurrence { session, session_id, noted_at, calibration_id, settings_id } =
+            stored;
+        Self { session, session_id, noted_at, calibration_id, settings_id }
+    }
+}
+
+impl From<StoredAct> for ActView {
+    fn from(StoredAct { by, at }: StoredAct) -> Self {
+        Self { by, at }
+    }
 }

@@ -1,7 +1,9 @@
-//! A stretch of a session as it was recorded and as it was judged, row by row.
+//! A part of a session, row by row: the recorded samples and what was judged.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
+
+use super::words::CodeWord;
 
 use offbd_core::diagnosis::{AxisEvidence, Evidence};
 use offbd_core::vocabulary::Sample;
@@ -10,27 +12,28 @@ use offbd_core::vocabulary::Sample;
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct RecordingView {
     pub asset: String,
-    pub code: String,
+    pub code: CodeWord,
     /// The session's name.
     pub session: String,
     /// The service's id of the session.
     pub session_id: String,
-    /// When the deviation began, as far as the evidence says, s on the
-    /// device's clock, as all times here.
+    /// Estimated time at which the deviation began, s on the device's clock, like all times
+    /// here; null if unknown.
     pub onset_s: Option<f64>,
-    /// When the test failed.
+    /// Time at which the test failed, s.
     pub failed_s: f64,
-    /// When the fault was confirmed; null if it never was.
+    /// Time at which the fault was confirmed, s; null if it never was.
     pub confirmed_s: Option<f64>,
-    /// The stretch that was asked for.
+    /// Start of the requested interval, s.
     pub from_s: f64,
+    /// End of the requested interval, s.
     pub to_s: f64,
-    /// Whether the session has come to its end: false while samples of an open
-    /// session may still come.
+    /// Whether the interval is complete: false while the session is open and samples of the
+    /// interval may still arrive.
     pub complete: bool,
-    /// Of the calibration that judged; null on a rig not learnt.
+    /// Id of the calibration that was used; null if the rig was not learnt.
     pub calibration_id: Option<String>,
-    /// Of the profile, the settings and the rig's description that judged.
+    /// Id of the profile, settings and rig description that were used.
     pub settings_id: String,
     /// One entry for each sample, in order of time.
     pub columns: ColumnsView,
@@ -38,17 +41,18 @@ pub struct RecordingView {
 
 macro_rules! columns {
     ($($(#[$doc:meta])* $name:ident: $kind:ty),+ $(,)?) => {
-        /// One sample and what was judged of it. Empty where it was not judged:
-        /// too late, or no time has passed.
+        /// One sample and the quantities judged at it. These are `None` if the sample was
+        /// not judged because it was too late or no time had passed.
         #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
         pub struct RecordingRow { $($(#[$doc])* pub $name: $kind),+ }
 
-        /// The columns of a recording; null where a sample was not judged.
+        /// The columns of a recording, all of the same length. Judged quantities are null if
+        /// the sample was not judged.
         #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
         pub struct ColumnsView { $($(#[$doc])* pub $name: Vec<$kind>),+ }
 
         impl ColumnsView {
-            /// The columns of `rows`.
+            /// Returns the columns of `rows`.
             #[must_use]
             pub fn of(rows: &[RecordingRow]) -> Self {
                 Self { $($name: rows.iter().map(|row| row.$name).collect()),+ }
@@ -58,33 +62,40 @@ macro_rules! columns {
 }
 
 columns! {
-    /// s on the device's clock.
+    /// Time, s on the device's clock.
     t_s: f64,
-    /// As the device sent it.
+    /// Command of the plate angle about x, as the device sent it.
     cmd_qx_rad: Option<f64>,
+    /// Command of the plate angle about y, as the device sent it.
     cmd_qy_rad: Option<f64>,
+    /// Position along x, as the device sent it.
     x_m: Option<f64>,
+    /// Position along y, as the device sent it.
     y_m: Option<f64>,
     /// Measured acceleration along x over the window, m/s².
     x_measured_m_s2: Option<f64>,
-    /// The twin's through the same filter, m/s².
+    /// The twin's acceleration along x through the same filter, m/s².
     x_twin_m_s2: Option<f64>,
-    /// Measured − twin, m/s².
+    /// Residual along x: measured minus the twin's acceleration, m/s².
     x_residual_m_s2: Option<f64>,
-    /// Residual limit in force, m/s².
+    /// Limit of the residual along x, m/s².
     x_limit_m_s2: Option<f64>,
-    /// Whether the residual might be judged (the gate).
+    /// Whether the enable condition held along x.
     x_enabled: Option<bool>,
-    /// The same along y.
+    /// Measured acceleration along y over the window, m/s².
     y_measured_m_s2: Option<f64>,
+    /// The twin's acceleration along y through the same filter, m/s².
     y_twin_m_s2: Option<f64>,
+    /// Residual along y: measured minus the twin's acceleration, m/s².
     y_residual_m_s2: Option<f64>,
+    /// Limit of the residual along y, m/s².
     y_limit_m_s2: Option<f64>,
+    /// Whether the enable condition held along y.
     y_enabled: Option<bool>,
 }
 
 impl RecordingRow {
-    /// The row of `sample`, judged on `evidence`.
+    /// Returns the row of `sample`, with the quantities of `evidence` if it was judged.
     #[must_use]
     pub fn new(sample: &Sample, evidence: Option<&Evidence>) -> Self {
         let axis = |of: fn(&Evidence) -> &AxisEvidence| evidence.map(of);
@@ -109,7 +120,7 @@ impl RecordingRow {
     }
 }
 
-/// The rows as CSV, with a header that has the names of the columns.
+/// Writes the rows as CSV with a header of the column names.
 ///
 /// # Errors
 /// [`csv::Error`] if `writer` fails.

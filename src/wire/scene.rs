@@ -1,47 +1,47 @@
-//! The scene file: a body, a plate, and how the plate moves, as JSON.
+//! The scene file: a body, a plate and the law of its motion, as JSON.
 
 use nalgebra::{Vector2, Vector3};
 use serde::Deserialize;
 
-use super::asset::{BallView, ContactView, check_object, contact, outline, pointer};
+use super::asset::{BallView, ContactView, check_object, contact, plate_shape, pointer};
 use super::preset::PresetOr;
 use offbd_core::plant::{Ball, Contact, Motion, Plate};
 use offbd_core::vocabulary::{Invalid, in_range, positive};
 use offbd_lab::scene::{LONGEST_SCENE_S, Law, Laws, Push, Scene, Subject, Term};
 
-/// A scene as it is written. What is left out is the chapter's.
+/// The content of a scene file. Missing fields have the chapter's values.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SceneView {
     pub name: String,
-    /// In (0, 3600] s.
+    /// Duration, in (0, 3600] s.
     pub duration_s: f64,
-    /// Whether the plate ends at its edges; `false` makes it endless.
+    /// Whether the plate ends at its edges; if `false`, it is endless.
     pub edges: bool,
     pub ball: Option<BallView>,
-    /// Instead of a ball.
+    /// A block in place of the ball.
     pub block: Option<BlockView>,
     pub plate: PresetOr<ScenePlateView>,
     pub contact: PresetOr<ContactView>,
     pub initial: InitialView,
-    /// Terms of the angle about x, at most [`MOST_TERMS`].
+    /// Terms of the angle about x, at most [`MAX_TERMS`].
     pub qx: Vec<TermView>,
-    /// Terms of the angle about y, likewise.
+    /// Terms of the angle about y, at most [`MAX_TERMS`].
     pub qy: Vec<TermView>,
-    /// Forces on the body's centre, at most [`MOST_PUSHES`].
+    /// Forces on the body's centre, at most [`MAX_PUSHES`].
     pub pushes: Vec<PushView>,
 }
 
-/// Most terms of one angle: every evaluation adds them all up, a hundred
-/// thousand times a run. More are refused.
-pub const MOST_TERMS: usize = 64;
+/// Largest number of terms of one angle: every evaluation sums them all, a hundred thousand
+/// times per run.
+pub const MAX_TERMS: usize = 64;
 
-/// Most pushes of a scene: each makes two breaks, at which every method starts
-/// afresh. More are refused.
-pub const MOST_PUSHES: usize = 64;
+/// Largest number of pushes of a scene: each causes two discontinuities, at which every
+/// method restarts.
+pub const MAX_PUSHES: usize = 64;
 
-/// Longest name, characters. A longer one is refused.
-pub const LONGEST_NAME: usize = 128;
+/// Longest name, characters.
+pub const MAX_NAME_CHARS: usize = 128;
 
 impl Default for SceneView {
     /// The ball at rest on a level plate for the 0.6 s of the chapter's
@@ -53,8 +53,8 @@ impl Default for SceneView {
             edges: true,
             ball: None,
             block: None,
-            plate: PresetOr::Given(ScenePlateView::default()),
-            contact: PresetOr::Given(ContactView::default()),
+            plate: PresetOr::Value(ScenePlateView::default()),
+            contact: PresetOr::Value(ContactView::default()),
             initial: InitialView::default(),
             qx: Vec::new(),
             qy: Vec::new(),
@@ -63,18 +63,18 @@ impl Default for SceneView {
     }
 }
 
-/// A cube that slides and does not turn.
+/// A cube that slides without rotating.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct BlockView {
-    /// In (0, 1] m.
+    /// Length of an edge, in (0, 1] m.
     pub edge_m: f64,
-    /// In (0, 100] kg.
+    /// Mass, in (0, 100] kg.
     pub mass_kg: f64,
 }
 
 impl Default for BlockView {
-    /// The chapter's cube of 12.7 mm, of which it gives no mass: the ball's.
+    /// The chapter's cube of 12.7 mm. The chapter states no mass; the ball's is used.
     fn default() -> Self {
         Self { edge_m: 0.0127, mass_kg: Ball::default().mass_kg() }
     }
@@ -84,29 +84,30 @@ impl Default for BlockView {
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ScenePlateView {
-    /// Along x, in (0, 10] m.
+    /// Length along x, in (0, 10] m.
     pub length_m: Option<f64>,
-    /// Along y, in (0, 10] m.
+    /// Width along y, in (0, 10] m.
     pub width_m: Option<f64>,
-    /// Of a round plate, in (0, 10] m.
+    /// Diameter of a round plate, in (0, 10] m.
     pub diameter_m: Option<f64>,
-    /// In [0, 1] m.
+    /// Thickness, in [0, 1] m.
     pub thickness_m: Option<f64>,
 }
 
-/// Where and how the body starts, relative to the plate, in its frame.
+/// Initial motion of the body relative to the plate, in the plate frame.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct InitialView {
-    /// Each within ±10 m. Left out: where the body just touches the centre.
+    /// Position of its centre, each coordinate within ±10 m; if missing, the body touches the
+    /// plate's centre.
     pub position_m: Option<[f64; 3]>,
-    /// Each within ±100 m/s.
+    /// Velocity, each component within ±100 m/s.
     pub velocity_m_s: [f64; 3],
-    /// Each within ±100 000 rad/s.
+    /// Angular velocity, each component within ±100 000 rad/s.
     pub spin_rad_s: [f64; 3],
 }
 
-/// One term of an angle.
+/// One term of the law of an angle.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 pub enum TermView {
@@ -125,7 +126,7 @@ pub struct SineView {
     pub phase_rad: f64,
 }
 
-/// `to_rad·(3s² − 2s³)`, s going from 0 at `start_s` to 1 after `duration_s`.
+/// `to_rad·(3s² − 2s³)`; s rises from 0 at `start_s` to 1 within `duration_s`.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SmoothstepView {
@@ -135,20 +136,20 @@ pub struct SmoothstepView {
     pub duration_s: f64,
 }
 
-/// A force on the body's centre, for a while.
+/// A force on the body's centre for a limited time.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PushView {
-    /// Along x and y of the plate, each within ±1000 N.
+    /// Force along the plate's x and y, each component within ±1000 N.
     pub force_n: [f64; 2],
-    /// In [0, 3600] s.
+    /// Start, in [0, 3600] s.
     #[serde(default)]
     pub start_s: f64,
-    /// In (0, 3600] s.
+    /// Duration, in (0, 3600] s.
     pub duration_s: f64,
 }
 
-/// A scene with its name and the laws of its plate.
+/// A scene with its name and the laws of the plate's motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedScene {
     pub name: String,
@@ -182,18 +183,18 @@ fn named_scene(view: &SceneView) -> Result<NamedScene, Invalid> {
 }
 
 fn name(name: &str) -> Result<String, Invalid> {
-    let fits = (1..=LONGEST_NAME).contains(&name.chars().count());
+    let fits = (1..=MAX_NAME_CHARS).contains(&name.chars().count());
     if fits && !name.chars().any(char::is_control) {
         return Ok(name.to_owned());
     }
-    let reason = format!("must be 1 to {LONGEST_NAME} characters without control characters");
+    let reason = format!("must be 1 to {MAX_NAME_CHARS} characters without control characters");
     Err(Invalid::new("/name", reason))
 }
 
 fn subject(view: &SceneView, plate: &Plate) -> Result<Subject, Invalid> {
     match (&view.ball, &view.block) {
         (Some(_), Some(_)) => {
-            Err(Invalid::new("/block", "there is a ball already: one body is on the plate"))
+            Err(Invalid::new("/block", "a scene has one body: give either `ball` or `block`"))
         }
         (_, Some(block)) => Scene::block(block.edge_m, block.mass_kg, plate),
         (ball, None) => {
@@ -204,7 +205,7 @@ fn subject(view: &SceneView, plate: &Plate) -> Result<Subject, Invalid> {
 }
 
 fn plate(view: &ScenePlateView) -> Result<Plate, Invalid> {
-    let shape = outline(view.length_m, view.width_m, view.diameter_m)?;
+    let shape = plate_shape(view.length_m, view.width_m, view.diameter_m)?;
     let chapter = Plate::CHAPTER;
     let thickness_m = view.thickness_m.unwrap_or(chapter.thickness_m());
     Plate::new(shape, thickness_m, chapter.rim())
@@ -222,16 +223,16 @@ fn initial(view: &InitialView, scene: &Scene) -> Result<Motion, Invalid> {
     })
 }
 
-/// Three numbers within ±`most`.
-fn vector(element: &str, values: &[f64; 3], most: f64) -> Result<Vector3<f64>, Invalid> {
+/// Checks that each of three numbers is within ±`max`.
+fn vector(element: &str, values: &[f64; 3], max: f64) -> Result<Vector3<f64>, Invalid> {
     for (i, value) in values.iter().enumerate() {
-        in_range(&format!("{element}/{i}"), *value, -most..=most)?;
+        in_range(&format!("{element}/{i}"), *value, -max..=max)?;
     }
     Ok(Vector3::from(*values))
 }
 
 fn law(element: &str, views: &[TermView]) -> Result<Law, Invalid> {
-    at_most(element, views.len(), MOST_TERMS)?;
+    check_count(element, views.len(), MAX_TERMS)?;
     let terms = views.iter().enumerate();
     let terms: Result<Vec<Term>, Invalid> =
         terms.map(|(i, view)| term(view).checked(&format!("{element}/{i}"))).collect();
@@ -253,7 +254,7 @@ fn term(view: &TermView) -> Term {
 }
 
 fn pushes(views: &[PushView]) -> Result<Vec<Push>, Invalid> {
-    at_most("/pushes", views.len(), MOST_PUSHES)?;
+    check_count("/pushes", views.len(), MAX_PUSHES)?;
     views.iter().enumerate().map(|(i, view)| push(&format!("/pushes/{i}"), view)).collect()
 }
 
@@ -266,11 +267,11 @@ fn push(element: &str, view: &PushView) -> Result<Push, Invalid> {
     Ok(Push { force: Vector2::from(view.force_n), start_s: start, duration_s: duration })
 }
 
-fn at_most(element: &str, n: usize, most: usize) -> Result<(), Invalid> {
-    if n <= most {
+fn check_count(element: &str, n: usize, max: usize) -> Result<(), Invalid> {
+    if n <= max {
         return Ok(());
     }
-    Err(Invalid::new(element, format!("{n} of them: at most {most} are taken")))
+    Err(Invalid::new(element, format!("has {n} elements; at most {max} are allowed")))
 }
 
 #[cfg(test)]

@@ -1,5 +1,5 @@
-//! What the service says of itself: sessions, faults of the fleet, the state
-//! of a twin, replays, calibrations.
+//! The resources of the API: sessions, the fleet and its faults, events, the state of a
+//! twin, imports, replays, calibrations.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -11,249 +11,264 @@ use super::provenance::ProvenanceView;
 use super::trace::TraceView;
 use super::trend::TrendWarningView;
 use super::verdict::{EvidenceView, FaultView, SummaryView, evidence_view};
+use super::words::{
+    AxisWord, ChangeWord, CodeWord, CommandWord, HistoryWord, JobState, KindWord, LineWord,
+    ModelWord, ProfileWord, SessionState, StatusWord,
+};
 use offbd_core::diagnosis::StatusByte;
 use offbd_core::engine::{MonitorState, State};
-use offbd_core::vocabulary::{Axis, FaultCode, FaultStatus, PerAxis};
+use offbd_core::vocabulary::{Axis, FaultCode, PerAxis};
 
-/// A page of a list.
+/// One page of a list.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct Page<T> {
     pub items: Vec<T>,
-    /// Opaque; give it as `cursor` for the next page. Null on the last one.
+    /// Opaque value of the parameter `cursor` for the next page; null on the last page.
     pub next: Option<String>,
 }
 
 /// A session.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct SessionView {
-    /// The service's id.
+    /// The service's id of the session.
     pub id: String,
     pub asset: String,
-    /// The device's name of it, or the moment of its opening.
+    /// The device's name for the session, or the time at which it was opened.
     pub name: String,
-    /// `open` or `ended`.
-    pub state: String,
-    /// RFC 3339.
+    pub state: SessionState,
+    /// Time at which the session was opened, RFC 3339.
     pub opened_at: String,
+    /// Time at which the session was ended, RFC 3339; null while it is open.
     pub ended_at: Option<String>,
-    /// Samples recorded.
+    /// Number of recorded samples.
     pub samples: u64,
-    /// Rows that were no samples.
+    /// Number of rejected rows, which are neither recorded nor judged.
     pub rejected: u64,
+    /// Earliest time of a sample, s on the device's clock; null without samples.
     pub first_t_s: Option<f64>,
+    /// Latest time of a sample, s on the device's clock; null without samples.
     pub last_t_s: Option<f64>,
-    /// The highest `seq`.
+    /// Highest recorded `seq`; null if no sample has one.
     pub last_seq: Option<u64>,
-    /// Once ended.
+    /// The verdict; null while the session is open.
     pub verdict: Option<SummaryView>,
 }
 
-/// A fault of the fleet: what is remembered of one code of one asset.
+/// The record of one fault code of one asset.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct FaultEntryView {
     pub asset: String,
-    /// RFC 3339: when the record last changed.
+    /// Time at which the record last changed, RFC 3339.
     pub changed_at: String,
     #[serde(flatten)]
     pub record: FaultRecordView,
     #[serde(flatten)]
     pub provenance: ProvenanceView,
-    /// The monitor as it stands in the open session, debounce counter and
-    /// readiness; null without one, and in lists across the fleet.
+    /// State of the monitor in the open session; null if no session is open, and in lists
+    /// of several assets.
     pub monitor: Option<MonitorView>,
 }
 
-/// An event: a person cleared a code while no session was open. It has the
-/// keys of a fault line, without a session and a time on the device's clock.
+/// An event: a person cleared a code while no session was open. It has the keys of a fault
+/// line; those of the session and of times on the device's clock are null.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct ClearedView {
     /// Always `fault`.
     #[serde(rename = "type")]
-    pub line: String,
-    /// Always null, as `session_id` is.
+    pub line: LineWord,
+    /// Always null.
     pub session: Option<String>,
     /// Always null.
     pub t_s: Option<f64>,
-    pub code: String,
+    pub code: CodeWord,
     /// Always null.
-    pub kind: Option<String>,
+    pub kind: Option<KindWord>,
     /// Always `cleared`.
-    pub status: String,
+    pub status: StatusWord,
     /// ISO 14229 status byte, two hexadecimal digits.
     pub status_byte: String,
-    pub axis: Option<String>,
-    pub command: Option<String>,
-    /// Who cleared it.
+    /// Ball axis of a servo fault; null for other codes.
+    pub axis: Option<AxisWord>,
+    /// Plate angle that the servo turns; null for other codes.
+    pub command: Option<CommandWord>,
+    /// Name of the person who cleared it.
     pub by: String,
-    /// The same in one sentence.
+    /// The event in one sentence.
     pub summary: String,
 }
 
-/// What an event tells.
+/// The data of an event.
 #[derive(Clone, Debug, Serialize, ToSchema)]
 pub struct EventView {
     pub asset: String,
-    /// The service's id of the session; null if none was open.
+    /// The service's id of the session; null if no session was open.
     pub session_id: Option<String>,
     #[serde(flatten)]
     pub change: ChangeView,
 }
 
-/// What has changed.
+/// The change that an event reports.
 #[derive(Clone, Debug, Serialize, ToSchema)]
 #[serde(untagged)]
 pub enum ChangeView {
-    /// In a session.
+    /// A transition in a session.
     Fault(Box<FaultView>),
-    /// By hand, while no session was open.
+    /// A code cleared by a person while no session was open.
     Cleared(Box<ClearedView>),
 }
 
-/// The event of `code` cleared by `by` while no session was open.
+/// Returns the event of `code` cleared by `by` while no session was open.
 #[must_use]
 pub fn cleared_view(code: FaultCode, by: &str) -> ClearedView {
     ClearedView {
-        line: "fault".to_owned(),
+        line: LineWord::Fault,
         session: None,
         t_s: None,
-        code: code.to_string(),
+        code: code.into(),
         kind: None,
-        status: FaultStatus::Cleared.to_string(),
+        status: StatusWord::Cleared,
         status_byte: StatusByte::default().to_string(),
-        axis: code.axis().map(|a| a.as_str().to_owned()),
-        command: code.axis().map(|a| a.command().to_owned()),
+        axis: code.axis().map(AxisWord::from),
+        command: code.axis().map(CommandWord::from),
         by: by.to_owned(),
         summary: format!("{code} cleared by {by}: nothing of it is on record"),
     }
 }
 
-/// One asset of the fleet, at a glance.
+/// Summary of one asset of the fleet.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct FleetEntryView {
     pub asset: String,
-    /// Whether it has been learnt from healthy sessions.
+    /// Whether the asset has a calibration.
     pub calibrated: bool,
-    /// How far it is on its way there.
+    /// State of its automatic calibration.
     pub learning: LearningState,
-    /// The open session; null if there is none.
+    /// Name of the open session; null if no session is open.
     pub session: Option<String>,
+    /// The service's id of the open session; null if no session is open.
     pub session_id: Option<String>,
-    /// Samples recorded in it.
+    /// Number of samples recorded in the open session.
     pub samples: u64,
-    /// Of the last sample, s on the device's clock.
+    /// Time of the last sample, s on the device's clock; null without one.
     pub last_t_s: Option<f64>,
-    /// RFC 3339: when a sample last came. Until one comes after a restart of
-    /// the service, when the latest session was opened or ended.
+    /// Time at which a sample last arrived, RFC 3339. After a restart of the service, and
+    /// until a sample arrives, the time at which the latest session was opened or ended;
+    /// null without a session.
     pub last_seen: Option<String>,
-    /// How much later than the promptest of the session the last batch came,
-    /// s; null until one comes.
+    /// Delay of the last batch, relative to the smallest delay of a batch in the session, s;
+    /// null until a batch arrives.
     pub lag_s: Option<f64>,
-    /// Pending and confirmed ones.
+    /// Pending and confirmed faults.
     pub faults: Vec<FleetFaultView>,
-    /// Of faults on their way: drifts of a servo over the sessions.
+    /// Warnings of expected faults: drifts of a servo from session to session.
     pub warnings: Vec<TrendWarningView>,
 }
 
-/// An active fault, at a glance.
+/// Summary of an active fault.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct FleetFaultView {
-    pub code: String,
-    pub kind: Option<String>,
+    pub code: CodeWord,
+    pub kind: Option<KindWord>,
     /// `pending` or `confirmed`.
-    pub status: String,
+    pub status: StatusWord,
+    /// Whether the current occurrence has been acknowledged.
     pub acknowledged: bool,
-    /// RFC 3339: when the record last changed.
+    /// Time at which the record last changed, RFC 3339.
     pub changed_at: String,
 }
 
-/// Something that happened to a code of an asset.
+/// A change of status of a fault code, or an action of a person.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct HistoryView {
-    /// Rises with every event and act, over all assets.
+    /// Number that increases with every event and action over all assets.
     pub id: i64,
-    /// RFC 3339.
+    /// Time, RFC 3339.
     pub at: String,
-    /// `pending`, `confirmed`, `healed` or `cleared`: the status it changed to;
-    /// `acknowledge` or `clear`: what a person did.
-    pub what: String,
-    /// Who did it, if a person.
+    pub what: HistoryWord,
+    /// Name of the person who acted; null for a change found by a monitor.
     pub by: Option<String>,
+    /// The service's id of the session; null if no session was open.
     pub session_id: Option<String>,
-    /// The fault line of a change of status.
+    /// The fault line of a change of status; null for an action.
     pub fault: Option<FaultView>,
 }
 
-/// What a watcher of an asset is told: where its twin is, and what has been
-/// judged since he was last told.
+/// Live data of an asset for a client: the state of its twin, and what was judged since the
+/// last query.
 #[derive(Clone, Debug)]
 pub struct WatchView {
     pub state: StateView,
     pub trace: TraceView,
-    /// Moments told so far, for the next question.
+    /// Number of moments returned so far, to be passed to the next query.
     pub seen: u64,
 }
 
-/// One monitor at one moment.
+/// The state of one monitor.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct MonitorView {
-    pub code: String,
+    pub code: CodeWord,
     /// Fault detection counter, −128 (passed) to 127 (failed).
     pub counter: i8,
-    /// Whether it may judge right now.
+    /// Whether its enable condition holds now.
     pub enabled: bool,
-    /// Whether it has come to a result in this session.
+    /// Whether it has had a result in this session.
     pub complete_this_cycle: bool,
-    /// Whether it has come to a result since the code was last cleared.
+    /// Whether it has had a result since the code was last cleared.
     pub complete_since_clear: bool,
-    /// Seconds of this session in which it could judge.
+    /// Time of this session for which it could judge, s.
     #[serde(default)]
     pub judged_s: f64,
-    /// The same as a share of the session, from its first sample to its last,
-    /// 0 to 1.
+    /// That time as a fraction of the session from its first to its last sample, 0 to 1.
     #[serde(default)]
     pub judged_share: f64,
-    /// The same as `judged_s`, by the name that it had before.
+    /// Former name of `judged_s`, with the same value.
     pub enabled_s: f64,
 }
 
-/// A number for each direction of ball motion.
+/// One value for each direction of ball motion.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize, ToSchema)]
 pub struct XyView {
     pub x: f64,
     pub y: f64,
 }
 
-/// The twin beside the rig, after the last judged sample.
+/// The state of the twin and the monitors after the last judged sample.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct StateView {
     pub asset: String,
-    /// The open session; null if there is none, and then all is at rest.
+    /// Name of the open session; null if no session is open, and then the twin is at rest.
     pub session: Option<String>,
+    /// The service's id of the open session; null if no session is open.
     pub session_id: Option<String>,
-    /// Time of the last judged sample.
+    /// Time of the last judged sample, s on the device's clock; null without one.
     pub t_s: Option<f64>,
-    /// Samples recorded in this session.
+    /// Number of samples recorded in this session.
     pub samples: u64,
-    /// Samples judged in this session.
+    /// Number of samples judged in this session.
     pub judged: u64,
-    /// Samples waiting for an earlier one.
+    /// Number of samples that wait for an earlier one.
     pub waiting: usize,
+    /// The twin's ball position relative to the plate, m.
     pub twin_position_m: XyView,
+    /// The twin's ball velocity relative to the plate, m/s.
     pub twin_velocity_m_s: XyView,
-    /// The twin's plate angle behind each axis.
+    /// The twin's plate angle that moves the ball along each axis: qy for x, qx for y, rad.
     pub plate_angle_rad: XyView,
-    /// Measured and twin acceleration, residual, limit and gate, per axis.
+    /// The evidence at the last judged sample.
     pub evidence: EvidenceView,
+    /// The monitors, one for each fault code.
     pub monitors: Vec<MonitorView>,
-    /// The plant model in use, and why that one.
-    pub fidelity: String,
+    /// The plant model in use.
+    pub fidelity: ModelWord,
+    /// Why this plant model is in use.
     pub fidelity_reason: String,
-    /// How far the rig is on its way to being learnt; null once it is.
+    /// Progress of the automatic calibration; null once the rig is learnt.
     #[serde(default)]
     pub learning: Option<LearningView>,
 }
 
-/// The view of an engine's state.
+/// Returns the view of an engine's state; `session` is the id, name and number of samples of
+/// the open session.
 #[must_use]
 pub fn state_view(asset: &str, session: Option<(&str, &str, u64)>, state: &State) -> StateView {
     StateView {
@@ -269,7 +284,7 @@ pub fn state_view(asset: &str, session: Option<(&str, &str, u64)>, state: &State
         plate_angle_rad: xy(&state.plate_angle_rad),
         evidence: evidence_view(&state.evidence),
         monitors: monitor_views(state),
-        fidelity: state.fidelity.rung.name().to_owned(),
+        fidelity: state.fidelity.rung.into(),
         fidelity_reason: state.fidelity.to_string(),
         learning: None,
     }
@@ -279,7 +294,7 @@ fn xy(pair: &PerAxis<f64>) -> XyView {
     XyView { x: pair[Axis::X], y: pair[Axis::Y] }
 }
 
-/// The views of the monitors, in the order of [`FaultCode::ALL`].
+/// Returns the views of the monitors, in the order of [`FaultCode::ALL`].
 #[must_use]
 pub fn monitor_views(state: &State) -> Vec<MonitorView> {
     FaultCode::ALL.iter().zip(&state.monitors).map(monitor_view).collect()
@@ -287,7 +302,7 @@ pub fn monitor_views(state: &State) -> Vec<MonitorView> {
 
 fn monitor_view((code, monitor): (&FaultCode, &MonitorState)) -> MonitorView {
     MonitorView {
-        code: code.to_string(),
+        code: (*code).into(),
         counter: monitor.counter,
         enabled: monitor.readiness.enabled,
         complete_this_cycle: monitor.readiness.complete_this_cycle,
@@ -298,115 +313,127 @@ fn monitor_view((code, monitor): (&FaultCode, &MonitorState)) -> MonitorView {
     }
 }
 
-/// What came of an import.
+/// The result of an import.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct ImportView {
     pub session: SessionView,
+    /// Number of recorded samples, late ones included.
     pub accepted: u64,
+    /// Number of samples that were already recorded.
     pub duplicate: u64,
-    /// Samples recorded but not judged.
+    /// Number of samples recorded but not judged.
     pub late: u64,
+    /// Number of rejected rows.
     pub rejected: u64,
-    /// The first rows rejected, with their reasons.
+    /// The first rejected rows, with their reasons.
     pub rejections: Vec<super::telemetry::RowView>,
 }
 
-/// With which settings a session is judged again.
+/// Settings with which a session is judged again.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ReplaySettingsView {
-    /// `default` or `textbook`; without it the one of the asset file.
+    /// Profile of the diagnosis; if absent, that of the asset file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub profile: Option<String>,
-    /// Id of a calibration of the asset (of the job that learnt it, or its own)
-    /// to be used instead of the one in force when the session was opened.
+    pub profile: Option<ProfileWord>,
+    /// Id of a calibration of the asset, or of the job that made it, to use instead of the
+    /// calibration that was in use when the session was opened.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration: Option<String>,
-    /// Continuous failure before a test fails, in [0, 60] s: of servos, ball and
-    /// sensor.
+    /// Debounce time of all monitors: how long a failure must last before the test fails, in
+    /// [0, 60] s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub debounce_s: Option<f64>,
-    /// Wanted false alarms per rig and year, above 0.
+    /// Accepted false alarms per rig and year, above 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub false_alarms_per_rig_year: Option<f64>,
-    /// An asset file, or the parts of it that are to be different (JSON merge
-    /// patch, RFC 7396), over the one in force when the session was opened.
+    /// Changes to the asset file that was in use when the session was opened, as a JSON merge
+    /// patch (RFC 7396).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub asset: Option<serde_json::Value>,
 }
 
-/// A place where the verdict of a replay and the recorded one differ.
+/// A difference between the replayed and the recorded verdict.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct DifferenceView {
-    /// `altered`, `moved`, `only_recorded` or `only_replayed`.
-    #[serde(default)]
-    pub change: String,
-    /// Replayed − recorded, s; above 0 where the replay is later.
+    #[serde(default = "altered")]
+    pub change: ChangeWord,
+    /// Replayed minus recorded time, s, positive if the replay is later; null if only one
+    /// verdict has the transition.
     #[serde(default)]
     pub moved_s: Option<f64>,
-    /// Null where only the replay has it.
+    /// The recorded fault line; null if only the replay has the transition.
     pub recorded: Option<FaultView>,
-    /// Null where only the record has it.
+    /// The replayed fault line; null if only the record has the transition.
     pub replayed: Option<FaultView>,
 }
 
-/// What a replay found.
+/// The default for results stored by versions without this field.
+const fn altered() -> ChangeWord {
+    ChangeWord::Altered
+}
+
+/// The result of a replay.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct ReplayResultView {
+    /// The fault lines of the replay.
     pub faults: Vec<FaultView>,
     pub summary: SummaryView,
-    /// Hash of the recorded verdict; null while the session is open.
+    /// Verdict hash of the record; null while the session is open.
     pub recorded_hash: Option<String>,
-    /// Whether the two verdicts are the same, transition by transition.
+    /// Whether the two verdicts are equal, transition by transition.
     pub same: bool,
-    /// Every transition of either verdict, in the order of time.
+    /// Every transition of both verdicts, in the order of time.
     #[serde(default)]
     pub transitions: Vec<ComparedView>,
-    /// How many of them there are of each change.
+    /// The number of transitions of each change.
     #[serde(default)]
     pub tally: TallyView,
-    /// The fault lines of those that are not the same.
+    /// The transitions that differ, with their fault lines.
     pub differences: Vec<DifferenceView>,
-    /// Of the calibration that judged in the replay; null on a rig not learnt.
+    /// Id of the calibration used by the replay; null if the rig was not learnt.
     #[serde(default)]
     pub calibration_id: Option<String>,
-    /// Of the profile, the settings and the rig's description that judged.
+    /// Id of the profile, settings and rig description used by the replay.
     #[serde(default)]
     pub settings_id: String,
-    /// Whether the verdicts were cut at their limit of 10000 transitions.
+    /// Whether the verdicts were truncated to 10 000 transitions.
     pub truncated: bool,
 }
 
-/// A replay.
+/// A replay job: judging a recorded session again.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct ReplayView {
     pub id: String,
     pub session_id: String,
-    /// `queued`, `running`, `done` or `failed`.
-    pub state: String,
-    /// Share of the samples judged, 0 to 1.
+    pub state: JobState,
+    /// Fraction of the samples judged so far, 0 to 1.
     pub progress: f64,
     pub settings: ReplaySettingsView,
+    /// Time of creation, RFC 3339.
     pub created_at: String,
+    /// Time of completion or failure, RFC 3339; null before.
     pub finished_at: Option<String>,
+    /// The result; null unless the state is `done`.
     pub result: Option<ReplayResultView>,
+    /// Why the replay failed; null unless the state is `failed`.
     pub error: Option<String>,
 }
 
-/// A calibration of an asset: learning it, and what was learnt.
+/// A calibration job of an asset, with its result.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct CalibrationJobView {
     pub id: String,
     pub asset: String,
-    /// `queued`, `running`, `done` or `failed`.
-    pub state: String,
-    /// The sessions it learns from.
+    pub state: JobState,
+    /// Ids of the sessions it learns from.
     pub sessions: Vec<String>,
+    /// Time of creation, RFC 3339.
     pub made_at: String,
-    /// Whether it is in the asset file.
+    /// Whether this calibration is in use: in the asset file.
     pub active: bool,
-    /// Once done.
+    /// The calibration; null unless the state is `done`.
     pub calibration: Option<super::asset::CalibrationView>,
-    /// Once failed: what the data lack.
+    /// Why it failed, for example what the data lack; null unless the state is `failed`.
     pub error: Option<String>,
 }

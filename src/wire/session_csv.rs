@@ -1,8 +1,8 @@
-//! The session file: CSV with the header `t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m`
-//! in any order, more columns ignored, `seq` taken where present.
+//! The session file: CSV with the columns `t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m` in any order
+//! and optionally `seq`; other columns are ignored.
 //!
-//! An empty field is a value that is not there. One bad row is an error for
-//! that row, with its line, and the next row is read all the same.
+//! An empty field is a missing value. An invalid row is an error with its line number, and
+//! reading continues with the next row.
 
 use std::io::{self, Read, Write};
 
@@ -11,10 +11,10 @@ use offbd_core::vocabulary::Sample;
 /// The columns of a session file, in the order in which they are written.
 pub const COLUMNS: [&str; 5] = ["t_s", "cmd_qx_rad", "cmd_qy_rad", "x_m", "y_m"];
 
-/// Why a file is no session.
+/// Why a file is not a session file.
 #[derive(Debug, thiserror::Error)]
 pub enum CsvError {
-    #[error("the header lacks the column `{0}`; wanted: t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m")]
+    #[error("the header lacks the column `{0}`; required: t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m")]
     MissingColumn(&'static str),
     #[error("the header names the column `{0}` twice")]
     DoubleColumn(&'static str),
@@ -22,23 +22,23 @@ pub enum CsvError {
     Header(#[from] csv::Error),
 }
 
-/// Why a row is no sample.
+/// Why a row is not a valid sample.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("line {line}: {reason}")]
 pub struct RowError {
-    /// Line in the file, from 1, the header included.
+    /// Line number, from 1, counting the header.
     pub line: u64,
     pub reason: String,
 }
 
-/// Where each column stands in the file.
+/// Index of each column in the file.
 #[derive(Clone, Copy, Debug)]
-struct Layout {
+struct ColumnIndices {
     columns: [usize; COLUMNS.len()],
     seq: Option<usize>,
 }
 
-impl Layout {
+impl ColumnIndices {
     fn of(header: &csv::ByteRecord) -> Result<Self, CsvError> {
         let at = |name: &'static str| {
             let mut found =
@@ -57,18 +57,17 @@ impl Layout {
 }
 
 /// Reads samples row by row, in the order of the file.
-pub struct Reader<R> {
+pub struct SessionCsvReader<R> {
     csv: csv::Reader<R>,
-    layout: Layout,
+    indices: ColumnIndices,
     record: csv::ByteRecord,
 }
 
-impl<R: Read> Reader<R> {
+impl<R: Read> SessionCsvReader<R> {
     /// Reads the header.
     ///
     /// # Errors
-    /// [`CsvError`] when a column is missing or doubled, or the bytes cannot
-    /// be read.
+    /// [`CsvError`] if a column is missing or repeated, or `source` cannot be read.
     pub fn new(source: R) -> Result<Self, CsvError> {
         let mut csv = csv::ReaderBuilder::new().flexible(true).from_reader(source);
         let mut header = csv.byte_headers()?.clone();
@@ -78,11 +77,11 @@ impl<R: Read> Reader<R> {
             let fields = std::iter::once(rest).chain(header.iter().skip(1));
             header = fields.collect();
         }
-        let layout = Layout::of(&header)?;
-        Ok(Self { csv, layout, record: csv::ByteRecord::new() })
+        let indices = ColumnIndices::of(&header)?;
+        Ok(Self { csv, indices, record: csv::ByteRecord::new() })
     }
 
-    /// Line of the row that was read last, from 1, the header included.
+    /// Returns the line number of the row read last, from 1, counting the header.
     #[must_use]
     pub fn line(&self) -> u64 {
         self.record.position().map_or(0, csv::Position::line)
@@ -92,11 +91,11 @@ impl<R: Read> Reader<R> {
         let line = self.line();
         let fail = |reason: String| RowError { line, reason };
         let field = |column: usize| {
-            let bytes = self.record.get(self.layout.columns[column]);
+            let bytes = self.record.get(self.indices.columns[column]);
             let bytes = bytes.ok_or_else(|| fail(format!("no field `{}`", COLUMNS[column])))?;
-            number(bytes).map_err(|e| fail(format!("`{}`: {e}", COLUMNS[column])))
+            parse_number(bytes).map_err(|e| fail(format!("`{}`: {e}", COLUMNS[column])))
         };
-        let seq = match self.layout.seq.and_then(|i| self.record.get(i)).map(<[u8]>::trim_ascii) {
+        let seq = match self.indices.seq.and_then(|i| self.record.get(i)).map(<[u8]>::trim_ascii) {
             None | Some(b"") => None,
             Some(bytes) => Some(
                 std::str::from_utf8(bytes)
@@ -116,8 +115,8 @@ impl<R: Read> Reader<R> {
     }
 }
 
-/// The number in a field; none when it is empty.
-fn number(field: &[u8]) -> Result<Option<f64>, String> {
+/// Parses the number in a field; `None` if the field is empty.
+fn parse_number(field: &[u8]) -> Result<Option<f64>, String> {
     let field = field.trim_ascii();
     if field.is_empty() {
         return Ok(None);
@@ -127,7 +126,7 @@ fn number(field: &[u8]) -> Result<Option<f64>, String> {
     if value.is_finite() { Ok(Some(value)) } else { Err(format!("`{text}` is not finite")) }
 }
 
-impl<R: Read> Iterator for Reader<R> {
+impl<R: Read> Iterator for SessionCsvReader<R> {
     type Item = Result<Sample, RowError>;
 
     fn next(&mut self) -> Option<Self::Item> {
@@ -142,21 +141,21 @@ impl<R: Read> Iterator for Reader<R> {
     }
 }
 
-/// Writes samples with a header, `seq` only where any has one. Numbers are
-/// written so that they read back to the bit.
+/// Writes samples with a header, and with the column `seq` if any sample has one. Numbers
+/// are written such that reading them returns the same bits.
 ///
 /// # Errors
-/// Whatever the sink says.
+/// [`io::Error`] if `sink` fails.
 pub fn write<W: Write>(mut sink: W, samples: &[Sample]) -> io::Result<()> {
     let with_seq = samples.iter().any(|s| s.seq.is_some());
     write_header(&mut sink, with_seq)?;
     write_rows(&mut sink, samples, with_seq)
 }
 
-/// Writes the header alone.
+/// Writes only the header.
 ///
 /// # Errors
-/// Whatever the sink says.
+/// [`io::Error`] if `sink` fails.
 pub fn write_header<W: Write>(mut sink: W, with_seq: bool) -> io::Result<()> {
     if with_seq {
         write!(sink, "seq,")?;
@@ -164,10 +163,10 @@ pub fn write_header<W: Write>(mut sink: W, with_seq: bool) -> io::Result<()> {
     writeln!(sink, "{}", COLUMNS.join(","))
 }
 
-/// Writes the rows alone.
+/// Writes only the rows.
 ///
 /// # Errors
-/// Whatever the sink says.
+/// [`io::Error`] if `sink` fails.
 pub fn write_rows<W: Write>(mut sink: W, samples: &[Sample], with_seq: bool) -> io::Result<()> {
     for sample in samples {
         if with_seq {
@@ -191,11 +190,11 @@ mod tests {
     use proptest::prelude::*;
 
     fn read(text: &str) -> Vec<Result<Sample, RowError>> {
-        Reader::new(text.as_bytes()).unwrap().collect()
+        SessionCsvReader::new(text.as_bytes()).unwrap().collect()
     }
 
     #[test]
-    fn columns_in_any_order_and_more_of_them() {
+    fn columns_may_have_any_order_and_unknown_ones_are_ignored() {
         let rows = read("y_m,note,t_s,cmd_qy_rad,x_m,cmd_qx_rad\n,hello,1.5,,0.25,-0.1\n");
         let wanted =
             Sample { t_s: 1.5, cmd_qx_rad: Some(-0.1), x_m: Some(0.25), ..Sample::default() };
@@ -203,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bad_row_is_named_and_the_next_one_read() {
+    fn an_invalid_row_is_reported_with_its_line_and_the_next_row_is_read() {
         let rows = read(
             "t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n0,0,0,abc,0\n1,0\n2,0,0,NaN,0\n,0,0,0,0\n4,0,0,0,0\n",
         );
@@ -222,13 +221,14 @@ mod tests {
     }
 
     #[test]
-    fn a_header_that_lacks_a_column_is_no_session() {
-        let error = Reader::new("t_s,x_m,y_m,cmd_qx_rad\n".as_bytes()).err().unwrap();
+    fn a_header_with_a_missing_or_repeated_column_is_rejected() {
+        let error = SessionCsvReader::new("t_s,x_m,y_m,cmd_qx_rad\n".as_bytes()).err().unwrap();
         assert!(error.to_string().contains("`cmd_qy_rad`"), "{error}");
-        let error =
-            Reader::new("t_s,t_s,x_m,y_m,cmd_qx_rad,cmd_qy_rad\n".as_bytes()).err().unwrap();
+        let error = SessionCsvReader::new("t_s,t_s,x_m,y_m,cmd_qx_rad,cmd_qy_rad\n".as_bytes())
+            .err()
+            .unwrap();
         assert!(error.to_string().contains("twice"), "{error}");
-        assert!(Reader::new(&b""[..]).is_err());
+        assert!(SessionCsvReader::new(&b""[..]).is_err());
     }
 
     fn finite() -> impl Strategy<Value = f64> {
@@ -237,7 +237,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_written_reads_back_to_the_bit(
+        fn written_samples_are_read_back_bit_for_bit(
             rows in proptest::collection::vec(
                 (proptest::option::of(0..u64::MAX), finite(), proptest::array::uniform4(proptest::option::of(finite()))),
                 0..20,
@@ -248,7 +248,7 @@ mod tests {
             }).collect();
             let mut text = Vec::new();
             write(&mut text, &samples).unwrap();
-            let back: Vec<Sample> = Reader::new(text.as_slice()).unwrap().map(Result::unwrap).collect();
+            let back: Vec<Sample> = SessionCsvReader::new(text.as_slice()).unwrap().map(Result::unwrap).collect();
             prop_assert_eq!(back.len(), samples.len());
             for (a, b) in back.iter().zip(&samples) {
                 prop_assert_eq!(format!("{:?}", a), format!("{:?}", b));

@@ -1,10 +1,9 @@
 //! Batches of telemetry: rows or columns as JSON or MessagePack, NDJSON and CSV.
 //!
-//! Two kinds of trouble are kept apart. A document that cannot be read is
-//! refused as a whole, with the place; a row that is no sample is reported by
-//! its index, with the reason, and the other rows are taken. `NaN`, `Infinity`
-//! and numbers too large for a double, which JSON does not have but devices
-//! send, spoil their row alone.
+//! There are two kinds of errors. A document that cannot be parsed is rejected as a whole,
+//! with the pointer of the error. An invalid row is reported by its index, with the reason,
+//! and the other rows are accepted. `NaN`, `Infinity` and numbers too large for a double,
+//! which JSON does not have but some devices send, invalidate only their row.
 
 mod cells;
 mod lenient;
@@ -14,40 +13,40 @@ use std::collections::BTreeSet;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use self::cells::{Document, Row};
-use super::session_csv::Reader;
+use self::cells::{BatchDocument, BatchRow};
+use super::session_csv::SessionCsvReader;
 use offbd_core::vocabulary::Sample;
 
-/// Largest `seq`: what the store's whole numbers hold. A row beyond is rejected.
+/// Largest `seq`: the largest integer of the store.
 pub const MAX_SEQ: u64 = i64::MAX as u64;
 
-/// Most bytes of a reason that is given for a row.
-const MAX_REASON: usize = 200;
+/// Longest reason given for a row, bytes.
+const MAX_REASON_BYTES: usize = 200;
 
-/// A batch, row by row in the order of the document.
+/// A batch, with its rows in the order of the document.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Batch {
-    /// The device's name of the session, if it says one.
+    /// The device's name for the session, if given.
     pub session: Option<String>,
-    /// The client's own mark, to be echoed.
+    /// The client's id of the batch, which the acknowledgement repeats.
     pub id: Option<String>,
-    /// A sample, or the reason why the row is none.
+    /// A sample, or the reason why the row is invalid.
     pub rows: Vec<Result<Sample, String>>,
 }
 
-/// Why a document is no batch.
+/// Why a document is not a valid batch.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BatchError {
-    /// `pointer` is the JSON pointer of the offending element, empty for the
-    /// document as a whole.
+    /// `pointer` is the JSON pointer of the invalid element; it is empty for the whole
+    /// document.
     #[error("{reason}")]
     Malformed { pointer: String, reason: String },
     /// More rows than allowed.
-    #[error("{found} samples in one batch, at most {limit} are taken; send several batches")]
+    #[error("{found} samples in one batch; at most {limit} are allowed: send several batches")]
     TooMany { found: usize, limit: usize },
 }
 
-/// Reads JSON rows or columns; at most `limit` of them.
+/// Parses JSON rows or columns, with at most `limit` samples.
 ///
 /// # Errors
 /// [`BatchError`] if the document is malformed or too long.
@@ -59,7 +58,7 @@ pub fn json(document: &[u8], limit: usize) -> Result<Batch, BatchError> {
     batch(parsed?, limit)
 }
 
-/// Reads the same document as MessagePack; at most `limit` rows.
+/// Parses the same document as MessagePack, with at most `limit` samples.
 ///
 /// # Errors
 /// [`BatchError`] if the document is malformed or too long.
@@ -67,8 +66,8 @@ pub fn msgpack(document: &[u8], limit: usize) -> Result<Batch, BatchError> {
     batch(cells::msgpack(document, limit)?, limit)
 }
 
-fn batch(document: Document, limit: usize) -> Result<Batch, BatchError> {
-    let Document { session, id, samples, columns } = document;
+fn batch(document: BatchDocument, limit: usize) -> Result<Batch, BatchError> {
+    let BatchDocument { session, id, samples, columns } = document;
     let rows = match (samples, columns.is_empty()) {
         (Some(_), false) => {
             let reason = "a batch has either `samples` or columns, not both".to_owned();
@@ -76,7 +75,7 @@ fn batch(document: Document, limit: usize) -> Result<Batch, BatchError> {
         }
         (Some(samples), true) => {
             check_length(samples.n, limit)?;
-            samples.kept.into_iter().map(Row::sample).collect()
+            samples.values.into_iter().map(BatchRow::sample).collect()
         }
         (None, _) => {
             check_length(columns.n(), limit)?;
@@ -93,31 +92,31 @@ fn check_length(found: usize, limit: usize) -> Result<(), BatchError> {
     if found > limit { Err(BatchError::TooMany { found, limit }) } else { Ok(()) }
 }
 
-/// Reads NDJSON: one sample object a line, blank lines skipped; at most
-/// `limit` of them. A line that is no JSON spoils itself alone.
+/// Parses NDJSON: one sample object per line, with at most `limit` lines; blank lines are
+/// skipped. A line with invalid JSON is an invalid row.
 ///
 /// # Errors
-/// [`BatchError::TooMany`].
+/// [`BatchError::TooMany`] if there are too many lines.
 pub fn ndjson(document: &[u8], limit: usize) -> Result<Batch, BatchError> {
     let lines = document.split(|b| *b == b'\n').map(<[u8]>::trim_ascii).filter(|l| !l.is_empty());
     check_length(lines.clone().count(), limit)?;
-    let row = |line: &[u8]| match serde_json::from_slice::<Row>(line) {
+    let row = |line: &[u8]| match serde_json::from_slice::<BatchRow>(line) {
         Ok(row) => row.sample(),
         Err(error) => match lenient::quote_non_finite(line).map(|q| serde_json::from_slice(&q)) {
-            Some(Ok(row)) => Row::sample(row),
+            Some(Ok(row)) => BatchRow::sample(row),
             _ => Err(error.to_string()),
         },
     };
     Ok(Batch { rows: lines.map(row).collect(), ..Batch::default() })
 }
 
-/// Reads CSV with the header of a session file; at most `limit` rows.
+/// Parses CSV with the header of a session file, with at most `limit` rows.
 ///
 /// # Errors
-/// [`BatchError`] if the header is no session file's or there are too many rows.
+/// [`BatchError`] if the header is not that of a session file, or there are too many rows.
 pub fn csv(document: &[u8], limit: usize) -> Result<Batch, BatchError> {
     let malformed = |reason| BatchError::Malformed { pointer: String::new(), reason };
-    let reader = Reader::new(document).map_err(|e| malformed(e.to_string()))?;
+    let reader = SessionCsvReader::new(document).map_err(|e| malformed(e.to_string()))?;
     let mut rows = Vec::new();
     for row in reader {
         check_length(rows.len() + 1, limit)?;
@@ -133,86 +132,95 @@ fn check_seq(sample: Sample) -> Result<Sample, String> {
     }
 }
 
-/// `reason`, cut where it is so long that it must be quoting the data.
+/// Truncates a reason that is too long because it quotes the data.
 fn shorten(reason: &str) -> String {
-    if reason.len() <= MAX_REASON {
+    if reason.len() <= MAX_REASON_BYTES {
         return reason.to_owned();
     }
-    let cut = (0..=MAX_REASON).rev().find(|&i| reason.is_char_boundary(i)).unwrap_or(0);
+    let cut = (0..=MAX_REASON_BYTES).rev().find(|&i| reason.is_char_boundary(i)).unwrap_or(0);
     format!("{}…", &reason[..cut])
 }
 
-/// A row and what is to be said about it.
+/// A row that was rejected or not judged, with the reason.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct RowView {
-    /// Place in the batch, from 0.
+    /// Index of the row in the batch, from 0.
     pub index: usize,
+    /// Why it was rejected or not judged.
     pub reason: String,
 }
 
-/// What became of a batch: every row is accepted, a duplicate or rejected.
+/// The acknowledgement of a batch: each row is accepted, a duplicate or rejected.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct AckView {
-    /// Name of the session that the samples went to; null if they went to none.
+    /// Name of the session that the samples belong to; null if the batch has no valid sample.
     pub session: Option<String>,
-    /// The service's id of that session.
+    /// The service's id of that session; null if there is none.
     pub session_id: Option<String>,
-    /// Samples recorded, those in `late` included.
+    /// Number of recorded samples, including those in `late`.
     pub accepted: usize,
-    /// Samples that were there already.
+    /// Number of samples that were already recorded.
     pub duplicate: usize,
-    /// Rows that are no samples: neither recorded nor judged.
+    /// Invalid rows, which are neither recorded nor judged.
     pub rejected: Vec<RowView>,
-    /// Samples recorded but not judged: too late, or far ahead of the clock.
+    /// Samples that are recorded but not judged, because they are too late or their time is
+    /// far ahead.
     pub late: Vec<RowView>,
-    /// The highest `seq` recorded in the session.
+    /// Highest `seq` recorded in the session; null if no sample has one.
     pub last_seq: Option<u64>,
 }
 
-/// A sample as it goes out.
+/// One sample. A value that the device does not have is null.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct SampleView {
+    /// Number of the sample within the session, by which a duplicate is recognised; absent
+    /// if the device does not number its samples, and then `t_s` is used.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seq: Option<u64>,
-    /// Seconds on the device's clock.
+    /// Time, s on the device's clock.
     pub t_s: f64,
+    /// Command of the plate angle about x, in the device's unit, sign and axes.
     pub cmd_qx_rad: Option<f64>,
+    /// Command of the plate angle about y, in the device's unit, sign and axes.
     pub cmd_qy_rad: Option<f64>,
+    /// Position of the ball along x, in the device's unit, sign and axes.
     pub x_m: Option<f64>,
+    /// Position of the ball along y, in the device's unit, sign and axes.
     pub y_m: Option<f64>,
 }
 
-/// JSON rows, as a device sends them.
+/// A batch as JSON rows.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct RowsView {
-    /// The device's name of the session; without it the open one is meant.
+    /// The device's name for the session; if absent, the open session.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub session: Option<String>,
     pub samples: Vec<SampleView>,
 }
 
-/// The view of a sample.
+/// Returns the view of a sample.
 #[must_use]
 pub const fn sample_view(sample: &Sample) -> SampleView {
     let Sample { seq, t_s, cmd_qx_rad, cmd_qy_rad, x_m, y_m } = *sample;
     SampleView { seq, t_s, cmd_qx_rad, cmd_qy_rad, x_m, y_m }
 }
 
-/// By what a sample is known within its session: `seq`, or `t_s` without one.
+/// The key that identifies a sample within its session: `seq`, or the bits of `t_s` if it
+/// has none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum SampleKey {
     Seq(u64),
     Time(u64),
 }
 
-/// The keys of `samples`.
-pub fn keys<'a>(samples: impl IntoIterator<Item = &'a Sample>) -> BTreeSet<SampleKey> {
-    samples.into_iter().map(key).collect()
+/// Returns the keys of `samples`.
+pub fn sample_keys<'a>(samples: impl IntoIterator<Item = &'a Sample>) -> BTreeSet<SampleKey> {
+    samples.into_iter().map(sample_key).collect()
 }
 
-/// The key of a sample.
+/// Returns the key of a sample.
 #[must_use]
-pub fn key(sample: &Sample) -> SampleKey {
+pub fn sample_key(sample: &Sample) -> SampleKey {
     sample.seq.map_or_else(|| SampleKey::Time(sample.t_s.to_bits()), SampleKey::Seq)
 }
 

@@ -1,4 +1,4 @@
-//! Traces: what the pictures of a session are drawn from, column by column.
+//! Traces: the judged quantities of a session over time, for charts.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -7,34 +7,35 @@ use offbd_core::diagnosis::AxisEvidence;
 use offbd_core::engine::State;
 use offbd_core::vocabulary::Axis;
 
-/// A stretch of a session as it was judged, one entry for each moment, for
-/// drawing: all but the times are rounded to seven digits.
+/// The judged quantities over an interval of a session, for charts: columns of equal length.
+/// All values but the times are rounded to seven digits.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct TraceView {
-    /// s on the device's clock.
+    /// Times, s on the device's clock.
     pub t_s: Vec<f64>,
     pub x: AxisTraceView,
     pub y: AxisTraceView,
 }
 
-/// One direction of ball motion over time. Null where there is no number.
+/// The quantities along one axis over time. A value that is unknown is null.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct AxisTraceView {
-    /// Command in force behind this axis, rad.
+    /// Command of the plate angle that moves the ball along this axis, rad.
     pub command_rad: Vec<Option<f32>>,
-    /// The twin's plate angle behind this axis, rad.
+    /// The twin's plate angle that moves the ball along this axis, rad.
     pub plate_angle_rad: Vec<f32>,
-    /// Measured position, by the fit over the window, m.
+    /// Measured position, from the fit over the window, m.
     pub position_m: Vec<Option<f32>>,
-    /// Where the twin would be, had it left from the start of the window, m.
+    /// Position of the twin if it had started from the measured motion at the start of the
+    /// window, m.
     pub twin_position_m: Vec<f32>,
     /// Measured acceleration over the window, m/s².
     pub measured_m_s2: Vec<Option<f32>>,
-    /// The twin's through the same filter, m/s².
+    /// The twin's acceleration through the same filter, m/s².
     pub twin_m_s2: Vec<Option<f32>>,
-    /// Residual limit in force, m/s².
+    /// Limit of the residual, m/s².
     pub limit_m_s2: Vec<f32>,
-    /// Whether the residual may be judged (the gate).
+    /// Whether the enable condition holds.
     pub enabled: Vec<bool>,
 }
 
@@ -42,31 +43,33 @@ pub struct AxisTraceView {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TracePoint {
     t_s: f64,
-    x: AxisPoint,
-    y: AxisPoint,
+    x: AxisTracePoint,
+    y: AxisTracePoint,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct AxisPoint {
+struct AxisTracePoint {
     evidence: AxisEvidence,
     plate_angle_rad: f64,
     twin_position_m: f64,
 }
 
 impl TracePoint {
-    /// What a trace has of `state`; none before the first judged sample.
+    /// Returns the point at which the evidence of `state` was last renewed, every 50 ms in
+    /// the default profile; `None` unless that was at the last judged sample, since
+    /// the evidence belongs to no later one.
     #[must_use]
     pub fn of(state: &State) -> Option<Self> {
-        let of_axis = |axis: Axis| AxisPoint {
+        let at = state.at.filter(|_| state.at == state.evidence.at)?;
+        let of_axis = |axis: Axis| AxisTracePoint {
             evidence: state.evidence.axes[axis],
             plate_angle_rad: state.plate_angle_rad[axis],
             twin_position_m: state.twin_position_m[axis],
         };
-        let t_s = state.at?.seconds();
-        Some(Self { t_s, x: of_axis(Axis::X), y: of_axis(Axis::Y) })
+        Some(Self { t_s: at.seconds(), x: of_axis(Axis::X), y: of_axis(Axis::Y) })
     }
 
-    /// s on the device's clock.
+    /// Returns the time, s on the device's clock.
     #[must_use]
     pub const fn t_s(&self) -> f64 {
         self.t_s
@@ -83,16 +86,36 @@ impl TraceView {
 }
 
 impl AxisTraceView {
-    fn push(&mut self, point: &AxisPoint) {
+    fn push(&mut self, point: &AxisTracePoint) {
         let evidence = &point.evidence;
-        let short = |number: Option<f64>| number.map(|n| n as f32);
-        self.command_rad.push(short(evidence.command_rad));
+        let single = |number: Option<f64>| number.map(|n| n as f32);
+        self.command_rad.push(single(evidence.command_rad));
         self.plate_angle_rad.push(point.plate_angle_rad as f32);
-        self.position_m.push(short(evidence.position_m));
+        self.position_m.push(single(evidence.position_m));
         self.twin_position_m.push(point.twin_position_m as f32);
-        self.measured_m_s2.push(short(evidence.measured_m_s2));
-        self.twin_m_s2.push(short(evidence.twin_m_s2));
+        self.measured_m_s2.push(single(evidence.measured_m_s2));
+        self.twin_m_s2.push(single(evidence.twin_m_s2));
         self.limit_m_s2.push(evidence.limit_m_s2 as f32);
         self.enabled.push(evidence.enabled);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use offbd_core::diagnosis::Evidence;
+    use offbd_core::vocabulary::SimTime;
+
+    #[test]
+    fn evidence_is_paired_with_its_own_moment_only() {
+        let state = |at_s: f64, evidence_s: Option<f64>| State {
+            at: SimTime::new(at_s),
+            evidence: Evidence { at: evidence_s.and_then(SimTime::new), ..Evidence::default() },
+            ..State::default()
+        };
+        assert_eq!(TracePoint::of(&state(1.0, Some(1.0))).map(|p| p.t_s()), Some(1.0));
+        assert_eq!(TracePoint::of(&state(1.04, Some(1.0))), None, "40 ms later");
+        assert_eq!(TracePoint::of(&state(1.0, None)), None);
+        assert_eq!(TracePoint::of(&State::default()), None);
     }
 }

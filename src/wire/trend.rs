@@ -1,106 +1,111 @@
-//! How a rig's servos have answered from session to session, and what that
-//! leads to.
+//! Estimates of a rig's servos from session to session, their trends, and warnings.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::words::{AxisWord, CodeWord, CommandWord, ParameterWord};
 use offbd_core::diagnosis::ServoEstimate;
 use offbd_core::diagnosis::trend::{Drift, Parameter, Warning, drift};
 use offbd_core::vocabulary::{Axis, FaultCode, PerAxis};
 
-/// The servos of a rig over its sessions.
+/// Estimates and trends of the servos of a rig over its sessions.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct TrendsView {
     pub asset: String,
-    /// Of the calibration in the asset file; null on a rig not learnt, of which
-    /// there are no trends.
+    /// Id of the calibration in the asset file; null if the rig is not learnt, and then there
+    /// are no trends.
     pub calibration_id: Option<String>,
-    /// What the sessions estimated, oldest first, the last 200.
+    /// Estimates of the last 200 sessions, oldest first.
     pub points: Vec<TrendPointView>,
-    /// Of the sessions that were judged by this calibration: one for each axis
-    /// and parameter of which there are seven estimates.
+    /// Trends over the sessions that were judged with this calibration: one for each axis and
+    /// parameter with at least seven estimates.
     pub trends: Vec<TrendView>,
 }
 
-/// What one session estimated, against its twin.
+/// Estimates of one session, relative to the twin.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct TrendPointView {
     /// The session's name.
     pub session: String,
-    /// Null for a file.
+    /// The service's id of the session; null for a file.
     pub session_id: Option<String>,
-    /// RFC 3339; null for a file.
+    /// Time at which the session was ended, RFC 3339; null for a file.
     pub ended_at: Option<String>,
-    /// Of the calibration that it was judged by.
+    /// Id of the calibration that was used; null if the rig was not learnt.
     pub calibration_id: Option<String>,
-    /// Samples of the session.
+    /// Number of samples of the session.
     pub samples: u64,
-    /// Null where too little motion was seen.
+    /// Estimates of the x servo; null if there was too little motion.
     pub x: Option<ServoEstimateView>,
+    /// Estimates of the y servo; null if there was too little motion.
     pub y: Option<ServoEstimateView>,
 }
 
-/// A servo's parameters over a session against the twin's, with standard errors.
+/// A servo's parameters in a session, relative to the twin, with standard errors.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize, ToSchema)]
 pub struct ServoEstimateView {
-    /// Share of the command that the ball answers; 1 is as calibrated.
+    /// Gain relative to the calibration: 1 means unchanged.
     pub gain: f64,
+    /// Standard error of the gain.
     pub gain_error: f64,
-    /// Acceleration that no command explains, m/s².
+    /// Acceleration that the command does not explain, m/s².
     pub offset_m_s2: f64,
+    /// Standard error of the offset, m/s².
     pub offset_error_m_s2: f64,
-    /// Delay beyond the twin's, s.
+    /// Delay in addition to the twin's, s.
     pub delay_s: f64,
+    /// Standard error of the delay, s.
     pub delay_error_s: f64,
-    /// Motion that it rests on, s.
+    /// Duration of the motion on which the estimates are based, s.
     pub seconds: f64,
 }
 
-/// A straight line through what the sessions estimated of one parameter.
+/// A straight line through the estimates of one parameter over the sessions.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct TrendView {
-    pub axis: String,
-    pub command: String,
-    /// `gain`, `offset` (m/s²) or `delay` (s).
-    pub parameter: String,
-    /// Sessions that it goes through.
+    pub axis: AxisWord,
+    pub command: CommandWord,
+    pub parameter: ParameterWord,
+    /// Number of sessions with an estimate.
     pub sessions: usize,
     /// Change per session.
     pub slope: f64,
-    /// The slope lies between these with a confidence of 99.9 %.
+    /// Lower bound of the slope; it lies between the bounds with a confidence of 99.9 %.
     pub slope_low: f64,
+    /// Upper bound of the slope.
     pub slope_high: f64,
-    /// What the line says of the last session, and its standard error.
+    /// Value of the line at the last session.
     pub level: f64,
+    /// Standard error of the level.
     pub level_error: f64,
-    /// What is usual: the median of the first five of these.
+    /// Usual value: the median of the first five estimates.
     pub nominal: f64,
-    /// Between these it is no fault.
+    /// Lower limit, below which the value is a fault.
     pub limit_low: f64,
+    /// Upper limit, above which the value is a fault.
     pub limit_high: f64,
-    /// Before the fault; null where nothing is to be said.
+    /// Warning of an expected fault; null if there is none.
     pub warning: Option<TrendWarningView>,
 }
 
-/// A fault that is on its way.
+/// A warning that a servo drifts towards a fault.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct TrendWarningView {
-    /// The code of the fault that it leads to.
-    pub code: String,
-    pub axis: String,
-    pub command: String,
-    /// `gain`, `offset` (m/s²) or `delay` (s).
-    pub parameter: String,
-    /// Sessions until the line reaches the limit at the present slope, at most
-    /// 20; null where it is far from what is usual, but has no slope.
+    /// Code of the expected fault.
+    pub code: CodeWord,
+    pub axis: AxisWord,
+    pub command: CommandWord,
+    pub parameter: ParameterWord,
+    /// Number of sessions until the line reaches the limit at the present slope, at most 20;
+    /// null if the value is far from the usual one without a significant slope.
     pub sessions_left: Option<f64>,
-    /// The limit that it goes to.
+    /// The limit that the value approaches.
     pub limit: f64,
-    /// The same in one sentence.
+    /// The warning in one sentence.
     pub summary: String,
 }
 
-/// The view of an estimate.
+/// Returns the view of an estimate.
 #[must_use]
 pub const fn estimate_view(estimate: &ServoEstimate) -> ServoEstimateView {
     ServoEstimateView {
@@ -114,7 +119,7 @@ pub const fn estimate_view(estimate: &ServoEstimate) -> ServoEstimateView {
     }
 }
 
-/// The trends of a servo of each axis over `sessions`, oldest first.
+/// Returns the trends of both servos over `sessions`, oldest first.
 #[must_use]
 pub fn trend_views(sessions: &[PerAxis<Option<ServoEstimate>>]) -> Vec<TrendView> {
     let mut views = Vec::new();
@@ -129,9 +134,9 @@ pub fn trend_views(sessions: &[PerAxis<Option<ServoEstimate>>]) -> Vec<TrendView
 fn trend_view(axis: Axis, drift: &Drift) -> TrendView {
     let (trend, band) = (&drift.trend, &drift.band);
     TrendView {
-        axis: axis.as_str().to_owned(),
-        command: axis.command().to_owned(),
-        parameter: drift.parameter.as_str().to_owned(),
+        axis: axis.into(),
+        command: axis.into(),
+        parameter: drift.parameter.into(),
         sessions: trend.n_sessions,
         slope: trend.slope,
         slope_low: trend.slope_low,
@@ -153,10 +158,10 @@ fn warning_view(axis: Axis, drift: &Drift, warning: Warning) -> TrendWarningView
     };
     let limit = if up { band.high } else { band.low };
     TrendWarningView {
-        code: FaultCode::servo(axis).to_string(),
-        axis: axis.as_str().to_owned(),
-        command: axis.command().to_owned(),
-        parameter: drift.parameter.as_str().to_owned(),
+        code: FaultCode::servo(axis).into(),
+        axis: axis.into(),
+        command: axis.into(),
+        parameter: drift.parameter.into(),
         sessions_left: match warning {
             Warning::Crosses { sessions } => Some(sessions),
             Warning::Drifted { .. } => None,
@@ -166,7 +171,7 @@ fn warning_view(axis: Axis, drift: &Drift, warning: Warning) -> TrendWarningView
     }
 }
 
-/// What is to be said of a drift, in one sentence.
+/// Describes a warning in one sentence.
 fn sentence(axis: Axis, drift: &Drift, warning: Warning, limit: f64) -> String {
     let (trend, parameter) = (&drift.trend, drift.parameter);
     let write = |value: f64| match parameter {

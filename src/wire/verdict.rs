@@ -1,5 +1,5 @@
-//! The lines of a verdict: faults as they change, a summary, and a hash that
-//! is the same for the same recording however it was delivered.
+//! The lines of a verdict: one per transition and a summary, with a hash that depends only
+//! on the recording, not on how it was delivered.
 
 mod outcome;
 mod sentence;
@@ -13,145 +13,156 @@ use sha2::{Digest, Sha256};
 use utoipa::ToSchema;
 
 use super::basis::Basis;
-use offbd_core::diagnosis::{Answer, AxisEvidence, Candidate, Evidence, Suspicion, Transition};
-use offbd_core::engine::{Admission, Misfit, Output};
+use super::words::{AxisWord, CodeWord, CommandWord, KindWord, LineWord, MisfitWord, StatusWord};
+use offbd_core::diagnosis::{
+    AxisEvidence, Candidate, Evidence, ServoAnswer, Suspicion, Transition,
+};
+use offbd_core::engine::{Admission, Misfit};
 use offbd_core::vocabulary::{FaultCode, FaultStatus};
 
-/// A change of a fault's status; or its kind, where that shows only after the
-/// confirmation: the status is then the same as before.
+/// A transition: a change of a fault's status. If the kind of a fault is determined only
+/// after its confirmation, a further line with an unchanged status gives it.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct FaultView {
     /// Always `fault`.
     #[serde(rename = "type")]
-    pub line: String,
+    pub line: LineWord,
     /// The session's name.
     pub session: String,
-    /// The sample at which the status changed, s on the device's clock.
+    /// Time of the sample at which the status changed, s on the device's clock.
     pub t_s: f64,
-    /// `x_servo`, `y_servo`, `stuck_ball` or `sensor`.
-    pub code: String,
-    /// `dead`, `held`, `gain`, …; null where the evidence does not say.
-    pub kind: Option<String>,
-    /// `pending`, `confirmed`, `healed` or `cleared`.
-    pub status: String,
+    pub code: CodeWord,
+    /// Failure mode; null if the evidence does not determine it.
+    pub kind: Option<KindWord>,
+    pub status: StatusWord,
     /// ISO 14229 status byte, two hexadecimal digits.
     pub status_byte: String,
-    /// When the deviation began, as far as the evidence says.
+    /// Estimated time at which the deviation began, s on the device's clock; null if
+    /// unknown.
     pub onset_s: Option<f64>,
-    /// Ball axis of a servo fault.
-    pub axis: Option<String>,
-    /// Plate angle that the servo turns: `qy` for x, `qx` for y.
-    pub command: Option<String>,
-    /// Causes that read alike; empty where only one does.
+    /// Ball axis of a servo fault; null for other codes.
+    pub axis: Option<AxisWord>,
+    /// Plate angle that the servo turns: `qy` for x, `qx` for y; null for other codes.
+    pub command: Option<CommandWord>,
+    /// Causes that would explain the evidence equally; empty if there is only one.
     pub candidates: Vec<CandidateView>,
-    /// Of the calibration that judged; null on a rig not learnt.
+    /// Id of the calibration that was used; null if the rig was not learnt.
     #[serde(default)]
     pub calibration_id: Option<String>,
-    /// Of the profile, the settings and the rig's description that judged.
+    /// Id of the profile, settings and rig description that were used.
     #[serde(default)]
     pub settings_id: String,
-    /// The numbers at that moment, in one sentence and one by one.
+    /// The transition and its evidence in one sentence.
     pub summary: String,
+    /// The quantities at that time.
     pub evidence: EvidenceView,
 }
 
-/// One possible cause.
+/// A possible cause and its weight.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct CandidateView {
-    pub code: String,
-    pub kind: Option<String>,
-    /// In (0, 1]; the weights sum to one.
+    pub code: CodeWord,
+    /// Failure mode; null for a code without kinds.
+    pub kind: Option<KindWord>,
+    /// Weight in (0, 1]; the weights of all candidates sum to one.
     pub weight: f64,
 }
 
-/// The numbers at one moment.
+/// The quantities of the diagnosis at one time.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, ToSchema)]
 pub struct EvidenceView {
+    /// Time of the judged sample, s on the device's clock; null without one.
     pub t_s: Option<f64>,
-    /// Estimation window that was available, s.
+    /// Length of the estimation window that was available, s.
     pub window_s: f64,
     pub x: AxisEvidenceView,
     pub y: AxisEvidenceView,
-    /// Seconds without a ball seen.
+    /// Time for which no ball has been seen, s.
     pub unseen_s: f64,
-    /// Share of the samples of the last seconds without a ball, 0 to 1.
+    /// Fraction of recent samples without a ball, 0 to 1.
     #[serde(default)]
     pub missing_share: f64,
-    /// Seconds of bit-identical readings.
+    /// Time for which the readings have been bit-identical, s.
     pub identical_s: f64,
-    /// Seconds for which the ball has stood still.
+    /// Time for which the ball has stood still, s.
     pub still_s: f64,
-    /// Lone readings set aside in the last ten seconds.
+    /// Number of recent outliers, each fading with a time constant of ten seconds.
     pub outliers: u32,
-    /// Standard deviation of the readings about their fit, m.
+    /// Standard deviation of the readings about their fit, m; null if unknown.
     pub scatter_m: Option<f64>,
-    /// The same of healthy readings, the worse of both axes, m: learnt, or
-    /// assumed on a rig that is not.
+    /// Standard deviation of healthy readings, the larger of both axes, m: learnt, or assumed
+    /// if the rig is not learnt.
     #[serde(default)]
     pub healthy_scatter_m: f64,
-    /// The step of the readings that the sensor is blamed for, if one is.
+    /// The jump of the readings that is attributed to the sensor; null if there is none.
     #[serde(default)]
     pub jump: Option<StepView>,
 }
 
-/// A step of the readings that no ball can make.
+/// A jump of the readings that no ball can make.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize, ToSchema)]
 pub struct StepView {
-    /// The first reading beyond it, s on the device's clock.
+    /// Time of the first reading after the jump, s on the device's clock.
     pub t_s: f64,
-    /// How far the readings went, m.
+    /// Size of the jump, m.
     pub size_m: f64,
 }
 
-/// One axis at one moment.
+/// The quantities of one axis at one time. A quantity that is unknown is null.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, ToSchema)]
 pub struct AxisEvidenceView {
+    /// Command of the plate angle that moves the ball along this axis, rad.
     pub command_rad: Option<f64>,
+    /// Measured position, from the fit over the window, m.
     pub position_m: Option<f64>,
+    /// Measured velocity, from the fit over the window, m/s.
     pub velocity_m_s: Option<f64>,
     /// Measured acceleration over the window, m/s².
     pub measured_m_s2: Option<f64>,
-    /// The twin's through the same filter, m/s².
+    /// The twin's acceleration through the same filter, m/s².
     pub twin_m_s2: Option<f64>,
-    /// Measured − twin, m/s².
+    /// Residual: measured minus the twin's acceleration, m/s².
     pub residual_m_s2: Option<f64>,
+    /// Limit of the residual, m/s².
     pub limit_m_s2: f64,
-    /// Whether the enable condition (the gate) holds.
+    /// Whether the enable condition holds: the residual may be judged.
     pub enabled: bool,
-    /// Evidence for a fault of the servo: logarithm of how much likelier the
-    /// motion is if it is broken, nats.
+    /// Evidence for a fault of the servo: natural logarithm of the likelihood ratio of a
+    /// broken and a healthy servo, nats.
     #[serde(default)]
     pub nats: f64,
-    /// How far the path of the last two seconds bends from the twin's, root mean
-    /// square, m; none where that is not testable.
+    /// Path error: root mean square deviation of the path of the last two seconds from the
+    /// twin's, apart from a parabola with one kink, m; null if it cannot be tested.
     #[serde(default)]
     pub path_error_m: Option<f64>,
-    /// The most that it bends on the healthy rig, m; none where that is not known.
+    /// Largest path error expected of a healthy rig, m; null if unknown.
     #[serde(default)]
     pub path_limit_m: Option<f64>,
-    /// How the servo has answered its command of late; none where the profile
-    /// does not ask.
+    /// Recent parameters of the servo; null if the profile does not estimate them.
     #[serde(default)]
     pub answer: Option<AnswerView>,
-    /// Seconds for which the readings along this axis have been bit-identical.
+    /// Time for which the readings along this axis have been bit-identical, s.
     #[serde(default)]
     pub identical_s: f64,
 }
 
-/// A servo's effective parameters against the twin's, with standard errors.
+/// A servo's recent parameters, relative to the twin, with standard errors.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize, ToSchema)]
 pub struct AnswerView {
-    /// Acceleration that no command explains, m/s².
+    /// Acceleration that the command does not explain, m/s².
     pub offset_m_s2: f64,
+    /// Standard error of the offset, m/s².
     pub offset_error_m_s2: f64,
-    /// Share of the command that the ball answers; 1 is healthy.
+    /// Gain relative to the twin: 1 is healthy.
     pub gain: f64,
+    /// Standard error of the gain.
     pub gain_error: f64,
-    /// Delay beyond the twin's, s.
+    /// Delay in addition to the twin's, s.
     pub delay_s: f64,
+    /// Standard error of the delay, s.
     pub delay_error_s: f64,
-    /// Likelihoods of the kinds of fault that answer like this: dead, held,
-    /// reversed, gain, offset, slow; they sum to one.
+    /// Normalised likelihoods of the kinds dead, held, reversed, gain, offset and slow, in
+    /// this order; they sum to one.
     pub likelihoods: [f64; 6],
 }
 
@@ -160,62 +171,62 @@ pub struct AnswerView {
 pub struct SummaryView {
     /// Always `summary`.
     #[serde(rename = "type")]
-    pub line: String,
+    pub line: LineWord,
+    /// The session's name.
     pub session: String,
-    /// Samples taken, duplicates and rejected ones not counted.
+    /// Number of recorded samples, without duplicates and rejected rows.
     pub samples: u64,
+    /// Number of rejected rows.
     pub rejected: u64,
-    /// From the first to the last sample, s.
+    /// Time from the first to the last sample, s.
     pub duration_s: f64,
     /// Codes confirmed in this session, in the order of confirmation.
-    pub faults: Vec<String>,
-    /// What the session came to; null in a record of before it was said.
+    pub faults: Vec<CodeWord>,
+    /// Result of the session; null if an earlier version stored the summary without it.
     #[serde(default)]
     pub outcome: Option<Outcome>,
-    /// For each monitor how much it judged and what it came to; none in a record
-    /// of before it was said.
+    /// Judged time and result of each monitor; empty if an earlier version stored the summary
+    /// without them.
     #[serde(default)]
     pub monitors: Vec<JudgedView>,
+    /// SHA-256 of the number of judged samples and of all transitions, hexadecimal; equal
+    /// judgements have equal hashes.
     pub verdict_hash: String,
-    /// What in the data and the asset file cannot be of one rig; left out where
-    /// everything fits.
+    /// Contradictions between data and asset file; absent if there are none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<WarningView>,
 }
 
-/// Something in which the data and the asset file do not fit.
+/// A contradiction between the data and the asset file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct WarningView {
-    /// `rate`, `positions`, `commands`, `no_readings`, `no_commands`, `no_axis` or
-    /// `short`: no fault found means nothing then. `commands_held`, `one_axis`,
-    /// `swapped` or `wrong_sign`.
-    pub code: String,
-    /// The same in a sentence, with its numbers.
+    pub code: MisfitWord,
+    /// The contradiction in one sentence, with its numbers.
     pub message: String,
 }
 
-/// The views of what does not fit.
+/// Returns the views of `misfits`.
 #[must_use]
 pub fn warnings(misfits: &[Misfit]) -> Vec<WarningView> {
-    let view = |m: &Misfit| WarningView { code: m.as_str().to_owned(), message: m.to_string() };
+    let view = |m: &Misfit| WarningView { code: m.into(), message: m.to_string() };
     misfits.iter().map(view).collect()
 }
 
-/// The view of the transition of a status byte.
+/// Returns the view of a transition.
 #[must_use]
 pub fn fault_view(session: &str, basis: &Basis, transition: &Transition) -> FaultView {
     let axis = transition.axis();
     FaultView {
-        line: "fault".to_owned(),
+        line: LineWord::Fault,
         session: session.to_owned(),
         t_s: transition.at.seconds(),
-        code: transition.code.to_string(),
-        kind: transition.suspicion.kind.map(|k| k.to_string()),
-        status: transition.status.to_string(),
+        code: transition.code.into(),
+        kind: transition.suspicion.kind.map(KindWord::from),
+        status: transition.status.into(),
         status_byte: transition.byte.to_string(),
         onset_s: transition.suspicion.onset.map(|t| t.seconds()),
-        axis: axis.map(|a| a.as_str().to_owned()),
-        command: axis.map(|a| a.command().to_owned()),
+        axis: axis.map(AxisWord::from),
+        command: axis.map(CommandWord::from),
         candidates: transition.suspicion.candidates.iter().map(candidate_view).collect(),
         calibration_id: basis.calibration_id.clone(),
         settings_id: basis.settings_id.clone(),
@@ -224,17 +235,17 @@ pub fn fault_view(session: &str, basis: &Basis, transition: &Transition) -> Faul
     }
 }
 
-/// The view of a candidate.
+/// Returns the view of a candidate.
 #[must_use]
 pub fn candidate_view(candidate: &Candidate) -> CandidateView {
     CandidateView {
-        code: candidate.code.to_string(),
-        kind: candidate.kind.map(|k| k.to_string()),
+        code: candidate.code.into(),
+        kind: candidate.kind.map(KindWord::from),
         weight: candidate.weight,
     }
 }
 
-/// The view of the numbers at one moment.
+/// Returns the view of the evidence.
 #[must_use]
 pub fn evidence_view(evidence: &Evidence) -> EvidenceView {
     EvidenceView {
@@ -271,7 +282,7 @@ fn axis_evidence_view(axis: &AxisEvidence) -> AxisEvidenceView {
     }
 }
 
-const fn answer_view(answer: &Answer) -> AnswerView {
+const fn answer_view(answer: &ServoAnswer) -> AnswerView {
     AnswerView {
         offset_m_s2: answer.offset_m_s2,
         offset_error_m_s2: answer.offset_error_m_s2,
@@ -283,44 +294,43 @@ const fn answer_view(answer: &Answer) -> AnswerView {
     }
 }
 
-/// A verdict as it grows: which codes were confirmed, and the hash.
+/// Accumulates a verdict: the confirmed codes, and the hash.
 ///
-/// The hash covers how many samples were judged and every transition that they
-/// caused (time, code, kind, status, byte, onset), so it tells two verdicts
-/// apart where anything that matters differs.
+/// The hash covers the number of judged samples and every transition (time, code, kind,
+/// status, byte, onset), so it differs if anything that matters differs.
 #[derive(Clone, Debug, Default)]
 pub struct Verdict {
-    hash: Sha256,
+    hasher: Sha256,
     n_accepted: u64,
     confirmed: Vec<FaultCode>,
-    /// What was suspected when each test failed last in this session.
+    /// The suspicion of each code when its test last failed in this session.
     suspected: [Option<Suspicion>; FaultCode::COUNT],
 }
 
 impl Verdict {
-    /// Takes note of one output of the engine.
-    pub fn take(&mut self, output: &Output) {
-        let transition = match output {
-            Output::Admitted(Admission::Accepted) => {
-                self.n_accepted += 1;
-                return;
-            }
-            Output::Admitted(_) => return,
-            Output::Transition(transition) => transition,
-        };
+    /// Adds the decision on an input and the transitions that it caused.
+    pub fn take(&mut self, admission: Option<Admission>, transitions: &[Transition]) {
+        self.n_accepted += u64::from(admission == Some(Admission::Accepted));
+        for transition in transitions {
+            self.add_to_hash(transition);
+            self.note(transition);
+        }
+    }
+
+    fn add_to_hash(&mut self, transition: &Transition) {
         let time = |t: f64| t.to_bits().to_le_bytes();
-        self.hash.update(time(transition.at.seconds()));
-        self.hash.update([
+        self.hasher.update(time(transition.at.seconds()));
+        self.hasher.update([
             transition.code as u8,
             transition.suspicion.kind.map_or(u8::MAX, |k| k as u8),
             transition.status as u8,
             transition.byte.bits(),
         ]);
-        self.hash.update(transition.suspicion.onset.map_or([0xff; 8], |t| time(t.seconds())));
-        self.note(transition);
+        self.hasher.update(transition.suspicion.onset.map_or([0xff; 8], |t| time(t.seconds())));
     }
 
-    /// A test that passes again says how a fault stands, not that there is one.
+    /// Records what the session has found. A transition of a test that passes again reports
+    /// the state of a fault, not a new one.
     fn note(&mut self, transition: &Transition) {
         let Transition { code, status, byte, suspicion, .. } = transition;
         if byte.test_failed() {
@@ -333,20 +343,20 @@ impl Verdict {
         }
     }
 
-    /// Codes confirmed so far, in the order of confirmation.
+    /// Returns the codes confirmed so far, in the order of confirmation.
     #[must_use]
     pub fn confirmed(&self) -> &[FaultCode] {
         &self.confirmed
     }
 
-    /// Lower-case hexadecimal SHA-256 of the verdict so far.
+    /// Returns the hash of the verdict so far: SHA-256, lower-case hexadecimal.
     #[must_use]
     pub fn hash(&self) -> String {
-        let hash = self.hash.clone().chain_update(self.n_accepted.to_le_bytes());
+        let hash = self.hasher.clone().chain_update(self.n_accepted.to_le_bytes());
         HEXLOWER.encode(&hash.finalize())
     }
 
-    /// The summary line of a session.
+    /// Returns the summary line of a session, without the monitors' results and warnings.
     #[must_use]
     pub fn summary(
         &self,
@@ -356,12 +366,12 @@ impl Verdict {
         duration_s: f64,
     ) -> SummaryView {
         SummaryView {
-            line: "summary".to_owned(),
+            line: LineWord::Summary,
             session: session.to_owned(),
             samples,
             rejected,
             duration_s,
-            faults: self.confirmed.iter().map(ToString::to_string).collect(),
+            faults: self.confirmed.iter().map(|&code| code.into()).collect(),
             outcome: None,
             monitors: Vec::new(),
             verdict_hash: self.hash(),

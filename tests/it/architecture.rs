@@ -1,9 +1,9 @@
-//! The rules of the house that the compiler does not keep: which part of the
-//! service knows which, and documents that name only what is there.
-//! `ARCHITECTURE.md` says why.
+//! Rules of `ARCHITECTURE.md` that the compiler does not check: which names each folder must
+//! not use, and that documents name only existing paths.
 
 mod documents;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
@@ -11,8 +11,8 @@ const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 /// Documents whose paths must exist.
 const DOCUMENTS: [&str; 3] = ["ARCHITECTURE.md", "README.md", "CONTRIBUTING.md"];
 
-/// What may not be named in a folder: the parts of the service above it, and
-/// what is another part's trade.
+/// Names that must not occur in a folder: modules of the layers above it, and libraries that
+/// only other modules use.
 const FORBIDDEN: [(&str, &[&str]); 7] = [
     ("src/wire", &["crate::store", "crate::service", "crate::http", "axum::", "sqlx::", "tokio::"]),
     ("src/store", &["crate::wire", "crate::service", "crate::http", "axum::", "StatusCode"]),
@@ -42,36 +42,84 @@ const FORBIDDEN: [(&str, &[&str]); 7] = [
 ];
 
 #[test]
-fn no_part_names_what_it_must_not_know() {
+fn no_folder_uses_a_name_that_is_forbidden_there() {
     let mut found = Vec::new();
-    for (folder, words) in FORBIDDEN {
+    for (folder, names) in FORBIDDEN {
         for file in files(folder) {
             let text = std::fs::read_to_string(Path::new(ROOT).join(&file)).unwrap();
-            for (number, word) in named(&text, words) {
-                found.push(format!("{file}:{number}: `{word}` in {folder}"));
+            for (number, name) in occurrences(&text, names) {
+                found.push(format!("{file}:{number}: {folder} must not use `{name}`"));
             }
         }
     }
     assert!(found.is_empty(), "\n{}\n", found.join("\n"));
 }
 
-/// Lines of `text`, comments aside, with a word of `words`.
-fn named<'a>(text: &'a str, words: &'a [&str]) -> impl Iterator<Item = (usize, &'a str)> {
+/// Returns the lines of `text` with one of `names`, without comments.
+fn occurrences<'a>(text: &'a str, names: &'a [&str]) -> impl Iterator<Item = (usize, &'a str)> {
     let code = |line: &&str| !line.trim_start().starts_with("//");
     let lines = text.lines().enumerate().filter(move |(_, line)| code(line));
     lines.flat_map(move |(i, line)| {
-        words.iter().filter(move |word| line.contains(*word)).map(move |word| (i + 1, *word))
+        names.iter().filter(move |name| line.contains(*name)).map(move |name| (i + 1, *name))
     })
 }
 
 #[test]
-fn a_word_is_found_in_code_and_not_in_comments() {
+fn a_name_is_found_in_code_but_not_in_comments() {
     let text = "// axum::Router\nuse axum::Router;\n    /// `axum::Router`\n";
-    assert_eq!(named(text, &["axum::"]).collect::<Vec<_>>(), [(2, "axum::")]);
+    assert_eq!(occurrences(text, &["axum::"]).collect::<Vec<_>>(), [(2, "axum::")]);
+}
+
+/// Source folders of the crates, and names that may occur twice in them: `Traces` is one
+/// type with, and another without, the feature `otel`.
+const CRATES: [(&str, &[&str]); 3] =
+    [("src", &["Traces"]), ("crates/offbd-core/src", &[]), ("crates/offbd-lab/src", &[])];
+
+#[test]
+fn no_type_name_occurs_twice_in_a_crate() {
+    let mut found = Vec::new();
+    for (folder, exceptions) in CRATES {
+        let mut defined = BTreeMap::<String, Vec<String>>::new();
+        for file in files(folder) {
+            let text = std::fs::read_to_string(Path::new(ROOT).join(&file)).unwrap();
+            for name in text.lines().filter_map(type_name) {
+                defined.entry(name.to_owned()).or_default().push(file.clone());
+            }
+        }
+        defined.retain(|name, files| files.len() > 1 && !exceptions.contains(&name.as_str()));
+        found.extend(defined.iter().map(|(name, files)| format!("{name}: {}", files.join(", "))));
+    }
+    assert!(found.is_empty(), "\n{}\n", found.join("\n"));
+}
+
+/// Returns the type that a line defines at the top level of a file.
+fn type_name(line: &str) -> Option<&str> {
+    const KEYWORDS: [&str; 4] = ["struct", "enum", "trait", "type"];
+    let definition = match line.strip_prefix("pub(") {
+        Some(restricted) => restricted.split_once(") ")?.1,
+        None => line.strip_prefix("pub ").unwrap_or(line),
+    };
+    let (keyword, rest) = definition.split_once(' ')?;
+    let end = rest.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(rest.len());
+    KEYWORDS.contains(&keyword).then_some(&rest[..end])
 }
 
 #[test]
-fn documents_name_only_what_is_there() {
+fn a_type_is_known_by_its_definition() {
+    for line in
+        ["pub struct Name {", "pub(in a::b) enum Name<T> {", "type Name = u8;", "trait Name: A {"]
+    {
+        assert_eq!(type_name(line), Some("Name"), "{line}");
+    }
+    for line in
+        ["    type Name = u8;", "// struct Name", "pub fn name(type_name: u8) {", "use a::Name;"]
+    {
+        assert_eq!(type_name(line), None, "{line}");
+    }
+}
+
+#[test]
+fn every_path_named_in_a_document_exists() {
     let exists = |path: &str| {
         let root = Path::new(ROOT);
         root.join(path).exists() || root.join("src").join(path).exists()
@@ -87,7 +135,7 @@ fn documents_name_only_what_is_there() {
     assert!(missing.is_empty(), "\n{}\n", missing.join("\n"));
 }
 
-/// Source files below `folder`, relative to the root.
+/// Returns the Rust source files below `folder`, relative to the root.
 fn files(folder: &str) -> Vec<String> {
     let (mut found, mut todo) = (Vec::new(), vec![PathBuf::from(folder)]);
     while let Some(directory) = todo.pop() {

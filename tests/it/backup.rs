@@ -1,9 +1,9 @@
-//! A copy made under load is whole, and a service goes on from it.
+//! A backup made under load is complete, and a service can continue from it.
 
 use std::path::Path;
 use std::process::{Command, Output};
 
-use crate::support::device::{Line, device};
+use crate::support::device::{ServiceLink, device};
 use crate::support::process::Process;
 use crate::support::{judged, rig};
 use serde_json::Value;
@@ -18,32 +18,32 @@ fn text(bytes: &[u8]) -> String {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn copied_under_load_and_restored() {
+async fn a_backup_made_under_load_can_be_restored() {
     let data = tempfile::tempdir().unwrap();
     let process = Process::start(data.path());
-    let line = Line::to(&process.client);
+    let link = ServiceLink::to(&process.client);
     let devices: Vec<_> =
-        ["d", "e"].iter().map(|name| device(&line, name, true, data.path(), None)).collect();
+        ["d", "e"].iter().map(|name| device(&link, name, true, data.path(), None)).collect();
     for n in 0..4 {
-        line.progress(700).await;
-        let n_acknowledged = line.acknowledged();
+        link.wait_for_samples(700).await;
+        let n_acknowledged = link.acknowledged();
         let elsewhere = tempfile::tempdir().unwrap();
         let copy = data.path().join(format!("copy-{n}"));
         let made = offbd("backup", data.path(), &[&copy]);
         assert!(made.status.success(), "{}", text(&made.stderr));
         let restored = offbd("restore", elsewhere.path(), &[&copy]);
         assert!(restored.status.success(), "{}", text(&restored.stderr));
-        goes_on(elsewhere.path(), n_acknowledged).await;
+        check_restored(elsewhere.path(), n_acknowledged).await;
     }
-    line.hang_up();
+    link.stop_devices();
     for device in devices {
         device.await.unwrap();
     }
 }
 
-/// That everything acknowledged is in the restored store below `data`, and that
-/// the open sessions go on as if nothing had been.
-async fn goes_on(data: &Path, n_acknowledged: u64) {
+/// Checks that the store restored to `data` has every acknowledged sample, and that its open
+/// sessions can be continued.
+async fn check_restored(data: &Path, n_acknowledged: u64) {
     let samples = rig(1500, 500);
     let restored = Process::start(data);
     let client = &restored.client;
@@ -67,7 +67,8 @@ async fn goes_on(data: &Path, n_acknowledged: u64) {
     }
 }
 
-/// Bytes of the database file that nobody reads who only opens it.
+/// Returns the range of bytes of an index in the database file, which is not read when the
+/// database is opened.
 async fn page_of_an_index(file: &Path) -> std::ops::Range<usize> {
     let mut store = crate::support::connection(&format!("sqlite://{}", file.display())).await;
     let (root, size): (i64, i64) = sqlx::query_as(
@@ -82,7 +83,7 @@ async fn page_of_an_index(file: &Path) -> std::ops::Range<usize> {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn what_cannot_be_restored_changes_nothing() {
+async fn a_failed_restore_changes_nothing() {
     let data = tempfile::tempdir().unwrap();
     let copy = data.path().join("copy");
     let samples = rig(300, 300);
@@ -92,12 +93,12 @@ async fn what_cannot_be_restored_changes_nothing() {
         process.client.telemetry("a", Some("s"), &samples).await;
         assert!(offbd("backup", data.path(), &[&copy]).status.success());
         let again = offbd("backup", data.path(), &[&copy]);
-        assert!(text(&again.stderr).contains("is there already"), "{again:?}");
+        assert!(text(&again.stderr).contains("already exists"), "{again:?}");
         let used = offbd("restore", data.path(), &[&copy, Path::new("--replace")]);
         assert!(text(&used.stderr).contains("another process uses"), "{used:?}");
     }
     let there = offbd("restore", data.path(), &[&copy]);
-    assert!(text(&there.stderr).contains("is there already"), "{there:?}");
+    assert!(text(&there.stderr).contains("already exists"), "{there:?}");
     let whole = std::fs::read(&copy).unwrap();
     let mut damaged = whole.clone();
     let page = page_of_an_index(&copy).await;
@@ -122,7 +123,7 @@ async fn what_cannot_be_restored_changes_nothing() {
 }
 
 #[test]
-fn a_server_has_tools_of_its_own() {
+fn backup_of_a_postgresql_database_refers_to_pg_dump() {
     let data = tempfile::tempdir().unwrap();
     let copy = data.path().join("copy");
     let asked = offbd("backup", data.path(), &[&copy, Path::new("--database=postgres://h/d")]);

@@ -1,29 +1,29 @@
-//! Whatever comes in: a problem that names the element, the rest of the batch
-//! kept, the process alive.
+//! Invalid input: the response names the element, valid rows of a batch are kept, and the
+//! service continues.
 
-use crate::support::{Bench, Client, csv, rig};
+use crate::support::{Client, ServiceFixture, csv, rig};
 use reqwest::Method;
 use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 
 const TELEMETRY: &str = "assets/a/telemetry";
 
-async fn bench() -> Bench {
-    let bench = Bench::start().await;
-    bench.client.asset("a").await;
-    bench
+async fn service() -> ServiceFixture {
+    let fixture = ServiceFixture::start().await;
+    fixture.client.asset("a").await;
+    fixture
 }
 
-/// The process lives: it takes a sample.
-async fn alive(client: &Client) {
+/// Checks that the service still accepts a sample.
+async fn check_alive(client: &Client) {
     let ack = client.telemetry("a", Some("alive"), &rig(1, 1)).await;
     assert_eq!(ack["accepted"].as_u64().unwrap() + ack["duplicate"].as_u64().unwrap(), 1);
 }
 
 #[tokio::test]
-async fn unknown_things_are_named() {
-    let bench = bench().await;
-    let client = &bench.client;
+async fn an_unknown_resource_gets_404_with_its_name() {
+    let fixture = service().await;
+    let client = &fixture.client;
     for path in
         ["assets/nobody/state", "assets/nobody", "assets/nobody/faults", "events?asset=nobody"]
     {
@@ -41,13 +41,13 @@ async fn unknown_things_are_named() {
     let answer = client.send(client.request(Method::PATCH, "assets")).await;
     answer.problem(405);
     assert!(answer.headers.contains_key("allow"), "{:?}", answer.headers);
-    alive(client).await;
+    check_alive(client).await;
 }
 
 #[tokio::test]
-async fn asset_files_that_cannot_be() {
-    let bench = bench().await;
-    let client = &bench.client;
+async fn an_invalid_asset_file_is_rejected_with_its_pointer() {
+    let fixture = service().await;
+    let client = &fixture.client;
     for (file, status, pointer) in [
         (json!({"name":"b","ball":{"radius_m":-0.01}}), 422, "/ball/radius_m"),
         (json!({"name":"b","ball":{"radius_m":"big"}}), 422, "/ball/radius_m"),
@@ -69,13 +69,13 @@ async fn asset_files_that_cannot_be() {
     client.put("assets/c", &json!({"name":"a"})).await.problem(422);
     let long = format!("{{\"name\":\"{}\"}}", "x".repeat(70_000));
     client.post_text("assets", "application/json", long).await.problem(413);
-    alive(client).await;
+    check_alive(client).await;
 }
 
 #[tokio::test]
-async fn documents_that_are_no_batch() {
-    let bench = bench().await;
-    let client = &bench.client;
+async fn a_document_that_is_not_a_batch_is_rejected_with_a_pointer() {
+    let fixture = service().await;
+    let client = &fixture.client;
     for (kind, body, status, pointer) in [
         ("application/json", "{\"samples\":[{\"t_s\":0}", 400, json!("/samples")),
         ("application/json", "", 400, json!("")),
@@ -111,13 +111,13 @@ async fn documents_that_are_no_batch() {
     let named = r#"{"session":"b","samples":[]}"#;
     let answer = client.post_text("assets/a/telemetry?session=c", "application/json", named).await;
     assert_eq!(answer.problem(422)["pointer"], "/session");
-    alive(client).await;
+    check_alive(client).await;
 }
 
 #[tokio::test]
-async fn rows_that_are_no_samples_spoil_themselves_alone() {
-    let bench = bench().await;
-    let client = &bench.client;
+async fn an_invalid_row_is_rejected_and_the_rest_of_the_batch_accepted() {
+    let fixture = service().await;
+    let client = &fixture.client;
     let body = r#"{"session":"odd","samples":[{"t_s":0,"x_m":0},{"t_s":"1"},{"t_s":null},{},7,
         {"t_s":NaN},{"t_s":1,"x_m":-Infinity},{"t_s":2,"x_m":1e300},{"t_s":1e300},{"t_s":1e999},
         {"t_s":3,"seq":-4},{"t_s":0.01,"x_m":0}]}"#;
@@ -143,9 +143,9 @@ async fn rows_that_are_no_samples_spoil_themselves_alone() {
 }
 
 #[tokio::test]
-async fn clocks_that_go_wrong() {
-    let bench = bench().await;
-    let client = &bench.client;
+async fn samples_with_an_implausible_time_are_recorded_but_not_judged() {
+    let fixture = service().await;
+    let client = &fixture.client;
     let good = rig(300, 300);
     client.telemetry("a", Some("clock"), &good[..200]).await;
     let mut back = good[200];
@@ -160,13 +160,13 @@ async fn clocks_that_go_wrong() {
 }
 
 #[tokio::test]
-async fn empty_and_huge_batches() {
-    let bench = Bench::start_with(|config| {
+async fn an_empty_batch_is_accepted_and_a_huge_one_gets_413() {
+    let fixture = ServiceFixture::start_with(|config| {
         config.limits.batch_samples = 50;
         config.limits.batch_bytes = 20_000;
     })
     .await;
-    let client = &bench.client;
+    let client = &fixture.client;
     client.asset("a").await;
     let ack = client.post(TELEMETRY, &json!({"samples":[]})).await.expect(200);
     assert_eq!((&ack["accepted"], &ack["session"]), (&json!(0), &Value::Null));
@@ -176,14 +176,14 @@ async fn empty_and_huge_batches() {
     client.post_text(TELEMETRY, "application/json", " ".repeat(20_001)).await.problem(413);
     client.post_text(TELEMETRY, "text/csv", csv(&rig(51, 51))).await.problem(413);
     assert_eq!(client.get("sessions").await.expect(200)["items"], json!([]));
-    alive(client).await;
+    check_alive(client).await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_body_that_never_ends() {
-    let bench = Bench::start_with(|config| config.limits.body_timeout_s = 1).await;
-    bench.client.asset("a").await;
-    let mut socket = tokio::net::TcpStream::connect(&bench.client.address).await.unwrap();
+async fn an_incomplete_request_body_gets_408() {
+    let fixture = ServiceFixture::start_with(|config| config.limits.body_timeout_s = 1).await;
+    fixture.client.asset("a").await;
+    let mut socket = tokio::net::TcpStream::connect(&fixture.client.address).await.unwrap();
     let head = "POST /api/v1/assets/a/telemetry HTTP/1.1\r\nHost: localhost\r\n\
         Content-Type: application/json\r\nContent-Length: 1000\r\n\r\n{\"samples\":[";
     socket.write_all(head.as_bytes()).await.unwrap();
@@ -192,13 +192,13 @@ async fn a_body_that_never_ends() {
     let n = read.unwrap().unwrap();
     let answer = String::from_utf8_lossy(&answer[..n]).into_owned();
     assert!(answer.starts_with("HTTP/1.1 408"), "{answer}");
-    alive(&bench.client).await;
+    check_alive(&fixture.client).await;
 }
 
 #[tokio::test]
-async fn recordings_that_are_none() {
-    let bench = bench().await;
-    let client = &bench.client;
+async fn an_import_reports_invalid_rows_and_rejects_other_files() {
+    let fixture = service().await;
+    let client = &fixture.client;
     let path = "assets/a/sessions/import?name=broken";
     let text = format!("{}9.99,broken\n", csv(&rig(100, 100)));
     let imported = client.post_text(path, "text/csv", text).await.expect(201);
@@ -211,13 +211,13 @@ async fn recordings_that_are_none() {
     client.post_text(path, "application/json", "{}").await.problem(415);
     let path = "assets/nobody/sessions/import";
     client.post_text(path, "text/csv", csv(&rig(10, 10))).await.problem(404);
-    alive(client).await;
+    check_alive(client).await;
 }
 
 #[tokio::test]
-async fn questions_that_cannot_be() {
-    let bench = bench().await;
-    let client = &bench.client;
+async fn invalid_parameters_and_request_bodies_are_named() {
+    let fixture = service().await;
+    let client = &fixture.client;
     for (path, parameter) in [
         ("faults?status=odd", "status"),
         ("faults?sort=odd", "sort"),
@@ -249,13 +249,13 @@ async fn questions_that_cannot_be() {
     assert_eq!(wrong["pointer"], "/sessions/0");
     client.post("assets/a/calibrations", &json!({})).await.problem(422);
     client.post("assets/a/faults/sensor/acknowledge", &Value::Null).await.problem(409);
-    alive(client).await;
+    check_alive(client).await;
 }
 
 #[tokio::test]
-async fn a_name_that_was_used_takes_nothing_new() {
-    let bench = bench().await;
-    let client = &bench.client;
+async fn an_ended_session_accepts_no_new_samples() {
+    let fixture = service().await;
+    let client = &fixture.client;
     let samples = rig(300, 300);
     client.telemetry("a", Some("one"), &samples[..200]).await;
     client.telemetry("a", Some("two"), &samples[..10]).await;

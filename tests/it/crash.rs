@@ -1,43 +1,43 @@
-//! `kill -9` in the middle of a stream: every acknowledged sample is there once,
-//! the faults too, and the verdict is that of an uninterrupted run.
+//! `kill -9` during operation: every acknowledged sample and every fault is stored once, and
+//! the verdict equals that of an uninterrupted run.
 
 use std::path::Path;
 use std::process::Command;
 
-use crate::support::device::{Line, Random, device};
+use crate::support::device::{Random, ServiceLink, device};
 use crate::support::process::Process;
 use crate::support::{judged, rig};
 use serde_json::json;
 
-/// How often the process is killed; KILLS says otherwise.
+/// Number of kills, unless the environment variable KILLS is set.
 const KILLS: usize = 10;
 
-/// What the journal may hold, one after the other: nothing, so that every commit
-/// is followed by a folding; a few batches; all there is.
+/// Size limits of the journal, used in turn: every commit is folded; a few batches fit;
+/// everything fits.
 const JOURNAL_BYTES: [&str; 3] = ["1", "20000", "16777216"];
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn killed_many_times_under_load() {
+async fn killed_many_times_under_load_the_service_loses_no_acknowledged_sample() {
     let n_kills = std::env::var("KILLS").map_or(KILLS, |n| n.parse().unwrap());
     let data = tempfile::tempdir().unwrap();
     let start = |bytes: &str| {
         Process::start_with(data.path(), &[("OFFBD_LIMITS__JOURNAL_BYTES", Path::new(bytes))])
     };
     let mut process = start(JOURNAL_BYTES[0]);
-    let line = Line::to(&process.client);
-    let devices = [("counts", true), ("does-not", false), ("counts-too", true)]
-        .map(|(name, counts)| device(&line, name, counts, data.path(), None));
+    let link = ServiceLink::to(&process.client);
+    let devices = [("numbered", true), ("unnumbered", false), ("numbered-too", true)]
+        .map(|(name, numbers)| device(&link, name, numbers, data.path(), None));
     let mut random = Random(1);
     for kill in 0..n_kills {
-        line.progress(random.below(600) as u64).await;
+        link.wait_for_samples(random.below(600) as u64).await;
         drop(process);
         if kill % 5 == 4 {
-            Process::stillborn(data.path(), random.below(60_000) as u64);
+            Process::start_and_kill(data.path(), random.below(60_000) as u64);
         }
         process = start(JOURNAL_BYTES[kill % JOURNAL_BYTES.len()]);
-        line.moves(&process.client);
+        link.set_service(&process.client);
     }
-    line.hang_up();
+    link.stop_devices();
     let mut laps = 0;
     for device in devices {
         laps += device.await.unwrap();
@@ -45,12 +45,12 @@ async fn killed_many_times_under_load() {
     println!(
         "{n_kills} kills under load, {} at start; {laps} recordings, {} samples: each stored once",
         n_kills / 5,
-        line.acknowledged()
+        link.acknowledged()
     );
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn killed_in_the_middle_and_started_again() {
+async fn a_killed_service_continues_open_sessions_without_loss() {
     let data = tempfile::tempdir().unwrap();
     let samples = rig(4000, 1200);
     let (hash, faults) = judged("a", &samples);
@@ -63,7 +63,7 @@ async fn killed_in_the_middle_and_started_again() {
         if i == 20 || i == 45 || i == 70 {
             let known = process.client.get("assets/a/faults?status=all").await.expect(200);
             let state = process.client.get("assets/a/state").await.expect(200);
-            // A batch whose acknowledgement nobody reads: it may be lost, or not.
+            // A batch whose acknowledgement is not read: it may be lost or not.
             let (client, unread) = (
                 process.client.clone(),
                 crate::support::batch(Some("s"), &samples[(i + 1) * 40..][..40]),
@@ -96,7 +96,7 @@ async fn killed_in_the_middle_and_started_again() {
 
 #[cfg(unix)]
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn asked_to_stop_it_stops_well() {
+async fn sigterm_stops_the_service_without_loss() {
     let data = tempfile::tempdir().unwrap();
     let mut process = Process::start(data.path());
     process.client.asset("a").await;

@@ -1,7 +1,7 @@
-//! The fault memory through the interface: all of it is there, across sessions
-//! and restarts, and each change is told.
+//! The fault memory over the API: it is complete across sessions and restarts, and every
+//! change is an event.
 
-use crate::support::{Bench, Client, Events, connection, rig, url};
+use crate::support::{Client, Events, ServiceFixture, connection, rig, url};
 use offbd_core::vocabulary::Sample;
 use serde_json::{Value, json};
 
@@ -9,20 +9,20 @@ async fn fault(client: &Client, asset: &str, code: &str) -> Value {
     client.get(&format!("assets/{asset}/faults/{code}")).await.expect(200)
 }
 
-/// Keys that say the same whatever the moment: all but the wall clock's.
-fn lasting(fault: &Value) -> Value {
+/// Returns the fault without the key that depends on the wall clock.
+fn without_changed_at(fault: &Value) -> Value {
     let mut fault = fault.clone();
     fault.as_object_mut().unwrap().remove("changed_at");
     fault
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_fault_says_all_that_is_known_of_it_and_a_restart_forgets_nothing() {
-    let mut bench = Bench::start().await;
-    bench.client.asset("a").await;
-    bench.client.telemetry("a", Some("s"), &rig(2000, 300)).await;
-    let session = bench.client.session("a", "s").await;
-    let x = fault(&bench.client, "a", "x_servo").await;
+async fn a_fault_record_is_complete_and_unchanged_after_a_restart() {
+    let mut fixture = ServiceFixture::start().await;
+    fixture.client.asset("a").await;
+    fixture.client.telemetry("a", Some("s"), &rig(2000, 300)).await;
+    let session = fixture.client.session("a", "s").await;
+    let x = fault(&fixture.client, "a", "x_servo").await;
     assert_eq!(x["status_byte"], "2F");
     let bits = &x["status_bits"];
     for (bit, set) in [
@@ -45,25 +45,25 @@ async fn a_fault_says_all_that_is_known_of_it_and_a_restart_forgets_nothing() {
     assert_eq!((&x["monitor"]["counter"], &x["monitor"]["code"]), (&json!(127), &json!("x_servo")));
     assert_eq!(x["monitor"]["complete_this_cycle"], true);
     let path = "assets/a/faults/x_servo/acknowledge?by=";
-    bench.client.post(&format!("{path}ann"), &Value::Null).await.expect(200);
-    let again = bench.client.post(&format!("{path}bob"), &Value::Null).await.expect(200);
-    assert_eq!(again["acknowledgement"]["by"], "ann", "who came second has nothing to say");
-    let before = fault(&bench.client, "a", "x_servo").await;
-    bench.restart().await;
-    assert_eq!(fault(&bench.client, "a", "x_servo").await, before);
+    fixture.client.post(&format!("{path}ann"), &Value::Null).await.expect(200);
+    let again = fixture.client.post(&format!("{path}bob"), &Value::Null).await.expect(200);
+    assert_eq!(again["acknowledgement"]["by"], "ann", "only the first acknowledgement counts");
+    let before = fault(&fixture.client, "a", "x_servo").await;
+    fixture.restart().await;
+    assert_eq!(fault(&fixture.client, "a", "x_servo").await, before);
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn sessions_are_operation_cycles_and_the_in_use_ratio_outlives_clearing() {
-    let mut bench = Bench::start().await;
-    bench.client.asset("a").await;
-    // A minute of a ball that moves, a moment of one, shorter than the 0.4 s that any
-    // fault takes to be confirmed, and a minute without one.
+async fn in_use_counts_are_updated_per_session_and_survive_clearing() {
+    let mut fixture = ServiceFixture::start().await;
+    fixture.client.asset("a").await;
+    // A minute with a moving ball; 0.3 s, which is shorter than the 0.4 s that the
+    // confirmation of any fault takes; and a minute without a ball.
     let unseen: Vec<Sample> =
         rig(6000, 6000).iter().map(|s| Sample { x_m: None, y_m: None, ..*s }).collect();
     for (name, samples) in [("one", &rig(6000, 6000)), ("two", &rig(30, 30)), ("three", &unseen)] {
-        bench.client.telemetry("a", Some(name), samples).await;
-        bench.client.end("a", name).await;
+        fixture.client.telemetry("a", Some(name), samples).await;
+        fixture.client.end("a", name).await;
     }
     let ratio = |fault: &Value| {
         let in_use = &fault["in_use"];
@@ -71,22 +71,22 @@ async fn sessions_are_operation_cycles_and_the_in_use_ratio_outlives_clearing() 
         let counts = ["operation_cycles", "cycles_with_data", "cycles_judged"].map(count);
         (counts, in_use["ratio"].as_f64())
     };
-    let x = fault(&bench.client, "a", "x_servo").await;
+    let x = fault(&fixture.client, "a", "x_servo").await;
     assert_eq!(ratio(&x), ([3, 1, 1], Some(1.0)));
     assert_eq!(x["monitor"], Value::Null, "no session is open");
-    let sensor = fault(&bench.client, "a", "sensor").await;
-    assert_eq!(ratio(&sensor), ([3, 2, 2], Some(1.0)), "it needs no ball");
-    bench.client.delete("assets/a/faults/x_servo?by=ann").await.expect(204);
-    bench.restart().await;
-    let x = fault(&bench.client, "a", "x_servo").await;
+    let sensor = fault(&fixture.client, "a", "sensor").await;
+    assert_eq!(ratio(&sensor), ([3, 2, 2], Some(1.0)), "the sensor needs no ball");
+    fixture.client.delete("assets/a/faults/x_servo?by=ann").await.expect(204);
+    fixture.restart().await;
+    let x = fault(&fixture.client, "a", "x_servo").await;
     assert_eq!(ratio(&x), ([3, 1, 1], Some(1.0)));
     assert_eq!((&x["status_byte"], &x["cleared"]["by"]), (&json!("50"), &json!("ann")));
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_second_session_is_a_second_occurrence_and_counts_towards_nothing_good() {
-    let bench = Bench::start().await;
-    let client = &bench.client;
+async fn a_failure_in_a_later_session_is_a_new_occurrence_and_resets_healing() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
     client.asset("a").await;
     client.telemetry("a", Some("sick"), &rig(2000, 300)).await;
     client.end("a", "sick").await;
@@ -108,38 +108,38 @@ async fn a_second_session_is_a_second_occurrence_and_counts_towards_nothing_good
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_code_cleared_while_no_session_is_open_is_an_event() {
-    let mut bench = Bench::start().await;
-    bench.client.asset("a").await;
-    bench.client.telemetry("a", Some("s"), &rig(2000, 300)).await;
-    bench.client.end("a", "s").await;
-    let stream = bench.client.request(reqwest::Method::GET, "events?asset=a").send().await;
+    let mut fixture = ServiceFixture::start().await;
+    fixture.client.asset("a").await;
+    fixture.client.telemetry("a", Some("s"), &rig(2000, 300)).await;
+    fixture.client.end("a", "s").await;
+    let stream = fixture.client.request(reqwest::Method::GET, "events?asset=a").send().await;
     let mut live = Events::new(stream.unwrap());
-    bench.client.delete("assets/a/faults/sensor?by=ann").await.expect(204);
-    bench.client.delete("assets/a/faults/x_servo?by=ann").await.expect(204);
+    fixture.client.delete("assets/a/faults/sensor?by=ann").await.expect(204);
+    fixture.client.delete("assets/a/faults/x_servo?by=ann").await.expect(204);
     let cleared = live.next().await;
     assert_eq!((&cleared["type"], &cleared["asset"]), (&json!("fault"), &json!("a")));
-    assert_eq!(cleared["code"], "x_servo", "the sensor had nothing to clear");
+    assert_eq!(cleared["code"], "x_servo", "clearing the sensor changed nothing");
     assert_eq!((&cleared["status"], &cleared["status_byte"]), (&json!("cleared"), &json!("50")));
     for key in ["session", "session_id", "t_s"] {
         assert_eq!(cleared.get(key), Some(&Value::Null), "{key}");
     }
     assert_eq!(cleared["by"], "ann");
-    bench.client.delete("assets/a/faults/x_servo?by=bob").await.expect(204);
-    bench.restart().await;
-    // Those who were away are told once, in its place among the others.
+    fixture.client.delete("assets/a/faults/x_servo?by=bob").await.expect(204);
+    fixture.restart().await;
+    // A subscriber that was away gets the event once, in its order.
     let after = cleared["id"].as_i64().unwrap() - 1;
     let path = format!("events?asset=a&after={after}");
-    let stream = bench.client.request(reqwest::Method::GET, &path).send().await;
+    let stream = fixture.client.request(reqwest::Method::GET, &path).send().await;
     let mut missed = Events::new(stream.unwrap());
     assert_eq!(missed.next().await, cleared);
-    bench.client.telemetry("a", Some("t"), &rig(2000, 300)).await;
-    assert_eq!(missed.next().await["session"], "t", "clearing nothing is no event");
+    fixture.client.telemetry("a", Some("t"), &rig(2000, 300)).await;
+    assert_eq!(missed.next().await["session"], "t", "clearing a cleared code is no event");
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_fault_names_the_calibration_and_the_settings_that_judged_it() {
-    let bench = Bench::start().await;
-    let client = &bench.client;
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
     let judged = |asset: Value| {
         let client = client.clone();
         async move {
@@ -147,7 +147,7 @@ async fn a_fault_names_the_calibration_and_the_settings_that_judged_it() {
             client.post("assets", &asset).await.expect(201);
             client.telemetry(&name, Some("s"), &rig(2000, 300)).await;
             let fault = fault(&client, &name, "x_servo").await;
-            lasting(&fault)["last_occurrence"].clone()
+            without_changed_at(&fault)["last_occurrence"].clone()
         }
     };
     let plain = judged(json!({"name": "plain"})).await;
@@ -164,34 +164,34 @@ async fn a_fault_names_the_calibration_and_the_settings_that_judged_it() {
     let asset = client.get("assets/learnt").await.expect(200);
     assert_eq!(calibrated["calibration_id"], asset["calibration"]["id"]);
     assert_eq!(calibrated["settings_id"], plain["settings_id"]);
-    // The events say the same.
+    // The events have the same ids.
     let stream = client.request(reqwest::Method::GET, "events?asset=learnt&after=0").send().await;
     let event = Events::new(stream.unwrap()).next().await;
     assert_eq!(event["calibration_id"], calibrated["calibration_id"]);
     assert_eq!(event["settings_id"], calibrated["settings_id"]);
 }
 
-/// A column of a recording.
+/// Returns a column of a recording.
 fn column<'a>(recording: &'a Value, name: &str) -> &'a Vec<Value> {
     recording["columns"][name].as_array().unwrap()
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn the_seconds_around_a_fault_are_those_that_were_judged() {
-    let mut bench = Bench::start().await;
-    bench.client.asset("a").await;
-    // Without a count: samples wait for earlier ones, the last ones too.
+async fn the_recording_of_a_fault_equals_what_was_judged() {
+    let mut fixture = ServiceFixture::start().await;
+    fixture.client.asset("a").await;
+    // Without sequence numbers, samples wait for earlier ones, also the last ones.
     let samples: Vec<Sample> = rig(3000, 1500).iter().map(|s| Sample { seq: None, ..*s }).collect();
-    let events = bench.client.request(reqwest::Method::GET, "events?asset=a&after=0");
+    let events = fixture.client.request(reqwest::Method::GET, "events?asset=a&after=0");
     let mut events = Events::new(events.send().await.unwrap());
-    bench.client.telemetry("a", Some("s"), &samples[..2200]).await;
+    fixture.client.telemetry("a", Some("s"), &samples[..2200]).await;
     let path = "assets/a/faults/x_servo/recording";
-    let early = bench.client.get(path).await.expect(200);
-    assert_eq!(early["complete"], false, "it goes on");
-    bench.client.telemetry("a", Some("s"), &samples[2200..]).await;
-    bench.client.end("a", "s").await;
-    bench.restart().await;
-    let client = &bench.client;
+    let early = fixture.client.get(path).await.expect(200);
+    assert_eq!(early["complete"], false, "the session is open");
+    fixture.client.telemetry("a", Some("s"), &samples[2200..]).await;
+    fixture.client.end("a", "s").await;
+    fixture.restart().await;
+    let client = &fixture.client;
     let recording = client.get(path).await.expect(200);
     assert_eq!((&recording["complete"], &recording["session"]), (&json!(true), &json!("s")));
     let time = |name: &str| recording[name].as_f64().unwrap();
@@ -207,7 +207,7 @@ async fn the_seconds_around_a_fault_are_those_that_were_judged() {
     }
     let n_early = column(&early, "t_s").len();
     assert_eq!(column(&early, "x_twin_m_s2")[..], column(&recording, "x_twin_m_s2")[..n_early]);
-    // What the events said at their moments stands in the rows of these moments.
+    // The rows at the times of the events have the evidence of the events.
     for _ in 0..2 {
         let event = loop {
             let event = events.next().await;
@@ -252,16 +252,16 @@ async fn the_seconds_around_a_fault_are_those_that_were_judged() {
     client.get(path).await.problem(404);
 }
 
-/// The failure is found however many changes of other codes came before it.
+/// The failure is found regardless of the number of earlier transitions of other codes.
 #[tokio::test(flavor = "multi_thread")]
-async fn a_recording_is_found_behind_ten_thousand_changes() {
-    let bench = Bench::start().await;
-    bench.client.asset("a").await;
-    bench.client.telemetry("a", Some("s"), &rig(1500, 500)).await;
-    bench.client.end("a", "s").await;
+async fn a_recording_is_found_after_ten_thousand_other_transitions() {
+    let fixture = ServiceFixture::start().await;
+    fixture.client.asset("a").await;
+    fixture.client.telemetry("a", Some("s"), &rig(1500, 500)).await;
+    fixture.client.end("a", "s").await;
     let path = "assets/a/faults/x_servo/recording";
-    let before = bench.client.get(path).await.expect(200);
-    let mut store = connection(&url(bench.data.path())).await;
+    let before = fixture.client.get(path).await.expect(200);
+    let mut store = connection(&url(fixture.data.path())).await;
     for statement in [
         "UPDATE transition SET ordinal = ordinal + 20000",
         "WITH RECURSIVE count (n) AS (SELECT 1 UNION ALL SELECT n + 1 FROM count WHERE n < 10001)
@@ -271,5 +271,5 @@ async fn a_recording_is_found_behind_ten_thousand_changes() {
     ] {
         sqlx::query(statement).execute(&mut store).await.unwrap();
     }
-    assert_eq!(bench.client.get(path).await.expect(200), before);
+    assert_eq!(fixture.client.get(path).await.expect(200), before);
 }

@@ -1,27 +1,27 @@
-//! Every parser on input that is nearly right: files of `tests/it/fuzz/corpus`,
-//! changed a little, again and again. Nothing may panic, and what is taken must
-//! be what it seems.
+//! Fuzzing of every parser with mutations of the files in `tests/it/fuzz/corpus`. No parser
+//! may panic, and accepted input must be consistent.
 //!
-//! An input that is answered in a way not seen before joins those that are
-//! changed. `FUZZ=1000000 cargo test --test it fuzz` tries as many inputs for each
-//! parser; the seed is fixed, `SEED` gives another. An input that fails is kept:
-//! put it into the corpus with the repair.
+//! An input with a new kind of result joins the inputs that are mutated. The environment
+//! variable `FUZZ` sets the number of inputs per parser
+//! (`FUZZ=1000000 cargo test --test it fuzz`), `SEED` the seed. A failing input is written to
+//! a file; add it to the corpus with the repair.
 
-mod change;
 mod frames;
+mod mutation;
 mod parsers;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
-use change::Pool;
+use mutation::InputPool;
 use parsers::{PARSERS, Parser};
 
-/// Inputs tried with each parser; FUZZ says otherwise.
+/// Number of inputs per parser, unless FUZZ is set.
 const INPUTS: usize = 1500;
 
-fn number(name: &str, otherwise: usize) -> usize {
-    std::env::var(name).map_or(otherwise, |n| n.parse().unwrap())
+/// Returns the number in an environment variable, or `default`.
+fn env_number(name: &str, default: usize) -> usize {
+    std::env::var(name).map_or(default, |n| n.parse().unwrap())
 }
 
 fn corpus(name: &str) -> Vec<Vec<u8>> {
@@ -33,8 +33,9 @@ fn corpus(name: &str) -> Vec<Vec<u8>> {
     files.iter().map(|file| std::fs::read(file).unwrap()).collect()
 }
 
-/// Tries `input`; keeps it if it fails.
-fn try_out(name: &str, parse: Parser, input: &[u8]) -> String {
+/// Runs the parser on `input` and returns the kind of its result; writes the input to a file
+/// if the parser panics.
+fn run_parser(name: &str, parse: Parser, input: &[u8]) -> String {
     catch_unwind(AssertUnwindSafe(|| parse(input))).unwrap_or_else(|failure| {
         let kept = std::env::temp_dir().join(format!("offbd-fuzz-{name}"));
         std::fs::write(&kept, input).unwrap();
@@ -44,20 +45,20 @@ fn try_out(name: &str, parse: Parser, input: &[u8]) -> String {
 }
 
 #[test]
-fn every_parser_bears_what_is_nearly_right() {
-    let (n, seed) = (number("FUZZ", INPUTS), number("SEED", 1) as u64);
+fn no_parser_panics_on_mutated_inputs() {
+    let (n, seed) = (env_number("FUZZ", INPUTS), env_number("SEED", 1) as u64);
     let run = |name: &str, parse: Parser| {
-        let mut pool = Pool::new(corpus(name), seed);
-        for input in pool.given() {
-            pool.learn(&input, try_out(name, parse, &input));
+        let mut pool = InputPool::new(corpus(name), seed);
+        for input in pool.inputs() {
+            pool.record(&input, run_parser(name, parse, &input));
         }
         for _ in 0..n {
             let input = pool.next();
-            let answer = try_out(name, parse, &input);
-            pool.learn(&input, answer);
+            let result = run_parser(name, parse, &input);
+            pool.record(&input, result);
         }
-        assert!(pool.n_answers() > 3, "{name}: {} kinds of answers", pool.n_answers());
-        println!("{name}: {n} inputs, {} kinds of answers", pool.n_answers());
+        assert!(pool.n_results() > 3, "{name}: {} kinds of results", pool.n_results());
+        println!("{name}: {n} inputs, {} kinds of results", pool.n_results());
     };
     std::thread::scope(|threads| {
         for (name, parse) in PARSERS {

@@ -1,12 +1,14 @@
-//! What the journal holds and what is folded make one recording, whatever comes
-//! between: folding, reading, ending, a kill, another version's database.
+//! Samples of a session are partly in the journal and partly folded into chunks. Together they
+//! are the recording, after any sequence of folding, reading, ending, kills and upgrades.
 
 use std::path::Path;
 
 use crate::support::process::Process;
-use crate::support::{Bench, connection, rig, url};
-use offbd::store::codec::{self, Stay};
-use offbd::store::{AssetRow, Place, Progress, SessionFilter, SessionRow, Store, Write, Writer};
+use crate::support::{ServiceFixture, connection, rig, url};
+use offbd::store::codec::{self, Packing};
+use offbd::store::{
+    AssetRow, Location, SessionFilter, SessionProgress, SessionRow, Store, Write, Writer,
+};
 use offbd_core::vocabulary::Sample;
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
@@ -15,22 +17,25 @@ use sqlx::migrate::Migrator;
 
 const ASSETS: usize = 3;
 
-/// Something that happens to the store.
+/// An operation on the store.
 #[derive(Clone, Debug)]
 enum Step {
-    /// A group: how many samples of which asset.
+    /// A group commit: asset and number of samples of each append.
     Commit(Vec<(usize, usize)>),
-    /// A row of an asset that was no sample.
+    /// Counts a rejected row of an asset.
     Reject(usize),
-    /// A group with a change that cannot be.
-    Spoil(usize, usize),
-    /// What is too much, above these bytes.
+    /// A group commit with an invalid change, which must not change anything.
+    Conflict(usize, usize),
+    /// Folds the journal down to this size, bytes.
     Fold(usize),
+    /// Reads a session of an asset from an index.
     Read(usize, usize),
-    /// Its session ends, and another opens.
+    /// Ends the session of an asset and opens another.
     End(usize),
     Delete(usize),
+    /// Closes the store and opens it again.
     Stop,
+    /// Drops the writer without closing it and opens the store again.
     Kill,
 }
 
@@ -42,7 +47,7 @@ fn step() -> impl Strategy<Value = Step> {
         1 => (asset(), 900..1200usize).prop_map(|run| Step::Commit(vec![run])),
         1 => (asset(), 7000..20_000usize).prop_map(|run| Step::Commit(vec![run])),
         2 => asset().prop_map(Step::Reject),
-        1 => few().prop_map(|(asset, n)| Step::Spoil(asset, n)),
+        1 => few().prop_map(|(asset, n)| Step::Conflict(asset, n)),
         4 => prop_oneof![Just(0), 100..20_000usize].prop_map(Step::Fold),
         4 => (asset(), 0..2000usize).prop_map(|(asset, at)| Step::Read(asset, at)),
         1 => asset().prop_map(Step::End),
@@ -52,18 +57,18 @@ fn step() -> impl Strategy<Value = Step> {
     ]
 }
 
-/// What a session must be.
+/// The expected content of a session.
 #[derive(Clone, Default)]
-struct Wanted {
+struct ExpectedSession {
     id: String,
     asset: usize,
     samples: Vec<Sample>,
     n_rejected: i64,
 }
 
-impl Wanted {
-    fn progress(&self) -> Progress {
-        Progress {
+impl ExpectedSession {
+    fn progress(&self) -> SessionProgress {
+        SessionProgress {
             n_samples: self.samples.len() as i64,
             n_rejected: self.n_rejected,
             first_t_s: self.samples.first().map(|sample| sample.t_s),
@@ -72,7 +77,7 @@ impl Wanted {
         }
     }
 
-    /// The change that brings `n` more samples.
+    /// Returns the change that appends `n` samples.
     fn append(&mut self, n: usize) -> Write {
         let first = self.samples.len();
         self.samples.extend((first..first + n).map(sample));
@@ -85,7 +90,7 @@ impl Wanted {
     }
 }
 
-/// The sample at `index`; some have nothing but their time.
+/// Returns the sample at `index`; some have only a time.
 fn sample(index: usize) -> Sample {
     let t_s = index as f64 * 0.01;
     let reading = |value: f64| (!index.is_multiple_of(7)).then_some(value);
@@ -114,31 +119,31 @@ fn session(id: &str, asset: &str) -> SessionRow {
         ended_at: None,
         setup: "{}".to_owned(),
         baseline: "{}".to_owned(),
-        progress: Progress::default(),
+        progress: SessionProgress::default(),
         verdict: None,
         verdict_hash: None,
     }
 }
 
-/// A store, and what must be in it.
-struct Trial {
-    place: Place,
+/// A store and its expected content.
+struct StoreTest {
+    location: Location,
     store: Store,
     writer: Option<Writer>,
-    open: Vec<Wanted>,
-    ended: Vec<Wanted>,
+    open: Vec<ExpectedSession>,
+    ended: Vec<ExpectedSession>,
     n_opened: usize,
 }
 
-impl Trial {
+impl StoreTest {
     async fn begin(data: &Path) -> Self {
-        let place = Place::of_url(&url(data)).unwrap();
-        let (store, mut writer) = Store::open(&place).await.unwrap();
+        let location = Location::of_url(&url(data)).unwrap();
+        let (store, mut writer) = Store::open(&location).await.unwrap();
         let mut made = (0..ASSETS).map(|i| Write::CreateAsset(asset(&i.to_string()))).collect();
         writer.commit(&mut [&mut made]).await.unwrap();
-        let open = vec![Wanted::default(); ASSETS];
+        let open = vec![ExpectedSession::default(); ASSETS];
         let mut this =
-            Self { place, store, writer: Some(writer), open, ended: vec![], n_opened: 0 };
+            Self { location, store, writer: Some(writer), open, ended: vec![], n_opened: 0 };
         for asset in 0..ASSETS {
             let opened = this.opened(asset);
             this.commit(vec![opened]).await;
@@ -149,7 +154,7 @@ impl Trial {
     fn opened(&mut self, asset: usize) -> Write {
         let id = format!("session-{}", self.n_opened);
         self.n_opened += 1;
-        self.open[asset] = Wanted { id: id.clone(), asset, ..Wanted::default() };
+        self.open[asset] = ExpectedSession { id: id.clone(), asset, ..ExpectedSession::default() };
         Write::OpenSession(session(&id, &asset.to_string()))
     }
 
@@ -161,7 +166,7 @@ impl Trial {
         self.writer().commit(&mut [&mut set]).await.unwrap();
     }
 
-    async fn take(&mut self, step: Step) -> Result<(), TestCaseError> {
+    async fn apply(&mut self, step: Step) -> Result<(), TestCaseError> {
         match step {
             Step::Commit(runs) => {
                 let set = runs.iter().map(|(asset, n)| self.open[*asset].append(*n)).collect();
@@ -172,9 +177,10 @@ impl Trial {
                 let set = vec![self.open[asset].append(0)];
                 self.commit(set).await;
             }
-            Step::Spoil(at, n) => {
+            Step::Conflict(at, n) => {
                 let mut set = vec![self.open[at].clone().append(n), Write::CreateAsset(asset("0"))];
-                let error = self.writer().commit(&mut [&mut set]).await.expect_err("it is there");
+                let error =
+                    self.writer().commit(&mut [&mut set]).await.expect_err("the asset exists");
                 assert!(error.is_conflict() && !error.is_outage(), "{error}");
             }
             Step::Fold(above) => self.writer().fold(above).await.unwrap(),
@@ -200,7 +206,7 @@ impl Trial {
             }
             Step::Delete(at) => {
                 let last = self.open[at].append(1);
-                let given_up = Write::GiveUpAsset { name: at.to_string(), at: 1 };
+                let given_up = Write::HideAsset { name: at.to_string(), at: 1 };
                 let gone = Write::DeleteAsset { name: at.to_string() };
                 let again = Write::CreateAsset(asset(&at.to_string()));
                 let opened = self.opened(at);
@@ -213,28 +219,32 @@ impl Trial {
         Ok(())
     }
 
-    async fn restart(&mut self, well: bool) {
+    async fn restart(&mut self, gracefully: bool) {
         self.store.close().await;
         let writer = self.writer.take().unwrap();
-        if well {
+        if gracefully {
             writer.close().await.unwrap()
         } else {
             drop(writer)
         }
-        let (store, writer) = Store::open(&self.place).await.unwrap();
+        let (store, writer) = Store::open(&self.location).await.unwrap();
         (self.store, self.writer) = (store, Some(writer));
-        if well {
-            assert_eq!(rows(&of(&self.place), "journal").await, 0, "all is folded");
+        if gracefully {
+            assert_eq!(
+                count_rows(&url_of(&self.location), "journal").await,
+                0,
+                "everything is folded"
+            );
         }
     }
 
     async fn read(&self, session: &str, from: usize) -> Vec<Sample> {
         let mut samples: Vec<Sample> = Vec::new();
-        let next = |n: usize| i64::try_from(from + n).unwrap();
-        while let Some(more) = self.store.samples_from(session, next(samples.len())).await.unwrap()
+        let index = |n: usize| i64::try_from(from + n).unwrap();
+        while let Some(part) = self.store.samples_from(session, index(samples.len())).await.unwrap()
         {
-            assert!(!more.is_empty());
-            samples.extend(more);
+            assert!(!part.is_empty());
+            samples.extend(part);
         }
         samples
     }
@@ -255,17 +265,17 @@ impl Trial {
     }
 }
 
-/// How many rows `table` has.
-async fn rows(url: &str, table: &str) -> i64 {
+/// Returns the number of rows of `table`.
+async fn count_rows(url: &str, table: &str) -> i64 {
     let mut db = connection(url).await;
     let sql = sqlx::AssertSqlSafe(format!("SELECT COUNT(*) FROM {table}"));
     sqlx::query_scalar(sql).fetch_one(&mut db).await.unwrap()
 }
 
-fn of(place: &Place) -> String {
-    match place {
-        Place::File(file) => format!("sqlite://{}", file.display()),
-        Place::Server(url) => url.clone(),
+fn url_of(location: &Location) -> String {
+    match location {
+        Location::File(file) => format!("sqlite://{}", file.display()),
+        Location::Server(url) => url.clone(),
     }
 }
 
@@ -273,21 +283,21 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn any_order_of_things_makes_the_same_recording(
+    fn any_order_of_operations_preserves_the_recordings(
         steps in prop::collection::vec(step(), 1..60),
     ) {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
         runtime.block_on(async {
             let data = tempfile::tempdir().unwrap();
-            let mut trial = Trial::begin(data.path()).await;
+            let mut test = StoreTest::begin(data.path()).await;
             for step in steps {
-                trial.take(step).await?;
+                test.apply(step).await?;
             }
-            trial.check().await?;
-            trial.take(Step::Kill).await?;
-            trial.check().await?;
-            trial.take(Step::Stop).await?;
-            trial.check().await
+            test.check().await?;
+            test.apply(Step::Kill).await?;
+            test.check().await?;
+            test.apply(Step::Stop).await?;
+            test.check().await
         })?;
     }
 }
@@ -295,39 +305,39 @@ proptest! {
 proptest! {
     #![proptest_config(ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Four times what comes is folded from one and a half times the limit on, so the
-    /// oldest of it is gone before a quarter of that more has come.
+    /// From one and a half times the limit on, four times as many bytes are folded as arrive,
+    /// so the journal stays below twice its limit plus a little more than one group.
     #[test]
-    fn the_journal_stays_below_twice_its_limit_and_a_little_more_than_a_group(
+    fn the_size_of_the_journal_is_bounded(
         groups in prop::collection::vec(prop::collection::vec((0..ASSETS, 1..80usize), 1..6), 1..100),
         above in 2000..20_000usize,
     ) {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
         runtime.block_on(async {
             let data = tempfile::tempdir().unwrap();
-            let mut trial = Trial::begin(data.path()).await;
-            let (mut before, mut most) = (trial.writer().journal_bytes(), 0);
+            let mut test = StoreTest::begin(data.path()).await;
+            let (mut before, mut largest_group) = (test.writer().journal_bytes(), 0);
             for group in groups {
-                trial.take(Step::Commit(group)).await?;
-                let n_bytes = trial.writer().journal_bytes();
-                most = most.max(n_bytes.saturating_sub(before));
-                prop_assert!(n_bytes <= above * 15 / 8 + most * 5 / 4, "{n_bytes}");
-                trial.take(Step::Fold(above)).await?;
-                before = trial.writer().journal_bytes();
+                test.apply(Step::Commit(group)).await?;
+                let n_bytes = test.writer().journal_bytes();
+                largest_group = largest_group.max(n_bytes.saturating_sub(before));
+                prop_assert!(n_bytes <= above * 15 / 8 + largest_group * 5 / 4, "{n_bytes}");
+                test.apply(Step::Fold(above)).await?;
+                before = test.writer().journal_bytes();
             }
             Ok(())
         })?;
     }
 }
 
-/// How many orders are tried; CASES says otherwise.
+/// Number of cases of each property, unless the environment variable CASES is set.
 fn cases() -> u32 {
     std::env::var("CASES").map_or(24, |n| n.parse().unwrap())
 }
 
-/// A database of the version before the journal: its first migrations, and a
-/// session whose samples are all in small chunks.
-async fn older(data: &Path, samples: &[Sample]) {
+/// Creates a database of the last version without a journal: its migrations, and a session
+/// whose samples are all in small chunks.
+async fn create_old_database(data: &Path, samples: &[Sample]) {
     let first = tempfile::tempdir().unwrap();
     for file in std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/migrations")).unwrap() {
         let file = file.unwrap();
@@ -335,9 +345,9 @@ async fn older(data: &Path, samples: &[Sample]) {
             std::fs::copy(file.path(), first.path().join(file.file_name())).unwrap();
         }
     }
-    let place = of(&Place::of_url(&url(data)).unwrap())
+    let location = url_of(&Location::of_url(&url(data)).unwrap())
         + if crate::support::on_postgres() { "" } else { "?mode=rwc" };
-    let mut db = connection(&place).await;
+    let mut db = connection(&location).await;
     Migrator::new(first.path()).await.unwrap().run_direct(None, &mut db, false).await.unwrap();
     sqlx::query("INSERT INTO asset VALUES ('0', '{}', 1, 0, 0)").execute(&mut db).await.unwrap();
     sqlx::query(
@@ -358,7 +368,7 @@ async fn older(data: &Path, samples: &[Sample]) {
             .bind(part.len() as i64)
             .bind(part[0].t_s)
             .bind(part[part.len() - 1].t_s)
-            .bind(codec::encode(part, Stay::Short))
+            .bind(codec::encode(part, Packing::Plain))
             .execute(&mut db)
             .await
             .unwrap();
@@ -367,15 +377,16 @@ async fn older(data: &Path, samples: &[Sample]) {
 }
 
 #[tokio::test]
-async fn an_older_database_goes_on() {
+async fn a_database_of_an_earlier_version_can_be_continued() {
     let data = tempfile::tempdir().unwrap();
     let samples: Vec<_> = (0..950).map(sample).collect();
-    older(data.path(), &samples).await;
-    let place = Place::of_url(&url(data.path())).unwrap();
-    let (store, writer) = Store::open(&place).await.unwrap();
-    let open = vec![Wanted { id: "old".to_owned(), asset: 0, samples, n_rejected: 0 }];
-    let mut trial = Trial { place, store, writer: Some(writer), open, ended: vec![], n_opened: 0 };
-    trial.check().await.unwrap();
+    create_old_database(data.path(), &samples).await;
+    let location = Location::of_url(&url(data.path())).unwrap();
+    let (store, writer) = Store::open(&location).await.unwrap();
+    let open = vec![ExpectedSession { id: "old".to_owned(), asset: 0, samples, n_rejected: 0 }];
+    let mut test =
+        StoreTest { location, store, writer: Some(writer), open, ended: vec![], n_opened: 0 };
+    test.check().await.unwrap();
     for step in [
         Step::Commit(vec![(0, 40)]),
         Step::Kill,
@@ -384,30 +395,30 @@ async fn an_older_database_goes_on() {
         Step::Commit(vec![(0, 9000)]),
         Step::End(0),
     ] {
-        trial.take(step).await.unwrap();
-        trial.check().await.unwrap();
+        test.apply(step).await.unwrap();
+        test.check().await.unwrap();
     }
 }
 
 #[tokio::test]
-async fn a_damaged_journal_is_not_passed_over() {
+async fn a_damaged_journal_is_reported_at_open() {
     let data = tempfile::tempdir().unwrap();
-    let mut trial = Trial::begin(data.path()).await;
-    trial.take(Step::Commit(vec![(0, 10), (1, 10)])).await.unwrap();
+    let mut test = StoreTest::begin(data.path()).await;
+    test.apply(Step::Commit(vec![(0, 10), (1, 10)])).await.unwrap();
     let mut db = connection(&url(data.path())).await;
-    drop(trial);
+    drop(test);
     for damaged in [&b""[..], b"\x91", b"no journal"] {
         sqlx::query("UPDATE journal SET data = $1").bind(damaged).execute(&mut db).await.unwrap();
-        let place = Place::of_url(&url(data.path())).unwrap();
-        let error = Store::open(&place).await.err().unwrap().to_string();
-        assert!(error.contains("of the journal"), "{error}");
+        let location = Location::of_url(&url(data.path())).unwrap();
+        let error = Store::open(&location).await.err().unwrap().to_string();
+        assert!(error.contains("journal row"), "{error}");
     }
 }
 
-/// The journal holds what was acknowledged while it was let grow, and is folded
-/// by a process that lets it have nothing; each is killed.
+/// One process with a large limit of the journal alternates with one that folds everything;
+/// each is killed.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn killed_between_the_journal_and_the_chunks() {
+async fn a_kill_between_journal_and_chunks_loses_nothing() {
     let data = tempfile::tempdir().unwrap();
     let samples = rig(1600, 1600);
     let start = |bytes: &str| {
@@ -424,8 +435,12 @@ async fn killed_between_the_journal_and_the_chunks() {
         assert_eq!(process.client.recording("a", "s").await, samples[..n]);
         drop(process);
         if i == 0 {
-            assert_eq!(rows(&url(data.path()), "chunk").await, 0, "all of it is in the journal");
-            assert_eq!(rows(&url(data.path()), "journal").await, 10);
+            assert_eq!(
+                count_rows(&url(data.path()), "chunk").await,
+                0,
+                "everything is in the journal"
+            );
+            assert_eq!(count_rows(&url(data.path()), "journal").await, 10);
         }
         process = start(bytes);
         assert_eq!(process.client.recording("a", "s").await, samples[..n]);
@@ -434,19 +449,19 @@ async fn killed_between_the_journal_and_the_chunks() {
     let session = process.client.end("a", "s").await;
     assert_eq!(session["verdict"]["verdict_hash"], crate::support::judged("a", &samples).0);
     assert_eq!(process.client.recording("a", "s").await, samples);
-    assert_eq!(rows(&url(data.path()), "chunk").await, 1);
+    assert_eq!(count_rows(&url(data.path()), "chunk").await, 1);
 }
 
-/// Whoever reads while all is moved from the journal to small chunks and from
-/// these to long ones finds everything that was acknowledged before.
+/// A reader finds every acknowledged sample while samples are moved from the journal to small
+/// chunks and from these to large ones.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn read_while_it_is_folded() {
-    let bench = Bench::start_with(|config| config.limits.journal_bytes = 3000).await;
-    bench.client.asset("a").await;
+async fn a_recording_can_be_read_while_it_is_folded() {
+    let fixture = ServiceFixture::start_with(|config| config.limits.journal_bytes = 3000).await;
+    fixture.client.asset("a").await;
     let samples = rig(9000, 9000);
-    bench.client.telemetry("a", Some("s"), &samples[..30]).await;
+    fixture.client.telemetry("a", Some("s"), &samples[..30]).await;
     let (sent, acknowledged) = tokio::sync::watch::channel(30);
-    let (client, recorded) = (bench.client.clone(), samples.clone());
+    let (client, recorded) = (fixture.client.clone(), samples.clone());
     let sending = tokio::spawn(async move {
         for (i, part) in recorded[30..].chunks(30).enumerate() {
             client.telemetry("a", Some("s"), part).await;
@@ -456,14 +471,14 @@ async fn read_while_it_is_folded() {
     let mut n_read = 0;
     while !sending.is_finished() {
         let n = *acknowledged.borrow();
-        let session = bench.client.session("a", "s").await;
+        let session = fixture.client.session("a", "s").await;
         assert!(session["samples"].as_u64().unwrap() >= n as u64, "{session}");
-        let recording = bench.client.recording("a", "s").await;
+        let recording = fixture.client.recording("a", "s").await;
         assert!(recording.len() >= n, "{} of {n}", recording.len());
         assert_eq!(recording, samples[..recording.len()]);
         n_read += 1;
     }
     sending.await.unwrap();
     assert!(n_read > 3, "{n_read}");
-    assert_eq!(bench.client.recording("a", "s").await, samples);
+    assert_eq!(fixture.client.recording("a", "s").await, samples);
 }

@@ -1,7 +1,7 @@
-//! Ingest goes on whatever one device, one deletion or one change does, and the
-//! service stops in bounded time whatever waits.
+//! Ingest continues regardless of one device, one deletion or one failing change, and the
+//! service shuts down in bounded time.
 
-use crate::support::{Bench, Client, DEADLINE, batch, eventually, packed, rig};
+use crate::support::{Client, DEADLINE, ServiceFixture, batch, eventually, packed, rig};
 use futures_util::{SinkExt, StreamExt};
 use offbd_core::vocabulary::Sample;
 use serde_json::{Value, json};
@@ -12,12 +12,12 @@ use tokio_tungstenite::{MaybeTlsStream, WebSocketStream, connect_async};
 
 type Socket = WebSocketStream<MaybeTlsStream<TcpStream>>;
 
-/// Rows in a batch, and samples that may be in flight: one batch takes all permits.
+/// Rows per batch, and largest number of samples in flight.
 const ROWS: usize = 50;
 
-/// A server in which one batch takes all permits.
-async fn narrow() -> Bench {
-    Bench::start_with(|config| {
+/// Starts a service in which one batch takes all permits.
+async fn service_with_few_permits() -> ServiceFixture {
+    ServiceFixture::start_with(|config| {
         config.limits.batch_samples = ROWS;
         config.limits.in_flight_samples = ROWS;
     })
@@ -29,15 +29,15 @@ async fn stream(client: &Client, asset: &str) -> Socket {
     connect_async(url).await.unwrap().0
 }
 
-/// Sends `samples` in batches, as MessagePack, and reads nothing.
-async fn flood(socket: &mut Socket, samples: &[Sample]) {
+/// Sends `samples` in batches, as MessagePack, without reading.
+async fn send_all(socket: &mut Socket, samples: &[Sample]) {
     for part in samples.chunks(ROWS) {
         let document = packed(&batch(Some("s"), part));
         socket.send(Message::binary(document)).await.unwrap();
     }
 }
 
-/// The next answer; `None` if the service ends the stream.
+/// Returns the next answer, or `None` if the service ends the stream.
 async fn answer(socket: &mut Socket) -> Option<Value> {
     loop {
         let frame = tokio::time::timeout(DEADLINE, socket.next()).await.expect("an answer");
@@ -50,10 +50,10 @@ async fn answer(socket: &mut Socket) -> Option<Value> {
 }
 
 /// Reads answers until `n` samples are accepted.
-async fn accepted(socket: &mut Socket, n: usize) {
+async fn read_until_accepted(socket: &mut Socket, n: usize) {
     let mut accepted = 0;
     while accepted < n as u64 {
-        let answer = answer(socket).await.expect("the stream goes on");
+        let answer = answer(socket).await.expect("the stream continues");
         accepted += answer["accepted"].as_u64().unwrap_or_else(|| panic!("{answer}"));
     }
 }
@@ -68,81 +68,81 @@ async fn readiness(client: &Client, status: u16) -> String {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn streams_that_send_before_they_read_are_all_acknowledged() {
-    let bench = narrow().await;
+async fn streams_that_send_everything_before_reading_are_acknowledged() {
+    let fixture = service_with_few_permits().await;
     let samples = rig(40 * ROWS, usize::MAX);
     let mut sockets = Vec::new();
     for asset in ["a", "b"] {
-        bench.client.asset(asset).await;
-        sockets.push(stream(&bench.client, asset).await);
+        fixture.client.asset(asset).await;
+        sockets.push(stream(&fixture.client, asset).await);
     }
     for part in samples.chunks(10 * ROWS) {
         for socket in &mut sockets {
-            flood(socket, part).await;
+            send_all(socket, part).await;
         }
     }
     for socket in &mut sockets {
-        accepted(socket, samples.len()).await;
+        read_until_accepted(socket, samples.len()).await;
     }
-    // All permits are back: a batch that takes all of them is not turned away.
+    // All permits are released: a batch that needs all of them is accepted.
     let last = rig(41 * ROWS, usize::MAX).split_off(40 * ROWS);
-    bench.client.telemetry("a", Some("s"), &last).await;
-    assert_eq!(bench.client.recording("b", "s").await, samples);
+    fixture.client.telemetry("a", Some("s"), &last).await;
+    assert_eq!(fixture.client.recording("b", "s").await, samples);
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn streams_go_on_when_the_database_is_back() {
-    let bench = narrow().await;
+async fn streams_continue_when_the_database_is_available_again() {
+    let fixture = service_with_few_permits().await;
     let samples = rig(20 * ROWS, usize::MAX);
     let mut sockets = Vec::new();
     for i in 0..6 {
         let asset = format!("a{i}");
-        bench.client.asset(&asset).await;
-        sockets.push(stream(&bench.client, &asset).await);
+        fixture.client.asset(&asset).await;
+        sockets.push(stream(&fixture.client, &asset).await);
     }
-    let hold = bench.hold().await;
+    let lock = fixture.lock_store().await;
     for socket in &mut sockets {
-        flood(socket, &samples).await;
+        send_all(socket, &samples).await;
     }
-    let reason = readiness(&bench.client, 503).await;
-    // A file that is locked says so, a server hangs.
+    let reason = readiness(&fixture.client, 503).await;
+    // SQLite reports the lock, PostgreSQL waits.
     let why = if crate::support::on_postgres() { "nothing has been committed" } else { "locked" };
     assert!(reason.contains(why), "{reason}");
-    hold.let_go().await;
+    lock.release().await;
     for socket in &mut sockets {
-        accepted(socket, samples.len()).await;
+        read_until_accepted(socket, samples.len()).await;
     }
-    readiness(&bench.client, 200).await;
+    readiness(&fixture.client, 200).await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_stop_does_not_wait_for_a_database_that_is_away() {
-    let mut bench = narrow().await;
-    bench.client.asset("a").await;
+async fn a_shutdown_does_not_wait_for_an_unavailable_database() {
+    let mut fixture = service_with_few_permits().await;
+    fixture.client.asset("a").await;
     let samples = rig(10 * ROWS, usize::MAX);
-    let mut socket = stream(&bench.client, "a").await;
-    flood(&mut socket, &samples[..ROWS]).await;
-    accepted(&mut socket, ROWS).await;
-    let hold = bench.hold().await;
-    flood(&mut socket, &samples[ROWS..]).await;
-    readiness(&bench.client, 503).await;
-    bench.server.take().unwrap().shutdown().await.expect("it stops in time");
+    let mut socket = stream(&fixture.client, "a").await;
+    send_all(&mut socket, &samples[..ROWS]).await;
+    read_until_accepted(&mut socket, ROWS).await;
+    let lock = fixture.lock_store().await;
+    send_all(&mut socket, &samples[ROWS..]).await;
+    readiness(&fixture.client, 503).await;
+    fixture.server.take().unwrap().shutdown().await.expect("it stops within the deadline");
     while let Some(answer) = answer(&mut socket).await {
         assert_eq!(answer["type"], "error", "{answer}");
     }
-    hold.let_go().await;
-    // What was not acknowledged is sent again.
-    let server = offbd::server::start(crate::support::config(bench.data.path())).await.unwrap();
+    lock.release().await;
+    // The device sends again what was not acknowledged.
+    let server = offbd::server::start(crate::support::config(fixture.data.path())).await.unwrap();
     let client = Client::new(server.address.to_string());
     client.telemetry("a", Some("s"), &samples).await;
     assert_eq!(client.recording("a", "s").await, samples);
 }
 
-/// Gives the session `name` of `asset` `n` chunks more, and transitions too.
-async fn enlarge(bench: &Bench, asset: &str, name: &str, n: usize) {
-    let session = bench.client.session(asset, name).await;
+/// Adds `n` chunks and transitions to the session `name` of `asset`.
+async fn enlarge(fixture: &ServiceFixture, asset: &str, name: &str, n: usize) {
+    let session = fixture.client.session(asset, name).await;
     let id = session["id"].as_str().unwrap();
-    let mut store = bench.store().await;
+    let mut store = fixture.store().await;
     for i in 0..n {
         let first = 1_000_000 + i * 10;
         let sql = format!(
@@ -156,28 +156,29 @@ async fn enlarge(bench: &Bench, asset: &str, name: &str, n: usize) {
     }
 }
 
-async fn count(bench: &Bench, of: &str) -> i64 {
+/// Returns the number of rows of a table or `FROM` clause.
+async fn count(fixture: &ServiceFixture, of: &str) -> i64 {
     let sql = AssertSqlSafe(format!("SELECT COUNT(*) FROM {of}"));
-    sqlx::query_scalar(sql).fetch_one(&mut bench.store().await).await.unwrap()
+    sqlx::query_scalar(sql).fetch_one(&mut fixture.store().await).await.unwrap()
 }
 
-/// A server with an asset `large` of two sessions, of which one is open, with more
-/// chunks than one transaction deletes, and another asset `b`.
-async fn with_large() -> Bench {
-    let bench = Bench::start().await;
+/// Starts a service with an asset `large` and an asset `b`, each with an ended and an open
+/// session. The ended one of `large` has more chunks than one transaction deletes.
+async fn service_with_large_asset() -> ServiceFixture {
+    let fixture = ServiceFixture::start().await;
     let samples = rig(600, usize::MAX);
     for asset in ["large", "b"] {
-        bench.client.asset(asset).await;
-        bench.client.telemetry(asset, Some("first"), &samples).await;
-        bench.client.end(asset, "first").await;
-        bench.client.telemetry(asset, Some("second"), &samples).await;
+        fixture.client.asset(asset).await;
+        fixture.client.telemetry(asset, Some("first"), &samples).await;
+        fixture.client.end(asset, "first").await;
+        fixture.client.telemetry(asset, Some("second"), &samples).await;
     }
-    enlarge(&bench, "large", "first", 200).await;
-    bench
+    enlarge(&fixture, "large", "first", 200).await;
+    fixture
 }
 
-/// A change of the database from which on no chunk beyond the first piece can go.
-async fn stuck(bench: &Bench) {
+/// Makes the database reject the deletion of a chunk that is not in the first part.
+async fn block_deletion(fixture: &ServiceFixture) {
     let words = if crate::support::on_postgres() {
         "CREATE FUNCTION refuse() RETURNS trigger LANGUAGE plpgsql AS
          'BEGIN RAISE ''stuck'' USING ERRCODE = ''23514''; END';
@@ -187,17 +188,17 @@ async fn stuck(bench: &Bench) {
         "CREATE TRIGGER stuck BEFORE DELETE ON chunk WHEN OLD.first_index = 1000500
          BEGIN SELECT RAISE(ABORT, 'stuck'); END"
     };
-    bench.store().await.execute(words).await.unwrap();
+    fixture.store().await.execute(words).await.unwrap();
 }
 
-async fn loosen(bench: &Bench) {
+async fn unblock_deletion(fixture: &ServiceFixture) {
     let on = if crate::support::on_postgres() { " ON chunk" } else { "" };
     let words = format!("DROP TRIGGER stuck{on}");
-    bench.store().await.execute(AssertSqlSafe(words)).await.unwrap();
+    fixture.store().await.execute(AssertSqlSafe(words)).await.unwrap();
 }
 
-/// A change of the database that notes at which commit each chunk goes.
-async fn note_what_goes(bench: &Bench) {
+/// Makes the database record the commit that deletes each chunk.
+async fn record_deletions(fixture: &ServiceFixture) {
     let note = "INSERT INTO gone SELECT value FROM counter WHERE name = 'commit'";
     let words = if crate::support::on_postgres() {
         format!(
@@ -212,119 +213,119 @@ async fn note_what_goes(bench: &Bench) {
              CREATE TRIGGER noted BEFORE DELETE ON chunk BEGIN {note}; END"
         )
     };
-    bench.store().await.execute(AssertSqlSafe(words)).await.unwrap();
+    fixture.store().await.execute(AssertSqlSafe(words)).await.unwrap();
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_large_asset_goes_in_pieces_between_which_others_are_acknowledged() {
-    let bench = with_large().await;
-    note_what_goes(&bench).await;
+async fn a_large_asset_is_deleted_in_parts_between_other_commits() {
+    let fixture = service_with_large_asset().await;
+    record_deletions(&fixture).await;
     let deleting = tokio::spawn({
-        let client = bench.client.clone();
+        let client = fixture.client.clone();
         async move { client.delete("assets/large").await.expect(204) }
     });
     for (i, part) in rig(3000, usize::MAX)[600..].chunks(20).enumerate() {
-        let ack = bench.client.telemetry("b", Some("second"), part).await;
+        let ack = fixture.client.telemetry("b", Some("second"), part).await;
         assert_eq!(ack["accepted"], 20, "batch {i}");
     }
     deleting.await.unwrap();
     let most = "(SELECT at FROM gone GROUP BY at HAVING COUNT(*) > 16) large";
-    assert!(count(&bench, "gone").await > 200);
-    assert_eq!(count(&bench, most).await, 0, "too much in one transaction");
-    assert_eq!(count(&bench, "session WHERE asset = 'large'").await, 0);
-    assert_eq!(count(&bench, "chunk WHERE session NOT IN (SELECT id FROM session)").await, 0);
-    assert_eq!(count(&bench, "transition WHERE asset = 'large'").await, 0);
-    bench.client.get("assets/large").await.problem(404);
-    // The name is free.
-    bench.client.asset("large").await;
-    let page = bench.client.get("sessions?asset=large").await.expect(200);
+    assert!(count(&fixture, "gone").await > 200);
+    assert_eq!(count(&fixture, most).await, 0, "too much in one transaction");
+    assert_eq!(count(&fixture, "session WHERE asset = 'large'").await, 0);
+    assert_eq!(count(&fixture, "chunk WHERE session NOT IN (SELECT id FROM session)").await, 0);
+    assert_eq!(count(&fixture, "transition WHERE asset = 'large'").await, 0);
+    fixture.client.get("assets/large").await.problem(404);
+    // The name can be used again.
+    fixture.client.asset("large").await;
+    let page = fixture.client.get("sessions?asset=large").await.expect(200);
     assert_eq!(page["items"], json!([]));
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_deletion_that_was_broken_off_is_hidden_and_goes_on_with_the_next_start() {
-    let mut bench = with_large().await;
-    stuck(&bench).await;
-    let problem = bench.client.delete("assets/large").await.problem(503);
+async fn an_interrupted_deletion_is_hidden_and_continues_at_the_next_start() {
+    let mut fixture = service_with_large_asset().await;
+    block_deletion(&fixture).await;
+    let problem = fixture.client.delete("assets/large").await.problem(503);
     let detail = problem["detail"].as_str().unwrap();
     let session = "SELECT id FROM session WHERE asset = 'large' AND name = 'first'";
-    let id: String = sqlx::query_scalar(session).fetch_one(&mut bench.store().await).await.unwrap();
+    let id: String =
+        sqlx::query_scalar(session).fetch_one(&mut fixture.store().await).await.unwrap();
     assert!(detail.contains(&format!("the deletion of session {id}")), "{detail}");
-    let left = count(&bench, &format!("chunk WHERE session = '{id}'")).await;
+    let left = count(&fixture, &format!("chunk WHERE session = '{id}'")).await;
     assert!((1..=185).contains(&left), "{left} chunks are left");
     for path in ["assets/large", "assets/large/state", "assets/large/faults"] {
-        bench.client.get(path).await.problem(404);
+        fixture.client.get(path).await.problem(404);
     }
-    bench.client.get(&format!("sessions/{id}")).await.problem(404);
-    let assets = bench.client.get("assets").await.expect(200);
+    fixture.client.get(&format!("sessions/{id}")).await.problem(404);
+    let assets = fixture.client.get("assets").await.expect(200);
     assert_eq!(assets["items"].as_array().unwrap().len(), 1, "{assets}");
-    let sessions = bench.client.get("sessions").await.expect(200);
+    let sessions = fixture.client.get("sessions").await.expect(200);
     assert_eq!(sessions["items"].as_array().unwrap().len(), 2, "{sessions}");
-    bench.client.delete("assets/large").await.problem(404);
-    bench.client.post("assets", &json!({ "name": "large" })).await.problem(429);
-    bench.client.telemetry("b", Some("second"), &rig(700, usize::MAX)[600..]).await;
-    loosen(&bench).await;
-    bench.restart().await;
-    eventually(|| async { (count(&bench, "asset").await == 1).then_some(()) }).await;
-    assert_eq!(count(&bench, "session").await, 2);
-    bench.client.asset("large").await;
+    fixture.client.delete("assets/large").await.problem(404);
+    fixture.client.post("assets", &json!({ "name": "large" })).await.problem(429);
+    fixture.client.telemetry("b", Some("second"), &rig(700, usize::MAX)[600..]).await;
+    unblock_deletion(&fixture).await;
+    fixture.restart().await;
+    eventually(|| async { (count(&fixture, "asset").await == 1).then_some(()) }).await;
+    assert_eq!(count(&fixture, "session").await, 2);
+    fixture.client.asset("large").await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_large_session_goes_in_pieces_and_is_hidden_at_once() {
-    let mut bench = with_large().await;
+async fn a_large_session_is_hidden_at_once_and_deleted_in_parts() {
+    let mut fixture = service_with_large_asset().await;
     let path = |session: &Value| format!("sessions/{}", session["id"].as_str().unwrap());
-    let first = path(&bench.client.session("large", "first").await);
-    stuck(&bench).await;
-    bench.client.delete(&first).await.problem(503);
-    bench.client.get(&first).await.problem(404);
-    let second = path(&bench.client.session("large", "second").await);
-    bench.client.delete(&second).await.expect(204);
-    loosen(&bench).await;
-    bench.restart().await;
-    eventually(|| async { (count(&bench, "session").await == 2).then_some(()) }).await;
-    bench.client.telemetry("large", Some("first"), &rig(10, usize::MAX)).await;
+    let first = path(&fixture.client.session("large", "first").await);
+    block_deletion(&fixture).await;
+    fixture.client.delete(&first).await.problem(503);
+    fixture.client.get(&first).await.problem(404);
+    let second = path(&fixture.client.session("large", "second").await);
+    fixture.client.delete(&second).await.expect(204);
+    unblock_deletion(&fixture).await;
+    fixture.restart().await;
+    eventually(|| async { (count(&fixture, "session").await == 2).then_some(()) }).await;
+    fixture.client.telemetry("large", Some("first"), &rig(10, usize::MAX)).await;
 }
 
-/// A change of the database that makes it fail on an asset `bad` as if its disk were
-/// full, and on nothing else.
-async fn full_for_one(bench: &Bench) {
+/// Makes the database fail on an asset `bad`, and on nothing else, as if the disk were full.
+async fn fail_for_asset_bad(fixture: &ServiceFixture) {
     let words = if crate::support::on_postgres() {
         "CREATE FUNCTION refuse() RETURNS trigger LANGUAGE plpgsql AS
          'BEGIN RAISE ''full'' USING ERRCODE = ''53100''; END';
          CREATE TRIGGER full_for_one BEFORE INSERT ON asset FOR EACH ROW
          WHEN (NEW.name = 'bad') EXECUTE FUNCTION refuse()"
     } else {
-        // The largest key is taken, so the next one is SQLITE_FULL.
+        // The largest key is in use, so the next insertion gives SQLITE_FULL.
         "CREATE TABLE used_up (id INTEGER PRIMARY KEY AUTOINCREMENT);
          INSERT INTO used_up VALUES (9223372036854775807);
          CREATE TRIGGER full_for_one BEFORE INSERT ON asset WHEN NEW.name = 'bad'
          BEGIN INSERT INTO used_up VALUES (NULL); END"
     };
-    bench.store().await.execute(words).await.unwrap();
+    fixture.store().await.execute(words).await.unwrap();
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_change_on_which_the_database_always_fails_is_refused_and_the_others_go_on() {
-    let bench = Bench::start().await;
-    bench.client.asset("b").await;
+async fn a_change_that_always_fails_is_rejected_and_the_others_are_committed() {
+    let fixture = ServiceFixture::start().await;
+    fixture.client.asset("b").await;
     let samples = rig(300, usize::MAX);
-    bench.client.telemetry("b", Some("s"), &samples[..100]).await;
-    full_for_one(&bench).await;
-    let mut socket = stream(&bench.client, "b").await;
-    // All of it is in one group.
-    let hold = bench.hold().await;
-    flood(&mut socket, &samples[100..200]).await;
+    fixture.client.telemetry("b", Some("s"), &samples[..100]).await;
+    fail_for_asset_bad(&fixture).await;
+    let mut socket = stream(&fixture.client, "b").await;
+    // All changes are in one group commit.
+    let lock = fixture.lock_store().await;
+    send_all(&mut socket, &samples[100..200]).await;
     let bad = tokio::spawn({
-        let client = bench.client.clone();
+        let client = fixture.client.clone();
         async move { client.post("assets", &json!({ "name": "bad" })).await }
     });
-    flood(&mut socket, &samples[200..]).await;
-    hold.let_go().await;
-    accepted(&mut socket, 200).await;
+    send_all(&mut socket, &samples[200..]).await;
+    lock.release().await;
+    read_until_accepted(&mut socket, 200).await;
     let problem = bad.await.unwrap().problem(503);
     assert!(problem["detail"].as_str().unwrap().contains("asset `bad`"), "{problem}");
-    readiness(&bench.client, 200).await;
-    bench.client.asset("good").await;
-    assert_eq!(bench.client.recording("b", "s").await, samples);
+    readiness(&fixture.client, 200).await;
+    fixture.client.asset("good").await;
+    assert_eq!(fixture.client.recording("b", "s").await, samples);
 }

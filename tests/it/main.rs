@@ -1,6 +1,5 @@
-//! offbd from outside: over sockets, as a process, in a real database. With
-//! `TEST_DATABASE=postgres` what starts a service starts it on a private
-//! server of PostgreSQL.
+//! Tests of offbd from outside: over sockets, as a process, with a real database. With
+//! `TEST_DATABASE=postgres` the services under test use a private PostgreSQL server.
 
 #![allow(unreachable_pub, clippy::unwrap_used, reason = "a test fails by panicking")]
 

@@ -1,17 +1,17 @@
-//! What an operator watches: metrics, the dashboard and the alerts made of them.
+//! Metrics, and the dashboard and alerts that use them.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::support::process::Process;
-use crate::support::{Bench, batch, rig};
+use crate::support::{ServiceFixture, batch, rig};
 use serde_json::json;
 
 const DASHBOARD: &str = include_str!("../../deploy/grafana/offbd.json");
 const ALERTS: &str = include_str!("../../deploy/prometheus/offbd.yaml");
 const MANUAL: &str = include_str!("../../docs/operations.md");
 
-/// What `/metrics` shows: the labels of each series' name.
-fn series(text: &str) -> BTreeMap<String, BTreeSet<String>> {
+/// Returns the metrics of `/metrics`, each with its labels.
+fn metrics_and_labels(text: &str) -> BTreeMap<String, BTreeSet<String>> {
     let mut series: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     for line in text.lines().filter(|line| !line.is_empty() && !line.starts_with('#')) {
         let (name, rest) = line.split_at(line.find(['{', ' ']).unwrap());
@@ -22,7 +22,7 @@ fn series(text: &str) -> BTreeMap<String, BTreeSet<String>> {
     series
 }
 
-/// Every use of a metric in `text`, with the labels by which it is selected.
+/// Returns every use of a metric in `text`, with the labels in its selector.
 fn uses(text: &str) -> Vec<(String, Vec<String>)> {
     let part = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
     let mut uses = Vec::new();
@@ -40,44 +40,44 @@ fn uses(text: &str) -> Vec<(String, Vec<String>)> {
     uses
 }
 
-async fn metrics(bench: &Bench) -> String {
-    bench.client.get("/metrics").await.text
+async fn metrics(fixture: &ServiceFixture) -> String {
+    fixture.client.get("/metrics").await.text
 }
 
-/// A server that has done a little of everything.
-async fn busy() -> Bench {
-    let bench = Bench::start().await;
-    bench.client.asset("very-own-rig").await;
-    bench.client.telemetry("very-own-rig", Some("very-own-session"), &rig(200, 100)).await;
-    bench.client.get("/nowhere/very-own-path").await.problem(404);
-    bench
+/// Starts a service that has handled several kinds of requests.
+async fn busy_service() -> ServiceFixture {
+    let fixture = ServiceFixture::start().await;
+    fixture.client.asset("very-own-rig").await;
+    fixture.client.telemetry("very-own-rig", Some("very-own-session"), &rig(200, 100)).await;
+    fixture.client.get("/nowhere/very-own-path").await.problem(404);
+    fixture
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_is_watched_is_measured() {
-    let bench = busy().await;
-    let there = series(&metrics(&bench).await);
-    // Prometheus gives these to every series.
-    let given = ["job", "instance", "le"];
+async fn dashboard_and_alerts_use_only_existing_metrics() {
+    let fixture = busy_service().await;
+    let existing = metrics_and_labels(&metrics(&fixture).await);
+    // Prometheus adds these labels to every series.
+    let added = ["job", "instance", "le"];
     for (file, text) in [("dashboard", DASHBOARD), ("alerts", ALERTS)] {
         let uses = uses(text);
         assert!(uses.len() > 10, "{file}");
         for (name, labels) in uses {
-            let known = there.get(&name).unwrap_or_else(|| panic!("{file}: there is no {name}"));
-            let strange =
-                labels.iter().find(|l| !known.contains(*l) && !given.contains(&l.as_str()));
-            assert_eq!(strange, None, "{file}: {name} has no such label");
+            let known = existing.get(&name).unwrap_or_else(|| panic!("{file}: there is no {name}"));
+            let unknown =
+                labels.iter().find(|l| !known.contains(*l) && !added.contains(&l.as_str()));
+            assert_eq!(unknown, None, "{file}: {name} has no such label");
         }
     }
 }
 
-/// Where a JSON Web Token says what its bearer is for, by default.
+/// Default claims of a JSON Web Token for role and asset.
 const CLAIMS: [&str; 2] = ["offbd_role", "offbd_asset"];
 
 #[tokio::test(flavor = "multi_thread")]
-async fn every_metric_is_explained_and_none_has_labels_from_outside() {
-    let bench = busy().await;
-    let text = metrics(&bench).await;
+async fn every_metric_is_documented_and_no_label_comes_from_a_request() {
+    let fixture = busy_service().await;
+    let text = metrics(&fixture).await;
     let mut names = BTreeSet::new();
     for line in text.lines() {
         let Some(rest) = line.strip_prefix("# TYPE ") else { continue };
@@ -89,22 +89,22 @@ async fn every_metric_is_explained_and_none_has_labels_from_outside() {
     for name in &names {
         assert!(MANUAL.contains(&format!("`{name}`")), "docs/operations.md does not name {name}");
     }
-    // Claims of a JSON Web Token are named as metrics are.
+    // Claims of a JSON Web Token have the same prefix as metrics.
     let metrics = uses(MANUAL).into_iter().filter(|(name, _)| !CLAIMS.contains(&name.as_str()));
     for (name, _) in metrics {
-        assert!(names.contains(&name), "docs/operations.md names {name}, which is not there");
+        assert!(names.contains(&name), "docs/operations.md names {name}, which does not exist");
     }
-    assert!(!text.contains("very-own"), "a label comes from outside");
+    assert!(!text.contains("very-own"), "a label contains a name from a request");
 }
 
-/// The number of a series.
+/// Returns the value of a series.
 fn number(text: &str, series: &str) -> f64 {
     let line = text.lines().find_map(|line| line.strip_prefix(series)?.strip_prefix(' '));
     line.unwrap_or_else(|| panic!("no {series}")).parse().unwrap()
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn it_is_counted_what_became_of_samples_and_what_was_found() {
+async fn metrics_count_samples_by_outcome_and_fault_transitions() {
     let data = tempfile::tempdir().unwrap();
     let Process { client, .. } = &Process::start(data.path());
     client.asset("a").await;

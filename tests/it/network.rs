@@ -1,10 +1,10 @@
-//! Connections as they should not be, and encrypted ones, against a real server.
+//! Misbehaving and encrypted connections to a real service.
 
 use std::path::PathBuf;
 use std::process::{Command, Output};
 use std::sync::Arc;
 
-use crate::support::{Bench, DEADLINE, batch, eventually, rig};
+use crate::support::{DEADLINE, ServiceFixture, batch, eventually, rig};
 use futures_util::{SinkExt, StreamExt};
 use offbd::config::{Config, TlsConfig};
 use reqwest::Method;
@@ -15,12 +15,12 @@ use tokio_rustls::rustls::pki_types::{CertificateDer, ServerName, pem::PemObject
 use tokio_rustls::rustls::{ClientConfig, RootCertStore, crypto::ring};
 use tokio_tungstenite::tungstenite::Message;
 
-/// A connection to the server, without a client's manners.
-struct Raw(TcpStream);
+/// A TCP connection to the service, on which a test can send anything.
+struct RawConnection(TcpStream);
 
-impl Raw {
-    async fn new(bench: &Bench) -> Self {
-        Self(TcpStream::connect(&bench.client.address).await.unwrap())
+impl RawConnection {
+    async fn new(fixture: &ServiceFixture) -> Self {
+        Self(TcpStream::connect(&fixture.client.address).await.unwrap())
     }
 
     async fn send(&mut self, text: &str) -> &mut Self {
@@ -28,8 +28,8 @@ impl Raw {
         self
     }
 
-    /// What comes until `mark` has come, or the connection ends.
-    async fn until(&mut self, mark: &str) -> String {
+    /// Reads until `mark` has been received or the connection ends.
+    async fn read_until(&mut self, mark: &str) -> String {
         let mut got = Vec::new();
         let read = async {
             while self.0.read_buf(&mut got).await.is_ok_and(|n| n > 0) {
@@ -38,137 +38,141 @@ impl Raw {
                 }
             }
         };
-        tokio::time::timeout(DEADLINE, read).await.expect("the server ends it in time");
+        tokio::time::timeout(DEADLINE, read)
+            .await
+            .expect("the service responds within the deadline");
         String::from_utf8_lossy(&got).into_owned()
     }
 
-    /// What comes until the server closes the connection.
-    async fn rest(&mut self) -> String {
-        self.until("\u{0}never").await
+    /// Reads until the service closes the connection.
+    async fn read_to_end(&mut self) -> String {
+        self.read_until("\u{0}never").await
     }
 }
 
 const HEALTH: &str = "GET /healthz HTTP/1.1\r\nhost: localhost\r\n\r\n";
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_head_that_never_ends_is_given_up() {
-    let bench = Bench::start_with(|config| config.limits.header_timeout_s = 1).await;
-    let mut slow = Raw::new(&bench).await;
+async fn an_incomplete_request_head_times_out() {
+    let fixture = ServiceFixture::start_with(|config| config.limits.header_timeout_s = 1).await;
+    let mut slow = RawConnection::new(&fixture).await;
     slow.send("GET /healthz HTTP/1.1\r\nhost: localhost\r\nx-slow: ").await;
-    let answer = slow.rest().await;
+    let answer = slow.read_to_end().await;
     assert!(!answer.contains(" 200 "), "{answer}");
-    let mut silent = Raw::new(&bench).await;
-    assert_eq!(silent.rest().await, "");
-    // Between two requests, too.
-    let mut idle = Raw::new(&bench).await;
-    assert!(idle.send(HEALTH).await.until("}").await.contains(" 200 OK"));
-    assert_eq!(idle.rest().await, "");
+    let mut silent = RawConnection::new(&fixture).await;
+    assert_eq!(silent.read_to_end().await, "");
+    // Also between two requests.
+    let mut idle = RawConnection::new(&fixture).await;
+    assert!(idle.send(HEALTH).await.read_until("}").await.contains(" 200 OK"));
+    assert_eq!(idle.read_to_end().await, "");
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_head_that_is_too_long_is_refused() {
-    let bench = Bench::start().await;
+async fn a_request_head_that_is_too_long_gets_431() {
+    let fixture = ServiceFixture::start().await;
     let long = "x".repeat(200 << 10);
     let many = (0..200).map(|i| format!("x-{i}: 1\r\n")).collect::<String>();
     for fields in [format!("x-long: {long}\r\n"), many] {
-        let mut raw = Raw::new(&bench).await;
+        let mut raw = RawConnection::new(&fixture).await;
         let head = format!("GET /healthz HTTP/1.1\r\nhost: localhost\r\n{fields}\r\n");
-        // The server may close before all is sent.
+        // The service may close the connection before everything is sent.
         let _ = raw.0.write_all(head.as_bytes()).await;
-        let answer = raw.until("\r\n").await;
+        let answer = raw.read_until("\r\n").await;
         assert!(answer.is_empty() || answer.contains(" 431 "), "{answer}");
     }
-    bench.client.get("/healthz").await.expect(200);
+    fixture.client.get("/healthz").await.expect(200);
 }
 
-/// A server with room for one connection, and one that takes it up with half a
+/// Starts a service that allows one connection, and opens a connection with an incomplete
 /// request.
-async fn taken(change: impl FnOnce(&mut Config)) -> (Bench, Raw) {
-    let bench = Bench::start_with(|config| {
+async fn service_with_open_connection(
+    change: impl FnOnce(&mut Config),
+) -> (ServiceFixture, RawConnection) {
+    let fixture = ServiceFixture::start_with(|config| {
         config.limits.connections = 1;
         change(config);
     })
     .await;
-    let mut raw = Raw::new(&bench).await;
+    let mut raw = RawConnection::new(&fixture).await;
     let head = "POST /api/v1/assets HTTP/1.1\r\nhost: localhost\r\ncontent-length: 100\r\n\
         expect: 100-continue\r\n\r\n";
-    // That it is to continue says that the request is under way.
-    assert!(raw.send(head).await.until("\r\n\r\n").await.contains(" 100 "));
+    // The response 100 shows that the service handles the request.
+    assert!(raw.send(head).await.read_until("\r\n\r\n").await.contains(" 100 "));
     raw.send("{\"name\":").await;
-    (bench, raw)
+    (fixture, raw)
 }
 
-/// Waits until the one place is free.
-async fn free(bench: &Bench) {
+/// Waits until the service accepts a new connection.
+async fn wait_until_accepted(fixture: &ServiceFixture) {
     let asked = || async {
-        let mut raw = Raw::new(bench).await;
+        let mut raw = RawConnection::new(fixture).await;
         let sent = raw.0.write_all(HEALTH.as_bytes()).await;
-        let answer = if sent.is_ok() { raw.until("}").await } else { String::new() };
+        let answer = if sent.is_ok() { raw.read_until("}").await } else { String::new() };
         answer.contains(" 200 OK").then_some(())
     };
     eventually(asked).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn one_connection_too_many_is_closed_at_once() {
-    let (bench, raw) = taken(|_| {}).await;
-    let mut refused = Raw::new(&bench).await;
-    assert_eq!(refused.rest().await, "");
+async fn a_connection_above_the_limit_is_closed_at_once() {
+    let (fixture, raw) = service_with_open_connection(|_| {}).await;
+    let mut refused = RawConnection::new(&fixture).await;
+    assert_eq!(refused.read_to_end().await, "");
     drop(raw);
-    free(&bench).await;
+    wait_until_accepted(&fixture).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn one_address_has_its_share_of_the_connections() {
-    let (bench, raw) = taken(|config| {
+async fn connections_per_address_are_limited() {
+    let (fixture, raw) = service_with_open_connection(|config| {
         config.limits.connections = 100;
         config.limits.connections_per_address = 1;
     })
     .await;
-    assert_eq!(Raw::new(&bench).await.rest().await, "");
+    assert_eq!(RawConnection::new(&fixture).await.read_to_end().await, "");
     drop(raw);
-    free(&bench).await;
+    wait_until_accepted(&fixture).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_half_closed_connection_holds_nothing() {
-    let (bench, mut raw) = taken(|_| {}).await;
+async fn a_half_closed_connection_is_released() {
+    let (fixture, mut raw) = service_with_open_connection(|_| {}).await;
     raw.0.shutdown().await.unwrap();
-    free(&bench).await;
-    let list = || async { bench.client.request(Method::GET, "assets").send().await.ok() };
+    wait_until_accepted(&fixture).await;
+    let list = || async { fixture.client.request(Method::GET, "assets").send().await.ok() };
     let list = eventually(list).await.json::<Value>().await.unwrap();
-    assert_eq!(list["items"], Value::Array(vec![]), "half a request does nothing");
+    assert_eq!(list["items"], Value::Array(vec![]), "an incomplete request changes nothing");
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_websocket_holds_its_place() {
-    let bench = Bench::start_with(|config| config.limits.connections = 2).await;
-    bench.client.asset("a").await;
-    let url = format!("ws://{}/api/v1/assets/a/stream", bench.client.address);
+async fn an_open_websocket_counts_as_a_connection() {
+    let fixture = ServiceFixture::start_with(|config| config.limits.connections = 2).await;
+    fixture.client.asset("a").await;
+    let url = format!("ws://{}/api/v1/assets/a/stream", fixture.client.address);
     let (mut socket, _) = tokio_tungstenite::connect_async(url).await.unwrap();
-    // The client's own connection is the other.
-    bench.client.get("/healthz").await.expect(200);
-    assert_eq!(Raw::new(&bench).await.rest().await, "");
+    // The connection of `client` is the second one.
+    fixture.client.get("/healthz").await.expect(200);
+    assert_eq!(RawConnection::new(&fixture).await.read_to_end().await, "");
     socket.close(None).await.unwrap();
     while socket.next().await.is_some_and(|frame| frame.is_ok()) {}
-    free(&bench).await;
+    wait_until_accepted(&fixture).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_client_that_reads_nothing_is_cut_off() {
-    let bench = Bench::start_with(|config| {
+async fn a_client_that_does_not_read_is_disconnected() {
+    let fixture = ServiceFixture::start_with(|config| {
         config.limits.connections = 1;
         config.limits.write_timeout_s = 1;
     })
     .await;
-    let mut deaf = Raw::new(&bench).await;
-    // More than the buffers between hold: some 150 kB each.
-    let ask = "GET /openapi.json HTTP/1.1\r\nhost: localhost\r\n\r\n".repeat(400);
-    deaf.send(&ask).await;
-    free(&bench).await;
+    let mut silent = RawConnection::new(&fixture).await;
+    // The responses of about 150 kB each exceed all buffers.
+    let requests = "GET /openapi.json HTTP/1.1\r\nhost: localhost\r\n\r\n".repeat(400);
+    silent.send(&requests).await;
+    wait_until_accepted(&fixture).await;
 }
 
-/// A certificate for this machine in `directory`, and the files of it.
+/// Writes a self-signed certificate for this machine to `directory`.
 fn certificate(directory: &std::path::Path) -> TlsConfig {
     let names = ["localhost".to_owned(), "127.0.0.1".to_owned()];
     let made = rcgen::generate_simple_self_signed(names).unwrap();
@@ -183,6 +187,12 @@ fn certificate(directory: &std::path::Path) -> TlsConfig {
     }
 }
 
+/// Runs `offbd` with these arguments.
+async fn offbd(arguments: Vec<String>) -> Output {
+    let run = move || Command::new(env!("CARGO_BIN_EXE_offbd")).args(arguments).output();
+    tokio::task::spawn_blocking(run).await.unwrap().unwrap()
+}
+
 /// Runs curl.
 async fn curl(arguments: Vec<String>) -> Output {
     let run = move || {
@@ -192,15 +202,15 @@ async fn curl(arguments: Vec<String>) -> Output {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn validate_curl_and_a_websocket_come_in_encrypted() {
+async fn validate_curl_and_a_websocket_client_connect_over_tls() {
     let directory = tempfile::tempdir().unwrap();
     let files = certificate(directory.path());
-    let bench = Bench::start_with(|config| {
+    let fixture = ServiceFixture::start_with(|config| {
         config.tls = Some(files.clone());
         config.limits.header_timeout_s = 1;
     })
     .await;
-    let address = bench.client.address.clone();
+    let address = fixture.client.address.clone();
     let words = |line: &str| line.split(' ').map(str::to_owned).collect::<Vec<_>>();
     let trusted = format!("--cacert {}", files.certificate.display());
     let health = curl(words(&format!("{trusted} https://{address}/healthz"))).await;
@@ -208,15 +218,15 @@ async fn validate_curl_and_a_websocket_come_in_encrypted() {
     let asset = format!("{trusted} --json {{\"name\":\"a\"}} https://{address}/api/v1/assets");
     let made = curl(words(&asset)).await;
     assert!(String::from_utf8_lossy(&made.stdout).contains("\"name\":\"a\""), "{made:?}");
-    // 60: not trusted, 35: no encryption that both know.
-    let strange = curl(words(&format!("https://{address}/healthz"))).await;
-    assert_eq!(strange.status.code(), Some(60), "{strange:?}");
+    // 60: not trusted; 35: no common TLS version.
+    let untrusted = curl(words(&format!("https://{address}/healthz"))).await;
+    assert_eq!(untrusted.status.code(), Some(60), "{untrusted:?}");
     let old = curl(words(&format!("{trusted} --tls-max 1.1 https://{address}/healthz"))).await;
     assert_eq!(old.status.code(), Some(35), "{old:?}");
     let plain = curl(words(&format!("http://{address}/healthz"))).await;
     assert!(!plain.status.success(), "{plain:?}");
-    // Whoever begins no encryption is not waited for.
-    assert_eq!(Raw::new(&bench).await.rest().await, "");
+    // A connection without a TLS handshake times out.
+    assert_eq!(RawConnection::new(&fixture).await.read_to_end().await, "");
 
     let mut roots = RootCertStore::empty();
     roots.add(CertificateDer::from_pem_file(&files.certificate).unwrap()).unwrap();
@@ -234,4 +244,22 @@ async fn validate_curl_and_a_websocket_come_in_encrypted() {
     let answer = tokio::time::timeout(DEADLINE, socket.next()).await.unwrap().unwrap().unwrap();
     let answer: Value = serde_json::from_str(answer.to_text().unwrap()).unwrap();
     assert_eq!(answer["accepted"], 10, "{answer}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn watch_connects_over_tls_if_the_certificate_is_trusted() {
+    let directory = tempfile::tempdir().unwrap();
+    let files = certificate(directory.path());
+    let fixture = ServiceFixture::start_with(|config| config.tls = Some(files.clone())).await;
+    let address = fixture.client.address.clone();
+    let asset = format!("--cacert {} --json {{\"name\":\"a\"}}", files.certificate.display());
+    let words = |line: &str| line.split(' ').map(str::to_owned).collect::<Vec<_>>();
+    curl(words(&format!("{asset} https://{address}/api/v1/assets"))).await;
+    let watch = format!("watch a --states 1 --address https://{address}");
+    let ca_file = files.certificate.display();
+    let done = offbd(words(&format!("{watch} --ca-file {ca_file}"))).await;
+    assert!(String::from_utf8_lossy(&done.stdout).contains(" a "), "{done:?}");
+    let done = offbd(words(&watch)).await;
+    let stderr = String::from_utf8_lossy(&done.stderr);
+    assert!(!done.status.success() && stderr.contains("certificate"), "{stderr}");
 }

@@ -1,9 +1,9 @@
-//! The committed description of the interface is the one the code gives.
+//! The committed OpenAPI description equals the one generated from the code.
 
 const COMMITTED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/openapi.yaml");
 
 #[test]
-fn openapi_yaml_is_what_the_code_says() {
+fn openapi_yaml_equals_the_generated_description() {
     let generated = offbd::http::openapi_yaml();
     if std::env::var_os("UPDATE_OPENAPI").is_some() {
         std::fs::write(COMMITTED, &generated).unwrap();

@@ -1,14 +1,15 @@
-//! What a session comes to, monitor by monitor, and when nothing can be said.
+//! The outcomes of sessions and their monitors, and when a monitor does not judge.
 
 use offbd::wire::verdict::{Outcome, SummaryView, Verdict};
-use offbd_core::diagnosis::FaultMemory;
-use offbd_core::engine::{Engine, Input, Output, Rig, Setup, calibrate};
+use offbd::wire::words::CodeWord;
+use offbd_core::diagnosis::{FaultMemory, Transition};
+use offbd_core::engine::{Engine, Input, Rig, Setup, calibrate};
 use offbd_core::vocabulary::{FaultCode, FaultStatus, Sample};
 use offbd_lab::simulation::{Disturbances, Fault, Preset, Reference, SimulatedRig};
 
 const LIVELY: Disturbances = Disturbances { pushes_per_minute: 4.0, gusts_per_minute: 1.0 };
 
-/// Rows of a simulated session.
+/// Returns the samples of a simulated session.
 fn session(
     preset: Preset,
     reference: Reference,
@@ -27,45 +28,42 @@ fn session(
 fn learnt(preset: Preset) -> Setup {
     let mut rig: Rig = preset.model().unwrap().rig;
     let healthy = session(preset, Reference::Steps, 120.0, 1000, "");
-    rig.calibration = Some(calibrate(&rig, &[healthy], "", "").unwrap());
+    rig.calibration = Some(calibrate(&rig, &[healthy]).unwrap());
     Setup::new(rig, None).unwrap()
 }
 
-fn outputs(setup: &Setup, samples: &[Sample]) -> Vec<Output> {
+fn transitions(setup: &Setup, samples: &[Sample]) -> Vec<Transition> {
     let mut engine = Engine::new(setup.clone(), FaultMemory::default());
-    let mut outputs = Vec::new();
+    let mut transitions = Vec::new();
     for &sample in samples {
-        engine.handle(Input::Sample(sample), &mut outputs);
+        engine.handle(Input::Sample(sample), &mut transitions);
     }
-    engine.handle(Input::End, &mut outputs);
-    outputs
+    engine.handle(Input::End, &mut transitions);
+    transitions
 }
 
-fn confirmed(outputs: &[Output]) -> Vec<(FaultCode, f64)> {
+fn confirmed(transitions: &[Transition]) -> Vec<(FaultCode, f64)> {
     let mut found = Vec::new();
-    for output in outputs {
-        if let Output::Transition(t) = output
-            && t.status == FaultStatus::Confirmed
-            && found.iter().all(|&(code, _)| code != t.code)
-        {
+    for t in transitions.iter().filter(|t| t.status == FaultStatus::Confirmed) {
+        if found.iter().all(|&(code, _)| code != t.code) {
             found.push((t.code, t.at.seconds()));
         }
     }
     found
 }
 
-/// What a session comes to on what earlier ones have left in `memory`, and what
-/// it leaves.
+/// Returns the summary of a session that starts with `memory`, and the memory after it.
 fn summary_after(
     memory: FaultMemory,
     setup: &Setup,
     samples: &[Sample],
 ) -> (SummaryView, FaultMemory) {
     let mut engine = Engine::new(setup.clone(), memory);
-    let (mut outputs, mut verdict) = (Vec::new(), Verdict::default());
-    let inputs = samples.iter().map(|&s| Input::Sample(s)).chain([Input::End]);
-    inputs.for_each(|input| engine.handle(input, &mut outputs));
-    outputs.iter().for_each(|output| verdict.take(output));
+    let mut verdict = Verdict::default();
+    for input in samples.iter().map(|&s| Input::Sample(s)).chain([Input::End]) {
+        let mut transitions = Vec::new();
+        verdict.take(engine.handle(input, &mut transitions), &transitions);
+    }
     let summary = verdict.summary("s", samples.len() as u64, 0, 0.0);
     (summary.with_monitors(verdict.monitors(&engine.state())), engine.memory().clone())
 }
@@ -94,7 +92,7 @@ fn a_healthy_session_is_judged_by_every_monitor_for_most_of_its_time() {
 }
 
 #[test]
-fn a_rig_that_is_not_learnt_says_so_of_servos_and_ball() {
+fn servos_and_ball_of_a_rig_that_is_not_learnt_have_the_outcome_not_learnt() {
     use Outcome::{NoFault, NotLearnt};
     let setup = Setup::new(Preset::Chapter.model().unwrap().rig, None).unwrap();
     let samples = session(Preset::Chapter, Reference::Circle, 30.0, 5, "");
@@ -115,37 +113,37 @@ fn without_commands_no_servo_is_judged() {
     assert_eq!(found.outcome, Some(Outcome::PartlyJudged));
 }
 
-/// A learnt rig looks through windows of half a second or more, and takes as long
-/// again to confirm.
+/// A learnt rig uses windows of half a second or more, and the confirmation takes as long
+/// again.
 #[test]
-fn of_a_moment_nothing_is_judged_and_of_two_seconds_little() {
+fn a_very_short_session_is_not_judged() {
     let setup = learnt(Preset::Chapter);
     let of = |seconds: f64| {
         let samples = session(Preset::Chapter, Reference::Circle, seconds, 5, "");
         summary(&setup, &samples)
     };
-    let moment = of(0.3);
-    assert_eq!(moment.outcome, Some(Outcome::NotJudged), "{moment:?}");
-    assert!(outcomes(&moment).iter().all(|&o| o == Outcome::NotJudged));
+    let very_short = of(0.3);
+    assert_eq!(very_short.outcome, Some(Outcome::NotJudged), "{very_short:?}");
+    assert!(outcomes(&very_short).iter().all(|&o| o == Outcome::NotJudged));
     let short = of(2.0);
     assert!(shares(&short)[..2].iter().all(|share| (0.0..0.8).contains(share)), "{short:?}");
     assert_ne!(of(1.2).outcome, Some(Outcome::NoFault));
 }
 
 #[test]
-fn a_ball_at_rest_says_nothing_of_servos_or_itself() {
+fn a_ball_at_rest_leaves_servos_and_ball_not_judged() {
     use Outcome::{NoFault, NotJudged};
     let rest = |i: u32| Sample {
         t_s: 0.01 * f64::from(i),
         cmd_qx_rad: Some(0.0),
         cmd_qy_rad: Some(0.0),
-        // A tenth of a millimetre to and fro: the sensor lives.
+        // Noise of a tenth of a millimetre, so that the readings are not frozen.
         x_m: Some(1e-4 * f64::from(i % 3)),
         y_m: Some(1e-4 * f64::from(i % 2)),
         ..Sample::default()
     };
     let mut setup = learnt(Preset::Chapter);
-    // A level plate that holds its ball by half a degree.
+    // A level plate with a breakaway angle of half a degree.
     for axis in [&mut setup.rig.calibration.as_mut().unwrap().axes] {
         for learnt in [&mut axis.x, &mut axis.y] {
             let learnt = learnt.as_mut().unwrap();
@@ -160,10 +158,10 @@ fn a_ball_at_rest_says_nothing_of_servos_or_itself() {
     assert_eq!(found.outcome, Some(Outcome::PartlyJudged));
 }
 
-/// The owner's debounce holds for the sensor, too, and a jump of the readings
-/// lasts for as long as it takes.
+/// The debounce setting also applies to the sensor, and a jump of the readings counts as a
+/// failure for as long.
 #[test]
-fn the_owners_debounce_delays_a_sensor_fault() {
+fn the_debounce_setting_delays_a_sensor_fault() {
     let setup = learnt(Preset::Chapter);
     let mut patient = setup.rig.clone();
     patient.diagnostics.debounce_s = Some(2.5);
@@ -171,49 +169,46 @@ fn the_owners_debounce_delays_a_sensor_fault() {
     for fault in ["sensor:dropout@10", "sensor:jump@10"] {
         let samples = session(Preset::Chapter, Reference::Circle, 20.0, 7, fault);
         let at = |setup: &Setup| {
-            let found = confirmed(&outputs(setup, &samples));
+            let found = confirmed(&transitions(setup, &samples));
             assert_eq!(found.first().map(|f| f.0), Some(FaultCode::Sensor), "{fault}: {found:?}");
             found[0].1
         };
-        // 2.5 s in the place of 0.3 s.
+        // 2.5 s instead of 0.3 s.
         let later_s = at(&patient) - at(&setup);
         assert!((2.1..2.4).contains(&later_s), "{fault}: {later_s} s later");
     }
 }
 
 #[test]
-fn a_jump_is_told_by_its_size_and_moment() {
+fn a_jump_is_reported_with_size_and_time() {
     let samples = session(Preset::Chapter, Reference::Circle, 20.0, 7, "sensor:jump@10");
-    let all = outputs(&learnt(Preset::Chapter), &samples);
-    let jump = all.iter().find_map(|output| match output {
-        Output::Transition(t) => t.evidence.jump,
-        Output::Admitted(_) => None,
-    });
+    let all = transitions(&learnt(Preset::Chapter), &samples);
+    let jump = all.iter().find_map(|t| t.evidence.jump);
     let jump = jump.expect("the readings step");
     assert!((9.95..10.1).contains(&jump.at_s), "{jump:?}");
     assert!((0.01..0.2).contains(&jump.size_m), "{jump:?}");
 }
 
-/// A fault that goes on into the next session is found there again, and one that
-/// is gone is no fault of that session though it stays on record.
+/// A fault that continues in the next session is found there again. A fault that has ended is
+/// not in the verdict, although it stays in the fault memory.
 #[test]
-fn each_session_says_what_it_has_found_itself() {
+fn a_verdict_contains_only_faults_found_in_its_session() {
     let setup = learnt(Preset::Chapter);
     let of = |fault: &str| session(Preset::Chapter, Reference::Circle, 20.0, 7, fault);
     let (first, memory) = summary_after(FaultMemory::default(), &setup, &of("x_servo:dead@5"));
-    assert_eq!(first.faults, ["x_servo"]);
+    assert_eq!(first.faults, [CodeWord::XServo]);
     let (second, memory) = summary_after(memory, &setup, &of("x_servo:dead@0"));
     assert_eq!((second.faults, second.outcome), (first.faults, Some(Outcome::Fault)));
-    assert_eq!(memory.record(FaultCode::XServo).occurrences, 1, "it has never passed");
+    assert_eq!(memory.record(FaultCode::XServo).occurrences, 1, "its test has never passed");
     let (third, memory) = summary_after(memory, &setup, &of(""));
     assert_eq!((third.faults, third.outcome), (vec![], Some(Outcome::NoFault)));
     assert_eq!(memory.record(FaultCode::XServo).word(), FaultStatus::Confirmed);
 }
 
-/// A monitor that must see a failure for a minute has judged nothing in half of
-/// one, nor does the session count for its in-use ratio.
+/// A monitor that requires a failure of one minute has judged nothing in half a minute, and
+/// the session does not count for its in-use ratio.
 #[test]
-fn how_long_it_takes_to_judge_goes_with_the_settings_in_force() {
+fn the_time_needed_to_judge_depends_on_the_debounce_setting() {
     let mut rig = learnt(Preset::Chapter).rig;
     rig.diagnostics.debounce_s = Some(60.0);
     let samples = session(Preset::Chapter, Reference::Circle, 30.0, 5, "");

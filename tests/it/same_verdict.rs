@@ -1,6 +1,7 @@
-//! The same session by every way in: the same recording, the same verdict.
+//! One session sent over every transport and in every format gives the same recording and the
+//! same verdict.
 
-use crate::support::{Bench, Client, batch, csv, judged, learnt, packed, rig};
+use crate::support::{Client, ServiceFixture, batch, csv, judged, learnt, packed, rig};
 use futures_util::{SinkExt, StreamExt};
 use offbd::wire::asset::view;
 use offbd_core::vocabulary::Sample;
@@ -8,17 +9,17 @@ use serde_json::{Value, json};
 use tokio_tungstenite::connect_async;
 use tokio_tungstenite::tungstenite::Message;
 
-/// The hash of session `s` of `asset`, which is ended, and its recording.
-async fn settled(client: &Client, asset: &str) -> (String, Vec<Sample>) {
+/// Ends session `s` of `asset` and returns its verdict hash and its recording.
+async fn end_session(client: &Client, asset: &str) -> (String, Vec<Sample>) {
     let session = client.end(asset, "s").await;
     let hash = session["verdict"]["verdict_hash"].as_str().unwrap().to_owned();
     (hash, client.recording(asset, "s").await)
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn whatever_the_way_in() {
-    let bench = Bench::start().await;
-    let client = &bench.client;
+async fn every_transport_and_format_gives_the_same_recording_and_verdict() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
     let samples = rig(3000, 1500);
     let (hash, faults) = judged("a", &samples);
     assert!(faults.contains(&"x_servo".to_owned()), "{faults:?}");
@@ -43,39 +44,39 @@ async fn whatever_the_way_in() {
         client.telemetry("hundreds", Some("s"), part).await;
     }
     for part in samples.chunks(777) {
-        let said = client.post("assets/columns/telemetry", &columns(part)).await.expect(200);
+        let text = client.post("assets/columns/telemetry", &columns(part)).await.expect(200);
         let packed = client.post_packed("assets/packed/telemetry", &columns(part)).await;
-        assert_eq!(outcome(packed.expect(200)), outcome(said));
+        assert_eq!(without_session_id(packed.expect(200)), without_session_id(text));
         let path = "assets/csv/telemetry?session=s";
         client.post_text(path, "text/csv", csv(part)).await.expect(200);
         let path = "assets/lines/telemetry?session=s";
         client.post_text(path, "application/x-ndjson", lines(part)).await.expect(200);
     }
-    over_websocket(client, "socket", &samples, |frame| Message::text(frame.to_string())).await;
-    over_websocket(client, "packed-socket", &samples, |frame| Message::binary(packed(frame))).await;
+    send_over_websocket(client, "socket", &samples, |frame| Message::text(frame.to_string())).await;
+    send_over_websocket(client, "packed-socket", &samples, |frame| Message::binary(packed(frame)))
+        .await;
     let path = "assets/imported/sessions/import?name=s";
     let imported = client.post_text(path, "text/csv", csv(&samples)).await.expect(201);
     assert_eq!(imported["accepted"], 3000);
     for asset in assets {
-        let (found, recording) = settled(client, asset).await;
+        let (found, recording) = end_session(client, asset).await;
         assert_eq!(found, hash, "{asset}");
         assert_eq!(recording, samples, "{asset}");
     }
-    assert_eq!(replayed_from_a_file(&samples), hash);
+    assert_eq!(hash_by_command_line(&samples), hash);
 }
 
-/// An acknowledgement without the id, which is a session's own.
-fn outcome(mut ack: Value) -> Value {
+/// Returns an acknowledgement without the session's id, which differs between assets.
+fn without_session_id(mut ack: Value) -> Value {
     ack.as_object_mut().unwrap().remove("session_id");
     ack
 }
 
-/// Rows of which some are no samples, some there already and some late get the
-/// same answer in both formats.
+/// Valid, invalid, duplicate and late rows get the same acknowledgement in both formats.
 #[tokio::test]
-async fn an_acknowledgement_is_the_same_in_both_formats() {
-    let bench = Bench::start().await;
-    let client = &bench.client;
+async fn json_and_msgpack_batches_get_the_same_acknowledgement() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
     for asset in ["text", "packed"] {
         client.asset(asset).await;
     }
@@ -100,16 +101,16 @@ async fn an_acknowledgement_is_the_same_in_both_formats() {
         if text["status"].is_number() {
             assert_eq!((&packed["type"], &packed["pointer"]), (&text["type"], &text["pointer"]));
         } else {
-            assert_eq!(outcome(packed), outcome(text));
+            assert_eq!(without_session_id(packed), without_session_id(text));
         }
     }
-    let (said, packed) = (settled(client, "text").await, settled(client, "packed").await);
-    assert_eq!(said, packed);
-    assert_eq!(said.1.len(), 204);
+    let (text, packed) = (end_session(client, "text").await, end_session(client, "packed").await);
+    assert_eq!(text, packed);
+    assert_eq!(text.1.len(), 204);
 }
 
-/// The hash that the command line gives for the session as a file.
-fn replayed_from_a_file(samples: &[Sample]) -> String {
+/// Returns the verdict hash that the command line prints for the session as a file.
+fn hash_by_command_line(samples: &[Sample]) -> String {
     let file = tempfile::NamedTempFile::new().unwrap();
     std::fs::write(file.path(), csv(samples)).unwrap();
     let mut offbd = assert_cmd::Command::new(env!("CARGO_BIN_EXE_offbd"));
@@ -140,8 +141,8 @@ fn lines(samples: &[Sample]) -> String {
     samples.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
-/// Sends everything before it reads an answer, then reads them all.
-async fn over_websocket(
+/// Sends all batches before it reads an answer, then reads all answers.
+async fn send_over_websocket(
     client: &Client,
     asset: &str,
     samples: &[Sample],
@@ -181,9 +182,9 @@ async fn over_websocket(
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_replay_says_the_same_unless_asked_otherwise() {
-    let bench = Bench::start().await;
-    let client = &bench.client;
+async fn a_replay_with_equal_settings_gives_the_same_verdict() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
     client.asset("a").await;
     let samples = rig(3000, 1500);
     client.telemetry("a", Some("s"), &samples[..2500]).await;
@@ -192,7 +193,7 @@ async fn a_replay_says_the_same_unless_asked_otherwise() {
     let session = client.end("a", "s").await;
     let path = format!("sessions/{}/replays", session["id"].as_str().unwrap());
 
-    let replay = replayed(client, &path, &Value::Null).await;
+    let replay = run_replay(client, &path, &Value::Null).await;
     let result = &replay["result"];
     assert_eq!(result["same"], true, "{replay}");
     assert_eq!(result["summary"]["verdict_hash"], session["verdict"]["verdict_hash"]);
@@ -201,13 +202,14 @@ async fn a_replay_says_the_same_unless_asked_otherwise() {
     assert!(!result["faults"].as_array().unwrap().is_empty());
 
     let settings = json!({"profile":"textbook","asset":{"ball":{"mass_kg":0.1}}});
-    let replay = replayed(client, &path, &settings).await;
+    let replay = run_replay(client, &path, &settings).await;
     assert_eq!(replay["result"]["same"], false);
     assert!(!replay["result"]["differences"].as_array().unwrap().is_empty());
     assert_eq!(replay["settings"], settings);
 }
 
-async fn replayed(client: &Client, path: &str, settings: &Value) -> Value {
+/// Starts a replay and waits until it is done.
+async fn run_replay(client: &Client, path: &str, settings: &Value) -> Value {
     let answer = client.post(path, settings).await;
     let id = answer.expect(202)["id"].as_str().unwrap().to_owned();
     assert_eq!(answer.headers["location"], format!("/api/v1/replays/{id}"));

@@ -1,9 +1,9 @@
-//! The rest of the interface over a real socket: sessions, faults, events,
-//! calibrations, back-pressure, a failing store, a graceful stop.
+//! The other operations of the API over a real socket: sessions, faults, events, calibrations,
+//! limits, a failing store, a graceful shutdown.
 
 use std::collections::BTreeSet;
 
-use crate::support::{Bench, Client, Events, batch, csv, read_csv, registration, rig};
+use crate::support::{Client, Events, ServiceFixture, batch, csv, read_csv, registration, rig};
 use futures_util::{SinkExt, StreamExt};
 use offbd_core::vocabulary::Sample;
 use reqwest::Method;
@@ -19,8 +19,8 @@ async fn sessions(client: &Client, asset: &str) -> Vec<Value> {
 
 #[tokio::test]
 async fn sessions_are_listed_by_state_newest_first() {
-    let bench = Bench::start().await;
-    let client = &bench.client;
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
     for asset in ["a", "b"] {
         client.asset(asset).await;
         for session in ["1", "2", "3"] {
@@ -42,8 +42,8 @@ async fn sessions_are_listed_by_state_newest_first() {
     }
 }
 
-/// Waits until nothing is left in the journal.
-async fn folded(store: &mut sqlx::AnyConnection) {
+/// Waits until the journal is empty.
+async fn wait_until_folded(store: &mut sqlx::AnyConnection) {
     loop {
         let left: i64 = sqlx::query_scalar("SELECT count(*) FROM journal")
             .fetch_one(&mut *store)
@@ -56,8 +56,8 @@ async fn folded(store: &mut sqlx::AnyConnection) {
     }
 }
 
-/// Makes the store refuse chunks of the session `id`.
-fn broken(id: &str) -> String {
+/// Returns the SQL that makes the store reject chunks of the session `id`.
+fn reject_chunks_sql(id: &str) -> String {
     if crate::support::on_postgres() {
         let rule = format!("CHECK (session <> '{id}') NOT VALID");
         return format!("ALTER TABLE chunk ADD CONSTRAINT broken {rule}");
@@ -69,19 +69,20 @@ fn broken(id: &str) -> String {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn what_the_store_does_not_take_is_not_acknowledged() {
-    let bench = Bench::start_with(|config| config.limits.journal_bytes = 1).await;
-    let client = &bench.client;
+async fn samples_that_the_store_rejects_are_not_acknowledged() {
+    let fixture = ServiceFixture::start_with(|config| config.limits.journal_bytes = 1).await;
+    let client = &fixture.client;
     client.asset("a").await;
     client.asset("b").await;
     let samples = rig(1000, 300);
     client.telemetry("a", Some("s"), &samples[..500]).await;
-    let mut store = bench.store().await;
-    folded(&mut store).await;
+    let mut store = fixture.store().await;
+    wait_until_folded(&mut store).await;
     let session = client.session("a", "s").await;
     let id = session["id"].as_str().unwrap();
-    store.execute(sqlx::AssertSqlSafe(broken(id))).await.unwrap();
-    // One batch goes to the journal and, since it cannot leave it, is the last.
+    store.execute(sqlx::AssertSqlSafe(reject_chunks_sql(id))).await.unwrap();
+    // One batch is accepted into the journal. Since the journal cannot be folded, it is the
+    // last.
     assert_eq!(client.telemetry("a", Some("s"), &samples[500..600]).await["accepted"], 100);
     client.telemetry("b", Some("s"), &samples[..100]).await;
     let known = client.get("assets/a/faults?status=all").await.expect(200);
@@ -108,85 +109,85 @@ async fn what_the_store_does_not_take_is_not_acknowledged() {
 }
 
 #[tokio::test]
-async fn small_batches_become_few_chunks() {
-    let bench = Bench::start().await;
-    bench.client.asset("a").await;
+async fn small_batches_are_merged_into_few_chunks() {
+    let fixture = ServiceFixture::start().await;
+    fixture.client.asset("a").await;
     let samples = rig(9_000, 9_000);
     for part in samples.chunks(3) {
-        bench.client.telemetry("a", Some("s"), part).await;
+        fixture.client.telemetry("a", Some("s"), part).await;
     }
-    let mut store = bench.store().await;
+    let mut store = fixture.store().await;
     let mut chunks = async || -> i64 {
         sqlx::query_scalar("SELECT COUNT(*) FROM chunk").fetch_one(&mut store).await.unwrap()
     };
     let most = i64::try_from(offbd::store::MAX_TAIL_CHUNKS).unwrap();
     assert!(chunks().await <= most + 1, "{}", chunks().await);
-    assert_eq!(bench.client.recording("a", "s").await, samples);
-    bench.client.end("a", "s").await;
+    assert_eq!(fixture.client.recording("a", "s").await, samples);
+    fixture.client.end("a", "s").await;
     assert_eq!(chunks().await, 2);
-    assert_eq!(bench.client.recording("a", "s").await, samples);
+    assert_eq!(fixture.client.recording("a", "s").await, samples);
 }
 
 #[tokio::test]
-async fn a_store_has_one_server() {
-    let bench = Bench::start().await;
-    let second = offbd::server::start(crate::support::config(bench.data.path())).await;
-    let error = format!("{:#}", second.err().expect("the store is taken"));
+async fn a_second_service_cannot_open_the_store() {
+    let fixture = ServiceFixture::start().await;
+    let second = offbd::server::start(crate::support::config(fixture.data.path())).await;
+    let error = format!("{:#}", second.err().expect("the store is locked"));
     assert!(error.contains("another process"), "{error}");
 }
 
 #[tokio::test]
-async fn a_guest_writes_beside_the_service() {
-    use offbd::store::{Place, Store, Write};
-    let bench = Bench::start().await;
-    bench.client.asset("a").await;
-    let place = Place::of_url(&crate::support::url(bench.data.path())).unwrap();
-    let (store, mut writer) = Store::open_beside(&place).await.unwrap();
+async fn an_auxiliary_writer_can_write_while_the_service_runs() {
+    use offbd::store::{Location, Store, Write};
+    let fixture = ServiceFixture::start().await;
+    fixture.client.asset("a").await;
+    let location = Location::of_url(&crate::support::url(fixture.data.path())).unwrap();
+    let (store, mut writer) = Store::open_auxiliary(&location).await.unwrap();
     let mut row = store.asset("a").await.unwrap().unwrap();
     row.name = "b".to_owned();
     for _ in 0..2 {
         let name = row.name.clone();
         let mut set = vec![
             Write::CreateAsset(row.clone()),
-            Write::GiveUpAsset { name: name.clone(), at: 1 },
+            Write::HideAsset { name: name.clone(), at: 1 },
             Write::DeleteAsset { name },
         ];
         writer.commit(&mut [&mut set]).await.unwrap();
-        bench.client.telemetry("a", None, &rig(10, 10)).await;
+        fixture.client.telemetry("a", None, &rig(10, 10)).await;
     }
     writer.close().await.unwrap();
-    bench.client.get("/readyz").await.expect(200);
+    fixture.client.get("/readyz").await.expect(200);
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn too_much_at_once_is_turned_away_and_nothing_is_lost() {
-    let bench = Bench::start_with(|config| {
+async fn batches_above_the_limit_in_flight_get_429_and_nothing_is_lost() {
+    let fixture = ServiceFixture::start_with(|config| {
         config.limits.batch_samples = 50;
         config.limits.in_flight_samples = 100;
     })
     .await;
-    let client = bench.client.clone();
+    let client = fixture.client.clone();
     client.asset("a").await;
     client.telemetry("a", Some("s"), &rig(1, 1)).await;
     let samples = rig(400, 400);
-    let hold = bench.hold().await;
+    let lock = fixture.lock_store().await;
     let send = |part: &[Sample]| {
         let (client, body) = (client.clone(), batch(Some("s"), part));
         tokio::spawn(async move { client.post("assets/a/telemetry", &body).await })
     };
     let mut sent: Vec<_> = samples.chunks(50).map(send).collect();
-    // The store is held, so no batch is acknowledged: six of the eight must be
-    // turned away at once, and the two that are under way wait.
-    let mut turned_away = 0;
-    while turned_away < 6 {
+    // The store is locked, so no batch is acknowledged: six of the eight batches must be
+    // rejected at once, and the two in flight wait.
+    let mut rejected = 0;
+    while rejected < 6 {
         let (answer, _, rest) = futures_util::future::select_all(sent).await;
         let answer = answer.unwrap();
         let problem = answer.problem(429);
         assert_eq!(problem["type"], "urn:offbd:problem:busy");
         assert_eq!(answer.headers["retry-after"], "1");
-        (sent, turned_away) = (rest, turned_away + 1);
+        (sent, rejected) = (rest, rejected + 1);
     }
-    hold.let_go().await;
+    lock.release().await;
     for waiting in sent {
         waiting.await.unwrap().expect(200);
     }
@@ -199,25 +200,25 @@ async fn too_much_at_once_is_turned_away_and_nothing_is_lost() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_stop_finishes_what_is_under_way() {
-    let mut bench = Bench::start().await;
-    let client = bench.client.clone();
+async fn a_shutdown_completes_batches_in_flight() {
+    let mut fixture = ServiceFixture::start().await;
+    let client = fixture.client.clone();
     client.asset("a").await;
     let samples = rig(200, 200);
     client.telemetry("a", Some("s"), &samples[..100]).await;
     let events = client.request(Method::GET, "events").send().await.unwrap();
     let url = format!("ws://{}/api/v1/assets/a/stream", client.address);
     let (mut socket, _) = connect_async(url).await.unwrap();
-    let hold = bench.hold().await;
+    let lock = fixture.lock_store().await;
     socket.send(Message::text(batch(Some("s"), &samples[100..]).to_string())).await.unwrap();
-    // The batch is in the engine, not yet in the store.
+    // The batch has been judged but not stored.
     crate::support::eventually(|| async {
         let state = client.get("assets/a/state").await;
         (state.status == 200 && state.json()["samples"] == 200).then_some(())
     })
     .await;
-    let stopping = tokio::spawn(bench.server.take().unwrap().shutdown());
-    hold.let_go().await;
+    let stopping = tokio::spawn(fixture.server.take().unwrap().shutdown());
+    lock.release().await;
     let mut acknowledged = false;
     while let Some(Ok(frame)) = socket.next().await {
         match frame {
@@ -228,17 +229,17 @@ async fn a_stop_finishes_what_is_under_way() {
     }
     assert!(acknowledged);
     stopping.await.unwrap().unwrap();
-    assert!(events.text().await.is_ok(), "the stream of events ends well");
-    let server = offbd::server::start(crate::support::config(bench.data.path())).await.unwrap();
+    assert!(events.text().await.is_ok(), "the stream of events ends without an error");
+    let server = offbd::server::start(crate::support::config(fixture.data.path())).await.unwrap();
     let client = Client::new(server.address.to_string());
     assert_eq!(client.recording("a", "s").await, samples);
     server.shutdown().await.unwrap();
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn events_missed_come_first_and_each_comes_once() {
-    let bench = Bench::start().await;
-    let client = &bench.client;
+async fn missed_events_are_sent_first_and_each_event_once() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
     client.asset("a").await;
     client.asset("b").await;
     let samples = rig(2000, 300);
@@ -254,7 +255,11 @@ async fn events_missed_come_first_and_each_comes_once() {
     let id = first["id"].as_i64().unwrap();
     let request = client.request(Method::GET, "events?asset=b").header("last-event-id", id);
     let mut caught_up = Events::new(request.send().await.unwrap());
-    assert_eq!(caught_up.any().await, ("begin".to_owned(), json!({"id":id})), "where it goes on");
+    assert_eq!(
+        caught_up.any().await,
+        ("begin".to_owned(), json!({"id":id})),
+        "the event after which the stream continues"
+    );
     let of_b = caught_up.next().await;
     assert_eq!((&of_b["asset"], &of_b["type"]), (&json!("b"), &json!("fault")));
     let mut ids = vec![id];
@@ -262,7 +267,7 @@ async fn events_missed_come_first_and_each_comes_once() {
         let event = live.next().await;
         ids.push(event["id"].as_i64().unwrap());
         if event["id"] == of_b["id"] {
-            assert_eq!(event, of_b, "live and caught up say the same");
+            assert_eq!(event, of_b, "live and missed events are equal");
             break;
         }
     }
@@ -282,21 +287,21 @@ fn without_seq(samples: &[Sample], shift_s: f64) -> Vec<Sample> {
 }
 
 #[tokio::test]
-async fn samples_without_a_session_find_one() {
-    let bench = Bench::start().await;
-    let client = &bench.client;
+async fn samples_without_a_session_name_are_assigned_to_a_session() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
     client.asset("a").await;
     let samples = rig(3000, 3000);
     let first = client.telemetry("a", None, &samples[..2000]).await;
     let second = client.telemetry("a", None, &samples[2000..]).await;
     assert_eq!(first["session_id"], second["session_id"]);
     let again = client.telemetry("a", None, &samples[..1000]).await;
-    assert_eq!(again["duplicate"], 1000, "sent again is not started anew");
-    let mut anew = rig(500, 500);
-    anew.iter_mut().for_each(|s| s.x_m = s.x_m.map(|x| x + 0.001));
-    let anew = client.telemetry("a", None, &anew).await;
-    assert_eq!((&anew["accepted"], &anew["late"]), (&json!(500), &json!([])));
-    assert_ne!(anew["session_id"], first["session_id"]);
+    assert_eq!(again["duplicate"], 1000, "a repeated batch does not open a session");
+    let mut restarted = rig(500, 500);
+    restarted.iter_mut().for_each(|s| s.x_m = s.x_m.map(|x| x + 0.001));
+    let ack = client.telemetry("a", None, &restarted).await;
+    assert_eq!((&ack["accepted"], &ack["late"]), (&json!(500), &json!([])));
+    assert_ne!(ack["session_id"], first["session_id"]);
     let found = sessions(client, "a").await;
     let states: Vec<_> = found.iter().map(|s| s["state"].as_str().unwrap()).collect();
     assert_eq!(states, ["open", "ended"]);
@@ -304,26 +309,26 @@ async fn samples_without_a_session_find_one() {
 }
 
 #[tokio::test]
-async fn devices_that_do_not_count_may_start_anew_too() {
-    let mut bench = Bench::start().await;
-    bench.client.asset("a").await;
+async fn a_restarted_device_without_sequence_numbers_gets_a_new_session() {
+    let mut fixture = ServiceFixture::start().await;
+    fixture.client.asset("a").await;
     let samples = rig(3000, 3000);
-    bench.client.telemetry("a", None, &without_seq(&samples, 100.0)).await;
-    // One slip of the clock is no new start, whatever the batches.
-    bench.client.telemetry("a", None, &without_seq(&samples[..1], 0.0)).await;
-    bench.client.telemetry("a", None, &without_seq(&samples[..1], 130.0)).await;
-    assert_eq!(sessions(&bench.client, "a").await.len(), 1);
-    bench.client.telemetry("a", None, &without_seq(&samples[10..11], 0.0)).await;
-    bench.restart().await;
-    let ack = bench.client.telemetry("a", None, &without_seq(&samples[11..500], 0.0)).await;
+    fixture.client.telemetry("a", None, &without_seq(&samples, 100.0)).await;
+    // A single sample with a wrong time does not count as a restart of the device.
+    fixture.client.telemetry("a", None, &without_seq(&samples[..1], 0.0)).await;
+    fixture.client.telemetry("a", None, &without_seq(&samples[..1], 130.0)).await;
+    assert_eq!(sessions(&fixture.client, "a").await.len(), 1);
+    fixture.client.telemetry("a", None, &without_seq(&samples[10..11], 0.0)).await;
+    fixture.restart().await;
+    let ack = fixture.client.telemetry("a", None, &without_seq(&samples[11..500], 0.0)).await;
     assert_eq!((&ack["accepted"], &ack["late"]), (&json!(489), &json!([])), "{ack}");
-    assert_eq!(sessions(&bench.client, "a").await.len(), 2);
+    assert_eq!(sessions(&fixture.client, "a").await.len(), 2);
 }
 
 #[tokio::test]
-async fn faults_are_acknowledged_cleared_and_listed_across_the_fleet() {
-    let bench = Bench::start().await;
-    let client = &bench.client;
+async fn faults_can_be_listed_acknowledged_and_cleared() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
     let samples = rig(2000, 300);
     for asset in ["a", "b", "c"] {
         client.asset(asset).await;
@@ -358,35 +363,35 @@ async fn faults_are_acknowledged_cleared_and_listed_across_the_fleet() {
 }
 
 #[tokio::test]
-async fn clearing_outlives_a_restart_and_needs_no_session() {
-    let mut bench = Bench::start().await;
-    bench.client.asset("a").await;
-    bench.client.telemetry("a", Some("s"), &rig(2000, 300)).await;
-    bench.client.delete("assets/a/faults/x_servo").await.expect(204);
-    let before = bench.client.get("assets/a/faults?status=all").await.expect(200);
-    let state = bench.client.get("assets/a/state").await.expect(200);
-    bench.restart().await;
-    assert_eq!(bench.client.get("assets/a/faults?status=all").await.expect(200), before);
-    assert_eq!(bench.client.get("assets/a/state").await.expect(200), state);
-    bench.client.telemetry("a", Some("t"), &rig(2000, 300)).await;
-    bench.client.end("a", "t").await;
+async fn a_cleared_fault_stays_cleared_after_a_restart() {
+    let mut fixture = ServiceFixture::start().await;
+    fixture.client.asset("a").await;
+    fixture.client.telemetry("a", Some("s"), &rig(2000, 300)).await;
+    fixture.client.delete("assets/a/faults/x_servo").await.expect(204);
+    let before = fixture.client.get("assets/a/faults?status=all").await.expect(200);
+    let state = fixture.client.get("assets/a/state").await.expect(200);
+    fixture.restart().await;
+    assert_eq!(fixture.client.get("assets/a/faults?status=all").await.expect(200), before);
+    assert_eq!(fixture.client.get("assets/a/state").await.expect(200), state);
+    fixture.client.telemetry("a", Some("t"), &rig(2000, 300)).await;
+    fixture.client.end("a", "t").await;
     assert!(
-        !bench.client.get("assets/a/faults").await.expect(200)["items"]
+        !fixture.client.get("assets/a/faults").await.expect(200)["items"]
             .as_array()
             .unwrap()
             .is_empty()
     );
     for code in ["x_servo", "y_servo", "stuck_ball", "sensor"] {
-        bench.client.delete(&format!("assets/a/faults/{code}")).await.expect(204);
+        fixture.client.delete(&format!("assets/a/faults/{code}")).await.expect(204);
     }
-    bench.restart().await;
-    assert_eq!(bench.client.get("assets/a/faults").await.expect(200)["items"], json!([]));
+    fixture.restart().await;
+    assert_eq!(fixture.client.get("assets/a/faults").await.expect(200)["items"], json!([]));
 }
 
 #[tokio::test]
-async fn assets_come_change_and_go() {
-    let bench = Bench::start().await;
-    let client = &bench.client;
+async fn assets_can_be_created_changed_and_deleted() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
     let new = client.put("assets/a", &json!({"name":"a"})).await.expect(201);
     assert_eq!(new["sample_rate_hz"], 100.0);
     client.telemetry("a", Some("one"), &rig(100, 100)).await;
@@ -394,7 +399,7 @@ async fn assets_come_change_and_go() {
     client.put("assets/a", &heavy).await.expect(200);
     assert_eq!(client.get("assets/a").await.expect(200)["ball"]["mass_kg"], 0.2);
     let session = client.session("a", "one").await;
-    assert_eq!(session["state"], "open", "an open session goes on");
+    assert_eq!(session["state"], "open", "an open session continues");
     for name in ["b", "c", "d"] {
         client.asset(name).await;
     }
@@ -408,13 +413,13 @@ async fn assets_come_change_and_go() {
     client.post("assets/a/telemetry", &batch(None, &rig(1, 1))).await.problem(404);
     client.asset("a").await;
     let ack = client.telemetry("a", Some("one"), &rig(100, 100)).await;
-    assert_eq!(ack["accepted"], 100, "a new asset of the same name knows nothing of the old one");
+    assert_eq!(ack["accepted"], 100, "a new asset of the same name has no data of the old one");
 }
 
 #[tokio::test]
-async fn sessions_are_opened_ended_deleted_and_exported() {
-    let bench = Bench::start().await;
-    let client = &bench.client;
+async fn sessions_can_be_opened_ended_exported_and_deleted() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
     client.asset("a").await;
     let opened = client.post("assets/a/sessions", &json!({"name":"Mäandern 1"})).await;
     let session = opened.expect(201);
@@ -429,12 +434,12 @@ async fn sessions_are_opened_ended_deleted_and_exported() {
     let packed = client.request(Method::GET, &format!("{at}/telemetry"));
     let packed = packed.header("accept-encoding", "gzip").send().await.unwrap();
     assert_eq!(packed.headers()["content-encoding"], "gzip");
-    assert!(packed.bytes().await.is_ok(), "it ends well when it is packed, too");
+    assert!(packed.bytes().await.is_ok(), "a compressed response is complete");
     let request = client.request(Method::GET, &format!("{at}/telemetry"));
     let exported = client.send(request.header("accept", "application/json")).await.expect(200);
     assert_eq!(exported["session"], "Mäandern 1");
     assert_eq!(exported["samples"].as_array().unwrap().len(), 20_000);
-    // What was exported can be sent again as it is.
+    // An export can be sent again unchanged.
     let again =
         json!({"session":"Mäandern 1","samples":&exported["samples"].as_array().unwrap()[..500]});
     assert_eq!(client.post("assets/a/telemetry", &again).await.expect(200)["duplicate"], 500);
@@ -447,19 +452,19 @@ async fn sessions_are_opened_ended_deleted_and_exported() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn many_streams_at_once_lose_nothing() {
-    let bench = Bench::start().await;
+async fn many_concurrent_streams_lose_nothing() {
+    let fixture = ServiceFixture::start().await;
     let samples = rig(2000, 2000);
     let mut streams = tokio::task::JoinSet::new();
     for i in 0..8 {
         let asset = format!("rig{i}");
-        bench.client.asset(&asset).await;
-        let (address, samples) = (bench.client.address.clone(), samples.clone());
+        fixture.client.asset(&asset).await;
+        let (address, samples) = (fixture.client.address.clone(), samples.clone());
         streams.spawn(async move {
             let url = format!("ws://{address}/api/v1/assets/{asset}/stream");
             let (socket, _) = connect_async(url).await.unwrap();
             let (mut up, mut down) = socket.split();
-            let flood = tokio::spawn(async move {
+            let sending = tokio::spawn(async move {
                 for part in samples.chunks(5) {
                     up.send(Message::text(batch(Some("s"), part).to_string())).await.unwrap();
                 }
@@ -471,22 +476,22 @@ async fn many_streams_at_once_lose_nothing() {
                 let frame: Value = serde_json::from_str(&text).unwrap();
                 accepted += frame["accepted"].as_u64().unwrap_or(0);
             }
-            drop(flood.await.unwrap());
+            drop(sending.await.unwrap());
         });
     }
     while let Some(done) = streams.join_next().await {
         done.unwrap();
     }
     for i in 0..8 {
-        assert_eq!(bench.client.recording(&format!("rig{i}"), "s").await, samples);
+        assert_eq!(fixture.client.recording(&format!("rig{i}"), "s").await, samples);
     }
 }
 
 #[tokio::test]
-async fn a_frame_that_is_too_long_ends_its_stream_alone() {
-    let bench = Bench::start_with(|config| config.limits.batch_bytes = 10_000).await;
-    bench.client.asset("a").await;
-    let url = format!("ws://{}/api/v1/assets/a/stream", bench.client.address);
+async fn a_frame_that_is_too_long_ends_only_its_stream() {
+    let fixture = ServiceFixture::start_with(|config| config.limits.batch_bytes = 10_000).await;
+    fixture.client.asset("a").await;
+    let url = format!("ws://{}/api/v1/assets/a/stream", fixture.client.address);
     let (mut socket, _) = connect_async(url).await.unwrap();
     socket.send(Message::text("x".repeat(5_000))).await.unwrap();
     let text = loop {
@@ -501,31 +506,31 @@ async fn a_frame_that_is_too_long_ends_its_stream_alone() {
             assert_eq!(u16::from(frame.code), 1009);
         }
     }
-    bench.client.telemetry("a", None, &rig(10, 10)).await;
+    fixture.client.telemetry("a", None, &rig(10, 10)).await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_rig_is_learnt_from_its_sessions() {
-    let mut bench = Bench::start().await;
-    bench.client.asset("a").await;
+async fn a_rig_can_be_calibrated_from_its_sessions() {
+    let mut fixture = ServiceFixture::start().await;
+    fixture.client.asset("a").await;
     let import = |name: &str| format!("assets/a/sessions/import?name={name}");
     let good = csv(&rig(9000, 9000));
-    bench.client.post_text(&import("good"), "text/csv", good).await.expect(201);
-    bench.client.post_text(&import("short"), "text/csv", csv(&rig(50, 50))).await.expect(201);
+    fixture.client.post_text(&import("good"), "text/csv", good).await.expect(201);
+    fixture.client.post_text(&import("short"), "text/csv", csv(&rig(50, 50))).await.expect(201);
     let mut ids = Vec::new();
     for name in ["good", "short"] {
-        let session = bench.client.session("a", name).await;
+        let session = fixture.client.session("a", name).await;
         let wanted = json!({ "sessions": [session["id"]] });
-        let answer = bench.client.post("assets/a/calibrations", &wanted).await;
+        let answer = fixture.client.post("assets/a/calibrations", &wanted).await;
         let id = answer.expect(202)["id"].as_str().unwrap().to_owned();
         assert_eq!(answer.headers["location"], format!("/api/v1/assets/a/calibrations/{id}"));
         ids.push(format!("assets/a/calibrations/{id}"));
     }
-    bench.restart().await;
-    let client = &bench.client;
-    let mut settled = Vec::new();
+    fixture.restart().await;
+    let client = &fixture.client;
+    let mut jobs = Vec::new();
     for path in &ids {
-        settled.push(
+        jobs.push(
             crate::support::eventually(|| async {
                 let job = client.get(path).await.expect(200);
                 let state = job["state"].as_str().unwrap();
@@ -534,9 +539,9 @@ async fn a_rig_is_learnt_from_its_sessions() {
             .await,
         );
     }
-    assert_eq!(settled[0]["state"], "done", "{}", settled[0]);
-    assert_eq!(settled[1]["state"], "failed");
-    assert!(settled[1]["error"].as_str().unwrap().contains("are needed"), "{}", settled[1]);
+    assert_eq!(jobs[0]["state"], "done", "{}", jobs[0]);
+    assert_eq!(jobs[1]["state"], "failed");
+    assert!(jobs[1]["error"].as_str().unwrap().contains("are needed"), "{}", jobs[1]);
     client.post(&format!("{}/activate", ids[1]), &Value::Null).await.problem(409);
     let active = client.post(&format!("{}/activate", ids[0]), &Value::Null).await.expect(200);
     assert_eq!(active["active"], true);
@@ -550,9 +555,9 @@ async fn a_rig_is_learnt_from_its_sessions() {
 }
 
 #[tokio::test]
-async fn operation() {
-    let bench = Bench::start().await;
-    let client = &bench.client;
+async fn health_metrics_description_and_pages_are_served() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
     client.asset("a").await;
     client.telemetry("a", None, &rig(10, 10)).await;
     assert_eq!(client.get("/healthz").await.expect(200)["status"], "ok");
@@ -566,15 +571,18 @@ async fn operation() {
     assert!(docs.status == 200 && docs.text.contains("swagger"), "{docs:?}");
     let page = client.get("/").await;
     assert!(page.headers["content-type"].to_str().unwrap().starts_with("text/html"));
-    assert!(!page.text.contains("http://") && !page.text.contains("https://"), "all from here");
+    assert!(
+        !page.text.contains("http://") && !page.text.contains("https://"),
+        "the page loads nothing from other hosts"
+    );
     let request = client.request(Method::GET, "/openapi.yaml").header("accept-encoding", "gzip");
     assert_eq!(request.send().await.unwrap().headers()["content-encoding"], "gzip");
     let request = client.request(Method::GET, "/healthz").header("x-request-id", "mine");
     assert_eq!(request.send().await.unwrap().headers()["x-request-id"], "mine");
 }
 
-/// A replay of the session `id` with `settings`, once it is done.
-async fn replayed(client: &Client, id: &str, settings: Value) -> Value {
+/// Replays the session `id` with `settings` and returns the result.
+async fn run_replay(client: &Client, id: &str, settings: Value) -> Value {
     let answer = client.post(&format!("sessions/{id}/replays"), &settings).await.expect(202);
     let path = format!("replays/{}", answer["id"].as_str().unwrap());
     crate::support::eventually(|| async {
@@ -586,9 +594,9 @@ async fn replayed(client: &Client, id: &str, settings: Value) -> Value {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_replay_says_what_other_settings_would_have_changed() {
-    let bench = Bench::start().await;
-    let client = &bench.client;
+async fn a_replay_reports_the_differences_caused_by_other_settings() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
     client.asset("a").await;
     let import = |name: &str| format!("assets/a/sessions/import?name={name}");
     client.post_text(&import("good"), "text/csv", csv(&rig(9000, 9000))).await.expect(201);
@@ -604,14 +612,14 @@ async fn a_replay_says_what_other_settings_would_have_changed() {
     let sick = client.session("a", "sick").await["id"].as_str().unwrap().to_owned();
     let recorded = client.get("assets/a/faults/x_servo").await.expect(200);
 
-    let same = replayed(client, &sick, json!({})).await;
+    let same = run_replay(client, &sick, json!({})).await;
     let n_faults = same["faults"].as_array().unwrap().len();
     assert_eq!(same["tally"]["same"], n_faults);
     assert_eq!(same["transitions"].as_array().unwrap().len(), n_faults);
     assert_eq!((&same["same"], &same["differences"]), (&json!(true), &json!([])));
     assert_eq!(same["settings_id"], recorded["last_occurrence"]["settings_id"]);
 
-    let slow = replayed(client, &sick, json!({ "debounce_s": 1.1 })).await;
+    let slow = run_replay(client, &sick, json!({ "debounce_s": 1.1 })).await;
     let failed = slow["transitions"].as_array().unwrap();
     let failed = failed.iter().find(|t| t["code"] == "x_servo").unwrap();
     assert_eq!(failed["change"], "moved", "{failed}");
@@ -623,7 +631,7 @@ async fn a_replay_says_what_other_settings_would_have_changed() {
     assert_eq!(line["replayed"]["t_s"], failed["replayed_t_s"]);
 
     for id in [&learnt["id"], &learnt["calibration"]["id"]] {
-        let on_learnt = replayed(client, &sick, json!({ "calibration": id })).await;
+        let on_learnt = run_replay(client, &sick, json!({ "calibration": id })).await;
         assert_eq!(on_learnt["calibration_id"], learnt["calibration"]["id"]);
         assert_ne!(on_learnt["faults"][0]["evidence"], same["faults"][0]["evidence"]);
         assert_eq!(on_learnt["faults"][0]["calibration_id"], learnt["calibration"]["id"]);
@@ -640,9 +648,9 @@ async fn a_replay_says_what_other_settings_would_have_changed() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_drive_cycle_is_worked_out_for_a_rig_that_is_learnt() {
-    let bench = Bench::start().await;
-    let client = &bench.client;
+async fn a_learnt_rig_has_a_drive_cycle() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
     client.post("assets", &registration("a")).await.expect(201);
     let cycle = client.get("assets/a/drive-cycle").await.expect(200);
     assert_eq!((&cycle["asset"], cycle["faults"].as_array().unwrap().len()), (&json!("a"), 9));

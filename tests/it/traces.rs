@@ -1,4 +1,4 @@
-//! Traces for a collector of OpenTelemetry.
+//! Traces sent to an OpenTelemetry collector.
 
 use axum::Router;
 use axum::body::Bytes;
@@ -10,7 +10,7 @@ use tokio::sync::mpsc;
 use crate::support::process::Process;
 use crate::support::{self, eventually, rig};
 
-/// A collector that hands on what it gets.
+/// Starts a collector; returns its address and the bodies that it receives.
 async fn collector() -> (String, mpsc::UnboundedReceiver<Bytes>) {
     let (got, traces) = mpsc::unbounded_channel();
     let take = post(move |body: Bytes| async move { drop(got.send(body)) });
@@ -21,8 +21,10 @@ async fn collector() -> (String, mpsc::UnboundedReceiver<Bytes>) {
     (address, traces)
 }
 
-/// A service that sends this share of its own traces to a collector.
-async fn traced(share: &str) -> (Process, mpsc::UnboundedReceiver<Bytes>, tempfile::TempDir) {
+/// Starts a service that sends this fraction of its own traces to a collector.
+async fn service_with_traces(
+    share: &str,
+) -> (Process, mpsc::UnboundedReceiver<Bytes>, tempfile::TempDir) {
     let (address, traces) = collector().await;
     let data = tempfile::tempdir().unwrap();
     let endpoint = format!("http://{address}");
@@ -31,22 +33,23 @@ async fn traced(share: &str) -> (Process, mpsc::UnboundedReceiver<Bytes>, tempfi
     (Process::start_with(data.path(), &settings), traces, data)
 }
 
+/// Returns whether `word` occurs in `bytes`.
 fn has(bytes: &[u8], word: impl AsRef<[u8]>) -> bool {
     let word = word.as_ref();
     bytes.windows(word.len()).any(|window| window == word)
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn traces_go_to_the_collector() {
-    let (process, mut traces, _data) = traced("1").await;
+async fn traces_are_sent_to_the_collector() {
+    let (process, mut traces, _data) = service_with_traces("1").await;
     process.client.asset("a").await;
     process.client.telemetry("a", Some("s"), &rig(50, usize::MAX)).await;
-    let mut told = Vec::new();
+    let mut received = Vec::new();
     let words =
         ["offbd", "service.version", "request", "/api/v1/assets/a/telemetry", "judge", "commit"];
-    while !words.iter().all(|word| has(&told, word)) {
-        let more = tokio::time::timeout(support::DEADLINE, traces.recv()).await;
-        told.extend(more.expect("the traces come").unwrap());
+    while !words.iter().all(|word| has(&received, word)) {
+        let next = tokio::time::timeout(support::DEADLINE, traces.recv()).await;
+        received.extend(next.expect("traces within the deadline").unwrap());
     }
 }
 
@@ -55,8 +58,8 @@ const TRACE: [u8; 16] = 0x4bf92f3577b34da6a3ce929d0e0e4736_u128.to_be_bytes();
 const PARENT: [u8; 8] = 0x00f067aa0ba902b7_u64.to_be_bytes();
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_request_belongs_to_the_trace_of_its_caller() {
-    let (process, mut traces, _data) = traced("0").await;
+async fn a_request_joins_the_trace_of_its_caller() {
+    let (process, mut traces, _data) = service_with_traces("0").await;
     let ask = |path: &str, parent: &str| {
         let request = process.client.request(Method::GET, path).header("traceparent", parent);
         async move { assert!(request.send().await.unwrap().status().is_success()) }
@@ -64,14 +67,14 @@ async fn a_request_belongs_to_the_trace_of_its_caller() {
     ask("/api/v1/assets", "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-00").await;
     ask("/api/v1/assets", "nonsense").await;
     ask("/api/v1/fleet", "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01").await;
-    let told = tokio::time::timeout(support::DEADLINE, traces.recv()).await.unwrap().unwrap();
-    assert!(has(&told, TRACE) && has(&told, PARENT) && has(&told, "/api/v1/fleet"));
-    assert!(!has(&told, "/api/v1/assets"), "the caller does not trace it");
+    let received = tokio::time::timeout(support::DEADLINE, traces.recv()).await.unwrap().unwrap();
+    assert!(has(&received, TRACE) && has(&received, PARENT) && has(&received, "/api/v1/fleet"));
+    assert!(!has(&received, "/api/v1/assets"), "the caller does not trace this request");
 }
 
-/// Without the collector everything goes on.
+/// The service works without the collector.
 #[tokio::test(flavor = "multi_thread")]
-async fn a_collector_that_is_away_stops_nothing() {
+async fn an_unavailable_collector_does_not_affect_the_service() {
     let data = tempfile::tempdir().unwrap();
     let nowhere = "http://127.0.0.1:9";
     let process = Process::start_with(data.path(), &[("OFFBD_TRACES__ENDPOINT", nowhere.as_ref())]);

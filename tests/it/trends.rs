@@ -1,14 +1,14 @@
-//! Drift before fault: sessions of a simulated rig whose servo weakens from one
-//! to the next, by every way that there is to see it.
+//! Warnings of drift: sessions of a simulated rig whose servo weakens from session to session,
+//! observed through every operation that shows it.
 
-use crate::support::{Bench, Client, csv, eventually};
+use crate::support::{Client, ServiceFixture, csv, eventually};
 use offbd_core::vocabulary::Sample;
 use offbd_lab::simulation::{Disturbances, Preset, Reference, SimulatedRig};
 use serde_json::{Value, json};
 
 const SESSIONS: u64 = 12;
 
-/// A session of the simulated rig, with a fault as on the command line.
+/// Returns a session of the simulated rig; `fault` has the syntax of the command line.
 fn session(seed: u64, seconds: usize, fault: Option<&str>) -> Vec<Sample> {
     let model = Preset::Chapter.model().unwrap();
     let mut rig =
@@ -17,7 +17,7 @@ fn session(seed: u64, seconds: usize, fault: Option<&str>) -> Vec<Sample> {
     (0..seconds * 100).map(|_| rig.next_sample()).collect()
 }
 
-/// Session `i` of a rig whose x servo loses one percent of its gain in each.
+/// Returns session `i` of a rig whose x servo loses one percent of its gain per session.
 fn weakening(i: u64) -> Vec<Sample> {
     let gain = format!("x_servo:gain={}@0", 1.0 - 0.01 * i as f64);
     session(100 + i, 60, (i > 0).then_some(gain.as_str()))
@@ -28,8 +28,8 @@ async fn import(client: &Client, asset: &str, name: &str, samples: &[Sample]) ->
     client.post_text(&path, "text/csv", csv(samples)).await.expect(201)["session"].clone()
 }
 
-/// Registers `asset` and learns it from a healthy session.
-async fn learnt(client: &Client, asset: &str) {
+/// Registers `asset` and calibrates it with a healthy session.
+async fn register_and_learn(client: &Client, asset: &str) {
     client.post("assets", &json!({ "name": asset })).await.expect(201);
     learn(client, asset, 1).await;
 }
@@ -54,22 +54,23 @@ fn warnings(trends: &Value) -> Vec<&Value> {
     all.filter(|warning| !warning.is_null()).collect()
 }
 
-async fn of_fleet(client: &Client, asset: &str) -> Value {
+/// Returns the warnings of `asset` in the fleet.
+async fn fleet_warnings(client: &Client, asset: &str) -> Value {
     let fleet = client.get("fleet").await.expect(200);
     let items = fleet["items"].as_array().unwrap();
     items.iter().find(|entry| entry["asset"] == asset).unwrap()["warnings"].clone()
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_weakening_servo_is_warned_of_before_its_fault_is_confirmed() {
-    let mut bench = Bench::start().await;
-    let client = bench.client.clone();
-    learnt(&client, "weak").await;
+async fn a_weakening_servo_has_a_warning_before_its_fault_is_confirmed() {
+    let mut fixture = ServiceFixture::start().await;
+    let client = fixture.client.clone();
+    register_and_learn(&client, "weak").await;
     let mut warned_at = None;
     for i in 0..SESSIONS {
         let ended = import(&client, "weak", &format!("s{i}"), &weakening(i)).await;
         assert_eq!(ended["verdict"]["faults"], json!([]), "session {i} has no fault yet");
-        if of_fleet(&client, "weak").await != json!([]) {
+        if fleet_warnings(&client, "weak").await != json!([]) {
             warned_at = warned_at.or(Some(i));
         }
     }
@@ -77,11 +78,11 @@ async fn a_weakening_servo_is_warned_of_before_its_fault_is_confirmed() {
     let [warning] = &warnings(&view)[..] else { panic!("one parameter drifts: {view}") };
     assert_eq!((&warning["code"], &warning["command"]), (&json!("x_servo"), &json!("qy")));
     assert_eq!((&warning["axis"], &warning["parameter"]), (&json!("x"), &json!("gain")));
-    assert_eq!(of_fleet(&client, "weak").await, json!([warning]));
+    assert_eq!(fleet_warnings(&client, "weak").await, json!([warning]));
     assert!(warned_at.is_some_and(|at| at < SESSIONS), "{warned_at:?}");
 
-    // The slope is the one that was put in, within its confidence; at one
-    // percent a session 0.3 of gain are gone in 30 sessions, 12 of them over.
+    // The confidence interval contains the injected slope. At one percent per session, the
+    // limit of 0.3 is reached after 30 sessions, of which 12 are over.
     let gain = &view["trends"][0];
     let number = |key: &str| gain[key].as_f64().unwrap();
     assert!((number("slope_low")..number("slope_high")).contains(&-0.01), "{gain}");
@@ -90,15 +91,15 @@ async fn a_weakening_servo_is_warned_of_before_its_fault_is_confirmed() {
     assert!((8.0..=20.0).contains(&left), "{left}");
     assert!((number("limit_low") - (number("nominal") - 0.3)).abs() < 1e-12);
 
-    // Then it breaks: now it is a fault.
+    // A large loss of gain is a fault.
     let broken =
         import(&client, "weak", "broken", &session(7, 60, Some("x_servo:gain=0.5@20"))).await;
     assert_eq!(broken["verdict"]["faults"], json!(["x_servo"]));
 
-    // All of it survives a restart, and goes with the sessions.
+    // Estimates and trends survive a restart and are deleted with their sessions.
     let before = trends(&client, "weak").await;
-    bench.restart().await;
-    let client = &bench.client;
+    fixture.restart().await;
+    let client = &fixture.client;
     assert_eq!(trends(client, "weak").await, before);
     let points = before["points"].as_array().unwrap();
     let names: Vec<_> = points.iter().map(|p| p["session"].as_str().unwrap()).collect();
@@ -106,27 +107,27 @@ async fn a_weakening_servo_is_warned_of_before_its_fault_is_confirmed() {
         (names.first(), names.last(), names.len()),
         (Some(&"healthy-1"), Some(&"broken"), 14)
     );
-    assert_eq!(points[0]["calibration_id"], Value::Null, "nothing was learnt then");
+    assert_eq!(points[0]["calibration_id"], Value::Null, "the rig was not learnt yet");
     let last = format!("sessions/{}", points[13]["session_id"].as_str().unwrap());
     client.delete(&last).await.expect(204);
     assert_eq!(trends(client, "weak").await["points"].as_array().unwrap().len(), 13);
 
-    // Learnt anew, nothing is known of a drift against that.
+    // With a new calibration there are no trends yet.
     learn(client, "weak", 2).await;
-    assert_eq!(of_fleet(client, "weak").await, json!([]));
+    assert_eq!(fleet_warnings(client, "weak").await, json!([]));
     let anew = trends(client, "weak").await;
     assert_eq!(anew["trends"], json!([]));
     assert_ne!(anew["calibration_id"], before["calibration_id"]);
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_healthy_rig_is_not_warned_of() {
-    let bench = Bench::start().await;
-    let client = &bench.client;
-    learnt(client, "well").await;
+async fn a_healthy_rig_has_no_warning() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
+    register_and_learn(client, "well").await;
     for i in 0..SESSIONS {
         import(client, "well", &format!("s{i}"), &session(100 + i, 60, None)).await;
-        assert_eq!(of_fleet(client, "well").await, json!([]), "session {i}");
+        assert_eq!(fleet_warnings(client, "well").await, json!([]), "session {i}");
     }
     let view = trends(client, "well").await;
     assert_eq!(view["trends"].as_array().unwrap().len(), 6, "three parameters of two axes");
@@ -136,8 +137,8 @@ async fn a_healthy_rig_is_not_warned_of() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn without_a_calibration_there_are_estimates_but_no_trends() {
-    let bench = Bench::start().await;
-    let client = &bench.client;
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
     client.post("assets", &json!({ "name": "new" })).await.expect(201);
     assert_eq!(
         trends(client, "new").await,

@@ -1,6 +1,6 @@
-//! What the page shows: the fleet at a glance, traces, and what happened when.
+//! The data of the dashboard: the fleet, traces, and the history of a fault.
 
-use crate::support::{Bench, rig};
+use crate::support::{ServiceFixture, rig};
 use futures_util::StreamExt;
 use serde_json::{Value, json};
 use tokio_tungstenite::connect_async;
@@ -10,9 +10,9 @@ fn numbers(column: &Value) -> Vec<Option<f64>> {
 }
 
 #[tokio::test]
-async fn the_fleet_at_a_glance() {
-    let mut bench = Bench::start().await;
-    let client = bench.client.clone();
+async fn the_fleet_lists_sessions_faults_and_lag_of_every_asset() {
+    let mut fixture = ServiceFixture::start().await;
+    let client = fixture.client.clone();
     for name in ["a", "b", "c"] {
         client.asset(name).await;
     }
@@ -25,7 +25,7 @@ async fn the_fleet_at_a_glance() {
         (&b["asset"], &b["session"], &b["samples"]),
         (&json!("b"), &json!("s"), &json!(2000))
     );
-    assert_eq!(b["lag_s"], 0.0, "the first batch is the promptest so far");
+    assert_eq!(b["lag_s"], 0.0, "the first batch has the smallest delay so far");
     let seen = b["last_seen"].as_str().unwrap().to_owned();
     let faults = b["faults"].clone();
     let x_servo = faults.as_array().unwrap().iter().find(|f| f["code"] == "x_servo").unwrap();
@@ -37,14 +37,14 @@ async fn the_fleet_at_a_glance() {
     let last = client.get(&next).await.expect(200);
     assert_eq!((&last["items"][0]["asset"], &last["next"]), (&json!("c"), &Value::Null));
 
-    // A batch that comes no later, with data that are older, lags.
+    // A batch with older samples has a lag.
     client.telemetry("b", Some("s"), &rig(10, 10)).await;
     let lag = client.get("fleet").await.expect(200)["items"][1]["lag_s"].as_f64().unwrap();
     assert!(lag > 19.0, "{lag}");
 
-    // After a restart the last that is known is the session's opening.
-    bench.restart().await;
-    let after = bench.client.get("fleet").await.expect(200)["items"][1].clone();
+    // After a restart, `last_seen` is the opening of the session.
+    fixture.restart().await;
+    let after = fixture.client.get("fleet").await.expect(200)["items"][1].clone();
     assert_eq!(after["lag_s"], Value::Null);
     let opened = after["last_seen"].as_str().unwrap().to_owned();
     assert!(opened <= seen, "{opened} is not after {seen}");
@@ -52,9 +52,9 @@ async fn the_fleet_at_a_glance() {
 }
 
 #[tokio::test]
-async fn what_happened_to_a_code_newest_first() {
-    let bench = Bench::start().await;
-    let client = &bench.client;
+async fn the_history_of_a_code_is_listed_newest_first() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
     client.asset("a").await;
     client.telemetry("a", Some("s"), &rig(2000, 300)).await;
     let at = "assets/a/faults/x_servo";
@@ -62,8 +62,8 @@ async fn what_happened_to_a_code_newest_first() {
     client.delete(&format!("{at}?by=bob")).await;
     let page = client.get(&format!("{at}/history")).await.expect(200);
     let items = page["items"].as_array().unwrap();
-    let said = |i: usize| (items[i]["what"].as_str().unwrap(), items[i]["by"].as_str());
-    let whats: Vec<_> = (0..items.len()).map(said).collect();
+    let entry = |i: usize| (items[i]["what"].as_str().unwrap(), items[i]["by"].as_str());
+    let whats: Vec<_> = (0..items.len()).map(entry).collect();
     let acts = [("clear", Some("bob")), ("acknowledge", Some("ada"))];
     assert!(acts.iter().all(|act| whats.contains(act)), "{whats:?}");
     assert_eq!(whats[whats.len() - 2..], [("confirmed", None), ("pending", None)]);
@@ -71,7 +71,7 @@ async fn what_happened_to_a_code_newest_first() {
     let ids: Vec<_> = items.iter().map(|item| item["id"].as_i64().unwrap()).collect();
     assert!(ids.is_sorted_by(|a, b| a > b), "{ids:?}");
 
-    // Page by page it is the same.
+    // The pages give the same entries.
     let mut paged = Vec::new();
     let mut address = format!("{at}/history?limit=1");
     loop {
@@ -94,15 +94,16 @@ async fn what_happened_to_a_code_newest_first() {
 }
 
 #[tokio::test]
-async fn a_trace_shows_what_was_judged() {
-    let bench = Bench::start().await;
-    let client = &bench.client;
+async fn a_trace_equals_what_was_judged() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
     client.asset("a").await;
     client.telemetry("a", Some("s"), &rig(2000, 300)).await;
     let id = client.end("a", "s").await["id"].as_str().unwrap().to_owned();
     let all = client.get(&format!("sessions/{id}/trace")).await.expect(200);
     let n = all["t_s"].as_array().unwrap().len();
-    assert!(n > 1900, "{n} moments");
+    // Evidence is renewed every 50 ms.
+    assert!((380..=400).contains(&n), "{n} moments");
     let column = |trace: &Value, name: &str| numbers(&trace["x"][name]);
     assert!(
         ["command_rad", "position_m", "measured_m_s2", "twin_m_s2", "limit_m_s2"]
@@ -110,51 +111,53 @@ async fn a_trace_shows_what_was_judged() {
             .all(|name| column(&all, name).len() == n)
     );
 
-    // Where the fault line says that measured and twin part, the trace does.
+    // At the time of the fault line, the trace has the evidence of that line.
     let lines = client.get(&format!("sessions/{id}/faults")).await.expect(200);
     let line = &lines["items"][0];
     let times = numbers(&all["t_s"]);
     let i = times.iter().position(|t| *t == line["t_s"].as_f64()).unwrap();
     for name in ["measured_m_s2", "twin_m_s2", "limit_m_s2"] {
-        let (drawn, told) = (column(&all, name)[i].unwrap(), line["evidence"]["x"][name].as_f64());
-        // Seven digits are drawn.
-        assert!((drawn - told.unwrap()).abs() < 1e-6, "{name}: {drawn}, {told:?}");
+        let (drawn, reported) =
+            (column(&all, name)[i].unwrap(), line["evidence"]["x"][name].as_f64());
+        // A trace is rounded to seven digits.
+        assert!((drawn - reported.unwrap()).abs() < 1e-6, "{name}: {drawn}, {reported:?}");
     }
 
     let part = client.get(&format!("sessions/{id}/trace?from_s=5&to_s=6")).await.expect(200);
     let times = numbers(&part["t_s"]);
-    assert!(times.iter().all(|t| (5.0..=6.0).contains(&t.unwrap())) && times.len() > 90);
+    assert!(times.iter().all(|t| (5.0..=6.0).contains(&t.unwrap())) && times.len() >= 19);
     let few = client.get(&format!("sessions/{id}/trace?points=50")).await.expect(200);
     assert!((40..=50).contains(&few["t_s"].as_array().unwrap().len()));
     let textbook = client.get(&format!("sessions/{id}/trace?profile=textbook")).await.expect(200);
-    assert_eq!(column(&textbook, "limit_m_s2")[n / 2], Some(0.01));
-    client.get(&format!("sessions/{id}/trace?profile=none")).await.problem(422);
+    let limits = column(&textbook, "limit_m_s2");
+    assert_eq!(limits[limits.len() / 2], Some(0.01));
+    client.get(&format!("sessions/{id}/trace?profile=none")).await.problem(400);
     client.get("sessions/none/trace").await.problem(404);
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_watcher_is_told_every_moment_once() {
-    let bench = Bench::start().await;
-    let client = &bench.client;
+async fn a_stream_with_traces_gets_every_moment_once() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
     client.asset("a").await;
     let url = format!("ws://{}/api/v1/assets/a/stream?state=50&trace=true", client.address);
     let (mut socket, _) = connect_async(url).await.unwrap();
     let samples = rig(600, 600);
     client.telemetry("a", Some("s"), &samples[..100]).await;
-    let mut told: Vec<f64> = Vec::new();
+    let mut times: Vec<f64> = Vec::new();
     let mut sent = false;
-    while told.last().is_none_or(|t| *t < samples[590].t_s) {
+    while times.last().is_none_or(|t| *t < samples[580].t_s) {
         let frame = tokio::time::timeout(crate::support::DEADLINE, socket.next()).await;
         let frame = frame.unwrap().unwrap().unwrap();
         let Ok(text) = frame.to_text() else { continue };
         let Ok(frame) = serde_json::from_str::<Value>(text) else { continue };
-        told.extend(numbers(&frame["trace"]["t_s"]).into_iter().flatten());
-        // Once a state has come, somebody watches: from here on nothing is lost.
+        times.extend(numbers(&frame["trace"]["t_s"]).into_iter().flatten());
+        // The first state shows that the stream is set up: from now on it gets everything.
         if !sent && frame["samples"] == 100 {
             client.telemetry("a", Some("s"), &samples[100..]).await;
             sent = true;
         }
     }
-    assert!(told.is_sorted_by(|a, b| a < b), "each once, in order");
-    assert!(told.len() > 480, "{} moments", told.len());
+    assert!(times.is_sorted_by(|a, b| a < b), "every moment once and in order");
+    assert!(times.len() > 96, "{} moments", times.len());
 }

@@ -1,11 +1,11 @@
-//! The twin and the evaluator inside your own program, without the service:
+//! Runs the twin and the diagnosis inside a program of your own, without the service:
 //! `cargo run -p offbd-core --example embed`.
 //!
-//! Here the "device" is a closure: the library's own twin of the rig, whose x
-//! servo stops obeying after ten seconds.
+//! The "device" is a closure that simulates the rig with the library's own twin; its x
+//! servo stops answering after ten seconds.
 
 use offbd_core::diagnosis::FaultMemory;
-use offbd_core::engine::{Engine, Input, Output, Rig, Setup};
+use offbd_core::engine::{Engine, Input, Rig, Setup};
 use offbd_core::plant::{RollingState, Twin};
 use offbd_core::vocabulary::{Invalid, PerAxis, Sample, SimTime};
 
@@ -24,13 +24,11 @@ fn main() -> Result<(), Invalid> {
         Some(Sample { seq: None, t_s, cmd_qx_rad, cmd_qy_rad, x_m, y_m })
     };
     let mut engine = Engine::new(setup, FaultMemory::default());
-    let mut outputs = Vec::new();
+    let mut transitions = Vec::new();
     for sample in (0..2000).map_while(|i| device(f64::from(i) * 0.01)) {
-        engine.handle(Input::Sample(sample), &mut outputs);
-        for output in outputs.drain(..) {
-            if let Output::Transition(fault) = output {
-                println!("{:.2} s: {} is {}", fault.at.seconds(), fault.code, fault.status);
-            }
+        engine.handle(Input::Sample(sample), &mut transitions);
+        for fault in transitions.drain(..) {
+            println!("{:.2} s: {} is {}", fault.at.seconds(), fault.code, fault.status);
         }
     }
     Ok(())

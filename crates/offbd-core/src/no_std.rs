@@ -1,5 +1,5 @@
-//! What the standard library's prelude and `f64` bring elsewhere: collections of
-//! `alloc`, and the functions of the crate `libm` through `num_traits::Float`.
+//! Replacements for the standard library's prelude and `f64` methods: the collections of
+//! `alloc`, and the functions of `libm` through `num_traits::Float`.
 
 pub(crate) use alloc::borrow::ToOwned;
 pub(crate) use alloc::boxed::Box;

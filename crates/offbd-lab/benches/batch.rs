@@ -1,16 +1,16 @@
-//! What a step of a rolling ball costs, alone and in a batch.
+//! Measures the cost of a step of a rolling ball, alone and in a batch.
 //!
-//! `cargo bench -p offbd-lab --bench batch [-- ROUNDS]` compares in
-//! one run, on the same balls and plates:
+//! `cargo bench -p offbd-lab --bench batch [-- ROUNDS]` compares in one run, on the
+//! same balls and plates:
 //!
-//! - *rolling*: `Rolling::midpoint`, each ball on its own, the library's sines;
-//! - *alone*: `RollingConstants::midpoint`, each ball on its own;
-//! - a batch by each set of instructions that the machine has. All give the
-//!   states that *alone* gives, to the bit, and the run checks it.
+//! - *rolling*: `Rolling::midpoint`, one ball at a time;
+//! - *alone*: `RollingConstants::midpoint`, one ball at a time;
+//! - a batch by each set of instructions that the machine has. The run checks that all
+//!   sets give the states of *alone*, to the bit.
 //!
-//! Nanoseconds per ball and step, the median of the rounds, which take turns;
-//! in brackets, how many times *alone*. Left out: where the plates come from,
-//! and reading states back. One core.
+//! Prints nanoseconds per ball and step, the median of interleaved rounds, and in
+//! brackets the ratio to *alone*. Not included: computing the plates' motion and
+//! reading states back. Uses one core.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
 
@@ -21,10 +21,10 @@ use nalgebra::Vector2;
 use offbd_core::plant::{Ball, Plate, PlateShape, Rolling, RollingState, Tilt};
 use offbd_lab::batch::{Instructions, PlateColumns, RollingBatch, RollingConstants};
 
-/// A hall, two fleets, and one that leaves the inner caches.
+/// Fleet sizes, in balls: from one hall to a fleet too large for the inner caches.
 const SIZES: [usize; 4] = [64, 1024, 4096, 16_384];
-/// Ball-steps that each way takes in a round: under a millisecond, so that a
-/// busy machine disturbs single rounds and not their median.
+/// Number of ball-steps of each stepper in a round. Chosen to take under a
+/// millisecond, so that a busy machine disturbs single rounds and not their median.
 const BALL_STEPS: usize = 1 << 14;
 
 fn main() {
@@ -32,31 +32,31 @@ fn main() {
     println!("ns per ball and step (times alone), median of {rounds} rounds");
     for n in SIZES {
         let fleet = Fleet::new(n);
-        let mut ways = fleet.ways();
-        let mut costs = vec![Vec::new(); ways.len()];
+        let mut steppers = fleet.steppers();
+        let mut costs = vec![Vec::new(); steppers.len()];
         for _ in 0..rounds {
-            for (way, costs) in ways.iter_mut().zip(&mut costs) {
-                costs.push(cost(way, &fleet));
+            for (stepper, costs) in steppers.iter_mut().zip(&mut costs) {
+                costs.push(cost(stepper, &fleet));
             }
         }
-        report(n, &ways, &costs);
+        report(n, &steppers, &costs);
     }
 }
 
-fn report(n: usize, ways: &[Way], costs: &[Vec<f64>]) {
+fn report(n: usize, steppers: &[Stepper], costs: &[Vec<f64>]) {
     let alone = median(&costs[1]);
     print!("{n:6} balls:");
-    for (way, costs) in ways.iter().zip(costs) {
-        print!("  {} {:.2} ({:.3})", way.name(), median(costs), median(costs) / alone);
+    for (stepper, costs) in steppers.iter().zip(costs) {
+        print!("  {} {:.2} ({:.3})", stepper.name(), median(costs), median(costs) / alone);
     }
     println!();
-    let expected = ways[1].states();
-    for way in &ways[2..] {
-        assert!(way.states() == expected, "{} differs", way.name());
+    let expected = steppers[1].states();
+    for stepper in &steppers[2..] {
+        assert!(stepper.states() == expected, "{} differs", stepper.name());
     }
 }
 
-/// A fleet of different rigs, each on a plate of its own that is held.
+/// A fleet of different rigs, each with its own plate, whose motion is constant.
 struct Fleet {
     rigs: Vec<(Ball, Plate)>,
     tilts: Vec<Tilt>,
@@ -86,25 +86,26 @@ impl Fleet {
         PlateColumns { qx_rad, qy_rad, qx_rate, qy_rate, qx_acceleration, qy_acceleration, step_s }
     }
 
-    fn ways(&self) -> Vec<Way> {
+    fn steppers(&self) -> Vec<Stepper> {
         let states = vec![RollingState::default(); self.rigs.len()];
         let rolling = self.rigs.iter().map(|(ball, plate)| Rolling::new(ball, plate)).collect();
         let constants: Vec<_> =
             self.rigs.iter().map(|(ball, plate)| RollingConstants::new(ball, plate)).collect();
-        let batch =
-            |instructions| Way::Batch(RollingBatch::new(&constants, instructions), instructions);
-        let batches: Vec<Way> = Instructions::available().map(batch).collect();
-        let mut ways = vec![Way::Rolling(rolling, states.clone())];
-        ways.push(Way::Alone(constants, states));
-        ways.extend(batches);
-        ways
+        let batch = |instructions| {
+            Stepper::Batch(RollingBatch::new(&constants, instructions), instructions)
+        };
+        let batches: Vec<Stepper> = Instructions::available().map(batch).collect();
+        let mut steppers = vec![Stepper::Rolling(rolling, states.clone())];
+        steppers.push(Stepper::Alone(constants, states));
+        steppers.extend(batches);
+        steppers
     }
 }
 
-/// A step so short that no ball runs away in any number of rounds.
+/// Step size, s. Chosen so short that no ball moves far in any number of rounds.
 const STEP_S: f64 = 1e-7;
 
-/// A number in [−0.5, 0.5) for ball `i`, another for each `what`.
+/// Returns a number in [−0.5, 0.5) for ball `i`, a different one for each `what`.
 fn spread(i: usize, what: usize) -> f64 {
     ((i * 7919 + what * 104_729) % 1009) as f64 / 1009.0 - 0.5
 }
@@ -120,13 +121,13 @@ fn tilt(i: usize) -> Tilt {
     Tilt { angle: pair(1, 0.4), rate: pair(3, 1.0), acceleration: pair(5, 10.0) }
 }
 
-enum Way {
+enum Stepper {
     Rolling(Vec<Rolling>, Vec<RollingState>),
     Alone(Vec<RollingConstants>, Vec<RollingState>),
     Batch(RollingBatch, Instructions),
 }
 
-impl Way {
+impl Stepper {
     fn name(&self) -> String {
         match self {
             Self::Rolling(..) => "rolling".to_owned(),
@@ -159,13 +160,14 @@ impl Way {
     }
 }
 
-/// Nanoseconds per ball and step, after one that brings the data near.
-fn cost(way: &mut Way, fleet: &Fleet) -> f64 {
+/// Returns the time per ball and step, ns, measured after one step that warms the
+/// caches.
+fn cost(stepper: &mut Stepper, fleet: &Fleet) -> f64 {
     let steps = BALL_STEPS / fleet.rigs.len();
-    way.step(fleet);
+    stepper.step(fleet);
     let start = Instant::now();
     for _ in 0..steps {
-        black_box(&mut *way).step(black_box(fleet));
+        black_box(&mut *stepper).step(black_box(fleet));
     }
     start.elapsed().as_secs_f64() * 1e9 / BALL_STEPS as f64
 }

@@ -1,7 +1,8 @@
 //! The laboratory of offbd: scenes, the models and methods that only scenes
-//! need, simulated rigs, and charts of what was measured.
+//! need, simulated rigs, and charts of measurements.
 //!
-//! The service runs without it. Knows no service, no store, no HTTP.
+//! The service does not need this crate. The crate depends on neither the
+//! service, its store nor HTTP.
 
 pub mod batch;
 pub mod chart;

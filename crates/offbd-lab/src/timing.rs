@@ -1,31 +1,32 @@
-//! CPU time of a piece of work: that of this thread, so that other processes
-//! on the machine disturb it little.
+//! Measures CPU time, of the calling thread alone: other processes on the machine
+//! disturb it little.
 
-/// CPU seconds that one measurement takes at least: short runs are repeated
-/// within it, so that the clock's resolution (tens of ns to 1 µs) does not show.
+/// Minimum CPU time of one measurement, s: shorter runs are repeated until they
+/// fill it. Chosen so that the clock's resolution (tens of ns to 1 µs) is
+/// negligible.
 const LEAST_S: f64 = 5e-3;
 
-/// Most runs within one measurement: what costs less than a picosecond was
-/// optimised away.
+/// Maximum number of runs in one measurement. Chosen so that a run that does not
+/// fill 5 ms takes under 20 ps: the compiler has optimised it away.
 const MOST_RUNS: u32 = 1 << 28;
 
 /// CPU time of one run, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CpuTime {
-    /// The least of the repeated measurements: what the work itself costs.
+    /// The minimum of the repeated measurements: the least disturbed one.
     pub minimum_s: f64,
-    /// Their median.
+    /// The median of the repeated measurements.
     pub median_s: f64,
 }
 
 impl CpuTime {
-    /// Median over minimum: 1 on a quiet machine.
+    /// Returns the median over the minimum: 1 on an idle machine.
     #[must_use]
     pub fn spread(&self) -> f64 {
         self.median_s / self.minimum_s
     }
 
-    /// CPU microseconds per simulated second, for a run that simulates
+    /// Returns the CPU time per simulated second, µs/s, of a run that simulates
     /// `simulated_s` seconds.
     #[must_use]
     pub fn us_per_s(&self, simulated_s: f64) -> f64 {
@@ -33,8 +34,8 @@ impl CpuTime {
     }
 }
 
-/// Measures `run` `repeats` times (at least once), each over as many runs as
-/// fill 5 ms. Wrap what `run` computes in [`std::hint::black_box`].
+/// Measures `run` `repeats` times (at least once), each time over as many runs as
+/// fill 5 ms. Pass what `run` computes to [`std::hint::black_box`].
 pub fn cpu_time(repeats: usize, mut run: impl FnMut()) -> CpuTime {
     let mut n = 1;
     let mut first_s = batch(n, &mut run);
@@ -51,7 +52,8 @@ pub fn cpu_time(repeats: usize, mut run: impl FnMut()) -> CpuTime {
     CpuTime { minimum_s: each_s.into_iter().fold(f64::INFINITY, f64::min), median_s }
 }
 
-/// How many runs should last a little longer than the least.
+/// Returns a number of runs expected to take 1.3 times the minimum, given that `n`
+/// runs took `took_s`; at least twice `n`.
 fn grown(n: u32, took_s: f64) -> u32 {
     let wanted = f64::from(n) * 1.3 * LEAST_S / took_s.max(1e-9);
     (wanted.ceil() as u32).clamp(n.saturating_mul(2), MOST_RUNS)
@@ -65,14 +67,14 @@ fn batch(n: u32, run: &mut impl FnMut()) -> f64 {
     now_s() - start_s
 }
 
-/// CPU time that `run` takes once, s, beside what it returns.
+/// Calls `run` once; returns its result and its CPU time, s.
 pub fn cpu_once<T>(run: impl FnOnce() -> T) -> (T, f64) {
     let start_s = now_s();
     let done = run();
     (done, now_s() - start_s)
 }
 
-/// CPU time of this thread so far, s.
+/// Returns the CPU time of this thread so far, s.
 #[cfg(unix)]
 #[expect(clippy::disallowed_methods, reason = "charts measure cost; no verdict sees it")]
 fn now_s() -> f64 {
@@ -80,7 +82,7 @@ fn now_s() -> f64 {
     time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
 }
 
-/// Elsewhere the time that passes stands in for it, s.
+/// Returns the wall-clock time, s, as a substitute on other platforms.
 #[cfg(not(unix))]
 #[expect(clippy::disallowed_methods, reason = "charts measure cost; no verdict sees it")]
 fn now_s() -> f64 {

@@ -1,20 +1,20 @@
-//! `offbd chart`: measures, draws, and keeps the records.
+//! `offbd chart`: measures, draws, and stores the records.
 
 use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::cli::unusable::Unusable;
+use crate::cli::errors::InputError;
 use crate::cli::{output, table};
 use crate::wire::scene;
-use offbd_lab::chart::work_precision::{self, Charted, Peers};
+use offbd_lab::chart::work_precision::{self, ChartedScene, Peers};
 use offbd_lab::chart::{self, Chart, ChartError, Effort};
 
 /// Measures a trade-off on this machine: SVG, PNG and the records as JSON.
 ///
-/// A short table goes to stdout, the names of the files to stderr. Costs are
-/// CPU time: leave the machine alone meanwhile.
+/// Writes a short table to stdout, and the names of the files to stderr. Costs are
+/// CPU times: keep the machine idle meanwhile.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "Examples:\n  \
     offbd chart work-precision\n  \
@@ -24,11 +24,11 @@ use offbd_lab::chart::{self, Chart, ChartError, Effort};
 pub(in crate::cli) struct ChartArgs {
     /// Which chart
     #[arg(value_enum)]
-    name: Name,
-    /// Where the files go; made if need be
+    name: ChartName,
+    /// Directory of the files; created if missing
     #[arg(short, long, value_name = "DIR", default_value = "charts")]
     output: PathBuf,
-    /// Records of other engines to draw beside ours, for work-precision
+    /// Records of other engines to draw as well, for work-precision
     #[arg(long, value_name = "FILE")]
     with: Vec<PathBuf>,
     /// Measure a few points only
@@ -37,22 +37,22 @@ pub(in crate::cli) struct ChartArgs {
 }
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
-enum Name {
+enum ChartName {
     /// Acceleration estimators: error against delay and cost
     Estimators,
     /// Models and methods: error against CPU time per simulated second
     WorkPrecision,
-    /// Models: error over the plate's motion, and what is chosen
+    /// Models: error over the plate's motion, and the automatic choice
     Fidelity,
-    /// Methods: the largest stable step, measured and predicted
+    /// Methods: largest stable step, measured and predicted
     Stability,
     /// Detectors of servo faults: delay against false alarms
     Detectors,
-    /// Calibrations: false alarms and delays, promised against what comes
+    /// Calibrations: false alarms and delays, predicted and observed
     Certificate,
 }
 
-impl Name {
+impl ChartName {
     fn make(self, effort: Effort, with: &[PathBuf]) -> Result<Chart, ChartError> {
         match self {
             Self::Estimators => chart::estimators::make(effort),
@@ -84,15 +84,15 @@ pub(super) fn run(args: &ChartArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Records that cannot be read are unusable input.
+/// Maps unreadable records to unusable input.
 fn unusable(error: ChartError) -> anyhow::Error {
     match error {
-        ChartError::Peers { path, reason } => Unusable::file(&path, reason).into(),
+        ChartError::Peers { path, reason } => InputError::file(&path, reason).into(),
         other => other.into(),
     }
 }
 
-fn write_table(rows: &chart::Table) -> anyhow::Result<()> {
+fn write_table(rows: &chart::ChartTable) -> anyhow::Result<()> {
     let mut out = output::stdout();
     let mut table = table::table(&rows.heading, &rows.right);
     for row in &rows.rows {
@@ -110,9 +110,8 @@ macro_rules! scene {
     };
 }
 
-/// The scenes of the chart of speed against accuracy: a constant slope, a sine,
-/// and a plate that turns so steep that the ball slips, flies and lands; each on
-/// a hard and a soft contact.
+/// The scenes of the work–precision chart: a constant slope, a sine, and a plate that
+/// turns so steep that the ball slips, flies and lands; each on a hard and a soft contact.
 const CHARTED: [&str; 6] = [
     scene!("slope"),
     scene!("sine"),
@@ -122,9 +121,9 @@ const CHARTED: [&str; 6] = [
     scene!("steep-soft"),
 ];
 
-fn charted() -> Result<Vec<Charted>, ChartError> {
+fn charted() -> Result<Vec<ChartedScene>, ChartError> {
     let parsed = CHARTED.iter().map(|file| scene::parse(file.as_bytes()));
     Ok(parsed
-        .map(|named| named.map(|n| Charted { name: n.name, scene: n.scene, laws: n.laws }))
+        .map(|named| named.map(|n| ChartedScene { name: n.name, scene: n.scene, laws: n.laws }))
         .collect::<Result<_, _>>()?)
 }

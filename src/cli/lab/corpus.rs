@@ -1,5 +1,5 @@
-//! A labelled corpus of simulated sessions: per preset a calibration session,
-//! healthy ones with hands and gusts, and one for each kind of fault.
+//! A labelled corpus of simulated sessions: per preset a calibration session, healthy
+//! sessions with pushes and gusts, and a session for each kind of fault.
 
 use std::path::Path;
 
@@ -31,17 +31,18 @@ const FAULTS: [&str; 15] = [
     "sensor:jump",
 ];
 
-/// Length of a calibration session, s: two minutes are learnt from safely.
+/// Duration of a calibration session, s; chosen: enough for a reliable calibration.
 const CALIBRATION_S: f64 = 120.0;
-/// Healthy sessions per rig.
+/// Number of healthy sessions per rig.
 const N_HEALTHY: usize = 3;
-/// Onsets lie in this share of the session; fractions of the golden ratio
-/// spread them evenly.
+/// Range of the onsets as shares of the session; chosen.
 const ONSET_SHARE: [f64; 2] = [0.3, 0.55];
+/// Fractional part of the golden ratio: the fractional parts of its multiples spread
+/// onsets evenly.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
-/// A session to be recorded.
-struct Plan {
+/// A session of a corpus to be recorded.
+struct CorpusSession {
     preset: Preset,
     file: String,
     reference: Reference,
@@ -51,9 +52,9 @@ struct Plan {
     seed: u64,
 }
 
-/// Writes a corpus into `dir`, sessions of `seconds`, all from one `seed`.
+/// Writes a corpus into `dir`, with sessions of `seconds`, all from one `seed`.
 pub(super) fn write(dir: &Path, seconds: f64, seed: u64) -> anyhow::Result<()> {
-    let plans: Vec<Plan> =
+    let plans: Vec<CorpusSession> =
         Preset::ALL.into_iter().flat_map(|preset| plans(preset, seconds, seed)).collect();
     for preset in Preset::ALL {
         let folder = dir.join(preset.as_str());
@@ -78,17 +79,21 @@ pub(super) fn write(dir: &Path, seconds: f64, seed: u64) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn plans(preset: Preset, seconds: f64, seed: u64) -> Vec<Plan> {
+fn plans(preset: Preset, seconds: f64, seed: u64) -> Vec<CorpusSession> {
     let n_rig = preset as u64 + 1;
-    let plan = |file: String, n: usize, fault: Option<String>, hands: f64| Plan {
-        preset,
-        file,
-        reference: if n == 0 { Reference::Lissajous } else { Reference::ALL[(n + 1) % 4] },
-        seconds: if n == 0 { CALIBRATION_S } else { seconds },
-        disturbances: Disturbances { pushes_per_minute: hands, gusts_per_minute: hands / 2.0 },
-        fault,
-        seed: seed.wrapping_mul(1_000_003).wrapping_add(n_rig * 1000 + n as u64),
-    };
+    let plan =
+        |file: String, n: usize, fault: Option<String>, pushes_per_minute: f64| CorpusSession {
+            preset,
+            file,
+            reference: if n == 0 { Reference::Lissajous } else { Reference::ALL[(n + 1) % 4] },
+            seconds: if n == 0 { CALIBRATION_S } else { seconds },
+            disturbances: Disturbances {
+                pushes_per_minute,
+                gusts_per_minute: pushes_per_minute / 2.0,
+            },
+            fault,
+            seed: seed.wrapping_mul(1_000_003).wrapping_add(n_rig * 1000 + n as u64),
+        };
     let mut all = vec![plan("calibration.csv".to_owned(), 0, None, 0.0)];
     for i in 0..N_HEALTHY {
         all.push(plan(format!("{i:03}.csv"), 1 + i, None, 2.0));
@@ -102,7 +107,7 @@ fn plans(preset: Preset, seconds: f64, seed: u64) -> Vec<Plan> {
     all
 }
 
-impl Plan {
+impl CorpusSession {
     fn write(&self, dir: &Path) -> anyhow::Result<Label> {
         let model = self.preset.model()?;
         let mut rig = SimulatedRig::new(model, self.reference, self.disturbances, self.seed)?;

@@ -1,13 +1,13 @@
-//! `labels.json` of a labelled corpus: what is true of each session.
+//! `labels.json` of a labelled corpus: the true fault of each session.
 
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::cli::unusable::{Unusable, read};
+use crate::cli::errors::{InputError, read};
 use offbd_lab::simulation::{FaultEffect, FaultTruth};
 
-/// What is true of one session.
+/// The label of one session.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Label {
     /// Path within the corpus, `RIG/SESSION.csv`.
@@ -19,7 +19,7 @@ pub(super) struct Label {
     pub rows: u64,
     /// `healthy`, or the code of the fault.
     pub class: String,
-    /// Codes that are right as well, where the readings cannot tell.
+    /// Further codes that count as correct, because the readings cannot distinguish them.
     #[serde(default)]
     pub also: Vec<String>,
     pub fault: Option<LabelledFault>,
@@ -36,23 +36,23 @@ pub(super) struct LabelledFault {
     pub onset_s: f64,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub end_s: Option<f64>,
-    /// When it could first be seen; null: never.
+    /// Time at which it first became detectable, s; null: never.
     pub chance_s: Option<f64>,
 }
 
 impl Label {
-    /// Whether the session is there to learn from, not to be judged.
+    /// Returns whether the session is for calibration, not to be judged.
     pub(super) fn is_calibration(&self) -> bool {
         self.file.ends_with("calibration.csv")
     }
 }
 
-/// The class of a session with this fault.
+/// Returns the class of a session with this fault.
 pub(super) fn class(fault: Option<&FaultTruth>) -> String {
     fault.map_or_else(|| "healthy".to_owned(), |f| f.fault.effect.code().to_string())
 }
 
-/// What is true of a simulated fault, rounded to the millisecond.
+/// Returns the label of a simulated fault, with times rounded to the millisecond.
 pub(super) fn labelled(truth: &FaultTruth) -> LabelledFault {
     let effect: &FaultEffect = &truth.fault.effect;
     let size = effect.size().map(|size| match size.as_slice() {
@@ -70,8 +70,8 @@ pub(super) fn labelled(truth: &FaultTruth) -> LabelledFault {
     }
 }
 
-/// The labels of the corpus in `dir`.
-pub(super) fn load(dir: &Path) -> Result<Vec<Label>, Unusable> {
+/// Reads the labels of the corpus in `dir`.
+pub(super) fn load(dir: &Path) -> Result<Vec<Label>, InputError> {
     let path = dir.join("labels.json");
-    serde_json::from_slice(&read(&path)?).map_err(|e| Unusable::file(&path, e))
+    serde_json::from_slice(&read(&path)?).map_err(|e| InputError::file(&path, e))
 }

@@ -1,5 +1,5 @@
-//! The laboratory's commands: rigs that are simulated, scenes, charts, and
-//! scores of the diagnosis against labels.
+//! The commands of the laboratory: simulated rigs, scenes, charts, and scores of the
+//! diagnosis against labels.
 
 mod chart;
 mod corpus;
@@ -23,8 +23,8 @@ pub(super) enum LabCommand {
 }
 
 impl LabCommand {
-    /// The level of the log where none is asked for: the service inside the
-    /// demo reports problems only.
+    /// Returns the default log level: the service inside the demo logs warnings and errors
+    /// only.
     pub(super) fn log_level(&self) -> Option<&'static str> {
         matches!(self, Self::Demo(_)).then_some("warn")
     }

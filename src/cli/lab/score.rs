@@ -1,13 +1,14 @@
-//! `offbd score`: judges a labelled corpus and compares with its labels.
+//! `offbd score`: judges a labelled corpus and compares the verdicts with its labels.
 //!
-//! Each rig is calibrated on its `calibration.csv`; its other sessions are
-//! judged; the first *confirmed* fault of each is compared with the truth.
-//! A detection before the onset is a false alarm; delays count from the
-//! fault's first chance to be seen, and beside it from the onset. A fault that
-//! never had a chance and was not detected is left out of the rates.
+//! Each rig is calibrated on its `calibration.csv`; its other sessions are judged, and the
+//! first *confirmed* fault of each is compared with the label. A detection before the
+//! onset is a false alarm. Delays count from the first chance, the time at which the fault
+//! became detectable, and also from the onset. A fault that never became detectable and
+//! was not detected is excluded from the rates.
 
 mod figures;
 
+use crate::wire::words::StatusWord;
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -17,15 +18,14 @@ use rayon::prelude::*;
 
 use super::labels::{self, Label};
 use crate::cli::calibrate;
-use crate::cli::judge::{self, Judged};
-use crate::cli::output::{self, Format, words};
+use crate::cli::errors::InputError;
+use crate::cli::judge::{self, JudgedSession};
+use crate::cli::output::{self, OutputFormat, value_parser};
 use crate::cli::replay::{in_threads, progress};
 use crate::cli::table;
-use crate::cli::unusable::Unusable;
-use figures::{Figures, Found};
+use figures::{FirstConfirmed, ScoreReport};
 use offbd_core::diagnosis::Profile;
 use offbd_core::engine::Setup;
-use offbd_core::vocabulary::FaultStatus;
 
 /// Scores the diagnosis on a labelled corpus: delays, false alarms, isolation.
 ///
@@ -42,17 +42,17 @@ pub(in crate::cli) struct ScoreArgs {
     dir: PathBuf,
     /// A table for people, or one JSON object
     #[arg(long, value_enum, default_value = "table")]
-    format: Format,
-    /// Judge by this profile instead of the assets'
-    #[arg(long, value_parser = words::<Profile>(Profile::ALL.map(Profile::as_str)))]
+    format: OutputFormat,
+    /// Judge by this profile instead of the rigs' own
+    #[arg(long, value_parser = value_parser::<Profile>(Profile::ALL.map(Profile::as_str)))]
     profile: Option<Profile>,
-    /// A line per session, on stderr
+    /// Print a line per session to stderr
     #[arg(long)]
     list: bool,
-    /// Judge without learning the rigs first
+    /// Judge without calibrating the rigs
     #[arg(long)]
     no_calibration: bool,
-    /// Sessions judged at a time [default: one per core]
+    /// Number of sessions judged in parallel [default: one per core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
 }
@@ -67,17 +67,20 @@ pub(super) fn run(args: &ScoreArgs) -> anyhow::Result<()> {
     let figures = figures::figures(labels.iter().zip(found.iter().map(Option::as_ref)));
     let mut out = output::stdout();
     match args.format {
-        Format::Json => {
+        OutputFormat::Json => {
             serde_json::to_writer(&mut out, &figures)?;
             writeln!(out)?;
         }
-        Format::Table => write_table(&mut out, &figures)?,
+        OutputFormat::Table => write_table(&mut out, &figures)?,
     }
     Ok(out.flush()?)
 }
 
-/// The first confirmed fault of each session.
-fn judge_all(args: &ScoreArgs, labels: &[Label]) -> Result<Vec<Option<Found>>, Unusable> {
+/// Judges all sessions; returns the first confirmed fault of each.
+fn judge_all(
+    args: &ScoreArgs,
+    labels: &[Label],
+) -> Result<Vec<Option<FirstConfirmed>>, InputError> {
     let mut rigs: Vec<&str> = labels.iter().map(|l| l.rig.as_str()).collect();
     rigs.sort_unstable();
     rigs.dedup();
@@ -88,52 +91,53 @@ fn judge_all(args: &ScoreArgs, labels: &[Label]) -> Result<Vec<Option<Found>>, U
             bar.inc(1);
             Ok((*rig, set_up(args, &args.dir.join(rig))?))
         })
-        .collect::<Result<BTreeMap<&str, Setup>, Unusable>>()?;
+        .collect::<Result<BTreeMap<&str, Setup>, InputError>>()?;
     let judged = labels
         .par_iter()
         .map(|label| {
             bar.inc(1);
             judge::judge_file(&setups[label.rig.as_str()], &args.dir.join(&label.file))
         })
-        .collect::<Result<Vec<Judged>, Unusable>>()?;
+        .collect::<Result<Vec<JudgedSession>, InputError>>()?;
     bar.finish_and_clear();
     check_rows(&args.dir, labels, &judged)?;
     Ok(judged.iter().map(first_confirmed).collect())
 }
 
-fn set_up(args: &ScoreArgs, folder: &Path) -> Result<Setup, Unusable> {
+fn set_up(args: &ScoreArgs, folder: &Path) -> Result<Setup, InputError> {
     let mut rig = judge::load_rig(Some(&folder.join("rig.json")))?;
     if !args.no_calibration {
         let path = folder.join("calibration.csv");
         let (samples, _) = judge::read_samples(&path)?;
         let data = calibrate::data_hash(std::slice::from_ref(&path))?;
         let learnt = calibrate::learn(&rig, &[samples], &data);
-        rig.calibration = Some(learnt.map_err(|e| Unusable::file(&path, e))?);
+        rig.calibration = Some(learnt.map_err(|e| InputError::file(&path, e))?);
     }
     judge::set_up(rig, args.profile)
 }
 
-/// A corpus whose rows are not those of its labels is not the one labelled.
-fn check_rows(dir: &Path, labels: &[Label], judged: &[Judged]) -> Result<(), Unusable> {
+/// Checks that the corpus has the number of rows of its labels, within 1 %.
+fn check_rows(dir: &Path, labels: &[Label], judged: &[JudgedSession]) -> Result<(), InputError> {
     let rows: u64 = labels.iter().map(|l| l.rows).sum();
     let samples: u64 = judged.iter().map(|j| j.summary.samples).sum();
     if rows.abs_diff(samples) as f64 > 0.01 * rows as f64 {
         let reason = format!("the labels count {rows} rows, the sessions have {samples} samples");
-        return Err(Unusable::file(dir, reason));
+        return Err(InputError::file(dir, reason));
     }
     Ok(())
 }
 
-fn first_confirmed(judged: &Judged) -> Option<Found> {
+fn first_confirmed(judged: &JudgedSession) -> Option<FirstConfirmed> {
     let confirmed = |f: &&_| {
         let fault: &crate::wire::verdict::FaultView = f;
-        fault.status == FaultStatus::Confirmed.as_str()
+        fault.status == StatusWord::Confirmed
     };
     let fault = judged.faults.iter().find(confirmed)?;
-    Some(Found { code: fault.code.clone(), kind: fault.kind.clone(), t_s: fault.t_s })
+    let kind = fault.kind.map(|kind| kind.to_string());
+    Some(FirstConfirmed { code: fault.code.to_string(), kind, t_s: fault.t_s })
 }
 
-fn list(label: &Label, found: Option<&Found>) {
+fn list(label: &Label, found: Option<&FirstConfirmed>) {
     let truth = label
         .fault
         .as_ref()
@@ -145,7 +149,7 @@ fn list(label: &Label, found: Option<&Found>) {
     anstream::eprintln!("{:<22} {:<11} {truth:<24} -> {got}", label.file, label.class);
 }
 
-fn write_table(out: &mut impl Write, figures: &Figures) -> anyhow::Result<()> {
+fn write_table(out: &mut impl Write, figures: &ScoreReport) -> anyhow::Result<()> {
     let mut overall = table::table(&["figure", "value"], &[1]);
     for (name, value) in figures.overall() {
         overall.add_row([name.to_owned(), value]);

@@ -1,4 +1,4 @@
-//! `offbd simulate`: a session of the simulated rig, or a labelled corpus.
+//! `offbd simulate`: simulates a session of a rig, or a labelled corpus.
 
 mod numbers;
 mod options;
@@ -11,15 +11,15 @@ use clap::Args;
 use super::corpus;
 use super::labels::{Label, class, labelled};
 use crate::cli::calibrate::write_asset;
+use crate::cli::errors::BadArgument;
 use crate::cli::judge;
-use crate::cli::output::{self, words};
-use crate::cli::unusable::BadArgument;
+use crate::cli::output::{self, value_parser};
 use crate::wire::session_csv;
 use offbd_core::vocabulary::{Axis, Invalid, Sample};
 use offbd_lab::simulation::{Fault, Preset, Reference, RigModel, SimulatedRig, Transport, Variety};
 use options::{LineArgs, RigArgs, SensorArgs};
 
-/// Records a session of the simulated rig: PID control, servos, noise, faults.
+/// Simulates a session of a rig: PID control, servos, noise, faults.
 ///
 /// Equal seeds give equal bytes. A fault is CODE:KIND[=SIZE]@START[-END] with
 /// times in seconds.
@@ -46,31 +46,31 @@ use options::{LineArgs, RigArgs, SensorArgs};
 pub(in crate::cli) struct SimulateArgs {
     /// Kind of rig: its servos, surface, sensor and controller
     #[arg(long, default_value = "chapter", conflicts_with = "rig_seed",
-          value_parser = words::<Preset>(Preset::ALL.map(Preset::as_str)))]
+          value_parser = value_parser::<Preset>(Preset::ALL.map(Preset::as_str)))]
     preset: Preset,
     /// Ball, plate, angle limit and sample rate from this asset file
     #[arg(long, value_name = "ASSET.json")]
     asset: Option<PathBuf>,
-    /// Where the ball is asked to go
+    /// Reference motion of the ball
     #[arg(long, default_value = "steps",
-          value_parser = words::<Reference>(Reference::ALL.map(Reference::as_str)))]
+          value_parser = value_parser::<Reference>(Reference::ALL.map(Reference::as_str)))]
     reference: Reference,
     /// Length of the session, s
     #[arg(long, default_value_t = 60.0, value_name = "S", value_parser = seconds)]
     seconds: f64,
-    /// Seed of all that is random
+    /// Seed of all random numbers
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// A fault: CODE:KIND[=SIZE]@START[-END]; may be given again
+    /// A fault: CODE:KIND[=SIZE]@START[-END]; may be repeated
     #[arg(long, value_name = "FAULT")]
     fault: Vec<Fault>,
-    /// Where the session goes; - is stdout
+    /// File of the session; - is stdout
     #[arg(short, long, default_value = "-", value_name = "SESSION.csv")]
     output: PathBuf,
-    /// Write what is true of the session here, as in a corpus' labels
+    /// Write the label of the session here, as in the labels of a corpus
     #[arg(long, value_name = "FILE.json")]
     truth: Option<PathBuf>,
-    /// Write what the rig's owner knows here: its asset file
+    /// Write the rig's asset file, as its owner would describe it, here
     #[arg(long, value_name = "ASSET.json")]
     rig: Option<PathBuf>,
     /// Number the rows in a column `seq`
@@ -88,10 +88,10 @@ pub(in crate::cli) struct SimulateArgs {
     line: LineArgs,
 }
 
-/// Longest session that is simulated at once, s: a day.
+/// Longest session, s; chosen: a day.
 const MAX_SECONDS: f64 = 86_400.0;
 
-/// A length in seconds, in (0, 86400].
+/// Parses a duration in seconds, in (0, 86400].
 pub(super) fn seconds(word: &str) -> Result<f64, String> {
     let value: Option<f64> = word.parse().ok();
     let in_range = |v: &f64| *v > 0.0 && *v <= MAX_SECONDS;
@@ -107,10 +107,10 @@ pub(super) fn run(args: &SimulateArgs) -> anyhow::Result<()> {
         write_asset(&model.rig, path)?;
     }
     let name = model.rig.name.clone();
-    args.servos_of_faults(&model)?;
-    let hands = args.sensor.disturbances();
+    args.check_fault_axes(&model)?;
+    let disturbances = args.sensor.disturbances();
     let mut rig =
-        SimulatedRig::new(model, args.reference, hands, args.seed).map_err(bad_argument)?;
+        SimulatedRig::new(model, args.reference, disturbances, args.seed).map_err(bad_argument)?;
     args.fault.iter().for_each(|fault| rig.inject(*fault));
     let samples = record(&mut rig, args.seconds);
     let rows = args.transported(&samples)?;
@@ -121,13 +121,13 @@ pub(super) fn run(args: &SimulateArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The rows that `rig` logs in the next `seconds`.
+/// Returns the rows that `rig` logs in the next `seconds`.
 pub(super) fn record(rig: &mut SimulatedRig, seconds: f64) -> Vec<Sample> {
     let end_s = rig.truth().t_s + seconds;
     std::iter::from_fn(|| Some(rig.next_sample())).take_while(|s| s.t_s <= end_s).collect()
 }
 
-/// Writes a session, with the column `seq` only if wanted.
+/// Writes a session, with the column `seq` if `seq` is true.
 pub(super) fn write_session(path: &Path, samples: &[Sample], seq: bool) -> anyhow::Result<()> {
     let mut out = output::create(path)?;
     let unnumbered = |s: &Sample| Sample { seq: s.seq.filter(|_| seq), ..*s };
@@ -142,13 +142,13 @@ fn write_truth(path: &Path, label: &Label) -> anyhow::Result<()> {
     Ok(out.flush()?)
 }
 
-/// A number on the command line that cannot be.
+/// Maps an invalid number on the command line to an error.
 fn bad_argument(error: Invalid) -> anyhow::Error {
-    crate::cli::unusable::Unusable::new("cannot simulate", error).into()
+    crate::cli::errors::InputError::new("cannot simulate", error).into()
 }
 
 impl SimulateArgs {
-    /// The rig of this session.
+    /// Returns the rig of this session.
     fn model(&self) -> anyhow::Result<RigModel> {
         let mut model = match self.own.rig_seed {
             Some(seed) => Variety::Real.rig(seed),
@@ -163,8 +163,8 @@ impl SimulateArgs {
         Ok(model.of_session(self.seed))
     }
 
-    /// Whether the rig has the servos that are to fail.
-    fn servos_of_faults(&self, model: &RigModel) -> Result<(), BadArgument> {
+    /// Checks that the rig has the axes of the faults.
+    fn check_fault_axes(&self, model: &RigModel) -> Result<(), BadArgument> {
         let missing = |fault: &&Fault| fault.effect.axis() == Some(Axis::Y) && model.one_axis;
         self.fault.iter().find(missing).map_or(Ok(()), |fault| {
             Err(BadArgument(format!("--fault {fault}: the rig has one axis, x")))

@@ -1,14 +1,16 @@
-//! Two verdicts on the same sessions, side by side.
+//! Comparison of two verdicts on the same session.
 
 use std::io::Write;
 
 use serde::Serialize;
 
-use crate::cli::judge::Judged;
+use crate::cli::judge::JudgedSession;
 use crate::cli::table;
-use crate::wire::difference::{Compared, ComparedView, TallyView, compare, tally};
+use crate::wire::difference::{
+    ComparedTransition, ComparedView, TallyView, compare, count_changes,
+};
 
-/// A line for each transition of either verdict.
+/// A JSON line for a transition of either verdict.
 #[derive(Serialize)]
 struct DifferenceLine<'a> {
     #[serde(rename = "type")]
@@ -18,7 +20,7 @@ struct DifferenceLine<'a> {
     transition: &'a ComparedView,
 }
 
-/// The last line of a session.
+/// The last JSON line of a session.
 #[derive(Serialize)]
 struct ComparisonLine<'a> {
     #[serde(rename = "type")]
@@ -30,11 +32,11 @@ struct ComparisonLine<'a> {
     against_hash: &'a str,
 }
 
-/// The session's verdict against another on it, as JSON lines.
+/// Writes the comparison as JSON lines.
 pub(super) fn write_json(
     out: &mut impl Write,
-    judged: &Judged,
-    against: &Judged,
+    judged: &JudgedSession,
+    against: &JudgedSession,
 ) -> anyhow::Result<()> {
     let session = judged.summary.session.as_str();
     let all = compare(&judged.faults, &against.faults);
@@ -46,7 +48,7 @@ pub(super) fn write_json(
     let line = ComparisonLine {
         line: "comparison",
         session,
-        tally: tally(&all),
+        tally: count_changes(&all),
         verdict_hash: &judged.summary.verdict_hash,
         against_hash: &against.summary.verdict_hash,
     };
@@ -54,14 +56,14 @@ pub(super) fn write_json(
     Ok(writeln!(out)?)
 }
 
-/// The same as a table.
+/// Writes the comparison as a table.
 pub(super) fn write_table(
     out: &mut impl Write,
-    judged: &Judged,
-    against: &Judged,
+    judged: &JudgedSession,
+    against: &JudgedSession,
 ) -> anyhow::Result<()> {
     let all = compare(&judged.faults, &against.faults);
-    let TallyView { same, altered, moved, only_recorded, only_replayed } = tally(&all);
+    let TallyView { same, altered, moved, only_recorded, only_replayed } = count_changes(&all);
     let name = &judged.summary.session;
     let counts = format!(
         "{same} the same, {altered} altered, {moved} moved, {only_recorded} here only, \
@@ -82,7 +84,7 @@ pub(super) fn write_table(
     Ok(())
 }
 
-fn cells(one: &Compared) -> [String; 6] {
+fn cells(one: &ComparedTransition) -> [String; 6] {
     let view = &one.view;
     let time = |t_s: Option<f64>| t_s.map_or_else(String::new, |t_s| format!("{t_s:.2}"));
     let word = match view.change.as_str() {

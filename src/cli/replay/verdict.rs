@@ -1,15 +1,16 @@
-//! A verdict in a few words, and how much of each session was judged.
+//! The verdict in a few words, and how much of each session was judged.
 
+use crate::wire::words::{CodeWord, KindWord, StatusWord};
 use comfy_table::Table;
 
-use crate::cli::judge::Judged;
+use crate::cli::judge::JudgedSession;
 use crate::cli::table;
 use crate::wire::verdict::{CandidateView, FaultView, JudgedView, Outcome};
-use offbd_core::vocabulary::{FaultCode, FaultStatus};
+use offbd_core::vocabulary::FaultCode;
 
-/// The verdict on a session in a few words: what was found, or else what was not;
-/// and what was not learnt or not judged.
-pub(super) fn words(session: &Judged) -> String {
+/// The verdict on a session in a few words: the faults that were found, or else those
+/// that were excluded, and the monitors that were not learnt or did not judge.
+pub(super) fn words(session: &JudgedSession) -> String {
     if session.summary.outcome == Some(Outcome::NotJudged) {
         return Outcome::NotJudged.as_str().to_owned();
     }
@@ -34,18 +35,18 @@ pub(super) fn words(session: &Judged) -> String {
     words.join("; ")
 }
 
-fn codes(session: &Judged, outcome: Outcome) -> Vec<&str> {
+fn codes(session: &JudgedSession, outcome: Outcome) -> Vec<&str> {
     let monitors = session.summary.monitors.iter();
     monitors.filter(|m| m.outcome == outcome).map(|m| m.code.as_str()).collect()
 }
 
-/// The confirmed faults, each with its moment.
-fn found(session: &Judged) -> Vec<String> {
-    let one = |code: &String| {
-        let confirmed = FaultStatus::Confirmed.as_str();
-        let of_code = || session.faults.iter().filter(|f| f.code == *code && f.status == confirmed);
+/// The confirmed faults, each with the time of its confirmation.
+fn found(session: &JudgedSession) -> Vec<String> {
+    let one = |code: &CodeWord| {
+        let confirmed = |f: &&FaultView| f.code == *code && f.status == StatusWord::Confirmed;
+        let of_code = || session.faults.iter().filter(confirmed);
         let first = of_code().next()?;
-        // The kind may have shown only later.
+        // The kind may have been determined later.
         let kind = of_code().find(|f| f.kind.is_some()).unwrap_or(first);
         let monitor = session.summary.monitors.iter().find(|m| m.code == *code);
         Some(format!("{} at {:.2} s", blamed(monitor, kind), first.t_s))
@@ -53,29 +54,27 @@ fn found(session: &Judged) -> Vec<String> {
     session.summary.faults.iter().filter_map(one).collect()
 }
 
-/// The cause, or all of them where several read alike.
+/// The cause of a fault, or all candidates if they cannot be told apart.
 fn blamed(monitor: Option<&JudgedView>, fault: &FaultView) -> String {
     let alike = monitor.filter(|m| m.outcome == Outcome::CannotTell);
     let Some(monitor) = alike else {
-        return named(&fault.code, fault.kind.as_deref());
+        return named(fault.code, fault.kind);
     };
-    let word = |c: &CandidateView| {
-        format!("{} {:.0} %", named(&c.code, c.kind.as_deref()), 100.0 * c.weight)
-    };
+    let word = |c: &CandidateView| format!("{} {:.0} %", named(c.code, c.kind), 100.0 * c.weight);
     let causes: Vec<String> = monitor.candidates.iter().map(word).collect();
     format!("cannot tell {}", causes.join(" from "))
 }
 
-fn named(code: &str, kind: Option<&str>) -> String {
-    kind.map_or_else(|| code.to_owned(), |kind| format!("{code} ({kind})"))
+fn named(code: CodeWord, kind: Option<KindWord>) -> String {
+    kind.map_or_else(|| code.to_string(), |kind| format!("{code} ({kind})"))
 }
 
-/// How much of each session each monitor judged.
-pub(super) fn judged<'a>(sessions: impl Iterator<Item = &'a Judged>) -> Table {
+/// A table of how much of each session each monitor judged.
+pub(super) fn judged<'a>(sessions: impl Iterator<Item = &'a JudgedSession>) -> Table {
     let mut heading = vec!["judged"];
     heading.extend(FaultCode::ALL.iter().map(|code| code.as_str()));
-    let mut rows = table::of_names(&heading, &[1, 2, 3, 4]);
-    for Judged { summary, .. } in sessions {
+    let mut rows = table::table_of_files(&heading, &[1, 2, 3, 4]);
+    for JudgedSession { summary, .. } in sessions {
         let cell = |m: &JudgedView| table::judged(m.judged_share, m.judged_s);
         let cells = summary.monitors.iter().map(cell);
         rows.add_row(std::iter::once(summary.session.clone()).chain(cells));

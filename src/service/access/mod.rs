@@ -1,193 +1,161 @@
-//! Who may do what, and who did what.
+//! Authentication, authorization and audit entries.
 //!
-//! A *right* is what an operation takes; a *role* is what a token was given.
-//! [`Right::reach`] is the whole of the policy: a device reaches its own asset,
-//! the others all or nothing. Knows no headers, no cookies and no addresses.
+//! A *right* is required by an operation; a *role* is assigned to a token.
+//! [`Right::scope`] is the complete policy: it maps each right and role to the assets that
+//! the right covers. Independent of HTTP headers, cookies and addresses.
 
 mod audit;
 pub mod jwt;
-mod passes;
+pub(super) mod principals;
 mod provider;
 mod tokens;
 
-use std::fmt;
-use std::str::FromStr;
 use std::sync::Arc;
 
-pub use audit::Deed;
-pub(super) use passes::Passes;
-pub use passes::{Credential, LOOK_AGAIN};
+pub use audit::AuditEntry;
+pub(super) use principals::PrincipalCache;
+pub use principals::{Credential, PRINCIPAL_CACHE_TIME};
 pub use provider::{KeyFeed, MAX_KEY_AGE, Provider};
-pub use tokens::{MAX_TOKEN_NAME, Minted, NewToken, PREFIX, mint, token_view};
+pub(super) use tokens::random;
+pub use tokens::{MAX_TOKEN_NAME, Minted, NewToken, mint, token_view};
 
 use crate::store::Micros;
+pub use crate::wire::words::Role;
 
-/// What a token is for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Role {
-    /// One rig's own device.
-    Device,
-    /// Sees everything, changes nothing.
-    Viewer,
-    /// Works with the rigs and their faults.
-    Operator,
-    /// May do everything.
-    Admin,
-}
+/// The prefix of every token, so that secret scanners recognize it.
+pub const PREFIX: &str = "offbd_";
 
-impl Role {
-    /// Every role, the least first.
-    pub const ALL: [Self; 4] = [Self::Device, Self::Viewer, Self::Operator, Self::Admin];
-
-    #[must_use]
-    pub const fn as_str(self) -> &'static str {
-        match self {
-            Self::Device => "device",
-            Self::Viewer => "viewer",
-            Self::Operator => "operator",
-            Self::Admin => "admin",
-        }
-    }
-}
-
-impl fmt::Display for Role {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.as_str())
-    }
-}
-
-impl FromStr for Role {
-    type Err = String;
-    fn from_str(word: &str) -> Result<Self, String> {
-        let known = Self::ALL.into_iter().find(|role| role.as_str() == word);
-        known.ok_or_else(|| format!("`{word}` is not one of device, viewer, operator, admin"))
-    }
-}
-
-/// What an operation takes.
+/// A right that an operation requires. [`Self::as_str`] is the value of `x-right` in the
+/// OpenAPI document.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Right {
-    /// Nobody is asked who they are.
-    Open,
-    /// Any token.
-    Known,
-    /// Seeing what concerns one asset.
+    /// `open`: no token required.
+    Public,
+    /// `known`: any valid token.
+    Authenticated,
+    /// `read-asset`: reading data of one asset.
     ReadAsset,
-    /// Seeing everything.
+    /// `read`: reading data of the whole fleet.
     Read,
-    /// Sending an asset's telemetry.
-    Feed,
-    /// Opening and ending an asset's sessions.
-    Conduct,
-    /// Working with assets, faults and recordings.
+    /// `feed`: sending telemetry of an asset.
+    SendTelemetry,
+    /// `conduct`: opening and ending sessions of an asset.
+    ControlSessions,
+    /// `operate`: changing assets, faults, recordings and calibrations.
     Operate,
-    /// Deleting what was recorded; tokens; the audit log.
+    /// `administer`: deleting assets and sessions, managing tokens, reading the audit log.
     Administer,
 }
 
-/// How far a right reaches for a role.
+/// The assets that a right covers for a role.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Reach {
-    Nothing,
-    /// The one asset of the device.
-    Own,
-    Everything,
+pub enum AccessScope {
+    /// No asset: the role does not have the right.
+    None,
+    /// Only the asset of the device's token.
+    OwnAsset,
+    /// All assets.
+    All,
 }
 
 impl Right {
     /// Every right.
     pub const ALL: [Self; 8] = [
-        Self::Open,
-        Self::Known,
+        Self::Public,
+        Self::Authenticated,
         Self::ReadAsset,
         Self::Read,
-        Self::Feed,
-        Self::Conduct,
+        Self::SendTelemetry,
+        Self::ControlSessions,
         Self::Operate,
         Self::Administer,
     ];
 
-    /// The word for it in the interface's description.
+    /// Returns the value of `x-right` in the OpenAPI document.
     #[must_use]
     pub const fn as_str(self) -> &'static str {
         match self {
-            Self::Open => "open",
-            Self::Known => "known",
+            Self::Public => "open",
+            Self::Authenticated => "known",
             Self::ReadAsset => "read-asset",
             Self::Read => "read",
-            Self::Feed => "feed",
-            Self::Conduct => "conduct",
+            Self::SendTelemetry => "feed",
+            Self::ControlSessions => "conduct",
             Self::Operate => "operate",
             Self::Administer => "administer",
         }
     }
 
-    /// How far it reaches for `role`.
+    /// Returns the assets that this right covers for `role`.
     #[must_use]
-    pub const fn reach(self, role: Role) -> Reach {
+    pub const fn scope(self, role: Role) -> AccessScope {
         match (self, role) {
-            (Self::Open | Self::Known, _) | (_, Role::Admin) => Reach::Everything,
-            (Self::ReadAsset | Self::Feed | Self::Conduct, Role::Device) => Reach::Own,
+            (Self::Public | Self::Authenticated, _) | (_, Role::Admin) => AccessScope::All,
+            (Self::ReadAsset | Self::SendTelemetry | Self::ControlSessions, Role::Device) => {
+                AccessScope::OwnAsset
+            }
             (Self::ReadAsset | Self::Read, Role::Viewer | Role::Operator)
-            | (Self::Conduct | Self::Operate, Role::Operator) => Reach::Everything,
-            _ => Reach::Nothing,
+            | (Self::ControlSessions | Self::Operate, Role::Operator) => AccessScope::All,
+            _ => AccessScope::None,
         }
     }
 }
 
-/// A token that was found to be in force.
+/// The authenticated identity behind a valid token.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Pass {
-    /// The token's id; of a JSON Web Token the issuer and the subject.
+pub struct Principal {
+    /// The id of the token; for a JSON Web Token its issuer and subject.
     pub id: String,
-    /// The token's name; of a JSON Web Token the subject.
+    /// The name of the token; for a JSON Web Token its subject.
     pub name: String,
     pub role: Role,
-    /// The one asset of a device.
+    /// The asset of a device.
     pub asset: Option<String>,
     pub expires_at: Option<Micros>,
-    /// By what it was found.
+    /// The credential of the request.
     pub credential: Credential,
-    /// What signed it, if it is a JSON Web Token.
+    /// The key that signed the token, if it is a JSON Web Token.
     pub signed_by: Option<jwt::Fingerprint>,
 }
 
-/// Who asks.
+/// The caller of a request.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Caller {
-    /// Nobody is asked for a token here.
-    Anyone,
-    Known(Arc<Pass>),
+    /// Authentication is off.
+    Anonymous,
+    Authenticated(Arc<Principal>),
 }
 
 impl Caller {
-    /// The name of the token.
+    /// Returns the name of the token.
     #[must_use]
     pub fn name(&self) -> Option<&str> {
-        self.pass().map(|pass| pass.name.as_str())
+        self.principal().map(|principal| principal.name.as_str())
     }
 
     #[must_use]
-    pub fn pass(&self) -> Option<&Pass> {
+    pub fn principal(&self) -> Option<&Principal> {
         match self {
-            Self::Anyone => None,
-            Self::Known(pass) => Some(pass),
+            Self::Anonymous => None,
+            Self::Authenticated(principal) => Some(principal),
         }
     }
 
-    /// How far `right` reaches for the caller.
+    /// Returns the assets that `right` covers for the caller.
     #[must_use]
-    pub fn reach(&self, right: Right) -> Reach {
-        self.pass().map_or(Reach::Everything, |pass| right.reach(pass.role))
+    pub fn scope(&self, right: Right) -> AccessScope {
+        self.principal().map_or(AccessScope::All, |principal| right.scope(principal.role))
     }
 
-    /// Whether the caller may do to `asset` what takes `right`.
+    /// Whether the caller has `right` for `asset`.
     #[must_use]
     pub fn may(&self, right: Right, asset: &str) -> bool {
-        match self.reach(right) {
-            Reach::Nothing => false,
-            Reach::Own => self.pass().and_then(|pass| pass.asset.as_deref()) == Some(asset),
-            Reach::Everything => true,
+        match self.scope(right) {
+            AccessScope::None => false,
+            AccessScope::OwnAsset => {
+                self.principal().and_then(|principal| principal.asset.as_deref()) == Some(asset)
+            }
+            AccessScope::All => true,
         }
     }
 }

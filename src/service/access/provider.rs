@@ -1,101 +1,107 @@
-//! The identity provider: what its tokens must say, and its keys as they were
-//! read last.
+//! The identity provider: the claims that its tokens must have, and its public keys.
 //!
-//! Who reads them, from where and how often, is not known here: a [`KeyFeed`]
-//! brings them, and looks again when a token names a key that is not there.
+//! The keys are published by the owner of the [`KeyFeed`], who decides where and how often
+//! to read them. A token with an unknown key requests a refresh.
 
 use std::sync::Arc;
 use std::time::Duration;
 
 use tokio::sync::{Notify, watch};
 
-use super::jwt::{Expected, Fingerprint, KeySet, Refusal, Verified, verify};
+use super::jwt::{ExpectedClaims, Fingerprint, JwtError, KeySet, VerifiedToken, verify};
 use crate::store::Micros;
 
-/// For how long keys are used without having been read again; then nobody comes
-/// in by them.
+/// Longest time for which keys are used without a refresh; then all JSON Web Tokens are
+/// refused.
 pub const MAX_KEY_AGE: Duration = Duration::from_secs(24 * 3600);
 
 #[derive(Clone, Debug, Default)]
-struct Held {
+struct CachedKeys {
     keys: Option<Arc<KeySet>>,
     read_at: Micros,
 }
 
-/// Whose tokens are taken beside the service's own.
+/// The identity provider whose JSON Web Tokens are accepted.
 pub struct Provider {
-    pub expected: Expected,
-    held: watch::Receiver<Held>,
-    wanted: Arc<Notify>,
+    pub expected: ExpectedClaims,
+    cached: watch::Receiver<CachedKeys>,
+    refresh_requested: Arc<Notify>,
 }
 
-/// Brings the keys of a [`Provider`].
+/// Publishes the keys of a [`Provider`].
 pub struct KeyFeed {
-    held: watch::Sender<Held>,
-    wanted: Arc<Notify>,
+    cached: watch::Sender<CachedKeys>,
+    refresh_requested: Arc<Notify>,
 }
 
 impl KeyFeed {
-    /// What was read at `now`.
-    pub fn bring(&self, keys: KeySet, now: Micros) {
-        self.held.send_replace(Held { keys: Some(Arc::new(keys)), read_at: now });
+    /// Publishes keys that were read at `now`.
+    pub fn publish(&self, keys: KeySet, now: Micros) {
+        self.cached.send_replace(CachedKeys { keys: Some(Arc::new(keys)), read_at: now });
     }
 
-    /// Lets go on who waits, with the keys that there are.
-    pub fn bring_nothing(&self) {
-        self.held.send_modify(|_| {});
+    /// Completes pending refreshes with the current keys.
+    pub fn publish_unchanged(&self) {
+        self.cached.send_modify(|_| {});
     }
 
-    /// Ends when a token names a key that is not there.
-    pub async fn wanted(&self) {
-        self.wanted.notified().await;
+    /// Completes when a token with an unknown key requests a refresh.
+    pub async fn refresh_requested(&self) {
+        self.refresh_requested.notified().await;
     }
 }
 
 impl Provider {
-    /// A provider without keys, and what brings them.
+    /// Returns a provider without keys, and the feed to publish them.
     #[must_use]
-    pub fn new(expected: Expected) -> (Self, KeyFeed) {
-        let (sender, held) = watch::channel(Held::default());
-        let wanted = Arc::new(Notify::new());
-        let feed = KeyFeed { held: sender, wanted: wanted.clone() };
-        (Self { expected, held, wanted }, feed)
+    pub fn new(expected: ExpectedClaims) -> (Self, KeyFeed) {
+        let (sender, cached) = watch::channel(CachedKeys::default());
+        let refresh_requested = Arc::new(Notify::new());
+        let feed = KeyFeed { cached: sender, refresh_requested: refresh_requested.clone() };
+        (Self { expected, cached, refresh_requested }, feed)
     }
 
-    /// Keys that are not too old.
+    /// Returns the keys unless they are older than [`MAX_KEY_AGE`].
     fn keys(&self, now: Micros) -> Option<Arc<KeySet>> {
-        let held = self.held.borrow();
-        let age = Duration::from_micros(now.abs_diff(held.read_at));
-        held.keys.clone().filter(|_| age < MAX_KEY_AGE)
+        let cached = self.cached.borrow();
+        let age = Duration::from_micros(now.abs_diff(cached.read_at));
+        cached.keys.clone().filter(|_| age < MAX_KEY_AGE)
     }
 
     /// Whether the key is still published.
-    pub(super) fn has(&self, key: Fingerprint, now: Micros) -> bool {
+    pub(in crate::service) fn has(&self, key: Fingerprint, now: Micros) -> bool {
         self.keys(now).is_some_and(|keys| keys.has(key))
     }
 
-    /// Whom `token` names; the keys are looked at again for one that is not there.
-    pub(super) async fn verify(&self, token: &str, now: Micros) -> Result<Verified, Refusal> {
-        match self.verify_at_once(token, now) {
-            Err(Refusal::UnknownKey | Refusal::NoKeys) => {
-                self.look_again().await;
-                self.verify_at_once(token, now)
+    /// Verifies `token`; refreshes the keys once if its key is unknown.
+    ///
+    /// # Errors
+    /// [`JwtError`] if the token is invalid.
+    pub(in crate::service) async fn verify(
+        &self,
+        token: &str,
+        now: Micros,
+    ) -> Result<VerifiedToken, JwtError> {
+        match self.verify_with_cached_keys(token, now) {
+            Err(JwtError::UnknownKey | JwtError::NoKeys) => {
+                self.refresh().await;
+                self.verify_with_cached_keys(token, now)
             }
-            told => told,
+            result => result,
         }
     }
 
-    fn verify_at_once(&self, token: &str, now: Micros) -> Result<Verified, Refusal> {
-        let keys = self.keys(now).ok_or(Refusal::NoKeys)?;
+    fn verify_with_cached_keys(&self, token: &str, now: Micros) -> Result<VerifiedToken, JwtError> {
+        let keys = self.keys(now).ok_or(JwtError::NoKeys)?;
         verify(token, &keys, &self.expected, now)
     }
 
-    async fn look_again(&self) {
-        let mut held = self.held.clone();
-        held.mark_unchanged();
-        self.wanted.notify_one();
-        // Ends also when the feed does.
-        let _ = held.changed().await;
+    async fn refresh(&self) {
+        let mut cached = self.cached.clone();
+        cached.mark_unchanged();
+        self.refresh_requested.notify_one();
+        // Also completes when the feed is dropped.
+        let _ = cached.changed().await;
     }
 }
 
@@ -104,20 +110,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn keys_that_nobody_renews_have_an_end() {
+    fn keys_without_a_refresh_expire() {
         let claim = String::new;
         let (issuer, audience, role_claim, asset_claim) = (claim(), claim(), claim(), claim());
-        let expected = Expected { issuer, audience, role_claim, asset_claim };
+        let expected = ExpectedClaims { issuer, audience, role_claim, asset_claim };
         let (provider, feed) = Provider::new(expected);
         assert!(provider.keys(0).is_none());
         let x = "A".repeat(43);
         let document = format!(r#"{{"keys":[{{"kty":"OKP","crv":"Ed25519","x":"{x}"}}]}}"#);
         let age = MAX_KEY_AGE.as_micros() as Micros;
-        feed.bring(KeySet::parse(document.as_bytes()).unwrap(), 7);
-        feed.bring_nothing();
+        feed.publish(KeySet::parse(document.as_bytes()).unwrap(), 7);
+        feed.publish_unchanged();
         assert!(provider.keys(7 + age - 1).is_some());
         assert!(provider.keys(7 + age).is_none());
-        // A clock that was put back makes nothing younger.
+        // A clock that is set back does not extend the validity.
         assert!(provider.keys(7 - age).is_none());
     }
 }

@@ -1,15 +1,16 @@
-//! What goes, piece by piece: first nobody sees it any more, then it is dropped in
-//! parts, and at last the row goes that the parts belong to.
+//! Deletion of assets and sessions in steps, so that no transaction is long: first they
+//! are hidden from all readers, then their parts are deleted in limited numbers, and at
+//! last their own row.
 
 use sqlx::AnyConnection;
 
-use super::Group;
+use super::GroupCommit;
 use crate::store::{Micros, StoreError};
 
-impl Group<'_> {
-    /// The asset `name` and its sessions are no longer seen. What is small goes at
-    /// once; the open session ends without a verdict.
-    pub(super) async fn give_up_asset(
+impl GroupCommit<'_> {
+    /// Hides the asset `name` and its sessions, deletes its faults and calibrations, and
+    /// ends its open session without a verdict.
+    pub(super) async fn hide_asset(
         &mut self,
         db: &mut AnyConnection,
         name: &str,
@@ -18,7 +19,7 @@ impl Group<'_> {
         let open = sqlx::query_scalar("SELECT id FROM session WHERE state = 'open' AND asset = $1");
         let open: Option<String> = open.bind(name).fetch_optional(&mut *db).await?;
         if let Some(session) = open {
-            self.forget(&session);
+            self.discard(&session);
         }
         for sql in [
             "UPDATE session SET state = 'ended', ended_at = $2, expired_at = $2
@@ -35,20 +36,20 @@ impl Group<'_> {
         Ok(())
     }
 
-    /// The session is gone, with what is left of it.
+    /// Deletes `session`, with what is left of its chunks and transitions.
     pub(super) async fn delete_session(
         &mut self,
         db: &mut AnyConnection,
         session: &str,
     ) -> Result<(), StoreError> {
-        self.forget(session);
+        self.discard(session);
         sqlx::query("DELETE FROM session WHERE id = $1").bind(session).execute(db).await?;
         Ok(())
     }
 }
 
-/// The asset is gone, with what is left of it, if it was given up: another of its name
-/// may be there since.
+/// Deletes the asset `name`, with what is left of it, if it is hidden. A new asset of the
+/// same name is not deleted.
 pub(super) async fn delete_asset(db: &mut AnyConnection, name: &str) -> Result<(), StoreError> {
     sqlx::query("DELETE FROM asset WHERE name = $1 AND deleted_at IS NOT NULL")
         .bind(name)
@@ -57,7 +58,8 @@ pub(super) async fn delete_asset(db: &mut AnyConnection, name: &str) -> Result<(
     Ok(())
 }
 
-pub(super) async fn expire(
+/// Hides `session` if it has ended.
+pub(super) async fn hide_session(
     db: &mut AnyConnection,
     session: &str,
     at: Micros,
@@ -70,7 +72,7 @@ pub(super) async fn expire(
     Ok(())
 }
 
-/// Drops the first chunks of `session`.
+/// Deletes the first chunks of `session`, at most `limit`.
 pub(super) async fn drop_chunks(
     db: &mut AnyConnection,
     session: &str,
@@ -82,7 +84,7 @@ pub(super) async fn drop_chunks(
     Ok(())
 }
 
-/// Drops the first transitions of `session`.
+/// Deletes the first transitions of `session`, at most `limit`.
 pub(super) async fn drop_transitions(
     db: &mut AnyConnection,
     session: &str,

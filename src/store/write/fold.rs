@@ -1,45 +1,49 @@
-//! Out of the journal: into the chunks of a session, or to the journal's end.
+//! Folding: moving samples from the journal to the chunks of their session.
+//!
+//! The writer folds between two commits once the journal exceeds its limit, starting with
+//! the session that has been in it longest. Sessions that end, and long runs, are folded
+//! by their own commit.
 
 use std::collections::HashSet;
 
 use sqlx::AnyConnection;
 
-use super::{Group, Writer, put_progress};
+use super::{GroupCommit, Writer, put_progress};
 use crate::store::StoreError;
 use crate::store::journal::Journal;
 use crate::store::tail::Run;
 
-/// Transactions at least in which a full journal is folded, so that nobody waits
-/// long for one.
-const FOLDS: usize = 64;
+/// Smallest number of transactions in which a full journal is folded, so that each is
+/// short.
+const MIN_FOLDS: usize = 64;
 
-/// Bytes folded in one transaction while nobody waits.
-const FOLD_BYTES: usize = 1 << 20;
+/// Bytes folded in one transaction when the writer is closed, and no commit waits.
+const CLOSING_FOLD_BYTES: usize = 1 << 20;
 
-/// Where sessions go that are in the journal.
+/// Where a [`Relocation`] moves samples.
 #[derive(Clone, Copy, Debug)]
-enum Way {
-    /// Into their chunks.
-    Fold,
-    /// To the journal's end.
-    Carry,
+enum Destination {
+    /// To the chunks of their session.
+    Chunks,
+    /// To a new row at the end of the journal, so that its older rows can be removed.
+    JournalEnd,
 }
 
-/// What a transaction does beside its sets.
+/// Moves all samples of `sessions` that are in the journal.
 #[derive(Debug)]
-pub(super) struct Moves {
+pub(super) struct Relocation {
     sessions: Vec<String>,
-    way: Way,
+    to: Destination,
 }
 
 impl Writer {
-    /// Folds what has been in the journal longest, if the journal has more than
-    /// `above` bytes: a little at a time, for whoever comes meanwhile waits. From half
-    /// as much again on it is four times what has come since the last call, so that
-    /// the journal stays below 15/8 of `above` and 5/4 of what one group brings.
+    /// Folds the oldest sessions of the journal if it has more than `above` bytes. Each
+    /// call folds a small part, because commits wait for it. Above 3/2 of `above` this
+    /// part is four times what was added since the last call, so that the journal stays
+    /// below 15/8 of `above` plus 5/4 of the size of one group.
     ///
-    /// A session whose chunks the database refuses stays in the journal. It takes
-    /// no more samples until the database takes those.
+    /// A session whose chunks the database refuses stays in the journal, and accepts no
+    /// further samples until the database accepts its chunks.
     ///
     /// # Errors
     /// As for [`Writer::commit`].
@@ -47,8 +51,8 @@ impl Writer {
         let n_bytes = self.journal.n_bytes();
         let grown = n_bytes.saturating_sub(self.n_bytes_before);
         if n_bytes > above {
-            let pressed = if n_bytes > above + above / 2 { 4 * grown } else { 1 };
-            let sessions = self.journal.oldest(pressed.max(above / FOLDS), &HashSet::new());
+            let urgent = if n_bytes > above + above / 2 { 4 * grown } else { 1 };
+            let sessions = self.journal.oldest(urgent.max(above / MIN_FOLDS), &HashSet::new());
             self.fold_these(sessions).await?;
         }
         self.n_bytes_before = self.journal.n_bytes();
@@ -57,7 +61,7 @@ impl Writer {
 
     pub(super) async fn fold_all(&mut self) -> Result<(), StoreError> {
         while self.journal.n_bytes() > 0 {
-            let sessions = self.journal.oldest(FOLD_BYTES, &self.refused);
+            let sessions = self.journal.oldest(CLOSING_FOLD_BYTES, &self.refused);
             let is_last = sessions.is_empty();
             self.fold_these(sessions).await?;
             if is_last {
@@ -68,64 +72,71 @@ impl Writer {
     }
 
     async fn fold_these(&mut self, sessions: Vec<String>) -> Result<(), StoreError> {
-        let moves = Moves { sessions, way: Way::Fold };
-        match self.transact(&mut [], Some(&moves)).await {
-            Err(error) if !error.is_outage() => self.fold_each(moves.sessions).await,
+        let relocation = Relocation { sessions, to: Destination::Chunks };
+        match self.transact(&mut [], Some(&relocation)).await {
+            Err(error) if !error.is_outage() => self.fold_each(relocation.sessions).await,
             result => result,
         }
     }
 
-    /// Folds each of `sessions` on its own, those that can be.
+    /// Folds each of `sessions` in its own transaction. Those that the database refuses
+    /// are moved to the end of the journal.
     async fn fold_each(&mut self, sessions: Vec<String>) -> Result<(), StoreError> {
         for session in sessions {
-            let mut moves = Moves { sessions: vec![session.clone()], way: Way::Fold };
-            let Err(error) = self.transact(&mut [], Some(&moves)).await else { continue };
+            let mut relocation =
+                Relocation { sessions: vec![session.clone()], to: Destination::Chunks };
+            let Err(error) = self.transact(&mut [], Some(&relocation)).await else { continue };
             if error.is_outage() {
                 return Err(error);
             }
-            tracing::error!(session, %error, "a recording cannot be stored; it takes no more");
-            moves.way = Way::Carry;
-            self.transact(&mut [], Some(&moves)).await?;
+            tracing::error!(
+                session,
+                %error,
+                "cannot fold a session; it accepts no further samples until this succeeds"
+            );
+            relocation.to = Destination::JournalEnd;
+            self.transact(&mut [], Some(&relocation)).await?;
             self.refused.insert(session);
         }
         Ok(())
     }
 }
 
-impl Group<'_> {
-    /// The samples of `session` that wait, behind those in the journal.
-    fn take(&mut self, session: &str) -> Result<Option<Run>, StoreError> {
-        let held = self.journal.run(session)?;
+impl GroupCommit<'_> {
+    /// Takes the samples of `session` in the journal and in this group, as one run.
+    fn take_run(&mut self, session: &str) -> Result<Option<Run>, StoreError> {
+        let in_journal = self.journal.run(session)?;
         let at = self.pending.iter().position(|run| run.session == session);
         let new = at.map(|at| self.pending.swap_remove(at));
-        Ok(match (held, new) {
-            (Some(held), Some(new)) => Some(held.followed_by(new)),
-            (held, new) => held.or(new),
+        Ok(match (in_journal, new) {
+            (Some(in_journal), Some(new)) => Some(in_journal.followed_by(new)),
+            (in_journal, new) => in_journal.or(new),
         })
     }
 
-    /// `session` is deleted: nothing of it is left to be folded.
-    pub(super) fn forget(&mut self, session: &str) {
+    /// Drops the samples of `session`, which is deleted.
+    pub(super) fn discard(&mut self, session: &str) {
         self.pending.retain(|run| run.session != session);
         self.tails.remove(session);
-        self.changes.gone.insert(session.to_owned());
+        self.changes.removed_sessions.insert(session.to_owned());
     }
 
-    /// Folds all of `session`, which ends.
-    pub(super) async fn finish(
+    /// Folds `session`, which ends, and merges its tail.
+    pub(super) async fn fold_ended(
         &mut self,
         db: &mut AnyConnection,
         session: &str,
     ) -> Result<(), StoreError> {
-        let run = self.take(session)?;
+        let run = self.take_run(session)?;
         put_progress(db, run.as_slice()).await?;
-        let run = run.unwrap_or_else(|| Run::nothing(session));
+        let run = run.unwrap_or_else(|| Run::empty(session));
         self.tails.finish(db, &run).await?;
-        self.changes.gone.insert(run.session);
+        self.changes.removed_sessions.insert(run.session);
         Ok(())
     }
 
-    /// Folds what must be, appends the rest to the journal.
+    /// Writes the group's samples: folds long runs and sessions that were refused before,
+    /// and appends all others to the journal.
     pub(super) async fn flush(&mut self, db: &mut AnyConnection) -> Result<(), StoreError> {
         let at_once = |run: &Run| self.refused.contains(&run.session) || self.journal.is_large(run);
         let folded: Vec<_> =
@@ -146,27 +157,28 @@ impl Group<'_> {
     ) -> Result<(), StoreError> {
         let mut runs = Vec::with_capacity(sessions.len());
         for session in sessions {
-            runs.extend(self.take(session)?);
+            runs.extend(self.take_run(session)?);
         }
         put_progress(db, &runs).await?;
         self.tails.append(db, &runs).await?;
-        self.changes.gone.extend(runs.into_iter().map(|run| run.session));
+        self.changes.removed_sessions.extend(runs.into_iter().map(|run| run.session));
         Ok(())
     }
 
-    /// Moves all that the journal has of some sessions; nothing else waits.
+    /// Carries out `relocation`, and removes rows of the journal that are no longer
+    /// needed. The group has no other changes.
     pub(super) async fn relocate(
         &mut self,
         db: &mut AnyConnection,
-        moves: &Moves,
+        relocation: &Relocation,
     ) -> Result<(), StoreError> {
-        match moves.way {
-            Way::Fold => self.fold(db, &moves.sessions).await?,
-            Way::Carry => {
-                for session in &moves.sessions {
-                    let run = self.take(session)?;
+        match relocation.to {
+            Destination::Chunks => self.fold(db, &relocation.sessions).await?,
+            Destination::JournalEnd => {
+                for session in &relocation.sessions {
+                    let run = self.take_run(session)?;
                     self.pending.extend(run);
-                    self.changes.gone.insert(session.clone());
+                    self.changes.removed_sessions.insert(session.clone());
                 }
                 self.append(db).await?;
             }

@@ -1,14 +1,14 @@
-//! What a change is about, in words for an error and the log.
+//! Descriptions of changes, for error messages and logs.
 
 use super::Write;
 
 impl Write {
-    /// What it is about, as in "the store does not take …".
+    /// Describes the change as a noun, as in "the store does not accept …".
     #[must_use]
     pub fn subject(&self) -> String {
         match self {
             Self::CreateAsset(row) | Self::UpdateAsset(row) => format!("asset `{}`", row.name),
-            Self::GiveUpAsset { name, .. } | Self::DeleteAsset { name } => {
+            Self::HideAsset { name, .. } | Self::DeleteAsset { name } => {
                 format!("the deletion of asset `{name}`")
             }
             Self::OpenSession(row) => format!("session {}", row.id),
@@ -17,20 +17,20 @@ impl Write {
             }
             Self::EndSession { session, .. } => format!("the end of session {session}"),
             Self::DeleteSession { session }
-            | Self::ExpireSession { session, .. }
+            | Self::HideSession { session, .. }
             | Self::DropChunks { session, .. }
             | Self::DropTransitions { session, .. } => format!("the deletion of session {session}"),
-            Self::Act(row) => format!("an act on {} of asset `{}`", row.code, row.asset),
+            Self::Action(row) => format!("an action on {} of asset `{}`", row.code, row.asset),
             Self::Transition(row) => format!("a change of {} of asset `{}`", row.code, row.asset),
             Self::Fault(row) => format!("the fault {} of asset `{}`", row.code, row.asset),
-            Self::Trend(row) => format!("an estimate of session {}", row.session),
+            Self::Trend(row) => format!("a servo estimate of session {}", row.session),
             Self::PutReplay(row) => format!("replay {}", row.id),
             Self::PutCalibration(row) => format!("calibration {}", row.id),
             Self::ActivateCalibration { asset, .. } => {
                 format!("the active calibration of asset `{asset}`")
             }
-            Self::PutLearning { asset, .. } => format!("the learning of asset `{asset}`"),
-            Self::Access(_) => "a change of who may come in".to_owned(),
+            Self::PutLearning { asset, .. } => format!("the learning record of asset `{asset}`"),
+            Self::Access(_) => "a change of tokens, logins or the audit log".to_owned(),
         }
     }
 }

@@ -1,19 +1,19 @@
 """Runs the drive cycle of drive-cycle.json and records it in drive-cycle-run.csv.
 
-Put the ball near the middle, then start this. Judge what it records:
+Put the ball near the middle of the plate, then start this program. To diagnose the recording:
     offbd replay --asset learnt.json drive-cycle-run.csv
 """
 import json, time
 
 def read_rig():
-    """Yours: where the ball is, x and y in the device's unit; None where it is not seen."""
+    """To be written: returns the ball's x and y in the device's unit, None if it is not seen."""
     return 0.0, 0.0
 
 def move_rig(qx, qy):
-    """Yours: command the plate angles; None where the rig has no such servo."""
+    """To be written: commands the plate angles; None if the rig has no such servo."""
 
 class Correction:
-    """What is added to one command, by how far the ball is from its set point."""
+    """A PID correction of one command by the distance of the ball from its set point."""
 
     def __init__(self, gains):
         self.gains, self.error, self.rate, self.sum, self.unseen, self.last = gains, None, 0.0, 0.0, 0.0, 0.0
@@ -21,13 +21,13 @@ class Correction:
     def __call__(self, error, dt):
         if error is None:
             self.error, self.rate, self.unseen = None, 0.0, self.unseen + dt
-            if self.unseen > 0.3:              # no ball: the commands alone
+            if self.unseen > 0.3:              # no ball for long: no correction
                 self.last = 0.0
             return self.last
         change = (error - self.error) / dt if self.error is not None and dt > 0 else 0.0
         self.rate += (change - self.rate) * dt / (cycle["filter_s"] + dt)
-        most = 0.5 * cycle["limit"]
-        self.sum = max(-most, min(most, self.sum + self.gains["integral"] * error * dt))
+        limit = 0.5 * cycle["limit"]
+        self.sum = max(-limit, min(limit, self.sum + self.gains["integral"] * error * dt))
         self.error, self.unseen = error, 0.0
         self.last = self.gains["proportional"] * error + self.sum + self.gains["derivative"] * self.rate
         return self.last
@@ -38,13 +38,13 @@ corrections = {"qx": cycle["correct_qx"], "qy": cycle["correct_qy"]}
 corrections = {name: Correction(gains) for name, gains in corrections.items() if gains}
 
 def command(name, i, read, dt):
-    """The command of row i, corrected, within the servo's limit."""
+    """Returns the corrected command of row i, limited to the servo's range."""
     if name not in corrections:
         return None
-    place = "x_m" if corrections[name].gains["reads_x"] else "y_m"
-    error = None if read[place] is None else rows[place][i] - read[place]
-    wish = rows["cmd_%s_rad" % name][i] + corrections[name](error, dt)
-    return max(-cycle["limit"], min(cycle["limit"], wish))
+    reading = "x_m" if corrections[name].gains["reads_x"] else "y_m"
+    error = None if read[reading] is None else rows[reading][i] - read[reading]
+    wanted = rows["cmd_%s_rad" % name][i] + corrections[name](error, dt)
+    return max(-cycle["limit"], min(cycle["limit"], wanted))
 
 def field(value):
     return "" if value is None else "%.6f" % value

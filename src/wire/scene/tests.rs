@@ -1,6 +1,6 @@
 use super::*;
 
-/// The example of the contract, word for word.
+/// The example of the contract, verbatim.
 const CONTRACT: &str = r#"
     { "name": "sine", "duration_s": 10, "edges": false,
       "ball": { "radius_m": 0.0127, "mass_kg": 0.051, "inertia_factor": 0.4 },
@@ -14,7 +14,7 @@ fn error(text: &str) -> Invalid {
 }
 
 #[test]
-fn the_contracts_example_is_understood() {
+fn the_contracts_example_is_parsed() {
     let NamedScene { name, scene, laws } = parse(CONTRACT.as_bytes()).unwrap();
     assert_eq!((name.as_str(), scene.duration_s, scene.edges), ("sine", 10.0, false));
     assert_eq!(scene.subject, Subject::Ball(Ball::default()));
@@ -25,10 +25,10 @@ fn the_contracts_example_is_understood() {
 }
 
 #[test]
-fn what_is_left_out_is_the_chapters() {
+fn missing_fields_have_the_chapters_values() {
     let scene = parse(b"{}").unwrap().scene;
     assert_eq!((scene.plate, scene.contact), (Plate::CHAPTER, Contact::CHAPTER));
-    // 0.01 + 0.0127 to the last digit but one.
+    // 0.01 + 0.0127, apart from rounding.
     assert!((scene.initial.position - Vector3::new(0.0, 0.0, 0.0227)).norm() < 1e-15);
     assert!(scene.edges);
     let parts = parse(br#"{"contact":{"friction":0.3},"plate":{"width_m":0.25}}"#).unwrap().scene;
@@ -37,7 +37,7 @@ fn what_is_left_out_is_the_chapters() {
 }
 
 #[test]
-fn presets_have_names() {
+fn plates_and_contacts_can_be_given_by_the_name_of_a_preset() {
     let of = |text: &str| parse(text.as_bytes()).unwrap().scene;
     assert_eq!(of(r#"{"contact":"soft"}"#).contact, Contact::SOFT);
     assert_eq!(of(r#"{"plate":"section-4.8"}"#).plate, Plate::SECTION_4_8);
@@ -47,15 +47,14 @@ fn presets_have_names() {
 }
 
 #[test]
-fn a_block_rests_on_the_plate() {
+fn a_block_starts_at_rest_on_the_plate() {
     let scene = parse(br#"{"block":{"edge_m":0.02}}"#).unwrap().scene;
     assert_eq!(scene.initial.position.z, 0.02);
     assert!(matches!(scene.subject, Subject::Block(block) if block.mass_kg == 0.051));
 }
 
-/// Each wrong element is named by its pointer.
 #[test]
-fn what_is_wrong_is_named() {
+fn an_error_has_the_pointer_of_the_invalid_element() {
     for (text, element) in [
         (r#"{"durations":1}"#, "/durations"),
         (r#"{"duration_s":0}"#, "/duration_s"),
@@ -90,9 +89,9 @@ fn what_is_wrong_is_named() {
 }
 
 #[test]
-fn sizes_have_limits() {
-    let terms = vec![r#"{"constant_rad":0.001}"#; MOST_TERMS + 1].join(",");
+fn the_numbers_of_terms_and_pushes_are_limited() {
+    let terms = vec![r#"{"constant_rad":0.001}"#; MAX_TERMS + 1].join(",");
     assert_eq!(error(&format!(r#"{{"qx":[{terms}]}}"#)).element, "/qx");
-    let pushes = vec![r#"{"force_n":[0,0],"duration_s":1}"#; MOST_PUSHES + 1].join(",");
+    let pushes = vec![r#"{"force_n":[0,0],"duration_s":1}"#; MAX_PUSHES + 1].join(",");
     assert_eq!(error(&format!(r#"{{"pushes":[{pushes}]}}"#)).element, "/pushes");
 }

@@ -1,5 +1,5 @@
-//! The syntactic view of a batch in JSON or MessagePack: cells that may be
-//! anything.
+//! The syntactic view of a batch in JSON or MessagePack, whose *cells* (the values of its
+//! rows and columns) may have any type.
 
 use std::fmt;
 
@@ -10,13 +10,11 @@ use super::{BatchError, MAX_SEQ};
 use crate::wire::asset::pointer;
 use offbd_core::vocabulary::{Brief, Sample};
 
-/// Deepest nesting of a MessagePack document; one beyond is refused. As in
-/// `serde_json`.
+/// Deepest nesting of a MessagePack document, as in `serde_json`.
 const MAX_DEPTH: usize = 128;
 
-/// Values for which room is made because an array announces them; for more, once
-/// they have come.
-const MAX_AHEAD: usize = 128;
+/// Largest number of values for which memory is reserved because an array announces them.
+const MAX_RESERVED: usize = 128;
 
 /// A value where a number is expected.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -26,7 +24,7 @@ pub(super) enum Cell {
     Null,
     Number(f64),
     Whole(u64),
-    /// Something else, and what.
+    /// A value of another type, with its name.
     Other(&'static str),
 }
 
@@ -61,318 +59,287 @@ impl Cell {
     }
 }
 
-/// The cells of one sample.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Cells {
-    seq: Cell,
-    t_s: Cell,
-    cmd_qx_rad: Cell,
-    cmd_qy_rad: Cell,
-    x_m: Cell,
-    y_m: Cell,
+/// Names of the fields of a sample, in the order of [`SampleCells`] and of the columns of a
+/// batch.
+const FIELDS: [&str; 6] = ["t_s", "seq", "cmd_qx_rad", "cmd_qy_rad", "x_m", "y_m"];
+
+/// Index of the field `t_s`, which every batch in columns must have.
+const T_S: usize = 0;
+
+/// The cells of one sample, in the order of [`FIELDS`].
+pub(super) type SampleCells = [Cell; FIELDS.len()];
+
+fn sample([t_s, seq, cmd_qx_rad, cmd_qy_rad, x_m, y_m]: SampleCells) -> Result<Sample, String> {
+    Ok(Sample {
+        seq: seq.seq()?,
+        t_s: t_s.time()?,
+        cmd_qx_rad: cmd_qx_rad.number("cmd_qx_rad")?,
+        cmd_qy_rad: cmd_qy_rad.number("cmd_qy_rad")?,
+        x_m: x_m.number("x_m")?,
+        y_m: y_m.number("y_m")?,
+    })
 }
 
-impl Cells {
-    fn sample(self) -> Result<Sample, String> {
-        Ok(Sample {
-            seq: self.seq.seq()?,
-            t_s: self.t_s.time()?,
-            cmd_qx_rad: self.cmd_qx_rad.number("cmd_qx_rad")?,
-            cmd_qy_rad: self.cmd_qy_rad.number("cmd_qy_rad")?,
-            x_m: self.x_m.number("x_m")?,
-            y_m: self.y_m.number("y_m")?,
-        })
-    }
-}
-
-/// A row: an object, or something that is none.
+/// A row of a batch: an object, or a value of another type, with its name.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Row {
-    Object(Cells),
+pub(super) enum BatchRow {
+    Object(SampleCells),
     Other(&'static str),
 }
 
-impl Row {
+impl BatchRow {
     pub(super) fn sample(self) -> Result<Sample, String> {
         match self {
-            Self::Object(cells) => cells.sample(),
+            Self::Object(cells) => sample(cells),
             Self::Other(what) => Err(format!("the row is {what}, not an object")),
         }
     }
 }
 
-/// The rows up to the limit, and how many there were.
+/// The values of an array up to the limit, and the length of the whole array.
 #[derive(Debug, Default)]
-pub(super) struct Rows<T> {
-    pub(super) kept: Vec<T>,
+pub(super) struct LimitedArray<T> {
+    pub(super) values: Vec<T>,
     pub(super) n: usize,
 }
 
-/// The columns that the document has.
+/// The columns of a batch, in the order of [`FIELDS`]; `None` if a column is missing.
 #[derive(Debug, Default)]
-pub(super) struct Columns {
-    seq: Option<Rows<Cell>>,
-    t_s: Option<Rows<Cell>>,
-    cmd_qx_rad: Option<Rows<Cell>>,
-    cmd_qy_rad: Option<Rows<Cell>>,
-    x_m: Option<Rows<Cell>>,
-    y_m: Option<Rows<Cell>>,
-}
+pub(super) struct BatchColumns([Option<LimitedArray<Cell>>; FIELDS.len()]);
 
-impl Columns {
-    fn named(&self) -> [(&'static str, Option<&Rows<Cell>>); 6] {
-        [
-            ("t_s", self.t_s.as_ref()),
-            ("seq", self.seq.as_ref()),
-            ("cmd_qx_rad", self.cmd_qx_rad.as_ref()),
-            ("cmd_qy_rad", self.cmd_qy_rad.as_ref()),
-            ("x_m", self.x_m.as_ref()),
-            ("y_m", self.y_m.as_ref()),
-        ]
-    }
-
+impl BatchColumns {
     pub(super) fn is_empty(&self) -> bool {
-        self.named().iter().all(|(_, column)| column.is_none())
+        self.0.iter().all(Option::is_none)
     }
 
-    /// Length of the longest column.
+    /// Returns the length of the longest column.
     pub(super) fn n(&self) -> usize {
-        self.named().iter().filter_map(|(_, column)| column.map(|c| c.n)).max().unwrap_or(0)
+        self.0.iter().flatten().map(|column| column.n).max().unwrap_or(0)
     }
 
-    /// The samples, or the column that cannot be and why.
+    /// Returns the samples, one per row.
+    ///
+    /// # Errors
+    /// The name of the missing or wrong column, and the reason.
     pub(super) fn samples(self) -> Result<Vec<Result<Sample, String>>, (&'static str, String)> {
-        let Some(t_s) = &self.t_s else {
+        let Some(t_s) = &self.0[T_S] else {
             return Err(("t_s", "the batch has neither `samples` nor a column `t_s`".to_owned()));
         };
-        for (name, column) in self.named() {
+        for (name, column) in FIELDS.into_iter().zip(&self.0) {
             if let Some(column) = column
                 && column.n != t_s.n
             {
                 return Err((name, format!("has {} values where `t_s` has {}", column.n, t_s.n)));
             }
         }
-        let cell = |column: &Option<Rows<Cell>>, i: usize| {
-            column.as_ref().and_then(|c| c.kept.get(i)).copied().unwrap_or_default()
+        let cell = |column: &Option<LimitedArray<Cell>>, i: usize| {
+            column.as_ref().and_then(|c| c.values.get(i)).copied().unwrap_or_default()
         };
-        let row = |i: usize| Cells {
-            seq: cell(&self.seq, i),
-            t_s: cell(&self.t_s, i),
-            cmd_qx_rad: cell(&self.cmd_qx_rad, i),
-            cmd_qy_rad: cell(&self.cmd_qy_rad, i),
-            x_m: cell(&self.x_m, i),
-            y_m: cell(&self.y_m, i),
-        };
-        Ok((0..t_s.n).map(|i| row(i).sample()).collect())
+        let row = |i: usize| std::array::from_fn(|field| cell(&self.0[field], i));
+        Ok((0..t_s.n).map(|i| sample(row(i))).collect())
     }
 }
 
-/// A batch.
+/// The syntactic view of a batch.
 #[derive(Debug, Default)]
-pub(super) struct Document {
+pub(super) struct BatchDocument {
     pub(super) session: Option<String>,
     pub(super) id: Option<String>,
-    pub(super) samples: Option<Rows<Row>>,
-    pub(super) columns: Columns,
+    pub(super) samples: Option<LimitedArray<BatchRow>>,
+    pub(super) columns: BatchColumns,
 }
 
 /// Parses JSON, keeping at most `limit` values of each array.
-pub(super) fn json(document: &[u8], limit: usize) -> Result<Document, BatchError> {
+pub(super) fn json(document: &[u8], limit: usize) -> Result<BatchDocument, BatchError> {
     let mut json = serde_json::Deserializer::from_slice(document);
-    let parsed = json.deserialize_map(DocumentVisitor { limit });
+    let parsed = json.deserialize_map(BatchDocumentVisitor { limit });
     parsed.and_then(|parsed| json.end().map(|()| parsed)).map_err(|error| {
-        let pointer = place(&mut serde_json::Deserializer::from_slice(document), limit);
+        let pointer = error_pointer(&mut serde_json::Deserializer::from_slice(document), limit);
         BatchError::Malformed { pointer, reason: error.to_string() }
     })
 }
 
 /// Parses MessagePack, keeping at most `limit` values of each array.
-pub(super) fn msgpack(document: &[u8], limit: usize) -> Result<Document, BatchError> {
+pub(super) fn msgpack(document: &[u8], limit: usize) -> Result<BatchDocument, BatchError> {
     let unpack = || {
         let mut unpack = rmp_serde::Deserializer::new(document);
         unpack.set_max_depth(MAX_DEPTH);
         unpack
     };
     let mut whole = unpack();
-    let parsed = whole.deserialize_map(DocumentVisitor { limit });
+    let parsed = whole.deserialize_map(BatchDocumentVisitor { limit });
     let trailing = whole.get_ref().len();
     let error = match parsed {
         Ok(parsed) if trailing == 0 => return Ok(parsed),
         Ok(_) => rmp_serde::decode::Error::custom(format!("{trailing} bytes follow the document")),
         Err(error) => error,
     };
-    let pointer = place(&mut unpack(), limit);
+    let pointer = error_pointer(&mut unpack(), limit);
     Err(BatchError::Malformed { pointer, reason: error.to_string() })
 }
 
-/// The pointer of the element at which the parser stops. Keeping track of it
-/// takes time, so a document is read so only once it has failed.
-fn place<'de>(document: impl Deserializer<'de>, limit: usize) -> String {
+/// Returns the JSON pointer of the element at which the parser fails. Tracking the path is
+/// slow, so it is done in a second pass and only for invalid documents.
+fn error_pointer<'de>(document: impl Deserializer<'de>, limit: usize) -> String {
     let mut track = serde_path_to_error::Track::new();
     let tracked = serde_path_to_error::Deserializer::new(document, &mut track);
-    match tracked.deserialize_map(DocumentVisitor { limit }) {
+    match tracked.deserialize_map(BatchDocumentVisitor { limit }) {
         Ok(_) => String::new(),
         Err(_) => pointer(&track.path()),
     }
 }
 
+/// A key of a batch or of a row.
 #[derive(Clone, Copy)]
-enum Key {
+enum BatchKey {
     Session,
     Id,
     Samples,
-    Seq,
-    TS,
-    CmdQxRad,
-    CmdQyRad,
-    XM,
-    YM,
+    /// Index in [`FIELDS`].
+    Field(usize),
     Unknown,
 }
 
-/// By name alone: what serde derives would also take numbers.
-impl<'de> Deserialize<'de> for Key {
+/// Written by hand because a derived implementation would also accept numbers as keys.
+impl<'de> Deserialize<'de> for BatchKey {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_str(KeyVisitor)
+        deserializer.deserialize_str(BatchKeyVisitor)
     }
 }
 
-struct KeyVisitor;
+struct BatchKeyVisitor;
 
-impl Visitor<'_> for KeyVisitor {
-    type Value = Key;
+impl Visitor<'_> for BatchKeyVisitor {
+    type Value = BatchKey;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("the name of a field")
     }
 
-    fn visit_str<E>(self, name: &str) -> Result<Key, E> {
+    fn visit_str<E>(self, name: &str) -> Result<BatchKey, E> {
+        if let Some(field) = FIELDS.iter().position(|field| *field == name) {
+            return Ok(BatchKey::Field(field));
+        }
         Ok(match name {
-            "session" => Key::Session,
-            "id" => Key::Id,
-            "samples" => Key::Samples,
-            "seq" => Key::Seq,
-            "t_s" => Key::TS,
-            "cmd_qx_rad" => Key::CmdQxRad,
-            "cmd_qy_rad" => Key::CmdQyRad,
-            "x_m" => Key::XM,
-            "y_m" => Key::YM,
-            _ => Key::Unknown,
+            "session" => BatchKey::Session,
+            "id" => BatchKey::Id,
+            "samples" => BatchKey::Samples,
+            _ => BatchKey::Unknown,
         })
     }
 }
 
-struct DocumentVisitor {
+struct BatchDocumentVisitor {
     limit: usize,
 }
 
-impl<'de> Visitor<'de> for DocumentVisitor {
-    type Value = Document;
+impl<'de> Visitor<'de> for BatchDocumentVisitor {
+    type Value = BatchDocument;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("an object with `samples`, or with the columns `t_s`, `x_m`, …")
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Document, A::Error> {
-        let mut document = Document::default();
-        let cells = || Capped::<Cell>::new(self.limit);
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<BatchDocument, A::Error> {
+        let mut document = BatchDocument::default();
         while let Some(key) = map.next_key()? {
-            let columns = &mut document.columns;
             match key {
-                Key::Session => document.session = map.next_value()?,
-                Key::Id => document.id = map.next_value::<Option<Mark>>()?.map(|m| m.0),
-                Key::Samples => {
-                    document.samples = Some(map.next_value_seed(Capped::<Row>::new(self.limit))?);
+                BatchKey::Session => document.session = map.next_value()?,
+                BatchKey::Id => document.id = map.next_value::<Option<BatchId>>()?.map(|id| id.0),
+                BatchKey::Samples => {
+                    let rows = LimitedArrayVisitor::<BatchRow>::new(self.limit);
+                    document.samples = Some(map.next_value_seed(rows)?);
                 }
-                Key::Seq => columns.seq = Some(map.next_value_seed(cells())?),
-                Key::TS => columns.t_s = Some(map.next_value_seed(cells())?),
-                Key::CmdQxRad => columns.cmd_qx_rad = Some(map.next_value_seed(cells())?),
-                Key::CmdQyRad => columns.cmd_qy_rad = Some(map.next_value_seed(cells())?),
-                Key::XM => columns.x_m = Some(map.next_value_seed(cells())?),
-                Key::YM => columns.y_m = Some(map.next_value_seed(cells())?),
-                Key::Unknown => drop(map.next_value::<IgnoredAny>()?),
+                BatchKey::Field(field) => {
+                    let cells = LimitedArrayVisitor::<Cell>::new(self.limit);
+                    document.columns.0[field] = Some(map.next_value_seed(cells)?);
+                }
+                BatchKey::Unknown => drop(map.next_value::<IgnoredAny>()?),
             }
         }
         Ok(document)
     }
 }
 
-/// A client's mark: a string or a whole number.
-struct Mark(String);
+/// The client's id of a batch: a string or a whole number.
+struct BatchId(String);
 
-impl<'de> Deserialize<'de> for Mark {
+impl<'de> Deserialize<'de> for BatchId {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(MarkVisitor)
+        deserializer.deserialize_any(BatchIdVisitor)
     }
 }
 
-struct MarkVisitor;
+struct BatchIdVisitor;
 
-impl Visitor<'_> for MarkVisitor {
-    type Value = Mark;
+impl Visitor<'_> for BatchIdVisitor {
+    type Value = BatchId;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("a string or a whole number")
     }
 
-    fn visit_str<E>(self, text: &str) -> Result<Mark, E> {
-        Ok(Mark(text.to_owned()))
+    fn visit_str<E>(self, text: &str) -> Result<BatchId, E> {
+        Ok(BatchId(text.to_owned()))
     }
-    fn visit_u64<E>(self, number: u64) -> Result<Mark, E> {
-        Ok(Mark(number.to_string()))
+    fn visit_u64<E>(self, number: u64) -> Result<BatchId, E> {
+        Ok(BatchId(number.to_string()))
     }
 }
 
-/// An array of which at most `limit` values are kept; the others are counted.
-struct Capped<T> {
+/// Deserializes an array, keeping at most `limit` values and counting the rest.
+struct LimitedArrayVisitor<T> {
     limit: usize,
     of: std::marker::PhantomData<T>,
 }
 
-impl<T> Capped<T> {
+impl<T> LimitedArrayVisitor<T> {
     const fn new(limit: usize) -> Self {
         Self { limit, of: std::marker::PhantomData }
     }
 }
 
-impl<'de, T: Deserialize<'de>> serde::de::DeserializeSeed<'de> for Capped<T> {
-    type Value = Rows<T>;
-    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Rows<T>, D::Error> {
+impl<'de, T: Deserialize<'de>> serde::de::DeserializeSeed<'de> for LimitedArrayVisitor<T> {
+    type Value = LimitedArray<T>;
+    fn deserialize<D: Deserializer<'de>>(
+        self,
+        deserializer: D,
+    ) -> Result<LimitedArray<T>, D::Error> {
         deserializer.deserialize_seq(self)
     }
 }
 
-impl<'de, T: Deserialize<'de>> Visitor<'de> for Capped<T> {
-    type Value = Rows<T>;
+impl<'de, T: Deserialize<'de>> Visitor<'de> for LimitedArrayVisitor<T> {
+    type Value = LimitedArray<T>;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("an array")
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Rows<T>, A::Error> {
-        let announced = seq.size_hint().unwrap_or_default().min(self.limit).min(MAX_AHEAD);
-        let mut rows = Rows { kept: Vec::with_capacity(announced), n: 0 };
-        while rows.n < self.limit {
-            let Some(value) = seq.next_element()? else { return Ok(rows) };
-            rows.kept.push(value);
-            rows.n += 1;
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<LimitedArray<T>, A::Error> {
+        let announced = seq.size_hint().unwrap_or_default().min(self.limit).min(MAX_RESERVED);
+        let mut array = LimitedArray { values: Vec::with_capacity(announced), n: 0 };
+        while array.n < self.limit {
+            let Some(value) = seq.next_element()? else { return Ok(array) };
+            array.values.push(value);
+            array.n += 1;
         }
         while seq.next_element::<IgnoredAny>()?.is_some() {
-            rows.n += 1;
+            array.n += 1;
         }
-        Ok(rows)
+        Ok(array)
     }
 }
 
-/// The visits that a cell and a row have in common: what is not wanted.
-macro_rules! otherwise {
+/// The methods for unexpected types that the visitors of a cell and of a row share.
+macro_rules! visit_unexpected {
     ($of:expr) => {
         fn visit_bool<E>(self, _: bool) -> Result<Self::Value, E> {
             Ok($of("a boolean"))
         }
         fn visit_str<E>(self, text: &str) -> Result<Self::Value, E> {
-            Ok($of(if super::lenient::is_mark(text) {
-                super::lenient::MEANING
+            Ok($of(if super::lenient::is_marker(text) {
+                super::lenient::NOT_FINITE
             } else {
                 "a string"
             }))
@@ -411,7 +378,7 @@ impl<'de> Visitor<'de> for CellVisitor {
 
     fn visit_f64<E>(self, value: f64) -> Result<Cell, E> {
         let finite = value.is_finite();
-        Ok(if finite { Cell::Number(value) } else { Cell::Other(super::lenient::MEANING) })
+        Ok(if finite { Cell::Number(value) } else { Cell::Other(super::lenient::NOT_FINITE) })
     }
     fn visit_u64<E>(self, value: u64) -> Result<Cell, E> {
         Ok(Cell::Whole(value))
@@ -426,50 +393,45 @@ impl<'de> Visitor<'de> for CellVisitor {
         while map.next_entry::<IgnoredAny, IgnoredAny>()?.is_some() {}
         Ok(Cell::Other("an object"))
     }
-    otherwise!(Cell::Other);
+    visit_unexpected!(Cell::Other);
 }
 
-impl<'de> Deserialize<'de> for Row {
+impl<'de> Deserialize<'de> for BatchRow {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(RowVisitor)
+        deserializer.deserialize_any(BatchRowVisitor)
     }
 }
 
-struct RowVisitor;
+struct BatchRowVisitor;
 
-impl<'de> Visitor<'de> for RowVisitor {
-    type Value = Row;
+impl<'de> Visitor<'de> for BatchRowVisitor {
+    type Value = BatchRow;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("a sample")
     }
 
-    fn visit_f64<E>(self, _: f64) -> Result<Row, E> {
-        Ok(Row::Other("a number"))
+    fn visit_f64<E>(self, _: f64) -> Result<BatchRow, E> {
+        Ok(BatchRow::Other("a number"))
     }
-    fn visit_u64<E>(self, _: u64) -> Result<Row, E> {
-        Ok(Row::Other("a number"))
+    fn visit_u64<E>(self, _: u64) -> Result<BatchRow, E> {
+        Ok(BatchRow::Other("a number"))
     }
-    fn visit_i64<E>(self, _: i64) -> Result<Row, E> {
-        Ok(Row::Other("a number"))
+    fn visit_i64<E>(self, _: i64) -> Result<BatchRow, E> {
+        Ok(BatchRow::Other("a number"))
     }
-    fn visit_unit<E>(self) -> Result<Row, E> {
-        Ok(Row::Other("null"))
+    fn visit_unit<E>(self) -> Result<BatchRow, E> {
+        Ok(BatchRow::Other("null"))
     }
-    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Row, A::Error> {
-        let mut cells = Cells::default();
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<BatchRow, A::Error> {
+        let mut cells = SampleCells::default();
         while let Some(key) = map.next_key()? {
             match key {
-                Key::Seq => cells.seq = map.next_value()?,
-                Key::TS => cells.t_s = map.next_value()?,
-                Key::CmdQxRad => cells.cmd_qx_rad = map.next_value()?,
-                Key::CmdQyRad => cells.cmd_qy_rad = map.next_value()?,
-                Key::XM => cells.x_m = map.next_value()?,
-                Key::YM => cells.y_m = map.next_value()?,
+                BatchKey::Field(field) => cells[field] = map.next_value()?,
                 _ => drop(map.next_value::<IgnoredAny>()?),
             }
         }
-        Ok(Row::Object(cells))
+        Ok(BatchRow::Object(cells))
     }
-    otherwise!(Row::Other);
+    visit_unexpected!(BatchRow::Other);
 }

@@ -1,19 +1,20 @@
-//! What devices send in the place of a number: `NaN`, `Infinity`, `1e999`.
+//! Tolerates `NaN`, `Infinity` and `1e999`, which some devices send in place of a number.
 //!
-//! JSON has none of these, and one would spoil the whole batch. Looked for only
-//! once a document has failed: they become strings, which spoil their row.
+//! They are invalid in JSON and would invalidate the whole batch. Only if a document cannot
+//! be parsed, they are replaced by marker strings, so that only their rows are rejected.
 
-/// What such a string means to a reader.
-pub(super) const MEANING: &str = "not finite";
+/// Name of such a value in messages.
+pub(super) const NOT_FINITE: &str = "not finite";
 
-const MARK: &str = "\u{1}not finite";
+/// The string that stands for such a value.
+const MARKER: &str = "\u{1}not finite";
 
-/// Whether a string stands for such a number.
-pub(super) fn is_mark(text: &str) -> bool {
-    text == MARK
+/// Returns whether a string stands for such a value.
+pub(super) fn is_marker(text: &str) -> bool {
+    text == MARKER
 }
 
-/// The document with such numbers as strings; none if it has none.
+/// Returns the document with such values replaced by the marker, or `None` if it has none.
 pub(super) fn quote_non_finite(document: &[u8]) -> Option<Vec<u8>> {
     let mut quoted = Vec::with_capacity(document.len());
     let mut found = false;
@@ -40,7 +41,7 @@ const fn is_word(byte: u8) -> bool {
     byte.is_ascii_alphanumeric() || matches!(byte, b'+' | b'-' | b'.')
 }
 
-/// Length of the string at the start of `text`, quotes included.
+/// Returns the length of the string literal at the start of `text`, quotes included.
 fn string_length(text: &[u8]) -> usize {
     let mut at = 1;
     while let Some(&byte) = text.get(at) {
@@ -53,8 +54,8 @@ fn string_length(text: &[u8]) -> usize {
     text.len()
 }
 
-/// Whether Rust reads the token as a number, but not as a finite one: `NaN`,
-/// `inf`, `-Infinity`, `1e999`.
+/// Returns whether Rust parses the token as a number that is not finite: `NaN`, `inf`,
+/// `-Infinity`, `1e999`.
 fn is_non_finite(token: &[u8]) -> bool {
     let text = std::str::from_utf8(token).unwrap_or_default();
     text.parse::<f64>().is_ok_and(|value| !value.is_finite())

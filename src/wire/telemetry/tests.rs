@@ -14,7 +14,7 @@ fn reasons(batch: &Batch) -> Vec<(usize, &str)> {
 }
 
 #[test]
-fn rows_and_columns_say_the_same() {
+fn rows_and_columns_are_equivalent() {
     let rows = br#"{"session":"a","id":7,"samples":[
         {"seq":1,"t_s":0.5,"cmd_qx_rad":0.1,"x_m":null,"note":[1,{}]},{"t_s":1,"y_m":-2}]}"#;
     let columns = br#"{"session":"a","id":"7","t_s":[0.5,1],"seq":[1,null],
@@ -28,7 +28,7 @@ fn rows_and_columns_say_the_same() {
 }
 
 #[test]
-fn a_bad_row_is_named_and_the_others_are_taken() {
+fn an_invalid_row_is_reported_and_the_others_are_accepted() {
     let document = br#"{"samples":[{"t_s":0},{"t_s":"1"},{"t_s":null},{},3,{"t_s":1,"x_m":[]},
         {"t_s":2,"seq":-1},{"t_s":2,"seq":1.5},{"t_s":2,"seq":18446744073709551615},null,{"t_s":9}]}"#;
     let batch = json(document, LIMIT).unwrap();
@@ -47,7 +47,7 @@ fn a_bad_row_is_named_and_the_others_are_taken() {
 }
 
 #[test]
-fn numbers_that_json_does_not_have_spoil_their_row_alone() {
+fn a_non_finite_number_in_json_invalidates_only_its_row() {
     let document = br#"{"session":"NaN \" NaN","samples":[{"t_s":0,"x_m":NaN},{"t_s":1},
         {"t_s":-Infinity},{"t_s":2,"y_m":1e999}]}"#;
     let batch = json(document, LIMIT).unwrap();
@@ -64,7 +64,7 @@ fn numbers_that_json_does_not_have_spoil_their_row_alone() {
 }
 
 #[test]
-fn a_malformed_document_is_refused_with_the_place() {
+fn a_malformed_document_is_rejected_with_the_pointer_of_the_error() {
     let refused = |document: &str| match json(document.as_bytes(), LIMIT) {
         Err(BatchError::Malformed { pointer, reason }) => (pointer, reason),
         other => panic!("{document}: {other:?}"),
@@ -84,7 +84,7 @@ fn a_malformed_document_is_refused_with_the_place() {
 }
 
 #[test]
-fn a_batch_that_is_too_long_is_refused_whole() {
+fn a_batch_with_too_many_rows_is_rejected_as_a_whole() {
     let rows: Vec<_> = (0..=LIMIT).map(|i| format!(r#"{{"t_s":{i}}}"#)).collect();
     let too_many = BatchError::TooMany { found: LIMIT + 1, limit: LIMIT };
     let document = format!(r#"{{"samples":[{}]}}"#, rows.join(","));
@@ -96,7 +96,7 @@ fn a_batch_that_is_too_long_is_refused_whole() {
 }
 
 #[test]
-fn csv_keeps_the_good_rows() {
+fn the_valid_rows_of_a_csv_batch_are_accepted() {
     let text = b"t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n0,0,0,0,0\nx,0,0,0,0\n2,,,,\n";
     let batch = csv(text, LIMIT).unwrap();
     assert_eq!(reasons(&batch), [(1, "line 3: `t_s`: `x` is not a number")]);
@@ -122,23 +122,23 @@ fn sample() -> impl Strategy<Value = Sample> {
 
 proptest! {
     #[test]
-    fn every_format_carries_every_bit(samples in proptest::collection::vec(sample(), 0..LIMIT)) {
+    fn every_format_preserves_samples_bit_for_bit(samples in proptest::collection::vec(sample(), 0..LIMIT)) {
         let views: Vec<_> = samples.iter().map(sample_view).collect();
         let wanted: Vec<String> = samples.iter().map(|s| format!("{:?}", Ok::<_, String>(s))).collect();
-        let said = |batch: Batch| batch.rows.iter().map(|r| format!("{r:?}")).collect::<Vec<_>>();
+        let rows_of = |batch: Batch| batch.rows.iter().map(|r| format!("{r:?}")).collect::<Vec<_>>();
         let rows = serde_json::to_vec(&RowsView { session: None, samples: views.clone() }).unwrap();
-        prop_assert_eq!(&said(json(&rows, LIMIT).unwrap()), &wanted);
+        prop_assert_eq!(&rows_of(json(&rows, LIMIT).unwrap()), &wanted);
         let lines: Vec<_> = views.iter().map(|v| serde_json::to_string(v).unwrap()).collect();
-        prop_assert_eq!(&said(ndjson(lines.join("\n").as_bytes(), LIMIT).unwrap()), &wanted);
+        prop_assert_eq!(&rows_of(ndjson(lines.join("\n").as_bytes(), LIMIT).unwrap()), &wanted);
         let packed = rmp_serde::to_vec_named(&RowsView { session: None, samples: views }).unwrap();
-        prop_assert_eq!(&said(msgpack(&packed, LIMIT).unwrap()), &wanted);
+        prop_assert_eq!(&rows_of(msgpack(&packed, LIMIT).unwrap()), &wanted);
         let mut text = Vec::new();
         crate::wire::session_csv::write(&mut text, &samples).unwrap();
-        prop_assert_eq!(&said(csv(&text, LIMIT).unwrap()), &wanted);
+        prop_assert_eq!(&rows_of(csv(&text, LIMIT).unwrap()), &wanted);
     }
 
     #[test]
-    fn any_bytes_are_read_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
+    fn arbitrary_bytes_are_parsed_or_rejected_without_panic(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
         let _ = json(&bytes, LIMIT);
         let _ = msgpack(&bytes, LIMIT);
         let _ = ndjson(&bytes, LIMIT);
@@ -146,28 +146,28 @@ proptest! {
     }
 
     #[test]
-    fn any_text_like_json_is_read_or_refused(text in r#"[\{\}\[\]:,"a-z_0-9.eE+\- ]{0,80}"#) {
+    fn arbitrary_json_like_text_is_parsed_or_rejected_without_panic(text in r#"[\{\}\[\]:,"a-z_0-9.eE+\- ]{0,80}"#) {
         let _ = json(text.as_bytes(), LIMIT);
     }
 
-    /// Whatever a document says, it says it in both formats: the same rows with
-    /// the same reasons, or refused at the same place.
+    /// Both formats give the same rows with the same reasons, or are rejected with the same
+    /// pointer.
     #[test]
-    fn msgpack_is_its_json_twin(document in document()) {
-        let place = |batch: Result<Batch, BatchError>| batch.map_err(|error| match error {
+    fn a_document_gives_the_same_result_in_msgpack_and_json(document in document()) {
+        let outcome = |batch: Result<Batch, BatchError>| batch.map_err(|error| match error {
             BatchError::Malformed { pointer, .. } => Err(pointer),
             BatchError::TooMany { found, limit } => Ok((found, limit)),
         });
         let packed = rmp_serde::to_vec_named(&document).unwrap();
         let text = serde_json::to_vec(&document).unwrap();
-        prop_assert_eq!(place(msgpack(&packed, LIMIT)), place(json(&text, LIMIT)));
+        prop_assert_eq!(outcome(msgpack(&packed, LIMIT)), outcome(json(&text, LIMIT)));
     }
 
     #[test]
-    fn cut_or_bent_msgpack_is_read_or_refused(
+    fn truncated_msgpack_is_rejected_and_altered_msgpack_does_not_panic(
         document in document(),
         cut in any::<prop::sample::Index>(),
-        bend in any::<(prop::sample::Index, u8)>(),
+        change in any::<(prop::sample::Index, u8)>(),
     ) {
         let packed = rmp_serde::to_vec_named(&document).unwrap();
         let whole = msgpack(&packed, LIMIT);
@@ -176,14 +176,14 @@ proptest! {
         let mut longer = packed.clone();
         longer.push(0xc0);
         prop_assert!(msgpack(&longer, LIMIT).is_err() || whole.is_err());
-        let mut bent = packed;
-        let at = bend.0.index(bent.len());
-        bent[at] = bend.1;
-        let _ = msgpack(&bent, LIMIT);
+        let mut altered = packed;
+        let at = change.0.index(altered.len());
+        altered[at] = change.1;
+        let _ = msgpack(&altered, LIMIT);
     }
 }
 
-/// What may stand where a number should.
+/// Values in place of a number.
 fn value() -> impl Strategy<Value = Value> {
     prop_oneof![
         4 => finite().prop_map(|v| json!(v)),
@@ -205,7 +205,7 @@ fn row() -> impl Strategy<Value = Value> {
     prop_oneof![8 => object, 1 => value()]
 }
 
-/// An object that may be a batch.
+/// Objects that may be batches.
 fn document() -> impl Strategy<Value = Value> {
     let rows = proptest::collection::vec(row(), 0..LIMIT + 20);
     let rows = (rows, value()).prop_map(|(rows, id)| json!({ "samples": rows, "id": id }));
@@ -220,6 +220,7 @@ fn document() -> impl Strategy<Value = Value> {
     prop_oneof![rows, columns, odd]
 }
 
+/// Returns pointer and reason of the error for a MessagePack document.
 fn refused(document: &[u8]) -> (String, String) {
     match msgpack(document, LIMIT) {
         Err(BatchError::Malformed { pointer, reason }) => (pointer, reason),
@@ -228,7 +229,7 @@ fn refused(document: &[u8]) -> (String, String) {
 }
 
 #[test]
-fn what_json_does_not_have_spoils_its_row_alone() {
+fn a_msgpack_value_without_json_equivalent_invalidates_only_its_row() {
     let column = |values: &[&[u8]]| {
         let mut document = vec![0x81, 0xa3, b't', b'_', b's', 0x90 | values.len() as u8];
         values.iter().for_each(|value| document.extend_from_slice(value));
@@ -241,7 +242,7 @@ fn what_json_does_not_have_spoils_its_row_alone() {
         &f32(half),
         &[0xc4, 2, 1, 2],    // bytes
         &[0xd4, 5, 0],       // an extension
-        &[0xa2, 0xff, 0xfe], // a string that is no UTF-8
+        &[0xa2, 0xff, 0xfe], // a string that is not UTF-8
         &[0xd3, 0x80, 0, 0, 0, 0, 0, 0, 0],
     ]);
     let batch = msgpack(&document, LIMIT).unwrap();
@@ -257,7 +258,7 @@ fn what_json_does_not_have_spoils_its_row_alone() {
 }
 
 #[test]
-fn hostile_msgpack_is_refused_with_the_place() {
+fn hostile_msgpack_is_rejected_with_the_pointer_of_the_error() {
     for document in [&[][..], &[0x90], &[0xc1], &[0xdf, 0xff, 0xff, 0xff, 0xff]] {
         assert_eq!(refused(document).0, "", "{document:x?}");
     }
@@ -265,19 +266,19 @@ fn hostile_msgpack_is_refused_with_the_place() {
         [&[0x81, 0xa0 | name.len() as u8], name.as_bytes(), value].concat()
     };
     let huge = [0xff; 4];
-    for (name, marker, place) in [
+    for (name, marker, pointer) in [
         ("samples", 0xdd, "/samples/0"),
         ("x_m", 0xdd, "/x_m/0"),
         ("session", 0xdb, "/session"),
         ("note", 0xc6, "/note"),
     ] {
         let document = key(name, &[&[marker][..], &huge].concat());
-        assert_eq!(refused(&document).0, place);
+        assert_eq!(refused(&document).0, pointer);
     }
     let deep = [vec![0x91; 100_000], vec![0xc0]].concat();
     for name in ["note", "samples", "t_s"] {
         assert!(refused(&key(name, &deep)).1.contains("depth"), "{name}");
     }
-    assert_eq!(refused(&[0x81, 0x07, 0xc0]).0, "/7", "a key that is no name");
+    assert_eq!(refused(&[0x81, 0x07, 0xc0]).0, "/7", "a key that is not a string");
     assert!(refused(&[0x80, 0xc0]).1.contains("1 bytes follow"));
 }

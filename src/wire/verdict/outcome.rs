@@ -1,47 +1,48 @@
-//! What a session came to, monitor by monitor, and how much of it was judged.
+//! The results of the monitors and of the session, and how much was judged.
 //!
-//! Silence is no proof of health: a monitor that could not judge says so, and so
-//! does one of a rig that is not learnt, or one that has found two causes which
-//! read alike.
+//! No fault line does not mean no fault: a monitor that could not judge, a rig that is not
+//! learnt, and causes that cannot be told apart each have their own result.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::{CandidateView, SummaryView, Verdict, candidate_view, warnings};
+use crate::wire::words::CodeWord;
 use offbd_core::diagnosis::Suspicion;
 use offbd_core::engine::{Misfit, MonitorState, Reach, State};
 use offbd_core::vocabulary::FaultCode;
 
-/// What a session came to, or one monitor in it.
+/// The result of a session, or of one monitor in a session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub enum Outcome {
-    /// Confirmed.
+    /// A fault was confirmed.
     #[serde(rename = "fault")]
     Fault,
-    /// Confirmed, but causes read alike that lie in different parts of the rig.
+    /// A fault was confirmed, but causes in different parts of the rig would explain it
+    /// equally.
     #[serde(rename = "cannot tell")]
     CannotTell,
     /// A test has failed, and nothing was confirmed.
     #[serde(rename = "pending")]
     Pending,
-    /// Judged for long enough to have confirmed a fault, and there was none; of a
-    /// session: by every monitor.
+    /// Judged for long enough to confirm a fault, and there was none; for a session: by every
+    /// monitor.
     #[serde(rename = "no fault")]
     NoFault,
-    /// Of a session: no fault, but some monitors have not judged.
+    /// Only for a session: no fault, but some monitors have not judged.
     #[serde(rename = "partly judged")]
     PartlyJudged,
-    /// No fault, but the rig is not learnt: faults of its servos and its ball are
-    /// not confirmed.
+    /// No fault, but the rig is not learnt, so that faults of its servos and its ball cannot
+    /// be confirmed.
     #[serde(rename = "not learnt")]
     NotLearnt,
-    /// Judged for less time than a fault takes to be confirmed.
+    /// Judged for less time than the confirmation of a fault takes.
     #[serde(rename = "not judged")]
     NotJudged,
 }
 
 impl Outcome {
-    /// The same word as on the wire.
+    /// Returns the word used in JSON.
     #[must_use]
     pub const fn as_str(self) -> &'static str {
         match self {
@@ -55,8 +56,8 @@ impl Outcome {
         }
     }
 
-    /// What a session came to whose monitors came to `each`: the worst that was
-    /// found, or else the least that is known.
+    /// Returns the result of a session whose monitors have the results `each`: the most
+    /// severe finding, or else the least that is known.
     fn of_session(each: &[Self]) -> Self {
         let found = [Self::Fault, Self::CannotTell, Self::Pending];
         let all = |outcome| each.iter().all(|&o| o == outcome);
@@ -70,22 +71,22 @@ impl Outcome {
     }
 }
 
-/// One monitor over a whole session.
+/// The result of one monitor in a session.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct JudgedView {
-    pub code: String,
-    /// Seconds of the session in which it could judge.
+    pub code: CodeWord,
+    /// Time of the session for which it could judge, s.
     pub judged_s: f64,
-    /// The same as a share of the session, from its first sample to its last,
-    /// 0 to 1.
+    /// That time as a fraction of the session from its first to its last sample, 0 to 1.
     pub judged_share: f64,
     pub outcome: Outcome,
-    /// Causes that read alike, heaviest first; empty where only one does.
+    /// Causes that would explain the evidence equally, heaviest first; empty if there is only
+    /// one.
     pub candidates: Vec<CandidateView>,
 }
 
 impl Verdict {
-    /// What each monitor came to, in the order of [`FaultCode::ALL`], in a session
+    /// Returns the result of each monitor, in the order of [`FaultCode::ALL`], of a session
     /// that leaves the engine in `state`.
     #[must_use]
     pub fn monitors(&self, state: &State) -> Vec<JudgedView> {
@@ -97,7 +98,7 @@ impl Verdict {
         let suspected = self.suspected[code as usize].as_ref();
         let candidates = suspected.map(|s| s.candidates.iter().map(candidate_view).collect());
         JudgedView {
-            code: code.to_string(),
+            code: code.into(),
             judged_s: monitor.judged_s,
             judged_share: monitor.judged_share,
             outcome: self.outcome(code, monitor.reach),
@@ -108,7 +109,7 @@ impl Verdict {
     fn outcome(&self, code: FaultCode, reach: Reach) -> Outcome {
         let suspected = self.suspected[code as usize].as_ref();
         match (self.confirmed.contains(&code), suspected, reach) {
-            (true, Some(suspicion), _) if read_alike(suspicion) => Outcome::CannotTell,
+            (true, Some(suspicion), _) if is_ambiguous(suspicion) => Outcome::CannotTell,
             (true, ..) => Outcome::Fault,
             (false, Some(_), _) => Outcome::Pending,
             (false, None, Reach::Judged) => Outcome::NoFault,
@@ -118,21 +119,22 @@ impl Verdict {
     }
 }
 
-/// Whether the causes lie in different parts of the rig.
-pub(super) fn read_alike(suspicion: &Suspicion) -> bool {
+/// Returns whether the candidates are in different parts of the rig.
+pub(super) fn is_ambiguous(suspicion: &Suspicion) -> bool {
     let first = suspicion.candidates.first().map(|c| c.code);
     suspicion.candidates.iter().any(|c| Some(c.code) != first)
 }
 
 impl SummaryView {
-    /// The same with what each monitor came to, and so the session.
+    /// Adds the results of the monitors, and the result of the session that follows.
     #[must_use]
     pub fn with_monitors(self, monitors: Vec<JudgedView>) -> Self {
         let each: Vec<Outcome> = monitors.iter().map(|m| m.outcome).collect();
         Self { outcome: Some(Outcome::of_session(&each)), monitors, ..self }
     }
 
-    /// The same with what does not fit: no fault found may mean nothing then.
+    /// Adds the warnings of `misfits`. If one of them prevents judging and nothing was found,
+    /// the result is [`Outcome::NotJudged`].
     #[must_use]
     pub fn with_misfits(self, misfits: &[Misfit]) -> Self {
         let found =
@@ -147,10 +149,9 @@ impl SummaryView {
 mod tests {
     use super::*;
     use offbd_core::diagnosis::{Candidate, Evidence, StatusByte, Transition};
-    use offbd_core::engine::Output;
     use offbd_core::vocabulary::{FaultKind, FaultStatus, SimTime};
 
-    /// A confirmed stuck ball with these causes, as the verdict takes it.
+    /// Returns the result of a confirmed stuck ball with these candidates.
     fn stuck(candidates: Vec<Candidate>) -> JudgedView {
         let mut byte = StatusByte::default();
         byte.failed();
@@ -160,12 +161,12 @@ mod tests {
         let (status, evidence) = (FaultStatus::Confirmed, Evidence::default());
         let transition = Transition { at, code, status, byte, suspicion, evidence };
         let mut verdict = Verdict::default();
-        verdict.take(&Output::Transition(Box::new(transition)));
+        verdict.take(None, &[transition]);
         verdict.monitors(&State::default()).swap_remove(code as usize)
     }
 
     #[test]
-    fn causes_in_different_parts_cannot_be_told() {
+    fn candidates_in_different_parts_make_the_outcome_cannot_tell() {
         let ball = Candidate { code: FaultCode::StuckBall, kind: None, weight: 0.6 };
         let kind = Some(FaultKind::Dead);
         let servo = Candidate { code: FaultCode::XServo, kind, weight: 0.4 };
@@ -179,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn a_session_is_what_is_worst_or_least_known() {
+    fn the_outcome_of_a_session_is_its_worst_finding_or_the_least_known() {
         use Outcome::{CannotTell, Fault, NoFault, NotJudged, NotLearnt, PartlyJudged, Pending};
         let cases = [
             (vec![NoFault, NoFault], NoFault),
@@ -197,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn the_word_is_the_one_on_the_wire() {
+    fn as_str_equals_the_serialised_word() {
         use Outcome::{CannotTell, Fault, NoFault, NotJudged, NotLearnt, PartlyJudged, Pending};
         for outcome in [Fault, CannotTell, Pending, NoFault, PartlyJudged, NotLearnt, NotJudged] {
             assert_eq!(serde_json::to_value(outcome).unwrap(), outcome.as_str());

@@ -1,10 +1,12 @@
-//! What was seen when a fault changed, in one sentence that follows its kind.
+//! Describes a transition and its evidence in one sentence, whose form depends on the kind.
 
-use super::outcome::read_alike;
-use offbd_core::diagnosis::{Answer, AxisEvidence, Candidate, Evidence, Suspicion, Transition};
+use super::outcome::is_ambiguous;
+use offbd_core::diagnosis::{
+    AxisEvidence, Candidate, Evidence, ServoAnswer, Suspicion, Transition,
+};
 use offbd_core::vocabulary::{Axis, FaultCode, FaultKind, FaultStatus};
 
-/// What was seen, in one sentence.
+/// Describes a transition in one sentence.
 #[must_use]
 pub fn sentence(transition: &Transition) -> String {
     let Transition { code, status, byte, suspicion, .. } = transition;
@@ -21,8 +23,8 @@ pub fn sentence(transition: &Transition) -> String {
         FaultStatus::Pending | FaultStatus::Confirmed => {
             let onset = suspicion.onset.map(|t| format!(" since {:.2} s", t.seconds()));
             let since = onset.unwrap_or_default();
-            let (open, seen) = (open(suspicion), seen(transition));
-            format!("{name} {status}{since}: {open}{seen}{}", decides(transition))
+            let (undecided, findings) = (undecided(suspicion), findings(transition));
+            format!("{name} {status}{since}: {undecided}{findings}{}", deciding_motion(transition))
         }
     }
 }
@@ -31,14 +33,14 @@ fn named(code: FaultCode, kind: Option<FaultKind>) -> String {
     kind.map_or_else(|| code.to_string(), |kind| format!("{code} ({kind})"))
 }
 
-/// What the evidence leaves open: causes in different parts of the rig, or kinds
-/// of one part none of which stands out.
-fn open(suspicion: &Suspicion) -> String {
+/// Describes what the evidence does not decide: candidates in different parts of the rig, or
+/// kinds of one part. Empty if there is nothing.
+fn undecided(suspicion: &Suspicion) -> String {
     let candidates = &suspicion.candidates;
     let weighed = |word: String, c: &Candidate| format!("{word} {:.0} %", 100.0 * c.weight);
     let causes = || candidates.iter().map(|c| weighed(named(c.code, c.kind), c));
     let kinds = || candidates.iter().filter_map(|c| Some(weighed(c.kind?.to_string(), c)));
-    match (read_alike(suspicion), suspicion.kind) {
+    match (is_ambiguous(suspicion), suspicion.kind) {
         (true, _) => format!("cannot tell {}; ", causes().collect::<Vec<_>>().join(" from ")),
         (false, None) if candidates.len() > 1 => {
             format!("cannot tell which kind: {}; ", kinds().collect::<Vec<_>>().join(", "))
@@ -47,16 +49,16 @@ fn open(suspicion: &Suspicion) -> String {
     }
 }
 
-/// The motion that would decide between causes that read alike; nothing where there is
-/// but one.
-fn decides(transition: &Transition) -> String {
+/// Describes a motion that would decide between the candidates. Empty if they are all in one
+/// part of the rig.
+fn deciding_motion(transition: &Transition) -> String {
     let suspicion = &transition.suspicion;
-    if !read_alike(suspicion) {
+    if !is_ambiguous(suspicion) {
         return String::new();
     }
     let servo = suspicion.candidates.iter().find_map(|c| c.code.axis());
     let motion = match servo.map(Axis::other) {
-        // The other servo's ball rolls if it is not stuck.
+        // The other servo moves the ball unless it is stuck.
         Some(axis) if transition.evidence.axes[axis].command_rad.is_some() => format!(
             "tilting by {} would decide, as the drive cycle does: a ball that then rolls along {} \
              is not stuck",
@@ -70,7 +72,7 @@ fn decides(transition: &Transition) -> String {
     format!("; {motion}")
 }
 
-fn seen(transition: &Transition) -> String {
+fn findings(transition: &Transition) -> String {
     let (evidence, kind) = (&transition.evidence, transition.suspicion.kind);
     match transition.code.axis() {
         Some(axis) => servo(axis, kind, evidence),
@@ -79,11 +81,11 @@ fn seen(transition: &Transition) -> String {
     }
 }
 
-/// Stillness that is said to be some, s: what the monitor of the ball asks for.
-const SAYABLE_STILL_S: f64 = 0.3;
+/// Shortest time of stillness that is mentioned, s: what the monitor `stuck_ball` requires.
+const LEAST_REPORTED_STILL_S: f64 = 0.3;
 
 fn stuck_ball(evidence: &Evidence) -> String {
-    if evidence.still_s < SAYABLE_STILL_S {
+    if evidence.still_s < LEAST_REPORTED_STILL_S {
         let nats = evidence.axes.x.nats + evidence.axes.y.nats;
         return format!(
             "the ball hardly moves although the plate asks it to along both axes (weight of \
@@ -111,7 +113,7 @@ fn sensor(kind: Option<FaultKind>, evidence: &Evidence) -> String {
         }
         (Some(FaultKind::Dropout), ..) => unseen(evidence),
         (Some(FaultKind::Frozen), ..) => repeated(evidence),
-        _ => anything(evidence),
+        _ => all_readings(evidence),
     }
 }
 
@@ -123,7 +125,7 @@ fn unseen(evidence: &Evidence) -> String {
     }
 }
 
-/// Along one axis alone, or along each that is read.
+/// Identical readings along one axis, or along both.
 fn repeated(evidence: &Evidence) -> String {
     if evidence.identical_s > 0.0 {
         return format!("readings have been the same to the bit for {:.1} s", evidence.identical_s);
@@ -138,8 +140,8 @@ fn repeated(evidence: &Evidence) -> String {
     )
 }
 
-/// All that is known of the readings, where no kind says what matters.
-fn anything(evidence: &Evidence) -> String {
+/// All quantities of the readings, if no kind tells which of them matters.
+fn all_readings(evidence: &Evidence) -> String {
     let scatter = evidence.scatter_m.map_or("unknown".to_owned(), |s| format!("{:.2} mm", s * 1e3));
     format!(
         "no ball seen for {:.1} s, readings identical for {:.1} s, {} set aside in 10 s, scatter \
@@ -150,13 +152,13 @@ fn anything(evidence: &Evidence) -> String {
 
 fn servo(axis: Axis, kind: Option<FaultKind>, evidence: &Evidence) -> String {
     let e = &evidence.axes[axis];
-    let answer = e.answer.and_then(|answer| answered(axis, kind, &answer));
+    let answer = e.answer.and_then(|answer| response(axis, kind, &answer));
     let answer = answer.map(|words| format!("{words}; ")).unwrap_or_default();
     format!("{answer}{}", accelerated(axis, e))
 }
 
 fn accelerated(axis: Axis, e: &AxisEvidence) -> String {
-    // A residual within its limit is not what raised it.
+    // A residual within its limit is not the cause of the fault.
     let ground = match (e.violates(), e.path_error_m.zip(e.path_limit_m)) {
         (true, _) => format!("limit {:.2}", e.limit_m_s2),
         (false, Some((error, limit))) if e.is_off_path() => format!(
@@ -176,11 +178,11 @@ fn accelerated(axis: Axis, e: &AxisEvidence) -> String {
     }
 }
 
-/// Standard error of a gain beyond which it is better not said.
-const SAYABLE_GAIN_ERROR: f64 = 0.3;
+/// Largest standard error with which a gain is mentioned.
+const MAX_REPORTED_GAIN_ERROR: f64 = 0.3;
 
-/// How the servo answers its command, by what is wrong with it.
-fn answered(axis: Axis, kind: Option<FaultKind>, answer: &Answer) -> Option<String> {
+/// Describes the response of the servo to its command, according to the kind of fault.
+fn response(axis: Axis, kind: Option<FaultKind>, answer: &ServoAnswer) -> Option<String> {
     let command = axis.command();
     let share = share(answer);
     let known = share.as_ref().map(|share| format!(" ({share})")).unwrap_or_default();
@@ -202,19 +204,19 @@ fn answered(axis: Axis, kind: Option<FaultKind>, answer: &Answer) -> Option<Stri
         ),
         Some(FaultKind::Slow) => format!("the servo answers {command} late"),
         Some(FaultKind::Intermittent) => format!("the servo answers {command} now and then"),
-        _ => format!("the servo answers {} of {command}{}", share?, unasked(answer)),
+        _ => format!("the servo answers {} of {command}{}", share?, unexplained(answer)),
     };
     Some(words)
 }
 
-/// How much of its command the servo answers, where that can be said.
-fn share(answer: &Answer) -> Option<String> {
+/// Describes the gain in percent; `None` if it is too uncertain.
+fn share(answer: &ServoAnswer) -> Option<String> {
     let (gain, error) = (100.0 * answer.gain, 100.0 * answer.gain_error);
-    (answer.gain_error <= SAYABLE_GAIN_ERROR).then(|| format!("{gain:.0} ± {error:.0} %"))
+    (answer.gain_error <= MAX_REPORTED_GAIN_ERROR).then(|| format!("{gain:.0} ± {error:.0} %"))
 }
 
-/// What the ball does that no command explains, where it surely does.
-fn unasked(answer: &Answer) -> String {
+/// Describes the acceleration that no command explains; empty if it is not significant.
+fn unexplained(answer: &ServoAnswer) -> String {
     let off = answer.offset_m_s2;
     match off.abs() > 2.0 * answer.offset_error_m_s2 {
         true => format!(" with {off:+.2} m/s² that nobody asked for"),

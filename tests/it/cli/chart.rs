@@ -1,32 +1,32 @@
 use serde_json::Value;
 
-use super::bench::Bench;
+use super::fixture::CliFixture;
 
-fn records(bench: &Bench, name: &str) -> Vec<Value> {
-    let document: Value = serde_json::from_str(&bench.read(name)).unwrap();
+fn records(cli: &CliFixture, name: &str) -> Vec<Value> {
+    let document: Value = serde_json::from_str(&cli.read(name)).unwrap();
     assert!(document["machine"]["cores"].as_u64() > Some(0), "{document}");
     assert_eq!(document["versions"]["offbd"], env!("CARGO_PKG_VERSION"));
     document["records"].as_array().unwrap().clone()
 }
 
 #[test]
-fn estimators_are_measured_drawn_and_kept() {
-    let bench = Bench::new();
-    let done = bench.ok("chart estimators --quick -o new/charts");
+fn the_chart_of_estimators_writes_records_and_drawings() {
+    let cli = CliFixture::new();
+    let done = cli.ok("chart estimators --quick -o new/charts");
     let files = ["estimators.json", "estimators.svg", "estimators.png"];
     for file in files {
         assert!(done.stderr.contains(file), "{}", done.stderr);
-        assert!(bench.path("new/charts").join(file).is_file(), "{file}");
+        assert!(cli.path("new/charts").join(file).is_file(), "{file}");
     }
     assert!(done.stdout.starts_with("estimator "), "{}", done.stdout);
     assert!(done.stdout.lines().all(|line| line.chars().count() <= 80), "{}", done.stdout);
-    let drawing = bench.read("new/charts/estimators.svg");
+    let drawing = cli.read("new/charts/estimators.svg");
     for text in
         ["quadratic fit", "Kalman", "delay (ms)", "rms error (m/s²)", "100 Hz, noise 0.5 mm"]
     {
         assert!(drawing.contains(text), "{text}");
     }
-    let records = records(&bench, "new/charts/estimators.json");
+    let records = records(&cli, "new/charts/estimators.json");
     let own: Vec<&Value> = records.iter().filter(|r| r["offbd"] == true).collect();
     assert_eq!(own.len(), 1);
     assert_eq!(own[0]["value"], 0.5);
@@ -37,17 +37,17 @@ fn estimators_are_measured_drawn_and_kept() {
 }
 
 #[test]
-fn work_precision_puts_the_choice_and_peers_beside_what_is_charted() {
-    let bench = Bench::new();
+fn work_precision_includes_the_automatic_choice_and_the_records_of_peers() {
+    let cli = CliFixture::new();
     let peer = r#"{"chart":"work-precision","machine":{"cpu":"c","cores":1,"features":[],"os":"o"},
         "versions":{"anvil":"1.2"},"records":[{"scene":"slope","engine":"anvil","model":"rigid",
         "method":"euler","setting":"step_s","value":0.001,"error_m":1e-4,"cpu_us_per_s":50.0,
         "spread":1.0,"note":null}]}"#;
-    std::fs::write(bench.path("peers.json"), peer).unwrap();
-    let done = bench.ok("chart work-precision --quick --with peers.json -o charts");
+    std::fs::write(cli.path("peers.json"), peer).unwrap();
+    let done = cli.ok("chart work-precision --quick --with peers.json -o charts");
     assert!(done.stdout.contains("contact-step"), "{}", done.stdout);
-    assert!(bench.read("charts/work-precision.svg").contains("anvil"));
-    let records = records(&bench, "charts/work-precision.json");
+    assert!(cli.read("charts/work-precision.svg").contains("anvil"));
+    let records = records(&cli, "charts/work-precision.json");
     assert!(records.iter().any(|r| r["engine"] == "anvil"));
     let own: Vec<&Value> = records.iter().filter(|r| r["engine"] == "offbd").collect();
     assert!(own.iter().any(|r| r["front"] == true));
@@ -59,30 +59,30 @@ fn work_precision_puts_the_choice_and_peers_beside_what_is_charted() {
 }
 
 #[test]
-fn detectors_are_compared_on_sessions_with_and_without_faults() {
-    let bench = Bench::new();
-    let done = bench.ok("chart detectors --quick -o charts");
+fn detectors_are_compared_on_healthy_and_faulty_sessions() {
+    let cli = CliFixture::new();
+    let done = cli.ok("chart detectors --quick -o charts");
     assert!(done.stdout.starts_with("method "), "{}", done.stdout);
     assert!(done.stdout.lines().all(|line| line.chars().count() <= 80), "{}", done.stdout);
-    let drawing = bench.read("charts/detectors.svg");
+    let drawing = cli.read("charts/detectors.svg");
     for text in ["s rule", "offbd, weighed", "CUSUM", "false alarms per hour", "0.01 m/s²"] {
         assert!(drawing.contains(text), "{text}");
     }
-    assert!(bench.read("charts/detectors-faults.svg").contains("servo dead"));
-    let records = records(&bench, "charts/detectors.json");
+    assert!(cli.read("charts/detectors-faults.svg").contains("servo dead"));
+    let records = records(&cli, "charts/detectors.json");
     let of = |what: &str| -> Vec<&Value> { records.iter().filter(|r| r["of"] == what).collect() };
-    // The higher the threshold, the fewer are alarmed and the fewer are found.
+    // A higher threshold gives fewer false alarms and fewer detections.
     let sweep = of("method");
     for pair in sweep.windows(2).filter(|p| p[0]["method"] == p[1]["method"]) {
         let at = |i: usize, key: &str| pair[i][key].as_u64().unwrap();
-        // A sum that starts anew after each alarm is not monotonous in what is
-        // found; the verdict has no threshold.
+        // A CUSUM that restarts after each alarm does not detect monotonically; the verdict
+        // has no threshold.
         if pair[0]["unit"] == "nats" || pair[0]["unit"] == "m/s²" {
             assert!(at(0, "false_alarms") >= at(1, "false_alarms"), "{pair:?}");
             assert!(at(0, "n_detected") >= at(1, "n_detected"), "{pair:?}");
         }
     }
-    // A dead servo is what every method is for; a ball is nobody's but ours.
+    // Every method finds a dead servo; only offbd finds a stuck ball.
     let right = |method: &str, fault: &str| {
         let all = of("fault");
         let kind = all.iter().find(|k| k["method"] == method && k["fault"] == fault);
@@ -97,9 +97,9 @@ fn detectors_are_compared_on_sessions_with_and_without_faults() {
 }
 
 #[test]
-fn records_that_are_none_are_named() {
-    let bench = Bench::new();
-    std::fs::write(bench.path("peers.json"), "{}").unwrap();
-    let done = bench.run(3, "chart work-precision --quick --with peers.json");
+fn a_file_without_records_is_named() {
+    let cli = CliFixture::new();
+    std::fs::write(cli.path("peers.json"), "{}").unwrap();
+    let done = cli.run(3, "chart work-precision --quick --with peers.json");
     assert!(done.stderr.contains("peers.json"), "{}", done.stderr);
 }

@@ -1,10 +1,10 @@
-//! The command line from outside: a process, its two streams and its exit code.
+//! The command line from outside: a process with its output and exit code.
 
-mod bench;
 mod calibrate;
 mod chart;
 mod demo;
 mod drive_cycle;
+mod fixture;
 mod replay;
 mod scene;
 mod score;

@@ -1,23 +1,23 @@
-use super::bench::Bench;
+use super::fixture::CliFixture;
 
 #[test]
-fn check_says_what_the_configuration_comes_to() {
-    let bench = Bench::new();
-    bench.write("offbd.toml", "listen = '127.0.0.1:9'\n");
-    let told = bench.ok("check --config offbd.toml --data elsewhere").stdout;
-    assert!(told.contains("127.0.0.1:9") && told.contains("elsewhere"), "{told}");
+fn check_prints_the_effective_configuration() {
+    let cli = CliFixture::new();
+    cli.write("offbd.toml", "listen = '127.0.0.1:9'\n");
+    let stdout = cli.ok("check --config offbd.toml --data elsewhere").stdout;
+    assert!(stdout.contains("127.0.0.1:9") && stdout.contains("elsewhere"), "{stdout}");
 }
 
 #[test]
-fn a_configuration_that_cannot_be_names_its_key() {
-    let bench = Bench::new();
-    bench.write("unknown.toml", "[limits]\nnope = 1\n");
-    bench.write("wrong.toml", "[limits]\nbatch_samples = 0\n");
+fn an_invalid_configuration_is_rejected_with_the_key() {
+    let cli = CliFixture::new();
+    cli.write("unknown.toml", "[limits]\nnope = 1\n");
+    cli.write("wrong.toml", "[limits]\nbatch_samples = 0\n");
     for (file, key) in
         [("unknown.toml", "nope"), ("wrong.toml", "limits.batch_samples"), ("none.toml", "none")]
     {
         for command in ["check", "migrate", "serve"] {
-            let done = bench.run(3, &format!("{command} --config {file}"));
+            let done = cli.run(3, &format!("{command} --config {file}"));
             assert!(done.stderr.contains(key), "{command} {file}: {}", done.stderr);
         }
     }
@@ -25,14 +25,14 @@ fn a_configuration_that_cannot_be_names_its_key() {
 
 #[test]
 fn migrating_twice_changes_nothing() {
-    let bench = Bench::new();
-    let first = bench.ok("migrate --data store").stdout;
+    let cli = CliFixture::new();
+    let first = cli.ok("migrate --data store").stdout;
     assert!(first.contains("offbd.sqlite"), "{first}");
-    assert_eq!(bench.ok("migrate --data store").stdout, first);
+    assert_eq!(cli.ok("migrate --data store").stdout, first);
 }
 
 #[test]
-fn watching_where_nobody_serves_says_so() {
-    let done = Bench::new().run(1, "watch bench-1 --address 127.0.0.1:1");
+fn watch_reports_a_missing_service() {
+    let done = CliFixture::new().run(1, "watch bench-1 --address 127.0.0.1:1");
     assert!(done.stderr.contains("no stream of bench-1 at 127.0.0.1:1"), "{}", done.stderr);
 }

@@ -1,56 +1,56 @@
 use serde_json::Value;
 
-use super::bench::Bench;
+use super::fixture::CliFixture;
 
 const HEADER: &str = "t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m";
 
 #[test]
 fn equal_seeds_give_equal_bytes() {
-    let bench = Bench::new();
+    let cli = CliFixture::new();
     let noisy = "simulate --seconds 5 --pushes 20 --late 0.1 --fault sensor:spikes@2 --seed";
-    let first = bench.ok(&format!("{noisy} 1")).stdout;
-    assert_eq!(first, bench.ok(&format!("{noisy} 1")).stdout);
-    assert_ne!(first, bench.ok(&format!("{noisy} 2")).stdout);
+    let first = cli.ok(&format!("{noisy} 1")).stdout;
+    assert_eq!(first, cli.ok(&format!("{noisy} 1")).stdout);
+    assert_ne!(first, cli.ok(&format!("{noisy} 2")).stdout);
 }
 
 #[test]
 fn a_session_has_the_columns_of_the_contract() {
-    let bench = Bench::new();
-    let plain = bench.ok("simulate --seconds 2").stdout;
+    let cli = CliFixture::new();
+    let plain = cli.ok("simulate --seconds 2").stdout;
     assert_eq!(plain.lines().next(), Some(HEADER));
     assert!((200..=202).contains(&plain.lines().count()));
-    let numbered = bench.ok("simulate --seconds 2 --seq").stdout;
+    let numbered = cli.ok("simulate --seconds 2 --seq").stdout;
     assert_eq!(numbered.lines().next(), Some(format!("seq,{HEADER}").as_str()));
     assert!(numbered.lines().nth(1).unwrap().starts_with("1,0,"));
 }
 
 #[test]
 fn the_rate_and_the_plate_come_from_the_asset_file() {
-    let bench = Bench::new();
-    bench.write("slow.json", r#"{"name":"slow","sample_rate_hz":20}"#);
-    let rows = bench.ok("simulate --asset slow.json --seconds 10").stdout.lines().count() - 1;
+    let cli = CliFixture::new();
+    cli.write("slow.json", r#"{"name":"slow","sample_rate_hz":20}"#);
+    let rows = cli.ok("simulate --asset slow.json --seconds 10").stdout.lines().count() - 1;
     assert!((199..=202).contains(&rows), "{rows} rows in 10 s at 20 Hz");
-    bench.write("fast.json", r#"{"name":"fast","sample_rate_hz":5000}"#);
-    assert!(bench.run(3, "simulate --asset fast.json").stderr.contains("/sample_rate_hz"));
+    cli.write("fast.json", r#"{"name":"fast","sample_rate_hz":5000}"#);
+    assert!(cli.run(3, "simulate --asset fast.json").stderr.contains("/sample_rate_hz"));
 }
 
 #[test]
-fn the_truth_says_what_was_injected() {
-    let bench = Bench::new();
-    bench.ok("simulate --fault y_servo:gain=0.5@8 --seconds 30 -o s.csv --truth t.json");
-    let truth: Value = serde_json::from_str(&bench.read("t.json")).unwrap();
+fn the_truth_file_describes_the_injected_fault() {
+    let cli = CliFixture::new();
+    cli.ok("simulate --fault y_servo:gain=0.5@8 --seconds 30 -o s.csv --truth t.json");
+    let truth: Value = serde_json::from_str(&cli.read("t.json")).unwrap();
     assert_eq!((&truth["class"], &truth["file"]), (&"y_servo".into(), &"s.csv".into()));
     let fault = &truth["fault"];
     assert_eq!((&fault["kind"], &fault["axis"]), (&"gain".into(), &"y".into()));
     assert_eq!((fault["size"].as_f64(), fault["onset_s"].as_f64()), (Some(0.5), Some(8.0)));
     assert!(fault["chance_s"].as_f64().unwrap() >= 8.0);
-    assert_eq!(truth["rows"].as_u64().unwrap() as usize, bench.read("s.csv").lines().count() - 1);
+    assert_eq!(truth["rows"].as_u64().unwrap() as usize, cli.read("s.csv").lines().count() - 1);
 }
 
 #[test]
-fn a_gap_leaves_rows_out() {
-    let bench = Bench::new();
-    let done = bench.ok("simulate --seconds 10 --gap 4-6");
+fn a_gap_omits_rows() {
+    let cli = CliFixture::new();
+    let done = cli.ok("simulate --seconds 10 --gap 4-6");
     let inside = |line: &str| {
         let t: f64 = line.split(',').next().unwrap().parse().unwrap();
         (4.0..6.0).contains(&t)
@@ -58,16 +58,16 @@ fn a_gap_leaves_rows_out() {
     assert!(!done.stdout.lines().skip(1).any(inside));
 }
 
-/// The columns of a session as numbers, none where a field is empty.
+/// Returns the rows of a session as numbers, `None` for an empty field.
 fn columns(session: &str) -> Vec<Vec<Option<f64>>> {
     let rows = session.lines().skip(1);
     rows.map(|row| row.split(',').map(|field| field.parse().ok()).collect()).collect()
 }
 
 #[test]
-fn what_real_rigs_do_can_be_asked_for() {
-    let bench = Bench::new();
-    let session = |line: &str| columns(&bench.ok(&format!("simulate --seconds 20 {line}")).stdout);
+fn imperfections_of_real_rigs_can_be_simulated() {
+    let cli = CliFixture::new();
+    let session = |line: &str| columns(&cli.ok(&format!("simulate --seconds 20 {line}")).stdout);
 
     let whole = session("--whole-degrees");
     let commands = whole.iter().flat_map(|row| [row[1].unwrap(), row[2].unwrap()]);
@@ -87,42 +87,42 @@ fn what_real_rigs_do_can_be_asked_for() {
     let repeated = steady.windows(2).filter(|w| w[0][3..] == w[1][3..]).count();
     assert!(repeated > steady.len() * 9 / 10, "{repeated} of {} repeat", steady.len());
 
-    // The first reading is of a ball at rest, noise and a millimetre aside.
+    // The first reading is of a ball at rest, except for noise and a millimetre.
     let first = |line: &str| (session(line)[1][3].unwrap(), session(line)[1][4].unwrap());
     let (centred, off) = (first(""), first("--origin-m 0.03,-0.01"));
     assert!((off.0 - centred.0 - 0.03).abs() < 1e-3 && (off.1 - centred.1 + 0.01).abs() < 1e-3);
 }
 
-/// The integral balances the plate: the mean command is minus its level.
+/// The integral part of the controller balances the plate: the mean command is minus the level.
 #[test]
-fn a_plate_off_level_is_balanced_by_the_commands() {
-    let bench = Bench::new();
+fn the_commands_balance_a_plate_that_is_off_level() {
+    let cli = CliFixture::new();
     let level = "simulate --seconds 60 --reference hold --breakaway-deg 0 --level-deg -2,1.5";
-    let rows = columns(&bench.ok(level).stdout);
+    let rows = columns(&cli.ok(level).stdout);
     let mean = |column: usize| {
         let last = &rows[rows.len() - 2000..];
         last.iter().map(|row| row[column].unwrap()).sum::<f64>() / 2000.0
     };
     let (qx_deg, qy_deg) = (mean(1).to_degrees(), mean(2).to_degrees());
-    // The y servo's gain is 0.96; the play hides a twentieth of a degree.
+    // The gain of the y servo is 0.96; play causes an error of a twentieth of a degree.
     assert!((qy_deg - 2.0).abs() < 0.1 && (qx_deg + 1.5 / 0.96).abs() < 0.1, "{qx_deg} {qy_deg}");
 }
 
 #[test]
-fn a_rig_drawn_at_random_has_a_level_of_its_own_in_each_session() {
-    let bench = Bench::new();
-    let session = |line: &str| bench.ok(&format!("simulate --seconds 5 {line}")).stdout;
+fn a_randomly_drawn_rig_depends_only_on_its_seed() {
+    let cli = CliFixture::new();
+    let session = |line: &str| cli.ok(&format!("simulate --seconds 5 {line}")).stdout;
     assert_eq!(session("--rig-seed 7 --rig a.json"), session("--rig-seed 7 --rig b.json"));
-    assert_eq!(bench.read("a.json"), bench.read("b.json"));
+    assert_eq!(cli.read("a.json"), cli.read("b.json"));
     assert_ne!(session("--rig-seed 7"), session("--rig-seed 8 --rig c.json"));
-    assert_ne!(bench.read("a.json"), bench.read("c.json"));
+    assert_ne!(cli.read("a.json"), cli.read("c.json"));
     assert_ne!(session("--level-sd-deg 1"), session(""));
     assert_eq!(session("--level-sd-deg 0"), session(""));
 }
 
 #[test]
-fn a_number_out_of_range_is_refused_by_its_option() {
-    let bench = Bench::new();
+fn a_number_out_of_range_is_rejected_with_its_option() {
+    let cli = CliFixture::new();
     for (line, range) in [
         ("--level-deg 12", "-10 to 10"),
         ("--level-deg 1,NaN", "-10 to 10"),
@@ -140,15 +140,15 @@ fn a_number_out_of_range_is_refused_by_its_option() {
         ("--pushes inf", "0 to 600"),
         ("--late-window-s 61", "0 to 60"),
     ] {
-        let said = bench.run(2, &format!("simulate {line}")).stderr;
+        let stderr = cli.run(2, &format!("simulate {line}")).stderr;
         let option = line.split(' ').next().unwrap();
-        assert!(said.contains(option) && said.contains(range), "{line}: {said}");
+        assert!(stderr.contains(option) && stderr.contains(range), "{line}: {stderr}");
     }
 }
 
 #[test]
-fn options_that_do_not_go_together_are_refused() {
-    let bench = Bench::new();
+fn incompatible_options_are_rejected() {
+    let cli = CliFixture::new();
     for line in [
         "--rig-seed 1 --preset touch",
         "--hold-rows 2 --refresh-hz 10",
@@ -156,11 +156,11 @@ fn options_that_do_not_go_together_are_refused() {
         "--one-axis --fault y_servo:dead@3",
         "--one-axis --fault sensor:freeze_axis=y@3",
     ] {
-        let said = bench.run(2, &format!("simulate {line}")).stderr;
+        let stderr = cli.run(2, &format!("simulate {line}")).stderr;
         assert!(
-            line.split(' ').any(|word| word.starts_with("--") && said.contains(word)),
-            "{said}"
+            line.split(' ').any(|word| word.starts_with("--") && stderr.contains(word)),
+            "{stderr}"
         );
     }
-    bench.ok("simulate --one-axis --seconds 5 --fault x_servo:dead@3");
+    cli.ok("simulate --one-axis --seconds 5 --fault x_servo:dead@3");
 }

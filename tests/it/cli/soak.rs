@@ -1,19 +1,19 @@
 use serde_json::Value;
 
-use super::bench::Bench;
+use super::fixture::CliFixture;
 
-/// An hour of one rig.
+/// Options for about an hour of one rig.
 const HOUR: &str = "soak --rig-days 0.04 --jobs 1 --format json";
 
-fn figures(bench: &Bench, line: &str) -> Value {
-    bench.ok(&format!("{HOUR} {line}")).json().remove(0)
+fn figures(cli: &CliFixture, line: &str) -> Value {
+    cli.ok(&format!("{HOUR} {line}")).json().remove(0)
 }
 
 #[test]
-fn equal_seeds_come_to_equal_figures_and_a_rig_is_watched_or_refused() {
-    let bench = Bench::new();
-    let first = figures(&bench, "--seed 3");
-    assert_eq!(first, figures(&bench, "--seed 3"));
+fn equal_seeds_give_equal_results_and_each_rig_is_counted_once() {
+    let cli = CliFixture::new();
+    let first = figures(&cli, "--seed 3");
+    assert_eq!(first, figures(&cli, "--seed 3"));
     let count = |key: &str| first[key].as_u64().unwrap();
     assert_eq!(count("rigs") + count("refused"), 1);
     assert_eq!(first["refusals"].as_array().unwrap().len() as u64, count("refused"));
@@ -25,24 +25,24 @@ fn equal_seeds_come_to_equal_figures_and_a_rig_is_watched_or_refused() {
 
 /// In these two minutes the ball hardly moves.
 #[test]
-fn a_rig_that_cannot_be_learnt_is_named_with_the_reason() {
-    let bench = Bench::new();
-    let done = bench.ok(&format!("{HOUR} --seed 45 --calibration-sessions 1"));
+fn a_failed_calibration_is_reported_with_the_reason() {
+    let cli = CliFixture::new();
+    let done = cli.ok(&format!("{HOUR} --seed 45 --calibration-sessions 1"));
     let figures = &done.json()[0];
     assert_eq!((&figures["refused"], &figures["rigs"]), (&1.into(), &0.into()));
-    let said = figures["refusals"][0].as_str().unwrap();
-    assert!(said.contains(": x: ") || said.contains(": y: "), "{said}");
-    assert!(done.stderr.contains(&format!("not watched: {said}")), "{}", done.stderr);
+    let refusal = figures["refusals"][0].as_str().unwrap();
+    assert!(refusal.contains(": x: ") || refusal.contains(": y: "), "{refusal}");
+    assert!(done.stderr.contains(&format!("not watched: {refusal}")), "{}", done.stderr);
 }
 
 #[test]
-fn bad_numbers_are_refused_by_their_option() {
-    let bench = Bench::new();
-    for (line, said) in [
+fn invalid_values_are_rejected_with_their_option() {
+    let cli = CliFixture::new();
+    for (line, expected) in [
         ("--variety wild", "presets, real"),
         ("--calibration-sessions 0", "1..=30"),
         ("--rig-days 0", "--rig-days"),
     ] {
-        assert!(bench.run(2, &format!("soak {line}")).stderr.contains(said), "{line}");
+        assert!(cli.run(2, &format!("soak {line}")).stderr.contains(expected), "{line}");
     }
 }

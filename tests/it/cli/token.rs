@@ -1,57 +1,57 @@
-use super::bench::Bench;
+use super::fixture::CliFixture;
 
 #[test]
-fn a_token_is_made_listed_and_revoked() {
-    let bench = Bench::new();
-    let made = bench.ok("token create --name ann --role admin --data store");
+fn a_token_can_be_created_listed_and_revoked() {
+    let cli = CliFixture::new();
+    let made = cli.ok("token create --name ann --role admin --data store");
     let secret = made.stdout.trim().to_owned();
     assert!(secret.starts_with("offbd_") && secret.len() == 70, "{secret}");
     assert!(!made.stderr.contains(&secret), "{}", made.stderr);
     let device = "token create --name rig --role device --asset bench-1 --days 30 --data store";
-    let made = bench.ok(device);
+    let made = cli.ok(device);
     assert!(made.stderr.contains("there is no such asset yet"), "{}", made.stderr);
-    let again = bench.run(1, device);
-    assert!(again.stderr.contains("there is a token `rig`"), "{}", again.stderr);
-    bench.ok("token revoke ann --data store");
-    let gone = bench.run(1, "token revoke ann --data store");
+    let again = cli.run(1, device);
+    assert!(again.stderr.contains("a token `rig` exists already"), "{}", again.stderr);
+    cli.ok("token revoke ann --data store");
+    let gone = cli.run(1, "token revoke ann --data store");
     assert!(gone.stderr.contains("no token `ann` is in force"), "{}", gone.stderr);
-    let tokens = bench.ok("token list --format json --data store").json();
+    let tokens = cli.ok("token list --format json --data store").json();
     let names: Vec<_> = tokens.iter().map(|token| token["name"].as_str().unwrap()).collect();
     assert_eq!(names, ["rig", "ann"]);
     assert_eq!(tokens[0]["asset"], "bench-1");
     assert!(tokens[0]["expires_at"].is_string() && tokens[1]["revoked_at"].is_string());
-    let table = bench.ok("token list --data store").stdout;
+    let table = cli.ok("token list --data store").stdout;
     assert!(table.contains("device") && table.contains("revoked 2"), "{table}");
     assert!(!table.contains(&secret[6..]) && !tokens[1].to_string().contains(&secret[6..]));
 }
 
 #[test]
-fn a_token_that_cannot_be_is_not_made() {
-    let bench = Bench::new();
-    for (line, told) in [
+fn invalid_token_options_are_rejected() {
+    let cli = CliFixture::new();
+    for (line, expected) in [
         ("token create --name x --role god", "god"),
         ("token create --name x --role device", "--asset"),
         ("token create --name x --role viewer --asset a", "/asset"),
         ("token create --name x --role viewer --days 0", "--days"),
     ] {
-        let done = bench.run(2, line);
-        assert!(done.stderr.contains(told), "{line}: {}", done.stderr);
+        let done = cli.run(2, line);
+        assert!(done.stderr.contains(expected), "{line}: {}", done.stderr);
         assert_eq!(done.stdout, "", "{line}");
     }
 }
 
 #[test]
-fn the_service_does_not_start_open_to_other_machines() {
-    let bench = Bench::new();
-    bench.write("open.toml", "auth = 'off'\nlisten = '0.0.0.0:0'\n");
-    let done = bench.run(3, "serve --config open.toml");
-    for told in ["`auth`", "offbd token create", "127.0.0.1"] {
-        assert!(done.stderr.contains(told), "{}", done.stderr);
+fn without_authentication_the_service_does_not_listen_to_other_machines() {
+    let cli = CliFixture::new();
+    cli.write("open.toml", "auth = 'off'\nlisten = '0.0.0.0:0'\n");
+    let done = cli.run(3, "serve --config open.toml");
+    for expected in ["`auth`", "offbd token create", "127.0.0.1"] {
+        assert!(done.stderr.contains(expected), "{}", done.stderr);
     }
-    let told = bench.ok("check --listen 0.0.0.0:0").stdout;
-    assert!(told.contains("with a token, not encrypted"), "{told}");
-    assert!(bench.ok("check").stdout.contains("for everyone on this machine"));
-    bench.write("tls.toml", "[tls]\ncertificate = 'none.pem'\nkey = 'none.pem'\n");
-    let done = bench.run(1, "serve --config tls.toml");
+    let stdout = cli.ok("check --listen 0.0.0.0:0").stdout;
+    assert!(stdout.contains("with a token, not encrypted"), "{stdout}");
+    assert!(cli.ok("check").stdout.contains("for everyone on this machine"));
+    cli.write("tls.toml", "[tls]\ncertificate = 'none.pem'\nkey = 'none.pem'\n");
+    let done = cli.run(1, "serve --config tls.toml");
     assert!(done.stderr.contains("`tls.certificate`"), "{}", done.stderr);
 }

@@ -1,7 +1,7 @@
 use std::io::Read;
 use std::process::{Command, Stdio};
 
-use super::bench::Bench;
+use super::fixture::CliFixture;
 
 const COMMANDS: [&str; 12] = [
     "simulate",
@@ -19,22 +19,22 @@ const COMMANDS: [&str; 12] = [
 ];
 
 #[test]
-fn help_teaches_with_examples_within_eighty_columns() {
-    let bench = Bench::new();
+fn the_help_of_each_command_has_an_example_and_fits_in_eighty_columns() {
+    let cli = CliFixture::new();
     for command in COMMANDS {
-        let help = bench.ok(&format!("{command} --help"));
+        let help = cli.ok(&format!("{command} --help"));
         assert!(help.stdout.contains(&format!("  offbd {command} ")), "no example of {command}");
         let wide = help.stdout.lines().find(|line| line.chars().count() > 80);
         assert_eq!(wide, None);
         assert_eq!(help.stderr, "");
     }
-    assert!(bench.ok("--help").stdout.contains("Exit status"));
+    assert!(cli.ok("--help").stdout.contains("Exit status"));
 }
 
 #[test]
-fn bad_arguments_exit_with_2_and_say_what_would_be_right() {
-    let bench = Bench::new();
-    for (line, said) in [
+fn invalid_arguments_exit_with_2_and_a_hint() {
+    let cli = CliFixture::new();
+    for (line, expected) in [
         ("", "Usage"),
         ("dance", "dance"),
         ("replay", "SESSION.csv"),
@@ -48,21 +48,21 @@ fn bad_arguments_exit_with_2_and_say_what_would_be_right() {
         ("calibrate a.csv -o b.json", "--asset"),
         ("chart pie", "estimators"),
     ] {
-        let done = bench.run(2, line);
-        assert!(done.stderr.contains(said), "{line}: {}", done.stderr);
+        let done = cli.run(2, line);
+        assert!(done.stderr.contains(expected), "{line}: {}", done.stderr);
         assert_eq!(done.stdout, "", "{line}");
     }
 }
 
 #[test]
-fn unusable_input_exits_with_3_and_is_named() {
-    let bench = Bench::new();
-    bench.write("header.csv", "t_s,x_m\n0,0\n");
-    bench.write("empty.csv", "t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n");
-    bench.write("radius.json", r#"{"name":"a","ball":{"radius_m":-1}}"#);
-    bench.write("broken.json", "{");
-    bench.ok("simulate --seconds 1 -o good.csv");
-    for (line, said) in [
+fn unusable_input_exits_with_3_and_the_name_of_the_file() {
+    let cli = CliFixture::new();
+    cli.write("header.csv", "t_s,x_m\n0,0\n");
+    cli.write("empty.csv", "t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n");
+    cli.write("radius.json", r#"{"name":"a","ball":{"radius_m":-1}}"#);
+    cli.write("broken.json", "{");
+    cli.ok("simulate --seconds 1 -o good.csv");
+    for (line, expected) in [
         ("replay nowhere.csv", vec!["nowhere.csv"]),
         ("replay .", vec![".: "]),
         ("replay header.csv", vec!["header.csv", "cmd_qx_rad"]),
@@ -73,15 +73,15 @@ fn unusable_input_exits_with_3_and_is_named() {
         ("simulate --asset radius.json -o o.csv", vec!["/ball/radius_m"]),
         ("score .", vec!["labels.json"]),
     ] {
-        let done = bench.run(3, line);
-        assert!(said.iter().all(|s| done.stderr.contains(s)), "{line}: {}", done.stderr);
+        let done = cli.run(3, line);
+        assert!(expected.iter().all(|s| done.stderr.contains(s)), "{line}: {}", done.stderr);
         assert_eq!(done.stdout, "", "{line}");
     }
 }
 
-/// A session of two minutes is far more than a pipe holds.
+/// A session of two minutes is much larger than the buffer of a pipe.
 #[test]
-fn a_reader_that_leaves_early_is_no_failure() {
+fn a_closed_stdout_pipe_is_not_an_error() {
     let mut child = Command::new(assert_cmd::cargo::cargo_bin!("offbd"))
         .args(["simulate", "--seconds", "120"])
         .stdout(Stdio::piped())

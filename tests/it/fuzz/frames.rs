@@ -1,18 +1,18 @@
-//! Frames of a WebSocket that are nearly right, sent to a real server.
+//! Fuzzing of the WebSocket: mutated frames, sent to a real service.
 
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 use tokio::time::timeout;
 
-use super::change::Pool;
-use super::{corpus, number};
-use crate::support::{Bench, DEADLINE, batch, rig};
+use super::mutation::InputPool;
+use super::{corpus, env_number};
+use crate::support::{DEADLINE, ServiceFixture, batch, rig};
 
-/// Connections that are tried; FUZZ says otherwise.
+/// Number of connections, unless FUZZ is set.
 const CONNECTIONS: usize = 60;
 
-/// A connection that has become a WebSocket.
-async fn upgraded(address: &str) -> TcpStream {
+/// Opens a connection and upgrades it to a WebSocket.
+async fn open_websocket(address: &str) -> TcpStream {
     let mut socket = TcpStream::connect(address).await.unwrap();
     let request = format!(
         "GET /api/v1/assets/a/stream HTTP/1.1\r\nhost: {address}\r\nconnection: upgrade\r\n\
@@ -28,7 +28,7 @@ async fn upgraded(address: &str) -> TcpStream {
     socket
 }
 
-/// The frame of a text, masked with nothing.
+/// Returns the frame of a text with a masking key of zero.
 fn frame(text: &[u8]) -> Vec<u8> {
     let mut frame = vec![0x81];
     match u16::try_from(text.len()) {
@@ -47,35 +47,36 @@ fn frame(text: &[u8]) -> Vec<u8> {
     frame
 }
 
-/// A frame that closes.
+/// A close frame.
 const CLOSE: [u8; 6] = [0x88, 0x80, 0, 0, 0, 0];
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_websocket_bears_frames_that_are_nearly_right() {
-    let bench = Bench::start().await;
-    bench.client.asset("a").await;
+async fn the_service_survives_mutated_websocket_frames() {
+    let fixture = ServiceFixture::start().await;
+    fixture.client.asset("a").await;
     let mut inputs: Vec<Vec<u8>> = corpus("json").iter().map(|text| frame(text)).collect();
     inputs.extend(corpus("frames"));
-    let mut pool = Pool::new(inputs, number("SEED", 1) as u64);
-    for _ in 0..number("FUZZ", CONNECTIONS) {
+    let mut pool = InputPool::new(inputs, env_number("SEED", 1) as u64);
+    for _ in 0..env_number("FUZZ", CONNECTIONS) {
         let input = pool.next();
-        let mut socket = upgraded(&bench.client.address).await;
+        let mut socket = open_websocket(&fixture.client.address).await;
         let sent = async {
             socket.write_all(&input).await?;
             socket.write_all(&CLOSE).await?;
-            // What waits for the rest of a frame learns that there is none.
+            // Ends a wait for the rest of an incomplete frame.
             socket.shutdown().await
         };
-        // The service may have closed already.
+        // The service may have closed the connection already.
         let _ = sent.await;
         let mut answer = Vec::new();
-        // It closes, in whatever way.
-        let _ = timeout(DEADLINE, socket.read_to_end(&mut answer)).await.expect("it closes");
-        pool.learn(&input, answer.iter().take(24).map(|b| char::from(*b)).collect());
+        // The service closes the connection, with or without an error.
+        let closed = timeout(DEADLINE, socket.read_to_end(&mut answer)).await;
+        let _ = closed.expect("the service closes the connection");
+        pool.record(&input, answer.iter().take(24).map(|b| char::from(*b)).collect());
     }
-    // It goes on as if nothing had been.
+    // The service still works.
     let samples = rig(50, usize::MAX);
-    let ack = bench.client.post("assets/a/telemetry", &batch(Some("after"), &samples)).await;
+    let ack = fixture.client.post("assets/a/telemetry", &batch(Some("after"), &samples)).await;
     assert_eq!(ack.expect(200)["accepted"], 50);
-    bench.client.get("/readyz").await.expect(200);
+    fixture.client.get("/readyz").await.expect(200);
 }

@@ -1,5 +1,5 @@
-//! What is tried out. Each reads an input, checks what it takes, and says how it
-//! was answered.
+//! The parsers under test. Each parses an input, checks what it accepted, and returns the
+//! kind of the result.
 
 use offbd::service::access::Role;
 use offbd::service::access::jwt::{KeySet, MAX_SUBJECT, verify};
@@ -13,7 +13,7 @@ use crate::support::provider::{self, Key};
 
 pub type Parser = fn(&[u8]) -> String;
 
-/// Every parser by the directory of its corpus.
+/// Every parser, with the directory of its corpus.
 pub const PARSERS: [(&str, Parser); 11] = [
     ("json", |input| batch(telemetry::json(input, LIMIT))),
     ("msgpack", |input| batch(telemetry::msgpack(input, LIMIT))),
@@ -23,18 +23,19 @@ pub const PARSERS: [(&str, Parser); 11] = [
     ("asset", asset_file),
     ("scene", scene_file),
     ("chunk", chunk),
-    ("moment", moment),
+    ("moment", timestamp),
     ("jwt", jwt),
     ("jwks", jwks),
 ];
 
-/// Samples in a batch.
+/// Largest number of samples of a batch.
 const LIMIT: usize = 200;
 
 /// Longest reason given for a row, bytes.
-const MAX_REASON: usize = 300;
+const MAX_REASON_BYTES: usize = 300;
 
-/// `text` without what is of this input alone.
+/// Returns the first words of a message, without numbers and punctuation, which depend on the
+/// input.
 fn kind(text: &str) -> String {
     let words = text.split(|c: char| !c.is_ascii_alphabetic() && c != '_');
     words.filter(|word| word.len() > 1).take(12).collect::<Vec<_>>().join(" ")
@@ -47,7 +48,7 @@ fn batch(read: Result<Batch, BatchError>) -> String {
     };
     assert!(batch.rows.len() <= LIMIT);
     let refused: Vec<&String> = batch.rows.iter().filter_map(|row| row.as_ref().err()).collect();
-    assert!(refused.iter().all(|reason| reason.len() <= MAX_REASON), "{refused:?}");
+    assert!(refused.iter().all(|reason| reason.len() <= MAX_REASON_BYTES), "{refused:?}");
     let samples: Vec<Sample> =
         batch.rows.iter().filter_map(|row| row.as_ref().ok()).copied().collect();
     if samples.iter().all(is_finite) {
@@ -67,28 +68,28 @@ fn is_finite(sample: &Sample) -> bool {
 fn written_and_read(samples: &[Sample]) -> Vec<Sample> {
     let mut text = Vec::new();
     session_csv::write(&mut text, samples).unwrap();
-    session_csv::Reader::new(text.as_slice()).unwrap().map(|row| row.unwrap()).collect()
+    session_csv::SessionCsvReader::new(text.as_slice()).unwrap().map(|row| row.unwrap()).collect()
 }
 
-/// The engine never fails on data.
+/// Checks that the engine does not panic.
 fn judge(samples: &[Sample]) {
     let setup = Setup::new(Rig::chapter("fuzz"), None).unwrap();
     let mut engine = Engine::new(setup, FaultMemory::default());
-    let mut outputs = Vec::new();
+    let mut transitions = Vec::new();
     for sample in samples {
-        engine.handle(Input::Sample(*sample), &mut outputs);
+        engine.handle(Input::Sample(*sample), &mut transitions);
     }
-    engine.handle(Input::End, &mut outputs);
+    engine.handle(Input::End, &mut transitions);
 }
 
-/// A recording that a rig is learnt from.
+/// A recording from which a rig is calibrated.
 fn calibration(input: &[u8]) -> String {
-    let reader = match session_csv::Reader::new(input) {
+    let reader = match session_csv::SessionCsvReader::new(input) {
         Ok(reader) => reader,
         Err(error) => return kind(&error.to_string()),
     };
     let samples: Vec<Sample> = reader.filter_map(Result::ok).collect();
-    match calibrate(&Rig::chapter("fuzz"), &[samples], "", "") {
+    match calibrate(&Rig::chapter("fuzz"), &[samples]) {
         Ok(learnt) => {
             let rig = Rig { calibration: Some(learnt), ..Rig::chapter("fuzz") };
             let file = serde_json::to_vec(&asset::view(&rig)).unwrap();
@@ -110,7 +111,7 @@ fn asset_file(input: &[u8]) -> String {
     match Setup::new(rig, None) {
         Ok(setup) => {
             let mut engine = Engine::new(setup, FaultMemory::default());
-            let mut outputs = Vec::new();
+            let mut transitions = Vec::new();
             for i in 0..20 {
                 let t_s = f64::from(i) * 0.01;
                 let (x_m, y_m) = (Some(0.01), Some(-0.01));
@@ -122,7 +123,7 @@ fn asset_file(input: &[u8]) -> String {
                     x_m,
                     y_m,
                 };
-                engine.handle(Input::Sample(sample), &mut outputs);
+                engine.handle(Input::Sample(sample), &mut transitions);
             }
             format!("a rig {}", again.calibration.is_some())
         }
@@ -141,7 +142,7 @@ fn scene_file(input: &[u8]) -> String {
     }
 }
 
-/// What the store compresses samples into.
+/// A chunk, the compressed form of samples in the store.
 fn chunk(input: &[u8]) -> String {
     match offbd::store::codec::decode(input) {
         Ok(samples) => format!("{} samples", samples.len().min(3)),
@@ -149,19 +150,19 @@ fn chunk(input: &[u8]) -> String {
     }
 }
 
-/// A moment, as a query or a body names one.
-fn moment(input: &[u8]) -> String {
-    match offbd::service::moment(&String::from_utf8_lossy(input)) {
-        Ok(moment) => format!("a moment {}", moment < 0),
+/// A timestamp of a query or a request body.
+fn timestamp(input: &[u8]) -> String {
+    match offbd::service::parse_timestamp(&String::from_utf8_lossy(input)) {
+        Ok(timestamp) => format!("a timestamp {}", timestamp < 0),
         Err(reason) => kind(&reason),
     }
 }
 
-/// In 2027, when the tokens of the corpus are in force.
+/// A time in 2027, when the tokens of the corpus are valid, µs since 1970.
 const NOW: i64 = 1_800_000_000_000_000;
 
-/// A token of an identity provider, whose key signs whatever is in it: the header
-/// up to the first line's end, the claims behind it.
+/// A token of an identity provider: the first line of the input is its header, the rest its
+/// claims; it is signed with the provider's key.
 fn jwt(input: &[u8]) -> String {
     let key = Key::new("k");
     let end = input.iter().position(|byte| *byte == b'\n').unwrap_or(input.len());
@@ -181,18 +182,18 @@ fn jwt(input: &[u8]) -> String {
     }
 }
 
-/// The keys of an identity provider, and tokens that none of them has signed.
+/// The key set of an identity provider, tried with forged tokens.
 fn jwks(input: &[u8]) -> String {
     let keys = match KeySet::parse(input) {
         Ok(keys) => keys,
         Err(error) => return kind(&error.to_string()),
     };
     let claims = provider::claims("s", "admin");
-    let told = ["EdDSA", "ES256", "ES384", "RS256", "PS512"].map(|algorithm| {
+    let refusals = ["EdDSA", "ES256", "ES384", "RS256", "PS512"].map(|algorithm| {
         let header = serde_json::json!({ "alg": algorithm, "kid": "k" });
         let forged = provider::token(&header, &claims, |_| vec![1; 64]);
         let refusal = verify(&forged, &keys, &provider::config("").expected(), NOW).unwrap_err();
         kind(&refusal.to_string())
     });
-    format!("{} {}", keys.n_keys().min(3), told.join(" "))
+    format!("{} {}", keys.n_keys().min(3), refusals.join(" "))
 }

@@ -1,8 +1,8 @@
-"""Makes vectors.json by PyJWT and cryptography, which share no code with offbd:
+"""Makes vectors.json with PyJWT and cryptography, which share no code with offbd:
 
     pip install 'PyJWT[crypto]' && python3 tests/it/jwt/make.py > tests/it/jwt/vectors.json
 
-The private keys are made anew each time and kept nowhere. Tokens expire in 2100.
+The private keys are new each time and not stored. Tokens expire in 2100.
 """
 
 import json
@@ -41,7 +41,7 @@ for algorithm, (key, kind) in KEYS.items():
     published = {**kind.to_jwk(key.public_key(), as_dict=True), "kid": name, "use": "sig"}
     if published not in keys:
         keys.append(published)
-# A set may have keys that are not for signatures, or of a kind yet to come.
+# A set may contain keys that are not for signatures, or of an unknown type.
 keys.append({"kty": "OKP", "crv": "X25519", "x": "AAAA", "kid": "agreement", "use": "enc"})
 keys.append({"kty": "AKP", "alg": "ML-DSA-44", "pub": "AAAA", "kid": "later"})
 print(json.dumps({"claims": CLAIMS, "jwks": {"keys": keys}, "tokens": tokens}, indent=1))

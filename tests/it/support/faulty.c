@@ -1,6 +1,6 @@
-/* Loaded before the C library: lets calls on the store's files fail as the
- * lines of the file FAULTS say: "write ERRNO", "torn ERRNO" (half is written),
- * "sync ERRNO"; "clock SECONDS" moves the wall clock. */
+/* Preloaded before the C library: makes system calls on the store's files fail
+ * according to the lines of the file FAULTS: "write ERRNO", "torn ERRNO" (half is
+ * written), "sync ERRNO"; "clock SECONDS" shifts the wall clock. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -10,6 +10,7 @@
 #include <time.h>
 #include <unistd.h>
 
+/* The number that FAULTS has for this fault, or 0. */
 static int due(const char *what)
 {
     char word[16];
@@ -23,7 +24,7 @@ static int due(const char *what)
     return found;
 }
 
-static int of_store(int fd)
+static int is_store_file(int fd)
 {
     char link[64], path[4096];
     snprintf(link, sizeof link, "/proc/self/fd/%d", fd);
@@ -36,11 +37,11 @@ static int of_store(int fd)
 
 #define REAL(name) ((__typeof__(name) *)dlsym(RTLD_NEXT, #name))
 
-/* How much of `n` bytes may be written, and the error after that. */
+/* The number of bytes of `n` to write, and the error that follows, or 0. */
 static size_t allowed(int fd, size_t n, int *error)
 {
     *error = 0;
-    if (!of_store(fd))
+    if (!is_store_file(fd))
         return n;
     if ((*error = due("write")))
         return 0;
@@ -74,7 +75,7 @@ ssize_t pwrite64(int fd, const void *data, size_t n, off64_t at)
 
 int fsync(int fd)
 {
-    int error = of_store(fd) ? due("sync") : 0;
+    int error = is_store_file(fd) ? due("sync") : 0;
     if (!error)
         return REAL(fsync)(fd);
     errno = error;
@@ -83,7 +84,7 @@ int fsync(int fd)
 
 int fdatasync(int fd)
 {
-    int error = of_store(fd) ? due("sync") : 0;
+    int error = is_store_file(fd) ? due("sync") : 0;
     if (!error)
         return REAL(fdatasync)(fd);
     errno = error;

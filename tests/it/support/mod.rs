@@ -1,4 +1,4 @@
-//! A server in the test's process, a client for it, and a small rig.
+//! A service in the test's process, a client for it, and samples of a small simulated rig.
 
 #![allow(dead_code, reason = "each test uses a part")]
 
@@ -9,31 +9,34 @@ pub mod provider;
 
 use std::future::Future;
 use std::path::Path;
+use std::pin::Pin;
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
+use futures_util::StreamExt;
 use offbd::config::Config;
 use offbd::server::{self, Server};
 use offbd::wire::asset::view;
-use offbd_core::diagnosis::Calibration;
-use offbd_core::engine::{Engine, Input, Output, Rig, Setup, calibrate};
+use offbd_core::diagnosis::{Calibration, CalibrationOrigin};
+use offbd_core::engine::{Engine, Input, Rig, Setup, calibrate};
 use offbd_core::vocabulary::Sample;
 use reqwest::header::CONTENT_TYPE;
 use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
 use sqlx::{AssertSqlSafe, ConnectOptions, Executor};
+use sse_stream::{Sse, SseStream};
 
-/// Longest time to wait for anything; far more than it takes.
+/// Longest time to wait for anything; far more than is needed.
 pub const DEADLINE: Duration = Duration::from_secs(60);
 
-/// A server with a data directory of its own.
-pub struct Bench {
+/// A service with its own data directory.
+pub struct ServiceFixture {
     pub server: Option<Server>,
     pub client: Client,
     pub data: tempfile::TempDir,
 }
 
-/// Whether services under test use PostgreSQL: `TEST_DATABASE=postgres`.
+/// Returns whether services under test use PostgreSQL: `TEST_DATABASE=postgres`.
 pub fn on_postgres() -> bool {
     match std::env::var("TEST_DATABASE") {
         Ok(database) if database == "postgres" => true,
@@ -43,8 +46,8 @@ pub fn on_postgres() -> bool {
     }
 }
 
-/// A configuration that uses `data`, or the database of its name, and any free
-/// port.
+/// Returns a configuration that uses `data`, or the PostgreSQL database of its name, and any
+/// free port.
 pub fn config(data: &Path) -> Config {
     let mut config = Config { data: data.to_owned(), ..Config::default() };
     if on_postgres() {
@@ -56,24 +59,25 @@ pub fn config(data: &Path) -> Config {
     config
 }
 
-/// The URL of the store below `data`.
+/// Returns the URL of the store of `data`.
 pub fn url(data: &Path) -> String {
     let file = || format!("sqlite://{}/offbd.sqlite", data.display());
     config(data).database.unwrap_or_else(file)
 }
 
+/// Opens a connection to the store at `url`.
 pub async fn connection(url: &str) -> sqlx::AnyConnection {
     try_connection(url).await.unwrap()
 }
 
-/// The same with a server that may be away.
+/// Like [`connection`], for a database server that may be unavailable.
 pub async fn try_connection(url: &str) -> sqlx::Result<sqlx::AnyConnection> {
     sqlx::any::install_default_drivers();
     url.parse::<sqlx::any::AnyConnectOptions>().unwrap().connect().await
 }
 
-/// All that the store below `data` holds, as bytes to search in: its files, or
-/// its rows as text.
+/// Returns the content of the store of `data` as bytes to search in: its files, or its rows
+/// as text.
 pub async fn stored(data: &Path) -> Vec<u8> {
     if !on_postgres() {
         let files = std::fs::read_dir(data).unwrap().map(|file| file.unwrap().path());
@@ -91,7 +95,7 @@ pub async fn stored(data: &Path) -> Vec<u8> {
     rows
 }
 
-impl Bench {
+impl ServiceFixture {
     pub async fn start() -> Self {
         Self::start_with(|_| {}).await
     }
@@ -105,20 +109,20 @@ impl Bench {
         Self { server: Some(server), client, data }
     }
 
-    /// A connection of its own to the server's store.
+    /// Opens a connection to the service's store.
     pub async fn store(&self) -> sqlx::AnyConnection {
         connection(&url(self.data.path())).await
     }
 
-    /// Lets nobody write until it is dropped or let go of.
-    pub async fn hold(&self) -> Hold {
+    /// Locks the store against writes until the lock is released or dropped.
+    pub async fn lock_store(&self) -> StoreLock {
         let mut store = self.store().await;
         let words = if on_postgres() { "BEGIN; LOCK TABLE counter" } else { "BEGIN IMMEDIATE" };
         store.execute(words).await.unwrap();
-        Hold { store }
+        StoreLock { store }
     }
 
-    /// Stops gracefully and starts again on the same data.
+    /// Shuts the service down and starts it again with the same data.
     pub async fn restart(&mut self) {
         self.server.take().unwrap().shutdown().await.unwrap();
         let server = server::start(config(self.data.path())).await.unwrap();
@@ -127,27 +131,27 @@ impl Bench {
     }
 }
 
-/// Holds the store, see [`Bench::hold`].
-pub struct Hold {
+/// A lock of the store, see [`ServiceFixture::lock_store`].
+pub struct StoreLock {
     store: sqlx::AnyConnection,
 }
 
-impl Hold {
-    pub async fn let_go(mut self) {
+impl StoreLock {
+    pub async fn release(mut self) {
         self.store.execute("ROLLBACK").await.unwrap();
     }
 }
 
-/// Asks the interface.
+/// A client of the API.
 #[derive(Clone)]
 pub struct Client {
     pub address: String,
-    /// Shown with every request.
+    /// Bearer token sent with every request.
     pub token: Option<String>,
     http: reqwest::Client,
 }
 
-/// An answer.
+/// A response.
 #[derive(Debug)]
 pub struct Answer {
     pub status: StatusCode,
@@ -160,14 +164,14 @@ impl Answer {
         serde_json::from_str(&self.text).unwrap_or_else(|e| panic!("{e}: {}", self.text))
     }
 
-    /// The JSON of an answer that must have `status`.
+    /// Returns the JSON of a response that must have `status`.
     #[track_caller]
     pub fn expect(&self, status: u16) -> Value {
         assert_eq!(self.status.as_u16(), status, "{}", self.text);
         if self.text.is_empty() { Value::Null } else { self.json() }
     }
 
-    /// The problem of an answer that must have `status`.
+    /// Returns the problem of a response that must have `status`.
     #[track_caller]
     pub fn problem(&self, status: u16) -> Value {
         let problem = self.expect(status);
@@ -185,7 +189,7 @@ impl Client {
         Self { address, token: None, http: reqwest::Client::new() }
     }
 
-    /// The same with a token to show.
+    /// Returns a client with a token.
     pub fn with(&self, token: &str) -> Self {
         Self { token: Some(token.to_owned()), ..self.clone() }
     }
@@ -240,13 +244,13 @@ impl Client {
         self.post("assets", &registration(name)).await.expect(201);
     }
 
-    /// Sends a batch that must be taken.
+    /// Sends a batch that must be accepted.
     pub async fn telemetry(&self, asset: &str, session: Option<&str>, samples: &[Sample]) -> Value {
         let body = batch(session, samples);
         self.post(&format!("assets/{asset}/telemetry"), &body).await.expect(200)
     }
 
-    /// The asset's session of this name.
+    /// Returns the asset's session of this name.
     pub async fn session(&self, asset: &str, name: &str) -> Value {
         let page = self.get(&format!("sessions?asset={asset}&limit=500")).await.expect(200);
         let items = page["items"].as_array().unwrap();
@@ -260,7 +264,7 @@ impl Client {
         self.post(&format!("sessions/{id}/end"), &Value::Null).await.expect(200)
     }
 
-    /// The recording of the session of this name.
+    /// Returns the recording of the session of this name.
     pub async fn recording(&self, asset: &str, name: &str) -> Vec<Sample> {
         let session = self.session(asset, name).await;
         let id = session["id"].as_str().unwrap();
@@ -270,38 +274,38 @@ impl Client {
     }
 }
 
-/// The samples of a session file.
+/// Parses a session file.
 pub fn read_csv(text: &str) -> Vec<Sample> {
-    let reader = offbd::wire::session_csv::Reader::new(text.as_bytes()).unwrap();
+    let reader = offbd::wire::session_csv::SessionCsvReader::new(text.as_bytes()).unwrap();
     reader.map(Result::unwrap).collect()
 }
 
-/// A batch as JSON rows.
+/// Returns a batch as JSON rows.
 pub fn batch(session: Option<&str>, samples: &[Sample]) -> Value {
     let rows: Vec<_> = samples.iter().map(offbd::wire::telemetry::sample_view).collect();
     json!({ "session": session, "samples": rows })
 }
 
-/// A document as MessagePack.
+/// Returns a document as MessagePack.
 pub fn packed(document: &Value) -> Vec<u8> {
     rmp_serde::to_vec_named(document).unwrap()
 }
 
-/// Samples as a session file.
+/// Returns samples as a session file.
 pub fn csv(samples: &[Sample]) -> String {
     let mut text = Vec::new();
     offbd::wire::session_csv::write(&mut text, samples).unwrap();
     String::from_utf8(text).unwrap()
 }
 
-/// A servo of the small rig: dead time 40 ms, lag 60 ms, at 100 Hz.
-struct Servo {
+/// A simulated servo with a dead time of 40 ms and a lag of 60 ms, at 100 Hz.
+struct SimulatedServo {
     waiting: [f64; 4],
     angle: f64,
     dead: bool,
 }
 
-impl Servo {
+impl SimulatedServo {
     fn turn(&mut self, command: f64) -> f64 {
         self.waiting.rotate_left(1);
         let due = std::mem::replace(&mut self.waiting[3], command);
@@ -312,11 +316,11 @@ impl Servo {
     }
 }
 
-/// `n` samples at 100 Hz of a ball that is to follow a circle; the x servo is
-/// dead from sample `dead_from` on.
+/// Returns `n` samples at 100 Hz of a ball that follows a circle; the x servo is dead from
+/// sample `dead_from` on.
 pub fn rig(n: usize, dead_from: usize) -> Vec<Sample> {
     const STEP: f64 = 0.01;
-    let servo = || Servo { waiting: [0.0; 4], angle: 0.0, dead: false };
+    let servo = || SimulatedServo { waiting: [0.0; 4], angle: 0.0, dead: false };
     let (mut servos, mut at, mut v) = ([servo(), servo()], [0.0f64; 2], [0.0f64; 2]);
     let mut noise = 1u64;
     let mut samples = Vec::new();
@@ -346,29 +350,31 @@ pub fn rig(n: usize, dead_from: usize) -> Vec<Sample> {
     samples
 }
 
-/// The asset of this name, learnt from a minute of its own.
+/// Returns the asset of this name, calibrated with healthy samples of [`rig`].
 pub fn learnt(name: &str) -> Rig {
     static LEARNT: OnceLock<Calibration> = OnceLock::new();
     let learn = || {
         let healthy = rig(6000, usize::MAX);
-        calibrate(&Rig::chapter("a"), &[healthy], "", "2026-01-01T00:00:00Z").unwrap()
+        let made_at = "2026-01-01T00:00:00Z".to_owned();
+        let origin = CalibrationOrigin { made_at, ..CalibrationOrigin::default() };
+        Calibration { origin, ..calibrate(&Rig::chapter("a"), &[healthy]).unwrap() }
     };
     let calibration = Some(LEARNT.get_or_init(learn).clone());
     Rig { calibration, ..Rig::chapter(name) }
 }
 
-/// What registers [`learnt`].
+/// Returns the asset file of [`learnt`], to register it.
 pub fn registration(name: &str) -> Value {
     serde_json::to_value(view(&learnt(name))).unwrap()
 }
 
-/// The verdict hash of a recording of an asset learnt so, and what was confirmed.
+/// Returns the verdict hash and the confirmed codes of a recording of [`learnt`].
 pub fn judged(name: &str, samples: &[Sample]) -> (String, Vec<String>) {
     let Judgement { hash, faults, .. } = judgement(name, samples);
     (hash, faults)
 }
 
-/// What the engine itself says of a recording.
+/// The result of the engine for a recording.
 pub struct Judgement {
     pub hash: String,
     pub faults: Vec<String>,
@@ -376,35 +382,32 @@ pub struct Judgement {
     pub memory: offbd_core::diagnosis::FaultMemory,
 }
 
+/// Judges a recording of [`learnt`].
 pub fn judgement(name: &str, samples: &[Sample]) -> Judgement {
     let setup = Setup::new(learnt(name), None).unwrap();
     let mut engine = Engine::new(setup, Default::default());
     let mut verdict = offbd::wire::verdict::Verdict::default();
-    let (mut outputs, mut n_transitions) = (Vec::new(), 0);
+    let (mut transitions, mut n_transitions) = (Vec::new(), 0);
     for input in samples.iter().map(|s| Input::Sample(*s)).chain([Input::End]) {
-        outputs.clear();
-        engine.handle(input, &mut outputs);
-        outputs.iter().for_each(|o| verdict.take(o));
-        n_transitions += outputs.iter().filter(|o| matches!(o, Output::Transition(_))).count();
+        transitions.clear();
+        verdict.take(engine.handle(input, &mut transitions), &transitions);
+        n_transitions += transitions.len();
     }
     let faults = verdict.confirmed().iter().map(ToString::to_string).collect();
     Judgement { hash: verdict.hash(), faults, n_transitions, memory: engine.memory().clone() }
 }
 
 /// Server-Sent Events, one by one.
-pub struct Events {
-    response: reqwest::Response,
-    text: String,
-}
+pub struct Events(Pin<Box<SseStream<reqwest::Body>>>);
 
 impl Events {
     pub fn new(response: reqwest::Response) -> Self {
         assert_eq!(response.status(), 200);
-        Self { response, text: String::new() }
+        Self(Box::pin(SseStream::new(response.into())))
     }
 
-    /// The next fault event's data, with its `id`; the first event of all,
-    /// `begin`, only says where the others follow on.
+    /// Returns the data of the next fault event, with its `id`, and skips the first event,
+    /// `begin`, which has only the id after which the stream starts.
     pub async fn next(&mut self) -> Value {
         loop {
             let (kind, data) = self.any().await;
@@ -414,46 +417,37 @@ impl Events {
         }
     }
 
-    /// The next event's type, and its data with its `id`.
+    /// Returns the type of the next event, and its data with its `id`.
     pub async fn any(&mut self) -> (String, Value) {
         loop {
-            if let Some((event, rest)) = self.text.split_once("\n\n") {
-                let event = event.to_owned();
-                self.text = rest.to_owned();
-                let field = |name: &str| {
-                    event.lines().find_map(|l| l.strip_prefix(name)).map(|v| v.trim().to_owned())
-                };
-                if let Some(data) = field("data:") {
-                    let mut data: Value = serde_json::from_str(&data).unwrap();
-                    data["id"] = field("id:").unwrap().parse::<i64>().unwrap().into();
-                    return (field("event:").unwrap(), data);
-                }
-                continue;
-            }
-            let chunk = tokio::time::timeout(DEADLINE, self.response.chunk()).await;
-            let chunk = chunk.unwrap().unwrap().expect("the stream goes on");
-            self.text.push_str(std::str::from_utf8(&chunk).unwrap());
+            let event = self.event().await.expect("the stream continues");
+            let Some(data) = event.data else { continue };
+            let mut data: Value = serde_json::from_str(&data).unwrap();
+            data["id"] = event.id.unwrap().parse::<i64>().unwrap().into();
+            return (event.event.unwrap(), data);
         }
     }
-}
 
-impl Events {
-    /// Whether the service ends the stream without another event.
+    /// Returns whether the service ends the stream without another event.
     pub async fn ended(&mut self) -> bool {
-        let chunk = tokio::time::timeout(DEADLINE, self.response.chunk()).await;
-        matches!(chunk, Ok(Ok(None))) && self.text.is_empty()
+        self.event().await.is_none()
+    }
+
+    async fn event(&mut self) -> Option<Sse> {
+        let event = tokio::time::timeout(DEADLINE, self.0.next()).await.expect("an event in time");
+        event.map(Result::unwrap)
     }
 }
 
-/// Asks again until `done` gives something; fails after [`DEADLINE`].
-#[expect(clippy::disallowed_methods, reason = "a test must not wait for ever")]
+/// Repeats `done` until it returns something; fails after [`DEADLINE`].
+#[expect(clippy::disallowed_methods, reason = "a test must not wait forever")]
 pub async fn eventually<T, F: Future<Output = Option<T>>>(mut done: impl FnMut() -> F) -> T {
-    let begun = Instant::now();
+    let start = Instant::now();
     loop {
         if let Some(found) = done().await {
             return found;
         }
-        assert!(begun.elapsed() < DEADLINE, "it did not come about in time");
+        assert!(start.elapsed() < DEADLINE, "not fulfilled within the deadline");
         tokio::task::yield_now().await;
     }
 }

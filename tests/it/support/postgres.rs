@@ -1,5 +1,5 @@
-//! A private server of PostgreSQL, reached through a socket in a directory of
-//! its own. It ends with the process that started it, however that ends.
+//! A private PostgreSQL server with its own directory and socket. It ends with the process
+//! that started it, even if that is killed.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -9,9 +9,9 @@ use std::sync::OnceLock;
 const MISSING: &str = "no `initdb` of PostgreSQL in PATH or /usr/lib/postgresql/*/bin: install \
     `postgresql`, or set POSTGRES_PROGRAMS to the directory that has it";
 
-/// Runs the server whose programs are in $1 on the data in $2 until a line
-/// comes, which names the signal. Says `ready` when it answers, and `gone` when
-/// it does not any more. At the end of input it ends at once and removes all.
+/// Runs the server with the programs in $1 and the data in $2 until it reads a line, which is
+/// the signal to stop with. Prints `ready` when the server is ready and `gone` when it has
+/// stopped. At the end of input it stops the server at once and removes the data.
 const WATCH: &str = r#"
 "$1/postgres" -D "$2" -c listen_addresses= -c unix_socket_directories="$2" \
     -c max_connections=200 >>"$2/log" 2>&1 & server=$!
@@ -32,8 +32,8 @@ pub struct Postgres {
 }
 
 impl Postgres {
-    /// A new server in an empty directory. Names are sorted as in English, so
-    /// that nothing depends on the order of bytes.
+    /// Starts a new server in an empty directory. Its collation is English, to show that
+    /// nothing depends on the order of bytes.
     pub fn new() -> Self {
         Self::in_directory(tempfile::tempdir().unwrap().keep())
     }
@@ -71,7 +71,7 @@ impl Postgres {
         self.running = Some((child, input, output));
     }
 
-    /// Stops it by a signal: `INT` breaks off what runs, `QUIT` is a crash.
+    /// Stops the server with a signal: `INT` aborts running transactions, `QUIT` is a crash.
     pub fn stop(&mut self, signal: &str) {
         let (mut child, mut input, mut output) = self.running.take().unwrap();
         writeln!(input, "{signal}").unwrap();
@@ -85,7 +85,7 @@ impl Postgres {
         &self.directory
     }
 
-    /// The URL of the database of this name, made if it is not there.
+    /// Returns the URL of the database of this name, which is created if it does not exist.
     pub fn database(&self, name: &str) -> String {
         database(&self.directory, name)
     }
@@ -110,19 +110,19 @@ fn database(directory: &Path, name: &str) -> String {
     url(directory, name)
 }
 
-/// The URL of a database on the server whose socket is in `directory`.
+/// Returns the URL of a database on the server with its socket in `directory`.
 pub fn url(directory: &Path, name: &str) -> String {
     let socket = directory.to_str().unwrap().replace('/', "%2F");
     format!("postgres://offbd@{socket}/{name}")
 }
 
-/// The URL of a database on the one server that this process's tests share.
+/// Returns the URL of a database on the server that all tests of this process share.
 pub fn shared_database(name: &str) -> String {
     static DIRECTORY: OnceLock<PathBuf> = OnceLock::new();
     let directory = DIRECTORY.get_or_init(|| {
         let directory = std::env::temp_dir().join(format!("offbd-postgres-{}", std::process::id()));
         std::fs::create_dir(&directory).unwrap();
-        // It lives as long as the process.
+        // The server runs as long as the process.
         std::mem::forget(Postgres::in_directory(directory.clone()));
         directory
     });
@@ -152,7 +152,8 @@ fn is_root() -> bool {
     id.stdout == b"0\n"
 }
 
-/// `program`, not as root: the server refuses to.
+/// Returns the command for `program`, as another user if the tests run as root: the server
+/// refuses to run as root.
 fn as_nobody(program: impl AsRef<std::ffi::OsStr>) -> Command {
     if !is_root() {
         return Command::new(program);

@@ -1,4 +1,4 @@
-//! The service as a process of its own, which can be killed.
+//! The service as a separate process, which can be killed.
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -16,23 +16,23 @@ impl Process {
         Self::start_with(data, &[])
     }
 
-    /// The same with more in its environment.
+    /// Starts the service with additional environment variables.
     pub fn start_with(data: &Path, environment: &[(&str, &Path)]) -> Self {
         let mut child = command(data).envs(environment.iter().copied()).spawn().unwrap();
         let mut log = BufReader::new(child.stderr.take().unwrap()).lines().map_while(Result::ok);
-        let mut said = String::new();
+        let mut output = String::new();
         let address = log.find_map(|line| {
-            said.push_str(&line);
+            output.push_str(&line);
             let line: serde_json::Value = serde_json::from_str(&line).ok()?;
             (line["message"] == "serving").then(|| line["address"].as_str().unwrap().to_owned())
         });
-        let address = address.unwrap_or_else(|| panic!("it does not serve: {said}"));
+        let address = address.unwrap_or_else(|| panic!("the service does not start: {output}"));
         std::thread::spawn(move || log.for_each(drop));
         Self { child, client: Client::new(address) }
     }
 
-    /// One that is killed before it serves, after a while that grows with `n`.
-    pub fn stillborn(data: &Path, n: u64) {
+    /// Starts a service and kills it during its start, after a time that grows with `n`.
+    pub fn start_and_kill(data: &Path, n: u64) {
         let mut child = command(data).spawn().unwrap();
         for _ in 0..n {
             assert!(child.try_wait().unwrap().is_none_or(|status| status.success()));
@@ -53,9 +53,9 @@ fn command(data: &Path) -> Command {
 }
 
 impl Drop for Process {
-    /// SIGKILL: no warning, no last word.
+    /// Kills the process with SIGKILL.
     fn drop(&mut self) {
-        // One that has ended already needs no killing.
+        // Fails if the process has already ended.
         let _ = self.child.kill();
         self.child.wait().unwrap();
     }

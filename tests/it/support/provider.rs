@@ -1,5 +1,4 @@
-//! An identity provider: keys, tokens signed by them, and a place where the keys
-//! are published.
+//! An identity provider: keys, tokens signed with them, and a server that publishes the keys.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -21,14 +20,14 @@ pub fn base64(bytes: impl AsRef<[u8]>) -> String {
     URL_SAFE_NO_PAD.encode(bytes)
 }
 
-/// A token with what `sign` makes of it.
+/// Returns a token with the signature made by `sign`.
 pub fn token(header: &Value, claims: &Value, sign: impl Fn(&[u8]) -> Vec<u8>) -> String {
     let message = format!("{}.{}", base64(header.to_string()), base64(claims.to_string()));
     let signature = base64(sign(message.as_bytes()));
     format!("{message}.{signature}")
 }
 
-/// A key pair of Ed25519.
+/// An Ed25519 key pair.
 pub struct Key {
     pub id: &'static str,
     pair: Ed25519KeyPair,
@@ -55,59 +54,59 @@ impl Key {
     }
 }
 
-/// The set of `keys` as it is published.
+/// Returns the JSON Web Key Set of `keys`.
 pub fn jwks(keys: &[&Key]) -> String {
     let keys: Vec<Value> = keys.iter().map(|key| key.public()).collect();
     json!({ "keys": keys }).to_string()
 }
 
-/// The end of 2099.
+/// The end of 2099, s since 1970.
 pub const END: i64 = 4_102_444_800;
 
-/// Claims of `subject` that are good until [`END`].
+/// Returns claims of `subject` that expire at [`END`].
 pub fn claims(subject: &str, role: &str) -> Value {
     json!({ "iss": ISSUER, "aud": AUDIENCE, "sub": subject, "exp": END, "offbd_role": role })
 }
 
-/// Those of an asset's device.
+/// Returns the claims of an asset's device.
 pub fn device(asset: &str) -> Value {
     let mut claims = claims(&format!("{asset}'s device"), "device");
     claims["offbd_asset"] = json!(asset);
     claims
 }
 
-/// A configuration that takes the provider's tokens.
+/// Returns a configuration that accepts the provider's tokens, with its keys at `jwks`.
 pub fn config(jwks: impl ToString) -> JwtConfig {
     let (role_claim, asset_claim) = ("offbd_role".to_owned(), "offbd_asset".to_owned());
     let (issuer, audience) = (ISSUER.to_owned(), AUDIENCE.to_owned());
     JwtConfig { issuer, audience, jwks: jwks.to_string(), role_claim, asset_claim }
 }
 
-/// What is published at an address of this machine.
+/// The document published at an address of this machine.
 #[derive(Clone, Default)]
 pub struct Published {
     pub document: Arc<std::sync::Mutex<String>>,
-    /// How often it was asked for.
-    pub asked: Arc<AtomicUsize>,
+    /// Number of requests.
+    pub requests: Arc<AtomicUsize>,
 }
 
 impl Published {
     pub fn new(document: String) -> Self {
         let published = Self::default();
-        published.is(document);
+        published.set(document);
         published
     }
 
-    /// Publishes something else; nothing answers like that if it is empty.
-    pub fn is(&self, document: String) {
+    /// Sets the document; if it is empty, requests get 503.
+    pub fn set(&self, document: String) {
         *self.document.lock().unwrap() = document;
     }
 
-    pub fn n_asked(&self) -> usize {
-        self.asked.load(Ordering::SeqCst)
+    pub fn n_requests(&self) -> usize {
+        self.requests.load(Ordering::SeqCst)
     }
 
-    /// Answers at the port that is returned, encrypted if there is a way to.
+    /// Starts the server, with TLS if `tls` is given, and returns its port.
     pub async fn serve(&self, tls: Option<tokio_rustls::TlsAcceptor>) -> u16 {
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let port = listener.local_addr().unwrap().port();
@@ -133,14 +132,14 @@ impl Published {
                 return;
             }
         }
-        self.asked.fetch_add(1, Ordering::SeqCst);
+        self.requests.fetch_add(1, Ordering::SeqCst);
         let body = self.document.lock().unwrap().clone();
         let status = if body.is_empty() { "503 Service Unavailable" } else { "200 OK" };
         let head = format!(
             "HTTP/1.1 {status}\r\nconnection: close\r\ncontent-length: {}\r\n\r\n",
             body.len()
         );
-        // Who has hung up gets no answer.
+        // The client may have closed the connection.
         let _ = socket.write_all((head + &body).as_bytes()).await;
         let _ = socket.shutdown().await;
     }

@@ -1,16 +1,16 @@
 //! Debouncing by time: a fault detection counter from −128 to 127.
 //!
-//! Prefailed raises it (jumping up to zero first), prepassed lowers it, at
-//! rates that take `fail_s` and `pass_s` from zero to an end. It does not jump
-//! down first but leaks away in `leak_s`: the residual of a ball that a sick
-//! servo swings to and fro crosses zero twice a swing, and a loose contact
-//! comes and goes. While the enable condition is lost it freezes.
-//! A silent rig is judged by time, not by counts, so the rates are per second.
+//! Prefailed raises the counter (jumping up to zero first), prepassed lowers it, at rates
+//! that take `fail_s` and `pass_s` from zero to either end. Prepassed does not jump down
+//! to zero but takes `leak_s` from the upper end: the residual of a ball that a faulty
+//! servo swings to and fro crosses zero twice a period, and a loose contact comes and
+//! goes. While the enable condition does not hold the counter is frozen. Rates are per
+//! second, not per judgement, so that they do not depend on the sample rate.
 
 use super::Settings;
 use crate::vocabulary::{FaultCode, FaultKind};
 
-/// What a monitor says of one moment.
+/// The result of a monitor at one moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Test {
     /// The enable condition does not hold: neither passed nor failed.
@@ -20,25 +20,25 @@ pub enum Test {
     Prefailed,
 }
 
-/// How fast the counter of one monitor moves, s.
+/// The debounce times of one monitor, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pace {
-    /// Failure from zero to the upper end.
+pub struct DebounceTimes {
+    /// Time of failure from zero to the upper end.
     pub fail_s: f64,
-    /// Further failure until it counts as a trip.
+    /// Further time of failure until it counts as a trip.
     pub confirm_s: f64,
-    /// Agreement from zero to the lower end.
+    /// Time of agreement from zero to the lower end.
     pub pass_s: f64,
-    /// Agreement from the upper end to zero.
+    /// Time of agreement from the upper end to zero.
     pub leak_s: f64,
 }
 
-impl Pace {
-    /// The pace of `code`'s monitor: a loose contact comes and goes; readings
-    /// and a ball are given up on sooner, for a disturbance shows in them too.
-    /// The ball of a learnt rig that stands fails as soon as readings do, unless
-    /// it has a `rival`: another cause that reads alike, which has to have its
-    /// time to show. Of readings that scatter the `kind` is noise.
+impl DebounceTimes {
+    /// Returns the times for `code`. Servos have a slow leak, because a loose contact
+    /// comes and goes. Readings and ball fail sooner. A ball that stands fails as soon as
+    /// readings do on a learnt rig, unless there is a `rival` cause with the same
+    /// symptoms, which needs time to show. Of the sensor's kinds of fault, noise has a
+    /// time of its own.
     #[must_use]
     pub fn of(code: FaultCode, kind: Option<FaultKind>, rival: bool, settings: &Settings) -> Self {
         let Settings { fail_s, confirm_s, pass_s, .. } = *settings;
@@ -62,9 +62,9 @@ impl Pace {
     }
 }
 
-impl Pace {
-    /// Time that a lasting failure of `code` takes to be confirmed by `settings`,
-    /// where nothing else reads alike, s: debounce and confirmation.
+impl DebounceTimes {
+    /// Returns the time that a persistent failure of `code` without a rival cause takes
+    /// to be confirmed, s: debounce plus confirmation.
     #[must_use]
     pub fn needed_s(code: FaultCode, settings: &Settings) -> f64 {
         let Self { fail_s, confirm_s, .. } = Self::of(code, None, false, settings);
@@ -72,25 +72,25 @@ impl Pace {
     }
 }
 
-/// What the counter came to.
+/// The result of debouncing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Qualified {
-    /// Still on its way, or nothing new.
+    /// Between both ends, or nothing new.
     No,
-    /// At −128: PASSED.
+    /// The counter is at −128: PASSED.
     Passed,
-    /// At +127: FAILED.
+    /// The counter is at +127: FAILED.
     Failed,
-    /// Failed, and has been failing long enough to count as a trip.
+    /// FAILED for long enough to count as a trip.
     Tripped,
 }
 
-/// The debounce of one monitor.
+/// The debounce state of one monitor.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Debounce {
-    /// In [−1, 1]; −1 is passed, +1 is failed.
+    /// In [−1, 1]; −1 is passed, 1 is failed.
     level: f64,
-    /// Seconds of failure since the counter reached its upper end.
+    /// Time of failure since the counter reached its upper end, s.
     failing_s: f64,
 }
 
@@ -103,37 +103,37 @@ impl Debounce {
         (self.level * scale) as i8
     }
 
-    /// Whether it is on its way up: something is suspected.
+    /// Whether the counter is above zero: a fault is suspected.
     #[must_use]
     pub fn suspicious(&self) -> bool {
         self.level > 0.0
     }
 
-    /// Whether it is at its upper end: the test has failed.
+    /// Whether the counter is at its upper end: the test has failed.
     #[must_use]
     pub fn failed(&self) -> bool {
         self.level >= 1.0
     }
 
-    /// How far it has come on the way to a trip, 0 to 1.
+    /// Returns the progress towards a trip, 0 to 1.
     #[must_use]
-    pub fn progress(&self, pace: &Pace) -> f64 {
-        let Pace { fail_s, confirm_s, .. } = *pace;
+    pub fn progress(&self, times: &DebounceTimes) -> f64 {
+        let DebounceTimes { fail_s, confirm_s, .. } = *times;
         let needed_s = fail_s + confirm_s;
         let came_s = self.level.max(0.0) * fail_s + self.failing_s;
         if needed_s > 0.0 { (came_s / needed_s).min(1.0) } else { self.level.max(0.0) }
     }
 
-    /// Takes suspicion back: another cause accounts for what was seen.
+    /// Withdraws the suspicion: another cause explains the readings.
     pub fn exonerate(&mut self) {
         self.level = self.level.min(0.0);
         self.failing_s = 0.0;
     }
 
-    /// Takes `test`, which held for the `dt` seconds before this sample. A
-    /// time of zero qualifies at once.
-    pub fn update(&mut self, test: Test, dt: f64, pace: &Pace) -> Qualified {
-        let Pace { fail_s, confirm_s, pass_s, leak_s } = *pace;
+    /// Updates the counter by `test`, which held for the `dt` seconds before this sample.
+    /// A debounce time of zero qualifies at once.
+    pub fn update(&mut self, test: Test, dt: f64, times: &DebounceTimes) -> Qualified {
+        let DebounceTimes { fail_s, confirm_s, pass_s, leak_s } = *times;
         let share = |full: f64| if full > 0.0 { dt / full } else { 1.0 };
         match test {
             Test::NotTested => Qualified::No,
@@ -166,8 +166,8 @@ mod tests {
     use super::*;
 
     fn run(debounce: &mut Debounce, test: Test, n: usize) -> Vec<Qualified> {
-        let pace = Pace { fail_s: 0.5, confirm_s: 0.25, pass_s: 1.0, leak_s: 2.0 };
-        (0..n).map(|_| debounce.update(test, 0.125, &pace)).collect()
+        let times = DebounceTimes { fail_s: 0.5, confirm_s: 0.25, pass_s: 1.0, leak_s: 2.0 };
+        (0..n).map(|_| debounce.update(test, 0.125, &times)).collect()
     }
 
     #[test]
@@ -193,8 +193,8 @@ mod tests {
         assert_eq!(debounce.counter(), 31, "jumps up to zero first");
     }
 
-    /// Hands that push a ball twice, each time seen for three quarters of what
-    /// fails, confirm nothing unless the second comes within half a second.
+    /// Two pushes by hand, each visible for three quarters of `fail_s`, confirm nothing
+    /// unless the second follows within half a second.
     #[test]
     fn two_pushes_confirm_nothing_unless_close_together() {
         let settings = Settings::default();
@@ -207,7 +207,7 @@ mod tests {
                     debounce.update(
                         test,
                         0.01,
-                        &Pace::of(FaultCode::XServo, None, false, &settings),
+                        &DebounceTimes::of(FaultCode::XServo, None, false, &settings),
                     ) == Qualified::Tripped
                 };
                 (0..n).any(tripped)
@@ -225,8 +225,8 @@ mod tests {
         let settings = Settings { learnt: true, ..Settings::default() };
         let fails = |rival, after_s: f64| {
             let mut debounce = Debounce::default();
-            let pace = Pace::of(FaultCode::StuckBall, None, rival, &settings);
-            debounce.update(Test::Prefailed, after_s, &pace) == Qualified::Failed
+            let times = DebounceTimes::of(FaultCode::StuckBall, None, rival, &settings);
+            debounce.update(Test::Prefailed, after_s, &times) == Qualified::Failed
         };
         assert_eq!([0.25, 0.35].map(|s| fails(false, s)), [false, true]);
         assert_eq!([0.55, 0.65].map(|s| fails(true, s)), [false, true]);
@@ -236,8 +236,9 @@ mod tests {
     #[test]
     fn noise_takes_longer_than_what_one_reading_shows() {
         let fails = |kind, after_s: f64| {
-            let pace = Pace::of(FaultCode::Sensor, Some(kind), false, &Settings::default());
-            Debounce::default().update(Test::Prefailed, after_s, &pace) == Qualified::Failed
+            let times =
+                DebounceTimes::of(FaultCode::Sensor, Some(kind), false, &Settings::default());
+            Debounce::default().update(Test::Prefailed, after_s, &times) == Qualified::Failed
         };
         assert_eq!([0.25, 0.35].map(|s| fails(FaultKind::Frozen, s)), [false, true]);
         assert_eq!([0.4, 0.5].map(|s| fails(FaultKind::Noise, s)), [false, true]);
@@ -251,7 +252,7 @@ mod tests {
             debounce.update(
                 Test::Prefailed,
                 0.0,
-                &Pace::of(FaultCode::XServo, None, false, &settings)
+                &DebounceTimes::of(FaultCode::XServo, None, false, &settings)
             ),
             Qualified::Tripped
         );

@@ -1,101 +1,113 @@
-//! The monitors: one moment of evidence in, one test per code out.
+//! The monitors: evidence of one moment in, one test result per fault code out.
 //!
-//! Order matters and is the isolation: readings that cannot be trusted say
-//! nothing about the ball, a ball that cannot move says nothing about the
-//! servos. A monitor that is out of its depth is *not tested*, never *passed*.
+//! The order of the monitors is the isolation: readings that cannot be trusted tell
+//! nothing about the ball, and a ball that cannot move tells nothing about the servos. A
+//! monitor that cannot judge is *not tested*, never *passed*.
 
+use super::limits::LEAST_REPEAT_S;
 use super::stillness::{AxisStillness, Stillness};
 use super::{AxisEvidence, Candidate, Evidence, Limits, Profile, SensorLimits, Settings, Test};
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use crate::vocabulary::{Axis, FaultCode, FaultKind, PerAxis};
 
-/// The chapter's enable condition: command, rad, or measured acceleration,
-/// m/s² (application 3).
+/// The chapter's enable condition (application 3): least command, rad.
 const TEXTBOOK_ENABLE_RAD: f64 = 0.08;
+/// The chapter's enable condition (application 3): least measured acceleration, m/s².
 const TEXTBOOK_ENABLE_M_S2: f64 = 0.5;
 
-/// Seconds of identical readings, while asked to move, that no living sensor
-/// on a rolling ball gives: longer than any refresh seen (0.2 s).
-const FROZEN_S: f64 = 0.3;
+/// Duration of identical readings, s, that no working sensor shows while the ball is
+/// asked to move: longer than any refresh seen (0.2 s).
+const FROZEN_S: f64 = LEAST_REPEAT_S;
 
-/// Standard deviations of a reading by which a ball must have gone on, by its
-/// last velocity, for identical readings to be frozen.
-const MISSED: f64 = 20.0;
+/// Identical readings for less than this, s, show that the readings of an axis are alive.
+/// Chosen: half of [`FROZEN_S`].
+const LIVE_S: f64 = FROZEN_S / 2.0;
 
-/// How fast a ball that nothing drives rolls out, m/s². Assumed: what half a
-/// degree of tilt would give it. Without it a drawn rig whose sensor holds its
-/// value at rest was called frozen 37 times an hour, with it never.
+/// Distance, in standard deviations of a reading, by which the ball must have moved on at
+/// its last velocity for identical readings to count as frozen. Chosen.
+const MISSED_DEVIATIONS: f64 = 20.0;
+
+/// Deceleration of a rolling ball that nothing drives, m/s². Assumed: the effect of half
+/// a degree of tilt. Without it the sensor of a simulated rig that holds its value at
+/// rest was called frozen 37 times an hour, with it never.
 const ROLLS_OUT_M_S2: f64 = 0.05;
 
-/// A ball at rest seems to move by less than this many noise deviations.
+/// Apparent motion of a ball at rest, in standard deviations of a reading. Chosen.
 const STILL_FACTOR: f64 = 6.0;
 
-/// Seconds in which a ball asked to move must have begun to.
+/// Time within which a ball that is asked to move must have begun to move, s. Chosen.
 const PRESSED_S: f64 = 0.3;
-/// How far a ball at rest must have been asked to roll, in widths of what counts as
-/// still: one that turns round stays within a width for as long as one at rest takes
-/// for up to (1 + √2)² = 5.8 of them, and mostly for fewer. More than four would leave
-/// a coarse rig's drive cycle without a verdict on its ball.
+/// Distance that a ball at rest must have been asked to roll, in widths of the still
+/// range. A ball that turns round stays within one width for as long as one at rest takes
+/// for up to (1 + √2)² = 5.8 widths, and mostly for fewer. With more than four, the drive
+/// cycle of a rig with coarse readings would give no result for its ball.
 const TURNING_WIDTHS: f64 = 4.0;
 
-/// Share of samples without a ball that is too many.
+/// Fraction of samples without a ball from which on the sensor fails. Chosen: most of
+/// them are missing.
 const MISSING_SHARE: f64 = 0.5;
 
-/// Scatter over the healthy one that is noise, beside what healthy readings have
-/// been seen to scatter by for a while ([`SensorLimits::scatter_m`]).
-const NOISY: f64 = 3.5;
+/// Ratio of scatter to healthy scatter above which readings count as noisy, if they also
+/// exceed the scatter that healthy readings have shown for a while
+/// ([`SensorLimits::scatter_m`]). Chosen.
+const NOISE_RATIO: f64 = 3.5;
 
-/// Share of a cause that reads alike, where nothing else tells the two apart: a
-/// ball that stands may do so because its servo is dead, identical readings may be
-/// those of a ball that stands. Chosen, not measured: either is rarer.
+/// Weight of a dead servo as the cause of a ball that stands, as long as nothing
+/// distinguishes the two. Chosen, not measured: a dead servo is the rarer cause.
 const SERVO_SHARE: f64 = 0.4;
+/// Weight of a stuck ball as the cause of identical readings, as long as nothing
+/// distinguishes the two. Chosen, not measured: a stuck ball is the rarer cause.
 const STUCK_SHARE: f64 = 0.3;
 
-/// Evidence against both servos at once that speaks for what they share, nats.
+/// Evidence against both servos at the same time from which on a common cause is blamed,
+/// nats. Chosen: below what suspects a single servo (10).
 const SHARED_NATS: f64 = 9.0;
-/// Evidence against both that neither ball nor sensor account for, nats: both
-/// have failed, as when their supply does.
+/// Evidence against both servos from which on both have failed, as by a common supply, if
+/// neither ball nor sensor explain it, nats. Chosen: below the most that is accumulated
+/// (40).
 const BOTH_NATS: f64 = 30.0;
-/// Share of its limit by which the path must bend as well where the weight of evidence
-/// alone is not believed. Chosen: an earlier form of the rule found 180, 180 and 179 of 700
-/// faults put into servos of real rigs with 0.5, 0.7 and 1.
-const BENT_SHARE: f64 = 0.7;
-/// Evidence that is not believed, as a share of what makes a servo suspected.
+/// Fraction of its limit by which the path must also deviate where the evidence alone is
+/// not believed. Chosen: an earlier form of the rule found 180, 180 and 179 of 700 faults
+/// put into servos of real rigs with 0.5, 0.7 and 1.
+const LEAST_PATH_SHARE: f64 = 0.7;
+/// Cap of evidence that is not believed, as a fraction of what makes a servo suspected.
+/// Chosen: just below 1.
 const DOUBTED_SHARE: f64 = 0.99;
-/// Speed below which a ball counts as held back, m/s.
+/// Speed below which a ball counts as held back, m/s. Chosen.
 const HELD_BACK_M_S: f64 = 0.03;
 
-/// What the monitors look at besides the evidence.
+/// The circumstances that the monitors consider besides the evidence.
 #[derive(Clone, Copy, Debug)]
 pub struct Surroundings {
-    /// Seconds for which the ball has been clear of the edge.
+    /// Time for which the ball has been clear of the edge, s.
     pub clear_s: f64,
     /// Whether the ball was last seen at the edge.
     pub at_edge: bool,
-    /// The axis across whose rim the ball lies; none in a corner.
+    /// The axis whose rim the ball lies at; `None` in a corner.
     pub rim: Option<Axis>,
-    /// Seconds for which it has lain there.
+    /// Time for which the ball has lain there, s.
     pub rim_s: f64,
-    /// Whether it was last seen at an edge without a rim: it is falling.
+    /// Whether the ball was last seen at an edge without a rim: it is falling.
     pub over_the_edge: bool,
-    /// Whether readings have stepped of late as no ball can.
+    /// Whether the readings have recently jumped farther than a ball can move.
     pub jumped: bool,
-    /// Scatter of the readings that is noise, m.
+    /// Scatter above which readings count as noisy, m.
     pub noisy_m: f64,
 }
 
-/// What one monitor says of one moment.
+/// The result of one monitor at one moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Finding {
     pub test: Test,
-    /// Evidence for a fault of this servo, nats; none where it has no say.
+    /// Evidence for a fault of this servo, nats; `None` for the other monitors and while
+    /// the servos cannot be judged.
     pub nats: Option<f64>,
-    /// The ball has left the plate: a test that failed can have no more
-    /// evidence, and needs none.
+    /// Whether the ball has left the plate: no more evidence can follow, and a failed
+    /// test needs none.
     pub gone: bool,
     pub kind: Option<FaultKind>,
-    /// Another cause that reads alike.
+    /// Another cause with the same symptoms.
     pub rival: Option<Candidate>,
 }
 
@@ -104,7 +116,7 @@ impl Finding {
         Self { test: Test::NotTested, nats: None, gone: false, kind: None, rival: None };
     const PASS: Self = Self { test: Test::Prepassed, ..Self::NOTHING };
 
-    /// This finding, or the other where this one is no failure.
+    /// Returns this finding if it is a failure, else `other` if there is one.
     fn or(self, other: Option<Self>) -> Self {
         if self.test == Test::Prefailed { self } else { other.unwrap_or(self) }
     }
@@ -120,16 +132,16 @@ pub struct Evaluator {
     profile: Profile,
     limits: PerAxis<Limits>,
     sensor: SensorLimits,
-    /// Evidence that makes each servo suspected, nats: it explains why a ball
-    /// stands that was asked to move by it alone.
+    /// Evidence that makes each servo suspected, nats. From there on a dead servo
+    /// explains why a ball stands that only this servo asked to move.
     suspect_nats: PerAxis<f64>,
-    /// Whether that is more than for other rigs, because evidence was found against
-    /// the servo while it was healthy: the twin fits badly.
+    /// Whether that evidence is raised because some was found against the healthy servo:
+    /// the twin fits badly.
     fits_badly: PerAxis<bool>,
 }
 
 impl Evaluator {
-    /// The monitors by these limits, with the evidence that [`Settings`] ask for.
+    /// Builds the monitors with these limits and the evidence that [`Settings`] require.
     #[must_use]
     pub fn new(profile: Profile, limits: PerAxis<Limits>, sensor: SensorLimits) -> Self {
         let suspect_nats = PerAxis::from_fn(|_| Settings::of(profile).suspect_nats);
@@ -137,8 +149,8 @@ impl Evaluator {
         Self { profile, limits, sensor, suspect_nats, fits_badly }
     }
 
-    /// The same where it takes `suspect_nats` to suspect a servo, nats, times the
-    /// `factor` of its axis, ≥ 1.
+    /// Sets the evidence that makes a servo suspected: `suspect_nats` times the `factor`
+    /// of its axis, ≥ 1.
     #[must_use]
     pub fn with_suspicion(self, suspect_nats: f64, factor: PerAxis<f64>) -> Self {
         let fits_badly = PerAxis::from_fn(|axis| factor[axis] > 1.0);
@@ -152,8 +164,8 @@ impl Evaluator {
         &self.limits
     }
 
-    /// Whether the residual of `axis` may be judged: the enable condition.
-    /// `pull_m_s2` is what the plate asks of the ball at least.
+    /// Whether the residual of `axis` may be judged (the enable condition). `pull_m_s2`
+    /// is the least acceleration that the plate demands of the ball, m/s².
     #[must_use]
     pub fn enabled(
         &self,
@@ -179,7 +191,7 @@ impl Evaluator {
         testable && readings.unseen_s == 0.0 && !resting
     }
 
-    /// What every monitor says, in the order of [`FaultCode::ALL`].
+    /// Returns the findings of all monitors, in the order of [`FaultCode::ALL`].
     #[must_use]
     pub fn evaluate(
         &self,
@@ -204,13 +216,13 @@ impl Evaluator {
         [servo(Axis::X), servo(Axis::Y), stuck, sensor]
     }
 
-    /// `finding` with as much of the evidence against the servo of `axis` as is
-    /// believed. Where the twin fits badly, evidence creeps up on a healthy servo: the
-    /// path has to bend from the twin's as well, but for an offset, which it takes for
-    /// the level.
+    /// Returns `finding` with its evidence capped if it is not believed. Where the twin
+    /// fits badly, evidence accumulates against a healthy servo; it is then believed only
+    /// if the path deviates as well, or if the kind is an offset, which the path error
+    /// takes for the session's level.
     fn believed(&self, axis: Axis, evidence: &Evidence, finding: Finding) -> Finding {
         let e = &evidence.axes[axis];
-        let bent = e.path_share().is_some_and(|share| share >= BENT_SHARE);
+        let bent = e.path_share().is_some_and(|share| share >= LEAST_PATH_SHARE);
         let doubted = self.fits_badly[axis] && e.path_limit_m.is_some() && !bent;
         match doubted && finding.kind != Some(FaultKind::Offset) {
             true => {
@@ -221,21 +233,21 @@ impl Evaluator {
         }
     }
 
-    /// Scatter of the readings that is noise, m, where healthy ones blur by
-    /// `blur_m` because of the ball's motion.
+    /// Returns the scatter above which readings count as noisy, m, where healthy ones
+    /// blur by `blur_m` because the ball moves.
     #[must_use]
     pub fn noisy_m(&self, blur_m: f64) -> f64 {
         let noise_m = self.noise_m();
-        (NOISY * noise_m.hypot(blur_m)).max(self.sensor.scatter_m)
+        (NOISE_RATIO * noise_m.hypot(blur_m)).max(self.sensor.scatter_m)
     }
 
-    /// How far a ball at rest may seem to move, m.
+    /// Returns how far a ball at rest may seem to move, m.
     #[must_use]
     pub fn still_m(&self) -> f64 {
         STILL_FACTOR * self.noise_m()
     }
 
-    /// Standard deviation of healthy readings, the worse of both axes, m.
+    /// Standard deviation of healthy readings, the larger of both axes, m.
     #[must_use]
     pub fn noise_m(&self) -> f64 {
         let of = |axis: Axis| self.limits[axis].noise_m;
@@ -258,7 +270,7 @@ impl Evaluator {
         if readings.outliers() >= self.sensor.outliers {
             return Finding::fail(Some(FaultKind::Spikes));
         }
-        // A bounce off the rim is no parabola.
+        // The path of a bounce off the rim is no parabola.
         let rolls = around.clear_s >= evidence.window_s;
         if rolls && evidence.scatter_m.is_some_and(|s| s > around.noisy_m) {
             return Finding::fail(Some(FaultKind::Noise));
@@ -266,8 +278,8 @@ impl Evaluator {
         self.frozen(readings, around).unwrap_or(Finding::PASS)
     }
 
-    /// Bit-identical readings although the ball is asked to move, did move, or has
-    /// always read otherwise, even at rest.
+    /// Bit-identical readings although the ball is asked to move or did move, or for
+    /// longer than healthy readings of a ball at rest.
     fn frozen(&self, readings: &Stillness, around: &Surroundings) -> Option<Finding> {
         if around.at_edge {
             return None;
@@ -284,18 +296,18 @@ impl Evaluator {
             let rival = (!moved).then_some(stuck);
             return Some(Finding { rival, ..Finding::fail(Some(FaultKind::Frozen)) });
         }
-        let alone = |axis: Axis| dead(axis) && axes[axis.other()].identical_s < FROZEN_S / 2.0;
+        let alone = |axis: Axis| dead(axis) && axes[axis.other()].identical_s < LIVE_S;
         any(&alone).then(|| Finding::fail(Some(FaultKind::Frozen)))
     }
 
-    /// Whether a ball that moved when its readings last changed must have gone on.
+    /// Whether a ball that moved when its readings last changed must have moved on.
     fn missed(&self, axis: Axis, still: &AxisStillness) -> bool {
         let stops_m_s2 = ROLLS_OUT_M_S2.max(self.limits[axis].rolls_out_m_s2);
-        still.missed_m(stops_m_s2) > MISSED * self.noise_m()
+        still.missed_m(stops_m_s2) > MISSED_DEVIATIONS * self.noise_m()
     }
 
-    /// Whether readings of `axis` have been the same for longer than any that
-    /// live are.
+    /// Whether readings of `axis` have been identical for longer than those of a working
+    /// sensor are.
     fn dead(&self, axis: Axis, still: &AxisStillness) -> bool {
         let limits = &self.limits[axis];
         let asked = still.pressed_s >= FROZEN_S || self.missed(axis, still);
@@ -303,16 +315,16 @@ impl Evaluator {
         resting || asked && still.identical_s >= limits.repeat_s
     }
 
-    /// Time for which readings of a ball at rest may be the same, s: both axes are
-    /// one look at it. None if that of an axis that is measured is not known.
+    /// Longest time for which readings of a ball at rest may be identical, s; the longer
+    /// of both axes, which are read together. `None` if unknown for a measured axis.
     fn rest_repeat_s(&self) -> Option<f64> {
         let measured = Axis::ALL.into_iter().filter(|&a| self.limits[a].noise_m.is_some());
         measured.map(|a| self.limits[a].rest_repeat_s).try_fold(0.0, |most, s| Some(s?.max(most)))
     }
 
-    /// The ball stands still although it is asked to move. Asked along one axis
-    /// alone, it may stand because that servo does not answer: evidence gathered
-    /// while the ball still rolled says so.
+    /// A ball that stands still although it is asked to move. If it is asked along one
+    /// axis only, a dead servo of that axis is a rival cause; evidence from before the
+    /// ball stood decides.
     fn stuck_ball(
         &self,
         evidence: &Evidence,
@@ -335,9 +347,9 @@ impl Evaluator {
         }
     }
 
-    /// A ball that stands though it is asked to move along `axis` alone. The
-    /// servo's weight rises with the evidence against it, up to all of it at what
-    /// makes it suspected: then it explains why the ball stands.
+    /// A ball that stands although it is asked to move along `axis` only. The weight of
+    /// the servo as the cause rises linearly with the evidence against it. From the
+    /// evidence on that makes it suspected, the servo alone explains why the ball stands.
     fn stuck_or_servo(&self, axis: Axis, evidence: &Evidence) -> Finding {
         let share = (evidence.axes[axis].nats / self.suspect_nats[axis]).max(0.0);
         if share >= 1.0 {
@@ -349,9 +361,9 @@ impl Evaluator {
     }
 }
 
-/// What the residual and the weighed explanations say of one servo. Two servos
-/// do not fail in the same second: evidence against both speaks for neither,
-/// unless nothing else accounts for it.
+/// The finding for one servo, from its residual, path and evidence. Two servos do not
+/// fail in the same second: evidence against both counts against neither, unless there is
+/// too much of it for any other cause.
 fn servo(axis: Axis, evidence: &Evidence, around: &Surroundings) -> Finding {
     let (e, other) = (&evidence.axes[axis], &evidence.axes[axis.other()]);
     let nats = if other.nats < BOTH_NATS { (e.nats - other.nats).max(0.0) } else { e.nats };
@@ -359,7 +371,7 @@ fn servo(axis: Axis, evidence: &Evidence, around: &Surroundings) -> Finding {
     let test = match fails(e) {
         true if fails(other) && e.nats.min(other.nats) < BOTH_NATS => Test::NotTested,
         true => Test::Prefailed,
-        // The rim may hold what a servo would not.
+        // At the rim, agreement proves nothing: the rim may hold the ball.
         false if e.enabled && !around.at_edge => Test::Prepassed,
         false => Test::NotTested,
     };
@@ -367,9 +379,9 @@ fn servo(axis: Axis, evidence: &Evidence, around: &Surroundings) -> Finding {
     Finding { test, nats: Some(nats), gone: around.over_the_edge, kind, rival: None }
 }
 
-/// Whether a ball at the rim stays there although it ought to leave. A rim
-/// only pushes inward, so all that it can explain is a residual inward: one
-/// outward is the servo's, for as long as the readings are alive.
+/// Whether a ball at the rim stays there although it should leave. A rim only pushes
+/// inward, so it can only explain an inward residual; an outward one is due to the servo,
+/// as long as the readings are alive.
 fn pinned(
     axis: Axis,
     e: &AxisEvidence,
@@ -383,7 +395,7 @@ fn pinned(
     around.rim == Some(axis) && around.rim_s >= window_s && outward && alive
 }
 
-/// The chapter's rule: enabled and the residual at least 0.01 m/s².
+/// The chapter's rule: enabled, and a residual of at least 0.01 m/s².
 fn textbook(axis: Axis, evidence: &Evidence) -> Finding {
     let e = &evidence.axes[axis];
     match (e.enabled, e.violates()) {
@@ -393,7 +405,7 @@ fn textbook(axis: Axis, evidence: &Evidence) -> Finding {
     }
 }
 
-/// The ball hardly moves, and neither servo is answered.
+/// The ball hardly moves and answers neither servo.
 fn held_back(evidence: &Evidence, around: &Surroundings) -> Option<Finding> {
     let PerAxis { x, y } = &evidence.axes;
     let slow = |e: &AxisEvidence| e.velocity_m_s.is_some_and(|v| v.abs() < HELD_BACK_M_S);
@@ -407,7 +419,7 @@ mod tests {
     use super::super::stillness::Reading;
     use super::*;
 
-    /// A ball clear of the edge, of whose readings nothing is known.
+    /// A ball clear of the edge, with unlimited scatter.
     const CLEAR: Surroundings = Surroundings {
         clear_s: 1.0,
         at_edge: false,
@@ -418,7 +430,7 @@ mod tests {
         noisy_m: 1.0,
     };
 
-    /// A ball that lies at the rim at +x while the twin goes by `twin`, m/s².
+    /// The result for a ball at the rim at +x while the twin accelerates by `twin`, m/s².
     fn at_the_rim(twin: f64, identical_s: f64) -> Test {
         let evaluator = Evaluator::new(
             Profile::Default,
@@ -443,15 +455,15 @@ mod tests {
         servo(Axis::X, &evidence, &around).test
     }
 
-    /// A ball that stands in the middle and is asked to move along x alone, by a
-    /// servo that has `nats` against it where `suspect_nats` make it suspected.
+    /// A ball that stands in the middle and is asked to move along x only, by a servo
+    /// with evidence `nats` against it, which is suspected from `suspect_nats` on.
     fn standing(nats: f64, suspect_nats: f64) -> Finding {
         let reading = Reading {
             dt: 0.5,
             position_m: PerAxis { x: Some(0.0), y: Some(0.0) },
             asked_m_s2: PerAxis { x: 1.0, y: 0.0 },
             still_m: 1e-3,
-            usable: true,
+            refused: false,
             outliers: 0,
         };
         let mut readings = Stillness::default();
@@ -466,8 +478,8 @@ mod tests {
         evaluator.stuck_ball(&evidence, &readings, &CLEAR)
     }
 
-    /// A path that bends from the twin's accuses its servo, where the other axis goes by
-    /// its own: what both share is another's.
+    /// A path that deviates from the twin's accuses its servo if the other axis agrees
+    /// with the twin; a deviation of both has a common cause.
     #[test]
     fn a_path_off_the_twins_accuses_its_servo_alone() {
         let bent = |error_m: f64| AxisEvidence {
@@ -484,8 +496,8 @@ mod tests {
         assert_eq!(test(6e-3, 6e-3), Test::NotTested);
     }
 
-    /// Where the twin fits badly, evidence is believed that a bent path or an offset
-    /// goes with, or where no path is judged.
+    /// Where the twin fits badly, evidence counts if the path deviates as well, if the
+    /// kind is an offset, or if no path is judged.
     #[test]
     fn evidence_alone_does_not_accuse_where_the_twin_fits_badly() {
         let wide = Limits::new(Profile::Default, None, false, 7.0);
@@ -516,7 +528,7 @@ mod tests {
         assert_eq!(standing(10.0, 10.0).test, Test::NotTested);
     }
 
-    /// An owner who asks for more evidence has the servo suspected later.
+    /// If the owner requires more evidence, the servo is suspected later.
     #[test]
     fn a_rival_weighs_by_the_evidence_that_is_asked_for() {
         let weight = |nats, suspect| standing(nats, suspect).rival.map_or(1.0, |r| r.weight);
@@ -528,8 +540,8 @@ mod tests {
         }
     }
 
-    /// Readings that scatter by 2 mm, of a ball that is clear of the edge and
-    /// moves `blur_m` within the uncertainty of a reading's time.
+    /// The result for readings that scatter by 2 mm, of a ball clear of the edge that
+    /// moves by `blur_m` within the uncertainty of a reading's time.
     fn scattered(noise_m: f64, clear_s: f64, blur_m: f64) -> Test {
         let mut limit = Limits::new(Profile::Default, None, false, 7.0);
         limit.noise_m = Some(noise_m);

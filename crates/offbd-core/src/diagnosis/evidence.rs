@@ -1,12 +1,13 @@
-//! What speaks for a fault: the numbers at one moment, and the suspicion that
-//! they lead to.
+//! The evidence for a fault: the quantities at one moment, and the suspicion that follows
+//! from them.
 
-use super::{Answer, Step};
+use super::{PositionJump, ServoAnswer};
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use crate::vocabulary::{Axis, FaultCode, FaultKind, PerAxis, SimTime};
 
-/// One axis at one moment. Accelerations are over the estimation window.
+/// The quantities of one axis at one moment. Accelerations are over the estimation
+/// window.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AxisEvidence {
     /// Command in force, rad.
@@ -23,76 +24,75 @@ pub struct AxisEvidence {
     pub limit_m_s2: f64,
     /// Whether the enable condition holds: the residual may be judged.
     pub enabled: bool,
-    /// Evidence for a fault of the servo: logarithm of how much likelier the
-    /// motion is if it is broken, nats.
+    /// Evidence for a fault of the servo, nats: the log-likelihood ratio of a broken to a
+    /// healthy servo.
     pub nats: f64,
-    /// How far the path of the last two seconds bends from the twin's, root mean
-    /// square, m; none where that is not testable.
+    /// Root mean square deviation of the path of the last two seconds from the twin's, m;
+    /// `None` if not testable.
     pub path_error_m: Option<f64>,
-    /// The most that it bends on the healthy rig, m; none where that is not known.
+    /// Limit of that deviation, m; `None` if unknown.
     pub path_limit_m: Option<f64>,
-    /// How the servo has answered its command of late.
-    pub answer: Option<Answer>,
-    /// Seconds for which the readings along this axis have been bit-identical.
+    /// The servo's recent response to its command.
+    pub answer: Option<ServoAnswer>,
+    /// Time for which the readings along this axis have been bit-identical, s.
     pub identical_s: f64,
 }
 
 impl AxisEvidence {
-    /// Measured − twin acceleration, m/s²; none where it is not testable.
+    /// Measured − twin acceleration, m/s²; `None` if not testable.
     #[must_use]
     pub fn residual_m_s2(&self) -> Option<f64> {
         Some(self.measured_m_s2? - self.twin_m_s2?)
     }
 
-    /// Whether the path bends from the twin's by more than the limit.
+    /// Whether the path deviates from the twin's by the limit or more.
     #[must_use]
     pub fn is_off_path(&self) -> bool {
         self.path_share().is_some_and(|share| share >= 1.0)
     }
 
-    /// How far the path bends from the twin's, as a share of the limit; none where
-    /// either is not known.
+    /// Deviation of the path from the twin's as a fraction of the limit; `None` if either
+    /// is unknown.
     #[must_use]
     pub fn path_share(&self) -> Option<f64> {
         Some(self.path_error_m? / self.path_limit_m?)
     }
 
-    /// Whether the axis is enabled and its residual beyond the limit.
+    /// Whether the axis is enabled and its residual at or beyond the limit.
     #[must_use]
     pub fn violates(&self) -> bool {
         self.enabled && self.residual_m_s2().is_some_and(|r| r.abs() >= self.limit_m_s2)
     }
 }
 
-/// The numbers at one moment: an innovation record, and the freeze frame of a
-/// fault when it is kept.
+/// The quantities at one moment; kept with a fault, they are its freeze frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Evidence {
-    /// The judged sample's time.
+    /// Time of the judged sample.
     pub at: Option<SimTime>,
     /// Length of the estimation window that was available, s.
     pub window_s: f64,
     pub axes: PerAxis<AxisEvidence>,
-    /// Seconds for which no ball has been seen.
+    /// Time for which no ball has been seen, s.
     pub unseen_s: f64,
-    /// Share of the samples of the last seconds without a ball, 0 to 1.
+    /// Fraction of recent samples without a ball, 0 to 1.
     pub missing_share: f64,
-    /// Seconds for which the readings have been bit-identical.
+    /// Time for which the readings have been bit-identical, s.
     pub identical_s: f64,
-    /// Seconds for which the ball has stood still within the noise.
+    /// Time for which the ball has stood still within the noise, s.
     pub still_s: f64,
-    /// Lone readings set aside as outliers in the last ten seconds.
+    /// Recent outliers, each fading with a time constant of ten seconds.
     pub outliers: u32,
     /// Standard deviation of the readings about their fit, m.
     pub scatter_m: Option<f64>,
-    /// The same of healthy readings, the worse of both axes, m: learnt, or
-    /// assumed on a rig that is not.
+    /// Standard deviation of healthy readings, the larger of both axes, m: learnt, or
+    /// assumed if the rig is not learnt.
     pub healthy_scatter_m: f64,
-    /// The step of the readings that the sensor is blamed for, if one is.
-    pub jump: Option<Step>,
+    /// The jump of the readings that the sensor is blamed for, if any.
+    pub jump: Option<PositionJump>,
 }
 
-/// One possible cause and how much of the evidence speaks for it.
+/// A possible cause and its weight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Candidate {
     pub code: FaultCode,
@@ -101,20 +101,20 @@ pub struct Candidate {
     pub weight: f64,
 }
 
-/// What is suspected: since when, in which way, and what else it may be.
+/// A suspected fault: its onset, its kind and the causes that may explain it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Suspicion {
-    /// When the deviation began, as far as the evidence says.
+    /// Estimated time at which the deviation began.
     pub onset: Option<SimTime>,
     pub kind: Option<FaultKind>,
-    /// Causes that read alike, heaviest first; empty where only one does.
+    /// Causes with the same symptoms, heaviest first; empty if there is only one.
     pub candidates: Vec<Candidate>,
 }
 
 /// A change of one code's status byte.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Transition {
-    /// The sample at which it changed.
+    /// Time of the sample at which it changed.
     pub at: SimTime,
     pub code: FaultCode,
     pub status: crate::vocabulary::FaultStatus,
@@ -124,7 +124,7 @@ pub struct Transition {
 }
 
 impl Transition {
-    /// The axis to blame, for the servo codes.
+    /// The axis at fault, for the servo codes.
     #[must_use]
     pub const fn axis(&self) -> Option<Axis> {
         self.code.axis()

@@ -1,4 +1,4 @@
-//! How far measured and predicted acceleration may differ.
+//! The limits of the residual, the path and the readings.
 
 use crate::maths::window_for;
 
@@ -7,38 +7,42 @@ use super::{AxisCalibration, Profile, SensorCalibration};
 /// The chapter's fault limit, m/s² (application 3).
 const TEXTBOOK_LIMIT_M_S2: f64 = 0.01;
 
-/// Standard errors of the estimate that are always allowed. Coloured readings
-/// make the white-noise error too small by about two.
+/// Standard errors of the residual within the limit. Correlated readings make the
+/// white-noise error too small by a factor of about two.
 const ERROR_FACTOR: f64 = 6.0;
 
-/// Healthy residual deviations that are allowed once they are known.
+/// Standard deviations of the healthy residual within the limit, for a learnt rig.
+/// Chosen.
 const HEALTHY_FACTOR: f64 = 5.0;
 
-/// Outliers of late that are too many: those of a healthy sensor, twice, and
-/// some. Not learnt: of four in ten seconds no healthy sensor is known.
+/// Recent outliers above twice the healthy count from which on the sensor fails. Chosen.
 const FEW_OUTLIERS: f64 = 4.0;
+/// Recent outliers from which on the sensor of a rig that is not learnt fails: no healthy
+/// sensor with four in ten seconds is known.
 const UNKNOWN_OUTLIERS: f64 = 4.0;
+/// Factor on the outliers of the healthy sensor. Chosen.
 const OUTLIERS_FACTOR: f64 = 2.0;
-/// Seconds without a ball for which no healthy tracker that is not learnt loses
-/// it; one that is learnt may for longer than it ever did.
+/// Time without a ball from which on the sensor fails, s: no healthy tracker of a rig
+/// that is not learnt has lost it for as long.
 const UNSEEN_S: f64 = 0.3;
+/// Factor on the longest healthy time without a ball. Chosen.
 const UNSEEN_FACTOR: f64 = 1.5;
-/// Times the most scatter that healthy readings have shown for a while.
+/// Factor on the largest scatter that healthy readings have shown for a while. Chosen.
 const SCATTER_FACTOR: f64 = 1.25;
-/// Scatter for which no sensor is blamed where that is not known, m: a tracker
-/// good to a pixel.
+/// Scatter up to which no sensor is blamed if the healthy scatter is unknown, m: that of
+/// a tracker accurate to a pixel.
 const UNKNOWN_SCATTER_M: f64 = 1e-3;
 /// Least scatter for which a sensor is blamed, m: the roughness of a plate.
 const LEAST_SCATTER_M: f64 = 1e-4;
 
-/// The limits of what the readings themselves show.
+/// The limits of the readings themselves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SensorLimits {
-    /// Outliers of late.
+    /// Recent outliers.
     pub outliers: f64,
     /// Time without a ball, s.
     pub unseen_s: f64,
-    /// Scatter about the motion that is no noise, m.
+    /// Scatter about the motion that does not count as noise, m.
     pub scatter_m: f64,
 }
 
@@ -55,66 +59,90 @@ impl SensorLimits {
     }
 }
 
-/// The limits of one axis; an adaptive limit J0 + J1·|predicted| + J3·σ_a.
+/// The limits of one axis. That of the residual adapts: J0 + J1·|predicted| + J3·σ_a.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// J0, m/s².
     floor_m_s2: f64,
-    /// J1, the share of the predicted acceleration that may be model error.
+    /// J1, the fraction of the predicted acceleration that may be model error.
     share: f64,
     /// J3, in standard errors.
     errors: f64,
-    /// Acceleration that a ball at rest resists, m/s².
+    /// Acceleration that a ball at rest withstands, m/s².
     pub breakaway_m_s2: f64,
-    /// Deceleration of a ball that rolls out as far as it is known, m/s²: half of
-    /// what holds it.
+    /// Deceleration of a rolling ball that nothing drives, m/s²: half of what a ball at
+    /// rest withstands.
     pub rolls_out_m_s2: f64,
     /// Standard deviation of the healthy residual, m/s².
     pub residual_m_s2: f64,
-    /// Standard deviation of healthy readings, m; none where the axis has no
-    /// readings.
+    /// Standard deviation of healthy readings, m; `None` if the axis has no readings.
     pub noise_m: Option<f64>,
     /// Time for which readings of a ball that is asked to move, or moved, may be
-    /// the same, s.
+    /// identical, s.
     pub repeat_s: f64,
-    /// The same for a ball that may be at rest; none if that is not known.
+    /// Time for which readings of a ball that may be at rest may be identical, s; `None`
+    /// if unknown.
     pub rest_repeat_s: Option<f64>,
-    /// The most that the path bends from the twin's over two seconds, root mean square,
-    /// m; none if that is not known.
+    /// Largest root mean square deviation of the path from the twin's over two seconds,
+    /// m; `None` if unknown.
     pub path_m: Option<f64>,
 }
 
-/// Acceleration that counts as asking a ball to move on any rig, m/s²: one
-/// degree of tilt.
+/// Acceleration that counts as asking a ball to move on any rig, m/s²: one degree of
+/// tilt.
 const LEAST_PRESS_M_S2: f64 = 0.12;
 
-/// Shortest time for which identical readings are believed to be frozen, s:
-/// longer than any refresh seen (0.2 s).
-const LEAST_REPEAT_S: f64 = 0.3;
-/// The same for a ball that may be at rest, s.
+/// Shortest duration of identical readings that count as frozen, s: longer than any
+/// refresh seen (0.2 s).
+pub(super) const LEAST_REPEAT_S: f64 = 0.3;
+/// Shortest duration of identical readings that count as frozen if the ball may be at
+/// rest, s. Chosen.
 const LEAST_REST_REPEAT_S: f64 = 2.0;
-/// Times the longest healthy repeat.
+/// Factor on the longest healthy repeat. Chosen.
 const REPEAT_FACTOR: f64 = 2.0;
+/// Factor on the longest healthy repeat if the ball may be at rest. Chosen.
 const REST_REPEAT_FACTOR: f64 = 3.0;
-/// The same where nothing is learnt, s: healthy ones of 1.8 s have been seen.
+/// Duration of identical readings that count as frozen if nothing is learnt, s: healthy
+/// ones of 1.8 s have been seen.
 const UNKNOWN_REPEAT_S: f64 = 3.0;
-/// Rest in one piece that must have been seen to know how its readings repeat, s,
-/// and as a multiple of the longest repeat: a sensor that holds its value while
-/// the ball rests repeats it for as long as that does.
+/// Duration of one rest, s, from which on the repeats of readings at rest are known, if
+/// it is also longer than [`REST_SEEN_REPEATS`] of them: a sensor that holds its value at
+/// rest repeats it for as long as the ball rests. Chosen.
 const REST_SEEN_S: f64 = 3.0;
+/// Least duration of one rest in longest repeats. Chosen.
 const REST_SEEN_REPEATS: f64 = 5.0;
 
-/// Times the most that a healthy path is expected to bend from the twin's: of 700
-/// faults put into servos of real rigs 184 were found with it, 171 with 1.4.
+/// Least limit of the residual, m/s². Chosen.
+pub(super) const LEAST_FLOOR_M_S2: f64 = 0.15;
+/// Fraction of the predicted acceleration that may be model error on a learnt rig.
+/// Chosen.
+const LEARNT_MODEL_SHARE: f64 = 0.2;
+/// Fraction of the predicted acceleration that may be model error on a rig that is not
+/// learnt: healthy gains from 0.5 on have been seen.
+const UNKNOWN_MODEL_SHARE: f64 = 0.5;
+/// Level assumed before anything is learnt, rad: 1.7° has been seen on a healthy rig.
+const UNKNOWN_LEVEL_RAD: f64 = 0.03;
+/// Breakaway assumed before anything is learnt, rad: balls that stand at 1° have been
+/// seen on healthy rigs.
+const UNKNOWN_BREAKAWAY_RAD: f64 = 0.0175;
+/// Noise assumed before anything is learnt, m: that of a coarse camera.
+const UNKNOWN_READING_NOISE_M: f64 = 2e-3;
+/// Factor on the learnt breakaway: friction varies over a plate. Chosen.
+const BREAKAWAY_FACTOR: f64 = 1.5;
+/// Fraction of the learnt breakaway that is taken to brake a rolling ball. Chosen.
+const ROLL_OUT_SHARE: f64 = 0.5;
+
+/// Factor on the largest healthy deviation of the path: of 700 faults put into servos of
+/// real rigs 184 were found with it, 171 with 1.4.
 const PATH_FACTOR: f64 = 1.2;
-/// What hands bend it by on a rig that bends it less by itself, m: 40 drawn rigs with two
-/// pushes a minute had 27 false alarms of servos in 120 h with 4 mm, 23 with 5 mm, and
-/// some 80 with 2 mm.
+/// Least limit of the deviation of the path, m: hands disturb it by as much on a rig that
+/// fits well. 40 simulated rigs with two pushes a minute had 27 false alarms of servos in
+/// 120 h with 4 mm, 23 with 5 mm, and some 80 with 2 mm.
 const LEAST_PATH_M: f64 = 5e-3;
 
 impl Limits {
-    /// The limits of `profile` for an axis, learnt or not, on a rig where a
-    /// tilt of one radian would accelerate the ball by `slope_m_s2`.
+    /// Returns the limits of `profile` for an axis, learnt or not. A tilt of one radian
+    /// accelerates the ball by `slope_m_s2`. An `absent` axis has no readings.
     #[must_use]
     pub fn new(
         profile: Profile,
@@ -122,31 +150,29 @@ impl Limits {
         absent: bool,
         slope_m_s2: f64,
     ) -> Self {
-        // Not learnt: a plate 1.7° off level and balls that stand at 1° have
-        // been seen on healthy rigs, and 2 mm is a coarse camera.
+        // The limits before anything is learnt.
         let wide = Self {
-            floor_m_s2: 0.03 * slope_m_s2 + 0.15,
-            share: 0.5,
+            floor_m_s2: UNKNOWN_LEVEL_RAD * slope_m_s2 + LEAST_FLOOR_M_S2,
+            share: UNKNOWN_MODEL_SHARE,
             errors: ERROR_FACTOR,
-            breakaway_m_s2: 0.0175 * slope_m_s2,
+            breakaway_m_s2: UNKNOWN_BREAKAWAY_RAD * slope_m_s2,
             rolls_out_m_s2: 0.0,
             residual_m_s2: 0.0,
-            noise_m: (!absent).then_some(2e-3),
+            noise_m: (!absent).then_some(UNKNOWN_READING_NOISE_M),
             repeat_s: UNKNOWN_REPEAT_S,
             rest_repeat_s: None,
             path_m: None,
         };
         let known = learnt.map_or(wide, |l| Self {
-            floor_m_s2: (HEALTHY_FACTOR * l.residual_m_s2).max(0.15),
-            share: 0.2,
+            floor_m_s2: (HEALTHY_FACTOR * l.residual_m_s2).max(LEAST_FLOOR_M_S2),
+            share: LEARNT_MODEL_SHARE,
             errors: ERROR_FACTOR,
-            // Half again as much as learnt: friction varies over a plate. Of a ball
-            // that never rested it is not known.
+            // The breakaway of a ball that never rested is not known.
             breakaway_m_s2: match l.rest_s > 0.0 {
-                true => 1.5 * l.breakaway_rad * slope_m_s2,
+                true => BREAKAWAY_FACTOR * l.breakaway_rad * slope_m_s2,
                 false => wide.breakaway_m_s2,
             },
-            rolls_out_m_s2: 0.5 * l.breakaway_rad * slope_m_s2,
+            rolls_out_m_s2: ROLL_OUT_SHARE * l.breakaway_rad * slope_m_s2,
             residual_m_s2: l.residual_m_s2,
             noise_m: Some(l.noise_m),
             repeat_s: (REPEAT_FACTOR * l.longest_repeat_s).max(LEAST_REPEAT_S),
@@ -163,21 +189,21 @@ impl Limits {
         }
     }
 
-    /// Acceleration that asks a ball at rest to move, m/s².
+    /// Acceleration from which on a ball at rest counts as asked to move, m/s².
     #[must_use]
     pub const fn pressing_m_s2(&self) -> f64 {
         self.breakaway_m_s2.max(LEAST_PRESS_M_S2)
     }
 
-    /// The window, s, in which noise adds `share` of the floor to the limit,
+    /// Returns the window, s, with which noise adds `share` of the floor to the limit,
     /// for readings `period_s` apart.
     #[must_use]
     pub fn window_s(&self, share: f64, period_s: f64) -> f64 {
         window_for(self.noise_m.unwrap_or(0.0), period_s, share * self.floor_m_s2 / self.errors)
     }
 
-    /// The limit, m/s², for a predicted acceleration and the standard error of
-    /// the residual.
+    /// Returns the limit of the residual, m/s², for a predicted acceleration and the
+    /// standard error of the residual.
     #[must_use]
     pub fn at(&self, predicted_m_s2: f64, error_m_s2: f64) -> f64 {
         self.floor_m_s2 + self.share * predicted_m_s2.abs() + self.errors * error_m_s2

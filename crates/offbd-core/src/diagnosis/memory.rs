@@ -1,9 +1,9 @@
-//! The fault memory of one rig: per code the status byte, the trip, healing
-//! and aging counters, occurrences, the freeze frame, whether it has been
-//! acknowledged, and how often its monitor could judge.
+//! The fault memory of one rig: per code the status byte, the trip, healing and aging
+//! counters, occurrences, the freeze frame, whether it has been acknowledged, and how
+//! often its monitor could judge.
 //!
-//! One session is one operation cycle. Knows nothing of sensors or thresholds:
-//! it is told FAILED, PASSED, cycle start and cycle end.
+//! One session is one operation cycle. Independent of sensors and limits: its inputs are
+//! FAILED, PASSED, and the start and end of a cycle.
 
 use super::{Evidence, Suspicion};
 #[cfg(not(feature = "std"))]
@@ -15,11 +15,11 @@ use super::StatusByte;
 /// When a fault counts as confirmed, healed and aged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MemoryRules {
-    /// Operation cycles with a confirmed failure before bit 3 is set; ≥ 1.
+    /// Operation cycles with a trip before bit 3 (confirmedDTC) is set; ≥ 1.
     pub confirmation_threshold: u8,
-    /// Whether confirmation asks for the warning indicator (bit 7).
+    /// Whether confirmation requests the warning indicator (bit 7).
     pub indicator: bool,
-    /// Good cycles until the indicator goes out; ≥ 1.
+    /// Good cycles until the indicator is switched off; ≥ 1.
     pub healing_cycles: u8,
     /// Further good cycles until the stored data is erased; ≥ 1.
     pub aging_cycles: u8,
@@ -33,28 +33,27 @@ impl Default for MemoryRules {
     }
 }
 
-/// How often a monitor has been in a position to find its fault: the in-use
-/// performance of SAE J1979. Neither clearing nor aging erases it.
+/// How often a monitor could have found its fault: the in-use performance ratio of SAE
+/// J1979. Neither clearing nor aging erases it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct InUse {
     /// Operation cycles that have ended.
     pub cycles: u32,
-    /// Those that brought enough data to judge by.
+    /// Cycles with enough data to judge.
     pub with_data: u32,
-    /// Those in which the gate was open long enough to have found a fault.
+    /// Cycles in which the monitor was enabled for long enough to find a fault.
     pub judged: u32,
 }
 
 impl InUse {
-    /// How much longer than a fault takes to be confirmed there must be data:
-    /// a gate that is open for a tenth of the time is wide enough, one that is
-    /// stricter shows as a low ratio. Chosen, not measured.
+    /// Data that a cycle must bring, in multiples of the time that a fault takes to be
+    /// confirmed: an enable condition that holds for a tenth of the time suffices, a
+    /// stricter one shows as a low ratio. Chosen, not measured.
     const DATA_FACTOR: f64 = 10.0;
 
-    /// Counts a cycle that ends, with `data_s` seconds of data and the gate
-    /// open for `judged_s` of them, for a fault that takes `needed_s` to be
-    /// confirmed. A cycle that judged had enough data, so that
-    /// `judged` ≤ `with_data` ≤ `cycles`.
+    /// Counts a cycle with `data_s` seconds of data and the monitor enabled for
+    /// `judged_s` of them, for a fault that takes `needed_s` to be confirmed. A judged
+    /// cycle always counts as one with data, so that `judged` ≤ `with_data` ≤ `cycles`.
     pub fn count(&mut self, data_s: f64, judged_s: f64, needed_s: f64) {
         let judged = Self::judges(judged_s, needed_s);
         let with_data = judged || (data_s > 0.0 && data_s >= Self::DATA_FACTOR * needed_s);
@@ -63,71 +62,71 @@ impl InUse {
         self.judged = self.judged.saturating_add(u32::from(judged));
     }
 
-    /// Whether `judged_s` seconds with the gate open are long enough to have found
-    /// a fault that takes `needed_s` to be confirmed.
+    /// Whether `judged_s` seconds of judging suffice to find a fault that takes
+    /// `needed_s` to be confirmed.
     #[must_use]
     pub fn judges(judged_s: f64, needed_s: f64) -> bool {
         judged_s > 0.0 && judged_s >= needed_s
     }
 
-    /// Judged cycles over those with data, 0 to 1; none before there is one.
+    /// Judged cycles over cycles with data, 0 to 1; `None` if there are none.
     #[must_use]
     pub fn ratio(&self) -> Option<f64> {
         (self.with_data > 0).then(|| f64::from(self.judged) / f64::from(self.with_data))
     }
 }
 
-/// What is remembered of one code.
+/// The record of one code.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FaultRecord {
     pub status: StatusByte,
-    /// Cycles in which the failure lasted long enough to count as a trip.
+    /// Cycles in which the failure lasted for long enough to count as a trip.
     pub trips: u8,
-    /// Whether this cycle has counted as a trip already.
+    /// Whether this cycle has already counted as a trip.
     pub tripped_this_cycle: bool,
-    /// Good cycles in a row since the last failure.
+    /// Consecutive good cycles since the last failure.
     pub good_cycles: u8,
-    /// Whether good cycles have put the fault to rest (cleared by a failure).
+    /// Whether enough good cycles have followed; reset by a failure.
     pub healed: bool,
-    /// Times the test went from not failed to failed since the last clear.
+    /// Transitions of the test from not failed to failed since the last clear.
     pub occurrences: u32,
-    /// Onset of the first of them, on the clock of its session.
+    /// Onset of the first occurrence, on the clock of its session.
     pub first_onset: Option<SimTime>,
-    /// Onset of the last of them, on the clock of its session.
+    /// Onset of the last occurrence, on the clock of its session.
     pub last_onset: Option<SimTime>,
     /// Operation cycles with a failure since the last clear.
     pub failed_cycles: u32,
     /// Whether the current occurrence has been acknowledged.
     pub acknowledged: bool,
-    /// What was suspected when the test last failed.
+    /// The suspicion when the test last failed.
     pub suspicion: Option<Suspicion>,
-    /// The moment of the first failure of the current occurrence. Boxed: most
-    /// records have none, and every asset has several.
+    /// The evidence at the first failure of the current occurrence. Boxed: most records
+    /// have none, and every asset has several.
     pub freeze_frame: Option<Box<Evidence>>,
-    /// How often the monitor could judge at all.
+    /// How often the monitor could judge.
     pub in_use: InUse,
 }
 
 impl FaultRecord {
-    /// Good cycles that count towards healing.
+    /// Good cycles counted towards healing.
     #[must_use]
     pub fn healing_counter(&self, rules: &MemoryRules) -> u8 {
         if self.status.confirmed() { self.good_cycles.min(rules.healing_cycles) } else { 0 }
     }
 
-    /// Good cycles after healing, which count towards aging.
+    /// Good cycles after healing, counted towards aging.
     #[must_use]
     pub fn aging_counter(&self, rules: &MemoryRules) -> u8 {
         let past = self.good_cycles.saturating_sub(rules.healing_cycles);
         if self.status.confirmed() { past.min(rules.aging_cycles) } else { 0 }
     }
 
-    /// The same with nothing on record but `status` and the monitor's use.
+    /// Returns an empty record with `status` and the monitor's in-use counts.
     fn erased(&self, status: StatusByte) -> Self {
         Self { status, in_use: self.in_use, ..Self::default() }
     }
 
-    /// The contract's word for the status byte.
+    /// The state that the status byte stands for.
     #[must_use]
     pub const fn word(&self) -> FaultStatus {
         if self.healed && self.status.confirmed() {
@@ -141,14 +140,14 @@ impl FaultRecord {
         }
     }
 
-    /// The kind last suspected, where the evidence said one.
+    /// The last suspected kind, if the evidence told one.
     #[must_use]
     pub fn kind(&self) -> Option<FaultKind> {
         self.suspicion.as_ref().and_then(|s| s.kind)
     }
 }
 
-/// The four codes of one rig.
+/// The fault memory of one rig: a record per code.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FaultMemory {
     records: [FaultRecord; FaultCode::COUNT],
@@ -161,7 +160,7 @@ impl FaultMemory {
         &self.records[code as usize]
     }
 
-    /// A memory with `record` in the place of `code`, as read from a store.
+    /// Replaces the record of `code`, as when read from a store.
     #[must_use]
     pub fn with(mut self, code: FaultCode, record: FaultRecord) -> Self {
         self.records[code as usize] = record;
@@ -172,7 +171,7 @@ impl FaultMemory {
         &mut self.records[code as usize]
     }
 
-    /// FAILED for `code`. Returns whether the byte changed.
+    /// Takes FAILED for `code`. Returns whether the byte changed.
     pub fn failed(&mut self, code: FaultCode, suspicion: &Suspicion, frame: &Evidence) -> bool {
         let record = self.record_mut(code);
         let before = record.status;
@@ -195,8 +194,8 @@ impl FaultMemory {
         record.status != before
     }
 
-    /// The failure has lasted long enough to count for this cycle. Returns
-    /// whether the byte changed.
+    /// Takes a trip: the failure has lasted for long enough to count for this cycle.
+    /// Returns whether the byte changed.
     pub fn trip(&mut self, code: FaultCode, suspicion: &Suspicion, rules: &MemoryRules) -> bool {
         let record = self.record_mut(code);
         let before = record.status;
@@ -211,10 +210,9 @@ impl FaultMemory {
         record.status != before
     }
 
-    /// The kind of a fault on record may show only after its confirmation: takes
-    /// `suspicion` where it says one and the record does not. Returns whether it
-    /// did.
-    pub fn name(&mut self, code: FaultCode, suspicion: &Suspicion) -> bool {
+    /// Sets the kind of a confirmed fault if it showed only after the confirmation: takes
+    /// `suspicion` if it has a kind and the record has none. Returns whether it did.
+    pub fn set_kind(&mut self, code: FaultCode, suspicion: &Suspicion) -> bool {
         let record = self.record_mut(code);
         let named = record.kind().is_none() && suspicion.kind.is_some();
         let named = named && record.status.test_failed() && record.status.confirmed();
@@ -224,7 +222,7 @@ impl FaultMemory {
         named
     }
 
-    /// PASSED for `code`. Returns whether the byte changed.
+    /// Takes PASSED for `code`. Returns whether the byte changed.
     pub fn passed(&mut self, code: FaultCode) -> bool {
         let record = self.record_mut(code);
         let before = record.status;
@@ -232,7 +230,7 @@ impl FaultMemory {
         record.status != before
     }
 
-    /// A new operation cycle begins for every code.
+    /// Starts a new operation cycle for every code.
     pub fn start_cycle(&mut self) {
         for record in &mut self.records {
             record.status.start_cycle();
@@ -240,7 +238,7 @@ impl FaultMemory {
         }
     }
 
-    /// The operation cycle ends: pending falls, healing and aging advance.
+    /// Ends the operation cycle: clears pending, advances healing and aging.
     pub fn end_cycle(&mut self, rules: &MemoryRules) {
         for record in &mut self.records {
             if !record.status.end_cycle() {
@@ -262,21 +260,20 @@ impl FaultMemory {
         }
     }
 
-    /// Takes note of how much of the cycle that ends `code` could be judged;
-    /// see [`InUse::count`].
+    /// Counts how much of the ending cycle `code` could be judged; see [`InUse::count`].
     pub fn count_use(&mut self, code: FaultCode, data_s: f64, judged_s: f64, needed_s: f64) {
         self.record_mut(code).in_use.count(data_s, judged_s, needed_s);
     }
 
-    /// Erases everything stored of `code`: it has never run. How often its
-    /// monitor could judge stays, as SAE J1979 has it.
+    /// Clears `code`: all its data are erased except for how often its monitor could
+    /// judge, as in SAE J1979.
     pub fn clear(&mut self, code: FaultCode) {
         let record = self.record_mut(code);
         *record = record.erased(StatusByte::default());
     }
 
-    /// Marks the current occurrence of `code` as seen by a person. Returns
-    /// whether there was an occurrence to acknowledge.
+    /// Marks the current occurrence of `code` as acknowledged by a person. Returns
+    /// whether there was one.
     pub fn acknowledge(&mut self, code: FaultCode) -> bool {
         let record = self.record_mut(code);
         let present = record.status.pending() || record.status.confirmed();

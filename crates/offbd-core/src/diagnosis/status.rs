@@ -13,7 +13,7 @@
 
 use core::fmt;
 
-/// The status byte. Starts as 0x50: nothing completed, nothing failed.
+/// The status byte. The initial value 0x50 means: nothing completed, nothing failed.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct StatusByte(u8);
 
@@ -27,7 +27,7 @@ const NOT_COMPLETED_THIS_CYCLE: u8 = 0x40;
 const INDICATOR: u8 = 0x80;
 
 impl StatusByte {
-    /// The byte as read back from a store.
+    /// Restores the byte from a store.
     #[must_use]
     pub const fn from_bits(bits: u8) -> Self {
         Self(bits)
@@ -88,14 +88,14 @@ impl StatusByte {
         self.0 &= !bits;
     }
 
-    /// FAILED: the debounce counter reached its upper end.
+    /// Takes FAILED: the debounce counter reached its upper end.
     pub const fn failed(&mut self) {
         self.set(TEST_FAILED | FAILED_THIS_CYCLE | PENDING | FAILED_SINCE_CLEAR);
         self.reset(NOT_COMPLETED_SINCE_CLEAR | NOT_COMPLETED_THIS_CYCLE);
     }
 
-    /// The trip counter reached the confirmation threshold; `indicator` asks
-    /// for the warning indicator with it.
+    /// Confirms the fault: the trip counter reached the confirmation threshold.
+    /// `indicator` requests the warning indicator as well.
     pub const fn confirm(&mut self, indicator: bool) {
         self.set(CONFIRMED);
         if indicator {
@@ -103,19 +103,19 @@ impl StatusByte {
         }
     }
 
-    /// PASSED: the debounce counter reached its lower end.
+    /// Takes PASSED: the debounce counter reached its lower end.
     pub const fn passed(&mut self) {
         self.reset(TEST_FAILED | NOT_COMPLETED_SINCE_CLEAR | NOT_COMPLETED_THIS_CYCLE);
     }
 
-    /// A new operation cycle begins; testFailed is kept.
+    /// Starts an operation cycle; testFailed is kept.
     pub const fn start_cycle(&mut self) {
         self.reset(FAILED_THIS_CYCLE);
         self.set(NOT_COMPLETED_THIS_CYCLE);
     }
 
-    /// The operation cycle ends: a completed test that never failed in it is
-    /// pending no longer. Returns whether the cycle was good in that sense.
+    /// Ends the operation cycle: clears pendingDTC if the test completed and never failed
+    /// in it. Returns whether that was so (a good cycle).
     pub const fn end_cycle(&mut self) -> bool {
         let good = self.completed_this_cycle() && !self.failed_this_cycle();
         if good {
@@ -124,12 +124,12 @@ impl StatusByte {
         good
     }
 
-    /// Enough good cycles have followed: the indicator goes out.
+    /// Switches the indicator off after enough good cycles.
     pub const fn heal(&mut self) {
         self.reset(INDICATOR);
     }
 
-    /// Enough good cycles have followed healing: the confirmation goes.
+    /// Clears the confirmation after enough good cycles since healing.
     pub const fn age(&mut self) {
         self.reset(CONFIRMED);
     }

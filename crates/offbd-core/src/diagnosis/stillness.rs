@@ -1,66 +1,66 @@
-//! What the readings themselves say: seen or not, repeating, standing still,
-//! thrown about.
+//! Properties of the readings themselves: missing, identical, standing still, outliers.
 //!
-//! A ball at rest is not a fault and neither are repeated readings; they turn
-//! into evidence only while the commands ask the ball to move (*pressed*).
+//! Neither a ball at rest nor identical readings are faults; they count as evidence only
+//! while the commands ask the ball to move (*pressed*).
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use crate::vocabulary::{Axis, PerAxis};
 
-/// Half-life of the count of outliers and of the share of missing readings, s.
-const MEMORY_S: f64 = 2.0;
+/// Time constant of the fraction of missing readings, s. Chosen.
+const MISSING_MEMORY_S: f64 = 2.0;
 
-/// Stillness after which a ball counts as at rest, s.
+/// Time of stillness from which on a ball counts as at rest, s. Chosen.
 const RESTING_S: f64 = 0.25;
-/// Share of the time after which identical readings are frozen from which on
-/// they leave open whether they are alive.
+/// Fraction of the time that makes identical readings frozen from which on it is
+/// uncertain whether they are alive. Chosen.
 const REPEATED_SHARE: f64 = 0.4;
 
-/// Longest that outliers are counted back, s.
+/// Time constant of the count of recent outliers, s. Chosen.
 const OUTLIER_MEMORY_S: f64 = 10.0;
 
-/// One sample as this watch sees it.
+/// One sample as input of [`Stillness`].
 #[derive(Clone, Copy, Debug)]
 pub struct Reading {
-    /// Seconds since the sample before.
+    /// Time since the previous sample, s.
     pub dt: f64,
     pub position_m: PerAxis<Option<f64>>,
-    /// Acceleration by which the commands ask the ball to move along each axis,
-    /// m/s²; zero where they do not ask for more than what may hold it.
+    /// Acceleration that the commands demand of the ball along each axis, m/s²; zero
+    /// while it is below what may hold the ball.
     pub asked_m_s2: PerAxis<f64>,
-    /// How far a ball at rest may seem to move, m.
+    /// Range within which a ball at rest may seem to move, m.
     pub still_m: f64,
-    /// Whether the outlier gate let the reading through.
-    pub usable: bool,
-    /// Outliers that the gate has found since the sample before.
+    /// Whether the outlier gate refused the reading; false if there is none.
+    pub refused: bool,
+    /// Outliers found by the gate since the previous sample.
     pub outliers: u32,
 }
 
-/// Stillness of one axis.
+/// Stillness of the readings along one axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AxisStillness {
     anchor_m: Option<f64>,
-    /// Whether the reading before had left the anchor's surroundings: it takes
-    /// two, for among thousands of readings one strays by chance.
+    /// Whether the previous reading had left the still range: two are needed, since among
+    /// thousands of readings single ones stray by chance.
     strayed: bool,
     last_m: Option<f64>,
-    /// Seconds since the reading left its surroundings.
+    /// Time since the reading left the still range, s.
     pub still_s: f64,
-    /// Seconds of those in which the ball was asked to move, in a row.
+    /// Part of that time, up to now, for which the ball has been asked to move without a
+    /// break, s.
     pub pressed_s: f64,
-    /// How fast a free ball would go by now that was at rest when it was first
-    /// asked to move, m/s, and how far it would have come, in widths of what counts
-    /// as still.
+    /// Speed that a free ball would have reached since it was first asked to move from
+    /// rest, m/s.
     asked_m_s: f64,
+    /// Distance that it would have covered, in widths of the still range.
     pub asked_widths: f64,
-    /// Seconds for which every bit has been the same.
+    /// Time for which the readings have been bit-identical, s.
     pub identical_s: f64,
     /// Velocity of the ball when the readings last changed, m/s.
     velocity_m_s: f64,
 }
 
-/// Memory of the velocity, s: some readings of a camera.
+/// Time constant of the velocity, s: some readings of a camera. Chosen.
 const VELOCITY_MEMORY_S: f64 = 0.1;
 
 impl AxisStillness {
@@ -98,14 +98,14 @@ impl AxisStillness {
         self.identical_s = 0.0;
     }
 
-    /// Whether it has been still for long enough to be at rest.
+    /// Whether the ball has been still for long enough to count as at rest.
     #[must_use]
     pub const fn rests(&self) -> bool {
         self.still_s > RESTING_S
     }
 
-    /// Whether readings that may be the same for `repeat_s` have been so for long
-    /// enough, while the ball was asked to move, to doubt that they are alive.
+    /// Whether readings have been identical for long enough, while the ball was asked to
+    /// move, that they may not be alive; `repeat_s` is the time that makes them frozen.
     #[must_use]
     pub fn repeats(&self, repeat_s: f64) -> bool {
         self.identical_s > REPEATED_SHARE * repeat_s && self.pressed_s > 0.0
@@ -117,8 +117,8 @@ impl AxisStillness {
         self.last_m.is_some()
     }
 
-    /// How far the ball would have gone since the readings last changed, m, had
-    /// friction held it back by `held_m_s2`.
+    /// Returns how far the ball would have rolled since the readings last changed, m, if
+    /// friction decelerated it by `held_m_s2`.
     #[must_use]
     pub fn missed_m(&self, held_m_s2: f64) -> f64 {
         let speed = self.velocity_m_s.abs();
@@ -127,15 +127,15 @@ impl AxisStillness {
     }
 }
 
-/// The watch over the readings.
+/// The properties of the readings of one rig.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Stillness {
     pub axes: PerAxis<AxisStillness>,
-    /// Seconds since a ball was last seen.
+    /// Time since a ball was last seen, s.
     pub unseen_s: f64,
-    /// Share of samples without a ball, over the last seconds, in [0, 1].
+    /// Fraction of recent samples without a ball, in [0, 1].
     pub missing: f64,
-    /// Outliers in the last ten seconds, each fading linearly in weight.
+    /// Recent outliers, each fading with a time constant of ten seconds.
     outliers: f64,
 }
 
@@ -144,11 +144,11 @@ impl Stillness {
     pub fn update(&mut self, reading: &Reading) {
         let seen = Axis::ALL.iter().any(|&a| reading.position_m[a].is_some());
         self.unseen_s = if seen { 0.0 } else { self.unseen_s + reading.dt };
-        let fade = MEMORY_S / (MEMORY_S + reading.dt);
+        let fade = MISSING_MEMORY_S / (MISSING_MEMORY_S + reading.dt);
         self.missing = self.missing * fade + if seen { 0.0 } else { 1.0 - fade };
         self.outliers *= OUTLIER_MEMORY_S / (OUTLIER_MEMORY_S + reading.dt);
         self.outliers += f64::from(reading.outliers);
-        if !reading.usable {
+        if reading.refused {
             return;
         }
         for axis in Axis::ALL {
@@ -158,13 +158,14 @@ impl Stillness {
         }
     }
 
-    /// Outliers of late, each fading over ten seconds.
+    /// Returns the number of recent outliers, each fading with a time constant of ten
+    /// seconds.
     #[must_use]
     pub const fn outliers(&self) -> f64 {
         self.outliers
     }
 
-    /// Seconds for which the ball has stood still in every direction seen.
+    /// Time for which the ball has stood still along every measured axis, s.
     #[must_use]
     pub fn still_s(&self) -> f64 {
         self.least(|a| a.still_s)
@@ -177,7 +178,7 @@ impl Stillness {
         pressed && self.still_s() > RESTING_S
     }
 
-    /// Seconds for which every reading has been the same to the bit.
+    /// Time for which the readings of every axis have been bit-identical, s.
     #[must_use]
     pub fn identical_s(&self) -> f64 {
         self.least(|a| a.identical_s)
@@ -204,7 +205,7 @@ mod tests {
             position_m: PerAxis { x, y: None },
             asked_m_s2: PerAxis { x: if pressed { 1.0 } else { 0.0 }, y: 0.0 },
             still_m: 0.002,
-            usable: true,
+            refused: false,
             outliers: 0,
         }
     }
@@ -231,8 +232,8 @@ mod tests {
         }
     }
 
-    /// A ball that a pull of 0.5 m/s² turns round seems to stand for a while, but
-    /// not for as long as one that is held has been asked to roll six widths.
+    /// A ball that an acceleration of 0.5 m/s² turns round seems to stand for a while,
+    /// but not for as long as a held ball that has been asked to roll six widths.
     #[test]
     fn a_ball_that_turns_round_is_not_held() {
         let mut watch = Stillness::default();
@@ -252,7 +253,7 @@ mod tests {
             watch.update(&reading(None, true));
         }
         assert!((watch.unseen_s - 2.0).abs() < 1e-9);
-        // The share seen fades as (1 + dt/memory)⁻ⁿ.
+        // The fraction seen fades as (1 + dt/memory)⁻ⁿ.
         assert!((watch.missing - (1.0 - 1.005_f64.powi(-200))).abs() < 1e-9);
     }
 }

@@ -1,10 +1,10 @@
-//! Drift before fault: a line through what each session has estimated, and a
-//! warning before the line crosses the limit at which a fault is confirmed.
+//! Trends over sessions: a line through the estimates of each session, and a warning
+//! before it crosses the limit at which a fault is confirmed.
 //!
-//! The line is that of Theil and Sen: the median of the slopes between every
-//! two sessions, which a few wild sessions do not move (breakdown point 29 %).
-//! Its confidence is Sen's, from the distribution of Kendall's S without any
-//! drift. Knows no rig: numbers in order of sessions in, a judgement out.
+//! The line is that of Theil and Sen: the median of the slopes between all pairs of
+//! sessions, which is robust against outliers (breakdown point 29 %). Its confidence
+//! interval is Sen's, from the distribution of Kendall's S without drift. Independent of
+//! rigs: the input is one number per session.
 
 mod drift;
 
@@ -14,42 +14,43 @@ pub use drift::{Drift, HORIZON_SESSIONS, Parameter, drift};
 
 use crate::maths::{median, robust_deviation};
 
-/// Sessions that a trend looks back over; of more the last count. Every two of
-/// them have a slope, so that the work is their square.
+/// Most sessions in a trend; of more, the last count. The work grows with their square,
+/// since every pair has a slope. Chosen.
 pub const MAX_SESSIONS: usize = 200;
 
 /// Fewest sessions that make a trend: with seven, a run that rises or falls
 /// throughout has a chance of 2/7! = 0.04 % without any drift; with six, 0.3 %.
 pub const LEAST_SESSIONS: usize = 7;
 
-/// The quantile of the normal distribution for a confidence of 99.9 %,
-/// two-sided: a rig has six parameters, each looked at after every session, and
-/// one that is noisy leads to its limit wherever it is taken to drift.
+/// Quantile of the normal distribution for a two-sided confidence of 99.9 %. It is that
+/// high because a rig has six parameters, each tested after every session, and a false
+/// drift of a noisy one extrapolates to its limit.
 const QUANTILE: f64 = 3.291;
 
-/// Standard error of a median over that of a mean, of normal values: √(π/2).
+/// Standard error of a median over that of a mean, for normal values: √(π/2).
 const MEDIAN_ERROR: f64 = 1.2533;
 
-/// Share of the limit beyond which a drift is warned of however slow it is.
+/// Fraction of the limit beyond which a deviation is warned of, however slow it is.
+/// Chosen.
 const DRIFT_SHARE: f64 = 0.5;
 
-/// A straight line over sessions, numbered from 0 in their order.
+/// A straight line over sessions, numbered from 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trend {
     /// Change per session.
     pub slope: f64,
-    /// The slope lies between these with a confidence of 99.9 %.
+    /// Bounds of the slope with a confidence of 99.9 %.
     pub slope_low: f64,
     pub slope_high: f64,
-    /// What the line says of the last session, and its standard error.
+    /// Value of the line at the last session, and its standard error.
     pub level: f64,
     pub level_error: f64,
     pub n_sessions: usize,
 }
 
 impl Trend {
-    /// The line through `values`, one for each session, oldest first; none for
-    /// fewer than [`LEAST_SESSIONS`]. What is not finite does not count.
+    /// Fits the line to `values`, one per session, oldest first; `None` for fewer than
+    /// [`LEAST_SESSIONS`]. Values that are not finite do not count.
     #[must_use]
     pub fn of(values: &[f64]) -> Option<Self> {
         let values = &values[values.len().saturating_sub(MAX_SESSIONS)..];
@@ -76,14 +77,14 @@ impl Trend {
         Some(Self { slope, slope_low, slope_high, level, level_error, n_sessions: points.len() })
     }
 
-    /// Whether there is a drift at all: the confidence has no zero in it.
+    /// Whether there is a drift: the confidence interval of the slope excludes zero.
     #[must_use]
     pub fn is_significant(&self) -> bool {
         self.slope_low > 0.0 || self.slope_high < 0.0
     }
 
-    /// Sessions until the line reaches `limit` in the direction of its slope, 0
-    /// if it is there; none if it does not lead there.
+    /// Returns the number of sessions until the line reaches the limit in the direction
+    /// of its slope, 0 if it is beyond it; `None` if it never does.
     #[must_use]
     pub fn sessions_until(&self, limit: &Band) -> Option<f64> {
         let room = if self.slope > 0.0 { limit.high - self.level } else { self.level - limit.low };
@@ -94,7 +95,7 @@ impl Trend {
     }
 }
 
-/// The slopes between every two points.
+/// The slopes between all pairs of points.
 fn slopes(points: &[(f64, f64)]) -> Vec<f64> {
     let mut slopes = Vec::with_capacity(points.len() * (points.len() - 1) / 2);
     for (k, (i, a)) in points.iter().enumerate() {
@@ -103,10 +104,10 @@ fn slopes(points: &[(f64, f64)]) -> Vec<f64> {
     slopes
 }
 
-/// Sen's interval (Sen 1968, J. Am. Stat. Assoc. 63, eq. 2.6, with the normal
-/// approximation of his section 3): the slopes C/2 ranks on either side of the
-/// middle, C = z √(n(n−1)(2n+5)/18) being the quantile of Kendall's S.
-/// `slopes` are ascending, of `n` points.
+/// Sen's confidence interval (Sen 1968, J. Am. Stat. Assoc. 63, eq. 2.6, with the normal
+/// approximation of its section 3): the slopes C/2 ranks on either side of the middle,
+/// where C = z √(n(n−1)(2n+5)/18) is the quantile of Kendall's S. `slopes` of `n` points
+/// are ascending.
 fn confidence(slopes: &[f64], n: usize) -> (f64, f64) {
     let n = n as f64;
     let spread = QUANTILE * (n * (n - 1.0) * (2.0 * n + 5.0) / 18.0).sqrt();
@@ -117,25 +118,25 @@ fn confidence(slopes: &[f64], n: usize) -> (f64, f64) {
     (if below < 1.0 { slopes[0] } else { at(below - 1.0) }, at(above))
 }
 
-/// Between which an estimate is no fault.
+/// The range of an estimate that is no fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Band {
     pub low: f64,
-    /// What it usually is.
+    /// The usual value.
     pub nominal: f64,
     pub high: f64,
 }
 
 impl Band {
-    /// The same room on either side of another nominal value.
+    /// Shifts the band to another nominal value.
     #[must_use]
     pub fn about(&self, nominal: f64) -> Self {
         let by = nominal - self.nominal;
         Self { low: self.low + by, nominal, high: self.high + by }
     }
 
-    /// How far `value` is on its way from nominal to the limit on its side: 0
-    /// to 1, and more beyond it.
+    /// Returns how far `value` is from nominal to the limit on its side: 0 to 1, and more
+    /// beyond the limit.
     #[must_use]
     pub fn share(&self, value: f64) -> f64 {
         let away = value - self.nominal;
@@ -144,26 +145,26 @@ impl Band {
     }
 }
 
-/// Why a trend is warned of.
+/// The reason of a warning.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Warning {
     /// The line reaches the limit within so many sessions.
     Crosses { sessions: f64 },
-    /// It has gone this share of the way to the limit, a half or more, whether
-    /// or not it goes on.
+    /// The level has moved by this fraction of the distance to the limit, a half or more,
+    /// whether or not it moves on.
     Drifted { share: f64 },
 }
 
-/// What is to be said of a trend with the limits of `band`, looking `horizon`
-/// sessions ahead. A line that may as well be level is said nothing of, unless
-/// its level is surely beyond half the limit.
+/// Returns the warning for a trend with the limits of `band`, looking `horizon` sessions
+/// ahead. A slope that is not significant causes none, unless the level is beyond half
+/// the limit with confidence.
 #[must_use]
 pub fn warning(trend: &Trend, band: &Band, horizon: f64) -> Option<Warning> {
     let until = trend.sessions_until(band).filter(|&sessions| sessions <= horizon);
     if let Some(sessions) = until.filter(|_| trend.is_significant()) {
         return Some(Warning::Crosses { sessions });
     }
-    // The nearer end of the level's confidence decides.
+    // The end of the level's confidence interval nearer to nominal decides.
     let away = trend.level - band.nominal;
     let least = (away.abs() - QUANTILE * trend.level_error).max(0.0) * away.signum();
     let share = band.share(trend.level);

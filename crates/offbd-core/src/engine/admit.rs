@@ -1,47 +1,48 @@
-//! First stage: is it a sample, is it new, does its clock make sense?
+//! First stage: validates samples, detects duplicates, and checks the clock.
 //!
-//! A sample is known by its `seq`, or by `t_s` where it has none: sent twice,
-//! it counts once. What is new but cannot be judged is set aside, not lost.
+//! A sample is identified by its `seq`, or by `t_s` if it has none: sent twice, it counts
+//! once. New samples that cannot be judged are recorded all the same.
 
 use alloc::collections::VecDeque;
 
 use super::{Admission, AxisMapping, Rejection};
 use crate::vocabulary::Sample;
 
-/// Largest believable time, s: over 30 000 years.
+/// Largest plausible time, s. Chosen: over 30 000 years.
 const MAX_TIME_S: f64 = 1e12;
-/// Largest believable position, m: ten times the largest plate's half.
+/// Largest plausible position, m: ten times half of the largest plate (10 m).
 const MAX_POSITION_M: f64 = 50.0;
 /// Largest believable command, rad: a full turn.
 const MAX_COMMAND_RAD: f64 = core::f64::consts::TAU;
 
-/// Step of the clock ahead of which it is doubted, s.
-const JUMP_S: f64 = 3600.0;
-/// Samples in a row on a clock that jumped ahead, until it is believed.
-const JUMP_CONFIRMED: u32 = 5;
-/// Longest step between two of those, s.
-const JUMP_STEP_S: f64 = 10.0;
+/// Step of the clock beyond which it is doubted, s. Chosen: an hour.
+const CLOCK_JUMP_S: f64 = 3600.0;
+/// Consecutive samples after a jump of the clock until the new time is accepted. Chosen.
+const CLOCK_BELIEVED_AFTER: u32 = 5;
+/// Longest interval between two of these samples, s. Chosen.
+const CLOCK_STEP_S: f64 = 10.0;
 
-/// Ranges of `seq` remembered apart. Beyond it the oldest gap is closed: what
-/// was missing in it counts as a duplicate when it comes after all.
+/// Most separate ranges of `seq` that are remembered; bounds the memory. Beyond it the
+/// oldest gap is closed: a sample missing in it counts as a duplicate if it still
+/// arrives.
 const MAX_RANGES: usize = 1024;
-/// Times remembered of samples without `seq`. One older than all of them
-/// cannot be told from a duplicate and counts as one.
+/// Most times of samples without `seq` that are remembered; bounds the memory. An older
+/// sample counts as a duplicate.
 const MAX_TIMES: usize = 16_384;
 
-/// What has been taken already.
+/// The samples taken so far, to detect duplicates.
 #[derive(Clone, Debug, Default)]
-struct Ledger {
+struct SeenSamples {
     /// Inclusive ranges of `seq`, ascending, with a gap between any two.
     ranges: VecDeque<(u64, u64)>,
     /// Times without `seq`, ascending.
     times: VecDeque<f64>,
-    /// Whether `times` has let go of any.
+    /// Whether `times` has dropped any.
     forgot: bool,
 }
 
-impl Ledger {
-    /// Takes note of a sample; false if it is there already.
+impl SeenSamples {
+    /// Records a sample; returns false if it is known already.
     fn note(&mut self, sample: &Sample) -> bool {
         match sample.seq {
             Some(seq) => self.note_seq(seq),
@@ -92,21 +93,21 @@ impl Ledger {
     }
 }
 
-/// A clock that jumped ahead and may be right.
+/// A jump of the clock that has not been accepted yet.
 #[derive(Clone, Copy, Debug)]
-struct Doubt {
+struct SuspectedClockJump {
     t_s: f64,
     n: u32,
 }
 
-/// The stage.
+/// The stage: validation, duplicates, clock.
 #[derive(Clone, Debug)]
 pub(super) struct Admit {
     max_command: f64,
     max_position: f64,
-    ledger: Ledger,
+    seen: SeenSamples,
     newest_s: Option<f64>,
-    doubt: Option<Doubt>,
+    suspect: Option<SuspectedClockJump>,
 }
 
 impl Admit {
@@ -114,19 +115,19 @@ impl Admit {
         Self {
             max_command: MAX_COMMAND_RAD / mapping.command_unit_rad,
             max_position: MAX_POSITION_M / mapping.position_unit_m,
-            ledger: Ledger::default(),
+            seen: SeenSamples::default(),
             newest_s: None,
-            doubt: None,
+            suspect: None,
         }
     }
 
-    /// Judges a sample; `judged_s` is the time of the last sample that left
-    /// the reorder window.
+    /// Judges a sample; `judged_s` is the time of the last sample that left the reorder
+    /// window.
     pub(super) fn take(&mut self, sample: &Sample, judged_s: Option<f64>) -> Admission {
         if let Err(rejection) = self.check(sample) {
             return Admission::Rejected(rejection);
         }
-        if !self.ledger.note(sample) {
+        if !self.seen.note(sample) {
             return Admission::Duplicate;
         }
         if let Some(behind_s) = judged_s.map(|j| j - sample.t_s).filter(|&b| b >= 0.0) {
@@ -159,20 +160,20 @@ impl Admit {
         Ok(())
     }
 
-    /// How far `t_s` jumps ahead of the clock, unless the clock has gone on
-    /// from there for a while.
+    /// Returns how far `t_s` is ahead of the clock if that is a jump, unless enough
+    /// samples have followed from there.
     fn jumps(&mut self, t_s: f64) -> Option<f64> {
-        let ahead_s = self.newest_s.map(|n| t_s - n).filter(|&a| a > JUMP_S);
+        let ahead_s = self.newest_s.map(|n| t_s - n).filter(|&a| a > CLOCK_JUMP_S);
         let Some(ahead_s) = ahead_s else {
-            self.doubt = None;
+            self.suspect = None;
             return None;
         };
-        let n = match self.doubt {
-            Some(d) if (0.0..=JUMP_STEP_S).contains(&(t_s - d.t_s)) => d.n + 1,
+        let n = match self.suspect {
+            Some(d) if (0.0..=CLOCK_STEP_S).contains(&(t_s - d.t_s)) => d.n + 1,
             _ => 1,
         };
-        self.doubt = Some(Doubt { t_s, n });
-        (n < JUMP_CONFIRMED).then_some(ahead_s)
+        self.suspect = Some(SuspectedClockJump { t_s, n });
+        (n < CLOCK_BELIEVED_AFTER).then_some(ahead_s)
     }
 }
 
@@ -215,20 +216,20 @@ mod tests {
 
     #[test]
     fn a_full_ledger_of_times_never_takes_twice() {
-        let mut ledger = Ledger::default();
+        let mut seen = SeenSamples::default();
         for i in 0..(MAX_TIMES + 10) {
-            assert!(ledger.note_time(i as f64));
+            assert!(seen.note_time(i as f64));
         }
-        assert!(!ledger.note_time(3.0), "older than what is remembered");
-        assert!(!ledger.note_time(100.0));
+        assert!(!seen.note_time(3.0), "older than what is remembered");
+        assert!(!seen.note_time(100.0));
     }
 
     proptest! {
         #[test]
         fn every_seq_counts_once(seqs in proptest::collection::vec(0..300_u64, 1..500)) {
-            let (mut ledger, mut truth) = (Ledger::default(), BTreeSet::new());
+            let (mut seen, mut truth) = (SeenSamples::default(), BTreeSet::new());
             for seq in seqs {
-                prop_assert_eq!(ledger.note_seq(seq), truth.insert(seq));
+                prop_assert_eq!(seen.note_seq(seq), truth.insert(seq));
             }
         }
     }

@@ -1,18 +1,18 @@
-//! Second stage: samples in the order of their time.
+//! Second stage: puts samples in order of time.
 //!
-//! A sample waits for an earlier one at most the reorder window, counted in
-//! the samples' own time. One whose `seq` follows on from the last released
-//! does not wait at all. The order depends on the samples alone.
+//! A sample waits for earlier ones for at most the reorder window, measured in the
+//! samples' own time. One whose `seq` follows directly on the last released does not
+//! wait. The order depends on the samples alone.
 
 use alloc::collections::VecDeque;
 
 use crate::vocabulary::Sample;
 
-/// Most samples that wait; beyond it the earliest is released early. Half a
-/// second at 8 kHz.
+/// Most waiting samples; beyond it the earliest is released early. Half a second at 8
+/// kHz.
 const MAX_WAITING: usize = 4096;
 
-/// The stage.
+/// The waiting samples.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Align {
     /// Ascending in time.
@@ -22,16 +22,16 @@ pub(super) struct Align {
 }
 
 impl Align {
-    /// Takes a sample later than any released.
+    /// Adds a sample later than all that were released.
     pub(super) fn push(&mut self, sample: Sample) {
         let first = self.waiting.is_empty() && self.released.is_none();
         self.newest_s = if first { sample.t_s } else { self.newest_s.max(sample.t_s) };
-        // Mostly it is the latest; a sort by halves would first look elsewhere.
+        // Searched from the end: most samples are the latest.
         let after = self.waiting.iter().rev().take_while(|s| s.t_s > sample.t_s).count();
         self.waiting.insert(self.waiting.len() - after, sample);
     }
 
-    /// The next sample in order whose turn has come.
+    /// Returns the next sample in order if it is due.
     pub(super) fn pop(&mut self, reorder_s: f64) -> Option<Sample> {
         let next = self.waiting.front()?;
         let follows = match (self.released.and_then(|r| r.seq), next.seq) {
@@ -42,7 +42,7 @@ impl Align {
         if follows || due { self.flush() } else { None }
     }
 
-    /// The next sample in order, due or not.
+    /// Returns the next sample in order, due or not.
     pub(super) fn flush(&mut self) -> Option<Sample> {
         let next = self.waiting.pop_front()?;
         self.released = Some(next);

@@ -1,21 +1,20 @@
-//! How much data a session has brought, in seconds, whatever the gates say.
+//! The amount of data in a session, in seconds, independent of the enable conditions.
 
 use crate::vocabulary::{Axis, FaultCode, Sample};
 
-/// Seconds of data so far. A gap between two samples does not count.
+/// Time covered by data so far, s. Gaps between samples do not count.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Coverage {
     first_s: Option<f64>,
     last_s: Option<f64>,
-    /// With a sample, s.
+    /// Time with samples, s.
     sampled_s: f64,
-    /// With a ball seen, s.
+    /// Time with a ball seen, s.
     seen_s: f64,
 }
 
 impl Coverage {
-    /// Takes the next sample in order; one more than `gap_s` seconds after the
-    /// last begins anew.
+    /// Takes the next sample in order; an interval longer than `gap_s` does not count.
     pub(super) fn take(&mut self, sample: &Sample, gap_s: f64) {
         self.first_s.get_or_insert(sample.t_s);
         let dt = self.last_s.replace(sample.t_s).map_or(0.0, |last_s| sample.t_s - last_s);
@@ -28,16 +27,16 @@ impl Coverage {
         }
     }
 
-    /// `judged_s` seconds as a share of the session from its first sample to its
-    /// last, gaps included: in a gap nothing is judged either. A judgement counts
-    /// for the period before it, which may begin before the first sample.
+    /// Returns `judged_s` as a fraction of the session from its first sample to its last,
+    /// gaps included, since nothing is judged in a gap. At most 1: a judgement counts for
+    /// the period before it, which may begin before the first sample.
     pub(super) fn share(&self, judged_s: f64) -> f64 {
         let session_s = self.last_s.zip(self.first_s).map_or(0.0, |(last, first)| last - first);
         if session_s > 0.0 { (judged_s / session_s).min(1.0) } else { 0.0 }
     }
 
-    /// Seconds that the monitor of `code` could have judged, had its gate
-    /// always been open: samples for the sensor's, a ball for the others.
+    /// Time that the monitor of `code` could have judged if it had always been enabled,
+    /// s: time with samples for the sensor's, time with a ball for the others.
     pub(super) const fn data_s(&self, code: FaultCode) -> f64 {
         match code {
             FaultCode::Sensor => self.sampled_s,

@@ -1,28 +1,28 @@
-//! How far the ball is from the edge of the plate, and since when.
+//! Whether the ball is at the edge of the plate, and since when.
 
 use super::Rig;
 use super::frame::Moment;
 use crate::plant::Plate;
 use crate::vocabulary::{Axis, PerAxis, SimTime};
 
-/// The stage.
+/// The state of the ball relative to the edge.
 #[derive(Clone, Debug)]
 pub(super) struct Edge {
     plate: Plate,
-    /// Distance from the edge within which it may act, m.
+    /// Distance from the edge within which the edge may act on the ball, m.
     room_m: f64,
-    /// Acceleration that the steepest plate gives the ball, m/s².
+    /// Largest acceleration that the plate can give the ball, m/s².
     most_m_s2: f64,
-    /// Whether the ball was last read within that room, or may have been there
+    /// Whether the ball was last read within that distance, or may have been there
     /// between the last two readings.
     pub at_edge: bool,
-    /// For how long it has not been, s.
+    /// Time for which the ball has not been at the edge, s.
     pub clear_s: f64,
-    /// The axis across whose rim the ball lies, and for how long, s.
+    /// The axis whose rim the ball is at, and for how long, s.
     pub rim: Option<Axis>,
     pub rim_s: f64,
-    /// The last two readings, the newest last: where the ball is going.
-    course: [Option<(SimTime, PerAxis<f64>)>; 2],
+    /// The last two readings, the newest last.
+    recent: [Option<(SimTime, PerAxis<f64>)>; 2],
 }
 
 impl Edge {
@@ -35,7 +35,7 @@ impl Edge {
             clear_s: 0.0,
             rim: None,
             rim_s: 0.0,
-            course: [None; 2],
+            recent: [None; 2],
         }
     }
 
@@ -43,19 +43,19 @@ impl Edge {
     pub(super) fn restart(&mut self) {
         self.clear_s = 0.0;
         self.rim_s = 0.0;
-        self.course = [None; 2];
+        self.recent = [None; 2];
     }
 
-    /// Whether there is no rim that would keep the ball on the plate.
+    /// Whether the plate has no rim.
     pub(super) fn is_open(&self) -> bool {
         !self.plate.rim()
     }
 
-    /// Whether the ball, going on as by the last two readings or as the plate may
-    /// have hurried it, would by `at` have met a rim: a slow sensor sees it before
-    /// and after, and never at it.
+    /// Whether the ball may have met a rim before `at`, by extrapolation of the last two
+    /// readings with the largest acceleration of the plate: a slow sensor sees it before
+    /// and after the bounce, but not at the rim.
     pub(super) fn may_have_bounced(&self, at: SimTime) -> bool {
-        let [Some((earlier, from)), Some((newest, to))] = self.course else { return false };
+        let [Some((earlier, from)), Some((newest, to))] = self.recent else { return false };
         let share = (at - newest) / (newest - earlier);
         let ahead = |axis: Axis| to[axis] + share * (to[axis] - from[axis]);
         let hurried_m = self.most_m_s2 / 2.0 * (at - newest) * (at - earlier);
@@ -63,27 +63,27 @@ impl Edge {
         self.plate.rim() && left_m < self.room_m + hurried_m
     }
 
-    /// Whether the readings of `moment` are farther beyond the edge than the edge
-    /// is from the middle, and the ball has not left the plate before: no ball is
-    /// there, whatever the sensor takes for one.
+    /// Whether the readings of `moment` are farther beyond the edge than the edge is from
+    /// the middle, although the ball had not left the plate: whatever the sensor sees
+    /// there is no ball.
     pub(super) fn is_far_off(&self, moment: &Moment) -> bool {
         let PerAxis { x, y } = moment.position.map(Option::unwrap_or_default);
         let beyond_m = -self.plate.edge_distance_m(x, y);
         !self.at_edge && beyond_m > self.plate.edge_distance_m(0.0, 0.0)
     }
 
-    /// Takes a moment, `dt` after the one before; its readings if they are
-    /// `usable`. An axis that is not measured does not count.
-    pub(super) fn take(&mut self, moment: &Moment, dt: f64, usable: bool) {
+    /// Takes a moment, `dt` after the previous one; its readings count unless they were
+    /// `refused`. An axis that is not measured does not count.
+    pub(super) fn take(&mut self, moment: &Moment, dt: f64, refused: bool) {
         let PerAxis { x, y } = moment.position;
-        if usable && x.or(y).is_some() {
+        if !refused && x.or(y).is_some() {
             let place = PerAxis { x: x.unwrap_or(0.0), y: y.unwrap_or(0.0) };
             self.at_edge = self.is_near(place.x, place.y) || self.may_have_bounced(moment.at);
             let rim = self.plate.edge_axis(place.x, place.y, self.room_m);
             let rim = rim.filter(|_| self.plate.rim());
             self.rim_s = if rim.is_some() && rim == self.rim { self.rim_s + dt } else { 0.0 };
             self.rim = rim;
-            self.course = [self.course[1], Some((moment.at, place))];
+            self.recent = [self.recent[1], Some((moment.at, place))];
         }
         self.clear_s = if self.at_edge { 0.0 } else { self.clear_s + dt };
     }
@@ -110,7 +110,7 @@ mod tests {
 
     fn at_edge(rig: &Rig, places: &[f64]) -> bool {
         let mut edge = Edge::new(rig);
-        moments(places).iter().for_each(|m| edge.take(m, 0.1, true));
+        moments(places).iter().for_each(|m| edge.take(m, 0.1, false));
         edge.at_edge
     }
 
@@ -127,7 +127,7 @@ mod tests {
     fn a_restart_forgets_where_the_ball_was_going() {
         let mut edge = Edge::new(&Rig::chapter("a"));
         let moments = moments(&[0.08, 0.13, 0.14]);
-        moments[..2].iter().for_each(|m| edge.take(m, 0.1, true));
+        moments[..2].iter().for_each(|m| edge.take(m, 0.1, false));
         assert!(edge.may_have_bounced(moments[2].at));
         edge.restart();
         assert!(!edge.may_have_bounced(moments[2].at));

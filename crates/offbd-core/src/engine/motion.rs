@@ -1,10 +1,10 @@
-//! How much motion a rig has shown that it can be learnt from, while it runs.
+//! Measures, while a rig runs, how much motion it has shown that it can be learnt from.
 //!
-//! One idea: calibration cuts a recording into stretches in which the ball moves
-//! throughout; this counts the same seconds, sample by sample. The ball must be
-//! read on the plate, without a gap, and the command must have moved of late: a
-//! ball that rolls without having been asked to says nothing of its servo. Bounded
-//! memory; knows nothing of what is learnt.
+//! Calibration cuts a recording into stretches in which the ball moves throughout; this
+//! module counts the same seconds sample by sample. The ball must be read on the plate
+//! without a gap, and the command must have moved recently: a ball that rolls without
+//! being asked to tells nothing about its servo. The memory is bounded; independent of
+//! what is learnt.
 
 use super::calibrate::{MOVING_M, MOVING_RAD, WINDOWS_S};
 use super::frame::moment;
@@ -13,20 +13,20 @@ use crate::diagnosis::Settings;
 use crate::plant::Plate;
 use crate::vocabulary::{Axis, PerAxis, Sample};
 
-/// Usable motion along an axis from which on it is worth learning, s. Calibration
-/// judges each half by what the other taught: half of this is 25 of its windows of
-/// 1.2 s, of which it needs 6 with commands that tell the gain to 20 %. Of real
-/// recordings of 6 to 40 s, 86 of 92 were refused.
+/// Usable motion along an axis that suffices for learning, s. Calibration judges each
+/// half by what was learnt from the other: half of this is 25 of its windows of 1.2 s; it
+/// needs 6, with commands that determine the gain within 20 %. Of real recordings of 6 to
+/// 40 s, 86 of 92 were refused.
 pub const WANTED_MOTION_S: f64 = 60.0;
 
 /// Length of a piece, s: a window of calibration has three, each with motion.
 const PIECE_S: f64 = WINDOWS_S[0] / 3.0;
-/// Pieces with motion that make a stretch.
+/// Consecutive pieces with motion that make a stretch.
 const PIECES: u32 = 3;
-/// Readings that a piece holds at least.
+/// Least readings in a piece. Chosen.
 const PIECE_READINGS: u32 = 4;
-/// Time for which a ball still answers a change of its command, s: at a tilt of a
-/// degree it crosses a plate in about as long.
+/// Time for which a ball still responds to a change of its command, s: it takes about as
+/// long to cross a plate at a tilt of one degree.
 const ANSWER_S: f64 = 2.0;
 
 /// Counts the seconds of usable motion along each axis of one session.
@@ -34,15 +34,15 @@ const ANSWER_S: f64 = 2.0;
 pub struct UsableMotion {
     mapping: AxisMapping,
     plate: Plate,
-    /// Distance from the edge within which a ball is not on the plate, m.
+    /// Distance from the edge within which a ball does not count as on the plate, m.
     edge_m: f64,
     gap_s: f64,
     last_s: Option<f64>,
-    axes: PerAxis<Along>,
+    axes: PerAxis<AxisMotion>,
 }
 
 impl UsableMotion {
-    /// Of `rig`, before its first sample.
+    /// Builds a counter for `rig`, before its first sample.
     #[must_use]
     pub fn new(rig: &Rig) -> Self {
         Self {
@@ -55,7 +55,7 @@ impl UsableMotion {
         }
     }
 
-    /// Takes the next sample; one that is not later than the last does not count.
+    /// Takes the next sample; one that is not later than the last is ignored.
     pub fn take(&mut self, sample: &Sample) {
         let Some(moment) = moment(&self.mapping, sample) else { return };
         let t_s = moment.at.seconds();
@@ -79,8 +79,8 @@ impl UsableMotion {
         }
     }
 
-    /// Seconds of usable motion along each axis so far; none along one that has had
-    /// no commands or no positions, which is not learnt.
+    /// Returns the usable motion along each axis so far, s; `None` for an axis without
+    /// commands or without positions, which cannot be learnt.
     #[must_use]
     pub fn seconds(&self) -> PerAxis<Option<f64>> {
         PerAxis::from_fn(|axis| {
@@ -90,23 +90,23 @@ impl UsableMotion {
     }
 }
 
-/// One axis.
+/// The state of one axis.
 #[derive(Clone, Debug, Default)]
-struct Along {
+struct AxisMotion {
     /// Whether a position has been read.
     read: bool,
     /// The command from which the next move is measured, rad.
     anchor_rad: Option<f64>,
-    /// When the command moved last, s.
+    /// Time at which the command last moved, s.
     moved_s: Option<f64>,
     piece: Option<Piece>,
-    /// Pieces with motion, one after the other, and their time, s.
+    /// Number and duration, s, of the consecutive pieces with motion.
     n_pieces: u32,
     stretch_s: f64,
     counted_s: f64,
 }
 
-impl Along {
+impl AxisMotion {
     fn command(&mut self, t_s: f64, command_rad: Option<f64>) {
         let Some(command_rad) = command_rad else { return };
         match self.anchor_rad {
@@ -130,7 +130,7 @@ impl Along {
         }
     }
 
-    /// Counts a piece, with those before it once they are a stretch.
+    /// Counts a piece, with its predecessors once they make a stretch.
     fn count(&mut self, piece: &Piece) {
         let asked = self.moved_s.is_some_and(|moved_s| piece.last_s - moved_s <= ANSWER_S);
         if !asked || piece.high_m - piece.low_m <= MOVING_M {
@@ -148,7 +148,7 @@ impl Along {
     }
 }
 
-/// Readings one after the other.
+/// Consecutive readings.
 #[derive(Clone, Copy, Debug)]
 struct Piece {
     first_s: f64,
@@ -175,7 +175,7 @@ impl Piece {
 mod tests {
     use super::*;
 
-    /// `seconds` at 100 Hz of a ball that circles with `radius_m` under commands of
+    /// A ball that circles with `radius_m` at 100 Hz for `seconds` under commands of
     /// `command_rad`.
     fn circles(seconds: f64, radius_m: f64, command_rad: f64) -> Vec<Sample> {
         let sample = |i: u32| {
@@ -199,7 +199,7 @@ mod tests {
         motion.seconds()
     }
 
-    /// The seconds along x, of an axis that has commands and positions.
+    /// The seconds counted along x, for an axis with commands and positions.
     fn x_s(samples: impl IntoIterator<Item = Sample>) -> f64 {
         counted(samples).x.unwrap()
     }
@@ -208,7 +208,7 @@ mod tests {
     fn a_ball_that_circles_counts_and_one_that_rests_does_not() {
         let whole = counted(circles(30.0, 0.05, 0.03));
         for seconds in [whole.x.unwrap(), whole.y.unwrap()] {
-            // But for what is left of the last piece.
+            // Except for the unfinished piece at the end.
             assert!((29.0..=30.0).contains(&seconds), "{seconds}");
         }
         assert_eq!(x_s(circles(30.0, 0.0005, 0.03)), 0.0, "the ball rests");

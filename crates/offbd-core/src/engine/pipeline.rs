@@ -1,39 +1,44 @@
 //! The stages from the twin to the fault memory, for samples in order.
 //!
-//! Immutable: settings, geometry, limits. Mutable: twin, windows, watches.
-//! [`Pipeline::judge`] reads as the list of its stages.
+//! Immutable: settings, geometry, limits. Mutable: twin, windows, monitors.
+//! [`Pipeline::judge`] lists the stages.
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use nalgebra::Vector2;
 
+use super::acceleration_filter::AccelerationFilter;
 use super::coverage::Coverage;
 use super::edge::Edge;
 use super::frame::{self, Moment, Repeats};
-use super::look::Look;
-use super::watch::Watch;
-use super::{MonitorState, Output, Reach, Readiness, Rig, Setup, State};
+use super::monitor::Monitor;
+use super::{MonitorState, Reach, Readiness, Rig, Setup, State};
 use crate::diagnosis::{
-    AxisEvidence, AxisNature, Course, Evaluator, Evidence, FaultMemory, Finding, Gated, InUse,
-    LearntNature, Limits, OutlierGate, Pace, Profile, Qualified, Reading, Scatter, SensorLimits,
-    Servo, ServoEstimate, Settings, Step, Stillness, Surroundings, Test, UNKNOWN_NOISE_M, bend_m,
-    blur_m,
+    AxisEvidence, AxisPrior, DebounceTimes, Evaluator, Evidence, FaultMemory, Finding, GateOutcome,
+    InUse, LearntPrior, Limits, OutlierGate, PositionJump, Profile, Qualified, Reading, Scatter,
+    SensorLimits, ServoEstimate, ServoFilterBank, Settings, Stillness, Surroundings, Test,
+    Transition, TwinPath, UNKNOWN_NOISE_M, bend_m, blur_m,
 };
 use crate::plant::{LONGEST_SPAN_S, RollingState, Twin};
-use crate::vocabulary::{Axis, FaultCode, PerAxis, Sample, SimTime};
+use crate::vocabulary::{Axis, CLOCK_RESOLUTION_S, FaultCode, PerAxis, Sample, SimTime};
 
-/// Samples that a window holds at least: a filter over fewer is all noise.
+/// Samples that a full window must be long enough for. Chosen: the fit over fewer is
+/// mostly noise.
 pub(super) const LEAST_SAMPLES: f64 = 8.0;
-/// Longest period assumed before a second one has been seen, s.
-const LONGEST_FIRST_PERIOD_S: f64 = 0.25;
-/// How fast the period is followed, share per sample.
+/// Longest sample period assumed from the first interval, s. Chosen.
+const MAX_FIRST_PERIOD_S: f64 = 0.25;
+/// Gain of the filter of the sample period, per sample. Chosen: a time constant of 50
+/// samples.
 const PERIOD_GAIN: f64 = 0.02;
-/// Share of the window that must be covered before it is judged.
-pub(super) const FULL_WINDOW: f64 = 0.8;
-/// Distance of the twin's free path from the ball at which it is re-anchored, m.
+/// Fraction of the window that must be covered before the residual is judged. Chosen.
+pub(super) const FULL_WINDOW_SHARE: f64 = 0.8;
+/// Least readings in a window whose residual is judged. Chosen.
+const LEAST_JUDGED_SAMPLES: f64 = LEAST_SAMPLES / 2.0;
+/// Distance of the twin's free path from the ball at which the twin is rebased, m.
+/// Chosen: seldom reached, and small enough that positions keep their digits.
 const REBASE_M: f64 = 1.0;
 
-/// The stages' state.
+/// The state of the stages.
 #[derive(Clone, Debug)]
 pub(super) struct Pipeline {
     settings: Settings,
@@ -44,20 +49,20 @@ pub(super) struct Pipeline {
     now: Option<SimTime>,
     period_s: Option<f64>,
     gate: OutlierGate,
-    look: Look,
+    acceleration_filter: AccelerationFilter,
     scatter: PerAxis<Scatter>,
-    servos: PerAxis<Servo>,
+    servos: PerAxis<ServoFilterBank>,
     readings: Stillness,
     repeats: Repeats,
     edge: Edge,
     since_jump_s: f64,
-    /// The last step of the readings, if there was one.
-    jump: Option<Step>,
-    /// Scatter of the readings that is noise now, m.
+    /// The last jump of the readings, if there was one.
+    jump: Option<PositionJump>,
+    /// Scatter above which readings count as noisy at present, m.
     noisy_m: f64,
     unjudged_s: f64,
     evidence: Evidence,
-    watches: [Watch; FaultCode::COUNT],
+    monitors: [Monitor; FaultCode::COUNT],
     n_judged: u64,
 }
 
@@ -67,7 +72,7 @@ impl Pipeline {
         let limits = PerAxis::from_fn(|axis| {
             let learnt = rig.calibration.as_ref().and_then(|c| c.axes[axis].as_ref());
             let gain = setup.twin.axes[axis].gain.abs();
-            // A rig that is learnt but for this axis has no readings along it.
+            // A learnt rig without this axis has no readings along it.
             let absent = rig.calibration.is_some() && learnt.is_none();
             Limits::new(settings.profile, learnt, absent, gain * rig.ball.rolling_gravity())
         });
@@ -77,26 +82,26 @@ impl Pipeline {
             of(Axis::X).max(of(Axis::Y))
         };
         let adapts = settings.profile == Profile::Default && rig.calibration.is_some();
-        let settings = if adapts { settings.through(needed_s) } else { settings };
+        let settings = if adapts { settings.with_window(needed_s) } else { settings };
         let confirm_nats = PerAxis::from_fn(|axis| {
             let learnt = rig.calibration.as_ref().and_then(|c| c.axes[axis].as_ref());
             settings.confirming_nats(learnt)
         });
         let servo = |axis: Axis| {
             let learnt = rig.calibration.as_ref().and_then(|c| c.axes[axis].as_ref());
-            Servo::new(AxisNature {
+            ServoFilterBank::new(AxisPrior {
                 noise_m: limits[axis].noise_m.unwrap_or(0.0),
-                learnt: learnt.map(|l| LearntNature {
+                learnt: learnt.map(|l| LearntPrior {
                     model_error_m_s2: l.model_error_m_s2,
                     offset_spread_m_s2: l.level_spread_rad * l.gain * rig.ball.rolling_gravity(),
                     gain_spread: l.gain_spread,
                 }),
                 breakaway_m_s2: limits[axis].breakaway_m_s2,
-                sail_share: rig.ball.sail_share().min(1.0),
+                air_drag_ratio: rig.ball.air_drag_ratio().min(1.0),
                 familiar_m_s2: learnt.map_or(f64::INFINITY, |l| l.familiar_m_s2),
             })
         };
-        // What makes each servo suspected goes with what confirms its fault.
+        // The evidence for suspicion scales with the evidence for confirmation.
         let factor = PerAxis::from_fn(|a| confirm_nats[a] / settings.confirm_nats);
         Self {
             settings,
@@ -107,7 +112,7 @@ impl Pipeline {
             now: None,
             period_s: None,
             gate: OutlierGate::default(),
-            look: Look::new(settings.window_s),
+            acceleration_filter: AccelerationFilter::new(settings.window_s),
             scatter: PerAxis::default(),
             servos: PerAxis::from_fn(servo),
             readings: Stillness::default(),
@@ -118,18 +123,18 @@ impl Pipeline {
             noisy_m: 0.0,
             unjudged_s: f64::INFINITY,
             evidence: Evidence::default(),
-            watches: Default::default(),
+            monitors: Default::default(),
             n_judged: 0,
         }
     }
 
-    /// Takes one sample, in order, through every stage.
+    /// Passes one sample, in order, through all stages.
     pub(super) fn judge(
         &mut self,
         setup: &Setup,
         sample: &Sample,
         memory: &mut FaultMemory,
-        outputs: &mut Vec<Output>,
+        transitions: &mut Vec<Transition>,
     ) {
         let Some(moment) = frame::moment(&setup.rig.mapping, sample) else { return };
         let Some(dt) = self.tick(moment.at) else { return };
@@ -137,25 +142,25 @@ impl Pipeline {
         let moment = self.without_readings_far_off(moment);
         self.step_twin(&moment);
         let fresh = self.without_repeats(&moment);
-        let (usable, outliers) = self.estimate(&fresh, dt);
-        self.edge.take(&fresh, dt, usable);
-        self.watch_readings(&moment, dt, usable, outliers);
-        self.follow_servos(&fresh, usable);
+        let (refused, outliers) = self.screen(&fresh, dt);
+        self.edge.take(&fresh, dt, refused);
+        self.watch_readings(&moment, dt, refused, outliers);
+        self.follow_servos(&fresh, refused);
         self.unjudged_s += dt;
-        // Time stamps in milliseconds must not make a period a sample longer.
-        if self.unjudged_s >= self.settings.period_s - 1e-3 {
+        // Time stamps in milliseconds must not make a period one sample longer.
+        if self.unjudged_s >= self.settings.period_s - CLOCK_RESOLUTION_S {
             let dt = self.unjudged_s.min(self.settings.period_s + dt);
             self.unjudged_s = 0.0;
-            self.look.fit();
+            self.acceleration_filter.fit();
             self.noisy_m = self.evaluator.noisy_m(self.blur_m().hypot(self.bend_m()));
             self.collect_evidence(&moment);
             let around = self.surroundings();
             let findings = self.evaluator.evaluate(&self.evidence, &self.readings, &around);
-            self.remember(&moment, dt, &findings, memory, outputs);
+            self.remember(&moment, dt, &findings, memory, transitions);
         }
     }
 
-    /// The moment without its reading where no ball can be.
+    /// Removes a reading that is too far off the plate to be a ball.
     fn without_readings_far_off(&self, moment: Moment) -> Moment {
         match self.edge.is_far_off(&moment) {
             true => Moment { position: PerAxis::default(), ..moment },
@@ -163,7 +168,7 @@ impl Pipeline {
         }
     }
 
-    /// The moment without its reading where that is the one before.
+    /// Removes a reading that only repeats the previous one.
     fn without_repeats(&mut self, moment: &Moment) -> Moment {
         match self.repeats.is_repeat(moment.at, &moment.position) {
             true => Moment { position: PerAxis::default(), ..*moment },
@@ -171,8 +176,8 @@ impl Pipeline {
         }
     }
 
-    /// Seconds since the sample before; none if no time has passed. A gap, and
-    /// a clock that went on elsewhere, start afresh.
+    /// Returns the time since the previous sample, s; `None` if no time has passed. After
+    /// a gap or a jump of the clock the pipeline restarts.
     fn tick(&mut self, at: SimTime) -> Option<f64> {
         let dt = match self.now {
             Some(now) if at <= now => return None,
@@ -184,7 +189,7 @@ impl Pipeline {
             None => 0.0,
         };
         if dt > 0.0 {
-            let period = self.period_s.get_or_insert(dt.min(LONGEST_FIRST_PERIOD_S));
+            let period = self.period_s.get_or_insert(dt.min(MAX_FIRST_PERIOD_S));
             *period += PERIOD_GAIN * (dt - *period).clamp(-*period, *period);
         }
         self.now = Some(at);
@@ -195,12 +200,12 @@ impl Pipeline {
         self.settings.gap_after_s(self.period_s.unwrap_or(0.0)).min(LONGEST_SPAN_S)
     }
 
-    /// The window that the least readings take, s.
+    /// The window needed for the least number of samples, s.
     fn least_window_s(&self) -> f64 {
         LEAST_SAMPLES * self.period_s.unwrap_or(0.0)
     }
 
-    /// Forgets the past motion; what the debounce has gathered stays.
+    /// Forgets the motion; the debounce counters are kept.
     fn restart(&mut self) {
         self.twin.restart();
         Axis::ALL.into_iter().for_each(|axis| self.servos[axis].restart());
@@ -210,9 +215,9 @@ impl Pipeline {
         self.forget();
     }
 
-    /// Forgets every reading.
+    /// Drops all readings.
     fn forget(&mut self) {
-        self.look.forget();
+        self.acceleration_filter.forget();
         self.scatter = PerAxis::default();
         self.pause_servos();
     }
@@ -226,7 +231,8 @@ impl Pipeline {
     /// Stage: the twin follows the commands, in lockstep.
     fn step_twin(&mut self, moment: &Moment) {
         let of = |axis: Axis| {
-            let fit = self.look.fits[axis].map(|f| (f.measured.position, f.measured.velocity));
+            let fit = self.acceleration_filter.fits[axis]
+                .map(|f| (f.measured.position, f.measured.velocity));
             fit.unwrap_or((moment.position[axis].unwrap_or(0.0), 0.0))
         };
         let (x, y) = (of(Axis::X), of(Axis::Y));
@@ -242,28 +248,29 @@ impl Pipeline {
             self.gate.shift(moment.at.seconds(), shift.position, shift.velocity);
             for (i, axis) in Axis::ALL.into_iter().enumerate() {
                 let (t, p, v) = (moment.at.seconds(), shift.position[i], shift.velocity[i]);
-                self.look.rebase(axis, t, p, v);
+                self.acceleration_filter.rebase(axis, t, p, v);
                 self.scatter[axis] = Scatter::default();
                 self.servos[axis].rebase(t, p, v);
             }
         }
     }
 
-    /// Stage: outlier gate, then measured and twin's path through one filter.
-    /// Returns whether the readings are usable and how many earlier ones have
-    /// turned out to be outliers.
-    fn estimate(&mut self, moment: &Moment, dt: f64) -> (bool, u32) {
+    /// Stage: outlier gate, then the acceleration filter for measured and twin's path.
+    /// Returns whether the gate refused the readings (false if there are none), and how
+    /// many earlier ones have turned out to be outliers.
+    fn screen(&mut self, moment: &Moment, dt: f64) -> (bool, u32) {
         let t = moment.at.seconds();
         let (predicted, gap_s) = (self.twin.motion().position, self.gap_s());
         self.since_jump_s += dt;
-        if self.look.stale(t, gap_s) {
+        if self.acceleration_filter.stale(t, gap_s) {
             self.gate.restart();
             self.forget();
         }
         if Axis::ALL.iter().all(|&a| moment.position[a].is_none()) {
-            return (true, 0);
+            return (false, 0);
         }
-        // Off the twin's path, a ball that obeys it goes straight.
+        // Relative to the path of the twin that it follows, a ball moves in a straight
+        // line.
         let off = |axis: Axis| moment.position[axis].map(|p| p - predicted[axis as usize]);
         let (off_m, noise_m) = (PerAxis::from_fn(off), self.gate_noise_m());
         let gated = match self.edge.may_have_bounced(moment.at) {
@@ -271,29 +278,29 @@ impl Pipeline {
             false => self.gate.take(t, off_m, noise_m),
         };
         match gated {
-            Gated::Stepped(step) => {
+            GateOutcome::Jumped(step) => {
                 self.forget();
                 self.since_jump_s = 0.0;
                 self.jump = Some(step);
             }
-            // The window holds a reading that should not be in it.
-            Gated::Accepted { undone: true, .. } => self.forget(),
-            Gated::Accepted { .. } | Gated::Refused => {}
+            // The window holds an outlier that had been accepted.
+            GateOutcome::Accepted { undone: true, .. } => self.forget(),
+            GateOutcome::Accepted { .. } | GateOutcome::Refused => {}
         }
         for (i, axis) in Axis::ALL.into_iter().enumerate() {
             if let (true, Some(position)) = (gated.usable(), moment.position[axis]) {
                 let least_s = self.least_window_s();
-                self.look.push(axis, t, position, predicted[i], least_s);
+                self.acceleration_filter.push(axis, t, position, predicted[i], least_s);
                 self.scatter[axis].take(t, position - predicted[i], self.noisy_m);
             }
         }
         match gated {
-            Gated::Accepted { outliers, .. } => (true, outliers),
-            other => (other.usable(), 0),
+            GateOutcome::Accepted { outliers, .. } => (false, outliers),
+            other => (!other.usable(), 0),
         }
     }
 
-    /// Standard deviation by which the readings may leave their path, m.
+    /// Standard deviation of readings about their path, for the outlier gate, m.
     fn gate_noise_m(&self) -> f64 {
         let noise_m = match self.repeats.are_expected() {
             true => self.noise_m().hypot(self.blur_m()),
@@ -302,13 +309,13 @@ impl Pipeline {
         if self.settings.learnt { noise_m } else { noise_m.max(UNKNOWN_NOISE_M) }
     }
 
-    /// Standard deviation of healthy readings, the worse of both axes, m.
+    /// Standard deviation of healthy readings, the larger of both axes, m.
     fn noise_m(&self) -> f64 {
         self.evaluator.noise_m()
     }
 
     /// Stage: stillness, missing and identical readings.
-    fn watch_readings(&mut self, moment: &Moment, dt: f64, usable: bool, outliers: u32) {
+    fn watch_readings(&mut self, moment: &Moment, dt: f64, refused: bool, outliers: u32) {
         let limits = *self.evaluator.limits();
         let asked_m_s2 = PerAxis::from_fn(|a| {
             let pull_m_s2 = moment.command[a].map_or(0.0, |_| self.pull_m_s2(a));
@@ -319,20 +326,20 @@ impl Pipeline {
             position_m: moment.position,
             asked_m_s2,
             still_m: self.evaluator.still_m(),
-            usable,
+            refused,
             // Bounces off the rim look like outliers.
             outliers: if self.edge.clear_s < self.settings.window_s { 0 } else { outliers },
         });
     }
 
-    /// Acceleration that the plate asks of the ball along `axis` at least, m/s²,
-    /// for all that is known of this session's level.
+    /// Returns the least acceleration that the plate demands of the ball along `axis`,
+    /// m/s², given the uncertainty of this session's level.
     fn pull_m_s2(&self, axis: Axis) -> f64 {
         self.servos[axis].least_pull_m_s2(self.twin.motion().acceleration[axis as usize])
     }
 
-    /// Stage: what the ball's answer says of each servo.
-    fn follow_servos(&mut self, moment: &Moment, usable: bool) {
+    /// Stage: evidence against each servo.
+    fn follow_servos(&mut self, moment: &Moment, refused: bool) {
         if self.settings.profile == Profile::Textbook {
             return;
         }
@@ -343,13 +350,13 @@ impl Pipeline {
             match moment.position[axis] {
                 _ if self.edge.at_edge || moment.command[axis].is_none() => servo.pause(),
                 Some(_) if !answers[axis] => servo.pause(),
-                Some(position) if usable && !self.gate.doubts() => {
-                    let course = Course {
+                Some(position) if !refused && !self.gate.suspects_jump() => {
+                    let path = TwinPath {
                         position_m: motion.position[i],
                         velocity_m_s: motion.velocity[i],
                         acceleration_m_s2: motion.acceleration[i],
                     };
-                    servo.take(moment.at.seconds(), position, &course);
+                    servo.take(moment.at.seconds(), position, &path);
                 }
                 _ => {}
             }
@@ -362,19 +369,18 @@ impl Pipeline {
         self.readings.axes[axis].rests() && self.pull_m_s2(axis) < held_m_s2
     }
 
-    /// Whether the ball's motion along `axis` can answer its servo: not while it
-    /// rests within its breakaway angle, nor while readings that repeat themselves
-    /// although the ball is asked to move leave open whether they are alive, nor
-    /// while it stands still in every direction.
+    /// Whether the ball's motion along `axis` can respond to the servo: not while the
+    /// ball rests within its breakaway angle, not while identical readings of a ball that
+    /// is asked to move may be frozen, and not while it stands still along both axes.
     fn answers(&self, axis: Axis) -> bool {
         let may_be_dead = self.readings.axes[axis].repeats(self.evaluator.limits()[axis].repeat_s);
         !self.rests(axis) && !may_be_dead && !self.readings.is_held()
     }
 
-    /// Stage: residual, limit and gate of this moment.
+    /// Stage: residual, limit and enable condition.
     fn collect_evidence(&mut self, moment: &Moment) {
         let around = self.surroundings();
-        let window_s = self.look.window_s(self.least_window_s());
+        let window_s = self.acceleration_filter.window_s(self.least_window_s());
         let see = |axis: Axis| {
             let mut e = self.axis_evidence(moment, axis, window_s);
             let pull_m_s2 = self.pull_m_s2(axis);
@@ -382,9 +388,9 @@ impl Pipeline {
                 self.evaluator.enabled(axis, &e, window_s, pull_m_s2, &self.readings, &around);
             e
         };
-        let fits = &self.look.fits;
-        // A curve over a window takes a push for noise, three readings in a
-        // row a sharp bend; noise shows in both.
+        let fits = &self.acceleration_filter.fits;
+        // The scatter about a curve takes a push for noise, that about neighbours a sharp
+        // bend; noise raises both.
         let scatter = |axis: Axis| {
             let (curve, close) = (fits[axis]?.scatter, self.scatter[axis].deviation_m());
             Some(close.map_or(curve, |c| c.min(curve)))
@@ -404,18 +410,18 @@ impl Pipeline {
         };
     }
 
-    /// What is seen of `axis` over `window_s`, the gate aside.
+    /// Returns the evidence along `axis` over `window_s`, without the enable condition.
     fn axis_evidence(&self, moment: &Moment, axis: Axis, window_s: f64) -> AxisEvidence {
-        let (fit, servo) = (self.look.fits[axis], &self.servos[axis]);
+        let (fit, servo) = (self.acceleration_filter.fits[axis], &self.servos[axis]);
         let full = fit.filter(|f| {
             moment.position[axis].is_some()
-                && f.span_s >= FULL_WINDOW * window_s
-                && f.n as f64 >= LEAST_SAMPLES / 2.0
+                && f.span_s >= FULL_WINDOW_SHARE * window_s
+                && f.n as f64 >= LEAST_JUDGED_SAMPLES
         });
-        let of_session = |residual| self.of_session(axis, residual);
+        let session_offset = |residual| self.session_offset(axis, residual);
         let twin = full.map(|f| {
             let residual = f.deviation.acceleration;
-            f.measured.acceleration - residual + of_session(residual)
+            f.measured.acceleration - residual + session_offset(residual)
         });
         let error = full.map_or(0.0, |f| f.acceleration_error);
         AxisEvidence {
@@ -434,32 +440,32 @@ impl Pipeline {
         }
     }
 
-    /// How much of a residual along `axis` is this session's level, m/s²: none where
-    /// the rig is not learnt. A level that is not known well explains no less than
-    /// the rig's own.
-    fn of_session(&self, axis: Axis, residual_m_s2: f64) -> f64 {
+    /// Returns the part of a residual along `axis` that this session's level explains,
+    /// m/s²; zero for a rig that is not learnt. At most the whole residual.
+    fn session_offset(&self, axis: Axis, residual_m_s2: f64) -> f64 {
         let offset = self.servos[axis].steady_m_s2();
         let explains = self.settings.learnt && offset * residual_m_s2 > 0.0;
         if explains { residual_m_s2.signum() * residual_m_s2.abs().min(offset.abs()) } else { 0.0 }
     }
 
-    /// By how much a reading blurs, m: as far as the ball moves within the
-    /// uncertainty of its time.
+    /// The blur of a reading, m: how far the ball moves within the uncertainty of the
+    /// reading's time.
     fn blur_m(&self) -> f64 {
-        let speed = |axis: Axis| self.look.fits[axis].map_or(0.0, |f| f.measured.velocity);
+        let speed =
+            |axis: Axis| self.acceleration_filter.fits[axis].map_or(0.0, |f| f.measured.velocity);
         let (x, y) = (speed(Axis::X), speed(Axis::Y));
         let (period_s, held) = (self.period_s.unwrap_or(0.0), self.repeats.are_expected());
         blur_m((x * x + y * y).sqrt(), period_s, held)
     }
 
-    /// By how much the path may bend between three readings, m, where the ball's
-    /// acceleration is off the twin's by as much as no servo is blamed for.
+    /// The bend of the path between three readings, m, when the ball's acceleration
+    /// differs from the twin's by the limit of the residual.
     fn bend_m(&self) -> f64 {
         let off_m_s2 = |axis: Axis| self.evaluator.limits()[axis].at(0.0, 0.0);
         bend_m(off_m_s2(Axis::X).max(off_m_s2(Axis::Y)), self.period_s.unwrap_or(0.0))
     }
 
-    /// Whether readings have stepped of late as no ball can.
+    /// Whether the readings have recently jumped farther than a ball can move.
     fn jumped(&self) -> bool {
         self.since_jump_s < self.settings.jump_lasts_s()
     }
@@ -483,11 +489,11 @@ impl Pipeline {
         dt: f64,
         findings: &[Finding; FaultCode::COUNT],
         memory: &mut FaultMemory,
-        outputs: &mut Vec<Output>,
+        transitions: &mut Vec<Transition>,
     ) {
         let mut blamed = false;
         for (&code, finding) in FaultCode::ALL.iter().zip(findings) {
-            let watch = &mut self.watches[code as usize];
+            let watch = &mut self.monitors[code as usize];
             let rising = code.axis().and_then(|axis| self.servos[axis].rising_since());
             let share =
                 code.axis().map_or(1.0, |a| self.settings.confirm_nats / self.confirm_nats[a]);
@@ -497,57 +503,57 @@ impl Pipeline {
                 true => qualified,
                 false => qualified.min(Qualified::Failed),
             };
-            watch.apply(code, qualified, &self.settings, &self.evidence, memory, outputs);
+            watch.apply(code, qualified, &self.settings, &self.evidence, memory, transitions);
             let failed = match qualified {
                 Qualified::Tripped => true,
-                // What is weighed goes on being weighed until it is sure.
+                // Evidence continues to accumulate until it confirms.
                 Qualified::Failed => finding.nats.is_none(),
                 Qualified::No | Qualified::Passed => false,
             };
             blamed |= failed && code.axis().is_none();
         }
         if blamed {
-            // What the servos were suspected of before is accounted for.
+            // The blamed cause explains the earlier suspicion of the servos.
             for axis in Axis::ALL {
                 self.servos[axis].exonerate();
-                self.watches[FaultCode::servo(axis) as usize].exonerate();
+                self.monitors[FaultCode::servo(axis) as usize].exonerate();
             }
         }
     }
 
-    /// Starts the monitor of `code` again, as after a clear.
+    /// Resets the monitor of `code`, as after a clear.
     pub(super) fn reset_monitor(&mut self, code: FaultCode) {
-        self.watches[code as usize] = Watch::default();
+        self.monitors[code as usize] = Monitor::default();
         if let Some(axis) = code.axis() {
             self.servos[axis].exonerate();
         }
     }
 
-    /// How each servo has answered over this session.
+    /// Returns the parameters of each servo over this session.
     pub(super) fn servo_estimates(&self) -> PerAxis<Option<ServoEstimate>> {
         PerAxis::from_fn(|axis| self.servos[axis].estimate())
     }
 
-    /// Most evidence against each servo so far, nats, against what confirms a fault
-    /// of any.
+    /// Largest evidence against each servo so far, nats, scaled to the evidence that
+    /// confirms without a calibration.
     pub(super) fn most_nats(&self) -> PerAxis<f64> {
-        PerAxis::from_fn(|axis| self.watches[FaultCode::servo(axis) as usize].most_nats())
+        PerAxis::from_fn(|axis| self.monitors[FaultCode::servo(axis) as usize].most_nats())
     }
 
-    /// The most that the path of each axis has bent from the twin's, m.
+    /// Largest deviation of the path of each axis from the twin's so far, m.
     pub(super) fn most_path_error_m(&self) -> PerAxis<f64> {
         PerAxis::from_fn(|axis| self.servos[axis].most_path_error_m())
     }
 
-    /// The nearest that each monitor has come to an alarm by the time of its
-    /// failures, 0 to 1, and the seconds that it could judge.
+    /// The closest approach of each monitor to an alarm by duration of failure, 0 to 1,
+    /// and the time for which it could judge, s.
     pub(super) fn nearest(&self) -> [(f64, f64); FaultCode::COUNT] {
-        core::array::from_fn(|i| (self.watches[i].nearest(), self.watches[i].judged_s()))
+        core::array::from_fn(|i| (self.monitors[i].nearest(), self.monitors[i].judged_s()))
     }
 
-    /// How well the healthy explanation has foretold the readings of each axis, nats.
-    pub(super) fn foretold_nats(&self) -> PerAxis<f64> {
-        PerAxis::from_fn(|axis| self.servos[axis].foretold_nats())
+    /// Log-likelihood of the readings of each axis under the healthy hypothesis, nats.
+    pub(super) fn log_likelihood_nats(&self) -> PerAxis<f64> {
+        PerAxis::from_fn(|axis| self.servos[axis].log_likelihood_nats())
     }
 
     /// The evidence of the last sample.
@@ -560,20 +566,20 @@ impl Pipeline {
         self.now
     }
 
-    /// How far the monitor of `code` has got.
+    /// The result that the monitor of `code` can give so far.
     fn reach(&self, code: FaultCode) -> Reach {
-        let judged_s = self.watches[code as usize].judged_s();
-        match InUse::judges(judged_s, Pace::needed_s(code, &self.settings)) {
+        let judged_s = self.monitors[code as usize].judged_s();
+        match InUse::judges(judged_s, DebounceTimes::needed_s(code, &self.settings)) {
             false => Reach::NotJudged,
             true if !self.settings.confirms(code, None) => Reach::NotLearnt,
             true => Reach::Judged,
         }
     }
 
-    /// Takes note of how much of this session each monitor could judge.
+    /// Counts how much of this session each monitor could judge.
     pub(super) fn count_use(&self, coverage: &Coverage, memory: &mut FaultMemory) {
-        for (&code, watch) in FaultCode::ALL.iter().zip(&self.watches) {
-            let needed_s = Pace::needed_s(code, &self.settings);
+        for (&code, watch) in FaultCode::ALL.iter().zip(&self.monitors) {
+            let needed_s = DebounceTimes::needed_s(code, &self.settings);
             memory.count_use(code, coverage.data_s(code), watch.judged_s(), needed_s);
         }
     }
@@ -585,7 +591,7 @@ impl Pipeline {
         n_waiting: usize,
     ) -> State {
         let monitors = core::array::from_fn(|i| {
-            let (watch, status) = (&self.watches[i], memory.record(FaultCode::ALL[i]).status);
+            let (watch, status) = (&self.monitors[i], memory.record(FaultCode::ALL[i]).status);
             MonitorState {
                 counter: watch.counter(),
                 readiness: Readiness {
@@ -598,8 +604,8 @@ impl Pipeline {
                 reach: self.reach(FaultCode::ALL[i]),
             }
         });
-        let ghost = |a: Axis| {
-            self.look.fits[a].map_or((0.0, 0.0), |f| {
+        let beside_ball = |a: Axis| {
+            self.acceleration_filter.fits[a].map_or((0.0, 0.0), |f| {
                 let (residual, span) = (f.deviation.acceleration, f.span_s);
                 (
                     f.measured.position - residual * span * span / 2.0,
@@ -611,8 +617,8 @@ impl Pipeline {
             at: self.now,
             n_judged: self.n_judged,
             n_waiting,
-            twin_position_m: PerAxis::from_fn(|a| ghost(a).0),
-            twin_velocity_m_s: PerAxis::from_fn(|a| ghost(a).1),
+            twin_position_m: PerAxis::from_fn(|a| beside_ball(a).0),
+            twin_velocity_m_s: PerAxis::from_fn(|a| beside_ball(a).1),
             plate_angle_rad: self.twin.plate_angle(),
             evidence: self.evidence.clone(),
             monitors,
@@ -621,7 +627,7 @@ impl Pipeline {
     }
 }
 
-/// Time between two readings of a sensor that is logged faster than it reads, s.
+/// Time between two readings of a sensor that is slower than its log, s; zero otherwise.
 fn refresh_s(rig: &Rig) -> f64 {
     rig.calibration.as_ref().map_or(0.0, |c| c.sensor.refresh_s)
 }

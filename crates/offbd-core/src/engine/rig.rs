@@ -1,23 +1,25 @@
-//! A rig as its owner describes it, and the set-up that an engine runs on.
+//! The description of a rig, and the setup of an engine.
 
 use crate::diagnosis::{Calibration, Profile, Settings};
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
-use crate::plant::{Ball, Contact, Ladder, Plate, ServoModel, TwinAxis, TwinModel};
+use crate::plant::{
+    Ball, Contact, LONGEST_DEAD_TIME_S, Ladder, Plate, ServoModel, TwinAxis, TwinModel,
+};
 use crate::vocabulary::{Axis, Invalid, PerAxis, in_range, positive};
 
-/// How a device's numbers relate to the plate frame. Applied when a sample is
-/// judged; the recording keeps what was sent.
+/// How a device's numbers relate to the plate frame. Applied when a sample is judged; the
+/// recording keeps the numbers as sent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxisMapping {
-    /// Whether the device's x is the plate's y and the reverse.
+    /// Whether the device's x is the plate's y and vice versa.
     pub swap: bool,
     /// Sign of the readings along each plate axis, +1 or −1.
     pub sign: PerAxis<f64>,
     /// Metres per unit of the readings.
     pub position_unit_m: f64,
-    /// What is read where the middle of the plate is, m in the plate frame, −10 to
-    /// 10: taken off every reading.
+    /// The reading at the middle of the plate, m in the plate frame, −10 to 10:
+    /// subtracted from every reading.
     pub origin_m: PerAxis<f64>,
     /// Radians per unit of the commands.
     pub command_unit_rad: f64,
@@ -31,7 +33,7 @@ impl Default for AxisMapping {
     }
 }
 
-/// What the owner knows of the servos; both are of one kind.
+/// The parameters of the servos as known to the owner; the same for both.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ServoSpec {
     pub angle_limit_rad: f64,
@@ -41,32 +43,32 @@ pub struct ServoSpec {
 }
 
 impl Default for ServoSpec {
-    /// ±0.2 rad as in the chapter; a dead time of 40 ms and a lag of 60 ms are
-    /// the middle of the 80–300 ms seen on real rigs' low side; 10 rad/s is a
+    /// ±0.2 rad as in the chapter. A dead time of 40 ms and a lag of 60 ms make
+    /// 100 ms, near the lower end of the 80 to 300 ms seen on real rigs; 10 rad/s is a
     /// standard hobby servo (0.1 s per 60°).
     fn default() -> Self {
         Self { angle_limit_rad: 0.2, dead_time_s: 0.04, lag_s: 0.06, rate_limit_rad_s: 10.0 }
     }
 }
 
-/// What the owner asks of the diagnosis.
+/// The owner's requirements on the diagnosis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DiagnosticsSpec {
     pub profile: Profile,
     /// Wanted false alarms per rig and year, above zero.
     pub false_alarms_per_rig_year: Option<f64>,
-    /// Continuous failure before a test fails, s: of servos, ball and sensor.
+    /// Time of failure before a test fails, s; for servos, ball and sensor.
     pub debounce_s: Option<f64>,
 }
 
-/// A rig as described by its asset file, checked.
+/// A rig as described by its asset file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rig {
     pub name: String,
     pub sample_rate_hz: f64,
     pub ball: Ball,
     pub plate: Plate,
-    /// How the ball touches the plate; the lockstep twin asks for its friction.
+    /// The contact of ball and plate; the lockstep twin uses its friction.
     pub contact: Contact,
     pub servo: ServoSpec,
     pub mapping: AxisMapping,
@@ -74,14 +76,14 @@ pub struct Rig {
     pub calibration: Option<Calibration>,
 }
 
-/// Room between a ball and the edge where contact may begin, m.
+/// Distance between ball and edge at which contact may begin, m. Chosen.
 const EDGE_MARGIN_M: f64 = 0.006;
 
 /// Longest name of a rig, bytes.
 pub const MAX_NAME: usize = 128;
 
 impl Rig {
-    /// The chapter's rig under another name.
+    /// Returns the chapter's rig with the given name.
     #[must_use]
     pub fn chapter(name: &str) -> Self {
         Self {
@@ -97,7 +99,7 @@ impl Rig {
         }
     }
 
-    /// Checks what the parts' own constructors have not.
+    /// Checks what the constructors of the parts have not checked.
     ///
     /// # Errors
     /// [`Invalid`] naming the element.
@@ -108,7 +110,7 @@ impl Rig {
             return Err(Invalid::new("/name", reason));
         }
         positive("/sample_rate_hz", self.sample_rate_hz, 100_000.0)?;
-        in_range("/servo/dead_time_s", self.servo.dead_time_s, 0.0..=5.0)?;
+        in_range("/servo/dead_time_s", self.servo.dead_time_s, 0.0..=LONGEST_DEAD_TIME_S)?;
         self.servo_model()?;
         positive("/axes/position_unit_m", self.mapping.position_unit_m, 1000.0)?;
         in_range("/axes/x_offset_m", self.mapping.origin_m.x, -10.0..=10.0)?;
@@ -118,8 +120,8 @@ impl Rig {
         Ok(())
     }
 
-    /// Distance of the ball's centre from the edge, m, within which the edge may
-    /// act: a rim holds the ball by its side, without one its centre leaves.
+    /// Distance of the ball's centre from the edge within which the edge may act, m: a
+    /// rim touches the side of the ball; without a rim the centre must leave the plate.
     pub(super) fn contact_room_m(&self) -> f64 {
         let side_m = if self.plate.rim() { self.ball.radius_m() } else { 0.0 };
         side_m + EDGE_MARGIN_M
@@ -129,13 +131,13 @@ impl Rig {
         ServoModel::new(self.servo.angle_limit_rad, self.servo.lag_s, self.servo.rate_limit_rad_s)
     }
 
-    /// The models of this rig's ball, as near as `profile` asks for.
+    /// Returns the models of this rig's ball with the accuracy of `profile`.
     pub(super) fn ladder(&self, profile: Profile) -> Ladder {
         let accuracy_m_s2 = Settings::of(profile).twin_accuracy_m_s2;
         Ladder::new(&self.ball, &self.plate, self.contact.friction(), accuracy_m_s2)
     }
 
-    /// The settings of `profile` with what this rig's owner asks for.
+    /// Returns the settings of `profile` with the owner's requirements.
     ///
     /// # Errors
     /// [`Invalid`] naming the element under `/diagnostics`.
@@ -153,7 +155,7 @@ impl Rig {
     }
 }
 
-/// Everything an engine needs to judge one rig; immutable.
+/// Everything that an engine needs to judge one rig; immutable.
 #[derive(Clone, Debug)]
 pub struct Setup {
     pub rig: Rig,
@@ -162,11 +164,10 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// The set-up for `rig`, judged by `profile` or, without one, by the
-    /// profile that its owner chose.
+    /// Builds the setup of `rig` with `profile`, or with the owner's if `None`.
     ///
     /// # Errors
-    /// [`Invalid`] naming the first element of the rig that cannot be.
+    /// [`Invalid`] naming the first invalid element of the rig.
     pub fn new(rig: Rig, profile: Option<Profile>) -> Result<Self, Invalid> {
         rig.check()?;
         let settings = rig.settings(profile.unwrap_or(rig.diagnostics.profile))?;
@@ -191,7 +192,7 @@ impl Setup {
     }
 }
 
-/// Both axes before anything is learnt.
+/// The parameters of both axes before anything is learnt.
 fn nominal_axis(rig: &Rig) -> Result<TwinAxis, Invalid> {
     let (servo, dead_time_s) = (rig.servo_model()?, rig.servo.dead_time_s);
     Ok(TwinAxis { servo, dead_time_s, gain: 1.0, level_rad: 0.0, resistance_m_s2: 0.0 })

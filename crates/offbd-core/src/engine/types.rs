@@ -1,12 +1,12 @@
-//! What goes into the engine and what comes out.
+//! The inputs of the engine, its decisions on them and its state.
 
-use crate::diagnosis::{Evidence, Transition};
+use crate::diagnosis::Evidence;
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use crate::plant::Fidelity;
 use crate::vocabulary::{Brief, FaultCode, PerAxis, Sample, SimTime};
 
-/// Something that happens to a rig.
+/// An input of the engine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Input {
     /// A row of telemetry, in order of arrival.
@@ -15,29 +15,20 @@ pub enum Input {
     Clear(FaultCode),
     /// A person acknowledges the current occurrence of a code.
     Acknowledge(FaultCode),
-    /// The session ends: what still waits is judged, the operation cycle ends.
+    /// The session ends: the waiting samples are judged, the operation cycle ends.
     End,
 }
 
-/// Something that follows.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Output {
-    /// What became of the sample that was put in.
-    Admitted(Admission),
-    /// A status byte changed.
-    Transition(Box<Transition>),
-}
-
-/// What became of a sample.
+/// The decision on a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Admission {
-    /// New: to be recorded; judged now or once its turn comes.
+    /// New: to be recorded; judged at once or in its turn.
     Accepted,
     /// New and to be recorded, but too late or too far ahead to be judged.
     SetAside(Rejection),
-    /// Already there: neither recorded nor judged again.
+    /// Already known: neither recorded nor judged again.
     Duplicate,
-    /// Not a sample: neither recorded nor judged.
+    /// Invalid: neither recorded nor judged.
     Rejected(Rejection),
 }
 
@@ -48,14 +39,16 @@ pub enum Rejection {
     NotFinite { field: &'static str },
     #[error("{field} is {}, beyond ±{limit}", Brief(*value))]
     Absurd { field: &'static str, value: f64, limit: f64 },
-    #[error("t_s is {behind_s:.3} s behind what has been judged: kept, not judged")]
+    #[error("t_s is {behind_s:.3} s before the last judged sample: recorded, not judged")]
     Late { behind_s: f64 },
-    #[error("t_s jumps {ahead_s:.0} s ahead: kept, not judged unless the clock goes on from there")]
+    #[error(
+        "t_s jumps {ahead_s:.0} s ahead: recorded, not judged unless the clock continues from there"
+    )]
     Jump { ahead_s: f64 },
 }
 
 impl Rejection {
-    /// The kind of reason in one word.
+    /// The identifier of the reason.
     #[must_use]
     pub const fn as_str(self) -> &'static str {
         match self {
@@ -67,45 +60,44 @@ impl Rejection {
     }
 }
 
-/// Whether a monitor has come to a result.
+/// Whether a monitor has a result.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Readiness {
-    /// It may judge right now.
+    /// The monitor is enabled at present.
     pub enabled: bool,
-    /// It has come to a result in this session.
+    /// It has had a result in this session.
     pub complete_this_cycle: bool,
-    /// It has come to a result since the code was last cleared.
+    /// It has had a result since the code was last cleared.
     pub complete_since_clear: bool,
 }
 
-/// How far a monitor has got in a session, whatever it has found.
+/// The result that a monitor can give in a session so far, whatever it has found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Reach {
     /// It could judge for less time than a fault takes to be confirmed.
     #[default]
     NotJudged,
-    /// It has judged, but on a rig that is not learnt a fault of its code is
-    /// never confirmed, and agreement is no proof of health.
+    /// It has judged for long enough, but the rig is not learnt: a fault of its code is
+    /// never confirmed, and agreement does not prove health.
     NotLearnt,
-    /// It has judged for long enough to have confirmed a fault.
+    /// It has judged for long enough to confirm a fault.
     Judged,
 }
 
-/// One monitor at one moment.
+/// The state of one monitor.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MonitorState {
     /// Fault detection counter, −128 (passed) to 127 (failed).
     pub counter: i8,
     pub readiness: Readiness,
-    /// Seconds of this session in which it could judge.
+    /// Time of this session for which it could judge, s.
     pub judged_s: f64,
-    /// The same as a share of the session, from its first sample to its last,
-    /// 0 to 1.
+    /// That time as a fraction of the session from its first sample to its last, 0 to 1.
     pub judged_share: f64,
     pub reach: Reach,
 }
 
-/// Where an engine stands; see [`super::Engine::state`].
+/// The state of an engine; see [`super::Engine::state`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct State {
     /// Time of the last judged sample.
@@ -114,11 +106,11 @@ pub struct State {
     pub n_judged: u64,
     /// Samples waiting for an earlier one.
     pub n_waiting: usize,
-    /// The twin's position beside the measured one, m.
+    /// The twin's position relative to the plate, drawn beside the measured one, m.
     pub twin_position_m: PerAxis<f64>,
     /// The twin's velocity, m/s.
     pub twin_velocity_m_s: PerAxis<f64>,
-    /// The twin's plate angle behind each axis, rad.
+    /// The twin's plate angle of each axis, rad.
     pub plate_angle_rad: PerAxis<f64>,
     pub evidence: Evidence,
     /// One per code, in the order of [`FaultCode::ALL`].

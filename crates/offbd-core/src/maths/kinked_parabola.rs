@@ -1,30 +1,31 @@
-//! Least squares by a parabola that may have one kink.
+//! Least-squares fit of a parabola with at most one kink.
 //!
-//! A path under a steady unknown acceleration is a parabola; a push that the path
-//! has had at an unknown moment is a change of its slope there. What such a curve
-//! leaves is neither.
+//! A path under a steady unknown acceleration is a parabola; a push at an unknown moment
+//! changes its slope there. The residual of such a fit is due to neither.
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use nalgebra::{Matrix3, Vector3};
 
-/// Parameters of the curve: three of the parabola, moment and size of the kink.
-const PARAMETERS: usize = 5;
+/// Parameters of the curve: three of the parabola, position and size of the kink.
+const CURVE_PARAMETERS: usize = 5;
 
-/// Root mean square of what a parabola with at most one kink, at whichever point
-/// suits best, leaves of `points` (time, value) in order of time. At least two points
-/// follow a kink: of one alone nobody knows whether it lies on a new slope. None from
-/// fewer than six points, or where they stand too close together to bend a line.
+/// Returns the root mean square residual of `points` (time, value), ascending in time,
+/// about the best-fitting parabola with at most one kink.
 ///
-/// The kink at t_j adds β·(t − t_j)₊ to the parabola; by the sums over the points
-/// after t_j it is solved for in one pass (Frisch & Waugh 1933).
+/// The kink lies at one of the points and is followed by at least two others: a single
+/// one does not determine a new slope. Returns `None` for fewer than six points, or if
+/// they lie too close together to determine a parabola.
+///
+/// A kink at t_j adds β·(t − t_j)₊ to the parabola. All kinks are solved for in one pass
+/// over sums of the points after t_j (Frisch & Waugh 1933).
 #[must_use]
-pub fn off_kinked_parabola(points: &[(f64, f64)]) -> Option<f64> {
+pub fn kinked_parabola_rms(points: &[(f64, f64)]) -> Option<f64> {
     let n = points.len();
-    if n <= PARAMETERS {
+    if n <= CURVE_PARAMETERS {
         return None;
     }
-    // About the middle, so that powers of the time stay small.
+    // Times relative to the middle keep their powers small.
     let ((t0, _), (_, y0)) = (points[n / 2], points[0]);
     let about = |&(t, y): &(f64, f64)| (t - t0, y - y0);
     let (mut powers, mut right, mut squares) = ([0.0; 5], Vector3::zeros(), 0.0);
@@ -61,7 +62,7 @@ pub fn off_kinked_parabola(points: &[(f64, f64)]) -> Option<f64> {
             explained = explained.max(pulled * pulled / own);
         }
     }
-    Some(((left - explained).max(0.0) / (n - PARAMETERS) as f64).sqrt())
+    Some(((left - explained).max(0.0) / (n - CURVE_PARAMETERS) as f64).sqrt())
 }
 
 #[cfg(test)]
@@ -71,25 +72,25 @@ mod tests {
     use proptest::prelude::*;
 
     fn points(n: usize, of: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
-        // Far from zero, as times of day are.
+        // Far from zero, like times of day.
         (0..n).map(|i| 5000.0 + 0.1 * i as f64).map(|t| (t, of(t - 5000.0))).collect()
     }
 
     #[test]
     fn a_parabola_with_a_kink_leaves_nothing() {
         let path = |t: f64| 0.3 - 0.2 * t + 0.5 * t * t + 0.4 * (t - 0.7).max(0.0);
-        assert!(off_kinked_parabola(&points(20, path)).unwrap() < 1e-9);
+        assert!(kinked_parabola_rms(&points(20, path)).unwrap() < 1e-9);
         let two = |t: f64| path(t) - 0.8 * (t - 1.3).max(0.0);
-        assert!(off_kinked_parabola(&points(20, two)).unwrap() > 0.01);
+        assert!(kinked_parabola_rms(&points(20, two)).unwrap() > 0.01);
     }
 
     #[test]
     fn too_little_is_nothing() {
-        assert_eq!(off_kinked_parabola(&points(5, |t| t)), None);
-        assert_eq!(off_kinked_parabola(&[(1.0, 2.0); 9]), None);
+        assert_eq!(kinked_parabola_rms(&points(5, |t| t)), None);
+        assert_eq!(kinked_parabola_rms(&[(1.0, 2.0); 9]), None);
     }
 
-    /// The same by least squares with every kink in turn that two points follow.
+    /// Reference: an ordinary least-squares fit for every admissible kink.
     fn by_trying(points: &[(f64, f64)]) -> f64 {
         let n = points.len();
         let values = DVector::from_iterator(n, points.iter().map(|p| p.1));
@@ -103,7 +104,7 @@ mod tests {
             (curve * found - &values).norm_squared()
         };
         let least = (1..n - 2).map(left).fold(f64::INFINITY, f64::min);
-        (least / (n - PARAMETERS) as f64).sqrt()
+        (least / (n - CURVE_PARAMETERS) as f64).sqrt()
     }
 
     proptest! {
@@ -112,7 +113,7 @@ mod tests {
             values in prop::collection::vec(-0.1..0.1f64, 8..24)
         ) {
             let points = points(values.len(), |t| values[(t / 0.1).round() as usize]);
-            let (fast, slow) = (off_kinked_parabola(&points).unwrap(), by_trying(&points));
+            let (fast, slow) = (kinked_parabola_rms(&points).unwrap(), by_trying(&points));
             prop_assert!((fast - slow).abs() < 1e-6, "{fast}, not {slow}");
         }
     }

@@ -1,6 +1,6 @@
 //! Explicit integrators, least-squares filters and robust statistics.
 //!
-//! Pure and deterministic: numbers in, numbers out. Knows nothing of rigs.
+//! Pure functions of numbers; knows nothing of rigs.
 
 mod kinked_parabola;
 mod runge_kutta;
@@ -9,7 +9,7 @@ mod sliding_quadratic;
 mod statistics;
 mod system;
 
-pub use kinked_parabola::off_kinked_parabola;
+pub use kinked_parabola::kinked_parabola_rms;
 pub use runge_kutta::{
     DOPRI5, EULER, Estimated, MIDPOINT, RK4, RungeKutta, dopri5, semi_implicit_euler,
 };

@@ -1,9 +1,8 @@
-//! Explicit Runge–Kutta methods as data: one stepper, constant tableaux.
+//! Explicit Runge–Kutta methods as data: one stepper and constant tableaux.
 //!
-//! Source of the tableaux: Hairer, Nørsett, Wanner, *Solving Ordinary
-//! Differential Equations I*, 2nd ed.: Euler and the midpoint rule II.1 (p. 132
-//! f.), the classical method table 1.2 (p. 138), Dormand–Prince table 5.2
-//! (p. 178).
+//! Source of the tableaux: Hairer, Nørsett, Wanner, *Solving Ordinary Differential
+//! Equations I*, 2nd ed.: Euler and the midpoint rule II.1 (p. 132 f.), the classical
+//! method table 1.2 (p. 138), Dormand–Prince table 5.2 (p. 178).
 
 use super::system::{System, moved};
 
@@ -18,11 +17,11 @@ pub struct RungeKutta<const S: usize> {
     pub c: [f64; S],
 }
 
-/// A step's result with an estimate of its local error.
+/// The result of a step with an estimate of its local error.
 #[derive(Clone, Copy, Debug)]
 pub struct Estimated<const N: usize> {
     pub y: [f64; N],
-    /// y₁ minus the embedded solution of lower order.
+    /// y₁ minus the embedded lower-order solution.
     pub error: [f64; N],
 }
 
@@ -121,8 +120,8 @@ impl<const S: usize> RungeKutta<S> {
     }
 }
 
-/// One step of Dormand–Prince 5(4) with its error estimate. `first` is f(t, y);
-/// it becomes f at the step's end, the next step's first stage.
+/// One step of Dormand–Prince 5(4) with its error estimate. `first` is f(t, y) on entry
+/// and f at the end of the step on return: the first stage of the next step.
 #[inline]
 pub fn dopri5<const N: usize>(
     system: &impl System<N>,
@@ -140,8 +139,8 @@ pub fn dopri5<const N: usize>(
     Estimated { y: DOPRI5.sum(y, &k, h), error }
 }
 
-/// One step of semi-implicit (symplectic) Euler, order 1: the rates first, then
-/// the positions with the new rates.
+/// One step of semi-implicit (symplectic) Euler, order 1: the rates first, then the
+/// positions with the new rates.
 #[inline]
 pub fn semi_implicit_euler<const N: usize, F: System<N>>(
     system: &F,

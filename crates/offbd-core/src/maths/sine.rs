@@ -1,21 +1,19 @@
-//! Sine and cosine without a branch, a table or a call, so that a compiler
-//! can work on many angles at once.
+//! Sine and cosine without branches, tables or calls, so that the compiler can vectorise
+//! them.
 //!
-//! The angle is brought into [−π/4, π/4] by taking away k·π/2 in two parts
-//! (Cody and Waite). There two polynomials give sine and cosine, and the last
-//! two bits of k say which is which and with what sign. The constants are
-//! those of fdlibm (Sun Microsystems, 1993): `e_rem_pio2.c`, `k_sin.c` and
-//! `k_cos.c`. The polynomials are summed in pairs (Estrin), which shortens the
-//! chain of operations that wait for each other.
+//! The angle is reduced to [−π/4, π/4] by subtracting k·π/2 in two parts (Cody and
+//! Waite). Two polynomials give sine and cosine there, and the last two bits of k select
+//! which is which and the signs. The constants are those of fdlibm (Sun Microsystems,
+//! 1993): `e_rem_pio2.c`, `k_sin.c` and `k_cos.c`. The polynomials are evaluated in pairs
+//! (Estrin), which shortens the chain of dependent operations.
 //!
-//! Not a crate's vector sines, such as those of `wide`: they choose their
-//! instructions when they are compiled, not where they run, and contract a
-//! multiplication with an addition wherever those instructions can, so that
-//! two builds can differ in the last bit.
+//! Vector sines of other crates, such as those of `wide`, are not used: they choose their
+//! instructions at compile time, not at run time, and fuse multiplications with additions
+//! where those instructions allow it, so that two builds can differ in the last bit.
 
 use core::f64::consts::FRAC_2_PI;
 
-/// Up to this angle either way [`sin_cos`] is as good as it says, rad.
+/// Largest angle, in either direction, for which [`sin_cos`] keeps its accuracy, rad.
 pub const LIMIT_RAD: f64 = 1000.0;
 
 /// The first 33 bits of π/2: its product with a k below 2²⁰ is exact.
@@ -23,8 +21,8 @@ const HALF_PI_HIGH: f64 = f64::from_bits(0x3FF9_21FB_5440_0000);
 /// π/2 − [`HALF_PI_HIGH`].
 const HALF_PI_LOW: f64 = f64::from_bits(0x3DD0_B461_1A62_6331);
 
-/// 1.5·2⁵²: added, it rounds to the nearest integer and leaves that integer in
-/// the lowest bits; subtracted again, it leaves the integer as a number.
+/// 1.5·2⁵²: adding it rounds to the nearest integer and leaves that integer in the lowest
+/// bits; subtracting it again gives the integer as a number.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
 
 /// sin x ≈ x + x³·(S₀ + S₁x² + … + S₅x¹⁰), within 2⁻⁵⁸ of x.
@@ -47,17 +45,16 @@ const C: [f64; 6] = [
     f64::from_bits(0xBDA8_FAE9_BE88_38D4),
 ];
 
-/// (sin, cos) of `angle_rad`, within one unit in the last place of what the
-/// standard library gives (1.2e-16) for angles up to 1000 rad either way; not
-/// a number where the angle is infinite or none.
+/// Returns (sin, cos) of `angle_rad`, within one unit in the last place (1.2e-16) of the
+/// standard library for angles up to ±1000 rad; NaN if the angle is infinite or NaN.
 #[inline(always)]
 pub fn sin_cos(angle_rad: f64) -> (f64, f64) {
     let (x, turns) = reduced(angle_rad);
     turned(x, turns)
 }
 
-/// The first half of [`sin_cos`]: x in [−π/4, π/4], and how many quarter turns
-/// were taken away, in the lowest bits of the second number.
+/// The first half of [`sin_cos`]: returns x in [−π/4, π/4], and the number of quarter
+/// turns subtracted in the lowest bits of the second number.
 #[inline(always)]
 pub fn reduced(angle_rad: f64) -> (f64, f64) {
     let turns = angle_rad * FRAC_2_PI + ROUNDER;
@@ -65,7 +62,7 @@ pub fn reduced(angle_rad: f64) -> (f64, f64) {
     ((angle_rad - k * HALF_PI_HIGH) - k * HALF_PI_LOW, turns)
 }
 
-/// The second half of [`sin_cos`], of what [`reduced`] gave.
+/// The second half of [`sin_cos`], applied to the result of [`reduced`].
 #[inline(always)]
 pub fn turned(x: f64, turns: f64) -> (f64, f64) {
     let (sin, cos) = near_zero(x);
@@ -76,7 +73,7 @@ pub fn turned(x: f64, turns: f64) -> (f64, f64) {
     (f64::from_bits(sin ^ exchange ^ sin_sign), f64::from_bits(cos ^ exchange ^ cos_sign))
 }
 
-/// (sin, cos) of an `x` in [−π/4, π/4].
+/// Returns (sin, cos) of an `x` in [−π/4, π/4].
 #[inline(always)]
 fn near_zero(x: f64) -> (f64, f64) {
     let z = x * x;

@@ -1,12 +1,12 @@
-//! Least-squares quadratics over a sliding window of real time stamps: the
-//! acceleration filter, for a measured path and a predicted one at once.
+//! Least-squares quadratics over a sliding window of unevenly spaced readings: the
+//! acceleration filter, applied to a measured and a predicted path at once.
 //!
-//! Over n readings spaced T apart with standard deviation σ the acceleration
-//! has σ_a = σ/T²·√(720/(n(n²−1)(n²−4))). Because the fit is linear, the fit
-//! of the difference *is* the difference of the fits: both paths pass through
-//! the same filter at the same stamps, and its delay cancels in the residual.
-//! Sums are updated as readings come and go, O(1) amortised: they are rebuilt
-//! from the readings once per window, which keeps rounding from growing.
+//! For n readings spaced T apart with standard deviation σ the standard error of the
+//! acceleration is σ_a = σ/T²·√(720/(n(n²−1)(n²−4))). Because the fit is linear, the fit
+//! of the difference *is* the difference of the fits: both paths pass through the same
+//! filter at the same times, and its delay cancels in the residual. Sums are updated as
+//! readings enter and leave, in O(1) amortised; they are recomputed once per window so
+//! that rounding errors do not accumulate.
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
@@ -14,8 +14,8 @@ use alloc::collections::VecDeque;
 
 use nalgebra::{Matrix3, Vector3};
 
-/// Most readings a window holds; beyond it the oldest leave early, which
-/// shortens the window. 4096 is 0.5 s at 8 kHz.
+/// Most readings in a window; beyond it the oldest are dropped, which shortens the
+/// window. 4096 is 0.5 s at 8 kHz.
 const MAX_POINTS: usize = 4096;
 
 #[derive(Clone, Copy, Debug)]
@@ -25,24 +25,24 @@ struct Point {
     predicted: f64,
 }
 
-/// The window, s, over which readings `period_s` apart with standard deviation
-/// `noise` give an acceleration known to `error`: the formula above for many
-/// readings, σ_a = σ·√(720·T)/W^(5/2), solved for W.
+/// Returns the window length, s, at which readings `period_s` apart with standard
+/// deviation `noise` give an acceleration with standard error `error`: the formula above
+/// for many readings, σ_a = σ·√(720·T)/W^(5/2), solved for W.
 #[must_use]
 pub fn window_for(noise: f64, period_s: f64, error: f64) -> f64 {
     (noise * (720.0 * period_s).sqrt() / error).powf(0.4)
 }
 
-/// Sums over the window of powers of u = t − origin.
+/// Sums over the window, weighted with powers of u = t − origin.
 #[derive(Clone, Copy, Debug, Default)]
-struct Sums {
+struct PowerSums {
     u: [f64; 5],
     measured: [f64; 3],
     deviation: [f64; 3],
     deviation_squared: f64,
 }
 
-impl Sums {
+impl PowerSums {
     fn add(&mut self, u: f64, point: &Point, sign: f64) {
         let d = point.measured - point.predicted;
         let mut power = sign;
@@ -60,13 +60,13 @@ impl Sums {
 
 /// Position, velocity and acceleration of a fitted path at its newest reading.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Path {
+pub struct FittedPath {
     pub position: f64,
     pub velocity: f64,
     pub acceleration: f64,
 }
 
-impl Path {
+impl FittedPath {
     fn of(coefficients: &Vector3<f64>, u: f64) -> Self {
         let [c0, c1, c2] = (*coefficients).into();
         Self {
@@ -77,39 +77,39 @@ impl Path {
     }
 }
 
-/// What a window says.
+/// The fits of a window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fit {
     /// The measured path.
-    pub measured: Path,
+    pub measured: FittedPath,
     /// Measured − predicted path; its acceleration is the residual.
-    pub deviation: Path,
+    pub deviation: FittedPath,
     /// Standard deviation of the readings about the fitted deviation.
     pub scatter: f64,
-    /// Standard error of the deviation's acceleration for white readings.
+    /// Standard error of the deviation's acceleration, for white noise.
     pub acceleration_error: f64,
     /// Readings in the window.
     pub n: usize,
-    /// From the oldest to the newest reading, s.
+    /// Time from the oldest to the newest reading, s.
     pub span_s: f64,
 }
 
-/// The filter. See the module.
+/// The filter; see the module documentation.
 #[derive(Clone, Debug, Default)]
 pub struct SlidingQuadratic {
     points: VecDeque<Point>,
     origin: f64,
-    sums: Sums,
+    sums: PowerSums,
 }
 
 impl SlidingQuadratic {
-    /// Takes a reading newer than all before, and lets go of those older than
-    /// `window_s` before it.
+    /// Adds a reading newer than all others and drops those older than `window_s` before
+    /// it.
     pub fn push(&mut self, t: f64, measured: f64, predicted: f64, window_s: f64) {
         let point = Point { t, measured, predicted };
         if self.points.is_empty() {
             self.origin = t;
-            self.sums = Sums::default();
+            self.sums = PowerSums::default();
         }
         self.points.push_back(point);
         self.sums.add(t - self.origin, &point, 1.0);
@@ -124,8 +124,8 @@ impl SlidingQuadratic {
         }
     }
 
-    /// Takes the straight line through (`t`, `position`) with slope `velocity`
-    /// away from the predicted path; no acceleration changes.
+    /// Subtracts the straight line through (`t`, `position`) with slope `velocity` from
+    /// the predicted path; accelerations do not change.
     pub fn rebase(&mut self, t: f64, position: f64, velocity: f64) {
         for point in &mut self.points {
             point.predicted -= position + velocity * (point.t - t);
@@ -133,7 +133,7 @@ impl SlidingQuadratic {
         self.rebuild();
     }
 
-    /// Forgets everything.
+    /// Drops all readings.
     pub fn clear(&mut self) {
         self.points.clear();
     }
@@ -145,7 +145,7 @@ impl SlidingQuadratic {
     }
 
     fn rebuild(&mut self) {
-        self.sums = Sums::default();
+        self.sums = PowerSums::default();
         let Some(oldest) = self.points.front() else { return };
         self.origin = oldest.t;
         for point in &self.points {
@@ -153,8 +153,8 @@ impl SlidingQuadratic {
         }
     }
 
-    /// The fit over the window; none with fewer than four readings, or where
-    /// they stand too close together to bend a line.
+    /// Returns the fit over the window; `None` for fewer than four readings, or if they
+    /// lie too close together to determine a parabola.
     #[must_use]
     pub fn fit(&self) -> Option<Fit> {
         let (oldest, newest) = (self.points.front()?, self.points.back()?);
@@ -176,8 +176,8 @@ impl SlidingQuadratic {
         let scatter = (squares / (n - 3) as f64).sqrt();
         let u = newest.t - self.origin;
         Some(Fit {
-            measured: Path::of(&measured, u),
-            deviation: Path::of(&deviation, u),
+            measured: FittedPath::of(&measured, u),
+            deviation: FittedPath::of(&deviation, u),
             scatter,
             acceleration_error: 2.0 * scatter * inverse[(2, 2)].sqrt(),
             n,
@@ -191,7 +191,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Pushes `n` readings of `path` spaced `dt` apart; predicted is zero.
+    /// Pushes `n` readings of `path` spaced `dt` apart; the predicted path is zero.
     fn filled(n: usize, dt: f64, window_s: f64, path: impl Fn(f64) -> f64) -> SlidingQuadratic {
         let mut filter = SlidingQuadratic::default();
         for i in 0..n {
@@ -212,8 +212,8 @@ mod tests {
         }
     }
 
-    /// The window asked for gives the error asked for, up to the part of a
-    /// reading that it cuts off: 5/2 of it, here 2.5 %.
+    /// A window of the computed length gives the wanted error. It holds a whole number of
+    /// readings, which costs up to 5/2 of a reading's share, here 2.5 %.
     #[test]
     fn validate_the_window_for_an_error() {
         let (noise, period_s, error) = (5e-4, 0.004, 0.008);
@@ -237,7 +237,7 @@ mod tests {
     }
 
     proptest! {
-        /// The sums as updated agree with a fit made afresh.
+        /// The updated sums agree with recomputed ones.
         #[test]
         fn sliding_equals_afresh(
             readings in proptest::collection::vec((0.001..0.05_f64, -0.2..0.2_f64, -0.2..0.2_f64), 10..300)
@@ -257,7 +257,7 @@ mod tests {
             }
         }
 
-        /// A straight line taken from the prediction changes no acceleration.
+        /// Subtracting a straight line from the prediction changes no acceleration.
         #[test]
         fn rebasing_keeps_the_residual(p in -1.0..1.0_f64, v in -1.0..1.0_f64) {
             let mut filter = filled(60, 0.01, 0.5, |t| (3.0 * t).sin() * 0.1);

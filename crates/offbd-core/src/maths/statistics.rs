@@ -1,9 +1,9 @@
-//! Location and scale that a few wild values do not move.
+//! Robust estimates of location and scale.
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 
-/// The median, reordering `values`; none when there are none.
+/// Returns the median and reorders `values`; `None` if there are none.
 pub fn median(values: &mut [f64]) -> Option<f64> {
     if values.is_empty() {
         return None;
@@ -17,16 +17,16 @@ pub fn median(values: &mut [f64]) -> Option<f64> {
     Some(lower.midpoint(upper))
 }
 
-/// The value that the share `share`, in [0, 1], of `values` does not exceed
-/// (nearest rank), reordering them; none when there are none.
+/// Returns the `share` quantile of `values` (nearest rank; `share` in [0, 1]) and
+/// reorders them; `None` if there are none.
 pub fn quantile(values: &mut [f64], share: f64) -> Option<f64> {
     let last = values.len().checked_sub(1)?;
     let rank = ((values.len() as f64 * share).ceil() as usize).clamp(1, last + 1) - 1;
     Some(*values.select_nth_unstable_by(rank, f64::total_cmp).1)
 }
 
-/// 1.4826 × the median absolute deviation from the median: the standard
-/// deviation of a normal distribution (Rousseeuw & Croux 1993, eq. 1.1).
+/// Returns 1.4826 × the median absolute deviation from the median: the standard deviation
+/// if `values` are normal (Rousseeuw & Croux 1993, eq. 1.1).
 pub fn robust_deviation(values: &mut [f64]) -> Option<f64> {
     let centre = median(values)?;
     for value in values.iter_mut() {

@@ -1,7 +1,7 @@
-//! Differential equations as the integrators see them.
+//! The interface of a system of differential equations.
 
-/// y' = f(t, y) in N states, the first `POSITIONS` of which are positions and
-/// the next `POSITIONS` their rates: `y[i]' = y[i + POSITIONS]`.
+/// y' = f(t, y) with N states, of which the first `POSITIONS` are positions and the next
+/// `POSITIONS` their rates: `y[i]' = y[i + POSITIONS]`.
 pub trait System<const N: usize> {
     /// Number of leading states that are positions.
     const POSITIONS: usize;
@@ -10,7 +10,7 @@ pub trait System<const N: usize> {
     fn rate(&self, t: f64, y: &[f64; N]) -> [f64; N];
 }
 
-/// `y + h·k`, element by element.
+/// Returns `y + h·k`, element by element.
 #[inline]
 #[must_use]
 pub fn moved<const N: usize>(y: &[f64; N], k: &[f64; N], h: f64) -> [f64; N] {

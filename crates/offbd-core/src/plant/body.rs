@@ -1,4 +1,4 @@
-//! The bodies: a ball, and the plate it rolls on.
+//! The ball and the plate.
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
@@ -45,10 +45,10 @@ impl Ball {
         self.inertia_factor
     }
 
-    /// How easily air moves it: its area over its mass, a ping-pong ball's being
-    /// one.
+    /// How easily air moves the ball: its area over its mass, relative to a ping-pong
+    /// ball.
     #[must_use]
-    pub fn sail_share(&self) -> f64 {
+    pub fn air_drag_ratio(&self) -> f64 {
         const PING_PONG: f64 = 0.02 * 0.02 / 0.0027;
         self.radius_m * self.radius_m / self.mass_kg / PING_PONG
     }
@@ -86,18 +86,18 @@ pub struct Plate {
 }
 
 impl Plate {
-    /// The chapter's plate as its hardware and its text have it:
-    /// 0.38 × 0.24 × 0.02 m.
+    /// The chapter's plate, by its hardware description and its text: 0.38 × 0.24 × 0.02
+    /// m.
     pub const CHAPTER: Self = Self::rectangle(0.38, 0.24);
 
-    /// The plate that step 12 of the chapter types in: 0.38 × 0.25 × 0.02 m.
+    /// The plate entered in step 12 of the chapter: 0.38 × 0.25 × 0.02 m.
     pub const STEP_12: Self = Self::rectangle(0.38, 0.25);
 
-    /// The plate of the chapter's section 4.8: 0.35 × 0.24 m; the thickness,
-    /// which it leaves out, is that of the others.
+    /// The plate of section 4.8 of the chapter: 0.35 × 0.24 m. The section states no
+    /// thickness; that of the other two is used.
     pub const SECTION_4_8: Self = Self::rectangle(0.35, 0.24);
 
-    /// The sizes between which the chapter contradicts itself, by name.
+    /// The differing sizes that the chapter gives, by name.
     pub const PRESETS: [(&'static str, Self); 3] = [
         ("chapter", Self::CHAPTER),
         ("step-12", Self::STEP_12),
@@ -143,7 +143,7 @@ impl Plate {
         self.rim
     }
 
-    /// Height of the resting ball's centre above the joint, m.
+    /// Height of the resting ball's centre above the joint in the plate's centre, m.
     #[must_use]
     pub fn centre_gap_m(&self, ball: &Ball) -> f64 {
         self.thickness_m / 2.0 + ball.radius_m()
@@ -170,8 +170,8 @@ impl Plate {
         }
     }
 
-    /// The axis across whose edge, and no other, the point (x, y) is within
-    /// `room_m`. None on a disc, whose edge lies across both axes at once.
+    /// Returns the axis whose edge alone is within `room_m` of the point (x, y). `None`
+    /// in a corner, and on a disc, whose edge crosses both axes.
     #[must_use]
     pub fn edge_axis(&self, x_m: f64, y_m: f64, room_m: f64) -> Option<Axis> {
         let PlateShape::Rectangle { length_m, width_m } = self.shape else { return None };

@@ -1,11 +1,11 @@
-//! What touches the plate, and how the touch is: spring, damper, friction.
+//! The body on the plate and its contact: spring, damper, friction.
 
 use nalgebra::Vector3;
 
 use super::{Ball, Plate};
 use crate::vocabulary::{Axis, Invalid, positive};
 
-/// The contact's numbers; immutable.
+/// The parameters of the contact; immutable.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
     stiffness_n_per_m: f64,
@@ -15,8 +15,8 @@ pub struct Contact {
 }
 
 impl Contact {
-    /// The chapter's contact with K and D of its S-function, equation 4.6:
-    /// 800 000 N/m, 1000 N·s/m, μ = 0.6, v_thr = 1e-4 m/s.
+    /// The chapter's contact with K and D of its S-function (equation 4.6): 800 000 N/m,
+    /// 1000 N·s/m, μ = 0.6, v_thr = 1e-4 m/s.
     pub const CHAPTER: Self = Self {
         stiffness_n_per_m: 800_000.0,
         damping_n_s_per_m: 1000.0,
@@ -24,12 +24,11 @@ impl Contact {
         slip_threshold_m_s: 1e-4,
     };
 
-    /// The chapter's contact with the K and D of its section 4.8: 1000 N/m,
-    /// 100 N·s/m.
+    /// The chapter's contact with K and D of its section 4.8: 1000 N/m, 100 N·s/m.
     pub const SOFT: Self =
         Self { stiffness_n_per_m: 1000.0, damping_n_s_per_m: 100.0, ..Self::CHAPTER };
 
-    /// The numbers between which the chapter contradicts itself, by name.
+    /// The differing parameters that the chapter gives, by name.
     pub const PRESETS: [(&'static str, Self); 2] =
         [("chapter", Self::CHAPTER), ("soft", Self::SOFT)];
 
@@ -80,12 +79,12 @@ impl Default for Contact {
     }
 }
 
-/// What lies on the plate: a ball that may roll or a block that may not turn.
+/// The body on the plate: a ball, or a block that slides without turning.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Body {
     mass: f64,
-    /// From the contact to the centre, m, as far as turning is concerned: 0
-    /// for a block, whose slip is −v.
+    /// Lever arm of friction about the centre, m: the radius of a ball; 0 for a block,
+    /// whose slip is −v.
     arm: f64,
     /// 1/I, 1/(kg m²); 0 for a block, which does not turn.
     ease: f64,
@@ -104,8 +103,8 @@ impl Body {
         }
     }
 
-    /// A cube with an edge in (0, 1] m and a mass in (0, 100] kg that slides
-    /// and never turns: application problem 2 of the chapter.
+    /// A cube with an edge in (0, 1] m and a mass in (0, 100] kg that slides without
+    /// turning: application problem 2 of the chapter.
     ///
     /// # Errors
     /// [`Invalid`] naming the element under `/block`.
@@ -134,20 +133,19 @@ impl Body {
         self.ease
     }
 
-    /// Whether it turns at all.
+    /// Whether the body can turn.
     #[must_use]
     pub fn turns(&self) -> bool {
         self.arm > 0.0
     }
 
-    /// Height of its centre above the joint where it just touches, m.
+    /// Height of the body's centre above the joint when it just touches the plate, m.
     #[must_use]
     pub const fn rest_height_m(&self) -> f64 {
         self.rest_height
     }
 
-    /// How much a friction force changes the slip: d(slip)/dt per newton,
-    /// 1/m + r²/I, 1/kg.
+    /// Change of the slip per unit of friction impulse: 1/m + r²/I, 1/kg.
     #[must_use]
     pub fn slip_ease(&self) -> f64 {
         1.0 / self.mass + self.arm * self.arm * self.ease
@@ -163,7 +161,7 @@ impl Body {
     }
 }
 
-/// Position m, velocity m/s and spin rad/s of a body relative to the plate,
+/// Position (m), velocity (m/s) and spin (rad/s) of a body relative to the plate, in the
 /// plate frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Motion {
@@ -173,13 +171,13 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// At rest where the body just touches the plate's centre.
+    /// A body at rest that just touches the plate's centre.
     #[must_use]
     pub fn at_rest(body: &Body) -> Self {
         Self { position: Vector3::new(0.0, 0.0, body.rest_height_m()), ..Self::default() }
     }
 
-    /// (p, v, w) in one row.
+    /// (p, v, w) as one array.
     #[must_use]
     #[inline]
     pub fn to_row(&self) -> [f64; 9] {
@@ -198,12 +196,12 @@ impl Motion {
     }
 }
 
-/// Where there is a plate to stand on.
+/// Where the plate supports a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Ground {
-    /// A plate without end.
+    /// A plate of infinite extent.
     Endless,
-    /// Within the plate's outline only.
+    /// Only within the plate's outline.
     Plate(Plate),
 }
 
@@ -218,7 +216,7 @@ impl Ground {
         }
     }
 
-    /// Along one axis, the farthest from the centre that still has ground, m.
+    /// Distance from the centre to the edge along `axis`, m.
     #[must_use]
     pub fn reach_m(&self, axis: Axis) -> f64 {
         match self {

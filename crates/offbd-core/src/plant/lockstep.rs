@@ -1,19 +1,19 @@
-//! The lockstep twin's ladder: with each step the cheapest model that is near
-//! enough for the motion at hand.
+//! Model selection for the lockstep twin: each step uses the cheapest model that is
+//! accurate enough for the current motion.
 //!
-//! | rung | taken while |
+//! | model | used while |
 //! | --- | --- |
-//! | planar | the terms it leaves out stay below the wanted accuracy |
-//! | rolling | friction and the plate's push can hold the ball without slip |
-//! | sliding | they cannot: the ball slips, or leaves the plate |
+//! | planar | the terms that it neglects stay below the wanted accuracy |
+//! | rolling | friction and the plate's normal force can hold the ball without slip |
+//! | sliding | they cannot: the ball slips or leaves the plate |
 //!
-//! Whether friction holds, and whether small angles do, is asked of the plate's
-//! angles and rates alone: the rate of a servo modelled as a first-order lag
-//! jumps with each command, which no servo's does, and would throw the ball off.
+//! Both criteria use only the angles and rates of the plate, not its acceleration: in a
+//! servo modelled as a first-order lag the rate jumps with each command, which no real
+//! servo's does, and the resulting acceleration would throw the ball off.
 //!
-//! It climbs at once and comes down after the motion has been calm for a
-//! while. The compliant model has no rung: what it adds to the acceleration of
-//! a rolling ball, sag times α, is 1e-6 m/s² with the chapter's contact.
+//! A more accurate model is selected at once, a cheaper one after the motion has been
+//! calm for `CALM_S`. The compliant model is not offered: it changes the acceleration of
+//! a rolling ball by sag times α, 1e-6 m/s² with the chapter's contact.
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
@@ -28,17 +28,18 @@ use super::sliding::{Phase, Sliding};
 use super::tilt::{PlateMotion, Tilt};
 use super::{Ball, Plate};
 
-/// A calm motion for this long brings the twin down a rung, s: longer than the
-/// turning points of a swinging plate, whose rates vanish for a moment.
+/// Duration of calm motion before a cheaper model is selected, s. Chosen: longer than the
+/// turning points of a swinging plate, where its rates are small for a moment.
 const CALM_S: f64 = 0.5;
 
-/// Below this part of a limit the motion is calm.
-const CALM_PART: f64 = 0.5;
+/// Fraction of a limit below which the motion counts as calm. Chosen as hysteresis.
+const CALM_SHARE: f64 = 0.5;
 
-/// Part of the friction limit up to which the rolling model is taken.
-const MOST_DEMAND: f64 = 0.9;
+/// Fraction of the friction limit μ·F_z up to which the rolling model is used. Chosen: a
+/// margin of 10 % before the ball slips.
+const MAX_ROLLING_DEMAND: f64 = 0.9;
 
-/// The models of one ball on one plate, and what is wanted of them; immutable.
+/// The models of one ball on one plate, and the wanted accuracy; immutable.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ladder {
     planar: Planar,
@@ -70,19 +71,20 @@ impl Rung {
     }
 }
 
-/// The rung in use and why.
+/// The model in use and the quantities that selected it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Fidelity {
     pub rung: Rung,
-    /// Acceleration that the planar model leaves out, m/s².
+    /// Bound of the acceleration that the planar model neglects, m/s².
     pub left_out_m_s2: f64,
-    /// Acceleration that may be left out, m/s².
+    /// Acceleration that may be neglected, m/s².
     pub accuracy_m_s2: f64,
-    /// Part of the friction limit μ·F_z in use, by angles and rates; infinite
-    /// where the plate would have to pull.
+    /// Fraction of the friction limit μ·F_z in use, by angles and rates; infinite where
+    /// the plate would have to pull.
     pub demand: f64,
     calm_s: f64,
-    /// Height, rise and spin, which nobody measures, while the ball does not roll.
+    /// Unmeasured part of the motion (height, vertical speed, spin) while the ball does
+    /// not roll.
     unseen: Option<Motion>,
 }
 
@@ -91,18 +93,21 @@ impl fmt::Display for Fidelity {
         let (left_out, accuracy) = (self.left_out_m_s2, self.accuracy_m_s2);
         match self.rung {
             Rung::Planar => {
-                write!(f, "small angles leave out up to {left_out:.1e} m/s², {accuracy:.1e} may be")
+                write!(
+                    f,
+                    "small angles neglect up to {left_out:.1e} m/s², {accuracy:.1e} is allowed"
+                )
             }
             Rung::Rolling if left_out <= accuracy => {
                 write!(f, "small angles would do, once the motion has been calm for {CALM_S} s")
             }
             Rung::Rolling => write!(
                 f,
-                "small angles would leave out up to {left_out:.1e} m/s², {accuracy:.1e} may be"
+                "small angles would neglect up to {left_out:.1e} m/s², {accuracy:.1e} is allowed"
             ),
             Rung::Sliding => write!(
                 f,
-                "rolling takes {:.0} % of the friction that there is, or has done so",
+                "rolling needs {:.0} % of the available friction, or needed it a moment ago",
                 100.0 * self.demand
             ),
         }
@@ -110,9 +115,8 @@ impl fmt::Display for Fidelity {
 }
 
 impl Ladder {
-    /// Models of `ball` on `plate` with the friction μ in (0, 100], of which
-    /// the cheapest is taken that leaves out at most `accuracy_m_s2` of the
-    /// acceleration, m/s².
+    /// Builds the models of `ball` on `plate` with friction μ in (0, 100]. The cheapest
+    /// model is selected that neglects at most `accuracy_m_s2` of the acceleration, m/s².
     #[must_use]
     pub fn new(ball: &Ball, plate: &Plate, friction: f64, accuracy_m_s2: f64) -> Self {
         let body = Body::ball(ball, plate);
@@ -127,14 +131,14 @@ impl Ladder {
         }
     }
 
-    /// The planar model, the lowest rung.
+    /// The planar model, the cheapest.
     #[must_use]
     pub const fn planar(&self) -> &Planar {
         &self.planar
     }
 
-    /// Acceleration of the ball along x and y, m/s², at the `observed` motion,
-    /// over a step of `h` seconds with the plate as `tilt`.
+    /// Returns the acceleration of the ball along x and y, m/s², for the `observed`
+    /// motion over a step of `h` seconds with the plate moving as `tilt`.
     pub fn acceleration(
         &self,
         fidelity: &mut Fidelity,
@@ -147,7 +151,7 @@ impl Ladder {
         fidelity.left_out_m_s2 = self.planar.left_out(observed, &evenly);
         fidelity.demand = self.planar.friction_part(&tilt.angle) / self.friction;
         let small = fidelity.left_out_m_s2 <= self.accuracy_m_s2;
-        let grips = fidelity.demand <= CALM_PART;
+        let grips = fidelity.demand <= CALM_SHARE;
         if small && grips && fidelity.rung == Rung::Planar {
             return self.planar.acceleration(tilt);
         }
@@ -162,18 +166,18 @@ impl Ladder {
         }
     }
 
-    /// Climbs at once, comes down once calm.
+    /// Selects the model: a more accurate one at once, a cheaper one after calm motion.
     fn choose(&self, fidelity: &mut Fidelity, h: f64) -> Rung {
         let rolls = fidelity.unseen.is_none_or(|at| self.grips(&at));
-        let needed = if fidelity.demand > MOST_DEMAND || !rolls {
+        let needed = if fidelity.demand > MAX_ROLLING_DEMAND || !rolls {
             Rung::Sliding
-        } else if fidelity.left_out_m_s2 > self.accuracy_m_s2 * CALM_PART {
+        } else if fidelity.left_out_m_s2 > self.accuracy_m_s2 * CALM_SHARE {
             Rung::Rolling
         } else {
             Rung::Planar
         };
-        // A ball that grips again rolls at once: friction on the slip that the
-        // observed velocity only seems to show would be all noise.
+        // A ball that stops slipping rolls at once: the slip that the observed velocity
+        // still shows is noise, and so would be the friction computed from it.
         if needed >= fidelity.rung || fidelity.rung == Rung::Sliding {
             (fidelity.rung, fidelity.calm_s) = (needed, 0.0);
         } else {
@@ -188,13 +192,13 @@ impl Ladder {
         fidelity.rung
     }
 
-    /// Whether a ball on the sliding rung has come back to rolling.
+    /// Whether a ball on the sliding model has returned to rolling.
     fn grips(&self, at: &Motion) -> bool {
         let [x, y] = self.sliding.body.slip(&at.velocity, &at.spin);
-        at.position.z <= self.height && x.hypot(y) <= ROLLS_M_S
+        at.position.z <= self.height && x.hypot(y) <= ROLLING_SLIP_M_S
     }
 
-    /// The sliding model for one step, by explicit Euler in what is not seen.
+    /// One step of the sliding model; the unmeasured states by explicit Euler.
     fn slide(
         &self,
         fidelity: &mut Fidelity,
@@ -226,15 +230,16 @@ impl Ladder {
         Vector2::new(rate[3], rate[4]) + impulse
     }
 
-    /// The spin after a step, friction stopping at no slip.
+    /// The spin after a step; friction stops at zero slip.
     fn turned(&self, at: &Motion, rate: &[f64; 9], h: f64) -> Vector3<f64> {
         let spin = at.spin + Vector3::new(rate[6], rate[7], rate[8]) * h;
         let velocity = at.velocity + Vector3::new(rate[3], rate[4], 0.0) * h;
         let before = self.sliding.body.slip(&at.velocity, &at.spin);
         let after = self.sliding.body.slip(&velocity, &spin);
         let mut to = spin;
-        // Rolling as the ball is observed to move: one that does not follow the
-        // predicted impulse would else seem to slip in every step to come.
+        // Set to the spin of a ball rolling at the observed velocity: a ball that does
+        // not follow the predicted impulse would otherwise seem to slip in every later
+        // step.
         if before[0] * after[0] < 0.0 {
             to.y = at.velocity.x / self.radius;
         }
@@ -245,9 +250,9 @@ impl Ladder {
     }
 }
 
-/// Slip below which a ball counts as rolling again, m/s: what the filtered
-/// velocity of a camera at 1 mm noise and 0.5 s shows of its own.
-const ROLLS_M_S: f64 = 0.02;
+/// Slip below which a ball counts as rolling again, m/s: the error of the velocity
+/// filtered over 0.5 s from a camera with 1 mm of noise.
+const ROLLING_SLIP_M_S: f64 = 0.02;
 
 #[cfg(test)]
 mod tests {
@@ -263,7 +268,7 @@ mod tests {
         (Ladder::new(&ball, &plate, friction, ACCURACY), Rolling::new(&ball, &plate))
     }
 
-    /// The rung after a second under `tilt`, and the last acceleration along x.
+    /// Returns the last acceleration along x after a second under `tilt`.
     fn settle(ladder: &Ladder, fidelity: &mut Fidelity, tilt: &Tilt) -> f64 {
         let still = RollingState::default();
         (0..100).fold(0.0, |_, _| ladder.acceleration(fidelity, &still, tilt, H).x)
@@ -278,14 +283,14 @@ mod tests {
         let tilt = Tilt::constant(0.0, 0.2);
         ladder.acceleration(&mut fidelity, &RollingState::default(), &tilt, H);
         assert_eq!(fidelity.rung, Rung::Rolling);
-        assert!(fidelity.to_string().contains("small angles would leave out"));
+        assert!(fidelity.to_string().contains("small angles would neglect"));
         ladder.acceleration(&mut fidelity, &RollingState::default(), &Tilt::default(), H);
         assert_eq!(fidelity.rung, Rung::Rolling, "one calm step is not enough");
         settle(&ladder, &mut fidelity, &Tilt::default());
         assert_eq!(fidelity.rung, Rung::Planar);
     }
 
-    /// Carries a free ball through `steps` and returns its last acceleration.
+    /// Moves a free ball through `steps` and returns its last acceleration along x.
     fn carry(
         ladder: &Ladder,
         fidelity: &mut Fidelity,
@@ -311,8 +316,8 @@ mod tests {
         assert!((a - GRAVITY_M_S2 * (q.sin() - 0.2 * q.cos())).abs() < 1e-9, "{a}");
     }
 
-    /// After a slide the ball spins less than it would rolling. On a level
-    /// plate friction slows it until it rolls, and the twin comes back down.
+    /// After sliding the ball spins less than a rolling one. On a level plate friction
+    /// slows it until it rolls, and the twin returns to the planar model.
     #[test]
     fn it_rolls_again_after_a_slide() {
         let (ladder, _) = ladder(0.2);
@@ -325,8 +330,7 @@ mod tests {
         assert_eq!(fidelity.rung, Rung::Planar);
     }
 
-    /// A ball that slides on friction μ over a level plate, sent there by a
-    /// steep one.
+    /// A ball that slides with friction μ on a level plate after a steep one.
     fn sent_sliding(friction: f64) -> (Ladder, Fidelity, RollingState) {
         let (ladder, _) = ladder(friction);
         let (mut fidelity, mut ball) = (Fidelity::default(), RollingState::default());
@@ -340,7 +344,7 @@ mod tests {
         ball.velocity.x - spin.y * Ball::default().radius_m()
     }
 
-    /// Slip ends after s/((1 + 1/κ)·μ·g), and the sliding rung with it.
+    /// Slip, and with it the sliding model, ends after s/((1 + 1/κ)·μ·g).
     #[test]
     fn validate_when_sliding_ends() {
         let (ladder, mut fidelity, mut ball) = sent_sliding(0.2);
@@ -350,12 +354,12 @@ mod tests {
             carry(&ladder, &mut fidelity, &mut ball, &Tilt::default(), 1);
             steps += 1;
         }
-        // The rung of a step is chosen at its start.
+        // The model of a step is selected at its start.
         let took = f64::from(steps) * H;
         assert!((wanted..wanted + 2.0 * H).contains(&took), "{took} s, not {wanted} s");
     }
 
-    /// What was not seen of one slide says nothing about the next.
+    /// The unmeasured state of one slide does not affect the next.
     #[test]
     fn a_slide_is_forgotten() {
         let (ladder, mut fidelity, mut ball) = sent_sliding(0.2);
@@ -367,8 +371,8 @@ mod tests {
         assert_eq!(a, carry(&ladder, &mut fresh, &mut ball, &steep, 2));
     }
 
-    /// A ball whose measured velocity does not follow the friction predicted
-    /// for it, as of one pushed along, comes back to rolling all the same.
+    /// A ball whose measured velocity does not follow the predicted friction, because it
+    /// is pushed along, returns to rolling as well.
     #[test]
     fn a_ball_that_is_not_slowed_rolls_again() {
         let (ladder, mut fidelity, ball) = sent_sliding(0.6);
@@ -378,7 +382,7 @@ mod tests {
         assert!(fidelity.rung < Rung::Sliding, "{}", fidelity.rung.name());
     }
 
-    /// A first-order lag of 35 ms that gets 0.2 rad at once: for a moment its
+    /// A first-order lag of 35 ms that gets a command of 0.2 rad: for a moment its
     /// acceleration would pull the plate away from under the ball.
     #[test]
     fn a_servo_that_starts_with_a_jerk_throws_nothing_off() {
@@ -395,9 +399,9 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever the rung, a ball that can roll is predicted as the rolling
-        /// model predicts it, to the wanted accuracy and what is of second order
-        /// in the jump of a lag's rate.
+        /// With every model, a ball that can roll is predicted like the rolling model
+        /// does, up to the wanted accuracy and a second-order term from the jump of the
+        /// lag's rate.
         #[test]
         fn the_wanted_accuracy_holds(
             q in prop::array::uniform2(-0.2..0.2_f64), rate in prop::array::uniform2(-1.0..1.0_f64),

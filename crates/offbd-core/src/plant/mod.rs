@@ -1,9 +1,9 @@
-//! The rig as physics: ball, plate, servos and a ladder of models of the ball's
-//! motion, each in a file of its own with its equations and where it holds.
+//! The physics of the rig: ball, plate, servos, and models of the ball's motion of
+//! increasing cost, each in its own file with its equations and range of validity.
 //!
-//! One idea: a model is immutable data, its state is a small copyable value,
-//! and a step is a pure function of both. Knows no faults, no sensors, no
-//! clock. Notation and signs: `ARCHITECTURE.md`, "Frames and signs".
+//! A model is immutable data, its state is a small copyable value, and a step is a pure
+//! function of both. Knows no faults, sensors or clocks. Notation and signs:
+//! `ARCHITECTURE.md`, "Frames and signs".
 
 mod body;
 mod contact;
@@ -20,9 +20,11 @@ pub use contact::{Body, Contact, Ground, Motion};
 pub use lockstep::{Fidelity, Ladder, Rung};
 pub use planar::Planar;
 pub use rolling::{Grip, Rolling, RollingState};
-pub use servo::{Servo, ServoModel};
+pub use servo::{ServoModel, ServoState};
 pub use sliding::{Hold, Phase, Sliding};
 pub use tilt::{PlateMotion, Tilt};
 #[cfg(test)]
 pub(crate) use twin::steps;
-pub use twin::{LONGEST_SPAN_S, Twin, TwinAxis, TwinModel, TwinMotion, resisting};
+pub use twin::{
+    LONGEST_DEAD_TIME_S, LONGEST_SPAN_S, Twin, TwinAxis, TwinModel, TwinMotion, resistance_share,
+};

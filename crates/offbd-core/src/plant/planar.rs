@@ -1,24 +1,23 @@
-//! The planar model: each axis alone, small angles, solved exactly for an angle
-//! that is held over the step.
+//! The planar model: each axis by itself, for small angles, solved exactly for an angle
+//! held over the step.
 //!
-//! The rolling model to first order in the plate's angles and their rates, with
-//! q the angle that drives the axis (qy for x, −qx for y):
+//! The rolling model to first order in the plate's angles and rates, with q the angle
+//! that drives the axis (qy for x, −qx for y):
 //!
 //! ```text
 //! (1 + κ)·ẍ = g·q − (cgap + κ·r)·q̈
 //! ```
 //!
 //! With ξ = x + c·q, c = (cgap + κ·r)/(1 + κ), this is ξ̈ = g/(1 + κ)·q, a double
-//! integrator whose step under a held q is exact (zero-order hold). So the
-//! plate's angle is all that it needs, not its rates.
+//! integrator whose step under a held q is exact (zero-order hold). It needs the plate's
+//! angle only, not its rates.
 //!
-//! Valid for angles and rates that are small: it leaves out tan q − q, the
-//! centrifugal, Coriolis and Euler terms of second order. Their size is
-//! [`Planar::left_out`].
+//! Valid for small angles and rates: it neglects tan q − q and the centrifugal, Coriolis
+//! and Euler terms, all of second order. [`Planar::left_out`] bounds them.
 
 use nalgebra::Vector2;
 
-use super::servo::{Servo, Sweep};
+use super::servo::{ServoState, Sweep};
 use super::tilt::Tilt;
 use super::{Ball, GRAVITY_M_S2, Plate, RollingState};
 
@@ -42,14 +41,14 @@ impl Planar {
         }
     }
 
-    /// ξ and its rate for a ball at `state` on a plate that moves with `tilt`.
+    /// Returns ξ and its rate for a ball in `state` on a plate moving as `tilt`.
     #[must_use]
     pub fn enter(&self, state: &RollingState, tilt: &Tilt) -> [Vector2<f64>; 2] {
         let (angle, rate) = (drive(&tilt.angle), drive(&tilt.rate));
         [state.position + self.offset * angle, state.velocity + self.offset * rate]
     }
 
-    /// The ball's position and velocity for ξ on a plate that moves with `tilt`.
+    /// Returns the ball's position and velocity for ξ on a plate moving as `tilt`.
     #[must_use]
     pub fn leave(&self, xi: &[Vector2<f64>; 2], tilt: &Tilt) -> RollingState {
         RollingState {
@@ -59,7 +58,7 @@ impl Planar {
         }
     }
 
-    /// ξ after `h` seconds of held plate angles (qx, qy), exactly.
+    /// Returns ξ after `h` seconds at held plate angles (qx, qy); exact.
     #[must_use]
     #[inline]
     pub fn hold(&self, xi: &[Vector2<f64>; 2], angle: &Vector2<f64>, h: f64) -> [Vector2<f64>; 2] {
@@ -73,41 +72,46 @@ impl Planar {
         drive(&tilt.angle) * self.gain - drive(&tilt.acceleration) * self.offset
     }
 
-    /// What a servo that goes `before` and then through `swept` for `h` seconds
-    /// adds to the path of a ball at rest, on an axis that is `level_rad` off
-    /// level; exactly.
+    /// Returns what a servo that moves from `before` through `swept` in `h` seconds adds
+    /// to the path of a ball at rest, on an axis `level_rad` off level; exact.
     ///
-    /// The rate of a servo modelled as a lag jumps with its command, and with it
-    /// the velocity of the ball: x = ξ − c·q holds throughout.
+    /// The rate of a servo modelled as a lag jumps with its command, and so does the
+    /// velocity of the ball: x = ξ − c·q holds throughout.
     #[must_use]
     #[inline]
-    pub fn answer(&self, before: &Servo, swept: &Sweep, level_rad: f64, h: f64) -> Answer {
+    pub fn path_increment(
+        &self,
+        before: &ServoState,
+        swept: &Sweep,
+        level_rad: f64,
+        h: f64,
+    ) -> PathIncrement {
         let turned = swept.servo.angle - before.angle - before.rate * h;
         let faster = swept.servo.rate - before.rate;
-        Answer {
+        PathIncrement {
             position_m: self.gain * (swept.twice + level_rad * h * h / 2.0) - self.offset * turned,
             velocity_m_s: self.gain * (swept.once + level_rad * h) - self.offset * faster,
             acceleration_m_s2: self.gain * (swept.servo.angle + level_rad),
         }
     }
 
-    /// Friction that rolling on a plate held at `angle` takes, over the ball's
+    /// Friction force needed for rolling on a plate held at `angle`, over the ball's
     /// weight: κ/(1 + κ) of the larger angle.
     #[must_use]
     pub fn friction_part(&self, angle: &Vector2<f64>) -> f64 {
         angle.amax() * (1.0 - self.gain / GRAVITY_M_S2)
     }
 
-    /// Bound of the acceleration that the model leaves out, m/s²: what is of
-    /// second order in the motion, and q − sin q·cos q of gravity.
+    /// Bound of the acceleration that the model neglects, m/s²: the terms of second order
+    /// in the motion, and q − sin q·cos q of gravity.
     #[must_use]
     pub fn left_out(&self, state: &RollingState, tilt: &Tilt) -> f64 {
-        // The sum of a vector's parts bounds its length and costs no root.
+        // The sum of the components bounds the length and needs no square root.
         let length = |v: &Vector2<f64>| v.x.abs() + v.y.abs();
         let (angle, rate) = (length(&tilt.angle), length(&tilt.rate));
         let away = length(&state.position);
-        // sin and cos to third order: the worst direction, about 50° off the
-        // axes, leaves out 0.245 of the cube.
+        // sin and cos to third order: in the worst direction, about 50° off the axes,
+        // 0.245 of the cube is neglected.
         let gravity = self.gain * angle * angle * angle / 4.0;
         let turning = rate * rate * (away + self.reach)
             + 2.0 * rate * angle * length(&state.velocity)
@@ -116,12 +120,12 @@ impl Planar {
     }
 }
 
-/// What a step of one servo adds to the ball's path.
+/// What one servo adds to the ball's path over a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Answer {
+pub struct PathIncrement {
     pub position_m: f64,
     pub velocity_m_s: f64,
-    /// Acceleration at the end by gravity, m/s².
+    /// Acceleration by gravity at the end of the step, m/s².
     pub acceleration_m_s2: f64,
 }
 
@@ -154,7 +158,7 @@ mod tests {
     }
 
     proptest! {
-        /// What it leaves out is no more than it says.
+        /// The neglected acceleration stays within the stated bound.
         #[test]
         fn the_bound_holds_against_the_rolling_model(
             q in prop::array::uniform2(-0.3..0.3_f64), rate in prop::array::uniform2(-3.0..3.0_f64),

@@ -1,5 +1,5 @@
-//! The rolling ball: what is left of the contact when slip and penetration
-//! vanish (2 + 2 states and a spin).
+//! The rolling ball: the limit of the contact model without slip and penetration (2 + 2
+//! states and a spin).
 //!
 //! With `Ω`, `α` the plate's angular velocity and acceleration in the plate
 //! frame, κ the inertia factor and `f = g_P − 2Ω×v − Ω×(Ω×p) − α×p + F/m`:
@@ -10,8 +10,8 @@
 //! ẇz = −α_z − (Ω×w)_z          vx = r wy,  vy = −r wx,  pz = cgap
 //! ```
 //!
-//! Valid while friction can hold the ball without slip, for constant tilt
-//! about one axis up to tan(angle) = (1 + 1/κ)·μ, and while the plate pushes.
+//! Valid while the plate pushes and friction can hold the ball without slip: for constant
+//! tilt about one axis, up to tan(angle) = (1 + 1/κ)·μ.
 
 use nalgebra::{Vector2, Vector3};
 
@@ -20,7 +20,7 @@ use super::tilt::PlateMotion;
 use super::{Ball, Plate};
 use crate::maths::{MIDPOINT, RK4, System};
 
-/// Where a rolling ball is and how it moves, relative to the plate.
+/// The state of a rolling ball relative to the plate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RollingState {
     /// (x, y) in the plate frame, m.
@@ -32,7 +32,7 @@ pub struct RollingState {
 }
 
 impl RollingState {
-    /// (x, y, vx, vy, wz) in one row.
+    /// (x, y, vx, vy, wz) as one array.
     #[must_use]
     pub fn to_row(&self) -> [f64; 5] {
         [self.position.x, self.position.y, self.velocity.x, self.velocity.y, self.spin]
@@ -44,18 +44,18 @@ impl RollingState {
     }
 }
 
-/// What the contact has to bear for the ball to roll, per kilogram of ball.
+/// The contact forces that rolling requires, per kilogram of ball.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grip {
-    /// Friction force along x and y over mass, m/s².
+    /// Friction force along x and y per mass, m/s².
     pub friction: [f64; 2],
-    /// Normal force over mass, m/s²; negative where the ball would leave.
+    /// Normal force per mass, m/s²; negative where the ball would leave the plate.
     pub normal: f64,
 }
 
 impl Grip {
-    /// Larger part of the friction limit μ·F_z in use along one axis: up to 1
-    /// the ball rolls. Infinite where the plate would have to pull.
+    /// Fraction of the friction limit μ·F_z in use, the larger of both axes; the ball
+    /// rolls up to 1. Infinite where the plate would have to pull.
     #[must_use]
     pub fn demand(&self, friction: f64) -> f64 {
         let worst = self.friction[0].abs().max(self.friction[1].abs());
@@ -81,7 +81,7 @@ impl Rolling {
         }
     }
 
-    /// Rates of (x, y, vx, vy, wz).
+    /// Returns the rates of (x, y, vx, vy, wz).
     #[must_use]
     #[inline]
     pub fn rate(&self, y: &[f64; 5], plate: &PlateMotion) -> [f64; 5] {
@@ -89,14 +89,14 @@ impl Rolling {
         [y[2], y[3], a[0], a[1], spin]
     }
 
-    /// The state of a ball that moves as `from`, whatever slips.
+    /// Returns the rolling state of a ball that moves as `from`; slip is dropped.
     #[must_use]
     pub fn enter(&self, from: &Motion) -> [f64; 5] {
         let (p, v) = (&from.position, &from.velocity);
         [p.x, p.y, v.x, v.y, from.spin.z]
     }
 
-    /// The ball's motion in the state `y`.
+    /// Returns the ball's motion in the state `y`.
     #[must_use]
     pub fn leave(&self, y: &[f64; 5]) -> Motion {
         Motion {
@@ -106,8 +106,8 @@ impl Rolling {
         }
     }
 
-    /// Acceleration along x and y, that of the free ball, and the rate of the
-    /// spin about the normal.
+    /// Returns the acceleration along x and y, the acceleration of a free ball, and the
+    /// rate of the spin about the normal.
     #[inline]
     fn forced(&self, y: &[f64; 5], plate: &PlateMotion) -> ([f64; 2], Vector3<f64>, f64) {
         let p = Vector3::new(y[0], y[1], self.centre_gap);
@@ -120,20 +120,21 @@ impl Rolling {
         (a, free, turn.z)
     }
 
-    /// Acceleration in the plate frame, m/s², and the rate of the spin, rad/s².
+    /// Returns the acceleration in the plate frame, m/s², and the rate of the spin,
+    /// rad/s².
     #[must_use]
     pub fn acceleration(&self, state: &RollingState, plate: &PlateMotion) -> (Vector2<f64>, f64) {
         let (a, _, spin) = self.forced(&state.to_row(), plate);
         (Vector2::from(a), spin)
     }
 
-    /// What friction and the normal force have to be for the ball to roll on.
+    /// Returns the friction and normal force that rolling requires.
     #[must_use]
     pub fn grip(&self, y: &[f64; 5], plate: &PlateMotion) -> Grip {
         self.grip_and_rate(y, plate).0
     }
 
-    /// [`grip`](Self::grip) and the rate of `y`, which it is found with.
+    /// Returns [`grip`](Self::grip) and the rates of `y`, which share their computation.
     #[inline]
     #[must_use]
     pub fn grip_and_rate(&self, y: &[f64; 5], plate: &PlateMotion) -> (Grip, [f64; 5]) {
@@ -146,7 +147,7 @@ impl Rolling {
     /// plate at the start and at the middle of the step.
     #[must_use]
     pub fn midpoint(&self, state: &RollingState, plate: [&PlateMotion; 2], h: f64) -> RollingState {
-        let held = Held { rolling: self, plate: [plate[0], plate[1], plate[1]], h };
+        let held = HeldPlate { rolling: self, plate: [plate[0], plate[1], plate[1]], h };
         RollingState::from_row(&MIDPOINT.step(&held, 0.0, &state.to_row(), h))
     }
 
@@ -154,20 +155,20 @@ impl Rolling {
     /// `plate` is the plate at the start, the middle and the end of the step.
     #[must_use]
     pub fn rk4(&self, state: &RollingState, plate: [&PlateMotion; 3], h: f64) -> RollingState {
-        let held = Held { rolling: self, plate, h };
+        let held = HeldPlate { rolling: self, plate, h };
         RollingState::from_row(&RK4.step(&held, 0.0, &state.to_row(), h))
     }
 }
 
-/// The rolling ball over one step from 0 to `h`, whose plate is known at the
+/// The rolling ball over one step from 0 to `h`, with the plate's motion given at the
 /// start, the middle and the end.
-struct Held<'a> {
+struct HeldPlate<'a> {
     rolling: &'a Rolling,
     plate: [&'a PlateMotion; 3],
     h: f64,
 }
 
-impl System<5> for Held<'_> {
+impl System<5> for HeldPlate<'_> {
     const POSITIONS: usize = 2;
 
     fn rate(&self, t: f64, y: &[f64; 5]) -> [f64; 5] {

@@ -1,13 +1,13 @@
 //! A position servo: angle limit, first-order lag, rate limit.
 //!
-//! `q̇ = clamp((clamp(u, ±limit) − q)/lag, ±rate limit)`, advanced exactly for
-//! a command held over the step. Dead time is kept by whoever feeds commands.
+//! `q̇ = clamp((clamp(u, ±limit) − q)/lag, ±rate limit)`, solved exactly for a command
+//! held over the step. The caller delays commands by the dead time.
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use crate::vocabulary::{Invalid, in_range, positive};
 
-/// What a servo can do; immutable.
+/// The parameters of a servo; immutable.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ServoModel {
     angle_limit_rad: f64,
@@ -48,19 +48,19 @@ impl ServoModel {
         self.rate_limit_rad_s
     }
 
-    /// The servo after `h` seconds of the held command `command_rad`.
+    /// Returns the servo's state after `h` seconds of the held command `command_rad`.
     #[must_use]
-    pub fn advance(&self, servo: &Servo, command_rad: f64, h: f64) -> Servo {
+    pub fn advance(&self, servo: &ServoState, command_rad: f64, h: f64) -> ServoState {
         self.sweep(servo, command_rad, h).servo
     }
 
-    /// The same, with the angle's integrals over the step.
+    /// Like [`advance`](Self::advance), with the integrals of the angle over the step.
     #[must_use]
     #[inline]
-    pub fn sweep(&self, servo: &Servo, command_rad: f64, h: f64) -> Sweep {
+    pub fn sweep(&self, servo: &ServoState, command_rad: f64, h: f64) -> Sweep {
         let target = command_rad.min(self.angle_limit_rad).max(-self.angle_limit_rad);
-        // While the lag asks for more than the rate limit the angle runs
-        // straight; the rest of the step decays exponentially.
+        // While the lag asks for more than the rate limit the angle changes at a constant
+        // rate; the rest of the step decays exponentially.
         let beyond = (target - servo.angle).abs() - self.linear_band_rad();
         if beyond <= 0.0 {
             return self.decay(servo.angle, target, h);
@@ -78,28 +78,28 @@ impl ServoModel {
         self.rate_limit_rad_s * self.lag_s
     }
 
-    /// From `angle` straight towards `target` for `h` seconds.
+    /// Moves from `angle` towards `target` at the rate limit for `h` seconds.
     fn ramp(&self, angle: f64, target: f64, h: f64) -> Sweep {
         let rate = self.rate_limit_rad_s.copysign(target - angle);
         Sweep {
-            servo: Servo { angle: angle + rate * h, rate, acceleration: 0.0 },
+            servo: ServoState { angle: angle + rate * h, rate, acceleration: 0.0 },
             once: (angle + rate * h / 2.0) * h,
             twice: (angle + rate * h / 3.0) * h * h / 2.0,
         }
     }
 
-    /// From `angle` towards `target` for `h` seconds, e times nearer each lag.
+    /// Decays exponentially from `angle` towards `target` for `h` seconds.
     #[inline]
     fn decay(&self, angle: f64, target: f64, h: f64) -> Sweep {
         let (error, lag) = (target - angle, self.lag_s);
         if lag == 0.0 {
-            let servo = Servo { angle: target, ..Servo::default() };
+            let servo = ServoState { angle: target, ..ServoState::default() };
             return Sweep { servo, once: target * h, twice: target * h * h / 2.0 };
         }
         let left = error * (-h / lag).exp();
         let (rate, decayed) = (left / lag, lag * (error - left));
         Sweep {
-            servo: Servo { angle: target - left, rate, acceleration: -rate / lag },
+            servo: ServoState { angle: target - left, rate, acceleration: -rate / lag },
             once: target * h - decayed,
             twice: target * h * h / 2.0 - lag * (error * h - decayed),
         }
@@ -109,23 +109,22 @@ impl ServoModel {
 /// A servo's motion over a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sweep {
-    /// Where it is at the end.
-    pub servo: Servo,
-    /// The angle's integral over the step, rad·s.
+    /// The state at the end.
+    pub servo: ServoState,
+    /// Integral of the angle over the step, rad·s.
     pub once: f64,
-    /// The integral of that, rad·s²: how far a unit acceleration per radian
-    /// carries.
+    /// Double integral of the angle, rad·s²: the path under unit acceleration per radian.
     pub twice: f64,
 }
 
 impl Sweep {
-    /// A servo that has not moved yet.
+    /// A sweep of zero duration.
     #[must_use]
-    pub fn start(servo: Servo) -> Self {
+    pub fn start(servo: ServoState) -> Self {
         Self { servo, once: 0.0, twice: 0.0 }
     }
 
-    /// This step and, after it, a `next` one of `h` seconds.
+    /// Appends the sweep `next` of `h` seconds.
     #[must_use]
     pub fn then(&self, next: &Self, h: f64) -> Self {
         Self {
@@ -136,9 +135,9 @@ impl Sweep {
     }
 }
 
-/// Where a servo is: angle rad, rate rad/s, acceleration rad/s².
+/// The state of a servo: angle (rad), rate (rad/s), acceleration (rad/s²).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Servo {
+pub struct ServoState {
     pub angle: f64,
     pub rate: f64,
     pub acceleration: f64,
@@ -152,7 +151,7 @@ mod tests {
     #[test]
     fn validate_step_response_against_the_closed_form() {
         let model = ServoModel::new(0.5, 0.05, 1000.0).unwrap();
-        let servo = model.advance(&Servo::default(), 0.1, 0.08);
+        let servo = model.advance(&ServoState::default(), 0.1, 0.08);
         assert!((servo.angle - 0.1 * (1.0 - (-0.08_f64 / 0.05).exp())).abs() < 1e-15);
         assert!((servo.rate - 0.1 / 0.05 * (-0.08_f64 / 0.05).exp()).abs() < 1e-13);
     }
@@ -160,8 +159,8 @@ mod tests {
     #[test]
     fn validate_rate_limit_then_decay() {
         let model = ServoModel::new(1.0, 0.1, 2.0).unwrap();
-        // Error 0.5: straight at 2 rad/s until 0.2 is left, i.e. for 0.15 s.
-        let servo = model.advance(&Servo::default(), 0.5, 0.25);
+        // Error 0.5: at 2 rad/s until 0.2 is left, that is for 0.15 s.
+        let servo = model.advance(&ServoState::default(), 0.5, 0.25);
         assert!((servo.angle - (0.5 - 0.2 * (-1.0_f64).exp())).abs() < 1e-15);
     }
 
@@ -182,7 +181,7 @@ mod tests {
             from in -1.0..1.0_f64, command in -2.0..2.0_f64, h in 0.0..0.5_f64, split in 0.0..1.0_f64,
         ) {
             let model = ServoModel::new(limit, lag, rate).unwrap();
-            let start = Servo { angle: from, ..Servo::default() };
+            let start = ServoState { angle: from, ..ServoState::default() };
             let once = model.advance(&start, command, h);
             let twice = model.advance(&model.advance(&start, command, h * split), command, h * (1.0 - split));
             prop_assert!((once.angle - twice.angle).abs() < 1e-12);
@@ -195,7 +194,7 @@ mod tests {
             command in -1.0..1.0_f64, h in 0.001..0.5_f64,
         ) {
             let model = ServoModel::new(1.0, lag, rate).unwrap();
-            let start = Servo { angle: from, ..Servo::default() };
+            let start = ServoState { angle: from, ..ServoState::default() };
             let sweep = model.sweep(&start, command, h);
             let (n, dt) = (1000, h / 1000.0);
             let (mut once, mut twice) = (0.0, 0.0);

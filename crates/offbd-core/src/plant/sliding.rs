@@ -1,8 +1,9 @@
-//! The rigid plate with true Coulomb friction: a body that sticks or slips along
-//! each axis, leaves the plate, and lands.
+//! The rigid plate with Coulomb friction: a body that sticks or slips along each axis,
+//! leaves the plate, and lands.
 //!
-//! In contact pz = cgap and vz = 0, and with f the free acceleration, t the free
-//! turning, e = m·r²/I (1/κ for a ball, 0 for a block), all per kilogram:
+//! In contact pz = cgap and vz = 0. With f the acceleration and t the angular
+//! acceleration of a free body, and e = m·r²/I (1/κ for a ball, 0 for a block), per
+//! kilogram:
 //!
 //! ```text
 //! N = −f_z                                          pushes while N > 0
@@ -11,12 +12,12 @@
 //! v̇ = f + F,   ẇ = t + m·r/I·(F_y, −F_x, 0),   F_y alike with −r·t_x
 //! ```
 //!
-//! Landing is inelastic (the chapter's contact is overdamped by a factor of
-//! 2.5): vz stops, and friction's impulse stops the slip as far as μ times the
-//! normal impulse goes. Friction is a box, axis by axis, as in the chapter.
+//! Landing is inelastic (the chapter's contact is overdamped by a factor of 2.5): vz
+//! becomes zero, and the friction impulse reduces the slip by at most μ times the normal
+//! impulse. Friction acts on each axis separately (a friction box), as in the chapter.
 //!
-//! Valid while the contact is stiff against the motion: it has no sag, no
-//! creep, and lands within no time.
+//! Valid for a contact that is stiff compared with the motion: no sag, no creep,
+//! instantaneous landing.
 
 use nalgebra::Vector3;
 
@@ -26,25 +27,25 @@ use super::tilt::PlateMotion;
 /// How the contact holds along one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Hold {
-    /// No slip.
+    /// No slip along this axis.
     Stick,
     /// Slip with this sign of s, ±1.
     Slip(f64),
 }
 
-/// What the body does now.
+/// The phase of a body's motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Phase {
-    /// On the plate; holds along x and y.
+    /// On the plate, with the hold along x and y.
     Contact([Hold; 2]),
     /// Above the plate.
     Flight,
-    /// Beyond the edge, never to come back.
+    /// Beyond the edge; final.
     Fallen,
 }
 
 impl Phase {
-    /// In words, for people.
+    /// A description for people.
     #[must_use]
     pub const fn name(&self) -> &'static str {
         match self {
@@ -64,26 +65,26 @@ pub struct Sliding {
     pub ground: Ground,
 }
 
-/// Slip below this is none, m/s: a thousandth of the chapter's threshold.
+/// Slip below this counts as none, m/s: a thousandth of the chapter's threshold.
 const NO_SLIP_M_S: f64 = 1e-7;
 
-/// A body within this of the plate touches it, m: the depth at which the
-/// chapter's ball rests is 6e-7 m, so a start on a sprung plate counts too.
+/// Distance from the plate within which a body touches it, m. The chapter's ball rests at
+/// a depth of 6e-7 m, so a start on a compliant plate counts as touching.
 const TOUCHING_M: f64 = 1e-5;
 
 impl Sliding {
-    /// `friction` μ in (0, 100].
+    /// Builds the model with `friction` μ in (0, 100].
     #[must_use]
     pub const fn new(body: Body, friction: f64, ground: Ground) -> Self {
         Self { body, friction, ground }
     }
 
     /// e = m·r²/I.
-    fn eagerness(&self) -> f64 {
+    fn inertia_ratio(&self) -> f64 {
         self.body.slip_ease() * self.body.mass_kg() - 1.0
     }
 
-    /// Normal force over mass, m/s².
+    /// Normal force per mass, m/s².
     #[inline]
     fn normal(free: &Vector3<f64>) -> f64 {
         -free.z
@@ -95,10 +96,10 @@ impl Sliding {
         (plate.free(&at.position, &at.velocity), turn)
     }
 
-    /// Friction over mass that would keep each axis from slipping, m/s².
+    /// Friction force per mass that would keep each axis from slipping, m/s².
     #[inline]
     fn sticking(&self, free: &Vector3<f64>, turn: &Vector3<f64>) -> [f64; 2] {
-        let (r, share) = (self.body.arm_m(), 1.0 / (1.0 + self.eagerness()));
+        let (r, share) = (self.body.arm_m(), 1.0 / (1.0 + self.inertia_ratio()));
         [(r * turn.y - free.x) * share, (-r * turn.x - free.y) * share]
     }
 
@@ -110,7 +111,7 @@ impl Sliding {
         })
     }
 
-    /// Rates of (p, v, w) in `phase` under the plate's motion.
+    /// Returns the rates of (p, v, w) in `phase` under the plate's motion.
     #[must_use]
     #[inline]
     pub fn rate(&self, phase: &Phase, y: &[f64; 9], plate: &PlateMotion) -> [f64; 9] {
@@ -126,9 +127,9 @@ impl Sliding {
         [v.x, v.y, v.z, a.x, a.y, a.z, turn.x, turn.y, turn.z]
     }
 
-    /// How far `phase` is from its end: at 0 it ends, below 0 it is over. A
-    /// continuous function along a motion of one phase; its parts are in m,
-    /// m/s and m/s².
+    /// Returns the event function of `phase`: positive while the phase lasts, 0 at its
+    /// end, negative beyond. Continuous along a motion within one phase; its parts are in
+    /// m, m/s and m/s².
     #[must_use]
     pub fn margin(&self, phase: &Phase, y: &[f64; 9], plate: &PlateMotion) -> f64 {
         let at = Motion::from_row(y);
@@ -152,8 +153,8 @@ impl Sliding {
         held.fold(normal, f64::min)
     }
 
-    /// The phase that a body in the motion `at` is in or goes over to, and the
-    /// motion that it starts with: a landing stops vz.
+    /// Returns the phase that follows for a body moving as `at`, and the motion at its
+    /// start: a landing sets vz to zero.
     #[must_use]
     pub fn enter(&self, at: &Motion, plate: &PlateMotion) -> (Phase, Motion) {
         if self.ground.margin_m(at.position.x, at.position.y) <= 0.0 {
@@ -166,8 +167,8 @@ impl Sliding {
         let landed = self.land(at);
         let (free, turn) = self.free(&landed, plate);
         if Self::normal(&free) <= 0.0 || (above >= 0.0 && at.velocity.z > 0.0) {
-            // A plate that falls away still stops a body that comes faster:
-            // it would go on through the plate.
+            // A body that moves towards the plate faster than the plate recedes is
+            // stopped: it would pass through the plate.
             return (Phase::Flight, if at.velocity.z < 0.0 { landed } else { *at });
         }
         let sticking = self.sticking(&free, &turn);
@@ -184,13 +185,13 @@ impl Sliding {
         (Phase::Contact(holds), landed)
     }
 
-    /// The motion after an inelastic landing; one that comes softly changes little.
+    /// Returns the motion after an inelastic landing; a soft one changes little.
     fn land(&self, at: &Motion) -> Motion {
         let mut to = *at;
         let impulse = (-at.velocity.z).max(0.0);
         let slip = self.body.slip(&at.velocity, &at.spin);
         let most = self.friction * impulse;
-        let [x, y] = slip.map(|s| (s / (1.0 + self.eagerness())).clamp(-most, most));
+        let [x, y] = slip.map(|s| (s / (1.0 + self.inertia_ratio())).clamp(-most, most));
         let lever = self.body.arm_m() * self.body.inverse_inertia() * self.body.mass_kg();
         to.velocity += Vector3::new(x, y, 0.0);
         to.velocity.z = 0.0;

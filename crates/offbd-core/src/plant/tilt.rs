@@ -1,12 +1,11 @@
-//! The plate's motion, and what a body on it feels of it.
+//! The plate's motion, and the accelerations that it causes in its own frame.
 
 use nalgebra::{Vector2, Vector3};
 
 use super::GRAVITY_M_S2;
 use crate::maths::sine::sin_cos;
 
-/// Plate angles about x and y, within ±1000 rad, with their first and second
-/// rates.
+/// Plate angles about x and y, within ±1000 rad, with their first and second derivatives.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tilt {
     /// (qx, qy), rad.
@@ -24,7 +23,7 @@ impl Tilt {
         Self { angle: Vector2::new(qx_rad, qy_rad), ..Self::default() }
     }
 
-    /// Each of qx and qy as its angle, rate and acceleration.
+    /// Builds the motion from the angle, rate and acceleration of each of qx and qy.
     #[must_use]
     #[inline]
     pub fn of(x: [f64; 3], y: [f64; 3]) -> Self {
@@ -32,7 +31,7 @@ impl Tilt {
         Self { angle, rate, acceleration }
     }
 
-    /// The same motion as the plate frame feels it.
+    /// Returns the same motion expressed in the plate frame.
     #[must_use]
     #[inline]
     pub fn motion(&self) -> PlateMotion {
@@ -51,7 +50,7 @@ impl Tilt {
     }
 }
 
-/// The plate's motion in its own frame, and what pulls at a ball from outside.
+/// The plate's motion in its own frame, and the external acceleration of a ball.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PlateMotion {
     /// Ω = (q̇x cos qy, q̇y, q̇x sin qy), rad/s.
@@ -64,16 +63,15 @@ pub struct PlateMotion {
 }
 
 impl PlateMotion {
-    /// The same with a force on the ball's centre along x and y, given over its
-    /// mass, m/s².
+    /// Adds an external force on the ball's centre along x and y, given per mass, m/s².
     #[must_use]
     pub fn pushed(mut self, acceleration: Vector2<f64>) -> Self {
         self.gravity += Vector3::new(acceleration.x, acceleration.y, 0.0);
         self
     }
 
-    /// What a free body at `p` with the velocity `v`, both relative to the
-    /// plate, accelerates with: `g_P − 2Ω×v − Ω×(Ω×p) − α×p`, m/s².
+    /// Acceleration of a free body at `p` with velocity `v`, both relative to the plate:
+    /// `g_P − 2Ω×v − Ω×(Ω×p) − α×p`, m/s².
     #[must_use]
     #[inline]
     pub fn free(&self, p: &Vector3<f64>, v: &Vector3<f64>) -> Vector3<f64> {
@@ -81,8 +79,8 @@ impl PlateMotion {
         self.gravity - self.omega.cross(&inner) - self.alpha.cross(p)
     }
 
-    /// How the spin `w` of a free body changes, relative to the plate:
-    /// `−α − Ω×w`, rad/s².
+    /// Rate of change of the spin `w` of a free body relative to the plate: `−α − Ω×w`,
+    /// rad/s².
     #[must_use]
     #[inline]
     pub fn free_turn(&self, w: &Vector3<f64>) -> Vector3<f64> {

@@ -1,12 +1,11 @@
-//! The twin: servos and a rolling ball that follow the commands of a rig, in
-//! lockstep with its samples.
+//! The twin: servos and a rolling ball that follow the commands of a rig, in lockstep
+//! with its samples.
 //!
-//! One idea: judging needs the *curvature* of the twin's path, and the
-//! curvature does not change when a straight line is added. So the twin
-//! integrates its own acceleration freely and is re-anchored at will by
-//! [`Twin::rebase`], which can neither hide a fault nor let it drift away.
-//! The small terms that depend on where the ball is (centrifugal, Euler,
-//! Coriolis) use the observed motion, passed in.
+//! The diagnosis needs the *curvature* of the twin's path, which does not change when a
+//! straight line is added. So the twin integrates its own acceleration freely, and
+//! [`Twin::rebase`] moves it to the ball at any time without hiding a fault. The small
+//! terms that depend on the position of the ball (centrifugal, Euler, Coriolis) use the
+//! observed motion, which is an argument.
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
@@ -15,51 +14,55 @@ use alloc::collections::VecDeque;
 use nalgebra::Vector2;
 
 use super::servo::Sweep;
-use super::{Fidelity, Ladder, RollingState, Rung, Servo, ServoModel, Tilt};
+use super::{Fidelity, Ladder, RollingState, Rung, ServoModel, ServoState, Tilt};
 use crate::vocabulary::{Axis, PerAxis, SimTime};
 
-/// Commands remembered for the dead time. At 1 kHz it holds half a second;
-/// beyond it the oldest command is taken as in force.
+/// Most commands remembered for the dead time: half a second at 1 kHz. Beyond it the
+/// oldest remembered command is taken as in force.
 const COMMAND_HISTORY: usize = 512;
 
-/// Longest step of the twin between two samples, s: only what the planar model
-/// leaves out is not exact within it.
+/// Longest integration step, s. Chosen: only the terms that the planar model neglects
+/// have an integration error.
 const LONGEST_STEP_S: f64 = 0.05;
-/// The same while the ball slides, whose spin takes Euler's steps.
+/// Longest integration step while the ball slides, s: its spin is integrated by Euler's
+/// method.
 const SLIDING_STEP_S: f64 = 0.01;
-/// Longest span between two samples that the twin is carried over, s: the longest
-/// dead time that an asset file may state. After a longer one it starts afresh,
-/// so that no clock makes it take more steps than this.
-pub const LONGEST_SPAN_S: f64 = 5.0;
-/// Time that any servo takes to turn, s; one modelled as a lag starts at once.
+/// Longest interval between two samples that the twin integrates over, s: the longest
+/// dead time. After a longer one it restarts, which bounds the number of steps whatever
+/// the clock says.
+pub const LONGEST_SPAN_S: f64 = LONGEST_DEAD_TIME_S;
+/// Longest dead time that an asset file may state, s. Chosen.
+pub const LONGEST_DEAD_TIME_S: f64 = 5.0;
+/// Shortest time in which a servo turns, s; one modelled as a lag starts at once. Chosen.
 const LEAST_TURN_S: f64 = 1e-3;
 
-/// One axis of the twin: how the ball answers the servo that drives it.
+/// One axis of the twin: how the ball responds to the servo that drives it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TwinAxis {
     pub servo: ServoModel,
-    /// From a command to the servo's first movement, s.
+    /// Time from a command to the servo's first movement, s.
     pub dead_time_s: f64,
-    /// Measured over modelled acceleration, dimensionless; 1 when metres,
-    /// radians and the ball are what the asset file says.
+    /// Measured over modelled acceleration, dimensionless; 1 if units and ball are as the
+    /// asset file states.
     pub gain: f64,
-    /// Angle at a command of zero, rad: plate and servo horn off level.
+    /// Plate angle at a command of zero, rad: plate or servo horn off level.
     pub level_rad: f64,
     /// Deceleration of a rolling ball, m/s².
     pub resistance_m_s2: f64,
 }
 
-/// Speed at which rolling resistance acts in full, m/s: slower, the ball
-/// sticks and goes by turns, and half of it is as good a guess as any.
-const RESISTED_M_S: f64 = 0.01;
+/// Speed from which on rolling resistance acts fully, m/s; proportional below. Chosen: a
+/// slower ball alternately sticks and rolls.
+const FULL_RESISTANCE_M_S: f64 = 0.01;
 
-/// Share of the rolling resistance that acts against a velocity, m/s.
+/// Returns the fraction of the rolling resistance that acts at a velocity in m/s, with
+/// its sign.
 #[must_use]
-pub fn resisting(velocity_m_s: f64) -> f64 {
-    (velocity_m_s / RESISTED_M_S).clamp(-1.0, 1.0)
+pub fn resistance_share(velocity_m_s: f64) -> f64 {
+    (velocity_m_s / FULL_RESISTANCE_M_S).clamp(-1.0, 1.0)
 }
 
-/// What the twin is made of; immutable.
+/// The parameters of the twin; immutable.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TwinModel {
     pub ladder: Ladder,
@@ -67,14 +70,14 @@ pub struct TwinModel {
 }
 
 impl TwinModel {
-    /// A twin by the models of `ladder` whose axes are alike.
+    /// Builds a twin with the models of `ladder` and two equal axes.
     #[must_use]
     pub fn new(ladder: Ladder, axis: TwinAxis) -> Self {
         Self { ladder, axes: PerAxis { x: axis, y: axis } }
     }
 }
 
-/// Motion per axis: position m, velocity m/s, acceleration m/s².
+/// Motion per axis: position (m), velocity (m/s), acceleration (m/s²).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TwinMotion {
     pub position: Vector2<f64>,
@@ -82,7 +85,7 @@ pub struct TwinMotion {
     pub acceleration: Vector2<f64>,
 }
 
-/// Commands in force, rad, with the moment from which each holds, s.
+/// Commands, rad, with the time from which each holds, s.
 #[derive(Clone, Debug, Default)]
 struct CommandHistory {
     entries: VecDeque<(f64, f64)>,
@@ -99,8 +102,8 @@ impl CommandHistory {
         self.entries.push_back((at, command));
     }
 
-    /// The command in force at `at` and the moment, if known, at which the next
-    /// one takes over; forgets what is older.
+    /// Returns the command in force at time `at` and the time, if known, at which the
+    /// next one takes over; drops older commands.
     fn in_force(&mut self, at: f64) -> (f64, Option<f64>) {
         let mut next = self.entries.get(1).map(|&(from, _)| from);
         while next.is_some_and(|from| from <= at) {
@@ -118,13 +121,13 @@ pub struct Twin {
     model: TwinModel,
     now: Option<SimTime>,
     commands: PerAxis<CommandHistory>,
-    servos: PerAxis<Servo>,
+    servos: PerAxis<ServoState>,
     motion: TwinMotion,
     fidelity: Fidelity,
 }
 
 impl Twin {
-    /// A twin at rest that has seen nothing yet.
+    /// Builds a twin at rest that has seen no sample.
     #[must_use]
     pub fn new(model: TwinModel) -> Self {
         Self {
@@ -137,7 +140,7 @@ impl Twin {
         }
     }
 
-    /// The model in use and why.
+    /// The model in use and why it was selected.
     #[must_use]
     pub const fn fidelity(&self) -> &Fidelity {
         &self.fidelity
@@ -150,19 +153,19 @@ impl Twin {
         &self.motion
     }
 
-    /// Present plate angle behind each axis, rad, level included.
+    /// Present plate angle of each axis, rad, level included.
     #[must_use]
     pub fn plate_angle(&self) -> PerAxis<f64> {
         PerAxis::from_fn(|a| self.servos[a].angle + self.model.axes[a].level_rad)
     }
 
-    /// Advances to `to` under the commands seen so far, then takes note of the
-    /// commands that hold from `to` on. `observed` is the ball's motion as
-    /// measured, for the terms that depend on it.
+    /// Advances to `to` under the commands seen so far, then stores `commands`, which
+    /// hold from `to` on. `observed` is the measured motion of the ball, for the terms
+    /// that depend on it.
     ///
-    /// The first call, any call after [`restart`](Self::restart), and one more
-    /// than [`LONGEST_SPAN_S`] after the last, settles the servos on the given
-    /// commands instead.
+    /// The first call, a call after [`restart`](Self::restart), and a call more than
+    /// [`LONGEST_SPAN_S`] after the last one place the servos on the given commands
+    /// instead.
     pub fn advance(
         &mut self,
         to: SimTime,
@@ -184,7 +187,8 @@ impl Twin {
         }
     }
 
-    /// Forgets the past, as after a gap: the next sample settles the twin.
+    /// Forgets all motion, as after a gap: the next sample places the servos on its
+    /// commands.
     pub fn restart(&mut self) {
         self.now = None;
         self.motion = TwinMotion::default();
@@ -194,8 +198,8 @@ impl Twin {
         }
     }
 
-    /// Moves the twin onto `position` and `velocity`; returns the straight
-    /// line that was taken away, for whoever remembers earlier positions.
+    /// Moves the twin to `position` and `velocity`; returns the straight line that was
+    /// subtracted, for callers that hold earlier positions.
     pub fn rebase(&mut self, position: Vector2<f64>, velocity: Vector2<f64>) -> TwinMotion {
         let shift = TwinMotion {
             position: self.motion.position - position,
@@ -211,7 +215,7 @@ impl Twin {
         for axis in Axis::ALL {
             let limit = self.model.axes[axis].servo.angle_limit_rad();
             let angle = commands[axis].unwrap_or(0.0).clamp(-limit, limit);
-            self.servos[axis] = Servo { angle, ..Servo::default() };
+            self.servos[axis] = ServoState { angle, ..ServoState::default() };
         }
     }
 
@@ -231,8 +235,8 @@ impl Twin {
         }
     }
 
-    /// One step of `h` seconds: what is linear in the servos' angles exactly,
-    /// the rest at their mean.
+    /// One step of `h` seconds: the part linear in the servos' angles exactly, the rest
+    /// at their mean.
     fn step(&mut self, start: f64, h: f64, observed: &RollingState) {
         #[cfg(test)]
         steps::count();
@@ -252,9 +256,10 @@ impl Twin {
         let beyond = modelled - ladder.planar().acceleration(&tilt);
         for (i, axis) in Axis::ALL.into_iter().enumerate() {
             let model = &self.model.axes[axis];
-            let rest =
-                model.gain * beyond[i] - model.resistance_m_s2 * resisting(observed.velocity[i]);
-            let planar = ladder.planar().answer(&before[axis], &swept[axis], model.level_rad, h);
+            let rest = model.gain * beyond[i]
+                - model.resistance_m_s2 * resistance_share(observed.velocity[i]);
+            let planar =
+                ladder.planar().path_increment(&before[axis], &swept[axis], model.level_rad, h);
             // The y servo's positive angle drives the ball toward −y.
             let sign = if axis == Axis::X { model.gain } else { -model.gain };
             let motion = &mut self.motion;
@@ -265,8 +270,8 @@ impl Twin {
         }
     }
 
-    /// The servo of `axis` moved from `start` on for `h` seconds, exactly: a
-    /// command that takes over within the step does so at its own moment.
+    /// Moves the servo of `axis` from `start` for `h` seconds, exactly: a command that
+    /// takes over within the step does so at its own time.
     fn sweep(&mut self, axis: Axis, start: f64, h: f64) -> Sweep {
         let model = &self.model.axes[axis];
         let mut at = start - model.dead_time_s;
@@ -285,7 +290,7 @@ impl Twin {
     }
 }
 
-/// How many steps the twins of a thread have taken, for tests of what is bounded.
+/// Counts the steps of the twins of a thread, for tests of bounded work.
 #[cfg(test)]
 pub(crate) mod steps {
     use core::cell::Cell;
@@ -300,8 +305,8 @@ pub(crate) mod steps {
         assert!(TAKEN.get() <= MOST.get(), "the twins took more than {} steps", MOST.get());
     }
 
-    /// Runs `work`, which may take `most` steps: one more is a panic. Returns how
-    /// many it took.
+    /// Runs `work`, which panics if it takes more than `most` steps. Returns its result
+    /// and the number of steps.
     pub(crate) fn within<T>(most: u64, work: impl FnOnce() -> T) -> (T, u64) {
         TAKEN.set(0);
         MOST.set(most);
@@ -319,7 +324,7 @@ mod tests {
     fn twin(dead_time_s: f64, lag_s: f64) -> Twin {
         let servo = ServoModel::new(0.2, lag_s, 100.0).unwrap();
         let axis = TwinAxis { servo, dead_time_s, gain: 1.0, level_rad: 0.0, resistance_m_s2: 0.0 };
-        // To be held against the rolling ball, nothing may be left out.
+        // Zero accuracy: compared with the rolling ball, nothing may be neglected.
         let ladder = Ladder::new(&Ball::default(), &Plate::default(), 0.6, 0.0);
         Twin::new(TwinModel::new(ladder, axis))
     }
@@ -328,8 +333,8 @@ mod tests {
         SimTime::new(t).unwrap()
     }
 
-    /// After a jump of qy with a dead time the ball rolls with 5/7 g sin q, from
-    /// where the turning plate has left it: (cgap + κ·r)/(1 + κ)·q behind.
+    /// After a step of qy the ball rolls with 5/7 g sin q once the dead time is over,
+    /// from where the turning plate has left it: (cgap + κ·r)/(1 + κ)·q behind.
     #[test]
     fn validate_step_of_qy_moves_the_ball_along_x() {
         let mut twin = twin(0.05, 0.0);
@@ -338,8 +343,8 @@ mod tests {
             let commands = PerAxis { x: Some(command), y: Some(0.0) };
             twin.advance(at(f64::from(i) * 0.01), commands, &RollingState::default());
         }
-        // The command holds from t = 0.01 s and acts 0.05 s later.
-        // At 100 rad/s the jump takes a millisecond: half of it later.
+        // The command holds from t = 0.01 s and acts 0.05 s later. At 100 rad/s the turn
+        // takes a millisecond; half of it counts as delay.
         let seconds = 1.0 - 0.06 - 0.0005;
         let a = 5.0 / 7.0 * 9.81 * 0.1_f64.sin();
         let behind = (Plate::default().centre_gap_m(&Ball::default()) + 0.4 * 0.0127) / 1.4 * 0.1;
@@ -359,8 +364,7 @@ mod tests {
         assert_eq!(twin.motion().position.x, 0.0);
     }
 
-    /// A clock in milliseconds, or one that jumped by years, must not keep the
-    /// twin busy.
+    /// A clock in milliseconds, or one that jumps by years, must not cause long work.
     #[test]
     fn a_long_span_is_not_integrated_but_starts_afresh() {
         let commands = PerAxis { x: Some(0.1), y: Some(0.0) };

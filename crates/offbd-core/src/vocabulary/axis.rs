@@ -35,7 +35,7 @@ impl Axis {
         }
     }
 
-    /// The axis across this one.
+    /// The other axis.
     #[must_use]
     pub const fn other(self) -> Self {
         match self {
@@ -63,12 +63,12 @@ pub struct PerAxis<T> {
 }
 
 impl<T> PerAxis<T> {
-    /// Builds the value of each axis from the axis.
+    /// Builds the pair from a function of the axis.
     pub fn from_fn(mut f: impl FnMut(Axis) -> T) -> Self {
         Self { x: f(Axis::X), y: f(Axis::Y) }
     }
 
-    /// The same pair with each value changed by `f`.
+    /// Applies `f` to both values.
     pub fn map<U>(self, mut f: impl FnMut(T) -> U) -> PerAxis<U> {
         PerAxis { x: f(self.x), y: f(self.y) }
     }

@@ -1,4 +1,4 @@
-//! What can be wrong with a rig, and how far the evidence has come.
+//! Fault codes, fault kinds and fault states.
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
@@ -7,7 +7,7 @@ use core::str::FromStr;
 
 use super::Axis;
 
-/// A word that is none of those expected in its place.
+/// The error for a word that is not among the expected ones.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{word}` is not one of {expected}")]
 pub struct UnknownWord {
@@ -22,10 +22,10 @@ macro_rules! words {
         pub enum $name { $($(#[$vdoc])* $variant),+ }
 
         impl $name {
-            /// All of them, in the order of declaration.
+            /// All variants in the order of declaration.
             pub const ALL: &'static [Self] = &[$(Self::$variant),+];
 
-            /// The word used on the wire, in the store and in logs.
+            /// The identifier used on the wire, in the store and in logs.
             #[must_use]
             pub const fn as_str(self) -> &'static str {
                 match self { $(Self::$variant => $word),+ }
@@ -51,7 +51,7 @@ macro_rules! words {
 }
 
 words! {
-    /// A fault code: the part of the rig that is to blame.
+    /// A fault code: the part of the rig that is at fault.
     FaultCode {
         /// The servo that moves the ball along x (it turns qy).
         XServo = "x_servo",
@@ -68,7 +68,7 @@ impl FaultCode {
     /// Number of codes; code `c` has index `c as usize`.
     pub const COUNT: usize = Self::ALL.len();
 
-    /// The axis of a servo code, none for the others.
+    /// The axis of a servo code; `None` for the others.
     #[must_use]
     pub const fn axis(self) -> Option<Axis> {
         match self {
@@ -89,45 +89,45 @@ impl FaultCode {
 }
 
 words! {
-    /// In which way it is wrong, where the evidence says.
+    /// The failure mode, where the evidence tells it.
     FaultKind {
-        /// A servo that does not answer at all.
+        /// A servo does not answer at all.
         Dead = "dead",
-        /// A servo that stays where it is.
+        /// A servo stays at the angle where it is.
         Held = "held",
-        /// A servo that answers with a wrong factor.
+        /// A servo answers with a wrong factor.
         Gain = "gain",
-        /// A servo that answers the wrong way round.
+        /// A servo answers in the opposite direction.
         Reversed = "reversed",
-        /// A servo off by a constant angle (a slipped horn).
+        /// A servo is off by a constant angle (a slipped horn).
         Offset = "offset",
-        /// A servo that lags behind.
+        /// A servo lags.
         Slow = "slow",
-        /// A servo that fails now and then.
+        /// A servo fails intermittently.
         Intermittent = "intermittent",
-        /// Readings that repeat, bit-identical, while the ball must be moving.
+        /// Readings repeat bit-identically although the ball must be moving.
         Frozen = "frozen",
-        /// Readings missing.
+        /// Readings are missing.
         Dropout = "dropout",
-        /// Readings scattered far beyond the calibrated noise.
+        /// Readings scatter far beyond the calibrated noise.
         Noise = "noise",
-        /// Lone readings far off.
+        /// Single readings are far off.
         Spikes = "spikes",
-        /// A step in the readings that no ball can make.
+        /// The readings jump farther than a ball can move.
         Jump = "jump",
     }
 }
 
 words! {
-    /// How far a fault has come; the ISO 14229 status byte says it bit by bit.
+    /// The state of a fault code; a summary of the ISO 14229 status byte.
     FaultStatus {
         /// The test failed in this operation cycle; not yet confirmed.
         Pending = "pending",
-        /// The test failed in as many operation cycles as confirmation asks for.
+        /// The test failed in as many operation cycles as confirmation requires.
         Confirmed = "confirmed",
-        /// Good operation cycles have followed; still on record.
+        /// Good operation cycles have followed; the fault is still on record.
         Healed = "healed",
-        /// Nothing is on record: never failed, aged, or cleared by a person.
+        /// Nothing on record: never failed, aged, or cleared by a person.
         Cleared = "cleared",
     }
 }

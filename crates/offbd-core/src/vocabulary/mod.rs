@@ -1,8 +1,8 @@
-//! The words that every floor shares: axes, faults, times, samples, and the
-//! one error for a value that cannot be.
+//! The types that all modules share: axes, faults, times, samples, and the error for an
+//! invalid value.
 //!
-//! Knows only the standard library. Judges nothing: whether a sample is
-//! believable is the engine's question.
+//! Depends on the standard library only. Does not judge samples: whether one is plausible
+//! is decided in [`engine`](crate::engine).
 
 mod axis;
 mod fault;
@@ -14,4 +14,5 @@ pub use axis::{Axis, PerAxis};
 pub use fault::{FaultCode, FaultKind, FaultStatus, UnknownWord};
 pub use number::{Brief, Invalid, in_range, positive};
 pub use sample::Sample;
+pub(crate) use time::CLOCK_RESOLUTION_S;
 pub use time::SimTime;

@@ -1,35 +1,34 @@
-//! Checked numbers: a range check that NaN does not pass.
+//! Range checks that reject NaN.
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use core::fmt;
 use core::ops::RangeInclusive;
 
-/// A value that cannot be, with the element that holds it.
+/// An invalid value and the element that holds it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{element}: {reason}")]
 pub struct Invalid {
-    /// JSON pointer (RFC 6901) of the offending element, `/ball/radius_m`.
+    /// JSON pointer (RFC 6901) to the element, for example `/ball/radius_m`.
     pub element: String,
-    /// What is wrong with it, with the admissible range.
+    /// What is wrong with the value, with the admissible range.
     pub reason: String,
 }
 
 impl Invalid {
-    /// An error for `element` because of `reason`.
+    /// Returns an error for `element` with the given `reason`.
     pub fn new(element: impl Into<String>, reason: impl Into<String>) -> Self {
         Self { element: element.into(), reason: reason.into() }
     }
 }
 
-/// A number as people write it, in a reason: `1.5`, but `1e308` rather than 309
-/// digits.
+/// Displays a number for people: `1.5`, but `1e308` instead of 309 digits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Brief(pub f64);
 
 impl fmt::Display for Brief {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        /// Up to here every whole number is exact (2^53), and has 16 digits.
+        /// 2⁵³: up to here every integer is exact and has at most 16 digits.
         const EXACT: f64 = 9_007_199_254_740_992.0;
         let Self(value) = *self;
         let short = value == 0.0 || (EXACT.recip()..=EXACT).contains(&value.abs());
@@ -37,7 +36,7 @@ impl fmt::Display for Brief {
     }
 }
 
-/// `value` if it lies in `range`; NaN never does.
+/// Returns `value` if it lies in `range`; NaN never does.
 ///
 /// # Errors
 /// [`Invalid`] naming `element` and the range.
@@ -51,7 +50,7 @@ pub fn in_range(element: &str, value: f64, range: RangeInclusive<f64>) -> Result
     ))
 }
 
-/// `value` if it is above zero and at most `most`.
+/// Returns `value` if it is above zero and at most `most`.
 ///
 /// # Errors
 /// [`Invalid`] naming `element` and the range.

@@ -2,26 +2,26 @@
 
 use super::Axis;
 
-/// What a device says at one moment: the commanded plate angles in force and
-/// the ball's measured position in the plate frame.
+/// What a device reports at one moment: the commanded plate angles in force and the
+/// measured position of the ball.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Sample {
-    /// The device's running number within the session, if it counts.
+    /// Sequence number within the session, if the device counts.
     pub seq: Option<u64>,
-    /// Seconds on the device's clock (its *valid-at* time).
+    /// Seconds on the device's clock at which the sample was valid.
     pub t_s: f64,
-    /// Commanded plate angle about x, radians; none: the axis has no servo.
+    /// Commanded plate angle about x, radians; `None` if the axis has no servo.
     pub cmd_qx_rad: Option<f64>,
-    /// Commanded plate angle about y, radians; none: the axis has no servo.
+    /// Commanded plate angle about y, radians; `None` if the axis has no servo.
     pub cmd_qy_rad: Option<f64>,
-    /// Measured x, metres; none: no ball seen.
+    /// Measured x, metres; `None` if no ball was seen.
     pub x_m: Option<f64>,
-    /// Measured y, metres; none: no ball seen.
+    /// Measured y, metres; `None` if no ball was seen.
     pub y_m: Option<f64>,
 }
 
 impl Sample {
-    /// The command of the servo that drives `axis`: qy for x, qx for y.
+    /// Returns the command of the servo that drives `axis`: qy for x, qx for y.
     #[must_use]
     pub const fn command(&self, axis: Axis) -> Option<f64> {
         match axis {
@@ -30,7 +30,7 @@ impl Sample {
         }
     }
 
-    /// The measured position along `axis`.
+    /// Returns the measured position along `axis`.
     #[must_use]
     pub const fn position(&self, axis: Axis) -> Option<f64> {
         match axis {

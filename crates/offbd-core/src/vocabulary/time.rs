@@ -1,19 +1,22 @@
-//! The engine's time.
+//! Time on a session's clock.
 
 use core::cmp::Ordering;
 use core::ops::{Add, Sub};
 
-/// A moment on a session's clock, in seconds: always finite, totally ordered.
+/// Resolution of a clock in milliseconds, s.
+pub(crate) const CLOCK_RESOLUTION_S: f64 = 1e-3;
+
+/// A time on a session's clock, in seconds: always finite and totally ordered.
 ///
-/// It comes from the samples (`t_s`); nothing below the adapters reads a clock.
+/// It comes from the samples (`t_s`); the core never reads a clock.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SimTime(f64);
 
 impl SimTime {
-    /// The moment `seconds` after the clock's zero; `None` unless finite.
+    /// Returns the time `seconds` after the clock's zero; `None` unless it is finite.
     #[must_use]
     pub fn new(seconds: f64) -> Option<Self> {
-        // The total order tells −0 from 0; no clock does.
+        // Adding zero turns −0 into 0, which the total order would tell apart.
         seconds.is_finite().then_some(Self(seconds + 0.0))
     }
 
@@ -48,7 +51,7 @@ impl Sub for SimTime {
 
 impl Add<f64> for SimTime {
     type Output = Self;
-    /// The moment `seconds` later; saturates at the largest finite time.
+    /// Returns the time `seconds` later; saturates at the largest finite time.
     fn add(self, seconds: f64) -> Self {
         Self((self.0 + seconds).clamp(f64::MIN, f64::MAX))
     }

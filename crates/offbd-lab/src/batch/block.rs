@@ -1,18 +1,18 @@
-//! A block: [`LANES`] balls, each quantity of theirs in a row of its own.
+//! A block of [`LANES`] balls in structure-of-arrays layout: one row per quantity.
 //!
-//! Every loop here has a fixed number of turns, none of which looks at
-//! another's lane, so the compiler does as many at a time as the machine has
-//! room for. Lanes meet nowhere: a ball that is not a number stays alone.
+//! Every loop has a fixed number of iterations that do not depend on each other, so
+//! the compiler vectorises it. Lanes never mix: a NaN in one ball does not reach
+//! another.
 
-use super::step::{Motion, RollingConstants, Turn};
+use super::step::{BallNumbers, PlateRotation, RollingConstants};
 use offbd_core::maths::sine::{reduced, turned};
 
-/// Balls in a block. Enough that loops of independent turns hide the latency
-/// of the chain within each, few enough that a block with its inputs (5.4 kB)
-/// stays in the first cache.
+/// Number of balls in a block. Chosen large enough that independent iterations hide
+/// the latency of the dependency chain within each, and small enough that a block
+/// with its inputs (5.4 kB) stays in the L1 cache.
 pub(super) const LANES: usize = 32;
 
-/// One quantity of every ball of a block, at the beginning of a cache line.
+/// One quantity of every ball of a block, aligned to a cache line (64 bytes).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(align(64))]
 pub(super) struct Row(pub [f64; LANES]);
@@ -21,20 +21,22 @@ impl Row {
     pub(super) const ZERO: Self = Self([0.0; LANES]);
 }
 
-/// Constants and states. Lanes without a ball hold zeros and stay zero.
+/// Constants and states of a block of balls. Lanes without a ball hold zeros and
+/// stay zero.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Block {
+pub(super) struct LaneBlock {
     constants: [Row; 5],
     state: [Row; 5],
 }
 
-/// What a block is told of its plates: sines and cosines are its own work.
+/// The columns of [`PlateColumns`](super::PlateColumns) for one block, in their
+/// order.
 pub(super) type Inputs<'a> = [&'a [f64; LANES]; 7];
 
-/// (sin qx, cos qx, sin qy, cos qy) of a block.
+/// Buffers for sin qx, cos qx, sin qy and cos qy of a block.
 pub(super) type Scratch = [Row; 4];
 
-impl Block {
+impl LaneBlock {
     pub(super) const EMPTY: Self = Self { constants: [Row::ZERO; 5], state: [Row::ZERO; 5] };
 
     pub(super) fn set_constants(&mut self, lane: usize, of: &RollingConstants) {
@@ -45,13 +47,13 @@ impl Block {
         }
     }
 
-    pub(super) fn motion(&self, lane: usize) -> Motion {
+    pub(super) fn motion(&self, lane: usize) -> BallNumbers {
         let [x, y, vx, vy, spin] = self.state.each_ref().map(|row| row.0[lane]);
-        Motion { x, y, vx, vy, spin }
+        BallNumbers { x, y, vx, vy, spin }
     }
 
-    pub(super) fn set_motion(&mut self, lane: usize, to: Motion) {
-        let Motion { x, y, vx, vy, spin } = to;
+    pub(super) fn set_motion(&mut self, lane: usize, to: BallNumbers) {
+        let BallNumbers { x, y, vx, vy, spin } = to;
         for (row, value) in self.state.iter_mut().zip([x, y, vx, vy, spin]) {
             row.0[lane] = value;
         }
@@ -67,8 +69,8 @@ impl Block {
     }
 }
 
-/// [`sin_cos`](offbd_core::maths::sine::sin_cos) of a row, in two loops: in each, what
-/// waits for one another is half as long. `sin` and `cos` hold its middle.
+/// [`sin_cos`](offbd_core::maths::sine::sin_cos) of a row, in two loops, which halves
+/// the dependency chain of each. `sin` and `cos` hold the intermediate results.
 #[inline(always)]
 fn sines(angle: &[f64; LANES], sin: &mut Row, cos: &mut Row) {
     for ((x, turns), &angle) in sin.0.iter_mut().zip(&mut cos.0).zip(angle) {
@@ -94,14 +96,15 @@ fn advance(
             share: share.0[i],
             coriolis: coriolis.0[i],
         };
-        let turn = Turn {
+        let rotation = PlateRotation {
             x: (sin_x.0[i], cos_x.0[i]),
             y: (sin_y.0[i], cos_y.0[i]),
             rate: [rate_x[i], rate_y[i]],
             acceleration: [acceleration_x[i], acceleration_y[i]],
         };
-        let motion = Motion { x: x.0[i], y: y.0[i], vx: vx.0[i], vy: vy.0[i], spin: spin.0[i] };
-        let moved = constants.step(&motion, &turn, step[i]);
+        let motion =
+            BallNumbers { x: x.0[i], y: y.0[i], vx: vx.0[i], vy: vy.0[i], spin: spin.0[i] };
+        let moved = constants.step(&motion, &rotation, step[i]);
         x.0[i] = moved.x;
         y.0[i] = moved.y;
         vx.0[i] = moved.vx;

@@ -1,23 +1,23 @@
-//! Which vector instructions a machine has, asked once, and the same code
-//! compiled for each of them.
+//! Detects the machine's vector instructions once, and compiles the same code for
+//! each set of them.
 //!
-//! The standard library's own means suffice: three functions with one body,
-//! and one `unsafe` call into each that is not for every machine. A crate
-//! (`multiversion`, `pulp`) would write these lines for us, at the price of a
-//! procedural macro or of a vector type in every formula.
+//! The standard library suffices: three functions with one body, and one `unsafe`
+//! call of each function that not every machine can run. A crate (`multiversion`,
+//! `pulp`) would replace these lines, at the price of a procedural macro or of a
+//! vector type in every formula.
 
 use std::fmt;
 
 use super::PlateColumns;
-use super::block::{Block, LANES, Row, Scratch};
+use super::block::{LANES, LaneBlock, Row, Scratch};
 
-/// A set of vector instructions that this machine has. All give the same
-/// results, to the bit: multiplications and additions are never contracted.
+/// A set of vector instructions that this machine has. All sets give bit-identical
+/// results: multiplications and additions are never contracted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Instructions(Set);
+pub struct Instructions(InstructionSet);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Set {
+enum InstructionSet {
     Portable,
     #[cfg(target_arch = "x86_64")]
     Avx2,
@@ -26,38 +26,38 @@ enum Set {
 }
 
 impl Instructions {
-    /// What the target has for certain; everywhere the same code.
-    pub const PORTABLE: Self = Self(Set::Portable);
+    /// The instructions that every machine of the compilation target has.
+    pub const PORTABLE: Self = Self(InstructionSet::Portable);
 
-    /// All that this machine has, the widest last.
+    /// Returns all sets that this machine has, the widest last.
     pub fn available() -> impl Iterator<Item = Self> {
         let candidates = [
-            Some(Set::Portable),
+            Some(InstructionSet::Portable),
             #[cfg(target_arch = "x86_64")]
-            is_x86_feature_detected!("avx2").then_some(Set::Avx2),
+            is_x86_feature_detected!("avx2").then_some(InstructionSet::Avx2),
             #[cfg(target_arch = "x86_64")]
-            is_x86_feature_detected!("avx512f").then_some(Set::Avx512),
+            is_x86_feature_detected!("avx512f").then_some(InstructionSet::Avx512),
         ];
         candidates.into_iter().flatten().map(Self)
     }
 
-    /// The widest that this machine has.
+    /// Returns the widest set that this machine has.
     #[must_use]
     pub fn widest() -> Self {
         Self::available().last().unwrap_or(Self::PORTABLE)
     }
 
-    /// Advances every block by one step of its plates.
+    /// Advances every block by one step on its plates.
     #[expect(unsafe_code, reason = "calls functions compiled for instructions that were found")]
-    pub(super) fn step(self, blocks: &mut [Block], plates: &PlateColumns<'_>) {
+    pub(super) fn step(self, blocks: &mut [LaneBlock], plates: &PlateColumns<'_>) {
         match self.0 {
-            Set::Portable => step(blocks, plates),
+            InstructionSet::Portable => step(blocks, plates),
             // SAFETY: the value exists, so `available` has found the feature.
             #[cfg(target_arch = "x86_64")]
-            Set::Avx2 => unsafe { step_avx2(blocks, plates) },
+            InstructionSet::Avx2 => unsafe { step_avx2(blocks, plates) },
             // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
-            Set::Avx512 => unsafe { step_avx512(blocks, plates) },
+            InstructionSet::Avx512 => unsafe { step_avx512(blocks, plates) },
         }
     }
 }
@@ -65,29 +65,29 @@ impl Instructions {
 impl fmt::Display for Instructions {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self.0 {
-            Set::Portable => "portable",
+            InstructionSet::Portable => "portable",
             #[cfg(target_arch = "x86_64")]
-            Set::Avx2 => "avx2",
+            InstructionSet::Avx2 => "avx2",
             #[cfg(target_arch = "x86_64")]
-            Set::Avx512 => "avx512",
+            InstructionSet::Avx512 => "avx512",
         })
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn step_avx2(blocks: &mut [Block], plates: &PlateColumns<'_>) {
+fn step_avx2(blocks: &mut [LaneBlock], plates: &PlateColumns<'_>) {
     step(blocks, plates);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f")]
-fn step_avx512(blocks: &mut [Block], plates: &PlateColumns<'_>) {
+fn step_avx512(blocks: &mut [LaneBlock], plates: &PlateColumns<'_>) {
     step(blocks, plates);
 }
 
 #[inline(always)]
-fn step(blocks: &mut [Block], plates: &PlateColumns<'_>) {
+fn step(blocks: &mut [LaneBlock], plates: &PlateColumns<'_>) {
     let mut scratch: Scratch = [Row::ZERO; 4];
     let columns = plates.columns();
     let whole = columns.map(|column| column.as_chunks::<LANES>().0);

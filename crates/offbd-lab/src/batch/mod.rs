@@ -1,15 +1,14 @@
-//! Many rolling balls, one step at a time, as many at once as the machine has
-//! lanes: for fleets, for families of parameters, for noise drawn many times.
+//! Steps many rolling balls at once with vector instructions: for fleets, parameter
+//! sweeps and Monte Carlo runs.
 //!
-//! One idea: a ball's step is a fixed sequence of IEEE operations without
-//! branches, written once for one ball and looped over blocks of balls. So a
-//! ball's path depends, to the bit, on nothing but its own inputs: not on its
-//! neighbours, their number, or the instructions of the machine. Each ball may
-//! have a rig, a plate and a step of its own.
+//! A ball's step is a fixed sequence of IEEE operations without branches, written
+//! once for one ball and looped over blocks of balls. So a ball's path depends, to
+//! the bit, on its own inputs alone: not on its neighbours, their number, or the
+//! instructions of the machine. Each ball may have its own rig, plate and step.
 //!
-//! Use [`Rolling`](offbd_core::plant::Rolling) for one ball, an external force or a higher
-//! order; use a [`RollingBatch`] where there are dozens. It knows no edges and
-//! no limits of friction either.
+//! Use [`Rolling`](offbd_core::plant::Rolling) for one ball, an external force or a
+//! higher order; use a [`RollingBatch`] for dozens of balls. Like `Rolling`, it models
+//! neither edges nor the limit of friction.
 
 mod block;
 mod instructions;
@@ -18,11 +17,11 @@ mod step;
 pub use instructions::Instructions;
 pub use step::RollingConstants;
 
-use block::{Block, LANES};
+use block::{LANES, LaneBlock};
 use offbd_core::plant::RollingState;
 
-/// The plates of all balls at the middle of a step, ball by ball in the order
-/// of the batch. A plate that is held is the same columns again.
+/// The plates of all balls at the middle of a step, one value per ball in the order
+/// of the batch. For plates that stand still, pass the same columns again.
 #[derive(Clone, Copy, Debug)]
 pub struct PlateColumns<'a> {
     /// Angles about x, rad, within ±1000.
@@ -59,17 +58,17 @@ impl<'a> PlateColumns<'a> {
 /// Rolling balls that are advanced together.
 #[derive(Clone, Debug)]
 pub struct RollingBatch {
-    blocks: Vec<Block>,
+    blocks: Vec<LaneBlock>,
     n_balls: usize,
     instructions: Instructions,
 }
 
 impl RollingBatch {
-    /// A batch of balls at rest in the middle of their plates. The only place
-    /// that allocates: 80 bytes a ball, rounded up to whole blocks of 32.
+    /// Creates a batch of balls at rest at the centre of their plates. Only this
+    /// function allocates: 80 bytes per ball, rounded up to whole blocks of 32.
     #[must_use]
     pub fn new(balls: &[RollingConstants], instructions: Instructions) -> Self {
-        let mut blocks = vec![Block::EMPTY; balls.len().div_ceil(LANES)];
+        let mut blocks = vec![LaneBlock::EMPTY; balls.len().div_ceil(LANES)];
         for (i, ball) in balls.iter().enumerate() {
             blocks[i / LANES].set_constants(i % LANES, ball);
         }
@@ -86,6 +85,8 @@ impl RollingBatch {
         self.n_balls == 0
     }
 
+    /// Returns the state of ball `i`.
+    ///
     /// # Panics
     /// If there is no ball `i`.
     #[must_use]
@@ -94,6 +95,8 @@ impl RollingBatch {
         self.blocks[i / LANES].motion(i % LANES).into()
     }
 
+    /// Sets the state of ball `i`.
+    ///
     /// # Panics
     /// If there is no ball `i`.
     pub fn set_state(&mut self, i: usize, to: &RollingState) {
@@ -101,17 +104,16 @@ impl RollingBatch {
         self.blocks[i / LANES].set_motion(i % LANES, to.into());
     }
 
-    /// The states in the order of the balls.
+    /// Returns the states in the order of the balls.
     pub fn states(&self) -> impl Iterator<Item = RollingState> {
         (0..self.n_balls).map(|i| self.state(i))
     }
 
-    /// Advances every ball by its own step, as
-    /// [`RollingConstants::midpoint`] does. Allocates nothing. A number that
-    /// is none spoils the one ball that it belongs to.
+    /// Advances every ball by its own step, as [`RollingConstants::midpoint`] does.
+    /// Allocates nothing. A NaN or an infinity affects only the ball it belongs to.
     ///
     /// # Panics
-    /// If a column has not one value per ball.
+    /// If a column does not have exactly one value per ball.
     pub fn step(&mut self, plates: &PlateColumns<'_>) {
         for column in plates.columns() {
             assert_eq!(column.len(), self.n_balls, "a column needs a value per ball");

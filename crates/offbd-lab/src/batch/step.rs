@@ -1,10 +1,9 @@
-//! One step of one ball. Whatever steps a batch steps it through these
-//! functions, so that a ball does not know whether it is alone.
+//! One step of one ball. Single balls and batches use the same functions, so that
+//! their results are bit-identical.
 //!
-//! The acceleration of a rolling ball is linear in its state, with
-//! coefficients that only the plate decides. With Ω = (a, b, c), where
-//! a = q̇x cos qy, b = q̇y, c = q̇x sin qy, and α = Ω̇, the equations at the head
-//! of `rolling.rs` come to
+//! The acceleration of a rolling ball is linear in its state, with coefficients that
+//! depend on the plate alone. With Ω = (a, b, c), where a = q̇x cos qy, b = q̇y,
+//! c = q̇x sin qy, and α = Ω̇, the equations at the top of `rolling.rs` become
 //!
 //! ```text
 //! (1 + κ)·v̇x = g_x − ac·z − q̈y·(z + κr) + (b² + c²)·x + (α_z − ab)·y + (2 + κ)c·vy + κr·a·w
@@ -12,15 +11,15 @@
 //! ẇ = −α_z − (a·vx + b·vy)/r
 //! ```
 //!
-//! where z is the height of the ball's centre and w its spin. Both stages of
-//! a step share one set of coefficients.
+//! where z is the height of the ball's centre and w its spin about the plate's
+//! normal. Both stages of a step share one set of coefficients.
 
 use nalgebra::Vector2;
 
 use offbd_core::maths::sine::sin_cos;
 use offbd_core::plant::{Ball, GRAVITY_M_S2, Plate, RollingState, Tilt};
 
-/// What a step needs to know of one ball on one plate.
+/// The constants of one ball on one plate, for its step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RollingConstants {
     /// Height of the resting ball's centre above the joint, m.
@@ -29,7 +28,7 @@ pub struct RollingConstants {
     pub(super) spin_arm: f64,
     /// 1/r, 1/m.
     pub(super) curvature: f64,
-    /// 1/(1 + κ): what rolling leaves of a force.
+    /// 1/(1 + κ): acceleration of the rolling ball over that of a frictionless one.
     pub(super) share: f64,
     /// 2 + κ.
     pub(super) coriolis: f64,
@@ -47,34 +46,39 @@ impl RollingConstants {
         }
     }
 
-    /// One step of `step_s` seconds by the explicit midpoint rule (order 2),
-    /// without an external force; `tilt` is the plate at the middle of the
-    /// step, its angles within ±1000 rad.
+    /// Returns the state after one step of `step_s` seconds by the explicit midpoint
+    /// rule (order 2), without an external force; `tilt` is the plate at the middle of
+    /// the step, its angles within ±1000 rad.
     ///
-    /// Equal, to the bit, to the step of the same ball in a
+    /// Bit-identical to the step of the same ball in a
     /// [`RollingBatch`](super::RollingBatch).
     #[must_use]
     pub fn midpoint(&self, state: &RollingState, tilt: &Tilt, step_s: f64) -> RollingState {
-        let turn = Turn {
+        let rotation = PlateRotation {
             x: sin_cos(tilt.angle.x),
             y: sin_cos(tilt.angle.y),
             rate: tilt.rate.into(),
             acceleration: tilt.acceleration.into(),
         };
-        self.step(&Motion::from(state), &turn, step_s).into()
+        self.step(&BallNumbers::from(state), &rotation, step_s).into()
     }
 
     #[inline(always)]
-    pub(super) fn step(&self, motion: &Motion, turn: &Turn, step_s: f64) -> Motion {
-        let field = Field::new(self, turn);
+    pub(super) fn step(
+        &self,
+        motion: &BallNumbers,
+        rotation: &PlateRotation,
+        step_s: f64,
+    ) -> BallNumbers {
+        let field = MotionCoefficients::new(self, rotation);
         let middle = field.moved(motion, motion, 0.5 * step_s);
         field.moved(motion, &middle, step_s)
     }
 }
 
-/// A [`RollingState`] as plain numbers.
+/// A [`RollingState`] as scalars.
 #[derive(Clone, Copy)]
-pub(super) struct Motion {
+pub(super) struct BallNumbers {
     pub x: f64,
     pub y: f64,
     pub vx: f64,
@@ -82,15 +86,15 @@ pub(super) struct Motion {
     pub spin: f64,
 }
 
-impl From<&RollingState> for Motion {
+impl From<&RollingState> for BallNumbers {
     fn from(state: &RollingState) -> Self {
         let RollingState { position, velocity, spin } = *state;
         Self { x: position.x, y: position.y, vx: velocity.x, vy: velocity.y, spin }
     }
 }
 
-impl From<Motion> for RollingState {
-    fn from(motion: Motion) -> Self {
+impl From<BallNumbers> for RollingState {
+    fn from(motion: BallNumbers) -> Self {
         Self {
             position: Vector2::new(motion.x, motion.y),
             velocity: Vector2::new(motion.vx, motion.vy),
@@ -99,9 +103,9 @@ impl From<Motion> for RollingState {
     }
 }
 
-/// A [`Tilt`] by the sines and cosines of its angles.
+/// A [`Tilt`] with the sines and cosines in place of the angles.
 #[derive(Clone, Copy)]
-pub(super) struct Turn {
+pub(super) struct PlateRotation {
     /// (sin, cos) of qx.
     pub x: (f64, f64),
     /// (sin, cos) of qy.
@@ -112,27 +116,30 @@ pub(super) struct Turn {
     pub acceleration: [f64; 2],
 }
 
-/// The coefficients of the motion: what each part of the state adds to the
-/// accelerations, the linear ones before [`RollingConstants::share`].
-struct Field {
+/// The coefficients of the equations of motion; those of the linear accelerations are
+/// still to be multiplied by [`RollingConstants::share`].
+struct MotionCoefficients {
     share: f64,
+    /// Constant terms of v̇x and v̇y.
     constant: [f64; 2],
-    /// By x and y.
+    /// Coefficients of x and y in v̇x.
     x_by: [f64; 2],
+    /// Coefficients of x and y in v̇y.
     y_by: [f64; 2],
-    /// Of vy on x, and of −vx on y.
+    /// Coefficient of vy in v̇x, and of −vx in v̇y.
     sideways: f64,
-    /// Of the spin.
+    /// Coefficients of the spin in v̇x and v̇y.
     spin: [f64; 2],
-    /// −ẇ: constant, by vx and by vy.
+    /// −ẇ: constant term, coefficients of vx and vy.
     despin: [f64; 3],
 }
 
-impl Field {
+impl MotionCoefficients {
     #[inline(always)]
-    fn new(of: &RollingConstants, turn: &Turn) -> Self {
-        let ((sin_x, cos_x), (sin_y, cos_y)) = (turn.x, turn.y);
-        let ([rate_x, b], [acceleration_x, acceleration_y]) = (turn.rate, turn.acceleration);
+    fn new(of: &RollingConstants, rotation: &PlateRotation) -> Self {
+        let ((sin_x, cos_x), (sin_y, cos_y)) = (rotation.x, rotation.y);
+        let ([rate_x, b], [acceleration_x, acceleration_y]) =
+            (rotation.rate, rotation.acceleration);
         let (a, c) = (rate_x * cos_y, rate_x * sin_y);
         let (ab, bc) = (a * b, b * c);
         // α_z = q̈x sin qy + ab and α_x = q̈x cos qy − bc.
@@ -153,11 +160,11 @@ impl Field {
         }
     }
 
-    /// `from`, moved for `h` seconds at the rates that hold at `at`. What is
-    /// known last is added last, so that little waits for it.
+    /// Returns `from` moved for `h` seconds at the rates at `at`. Operands that become
+    /// available last are added last, which shortens the dependency chain.
     #[inline(always)]
-    fn moved(&self, from: &Motion, at: &Motion, h: f64) -> Motion {
-        let by_place = [
+    fn moved(&self, from: &BallNumbers, at: &BallNumbers, h: f64) -> BallNumbers {
+        let by_position = [
             self.constant[0] + (self.x_by[0] * at.x + self.x_by[1] * at.y),
             self.constant[1] + (self.y_by[0] * at.x + self.y_by[1] * at.y),
         ];
@@ -167,11 +174,11 @@ impl Field {
         ];
         let despin = self.despin[0] + (self.despin[1] * at.vx + self.despin[2] * at.vy);
         let gain = self.share * h;
-        Motion {
+        BallNumbers {
             x: from.x + at.vx * h,
             y: from.y + at.vy * h,
-            vx: from.vx + (by_place[0] + by_rate[0]) * gain,
-            vy: from.vy + (by_place[1] + by_rate[1]) * gain,
+            vx: from.vx + (by_position[0] + by_rate[0]) * gain,
+            vy: from.vy + (by_position[1] + by_rate[1]) * gain,
             spin: from.spin - despin * h,
         }
     }

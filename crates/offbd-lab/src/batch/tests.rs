@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use super::*;
 use offbd_core::plant::{Ball, Plate, PlateShape, Rolling, Tilt};
 
-/// One ball's part of a step: its rig, where it is, its plate, the step.
+/// The inputs of one ball's step: its rig, its state, its plate, the step size.
 #[derive(Clone, Debug)]
 struct Case {
     ball: Ball,
@@ -54,7 +54,7 @@ impl Case {
     }
 }
 
-/// The states after `n_steps` in one batch.
+/// Returns the states after `n_steps` in one batch.
 fn together(cases: &[Case], n_steps: usize, instructions: Instructions) -> Vec<RollingState> {
     let constants: Vec<_> = cases.iter().map(Case::constants).collect();
     let mut batch = RollingBatch::new(&constants, instructions);
@@ -86,13 +86,13 @@ fn bits(states: &[RollingState]) -> Vec<[u64; 5]> {
     states.iter().map(|state| numbers(state).map(f64::to_bits)).collect()
 }
 
-/// Which balls are numbers throughout.
-fn sound(states: &[RollingState]) -> Vec<bool> {
+/// Returns which states consist of finite numbers only.
+fn finite(states: &[RollingState]) -> Vec<bool> {
     states.iter().map(|state| numbers(state).iter().all(|n| n.is_finite())).collect()
 }
 
 proptest! {
-    /// Up to three blocks, so that batches end anywhere in the last one.
+    /// Up to three blocks, so that batches end at any lane of the last block.
     #[test]
     fn a_ball_in_a_batch_moves_as_it_does_alone(
         cases in prop::collection::vec(case(), 0..=3 * LANES),
@@ -126,11 +126,11 @@ proptest! {
                     prop_assert_eq!(bits(&[*state]), bits(&[*before]), "{}", instructions);
                 }
             }
-            prop_assert!(!sound(&states)[at]);
+            prop_assert!(!finite(&states)[at]);
         }
     }
 
-    /// Both compute the same terms in another order: some forty roundings of
+    /// Both compute the same terms in a different order: some forty roundings of
     /// 1.1e-16 each, of terms no larger than those summed here.
     #[test]
     fn a_step_agrees_with_the_rolling_model(case in case()) {
@@ -142,8 +142,8 @@ proptest! {
             (largest(tilt.acceleration) + 2.0 * rate * rate, largest(state.velocity));
         let (arm, spin) = (plate.centre_gap_m(ball) + ball.radius_m(), state.spin.abs());
         let a = 9.81 + angular * (largest(state.position) + arm) + 3.0 * rate * (speed + arm * spin);
-        let turn = angular + rate * (speed + h * a) * curvature;
-        let tolerance = [speed + h * a, a + 3.0 * rate * h * a + rate * arm * h * turn, turn]
+        let rotation = angular + rate * (speed + h * a) * curvature;
+        let tolerance = [speed + h * a, a + 3.0 * rate * h * a + rate * arm * h * rotation, rotation]
             .map(|rate| 4e-15 * h * rate);
         for (i, (ours, theirs)) in numbers(&case.alone(1)).into_iter().zip(numbers(&expected)).enumerate() {
             let allowed = tolerance[i / 2] + 2.3e-16 * theirs.abs();

@@ -1,13 +1,13 @@
-//! Broken lines in pixels: SVG's own dashes are beyond the plotting crate, and
-//! its stand-in leaves strokes without length.
+//! Dashed lines in pixels: plotters does not support SVG's dashes, and its own
+//! replacement leaves strokes of zero length.
 
-type At = (i32, i32);
+use super::canvas::Pixel;
 
-/// The strokes of `line`, `on` pixels long and `off` apart, corners within them
-/// kept.
-pub(super) fn dashes(line: &[At], on: i32, off: i32) -> Vec<Vec<At>> {
+/// Divides `line` into strokes, `on` pixels long and `off` apart, which follow its
+/// corners.
+pub(super) fn dashes(line: &[Pixel], on: i32, off: i32) -> Vec<Vec<Pixel>> {
     let mut strokes = Vec::new();
-    let mut stroke: Vec<At> = line.first().copied().into_iter().collect();
+    let mut stroke: Vec<Pixel> = line.first().copied().into_iter().collect();
     let (mut drawing, mut left) = (true, f64::from(on));
     for ends in line.windows(2) {
         let (mut from, to) = (real(ends[0]), real(ends[1]));
@@ -34,11 +34,11 @@ pub(super) fn dashes(line: &[At], on: i32, off: i32) -> Vec<Vec<At>> {
     strokes
 }
 
-fn real(at: At) -> (f64, f64) {
+fn real(at: Pixel) -> (f64, f64) {
     (f64::from(at.0), f64::from(at.1))
 }
 
-fn whole(at: (f64, f64)) -> At {
+fn whole(at: (f64, f64)) -> Pixel {
     (at.0.round() as i32, at.1.round() as i32)
 }
 

@@ -1,47 +1,38 @@
-//! Draws a figure as SVG: title and subtitle, a grid of panels, one legend
-//! beneath them, so that it never covers data.
+//! Draws a figure as SVG: title and subtitle, a grid of panels, and one legend beneath
+//! them, where it covers no data.
 
 use plotters::chart::{ChartBuilder, ChartContext};
-use plotters::coord::Shift;
-use plotters::prelude::{Cartesian2d, DrawingArea, IntoDrawingArea, PathElement, SVGBackend};
-use plotters::style::text_anchor::{HPos, Pos, VPos};
-use plotters::style::{BLACK, Color, IntoTextStyle, RGBColor, TextStyle, WHITE};
+use plotters::prelude::{Cartesian2d, IntoDrawingArea, SVGBackend};
+use plotters::style::text_anchor::{HPos, VPos};
+use plotters::style::{BLACK, Color, IntoTextStyle, RGBColor, WHITE};
 
-use super::dash::dashes;
+use super::canvas::{Area, CHARACTER, DrawResult, MARGIN, WIDTH, message, text_style, write_text};
 use super::error::ChartError;
 use super::figure::{Figure, Mark, Panel, Series, Stroke};
-use super::legend::{self, Entry};
-use super::look::Look;
+use super::legend::{self, LegendEntry};
 use super::marker;
 use super::scale::Scale;
+use super::stroke::draw_stroke;
 
-/// Width of a drawing, pixels; readable at half of it.
-pub(super) const WIDTH: u32 = 1800;
-
-/// Blank around everything.
-pub(super) const MARGIN: i32 = 36;
-
-/// Sizes of text, pixels; at half the width the smallest is 13.
+/// Size of the title, pixels. All sizes are chosen so that the smallest is 13 pixels at
+/// half the width.
 const TITLE: f64 = 42.0;
+/// Size of the subtitle, pixels.
 const SUBTITLE: f64 = 29.0;
+/// Size of labels of axes and titles of panels, pixels.
 const LABEL: f64 = 28.0;
+/// Size of tick labels, pixels.
 const TICK: f64 = 26.0;
-
-/// Mean width of a character, in sizes of its text, on the wide side.
-pub(super) const CHARACTER: f64 = 0.56;
 
 const GREY: RGBColor = RGBColor(70, 70, 70);
 const GRID: RGBColor = RGBColor(214, 214, 214);
 const FAINT: RGBColor = RGBColor(238, 238, 238);
 
-pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Axes<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<Scale, Scale>>;
-type Drawn = Result<(), String>;
-
-/// The figure as SVG 1.1.
+/// Draws the figure as SVG 1.1.
 ///
 /// # Errors
-/// [`ChartError::Draw`] if a panel has no room for its axes.
+/// [`ChartError::Draw`] if a panel is too small for its axes.
 pub fn svg(figure: &Figure) -> Result<String, ChartError> {
     let mut text = String::new();
     let legend = legend::rows(figure);
@@ -52,23 +43,19 @@ pub fn svg(figure: &Figure) -> Result<String, ChartError> {
     let height = head + panels + legend::height(&legend);
     let area = SVGBackend::with_string(&mut text, (WIDTH, height)).into_drawing_area();
     draw(figure, &area, &legend, (head, panels, rows))
-        .and_then(|()| area.present().map_err(said))
+        .and_then(|()| area.present().map_err(message))
         .map_err(|reason| ChartError::Draw { figure: figure.title.clone(), reason })?;
     drop(area);
     Ok(text)
 }
 
-fn said(error: impl std::fmt::Display) -> String {
-    error.to_string()
-}
-
 fn draw(
     figure: &Figure,
     area: &Area<'_>,
-    legend: &[Vec<Entry>],
+    legend: &[Vec<LegendEntry>],
     (head, panels, rows): (u32, u32, usize),
-) -> Drawn {
-    area.fill(&WHITE).map_err(said)?;
+) -> DrawResult {
+    area.fill(&WHITE).map_err(message)?;
     draw_head(figure, area)?;
     let columns = figure.columns.max(1);
     let (_, below) = area.split_vertically(head);
@@ -80,28 +67,12 @@ fn draw(
     legend::draw(legend, area, (head + panels) as i32)
 }
 
-/// SVG text is as large as it says; plotters divides by 1.24.
-pub(super) fn text_style(size: f64, colour: RGBColor, h: HPos, v: VPos) -> TextStyle<'static> {
-    let mut style = ("sans-serif", size * 1.24).into_text_style(&(WIDTH, WIDTH));
-    style.color = colour.to_backend_color();
-    style.pos(Pos::new(h, v))
-}
-
-pub(super) fn write_text(
-    area: &Area<'_>,
-    text: &str,
-    style: &TextStyle<'_>,
-    at: (i32, i32),
-) -> Drawn {
-    area.draw_text(text, style, at).map_err(said)
-}
-
 fn head_height(figure: &Figure) -> u32 {
     let lines = wrapped(&figure.subtitle, SUBTITLE).len() as u32;
     MARGIN as u32 + 58 + lines * 38 + 16
 }
 
-fn draw_head(figure: &Figure, area: &Area<'_>) -> Drawn {
+fn draw_head(figure: &Figure, area: &Area<'_>) -> DrawResult {
     let style = text_style(TITLE, BLACK, HPos::Left, VPos::Top);
     write_text(area, &figure.title, &style, (MARGIN, MARGIN))?;
     let style = text_style(SUBTITLE, GREY, HPos::Left, VPos::Top);
@@ -111,7 +82,7 @@ fn draw_head(figure: &Figure, area: &Area<'_>) -> Drawn {
     Ok(())
 }
 
-/// `text` in lines that fit into the width.
+/// Breaks `text` into lines that fit into the width.
 fn wrapped(text: &str, size: f64) -> Vec<String> {
     let room = (f64::from(WIDTH as i32 - 2 * MARGIN) / (size * CHARACTER)) as usize;
     let mut lines: Vec<String> = Vec::new();
@@ -127,13 +98,14 @@ fn wrapped(text: &str, size: f64) -> Vec<String> {
     lines
 }
 
-fn draw_panel(panel: &Panel, place: &Area<'_>, whole: &Area<'_>) -> Drawn {
+fn draw_panel(panel: &Panel, place: &Area<'_>, whole: &Area<'_>) -> DrawResult {
     let inner = place.margin(if panel.title.is_empty() { 8 } else { 50 }, 8, 12, 22);
     let mut builder = ChartBuilder::on(&inner);
     let names = (panel.y.scale.longest_name() as f64 * TICK * CHARACTER) as i32;
     builder.x_label_area_size(92).y_label_area_size(128.max(names + 30));
-    let mut axes =
-        builder.build_cartesian_2d(panel.x.scale.clone(), panel.y.scale.clone()).map_err(said)?;
+    let mut axes = builder
+        .build_cartesian_2d(panel.x.scale.clone(), panel.y.scale.clone())
+        .map_err(message)?;
     draw_regions(panel, &axes, whole)?;
     draw_axes(panel, &mut axes)?;
     draw_panel_title(panel, &axes, whole)?;
@@ -145,7 +117,7 @@ fn draw_panel(panel: &Panel, place: &Area<'_>, whole: &Area<'_>) -> Drawn {
     panel.marks.iter().try_for_each(|mark| draw_mark(panel, mark, &axes, whole))
 }
 
-fn draw_axes(panel: &Panel, axes: &mut Axes<'_, '_>) -> Drawn {
+fn draw_axes(panel: &Panel, axes: &mut Axes<'_, '_>) -> DrawResult {
     let size = (WIDTH, WIDTH);
     let mut mesh = axes.configure_mesh();
     mesh.x_desc(panel.x.label.as_str()).y_desc(panel.y.label.as_str());
@@ -156,66 +128,33 @@ fn draw_axes(panel: &Panel, axes: &mut Axes<'_, '_>) -> Drawn {
         mesh.disable_mesh();
     }
     mesh.bold_line_style(GRID.stroke_width(2)).light_line_style(FAINT.stroke_width(1));
-    mesh.draw().map_err(said)
+    mesh.draw().map_err(message)
 }
 
-fn draw_panel_title(panel: &Panel, axes: &Axes<'_, '_>, whole: &Area<'_>) -> Drawn {
+fn draw_panel_title(panel: &Panel, axes: &Axes<'_, '_>, whole: &Area<'_>) -> DrawResult {
     let (x, y) = axes.plotting_area().get_pixel_range();
     let at = ((x.start + x.end) / 2, y.start - 12);
     let style = text_style(LABEL, BLACK, HPos::Center, VPos::Bottom);
     write_text(whole, &panel.title, &style, at)
 }
 
-/// The pixels of those points that lie within the axes.
+/// Returns the pixels of the points within the axes.
 fn pixels(panel: &Panel, points: &[(f64, f64)], axes: &Axes<'_, '_>) -> Vec<(i32, i32)> {
     let inside = |p: &&(f64, f64)| panel.x.scale.contains(p.0) && panel.y.scale.contains(p.1);
     points.iter().filter(inside).map(|p| axes.backend_coord(p)).collect()
 }
 
-fn draw_series(panel: &Panel, series: &Series, axes: &Axes<'_, '_>, whole: &Area<'_>) -> Drawn {
+fn draw_series(
+    panel: &Panel,
+    series: &Series,
+    axes: &Axes<'_, '_>,
+    whole: &Area<'_>,
+) -> DrawResult {
     let points = pixels(panel, &series.points, axes);
     draw_stroke(&points, series.look, series.stroke, whole)
 }
 
-/// Line and markers through `points` (pixels); the legend's samples too.
-pub(super) fn draw_stroke(
-    points: &[(i32, i32)],
-    look: Look,
-    stroke: Stroke,
-    area: &Area<'_>,
-) -> Drawn {
-    match stroke {
-        Stroke::Front => return draw_front(points, look, area),
-        Stroke::Line | Stroke::LineAndMarkers => draw_line(points, look, area)?,
-        Stroke::Markers => {}
-    }
-    if stroke == Stroke::Line {
-        return Ok(());
-    }
-    points.iter().try_for_each(|&at| marker::draw(area, at, look, 9))
-}
-
-fn draw_line(points: &[(i32, i32)], look: Look, area: &Area<'_>) -> Drawn {
-    let style = look.colour().stroke_width(4);
-    let strokes = match look.dash {
-        None => vec![points.to_vec()],
-        Some((on, off)) => dashes(points, on, off),
-    };
-    let drawn = strokes.into_iter().filter(|stroke| stroke.len() > 1);
-    drawn
-        .map(|stroke| PathElement::new(stroke, style))
-        .try_for_each(|e| area.draw(&e).map_err(said))
-}
-
-fn draw_front(points: &[(i32, i32)], look: Look, area: &Area<'_>) -> Drawn {
-    if points.len() < 2 {
-        return Ok(());
-    }
-    let style = look.colour().mix(0.3).stroke_width(16);
-    area.draw(&PathElement::new(points.to_vec(), style)).map_err(said)
-}
-
-fn draw_mark(panel: &Panel, mark: &Mark, axes: &Axes<'_, '_>, whole: &Area<'_>) -> Drawn {
+fn draw_mark(panel: &Panel, mark: &Mark, axes: &Axes<'_, '_>, whole: &Area<'_>) -> DrawResult {
     let Some(&at) = pixels(panel, &[mark.at], axes).first() else { return Ok(()) };
     marker::draw_ring(whole, at, 19)?;
     if mark.text.is_empty() {
@@ -230,9 +169,9 @@ fn draw_mark(panel: &Panel, mark: &Mark, axes: &Axes<'_, '_>, whole: &Area<'_>) 
     write_text(whole, &mark.text, &style, (at.0 + dx, at.1 + dy))
 }
 
-/// Cells, each with its category's sign where there is room for it, so that the
-/// map also reads in grey.
-fn draw_regions(panel: &Panel, axes: &Axes<'_, '_>, whole: &Area<'_>) -> Drawn {
+/// Draws the cells, each with the marker of its category if there is room, so that the
+/// map is readable without colours.
+fn draw_regions(panel: &Panel, axes: &Axes<'_, '_>, whole: &Area<'_>) -> DrawResult {
     let Some(regions) = &panel.regions else { return Ok(()) };
     for (i, j, [low, high], category) in regions.filled() {
         let corner = |p: (f64, f64)| {

@@ -1,18 +1,19 @@
-//! One length on both axes: for what lies in space.
+//! Equal scales on both axes, for positions on the plate.
 
-use super::draw::{MARGIN, WIDTH};
+use super::canvas::{MARGIN, WIDTH};
 use super::scale::Scale;
 
-/// What a panel alone in its row, without a title, leaves beside its axes and
-/// above and below them, pixels: the drawing's margins, and labels.
+/// Width of margins and labels beside the axes of a single untitled panel in its row,
+/// pixels; as `draw.rs` lays it out.
 const BESIDE: i32 = 2 * MARGIN - 12 + 12 + 22 + 128;
+/// Height of margins and labels above and below these axes, pixels; likewise.
 const ABOVE_AND_BELOW: u32 = 8 + 8 + 92;
 
-/// Heights between which a panel is readable, pixels.
+/// Limits of a panel's height, pixels; chosen to be readable.
 const HEIGHTS: (u32, u32) = (600, 1400);
 
-/// Scales around the ranges `x` and `y` on which a circle is round, for a panel
-/// that is alone in its row, with the height that it then has.
+/// Returns scales around the ranges `x` and `y` with equal lengths per unit, for a single
+/// panel in its row, and the height of that panel.
 #[must_use]
 pub fn equal_scales(x: (f64, f64), y: (f64, f64)) -> (Scale, Scale, u32) {
     let width = f64::from(WIDTH as i32 - BESIDE);
@@ -33,7 +34,7 @@ mod tests {
     use super::*;
     use crate::chart::{Axis, Figure, Look, Panel, Series, Stroke, svg};
 
-    /// The pixels between the ends of a line drawn from `a` to `b`.
+    /// Draws a line from `a` to `b`; returns its length in pixels.
     fn drawn(a: (f64, f64), b: (f64, f64), ranges: [(f64, f64); 2]) -> f64 {
         let (x, y, panel_height) = equal_scales(ranges[0], ranges[1]);
         let mut panel = Panel::new("", Axis::new("x", x), Axis::new("y", y));

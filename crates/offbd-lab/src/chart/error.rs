@@ -1,25 +1,25 @@
 use std::io;
 use std::path::PathBuf;
 
-/// Why a chart could not be made.
+/// An error of making a chart.
 #[derive(Debug, thiserror::Error)]
 pub enum ChartError {
-    /// The drawing could not be laid out, a panel too small for its labels say.
+    /// The drawing could not be laid out; for example, a panel is too small for its labels.
     #[error("cannot draw {figure}: {reason}")]
     Draw { figure: String, reason: String },
-    /// The drawing could not be made into pixels.
+    /// The drawing could not be rasterised.
     #[error("cannot rasterise the drawing: {0}")]
     Raster(String),
-    /// The records are no JSON, a number that is not finite say.
+    /// The records could not be written as JSON; for example, a number is not finite.
     #[error("cannot write the records: {0}")]
     Records(#[from] serde_json::Error),
-    /// A scene cannot be.
+    /// A scene or rig is invalid.
     #[error("{0}")]
     Scene(#[from] offbd_core::vocabulary::Invalid),
-    /// A simulated rig cannot be learnt.
+    /// A simulated rig could not be calibrated.
     #[error("{0}")]
     Rig(#[from] offbd_core::engine::CannotCalibrate),
-    /// Somebody else's records could not be read.
+    /// The records of other engines could not be read.
     #[error("{}: {reason}", path.display())]
     Peers { path: PathBuf, reason: String },
     /// A file could not be written.

@@ -1,4 +1,4 @@
-//! A drawing as data: panels of series, marks and regions.
+//! Descriptions of drawings: panels with series, marks and regions.
 
 use super::look::Look;
 use super::regions::Regions;
@@ -8,16 +8,16 @@ use super::scale::Scale;
 #[derive(Clone, Debug)]
 pub struct Figure {
     pub title: String,
-    /// One sentence: what the reader should see.
+    /// One sentence with the conclusion for the reader.
     pub subtitle: String,
-    /// Panels beside each other; they fill row by row.
+    /// Number of panels per row.
     pub columns: usize,
     /// Height of a panel with its labels, in pixels of a drawing 1800 wide.
     pub panel_height: u32,
     pub panels: Vec<Panel>,
 }
 
-/// One pair of axes and what is drawn between them.
+/// One pair of axes with their contents.
 #[derive(Clone, Debug)]
 pub struct Panel {
     /// Empty for none.
@@ -26,8 +26,8 @@ pub struct Panel {
     pub y: Axis,
     /// Drawn first.
     pub regions: Option<Regions>,
-    /// Drawn in their order, fronts before all others. Series of the same name in several panels share
-    /// one entry of the legend.
+    /// Drawn in order, Pareto fronts before all others. Series of the same name in several
+    /// panels share one entry of the legend.
     pub series: Vec<Series>,
     /// Drawn last.
     pub marks: Vec<Mark>,
@@ -40,17 +40,17 @@ pub struct Axis {
     pub scale: Scale,
 }
 
-/// What is drawn of a series.
+/// How a series is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stroke {
     Markers,
     Line,
     LineAndMarkers,
-    /// A broad pale line beneath the others: a Pareto front.
+    /// A wide pale line beneath the others, for a Pareto front.
     Front,
 }
 
-/// Points that belong together. Points outside of the axes are left out.
+/// A series of points. Points outside the axes are not drawn.
 #[derive(Clone, Debug)]
 pub struct Series {
     pub name: String,
@@ -59,8 +59,7 @@ pub struct Series {
     pub points: Vec<(f64, f64)>,
 }
 
-/// A point to look at: a ring in black around it, named in the legend; `text`
-/// beside it unless empty.
+/// A marked point: a black ring, named in the legend, with `text` beside it unless empty.
 #[derive(Clone, Debug)]
 pub struct Mark {
     pub name: String,
@@ -69,7 +68,7 @@ pub struct Mark {
 }
 
 impl Panel {
-    /// An empty panel.
+    /// Creates an empty panel.
     #[must_use]
     pub fn new(title: impl Into<String>, x: Axis, y: Axis) -> Self {
         let (series, marks) = (Vec::new(), Vec::new());

@@ -1,21 +1,21 @@
-//! What is worth choosing: the Pareto front of two costs.
+//! The Pareto front of two costs.
 
-/// One point of a front, and where it came from.
+/// One point of a Pareto front, with its index.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Front {
+pub struct FrontPoint {
     /// Index into the points given.
     pub index: usize,
     pub point: (f64, f64),
 }
 
-/// The points that no other beats in both coordinates (less is better), in the
-/// order of the first. Of equal points the earliest stays; points that are not
-/// finite never do.
+/// Returns the points that no other point dominates (less is better in both coordinates),
+/// in ascending order of the first coordinate. Of equal points, the first is returned;
+/// points that are not finite are dropped.
 #[must_use]
-pub fn front(points: &[(f64, f64)]) -> Vec<Front> {
-    let finite = |p: &Front| p.point.0.is_finite() && p.point.1.is_finite();
-    let all = points.iter().enumerate().map(|(index, &point)| Front { index, point });
-    let mut sorted: Vec<Front> = all.filter(finite).collect();
+pub fn front(points: &[(f64, f64)]) -> Vec<FrontPoint> {
+    let finite = |p: &FrontPoint| p.point.0.is_finite() && p.point.1.is_finite();
+    let all = points.iter().enumerate().map(|(index, &point)| FrontPoint { index, point });
+    let mut sorted: Vec<FrontPoint> = all.filter(finite).collect();
     sorted.sort_by(|a, b| {
         let by_x = a.point.0.total_cmp(&b.point.0);
         by_x.then(a.point.1.total_cmp(&b.point.1)).then(a.index.cmp(&b.index))

@@ -1,12 +1,12 @@
-//! Colours, markers and strokes that differ in more than colour.
+//! Colours, markers and dashes of series.
 //!
 //! The colours are those of Okabe & Ito (*Color Universal Design*, 2008), which
-//! stay apart for colour-blind readers; each comes with a marker and a dash of
-//! its own, so that a chart also reads in grey.
+//! colour-blind readers can distinguish; each has its own marker and dash, so that a chart
+//! is readable without colours.
 
 use plotters::style::RGBColor;
 
-/// The sign at a point.
+/// The marker at a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Marker {
     Circle,
@@ -24,11 +24,11 @@ pub enum Marker {
 pub struct Look {
     pub rgb: (u8, u8, u8),
     pub marker: Marker,
-    /// Lengths of stroke and gap; none for an unbroken line.
+    /// Lengths of stroke and gap, pixels; `None`: a solid line.
     pub dash: Option<(i32, i32)>,
 }
 
-/// In the order in which they are best told apart; yellow, faint on white, last.
+/// In the order in which they are best distinguished; yellow, faint on white, last.
 const LOOKS: [Look; 8] = [
     look((0x00, 0x72, 0xB2), Marker::Circle, None),
     look((0xD5, 0x5E, 0x00), Marker::Square, Some((18, 8))),
@@ -45,17 +45,16 @@ const fn look(rgb: (u8, u8, u8), marker: Marker, dash: Option<(i32, i32)>) -> Lo
 }
 
 impl Look {
-    /// For what is marked or drawn beside the series.
+    /// The look of marks and reference lines.
     pub const BLACK: Self = look((0, 0, 0), Marker::Ring, None);
 
-    /// The look of the `i`-th series; they repeat after eight.
+    /// Returns the look of the `i`-th series; looks repeat after eight.
     #[must_use]
     pub fn of(i: usize) -> Self {
         LOOKS[i % LOOKS.len()]
     }
 
-    /// The `i`-th of `n` ordered steps, light to dark, in one hue: for bins of a
-    /// quantity.
+    /// Returns the `i`-th of `n` shades of one hue, light to dark, for bins of a quantity.
     #[must_use]
     pub fn step(i: usize, n: usize) -> Self {
         let share = if n < 2 { 1.0 } else { i as f64 / (n - 1) as f64 };
@@ -68,8 +67,8 @@ impl Look {
         RGBColor(self.rgb.0, self.rgb.1, self.rgb.2)
     }
 
-    /// Black or white, whichever reads better on this colour (relative
-    /// luminance of ITU-R BT.709).
+    /// Returns black or white, whichever has more contrast to this colour (luma with the
+    /// coefficients of ITU-R BT.709).
     pub(super) fn ink(self) -> RGBColor {
         let (r, g, b) = (f64::from(self.rgb.0), f64::from(self.rgb.1), f64::from(self.rgb.2));
         let luminance = 0.2126 * r + 0.7152 * g + 0.0722 * b;

@@ -1,15 +1,15 @@
-//! What numbers belong to: the machine and the versions they were measured with.
+//! The machine and the versions with which numbers were measured.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-/// A chart's file: what was measured, on which machine, with which versions.
+/// The file of a chart: the records, the machine and the versions.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Document<R> {
     pub chart: String,
     pub machine: Machine,
-    /// `offbd`, `rustc`, and whatever else was measured.
+    /// Versions of `offbd`, `rustc`, and other programs measured.
     pub versions: BTreeMap<String, String>,
     pub records: Vec<R>,
 }
@@ -17,18 +17,18 @@ pub struct Document<R> {
 /// The machine on which something was measured.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Machine {
-    /// Model name as the processor tells it.
+    /// Model name of the processor, or `unknown`.
     pub cpu: String,
-    /// Cores that this process may use.
+    /// Number of cores available to this process.
     pub cores: usize,
-    /// Instruction set extensions that matter to arithmetic.
+    /// Instruction set extensions relevant to arithmetic.
     pub features: Vec<String>,
-    /// Operating system and architecture, as `linux x86_64`.
+    /// Operating system and architecture, as in `linux x86_64`.
     pub os: String,
 }
 
 impl Machine {
-    /// This machine.
+    /// Returns this machine.
     #[must_use]
     pub fn this() -> Self {
         Self {
@@ -40,7 +40,7 @@ impl Machine {
     }
 }
 
-/// The versions of this program and of the compiler that built it.
+/// Returns the versions of this program and of the compiler that built it.
 #[must_use]
 pub fn versions() -> BTreeMap<String, String> {
     let pair = |name: &str, version: &str| (name.to_owned(), version.to_owned());
@@ -50,7 +50,7 @@ pub fn versions() -> BTreeMap<String, String> {
     ])
 }
 
-/// Linux names the model in /proc/cpuinfo; elsewhere it stays `unknown`.
+/// Reads the processor's model from /proc/cpuinfo on Linux; elsewhere returns `unknown`.
 fn cpu_model() -> String {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let named = |line: &&str| line.starts_with("model name") || line.starts_with("Model");

@@ -1,14 +1,14 @@
-//! Charts: measurements as records, a drawing and a table of them.
+//! Charts: measurements with their records, drawings and a table.
 //!
-//! A chart measures, keeps what it measured as records beside the machine and
-//! the versions they belong to, and draws them: SVG, whose text stays text, and
-//! the same as PNG. Drawings are described as data ([`Figure`], [`Panel`],
-//! [`Series`], [`Regions`]) and drawn by one routine, so that all charts share
-//! axes, legend, colours and markers.
+//! A chart measures, stores the records together with the machine and the versions, and
+//! draws them, as SVG with its text as text, and as PNG. Drawings are described as data
+//! ([`Figure`], [`Panel`], [`Series`], [`Regions`]) and drawn by one function, so that all
+//! charts share axes, legend, colours and markers.
 //!
 //! To add a chart: a module here whose `make` returns a [`Chart`], and its name
 //! in `src/cli/lab/chart.rs`.
 
+mod canvas;
 pub mod certificate;
 mod dash;
 pub mod detectors;
@@ -27,6 +27,7 @@ mod raster;
 mod regions;
 mod scale;
 pub mod stability;
+mod stroke;
 #[cfg(test)]
 mod tests;
 pub mod work_precision;
@@ -36,10 +37,10 @@ pub use draw::svg;
 pub use equal::equal_scales;
 pub use error::ChartError;
 pub use figure::{Axis, Figure, Mark, Panel, Series, Stroke};
-pub use front::{Front, front};
+pub use front::{FrontPoint, front};
 pub use look::{Look, Marker};
 pub use machine::{Document, Machine, versions};
 pub use raster::png;
 pub use regions::{Category, Regions};
 pub use scale::Scale;
-pub use write::{Chart, Effort, Table, write};
+pub use write::{Chart, ChartTable, Effort, write};

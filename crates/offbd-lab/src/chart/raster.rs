@@ -1,5 +1,5 @@
-//! SVG to PNG with a font of our own, so that both show the same drawing on a
-//! machine without any.
+//! Converts SVG to PNG with an embedded font, so that the result does not depend on the
+//! fonts of the machine.
 
 use std::sync::Arc;
 
@@ -8,10 +8,10 @@ use resvg::usvg::{Options, Tree, fontdb};
 
 use super::error::ChartError;
 
-/// The drawing in pixels as PNG: one pixel for each of the SVG's.
+/// Returns the drawing as PNG, with one pixel per pixel of the SVG.
 ///
 /// # Errors
-/// [`ChartError::Raster`] if `svg` is none.
+/// [`ChartError::Raster`] if `svg` is invalid.
 pub fn png(svg: &str) -> Result<Vec<u8>, ChartError> {
     let failed = |reason: &dyn std::fmt::Display| ChartError::Raster(reason.to_string());
     let tree = Tree::from_str(svg, &options()).map_err(|e| failed(&e))?;
@@ -22,7 +22,7 @@ pub fn png(svg: &str) -> Result<Vec<u8>, ChartError> {
     pixmap.encode_png().map_err(|e| failed(&e))
 }
 
-/// DejaVu Sans for every text, whatever is installed.
+/// Returns options that use the embedded DejaVu Sans for all text.
 fn options() -> Options<'static> {
     let mut fonts = fontdb::Database::new();
     fonts.load_font_source(fontdb::Source::Binary(Arc::new(dejavu::sans::regular())));

@@ -1,8 +1,8 @@
-//! A map: rectangles of discrete categories on the axes of a panel.
+//! Maps: rectangular cells of discrete categories on the axes of a panel.
 
 use super::look::Look;
 
-/// A kind of cell; the legend shows it.
+/// A category of cells, shown in the legend.
 #[derive(Clone, Debug)]
 pub struct Category {
     pub name: String,
@@ -18,16 +18,16 @@ pub struct Regions {
     pub x_edges: Vec<f64>,
     /// Ascending; one more than there are rows.
     pub y_edges: Vec<f64>,
-    /// The category of cell (i, j) at `j · columns + i`; a number that is no
-    /// category leaves the cell blank.
+    /// Index of the category of cell (i, j) at `j · columns + i`; an index out of range
+    /// leaves the cell blank.
     pub cells: Vec<usize>,
 }
 
-/// A cell: its corners and the category that fills it.
-pub(super) type Cell<'a> = (usize, usize, [(f64, f64); 2], &'a Category);
+/// A cell: its column, its row, its corners, and its category.
+pub(super) type FilledCell<'a> = (usize, usize, [(f64, f64); 2], &'a Category);
 
 impl Regions {
-    /// Cells centred on `xs` and `ys` (ascending, positive), their edges half way
+    /// Creates cells centred on `xs` and `ys` (ascending, positive), with the edges half way
     /// between on logarithmic axes.
     #[must_use]
     pub fn centred_log(
@@ -41,7 +41,7 @@ impl Regions {
         Self { categories, x_edges: log_edges(xs), y_edges: log_edges(ys), cells }
     }
 
-    pub(super) fn filled(&self) -> impl Iterator<Item = Cell<'_>> {
+    pub(super) fn filled(&self) -> impl Iterator<Item = FilledCell<'_>> {
         let columns = self.x_edges.len().saturating_sub(1);
         self.cells.iter().enumerate().filter_map(move |(k, &category)| {
             let (i, j) = (k % columns, k / columns);
@@ -52,7 +52,8 @@ impl Regions {
     }
 }
 
-/// Geometric means of neighbours; the outer edges as far out as the inner ones.
+/// Returns the geometric means of neighbours; each outer edge is as far from its centre as
+/// the inner edge on the other side.
 fn log_edges(centres: &[f64]) -> Vec<f64> {
     let [first, .., last] = centres else {
         let edges = |&c: &f64| vec![c / 2.0, c * 2.0];

@@ -1,26 +1,26 @@
-//! An axis' range, ticks and their labels: linear, logarithmic with decades, or names.
+//! Scales of axes: range, ticks and labels; linear, logarithmic, or names.
 
 use std::ops::Range;
 
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 
-/// Most labels along one axis.
+/// Maximum number of labels along a logarithmic axis; chosen.
 const MOST_LABELS: usize = 7;
 
-/// The range of an axis and how it runs.
+/// The type and range of an axis.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Scale {
-    /// From the first to the second, both finite.
+    /// Linear, from the first to the second value, both finite.
     Linear(f64, f64),
-    /// From the first to the second, both positive.
+    /// Logarithmic, from the first to the second value, both positive.
     Log(f64, f64),
     /// Names at 0, 1, 2 and so on.
     Names(Vec<String>),
 }
 
 impl Scale {
-    /// A logarithmic range around the positive `values`, with a margin of
-    /// `margin` (0.05 is five hundredths of its length) on both sides.
+    /// Returns a logarithmic range around the positive `values`, with a margin on both
+    /// sides as a share of its length.
     #[must_use]
     pub fn log_around(values: impl IntoIterator<Item = f64>, margin: f64) -> Self {
         let logs = values.into_iter().filter(|v| v.is_finite() && *v > 0.0).map(f64::log10);
@@ -28,14 +28,14 @@ impl Scale {
         Self::Log(10_f64.powf(low), 10_f64.powf(high))
     }
 
-    /// A linear range around `values`, with a margin likewise.
+    /// Returns a linear range around `values`, with a margin likewise.
     #[must_use]
     pub fn linear_around(values: impl IntoIterator<Item = f64>, margin: f64) -> Self {
         let (low, high) = around(values.into_iter().filter(|v| v.is_finite()), margin);
         Self::Linear(low, high)
     }
 
-    /// The first and the last value.
+    /// Returns the first and the last value.
     pub(super) fn ends(&self) -> (f64, f64) {
         match self {
             Self::Linear(low, high) | Self::Log(low, high) => (*low, *high),
@@ -53,13 +53,13 @@ impl Scale {
         value.clamp(low, high)
     }
 
-    /// Characters of the longest name; of numbers none count.
+    /// Returns the number of characters of the longest name; 0 for numeric scales.
     pub(super) fn longest_name(&self) -> usize {
         let Self::Names(names) = self else { return 0 };
         names.iter().map(|name| name.chars().count()).max().unwrap_or_default()
     }
 
-    /// Where `value` lies between the ends, 0 to 1.
+    /// Returns the position of `value` between the ends, 0 to 1.
     fn share(&self, value: f64) -> f64 {
         let (low, high) = self.ends();
         match self {
@@ -68,7 +68,7 @@ impl Scale {
         }
     }
 
-    /// Values with a label.
+    /// Returns the values with a label.
     fn labelled(&self) -> Vec<f64> {
         match *self {
             Self::Linear(low, high) => multiples(low, high, nice_step(high - low)),
@@ -77,7 +77,7 @@ impl Scale {
         }
     }
 
-    /// Values with a faint line, those with a label among them.
+    /// Returns the values with a grid line, including those with a label.
     fn ticks(&self) -> Vec<f64> {
         match *self {
             Self::Linear(..) | Self::Names(_) => self.labelled(),
@@ -107,8 +107,8 @@ fn around(values: impl Iterator<Item = f64>, margin: f64) -> (f64, f64) {
     (low - pad, high + pad)
 }
 
-/// Labels of a logarithmic axis: decades, some left out where there are many;
-/// also 2 and 5 (and 3) of each where there are few.
+/// Returns the labelled values of a logarithmic axis: decades, only some of them if there
+/// are many; with multiples of 2 and 5, or more, if there are few.
 fn labelled_log(low: f64, high: f64) -> Vec<f64> {
     let whole = decades(low, high, &[1.0]);
     if whole.len() > MOST_LABELS {
@@ -123,14 +123,14 @@ fn labelled_log(low: f64, high: f64) -> Vec<f64> {
     if with_few.len() <= MOST_LABELS { with_few } else { whole }
 }
 
-/// The `digits` times powers of ten between `low` and `high`.
+/// Returns the `digits` times powers of ten between `low` and `high`.
 fn decades(low: f64, high: f64, digits: &[f64]) -> Vec<f64> {
     let powers = low.log10().floor() as i32..=high.log10().ceil() as i32;
     let all = powers.flat_map(|p| digits.iter().map(move |d| d * 10_f64.powi(p)));
     all.filter(|v| (low * (1.0 - 1e-9)..=high * (1.0 + 1e-9)).contains(v)).collect()
 }
 
-/// 1, 2 or 5 times a power of ten, so that about five fit into `length`.
+/// Returns 1, 2 or 5 times a power of ten, of which about five fit into `length`.
 fn nice_step(length: f64) -> f64 {
     let raw = length / 5.0;
     let power = 10_f64.powf(raw.log10().floor());
@@ -143,13 +143,13 @@ fn multiples(low: f64, high: f64, step: f64) -> Vec<f64> {
     (first..=last).map(|k| k as f64 * step).collect()
 }
 
-/// As a reader writes it: no more digits than it has.
+/// Formats a number without superfluous digits.
 fn plain(value: f64) -> String {
     let rounded: f64 = format!("{value:.6e}").parse().unwrap_or(value);
     format!("{rounded}").replace('-', "−")
 }
 
-/// 10⁻³ for 0.001, 2·10⁴ for 20 000.
+/// Formats 0.001 as 10⁻³ and 20 000 as 2·10⁴.
 fn power_of_ten(value: f64) -> String {
     let text = format!("{value:.0e}");
     let Some((digit, power)) = text.split_once('e') else { return text };

@@ -1,4 +1,4 @@
-//! A chart of three made-up records, from the records to the files.
+//! A chart of three artificial records, from the records to the files.
 
 use resvg::tiny_skia::Pixmap;
 use serde::{Deserialize, Serialize};
@@ -6,15 +6,18 @@ use serde::{Deserialize, Serialize};
 use super::*;
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-struct Record {
+struct MadeUpRecord {
     method: String,
     error_m: Option<f64>,
     cost_us: f64,
 }
 
-fn records() -> Vec<Record> {
-    let record =
-        |method: &str, error_m, cost_us| Record { method: method.to_owned(), error_m, cost_us };
+fn records() -> Vec<MadeUpRecord> {
+    let record = |method: &str, error_m, cost_us| MadeUpRecord {
+        method: method.to_owned(),
+        error_m,
+        cost_us,
+    };
     vec![
         record("plain", Some(1e-3), 1.0),
         record("fine", Some(1e-7), 90.0),
@@ -63,7 +66,7 @@ fn chart() -> Chart {
         name: "made-up",
         records,
         figures: vec![("", figure)],
-        table: Table::default(),
+        table: ChartTable::default(),
         versions,
     }
 }
@@ -96,7 +99,7 @@ fn a_drawing_keeps_its_labels_as_text() {
     ] {
         assert!(texts.contains(&label), "no text {label:?} among {texts:?}");
     }
-    // Each name once, though its line or sign appears in panel and legend.
+    // Each name once, although its line or marker appears in panel and legend.
     assert_eq!(texts.iter().filter(|t| **t == "plain").count(), 1);
 }
 
@@ -109,7 +112,7 @@ fn the_pixels_have_the_size_of_the_drawing_and_are_not_blank() {
     let count = |rgb: (u8, u8, u8)| {
         pixels.pixels().iter().filter(|p| (p.red(), p.green(), p.blue()) == rgb).count()
     };
-    // Cells of the map, and black text that needs the font we carry.
+    // Cells of the map, and black text, which needs the embedded font.
     assert!(count(Look::of(0).rgb) > 10_000, "no blue");
     assert!(count((0, 0, 0)) > 1_000, "no text");
 }
@@ -120,7 +123,7 @@ fn files_are_written_and_records_read_back() {
     let written = write(&chart(), &dir.path().join("new")).unwrap();
     let names: Vec<_> = written.iter().map(|p| p.file_name().unwrap().to_str().unwrap()).collect();
     assert_eq!(names, ["made-up.json", "made-up.svg", "made-up.png"]);
-    let read: Document<Record> =
+    let read: Document<MadeUpRecord> =
         serde_json::from_slice(&std::fs::read(&written[0]).unwrap()).unwrap();
     assert_eq!((read.chart.as_str(), read.records), ("made-up", records()));
     assert_eq!(read.versions["other"], "3.1");

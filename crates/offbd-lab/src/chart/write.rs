@@ -1,4 +1,4 @@
-//! A finished chart and its files.
+//! A chart and its files.
 
 use std::path::{Path, PathBuf};
 
@@ -10,44 +10,44 @@ use super::figure::Figure;
 use super::machine::{Document, Machine, versions};
 use super::raster::png;
 
-/// How much is measured.
+/// The extent of a measurement.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Effort {
-    /// Everything, as for publishing.
+    /// All points, for publication.
     #[default]
     Full,
-    /// A few points, in about a second: to see that it works.
+    /// A few points, to test that the chart works.
     Quick,
 }
 
-/// What a chart's `make` returns.
+/// A measured chart: its records, figures and table.
 #[derive(Clone, Debug)]
 pub struct Chart {
-    /// The stem of its files.
+    /// The stem of the file names.
     pub name: &'static str,
-    /// Each serialised by the chart's own record type.
+    /// The records, serialised from the chart's own type.
     pub records: Vec<Value>,
-    /// The first is drawn as `NAME.svg` and `NAME.png`; of the others each as
-    /// `NAME-WORD`, by its word.
+    /// The figures with a suffix each. The first is written as `NAME.svg` and `NAME.png`,
+    /// the others as `NAME-SUFFIX.svg` and `NAME-SUFFIX.png`.
     pub figures: Vec<(&'static str, Figure)>,
-    pub table: Table,
-    /// Versions of other programs measured, beside our own.
+    pub table: ChartTable,
+    /// Versions of other programs measured.
     pub versions: Vec<(String, String)>,
 }
 
-/// A short table for people.
+/// A short table for the terminal.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Table {
+pub struct ChartTable {
     pub heading: Vec<&'static str>,
-    /// Columns of numbers.
+    /// Indices of the right-aligned columns.
     pub right: Vec<usize>,
     pub rows: Vec<Vec<String>>,
 }
 
-/// Writes records and drawings into `dir`, made if need be; returns the files.
+/// Writes records and drawings into `dir`, which is created if missing; returns the files.
 ///
 /// # Errors
-/// If it cannot be drawn or written.
+/// [`ChartError`] if a figure cannot be drawn or a file cannot be written.
 pub fn write(chart: &Chart, dir: &Path) -> Result<Vec<PathBuf>, ChartError> {
     let failed = |source| ChartError::File { path: dir.to_owned(), source };
     std::fs::create_dir_all(dir).map_err(failed)?;

@@ -1,12 +1,12 @@
 use super::Estimator;
 use super::history::History;
 
-/// The second difference of three neighbouring means of `n` positions each,
-/// a = (x̄₀ − 2 x̄₁ + x̄₂)/(nT)²: a moving average, differenced over its own
-/// length. Delay (3n − 1)T/2; σ_a = √(6/n) σ/(nT)².
+/// The second difference of three adjacent means of `n` positions each,
+/// a = (x̄₀ − 2 x̄₁ + x̄₂)/(nT)²: a moving average, differenced over its own length.
+/// Delay (3n − 1)T/2; σ_a = √(6/n) σ/(nT)².
 ///
-/// The sums are updated as positions come and go, and made afresh once per
-/// window, which keeps rounding from growing.
+/// The sums are updated with each position, and recomputed once per window, which keeps
+/// rounding errors from accumulating.
 #[derive(Clone, Debug)]
 pub struct Averages {
     history: History,
@@ -17,12 +17,13 @@ pub struct Averages {
 }
 
 impl Averages {
-    /// For positions every `period_s`, in means over `n`, at least 1.
+    /// Creates the estimator for positions every `period_s`, with means over `n`, at
+    /// least 1.
     #[must_use]
     pub fn new(n: usize, period_s: f64) -> Self {
         let n = n.max(1);
         let per_cube = 1.0 / (n as f64 * (n as f64 * period_s).powi(2));
-        // One more than the means hold: the one that leaves.
+        // One more than the means contain: the position that leaves the window.
         Self { history: History::new(3 * n + 1), n, sums: [0.0; 3], since_afresh: 0, per_cube }
     }
 
@@ -70,7 +71,7 @@ mod tests {
         }
     }
 
-    /// The sums as updated agree with the definition at every sample.
+    /// The updated sums agree with their definition at every sample.
     #[test]
     fn sliding_sums_equal_their_definition() {
         let mut averages = Averages::new(5, 1.0);

@@ -2,22 +2,23 @@ use std::f64::consts::{PI, SQRT_2};
 
 use super::Estimator;
 
-/// A Butterworth low-pass of second order by the bilinear transform,
-/// prewarped to be 3 dB down at the cutoff (Oppenheim & Schafer, *Discrete-Time
-/// Signal Processing*, 3rd ed., 7.2.2).
+/// A second-order Butterworth low-pass filter by the bilinear transform, prewarped for
+/// −3 dB at the cutoff frequency (Oppenheim & Schafer, *Discrete-Time Signal
+/// Processing*, 3rd ed., 7.2.2).
 ///
 /// With K = tan(π f_c T): H(z) = K²(1 + z⁻¹)² / ((1 + √2K + K²) +
 /// 2(K² − 1)z⁻¹ + (1 − √2K + K²)z⁻²).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LowPass {
-    /// Numerator, z⁰ to z⁻².
+    /// Coefficients of the numerator, z⁰ to z⁻².
     pub b: [f64; 3],
-    /// Denominator, z⁻¹ and z⁻²; that of z⁰ is 1.
+    /// Coefficients of the denominator, z⁻¹ and z⁻²; that of z⁰ is 1.
     pub a: [f64; 2],
 }
 
 impl LowPass {
-    /// 3 dB down at `cutoff_hz`, positive and below half the rate `1/period_s`.
+    /// Creates the filter with −3 dB at `cutoff_hz`, which is positive and below half the
+    /// sampling rate `1/period_s`.
     #[must_use]
     pub fn new(cutoff_hz: f64, period_s: f64) -> Self {
         let k = (PI * cutoff_hz * period_s).tan();
@@ -28,20 +29,22 @@ impl LowPass {
     }
 }
 
-/// The second difference of positions that passed a [`LowPass`]. The filter
-/// begins as if the first position had always been there.
+/// The second difference of positions filtered by a [`LowPass`]. The filter starts in
+/// the steady state of the first position.
 #[derive(Clone, Copy, Debug)]
 pub struct Butterworth {
     filter: LowPass,
-    /// Transposed direct form II; of positions relative to the first.
+    /// Filter state in transposed direct form II, for positions relative to the first.
     state: [f64; 2],
     first: Option<f64>,
+    /// The last two filtered positions, newest first.
     smooth: [f64; 2],
     per_square: f64,
 }
 
 impl Butterworth {
-    /// For positions every `period_s`; `cutoff_hz` as in [`LowPass::new`].
+    /// Creates the estimator for positions every `period_s`; `cutoff_hz` as in
+    /// [`LowPass::new`].
     #[must_use]
     pub fn new(cutoff_hz: f64, period_s: f64) -> Self {
         let filter = LowPass::new(cutoff_hz, period_s);
@@ -76,8 +79,8 @@ mod tests {
         assert!((found - wanted).abs() < tolerance, "{found} {wanted}");
     }
 
-    /// The closed form at a quarter of the rate: b₀ = 1/(2 + √2),
-    /// a₂ = (2 − √2)/(2 + √2); and at a tenth, as tables print it.
+    /// The closed form at a quarter of the sampling rate: b₀ = 1/(2 + √2),
+    /// a₂ = (2 − √2)/(2 + √2); and the tabulated values at a tenth.
     #[test]
     fn validate_known_coefficients() {
         let quarter = LowPass::new(0.25, 1.0);
@@ -92,7 +95,7 @@ mod tests {
         close(tenth.a[1], 0.412_801_6, 5e-8);
     }
 
-    /// |H|² is a half at the cutoff, by the sine's steady state.
+    /// |H|² is 1/2 at the cutoff frequency, in the steady state of a sine.
     #[test]
     fn validate_three_decibels_at_the_cutoff() {
         let mut filter = Butterworth::new(5.0, 0.01);

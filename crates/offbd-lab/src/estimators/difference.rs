@@ -2,8 +2,7 @@ use super::Estimator;
 use super::history::History;
 
 /// The second difference of positions `m` samples apart,
-/// a = (x(t) − 2 x(t − mT) + x(t − 2mT))/(mT)²: for m = 1 the first difference,
-/// twice, of the raw positions. Delay mT; σ_a = √6 σ/(mT)².
+/// a = (x(t) − 2 x(t − mT) + x(t − 2mT))/(mT)². Delay mT; σ_a = √6 σ/(mT)².
 #[derive(Clone, Debug)]
 pub struct Difference {
     history: History,
@@ -12,7 +11,8 @@ pub struct Difference {
 }
 
 impl Difference {
-    /// For positions every `period_s`, over `m` of them, at least 1.
+    /// Creates the estimator for positions every `period_s`, with a spacing of `m` of
+    /// them, at least 1.
     #[must_use]
     pub fn new(m: usize, period_s: f64) -> Self {
         let m = m.max(1);

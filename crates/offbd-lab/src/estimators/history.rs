@@ -1,14 +1,14 @@
-/// The newest `n` values, in a buffer that is as long.
+/// A ring buffer of the newest `n` values.
 #[derive(Clone, Debug)]
 pub(super) struct History {
     values: Box<[f64]>,
-    /// Where the next value goes: the oldest, once full.
+    /// Index of the next value; once full, that of the oldest one.
     next: usize,
     n_seen: usize,
 }
 
 impl History {
-    /// For at least one value.
+    /// Creates a buffer for `n` values, at least one.
     pub(super) fn new(n: usize) -> Self {
         Self { values: vec![0.0; n.max(1)].into(), next: 0, n_seen: 0 }
     }
@@ -23,14 +23,14 @@ impl History {
         self.n_seen >= self.values.len()
     }
 
-    /// The value `k` before the newest; `k` less than the length.
+    /// Returns the `k`-th value before the newest; `k` is less than the length.
     pub(super) fn ago(&self, k: usize) -> f64 {
         let n = self.values.len();
         let at = self.next + n - 1 - k;
         self.values[if at >= n { at - n } else { at }]
     }
 
-    /// The two runs of the buffer, oldest first; only once full.
+    /// Returns the two contiguous parts of the buffer, oldest first; valid once full.
     pub(super) fn runs(&self) -> (&[f64], &[f64]) {
         let (newer, older) = self.values.split_at(self.next);
         (older, newer)

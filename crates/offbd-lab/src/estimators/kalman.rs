@@ -1,32 +1,33 @@
-//! A Kalman filter at steady state for position, velocity and acceleration.
+//! A steady-state Kalman filter for position, velocity and acceleration.
 //!
-//! Discrete Wiener process acceleration (Bar-Shalom, Li & Kirubarajan,
-//! *Estimation with Applications to Tracking and Navigation*, 2001, 6.3.3): over
-//! each period T the acceleration changes by a white increment of standard
-//! deviation σ_w, x ← F x + Γ w with F = [1 T T²/2; 0 1 T; 0 0 1] and
-//! Γ = [T²/2, T, 1]ᵀ; positions are read with standard deviation σ. Jerk as white
-//! noise of spectral density q has σ_w = √(qT), which makes the tuning the same
-//! at every rate. The gains are those to which the Riccati recursion settles.
+//! Discrete Wiener process acceleration (Bar-Shalom, Li & Kirubarajan, *Estimation with
+//! Applications to Tracking and Navigation*, 2001, 6.3.3): over each period T the
+//! acceleration changes by a white increment of standard deviation σ_w, x ← F x + Γ w
+//! with F = [1 T T²/2; 0 1 T; 0 0 1] and Γ = [T²/2, T, 1]ᵀ; positions are measured with
+//! standard deviation σ. White-noise jerk of spectral density q gives σ_w = √(qT), which
+//! makes the tuning independent of the sampling rate. The gains are those to which the
+//! Riccati recursion converges.
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::Estimator;
 
-/// Most steps of the Riccati recursion. It settles within some ten times the
-/// filter's memory; what has not by then keeps the gains it has.
+/// Maximum number of steps of the Riccati recursion, which converges within some ten
+/// times the filter's memory. Chosen to bound the time; after it, the gains reached are
+/// used.
 const MOST_STEPS: usize = 200_000;
 
 /// Steady-state gains: K = [α, β/T, γ/T²].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Gains {
+pub struct KalmanGains {
     pub alpha: f64,
     pub beta: f64,
     pub gamma: f64,
 }
 
-impl Gains {
-    /// For the tracking index Λ = σ_w T²/σ, positive, on which alone they
-    /// depend.
+impl KalmanGains {
+    /// Returns the gains for the tracking index Λ = σ_w T²/σ, which is positive; they
+    /// depend on nothing else.
     #[must_use]
     pub fn settled(tracking_index: f64) -> Self {
         // In units of T and σ.
@@ -50,22 +51,22 @@ impl Gains {
     }
 }
 
-/// The filter. See the module.
+/// The steady-state Kalman filter; the module documentation describes it.
 #[derive(Clone, Copy, Debug)]
 pub struct Kalman {
     period_s: f64,
     gain: [f64; 3],
-    /// Position, velocity, acceleration; none before the first position.
+    /// Position, velocity, acceleration; `None` before the first position.
     state: Option<[f64; 3]>,
 }
 
 impl Kalman {
-    /// For positions every `period_s` with standard deviation `sigma` (m), and
-    /// jerk of spectral density `jerk_density` (m²/s⁵); all positive.
+    /// Creates the filter for positions every `period_s` with standard deviation `sigma`
+    /// (m), and jerk of spectral density `jerk_density` (m²/s⁵); all positive.
     #[must_use]
     pub fn new(jerk_density: f64, sigma: f64, period_s: f64) -> Self {
         let t = period_s;
-        let gains = Gains::settled((jerk_density * t).sqrt() * t * t / sigma);
+        let gains = KalmanGains::settled((jerk_density * t).sqrt() * t * t / sigma);
         let gain = [gains.alpha, gains.beta / t, gains.gamma / (t * t)];
         Self { period_s, gain, state: None }
     }
@@ -94,10 +95,10 @@ mod tests {
     use super::super::check::last;
     use super::*;
 
-    /// The closed form of α and β by tracking index (Gray & Murray, *A
-    /// Derivation of an Analytic Expression for the Tracking Index for the
-    /// Alpha-Beta-Gamma Filter*, IEEE T-AES 29 (1993) 1064–1065), with s = √(1 − α) the root of
-    /// s³ + bs² + cs − 1, b = Λ/2 − 3, c = Λ/2 + 3.
+    /// The closed form of α and β by tracking index (Gray & Murray, *A Derivation of an
+    /// Analytic Expression for the Tracking Index for the Alpha-Beta-Gamma Filter*, IEEE
+    /// T-AES 29 (1993) 1064–1065), with s = √(1 − α) the root of s³ + bs² + cs − 1,
+    /// b = Λ/2 − 3, c = Λ/2 + 3.
     fn gray_murray(index: f64) -> (f64, f64) {
         let (b, c) = (index / 2.0 - 3.0, index / 2.0 + 3.0);
         let (p, q) = (c - b * b / 3.0, 2.0 * b.powi(3) / 27.0 - b * c / 3.0 - 1.0);
@@ -112,7 +113,7 @@ mod tests {
     #[test]
     fn validate_gains_by_tracking_index() {
         for index in [1e-4, 1e-2, 0.3, 5.0] {
-            let Gains { alpha, beta, gamma } = Gains::settled(index);
+            let KalmanGains { alpha, beta, gamma } = KalmanGains::settled(index);
             let close = |found: f64, wanted: f64| {
                 assert!((found / wanted - 1.0).abs() < 1e-7, "{index}: {found} {wanted}");
             };

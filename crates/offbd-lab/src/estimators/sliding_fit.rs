@@ -1,9 +1,9 @@
 use super::Estimator;
 use offbd_core::maths::SlidingQuadratic;
 
-/// The engine's own filter, [`SlidingQuadratic`], fed evenly spaced positions:
-/// the curvature of the least-squares quadratic over a window. Delay half of the
-/// window; σ_a = σ/T²·√(720/(n(n²−1)(n²−4))) over n positions.
+/// The engine's own filter, [`SlidingQuadratic`], for evenly spaced positions: the
+/// second derivative of the least-squares quadratic over a window. The delay is half of
+/// the window; σ_a = σ/T²·√(720/(n(n²−1)(n²−4))) over n positions.
 #[derive(Clone, Debug)]
 pub struct SlidingFit {
     filter: SlidingQuadratic,
@@ -14,10 +14,10 @@ pub struct SlidingFit {
 }
 
 impl SlidingFit {
-    /// For positions every `period_s`, over as many as `window_s` spans.
+    /// Creates the estimator for positions every `period_s` over a window of `window_s`.
     #[must_use]
     pub fn new(window_s: f64, period_s: f64) -> Self {
-        // Half a period more, so that rounding of the stamps drops no position.
+        // Half a period more, so that rounding of the time stamps drops no position.
         let n_window = (window_s / period_s + 1e-9).floor() as u64 + 1;
         let window_s = (n_window as f64 - 0.5) * period_s;
         Self { filter: SlidingQuadratic::default(), window_s, period_s, n_seen: 0, n_window }
@@ -46,7 +46,7 @@ mod tests {
             let gain = noise_gain(&mut SlidingFit::new(window_s, 0.01), 200);
             let factor = 720.0 / (n * (n * n - 1.0) * (n * n - 4.0));
             let wanted = factor.sqrt() / 1e-4;
-            // The impulse leaves sums of large numbers behind: 1e-6 of them.
+            // The impulse leaves rounding errors in the running sums: up to 1e-6.
             assert!((gain / wanted - 1.0).abs() < 1e-6, "{n}: {gain} {wanted}");
         }
     }

@@ -1,9 +1,9 @@
-//! Step sizes from error estimates.
+//! Step-size control from error estimates.
 
-/// Chooses steps so that an estimated error stays at or below 1.
+/// Chooses steps so that a scaled error estimate stays at or below 1.
 #[derive(Clone, Copy, Debug)]
 pub struct StepControl {
-    /// The error of one step goes with h to this power.
+    /// The error of one step is proportional to h to this power.
     power: f64,
     shortest: f64,
     longest: f64,
@@ -11,30 +11,30 @@ pub struct StepControl {
     pub h: f64,
 }
 
-/// Steps never grow or shrink by more than this at once.
+/// Largest factor by which a step grows or shrinks at once; chosen.
 const LARGEST_CHANGE: f64 = 5.0;
 
-/// Aim below the limit, so that most steps are accepted: Hairer, Nørsett,
+/// Safety factor of the next step, so that most steps are accepted: Hairer, Nørsett,
 /// Wanner I, II.4 (4.13).
 const SAFETY: f64 = 0.9;
 
 impl StepControl {
-    /// Starts with `h` and stays within `shortest` and `longest`, all s;
-    /// the error of a step goes with h to the `power`.
+    /// Creates a control that starts with the step `h` and stays within `shortest` and
+    /// `longest`, all s; the error of a step is proportional to h to the `power`.
     #[must_use]
     pub fn new(power: f64, h: f64, shortest: f64, longest: f64) -> Self {
         Self { power, shortest, longest, h: h.clamp(shortest, longest) }
     }
 
-    /// Whether a step of `tried` seconds with the scaled `error` stands; sets
-    /// the next step either way. A step that cannot be shortened stands, and
-    /// an error that is no number never does before that.
+    /// Returns whether to accept a step of `tried` seconds with the scaled `error`, and
+    /// sets the next step. A step of the shortest length is always accepted; a longer one
+    /// with an error of NaN never is.
     pub fn accepts(&mut self, tried: f64, error: f64) -> bool {
         let change =
             if error.is_finite() { SAFETY * error.max(1e-10).powf(-1.0 / self.power) } else { 0.0 };
         let change = change.clamp(1.0 / LARGEST_CHANGE, LARGEST_CHANGE);
         let accepted = error <= 1.0 || tried <= self.shortest;
-        // A step cut short by the end of its segment says little about longer ones.
+        // A step that the end of its piece has shortened is no reason to shorten the next.
         let next =
             if accepted && tried < self.h { self.h.max(tried * change) } else { tried * change };
         self.h = next.clamp(self.shortest, self.longest);

@@ -1,18 +1,18 @@
-//! Small dense systems with the structure of motion: positions whose rates are
-//! states.
+//! Solves small dense linear systems with the structure of equations of motion: the
+//! derivatives of positions are states themselves.
 //!
-//! Gaussian elimination of fixed size and with this structure takes about two
-//! thirds of the time of a step by `nalgebra`'s general factors, measured on the
-//! nine states of the compliant model.
+//! A step with Gaussian elimination of fixed size that uses this structure takes about
+//! two thirds of the time of one with `nalgebra`'s general LU decomposition, measured on
+//! the nine states of the compliant model.
 #![expect(clippy::needless_range_loop, reason = "indices of a matrix, as in the textbook")]
 
 use offbd_core::maths::System;
 
-/// Factors of W = I/g − J for a system whose first P states have the next P as
-/// rates. The rows of the positions, `u_p/g − u_v = r_p`, are eliminated by
-/// hand, which leaves N − P unknowns to Gaussian elimination with partial
-/// pivoting.
-pub(super) struct Factors<const N: usize> {
+/// The LU decomposition of W = I/g − J for a system in which the derivatives of the
+/// first P states are the next P states. The rows of the positions,
+/// `u_p/g − u_v = r_p`, are eliminated analytically, which leaves N − P unknowns to
+/// Gaussian elimination with partial pivoting.
+pub(super) struct LuFactors<const N: usize> {
     positions: usize,
     g: f64,
     /// Rows and columns from P on: L below the diagonal, U on and above it.
@@ -24,8 +24,8 @@ pub(super) struct Factors<const N: usize> {
     by_position: [[f64; N]; N],
 }
 
-impl<const N: usize> Factors<N> {
-    /// Factors of I/g − `jacobian`, g > 0; `None` when it is singular.
+impl<const N: usize> LuFactors<N> {
+    /// Decomposes I/g − `jacobian`, g > 0; returns `None` if it is singular.
     #[inline]
     pub(super) fn new<F: System<N>>(jacobian: &[[f64; N]; N], g: f64) -> Option<Self> {
         let p = F::POSITIONS;
@@ -58,7 +58,7 @@ impl<const N: usize> Factors<N> {
         Some(Self { positions: p, g, lu, pivots, inverse, by_position: *jacobian })
     }
 
-    /// The solution u of W·u = `right`.
+    /// Returns the solution u of W·u = `right`.
     #[inline]
     pub(super) fn solve(&self, right: &[f64; N]) -> [f64; N] {
         let (p, mut u) = (self.positions, *right);
@@ -114,7 +114,7 @@ mod tests {
             let mut j = [[0.0; 5]; 5];
             (j[0][2], j[1][3]) = (1.0, 1.0);
             j[2..].copy_from_slice(&rows);
-            let u = Factors::new::<Any>(&j, g).unwrap().solve(&right);
+            let u = LuFactors::new::<Any>(&j, g).unwrap().solve(&right);
             for i in 0..5 {
                 let sum: f64 = (0..5).map(|k| (f64::from(i == k) / g - j[i][k]) * u[k]).sum();
                 let size: f64 = (0..5).map(|k| ((f64::from(i == k) / g - j[i][k]) * u[k]).abs()).sum();

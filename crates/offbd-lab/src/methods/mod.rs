@@ -1,5 +1,5 @@
-//! Methods for scenes: control of the step, and implicit methods for stiff
-//! systems. The explicit ones are `offbd_core::maths`'s.
+//! Methods for scenes: step-size control, and implicit methods for stiff systems. The
+//! explicit methods are in `offbd_core::maths`.
 
 mod adaptive;
 mod linear;

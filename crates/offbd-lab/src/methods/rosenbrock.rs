@@ -1,7 +1,7 @@
-//! Rosenbrock methods as data: linearly implicit Runge–Kutta methods that need
-//! one Jacobian and one factorisation a step, and no iteration.
+//! Rosenbrock methods as tables of coefficients: linearly implicit Runge–Kutta methods
+//! with one Jacobian and one LU decomposition per step, and no iteration.
 //!
-//! In the form without matrix products (Hairer, Wanner, *Solving Ordinary
+//! In the form without matrix–vector products (Hairer, Wanner, *Solving Ordinary
 //! Differential Equations II*, 2nd ed., IV.7, p. 111), with W = I/(hγ) − J:
 //!
 //! ```text
@@ -10,7 +10,7 @@
 //! ```
 
 use super::Stiff;
-use super::linear::Factors;
+use super::linear::LuFactors;
 use offbd_core::maths::{Estimated, moved};
 
 /// Coefficients of an S-stage method with an embedded solution.
@@ -20,7 +20,7 @@ pub struct Rosenbrock<const S: usize> {
     pub order: u32,
     pub gamma: f64,
     pub alpha: [f64; S],
-    /// Row sums that multiply ∂f/∂t.
+    /// Coefficients of ∂f/∂t.
     pub gamma_sum: [f64; S],
     pub a: [[f64; S]; S],
     pub c: [[f64; S]; S],
@@ -105,12 +105,12 @@ pub const RODAS4: Rosenbrock<6> = Rosenbrock {
     e: [0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
 };
 
-/// Span of the forward difference that takes ∂f/∂t, as a part of the step:
-/// rounding and truncation both stay below 1e-4 of the term.
+/// Span of the forward difference for ∂f/∂t as a share of the step. Chosen so that
+/// rounding and truncation errors both stay below 1e-4 of the term.
 const TIME_DIFFERENCE: f64 = 1e-4;
 
 impl<const S: usize> Rosenbrock<S> {
-    /// One step of `h` from (t, y); `None` when W is singular.
+    /// Returns the result of one step of `h` from (t, y); `None` if W is singular.
     #[inline]
     pub fn step<const N: usize, F: Stiff<N>>(
         &self,
@@ -119,7 +119,7 @@ impl<const S: usize> Rosenbrock<S> {
         y: &[f64; N],
         h: f64,
     ) -> Option<Estimated<N>> {
-        let factors = Factors::new::<F>(&system.jacobian(t, y), h * self.gamma)?;
+        let factors = LuFactors::new::<F>(&system.jacobian(t, y), h * self.gamma)?;
         let mut f = system.rate(t, y);
         let by_time = by_time(system, t, y, h, &f);
         let mut u = [[0.0; N]; S];
@@ -136,7 +136,7 @@ impl<const S: usize> Rosenbrock<S> {
     }
 }
 
-/// ∂f/∂t, where f(t, y) is `now`.
+/// Returns ∂f/∂t by a forward difference; `now` is f(t, y).
 #[inline]
 fn by_time<const N: usize>(
     system: &impl Stiff<N>,
@@ -150,7 +150,7 @@ fn by_time<const N: usize>(
     std::array::from_fn(|i| (later[i] - now[i]) / span)
 }
 
-/// `start + scale·Σ weights[j]·u[j]`.
+/// Returns `start + scale·Σ weights[j]·u[j]`.
 #[inline]
 fn sum<const N: usize>(start: &[f64; N], u: &[[f64; N]], weights: &[f64], scale: f64) -> [f64; N] {
     let mut to = *start;

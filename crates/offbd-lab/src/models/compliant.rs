@@ -8,14 +8,13 @@
 //! F_x = μ·clamp(s_x/v_thr, ±1)·F_z, F_y alike       τ = (r·F_y, −r·F_x, 0)
 //! ```
 //!
-//! As it stands it is the S-function `ballplateforces.c`: each axis of friction
-//! saturates alone, and a parting body is held back by the damper (F_z < 0).
-//! [`Compliant::with_cone`] and [`Compliant::with_push_only`] mend that. A
-//! block has r = 0 and no spin (application problem 2).
+//! By default it is the S-function `ballplateforces.c`: friction saturates on each axis
+//! separately, and the damper pulls a body back that leaves the plate (F_z < 0).
+//! [`Compliant::with_cone`] and [`Compliant::with_push_only`] correct that. A block has
+//! r = 0 and no spin (application problem 2).
 //!
-//! Valid for any motion, and the truth that the smaller models are measured
-//! against. Stiff: with the chapter's numbers the normal mode decays at 836 and
-//! 18 772 1/s, slip at 206 000 1/s.
+//! Valid for any motion; the simpler models are compared with it. Stiff: with the
+//! chapter's numbers the normal mode decays at 836 and 18 772 1/s, slip at 206 000 1/s.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -31,32 +30,32 @@ pub struct Compliant {
     push_only: bool,
 }
 
-/// Forces of the contact on the body, and how they change.
+/// The derivatives of the contact forces on the body.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Touch {
+pub(super) struct ContactDerivatives {
     /// ∂F_z/∂pz and ∂F_z/∂vz.
     normal_by: [f64; 2],
-    /// ∂F_x/∂F_z, ∂F_y/∂F_z: the friction in use.
+    /// ∂F_x/∂F_z, ∂F_y/∂F_z: the mobilised friction coefficients.
     by_normal: [f64; 2],
     /// ∂(F_x, F_y)/∂(s_x, s_y).
     by_slip: [[f64; 2]; 2],
 }
 
 impl Compliant {
-    /// Faithful to the S-function, without its start-up delay of 1 ms.
+    /// Creates the model as in the S-function, without its start-up delay of 1 ms.
     #[must_use]
     pub fn new(body: Body, contact: Contact, ground: Ground) -> Self {
         Self { body, contact, ground, cone: false, push_only: false }
     }
 
-    /// Friction limited as a whole, |F_xy| ≤ μF_z, not axis by axis.
+    /// Limits the resultant friction, |F_xy| ≤ μF_z, instead of each axis.
     #[must_use]
     pub const fn with_cone(mut self) -> Self {
         self.cone = true;
         self
     }
 
-    /// A plate that pushes and never pulls, F_z ≥ 0.
+    /// Limits the normal force to F_z ≥ 0: the plate never pulls.
     #[must_use]
     pub const fn with_push_only(mut self) -> Self {
         self.push_only = true;
@@ -76,7 +75,7 @@ impl Compliant {
         p.z < self.body.rest_height_m() && self.ground.margin_m(p.x, p.y) > 0.0
     }
 
-    /// Rates of (p, v, w) under the plate's motion.
+    /// Returns the derivatives of (p, v, w) under the plate's motion.
     #[must_use]
     #[inline]
     pub fn rate(&self, y: &[f64; 9], plate: &PlateMotion) -> [f64; 9] {
@@ -97,7 +96,7 @@ impl Compliant {
         plate.free_turn(w) + Vector3::new(lever * force.y, -lever * force.x, 0.0)
     }
 
-    /// Force of the contact on the body, N.
+    /// Returns the contact force on the body, N.
     #[must_use]
     #[inline]
     pub fn force(&self, at: &Motion) -> Vector3<f64> {
@@ -108,13 +107,13 @@ impl Compliant {
         let normal = -self.contact.stiffness_n_per_m() * depth
             - self.contact.damping_n_s_per_m() * at.velocity.z;
         let normal = if self.push_only { normal.max(0.0) } else { normal };
-        let [x, y] = self.friction_in_use(self.body.slip(&at.velocity, &at.spin));
+        let [x, y] = self.mobilised_friction(self.body.slip(&at.velocity, &at.spin));
         Vector3::new(x * normal, y * normal, normal)
     }
 
-    /// Friction force per unit of normal force.
+    /// Returns the friction force per unit of normal force.
     #[inline]
-    fn friction_in_use(&self, slip: [f64; 2]) -> [f64; 2] {
+    fn mobilised_friction(&self, slip: [f64; 2]) -> [f64; 2] {
         let (mu, threshold) = (self.contact.friction(), self.contact.slip_threshold_m_s());
         if self.cone {
             let scale = mu / slip[0].hypot(slip[1]).max(threshold);
@@ -123,13 +122,13 @@ impl Compliant {
         slip.map(|s| mu * (s / threshold).clamp(-1.0, 1.0))
     }
 
-    /// The force with its derivatives.
-    fn touch(&self, at: &Motion) -> Touch {
+    /// Returns the derivatives of the contact force.
+    fn contact_derivatives(&self, at: &Motion) -> ContactDerivatives {
         let (p, height) = (&at.position, self.body.rest_height_m());
-        // A body that just touches is about to be pressed in: without this, an
-        // implicit step from there would be an explicit one.
+        // A body that just touches counts as in contact: otherwise an implicit step from
+        // there would be an explicit one.
         if p.z > height || self.ground.margin_m(p.x, p.y) <= 0.0 {
-            return Touch::default();
+            return ContactDerivatives::default();
         }
         let force = self.force(at);
         let slip = self.body.slip(&at.velocity, &at.spin);
@@ -139,9 +138,9 @@ impl Compliant {
         } else {
             [-self.contact.stiffness_n_per_m(), -self.contact.damping_n_s_per_m()]
         };
-        Touch {
+        ContactDerivatives {
             normal_by,
-            by_normal: self.friction_in_use(slip),
+            by_normal: self.mobilised_friction(slip),
             by_slip: self.friction_by_slip(slip).map(|row| row.map(|f| f * force.z)),
         }
     }
@@ -162,12 +161,12 @@ impl Compliant {
         [[scale * y * y, -scale * x * y], [-scale * x * y, scale * x * x]]
     }
 
-    /// `∂rate[i]/∂y[j]` as `[i][j]`.
+    /// Returns `∂rate[i]/∂y[j]` as `[i][j]`.
     #[must_use]
     pub fn jacobian(&self, y: &[f64; 9], plate: &PlateMotion) -> [[f64; 9]; 9] {
         let mut j = [[0.0; 9]; 9];
         self.free_jacobian(&mut j, plate);
-        self.add_touch(&mut j, &self.touch(&Motion::from_row(y)));
+        self.add_contact(&mut j, &self.contact_derivatives(&Motion::from_row(y)));
         j
     }
 
@@ -186,21 +185,21 @@ impl Compliant {
         }
     }
 
-    fn add_touch(&self, j: &mut [[f64; 9]; 9], touch: &Touch) {
+    fn add_contact(&self, j: &mut [[f64; 9]; 9], contact: &ContactDerivatives) {
         let r = self.body.arm_m();
         let (light, lever) = (1.0 / self.body.mass_kg(), r * self.body.inverse_inertia());
         for (k, column) in [2, 5].into_iter().enumerate() {
-            let normal = touch.normal_by[k];
-            let [x, y] = touch.by_normal.map(|f| f * normal);
+            let normal = contact.normal_by[k];
+            let [x, y] = contact.by_normal.map(|f| f * normal);
             j[3][column] += light * x;
             j[4][column] += light * y;
             j[5][column] += light * normal;
             j[6][column] += lever * y;
             j[7][column] -= lever * x;
         }
-        // s_x falls with vx and rises with r·wy; s_y falls with vy and r·wx.
-        for (column, slip, by) in [(3, 0, -1.0), (7, 0, r), (4, 1, -1.0), (6, 1, -r)] {
-            let [x, y] = [touch.by_slip[0][slip] * by, touch.by_slip[1][slip] * by];
+        // s_x decreases with vx and increases with r·wy; s_y decreases with vy and r·wx.
+        for (column, slip, factor) in [(3, 0, -1.0), (7, 0, r), (4, 1, -1.0), (6, 1, -r)] {
+            let [x, y] = [contact.by_slip[0][slip] * factor, contact.by_slip[1][slip] * factor];
             j[3][column] += light * x;
             j[4][column] += light * y;
             j[6][column] += lever * y;
@@ -209,7 +208,7 @@ impl Compliant {
     }
 }
 
-/// [a]× with [a]×·b = a×b.
+/// Returns the skew-symmetric matrix [a]× with [a]×·b = a×b.
 fn cross_matrix(a: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(0.0, -a.z, a.y, a.z, 0.0, -a.x, -a.y, a.x, 0.0)
 }

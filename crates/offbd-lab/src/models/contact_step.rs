@@ -1,5 +1,5 @@
-//! A step of the compliant model in closed form: what is stiff by backward
-//! Euler, what is slow by the midpoint rule.
+//! A step of the compliant model in closed form: the stiff terms by backward Euler, the
+//! slow terms by the midpoint rule.
 //!
 //! The normal mode is linear, so its backward Euler step is one division. Slip
 //! along each axis feels a force that is linear up to v_thr and constant
@@ -11,18 +11,17 @@
 //!       with s* the slip without friction and e = 1/m + r²/I
 //! ```
 //!
-//! Gravity and the fictitious forces are taken at the middle of the step, with
-//! velocity and spin as rolling or falling makes them by then, so that the slow
-//! motion is of second order while the contact
-//! cannot blow up at any step.
+//! Gravity and the fictitious forces are evaluated at the middle of the step, with
+//! velocity and spin predicted by rolling or free fall. So the slow motion is of second
+//! order, while the contact is stable at any step.
 
 use nalgebra::Vector3;
 
 use super::compliant::Compliant;
 use offbd_core::plant::{Motion, PlateMotion};
 
-/// Steps of one length, with all that does not change from step to step. Forces
-/// are per kilogram.
+/// Contact steps of one length, with their precomputed constants. Forces are per
+/// kilogram.
 #[derive(Clone, Copy, Debug)]
 pub struct ContactStep {
     model: Compliant,
@@ -38,8 +37,8 @@ pub struct ContactStep {
     ease: f64,
     /// m·r/I, 1/m.
     lever: f64,
-    /// Acceleration while rolling over that of gravity along the plate,
-    /// 1/(1 + κ); 0 for a block.
+    /// Acceleration of the rolling ball over that of a frictionless one, 1/(1 + κ); 0 for
+    /// a block.
     rolls: f64,
     /// Spin over velocity while rolling, 1/r; 0 for a block.
     turns: f64,
@@ -48,7 +47,7 @@ pub struct ContactStep {
 }
 
 impl ContactStep {
-    /// Steps of `h` seconds, above 0, of `model`.
+    /// Creates steps of `h` seconds, above 0, of `model`.
     #[must_use]
     pub fn new(model: &Compliant, h: f64) -> Self {
         let (body, contact) = (&model.body, &model.contact);
@@ -74,7 +73,7 @@ impl ContactStep {
         }
     }
 
-    /// One step; `plate` is the plate at its middle.
+    /// Returns the motion after one step; `plate` is the plate at the middle of the step.
     #[must_use]
     #[inline]
     pub fn step(&self, from: &Motion, plate: &PlateMotion) -> Motion {
@@ -94,9 +93,8 @@ impl ContactStep {
         }
     }
 
-    /// Velocity and spin at the middle of the step, near enough for the slow
-    /// terms: on the plate as if the body rolled (or, a block, stuck), above it
-    /// as if it fell.
+    /// Predicts velocity and spin at the middle of the step, for the slow terms: on the
+    /// plate as if the ball rolled (or the block stuck), above it as in free fall.
     #[inline]
     fn half_way(&self, from: &Motion, plate: &PlateMotion) -> (Vector3<f64>, Vector3<f64>) {
         let half = self.h / 2.0;
@@ -111,7 +109,7 @@ impl ContactStep {
         (from.velocity + Vector3::new(x, y, 0.0), from.spin + spin)
     }
 
-    /// F_z/m over the step; 0 where the body is off the plate at its end.
+    /// Returns F_z/m during the step; 0 if the body is off the plate at its end.
     #[inline]
     fn normal_force(&self, from: &Motion, a_z: f64) -> f64 {
         let (p, h) = (&from.position, self.h);
@@ -126,12 +124,13 @@ impl ContactStep {
         if self.model.pushes_only() { force.max(0.0) } else { force }
     }
 
-    /// (F_x, F_y)/m over a step that ends with the slip `free` without friction.
+    /// Returns (F_x, F_y)/m during a step that without friction would end with the slip
+    /// `free`.
     #[inline]
     fn friction(&self, free: [f64; 2], normal: f64) -> [f64; 2] {
         let limit = self.friction * normal;
-        // A plate that pulls turns friction round: then it drives the slip, and
-        // the explicit step is the stable one.
+        // If the plate pulls, friction reverses and drives the slip: then the explicit
+        // step is the stable one.
         let sticks = self.threshold + self.ease * limit.max(0.0);
         if self.model.limits_as_a_cone() {
             let scale = limit / sticks.max(free[0].hypot(free[1]));

@@ -1,19 +1,19 @@
-//! The creeping ball: rolling with what the contact gives way, to first order.
+//! The creeping ball: rolling with the creep and sag of the contact, to first order.
 //!
-//! The regularised friction holds a ball only while it slips a little, and the
-//! spring only while it is pressed in. With F the forces that rolling implies,
+//! Regularised friction needs a small slip to carry a force, and the spring a small
+//! depth. With F the forces that rolling implies,
 //!
 //! ```text
 //! s = v_thr·F_xy/(μ·F_z)          creep, the slip that carries F_xy
 //! δ = F_z/K                       sag, the depth that carries F_z
 //! ```
 //!
-//! both settle within τ_n = D/K and τ_s = v_thr/((1 + 1/κ)·μ·g), about 1 ms and
-//! 5 µs with the chapter's numbers. While they settle,
-//! U = v + κ/(1 + κ)·s + 2/(1 + κ)·(−Ω_y·δ, Ω_x·δ) keeps its value: friction trades
-//! v for s, and sinking in a turning plate trades v for δ (Coriolis). So U obeys
-//! a smooth equation, and no step has to resolve the contact: to first order,
-//! the slow manifold of the compliant model (singular perturbation).
+//! both settle within τ_n = D/K and τ_s = v_thr/((1 + 1/κ)·μ·g), about 1 ms and 5 µs
+//! with the chapter's numbers. While they settle,
+//! U = v + κ/(1 + κ)·s + 2/(1 + κ)·(−Ω_y·δ, Ω_x·δ) is constant: friction exchanges v for
+//! s, and sinking in a turning plate exchanges v for δ (Coriolis). So U obeys a smooth
+//! equation, and no step has to resolve the contact: this is the slow manifold of the
+//! compliant model to first order (singular perturbation).
 //!
 //! Valid where rolling is valid and the motion is slow against τ_n and τ_s.
 
@@ -30,12 +30,12 @@ pub struct Creeping {
     contact: Contact,
 }
 
-/// What the contact gives way.
+/// The creep and sag of the contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Give {
-    /// Slip along x and y, m/s.
+pub struct CreepAndSag {
+    /// Creep: slip along x and y, m/s.
     pub slip: [f64; 2],
-    /// Depth of the ball in the plate, m.
+    /// Sag: depth of the ball in the plate, m.
     pub sag: f64,
     /// v − U along x and y, m/s.
     pub velocity: [f64; 2],
@@ -57,8 +57,8 @@ impl Creeping {
         &self.rolling
     }
 
-    /// How long sag and creep take to settle under the normal force `normal`
-    /// per kilogram, s.
+    /// Returns the settling times of sag and creep, s, under the normal force per mass
+    /// `normal`, m/s².
     #[must_use]
     pub fn settling_s(&self, normal: f64) -> [f64; 2] {
         let contact = &self.contact;
@@ -67,19 +67,19 @@ impl Creeping {
         [sag, share * contact.slip_threshold_m_s() / (contact.friction() * normal)]
     }
 
-    /// What the contact gives under the forces `grip`.
+    /// Returns creep and sag under the contact forces `grip`.
     #[must_use]
     #[inline]
-    pub fn give(&self, grip: &Grip, plate: &PlateMotion) -> Give {
+    pub fn creep_and_sag(&self, grip: &Grip, plate: &PlateMotion) -> CreepAndSag {
         let sag = self.body.mass_kg() * grip.normal / self.contact.stiffness_n_per_m();
         let per = self.contact.slip_threshold_m_s() / (self.contact.friction() * grip.normal);
         let slip = grip.friction.map(|f| f * per);
-        Give { slip, sag, velocity: self.trade(slip, sag, plate) }
+        CreepAndSag { slip, sag, velocity: self.velocity_offset(slip, sag, plate) }
     }
 
-    /// v − U for a slip and a depth.
+    /// Returns v − U for a slip and a depth.
     #[inline]
-    fn trade(&self, slip: [f64; 2], sag: f64, plate: &PlateMotion) -> [f64; 2] {
+    fn velocity_offset(&self, slip: [f64; 2], sag: f64, plate: &PlateMotion) -> [f64; 2] {
         let share = 1.0 / (1.0 + self.kappa);
         let turn = 2.0 * sag;
         [
@@ -88,27 +88,29 @@ impl Creeping {
         ]
     }
 
-    /// Rates of (x, y, Ux, Uy, wz), and what the contact has to bear.
+    /// Returns the derivatives of (x, y, Ux, Uy, wz), and the contact forces.
     #[must_use]
     #[inline]
     pub fn rate(&self, y: &[f64; 5], plate: &PlateMotion) -> ([f64; 5], Grip) {
         let (grip, rolled) = self.rolling.grip_and_rate(y, plate);
-        let give = self.give(&grip, plate);
-        let v = [y[2] + give.velocity[0], y[3] + give.velocity[1]];
-        let yielded = self.yielded(&give, plate);
-        let rates = [rolled[2] + yielded[0], rolled[3] + yielded[1], rolled[4] + yielded[2]];
+        let creep_and_sag = self.creep_and_sag(&grip, plate);
+        let v = [y[2] + creep_and_sag.velocity[0], y[3] + creep_and_sag.velocity[1]];
+        let correction = self.rate_correction(&creep_and_sag, plate);
+        let rates =
+            [rolled[2] + correction[0], rolled[3] + correction[1], rolled[4] + correction[2]];
         ([v[0], v[1], rates[0], rates[1], rates[2]], grip)
     }
 
-    /// What the rates of (Ux, Uy, wz) differ by from those of a ball that
-    /// gives nothing: v and w are not those of U, and the ball lies deeper.
+    /// Returns the difference of the derivatives of (Ux, Uy, wz) from those of the rolling
+    /// ball: velocity and spin differ from those of U, and the ball lies deeper.
     #[inline]
-    fn yielded(&self, give: &Give, plate: &PlateMotion) -> [f64; 3] {
+    fn rate_correction(&self, creep_and_sag: &CreepAndSag, plate: &PlateMotion) -> [f64; 3] {
         let (omega, alpha) = (&plate.omega, &plate.alpha);
-        let (share, sag, [x, y]) = (1.0 / (1.0 + self.kappa), give.sag, give.velocity);
-        // Of r·w, turned by a quarter.
-        let [turn_x, turn_y] = [x + give.slip[0], y + give.slip[1]];
-        // α×p acts at the sagged height; twice that comes back from d(Ω·δ)/dt.
+        let (share, sag, [x, y]) =
+            (1.0 / (1.0 + self.kappa), creep_and_sag.sag, creep_and_sag.velocity);
+        // The difference of r·w, rotated by 90°.
+        let [turn_x, turn_y] = [x + creep_and_sag.slip[0], y + creep_and_sag.slip[1]];
+        // α×p acts at the lowered height; d(Ω·δ)/dt contributes twice the opposite.
         let sunk_x = sag * (omega.x * omega.z - alpha.y);
         let sunk_y = sag * (omega.y * omega.z + alpha.x);
         [
@@ -118,28 +120,32 @@ impl Creeping {
         ]
     }
 
-    /// The state for a ball that moves as `from`: what is left when its slip
-    /// and its depth have settled.
+    /// Returns the state for a ball in the motion `from`, once its slip and its depth
+    /// have settled.
     #[must_use]
     pub fn enter(&self, from: &Motion, plate: &PlateMotion) -> [f64; 5] {
         let slip = self.body.slip(&from.velocity, &from.spin);
         let sag = self.body.rest_height_m() - from.position.z;
-        let trade = self.trade(slip, sag, plate);
+        let offset = self.velocity_offset(slip, sag, plate);
         let (p, v) = (&from.position, &from.velocity);
-        [p.x, p.y, v.x - trade[0], v.y - trade[1], from.spin.z]
+        [p.x, p.y, v.x - offset[0], v.y - offset[1], from.spin.z]
     }
 
-    /// The ball's motion in the state `y`.
+    /// Returns the ball's motion in the state `y`.
     #[must_use]
     pub fn leave(&self, y: &[f64; 5], plate: &PlateMotion) -> Motion {
         let grip = self.rolling.grip(y, plate);
-        let give = self.give(&grip, plate);
-        let v = [y[2] + give.velocity[0], y[3] + give.velocity[1]];
+        let creep_and_sag = self.creep_and_sag(&grip, plate);
+        let v = [y[2] + creep_and_sag.velocity[0], y[3] + creep_and_sag.velocity[1]];
         let r = self.body.arm_m();
         Motion {
-            position: Vector3::new(y[0], y[1], self.body.rest_height_m() - give.sag),
+            position: Vector3::new(y[0], y[1], self.body.rest_height_m() - creep_and_sag.sag),
             velocity: Vector3::new(v[0], v[1], 0.0),
-            spin: Vector3::new(-(v[1] + give.slip[1]) / r, (v[0] + give.slip[0]) / r, y[4]),
+            spin: Vector3::new(
+                -(v[1] + creep_and_sag.slip[1]) / r,
+                (v[0] + creep_and_sag.slip[0]) / r,
+                y[4],
+            ),
         }
     }
 }

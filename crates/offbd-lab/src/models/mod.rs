@@ -1,5 +1,5 @@
-//! Models of contact for scenes, above those of `offbd_core::plant`: a
-//! compliant contact, its stiff step, and rolling that creeps.
+//! Contact models for scenes, in addition to those of `offbd_core::plant`: a compliant
+//! contact, its stiff step in closed form, and rolling with creep.
 
 mod compliant;
 mod contact_step;
@@ -7,4 +7,4 @@ mod creeping;
 
 pub use compliant::Compliant;
 pub use contact_step::ContactStep;
-pub use creeping::{Creeping, Give};
+pub use creeping::{CreepAndSag, Creeping};

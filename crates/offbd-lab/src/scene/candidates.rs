@@ -1,46 +1,50 @@
-//! What may run a scene, with the work that it is expected to take.
+//! Lists the configurations that may run a scene, with their expected work.
 
 use super::Scene;
 use super::configuration::{Configuration, Method, Model, Pace};
-use super::reference::{Reference, rodas};
+use super::reference::{ReferenceSolution, rodas};
 use super::run::LONGEST_PART;
 
-/// Times of one step, ns on the machine of the charts.
+/// CPU time of one contact step, ns, measured on the machine of the charts.
 pub(super) const WORK_CONTACT_STEP: f64 = 80.0;
+/// CPU time of one Dormand–Prince step of a rolling ball, ns, measured likewise.
 pub(super) const WORK_DOPRI5: f64 = 500.0;
+/// CPU time of one Dormand–Prince step of the sliding model, ns, measured likewise.
 const WORK_SLIDING: f64 = 700.0;
 
-/// Time that the sliding model spends on finding a slip, a flight and a
-/// landing, ns on the machine of the charts.
+/// CPU time in which the sliding model locates a slip, a flight and a landing, ns,
+/// measured on the machine of the charts.
 const WORK_EVENTS: f64 = 10_000.0;
 
-/// Part of the tolerance at which Dormand–Prince runs at its finest. Its
-/// estimates are of the fourth-order solution and add up without cancelling:
-/// the fifth-order one has never been seen to be off by more.
+/// Finest tolerance of Dormand–Prince as a fraction of the wanted accuracy. Its error
+/// estimates are those of the fourth-order solution and add up without cancelling: the
+/// error of the fifth-order solution has never been observed to exceed them.
 pub(super) const METHOD_SHARE: f64 = 0.1;
 
-/// It is tried at so many times that as well, and each takes about
-/// [`GROWTH`] times the work of the one before.
+/// Tolerances at which Dormand–Prince is tried, as multiples of its finest one:
+/// decades, chosen.
 const COARSER: [f64; 4] = [1000.0, 100.0, 10.0, 1.0];
+/// Estimated growth of the work from each of these tolerances to the next finer one.
 const GROWTH: f64 = 1.5;
 
-/// The coarsest tolerance of RODAS, m.
+/// The coarsest tolerance of RODAS, m; chosen.
 const COARSEST_M: f64 = 1e-2;
 
-/// What is to be run.
+/// A scene to be run.
 pub(super) struct Task<'a> {
     pub scene: &'a Scene,
-    /// The plate does something of its own within this time, s.
+    /// The shortest time scale of the plate's motion, s.
     pub time_s: f64,
-    /// The accuracy, m.
+    /// The wanted accuracy, m.
     pub wanted_m: f64,
 }
 
-/// A configuration and its work, ns.
+/// Expected work, ns, and a configuration.
 type Candidate = (f64, Configuration);
 
-/// The candidates where `model`, the rolling or the creeping ball, will do: the
-/// least work first, its finest steps last.
+/// Returns the candidates of a scene for which `model`, the rolling or the creeping
+/// ball, is accurate enough, in ascending order of work; the last one is `model` at its
+/// finest tolerance.
 pub(super) fn smooth(task: &Task<'_>, model: Model) -> Vec<Candidate> {
     let mut all = by_dopri5(task, model);
     let most = all.last().map_or(0.0, |finest| finest.0);
@@ -48,10 +52,10 @@ pub(super) fn smooth(task: &Task<'_>, model: Model) -> Vec<Candidate> {
     ordered(all, most)
 }
 
-/// The candidates where nothing is known but the `reference`, the least work
-/// first, none with more than its own; without the rolling and the creeping
-/// ball unless it `rolls`.
-pub(super) fn any(task: &Task<'_>, rolls: bool, reference: &Reference) -> Vec<Candidate> {
+/// Returns the candidates of a scene of which only the `reference` is known, in
+/// ascending order of work, none with more work than the reference; with the rolling
+/// and the creeping ball only if the ball `rolls`.
+pub(super) fn any(task: &Task<'_>, rolls: bool, reference: &ReferenceSolution) -> Vec<Candidate> {
     let mut all = Vec::new();
     if rolls {
         all.extend(by_dopri5(task, Model::Rolling));
@@ -70,7 +74,8 @@ fn ordered(mut all: Vec<Candidate>, most: f64) -> Vec<Candidate> {
     all
 }
 
-/// `model` by Dormand–Prince with steps so short that they do not matter.
+/// Returns `model` by Dormand–Prince at its finest tolerance, at which the method's
+/// error is negligible.
 pub(super) fn finest(model: Model, wanted_m: f64) -> Option<Configuration> {
     dopri5(model, wanted_m * METHOD_SHARE)
 }
@@ -81,7 +86,7 @@ fn dopri5(model: Model, tolerance_m: f64) -> Option<Configuration> {
 }
 
 impl Task<'_> {
-    /// The least number of steps of Dormand–Prince.
+    /// Returns the minimum number of Dormand–Prince steps.
     fn dopri5_steps(&self) -> f64 {
         (self.scene.duration_s / (LONGEST_PART * self.time_s)).ceil().max(1.0)
     }
@@ -97,7 +102,7 @@ fn by_dopri5(task: &Task<'_>, model: Model) -> Vec<Candidate> {
         .collect()
 }
 
-/// Steps of 1, 2 and 5 times powers of ten.
+/// Returns the contact step at step sizes of 1, 2 and 5 times powers of ten.
 fn by_contact_steps(task: &Task<'_>, most: f64) -> impl Iterator<Item = Candidate> {
     let decades = (-9..=1).rev().flat_map(|power| [5.0, 2.0, 1.0].map(|n| n * 10_f64.powi(power)));
     let duration = task.scene.duration_s;
@@ -110,8 +115,8 @@ fn by_contact_steps(task: &Task<'_>, most: f64) -> impl Iterator<Item = Candidat
     })
 }
 
-/// Tolerances from the reference's up, by tens.
-fn by_rodas(reference: &Reference) -> impl Iterator<Item = Candidate> {
+/// Returns RODAS at tolerances from the reference's up, by factors of ten.
+fn by_rodas(reference: &ReferenceSolution) -> impl Iterator<Item = Candidate> {
     let tolerances = (0..).map(|power| reference.tolerance_m * 10_f64.powi(power));
     tolerances
         .take_while(|tolerance| *tolerance <= COARSEST_M * 1.1)

@@ -1,11 +1,11 @@
-//! Which model and which method, by the names that people use.
+//! The models and methods, with their names, and the configurations made of them.
 
 use std::fmt;
 use std::str::FromStr;
 
 use offbd_core::vocabulary::Invalid;
 
-/// A rung of the ladder of models, from the cheapest to the truest.
+/// A model of the body and its contact, ordered from the cheapest to the most accurate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Model {
     Planar,
@@ -15,10 +15,10 @@ pub enum Model {
     Compliant,
 }
 
-/// A way to step a model.
+/// A numerical method that steps a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
-    /// Exact for a held angle.
+    /// Exact while the angle is constant.
     ZeroOrderHold,
     Euler,
     SemiImplicitEuler,
@@ -27,7 +27,7 @@ pub enum Method {
     Dopri5,
     Rodas3,
     Rodas4,
-    /// Backward Euler of the contact in closed form.
+    /// Backward Euler for the contact, in closed form.
     ContactStep,
 }
 
@@ -46,7 +46,7 @@ impl Model {
         }
     }
 
-    /// The methods that can step it.
+    /// Returns the methods that can step this model.
     #[must_use]
     pub const fn methods(self) -> &'static [Method] {
         match self {
@@ -73,7 +73,7 @@ impl Model {
         }
     }
 
-    /// The method that is taken when none is named.
+    /// Returns the default method.
     #[must_use]
     pub const fn usual_method(self) -> Method {
         match self {
@@ -112,7 +112,7 @@ impl Method {
         }
     }
 
-    /// Whether it chooses its steps by itself, from a tolerance.
+    /// Returns whether the method adapts its step size to a tolerance.
     #[must_use]
     pub const fn adapts(self) -> bool {
         matches!(self, Self::Dopri5 | Self::Rodas3 | Self::Rodas4)
@@ -137,7 +137,7 @@ impl FromStr for Model {
     fn from_str(name: &str) -> Result<Self, Invalid> {
         Self::ALL.into_iter().find(|model| model.name() == name).ok_or_else(|| {
             let known = Self::ALL.map(Self::name).join(", ");
-            Invalid::new("/model", format!("{name} is none of {known}"))
+            Invalid::new("/model", format!("unknown model {name}; expected one of {known}"))
         })
     }
 }
@@ -148,29 +148,30 @@ impl FromStr for Method {
     fn from_str(name: &str) -> Result<Self, Invalid> {
         Self::ALL.into_iter().find(|method| method.name() == name).ok_or_else(|| {
             let known = Self::ALL.map(Self::name).join(", ");
-            Invalid::new("/method", format!("{name} is none of {known}"))
+            Invalid::new("/method", format!("unknown method {name}; expected one of {known}"))
         })
     }
 }
 
-/// How long the steps are.
+/// How the step size is set.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pace {
-    /// Fixed steps of so many seconds; the last one of a piece is shorter.
+    /// Fixed steps of at most this length, s: each smooth piece of the plate's motion is
+    /// divided into equal ones.
     Step(f64),
-    /// Steps such that the position at the end is off by this much at most, m,
-    /// as far as the method can tell.
+    /// Adaptive steps that keep the error of the position at the end of the scene, as the
+    /// method estimates it, within this tolerance, m.
     Tolerance(f64),
 }
 
-/// The shortest step, s: below it, time stands still in double precision after
-/// a few hours.
+/// The shortest step, s. Chosen so that time still advances in double precision after
+/// hours of a scene.
 pub const SHORTEST_STEP_S: f64 = 1e-9;
 
-/// The longest step, s.
+/// The longest step, s; chosen.
 pub const LONGEST_STEP_S: f64 = 10.0;
 
-/// A model with a method and its pace, which fit together.
+/// A model, a method that can step it, and a pace that the method accepts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Configuration {
     model: Model,
@@ -179,8 +180,9 @@ pub struct Configuration {
 }
 
 impl Configuration {
-    /// A step lies in [1e-9, 10] s, a tolerance in [1e-12, 1] m. A fixed step
-    /// goes with every method, a tolerance with those that adapt.
+    /// Checks the combination. A step lies in [1e-9, 10] s, a tolerance in [1e-12, 1] m.
+    /// Every method accepts a fixed step, only adaptive methods accept a tolerance; the
+    /// sliding model needs a tolerance.
     ///
     /// # Errors
     /// [`Invalid`] naming `/method`, `/step` or `/tolerance`.

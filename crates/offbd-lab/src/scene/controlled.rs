@@ -1,19 +1,19 @@
-//! A plate in closed loop: one PID per axis, held between its turns, through a
-//! second-order lag.
+//! A plate in closed loop: one sampled PID controller per axis with a zero-order hold,
+//! acting through a second-order lag.
 //!
 //! ```text
 //! u = kp·e + ki·∫e − kd·(p − p′)/T      every T, held; e = −p, within ±limit
 //! q̈ = (u − q)/τ² − 2·q̇/τ               the plate follows, critically damped
 //! ```
 //!
-//! The derivative acts on the measurement, so that nothing kicks at the start;
-//! the integral stands still while the limit holds. The lag is Simscape's
-//! second-order input filter, solved in closed form within a hold:
-//! q = u + (a + b·s)·exp(−s/τ), s from the hold's start.
+//! The derivative acts on the measurement, so that there is no derivative kick at the
+//! start; the integral is frozen while the command is limited (anti-windup). The lag is
+//! Simscape's second-order input filter, solved in closed form within a hold:
+//! q = u + (a + b·s)·exp(−s/τ), where s counts from the start of the hold.
 //!
-//! Gains by pole placement on p̈ = g/(1 + κ)·u, the rolling ball on a plate that
-//! follows at once: (s + ω)³ wants kd = 3ω, kp = 3ω², ki = ω³, each over
-//! g/(1 + κ). Valid while T/2 + 2τ is short against 1/(3ω).
+//! Gains by pole placement on p̈ = g/(1 + κ)·u, the rolling ball on a plate without lag:
+//! the characteristic polynomial (s + ω)³ requires kd = 3ω, kp = 3ω², ki = ω³, each
+//! divided by g/(1 + κ). Valid while T/2 + 2τ is short against 1/(3ω).
 
 use std::f64::consts::TAU;
 
@@ -23,25 +23,26 @@ use super::drive::{Drive, Push, next_push, pushed};
 use offbd_core::plant::{Ball, Motion, Tilt};
 use offbd_core::vocabulary::Axis;
 
-/// A loop; immutable. Gains in rad/m, rad/(m·s), rad·s/m.
+/// The parameters of a control loop; immutable. Gains in rad/m, rad/(m·s), rad·s/m.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Loop {
+pub struct ControlLoop {
     pub proportional: f64,
     pub integral: f64,
     pub derivative: f64,
-    /// Between two turns of the controller, s.
+    /// Sampling period of the controller, s.
     pub period_s: f64,
-    /// Largest command, rad.
+    /// Limit of the command's magnitude, rad.
     pub limit_rad: f64,
     /// Time constant τ of the plate's lag, s.
     pub lag_s: f64,
 }
 
-impl Loop {
-    /// The chapter's loop, 10 ms and ±0.2 rad, for `ball`. The triple pole at
-    /// 1.5 rad/s and the lag of 30 ms are ours: the delay of 65 ms costs 18° of
-    /// 72° at the crossover near 4.7 rad/s; with less lag, or larger gains, the
-    /// plate's first swing throws off a ball that starts 9 cm from the joint.
+impl ControlLoop {
+    /// Returns the chapter's loop, 10 ms and ±0.2 rad, for `ball`. The chapter gives
+    /// neither poles nor lag; the triple pole at 1.5 rad/s and the lag of 30 ms are
+    /// chosen: the delay of 65 ms costs 18° of the 72° phase margin at the crossover near
+    /// 4.7 rad/s; with less lag, or larger gains, the plate's first swing throws off a
+    /// ball that starts 9 cm from the joint.
     #[must_use]
     pub fn chapter(ball: &Ball) -> Self {
         let (omega, gain) = (1.5, ball.rolling_gravity());
@@ -56,38 +57,39 @@ impl Loop {
     }
 }
 
-/// One turn of the controller.
+/// One sampling instant of the controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Turn {
+pub struct ControlStep {
     pub at_s: f64,
-    /// Where the ball is, along x and y, m; it is wanted at the centre.
+    /// Position of the ball along x and y, m; the setpoint is the centre.
     pub position: Vector2<f64>,
-    /// (qx, qy) commanded from now on, rad.
+    /// Commands (qx, qy) from this instant on, rad.
     pub command: Vector2<f64>,
 }
 
-/// A plate that follows a loop around the ball.
+/// A plate driven by a controller that keeps the ball at the centre.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Controlled {
-    closed: Loop,
+pub struct ControlledPlate {
+    closed: ControlLoop,
     pushes: Vec<Push>,
-    axes: [Control; 2],
-    lag: [Lag; 2],
+    axes: [AxisController; 2],
+    lag: [SecondOrderLag; 2],
     since_s: f64,
     push: Vector2<f64>,
-    turns: Vec<Turn>,
+    steps: Vec<ControlStep>,
 }
 
 /// The controller of one axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Control {
+struct AxisController {
     integral: f64,
     last: Option<f64>,
 }
 
-impl Control {
-    /// The wish for the ball at `position`, rad along the axis.
-    fn turn(&mut self, closed: &Loop, position: f64) -> f64 {
+impl AxisController {
+    /// Returns the command for the ball at `position`, rad; positive accelerates the ball
+    /// along the axis.
+    fn update(&mut self, closed: &ControlLoop, position: f64) -> f64 {
         let change = (position - self.last.unwrap_or(position)) / closed.period_s;
         let free = -closed.proportional * position + self.integral - closed.derivative * change;
         let wish = free.clamp(-closed.limit_rad, closed.limit_rad);
@@ -99,22 +101,24 @@ impl Control {
     }
 }
 
-/// One angle within a hold, from its start.
+/// The response of one angle within a hold, from its start.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Lag {
+struct SecondOrderLag {
     command: f64,
+    /// Coefficient a, rad.
     apart: f64,
+    /// Coefficient b, rad/s.
     drift: f64,
 }
 
-impl Lag {
-    /// From an angle and its rate toward `command`.
+impl SecondOrderLag {
+    /// Starts at an angle and its rate and tends to `command`.
     fn toward(command: f64, [angle, rate]: [f64; 2], tau: f64) -> Self {
         let apart = angle - command;
         Self { command, apart, drift: rate + apart / tau }
     }
 
-    /// Angle, rate and acceleration after `s` seconds.
+    /// Returns angle, rate and acceleration after `s` seconds.
     fn after(&self, s: f64, tau: f64) -> [f64; 3] {
         let decay = (-s / tau).exp();
         let apart = self.apart + self.drift * s;
@@ -126,50 +130,50 @@ impl Lag {
     }
 }
 
-impl Controlled {
-    /// `closed` around a ball that is wanted at the centre, on a plate that
-    /// starts level.
+impl ControlledPlate {
+    /// Creates the control loop `closed` on a plate that starts level; the setpoint is
+    /// the centre.
     #[must_use]
-    pub fn new(closed: Loop, pushes: Vec<Push>) -> Self {
+    pub fn new(closed: ControlLoop, pushes: Vec<Push>) -> Self {
         Self {
             closed,
             pushes,
-            axes: [Control::default(); 2],
-            lag: [Lag::default(); 2],
+            axes: [AxisController::default(); 2],
+            lag: [SecondOrderLag::default(); 2],
             since_s: 0.0,
             push: Vector2::zeros(),
-            turns: Vec::new(),
+            steps: Vec::new(),
         }
     }
 
-    /// What the controller did, turn by turn.
+    /// Returns the sampling instants so far, in order.
     #[must_use]
-    pub fn turns(&self) -> &[Turn] {
-        &self.turns
+    pub fn control_steps(&self) -> &[ControlStep] {
+        &self.steps
     }
 
-    fn next_turn_s(&self) -> f64 {
-        self.turns.len() as f64 * self.closed.period_s
+    fn next_step_s(&self) -> f64 {
+        self.steps.len() as f64 * self.closed.period_s
     }
 
-    fn turn(&mut self, t: f64, at: &Motion) {
+    fn step(&mut self, t: f64, at: &Motion) {
         let wish = Axis::ALL.map(|axis| {
             let i = axis as usize;
-            self.axes[i].turn(&self.closed, at.position[i]) * axis.drive_sign()
+            self.axes[i].update(&self.closed, at.position[i]) * axis.drive_sign()
         });
         // The x servo turns qy, the y servo qx.
         let command = Vector2::new(wish[1], wish[0]);
         let (tau, s) = (self.closed.lag_s, t - self.since_s);
         for (lag, &command) in self.lag.iter_mut().zip(command.iter()) {
             let [angle, rate, _] = lag.after(s, tau);
-            *lag = Lag::toward(command, [angle, rate], tau);
+            *lag = SecondOrderLag::toward(command, [angle, rate], tau);
         }
         self.since_s = t;
-        self.turns.push(Turn { at_s: t, position: at.position.xy(), command });
+        self.steps.push(ControlStep { at_s: t, position: at.position.xy(), command });
     }
 }
 
-impl Drive for Controlled {
+impl Drive for ControlledPlate {
     #[inline]
     fn tilt(&self, t: f64) -> Tilt {
         let [x, y] = self.lag.map(|lag| lag.after(t - self.since_s, self.closed.lag_s));
@@ -185,15 +189,15 @@ impl Drive for Controlled {
     }
 
     fn begin(&mut self, t: f64, at: &Motion) -> f64 {
-        if self.next_turn_s() <= t {
-            self.turn(t, at);
+        if self.next_step_s() <= t {
+            self.step(t, at);
         }
-        let end = self.next_turn_s().min(next_push(&self.pushes, t));
+        let end = self.next_step_s().min(next_push(&self.pushes, t));
         self.push = pushed(&self.pushes, (t + end) / 2.0);
         end
     }
 
-    /// The period of the lag's corner.
+    /// Returns 2πτ, the period of the lag's corner frequency.
     fn shortest_time_s(&self) -> f64 {
         TAU * self.closed.lag_s
     }

@@ -1,4 +1,4 @@
-//! What moves the plate and pushes the ball, piece by smooth piece.
+//! Drives: they move the plate and push the ball, in smooth pieces.
 
 use std::cell::Cell;
 
@@ -7,27 +7,28 @@ use nalgebra::Vector2;
 use super::law::Law;
 use offbd_core::plant::{Motion, PlateMotion, Tilt};
 
-/// Moves the plate. Between two breaks its motion is smooth; at each break it
-/// may look at the ball, as a controller does.
+/// The motion of the plate, in smooth pieces. Where a piece begins, the drive may read
+/// the body's motion, as a controller does.
 pub trait Drive {
-    /// The plate at `t`, within the present piece.
+    /// Returns the plate's tilt at time `t`, s, within the current piece.
     fn tilt(&self, t: f64) -> Tilt;
 
-    /// Force on the body's centre along x and y in the present piece, N.
+    /// Returns the force on the body's centre along x and y in the current piece, N.
     fn push(&self) -> Vector2<f64>;
 
-    /// Whether nothing changes within the present piece.
+    /// Returns whether the plate stands still throughout the current piece.
     fn is_still(&self) -> bool;
 
-    /// Begins the piece at `t`, with the body in the motion `at`; returns its
-    /// end, after `t`, which may be infinite.
+    /// Begins the piece at time `t`, s, with the body in the motion `at`; returns the
+    /// end of the piece, s, which is after `t` and may be infinite.
     fn begin(&mut self, t: f64, at: &Motion) -> f64;
 
-    /// The shortest time in which the plate does something of its own, s.
+    /// Returns the shortest time scale of the plate's motion, s: a period or the duration
+    /// of a step.
     fn shortest_time_s(&self) -> f64;
 }
 
-/// A force on the body's centre that holds for a while.
+/// A constant force on the body's centre for a limited time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Push {
     /// Along x and y, N.
@@ -36,7 +37,7 @@ pub struct Push {
     pub duration_s: f64,
 }
 
-/// Both angles by a law of time.
+/// A drive that moves both angles by laws of time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Laws {
     qx: Law,
@@ -79,29 +80,31 @@ impl Drive for Laws {
     }
 }
 
-/// When the pushes change next after `t`.
+/// Returns the next time after `t` at which a push begins or ends, s.
 pub(super) fn next_push(pushes: &[Push], t: f64) -> f64 {
     let edges = pushes.iter().flat_map(|push| [push.start_s, push.start_s + push.duration_s]);
     edges.filter(|&edge| edge > t).fold(f64::INFINITY, f64::min)
 }
 
-/// The sum of the pushes in force at `inside`, N.
+/// Returns the sum of the pushes active at time `inside`, N.
 pub(super) fn pushed(pushes: &[Push], inside: f64) -> Vector2<f64> {
     let in_force = |push: &&Push| (push.start_s..push.start_s + push.duration_s).contains(&inside);
     pushes.iter().filter(in_force).map(|push| push.force).sum()
 }
 
-/// The plate as a model sees it, remembering the last moment asked for: stages
-/// of a method share their moments, and a plate that stands still has but one.
-pub(super) struct Seen<'a, D> {
+/// The plate's motion as input of a model, with the last evaluated instant cached:
+/// stages of a method often share their times, and a plate that stands still needs one
+/// evaluation only.
+pub(super) struct DrivenPlate<'a, D> {
     drive: &'a D,
     push: Vector2<f64>,
     still: Option<PlateMotion>,
     last: Cell<(f64, PlateMotion)>,
 }
 
-impl<'a, D: Drive> Seen<'a, D> {
-    /// `drive` in its present piece, which holds `t`, for a body of `mass` kg.
+impl<'a, D: Drive> DrivenPlate<'a, D> {
+    /// Creates the input from `drive` in its current piece, which contains `t`, for a
+    /// body of `mass` kg.
     pub(super) fn new(drive: &'a D, mass: f64, t: f64) -> Self {
         let push = drive.push() / mass;
         let now = drive.tilt(t).motion().pushed(push);

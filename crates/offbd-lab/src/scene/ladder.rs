@@ -1,81 +1,80 @@
-//! Fidelity chosen, not guessed: the cheapest model and method that meet a
-//! wanted accuracy, with the reasons.
+//! Chooses the cheapest model and method that meet a wanted accuracy, with the reasons.
 //!
-//! 1. A survey says whether the ball rolls at all, and how far the planar, the
-//!    rolling and the creeping ball are off. The planar one runs on the survey's
-//!    word, which is a bound; the others, if near enough, run by
-//!    Dormand–Prince, watched step by step: if the friction demand, the normal
-//!    force or the edge show that it does not hold, it is given up.
-//! 2. Otherwise a reference is run, the compliant model so finely that its own
-//!    error does not matter, and candidates are run and held against it, in the
-//!    order of the work that they are expected to take. The first that is near
-//!    enough stands. A run repeats itself to the bit, so that what was measured
-//!    is what will be; and since the reference is one of the candidates, there
-//!    always is one.
+//! 1. A survey estimates whether the ball rolls, and the errors of the planar, the
+//!    rolling and the creeping model. The planar model is accepted on the survey alone,
+//!    whose estimate is an upper bound. The rolling and the creeping model, if accurate
+//!    enough, are run by Dormand–Prince and checked at every step: a model is dropped if
+//!    the friction demand, the normal force or the edge shows that it is not valid.
+//! 2. Otherwise a reference is run, the compliant model at a tolerance at which its own
+//!    error is negligible. Candidates are run and compared with it in ascending order
+//!    of their expected work; the first one that is accurate enough is chosen. Runs
+//!    are deterministic to the bit, so the measured error is that of every later run.
+//!    The reference itself is a candidate, so there is always one that qualifies.
 //!
-//! Work is counted in steps, not in time, so that the choice is the same on
+//! Work is counted in steps, not in measured time, so that the choice is the same on
 //! every machine and in every run.
 
 use super::candidates::{self, METHOD_SHARE, Task, WORK_CONTACT_STEP, WORK_DOPRI5};
 use super::configuration::{Configuration, Method, Model, Pace};
 use super::drive::Drive;
-use super::reference::{Path, Reference, most_steps};
-use super::run::Stage;
+use super::reference::{ReferenceSolution, SampledPath, most_steps};
+use super::rolling_check::{RollingCheck, SURE_TO_ROLL};
+use super::run::SceneRunner;
 use super::stepping::Failure;
-use super::still_rolls::{SURE_TO_ROLL, StillRolls};
 use super::survey::Survey;
 use super::{Scene, Subject};
 
-/// One candidate that was looked at, and what became of it.
+/// One candidate that was considered, and its result.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Tried {
+pub struct TriedCandidate {
     pub model: Model,
     pub method: Method,
-    /// Estimate of the worst error of position, m, where there is one.
+    /// Estimate of the largest error of the position, m; `None` if there is none.
     pub error_m: Option<f64>,
     pub verdict: String,
 }
 
-/// What was chosen, and why.
+/// The chosen configuration, and the reasons.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
     pub configuration: Configuration,
-    /// Estimate of the worst error of position, m.
+    /// Estimate of the largest error of the position, m.
     pub error_m: f64,
     pub survey: Survey,
-    /// In the order in which they were looked at; the last one was chosen.
-    pub tried: Vec<Tried>,
+    /// The candidates in the order of consideration; the last one was chosen.
+    pub tried: Vec<TriedCandidate>,
 }
 
 /// No candidate meets the tolerance.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "no model and method meets {tolerance_m:e} m here; the nearest comes to about {best_m:e} m"
+    "no model and method meets {tolerance_m:e} m here; the best accuracy is about {best_m:e} m"
 )]
 pub struct OutOfReach {
     pub tolerance_m: f64,
     pub best_m: f64,
-    pub tried: Vec<Tried>,
+    pub tried: Vec<TriedCandidate>,
 }
 
-/// Part of the tolerance that a model's own error may use up.
+/// Share of the tolerance allowed for a model's own error; chosen: the other half is for
+/// its method.
 const MODEL_SHARE: f64 = 0.5;
 
-/// Part of the tolerance by which a run may differ from the reference, with the
-/// reference's own error: between the moments of comparison it may be a little
-/// more.
+/// Share of the tolerance allowed for the measured difference from the reference plus
+/// the reference's own error. Chosen below 1, because the difference may be a little
+/// larger between the times of comparison.
 const MEASURED_SHARE: f64 = 0.97;
 
-/// The angle of a plate that moves is renewed at least so many times in a scene
-/// and in the shortest time of its law.
+/// Minimum number of steps of the planar model in a scene and in the shortest time scale
+/// of a moving plate; chosen.
 const LEAST_HOLDS: f64 = 8.0;
 
-/// Chooses for `scene` under `drive` the cheapest configuration whose worst
-/// error of position (x, y) against the compliant model stays within
-/// `tolerance_m`, in [1e-12, 1].
+/// Chooses for `scene` under `drive` the cheapest configuration whose largest error of
+/// the position (x, y) against the compliant model is within `tolerance_m`, which lies in
+/// [1e-12, 1].
 ///
 /// # Errors
-/// [`OutOfReach`] with what was tried.
+/// [`OutOfReach`] with the candidates tried, if none meets the tolerance.
 pub fn choose<D: Drive + Clone>(
     scene: &Scene,
     drive: &D,
@@ -97,16 +96,16 @@ struct Search<'a, D> {
     drive: &'a D,
     tolerance: f64,
     survey: Survey,
-    tried: Vec<Tried>,
+    tried: Vec<TriedCandidate>,
 }
 
 impl<D: Drive + Clone> Search<'_, D> {
     fn note(&mut self, model: Model, method: Method, error_m: Option<f64>, verdict: String) {
-        self.tried.push(Tried { model, method, error_m, verdict });
+        self.tried.push(TriedCandidate { model, method, error_m, verdict });
     }
 
-    /// Small angles, held from step to step: the survey's bounds suffice, there
-    /// is nothing to watch on a plate so gentle that they do.
+    /// Tries the planar model: small angles, constant within each step. The survey's
+    /// bound suffices; a plate that meets it moves too little to need checks.
     fn planar(&mut self) -> Option<(Configuration, f64)> {
         let (survey, method) = (self.survey, Method::ZeroOrderHold);
         let why = if self.scene.edges {
@@ -129,7 +128,7 @@ impl<D: Drive + Clone> Search<'_, D> {
         Some((configuration, error))
     }
 
-    /// The rolling and the creeping ball.
+    /// Tries the rolling and the creeping model.
     fn smooth(&mut self) -> Option<(Configuration, f64)> {
         let survey = self.survey;
         if matches!(self.scene.subject, Subject::Block(_)) {
@@ -142,11 +141,11 @@ impl<D: Drive + Clone> Search<'_, D> {
                 self.note(model, Method::Dopri5, Some(error), why);
                 continue;
             }
-            return match self.watched(model) {
+            return match self.checked(model) {
                 Ok(path) => {
                     let tolerance_m = self.tolerance * METHOD_SHARE;
                     let (work, error_m) = (path.steps as f64 * WORK_DOPRI5, error + tolerance_m);
-                    let reference = Reference { path, work, tolerance_m, error_m };
+                    let reference = ReferenceSolution { path, work, tolerance_m, error_m };
                     self.first_near(candidates::smooth(&self.task(), model), &reference)
                 }
                 Err(failure) => {
@@ -177,23 +176,24 @@ impl<D: Drive + Clone> Search<'_, D> {
             .then(|| format!("friction demand up to {:.2} of μ·F_z", self.survey.demand))
     }
 
-    /// The path of `model`, a ball that rolls, as long as it does.
-    fn watched(&self, model: Model) -> Result<Path, Failure> {
+    /// Runs `model`, the rolling or the creeping ball, and checks its validity at every
+    /// step.
+    fn checked(&self, model: Model) -> Result<SampledPath, Failure> {
         let (scene, mut drive) = (self.scene, self.drive.clone());
         let finest = candidates::finest(model, self.tolerance)
             .ok_or(Failure::OutOfRange { at_s: 0.0, why: "no such run" })?;
-        let stage = Stage::new(most_steps(scene, WORK_DOPRI5), scene, &finest);
-        let watch = &mut StillRolls::new(scene);
-        Path::of(scene, |samples| match model {
+        let runner = SceneRunner::new(most_steps(scene, WORK_DOPRI5), scene, &finest);
+        let observer = &mut RollingCheck::new(scene);
+        SampledPath::of(scene, |samples| match model {
             Model::Rolling => {
-                stage.rolling(|ball| scene.rolling(ball), &mut drive, Some(samples), watch)
+                runner.rolling(|ball| scene.rolling(ball), &mut drive, Some(samples), observer)
             }
-            _ => stage.rolling(|ball| scene.creeping(ball), &mut drive, Some(samples), watch),
+            _ => runner.rolling(|ball| scene.creeping(ball), &mut drive, Some(samples), observer),
         })
     }
 
-    /// The first candidate that the compliant model bears out; else the
-    /// accuracy for which it could, m.
+    /// Returns the first candidate whose measured error against the compliant model is
+    /// small enough; else the best accuracy that can be confirmed, m.
     fn measured(&mut self) -> Result<(Configuration, f64), f64> {
         let reference = self.reference()?;
         let rolls = self.unsure_to_roll().is_none();
@@ -201,32 +201,32 @@ impl<D: Drive + Clone> Search<'_, D> {
         self.first_near(all, &reference).ok_or(reference.error_m)
     }
 
-    /// The first candidate that is near enough to the reference.
+    /// Returns the first candidate close enough to the reference.
     fn first_near(
         &mut self,
         candidates: Vec<(f64, Configuration)>,
-        reference: &Reference,
+        reference: &ReferenceSolution,
     ) -> Option<(Configuration, f64)> {
         let mut steps_before = 0;
         for (work, configuration) in candidates {
             let fixed = configuration.method() == Method::ContactStep;
-            // The plate's own pieces are shorter than the step: the same run.
+            // The drive's pieces are shorter than this step: it gives the previous run.
             if fixed && work <= steps_before as f64 * WORK_CONTACT_STEP {
                 continue;
             }
-            let off = self.off(&configuration, reference);
-            if off.meets {
-                return Some((configuration, off.error_m));
+            let measured = self.measure(&configuration, reference);
+            if measured.meets {
+                return Some((configuration, measured.error_m));
             }
             if fixed {
-                steps_before = off.steps;
+                steps_before = measured.steps;
             }
         }
         None
     }
 
-    fn reference(&mut self) -> Result<Reference, f64> {
-        let found = Reference::of(self.scene, self.drive, self.tolerance);
+    fn reference(&mut self) -> Result<ReferenceSolution, f64> {
+        let found = ReferenceSolution::of(self.scene, self.drive, self.tolerance);
         let (error_m, verdict) = match &found {
             Ok(reference) => {
                 let verdict = format!("tolerance {:.0e} m to compare with", reference.tolerance_m);
@@ -238,29 +238,33 @@ impl<D: Drive + Clone> Search<'_, D> {
         found
     }
 
-    /// Runs a candidate and holds it against the reference.
-    fn off(&mut self, configuration: &Configuration, reference: &Reference) -> Off {
+    /// Runs a candidate and compares it with the reference.
+    fn measure(
+        &mut self,
+        configuration: &Configuration,
+        reference: &ReferenceSolution,
+    ) -> CandidateError {
         let most_steps = (reference.work / WORK_CONTACT_STEP).ceil() as u64;
         let (model, method) = (configuration.model(), configuration.method());
-        match Path::run(most_steps, self.scene, &mut self.drive.clone(), configuration) {
+        match SampledPath::run(most_steps, self.scene, &mut self.drive.clone(), configuration) {
             Ok(path) => {
                 let error_m = path.apart(&reference.path) + reference.error_m;
                 let meets = error_m <= self.tolerance * MEASURED_SHARE;
                 let verdict = if meets { "meets it" } else { "is off" };
                 let pace = pace_name(configuration);
                 self.note(model, method, Some(error_m), format!("{pace} {verdict}"));
-                Off { error_m, steps: path.steps, meets }
+                CandidateError { error_m, steps: path.steps, meets }
             }
             Err(failure) => {
                 self.note(model, method, None, failure.to_string());
-                Off { error_m: f64::INFINITY, steps: 0, meets: false }
+                CandidateError { error_m: f64::INFINITY, steps: 0, meets: false }
             }
         }
     }
 }
 
-/// What came of a candidate.
-struct Off {
+/// The measured error of a candidate.
+struct CandidateError {
     error_m: f64,
     steps: u64,
     meets: bool,

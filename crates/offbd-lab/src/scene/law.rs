@@ -1,5 +1,5 @@
-//! How a plate angle goes with time: a sum of terms, each known in closed form
-//! with its two rates.
+//! A plate angle as a function of time: a sum of terms, each in closed form with its
+//! first and second derivative.
 
 use std::f64::consts::TAU;
 
@@ -18,8 +18,8 @@ pub enum Term {
 }
 
 impl Term {
-    /// Checks the term, named `element` in errors: angles within ±2π rad,
-    /// frequencies in [0, 1000] Hz, times within ±1e6 s, durations above 0.
+    /// Checks the term: angles within ±2π rad, frequencies in [0, 1000] Hz, phases and
+    /// times within ±1e6 rad and s, durations in (0, 1e6] s. Errors name it `element`.
     ///
     /// # Errors
     /// [`Invalid`] naming the element.
@@ -44,7 +44,8 @@ impl Term {
     }
 }
 
-/// An angle as a sum of terms. Between two breaks it is smooth.
+/// An angle as a sum of terms. It is smooth between two breaks, where a smoothstep
+/// begins or ends.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Law {
     constant: f64,
@@ -64,8 +65,8 @@ impl Law {
         law
     }
 
-    /// Angle, rate and acceleration at `t`, within a smooth piece that holds
-    /// `inside`: at a break it is the limit from that side.
+    /// Returns angle, rate and acceleration at `t`, within the smooth piece that contains
+    /// `inside`: at a break, the one-sided limit from that piece.
     #[must_use]
     #[inline]
     pub fn at(&self, t: f64, inside: f64) -> [f64; 3] {
@@ -79,7 +80,7 @@ impl Law {
         sum
     }
 
-    /// Whether the angle stands still in the piece that holds `inside`.
+    /// Returns whether the angle is constant in the smooth piece that contains `inside`.
     #[must_use]
     pub fn is_still(&self, inside: f64) -> bool {
         self.varying.iter().all(|term| match *term {
@@ -90,7 +91,7 @@ impl Law {
         })
     }
 
-    /// The first moment after `t` at which the law is not smooth.
+    /// Returns the first break after `t`, s; infinity if there is none.
     #[must_use]
     pub fn next_break(&self, t: f64) -> f64 {
         let edges = self.varying.iter().flat_map(|term| match *term {
@@ -100,7 +101,8 @@ impl Law {
         edges.filter(|&edge| edge > t).fold(f64::INFINITY, f64::min)
     }
 
-    /// The shortest time in which the angle does something of its own, s.
+    /// Returns the shortest time scale of the angle, s: a period or the duration of a
+    /// smoothstep; infinity if the angle is constant.
     #[must_use]
     pub fn shortest_time_s(&self) -> f64 {
         let times = self.varying.iter().map(|term| match *term {
@@ -159,7 +161,7 @@ mod tests {
     }
 
     proptest! {
-        /// Rates are the differences of what they are rates of.
+        /// Rate and acceleration agree with difference quotients.
         #[test]
         fn rates_are_derivatives(t in 0.0..0.4_f64) {
             let (law, d) = (law(), 1e-5);

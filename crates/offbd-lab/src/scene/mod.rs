@@ -1,39 +1,39 @@
-//! Scenes: a body on a plate that moves by a law or a controller, run by any
-//! rung of the ladder of models and any method that fits it.
+//! Scenes: a body on a plate that moves by a law of time or a controller, run by any
+//! model and any method that can step it.
 //!
-//! One idea: a run is a model, a method and a pace, all data; the loops below
-//! know none of them by name. Knows no files, no clock, no faults.
+//! A run is specified by data: a model, a method and a pace. The integration loops are
+//! generic over all three. The module uses no files, clock or faults.
 
 mod candidates;
 mod configuration;
 mod controlled;
 mod drive;
+mod driven_models;
 mod events;
 mod ladder;
 mod law;
 mod reference;
+mod rolling_check;
 mod run;
-mod rungs;
 mod samples;
 mod stepping;
-mod still_rolls;
 mod survey;
 
 pub use configuration::{Configuration, LONGEST_STEP_S, Method, Model, Pace, SHORTEST_STEP_S};
-pub use controlled::{Controlled, Loop, Turn};
+pub use controlled::{ControlLoop, ControlStep, ControlledPlate};
 pub use drive::{Drive, Laws, Push};
 pub use events::{Event, MOST_EVENTS};
-pub use ladder::{Choice, OutOfReach, Tried, choose};
+pub use ladder::{Choice, OutOfReach, TriedCandidate, choose};
 pub use law::{Law, Term};
-pub use run::{Outcome, run, suits};
+pub use run::{RunOutcome, run, suits};
 pub use samples::{Samples, Sink};
-pub use stepping::{Failure, MOST_STEPS, Tally};
+pub use stepping::{Failure, MOST_STEPS, RunStatistics};
 pub use survey::Survey;
 
 use offbd_core::plant::{Ball, Body, Contact, Ground, Motion, Plate};
 use offbd_core::vocabulary::{Invalid, positive};
 
-/// What is on the plate.
+/// The body on the plate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Subject {
     Ball(Ball),
@@ -48,24 +48,24 @@ pub struct Block {
     body: Body,
 }
 
-/// Longest scene, s: an hour.
+/// Longest scene, s: an hour; chosen to bound the computing time.
 pub const LONGEST_SCENE_S: f64 = 3600.0;
 
-/// A scene without its drive.
+/// A body on a plate with its initial motion; the plate's motion is a [`Drive`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     pub subject: Subject,
     pub plate: Plate,
     pub contact: Contact,
-    /// Whether the plate ends at its edges.
+    /// Whether the plate ends at its edges; otherwise it is endless.
     pub edges: bool,
     pub initial: Motion,
     pub duration_s: f64,
 }
 
 impl Scene {
-    /// `subject` on `plate`, at rest at its centre, for `duration_s` in
-    /// (0, 3600] s.
+    /// Creates a scene with `subject` at rest at the centre of an endless `plate`, for
+    /// `duration_s` in (0, 3600] s.
     ///
     /// # Errors
     /// [`Invalid`] naming the element.
@@ -82,7 +82,7 @@ impl Scene {
         Ok(scene)
     }
 
-    /// A block with an edge in (0, 1] m and a mass in (0, 100] kg.
+    /// Creates a block with an edge in (0, 1] m and a mass in (0, 100] kg.
     ///
     /// # Errors
     /// [`Invalid`] naming the element.

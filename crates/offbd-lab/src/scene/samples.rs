@@ -1,26 +1,26 @@
-//! Samples between the steps: what a method leaves at its own times, seen at
-//! regular ones.
+//! Samples at regular times, interpolated between the steps of a method.
 
 use super::configuration::SHORTEST_STEP_S;
 use offbd_core::plant::Motion;
 
-/// Where samples go: their time, s, and the motion.
+/// Receives samples: the time, s, and the motion.
 pub type Sink<'a> = dyn FnMut(f64, &Motion) + 'a;
 
-/// Regular samples of a run, from 0 on.
+/// Takes samples of a run at regular times, from 0 on.
 pub struct Samples<'a> {
     every_s: f64,
     taken: u64,
     sink: &'a mut Sink<'a>,
 }
 
-/// A sample this near a step's end, as a part of the interval, is that end.
+/// A sample closer than this to the end of a step, as a share of the sampling interval,
+/// takes the state at that end. Chosen: above rounding errors of time.
 const SAME_TIME: f64 = 1e-9;
 
 impl<'a> Samples<'a> {
-    /// A sample each `every_s` seconds, handed to `sink`. An interval that is
-    /// no number or below [`SHORTEST_STEP_S`] would never come to an end: then
-    /// the start alone is sampled.
+    /// Takes a sample every `every_s` seconds and passes it to `sink`. With an interval
+    /// that is NaN or below [`SHORTEST_STEP_S`], sampling would not terminate: then only
+    /// the start is sampled.
     pub fn new(every_s: f64, sink: &'a mut Sink<'a>) -> Self {
         let every_s = if every_s >= SHORTEST_STEP_S { every_s } else { f64::MAX };
         let every_s = every_s.min(f64::MAX);
@@ -31,8 +31,8 @@ impl<'a> Samples<'a> {
         self.taken as f64 * self.every_s
     }
 
-    /// Takes the samples due up to `t1`, by `motion` of their time; `None`
-    /// stands for the step's end.
+    /// Takes the samples due up to the end of the step, `t1`. `motion` maps their time
+    /// to the motion; `None` stands for the end of the step.
     pub(super) fn take(&mut self, t1: f64, mut motion: impl FnMut(Option<f64>) -> Motion) {
         while self.next() <= t1 + SAME_TIME * self.every_s {
             let t = self.next();
@@ -44,19 +44,19 @@ impl<'a> Samples<'a> {
     }
 }
 
-/// One step's two ends with their rates.
-pub(super) struct Span<'a, const N: usize> {
+/// The states and rates at both ends of a step, for interpolation in between.
+pub(super) struct StepInterpolant<'a, const N: usize> {
     pub t: [f64; 2],
     pub y: [&'a [f64; N]; 2],
     pub rate: [[f64; N]; 2],
 }
 
-impl<const N: usize> Span<'_, N> {
-    /// The state within the step: positions, of which there are `P`, by the
-    /// polynomial of degree five through both ends with rates and second
-    /// rates where the motion is `smooth`, and of degree three through both
-    /// ends with rates where a stiff contact makes the second rates jump;
-    /// their rates by its derivative; the rest by degree three.
+impl<const N: usize> StepInterpolant<'_, N> {
+    /// Returns the state at `t` within the step by Hermite interpolation. If the motion
+    /// is `smooth`, the first `positions` components follow the quintic polynomial with
+    /// the values, rates and accelerations of both ends; otherwise, as a stiff contact
+    /// makes accelerations jump, the cubic with values and rates. The velocities are the
+    /// derivative of that polynomial; further components are cubic.
     pub(super) fn at(&self, t: f64, positions: usize, smooth: bool) -> [f64; N] {
         let h = self.t[1] - self.t[0];
         let s = (t - self.t[0]) / h;
@@ -81,13 +81,15 @@ impl<const N: usize> Span<'_, N> {
     }
 }
 
-/// Second rates of the cubic through both ends with rates, over a unit step.
+/// Returns the second derivatives at both ends of the cubic with the values `y` and rates
+/// `v`, over a unit step.
 fn cubic_seconds(y: [f64; 2], v: [f64; 2]) -> [f64; 2] {
     let rise = y[1] - y[0];
     [6.0 * rise - 4.0 * v[0] - 2.0 * v[1], -6.0 * rise + 2.0 * v[0] + 4.0 * v[1]]
 }
 
-/// Value and rate at s in [0, 1] of the quintic through both ends.
+/// Returns value and rate at s in [0, 1] of the quintic with the values `y`, rates `v` and
+/// accelerations `a` at both ends.
 fn quintic(s: f64, y: [f64; 2], v: [f64; 2], a: [f64; 2]) -> (f64, f64) {
     let rise = y[1] - y[0] - v[0] - a[0] / 2.0;
     let turn = v[1] - v[0] - a[0];
@@ -112,9 +114,12 @@ mod tests {
         let v = |t: f64| 1.0 - 6.0 * t * t + 2.5 * t.powi(4);
         let a = |t: f64| -12.0 * t + 10.0 * t.powi(3);
         let (y0, y1) = ([p(0.2), v(0.2)], [p(0.6), v(0.6)]);
-        let span =
-            Span { t: [0.2, 0.6], y: [&y0, &y1], rate: [[v(0.2), a(0.2)], [v(0.6), a(0.6)]] };
-        let y = span.at(0.33, 1, true);
+        let interpolant = StepInterpolant {
+            t: [0.2, 0.6],
+            y: [&y0, &y1],
+            rate: [[v(0.2), a(0.2)], [v(0.6), a(0.6)]],
+        };
+        let y = interpolant.at(0.33, 1, true);
         assert!((y[0] - p(0.33)).abs() < 1e-14 && (y[1] - v(0.33)).abs() < 1e-13);
     }
 

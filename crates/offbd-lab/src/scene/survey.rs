@@ -1,48 +1,50 @@
-//! A cheap look at a scene before it is run: what the contact will have to
-//! bear, and what the smaller models leave out.
+//! A cheap survey of a scene before it is run: it estimates the load of the contact and
+//! the errors of the simpler models.
 //!
-//! The plate is looked at a few times per shortest time of its law, with the
-//! ball where it starts. That costs less than the cheapest run.
+//! The plate's motion is evaluated a few times per shortest time scale, with the ball at
+//! its start. That costs less than the cheapest run.
 
 use nalgebra::Vector2;
 
-use super::drive::{Drive, Seen};
+use super::drive::{Drive, DrivenPlate};
 use super::{Scene, Subject};
 use crate::models::Creeping;
 use offbd_core::plant::{Ball, Grip, Motion, Planar, Rolling, RollingState, Tilt};
 
-/// Looks per shortest time of the plate's law.
+/// Evaluations per shortest time scale of the plate's motion; chosen.
 const LOOKS_PER_TIME: f64 = 4.0;
 
-/// Most looks at one scene; a longer one is looked at more sparsely.
+/// Maximum number of evaluations of one scene, chosen to bound the cost; a longer scene
+/// is evaluated at longer intervals.
 const MOST_LOOKS: f64 = 64.0;
 
-/// A body that starts within this of the plate starts on it, m.
+/// Maximum initial depth of a body that starts on the plate, m; chosen: more than the
+/// sag of a soft contact.
 const ON_THE_PLATE_M: f64 = 1e-3;
 
-/// What the survey found; errors are estimates of the worst error of position
-/// over the scene against the compliant model, m.
+/// The result of a survey. Errors are estimates of the largest error of the position over
+/// the scene, against the compliant model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Survey {
-    /// Largest part of the friction limit in use; above 1 the ball slips.
+    /// Largest fraction of the friction limit in use; above 1 the ball slips.
     pub demand: f64,
-    /// Whether the body starts on the plate, not slipping more than it creeps.
+    /// Whether the body starts on the plate with no more slip than its creep.
     pub starts_rolling: bool,
-    /// Error of small angles, m.
+    /// Error of the planar model, which assumes small angles, m.
     pub planar_error_m: f64,
-    /// Step that keeps a held angle within a metre of the moving one, s: the
-    /// error goes with the square of the step.
+    /// Step of the planar model whose constant angle causes an error of 1 m, s: the error
+    /// is proportional to the square of the step.
     pub planar_step_s: f64,
-    /// Error of a model without creep and sag, m.
+    /// Error of the rolling model, which has neither creep nor sag, m.
     pub rolling_error_m: f64,
     /// Error of the creeping model, m.
     pub creeping_error_m: f64,
 }
 
 impl Survey {
-    /// Looks at `scene` under `drive`.
+    /// Surveys `scene` under `drive`.
     pub fn of<D: Drive>(scene: &Scene, drive: &mut D) -> Self {
-        let mut worst = Worst::default();
+        let mut worst = WorstCase::default();
         let mut t = 0.0;
         let time = drive.shortest_time_s();
         let look = (time / LOOKS_PER_TIME).max(scene.duration_s / MOST_LOOKS).min(scene.duration_s);
@@ -55,24 +57,27 @@ impl Survey {
     }
 }
 
-/// The worst seen so far.
+/// The largest values found so far.
 #[derive(Clone, Copy, Debug, Default)]
-struct Worst {
+struct WorstCase {
     demand: f64,
-    /// v − U of the creeping ball by creep, m/s, and by sag.
+    /// v − U of the creeping ball due to creep, m/s.
     creep: f64,
+    /// v − U of the creeping ball due to sag, m/s.
     sink: f64,
+    /// Depth of the body in the plate, m.
     sag: f64,
-    /// How long sag and creep take to settle, s.
+    /// Settling times of sag and creep, s.
     settling: [f64; 2],
+    /// Tilt of the plate, rad, with its rate and acceleration.
     angle: f64,
     rate: f64,
     acceleration: f64,
 }
 
-impl Worst {
+impl WorstCase {
     fn piece<D: Drive>(&mut self, scene: &Scene, drive: &D, from: f64, until: f64, look: f64) {
-        let plate = Seen::new(drive, scene.body().mass_kg(), from);
+        let plate = DrivenPlate::new(drive, scene.body().mass_kg(), from);
         let n = ((until - from) / look).ceil().max(1.0) as u32;
         for i in 0..=n {
             let t = from + (until - from) * f64::from(i) / f64::from(n);
@@ -81,8 +86,8 @@ impl Worst {
         }
     }
 
-    /// Notes how far and how fast the plate turns; a push counts as an angle of
-    /// any size, for the planar model has none.
+    /// Records angle, rate and acceleration of the plate. A push counts as an infinite
+    /// angle, because the planar model has no pushes.
     fn turn(&mut self, tilt: &Tilt, push: f64) {
         let angle = if push > 0.0 { f64::INFINITY } else { tilt.angle.norm() };
         self.angle = self.angle.max(angle);
@@ -90,9 +95,9 @@ impl Worst {
         self.acceleration = self.acceleration.max(tilt.acceleration.norm());
     }
 
-    /// Error of small angles, m, and the step that holding them takes: at worst
-    /// the plate is always where it is worst, and the ball as far and as fast
-    /// as that drives it.
+    /// Returns the error of small angles, m, and [`Survey::planar_step_s`]. The bound
+    /// assumes that the plate stays at its largest values, and the ball at the largest
+    /// distance and speed that they cause.
     fn planar(&self, scene: &Scene) -> (f64, f64) {
         let (Subject::Ball(ball), t) = (&scene.subject, scene.duration_s) else {
             return (f64::INFINITY, 0.0);
@@ -111,8 +116,8 @@ impl Worst {
             acceleration: worst(self.acceleration),
         };
         let left_out = Planar::new(ball, &scene.plate).left_out(&state, &tilt);
-        // The midpoint rule loses h²/24 of the change of the rate, twice the
-        // largest at most, and the ball carries the velocity to the end.
+        // The midpoint rule's error is h²/24 times the change of the rate, at most twice
+        // the largest rate; the error of velocity acts until the end of the scene.
         let step = (12.0 / (gain * self.rate * t)).sqrt();
         (left_out * t * t / 2.0, step)
     }
@@ -124,10 +129,12 @@ impl Worst {
                 let creeping = Creeping::new(ball, &scene.plate, &scene.contact);
                 let y = creeping.enter(at, plate);
                 let grip = Rolling::new(ball, &scene.plate).grip(&y, plate);
-                let give = creeping.give(&grip, plate);
-                let sink = 2.0 * give.sag * plate.omega.xy().norm() / (1.0 + ball.inertia_factor());
-                let creep = give.slip[0].hypot(give.slip[1]) * creeping_share(ball);
-                self.note(scene, &grip, [creep, sink], give.sag);
+                let creep_and_sag = creeping.creep_and_sag(&grip, plate);
+                let sink = 2.0 * creep_and_sag.sag * plate.omega.xy().norm()
+                    / (1.0 + ball.inertia_factor());
+                let creep =
+                    creep_and_sag.slip[0].hypot(creep_and_sag.slip[1]) * creeping_share(ball);
+                self.note(scene, &grip, [creep, sink], creep_and_sag.sag);
                 let settling = creeping.settling_s(grip.normal.max(f64::MIN_POSITIVE));
                 self.settling = [0, 1].map(|i| self.settling[i].max(settling[i]));
             }
@@ -149,9 +156,9 @@ impl Worst {
     }
 
     fn survey(&self, scene: &Scene, shortest_time: f64) -> Survey {
-        // The trade adds up over the scene at worst, and half again as much
-        // because the ball is looked at where it starts only; what each part
-        // lags behind by its settling time is the creeping model's error.
+        // At worst, v − U adds up over the scene; the factor 1.5 is a margin, because the
+        // ball is evaluated at its start only. The creeping model's error is the lag of
+        // each part by its settling time.
         let parts = [self.sink, self.creep];
         let rolling = 1.5 * (parts[0] + parts[1]) * scene.duration_s + self.sag * self.demand;
         let (planar_error_m, planar_step_s) = self.planar(scene);
@@ -171,7 +178,7 @@ impl Worst {
     }
 }
 
-/// κ/(1 + κ): the part of creep that shows in the velocity.
+/// Returns κ/(1 + κ), the share of the creep that appears in the velocity.
 fn creeping_share(ball: &Ball) -> f64 {
     ball.inertia_factor() / (1.0 + ball.inertia_factor())
 }

@@ -1,5 +1,5 @@
-//! The ball on the plate: rolling, resistance at rest and in motion, the rim
-//! or the open edge, and a ball that sticks.
+//! The ball on the plate: rolling, stiction and rolling resistance, the rim or the open
+//! edge, and the faults of a ball.
 
 use nalgebra::Vector2;
 
@@ -7,14 +7,14 @@ use super::fault::BallFault;
 use offbd_core::plant::{Ball, Plate, PlateShape, Rolling, RollingState, Tilt};
 use offbd_core::vocabulary::{Axis, Invalid, in_range};
 
-/// What the plate's surface does to the ball; immutable.
+/// The properties of the plate's surface and rim; immutable.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surface {
-    /// Tilt below which a ball at rest stays at rest, rad.
+    /// Stiction: tilt below which a ball at rest stays at rest, rad.
     pub breakaway_rad: f64,
-    /// Tilt at which a moving ball keeps its speed, rad.
+    /// Rolling resistance: tilt at which a moving ball keeps its speed, rad.
     pub rolling_rad: f64,
-    /// Speed after over speed before an impact on the rim, 0 to 1.
+    /// Coefficient of restitution of the rim, 0 to 1.
     pub restitution: f64,
 }
 
@@ -27,40 +27,41 @@ impl Surface {
     }
 }
 
-/// Slower than this, m/s, and not driven, a ball is at rest.
+/// Speed below which a ball that is not driven counts as at rest, m/s; chosen.
 const REST_M_S: f64 = 1e-3;
 
-/// The ball's motion.
+/// The state of the ball.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct BallState {
     pub rolling: RollingState,
-    /// It has fallen off the plate.
+    /// Whether the ball has fallen off the plate.
     pub lost: bool,
 }
 
 /// Ball, plate and surface; immutable.
 #[derive(Clone, Debug)]
-pub(super) struct Table {
+pub(super) struct BallOnPlate {
     rolling: Rolling,
     ball: Ball,
     plate: Plate,
     surface: Surface,
 }
 
-impl Table {
+impl BallOnPlate {
     pub(super) fn new(ball: Ball, plate: Plate, surface: Surface) -> Self {
         Self { rolling: Rolling::new(&ball, &plate), ball, plate, surface }
     }
 
-    /// Largest distance of the ball's centre from the plate's along each axis, m.
+    /// Returns the largest distance of the ball's centre from the plate's along each
+    /// axis, m.
     pub(super) fn reach(&self) -> Vector2<f64> {
         let kept = if self.plate.rim() { self.ball.radius_m() } else { 0.0 };
         let along = |axis| (self.plate.half_extent_m(axis) - kept).max(0.0);
         Vector2::new(along(Axis::X), along(Axis::Y))
     }
 
-    /// One step of `h` seconds: `tilt` at its start, middle and end, `push` an
-    /// acceleration of the free ball, m/s².
+    /// Returns the state after a step of `h` seconds, with the `tilt` at its start, middle
+    /// and end, and `push` an acceleration of the free ball, m/s².
     pub(super) fn advance(
         &self,
         state: &BallState,
@@ -83,9 +84,9 @@ impl Table {
         self.at_the_edge(after)
     }
 
-    /// The spin about the normal is braked as rolling is: by a couple of the
-    /// weight times the reach of the contact, which is rolling_rad·r. Without it
-    /// a ball that circles would spin faster without end.
+    /// Brakes the spin about the normal as rolling is braked: by a couple of the weight
+    /// times the lever of the contact force, rolling_rad·r. Without it the spin of a ball
+    /// that circles would grow without bound.
     fn spun_down(&self, state: RollingState, fault: Option<BallFault>, h: f64) -> RollingState {
         let kappa = self.ball.inertia_factor();
         let couple = self.resistance(self.surface.rolling_rad, fault) * (1.0 + kappa);
@@ -93,7 +94,7 @@ impl Table {
         RollingState { spin: state.spin.signum() * (state.spin.abs() - braked).max(0.0), ..state }
     }
 
-    /// The resistance as an acceleration of a rolling ball, m/s².
+    /// Returns the resistance as an acceleration of the rolling ball, m/s².
     fn resistance(&self, healthy_rad: f64, fault: Option<BallFault>) -> f64 {
         let sticky = if let Some(BallFault::Sticky(tilt)) = fault { tilt } else { 0.0 };
         self.ball.rolling_gravity() * healthy_rad.max(sticky).sin()
@@ -111,7 +112,7 @@ impl Table {
         hold > 0.0 && state.velocity.norm() < REST_M_S && drive.norm() <= hold
     }
 
-    /// The resistance to a moving ball as a push of the free ball, m/s².
+    /// Returns the resistance to a moving ball as an acceleration of the free ball, m/s².
     fn drag(&self, state: &RollingState, fault: Option<BallFault>) -> Vector2<f64> {
         let speed = state.velocity.norm();
         if speed == 0.0 {
@@ -143,7 +144,7 @@ fn at_rest(state: &RollingState) -> RollingState {
     RollingState { velocity: Vector2::zeros(), ..*state }
 }
 
-/// Resistance stops a ball; it does not turn it round.
+/// Returns `after`, but at rest if resistance would have reversed the velocity.
 fn stopped_by(before: &RollingState, after: RollingState, drag: Vector2<f64>) -> RollingState {
     let turned = after.velocity.dot(&before.velocity) < 0.0;
     if turned && drag != Vector2::zeros() { at_rest(&after) } else { after }
@@ -174,39 +175,40 @@ mod tests {
 
     const SURFACE: Surface = Surface { breakaway_rad: 0.01, rolling_rad: 0.002, restitution: 0.5 };
 
-    fn table(rim: bool) -> Table {
+    fn ball_on_plate(rim: bool) -> BallOnPlate {
         let plate = Plate::new(Plate::default().shape(), 0.02, rim).unwrap();
-        Table::new(Ball::default(), plate, SURFACE)
+        BallOnPlate::new(Ball::default(), plate, SURFACE)
     }
 
     fn run(
-        table: &Table,
+        ball_on_plate: &BallOnPlate,
         from: BallState,
         qy: f64,
         fault: Option<BallFault>,
         ms: u32,
     ) -> BallState {
         let tilt = Tilt::constant(0.0, qy);
-        (0..ms).fold(from, |s, _| table.advance(&s, [&tilt; 3], Vector2::zeros(), fault, 1e-3))
+        (0..ms)
+            .fold(from, |s, _| ball_on_plate.advance(&s, [&tilt; 3], Vector2::zeros(), fault, 1e-3))
     }
 
     #[test]
     fn a_ball_at_rest_starts_above_its_breakaway_tilt_only() {
         let rest = BallState::default();
-        assert_eq!(run(&table(true), rest, 0.0099, None, 500), rest);
-        let rolled = run(&table(true), rest, 0.02, None, 500).rolling.position.x;
+        assert_eq!(run(&ball_on_plate(true), rest, 0.0099, None, 500), rest);
+        let rolled = run(&ball_on_plate(true), rest, 0.02, None, 500).rolling.position.x;
         let expected = 9.81 / 1.4 * (0.02_f64.sin() - 0.002_f64.sin()) / 8.0;
         assert!((rolled / expected - 1.0).abs() < 5e-3, "{rolled} m is not {expected} m");
     }
 
-    /// Couple m·g·rolling_rad·r on an inertia κ·m·r².
+    /// A couple m·g·rolling_rad·r acts on the inertia κ·m·r².
     #[test]
     fn validate_that_a_ball_that_spins_on_the_spot_is_braked() {
         let spinning = RollingState { spin: -20.0, ..RollingState::default() };
         let from = BallState { rolling: spinning, lost: false };
         let rate = 9.81 * 0.002_f64.sin() / (0.4 * Ball::default().radius_m());
         for seconds in [2, 8] {
-            let spin = run(&table(true), from, 0.0, None, 1000 * seconds).rolling.spin;
+            let spin = run(&ball_on_plate(true), from, 0.0, None, 1000 * seconds).rolling.spin;
             let wanted = -(20.0 - rate * f64::from(seconds)).max(0.0);
             assert!((spin - wanted).abs() < 1e-9, "{spin} is not {wanted}");
         }
@@ -215,17 +217,17 @@ mod tests {
     #[test]
     fn a_sticky_ball_needs_more_and_a_glued_one_stops_at_once() {
         let rest = BallState::default();
-        assert_eq!(run(&table(true), rest, 0.09, Some(BallFault::Sticky(0.1)), 500), rest);
-        let moving = run(&table(true), rest, 0.05, None, 300);
-        let glued = run(&table(true), moving, 0.05, Some(BallFault::Glued), 100);
+        assert_eq!(run(&ball_on_plate(true), rest, 0.09, Some(BallFault::Sticky(0.1)), 500), rest);
+        let moving = run(&ball_on_plate(true), rest, 0.05, None, 300);
+        let glued = run(&ball_on_plate(true), moving, 0.05, Some(BallFault::Glued), 100);
         assert_eq!(glued.rolling.position, moving.rolling.position);
     }
 
     #[test]
     fn a_rim_keeps_the_ball_and_an_open_edge_loses_it() {
-        let kept = run(&table(true), BallState::default(), 0.1, None, 3000);
+        let kept = run(&ball_on_plate(true), BallState::default(), 0.1, None, 3000);
         assert!(!kept.lost && kept.rolling.position.x <= 0.19 - 0.0127);
-        assert!(run(&table(false), BallState::default(), 0.1, None, 3000).lost);
+        assert!(run(&ball_on_plate(false), BallState::default(), 0.1, None, 3000).lost);
     }
 
     #[test]

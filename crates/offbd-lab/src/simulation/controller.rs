@@ -1,41 +1,42 @@
-//! The rig's controller: one PID per axis on the measured position, with a
-//! filtered derivative and a whole number of command steps.
+//! The rig's controller: one PID per axis on the measured position, with a filtered
+//! derivative and quantised commands.
 //!
-//! The device runs one loop: look, command, log a row. At the chapter's 100 rows
-//! a second the loops close every 10 ms, as the chapter's do.
+//! The device runs one loop: read, command, log a row. At the chapter's 100 rows per
+//! second the loops close every 10 ms, as in the chapter.
 
 use super::steps::{rounded, step_in};
 use offbd_core::plant::Ball;
 use offbd_core::vocabulary::{Axis, Invalid, PerAxis, in_range, positive};
 
-/// A controller; immutable. Its gains follow from the loop it is to close.
+/// The parameters of a controller; immutable. Its gains follow from them by pole
+/// placement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ControllerModel {
     /// Natural frequency of the closed loop without lag, rad/s.
     pub bandwidth_rad_s: f64,
-    /// Damping ratio of the same.
+    /// Damping ratio of the closed loop without lag.
     pub damping: f64,
-    /// Integral action: share of the bandwidth, dimensionless.
+    /// Rate of the integral action as a share of the bandwidth.
     pub integral: f64,
     /// Time constant of the derivative's filter, s.
     pub derivative_filter_s: f64,
-    /// Largest command, rad.
+    /// Limit of the command's magnitude, rad.
     pub limit_rad: f64,
-    /// Share of the wanted acceleration that is commanded ahead, 0 to 1.
+    /// Feedforward: share of the reference acceleration, 0 to 1.
     pub feedforward: f64,
-    /// Largest bandwidth that a period of the log leaves, rad per period.
+    /// Upper limit of the bandwidth times the period of the log, rad.
     pub turn_per_period_rad: f64,
-    /// Smallest step of the command, rad; 0: continuous.
+    /// Resolution of the command, rad; 0: continuous.
     pub resolution_rad: f64,
 }
 
-/// How long the last command stands while no ball is seen, s; then the plate
-/// is levelled. A lone missing reading must not make the plate twitch.
+/// Time for which the last command is held while no ball is seen, s; then the plate is
+/// levelled. Chosen so that a single missing reading does not make the plate twitch.
 const BLIND_S: f64 = 0.3;
 
 /// The gains of one axis: rad per m, per m·s, per m/s and per m/s².
 #[derive(Clone, Copy, Debug)]
-struct Gains {
+struct PidGains {
     proportional: f64,
     integral: f64,
     derivative: f64,
@@ -55,15 +56,16 @@ impl ControllerModel {
         Ok(())
     }
 
-    /// What a loop holds that nobody has tuned to its rate, rad per period.
+    /// [`turn_per_period_rad`](Self::turn_per_period_rad) of a loop that is not tuned to
+    /// its rate, rad; chosen.
     pub const UNTUNED_RAD: f64 = 0.1;
 
-    /// Pole placement on ẍ = g/(1 + κ)·q. A slow loop gets a bandwidth that it
-    /// can hold.
-    fn gains(&self, ball: &Ball, period_s: f64) -> Gains {
+    /// Returns the gains by pole placement on ẍ = g/(1 + κ)·q, with the bandwidth limited
+    /// by the period.
+    fn gains(&self, ball: &Ball, period_s: f64) -> PidGains {
         let (w, g) =
             (self.bandwidth_rad_s.min(self.turn_per_period_rad / period_s), ball.rolling_gravity());
-        Gains {
+        PidGains {
             proportional: w * w / g,
             integral: self.integral * w * w * w / g,
             derivative: 2.0 * self.damping * w / g,
@@ -72,16 +74,16 @@ impl ControllerModel {
     }
 }
 
-/// Where the ball is asked to be along one axis, m, and to accelerate, m/s².
+/// The reference along one axis: position, m, and acceleration, m/s².
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Wanted {
+pub(super) struct Setpoint {
     pub position: f64,
     pub acceleration: f64,
 }
 
-/// What one axis remembers.
+/// The controller's state on one axis.
 #[derive(Clone, Copy, Debug, Default)]
-struct AxisState {
+struct AxisControlState {
     integral: f64,
     rate: f64,
     last: Option<f64>,
@@ -89,13 +91,13 @@ struct AxisState {
     command: f64,
 }
 
-/// The controller in motion.
+/// A controller with its state.
 #[derive(Clone, Debug)]
 pub(super) struct Controller {
     model: ControllerModel,
     period_s: f64,
-    gains: Gains,
-    axes: PerAxis<AxisState>,
+    gains: PidGains,
+    axes: PerAxis<AxisControlState>,
 }
 
 impl Controller {
@@ -103,12 +105,12 @@ impl Controller {
         Self { model, period_s, gains: model.gains(ball, period_s), axes: PerAxis::default() }
     }
 
-    /// The commands in force, rad.
+    /// Returns the current commands, rad.
     pub(super) fn commands(&self) -> PerAxis<f64> {
         self.axes.map(|a| a.command)
     }
 
-    /// Takes commands from outside; an axis without one keeps its own.
+    /// Sets commands from outside; an axis without one keeps its command.
     pub(super) fn command(&mut self, commands: PerAxis<Option<f64>>) {
         for axis in Axis::ALL {
             if let Some(command) = commands[axis] {
@@ -117,8 +119,8 @@ impl Controller {
         }
     }
 
-    /// One period: new commands from the last reading.
-    pub(super) fn update(&mut self, wanted: PerAxis<Wanted>, seen: PerAxis<Option<f64>>) {
+    /// Runs one period: computes new commands from the last reading.
+    pub(super) fn update(&mut self, wanted: PerAxis<Setpoint>, seen: PerAxis<Option<f64>>) {
         for axis in Axis::ALL {
             let state = self.axes[axis];
             self.axes[axis] = match seen[axis] {
@@ -128,24 +130,30 @@ impl Controller {
         }
     }
 
-    fn closed(&self, state: AxisState, axis: Axis, wanted: Wanted, position: f64) -> AxisState {
+    fn closed(
+        &self,
+        state: AxisControlState,
+        axis: Axis,
+        wanted: Setpoint,
+        position: f64,
+    ) -> AxisControlState {
         let (model, h) = (&self.model, self.period_s);
         let change = state.last.map_or(0.0, |last| (position - last) / h);
         let rate = state.rate + (change - state.rate) * h / (model.derivative_filter_s + h);
         let error = wanted.position - position;
         let integral = state.integral + self.gains.integral * error * h;
-        // The integral may not ask for more than half of the authority.
+        // Anti-windup: the integral may use at most half of the command range.
         let integral = integral.clamp(-model.limit_rad / 2.0, model.limit_rad / 2.0);
         let wish = self.gains.proportional * error + integral - self.gains.derivative * rate;
         let wish = wish + self.gains.feedforward * wanted.acceleration;
         let command = self.quantise(wish * axis.drive_sign());
-        AxisState { integral, rate, last: Some(position), unseen_s: 0.0, command }
+        AxisControlState { integral, rate, last: Some(position), unseen_s: 0.0, command }
     }
 
-    fn blind(&self, state: AxisState) -> AxisState {
+    fn blind(&self, state: AxisControlState) -> AxisControlState {
         let unseen_s = state.unseen_s + self.period_s;
         let command = if unseen_s > BLIND_S { 0.0 } else { state.command };
-        AxisState { rate: 0.0, last: None, unseen_s, command, ..state }
+        AxisControlState { rate: 0.0, last: None, unseen_s, command, ..state }
     }
 
     fn quantise(&self, command: f64) -> f64 {

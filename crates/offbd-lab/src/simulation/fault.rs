@@ -1,5 +1,5 @@
-//! The faults that a simulated rig can have, and their words on the command
-//! line: `CODE:KIND[=SIZE]@START[-END]`, as in `y_servo:gain=0.5@20-40`.
+//! The faults of a simulated rig, and their syntax on the command line:
+//! `CODE:KIND[=SIZE]@START[-END]`, as in `y_servo:gain=0.5@20-40`.
 
 use std::fmt;
 use std::str::FromStr;
@@ -8,52 +8,52 @@ use nalgebra::Vector2;
 
 use offbd_core::vocabulary::{Axis, FaultCode};
 
-/// What a servo does wrong. The angle is that of the plate behind it.
+/// A fault of a servo. Angles are those of the plate that it turns.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ServoFault {
-    /// Stays where it is.
+    /// The servo stays at its angle.
     Hold,
-    /// Loses power: a spring takes it back to zero.
+    /// The servo loses power, and a spring returns it to zero.
     Dead,
-    /// Answers with a factor.
+    /// The angle is the command times this factor.
     Gain(f64),
-    /// Answers the wrong way round.
+    /// The angle has the wrong sign.
     Reversed,
-    /// A slipped horn: off by a constant angle, rad.
+    /// The horn has slipped: the angle is off by a constant, rad.
     Offset(f64),
-    /// Lag longer and rate limit lower by this factor.
+    /// The lag is longer and the rate limit lower by this factor.
     Slow(f64),
-    /// A loose contact: power comes and goes.
+    /// A loose contact interrupts the power intermittently.
     Intermittent,
 }
 
-/// What is wrong with the ball.
+/// A fault of the ball.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum BallFault {
-    /// Fixed to the plate.
+    /// The ball is fixed to the plate.
     Glued,
-    /// Moves against a resistance that only a tilt above this, rad, overcomes.
+    /// The ball moves only at a tilt above this, rad.
     Sticky(f64),
 }
 
-/// What is wrong with the readings.
+/// A fault of the readings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SensorFault {
-    /// Repeats the last reading.
+    /// The sensor repeats its last reading.
     Freeze,
-    /// Repeats the last reading of one axis.
+    /// The sensor repeats its last reading of one axis.
     FreezeAxis(Axis),
-    /// Readings missing, with this probability.
+    /// Readings are missing, with this probability.
     Dropout(f64),
-    /// Noise larger by this factor.
+    /// The noise is larger by this factor.
     Noise(f64),
-    /// Outliers, with this probability.
+    /// Readings are outliers, with this probability.
     Spikes(f64),
-    /// Readings shifted by a constant, m.
+    /// Readings are shifted by a constant, m.
     Jump(Vector2<f64>),
 }
 
-/// What is wrong, and with what.
+/// The faulty component and its fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FaultEffect {
     Servo(Axis, ServoFault),
@@ -62,7 +62,7 @@ pub enum FaultEffect {
 }
 
 impl FaultEffect {
-    /// The code that a diagnosis should come to.
+    /// Returns the code of the correct diagnosis.
     #[must_use]
     pub const fn code(&self) -> FaultCode {
         match self {
@@ -72,7 +72,7 @@ impl FaultEffect {
         }
     }
 
-    /// The word for its kind, as in a corpus' labels.
+    /// Returns the name of the kind of fault, as in the labels of a corpus.
     #[must_use]
     pub const fn kind(&self) -> &'static str {
         match self {
@@ -94,7 +94,7 @@ impl FaultEffect {
         }
     }
 
-    /// The axis it is on, where it is on one.
+    /// Returns the axis of the fault; `None` if it is not on one axis.
     #[must_use]
     pub const fn axis(&self) -> Option<Axis> {
         match self {
@@ -103,7 +103,8 @@ impl FaultEffect {
         }
     }
 
-    /// Its size: a factor, an angle in rad, a probability or a shift in m.
+    /// Returns the size: a factor, an angle in rad, a probability or a shift in m; `None`
+    /// if the fault has none. A dropout's probability is not returned.
     #[must_use]
     pub fn size(&self) -> Option<Vec<f64>> {
         match *self {
@@ -123,21 +124,21 @@ impl FaultEffect {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fault {
     pub effect: FaultEffect,
-    /// When it begins, s on the rig's clock.
+    /// Onset on the rig's clock, s.
     pub onset_s: f64,
-    /// When it is repaired, s; none: never.
+    /// Repair on the rig's clock, s; `None`: never.
     pub end_s: Option<f64>,
 }
 
 impl Fault {
-    /// Whether it is there at `t_s`.
+    /// Returns whether the fault is active at `t_s`.
     #[must_use]
     pub fn active(&self, t_s: f64) -> bool {
         self.onset_s <= t_s && self.end_s.is_none_or(|end| t_s < end)
     }
 }
 
-/// A fault that cannot be understood.
+/// A syntax error in a fault.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FaultSyntax {
     #[error(
@@ -152,20 +153,27 @@ pub enum FaultSyntax {
     Time(String),
 }
 
-/// The words for all faults, for help and errors.
+/// The names of all faults, for error messages.
 pub(crate) const KNOWN: &str = "x_servo or y_servo: hold, dead, gain, reversed, offset, slow, \
      intermittent; stuck_ball: glued, sticky; sensor: freeze, freeze_axis, dropout, noise, \
      spikes, jump";
 
-/// Sizes when none is given: clear faults, each well inside what the corpus of
-/// recorded faults spans (gain 0.2–0.5, 3°, 12 times slower, 12 times noisier).
+/// Default sizes. Chosen: clear faults, each well inside the range of the corpus of
+/// recorded faults (gain 0.2–0.5, 3°, 12 times slower, 12 times noisier).
 mod typical {
+    /// Factor of the angle.
     pub(super) const GAIN: f64 = 0.4;
+    /// Angle of a slipped horn, rad.
     pub(super) const OFFSET_RAD: f64 = 0.05;
+    /// Factor of the lag.
     pub(super) const SLOW: f64 = 12.0;
+    /// Breakaway tilt of a sticky ball, rad.
     pub(super) const STICKY_RAD: f64 = 0.1;
+    /// Factor of the noise.
     pub(super) const NOISE: f64 = 12.0;
+    /// Share of outliers.
     pub(super) const SPIKES: f64 = 0.2;
+    /// Shift of the readings along x and y, m.
     pub(super) const JUMP_M: [f64; 2] = [0.035, -0.02];
 }
 
@@ -281,7 +289,7 @@ fn sensor(kind: &str, size: &SizeWord<'_>) -> Result<Option<SensorFault>, FaultS
     }))
 }
 
-/// The word after `=`, if there is one.
+/// The word after `=`, if any.
 struct SizeWord<'a> {
     kind: &'a str,
     word: Option<&'a str>,

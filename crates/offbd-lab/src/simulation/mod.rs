@@ -1,11 +1,11 @@
-//! The simulated rig: a plate on two servos, a ball, a sensor, a controller,
-//! and everything that can go wrong with them.
+//! The simulated rig: a plate on two servos, a ball, a sensor, a controller, and their
+//! faults.
 //!
-//! One idea: an immutable [`RigModel`], a mutable [`SimulatedRig`] that moves
-//! from event to event (sensor, controller, log) by an explicit time, and one
-//! seed from which separate random streams are drawn, so that equal seeds give
-//! equal bytes and a fault does not move the noise. Knows the plant; does not
-//! know how a rig is judged, and reads no clock.
+//! An immutable [`RigModel`] describes a rig; a mutable [`SimulatedRig`] simulates it
+//! from event to event (sensor, controller, log) on its own clock. Random streams for
+//! separate purposes come from one seed, so that equal seeds give equal bytes and a fault
+//! does not change the noise. The module uses the plant's models, but neither the
+//! diagnosis nor the system's clock.
 
 mod ball;
 mod controller;

@@ -1,4 +1,4 @@
-//! All that is true of one simulated rig, beside what its owner knows of it.
+//! The true properties of one simulated rig, and its description by the owner.
 
 use super::ball::Surface;
 use super::controller::ControllerModel;
@@ -11,7 +11,7 @@ use offbd_core::vocabulary::{Axis, Invalid, PerAxis, in_range, positive};
 /// A rig to be simulated; immutable.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RigModel {
-    /// What the owner knows: the asset file.
+    /// The description by the owner: the asset file.
     pub rig: Rig,
     pub servos: PerAxis<ServoTruth>,
     pub surface: Surface,
@@ -20,16 +20,16 @@ pub struct RigModel {
     /// Ball and beam: the ball stays on y = 0, and the log has neither commands nor
     /// positions along y.
     pub one_axis: bool,
-    /// How its sessions differ.
+    /// Variation between the sessions of this rig.
     pub spread: SessionSpread,
 }
 
 impl RigModel {
-    /// Fastest log that is simulated, rows per second: the plant's step is 1 ms.
+    /// Highest simulated log rate, rows per second: one row per step of the plant, 1 ms.
     pub const MAX_LOG_HZ: f64 = 1000.0;
 
-    /// The same sensor, servos and surface under another owner's ball, plate,
-    /// angle limit and sample rate.
+    /// Replaces ball, plate, angle limit and sample rate by those of `rig`; keeps sensor,
+    /// servos and surface.
     #[must_use]
     pub fn owned_as(mut self, rig: Rig) -> Self {
         self.controller.limit_rad = rig.servo.angle_limit_rad;

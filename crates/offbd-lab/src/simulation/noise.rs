@@ -1,11 +1,11 @@
-//! Random numbers: one ChaCha stream per purpose, all from one seed.
+//! Random numbers: one ChaCha stream per purpose, all derived from one seed.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-/// What a stream is drawn for. A new purpose goes to the end: the number is
-/// part of what a seed reproduces.
+/// The purpose of a random stream; its number selects the stream. Append new purposes at
+/// the end, so that a seed keeps reproducing the same numbers.
 #[derive(Clone, Copy)]
 pub(super) enum Purpose {
     Start,
@@ -33,27 +33,27 @@ impl Noise {
         Self(rng)
     }
 
-    /// Standard normal.
+    /// Draws from the standard normal distribution.
     pub(super) fn normal(&mut self) -> f64 {
         self.0.sample(StandardNormal)
     }
 
-    /// Uniform in [low, high); `low` where the range is empty.
+    /// Draws uniformly from [low, high); returns `low` if the range is empty.
     pub(super) fn uniform(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.0.random::<f64>()
     }
 
-    /// Whether an event of probability `p` happens.
+    /// Draws whether an event of probability `p` happens.
     pub(super) fn happens(&mut self, p: f64) -> bool {
         self.0.random::<f64>() < p
     }
 
-    /// +1 or −1.
+    /// Draws +1 or −1.
     pub(super) fn sign(&mut self) -> f64 {
         if self.happens(0.5) { 1.0 } else { -1.0 }
     }
 
-    /// Time to the next event of a Poisson process, s; infinite at rate zero.
+    /// Draws the time to the next event of a Poisson process, s; infinite at rate zero.
     pub(super) fn waiting_s(&mut self, per_minute: f64) -> f64 {
         let uniform = 1.0 - self.0.random::<f64>();
         if per_minute > 0.0 { -uniform.ln() * 60.0 / per_minute } else { f64::INFINITY }

@@ -1,6 +1,6 @@
-//! Rigs to start from, each in the spirit of a kind that people build. Their
-//! numbers lie in the ranges seen on real rigs: off level by 0.2–1.7°, a lag of
-//! 80–300 ms from command to acceleration, stiction up to 0.5–1° of command.
+//! Preset rigs, each typical of a kind that people build. Their numbers lie in the
+//! ranges observed on real rigs: off level by 0.2–1.7°, a lag of 80–300 ms from command
+//! to acceleration, stiction up to 0.5–1° of command.
 
 use std::fmt;
 use std::str::FromStr;
@@ -41,10 +41,10 @@ impl Preset {
         }
     }
 
-    /// The rig of this name.
+    /// Returns the rig of this name.
     ///
     /// # Errors
-    /// [`Invalid`] if its numbers cannot be; they can.
+    /// [`Invalid`] if its numbers are out of range; those of the presets are not.
     pub fn model(self) -> Result<RigModel, Invalid> {
         match self {
             Self::Chapter => Ok(chapter()),
@@ -70,11 +70,12 @@ impl FromStr for Preset {
     }
 }
 
-/// Readings count from the plate's centre.
+/// The origin of the readings at the plate's centre.
 const CENTRED: PerAxis<f64> = PerAxis { x: 0.0, y: 0.0 };
 
-/// A loop slower than the sensor and the servo by a factor of three or more,
-/// well damped; its derivative is filtered over a few readings.
+/// Returns a critically damped controller. The presets' bandwidths make the loop slower
+/// than sensor and servo by a factor of three or more, and filter the derivative over a
+/// few readings.
 fn controller(limit_rad: f64, bandwidth_rad_s: f64, derivative_filter_s: f64) -> ControllerModel {
     ControllerModel {
         bandwidth_rad_s,
@@ -137,7 +138,7 @@ fn pingpong() -> Result<RigModel, Invalid> {
     };
     let continuous = controller(rig.servo.angle_limit_rad, 1.8, 0.1);
     Ok(RigModel {
-        // Half a degree, as a servo library with microsecond steps gives.
+        // Half a degree: the resolution of a servo library with steps of a microsecond.
         controller: ControllerModel { resolution_rad: 0.5_f64.to_radians(), ..continuous },
         rig,
         servos: PerAxis { x: servo, y: ServoTruth { level_rad: 0.02, ..servo } },

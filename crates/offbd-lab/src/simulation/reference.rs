@@ -1,4 +1,4 @@
-//! Where the ball is asked to be.
+//! Reference motions: the setpoint of the ball over time.
 
 use std::f64::consts::TAU;
 use std::fmt;
@@ -9,17 +9,17 @@ use nalgebra::Vector2;
 use super::noise::{Noise, Purpose};
 use offbd_core::vocabulary::UnknownWord;
 
-/// A reference motion. Its amplitudes are shares of the free half extents.
+/// A reference motion. Amplitudes are shares of the ball's reach along each axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Reference {
     /// The plate's centre.
     Hold,
-    /// A new place, drawn at random, every 3 s.
+    /// A step to a random position every 3 s.
     #[default]
     Steps,
-    /// A circle in 3.2 s.
+    /// A circle with a period of 3.2 s.
     Circle,
-    /// Two periods, 3.2 s along x and 2.4 s along y.
+    /// A Lissajous figure with periods of 3.2 s along x and 2.4 s along y.
     Lissajous,
 }
 
@@ -53,17 +53,19 @@ impl FromStr for Reference {
     }
 }
 
-/// Seconds between two steps: three closed-loop time constants of the presets.
+/// Interval between two steps, s. Chosen: three closed-loop time constants of the
+/// presets.
 const STEP_S: f64 = 3.0;
-/// Shares of the free half extent: steps and turns stay clear of the rim while
-/// overshooting by a fifth.
+/// Largest step as a share of the reach. Chosen so that an overshoot of a fifth stays
+/// clear of the rim.
 const STEP_SHARE: f64 = 0.5;
+/// Amplitude of circle and Lissajous figure as a share of the reach; chosen likewise.
 const TURN_SHARE: f64 = 0.45;
-/// Periods of the turns, s: on half of the chapter's plate they ask for tilts of
-/// 1.5–3°, enough to tell a servo's gain from stiction.
+/// Periods of circle and Lissajous figure, s. Chosen: on half of the chapter's plate they
+/// require tilts of 1.5–3°, enough to distinguish a servo's gain from stiction.
 const TURN_S: [f64; 2] = [3.2, 2.4];
 
-/// The reference in motion.
+/// A reference motion with its state.
 #[derive(Clone, Debug)]
 pub(super) struct ReferenceState {
     reference: Reference,
@@ -79,7 +81,7 @@ impl ReferenceState {
         Self { reference, reach, noise, target: Vector2::zeros(), next_step_s: STEP_S }
     }
 
-    /// The wanted position at `t_s`, m; times must not go back.
+    /// Returns the reference position at `t_s`, m; times must not decrease.
     pub(super) fn at(&mut self, t_s: f64) -> Vector2<f64> {
         let turn = |period: f64| TAU * t_s / period;
         match self.reference {
@@ -96,7 +98,7 @@ impl ReferenceState {
         }
     }
 
-    /// The acceleration that goes with it, m/s²; a step has none.
+    /// Returns the acceleration at the reference position `wanted`, m/s²; zero for steps.
     pub(super) fn acceleration(&self, wanted: Vector2<f64>) -> Vector2<f64> {
         let square = Vector2::from(TURN_S.map(|period| (TAU / period).powi(2)));
         match self.reference {

@@ -1,17 +1,17 @@
-//! How often a sensor looks, beside how often the device logs.
+//! The refresh rate of a sensor, relative to the rate of the log.
 
 use std::ops::RangeInclusive;
 
 use offbd_core::vocabulary::{Invalid, in_range};
 
-/// When there is a new reading. Between two of them the rows of the log repeat
-/// the last one: a zero-order hold.
+/// When the sensor takes a new reading. In between, the rows of the log repeat the last
+/// one (zero-order hold).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Refresh {
-    /// With every nth row, n from 1 to [`Refresh::MAX_ROWS`]: the
-    /// device's loop runs n times for each look of its camera.
+    /// With every nth row, n from 1 to [`Refresh::MAX_ROWS`]: the device's loop runs n
+    /// times for each image of its camera.
     Rows(u32),
-    /// So many times a second ([`Refresh::HZ`]), in step with nothing.
+    /// At this rate in Hz, within [`Refresh::HZ`], not synchronised with the log.
     Hz(f64),
 }
 
@@ -22,9 +22,10 @@ impl Default for Refresh {
 }
 
 impl Refresh {
-    /// A look every ten seconds to ten a plant's step.
+    /// Range of refresh rates, Hz; chosen: from one reading in ten seconds to ten per step
+    /// of the plant.
     pub const HZ: RangeInclusive<f64> = 0.1..=10_000.0;
-    /// Most rows that repeat one reading: a second of the fastest log.
+    /// Maximum number of rows with one reading; chosen: a second of the fastest log.
     pub const MAX_ROWS: u32 = 1000;
 
     pub(super) fn check(self) -> Result<(), Invalid> {
@@ -38,12 +39,13 @@ impl Refresh {
         .map(drop)
     }
 
-    /// Whether there is a look for the row of this number, from 1 on.
+    /// Returns whether the sensor reads with row `n_row`, counted from 1.
     pub(super) const fn with_row(self, n_row: u64) -> bool {
         matches!(self, Self::Rows(n) if (n_row - 1).is_multiple_of(n as u64))
     }
 
-    /// When the look of this number is due, from 0 on, s; never if rows call for it.
+    /// Returns the time of reading `n_look`, counted from 0, s; infinity if readings are
+    /// tied to rows.
     pub(super) fn look_s(self, n_look: u64) -> f64 {
         match self {
             Self::Hz(hz) => n_look as f64 / hz,

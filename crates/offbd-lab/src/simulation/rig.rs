@@ -1,13 +1,13 @@
-//! The simulated rig in motion.
+//! The simulation of a rig.
 //!
-//! It goes from event to event (the sensor looks; the device reads it, commands
-//! and logs a row); between two events the plant advances in steps of at most
-//! 1 ms, each a row of stages: faults in force → servos → ball → truth.
+//! It advances from event to event (the sensor takes a reading; the device reads it,
+//! commands and logs a row). Between two events the plant advances in steps of at most
+//! 1 ms, each in stages: active faults → servos → ball → truth.
 
 use nalgebra::Vector2;
 
-use super::ball::{BallState, Table};
-use super::controller::{Controller, Wanted};
+use super::ball::{BallOnPlate, BallState};
+use super::controller::{Controller, Setpoint};
 use super::disturbance::{DisturbanceState, Disturbances};
 use super::fault::{BallFault, Fault, FaultEffect, SensorFault, ServoFault};
 use super::model::RigModel;
@@ -15,36 +15,41 @@ use super::noise::{Noise, Purpose};
 use super::reference::{Reference, ReferenceState};
 use super::sensor::{Reading, Sensor};
 use super::servo::{PlateAngle, SimulatedServo};
-use super::truth::{FaultTruth, Truth, Watch};
+use super::truth::{FaultObserver, FaultTruth, Truth};
 use offbd_core::plant::{RollingState, Tilt};
 use offbd_core::vocabulary::{Axis, FaultCode, Invalid, PerAxis, Sample};
 
-/// Longest step of the plant, s: a fiftieth of the fastest servo lag.
+/// Longest step of the plant, s. Chosen: a fiftieth of the fastest servo lag of the
+/// presets.
 const STEP_S: f64 = 1e-3;
-/// The log's jitter is cut here, as a share of the period, so that its times
-/// never go back.
+/// Limit of the log's jitter as a share of its period. Chosen below one half, so that the
+/// times never decrease.
 const MAX_JITTER: f64 = 0.4;
-/// The log's resolutions, as a device prints them: 0.1 ms, 10 µrad, 10 µm.
+/// Resolution of the log's times, per s: 0.1 ms, as a device prints them.
 const LOGGED_PER_S: f64 = 1e4;
+/// Resolution of the log's angles, per rad: 10 µrad, likewise.
 const LOGGED_PER_RAD: f64 = 1e5;
+/// Resolution of the log's positions, per m: 10 µm, likewise.
 const LOGGED_PER_M: f64 = 1e5;
 
-/// The faults in force at one moment.
+/// The faults active at one time.
 #[derive(Clone, Copy, Debug, Default)]
-struct InForce {
+struct ActiveFaults {
     servos: PerAxis<Option<ServoFault>>,
     ball: Option<BallFault>,
     sensor: Option<SensorFault>,
 }
 
-/// What happens next.
+/// An event of the simulation.
 #[derive(Clone, Copy)]
-enum Event {
+enum ScheduledEvent {
+    /// The sensor takes a reading.
     Look,
+    /// The device logs a row.
     Row,
 }
 
-/// When things happen next, s.
+/// The times of the next events.
 #[derive(Clone, Debug)]
 struct Schedule {
     n_looks: u64,
@@ -53,11 +58,12 @@ struct Schedule {
     clock: Noise,
 }
 
-/// A simulated rig; advances by [`next_sample`](Self::next_sample) alone.
+/// A simulated rig. Time advances with [`next_sample`](Self::next_sample) and
+/// [`next_sample_by`](Self::next_sample_by).
 #[derive(Clone, Debug)]
 pub struct SimulatedRig {
     model: RigModel,
-    table: Table,
+    ball_on_plate: BallOnPlate,
     now_s: f64,
     schedule: Schedule,
     servos: PerAxis<SimulatedServo>,
@@ -70,14 +76,15 @@ pub struct SimulatedRig {
     controller: Controller,
     reference: ReferenceState,
     disturbances: DisturbanceState,
-    faults: Vec<Watch>,
+    faults: Vec<FaultObserver>,
 }
 
 impl SimulatedRig {
-    /// A rig with its ball somewhere near the centre, at rest, at time zero.
+    /// Creates a rig at time zero, with its ball at rest at a random position near the
+    /// centre.
     ///
     /// # Errors
-    /// [`Invalid`] naming the element of the model that cannot be.
+    /// [`Invalid`] naming the element of the model that is out of range.
     pub fn new(
         model: RigModel,
         reference: Reference,
@@ -85,14 +92,14 @@ impl SimulatedRig {
         seed: u64,
     ) -> Result<Self, Invalid> {
         model.check()?;
-        let table = Table::new(model.rig.ball, model.rig.plate, model.surface);
+        let ball_on_plate = BallOnPlate::new(model.rig.ball, model.rig.plate, model.surface);
         let limit = model.controller.limit_rad;
         let servo = |axis: Axis, purpose| {
             SimulatedServo::new(model.servos[axis], limit, Noise::new(seed, purpose))
         };
         let servos =
             PerAxis { x: servo(Axis::X, Purpose::ServoX)?, y: servo(Axis::Y, Purpose::ServoY)? };
-        let reach = table.reach();
+        let reach = ball_on_plate.reach();
         let level = |axis: Axis| model.servos[axis].level_rad;
         Ok(Self {
             now_s: 0.0,
@@ -112,34 +119,34 @@ impl SimulatedRig {
             reference: ReferenceState::new(reference, reach, seed),
             disturbances: DisturbanceState::new(disturbances, &model.rig.ball, seed),
             faults: Vec::new(),
-            table,
+            ball_on_plate,
             model,
         })
     }
 
-    /// Adds a fault; it counts from its onset on, at once if that has passed.
+    /// Adds a fault; it acts from its onset on, at once if that has passed.
     pub fn inject(&mut self, fault: Fault) {
-        self.faults.push(Watch::new(fault));
+        self.faults.push(FaultObserver::new(fault));
     }
 
-    /// Ends every fault of `code` now, those still to come included.
+    /// Ends every fault of `code` now, including those that have not begun.
     pub fn repair(&mut self, code: FaultCode) {
         let now_s = self.now_s;
-        let of_code = |w: &&mut Watch| w.fault().effect.code() == code;
+        let of_code = |w: &&mut FaultObserver| w.fault().effect.code() == code;
         self.faults.iter_mut().filter(of_code).for_each(|w| w.end(now_s));
     }
 
-    /// Pushes the ball: an acceleration of the free ball, m/s², for `seconds`.
+    /// Pushes the ball with an acceleration of the free ball, m/s², for `seconds`.
     pub fn push(&mut self, acceleration: Vector2<f64>, seconds: f64) {
         self.disturbances.push(acceleration, self.now_s + seconds);
     }
 
-    /// All faults injected so far, with their first chances.
+    /// Returns all faults injected so far, with the first time each was detectable.
     pub fn faults(&self) -> impl Iterator<Item = &FaultTruth> {
-        self.faults.iter().map(Watch::truth)
+        self.faults.iter().map(FaultObserver::truth)
     }
 
-    /// What is really the case.
+    /// Returns the true state of the rig.
     #[must_use]
     pub fn truth(&self) -> Truth {
         Truth {
@@ -152,14 +159,15 @@ impl SimulatedRig {
         }
     }
 
-    /// The next row of the device's log. Rows are numbered from 1; their times
-    /// rise strictly.
+    /// Returns the next row of the device's log. Rows are numbered from 1; their times
+    /// increase strictly.
     pub fn next_sample(&mut self) -> Sample {
         self.next_row(Self::control)
     }
 
-    /// The same where `device` commands in place of the rig's own controller: it is
-    /// shown the row with its reading and the commands of the row before.
+    /// Like [`next_sample`](Self::next_sample), but `device` commands instead of the
+    /// rig's own controller: it receives the row with its reading and the commands of the
+    /// previous row.
     pub fn next_sample_by(
         &mut self,
         device: impl FnOnce(&Sample) -> PerAxis<Option<f64>>,
@@ -167,7 +175,7 @@ impl SimulatedRig {
         self.next_row(|rig| {
             let commands = device(&rig.log());
             rig.controller.command(commands);
-            rig.pass_on();
+            rig.send_commands();
         })
     }
 
@@ -176,8 +184,8 @@ impl SimulatedRig {
             let (event, at_s) = self.schedule.next(&self.model);
             self.advance_to(at_s);
             match event {
-                Event::Look => self.look(),
-                Event::Row => return self.row(control),
+                ScheduledEvent::Look => self.look(),
+                ScheduledEvent::Row => return self.row(control),
             }
         }
     }
@@ -198,17 +206,17 @@ impl SimulatedRig {
         let end = self.turn_plate(self.now_s + h / 2.0, h / 2.0, &faults);
         let push = self.disturbances.at(self.now_s);
         let push = self.on_the_beam(push);
-        // The rate of a lag jumps with its command: the ball feels that too.
+        // The rate of a lag jumps with its command: this acceleration acts on the ball too.
         let acceleration = (end.rate - start.rate) / h;
         let tilts = [start, middle, end].map(|tilt| Tilt { acceleration, ..tilt });
-        self.ball = self.table.advance(&self.ball, tilts.each_ref(), push, faults.ball, h);
+        self.ball = self.ball_on_plate.advance(&self.ball, tilts.each_ref(), push, faults.ball, h);
         self.now_s += h;
         self.watch();
     }
 
-    fn faults_in_force(&self) -> InForce {
-        let mut in_force = InForce::default();
-        for fault in self.faults.iter().map(Watch::fault).filter(|f| f.active(self.now_s)) {
+    fn faults_in_force(&self) -> ActiveFaults {
+        let mut in_force = ActiveFaults::default();
+        for fault in self.faults.iter().map(FaultObserver::fault).filter(|f| f.active(self.now_s)) {
             match fault.effect {
                 FaultEffect::Servo(axis, effect) => in_force.servos[axis] = Some(effect),
                 FaultEffect::Ball(effect) => in_force.ball = Some(effect),
@@ -218,7 +226,7 @@ impl SimulatedRig {
         in_force
     }
 
-    fn turn_plate(&mut self, at_s: f64, h: f64, faults: &InForce) -> Tilt {
+    fn turn_plate(&mut self, at_s: f64, h: f64, faults: &ActiveFaults) -> Tilt {
         for axis in Axis::ALL {
             self.plate[axis] = self.servos[axis].advance(at_s, h, faults.servos[axis]);
             self.healthy_rad[axis] = self.healthy_servos[axis].advance(at_s, h, None).angle;
@@ -226,7 +234,7 @@ impl SimulatedRig {
         self.tilt()
     }
 
-    /// The plate's tilt about (x, y): the servo of axis x turns it about y. A beam
+    /// Returns the plate's tilt about (x, y): the servo of axis x turns it about y. A beam
     /// turns about y only.
     fn tilt(&self) -> Tilt {
         let (x, y) =
@@ -238,7 +246,7 @@ impl SimulatedRig {
         }
     }
 
-    /// What of a push moves the ball: a beam guides it along x.
+    /// Returns the component of a push that moves the ball: a beam guides it along x.
     fn on_the_beam(&self, push: Vector2<f64>) -> Vector2<f64> {
         if self.model.one_axis { Vector2::new(push.x, 0.0) } else { push }
     }
@@ -256,7 +264,7 @@ impl SimulatedRig {
         self.sensor.look(self.now_s, ball, fault);
     }
 
-    /// One turn of the device's loop.
+    /// Runs the device's loop once; returns the row that it logs.
     fn row(&mut self, control: impl FnOnce(&mut Self)) -> Sample {
         if self.model.sensor.refresh.with_row(self.schedule.n_rows) {
             self.look();
@@ -272,14 +280,14 @@ impl SimulatedRig {
         let ahead = self.reference.acceleration(wanted);
         let wanted = PerAxis::from_fn(|axis| {
             let i = axis as usize;
-            Wanted { position: wanted[i], acceleration: ahead[i] }
+            Setpoint { position: wanted[i], acceleration: ahead[i] }
         });
         self.controller.update(wanted, self.reading);
-        self.pass_on();
+        self.send_commands();
     }
 
-    /// The servos take the commands in force.
-    fn pass_on(&mut self) {
+    /// Sends the current commands to the servos.
+    fn send_commands(&mut self) {
         let commands = self.controller.commands();
         for axis in Axis::ALL {
             self.servos[axis].command(self.now_s, commands[axis]);
@@ -307,22 +315,23 @@ impl Schedule {
         Self { n_looks: 0, n_rows: 0, next_row_s: 0.0, clock }
     }
 
-    /// The next event and its time; at one moment a look comes before a row.
-    fn next(&mut self, model: &RigModel) -> (Event, f64) {
+    /// Returns the next event and its time, s; at the same time a reading comes before a
+    /// row.
+    fn next(&mut self, model: &RigModel) -> (ScheduledEvent, f64) {
         let look_s = model.sensor.refresh.look_s(self.n_looks);
         if look_s <= self.next_row_s {
             self.n_looks += 1;
-            return (Event::Look, look_s);
+            return (ScheduledEvent::Look, look_s);
         }
         let row_s = self.next_row_s;
         self.n_rows += 1;
         let jitter = (self.clock.normal() * model.sensor.jitter).clamp(-MAX_JITTER, MAX_JITTER);
         self.next_row_s = (self.n_rows as f64 + jitter) / model.rig.sample_rate_hz;
-        (Event::Row, row_s)
+        (ScheduledEvent::Row, row_s)
     }
 }
 
-/// The ball at rest within a fifth of its reach of the centre.
+/// Returns the ball at rest, within a fifth of its reach from the centre.
 fn start(reach: Vector2<f64>, seed: u64, one_axis: bool) -> BallState {
     let mut noise = Noise::new(seed, Purpose::Start);
     let mut share = || noise.uniform(-0.2, 0.2);
@@ -333,6 +342,7 @@ fn start(reach: Vector2<f64>, seed: u64, one_axis: bool) -> BallState {
     BallState { rolling: RollingState { position, ..RollingState::default() }, lost: false }
 }
 
+/// Rounds a value to the resolution of the log.
 fn logged(value: f64, per_unit: f64) -> f64 {
     // Adding zero turns −0 into 0.
     (value * per_unit).round() / per_unit + 0.0

@@ -1,4 +1,4 @@
-//! The sensor: when it looks, what it makes of a position, and its faults.
+//! The sensor: the times of its readings, its errors, and its faults.
 
 use std::collections::VecDeque;
 
@@ -12,35 +12,35 @@ use super::refresh::Refresh;
 use super::steps::{rounded, step_in};
 use offbd_core::vocabulary::{Axis, Invalid, PerAxis, in_range};
 
-/// What is true of the sensor and of the device's log; immutable.
+/// The properties of the sensor and of the device's log; immutable.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SensorModel {
     pub refresh: Refresh,
-    /// From a look to its reading, s.
+    /// Delay of a reading, s.
     pub latency_s: f64,
     /// Standard deviation of a reading, m.
     pub noise_m: f64,
-    /// Quantisation: step of the readings (a pixel, a count), m; 0: as fine as
-    /// is logged.
+    /// Quantisation step of the readings (a pixel, a count), m; 0: the resolution of the
+    /// log.
     pub quantum_m: f64,
-    /// Dead band: a reading that differs from the last by no more than this along
-    /// both axes repeats it, m; 0: none. So a tracker holds a ball at rest.
+    /// Dead band, m: a reading that differs from the last by no more than this along both
+    /// axes repeats it; 0: none. Some trackers hold a ball at rest in this way.
     pub dead_band_m: f64,
-    /// Reading of a ball at the plate's centre, m: where the device has its origin.
+    /// Reading of a ball at the plate's centre, m.
     pub origin_m: PerAxis<f64>,
-    /// Share of readings in which no ball is seen.
+    /// Share of readings without a ball.
     pub missing: f64,
-    /// Share of lone readings far off.
+    /// Share of single readings that are outliers.
     pub outliers: f64,
-    /// Standard deviation of the log's period, as a share of it.
+    /// Standard deviation of the log's period as a share of it.
     pub jitter: f64,
 }
 
 impl SensorModel {
-    /// Lengths in readings, m: noise, dead band and the steps that are not zero. The
-    /// largest is that of the plate.
+    /// Range of noise, dead band and quantisation step, m; chosen: at most the size of a
+    /// large plate.
     pub const LENGTH_M: RangeInclusive<f64> = 0.0..=1.0;
-    /// The origin of the readings, m from the plate's centre.
+    /// Range of the reading of a ball at the plate's centre, m; chosen likewise.
     pub const ORIGIN_M: RangeInclusive<f64> = -1.0..=1.0;
 
     pub(super) fn check(&self) -> Result<(), Invalid> {
@@ -57,20 +57,21 @@ impl SensorModel {
         Ok(())
     }
 
-    /// The noise that a fault multiplies: quantising alone scatters by a
-    /// twelfth root, so that a noiseless sensor can become noisy too.
+    /// Returns the standard deviation that a noise fault multiplies, m: at least that of
+    /// the quantisation, q/√12, and 0.1 mm, so that a noiseless sensor can become noisy
+    /// too.
     fn noise_floor_m(&self) -> f64 {
         self.noise_m.max(self.quantum_m / 12.0_f64.sqrt()).max(1e-4)
     }
 }
 
-/// A reading: metres per axis, none where no ball is seen.
+/// A reading, m per axis; `None` if no ball is seen.
 pub(super) type Reading = PerAxis<Option<f64>>;
 
-/// A spike or an outlier lands this share of the reach away.
+/// Range of the distance of a spike or outlier as a share of the reach; chosen.
 const OUTLIER_SHARE: [f64; 2] = [0.2, 0.9];
 
-/// The sensor at work.
+/// A sensor with its state.
 #[derive(Clone, Debug)]
 pub(super) struct Sensor {
     model: SensorModel,
@@ -80,7 +81,7 @@ pub(super) struct Sensor {
     on_the_way: VecDeque<(f64, Reading)>,
     latest: Reading,
     last_seen: Reading,
-    /// What the dead band holds.
+    /// The reading that the dead band repeats.
     held: Reading,
 }
 
@@ -98,7 +99,7 @@ impl Sensor {
         }
     }
 
-    /// Looks at the ball at `at_s`; none: it is not there.
+    /// Takes a reading of the ball's position at `at_s`; `None`: the ball is lost.
     pub(super) fn look(
         &mut self,
         at_s: f64,
@@ -106,15 +107,15 @@ impl Sensor {
         fault: Option<SensorFault>,
     ) {
         let healthy = self.measure(ball);
-        let healthy = self.steadied(healthy);
-        let reading = self.spoil(healthy, fault);
+        let healthy = self.with_dead_band(healthy);
+        let reading = self.with_fault(healthy, fault);
         if reading.x.is_some() || reading.y.is_some() {
             self.last_seen = reading;
         }
         self.on_the_way.push_back((at_s + self.model.latency_s, reading));
     }
 
-    /// The reading that has arrived by `at_s`.
+    /// Returns the latest reading that has arrived by `at_s`.
     pub(super) fn reading(&mut self, at_s: f64) -> Reading {
         while self.on_the_way.front().is_some_and(|&(ready, _)| ready <= at_s) {
             if let Some((_, reading)) = self.on_the_way.pop_front() {
@@ -124,7 +125,8 @@ impl Sensor {
         self.latest
     }
 
-    /// Draws the same numbers whether or not there is a ball.
+    /// Returns a reading with noise, outliers and quantisation. Draws the same number of
+    /// random numbers whether or not there is a ball.
     fn measure(&mut self, ball: Option<Vector2<f64>>) -> Reading {
         let noise = PerAxis::from_fn(|_| self.noise.normal() * self.model.noise_m);
         let missing = self.noise.happens(self.model.missing);
@@ -140,8 +142,8 @@ impl Sensor {
         .map(|r| r.map(|m| self.quantise(m)))
     }
 
-    /// The reading behind the dead band.
-    fn steadied(&mut self, reading: Reading) -> Reading {
+    /// Applies the dead band to a reading.
+    fn with_dead_band(&mut self, reading: Reading) -> Reading {
         let within = |axis: Axis| match (reading[axis], self.held[axis]) {
             (Some(new), Some(held)) => (new - held).abs() <= self.model.dead_band_m,
             _ => false,
@@ -155,8 +157,9 @@ impl Sensor {
         reading
     }
 
-    /// Draws the same numbers whatever the fault.
-    fn spoil(&mut self, healthy: Reading, fault: Option<SensorFault>) -> Reading {
+    /// Applies a fault to a reading. Draws the same number of random numbers whatever the
+    /// fault.
+    fn with_fault(&mut self, healthy: Reading, fault: Option<SensorFault>) -> Reading {
         let chance = self.fault_noise.uniform(0.0, 1.0);
         let noise = PerAxis::from_fn(|_| self.fault_noise.normal());
         let far = PerAxis::from_fn(|_| outlier_share(&mut self.fault_noise));
@@ -207,7 +210,7 @@ mod tests {
         jitter: 0.0,
     };
 
-    /// A thousand readings of a ball that rolls along x at 1 mm a reading.
+    /// Returns a thousand readings of a ball that rolls along x by 1 mm per reading.
     fn readings(fault: Option<SensorFault>) -> Vec<Reading> {
         let mut sensor = Sensor::new(PANEL, Vector2::new(0.2, 0.1), 7);
         (0..1000)
@@ -289,7 +292,7 @@ mod tests {
         assert!(resting.iter().all(|r| *r == resting[0]));
         let rolling = run(1e-3);
         let new = rolling.windows(2).filter(|w| w[0] != w[1]).count();
-        // 99 mm in steps of just over 2 mm, noise aside.
+        // 99 mm in steps of just over 2 mm, apart from noise.
         assert!((30..=50).contains(&new), "{new} new readings");
         let lag = |(i, r): (usize, &Reading)| (r.x.unwrap() - i as f64 * 1e-3).abs();
         assert!(rolling.iter().enumerate().map(lag).all(|m| m < 3.5e-3));

@@ -1,21 +1,21 @@
-//! A servo with what a data sheet leaves out: dead time, play, a horn that is
-//! off level, and faults.
+//! A servo with properties that a data sheet omits: dead time, play, a level offset, and
+//! faults.
 //!
-//! One idea: a fault changes what the servo is asked for, or how fast it can
-//! follow; the mechanics stay those of [`ServoModel`].
+//! A fault changes the target of the servo or its speed; the dynamics remain those of
+//! [`ServoModel`].
 
 use std::collections::VecDeque;
 use std::ops::RangeInclusive;
 
 use super::fault::ServoFault;
 use super::noise::Noise;
-use offbd_core::plant::{Servo, ServoModel};
+use offbd_core::plant::{ServoModel, ServoState};
 use offbd_core::vocabulary::Invalid;
 
-/// What is true of one servo, known to nobody; immutable.
+/// The true properties of one servo, unknown to its owner; immutable.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ServoTruth {
-    /// Command to first movement, s.
+    /// Time from a command to the first movement, s.
     pub dead_time_s: f64,
     /// First-order lag, s.
     pub lag_s: f64,
@@ -24,37 +24,38 @@ pub struct ServoTruth {
     pub gain: f64,
     /// Plate angle at a command of zero, rad.
     pub level_rad: f64,
-    /// Play between horn and plate, rad, from stop to stop.
+    /// Total play between horn and plate, rad.
     pub play_rad: f64,
 }
 
 impl ServoTruth {
-    /// Plate angle per horn angle.
+    /// Range of [`gain`](Self::gain); chosen.
     pub const GAIN: RangeInclusive<f64> = -10.0..=10.0;
-    /// Plate angle at a command of zero, rad.
+    /// Range of [`level_rad`](Self::level_rad), rad; chosen.
     pub const LEVEL_RAD: RangeInclusive<f64> = -0.5..=0.5;
 }
 
-/// Angle of the plate about one axis with its rates: rad, rad/s, rad/s².
-pub(super) type PlateAngle = Servo;
+/// Angle, rate and acceleration of the plate about one axis, rad, rad/s, rad/s².
+pub(super) type PlateAngle = ServoState;
 
-/// A horn that slips settles within tens of milliseconds; a jump in no time
-/// would hit the ball with an infinite angular acceleration.
+/// Lag with which a slipped horn settles, s. Chosen: tens of milliseconds; an
+/// instantaneous jump would act on the ball with an infinite angular acceleration.
 const SLIP_LAG_S: f64 = 0.02;
 
-/// A loose contact holds and fails for times drawn evenly from here, s.
+/// Range of the uniformly distributed durations for which a loose contact closes and
+/// opens, s; chosen.
 const CONTACT_S: [f64; 2] = [0.3, 1.2];
 
-/// A loose contact: whether it holds, and until when.
+/// A loose contact: whether it is closed, and until when.
 #[derive(Clone, Debug)]
-struct Contact {
+struct LooseContact {
     holds: bool,
     until_s: f64,
     noise: Noise,
 }
 
-impl Contact {
-    /// Whether it holds at `at_s`; the first failure comes at once.
+impl LooseContact {
+    /// Returns whether the contact is closed at `at_s`; it first opens at once.
     fn holds(&mut self, at_s: f64) -> bool {
         while at_s >= self.until_s {
             self.holds = !self.holds;
@@ -64,34 +65,35 @@ impl Contact {
     }
 }
 
-/// One servo with the plate behind it, in motion.
+/// One servo and the plate angle it turns, with their state.
 #[derive(Clone, Debug)]
 pub(super) struct SimulatedServo {
     truth: ServoTruth,
     limit_rad: f64,
     commands: VecDeque<(f64, f64)>,
-    horn: Servo,
-    slip: Servo,
+    horn: ServoState,
+    slip: ServoState,
     linkage_rad: f64,
-    contact: Contact,
+    contact: LooseContact,
 }
 
 impl SimulatedServo {
     pub(super) fn new(truth: ServoTruth, limit_rad: f64, noise: Noise) -> Result<Self, Invalid> {
         mechanics(truth.lag_s, truth.rate_limit_rad_s)?;
-        let contact = Contact { holds: true, until_s: 0.0, noise };
-        let (commands, horn, slip) = (VecDeque::new(), Servo::default(), Servo::default());
+        let contact = LooseContact { holds: true, until_s: 0.0, noise };
+        let (commands, horn, slip) =
+            (VecDeque::new(), ServoState::default(), ServoState::default());
         Ok(Self { truth, limit_rad, commands, horn, slip, linkage_rad: 0.0, contact })
     }
 
-    /// Takes note of a command given at `at_s`.
+    /// Queues a command given at `at_s`.
     pub(super) fn command(&mut self, at_s: f64, command: f64) {
         if self.commands.back().is_none_or(|&(_, last)| last != command) {
             self.commands.push_back((at_s, command));
         }
     }
 
-    /// Moves by `h` seconds from `at_s` on under `fault`.
+    /// Advances by `h` seconds from `at_s` under `fault`; returns the plate's angle.
     pub(super) fn advance(&mut self, at_s: f64, h: f64, fault: Option<ServoFault>) -> PlateAngle {
         let command = self.in_force(at_s).clamp(-self.limit_rad, self.limit_rad);
         let slip = if let Some(ServoFault::Offset(angle)) = fault { angle } else { 0.0 };
@@ -102,7 +104,7 @@ impl SimulatedServo {
         self.plate()
     }
 
-    /// The command that has come through the dead time; forgets older ones.
+    /// Returns the command that has passed the dead time, and drops older ones.
     fn in_force(&mut self, at_s: f64) -> f64 {
         let arrived = at_s - self.truth.dead_time_s;
         while self.commands.get(1).is_some_and(|&(from, _)| from <= arrived) {
@@ -124,11 +126,11 @@ impl SimulatedServo {
         let (lag, rate) = (self.truth.lag_s * slower, self.truth.rate_limit_rad_s / slower);
         self.horn = match target {
             Some(target) => settle(lag, rate).advance(&self.horn, target, h),
-            None => Servo { angle: self.horn.angle, ..Servo::default() },
+            None => ServoState { angle: self.horn.angle, ..ServoState::default() },
         };
     }
 
-    /// The plate follows the horn with the play between them.
+    /// Moves the plate after the horn, with the play between them; returns its angle.
     fn plate(&mut self) -> PlateAngle {
         let truth = &self.truth;
         let wanted = truth.gain * self.horn.angle + self.slip.angle;
@@ -145,15 +147,15 @@ impl SimulatedServo {
     }
 }
 
-/// Largest horn angle, rad: the stops of a hobby servo are far outside what
-/// the controller commands.
+/// Limit of the horn angle, rad. Chosen: the stops of a hobby servo are far outside the
+/// controller's commands.
 const STOP_RAD: f64 = std::f64::consts::FRAC_PI_2;
 
 fn mechanics(lag_s: f64, rate_limit_rad_s: f64) -> Result<ServoModel, Invalid> {
     ServoModel::new(STOP_RAD, lag_s, rate_limit_rad_s)
 }
 
-/// Mechanics with numbers brought into the admissible range.
+/// Returns a servo model with its parameters clamped to the valid range.
 fn settle(lag_s: f64, rate_limit_rad_s: f64) -> ServoModel {
     let model = mechanics(lag_s.clamp(0.0, 10.0), rate_limit_rad_s.clamp(1e-3, 1000.0));
     model.unwrap_or_else(|_| unreachable!("both numbers are in range"))
@@ -173,7 +175,7 @@ mod tests {
         play_rad: 0.0,
     };
 
-    /// The plate's angle one second after a command of 0.1 rad.
+    /// Returns the plate's angle one second after a command of 0.1 rad.
     fn after_a_second(truth: ServoTruth, fault: Option<ServoFault>) -> f64 {
         let noise = Noise::new(1, Purpose::ServoX);
         let mut servo = SimulatedServo::new(truth, 0.2, noise).unwrap();
@@ -206,7 +208,7 @@ mod tests {
     #[test]
     fn a_loose_contact_fails_and_recovers() {
         let mut contact =
-            Contact { holds: true, until_s: 0.0, noise: Noise::new(3, Purpose::ServoX) };
+            LooseContact { holds: true, until_s: 0.0, noise: Noise::new(3, Purpose::ServoX) };
         let held: Vec<bool> = (0..60).map(|i| contact.holds(f64::from(i) * 0.1)).collect();
         assert!(!held[0] && held.contains(&true));
     }

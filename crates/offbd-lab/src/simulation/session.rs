@@ -1,5 +1,5 @@
-//! What changes from one session of a rig to the next: it stands elsewhere, its
-//! linkage was put on again, its supply is another.
+//! Variation between the sessions of one rig: it stands at another place, its linkage was
+//! remounted, its power supply is another.
 
 use super::model::RigModel;
 use super::noise::{Noise, Purpose};
@@ -8,14 +8,15 @@ use offbd_core::vocabulary::{Axis, Invalid, PerAxis, in_range};
 /// Standard deviations between the sessions of one rig; immutable.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SessionSpread {
-    /// Of the level of each axis, rad, 0 to 0.1. One real rig: 1.1° within a day.
+    /// Standard deviation of the level of each axis, rad, 0 to 0.1. Observed on one real
+    /// rig: 1.1° within a day.
     pub level_rad: f64,
-    /// Of the gain of each axis, as a share of it, 0 to 0.3.
+    /// Standard deviation of the gain of each axis as a share of it, 0 to 0.3.
     pub gain: f64,
 }
 
-/// No session is farther from its rig than this, standard deviations: a controller
-/// has to balance every one.
+/// Limit of a session's deviation from its rig, in standard deviations. Chosen so that a
+/// controller can balance the ball in every session.
 const FARTHEST: f64 = 3.0;
 
 impl SessionSpread {
@@ -27,8 +28,8 @@ impl SessionSpread {
 }
 
 impl RigModel {
-    /// This rig as it is in the session of `seed`: levels and gains drawn around
-    /// its own, from a normal distribution that ends at three standard deviations.
+    /// Returns this rig in the session of `seed`: levels and gains are drawn around its
+    /// own from a normal distribution, clamped at three standard deviations.
     #[must_use]
     pub fn of_session(&self, seed: u64) -> Self {
         let mut noise = Noise::new(seed, Purpose::Session);
@@ -43,7 +44,7 @@ impl RigModel {
         if self.one_axis { model.along_x() } else { model }
     }
 
-    /// The same rig with one axis: a beam along x, which has no level across.
+    /// Returns the same rig with one axis: a beam along x, whose level along y is zero.
     #[must_use]
     pub fn along_x(mut self) -> Self {
         self.one_axis = true;
@@ -63,7 +64,7 @@ mod tests {
         RigModel { spread, ..Preset::Chapter.model().unwrap() }
     }
 
-    /// Standard deviation of `of` over 600 sessions about the rig's own.
+    /// Returns the standard deviation of `of` over 600 sessions about the rig's own value.
     fn scatter(rig: &RigModel, of: impl Fn(&RigModel) -> f64) -> f64 {
         let squares = (0..600).map(|seed| (of(&rig.of_session(seed)) - of(rig)).powi(2));
         (squares.sum::<f64>() / 600.0).sqrt()
@@ -87,8 +88,8 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(16))]
-        /// The standard error of a deviation from 600 is 2.9 %; what is cut at three
-        /// deviations takes 0.7 % away. A tenth is three errors and more.
+        /// The standard error of a standard deviation from 600 values is 2.9 %; clamping at
+        /// three deviations reduces it by 0.7 %. A tenth is more than three standard errors.
         #[test]
         fn levels_and_gains_scatter_as_much_as_is_said(
             level_rad in 0.001..0.1_f64,

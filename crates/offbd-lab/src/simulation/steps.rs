@@ -1,20 +1,19 @@
-//! Rounding to steps: quantised readings, servos in whole degrees.
+//! Quantisation: rounding to steps, of readings and of servos with whole degrees.
 //!
-//! A step is zero (none) or large enough that a value over it stays finite: the
-//! least positive numbers of f64 divide everything to infinity.
+//! A step is zero (none) or large enough that a value divided by it is finite.
 
 use offbd_core::vocabulary::{Brief, Invalid};
 
-/// Least step, in m or rad: a ten-thousandth of what the log resolves.
+/// Smallest step, m or rad. Chosen: a ten-thousandth of the resolution of the log.
 pub const LEAST_STEP: f64 = 1e-9;
 
-/// Whether `step` is zero or from [`LEAST_STEP`] to `most`.
+/// Returns whether `step` is zero or from [`LEAST_STEP`] to `most`.
 #[must_use]
 pub fn is_step(step: f64, most: f64) -> bool {
     step == 0.0 || (LEAST_STEP..=most).contains(&step)
 }
 
-/// `step` if it is one; NaN never is.
+/// Returns `step` if it is valid; NaN never is.
 ///
 /// # Errors
 /// [`Invalid`] naming `element` and the range.
@@ -26,7 +25,7 @@ pub(super) fn step_in(element: &str, step: f64, most: f64) -> Result<f64, Invali
     Err(Invalid::new(element, format!("{step} is neither 0 nor {LEAST_STEP:e} to {most}")))
 }
 
-/// `value` at the nearest multiple of `step`; as it is where there is no step.
+/// Rounds `value` to the nearest multiple of `step`; a step of 0 leaves it unchanged.
 pub(super) fn rounded(value: f64, step: f64) -> f64 {
     if step > 0.0 { (value / step).round() * step } else { value }
 }
@@ -54,7 +53,7 @@ mod tests {
         ) {
             let step = 10.0_f64.powf(exponent).max(LEAST_STEP);
             let off = (rounded(value, step) - value).abs();
-            // Half a step, and what the product rounds.
+            // Half a step, and the rounding error of the product.
             prop_assert!(off <= step / 2.0 + value.abs() * f64::EPSILON, "{off} of {step}");
         }
     }

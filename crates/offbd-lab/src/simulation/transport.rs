@@ -1,31 +1,31 @@
-//! What may happen to rows between the device and whoever listens: they come
-//! twice, late, or not at all.
+//! Transport faults between the device and its receiver: rows arrive twice, late, or not
+//! at all.
 //!
-//! Works on rows in the order of the device's log; each comes out at most twice,
-//! and none more than the reorder window behind a newer one.
+//! Takes rows in the order of the device's log; each arrives at most twice, and none
+//! later than the reorder window after a newer one.
 
 use std::ops::RangeInclusive;
 
 use super::noise::{Noise, Purpose};
 use offbd_core::vocabulary::{Invalid, Sample, in_range};
 
-/// How often it happens; immutable.
+/// The shares of rows with each fault; immutable.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TransportFaults {
     /// Share of rows that are sent twice.
     pub duplicates: f64,
-    /// Share of rows that are held up.
+    /// Share of rows that are delayed.
     pub late: f64,
-    /// How long a row may be held up, s.
+    /// Maximum delay of a row, s.
     pub window_s: f64,
     /// Share of rows that are lost.
     pub lost: f64,
-    /// Spans of the device's clock, s, in which every row is lost.
+    /// Intervals on the device's clock, s, in which every row is lost.
     pub gaps: Vec<(f64, f64)>,
 }
 
 impl TransportFaults {
-    /// How long a row may be held up, s.
+    /// Range of [`window_s`](Self::window_s), s; chosen.
     pub const WINDOW_S: RangeInclusive<f64> = 0.0..=60.0;
 
     /// Checks every number.
@@ -41,7 +41,7 @@ impl TransportFaults {
     }
 }
 
-/// The line from the device, with the rows that are on their way.
+/// The line from the device, with the rows in transit.
 #[derive(Clone, Debug)]
 pub struct Transport {
     faults: TransportFaults,
@@ -50,7 +50,7 @@ pub struct Transport {
 }
 
 impl Transport {
-    /// A line with these faults.
+    /// Creates a line with these faults.
     ///
     /// # Errors
     /// [`Invalid`] naming the element under `/transport`.
@@ -60,7 +60,8 @@ impl Transport {
         Ok(Self { faults, noise, held_up: Vec::new() })
     }
 
-    /// Takes a row from the device and appends the rows that arrive by then.
+    /// Takes a row from the device, and appends the rows that arrive by its time to
+    /// `arrived`.
     pub fn send(&mut self, sample: Sample, arrived: &mut Vec<Sample>) {
         self.arrive_by(sample.t_s, arrived);
         let (lost, late) =
@@ -81,7 +82,7 @@ impl Transport {
         }
     }
 
-    /// The rows still on their way when the device stops.
+    /// Appends the rows still in transit to `arrived`.
     pub fn finish(&mut self, arrived: &mut Vec<Sample>) {
         self.arrive_by(f64::INFINITY, arrived);
     }

@@ -1,8 +1,8 @@
-//! What is really the case: where the ball is, where the plate stands, and
-//! when a fault first had a chance to be seen.
+//! The true state of the rig, and the time at which a fault first became detectable.
 //!
-//! A fault that has no effect yet (a dead servo that nobody commands) cannot be
-//! found; delays are fair only from its *first chance* on.
+//! A fault without an effect (a dead servo without commands) cannot be detected; detection
+//! delays therefore count from its *first chance*, when its effect first exceeds a
+//! limit.
 
 use std::collections::VecDeque;
 
@@ -13,7 +13,7 @@ use super::model::RigModel;
 use super::sensor::Reading;
 use offbd_core::vocabulary::{Axis, PerAxis};
 
-/// The rig at one moment, as nobody but the simulation knows it.
+/// The true state of the rig at one time, known to the simulation alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Truth {
     /// The rig's clock, s.
@@ -21,41 +21,45 @@ pub struct Truth {
     /// The ball's centre in the plate frame, m.
     pub position: Vector2<f64>,
     pub velocity: Vector2<f64>,
-    /// It has fallen off the plate.
+    /// Whether the ball has fallen off the plate.
     pub lost: bool,
-    /// The plate's angle behind the servo of each axis, rad.
+    /// Angle of the plate by the servo of each axis, rad.
     pub plate_rad: PerAxis<f64>,
-    /// The angle that a healthy servo would have under the same commands, rad.
+    /// The angle with a healthy servo under the same commands, rad.
     pub healthy_rad: PerAxis<f64>,
 }
 
-/// A fault and the first chance to see it.
+/// A fault and its first chance of being detected.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FaultTruth {
     pub fault: Fault,
-    /// When its effect first stood out, s; none: it never did so far.
+    /// Time at which its effect first became detectable, s; `None`: not so far.
     pub chance_s: Option<f64>,
 }
 
-/// A plate angle wrong by this much on average over [`WINDOW_S`] stands out.
+/// Mean error of the plate's angle over [`WINDOW_S`] from which on a servo fault is
+/// detectable, rad; chosen.
 const STANDS_OUT_RAD: f64 = 0.015;
+/// Window of that mean, s; chosen.
 const WINDOW_S: f64 = 0.3;
-/// A tilt of this many breakaway tilts ought to move a ball.
+/// Tilt from which on a stuck ball is detectable, in breakaway tilts; chosen: a healthy
+/// ball would move.
 const MOVING_BREAKAWAYS: f64 = 2.0;
-/// A reading that is off by this much cannot be noise: m, and in standard
-/// deviations of it.
+/// Minimum error of a frozen reading from which on the fault is detectable, m; chosen.
 const OFF_M: f64 = 0.003;
+/// The same error in standard deviations of the sensor's noise, in addition to its dead
+/// band; chosen: hardly any noise is as large.
 const OFF_DEVIATIONS: f64 = 4.0;
 
-/// Watches one fault for its first chance.
+/// Observes one fault to find its first chance.
 #[derive(Clone, Debug)]
-pub(super) struct Watch {
+pub(super) struct FaultObserver {
     truth: FaultTruth,
     errors: VecDeque<(f64, f64)>,
     sum: f64,
 }
 
-impl Watch {
+impl FaultObserver {
     pub(super) fn new(fault: Fault) -> Self {
         let truth = FaultTruth { fault, chance_s: None };
         Self { truth, errors: VecDeque::new(), sum: 0.0 }
@@ -69,7 +73,7 @@ impl Watch {
         &self.truth.fault
     }
 
-    /// Ends the fault at `at_s`; one still to come never begins.
+    /// Ends the fault at `at_s`; a fault with a later onset never begins.
     pub(super) fn end(&mut self, at_s: f64) {
         let fault = &mut self.truth.fault;
         if fault.end_s.is_none_or(|end_s| end_s > at_s) {
@@ -77,7 +81,7 @@ impl Watch {
         }
     }
 
-    /// Looks at one moment of `model`.
+    /// Takes the state of the rig `model` at one time.
     pub(super) fn observe(&mut self, truth: &Truth, latest: &Reading, model: &RigModel) {
         if self.truth.chance_s.is_some() || !self.truth.fault.active(truth.t_s) {
             return;
@@ -105,7 +109,7 @@ impl Watch {
         }
     }
 
-    /// Mean over the window that ends at `at_s`; zero until it is full.
+    /// Returns the mean over the window that ends at `at_s`; zero until the window is full.
     fn mean_error(&mut self, at_s: f64, error: f64) -> f64 {
         self.errors.push_back((at_s, error));
         self.sum += error;

@@ -1,4 +1,4 @@
-//! Rigs of which no two are alike, each drawn from one seed.
+//! Random rigs, each drawn from one seed.
 
 mod ranges;
 mod real;
@@ -12,14 +12,14 @@ use super::presets::Preset;
 use super::servo::ServoTruth;
 use offbd_core::vocabulary::{Axis, Invalid, PerAxis, UnknownWord};
 
-/// What rigs are drawn from.
+/// The population from which rigs are drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Variety {
-    /// The presets with their numbers drawn anew; a rig is the same in every session.
+    /// The presets with random parameters; a rig is the same in every session.
     Presets,
-    /// What is seen on real rigs: slow and noisy sensors that repeat and hold their
-    /// readings, servos in whole degrees, ball and beam, origins off centre,
-    /// stiction up to 2°, and levels and gains that differ between sessions.
+    /// Properties observed on real rigs: slow and noisy sensors that repeat and hold their
+    /// readings, servos with whole degrees, ball and beam, origins off centre, stiction up
+    /// to 2°, and levels and gains that differ between sessions.
     #[default]
     Real,
 }
@@ -35,10 +35,10 @@ impl Variety {
         }
     }
 
-    /// The rig that `seed` draws.
+    /// Returns the rig that `seed` draws.
     ///
     /// # Errors
-    /// [`Invalid`] if its numbers cannot be; they can.
+    /// [`Invalid`] if its numbers are out of range; those of both populations are not.
     pub fn rig(self, seed: u64) -> Result<RigModel, Invalid> {
         match self {
             Self::Presets => RigModel::varied(seed),
@@ -63,19 +63,19 @@ impl FromStr for Variety {
     }
 }
 
-/// Log rates of cameras and touch panels, Hz, by preset.
+/// Log rates by preset, Hz, typical of cameras and touch panels.
 const RATES_HZ: [[f64; 3]; 3] = [[50.0, 100.0, 200.0], [20.0, 30.0, 60.0], [100.0, 120.0, 150.0]];
 
-/// Bandwidth of the loop times all its delays.
+/// Bandwidth of the loop times the sum of its delays; about that of the presets.
 const LOOP_SHARE: f64 = 0.25;
 
 impl RigModel {
-    /// The preset with numbers that `seed` draws: gains from 0.8 to 1.2, plates up to 1.4° off
-    /// level, 60 to 240 ms from command to motion, play up to 0.3°, a ball that
-    /// stands at up to 0.7°, half to twice the preset's noise.
+    /// Returns a preset with parameters that `seed` draws: gains from 0.8 to 1.2, plates up
+    /// to 1.4° off level, 60 to 240 ms from command to motion, play up to 0.3°, stiction up
+    /// to 0.7°, half to twice the preset's noise.
     ///
     /// # Errors
-    /// [`Invalid`] if the preset's numbers cannot be; they can.
+    /// [`Invalid`] if the preset's numbers are out of range; they are not.
     pub fn varied(seed: u64) -> Result<Self, Invalid> {
         let preset = Preset::ALL[(seed % Preset::ALL.len() as u64) as usize];
         let mut model = preset.model()?;
@@ -100,8 +100,8 @@ impl RigModel {
         model.sensor.jitter = between(0.0, 0.15);
         let rates = RATES_HZ[preset as usize];
         model.rig.sample_rate_hz = rates[(between(0.0, 3.0) as usize).min(2)];
-        // Whoever builds a rig tunes its loop to its delays: the presets' loops
-        // are all about a quarter of them.
+        // Builders tune the loop to its delays: in the presets, the bandwidth times the
+        // delay is about a quarter.
         let period_s = 1.0 / model.rig.sample_rate_hz;
         let delay_s = dead_time_s + lag_s + model.sensor.latency_s + 1.5 * period_s;
         model.controller.bandwidth_rad_s = LOOP_SHARE / delay_s;

@@ -1,19 +1,19 @@
-//! Drive cycles of learnt rigs, run on the simulated rigs that they were learnt of: with
-//! sensor noise, quantised commands, play, friction and latencies that the twin, by which
-//! they were chosen, does not know.
+//! Drive cycles of calibrated rigs, run on the same simulated rigs, with sensor noise,
+//! quantised commands, play, friction and latencies that the twin, with which the cycles
+//! were planned, does not model.
 
 use std::sync::LazyLock;
 
 use offbd_core::diagnosis::{FaultMemory, Transition};
 use offbd_core::engine::{
-    DriveCycle, DriveLaw, Engine, Input, NotReached, Output, Reach, Rig, Setup, State, calibrate,
+    DriveCycle, DriveLaw, Engine, Input, NotReached, Reach, Rig, Setup, State, calibrate,
     drive_cycle,
 };
 use offbd_core::vocabulary::{FaultCode, FaultStatus, PerAxis, Sample};
 use offbd_lab::simulation::{Disturbances, Fault, Preset, Reference, RigModel, SimulatedRig};
 
-/// The faults that are injected, and what is to be found. Frozen readings begin on the way:
-/// a simulated sensor that has never read has nothing to repeat.
+/// Injected faults, with the expected codes. The readings freeze after the start: a sensor
+/// without a reading has nothing to repeat.
 const FAULTS: [(&str, FaultCode); 7] = [
     ("x_servo:dead@0", FaultCode::XServo),
     ("y_servo:dead@0", FaultCode::YServo),
@@ -24,8 +24,8 @@ const FAULTS: [(&str, FaultCode); 7] = [
     ("sensor:spikes@0", FaultCode::Sensor),
 ];
 
-/// Every other kind, along both axes. A healthy session may be off level by as much as
-/// an offset: it is told by beginning on the way.
+/// All other kinds, on both axes. The offsets begin after the start: from the start they
+/// would be indistinguishable from a healthy rig that is off level.
 const OTHER_FAULTS: [(&str, FaultCode); 15] = [
     ("x_servo:hold@1", FaultCode::XServo),
     ("y_servo:hold@1", FaultCode::YServo),
@@ -48,18 +48,18 @@ fn simulated(model: &RigModel, reference: Reference, seed: u64) -> SimulatedRig 
     SimulatedRig::new(model.clone(), reference, Disturbances::default(), seed).unwrap()
 }
 
-/// The rig of `model`, learnt from so many sessions of a minute.
+/// Returns the rig of `model`, calibrated on `n_sessions` of a minute.
 fn learnt(model: &RigModel, n_sessions: u64) -> Rig {
     let session = |seed| {
         let mut rig = simulated(model, Reference::Lissajous, seed);
         (0..(60.0 * model.rig.sample_rate_hz) as u32).map(|_| rig.next_sample()).collect()
     };
     let sessions: Vec<Vec<Sample>> = (5..5 + n_sessions).map(session).collect();
-    let calibration = calibrate(&model.rig, &sessions, "", "").unwrap();
+    let calibration = calibrate(&model.rig, &sessions).unwrap();
     Rig { calibration: Some(calibration), ..model.rig.clone() }
 }
 
-/// The chapter's rig, learnt from one session, and its cycle.
+/// The chapter's rig, calibrated on one session, and its drive cycle.
 static CHAPTER: LazyLock<(RigModel, Rig, DriveCycle)> = LazyLock::new(|| {
     let model = Preset::Chapter.model().unwrap();
     let rig = learnt(&model, 1);
@@ -67,15 +67,15 @@ static CHAPTER: LazyLock<(RigModel, Rig, DriveCycle)> = LazyLock::new(|| {
     (model, rig, cycle)
 });
 
-/// What a session came to.
+/// The result of a session.
 struct Ended {
     transitions: Vec<Transition>,
     state: State,
 }
 
 impl Ended {
-    /// Whether every monitor but those of an axis that is not there has come to a result,
-    /// after long enough to have found a fault.
+    /// Returns whether every monitor, except those of a missing axis, has a result after
+    /// long enough to have detected a fault.
     fn all_tested(&self, cycle: &DriveCycle) -> bool {
         cycle.monitors.iter().all(|monitor| {
             let ended = &self.state.monitors[monitor.code as usize];
@@ -91,22 +91,15 @@ impl Ended {
 
 fn judge(rig: &Rig, samples: impl Iterator<Item = Sample>) -> Ended {
     let mut engine = Engine::new(Setup::new(rig.clone(), None).unwrap(), FaultMemory::default());
-    let mut outputs = Vec::new();
+    let mut transitions = Vec::new();
     for sample in samples {
-        engine.handle(Input::Sample(sample), &mut outputs);
+        engine.handle(Input::Sample(sample), &mut transitions);
     }
-    engine.handle(Input::End, &mut outputs);
-    let transition = |output| match output {
-        Output::Transition(t) => Some(*t),
-        Output::Admitted(_) => None,
-    };
-    Ended {
-        transitions: outputs.into_iter().filter_map(transition).collect(),
-        state: engine.state(),
-    }
+    engine.handle(Input::End, &mut transitions);
+    Ended { transitions, state: engine.state() }
 }
 
-/// Runs `cycle` on the simulated rig, with a fault or without.
+/// Runs `cycle` on the simulated rig, with or without a fault.
 fn drive(model: &RigModel, rig: &Rig, cycle: &DriveCycle, fault: Option<&str>) -> Ended {
     let mut simulated = simulated(model, Reference::Hold, 11);
     if let Some(fault) = fault {
@@ -118,7 +111,8 @@ fn drive(model: &RigModel, rig: &Rig, cycle: &DriveCycle, fault: Option<&str>) -
     judge(rig, std::iter::from_fn(next).take_while(in_time))
 }
 
-/// What goes wrong where `cycle` is run on `model` with each of `faults` of its axes.
+/// Runs `cycle` on `model` with each of `faults` that concerns its axes; returns the faults
+/// that are not named by the first confirmed transition.
 fn wrong(
     model: &RigModel,
     rig: &Rig,
@@ -145,7 +139,7 @@ fn wrong(
 #[test]
 fn a_drive_cycle_ends_every_not_tested_and_finds_every_fault() {
     let (model, rig, cycle) = &*CHAPTER;
-    // A ball that rests for as long leaves most of it open.
+    // A ball at rest for the same time leaves monitors untested.
     let rests = |row: &Sample| Sample { x_m: Some(1e-4 * (row.t_s * 100.0 % 2.0).floor()), ..*row };
     let level =
         Sample { cmd_qx_rad: Some(0.0), cmd_qy_rad: Some(0.0), y_m: Some(0.0), ..cycle.rows[0] };
@@ -159,7 +153,7 @@ fn a_drive_cycle_ends_every_not_tested_and_finds_every_fault() {
     assert_eq!(wrong(model, rig, cycle, &all), Vec::<String>::new());
 }
 
-/// Ball and beam: one servo, which reads like a stuck ball; both are named then.
+/// Ball and beam: with one servo, its faults look like a stuck ball; both are named.
 #[test]
 fn a_rig_with_one_axis_has_a_cycle_along_it() {
     let chapter = Preset::Chapter.model().unwrap();
@@ -173,7 +167,7 @@ fn a_rig_with_one_axis_has_a_cycle_along_it() {
     assert_eq!(wrong(&model, &rig, &cycle, &FAULTS), Vec::<String>::new());
 }
 
-/// A camera of 30 Hz that sees whole millimetres, and servos in half degrees.
+/// A camera of 30 Hz with a resolution of 1 mm, and servos with a resolution of 0.5°.
 #[test]
 fn a_coarse_rig_takes_longer() {
     let model = Preset::Pingpong.model().unwrap();
@@ -186,7 +180,7 @@ fn a_coarse_rig_takes_longer() {
     assert!((5.0..20.0).contains(&cycle.duration_s), "{}", cycle.duration_s);
 }
 
-/// The ball stays on the plate, by the truth that no device knows.
+/// The true position of the ball stays on the plate.
 #[test]
 fn a_healthy_ball_stays_clear_of_the_edge() {
     let (model, rig, cycle) = &*CHAPTER;
@@ -203,7 +197,7 @@ fn a_healthy_ball_stays_clear_of_the_edge() {
     }
 }
 
-/// A rig whose owner looks at it from the other side is led through the same motion.
+/// A rig with other axes, signs and units goes through the same motion.
 #[test]
 fn a_device_with_other_axes_and_units_is_led_alike() {
     let (model, rig, own) = &*CHAPTER;
@@ -219,7 +213,7 @@ fn a_device_with_other_axes_and_units_is_led_alike() {
     let next = || {
         let mut logged = None;
         simulated.next_sample_by(|read| {
-            // What this device would read and command.
+            // The readings and commands in this device's axes and units.
             let (x_m, y_m) = (read.y_m.map(|y| 1e3 * y), read.x_m.map(|x| -1e3 * x));
             let here = Sample { x_m, y_m, ..*read };
             let commands = law.command(&cycle, &here);

@@ -1,6 +1,5 @@
-//! The twin, the engine and the laboratory from outside: against trusted
-//! trajectories, closed forms, orders of convergence, and rigs whose truth is
-//! known.
+//! Black-box tests of the twin, the engine and the laboratory: against reference
+//! trajectories, closed forms, orders of convergence, and rigs with known faults.
 
 #![allow(unreachable_pub, clippy::unwrap_used, reason = "a test fails by panicking")]
 

@@ -1,5 +1,5 @@
-//! Models and methods against trajectories that share no code with them:
-//! `crates/offbd-lab/tests/reference/make.py` says how they were computed.
+//! Models and methods against independently computed trajectories:
+//! `crates/offbd-lab/tests/reference/make.py` computes them.
 
 use std::f64::consts::PI;
 
@@ -9,7 +9,7 @@ use offbd_lab::scene::{
     Configuration, Law, Laws, Method, Model, Pace, Samples, Scene, Subject, Term, choose, run,
 };
 
-/// Times and positions, x and y; a file without y moves along x only.
+/// Times and positions, x and y; without a column y, the motion is along x only.
 type Track = Vec<(f64, Vector2<f64>)>;
 
 fn track(name: &str) -> Track {
@@ -22,7 +22,7 @@ fn track(name: &str) -> Track {
     text.lines().skip(1).map(row).collect()
 }
 
-/// One of the charted scenes with its drive.
+/// Returns one of the charted scenes with its drive.
 fn scene(name: &str) -> (Scene, Laws) {
     let (law, contact) = match name.strip_suffix("-soft") {
         Some(law) => (law, Contact::SOFT),
@@ -47,7 +47,7 @@ fn on_the_chapters_plate(contact: Contact, duration: f64) -> Scene {
 
 const SCENES: [&str; 6] = ["slope", "sine", "steep", "slope-soft", "sine-soft", "steep-soft"];
 
-/// Positions each `every` seconds.
+/// Returns the positions every `every` seconds.
 fn positions(
     (scene, laws): &(Scene, Laws),
     configuration: &Configuration,
@@ -65,7 +65,7 @@ fn apart(a: &[Vector2<f64>], b: &[Vector2<f64>]) -> f64 {
     a.iter().zip(b).map(|(p, q)| (p - q).norm()).fold(0.0, f64::max)
 }
 
-/// The worst distance from `truth`.
+/// Returns the largest distance from `truth`, m.
 fn error(scene: &(Scene, Laws), configuration: &Configuration, truth: &Track) -> f64 {
     let path = positions(scene, configuration, truth[1].0);
     assert_eq!(path.len(), truth.len());
@@ -101,8 +101,8 @@ fn validate_compliant_on_every_scene() {
     }
 }
 
-/// The contact step at 1 ms, beyond any explicit method's limit: 1.5e-6 m on
-/// the sine, and about 1e-4 m through slip, flight and landing.
+/// The contact step at 1 ms, beyond the stability limit of any explicit method: its error
+/// is 1.5e-6 m on the sine, and about 1e-4 m through slip, flight and landing.
 #[test]
 fn validate_the_contact_step_at_a_millisecond() {
     for (name, most) in [("slope", 1e-8), ("sine", 1e-5), ("steep", 1e-4), ("steep-soft", 2e-4)] {
@@ -112,8 +112,8 @@ fn validate_the_contact_step_at_a_millisecond() {
     }
 }
 
-/// The rigid plate with true friction: its own trajectory to rounding, the
-/// compliant one to what a rigid plate can be.
+/// The rigid plate with Coulomb friction: agrees with its own reference to rounding, and
+/// with the compliant one within the error of rigidity.
 #[test]
 fn validate_sliding_through_slip_flight_and_landing() {
     let rigid = configuration(Model::Sliding, Method::Dopri5, Pace::Tolerance(1e-9));
@@ -123,8 +123,8 @@ fn validate_sliding_through_slip_flight_and_landing() {
     assert!(off < 1e-4, "against the compliant plate: {off:e} m");
 }
 
-/// Creep and sag to first order bring the rolling ball from 1.2e-6 and 3e-6 m
-/// to where the second order begins.
+/// Creep and sag to first order reduce the errors of the rolling ball, 1.2e-6 and 3e-6 m,
+/// to terms of second order.
 #[test]
 fn validate_creeping_against_the_compliant_model() {
     let creeping = configuration(Model::Creeping, Method::Dopri5, Pace::Tolerance(1e-6));
@@ -138,9 +138,9 @@ fn validate_creeping_against_the_compliant_model() {
     }
 }
 
-/// On a plate that swings far about both axes, and so turns about its normal,
-/// what the contact gives shows in every term of the motion; what is left goes
-/// with the square of what it gives.
+/// On a plate with large swings about both axes, and thus a rotation about its normal,
+/// creep and sag affect every term of the motion; the remaining error is proportional to
+/// their square.
 #[test]
 fn validate_creeping_on_a_plate_that_turns_about_its_normal() {
     let sine = |frequency, phase| Law::new(&[Term::Sine { amplitude: 0.3, frequency, phase }]);
@@ -170,8 +170,8 @@ fn validate_the_choice_on_every_scene() {
     }
 }
 
-/// A plate that hardly moves needs no more than small angles, and its bound
-/// holds against the compliant model.
+/// For a plate that hardly moves the planar model is chosen, and its error bound holds
+/// against the compliant model.
 #[test]
 fn validate_the_choice_on_a_gentle_plate() {
     let sine = |amplitude, frequency| Term::Sine { amplitude, frequency, phase: 1.0 };
@@ -196,7 +196,7 @@ fn what_cannot_be_met_is_said() {
     assert!(!refusal.tried.is_empty());
 }
 
-/// Numbers in [0, 1) from a seed: xorshift64 (Marsaglia 2003).
+/// Random numbers in [0, 1) from a seed: xorshift64 (Marsaglia 2003).
 struct Dice(u64);
 
 impl Dice {
@@ -232,7 +232,8 @@ impl Dice {
         Law::new(&terms)
     }
 
-    /// A second on a plate that does anything, hard or soft, slippery or not.
+    /// Draws a scene of 1 s with a random motion of the plate, a hard or soft contact, and
+    /// a random friction.
     fn scene(&mut self) -> (Scene, Laws) {
         let (k, d) = if self.roll() < 0.5 { (1000.0, 100.0) } else { (800_000.0, 1000.0) };
         let contact = Contact::new(k, d, self.between(0.05, 1.0), 1e-4).unwrap();
@@ -241,9 +242,9 @@ impl Dice {
     }
 }
 
-/// Whatever the plate does, what is chosen is as near as was asked, with RODAS
-/// at 1e-10 m for the truth. Of 20 000 choices on 4000 such scenes all that
-/// were made were; two were declined, where runs of RODAS hardly agree to 1e-6 m.
+/// On random scenes the choice meets the requested accuracy, compared with RODAS at
+/// 1e-10 m. Of 20 000 choices on 4000 such scenes, all that were made met it; two were
+/// declined, where runs of RODAS hardly agree to 1e-6 m.
 #[test]
 fn validate_the_choice_on_scenes_at_random() {
     let mut dice = Dice(0x9E37_79B9_7F4A_7C15);

@@ -1,5 +1,5 @@
-//! The demo's side of the interface: what any client of the service does, over
-//! HTTP and WebSocket. Knows addresses and JSON, nothing of the service inside.
+//! The demo's client of the service, over HTTP and WebSocket. It uses addresses and JSON
+//! only, nothing internal to the service.
 
 use std::time::Duration;
 
@@ -17,11 +17,11 @@ use crate::wire::telemetry::{AckView, RowsView, sample_view};
 use offbd_core::engine::Rig;
 use offbd_core::vocabulary::{FaultCode, Sample};
 
-/// Times that a batch is sent before the demo gives up.
+/// Maximum number of attempts to send a batch; chosen.
 const ATTEMPTS: u32 = 5;
-/// Wait before the next attempt where the service names no time.
+/// Delay before a retry if the service gives none; chosen.
 const RETRY: Duration = Duration::from_millis(200);
-/// Longest wait for an acknowledgement; the store commits within milliseconds.
+/// Timeout of an acknowledgement; chosen: the store commits within milliseconds.
 const ANSWER: Duration = Duration::from_secs(20);
 
 /// A client for one asset.
@@ -33,7 +33,7 @@ pub(super) struct Client {
     asset: String,
 }
 
-/// How batches travel.
+/// The transport of batches.
 pub(super) enum Uplink {
     Http(Client),
     WebSocket(Box<WebSocketStream<MaybeTlsStream<TcpStream>>>),
@@ -49,41 +49,41 @@ impl Client {
         format!("http://{}/api/v1/assets/{}{rest}", self.address, self.asset)
     }
 
-    /// Registers the rig, or replaces what is registered.
+    /// Registers the rig, or replaces the registered one.
     pub(super) async fn register(&self, rig: &Rig) -> anyhow::Result<()> {
         let request = self.http.put(self.of_asset("")).json(&asset::view(rig));
         accepted(request.send().await?).await.context("registering the asset")?;
         Ok(())
     }
 
-    /// Erases what is remembered of `code`, as a workshop does after a repair.
+    /// Clears the fault memory of `code`, as a workshop does after a repair.
     pub(super) async fn clear(&self, code: FaultCode) -> anyhow::Result<()> {
         let request = self.http.delete(self.of_asset(&format!("/faults/{code}?by=demo")));
         accepted(request.send().await?).await.context("clearing a fault")?;
         Ok(())
     }
 
-    /// Fault transitions of the asset, as they happen.
+    /// Opens the stream of the asset's fault transitions.
     pub(super) async fn events(&self) -> anyhow::Result<Response> {
         let url = format!("http://{}/api/v1/events?asset={}", self.address, self.asset);
         accepted(self.http.get(url).send().await?).await.context("listening to events")
     }
 
-    /// Ends a session; the answer has its verdict.
+    /// Ends a session; returns it with its verdict.
     pub(super) async fn end_session(&self, id: &str) -> anyhow::Result<SessionView> {
         let url = format!("http://{}/api/v1/sessions/{id}/end", self.address);
         let answer = accepted(self.http.post(url).send().await?).await;
         Ok(answer.context("ending the session")?.json().await?)
     }
 
-    /// A WebSocket to the asset's stream.
+    /// Opens a WebSocket to the asset's stream.
     pub(super) async fn connect(&self) -> anyhow::Result<Uplink> {
         let url = format!("ws://{}/api/v1/assets/{}/stream", self.address, self.asset);
         let (socket, _) = tokio_tungstenite::connect_async(url).await.context("the WebSocket")?;
         Ok(Uplink::WebSocket(Box::new(socket)))
     }
 
-    /// Posts a batch until it is acknowledged. Sent twice it counts once.
+    /// Posts a batch, with retries, until it is acknowledged; duplicates have no effect.
     async fn post(&self, batch: &RowsView) -> anyhow::Result<AckView> {
         let mut attempts = 0;
         loop {
@@ -110,7 +110,7 @@ fn retry_after(answer: &Response) -> Duration {
     seconds.map_or(RETRY, Duration::from_secs)
 }
 
-/// The answer if it is a success, else the problem it names.
+/// Returns the response if it is a success, else an error with its body.
 async fn accepted(answer: Response) -> anyhow::Result<Response> {
     let status = answer.status();
     if status.is_success() {
@@ -119,13 +119,13 @@ async fn accepted(answer: Response) -> anyhow::Result<Response> {
     bail!("{status}: {}", answer.text().await.unwrap_or_default())
 }
 
-/// Whether a batch was refused because its session has ended.
+/// Returns whether a batch was refused because its session has ended.
 pub(super) fn is_ended(error: &anyhow::Error) -> bool {
     format!("{error:#}").contains("urn:offbd:problem:session-ended")
 }
 
 impl Uplink {
-    /// The name of the transport.
+    /// Returns the name of the transport.
     pub(super) const fn name(&self) -> &'static str {
         match self {
             Self::Http(_) => "HTTP batches",
@@ -154,13 +154,14 @@ impl Uplink {
     /// Closes a WebSocket.
     pub(super) async fn close(self) {
         if let Self::WebSocket(mut socket) = self {
-            // The other side may have gone first.
+            // The service may have closed it first.
             let _ = SinkExt::close(&mut socket).await;
         }
     }
 }
 
-/// The next acknowledgement; fault frames come over the events as well.
+/// Returns the next acknowledgement. Fault frames are skipped: the event stream has them
+/// too.
 async fn acknowledgement(
     socket: &mut WebSocketStream<MaybeTlsStream<TcpStream>>,
 ) -> anyhow::Result<AckView> {

@@ -1,15 +1,15 @@
-//! `offbd demo`: the service on its embedded store, and a simulated rig that
-//! streams to it in real time, as a device would, over HTTP and WebSocket.
+//! `offbd demo`: the service with its embedded store, and a simulated rig that streams to
+//! it in real time over HTTP and WebSocket, as a device does.
 //!
-//! What is found is read from the interface (Server-Sent Events), never from
-//! memory: the demo is a client like any other, in the same process.
+//! The demo reads the detected faults from the interface (Server-Sent Events), like any
+//! other client, although it runs in the same process.
 
 mod client;
+mod comparison;
+mod controls;
 mod events;
-mod hands;
 mod plan;
 mod show;
-mod tally;
 
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
@@ -24,17 +24,17 @@ use crate::config::Config;
 use crate::server;
 use crate::wire::session_csv;
 use client::Client;
-use hands::Hands;
+use controls::VisitorControls;
 use offbd_core::engine::Rig;
 use offbd_lab::simulation::{Disturbances, Fault, Preset, Reference, SimulatedRig};
 use sha2::{Digest, Sha256};
 use show::Show;
 
-/// Shows it all: the service, a simulated rig streaming to it, faults found.
+/// Demonstrates the service: a simulated rig streams to it, faults are found.
 ///
 /// Starts the service on its embedded store, registers and calibrates a
 /// simulated rig with PID control, streams it in real time over WebSocket and
-/// HTTP, injects faults, and prints what is found. Open the address it prints.
+/// HTTP, injects faults, and prints those found. Open the address it prints.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "Examples:\n  \
     offbd demo\n  \
@@ -44,7 +44,7 @@ use show::Show;
     A fault is CODE:KIND[=SIZE]@START[-END]; `offbd simulate --help` lists them. Exit\n\
     status with --seconds: 0 if what was injected and what was found agree, else 1.")]
 pub(in crate::cli) struct DemoArgs {
-    /// Port of the service on 127.0.0.1; 0 takes one that is free
+    /// Port of the service on 127.0.0.1; 0 takes a free one
     #[arg(long, default_value_t = 8087, value_name = "P")]
     port: u16,
     /// Directory of the store [default: a temporary one]
@@ -53,10 +53,10 @@ pub(in crate::cli) struct DemoArgs {
     /// End after this long on the rig's clock, s [default: until Ctrl-C]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = simulate::seconds)]
     seconds: Option<f64>,
-    /// A fault to inject; may be given again [default: one after the other]
+    /// A fault to inject; may be repeated [default: a sequence of faults]
     #[arg(long, value_name = "CODE:KIND@T")]
     fault: Vec<Fault>,
-    /// Seconds of the rig's clock in one second
+    /// Speed: seconds of the rig's clock per second
     #[arg(long, default_value_t = 1.0, value_name = "X", allow_negative_numbers = true,
           value_parser = speed)]
     speed: f64,
@@ -67,12 +67,12 @@ pub(in crate::cli) struct DemoArgs {
 
 /// The name of the demo's rig.
 const ASSET: &str = "demo-rig";
-/// A day: the demo's end where none is asked for.
+/// Duration of a demo without `--seconds`, s; chosen: a day.
 const ENDLESS_S: f64 = 86_400.0;
-/// Healthy seconds from which the rig is learnt; simulated in moments.
+/// Duration of the calibration session, s; chosen.
 const HEALTHY_S: f64 = 120.0;
-/// Fastest show: the rig's simulation alone is some hundreds of times faster
-/// than real.
+/// Maximum speed. Chosen: the simulation alone is some hundreds of times faster than real
+/// time.
 const MAX_SPEED: f64 = 100.0;
 
 fn speed(word: &str) -> Result<f64, String> {
@@ -90,10 +90,10 @@ async fn demo(args: &DemoArgs) -> anyhow::Result<()> {
     let listen = SocketAddr::from((Ipv4Addr::LOCALHOST, args.port));
     let data = store.path.clone();
     let config = Config { listen, data, ..Config::default() };
-    let (hands, routes) = hands::hands(ASSET);
+    let (controls, routes) = controls::visitor_controls(ASSET);
     let server = server::start_with(config, Some(routes));
     let server = server.await.context("cannot start; --port 0 takes a free port")?;
-    let result = show(args, &server.address.to_string(), &store, hands).await;
+    let result = show(args, &server.address.to_string(), &store, controls).await;
     server.shutdown().await?;
     let outcome = result?;
     if args.seconds.is_some() && !outcome.interrupted && !outcome.agreed {
@@ -102,8 +102,8 @@ async fn demo(args: &DemoArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// How a show went.
-struct Outcome {
+/// The outcome of a demo.
+struct DemoOutcome {
     agreed: bool,
     interrupted: bool,
 }
@@ -112,8 +112,8 @@ async fn show(
     args: &DemoArgs,
     address: &str,
     store: &StoreDirectory,
-    hands: Hands,
-) -> anyhow::Result<Outcome> {
+    controls: VisitorControls,
+) -> anyhow::Result<DemoOutcome> {
     let seconds = args.seconds.unwrap_or(ENDLESS_S);
     let asked = args.fault.clone();
     let faults = if asked.is_empty() { plan::shown(seconds) } else { asked };
@@ -123,14 +123,14 @@ async fn show(
     if store.temporary {
         anstream::println!("           removed at the end; --data DIR keeps one");
     }
-    let rig = learnt_rig(args.seed)?;
+    let rig = calibrated_rig(args.seed)?;
     let client = Client::new(address.to_owned(), &rig.name)?;
     client.register(&rig).await?;
     let simulated = simulated_rig(Reference::Steps, args.seed)?;
-    let mut show = Show::new(client, simulated, args.speed, hands).await?;
+    let mut show = Show::new(client, simulated, args.speed, controls).await?;
     let interrupted = show.run(plan::episodes(faults, seconds)).await?;
     let agreed = show.conclude()?;
-    Ok(Outcome { agreed, interrupted })
+    Ok(DemoOutcome { agreed, interrupted })
 }
 
 fn simulated_rig(reference: Reference, seed: u64) -> anyhow::Result<SimulatedRig> {
@@ -138,8 +138,8 @@ fn simulated_rig(reference: Reference, seed: u64) -> anyhow::Result<SimulatedRig
     Ok(SimulatedRig::new(model, reference, Disturbances::default(), seed)?)
 }
 
-/// The rig as its owner knows it, with what a healthy session teaches.
-fn learnt_rig(seed: u64) -> anyhow::Result<Rig> {
+/// Returns the rig as its owner knows it, calibrated on a healthy session.
+fn calibrated_rig(seed: u64) -> anyhow::Result<Rig> {
     let model = Preset::Chapter.model()?;
     let mut rig = Rig { name: ASSET.to_owned(), ..model.rig };
     let mut healthy = simulated_rig(Reference::Lissajous, seed.wrapping_add(1))?;
@@ -153,7 +153,7 @@ fn learnt_rig(seed: u64) -> anyhow::Result<Rig> {
     Ok(rig)
 }
 
-/// The store's directory; a temporary one goes with the demo.
+/// The directory of the store; a temporary one is removed with the demo.
 struct StoreDirectory {
     path: PathBuf,
     temporary: bool,
@@ -170,7 +170,7 @@ impl StoreDirectory {
 impl Drop for StoreDirectory {
     fn drop(&mut self) {
         if self.temporary {
-            // What cannot be removed is left to the system.
+            // Files that cannot be removed are left to the system.
             let _ = std::fs::remove_dir_all(&self.path);
         }
     }

@@ -1,7 +1,7 @@
-//! What the demo injects when, and where one session ends and the next begins.
+//! Plans the faults of the demo and its sessions.
 //!
-//! A fault ends before the next begins and the session with it, so that each is
-//! judged on a rig that was whole at the start of its session.
+//! A fault is repaired, and its session ends, before the next fault begins, so that every
+//! fault occurs in a session that starts with a healthy rig.
 
 use std::collections::VecDeque;
 
@@ -17,7 +17,7 @@ pub(super) struct Episode {
     pub faults: Vec<Fault>,
 }
 
-/// Faults shown when none are asked for, in this order.
+/// The default faults, in this order.
 const SHOWN: [FaultEffect; 4] = [
     FaultEffect::Servo(Axis::X, ServoFault::Dead),
     FaultEffect::Ball(BallFault::Glued),
@@ -25,18 +25,19 @@ const SHOWN: [FaultEffect; 4] = [
     FaultEffect::Servo(Axis::Y, ServoFault::Dead),
 ];
 
-/// A fault gets about this long, s, with what comes before and after it.
+/// Approximate interval between faults, s; chosen.
 const SLOT_S: f64 = 30.0;
-/// Within its slot a fault begins and ends at these shares.
+/// Onset of a fault as a share of its interval; chosen.
 const ONSET_SHARE: f64 = 0.35;
+/// Repair of a fault as a share of its interval; chosen.
 const END_SHARE: f64 = 0.8;
-/// A fault without an end is repaired at this share of the way to the next.
+/// Repair of a fault without an end, as a share of the time to the next onset; chosen.
 const REPAIR_SHARE: f64 = 0.6;
-/// A whole rig needs this long, s, for the ball to come back to the middle and
-/// for the next session to begin with it; closer faults share a session.
+/// Minimum time from a repair to the next onset for a new session, s. Chosen so that the
+/// ball returns to the centre first; closer faults share a session.
 const RECOVERY_S: f64 = 6.0;
 
-/// The faults shown in `seconds`: at least two, a slot for each.
+/// Returns the default faults within `seconds`: at least two, each in its own interval.
 pub(super) fn shown(seconds: f64) -> Vec<Fault> {
     let n = (seconds / SLOT_S).floor().max(2.0);
     let slot_s = seconds / n;
@@ -48,7 +49,7 @@ pub(super) fn shown(seconds: f64) -> Vec<Fault> {
     (0..n as usize).map(fault).collect()
 }
 
-/// The sessions in which `faults` are shown within `seconds`.
+/// Divides `seconds` into sessions with `faults`.
 pub(super) fn episodes(mut faults: Vec<Fault>, seconds: f64) -> Vec<Episode> {
     faults.retain(|f| f.onset_s < seconds);
     faults.sort_by(|a, b| a.onset_s.total_cmp(&b.onset_s));
@@ -70,8 +71,8 @@ pub(super) fn episodes(mut faults: Vec<Fault>, seconds: f64) -> Vec<Episode> {
     all
 }
 
-/// What is left to be shown of `rest` from `now_s` on, after the script was
-/// interrupted; at least one episode up to `end_s`.
+/// Adapts the episodes `rest` to a script that is resumed at `now_s`: drops those in the
+/// past, and leaves at least one until `end_s`.
 pub(super) fn go_on(rest: &mut VecDeque<Episode>, now_s: f64, end_s: f64) {
     rest.retain(|episode| episode.end_s > now_s);
     if rest.is_empty() && now_s < end_s {

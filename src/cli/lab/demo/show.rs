@@ -1,7 +1,7 @@
-//! The show: sessions streamed in real time, faults injected, findings printed.
+//! The show: streams sessions in real time, injects faults, and prints detected ones.
 //!
-//! The rig's clock is a deadline: at every tick all rows that are due by then
-//! are sent, so that a stall is caught up with and nothing is lost.
+//! At every tick, all rows due by the rig's clock are sent, so that the show catches up
+//! after a stall and no row is lost.
 
 use std::collections::VecDeque;
 use std::io::Write;
@@ -11,20 +11,20 @@ use tokio::sync::mpsc;
 use tokio::time::{Instant, Interval, MissedTickBehavior, interval, timeout};
 
 use super::client::{self, Client, Uplink};
+use super::comparison::FaultComparison;
+use super::controls::{VisitorCommand, VisitorControls};
 use super::events;
-use super::hands::{Act, Hands};
 use super::plan::{self, Episode};
-use super::tally::Tally;
 use crate::cli::{output, table};
 use crate::wire::verdict::FaultView;
 use offbd_core::vocabulary::{FaultCode, Sample};
 use offbd_lab::simulation::{Fault, FaultEffect, SimulatedRig};
 
-/// Time between two batches: ten rows at 100 Hz.
+/// Interval between two batches; chosen: ten rows at 100 Hz.
 const TICK: Duration = Duration::from_millis(100);
-/// Most rows of a batch; after a stall several follow each other.
+/// Maximum number of rows of a batch; chosen. After a stall several batches are sent.
 const MAX_ROWS: usize = 1000;
-/// How long the events may lag behind the verdict of a session that has ended.
+/// Maximum wait for the events of a session after its verdict; chosen.
 const LAST_EVENTS: Duration = Duration::from_secs(5);
 
 /// A show in progress.
@@ -36,37 +36,38 @@ pub(super) struct Show {
     started: Instant,
     ticks: Interval,
     events: mpsc::Receiver<FaultView>,
-    tally: Tally,
-    hands: Hands,
-    /// Whether faults come and go by themselves.
+    comparison: FaultComparison,
+    controls: VisitorControls,
+    /// Whether the script injects and repairs faults.
     script: bool,
-    /// What the names of this show's sessions begin with.
+    /// Prefix of the names of this show's sessions.
     name: String,
     n_sessions: u32,
 }
 
 /// Why a session's stream ends.
-enum Cut {
-    /// It has come to its end.
+enum StreamEnd {
+    /// The episode has ended.
     End,
+    /// Ctrl-C.
     Interrupted,
-    /// A visitor does something.
-    Act(Act),
+    /// A visitor has given a command.
+    Command(VisitorCommand),
 }
 
 /// One session in progress.
-struct Session {
+struct StreamedSession {
     name: String,
     /// The service's id, once a batch has been acknowledged.
     id: Option<String>,
     uplink: Uplink,
     end_s: f64,
-    /// What the person has not been told yet.
+    /// Messages still to be printed, with their times, s.
     to_announce: Vec<(f64, String)>,
 }
 
-impl Session {
-    /// Says what was done to the rig by `due_s`.
+impl StreamedSession {
+    /// Prints the messages due by `due_s`.
     fn announce(&mut self, due_s: f64) {
         self.to_announce.retain(|(at_s, text)| {
             if *at_s <= due_s {
@@ -77,17 +78,17 @@ impl Session {
     }
 }
 
-/// What is done to the rig in an episode, in order.
-fn acts(episode: &Episode) -> Vec<(f64, String)> {
-    let act = |fault: &Fault| {
+/// Returns the messages about the faults of an episode, in order.
+fn announcements(episode: &Episode) -> Vec<(f64, String)> {
+    let of_fault = |fault: &Fault| {
         let what = format!("{}:{}", fault.effect.code(), fault.effect.kind());
         let injected = (fault.onset_s, format!(">> {what} injected"));
         let repaired = fault.end_s.map(|end_s| (end_s, format!(">> {what} repaired")));
         std::iter::once(injected).chain(repaired)
     };
-    let mut acts: Vec<_> = episode.faults.iter().flat_map(act).collect();
-    acts.sort_by(|a, b| a.0.total_cmp(&b.0));
-    acts
+    let mut all: Vec<_> = episode.faults.iter().flat_map(of_fault).collect();
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    all
 }
 
 impl Show {
@@ -96,7 +97,7 @@ impl Show {
         client: Client,
         mut rig: SimulatedRig,
         speed: f64,
-        hands: Hands,
+        controls: VisitorControls,
     ) -> anyhow::Result<Self> {
         for &code in FaultCode::ALL {
             client.clear(code).await?;
@@ -104,11 +105,11 @@ impl Show {
         let events = events::listen(client.events().await?);
         let mut ticks = interval(TICK);
         ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
-        // To the millisecond: the next demo on a store that is kept may begin within
-        // the second, and a session of the same name would be taken for this one.
+        // To the millisecond: the next demo with the same store may start within the same
+        // second, and sessions of the same name would be merged.
         let name = jiff::Timestamp::now().strftime("demo-%Y%m%dT%H%M%S%.3f").to_string();
         let (next, started) = (rig.next_sample(), Instant::now());
-        let tally = Tally::default();
+        let comparison = FaultComparison::default();
         Ok(Self {
             client,
             rig,
@@ -117,61 +118,61 @@ impl Show {
             started,
             ticks,
             events,
-            tally,
-            hands,
+            comparison,
+            controls,
             script: true,
             name,
             n_sessions: 0,
         })
     }
 
-    /// Streams all `episodes`, and what visitors do in between; returns whether
-    /// Ctrl-C cut them short.
+    /// Streams all `episodes`, and the sessions that visitors control in between; returns
+    /// whether Ctrl-C interrupted them.
     pub(super) async fn run(&mut self, episodes: Vec<Episode>) -> anyhow::Result<bool> {
         let end_s = episodes.last().map_or(0.0, |last| last.end_s);
         let mut rest = VecDeque::from(episodes);
         while let Some(mut episode) = rest.pop_front() {
-            let mut cut = self.scripted(&mut episode).await?;
-            if let Cut::Act(act) = cut {
-                cut = self.by_hand(act, end_s).await?;
+            let mut end = self.scripted(&mut episode).await?;
+            if let StreamEnd::Command(command) = end {
+                end = self.by_hand(command, end_s).await?;
                 plan::go_on(&mut rest, self.next.t_s, end_s);
             }
-            if matches!(cut, Cut::Interrupted) {
+            if matches!(end, StreamEnd::Interrupted) {
                 return Ok(true);
             }
         }
         Ok(false)
     }
 
-    /// An episode as it was planned, or until a visitor lays hands on the rig.
-    async fn scripted(&mut self, episode: &mut Episode) -> anyhow::Result<Cut> {
+    /// Streams an episode as planned, until its end or a visitor's command.
+    async fn scripted(&mut self, episode: &mut Episode) -> anyhow::Result<StreamEnd> {
         let mut session = self.begin(episode).await?;
-        let cut = self.stream(&mut session).await?;
+        let end = self.stream(&mut session).await?;
         self.end(session, episode).await?;
-        Ok(cut)
+        Ok(end)
     }
 
-    /// One session in which visitors break and repair, until they hand the rig
-    /// back to the script.
-    async fn by_hand(&mut self, first: Act, end_s: f64) -> anyhow::Result<Cut> {
+    /// Streams a session in which visitors inject and repair faults, until they resume the
+    /// script.
+    async fn by_hand(&mut self, first: VisitorCommand, end_s: f64) -> anyhow::Result<StreamEnd> {
         self.script = false;
         self.repair();
         let start_s = self.next.t_s;
         let mut episode = Episode { start_s, end_s, faults: Vec::new() };
         let mut session = self.begin(&episode).await?;
-        let mut cut = Cut::Act(first);
-        while let Cut::Act(act) = cut {
-            match act {
-                Act::Script => break,
-                Act::Repair => self.repair(),
-                Act::Break(effect) => self.break_now(effect, &mut episode).await?,
+        let mut end = StreamEnd::Command(first);
+        while let StreamEnd::Command(command) = end {
+            match command {
+                VisitorCommand::Script => break,
+                VisitorCommand::Repair => self.repair(),
+                VisitorCommand::Break(effect) => self.break_now(effect, &mut episode).await?,
             }
-            cut = self.stream(&mut session).await?;
+            end = self.stream(&mut session).await?;
         }
         self.repair();
         self.end(session, &episode).await?;
         self.script = true;
-        Ok(cut)
+        Ok(end)
     }
 
     fn repair(&mut self) {
@@ -194,25 +195,25 @@ impl Show {
         Ok(())
     }
 
-    /// Tells visitors how the rig is.
+    /// Updates the state that visitors see.
     fn show(&self) {
         let now_s = self.rig.truth().t_s;
         let broken = self.rig.faults().map(|t| t.fault).filter(|fault| fault.active(now_s));
         let words = |fault: Fault| format!("{}:{}", fault.effect.code(), fault.effect.kind());
-        self.hands.show(self.script, broken.map(words).collect());
+        self.controls.show(self.script, broken.map(words).collect());
     }
 
-    /// Writes the comparison; returns whether injected and found agree.
+    /// Writes the comparison; returns whether injected and confirmed faults agree.
     pub(super) fn conclude(&self) -> anyhow::Result<bool> {
         let mut out = output::stdout();
         writeln!(out)?;
-        self.tally.write(&mut out)?;
+        self.comparison.write(&mut out)?;
         out.flush()?;
-        Ok(self.tally.agrees())
+        Ok(self.comparison.agrees())
     }
 
-    /// The sessions take turns: WebSocket, then HTTP.
-    async fn begin(&mut self, episode: &Episode) -> anyhow::Result<Session> {
+    /// Begins a session; sessions alternate between WebSocket and HTTP.
+    async fn begin(&mut self, episode: &Episode) -> anyhow::Result<StreamedSession> {
         self.n_sessions += 1;
         let name = format!("{}-{}", self.name, self.n_sessions);
         let by_socket = self.n_sessions % 2 == 1;
@@ -226,17 +227,17 @@ impl Show {
             self.rig.inject(*fault);
         }
         say(episode.start_s, &format!(">> session {name} begins, over {}", uplink.name()));
-        let to_announce = acts(episode);
-        Ok(Session { name, id: None, uplink, end_s: episode.end_s, to_announce })
+        let to_announce = announcements(episode);
+        Ok(StreamedSession { name, id: None, uplink, end_s: episode.end_s, to_announce })
     }
 
-    /// A code that was found in an earlier session and repaired is cleared
-    /// before it is injected again, as a workshop does.
+    /// Clears a code that was confirmed in an earlier session, as a workshop does after a
+    /// repair, before its fault is injected again.
     async fn clear_if_found_before(&self, code: FaultCode) -> anyhow::Result<()> {
-        if self.tally.has_found(code) { self.client.clear(code).await } else { Ok(()) }
+        if self.comparison.has_found(code) { self.client.clear(code).await } else { Ok(()) }
     }
 
-    async fn stream(&mut self, session: &mut Session) -> anyhow::Result<Cut> {
+    async fn stream(&mut self, session: &mut StreamedSession) -> anyhow::Result<StreamEnd> {
         loop {
             tokio::select! {
                 _ = self.ticks.tick() => {}
@@ -244,22 +245,22 @@ impl Show {
                     self.heard(&fault);
                     continue;
                 }
-                act = self.hands.next() => return Ok(Cut::Act(act)),
+                command = self.controls.next() => return Ok(StreamEnd::Command(command)),
                 interrupted = tokio::signal::ctrl_c() => {
                     interrupted?;
-                    return Ok(Cut::Interrupted);
+                    return Ok(StreamEnd::Interrupted);
                 }
             }
             let due_s = (self.started.elapsed().as_secs_f64() * self.speed).min(session.end_s);
             self.send_due(session, due_s).await?;
             self.show();
             if due_s >= session.end_s {
-                return Ok(Cut::End);
+                return Ok(StreamEnd::End);
             }
         }
     }
 
-    async fn send_due(&mut self, session: &mut Session, due_s: f64) -> anyhow::Result<()> {
+    async fn send_due(&mut self, session: &mut StreamedSession, due_s: f64) -> anyhow::Result<()> {
         let mut rows = Vec::new();
         while self.next.t_s < due_s {
             rows.push(std::mem::replace(&mut self.next, self.rig.next_sample()));
@@ -267,7 +268,7 @@ impl Show {
         for batch in rows.chunks(MAX_ROWS) {
             let ack = match session.uplink.send(&session.name, batch).await {
                 Err(error) if client::is_ended(&error) => {
-                    self.go_on_in_another(session);
+                    self.continue_in_new_session(session);
                     session.uplink.send(&session.name, batch).await?
                 }
                 ack => ack?,
@@ -278,16 +279,16 @@ impl Show {
         Ok(())
     }
 
-    /// A visitor has ended the session; a device would begin another.
-    fn go_on_in_another(&mut self, session: &mut Session) {
+    /// Continues in a new session, as a device does, after a visitor has ended this one.
+    fn continue_in_new_session(&mut self, session: &mut StreamedSession) {
         self.n_sessions += 1;
         (session.name, session.id) = (format!("{}-{}", self.name, self.n_sessions), None);
         say(self.rig.truth().t_s, &format!(">> ended by a visitor; session {}", session.name));
     }
 
-    /// Ends a session: its verdict is settled, and all of it has been heard.
-    async fn end(&mut self, session: Session, episode: &Episode) -> anyhow::Result<()> {
-        let Session { name, id, uplink, .. } = session;
+    /// Ends a session, and waits for the events of its verdict.
+    async fn end(&mut self, session: StreamedSession, episode: &Episode) -> anyhow::Result<()> {
+        let StreamedSession { name, id, uplink, .. } = session;
         uplink.close().await;
         let mut confirmed = Vec::new();
         let mut hash = "-".to_owned();
@@ -297,7 +298,7 @@ impl Show {
             (confirmed, hash) = (verdict.faults, verdict.verdict_hash);
         }
         let hear_all = async {
-            while !self.tally.has_heard(&name, &confirmed) {
+            while !self.comparison.has_heard(&name, &confirmed) {
                 let Some(fault) = self.events.recv().await else { return };
                 self.heard(&fault);
             }
@@ -309,22 +310,22 @@ impl Show {
         let short = hash.get(..12).unwrap_or(&hash);
         say(now_s, &format!(">> session {name} ends, verdict {short}"));
         let of_episode = |truth: &&offbd_lab::simulation::FaultTruth| {
-            // A repair by hand gives a fault another end than was planned.
+            // The end is not compared: a visitor's repair may differ from the plan.
             let is_it =
                 |f: &Fault| (f.effect, f.onset_s) == (truth.fault.effect, truth.fault.onset_s);
             episode.faults.iter().any(is_it) && truth.fault.onset_s <= now_s
         };
-        self.tally.injected(&name, self.rig.faults().filter(of_episode).copied());
+        self.comparison.injected(&name, self.rig.faults().filter(of_episode).copied());
         Ok(())
     }
 
     fn heard(&mut self, fault: &FaultView) {
         say(fault.t_s, &fault.summary);
-        self.tally.heard(fault);
+        self.comparison.heard(fault);
     }
 }
 
-/// A line of the show with the time on the rig's clock.
+/// Prints a message with the time on the rig's clock.
 fn say(t_s: f64, text: &str) {
     anstream::println!("{}", table::wrapped(&format!("{t_s:>8.2} s  "), text));
 }

@@ -1,36 +1,37 @@
-//! The scenes that have a name, and scene files.
+//! The named scenes, and scene files.
 
 use std::path::Path;
 
-use crate::cli::unusable::{BadArgument, Unusable, read};
+use crate::cli::errors::{BadArgument, InputError, read};
 use crate::cli::{output, table};
 use crate::wire::scene::{NamedScene, parse};
 use offbd_core::vocabulary::Invalid;
 
-/// What there is to run.
+/// What to run.
 pub(super) enum Exercise {
-    /// Scenes by laws of time, beside each other; the first is the scene's own.
+    /// Scenes whose plate moves by a law of time: the requested one, and others to compare
+    /// it with.
     Laws {
         scenes: Vec<NamedScene>,
-        /// What there is to be seen asks for this accuracy, m, if for any.
+        /// Accuracy required by the purpose of the scene, m, if any.
         tolerance_m: Option<f64>,
     },
-    /// The plate in closed loop.
+    /// The plate in closed loop, with or without the impulse.
     Control { impulse: bool },
-    /// A simulated rig with its twin.
+    /// A simulated rig with its twin, with or without the bad x servo.
     Rig { bad_x: bool },
 }
 
-struct Entry {
+struct CatalogueEntry {
     name: &'static str,
     about: &'static str,
-    what: What,
+    what: EntryContent,
 }
 
-enum What {
+enum EntryContent {
     /// Scene files.
     Laws(&'static [&'static str]),
-    /// Scene files, with the accuracy that shows what there is to see, m.
+    /// Scene files, with the accuracy required by their purpose, m.
     Fine(f64, &'static [&'static str]),
     Control(bool),
     Rig(bool),
@@ -42,98 +43,100 @@ macro_rules! file {
     };
 }
 
-const ENTRIES: [Entry; 12] = [
-    Entry {
+const ENTRIES: [CatalogueEntry; 12] = [
+    CatalogueEntry {
         name: "tilt",
         about: "steps 48-50: both angles pi/20 from rest; leaves by the near side, y, and falls",
-        what: What::Laws(&[file!("tilt")]),
+        what: EntryContent::Laws(&[file!("tilt")]),
     },
-    Entry {
+    CatalogueEntry {
         name: "pid",
         about: "application 1: two PID loops every 10 ms bring the ball to the centre, 30 s",
-        what: What::Control(false),
+        what: EntryContent::Control(false),
     },
-    Entry {
+    CatalogueEntry {
         name: "pid-impulse",
         about: "the same, and at 10 s a push of 10 % of the ball's weight along x for 0.1 s",
-        what: What::Control(true),
+        what: EntryContent::Control(true),
     },
-    Entry {
+    CatalogueEntry {
         name: "block",
         about: "application 2: a cube that slides, at pi/20 on both axes, beside the ball",
-        what: What::Fine(1e-7, &[file!("block"), file!("tilt")]),
+        what: EntryContent::Fine(1e-7, &[file!("block"), file!("tilt")]),
     },
-    Entry {
+    CatalogueEntry {
         name: "good-asset",
         about: "application 3: a rig and its twin side by side; nothing is reported",
-        what: What::Rig(false),
+        what: EntryContent::Rig(false),
     },
-    Entry {
+    CatalogueEntry {
         name: "bad-x-servo",
         about: "application 3: its x servo obeys 0.5 s late; x_servo is reported",
-        what: What::Rig(true),
+        what: EntryContent::Rig(true),
     },
-    Entry {
+    CatalogueEntry {
         name: "slope",
         about: "both angles pi/20 on an endless plate, 0.4 s",
-        what: What::Laws(&[file!("slope")]),
+        what: EntryContent::Laws(&[file!("slope")]),
     },
-    Entry {
+    CatalogueEntry {
         name: "sine",
         about: "both angles swing by 0.05 rad at 0.7 and 0.9 Hz, 10 s",
-        what: What::Laws(&[file!("sine")]),
+        what: EntryContent::Laws(&[file!("sine")]),
     },
-    Entry {
+    CatalogueEntry {
         name: "steep",
         about: "qy turns to 1.2 rad within 0.15 s: the ball slips, 0.4 s",
-        what: What::Laws(&[file!("steep")]),
+        what: EntryContent::Laws(&[file!("steep")]),
     },
-    Entry {
+    CatalogueEntry {
         name: "slope-soft",
         about: "slope on the soft contact of section 4.8",
-        what: What::Laws(&[file!("slope-soft")]),
+        what: EntryContent::Laws(&[file!("slope-soft")]),
     },
-    Entry {
+    CatalogueEntry {
         name: "sine-soft",
         about: "sine on the soft contact",
-        what: What::Laws(&[file!("sine-soft")]),
+        what: EntryContent::Laws(&[file!("sine-soft")]),
     },
-    Entry {
+    CatalogueEntry {
         name: "steep-soft",
         about: "steep on the soft contact",
-        what: What::Laws(&[file!("steep-soft")]),
+        what: EntryContent::Laws(&[file!("steep-soft")]),
     },
 ];
 
-/// One line for each named scene.
+/// Prints one line per named scene.
 pub(super) fn list() -> anyhow::Result<()> {
     let mut rows = table::table(&["scene", "what happens"], &[]);
     for entry in &ENTRIES {
         rows.add_row([entry.name, entry.about]);
     }
-    output::line(&table::lines(&rows).collect::<Vec<_>>().join("\n"))
+    output::print_line(&table::lines(&rows).collect::<Vec<_>>().join("\n"))
 }
 
-/// The scene of this name, or the file.
+/// Returns the scene of this name, or that of the file.
 pub(super) fn find(word: &str) -> anyhow::Result<Exercise> {
     if let Some(entry) = ENTRIES.iter().find(|entry| entry.name == word) {
         return Ok(match entry.what {
-            What::Laws(files) => Exercise::Laws { scenes: parsed(files)?, tolerance_m: None },
-            What::Fine(tolerance, files) => {
+            EntryContent::Laws(files) => {
+                Exercise::Laws { scenes: parsed(files)?, tolerance_m: None }
+            }
+            EntryContent::Fine(tolerance, files) => {
                 Exercise::Laws { scenes: parsed(files)?, tolerance_m: Some(tolerance) }
             }
-            What::Control(impulse) => Exercise::Control { impulse },
-            What::Rig(bad_x) => Exercise::Rig { bad_x },
+            EntryContent::Control(impulse) => Exercise::Control { impulse },
+            EntryContent::Rig(bad_x) => Exercise::Rig { bad_x },
         });
     }
     let path = Path::new(word);
     let looks_like_a_file = path.extension().is_some() || path.components().count() > 1;
     if !looks_like_a_file && !path.exists() {
         let names = ENTRIES.map(|entry| entry.name).join(", ");
-        let text = format!("no scene is called {word}; there are {names}, and scene files");
+        let text = format!("no scene is called {word}; expected a scene file or one of {names}");
         return Err(BadArgument(text).into());
     }
-    let scene = parse(&read(path)?).map_err(|e| Unusable::file(path, e))?;
+    let scene = parse(&read(path)?).map_err(|e| InputError::file(path, e))?;
     Ok(Exercise::Laws { scenes: vec![scene], tolerance_m: None })
 }
 

@@ -4,52 +4,55 @@ use nalgebra::Vector2;
 use serde_json::{Value, json};
 
 use super::SceneArgs;
-use super::course::{Course, Plan, Sampled};
-use super::files::Folder;
+use super::files::OutputFolder;
+use super::scene_run::{RunRequest, Sampled, SceneRun};
 use super::{laws, plots, report};
-use crate::cli::output::{self, Format};
+use crate::cli::output::{self, OutputFormat};
 use offbd_core::plant::{Ball, Contact, GRAVITY_M_S2, Plate};
 use offbd_core::vocabulary::{Invalid, Sample};
 use offbd_lab::chart::Figure;
-use offbd_lab::scene::{Controlled, Loop, Push, Scene, Subject, Turn};
+use offbd_lab::scene::{ControlLoop, ControlStep, ControlledPlate, Push, Scene, Subject};
 
+/// Duration of the scene, s; chosen.
 const DURATION_S: f64 = 30.0;
 
-/// Where the ball starts, m: off the centre along both axes.
+/// Start of the ball, m; chosen: off the centre along both axes.
 const START_M: [f64; 2] = [0.08, -0.05];
 
-/// The chapter's impulse, 10 % of the ball's weight along x at 10 s. An impulse
-/// has no force; it is taken as a pulse of 0.1 s.
+/// Force of the chapter's impulse along x as a share of the ball's weight.
 const PUSH_SHARE: f64 = 0.1;
+/// Time of the chapter's impulse, s.
 const PUSH_AT_S: f64 = 10.0;
+/// Duration of the impulse, s. Chosen, because an ideal impulse has no force.
 const PUSH_S: f64 = 0.1;
 
-/// What the exercise asks: back within 2 cm of the centre by 17 s.
+/// Distance from the centre that the exercise requires, m.
 const NEAR_M: f64 = 0.02;
+/// Time by which it requires it, s.
 const BACK_BY_S: f64 = 17.0;
 
 pub(super) fn run(args: &SceneArgs, impulse: bool) -> anyhow::Result<()> {
     let ball = Ball::default();
     let scene = scene(ball)?;
     let pushes = if impulse { vec![push(&ball)] } else { Vec::new() };
-    let mut drive = Controlled::new(Loop::chapter(&ball), pushes);
+    let mut drive = ControlledPlate::new(ControlLoop::chapter(&ball), pushes);
     let name = if impulse { "pid-impulse" } else { "pid" };
-    let plan = Plan { how: &args.how, sample: args.sample, sampled: true };
-    let course = plan.run(name, &scene, &mut drive).inspect_err(laws::say_tried)?;
-    let answer = Answer::of(&course.samples, impulse);
-    if let Some(folder) = Folder::new(args.output.as_deref())? {
-        write(&folder, &course, drive.turns())?;
+    let plan = RunRequest { how: &args.how, sample: args.sample, sampled: true };
+    let scene_run = plan.run(name, &scene, &mut drive).inspect_err(laws::print_tried)?;
+    let answer = ControlResult::of(&scene_run.samples, impulse);
+    if let Some(folder) = OutputFolder::new(args.output.as_deref())? {
+        write(&folder, &scene_run, drive.control_steps())?;
     }
-    laws::warn(&course);
+    laws::warn(&scene_run);
     match args.format {
-        Format::Table => output::line(&lines(&course, &answer).join("\n"))?,
-        Format::Json => {
-            let mut object = report::object(&course);
+        OutputFormat::Table => output::print_line(&lines(&scene_run, &answer).join("\n"))?,
+        OutputFormat::Json => {
+            let mut object = report::object(&scene_run);
             object["control"] = answer.object();
-            output::line(&object.to_string())?;
+            output::print_line(&object.to_string())?;
         }
     }
-    laws::failed(std::slice::from_ref(&course))
+    laws::failed(std::slice::from_ref(&scene_run))
 }
 
 fn scene(ball: Ball) -> Result<Scene, Invalid> {
@@ -65,19 +68,20 @@ fn push(ball: &Ball) -> Push {
     Push { force: Vector2::new(force, 0.0), start_s: PUSH_AT_S, duration_s: PUSH_S }
 }
 
-/// What the loop achieved.
-struct Answer {
-    /// From when on the ball was within 2 cm, before any push, s.
+/// The performance of the control loop.
+struct ControlResult {
+    /// Time from which on the ball stayed within 2 cm, before any push, s.
     settled_s: Option<f64>,
-    /// After the push: the largest distance, m, and when, s.
+    /// Largest distance after the push, m, and its time, s.
     farthest: Option<(f64, f64)>,
-    /// The last moment beyond 2 cm after the push, s; none: never beyond.
+    /// Last time beyond 2 cm after the push, s; `None`: never beyond.
     beyond_s: Option<f64>,
-    /// Whether it was near from 17 s on, to the end.
+    /// Whether the ball stayed within 2 cm from 17 s to the end; `None` without a push, or
+    /// if the run ended before.
     back: Option<bool>,
 }
 
-impl Answer {
+impl ControlResult {
     fn of(samples: &[Sampled], impulse: bool) -> Self {
         let before_s = if impulse { PUSH_AT_S } else { f64::INFINITY };
         let far = |s: &Sampled| s.1.position.xy().norm();
@@ -103,8 +107,8 @@ impl Answer {
     }
 }
 
-fn lines(course: &Course, answer: &Answer) -> Vec<String> {
-    let mut lines = report::lines(course);
+fn lines(scene_run: &SceneRun, answer: &ControlResult) -> Vec<String> {
+    let mut lines = report::lines(scene_run);
     lines.push(String::new());
     let settled = answer.settled_s.map_or_else(
         || "not within 2 cm of the centre".to_owned(),
@@ -125,7 +129,7 @@ fn lines(course: &Course, answer: &Answer) -> Vec<String> {
     lines
 }
 
-fn back(answer: &Answer) -> String {
+fn back(answer: &ControlResult) -> String {
     match (answer.back, answer.beyond_s) {
         (Some(true), None) => "yes: within 2 cm of the centre by 17 s, and all the time".to_owned(),
         (Some(true), Some(t)) => {
@@ -136,38 +140,38 @@ fn back(answer: &Answer) -> String {
     }
 }
 
-fn write(folder: &Folder, course: &Course, turns: &[Turn]) -> anyhow::Result<()> {
-    folder.trajectory("trajectory.csv", &course.samples)?;
-    folder.session(&turns.iter().map(sample).collect::<Vec<_>>())?;
-    folder.figure("position", &plots::position(course))?;
-    folder.figure("path", &plots::path(course))?;
-    folder.figure("control", &figure(course, turns))
+fn write(folder: &OutputFolder, scene_run: &SceneRun, steps: &[ControlStep]) -> anyhow::Result<()> {
+    folder.trajectory("trajectory.csv", &scene_run.samples)?;
+    folder.session(&steps.iter().map(sample).collect::<Vec<_>>())?;
+    folder.figure("position", &plots::position(scene_run))?;
+    folder.figure("path", &plots::path(scene_run))?;
+    folder.figure("control", &figure(scene_run, steps))
 }
 
-/// What a device would have logged at this turn.
-fn sample(turn: &Turn) -> Sample {
+/// Returns the row that a device would have logged at this sampling instant.
+fn sample(step: &ControlStep) -> Sample {
     Sample {
         seq: None,
-        t_s: turn.at_s,
-        cmd_qx_rad: Some(turn.command.x),
-        cmd_qy_rad: Some(turn.command.y),
-        x_m: Some(turn.position.x),
-        y_m: Some(turn.position.y),
+        t_s: step.at_s,
+        cmd_qx_rad: Some(step.command.x),
+        cmd_qy_rad: Some(step.command.y),
+        x_m: Some(step.position.x),
+        y_m: Some(step.position.y),
     }
 }
 
-/// Both errors above both outputs.
-fn figure(course: &Course, turns: &[Turn]) -> Figure {
-    let over = |name: &str, i: usize, of: fn(&Turn, usize) -> f64| {
-        plots::line(name, i, plots::over_time(turns, |turn| (turn.at_s, of(turn, i))))
+/// Draws both errors above both outputs.
+fn figure(scene_run: &SceneRun, steps: &[ControlStep]) -> Figure {
+    let over = |name: &str, i: usize, of: fn(&ControlStep, usize) -> f64| {
+        plots::line(name, i, plots::over_time(steps, |step| (step.at_s, of(step, i))))
     };
     let errors = ["along x", "along y"].into_iter().enumerate();
-    let errors = errors.map(|(i, name)| over(name, i, |turn, i| -turn.position[i])).collect();
+    let errors = errors.map(|(i, name)| over(name, i, |step, i| -step.position[i])).collect();
     // The x servo turns qy.
     let outputs = ["along x", "along y"].into_iter().enumerate();
-    let outputs = outputs.map(|(i, name)| over(name, i, |turn, i| turn.command[1 - i])).collect();
+    let outputs = outputs.map(|(i, name)| over(name, i, |step, i| step.command[1 - i])).collect();
     let mut figure = plots::figure(
-        format!("{}: two PID loops every 10 ms", course.name),
+        format!("{}: two PID loops every 10 ms", scene_run.name),
         "Errors (wanted minus measured position) and outputs: qy moves the ball along x, qx along y."
             .to_owned(),
         1,

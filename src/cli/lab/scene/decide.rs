@@ -1,27 +1,27 @@
-//! From what was asked for to a model, a method and a pace.
+//! Determines model, method and pace from the options.
 
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
-use crate::cli::unusable::BadArgument;
+use crate::cli::errors::BadArgument;
 use offbd_core::plant::GRAVITY_M_S2;
 use offbd_core::vocabulary::Invalid;
 use offbd_lab::scene::{
-    Choice, Configuration, Drive, Method, Model, Pace, Scene, Tried, choose, suits,
+    Choice, Configuration, Drive, Method, Model, Pace, Scene, TriedCandidate, choose, suits,
 };
 use offbd_lab::timing::cpu_once;
 
 /// How to run a scene.
 #[derive(Clone, Debug, Args)]
-pub(super) struct HowArgs {
+pub(super) struct ConfigurationArgs {
     /// Model of the ball and its contact
     #[arg(long, default_value = "auto", value_parser = or_auto::<Model>(Model::ALL.map(Model::name)))]
-    pub model: Asked<Model>,
-    /// Method that steps it
+    pub model: OrAuto<Model>,
+    /// Numerical method that steps the model
     #[arg(long, default_value = "auto", value_parser = or_auto::<Method>(Method::ALL.map(Method::name)))]
-    pub method: Asked<Method>,
-    /// Fixed steps of this length, s [default for methods of fixed steps: 0.001,
-    /// or what the method can bear]
+    pub method: OrAuto<Method>,
+    /// Fixed steps of this length, s [default for methods with fixed steps: 0.001,
+    /// or the stable step]
     #[arg(long, value_name = "S", conflicts_with = "tolerance", allow_negative_numbers = true,
           value_parser = positive_number)]
     pub step: Option<f64>,
@@ -31,39 +31,39 @@ pub(super) struct HowArgs {
     pub tolerance: Option<f64>,
 }
 
-/// A word, or `auto`.
+/// A named choice, or `None` for `auto`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Asked<T>(pub Option<T>);
+pub(super) struct OrAuto<T>(pub Option<T>);
 
 fn or_auto<T>(
     words: impl IntoIterator<Item = &'static str>,
-) -> impl TypedValueParser<Value = Asked<T>>
+) -> impl TypedValueParser<Value = OrAuto<T>>
 where
     T: std::str::FromStr<Err = Invalid> + Clone + Send + Sync + 'static,
 {
     PossibleValuesParser::new(std::iter::once("auto").chain(words))
-        .map(|word| Asked(word.parse::<T>().ok()))
+        .map(|word| OrAuto(word.parse::<T>().ok()))
 }
 
-/// A finite number above zero.
+/// Parses a finite number above zero.
 pub(super) fn positive_number(word: &str) -> Result<f64, String> {
     let value: Option<f64> = word.parse().ok();
     value.filter(|v| v.is_finite() && *v > 0.0).ok_or_else(|| "not a number above 0".to_owned())
 }
 
-/// Wanted accuracy when none is said, m.
+/// Default accuracy, m; chosen.
 const TOLERANCE_M: f64 = 1e-4;
 
-/// Fixed step when none is said, s: the chapter's longest.
+/// Default fixed step, s: the chapter's longest.
 const STEP_S: f64 = 1e-3;
 
-/// What is to be run, and where it comes from.
+/// The configuration to be run, and its origin.
 #[derive(Clone, Debug)]
 pub(super) struct Decision {
     pub configuration: Configuration,
-    /// The accuracy that was wanted of `auto`, m.
+    /// The accuracy requested from `auto`, m.
     pub wanted_m: Option<f64>,
-    /// What `auto` found, where it was asked.
+    /// The choice of `auto`, if it was requested.
     pub choice: Option<Choice>,
     /// CPU time of choosing, s.
     pub choosing_s: f64,
@@ -72,16 +72,16 @@ pub(super) struct Decision {
 /// No candidate meets the tolerance.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "no model and method meets {tolerance_m:e} m here; the nearest comes to about {best_m:.1e} m"
+    "no model and method meets {tolerance_m:e} m here; the best accuracy is about {best_m:.1e} m"
 )]
-pub(super) struct NoneMeets {
+pub(super) struct NoModelMeets {
     tolerance_m: f64,
     best_m: f64,
-    pub tried: Vec<Tried>,
+    pub tried: Vec<TriedCandidate>,
 }
 
-impl HowArgs {
-    /// Whether anything was said.
+impl ConfigurationArgs {
+    /// Returns whether all options have their defaults.
     pub(super) fn is_plain(&self) -> bool {
         let Self { model, method, step, tolerance } = self;
         model.0.is_none() && method.0.is_none() && step.is_none() && tolerance.is_none()
@@ -102,7 +102,7 @@ impl HowArgs {
             return Err(BadArgument(text).into());
         }
         let (choice, choosing_s) = cpu_once(|| choose(scene, drive, wanted_m));
-        let choice = choice.map_err(|none| NoneMeets {
+        let choice = choice.map_err(|none| NoModelMeets {
             tolerance_m: wanted_m,
             best_m: none.best_m,
             tried: none.tried,
@@ -117,8 +117,8 @@ impl HowArgs {
         Ok(Decision { configuration, wanted_m: Some(wanted_m), choice: Some(choice), choosing_s })
     }
 
-    /// The chosen model if the named method and step can run it; else the
-    /// truest that they can.
+    /// Returns the chosen model if the requested method and step can run it; else the most
+    /// accurate model that they can run.
     fn able(&self, chosen: Model) -> Model {
         let can = |model: Model| {
             let stepped = self.step.is_none() || model != Model::Sliding;
@@ -145,12 +145,12 @@ impl HowArgs {
     }
 }
 
-/// An option that cannot be, by its name.
+/// Maps an invalid option to an error with its name.
 fn bad(error: Invalid) -> BadArgument {
     BadArgument(format!("--{}: {}", error.element.trim_start_matches('/'), error.reason))
 }
 
-/// The method for a step when none is named.
+/// Returns the default method for a fixed step.
 const fn fixed_method(model: Model) -> Method {
     match model {
         Model::Planar => Method::ZeroOrderHold,
@@ -160,8 +160,9 @@ const fn fixed_method(model: Model) -> Method {
     }
 }
 
-/// 1 ms, or what an explicit method of the compliant model can bear: one time
-/// constant of its fastest mode, slip or normal (`crates/offbd-core/src/plant/contact.rs`).
+/// Returns the default step, s: 1 ms, or for an explicit method of the compliant model one
+/// time constant of its fastest mode, slip or normal
+/// (`crates/offbd-core/src/plant/contact.rs`).
 fn usual_step(scene: &Scene, model: Model, method: Method) -> f64 {
     if model != Model::Compliant || method == Method::ContactStep {
         return STEP_S;

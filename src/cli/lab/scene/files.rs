@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 
-use super::course::Sampled;
+use super::scene_run::Sampled;
 use crate::cli::calibrate::write_asset;
 use crate::cli::output;
 use crate::wire::session_csv;
@@ -16,26 +16,27 @@ use offbd_lab::chart::{Figure, png, svg};
 /// The header of a trajectory, plate frame.
 const HEADER: &str = "t_s,x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s,wx_rad_s,wy_rad_s,wz_rad_s";
 
-/// Where the files go; each one's name is said on stderr.
-pub(super) struct Folder(PathBuf);
+/// The directory of the files; the name of each file is printed to stderr.
+pub(super) struct OutputFolder(PathBuf);
 
-impl Folder {
-    /// The folder `dir`, made if need be; none where none is wanted.
+impl OutputFolder {
+    /// Creates the directory `dir` if it is missing; returns `None` if none is requested.
     pub(super) fn new(dir: Option<&Path>) -> anyhow::Result<Option<Self>> {
         let Some(dir) = dir else { return Ok(None) };
         std::fs::create_dir_all(dir).with_context(|| dir.display().to_string())?;
         Ok(Some(Self(dir.to_owned())))
     }
 
-    fn said(&self, name: &str) -> PathBuf {
+    /// Returns the path of a file, and prints it.
+    fn announced(&self, name: &str) -> PathBuf {
         let path = self.0.join(name);
         anstream::eprintln!("{}", path.display());
         path
     }
 
-    /// Each number with as many digits as it takes to read it back the same.
+    /// Writes a trajectory, with all digits that are needed to read the same numbers back.
     pub(super) fn trajectory(&self, name: &str, samples: &[Sampled]) -> anyhow::Result<()> {
-        let mut out = output::create(&self.said(name))?;
+        let mut out = output::create(&self.announced(name))?;
         writeln!(out, "{HEADER}")?;
         for (t, at) in samples {
             write!(out, "{t}")?;
@@ -48,22 +49,22 @@ impl Folder {
         Ok(out.flush()?)
     }
 
-    /// What a device would have recorded, for `offbd replay`.
+    /// Writes the session that a device would have recorded, for `offbd replay`.
     pub(super) fn session(&self, samples: &[Sample]) -> anyhow::Result<()> {
-        let mut out = output::create(&self.said("session.csv"))?;
+        let mut out = output::create(&self.announced("session.csv"))?;
         session_csv::write(&mut out, samples)?;
         Ok(out.flush()?)
     }
 
-    /// What the owner of a rig knows of it, for `offbd replay --asset`.
+    /// Writes the asset file of a rig, for `offbd replay --asset`.
     pub(super) fn asset(&self, rig: &Rig) -> anyhow::Result<()> {
-        write_asset(rig, &self.said("asset.json"))
+        write_asset(rig, &self.announced("asset.json"))
     }
 
     pub(super) fn figure(&self, name: &str, figure: &Figure) -> anyhow::Result<()> {
         let drawing = svg(figure)?;
-        put(&self.said(&format!("{name}.svg")), drawing.as_bytes())?;
-        put(&self.said(&format!("{name}.png")), &png(&drawing)?)
+        put(&self.announced(&format!("{name}.svg")), drawing.as_bytes())?;
+        put(&self.announced(&format!("{name}.png")), &png(&drawing)?)
     }
 }
 

@@ -3,15 +3,15 @@
 use serde_json::json;
 
 use super::SceneArgs;
-use super::course::{Course, Plan};
-use super::decide::NoneMeets;
-use super::files::Folder;
+use super::decide::NoModelMeets;
+use super::files::OutputFolder;
+use super::scene_run::{RunRequest, SceneRun};
 use super::{plots, report};
-use crate::cli::output::{self, Format};
+use crate::cli::output::{self, OutputFormat};
 use crate::wire::scene::NamedScene;
 
-/// Runs `scenes`, shows and writes what comes of them; to within `tolerance_m`
-/// where nothing else is asked for.
+/// Runs `scenes`, prints and writes the results; within `tolerance_m` if no other option
+/// is given.
 pub(super) fn run(
     args: &SceneArgs,
     scenes: &[NamedScene],
@@ -21,74 +21,74 @@ pub(super) fn run(
     if how.is_plain() {
         how.tolerance = tolerance_m;
     }
-    let plan = Plan { how: &how, sample: args.sample, sampled: args.output.is_some() };
-    let mut courses = Vec::new();
+    let plan = RunRequest { how: &how, sample: args.sample, sampled: args.output.is_some() };
+    let mut scene_runs = Vec::new();
     for NamedScene { name, scene, laws } in scenes {
-        let course = plan.run(name, scene, &mut laws.clone()).inspect_err(say_tried)?;
-        courses.push(course);
+        let scene_run = plan.run(name, scene, &mut laws.clone()).inspect_err(print_tried)?;
+        scene_runs.push(scene_run);
     }
-    if let Some(folder) = Folder::new(args.output.as_deref())? {
-        write(&folder, &courses)?;
+    if let Some(folder) = OutputFolder::new(args.output.as_deref())? {
+        write(&folder, &scene_runs)?;
     }
-    show(args.format, &courses)?;
-    failed(&courses)
+    show(args.format, &scene_runs)?;
+    failed(&scene_runs)
 }
 
-/// What was tried in vain, on stderr.
-pub(super) fn say_tried(error: &anyhow::Error) {
-    let Some(none) = error.downcast_ref::<NoneMeets>() else { return };
+/// Prints the candidates that were tried without success to stderr.
+pub(super) fn print_tried(error: &anyhow::Error) {
+    let Some(none) = error.downcast_ref::<NoModelMeets>() else { return };
     for line in report::tried(&none.tried) {
         anstream::eprintln!("{line}");
     }
 }
 
-fn write(folder: &Folder, courses: &[Course]) -> anyhow::Result<()> {
-    let Some((first, others)) = courses.split_first() else { return Ok(()) };
+fn write(folder: &OutputFolder, scene_runs: &[SceneRun]) -> anyhow::Result<()> {
+    let Some((first, others)) = scene_runs.split_first() else { return Ok(()) };
     folder.trajectory("trajectory.csv", &first.samples)?;
-    for course in others {
-        folder.trajectory(&format!("trajectory-{}.csv", course.name), &course.samples)?;
+    for scene_run in others {
+        folder.trajectory(&format!("trajectory-{}.csv", scene_run.name), &scene_run.samples)?;
     }
     folder.figure("position", &plots::position(first))?;
     folder.figure("path", &plots::path(first))?;
     if !others.is_empty() {
-        folder.figure("side-by-side", &plots::side_by_side(courses))?;
+        folder.figure("side-by-side", &plots::side_by_side(scene_runs))?;
     }
     Ok(())
 }
 
-fn show(format: Format, courses: &[Course]) -> anyhow::Result<()> {
-    for course in courses {
-        warn(course);
+fn show(format: OutputFormat, scene_runs: &[SceneRun]) -> anyhow::Result<()> {
+    for scene_run in scene_runs {
+        warn(scene_run);
     }
     match format {
-        Format::Table => {
-            let blocks = courses.iter().map(|course| report::lines(course).join("\n"));
-            output::line(&blocks.collect::<Vec<_>>().join("\n\n"))
+        OutputFormat::Table => {
+            let blocks = scene_runs.iter().map(|scene_run| report::lines(scene_run).join("\n"));
+            output::print_line(&blocks.collect::<Vec<_>>().join("\n\n"))
         }
-        Format::Json => {
-            let mut objects = courses.iter().map(report::object);
+        OutputFormat::Json => {
+            let mut objects = scene_runs.iter().map(report::object);
             let mut first = objects.next().unwrap_or_default();
             let beside: Vec<_> = objects.collect();
             if !beside.is_empty() {
                 first["beside"] = json!(beside);
             }
-            output::line(&first.to_string())
+            output::print_line(&first.to_string())
         }
     }
 }
 
-/// Says on stderr what to beware of.
-pub(super) fn warn(course: &Course) {
-    for warning in &course.warnings {
+/// Prints the warnings to stderr.
+pub(super) fn warn(scene_run: &SceneRun) {
+    for warning in &scene_run.warnings {
         anstream::eprintln!("warning: {warning}");
     }
 }
 
-/// The first failure among the courses.
-pub(super) fn failed(courses: &[Course]) -> anyhow::Result<()> {
-    for course in courses {
-        if let Err(failure) = &course.outcome {
-            return Err(anyhow::anyhow!("{}: {failure}", course.name));
+/// Returns the first failure of the runs as an error.
+pub(super) fn failed(scene_runs: &[SceneRun]) -> anyhow::Result<()> {
+    for scene_run in scene_runs {
+        if let Err(failure) = &scene_run.outcome {
+            return Err(anyhow::anyhow!("{}: {failure}", scene_run.name));
         }
     }
     Ok(())

@@ -1,8 +1,7 @@
-//! `offbd scene`: one scene by any model and method; the chapter's exercises.
+//! `offbd scene`: runs a scene by any model and method, and the chapter's exercises.
 
 mod catalogue;
 mod control;
-mod course;
 mod decide;
 mod files;
 mod laws;
@@ -10,20 +9,21 @@ mod plots;
 mod polyline;
 mod report;
 mod rig;
+mod scene_run;
 mod words;
 
 use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::cli::output::Format;
+use crate::cli::output::OutputFormat;
 use catalogue::Exercise;
-use decide::HowArgs;
+use decide::ConfigurationArgs;
 
-/// Runs a scene: a ball or block on a plate that moves by a law.
+/// Runs a scene: a ball or block on a moving plate.
 ///
-/// By itself it takes the cheapest model and method that meet the wanted
-/// accuracy, and says why.
+/// By default it chooses the cheapest model and method that meet the wanted
+/// accuracy, and prints the reasons.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "Examples:\n  \
     offbd scene --list\n  \
@@ -40,24 +40,24 @@ use decide::HowArgs;
     Exit status: 0 done, 1 the run failed or no model meets the tolerance, 2 bad\n\
     arguments, 3 unusable scene file.")]
 pub(in crate::cli) struct SceneArgs {
-    /// A scene of --list, or a file
+    /// Name of a scene in --list, or a scene file
     #[arg(value_name = "NAME|FILE.json", required_unless_present = "list")]
     scene: Option<String>,
-    /// Lists the scenes that have a name
+    /// List the named scenes
     #[arg(long)]
     list: bool,
     #[command(flatten)]
-    how: HowArgs,
+    how: ConfigurationArgs,
     /// Time between two samples, s [default: 0.01, or a 200th of the scene where
     /// that is shorter]
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = decide::positive_number)]
     sample: Option<f64>,
-    /// Writes trajectory.csv and plots here; made if need be
+    /// Write trajectory.csv and plots into this directory; created if missing
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// For people, or one JSON object
+    /// A table for people, or one JSON object
     #[arg(long, value_enum, default_value = "table")]
-    format: Format,
+    format: OutputFormat,
 }
 
 pub(super) fn run(args: &SceneArgs) -> anyhow::Result<()> {

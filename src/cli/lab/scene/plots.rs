@@ -1,29 +1,28 @@
-//! Drawings of courses: position over time, the path on the plate, two bodies
-//! side by side.
+//! Drawings of runs: position over time, the path on the plate, two bodies side by side.
 
-use super::course::{Course, Sampled};
 use super::polyline::simplified;
+use super::scene_run::{Sampled, SceneRun};
 use super::words;
 use offbd_core::plant::{Motion, Plate, PlateShape};
 use offbd_lab::chart::{Axis, Figure, Look, Mark, Panel, Scale, Series, Stroke, equal_scales};
 
-/// Events that are marked; more would hide the line.
+/// Maximum number of marked events; chosen: more would hide the line.
 const MOST_MARKS: usize = 4;
 
-/// Events closer than this, as a share of the scene, share their text.
+/// Interval below which events share their text, as a share of the scene; chosen.
 const CLOSE: f64 = 0.08;
 
-/// Height of a panel over time, pixels.
+/// Height of a panel over time, pixels; chosen.
 const PANEL_HEIGHT: u32 = 760;
 
-/// Margin around what is drawn, as a share of it.
+/// Margin around the data as a share of its extent; chosen.
 const MARGIN: f64 = 0.06;
 
-/// Of the plate, what is drawn beyond it where the ball falls off: a share of
-/// its half extent.
+/// Range drawn beyond the plate if the ball falls off, as a share of the plate's half
+/// extent; chosen.
 const BEYOND: f64 = 0.8;
 
-/// Points of a line over time.
+/// Returns the points of a line over time, simplified.
 pub(super) fn over_time<T>(values: &[T], of: impl Fn(&T) -> (f64, f64)) -> Vec<(f64, f64)> {
     simplified(values.iter().map(of).collect())
 }
@@ -32,7 +31,7 @@ pub(super) fn line(name: &str, look: usize, points: Vec<(f64, f64)>) -> Series {
     Series::new(name, Look::of(look), Stroke::Line, points)
 }
 
-/// Axes around the series, with time from 0 to `duration_s` along x.
+/// Returns a panel of the series, with time from 0 to `duration_s` along x.
 pub(super) fn time_panel(y: &str, duration_s: f64, series: Vec<Series>) -> Panel {
     let values = series.iter().flat_map(|series| series.points.iter()).map(|p| p.1);
     let values = Scale::linear_around(values, MARGIN);
@@ -54,36 +53,36 @@ pub(super) fn figure(
     Figure { title, subtitle, columns, panel_height: PANEL_HEIGHT, panels }
 }
 
-fn ran(course: &Course) -> String {
-    let configuration = words::configuration(&course.decision.configuration);
+fn ran(scene_run: &SceneRun) -> String {
+    let configuration = words::configuration(&scene_run.decision.configuration);
     let mut chars = configuration.chars();
     let first = chars.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
     format!("{first}{}.", chars.as_str())
 }
 
-/// x and y over time.
-pub(super) fn position(course: &Course) -> Figure {
+/// Draws x and y over time.
+pub(super) fn position(scene_run: &SceneRun) -> Figure {
     let of = |name: &str, i: usize| {
-        line(name, i, over_time(&course.samples, |(t, at)| (*t, at.position[i])))
+        line(name, i, over_time(&scene_run.samples, |(t, at)| (*t, at.position[i])))
     };
     let series = vec![of("x", 0), of("y", 1)];
-    let mut panel = time_panel("position on the plate (m)", course.scene.duration_s, series);
-    panel.marks = marks(course, |t, at| {
+    let mut panel = time_panel("position on the plate (m)", scene_run.scene.duration_s, series);
+    panel.marks = marks(scene_run, |t, at| {
         let (x, y) = (at.position.x, at.position.y);
         (t, if x.abs() > y.abs() { x } else { y })
     });
-    figure(format!("{}: position over time", course.name), ran(course), 1, vec![panel])
+    figure(format!("{}: position over time", scene_run.name), ran(scene_run), 1, vec![panel])
 }
 
-/// The first events after the start, each where `place` has it. Texts that
-/// would lie on each other become one.
-fn marks(course: &Course, place: impl Fn(f64, &Motion) -> (f64, f64)) -> Vec<Mark> {
+/// Returns marks for the first events after the start, each at the point that `place`
+/// returns. Texts that would overlap are joined.
+fn marks(scene_run: &SceneRun, place: impl Fn(f64, &Motion) -> (f64, f64)) -> Vec<Mark> {
     let mut marks: Vec<Mark> = Vec::new();
     let mut named: Option<(usize, f64)> = None;
-    for event in course.events.iter().skip(1).take(MOST_MARKS) {
-        let Some((_, at)) = course.samples.iter().find(|(t, _)| *t >= event.at_s) else { break };
-        let what = words::event(event, &course.scene);
-        let near = |t: f64| event.at_s - t < CLOSE * course.scene.duration_s;
+    for event in scene_run.events.iter().skip(1).take(MOST_MARKS) {
+        let Some((_, at)) = scene_run.samples.iter().find(|(t, _)| *t >= event.at_s) else { break };
+        let what = words::event(event, &scene_run.scene);
+        let near = |t: f64| event.at_s - t < CLOSE * scene_run.scene.duration_s;
         let text = match named.filter(|&(_, t)| near(t)) {
             Some((first, _)) => {
                 marks[first].text += &format!(", {what}");
@@ -100,20 +99,20 @@ fn marks(course: &Course, place: impl Fn(f64, &Motion) -> (f64, f64)) -> Vec<Mar
     marks
 }
 
-/// The path on the plate, with its outline where it has one.
-pub(super) fn path(course: &Course) -> Figure {
-    let points: Vec<(f64, f64)> = course.samples.iter().map(place).collect();
+/// Draws the path on the plate, with the outline of the plate if it has edges.
+pub(super) fn path(scene_run: &SceneRun) -> Figure {
+    let points: Vec<(f64, f64)> = scene_run.samples.iter().map(place).collect();
     let mut ranges = [0, 1].map(|i| range(&points, i));
     let mut series = Vec::new();
-    if course.scene.edges {
-        let outline = outline(&course.scene.plate);
+    if scene_run.scene.edges {
+        let outline = outline(&scene_run.scene.plate);
         for (i, range) in ranges.iter_mut().enumerate() {
             *range = beside_the_plate(*range, self::range(&outline, i));
         }
         series.push(Series::new("edge of the plate", Look::BLACK, Stroke::Line, outline));
     }
     let [x, y] = with_margin(ranges);
-    // The drawing leaves out what lies beyond its axes, whole lines too.
+    // Points outside the axes are not drawn, so the path ends at the first one.
     let seen = |p: &&(f64, f64)| (x.0..=x.1).contains(&p.0) && (y.0..=y.1).contains(&p.1);
     let path = simplified(points.iter().take_while(seen).copied().collect());
     series.push(line("path of the centre", 0, path));
@@ -124,20 +123,20 @@ pub(super) fn path(course: &Course) -> Figure {
         let name = "start".to_owned();
         panel.marks.push(Mark { text: name.clone(), name, at: *start });
     }
-    panel.marks.extend(edge(course));
+    panel.marks.extend(edge(scene_run));
     Figure {
-        title: format!("{}: path on the plate", course.name),
-        subtitle: format!("{} Plate frame, {} s.", ran(course), course.scene.duration_s),
+        title: format!("{}: path on the plate", scene_run.name),
+        subtitle: format!("{} Plate frame, {} s.", ran(scene_run), scene_run.scene.duration_s),
         columns: 1,
         panel_height,
         panels: vec![panel],
     }
 }
 
-/// Where the ball passes the edge.
-fn edge(course: &Course) -> Option<Mark> {
-    let falls = course.events.iter().find(|event| event.what == "falls")?;
-    let sample = course.samples.iter().find(|(t, _)| *t >= falls.at_s)?;
+/// Returns the mark where the ball passes the edge, if it does.
+fn edge(scene_run: &SceneRun) -> Option<Mark> {
+    let falls = scene_run.events.iter().find(|event| event.what == "falls")?;
+    let sample = scene_run.samples.iter().find(|(t, _)| *t >= falls.at_s)?;
     let name = "past the edge".to_owned();
     Some(Mark { text: format!("{:.3} s", falls.at_s), name, at: place(sample) })
 }
@@ -153,13 +152,14 @@ fn range(points: &[(f64, f64)], i: usize) -> (f64, f64) {
     if low <= high { (low, high) } else { (0.0, 0.0) }
 }
 
-/// The plate's `edge` wholly, and of the path's `range` what is near it.
+/// Returns the range of the plate's `edge`, extended by the part of the path's `range` near
+/// it.
 fn beside_the_plate(range: (f64, f64), edge: (f64, f64)) -> (f64, f64) {
     let beyond = BEYOND * (edge.1 - edge.0) / 2.0;
     (range.0.clamp(edge.0 - beyond, edge.0), range.1.clamp(edge.1, edge.1 + beyond))
 }
 
-/// Both ranges with a margin, neither of them thin against the other.
+/// Adds a margin to both ranges, and widens one that is narrow against the other.
 fn with_margin(ranges: [(f64, f64); 2]) -> [(f64, f64); 2] {
     let longest = ranges.iter().map(|(low, high)| high - low).fold(1e-9, f64::max);
     ranges.map(|(low, high)| {
@@ -170,7 +170,7 @@ fn with_margin(ranges: [(f64, f64); 2]) -> [(f64, f64); 2] {
     })
 }
 
-/// Corners of the plate's edge, or points around it.
+/// Returns the corners of a rectangular plate, or points around a round one.
 fn outline(plate: &Plate) -> Vec<(f64, f64)> {
     match plate.shape() {
         PlateShape::Rectangle { length_m, width_m } => {
@@ -184,34 +184,37 @@ fn outline(plate: &Plate) -> Vec<(f64, f64)> {
     }
 }
 
-/// How far each body has come: as it is, and logarithmically, on which a body
-/// that creeps shows beside one that rolls.
-pub(super) fn side_by_side(courses: &[Course]) -> Figure {
-    let duration_s = courses.iter().map(|course| course.scene.duration_s).fold(0.0, f64::max);
-    let panel = |points: fn(&Course) -> Vec<(f64, f64)>| {
-        let lines = courses.iter().enumerate();
-        let lines = lines.map(|(i, course)| line(body(course), i, points(course))).collect();
+/// Draws the distance of each body from its start on a linear and a logarithmic axis; the
+/// latter shows a body that creeps beside one that rolls.
+pub(super) fn side_by_side(scene_runs: &[SceneRun]) -> Figure {
+    let duration_s =
+        scene_runs.iter().map(|scene_run| scene_run.scene.duration_s).fold(0.0, f64::max);
+    let panel = |points: fn(&SceneRun) -> Vec<(f64, f64)>| {
+        let lines = scene_runs.iter().enumerate();
+        let lines =
+            lines.map(|(i, scene_run)| line(body(scene_run), i, points(scene_run))).collect();
         time_panel("way from the start (m)", duration_s, lines)
     };
-    let (plain, mut log) = (panel(|course| simplified(way(course))), panel(logarithmic_way));
-    let ways = log.series.iter().flat_map(|series| series.points.iter());
-    log.y.scale = Scale::log_around(ways.map(|p| p.1), MARGIN);
-    let names: Vec<&str> = courses.iter().map(body).collect();
+    let (plain, mut log) =
+        (panel(|scene_run| simplified(distance(scene_run))), panel(logarithmic_distance));
+    let distances = log.series.iter().flat_map(|series| series.points.iter());
+    log.y.scale = Scale::log_around(distances.map(|p| p.1), MARGIN);
+    let names: Vec<&str> = scene_runs.iter().map(body).collect();
     let subtitle = "On the same plate; linear on the left, logarithmic on the right.".to_owned();
     figure(format!("The {} side by side", names.join(" and the ")), subtitle, 2, vec![plain, log])
 }
 
-fn body(course: &Course) -> &'static str {
-    if course.scene.body().turns() { "ball" } else { "block" }
+fn body(scene_run: &SceneRun) -> &'static str {
+    if scene_run.scene.body().turns() { "ball" } else { "block" }
 }
 
-fn way(course: &Course) -> Vec<(f64, f64)> {
-    let start = course.scene.initial.position.xy();
-    course.samples.iter().map(|(t, at)| (*t, (at.position.xy() - start).norm())).collect()
+fn distance(scene_run: &SceneRun) -> Vec<(f64, f64)> {
+    let start = scene_run.scene.initial.position.xy();
+    scene_run.samples.iter().map(|(t, at)| (*t, (at.position.xy() - start).norm())).collect()
 }
 
-/// What can be drawn of it on a logarithmic axis.
-fn logarithmic_way(course: &Course) -> Vec<(f64, f64)> {
-    let logs = way(course).into_iter().filter(|p| p.1 > 0.0).map(|(t, way)| (t, way.ln()));
+/// Returns the distance over time for a logarithmic axis, without zeros.
+fn logarithmic_distance(scene_run: &SceneRun) -> Vec<(f64, f64)> {
+    let logs = distance(scene_run).into_iter().filter(|p| p.1 > 0.0).map(|(t, way)| (t, way.ln()));
     simplified(logs.collect()).into_iter().map(|(t, ln)| (t, ln.exp())).collect()
 }

@@ -1,16 +1,16 @@
-//! Lines with no more points than can be seen: a drawing has whole pixels, on
-//! which close points make steps of a smooth line.
+//! Simplifies lines to the visible resolution: drawings have integer pixels, on which close
+//! points would turn a smooth line into steps.
 
-/// A point this near the line without it is left out, as a share of the line's
-/// extent along each axis: half a pixel of a thousand.
+/// Distance from the simplified line below which a point is dropped, as a share of the
+/// line's extent along each axis. Chosen: half a pixel of a thousand.
 const SHARE: f64 = 5e-4;
 
-type Point = (f64, f64);
+type PlotPoint = (f64, f64);
 
-/// The points without those that would not be missed (Ramer 1972; Douglas &
-/// Peucker 1973).
-pub(super) fn simplified(points: Vec<Point>) -> Vec<Point> {
-    let extent = |of: fn(&Point) -> f64| {
+/// Simplifies a line by the Ramer–Douglas–Peucker algorithm (Ramer 1972; Douglas & Peucker
+/// 1973).
+pub(super) fn simplified(points: Vec<PlotPoint>) -> Vec<PlotPoint> {
+    let extent = |of: fn(&PlotPoint) -> f64| {
         let values = points.iter().map(of).filter(|v| v.is_finite());
         let (low, high) =
             values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
@@ -32,8 +32,9 @@ pub(super) fn simplified(points: Vec<Point>) -> Vec<Point> {
     points.into_iter().zip(keep).filter_map(|(point, keep)| keep.then_some(point)).collect()
 }
 
-/// The point between both that is farthest from their line, if that shows.
-fn farthest(points: &[Point], from: usize, to: usize, size: (f64, f64)) -> Option<usize> {
+/// Returns the point between `from` and `to` that is farthest from their line, if its
+/// distance is visible.
+fn farthest(points: &[PlotPoint], from: usize, to: usize, size: (f64, f64)) -> Option<usize> {
     let scaled = |i: usize| (points[i].0 / size.0, points[i].1 / size.1);
     let (a, b) = (scaled(from), scaled(to));
     let (dx, dy) = (b.0 - a.0, b.1 - a.1);
@@ -52,7 +53,7 @@ mod tests {
 
     #[test]
     fn a_straight_line_is_two_points_and_a_peak_is_kept() {
-        let line: Vec<Point> = (0..1000).map(|i| (f64::from(i), 2.0 * f64::from(i))).collect();
+        let line: Vec<PlotPoint> = (0..1000).map(|i| (f64::from(i), 2.0 * f64::from(i))).collect();
         assert_eq!(simplified(line.clone()), [line[0], line[999]]);
         let mut peak = line;
         peak[500].1 = 5000.0;
@@ -64,7 +65,7 @@ mod tests {
     #[test]
     fn a_curve_is_followed_by_few_points() {
         let sine = |t: f64| (t, (t * 6.0).sin());
-        let curve: Vec<Point> = (0..10_000).map(|i| sine(f64::from(i) * 1e-4)).collect();
+        let curve: Vec<PlotPoint> = (0..10_000).map(|i| sine(f64::from(i) * 1e-4)).collect();
         let few = simplified(curve);
         assert!((10..100).contains(&few.len()), "{}", few.len());
     }

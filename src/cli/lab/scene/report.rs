@@ -1,37 +1,37 @@
-//! What is printed of a course: lines for people, or an object for programs.
+//! The output of a run: lines of text, or a JSON object.
 
 use serde_json::{Value, json};
 
-use super::course::Course;
+use super::scene_run::SceneRun;
 use super::words;
 use crate::cli::table;
 use offbd_core::plant::Motion;
-use offbd_lab::scene::{Event, Model, Pace, Tried};
+use offbd_lab::scene::{Event, Model, Pace, TriedCandidate};
 
-/// Events that are printed; there are more in JSON.
+/// Maximum number of events printed as text; chosen. JSON has all of them.
 const SHOWN_EVENTS: usize = 12;
 
-/// Lines for people.
-pub(super) fn lines(course: &Course) -> Vec<String> {
+/// Returns the lines of text.
+pub(super) fn lines(scene_run: &SceneRun) -> Vec<String> {
     let mut lines = vec![
-        row("scene", &format!("{}, {} s", course.name, course.scene.duration_s)),
-        row("ran", &words::configuration(&course.decision.configuration)),
-        row("why", &why(course)),
-        row("error", &error(course)),
+        row("scene", &format!("{}, {} s", scene_run.name, scene_run.scene.duration_s)),
+        row("ran", &words::configuration(&scene_run.decision.configuration)),
+        row("why", &why(scene_run)),
+        row("error", &error(scene_run)),
     ];
-    lines.extend(effort(course));
-    lines.extend(tried(course.decision.choice.as_ref().map_or(&[], |choice| &choice.tried)));
-    lines.extend(events(course));
+    lines.extend(effort(scene_run));
+    lines.extend(tried(scene_run.decision.choice.as_ref().map_or(&[], |choice| &choice.tried)));
+    lines.extend(events(scene_run));
     lines
 }
 
-/// A word and what it stands for, within 80 columns.
+/// Formats a name and its value, wrapped to 80 columns.
 pub(super) fn row(word: &str, text: &str) -> String {
     table::wrapped(&format!("{word:<11}"), text)
 }
 
-fn why(course: &Course) -> String {
-    let decision = &course.decision;
+fn why(scene_run: &SceneRun) -> String {
+    let decision = &scene_run.decision;
     let (Some(wanted), Some(choice)) = (decision.wanted_m, &decision.choice) else {
         return "asked for".to_owned();
     };
@@ -46,21 +46,21 @@ fn why(course: &Course) -> String {
     }
 }
 
-fn error(course: &Course) -> String {
-    let decision = &course.decision;
+fn error(scene_run: &SceneRun) -> String {
+    let decision = &scene_run.decision;
     if let Some(choice) =
         decision.choice.as_ref().filter(|c| c.configuration == decision.configuration)
     {
         return format!("about {}, estimated", words::metres(choice.error_m));
     }
     let model = match decision.configuration.model() {
-        Model::Planar | Model::Rolling => Some(course.survey.rolling_error_m),
-        Model::Creeping => Some(course.survey.creeping_error_m),
+        Model::Planar | Model::Rolling => Some(scene_run.survey.rolling_error_m),
+        Model::Creeping => Some(scene_run.survey.creeping_error_m),
         Model::Sliding | Model::Compliant => None,
     };
-    let method = match (decision.configuration.pace(), &course.outcome) {
+    let method = match (decision.configuration.pace(), &scene_run.outcome) {
         (Pace::Tolerance(_), Ok(outcome)) => {
-            format!("the method's about {}", words::metres(outcome.tally.method_error_m))
+            format!("the method's about {}", words::metres(outcome.statistics.method_error_m))
         }
         _ => "the method's not estimated at fixed steps".to_owned(),
     };
@@ -70,29 +70,29 @@ fn error(course: &Course) -> String {
     }
 }
 
-fn effort(course: &Course) -> Vec<String> {
-    let Ok(outcome) = &course.outcome else {
-        let failure = course.outcome.as_ref().err().map(ToString::to_string).unwrap_or_default();
+fn effort(scene_run: &SceneRun) -> Vec<String> {
+    let Ok(outcome) = &scene_run.outcome else {
+        let failure = scene_run.outcome.as_ref().err().map(ToString::to_string).unwrap_or_default();
         return vec![row("failed", &failure)];
     };
-    let rejected = match outcome.tally.rejected {
+    let rejected = match outcome.statistics.rejected {
         0 => String::new(),
         n => format!(" and {n} tried in vain"),
     };
-    let choosing = match course.decision.choosing_s {
+    let choosing = match scene_run.decision.choosing_s {
         0.0 => String::new(),
         s => format!(", {} to choose", words::work(s)),
     };
     let p = outcome.end.position;
     vec![
-        row("steps", &format!("{}{rejected}", outcome.tally.steps)),
-        row("CPU time", &format!("{} to run{choosing}", words::work(course.running_s))),
+        row("steps", &format!("{}{rejected}", outcome.statistics.steps)),
+        row("CPU time", &format!("{} to run{choosing}", words::work(scene_run.running_s))),
         row("end", &format!("x {:.6}, y {:.6}, z {:.6} m", p.x, p.y, p.z)),
     ]
 }
 
-/// What was tried, in its order, as a table.
-pub(super) fn tried(tried: &[Tried]) -> Vec<String> {
+/// Returns the candidates in the order in which they were tried, as a table.
+pub(super) fn tried(tried: &[TriedCandidate]) -> Vec<String> {
     if tried.is_empty() {
         return Vec::new();
     }
@@ -104,54 +104,54 @@ pub(super) fn tried(tried: &[Tried]) -> Vec<String> {
     std::iter::once(String::new()).chain(table::lines(&rows)).collect()
 }
 
-fn events(course: &Course) -> Vec<String> {
-    if course.events.is_empty() {
+fn events(scene_run: &SceneRun) -> Vec<String> {
+    if scene_run.events.is_empty() {
         return Vec::new();
     }
-    let body = if course.scene.body().turns() { "ball" } else { "block" };
+    let body = if scene_run.scene.body().turns() { "ball" } else { "block" };
     let mut lines = vec![String::new(), format!("what happens, by the sliding model: the {body}")];
-    for event in course.events.iter().take(SHOWN_EVENTS) {
-        lines.push(format!("{:>10.4} s  {}", event.at_s, words::event(event, &course.scene)));
+    for event in scene_run.events.iter().take(SHOWN_EVENTS) {
+        lines.push(format!("{:>10.4} s  {}", event.at_s, words::event(event, &scene_run.scene)));
     }
-    if course.events.len() > SHOWN_EVENTS {
-        lines.push(format!("             and {} more", course.events.len() - SHOWN_EVENTS));
+    if scene_run.events.len() > SHOWN_EVENTS {
+        lines.push(format!("             and {} more", scene_run.events.len() - SHOWN_EVENTS));
     }
     lines
 }
 
-/// An object for programs.
-pub(super) fn object(course: &Course) -> Value {
-    let Course { decision, outcome, .. } = course;
+/// Returns the JSON object.
+pub(super) fn object(scene_run: &SceneRun) -> Value {
+    let SceneRun { decision, outcome, .. } = scene_run;
     let (step_s, tolerance_m) = match decision.configuration.pace() {
         Pace::Step(step) => (Some(step), None),
         Pace::Tolerance(tolerance) => (None, Some(tolerance)),
     };
     let choice = decision.choice.as_ref();
-    let tally = outcome.as_ref().ok().map(|outcome| outcome.tally);
+    let statistics = outcome.as_ref().ok().map(|outcome| outcome.statistics);
     json!({
-        "scene": course.name,
-        "duration_s": course.scene.duration_s,
+        "scene": scene_run.name,
+        "duration_s": scene_run.scene.duration_s,
         "model": decision.configuration.model().name(),
         "method": decision.configuration.method().name(),
         "step_s": step_s,
         "tolerance_m": tolerance_m,
-        "why": why(course),
+        "why": why(scene_run),
         "wanted_m": decision.wanted_m,
         "error_m": choice.filter(|c| c.configuration == decision.configuration).map(|c| c.error_m),
-        "friction_demand": course.survey.demand,
+        "friction_demand": scene_run.survey.demand,
         "tried": choice.map(|c| c.tried.iter().map(tried_object).collect::<Vec<_>>()),
-        "steps": tally.map(|t| t.steps),
-        "rejected": tally.map(|t| t.rejected),
-        "cpu_s": course.running_s,
+        "steps": statistics.map(|t| t.steps),
+        "rejected": statistics.map(|t| t.rejected),
+        "cpu_s": scene_run.running_s,
         "choosing_cpu_s": decision.choosing_s,
         "end": outcome.as_ref().ok().map(|o| motion_object(&o.end)),
-        "events": course.events.iter().map(|e| event_object(e, course)).collect::<Vec<_>>(),
-        "warnings": course.warnings,
+        "events": scene_run.events.iter().map(|e| event_object(e, scene_run)).collect::<Vec<_>>(),
+        "warnings": scene_run.warnings,
         "failure": outcome.as_ref().err().map(ToString::to_string),
     })
 }
 
-fn tried_object(tried: &Tried) -> Value {
+fn tried_object(tried: &TriedCandidate) -> Value {
     json!({
         "model": tried.model.name(),
         "method": tried.method.name(),
@@ -160,8 +160,8 @@ fn tried_object(tried: &Tried) -> Value {
     })
 }
 
-fn event_object(event: &Event, course: &Course) -> Value {
-    json!({ "t_s": event.at_s, "what": words::event(event, &course.scene) })
+fn event_object(event: &Event, scene_run: &SceneRun) -> Value {
+    json!({ "t_s": event.at_s, "what": words::event(event, &scene_run.scene) })
 }
 
 fn motion_object(at: &Motion) -> Value {

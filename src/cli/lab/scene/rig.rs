@@ -1,34 +1,35 @@
-//! Application 3: a rig beside its twin, judged by the chapter's rule.
+//! Application 3: a rig and its twin, judged by the chapter's rule.
 
-mod bench;
+mod ideal_rig;
 mod plot;
 
 use serde_json::json;
 
 use super::SceneArgs;
-use super::files::Folder;
+use super::files::OutputFolder;
 use super::report::row;
-use crate::cli::output::{self, Format};
+use crate::cli::errors::BadArgument;
+use crate::cli::output::{self, OutputFormat};
 use crate::cli::table;
-use crate::cli::unusable::BadArgument;
-use bench::{Judged, judge, record};
+use ideal_rig::{ProfileVerdict, judge, record};
 use offbd_core::diagnosis::Profile;
 
-/// Runs the good rig, or the one with a bad x servo.
+/// Runs the healthy rig, or the one with a bad x servo.
 pub(super) fn run(args: &SceneArgs, bad_x: bool) -> anyhow::Result<()> {
     let name = if bad_x { "bad-x-servo" } else { "good-asset" };
     if !args.how.is_plain() || args.sample.is_some() {
         let text = format!(
-            "{name} is a rig with its own twin: no --model, --method, --step, --tolerance or --sample"
+            "{name} is a rig with its own twin: \
+             --model, --method, --step, --tolerance and --sample do not apply"
         );
         return Err(BadArgument(text).into());
     }
     let recording = record(bad_x)?;
-    let judged: Vec<Judged> = [Profile::Textbook, Profile::Default]
+    let judged: Vec<ProfileVerdict> = [Profile::Textbook, Profile::Default]
         .into_iter()
         .map(|profile| judge(&recording, profile))
         .collect::<Result<_, _>>()?;
-    if let Some(folder) = Folder::new(args.output.as_deref())? {
+    if let Some(folder) = OutputFolder::new(args.output.as_deref())? {
         folder.trajectory("trajectory.csv", &recording.truth)?;
         folder.session(&recording.samples)?;
         folder.asset(&recording.rig)?;
@@ -37,10 +38,10 @@ pub(super) fn run(args: &SceneArgs, bad_x: bool) -> anyhow::Result<()> {
     show(args.format, name, &judged)
 }
 
-fn show(format: Format, name: &str, judged: &[Judged]) -> anyhow::Result<()> {
+fn show(format: OutputFormat, name: &str, judged: &[ProfileVerdict]) -> anyhow::Result<()> {
     match format {
-        Format::Table => output::line(&lines(name, judged).join("\n")),
-        Format::Json => {
+        OutputFormat::Table => output::print_line(&lines(name, judged).join("\n")),
+        OutputFormat::Json => {
             let verdicts = judged.iter().map(|judged| {
                 let faults = judged.faults.iter();
                 let faults: Vec<_> = faults
@@ -49,19 +50,19 @@ fn show(format: Format, name: &str, judged: &[Judged]) -> anyhow::Result<()> {
                 json!({ "profile": judged.profile.as_str(), "faults": faults })
             });
             let verdicts: Vec<_> = verdicts.collect();
-            output::line(&json!({ "scene": name, "verdicts": verdicts }).to_string())
+            output::print_line(&json!({ "scene": name, "verdicts": verdicts }).to_string())
         }
     }
 }
 
-fn lines(name: &str, judged: &[Judged]) -> Vec<String> {
+fn lines(name: &str, judged: &[ProfileVerdict]) -> Vec<String> {
     let what = if name == "bad-x-servo" {
         "its x servo obeys 0.5 s late; x_servo is to be reported, and nothing else"
     } else {
         "nothing is to be reported"
     };
     let mut lines = vec![
-        row("scene", &format!("{name}, {} s", bench::DURATION_S)),
+        row("scene", &format!("{name}, {} s", ideal_rig::DURATION_S)),
         row(
             "rig",
             &format!(

@@ -1,8 +1,8 @@
-//! Numbers and names as people read them.
+//! Formats numbers and names for people.
 
 use offbd_lab::scene::{Configuration, Event, Pace, Scene, Subject};
 
-/// Seconds of work in a unit of its size, three digits.
+/// Formats a duration in a suitable unit, with three digits.
 pub(super) fn work(seconds: f64) -> String {
     match seconds {
         s if s < 1e-3 => format!("{} µs", digits(s * 1e6)),
@@ -19,12 +19,12 @@ fn digits(value: f64) -> String {
     }
 }
 
-/// Metres with a power of ten, two digits.
+/// Formats metres in scientific notation, with two digits.
 pub(super) fn metres(value: f64) -> String {
     format!("{value:.1e} m")
 }
 
-/// As it was typed: 0.001, 1e-9; at most four digits of what was computed.
+/// Formats a number as people type it, such as 0.001 or 1e-9, with at most four digits.
 pub(super) fn plain(value: f64) -> String {
     let short: f64 = format!("{value:.3e}").parse().unwrap_or(value);
     if (1e-3..1e4).contains(&short.abs()) || short == 0.0 {
@@ -34,7 +34,7 @@ pub(super) fn plain(value: f64) -> String {
     }
 }
 
-/// Model, method and pace.
+/// Describes model, method and pace.
 pub(super) fn configuration(configuration: &Configuration) -> String {
     let pace = match configuration.pace() {
         Pace::Step(step) => format!("steps of {} s", plain(step)),
@@ -43,7 +43,7 @@ pub(super) fn configuration(configuration: &Configuration) -> String {
     format!("{} model by {}, {pace}", configuration.model(), configuration.method())
 }
 
-/// What happens at the event: a block does not roll.
+/// Returns the name of the event's phase; a block rests instead of rolling.
 pub(super) fn event(event: &Event, scene: &Scene) -> &'static str {
     match (&scene.subject, event.what) {
         (Subject::Block(_), "rolls") => "rests",

@@ -1,4 +1,4 @@
-//! The arithmetic of a score: from truth and finding per session to figures.
+//! Computes a score from the label and the first confirmed fault of each session.
 
 use std::collections::BTreeMap;
 
@@ -9,16 +9,16 @@ use crate::cli::lab::labels::LabelledFault;
 
 /// The first confirmed fault of a session.
 #[derive(Clone, Debug)]
-pub(super) struct Found {
+pub(super) struct FirstConfirmed {
     pub code: String,
     pub kind: Option<String>,
     pub t_s: f64,
 }
 
-/// The figures of a corpus. Rates are shares of the faulty sessions.
+/// The score of a corpus. Rates are shares of the faulty sessions.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub(super) struct Figures {
-    /// Hours without a fault: healthy sessions, and the others up to the onset.
+pub(super) struct ScoreReport {
+    /// Time without a fault, h: healthy sessions, and faulty ones up to the onset.
     pub healthy_hours: f64,
     /// Confirmed faults in healthy sessions or before the onset.
     pub false_alarms: u64,
@@ -27,24 +27,24 @@ pub(super) struct Figures {
     pub detection_rate: Option<f64>,
     pub within_2s: Option<f64>,
     pub within_5s: Option<f64>,
-    /// Detected, and the right code.
+    /// Number of faults detected with the correct code.
     pub isolated_right: u64,
     pub isolation_rate: Option<f64>,
     pub detected_and_right: Option<f64>,
-    /// From the fault's first chance, s.
+    /// Median delay from the fault's first chance, s.
     pub delay_median_s: Option<f64>,
     pub delay_p90_s: Option<f64>,
     pub delay_from_onset_median_s: Option<f64>,
-    /// Faults that never had a chance and were not detected: left out.
+    /// Number of faults that never became detectable and were not detected; excluded.
     pub no_chance: u64,
-    pub by_kind: BTreeMap<String, KindFigures>,
+    pub by_kind: BTreeMap<String, KindScore>,
     /// Sessions by `truth -> found`.
     pub matrix: BTreeMap<String, u64>,
 }
 
-/// The figures of one kind of fault.
+/// The score of one kind of fault.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub(super) struct KindFigures {
+pub(super) struct KindScore {
     pub n: u64,
     pub detected: u64,
     pub right: u64,
@@ -60,23 +60,23 @@ struct Detection {
     right: bool,
 }
 
-/// What is counted on the way.
+/// Counts over the sessions.
 #[derive(Debug, Default)]
-struct Tally {
+struct ScoreCounts {
     healthy_s: f64,
     false_alarms: u64,
     no_chance: u64,
-    /// Kinds of the faulty sessions that count.
+    /// Number of faulty sessions that count, by kind.
     kinds: BTreeMap<String, u64>,
     detections: Vec<Detection>,
     matrix: BTreeMap<String, u64>,
 }
 
-/// The figures over sessions with their truth and what was found.
+/// Computes the score over sessions with their labels and first confirmed faults.
 pub(super) fn figures<'a>(
-    sessions: impl Iterator<Item = (&'a Label, Option<&'a Found>)>,
-) -> Figures {
-    let mut tally = Tally::default();
+    sessions: impl Iterator<Item = (&'a Label, Option<&'a FirstConfirmed>)>,
+) -> ScoreReport {
+    let mut tally = ScoreCounts::default();
     for (label, found) in sessions {
         match &label.fault {
             None => tally.healthy(label, found),
@@ -86,18 +86,18 @@ pub(super) fn figures<'a>(
     tally.figures()
 }
 
-impl Tally {
+impl ScoreCounts {
     fn count(&mut self, truth: &str, found: &str) {
         *self.matrix.entry(format!("{truth} -> {found}")).or_default() += 1;
     }
 
-    fn healthy(&mut self, label: &Label, found: Option<&Found>) {
+    fn healthy(&mut self, label: &Label, found: Option<&FirstConfirmed>) {
         self.healthy_s += label.seconds;
         self.false_alarms += u64::from(found.is_some());
         self.count("healthy", found.map_or("none", |f| f.code.as_str()));
     }
 
-    fn faulty(&mut self, label: &Label, fault: &LabelledFault, found: Option<&Found>) {
+    fn faulty(&mut self, label: &Label, fault: &LabelledFault, found: Option<&FirstConfirmed>) {
         self.healthy_s += fault.onset_s;
         if found.is_none() && fault.chance_s.is_none() {
             self.no_chance += 1;
@@ -114,7 +114,7 @@ impl Tally {
         }
     }
 
-    fn detected(&mut self, label: &Label, fault: &LabelledFault, found: &Found) {
+    fn detected(&mut self, label: &Label, fault: &LabelledFault, found: &FirstConfirmed) {
         let right = found.code == label.class || label.also.contains(&found.code);
         self.count(&label.class, if right { &label.class } else { &found.code });
         self.detections.push(Detection {
@@ -125,7 +125,7 @@ impl Tally {
         });
     }
 
-    fn figures(self) -> Figures {
+    fn figures(self) -> ScoreReport {
         let n: u64 = self.kinds.values().sum();
         let share = |part: usize, of: u64| (of > 0).then(|| rounded(part as f64 / of as f64, 4));
         let delays = sorted(self.detections.iter().map(|d| d.delay_s));
@@ -133,7 +133,7 @@ impl Tally {
         let within = |limit_s: f64| share(delays.iter().filter(|d| **d <= limit_s).count(), n);
         let (detected, right) = (delays.len(), self.detections.iter().filter(|d| d.right).count());
         let by_kind = self.by_kind();
-        Figures {
+        ScoreReport {
             healthy_hours: rounded(self.healthy_s / 3600.0, 2),
             false_alarms: self.false_alarms,
             faulty_sessions: n,
@@ -153,12 +153,12 @@ impl Tally {
         }
     }
 
-    fn by_kind(&self) -> BTreeMap<String, KindFigures> {
+    fn by_kind(&self) -> BTreeMap<String, KindScore> {
         let of_kind = |(kind, n): (&String, &u64)| {
             let found: Vec<&Detection> =
                 self.detections.iter().filter(|d| d.kind == *kind).collect();
             let delays = sorted(found.iter().map(|d| d.delay_s));
-            let figures = KindFigures {
+            let figures = KindScore {
                 n: *n,
                 detected: found.len() as u64,
                 right: found.iter().filter(|d| d.right).count() as u64,
@@ -170,8 +170,8 @@ impl Tally {
     }
 }
 
-impl Figures {
-    /// The figures that are one number each, with their names and units.
+impl ScoreReport {
+    /// Returns the scalar figures, with their names and units.
     pub(super) fn overall(&self) -> Vec<(&'static str, String)> {
         let share = |s: Option<f64>| s.map_or("-".to_owned(), |s| format!("{:.1} %", s * 100.0));
         let seconds = |s: Option<f64>| s.map_or("-".to_owned(), |s| format!("{s:.2} s"));
@@ -201,18 +201,18 @@ fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
     values
 }
 
-/// The decimal nearest to the binary value.
+/// Rounds to the nearest decimal number with `digits` digits after the point.
 fn rounded(value: f64, digits: usize) -> f64 {
     format!("{value:.digits$}").parse().unwrap_or(value)
 }
 
-/// The smallest value that at least a share `p` does not exceed.
+/// Returns the quantile `p` by the nearest-rank method.
 fn nearest_rank(sorted: &[f64], p: f64) -> Option<f64> {
     let rank = (p * sorted.len() as f64).ceil() as usize;
     sorted.get(rank.max(1).min(sorted.len()).checked_sub(1)?).copied()
 }
 
-/// The middle value, or the mean of the two in the middle.
+/// Returns the median.
 fn median(sorted: &[f64]) -> Option<f64> {
     let middle = sorted.len() / 2;
     match (sorted.len(), sorted.len() % 2) {
@@ -247,8 +247,8 @@ mod tests {
         }
     }
 
-    fn found(code: &str, t_s: f64) -> Option<Found> {
-        Some(Found { code: code.to_owned(), kind: None, t_s })
+    fn found(code: &str, t_s: f64) -> Option<FirstConfirmed> {
+        Some(FirstConfirmed { code: code.to_owned(), kind: None, t_s })
     }
 
     /// Counted by hand: eight sessions, one of each outcome.
@@ -267,7 +267,7 @@ mod tests {
             (dead(None), None), // no chance
         ];
         let figures = figures(sessions.iter().map(|(l, f)| (l, f.as_ref())));
-        let expected = Figures {
+        let expected = ScoreReport {
             healthy_hours: rounded(260.0 / 3600.0, 2),
             false_alarms: 2,
             faulty_sessions: 6,
@@ -284,7 +284,7 @@ mod tests {
             no_chance: 1,
             by_kind: BTreeMap::from([(
                 "dead".to_owned(),
-                KindFigures { n: 6, detected: 4, right: 3, delay_median_s: Some(4.5) },
+                KindScore { n: 6, detected: 4, right: 3, delay_median_s: Some(4.5) },
             )]),
             matrix: BTreeMap::from(
                 [

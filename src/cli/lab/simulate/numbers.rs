@@ -1,11 +1,11 @@
-//! Numbers on the command line within their ranges, for clap, which names the option.
+//! Parsers of numbers within ranges, for clap, which adds the name of the option.
 
 use std::ops::RangeInclusive;
 
 use offbd_core::vocabulary::{Axis, PerAxis};
 use offbd_lab::simulation::{LEAST_STEP, is_step};
 
-/// A number in `range`; NaN is in none.
+/// Parses a number in `range`; NaN is invalid.
 pub(super) fn within(
     range: RangeInclusive<f64>,
 ) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync + 'static {
@@ -16,7 +16,7 @@ pub(super) fn within(
     }
 }
 
-/// `X,Y`, each in `range`, or one number for both axes.
+/// Parses `X,Y`, each in `range`, or one number for both axes.
 pub(super) fn pair(
     range: RangeInclusive<f64>,
 ) -> impl Fn(&str) -> Result<PerAxis<f64>, String> + Clone + Send + Sync + 'static {
@@ -27,7 +27,7 @@ pub(super) fn pair(
     }
 }
 
-/// Zero, or a step that can be divided by, up to `most`.
+/// Parses a resolution: zero, or a number from [`LEAST_STEP`] to `most`.
 pub(super) fn step(
     most: f64,
 ) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync + 'static {
@@ -38,7 +38,7 @@ pub(super) fn step(
     }
 }
 
-/// A span of seconds as in `12-14`.
+/// Parses an interval in seconds as in `12-14`.
 pub(super) fn span(word: &str) -> Result<(f64, f64), String> {
     let wrong = || "not a span of seconds as in 12-14".to_owned();
     let (from, to) = word.split_once('-').ok_or_else(wrong)?;
@@ -47,7 +47,7 @@ pub(super) fn span(word: &str) -> Result<(f64, f64), String> {
     if from < to { Ok((from, to)) } else { Err(wrong()) }
 }
 
-/// Degrees as radians, for each axis.
+/// Converts degrees to radians, for each axis.
 pub(super) fn radians(degrees: PerAxis<f64>) -> PerAxis<f64> {
     PerAxis::from_fn(|axis: Axis| degrees[axis].to_radians())
 }

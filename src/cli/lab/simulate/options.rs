@@ -1,4 +1,4 @@
-//! What the rig, its sensor and the line from it are like, instead of the preset's.
+//! Options that replace properties of a preset's rig, sensor and transport.
 
 use clap::Args;
 
@@ -8,20 +8,21 @@ use offbd_lab::simulation::{Disturbances, Refresh, RigModel, SensorModel, Transp
 
 /// One degree, rad.
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
-/// Levels, and their spread between sessions, degrees: no table is worse, and three
-/// deviations beyond the largest level are still one that can be simulated.
+/// Limit of the level, degrees; chosen: no table is worse.
 const LEVEL_DEG: f64 = 10.0;
+/// Limit of its standard deviation between sessions, degrees. Chosen so that the largest
+/// level plus three deviations can be simulated.
 const LEVEL_SD_DEG: f64 = 5.0;
-/// Plate angle per command; a plate that turns against it is a fault.
+/// Range of the plate angle per command; chosen: a negative gain is a fault.
 const GAIN: [f64; 2] = [0.05, 5.0];
-/// Breakaway tilts, degrees: beyond that a ball lies in a hole.
+/// Limit of the breakaway tilt, degrees; chosen: beyond it the ball lies in a hole.
 const BREAKAWAY_DEG: f64 = 10.0;
-/// Slowest log, rows per second; the fastest is the simulation's.
+/// Lowest log rate, rows per second; chosen. The highest one is the simulation's.
 const LEAST_RATE_HZ: f64 = 1.0;
-/// Most hands or gusts a minute: one after the other.
+/// Limit of pushes or gusts per minute; chosen: one push of 0.1 s after the other.
 const MOST_PER_MINUTE: f64 = 600.0;
 
-/// What the rig is like.
+/// Properties of the rig.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Rig and session [default: the preset's]")]
 pub(super) struct RigArgs {
@@ -29,11 +30,11 @@ pub(super) struct RigArgs {
     /// --seed then draws the session's level and gain too
     #[arg(long, value_name = "N")]
     pub rig_seed: Option<u64>,
-    /// Plate angle at a command of zero, degrees; one number is for both axes
+    /// Plate angle at a command of zero, degrees; one number applies to both axes
     #[arg(long, value_name = "X[,Y]", allow_hyphen_values = true,
           value_parser = pair(-LEVEL_DEG..=LEVEL_DEG))]
     level_deg: Option<PerAxis<f64>>,
-    /// Standard deviation of the level between sessions of different --seed
+    /// Standard deviation of the level between sessions with different --seed
     #[arg(long, value_name = "DEG", value_parser = within(0.0..=LEVEL_SD_DEG))]
     level_sd_deg: Option<f64>,
     /// Plate angle per command
@@ -42,7 +43,7 @@ pub(super) struct RigArgs {
     /// Stiction: tilt at which a ball at rest starts, degrees
     #[arg(long, value_name = "DEG", value_parser = within(0.0..=BREAKAWAY_DEG))]
     breakaway_deg: Option<f64>,
-    /// Servos that take whole degrees
+    /// Servos with a resolution of one degree
     #[arg(long)]
     whole_degrees: bool,
     /// Ball and beam: neither commands nor positions along y
@@ -54,7 +55,7 @@ pub(super) struct RigArgs {
     rate_hz: Option<f64>,
 }
 
-/// What the rig's sensor and surroundings are like.
+/// Properties of the rig's sensor and surroundings.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Sensor and surroundings [default: the preset's]")]
 pub(super) struct SensorArgs {
@@ -64,30 +65,30 @@ pub(super) struct SensorArgs {
     /// Quantisation: step of the readings (pixel, count), m
     #[arg(long, value_name = "M", value_parser = step(*SensorModel::LENGTH_M.end()))]
     quantum_m: Option<f64>,
-    /// Readings nearer to the last than this repeat it, m
+    /// Dead band: a reading closer to the last than this repeats it, m
     #[arg(long, value_name = "M", value_parser = within(SensorModel::LENGTH_M))]
     dead_band_m: Option<f64>,
     /// Reading of a ball at the plate's centre, m
     #[arg(long, value_name = "X[,Y]", allow_hyphen_values = true,
           value_parser = pair(SensorModel::ORIGIN_M))]
     origin_m: Option<PerAxis<f64>>,
-    /// New readings per second; between them rows repeat the last
+    /// New readings per second; rows in between repeat the last one
     #[arg(long, value_name = "HZ", value_parser = within(Refresh::HZ))]
     refresh_hz: Option<f64>,
-    /// A new reading with every Nth row; the others repeat the last
+    /// A new reading with every Nth row; the others repeat the last one
     #[arg(long, value_name = "N", conflicts_with = "refresh_hz",
           value_parser = clap::value_parser!(u32).range(1..=i64::from(Refresh::MAX_ROWS)))]
     hold_rows: Option<u32>,
-    /// Standard deviation of the log's period, as a share of it
+    /// Standard deviation of the log's period as a share of it
     #[arg(long, value_name = "SHARE", value_parser = within(0.0..=1.0))]
     jitter: Option<f64>,
     /// Share of readings without a ball
     #[arg(long, value_name = "SHARE", value_parser = within(0.0..=1.0))]
     missing: Option<f64>,
-    /// Share of lone readings far off
+    /// Share of readings that are outliers
     #[arg(long, value_name = "SHARE", value_parser = within(0.0..=1.0))]
     outliers: Option<f64>,
-    /// Hands pushing the ball, per minute
+    /// Pushes of the ball by hand, per minute
     #[arg(long, value_name = "N", default_value_t = 0.0,
           value_parser = within(0.0..=MOST_PER_MINUTE))]
     pushes: f64,
@@ -97,29 +98,29 @@ pub(super) struct SensorArgs {
     gusts: f64,
 }
 
-/// What happens to rows on the way.
+/// Transport faults.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Transport")]
 pub(super) struct LineArgs {
     /// Share of rows sent twice
     #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = within(0.0..=1.0))]
     duplicates: f64,
-    /// Share of rows held up, so that they come out of order
+    /// Share of rows delayed, so that they arrive out of order
     #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = within(0.0..=1.0))]
     late: f64,
-    /// How long a row may be held up, s
+    /// Maximum delay of a row, s
     #[arg(long, value_name = "S", default_value_t = 0.05,
           value_parser = within(TransportFaults::WINDOW_S))]
     late_window_s: f64,
     /// Share of rows lost
     #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = within(0.0..=1.0))]
     lost: f64,
-    /// A span of time in which every row is lost; may be given again
+    /// An interval in which every row is lost, s; may be repeated
     #[arg(long, value_name = "FROM-TO", value_parser = span)]
     gap: Vec<(f64, f64)>,
 }
 
-/// Sets what is given.
+/// Sets a value if one is given.
 fn set<T: Copy>(to: &mut T, from: Option<T>) {
     *to = from.unwrap_or(*to);
 }
@@ -134,7 +135,7 @@ impl RigArgs {
             set(&mut model.servos[axis].gain, self.gain.map(|gain| gain[axis]));
         }
         set(&mut model.surface.breakaway_rad, self.breakaway_deg.map(f64::to_radians));
-        // A ball that rolls is held by no more than one at rest.
+        // Rolling resistance is at most the stiction.
         model.surface.rolling_rad = model.surface.rolling_rad.min(model.surface.breakaway_rad);
         set(&mut model.controller.resolution_rad, self.whole_degrees.then_some(DEGREE));
         model.one_axis |= self.one_axis;

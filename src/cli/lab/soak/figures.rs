@@ -1,17 +1,17 @@
-//! What a soak came to, for people and for programs.
+//! The output of a soak: tables, or a JSON object.
 
 use std::collections::BTreeMap;
 use std::io::Write;
 
 use serde::Serialize;
 
-use super::found::{ByName, Found, PEAKS};
-use crate::cli::output::{self, Format};
+use super::counts::{ByName, PEAKS, SoakCounts};
+use crate::cli::output::{self, OutputFormat};
 use crate::cli::table;
 
 /// A soak as one JSON object.
 #[derive(Debug, Serialize)]
-struct Figures<'a> {
+struct SoakReport<'a> {
     rig_days: f64,
     samples: u64,
     rigs: u64,
@@ -26,20 +26,20 @@ struct Figures<'a> {
     alarms: &'a [String],
 }
 
-pub(super) fn write(format: Format, found: &Found) -> anyhow::Result<()> {
+pub(super) fn write(format: OutputFormat, found: &SoakCounts) -> anyhow::Result<()> {
     let mut out = output::stdout();
     match format {
-        Format::Json => {
-            serde_json::to_writer(&mut out, &Figures::of(found))?;
+        OutputFormat::Json => {
+            serde_json::to_writer(&mut out, &SoakReport::of(found))?;
             writeln!(out)?;
         }
-        Format::Table => write_tables(&mut out, found)?,
+        OutputFormat::Table => write_tables(&mut out, found)?,
     }
     Ok(out.flush()?)
 }
 
-impl<'a> Figures<'a> {
-    fn of(found: &'a Found) -> Self {
+impl<'a> SoakReport<'a> {
+    fn of(found: &'a SoakCounts) -> Self {
         let rate = |(name, n): (&'a String, &u64)| (name.as_str(), found.per_rig_day(*n));
         Self {
             rig_days: found.rig_days(),
@@ -58,7 +58,7 @@ impl<'a> Figures<'a> {
     }
 }
 
-fn write_tables(out: &mut impl Write, found: &Found) -> anyhow::Result<()> {
+fn write_tables(out: &mut impl Write, found: &SoakCounts) -> anyhow::Result<()> {
     let parts = [figures(found), monitors(found), peaks(found)];
     for (i, part) in parts.iter().flatten().enumerate() {
         if i > 0 {
@@ -71,7 +71,7 @@ fn write_tables(out: &mut impl Write, found: &Found) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn figures(found: &Found) -> Option<comfy_table::Table> {
+fn figures(found: &SoakCounts) -> Option<comfy_table::Table> {
     let mut figures = table::table(&["figure", "value"], &[1]);
     let mut row = |name: &str, value: String| {
         figures.add_row([name.to_owned(), value]);
@@ -88,8 +88,8 @@ fn figures(found: &Found) -> Option<comfy_table::Table> {
     Some(figures)
 }
 
-/// False alarms by monitor; none where there are none.
-fn monitors(found: &Found) -> Option<comfy_table::Table> {
+/// Returns a table of the false alarms by monitor; `None` if there are none.
+fn monitors(found: &SoakCounts) -> Option<comfy_table::Table> {
     let mut monitors = table::table(&["false alarms of", "number", "per rig-day"], &[1, 2]);
     for (name, n) in &found.confirmations {
         monitors.add_row([name.clone(), n.to_string(), rate(found.per_rig_day(*n))]);
@@ -97,7 +97,7 @@ fn monitors(found: &Found) -> Option<comfy_table::Table> {
     (!found.confirmations.is_empty()).then_some(monitors)
 }
 
-fn peaks(found: &Found) -> Option<comfy_table::Table> {
+fn peaks(found: &SoakCounts) -> Option<comfy_table::Table> {
     let mut peaks = table::table(&["evidence against a servo beyond", "per rig-day"], &[1]);
     for (level, n) in PEAKS.into_iter().zip(found.peaks) {
         peaks.add_row([format!("{level:.0} nats"), rate(found.per_rig_day(n))]);
@@ -114,13 +114,13 @@ fn rate(per_rig_day: Option<f64>) -> String {
     per_rig_day.map_or("-".to_owned(), |rate| format!("{rate:.2}"))
 }
 
-fn per_year(found: &Found) -> String {
-    const DAYS: f64 = 365.25;
+fn per_year(found: &SoakCounts) -> String {
+    const DAYS_PER_YEAR: f64 = 365.25;
     let n = found.alarms.len() as u64;
     match found.per_rig_day(n) {
         None => "-".to_owned(),
         // The rule of three: with 95 % confidence the rate is below 3/T.
-        Some(_) if n == 0 => format!("below {:.0}", 3.0 * DAYS / found.rig_days()),
-        Some(rate) => format!("{:.0}", rate * DAYS),
+        Some(_) if n == 0 => format!("below {:.0}", 3.0 * DAYS_PER_YEAR / found.rig_days()),
+        Some(rate) => format!("{:.0}", rate * DAYS_PER_YEAR),
     }
 }

@@ -1,49 +1,49 @@
-//! Judges one healthy session and notes what was found.
+//! Judges one healthy session and counts its false alarms.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::found::Found;
+use super::counts::SoakCounts;
 use crate::wire::verdict;
 use offbd_core::diagnosis::{Evidence, FaultMemory, Transition};
-use offbd_core::engine::{Engine, Input, Output, Setup};
+use offbd_core::engine::{Engine, Input, Setup};
 use offbd_core::vocabulary::{Axis, FaultCode, FaultStatus, Sample};
 
-/// A gap in the log comes every so often and lasts for so long, s.
+/// Interval between gaps in the log, s; chosen.
 const GAP_EVERY_S: f64 = 300.0;
+/// Duration of a gap in the log, s; chosen.
 const GAP_S: f64 = 3.0;
-/// Evidence that falls below this ends a peak, nats.
+/// Evidence below which a peak ends, nats; chosen.
 const PEAK_ENDS: f64 = 1.0;
 
-/// One session while it is watched.
-struct Watch<'a> {
+/// The state of one session while it is judged.
+struct SessionWatch<'a> {
     name: &'a str,
-    found: Found,
-    /// The worst of each code.
+    found: SoakCounts,
+    /// The worst status of each code.
     seen: BTreeMap<FaultCode, FaultStatus>,
-    /// Codes whose confirmed fault still fails.
+    /// Codes with a confirmed fault whose test still fails.
     on_record: BTreeSet<FaultCode>,
     peaks: [f64; 2],
 }
 
-/// Judges the session of this name with its gaps.
-pub(super) fn session(setup: &Setup, name: &str, samples: &[Sample]) -> Found {
+/// Judges the session `name`, with gaps in its log.
+pub(super) fn session(setup: &Setup, name: &str, samples: &[Sample]) -> SoakCounts {
     let mut engine = Engine::new(setup.clone(), FaultMemory::default());
-    let found = Found { n_sessions: 1, ..Found::default() };
+    let found = SoakCounts { n_sessions: 1, ..SoakCounts::default() };
     let (seen, on_record) = (BTreeMap::new(), BTreeSet::new());
-    let mut watch = Watch { name, found, seen, on_record, peaks: [0.0; 2] };
-    let mut outputs = Vec::new();
+    let mut watch = SessionWatch { name, found, seen, on_record, peaks: [0.0; 2] };
+    let mut transitions = Vec::new();
     for sample in samples.iter().filter(|s| s.t_s % GAP_EVERY_S > GAP_S) {
-        engine.handle(Input::Sample(*sample), &mut outputs);
+        engine.handle(Input::Sample(*sample), &mut transitions);
         watch.found.samples += 1;
-        outputs.drain(..).for_each(|output| watch.output(&output));
+        transitions.drain(..).for_each(|change| watch.transition(&change));
         watch.evidence(engine.evidence());
     }
     watch.end()
 }
 
-impl Watch<'_> {
-    fn output(&mut self, output: &Output) {
-        let Output::Transition(change) = output else { return };
+impl SessionWatch<'_> {
+    fn transition(&mut self, change: &Transition) {
         if change.byte.test_failed() {
             self.failing(change);
         } else {
@@ -56,7 +56,7 @@ impl Watch<'_> {
         if *worst != FaultStatus::Confirmed {
             *worst = change.status;
         }
-        // Told again, with its kind, it is the same.
+        // A fault that is reported again, with its kind, counts once.
         let confirmed = change.status == FaultStatus::Confirmed;
         if confirmed && self.on_record.insert(change.code) {
             self.alarm(change);
@@ -71,7 +71,7 @@ impl Watch<'_> {
         self.found.alarms.push(format!("{}: {sentence}", self.name));
     }
 
-    /// Counts each rise of the evidence against one servo by its peak.
+    /// Counts each rise of the evidence against a servo by its peak.
     fn evidence(&mut self, evidence: &Evidence) {
         let axes = &evidence.axes;
         for axis in Axis::ALL {
@@ -85,7 +85,7 @@ impl Watch<'_> {
         }
     }
 
-    fn end(mut self) -> Found {
+    fn end(mut self) -> SoakCounts {
         for (code, status) in self.seen {
             let list = match status {
                 FaultStatus::Confirmed => &mut self.found.confirmed,

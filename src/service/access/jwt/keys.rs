@@ -1,4 +1,4 @@
-//! A provider's public keys (JWKS, RFC 7517), and which algorithms each is for.
+//! A provider's public keys (JSON Web Key Set, RFC 7517), and the algorithms of each.
 
 use std::fmt;
 
@@ -7,9 +7,9 @@ use jsonwebtoken::jwk::{KeyOperations, PublicKeyUse};
 use jsonwebtoken::{Algorithm, DecodingKey};
 use sha2::{Digest, Sha256};
 
-use super::{Refusal, signatures};
+use super::{JwtError, signatures};
 
-/// SHA-256 of a key as it was published.
+/// The SHA-256 of a published key.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Fingerprint([u8; 32]);
 
@@ -19,44 +19,44 @@ impl fmt::Debug for Fingerprint {
     }
 }
 
-/// A key that can verify.
+/// A key that verifies signatures.
 #[derive(Debug)]
-pub(super) struct Key {
+pub(super) struct VerificationKey {
     id: Option<String>,
-    /// At least one; all of one family.
+    /// At least one; all of the same family.
     pub(super) algorithms: Vec<Algorithm>,
     pub(super) decoding: DecodingKey,
     pub(super) fingerprint: Fingerprint,
 }
 
-/// The keys of a provider that can verify; others are left out.
+/// The keys of a provider that verify signatures; others are ignored.
 #[derive(Debug)]
 pub struct KeySet {
-    keys: Vec<Key>,
+    keys: Vec<VerificationKey>,
 }
 
-/// Why a document is no set of keys.
+/// Why a document is not a usable key set.
 #[derive(Debug, thiserror::Error)]
-pub enum Unusable {
-    #[error("it is no JSON Web Key Set")]
-    Form(#[from] serde_json::Error),
-    #[error("it has no key that verifies RS, PS, ES256, ES384 or EdDSA signatures")]
+pub enum KeySetError {
+    #[error("not a JSON Web Key Set")]
+    Malformed(#[from] serde_json::Error),
+    #[error("no key verifies RS, PS, ES256, ES384 or EdDSA signatures")]
     Empty,
 }
 
 impl KeySet {
-    /// Reads a set of keys.
+    /// Parses a key set.
     ///
     /// # Errors
-    /// [`Unusable`] if it is none, or has no key that can verify.
-    pub fn parse(document: &[u8]) -> Result<Self, Unusable> {
+    /// [`KeySetError`] if it is malformed or has no key that verifies signatures.
+    pub fn parse(document: &[u8]) -> Result<Self, KeySetError> {
         signatures::install();
         let set: JwkSet = serde_json::from_slice(document)?;
-        let keys: Vec<Key> = set.keys.iter().filter_map(key).collect();
-        if keys.is_empty() { Err(Unusable::Empty) } else { Ok(Self { keys }) }
+        let keys: Vec<VerificationKey> = set.keys.iter().filter_map(key).collect();
+        if keys.is_empty() { Err(KeySetError::Empty) } else { Ok(Self { keys }) }
     }
 
-    /// How many there are.
+    /// Returns the number of keys.
     #[must_use]
     pub fn n_keys(&self) -> usize {
         self.keys.len()
@@ -68,28 +68,32 @@ impl KeySet {
         self.keys.iter().any(|key| key.fingerprint == fingerprint)
     }
 
-    /// The key of this id for `algorithm`; without an id the only key there is.
-    pub(super) fn find(&self, id: Option<&str>, algorithm: Algorithm) -> Result<&Key, Refusal> {
-        let fits = |key: &&Key| key.algorithms.contains(&algorithm);
+    /// Returns the key with this id for `algorithm`; without an id the only key of the set.
+    pub(super) fn find(
+        &self,
+        id: Option<&str>,
+        algorithm: Algorithm,
+    ) -> Result<&VerificationKey, JwtError> {
+        let fits = |key: &&VerificationKey| key.algorithms.contains(&algorithm);
         match (id, self.keys.as_slice()) {
-            (None, [only]) => Some(only).filter(fits).ok_or(Refusal::Algorithm),
-            (None, _) => Err(Refusal::NamesNoKey),
+            (None, [only]) => Some(only).filter(fits).ok_or(JwtError::Algorithm),
+            (None, _) => Err(JwtError::NoKeyId),
             (Some(id), keys) => {
                 let mut named = keys.iter().filter(|key| key.id.as_deref() == Some(id)).peekable();
                 let unknown = named.peek().is_none();
-                let why = if unknown { Refusal::UnknownKey } else { Refusal::Algorithm };
-                named.find(fits).ok_or(why)
+                let error = if unknown { JwtError::UnknownKey } else { JwtError::Algorithm };
+                named.find(fits).ok_or(error)
             }
         }
     }
 }
 
-fn key(jwk: &Jwk) -> Option<Key> {
+fn key(jwk: &Jwk) -> Option<VerificationKey> {
     let algorithms = algorithms(jwk);
     if algorithms.is_empty() || !verifies(jwk) {
         return None;
     }
-    Some(Key {
+    Some(VerificationKey {
         id: jwk.common.key_id.clone(),
         algorithms,
         decoding: DecodingKey::from_jwk(jwk).ok()?,
@@ -97,7 +101,7 @@ fn key(jwk: &Jwk) -> Option<Key> {
     })
 }
 
-/// Whether the key is published for signatures, as far as it says.
+/// Whether `use` and `key_ops`, if present, permit verifying signatures.
 fn verifies(jwk: &Jwk) -> bool {
     let common = &jwk.common;
     let by_use = common.public_key_use.as_ref().is_none_or(|of| *of == PublicKeyUse::Signature);
@@ -105,8 +109,8 @@ fn verifies(jwk: &Jwk) -> bool {
     by_use && operations.is_none_or(|known| known.contains(&KeyOperations::Verify))
 }
 
-/// What the key is for: the algorithm that it states, or all of its kind. A
-/// shared secret is for none, whatever it states: what verifies must not sign.
+/// Returns the algorithms of a key: the one in `alg`, or all of its type. A symmetric key
+/// has none, because a key that verifies must not be able to sign.
 fn algorithms(jwk: &Jwk) -> Vec<Algorithm> {
     use Algorithm::{ES256, ES384, EdDSA, PS256, PS384, PS512, RS256, RS384, RS512};
     let able: &[Algorithm] = match &jwk.algorithm {

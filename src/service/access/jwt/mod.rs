@@ -1,8 +1,7 @@
-//! JSON Web Tokens (RFC 7519) of an identity provider: whether one is in force,
-//! whom it names, and what for.
+//! Verifies JSON Web Tokens (RFC 7519) of an identity provider.
 //!
-//! A pure function of the token, the provider's keys, what is expected, and the
-//! time. Which algorithm may have signed is said by the key, never by the token.
+//! [`verify`] is a pure function of the token, the provider's keys, the expected claims and
+//! the time. The permitted algorithms are those of the key, never the one in the token.
 
 mod keys;
 mod signatures;
@@ -11,114 +10,115 @@ use jsonwebtoken::errors::ErrorKind;
 use jsonwebtoken::{Validation, decode, decode_header};
 use serde_json::Value;
 
-pub use keys::{Fingerprint, KeySet, Unusable};
+pub use keys::{Fingerprint, KeySet, KeySetError};
 
 use super::Role;
 use crate::store::Micros;
 
-/// How far the clocks of the provider and of this machine may be apart, seconds.
+/// Permitted difference between the clocks of the provider and this machine, s.
 pub const LEEWAY_S: f64 = 30.0;
 
-/// Longest token, bytes; a longer one is refused. Providers stay far below.
+/// Longest token, bytes; a longer one is refused. Tokens of providers are much shorter.
 const MAX_TOKEN: usize = 16 * 1024;
 
-/// Longest subject, bytes: what OpenID Connect allows (Core 1.0, section 2). A
-/// longer one is refused, for half a subject could be somebody else's.
+/// Longest subject, bytes, as in OpenID Connect Core 1.0, section 2. A longer one is
+/// refused, because a truncated subject could be that of another person.
 pub const MAX_SUBJECT: usize = 255;
 
-/// What a token must say, and where.
+/// The claims that a token must have.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Expected {
-    /// `iss` is this.
+pub struct ExpectedClaims {
+    /// Required value of `iss`.
     pub issuer: String,
-    /// `aud` is this, or has it.
+    /// Required value of `aud`, or of one of its elements.
     pub audience: String,
-    /// Where the role is: a claim's name, or a JSON pointer.
+    /// The claim with the role: a name or a JSON pointer.
     pub role_claim: String,
-    /// Where the one asset of a device is, likewise.
+    /// The claim with the asset of a device: a name or a JSON pointer.
     pub asset_claim: String,
 }
 
-/// Why a token is refused; says nothing of what is in it.
+/// Why a token is refused. The messages do not contain any part of the token.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Refusal {
-    #[error("it is no JSON Web Token signed by an algorithm that is taken")]
-    Form,
-    #[error("the provider's keys are not there")]
+pub enum JwtError {
+    #[error("not a JSON Web Token signed by a supported algorithm")]
+    Malformed,
+    #[error("the provider's keys are not available")]
     NoKeys,
-    #[error("it names a key that the provider does not have")]
+    #[error("the provider has no key with this key id")]
     UnknownKey,
-    #[error("it names no key, and the provider has not exactly one")]
-    NamesNoKey,
-    #[error("its key is not for its algorithm")]
+    #[error("no key id, and the provider does not have exactly one key")]
+    NoKeyId,
+    #[error("the key does not support the algorithm of the token")]
     Algorithm,
-    #[error("its signature is wrong")]
+    #[error("invalid signature")]
     Signature,
-    #[error("it is another issuer's")]
+    #[error("wrong issuer")]
     Issuer,
-    #[error("it is for another audience")]
+    #[error("wrong audience")]
     Audience,
-    #[error("it has expired")]
+    #[error("expired")]
     Expired,
-    #[error("its time has not come")]
-    Early,
-    #[error("its claim `{0}` is missing or cannot be")]
+    #[error("not valid yet")]
+    NotYetValid,
+    #[error("missing or invalid claim `{0}`")]
     Claim(&'static str),
-    #[error("it names no role of this service")]
+    #[error("no role of this service in the role claim")]
     Role,
-    #[error("it is a device's and names no asset")]
+    #[error("no asset in the token of a device")]
     Asset,
 }
 
-/// What a token in force says.
+/// The content of a valid token.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Verified {
+pub struct VerifiedToken {
     pub subject: String,
     pub role: Role,
-    /// The one asset of a device.
+    /// The asset of a device.
     pub asset: Option<String>,
-    /// When it ends, the leeway included.
+    /// Expiry time, including the leeway.
     pub expires_at: Micros,
-    /// By which key it was signed.
+    /// The key that signed it.
     pub key: Fingerprint,
 }
 
-/// Whom `token` names, if it is in force at `now`.
+/// Verifies `token` at the time `now`.
 ///
 /// # Errors
-/// [`Refusal`]
+/// [`JwtError`] if it is invalid.
 pub fn verify(
     token: &str,
     keys: &KeySet,
-    expected: &Expected,
+    expected: &ExpectedClaims,
     now: Micros,
-) -> Result<Verified, Refusal> {
+) -> Result<VerifiedToken, JwtError> {
     if token.len() > MAX_TOKEN {
-        return Err(Refusal::Form);
+        return Err(JwtError::Malformed);
     }
-    let header = decode_header(token).map_err(|_| Refusal::Form)?;
-    // What must be understood is not (RFC 7515, section 4.1.11).
+    let header = decode_header(token).map_err(|_| JwtError::Malformed)?;
+    // No critical extension is supported (RFC 7515, section 4.1.11).
     if header.crit.is_some() {
-        return Err(Refusal::Form);
+        return Err(JwtError::Malformed);
     }
     let key = keys.find(header.kid.as_deref(), header.alg)?;
     let decoded = decode::<Value>(token, &key.decoding, &validation(&key.algorithms, expected));
-    let claims = decoded.map_err(|error| refusal(error.kind()))?.claims;
-    // The library would take one of several.
+    let claims = decoded.map_err(|error| jwt_error(error.kind()))?.claims;
+    // The library would also accept an array that contains the issuer.
     if claims["iss"] != expected.issuer {
-        return Err(Refusal::Issuer);
+        return Err(JwtError::Issuer);
     }
-    let expires_at = in_force(&claims, now)?;
-    let role = role(claim(&claims, &expected.role_claim)).ok_or(Refusal::Role)?;
+    let expires_at = check_time(&claims, now)?;
+    let role = role(claim(&claims, &expected.role_claim)).ok_or(JwtError::Role)?;
     let asset = match role {
-        Role::Device => Some(asset(claim(&claims, &expected.asset_claim)).ok_or(Refusal::Asset)?),
+        Role::Device => Some(asset(claim(&claims, &expected.asset_claim)).ok_or(JwtError::Asset)?),
         _ => None,
     };
-    Ok(Verified { subject: subject(&claims)?, role, asset, expires_at, key: key.fingerprint })
+    Ok(VerifiedToken { subject: subject(&claims)?, role, asset, expires_at, key: key.fingerprint })
 }
 
-/// What the library looks after; time is not for it, for it would read the clock.
-fn validation(algorithms: &[jsonwebtoken::Algorithm], expected: &Expected) -> Validation {
+/// Returns the checks of the library. Times are not among them, because the library would
+/// read the clock.
+fn validation(algorithms: &[jsonwebtoken::Algorithm], expected: &ExpectedClaims) -> Validation {
     let algorithms = algorithms.to_vec();
     let mut validation = Validation { algorithms, validate_exp: false, ..Validation::default() };
     validation.set_issuer(&[&expected.issuer]);
@@ -127,57 +127,57 @@ fn validation(algorithms: &[jsonwebtoken::Algorithm], expected: &Expected) -> Va
     validation
 }
 
-fn refusal(error: &ErrorKind) -> Refusal {
+fn jwt_error(error: &ErrorKind) -> JwtError {
     match error {
-        ErrorKind::InvalidSignature => Refusal::Signature,
-        ErrorKind::InvalidAlgorithm => Refusal::Algorithm,
-        ErrorKind::InvalidIssuer => Refusal::Issuer,
-        ErrorKind::InvalidAudience => Refusal::Audience,
+        ErrorKind::InvalidSignature => JwtError::Signature,
+        ErrorKind::InvalidAlgorithm => JwtError::Algorithm,
+        ErrorKind::InvalidIssuer => JwtError::Issuer,
+        ErrorKind::InvalidAudience => JwtError::Audience,
         ErrorKind::MissingRequiredClaim(name) => {
             let known =
                 ["aud", "exp", "iss", "sub"].into_iter().find(|known| *known == name.as_str());
-            known.map_or(Refusal::Form, Refusal::Claim)
+            known.map_or(JwtError::Malformed, JwtError::Claim)
         }
-        _ => Refusal::Form,
+        _ => JwtError::Malformed,
     }
 }
 
-/// When the token ends, if it is in force at `now`.
-fn in_force(claims: &Value, now: Micros) -> Result<Micros, Refusal> {
-    // What is beyond the range of moments is the end of it: `as` saturates.
-    let moment = |seconds: f64| (seconds * 1e6) as Micros;
-    let expires_at = claims["exp"].as_f64().ok_or(Refusal::Claim("exp"))?;
-    let expires_at = moment(expires_at + LEEWAY_S);
+/// Checks `exp` and `nbf`; returns the expiry time.
+fn check_time(claims: &Value, now: Micros) -> Result<Micros, JwtError> {
+    // `as` saturates at the ends of the range.
+    let micros = |seconds: f64| (seconds * 1e6) as Micros;
+    let expires_at = claims["exp"].as_f64().ok_or(JwtError::Claim("exp"))?;
+    let expires_at = micros(expires_at + LEEWAY_S);
     if now >= expires_at {
-        return Err(Refusal::Expired);
+        return Err(JwtError::Expired);
     }
     match claims.get("nbf").map(Value::as_f64) {
-        Some(None) => Err(Refusal::Claim("nbf")),
-        Some(Some(begin)) if now < moment(begin - LEEWAY_S) => Err(Refusal::Early),
+        Some(None) => Err(JwtError::Claim("nbf")),
+        Some(Some(begin)) if now < micros(begin - LEEWAY_S) => Err(JwtError::NotYetValid),
         _ => Ok(expires_at),
     }
 }
 
-fn subject(claims: &Value) -> Result<String, Refusal> {
+fn subject(claims: &Value) -> Result<String, JwtError> {
     let subject = claims["sub"].as_str().unwrap_or_default();
     let whole = !subject.is_empty() && !subject.chars().any(char::is_control);
     let fits = whole && subject.len() <= MAX_SUBJECT;
-    fits.then(|| subject.to_owned()).ok_or(Refusal::Claim("sub"))
+    fits.then(|| subject.to_owned()).ok_or(JwtError::Claim("sub"))
 }
 
-/// A claim by its name, or by a JSON pointer, which begins with `/`.
-fn claim<'a>(claims: &'a Value, place: &str) -> Option<&'a Value> {
-    if place.starts_with('/') { claims.pointer(place) } else { claims.get(place) }
+/// Returns a claim by its name, or by a JSON pointer, which starts with `/`.
+fn claim<'a>(claims: &'a Value, path: &str) -> Option<&'a Value> {
+    if path.starts_with('/') { claims.pointer(path) } else { claims.get(path) }
 }
 
-/// A role, or the greatest of several; what is none of this service's is passed
-/// over in an array, for providers list a person's roles elsewhere too.
+/// Returns the role, or the highest of an array. Unknown roles in an array are ignored,
+/// because a provider also lists roles of other services.
 fn role(claim: Option<&Value>) -> Option<Role> {
     let one = |value: &Value| value.as_str()?.parse::<Role>().ok();
     match claim? {
         Value::Array(several) => {
             let held: Vec<Role> = several.iter().filter_map(one).collect();
-            Role::ALL.into_iter().rev().find(|role| held.contains(role))
+            Role::ALL.iter().copied().rev().find(|role| held.contains(role))
         }
         single => one(single),
     }

@@ -1,4 +1,4 @@
-//! Signatures, verified by ring, which is here for TLS anyway. Nothing is signed.
+//! Verifies signatures with ring, which is a dependency for TLS anyway. Nothing is signed.
 
 use jsonwebtoken::crypto::{CryptoProvider, JwtVerifier, KeyUtils};
 use jsonwebtoken::errors::{ErrorKind, new_error};
@@ -20,7 +20,7 @@ static PROVIDER: CryptoProvider = CryptoProvider {
     key_utils: KeyUtils::new_unimplemented(),
 };
 
-/// Lets the library verify by ring, unless the process has it verify by another.
+/// Installs ring as the provider of the library, unless the process has installed another.
 pub(super) fn install() {
     let _ = PROVIDER.install_default();
 }

@@ -1,17 +1,17 @@
 use super::*;
-use offbd_core::diagnosis::{StatusByte, Step};
+use offbd_core::diagnosis::{PositionJump, StatusByte};
 use offbd_core::vocabulary::{PerAxis, SimTime};
 
-/// A moment in which all that can be said is known.
+/// Evidence in which all quantities are known.
 fn evidence() -> Evidence {
-    let answer = Answer {
+    let answer = ServoAnswer {
         offset_m_s2: 0.3,
         offset_error_m_s2: 0.02,
         gain: 0.52,
         gain_error: 0.06,
         delay_s: 0.25,
         delay_error_s: 0.03,
-        ..Answer::default()
+        ..ServoAnswer::default()
     };
     let x = AxisEvidence {
         measured_m_s2: Some(0.05),
@@ -32,12 +32,12 @@ fn evidence() -> Evidence {
         outliers: 7,
         scatter_m: Some(3e-3),
         healthy_scatter_m: 2e-4,
-        jump: Some(Step { at_s: 4.97, size_m: 0.1 }),
+        jump: Some(PositionJump { at_s: 4.97, size_m: 0.1 }),
         ..Evidence::default()
     }
 }
 
-/// A failure of `code` in the way of `kind`, on `evidence`.
+/// A confirmed failure of `code` with `kind` and `evidence`.
 fn failure(code: FaultCode, kind: Option<FaultKind>, evidence: Evidence) -> Transition {
     let mut byte = StatusByte::default();
     byte.failed();
@@ -47,16 +47,16 @@ fn failure(code: FaultCode, kind: Option<FaultKind>, evidence: Evidence) -> Tran
     Transition { at, code, status: FaultStatus::Confirmed, byte, suspicion, evidence }
 }
 
-/// What is said after the name, the status and the onset.
-fn said(code: FaultCode, kind: Option<FaultKind>, evidence: Evidence) -> String {
+/// Returns the part of the sentence after name, status and onset.
+fn findings_of(code: FaultCode, kind: Option<FaultKind>, evidence: Evidence) -> String {
     let sentence = sentence(&failure(code, kind, evidence));
-    let (head, said) = sentence.split_once(": ").unwrap();
+    let (head, findings) = sentence.split_once(": ").unwrap();
     assert_eq!(head, format!("{} confirmed since 4.50 s", named(code, kind)));
-    said.to_owned()
+    findings.to_owned()
 }
 
 #[test]
-fn regress_a_sensor_fault_is_said_by_its_kind() {
+fn regress_the_sentence_of_a_sensor_fault_depends_on_its_kind() {
     let cases = [
         (FaultKind::Jump, "readings stepped by 100 mm at 4.97 s"),
         (FaultKind::Noise, "readings scatter by 3.00 mm where healthy ones do by 0.20 mm"),
@@ -65,22 +65,22 @@ fn regress_a_sensor_fault_is_said_by_its_kind() {
         (FaultKind::Frozen, "readings have been the same to the bit for 1.2 s"),
     ];
     for (kind, wanted) in cases {
-        assert_eq!(said(FaultCode::Sensor, Some(kind), evidence()), wanted);
+        assert_eq!(findings_of(FaultCode::Sensor, Some(kind), evidence()), wanted);
     }
     let one = Evidence { identical_s: 0.0, ..evidence() };
     assert_eq!(
-        said(FaultCode::Sensor, Some(FaultKind::Frozen), one),
+        findings_of(FaultCode::Sensor, Some(FaultKind::Frozen), one),
         "readings along x have been the same to the bit for 1.2 s while those along y change"
     );
     let seen = Evidence { unseen_s: 0.0, ..evidence() };
     assert_eq!(
-        said(FaultCode::Sensor, Some(FaultKind::Dropout), seen),
+        findings_of(FaultCode::Sensor, Some(FaultKind::Dropout), seen),
         "no ball seen in 62 % of the samples of late"
     );
 }
 
 #[test]
-fn regress_a_servo_fault_is_said_by_its_kind() {
+fn regress_the_sentence_of_a_servo_fault_depends_on_its_kind() {
     let cases = [
         (Some(FaultKind::Dead), "does not answer qy (52 ± 6 %)"),
         (Some(FaultKind::Held), "stays where it is whatever qy asks for (52 ± 6 %)"),
@@ -95,26 +95,26 @@ fn regress_a_servo_fault_is_said_by_its_kind() {
         let rest = "the ball accelerates by 0.05 m/s² along x where qy asks for -0.20 m/s² \
                     (limit 0.21)";
         let wanted = format!("the servo {wanted}; {rest}");
-        assert_eq!(said(FaultCode::XServo, kind, evidence()), wanted);
+        assert_eq!(findings_of(FaultCode::XServo, kind, evidence()), wanted);
     }
 }
 
 #[test]
-fn regress_a_ball_that_stands_is_told_from_one_that_hardly_moves() {
+fn regress_a_still_ball_and_a_slow_ball_have_different_sentences() {
     assert_eq!(
-        said(FaultCode::StuckBall, None, evidence()),
+        findings_of(FaultCode::StuckBall, None, evidence()),
         "the ball has stood still for 1.5 s while the plate asks it to move"
     );
     let slow = Evidence { still_s: 0.1, ..evidence() };
     assert_eq!(
-        said(FaultCode::StuckBall, None, slow),
+        findings_of(FaultCode::StuckBall, None, slow),
         "the ball hardly moves although the plate asks it to along both axes (weight of evidence \
          23 nats)"
     );
 }
 
 #[test]
-fn regress_causes_that_read_alike_are_all_named_the_heaviest_first() {
+fn regress_all_candidates_are_named_the_heaviest_first() {
     let servo = Candidate { code: FaultCode::XServo, kind: Some(FaultKind::Dead), weight: 0.7 };
     let ball = Candidate { code: FaultCode::StuckBall, kind: None, weight: 0.3 };
     let mut alike = failure(FaultCode::StuckBall, None, evidence());
@@ -141,14 +141,14 @@ fn regress_causes_that_read_alike_are_all_named_the_heaviest_first() {
     let mut kinds = failure(FaultCode::XServo, None, evidence());
     kinds.suspicion.candidates =
         vec![kind(FaultKind::Dead, 0.4), kind(FaultKind::Held, 0.35), kind(FaultKind::Gain, 0.25)];
-    let said = sentence(&kinds);
+    let text = sentence(&kinds);
     let wanted =
         "x_servo confirmed since 4.50 s: cannot tell which kind: dead 40 %, held 35 %, gain 25 %; ";
-    assert!(said.starts_with(wanted), "{said}");
+    assert!(text.starts_with(wanted), "{text}");
 }
 
 #[test]
-fn regress_a_test_that_passes_again_is_no_alarm() {
+fn regress_a_test_that_passes_again_is_not_reported_as_a_failure() {
     let mut passing = failure(FaultCode::Sensor, Some(FaultKind::Jump), evidence());
     passing.byte.passed();
     assert_eq!(
@@ -157,18 +157,17 @@ fn regress_a_test_that_passes_again_is_no_alarm() {
     );
 }
 
-/// A path off the twin's is the ground only where it is beyond its limit and no
-/// residual is.
+/// The path error is mentioned only if it exceeds its limit and the residual does not.
 #[test]
-fn a_path_off_the_twins_is_said_where_it_is_the_ground() {
-    let ground = |enabled: bool, error_m: f64| {
+fn a_path_error_is_mentioned_if_it_is_the_reason() {
+    let reason = |enabled: bool, error_m: f64| {
         let mut evidence = evidence();
         let x = &mut evidence.axes.x;
         (x.enabled, x.path_error_m, x.path_limit_m) = (enabled, Some(error_m), Some(6e-3));
-        said(FaultCode::XServo, None, evidence)
+        findings_of(FaultCode::XServo, None, evidence)
     };
     let bends = "(over two seconds its path bends 9.1 mm from the twin's, limit 6.0 mm)";
-    assert!(ground(false, 9.1e-3).ends_with(bends), "{}", ground(false, 9.1e-3));
-    assert!(ground(false, 5e-3).ends_with("(weight of evidence 14 nats)"));
-    assert!(ground(true, 9.1e-3).ends_with("(limit 0.21)"));
+    assert!(reason(false, 9.1e-3).ends_with(bends), "{}", reason(false, 9.1e-3));
+    assert!(reason(false, 5e-3).ends_with("(weight of evidence 14 nats)"));
+    assert!(reason(true, 9.1e-3).ends_with("(limit 0.21)"));
 }

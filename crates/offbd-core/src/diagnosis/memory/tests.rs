@@ -1,4 +1,4 @@
-//! The published vectors, and what must hold beside them.
+//! Published test vectors, and invariants.
 
 use super::*;
 
@@ -42,9 +42,9 @@ impl Bench {
     }
 }
 
-/// The published vectors for a confirmation threshold of 1, with and
-/// without the warning indicator. Healing takes the first good cycle,
-/// aging the second, so that "cycle end" and "healed" coincide here.
+/// The published vectors for a confirmation threshold of 1, with and without the warning
+/// indicator. Healing takes the first good cycle, aging the second, so that "cycle end"
+/// and "healed" coincide here.
 #[test]
 fn validate_vectors_with_indicator() {
     let mut bench = Bench::new(1, true);
@@ -136,13 +136,13 @@ fn a_kind_is_told_once_and_only_of_a_confirmed_failure() {
     let mut bench = Bench::new(1, true);
     let of = |kind| Suspicion { kind, ..Suspicion::default() };
     let (dead, held) = (of(Some(FaultKind::Dead)), of(Some(FaultKind::Held)));
-    assert!(!bench.memory.name(CODE, &dead), "nothing has failed");
+    assert!(!bench.memory.set_kind(CODE, &dead), "nothing has failed");
     bench.memory.failed(CODE, &of(None), &Evidence::default());
-    assert!(!bench.memory.name(CODE, &dead), "it is pending");
+    assert!(!bench.memory.set_kind(CODE, &dead), "it is pending");
     bench.failed();
-    assert!(!bench.memory.name(CODE, &of(None)));
-    assert!(bench.memory.name(CODE, &dead));
-    assert!(!bench.memory.name(CODE, &held), "it has a kind");
+    assert!(!bench.memory.set_kind(CODE, &of(None)));
+    assert!(bench.memory.set_kind(CODE, &dead));
+    assert!(!bench.memory.set_kind(CODE, &held), "it has a kind");
     assert_eq!(bench.memory.record(CODE).kind(), Some(FaultKind::Dead));
 }
 
@@ -184,11 +184,11 @@ fn healing_comes_before_aging_and_both_are_counted() {
     assert_eq!(counted, [(1, 0), (2, 0), (2, 1), (2, 2), (0, 0)], "then it is erased");
 }
 
-/// SAE J1979: the ratio counts cycles, and a scan tool's clear leaves it alone.
+/// SAE J1979: the ratio counts cycles and survives a clear by a scan tool.
 #[test]
 fn validate_the_in_use_ratio_outlives_a_clear() {
     let mut memory = FaultMemory::default();
-    // Seconds of data, seconds of open gate, for a fault that takes 0.8 s.
+    // Seconds of data and seconds judged, for a fault that takes 0.8 s.
     for (data_s, judged_s) in [(60.0, 30.0), (60.0, 0.5), (60.0, 0.0), (3.0, 0.5), (3.0, 0.8)] {
         memory.count_use(CODE, data_s, judged_s, 0.8);
     }
@@ -222,8 +222,9 @@ mod properties {
     }
 
     proptest! {
-        /// Whatever happens: counters stay within their ends, a ratio within
-        /// 0 and 1, and what has no occurrence has neither onset nor frame.
+        /// For any sequence of events: counters stay within their limits, the ratio
+        /// within 0 and 1, and a record without an occurrence has neither onset nor
+        /// freeze frame.
         #[test]
         fn counters_agree(events in prop::collection::vec(event(), 0..200)) {
             let mut bench = Bench::new(1, true);

@@ -1,14 +1,16 @@
-//! Readings gathered into blocks: a twentieth of a second tells a servo's
-//! fault as well as each of its readings, at a fraction of the cost.
+//! Averages readings into blocks: a twentieth of a second tells a servo's fault as well
+//! as single readings do, at a fraction of the cost.
 
-/// Length of a block, s: a tenth of the time in which the plainest fault shows.
-/// Slower readings make a block each.
-const BLOCK_S: f64 = 0.05;
+use crate::vocabulary::CLOCK_RESOLUTION_S;
 
-/// The twin's free path along one axis: position m, velocity m/s,
-/// acceleration m/s².
+/// Length of a block, s: a tenth of the time in which the plainest fault shows. Slower
+/// readings make one block each.
+pub(in crate::diagnosis) const BLOCK_S: f64 = 0.05;
+
+/// The twin's free path along one axis: position (m), velocity (m/s), acceleration
+/// (m/s²).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Course {
+pub struct TwinPath {
     pub position_m: f64,
     pub velocity_m_s: f64,
     pub acceleration_m_s2: f64,
@@ -16,64 +18,69 @@ pub struct Course {
 
 /// Means over a block of readings of one axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Block {
+pub(super) struct ReadingBlock {
     pub(super) t: f64,
     pub(super) measured_m: f64,
-    pub(super) course: Course,
+    pub(super) path: TwinPath,
     pub(super) n: u32,
 }
 
-impl Block {
-    /// Measured less the twin's position, m.
+impl ReadingBlock {
+    /// Measured − twin's position, m.
     pub(super) fn deviation_m(&self) -> f64 {
-        self.measured_m - self.course.position_m
+        self.measured_m - self.path.position_m
     }
 }
 
-/// Gathers readings into blocks.
+/// Averages readings into blocks.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Gatherer {
+pub(super) struct BlockBuilder {
     since: f64,
     last: Option<f64>,
-    sum: Block,
+    sum: ReadingBlock,
 }
 
-impl Gatherer {
-    /// Takes a reading; returns the block that it completes.
-    pub(super) fn take(&mut self, t: f64, measured_m: f64, course: &Course) -> Option<Block> {
+impl BlockBuilder {
+    /// Adds a reading; returns the block that it completes, if any.
+    pub(super) fn take(
+        &mut self,
+        t: f64,
+        measured_m: f64,
+        path: &TwinPath,
+    ) -> Option<ReadingBlock> {
         if self.sum.n == 0 {
             self.since = t;
         }
-        // Sums of times since the block began: those of the day lose digits.
+        // Times relative to the start of the block: sums of absolute times lose digits.
         self.sum.t += t - self.since;
         self.sum.measured_m += measured_m;
-        self.sum.course.position_m += course.position_m;
-        self.sum.course.velocity_m_s += course.velocity_m_s;
-        self.sum.course.acceleration_m_s2 += course.acceleration_m_s2;
+        self.sum.path.position_m += path.position_m;
+        self.sum.path.velocity_m_s += path.velocity_m_s;
+        self.sum.path.acceleration_m_s2 += path.acceleration_m_s2;
         self.sum.n += 1;
         let period_s = self.last.replace(t).map_or(0.0, |last| t - last);
-        // Time stamps in milliseconds must not make a block a reading longer.
-        (t - self.since + period_s >= BLOCK_S - 1e-3).then(|| self.close())
+        // Time stamps in milliseconds must not make a block one reading longer.
+        (t - self.since + period_s >= BLOCK_S - CLOCK_RESOLUTION_S).then(|| self.close())
     }
 
-    fn close(&mut self) -> Block {
+    fn close(&mut self) -> ReadingBlock {
         let sum = core::mem::take(&mut self.sum);
         let n = f64::from(sum.n);
-        Block {
+        ReadingBlock {
             t: self.since + sum.t / n,
             measured_m: sum.measured_m / n,
-            course: Course {
-                position_m: sum.course.position_m / n,
-                velocity_m_s: sum.course.velocity_m_s / n,
-                acceleration_m_s2: sum.course.acceleration_m_s2 / n,
+            path: TwinPath {
+                position_m: sum.path.position_m / n,
+                velocity_m_s: sum.path.velocity_m_s / n,
+                acceleration_m_s2: sum.path.acceleration_m_s2 / n,
             },
             n: sum.n,
         }
     }
 
-    /// Forgets what has been gathered.
+    /// Discards the unfinished block.
     pub(super) fn drop(&mut self) {
-        (self.sum, self.last) = (Block::default(), None);
+        (self.sum, self.last) = (ReadingBlock::default(), None);
     }
 }
 
@@ -82,12 +89,12 @@ mod tests {
     use super::*;
 
     /// The blocks of readings `period_s` apart, from 1000 s on.
-    fn blocks(period_s: f64) -> Vec<Block> {
-        let mut gatherer = Gatherer::default();
+    fn blocks(period_s: f64) -> Vec<ReadingBlock> {
+        let mut builder = BlockBuilder::default();
         let take = |i| {
             let t = 1000.0 + f64::from(i) * period_s;
-            let course = Course { position_m: 2.0 * t, ..Course::default() };
-            gatherer.take(t, 3.0 * t, &course)
+            let path = TwinPath { position_m: 2.0 * t, ..TwinPath::default() };
+            builder.take(t, 3.0 * t, &path)
         };
         (0..60).filter_map(take).collect()
     }
@@ -104,7 +111,7 @@ mod tests {
         }
     }
 
-    /// But for the first, whose period nobody knows yet.
+    /// Except for the first, whose period is not yet known.
     #[test]
     fn slow_readings_make_a_block_each() {
         assert!(blocks(0.2)[1..].iter().all(|b| b.n == 1));

@@ -1,5 +1,5 @@
-//! A Kalman filter of one axis' deviation from the twin under one hypothesis
-//! of what its servo does.
+//! A Kalman filter of the deviation from the twin along one axis, under one hypothesis
+//! about its servo.
 //!
 //! State: deviation y of the measured from the twin's path (m), its rate ẏ
 //! (m/s), and three parameters θ of the servo: offset b (m/s²), gain change m
@@ -9,66 +9,63 @@
 //! ÿ = b + m·a(t) − d·ȧ(t) + w,
 //! ```
 //!
-//! where a is the twin's acceleration and w white. What distinguishes the
-//! hypotheses is how far θ may be from zero, and how soon it may change: each
-//! θ decays to zero with a time constant, about which it wanders with a
-//! standard deviation (a first-order Gauss–Markov process).
+//! where a is the twin's acceleration and w white noise. The hypotheses differ in how far
+//! θ may be from zero and how soon it may change: each θ is a first-order Gauss–Markov
+//! process with a standard deviation and a time constant.
 //!
-//! A push is a step of ẏ at an unknown moment. Each correction therefore weighs
-//! a second explanation, that the ball was pushed since the last reading, and
-//! takes the likelier one: a push costs both hypotheses the same and speaks
-//! for neither.
+//! A push is a step of ẏ at an unknown time. Each correction therefore also evaluates the
+//! explanation that the ball was pushed since the last reading, and takes the likelier
+//! one: a push costs both hypotheses the same and is evidence for neither.
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 
-/// The parameters of a servo's answer, in the order offset, gain, delay.
+/// Number of parameters of a servo, in the order offset, gain, delay.
 pub(super) const PARAMETERS: usize = 3;
 const STATES: usize = 2 + PARAMETERS;
 
-/// What a hypothesis allows the parameters to be.
+/// The prior distribution of the parameters under a hypothesis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Prior {
+pub(super) struct ParameterPrior {
     /// Standard deviation of each parameter: m/s², 1, s.
     pub(super) deviation: [f64; PARAMETERS],
-    /// Time within which each may change, s.
+    /// Time constant of each parameter, s.
     pub(super) memory_s: [f64; PARAMETERS],
 }
 
-/// What happened between two readings.
+/// The interval between two readings.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Step {
-    /// Seconds between them.
+pub(super) struct FilterStep {
+    /// Its duration, s.
     pub(super) dt: f64,
-    /// What one unit of each parameter adds to the deviation (m) and to its
-    /// rate (m/s) over the step.
+    /// What one unit of each parameter adds to the deviation (m) and to its rate (m/s).
     pub(super) forcing: [[f64; 2]; PARAMETERS],
     /// Spectral density of the acceleration that no parameter explains, m²/s³.
     pub(super) density: f64,
 }
 
-/// Velocity that a push by hand gives, m/s: one standard deviation.
-const PUSH_M_S: f64 = 0.15;
-/// What it costs to say that the ball was pushed, nats. The prior odds of a push
-/// within a twentieth of a second would be five or more. Believing sooner in
-/// pushes makes the judgement later and surer, most of all where one push follows
-/// another: at as few false alarms of soaked rigs, 0.2 m/s at 1.5 nats find as much.
+/// Velocity given by a push by hand, m/s: one standard deviation. Chosen.
+const PUSH_DEVIATION_M_S: f64 = 0.15;
+/// Cost of the explanation that the ball was pushed, nats. The prior odds of a push
+/// within a twentieth of a second would be five or more. A lower cost makes the judgement
+/// later and more certain, above all if one push follows another; at equally few false
+/// alarms in `offbd soak`, 0.2 m/s at 1.5 nats find as much.
 const PUSH_NATS: f64 = 1.0;
-/// Rate of the deviation that is possible at the start, m/s (standard deviation).
-const START_M_S: f64 = 0.5;
+/// Standard deviation of the deviation's rate at the start, m/s. Chosen.
+const START_DEVIATION_M_S: f64 = 0.5;
 
-/// The filter. Covariance in m, m/s and the parameters' units.
+/// The filter. The covariance is in m, m/s and the units of the parameters.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Filter {
-    prior: Prior,
+pub(super) struct ServoFilter {
+    prior: ParameterPrior,
     state: [f64; STATES],
     covariance: [[f64; STATES]; STATES],
 }
 
-impl Filter {
-    /// A filter that knows of the servo what `prior` says and of the ball
-    /// nothing; [`anchor`](Self::anchor) comes first.
-    pub(super) fn new(prior: Prior) -> Self {
+impl ServoFilter {
+    /// Builds a filter with the prior of the servo; call [`anchor`](Self::anchor) before
+    /// use, since the ball's motion is unknown.
+    pub(super) fn new(prior: ParameterPrior) -> Self {
         let mut covariance = [[0.0; STATES]; STATES];
         for (k, deviation) in prior.deviation.into_iter().enumerate() {
             covariance[2 + k][2 + k] = deviation * deviation;
@@ -76,8 +73,8 @@ impl Filter {
         Self { prior, state: [0.0; STATES], covariance }
     }
 
-    /// Starts from the deviation `y` with variance `variance` after a time in
-    /// which nothing could be followed; what is known of the servo stays.
+    /// Starts from the deviation `y` with variance `variance`, after a time without
+    /// readings; the estimate of the servo is kept.
     pub(super) fn anchor(&mut self, y: f64, variance: f64) {
         for i in 0..2 {
             for j in 0..STATES {
@@ -86,10 +83,10 @@ impl Filter {
         }
         (self.state[0], self.state[1]) = (y, 0.0);
         self.covariance[0][0] = variance;
-        self.covariance[1][1] = START_M_S * START_M_S;
+        self.covariance[1][1] = START_DEVIATION_M_S * START_DEVIATION_M_S;
     }
 
-    /// Adds a straight line to the deviation, as when the twin is moved.
+    /// Adds a straight line to the deviation, as when the twin is rebased.
     pub(super) fn shift(&mut self, position: f64, velocity: f64) {
         self.state[0] += position;
         self.state[1] += velocity;
@@ -105,9 +102,9 @@ impl Filter {
         core::array::from_fn(|i| core::array::from_fn(|j| self.covariance[2 + i][2 + j]))
     }
 
-    /// Carries the estimate over `step`.
-    pub(super) fn predict(&mut self, step: &Step) {
-        let Step { dt, forcing, density } = *step;
+    /// Predicts the state over `step`.
+    pub(super) fn predict(&mut self, step: &FilterStep) {
+        let FilterStep { dt, forcing, density } = *step;
         let keep = self.prior.memory_s.map(|memory_s| memory_s / (memory_s + dt));
         let x = &mut self.state;
         let forced = |row: usize, of: &dyn Fn(usize) -> f64| -> f64 {
@@ -141,7 +138,7 @@ impl Filter {
         p[0][1] += density * dt * dt / 2.0;
         p[1][0] += density * dt * dt / 2.0;
         p[1][1] += density * dt;
-        // Rounding would let the two halves part.
+        // Restores the symmetry that rounding would destroy.
         let upper = *p;
         for (i, row) in p.iter_mut().enumerate() {
             for (j, value) in row.iter_mut().enumerate().take(i) {
@@ -154,8 +151,8 @@ impl Filter {
         }
     }
 
-    /// The Kalman update for an innovation of variance `s` that covaries with the
-    /// state by `row`.
+    /// The Kalman update for an innovation of variance `s` whose covariance with the
+    /// state is `row`.
     fn update(&mut self, row: &[f64; STATES], innovation: f64, s: f64) {
         for i in 0..STATES {
             let gain = row[i] / s;
@@ -166,15 +163,15 @@ impl Filter {
         }
     }
 
-    /// Takes the deviation `y` as read with variance `variance`, `dt` after the
-    /// last. Returns the log-likelihood of the reading, nats, up to a constant.
+    /// Corrects with the deviation `y` of variance `variance`, `dt` after the last.
+    /// Returns the log-likelihood of the reading, nats, up to a constant.
     pub(super) fn correct(&mut self, y: f64, variance: f64, dt: f64) -> f64 {
         let p = &mut self.covariance;
         let innovation = y - self.state[0];
         let likelihood = |s: f64| -0.5 * (innovation * innovation / s + s.ln());
-        let reach = PUSH_M_S * PUSH_M_S;
+        let reach = PUSH_DEVIATION_M_S * PUSH_DEVIATION_M_S;
         let plain = likelihood(p[0][0] + variance);
-        // Nearer than that no push can be the likelier explanation.
+        // For a smaller innovation a push cannot be the likelier explanation.
         let far = innovation * innovation > 2.0 * PUSH_NATS * (p[0][0] + variance);
         let wide = reach * dt * dt / 3.0;
         let pushed = if far { likelihood(p[0][0] + wide + variance) - PUSH_NATS } else { plain };
@@ -194,34 +191,35 @@ impl Filter {
 mod tests {
     use super::*;
 
-    const OPEN: Prior = Prior { deviation: [0.3, 0.7, 0.2], memory_s: [1e9; 3] };
+    const STEADY_FAULTY: ParameterPrior =
+        ParameterPrior { deviation: [0.3, 0.7, 0.2], memory_s: [1e9; 3] };
 
-    /// Follows `path` under a twin that accelerates by sin(2 t).
-    fn follow(prior: Prior, path: impl Fn(f64) -> f64) -> Filter {
+    /// Follows `path` with a twin that accelerates by sin(2 t).
+    fn follow(prior: ParameterPrior, path: impl Fn(f64) -> f64) -> ServoFilter {
         let twin = |t: f64| (-(2.0 * t).sin() / 4.0, -(2.0 * t).cos() / 2.0, (2.0 * t).sin());
         let (dt, variance) = (0.05, 1e-8);
-        let mut filter = Filter::new(prior);
+        let mut filter = ServoFilter::new(prior);
         filter.anchor(path(0.0), variance);
         for i in 0..200 {
             let (t, next) = (f64::from(i) * dt, f64::from(i + 1) * dt);
             let ((p, v, a), (p1, v1, a1)) = (twin(t), twin(next));
             let forcing =
                 [[dt * dt / 2.0, dt], [p1 - p - v * dt, v1 - v], [-(v1 - v - a * dt), -(a1 - a)]];
-            filter.predict(&Step { dt, forcing, density: 1e-9 });
+            filter.predict(&FilterStep { dt, forcing, density: 1e-9 });
             filter.correct(path(next), variance, dt);
         }
         filter
     }
 
-    /// A servo with another offset, gain or delay: ÿ is b, m·sin 2t or
-    /// sin 2(t − d) − sin 2t.
+    /// A servo with another offset, gain or delay: ÿ is b, m·sin 2t or sin 2(t − d) − sin
+    /// 2t.
     #[test]
     fn validate_parameters_against_closed_forms() {
         let late = |t: f64| ((2.0 * t).sin() - (2.0 * (t - 0.01)).sin()) / 4.0;
         let cases = [
-            (follow(OPEN, |t| 0.1 * t * t), [0.2, 0.0, 0.0]),
-            (follow(OPEN, |t| (2.0 * t).sin() / 8.0 + 0.3 * t), [0.0, -0.5, 0.0]),
-            (follow(OPEN, late), [0.0, 0.0, 0.01]),
+            (follow(STEADY_FAULTY, |t| 0.1 * t * t), [0.2, 0.0, 0.0]),
+            (follow(STEADY_FAULTY, |t| (2.0 * t).sin() / 8.0 + 0.3 * t), [0.0, -0.5, 0.0]),
+            (follow(STEADY_FAULTY, late), [0.0, 0.0, 0.01]),
         ];
         for (filter, wanted) in cases {
             for (k, wanted) in wanted.into_iter().enumerate() {
@@ -233,7 +231,7 @@ mod tests {
 
     #[test]
     fn a_push_is_no_parameter() {
-        let filter = follow(OPEN, |t| 0.25 * (t - 4.01).max(0.0));
+        let filter = follow(STEADY_FAULTY, |t| 0.25 * (t - 4.01).max(0.0));
         for k in 0..PARAMETERS {
             assert!(filter.parameter(k).0.abs() < 0.03, "{k}: {:?}", filter.parameter(k));
         }
@@ -241,7 +239,7 @@ mod tests {
 
     #[test]
     fn the_covariance_stays_one() {
-        let p = follow(OPEN, |t| 0.01 * (7.0 * t).sin()).covariance;
+        let p = follow(STEADY_FAULTY, |t| 0.01 * (7.0 * t).sin()).covariance;
         for i in 0..STATES {
             assert!(p[i][i] > 0.0, "{i}: {}", p[i][i]);
             for j in 0..STATES {

@@ -1,41 +1,41 @@
-//! How far the ball's path bends from the twin's over two seconds.
+//! Deviation of the ball's path from the twin's over two seconds.
 //!
-//! Within two seconds the path may differ from the twin's by a parabola with one
-//! kink: where the ball came from, how fast, the level of the session, and one
-//! push. What is left is the servo's, beyond what healthy sessions have shown. It
-//! needs no model of the noise, so that it holds on rigs that the twin fits badly;
-//! a steady offset it cannot see.
+//! Within two seconds the path may differ from the twin's by a parabola with one kink:
+//! initial position and velocity, the level of the session, and one push. The remaining
+//! deviation is due to the servo, beyond what healthy sessions have shown. It needs no
+//! model of the noise, so that it works on rigs that the twin fits badly; a steady offset
+//! cannot be seen.
 
 use alloc::collections::VecDeque;
 
-use crate::maths::off_kinked_parabola;
+use crate::maths::kinked_parabola_rms;
 
-/// Length of the path, s: of 1.2 to 3 s the one that told most faults put into
-/// recordings of a real rig from its healthy ones, at one limit for all of them.
+/// Length of the path, s: of 1.2 to 3 s the one that told most faults put into recordings
+/// of a real rig from its healthy ones, at one limit for all of them.
 const WINDOW_S: f64 = 2.0;
-/// Share of it that must be covered.
+/// Fraction of it that must be covered. Chosen.
 const COVERED: f64 = 0.85;
-/// Points that it holds at least.
+/// Least number of points. Chosen: three more than the curve has parameters.
 const LEAST_POINTS: usize = 8;
-/// Time that a point covers at least, s: blocks of readings within are averaged.
+/// Least time that a point covers, s: blocks of readings within are averaged. Chosen.
 const POINT_S: f64 = 0.15;
-/// Time without a point after which the path begins anew, s: of slow sensors, three
-/// readings.
+/// Time without a point after which the path is restarted, s: three readings of a slow
+/// sensor.
 const BREAK_S: f64 = 0.6;
 
-/// The path of late along one axis, off the twin's.
+/// The recent path along one axis relative to the twin's.
 #[derive(Clone, Debug, Default)]
 pub(super) struct PathError {
     points: VecDeque<(f64, f64)>,
-    /// Number and sums of time and deviation of the blocks since the last point, and
-    /// when the first of them was, s.
+    /// Number and sums of time and deviation of the blocks since the last point, and the
+    /// time of the first of them, s.
     gathered: (u32, f64, f64),
     since_s: f64,
     /// Time of the last block, s.
     last_s: Option<f64>,
-    /// What is left now, m; none where that is not known.
+    /// The current deviation, m; `None` if unknown.
     error_m: Option<f64>,
-    /// The most so far, m.
+    /// The largest deviation so far, m.
     most_m: f64,
 }
 
@@ -54,7 +54,7 @@ impl PathError {
         }
     }
 
-    /// Makes a point of the blocks gathered.
+    /// Makes a point of the accumulated blocks.
     fn close(&mut self) {
         let (n, times, deviations) = core::mem::take(&mut self.gathered);
         let t = times / f64::from(n);
@@ -65,24 +65,24 @@ impl PathError {
         let covered = t - self.points[0].0 >= COVERED * WINDOW_S;
         let enough = covered && self.points.len() >= LEAST_POINTS;
         let points = self.points.make_contiguous();
-        self.error_m = enough.then(|| off_kinked_parabola(points)).flatten();
+        self.error_m = enough.then(|| kinked_parabola_rms(points)).flatten();
         self.most_m = self.most_m.max(self.error_m.unwrap_or(0.0));
     }
 
-    /// The ball cannot answer now; it may go on within a moment.
+    /// Pauses while the ball cannot respond; it may continue after a moment.
     pub(super) fn pause(&mut self) {
         self.gathered = Default::default();
         (self.last_s, self.error_m) = (None, None);
     }
 
-    /// Begins anew.
+    /// Restarts the path.
     pub(super) fn clear(&mut self) {
         self.pause();
         self.points.clear();
     }
 
-    /// The twin was moved by the line through `position` m at `t` with slope
-    /// `velocity` m/s: the deviation grows by as much.
+    /// Follows a rebase of the twin by the line through `position` m at `t` with slope
+    /// `velocity` m/s: the deviation grows by that line.
     pub(super) fn rebase(&mut self, t: f64, position: f64, velocity: f64) {
         let line = |at: f64| position + velocity * (at - t);
         for (at, deviation_m) in &mut self.points {
@@ -92,12 +92,12 @@ impl PathError {
         *deviations += f64::from(*n) * line(0.0) + velocity * *times;
     }
 
-    /// What is left now, m; none where that is not known.
+    /// The current deviation, m; `None` if unknown.
     pub(super) const fn error_m(&self) -> Option<f64> {
         self.error_m
     }
 
-    /// The most that was left so far, m.
+    /// The largest deviation so far, m.
     pub(super) const fn most_m(&self) -> f64 {
         self.most_m
     }
@@ -107,7 +107,7 @@ impl PathError {
 mod tests {
     use super::*;
 
-    /// What is left at the end of 4 s of `path`, in blocks of 50 ms.
+    /// The path error after 4 s of `path`, in blocks of 50 ms.
     fn left(path: impl Fn(f64) -> f64) -> PathError {
         let mut error = PathError::default();
         for i in 0..80 {

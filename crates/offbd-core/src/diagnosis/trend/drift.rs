@@ -1,4 +1,4 @@
-//! Which parameters of a servo are followed, and the limits of each.
+//! The servo parameters whose drift is followed, and their limits.
 
 use super::{Band, MAX_SESSIONS, MEDIAN_ERROR, Trend, Warning, warning};
 use crate::diagnosis::ServoEstimate;
@@ -6,22 +6,23 @@ use crate::maths::{median, robust_deviation};
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 
-/// How far ahead a warning looks, sessions: in time to plan a repair, and no
-/// further than a line through as many sessions can be believed.
+/// How many sessions a warning looks ahead: in time to plan a repair, and no further than
+/// a line through as many sessions is credible. Chosen.
 pub const HORIZON_SESSIONS: f64 = 20.0;
 
-/// The first sessions, which say what is usual: few, for a drift begins at once.
+/// Number of first sessions that define the usual value: few, since a drift may begin at
+/// once. Chosen.
 const USUAL_SESSIONS: usize = 5;
 
-/// A servo's parameter that is followed from session to session.
+/// A servo parameter that is followed from session to session.
 ///
-/// The limits are the changes from which on one that comes in the midst of a
-/// session was confirmed in every one of four on the quiet simulated rig: a gain
-/// of 0.7 or 1.5, a horn slipped by 0.015 rad (0.1 m/s²), a servo three times as
-/// slow (0.1 s). A slower change is not: the monitors take it for the rig's nature.
+/// The limits are the smallest sudden changes within a session that were confirmed in all
+/// of four trials on the quiet simulated rig: a gain of 0.7 or 1.5, a horn slipped by
+/// 0.015 rad (0.1 m/s²), a servo three times as slow (0.1 s). Slower changes are not
+/// confirmed: the monitors adapt to them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Parameter {
-    /// Share of the command that the ball answers.
+    /// Fraction of the command that the ball answers.
     Gain,
     /// Acceleration that no command explains, m/s².
     Offset,
@@ -42,7 +43,7 @@ impl Parameter {
         }
     }
 
-    /// Its limits on a servo that answers as the twin's.
+    /// The limits for a servo that agrees with the twin's.
     #[must_use]
     pub const fn band(self) -> Band {
         match self {
@@ -61,24 +62,24 @@ impl Parameter {
     }
 }
 
-/// How a parameter of a servo goes over the sessions.
+/// The drift of a servo parameter over sessions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drift {
     pub parameter: Parameter,
     /// The line through the estimates.
     pub trend: Trend,
-    /// Its limits about what is usual for this rig.
+    /// The limits, shifted to the usual value of this rig.
     pub band: Band,
     pub warning: Option<Warning>,
 }
 
-/// How `parameter` goes over sessions, oldest first, each with what was
-/// estimated in it; none for too few of them.
+/// Returns the drift of `parameter` over sessions, oldest first, with the estimates of
+/// each; `None` for too few sessions.
 ///
-/// Estimates repeat far better than they are right: stiction and control loop
-/// shift them all alike, by up to their standard error. Hence the first
-/// sessions, not the calibration, say what is usual, and those that follow
-/// should ask the rig for motions of the same kind.
+/// Estimates are more repeatable than accurate: stiction and the control loop shift all
+/// of them alike, by up to their standard error. Hence the first sessions, not the
+/// calibration, define the usual value, and later sessions should ask the rig for motions
+/// of the same kind.
 #[must_use]
 pub fn drift(parameter: Parameter, sessions: &[Option<ServoEstimate>]) -> Option<Drift> {
     let sessions = &sessions[sessions.len().saturating_sub(MAX_SESSIONS)..];
@@ -92,7 +93,7 @@ pub fn drift(parameter: Parameter, sessions: &[Option<ServoEstimate>]) -> Option
     Some(Drift { parameter, trend, band, warning })
 }
 
-/// What is usual, and its standard error: the median of the first estimates.
+/// Returns the usual value and its standard error: the median of the first estimates.
 fn usual(values: &[f64]) -> Option<(f64, f64)> {
     let estimated = values.iter().copied().filter(|value| value.is_finite());
     let mut first: Vec<f64> = estimated.take(USUAL_SESSIONS).collect();

@@ -1,12 +1,11 @@
-//! Against the published figures, by counting, and on drifts that are known.
+//! Tests against published figures, by counting, and on known drifts.
 
 use super::*;
 use proptest::prelude::*;
 
 const GAIN: Band = Band { low: 0.7, nominal: 1.0, high: 1.3 };
 
-/// Deterministic noise with a normal distribution's scale: the sum of twelve
-/// uniform numbers less six.
+/// Deterministic, approximately normal noise: the sum of twelve uniform numbers less six.
 fn noise(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
     let mut uniform = move || {
@@ -18,9 +17,9 @@ fn noise(seed: u64) -> impl FnMut() -> f64 {
     move || (0..12).map(|_| uniform()).sum::<f64>() - 6.0
 }
 
-/// Sen 1968, section 6: times 1, 2, 3, 4, 10, 12, 18 and a slope of 4. The
-/// example's points are at unequal times; sessions that estimated nothing
-/// stand for the times between.
+/// Sen 1968, section 6: times 1, 2, 3, 4, 10, 12, 18 and a slope of 4. The points of the
+/// example are at unequal times; sessions without an estimate stand for the times
+/// between.
 #[test]
 fn validate_sens_own_example() {
     let mut values = [f64::NAN; 18];
@@ -29,14 +28,14 @@ fn validate_sens_own_example() {
     }
     let trend = Trend::of(&values).unwrap();
     assert_eq!((trend.slope, trend.n_sessions), (4.0, 7));
-    // His 93 % interval is 26/7 to 35/8; at 99.9 % it is wider.
+    // Sen's 93 % interval is 26/7 to 35/8; at 99.9 % it is wider.
     assert!(trend.slope_low <= 26.0 / 7.0 && trend.slope_high >= 35.0 / 8.0, "{trend:?}");
     assert!(trend.slope_low > 0.0);
 }
 
-/// The interval's ranks against the exact distribution of Kendall's S, counted
-/// over all orders of seven sessions: only a run that rises or falls throughout
-/// is a drift, and that is 2 of 5040.
+/// The ranks of the interval against the exact distribution of Kendall's S, counted over
+/// all orders of seven sessions: only a strictly rising or falling sequence is a drift, 2
+/// of 5040.
 #[test]
 fn validate_how_often_chance_makes_a_drift_by_counting() {
     fn orders(rest: &mut Vec<f64>, k: usize, take: &mut impl FnMut(&[f64])) {
@@ -64,8 +63,8 @@ fn validate_how_often_chance_makes_a_drift_by_counting() {
     }
 }
 
-/// Healthy rigs: the share that is taken to drift is the one asked for, and
-/// none of them is warned of.
+/// Healthy rigs: the fraction with a significant drift is as small as designed, and none
+/// is warned of.
 #[test]
 fn validate_that_no_drift_is_no_warning() {
     let mut drifts = 0;
@@ -76,12 +75,12 @@ fn validate_that_no_drift_is_no_warning() {
         drifts += u32::from(trend.is_significant());
         assert_eq!(warning(&trend, &GAIN, 20.0), None, "{trend:?}");
     }
-    // 0.1 % of 1000, and four standard deviations of a binomial more.
+    // 0.1 % of 1000, plus four standard deviations of a binomial.
     assert!(drifts <= 5, "{drifts}");
 }
 
-/// The line's level at the last session, against many runs with a known slope:
-/// the stated error is that which is found, within a third.
+/// The level at the last session over many runs with a known slope: the stated error
+/// agrees with the observed one within a third.
 #[test]
 fn validate_the_error_of_the_level() {
     let (mut squares, mut stated) = (0.0, 0.0);
@@ -96,8 +95,8 @@ fn validate_the_error_of_the_level() {
     assert!((stated / found - 1.0).abs() < 0.33, "found {found}, stated {stated}");
 }
 
-/// A servo that loses half a percent of its gain a session crosses 0.7 in its
-/// sixtieth: it is warned of within the horizon before, and rightly.
+/// A servo that loses half a percent of its gain per session crosses 0.7 in its sixtieth;
+/// the warning comes within the horizon and predicts that session.
 #[test]
 fn validate_that_a_known_drift_is_warned_of_in_time() {
     for seed in 1..=200 {
@@ -110,7 +109,7 @@ fn validate_that_a_known_drift_is_warned_of_in_time() {
         };
         assert_eq!(warned(15), None, "45 sessions ahead is beyond the horizon");
         let Some(Warning::Crosses { sessions }) = warned(50) else { panic!("{:?}", warned(50)) };
-        // The line has crossed where 0.005 (i + sessions) is 0.3.
+        // The line crosses where 0.005 (i + sessions) is 0.3.
         assert!((sessions - 11.0).abs() < 3.0, "seed {seed}: {sessions}");
         assert!(warned(45).is_some());
     }
@@ -141,7 +140,8 @@ fn a_step_that_stays_is_a_drift_beyond_half_the_limit() {
 }
 
 proptest! {
-    /// Other units, another zero: the same line. Backwards: its mirror image.
+    /// Scale and offset of the values transform the line accordingly; a negative scale
+    /// mirrors it.
     #[test]
     fn the_line_goes_with_its_units(
         values in prop::collection::vec(-10.0..10.0_f64, LEAST_SESSIONS..40),
@@ -157,7 +157,7 @@ proptest! {
         prop_assert!(trend.slope_low <= trend.slope && trend.slope <= trend.slope_high);
     }
 
-    /// What is warned to cross does so along the line, and not before.
+    /// A predicted crossing occurs on the line at that session, and not before.
     #[test]
     fn a_warning_comes_true_along_the_line(
         slope in -0.05..0.05_f64,

@@ -1,11 +1,11 @@
-//! What a calibration promises: how often each monitor will alarm on the healthy
-//! rig.
+//! The certificate of a calibration: the expected false alarms of each monitor on the
+//! healthy rig.
 //!
-//! In the T seconds that a monitor judged in the tests it came as near to an alarm
-//! as the share s of what confirms one: it comes that near about once in T. How
-//! much more seldom it comes all the way is the tail of its evidence. That no rig
-//! shows in minutes; it is taken from the population, rigs that were drawn and
-//! watched for hours: `offbd chart certificate` holds it against others.
+//! In the T seconds that a monitor judged in the tests it came as close to an alarm as
+//! the fraction s of what confirms one; it comes that close about once in T. How much
+//! rarer an alarm is follows from the tail of its evidence. A rig does not show this tail
+//! in minutes; it is taken from a population of simulated rigs that were watched for
+//! hours (`offbd chart certificate` compares the result with other rigs).
 
 use super::proof::PATIENCE;
 use super::self_test::SelfTest;
@@ -14,20 +14,22 @@ use crate::diagnosis::{Calibration, MonitorCertificate, Settings};
 use crate::no_std::*;
 use crate::vocabulary::FaultCode;
 
-/// By how much more evidence against a servo comes e times more seldom, nats: with
-/// it 58 drawn rigs promised 22 false alarms of servos in 232 h, and 24 came.
+/// Further evidence against a servo that makes an alarm e times rarer, nats: with it 58
+/// simulated rigs promised 22 false alarms of servos in 232 h, and 24 came.
 const TAIL_NATS: f64 = 1.4;
-/// The same for what fails by its time, as a share of the time that confirms. Assumed:
-/// on the same rigs alarms of such monitors did not go with how near the tests came.
+/// Further duration of failure that makes an alarm e times rarer, as a fraction of the
+/// time that confirms. Assumed: on the same rigs alarms by duration did not depend on how
+/// close the tests came.
 const TAIL_SHARE: f64 = 0.1;
-/// False alarms per hour that no test of some minutes shows. Of the sensor: outliers,
-/// uneven stamps and bounces that come once in many hours; 28 came in 252 h of 63 drawn
-/// rigs.
+/// False alarms of the sensor per hour that tests of minutes do not show: outliers,
+/// uneven time stamps and bounces that occur once in many hours; 28 came in 252 h of 63
+/// simulated rigs.
 const SENSOR_PER_HOUR: f64 = 0.1;
-/// Of the ball, one that stands where it never stood before: on the same rigs 1 came.
+/// False alarms per hour of a ball that stands where it never stood before: on the same
+/// rigs 1 came.
 const STUCK_BALL_PER_HOUR: f64 = 0.01;
 
-/// The certificate of each monitor by the `tests` of what was `learnt`.
+/// Returns the certificate of each monitor from the `tests` of what was `learnt`.
 pub(super) fn of(
     learnt: &Calibration,
     tests: &[SelfTest],
@@ -46,8 +48,8 @@ pub(super) fn of(
     })
 }
 
-/// The nearest that evidence against a servo came to what confirms a fault of it,
-/// and the tail in the same measure.
+/// Returns the closest approach of the evidence to what confirms a fault of a servo, and
+/// the tail in the same unit.
 fn weighed(learnt: &Calibration, code: FaultCode) -> (f64, f64) {
     let Some(axis) = code.axis() else { return (0.0, TAIL_SHARE) };
     let Some(axis) = learnt.axes[axis].as_ref() else { return (0.0, TAIL_SHARE) };
@@ -55,7 +57,7 @@ fn weighed(learnt: &Calibration, code: FaultCode) -> (f64, f64) {
     (axis.most_nats / confirm_nats, TAIL_NATS / confirm_nats)
 }
 
-/// What no test of a few minutes shows.
+/// False alarms per hour that tests of minutes do not show.
 const fn unforeseen_per_hour(code: FaultCode) -> f64 {
     match code {
         FaultCode::Sensor => SENSOR_PER_HOUR,
@@ -72,7 +74,7 @@ mod tests {
     use crate::engine::calibrate::calibrate;
 
     fn promised(seconds: f64) -> [MonitorCertificate; FaultCode::COUNT] {
-        let learnt = calibrate(&Rig::chapter("a"), &[session(seconds, 0.03, 1.0)], "", "");
+        let learnt = calibrate(&Rig::chapter("a"), &[session(seconds, 0.03, 1.0)]);
         learnt.unwrap().certificate.unwrap()
     }
 
@@ -86,8 +88,8 @@ mod tests {
         }
     }
 
-    /// The twin's own path leaves nothing to blame: what is promised is next to
-    /// nothing, but for the sensor.
+    /// The twin's own path gives no evidence: hardly any false alarms are expected,
+    /// except for the sensor.
     #[test]
     fn a_rig_that_obeys_the_twin_promises_no_alarms() {
         let promised = promised(120.0);
@@ -100,7 +102,7 @@ mod tests {
     fn an_axis_that_is_missing_promises_nothing() {
         let mut samples = session(60.0, 0.03, 1.0);
         samples.iter_mut().for_each(|s| (s.cmd_qx_rad, s.y_m) = (None, None));
-        let learnt = calibrate(&Rig::chapter("a"), &[samples], "", "").unwrap();
+        let learnt = calibrate(&Rig::chapter("a"), &[samples]).unwrap();
         let promised = learnt.certificate.unwrap();
         assert_eq!(promised[FaultCode::YServo as usize].alarms_per_hour, None);
         assert!(promised[FaultCode::XServo as usize].alarms_per_hour.is_some());

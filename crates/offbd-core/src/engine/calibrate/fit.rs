@@ -1,5 +1,5 @@
-//! Gain, level, dead time and lag of one axis: least trimmed squares over
-//! windows, inside a search.
+//! Gain, level, dead time and lag of one axis: least trimmed squares over windows, within
+//! a search.
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
@@ -13,19 +13,22 @@ use crate::maths::median;
 use crate::plant::{ServoModel, TwinAxis, TwinModel};
 use crate::vocabulary::Axis;
 
-/// Windows that are kept, of all: the rest may hold pushes.
+/// Fraction of the windows that is kept; the others may hold pushes. Chosen.
 const KEPT: f64 = 0.8;
-/// Share of its own motion that a window may leave unexplained beside what is usual,
-/// as a mean square: without it the windows of large motion were left out where a ball
-/// sticks, and gains of a real rig came out at 0.5 to 0.7 instead of 0.7 to 0.95. With
-/// 0, 0.1 and 0.3 of 700 faults put into servos of real rigs 121, 158 and 176 were
+/// Unexplained part that is tolerated in a window besides the median, as a fraction of
+/// its own mean square motion. Without it the windows of large motion were dropped where
+/// a ball sticks, and gains of a real rig came out at 0.5 to 0.7 instead of 0.7 to 0.95.
+/// With 0, 0.1 and 0.3, 121, 158 and 176 of 700 faults put into servos of real rigs were
 /// found; with 1 healthy runs were accused.
 const MOTION_SHARE: f64 = 0.3;
 
-/// One window with its straight line taken away: measured path, twin's path,
-/// the parabola t²/2 and what rolling resistance of 1 m/s² would add, all
-/// orthogonal to 1 and t.
-struct Window {
+/// Rounds of fitting and trimming. Chosen.
+const TRIM_ROUNDS: usize = 4;
+
+/// One window: measured path, twin's path, the parabola t²/2 and the path that a rolling
+/// resistance of 1 m/s² would add, all with their straight line removed (orthogonal to 1
+/// and t).
+struct FitWindow {
     session: usize,
     yy: f64,
     normal: Matrix3<f64>,
@@ -33,7 +36,7 @@ struct Window {
     n: usize,
 }
 
-impl Window {
+impl FitWindow {
     fn new(session: usize, moments: &[Moment], path: &[f64], resisted: &[f64], axis: Axis) -> Self {
         let t0 = moments[0].at;
         let read: Vec<usize> =
@@ -56,14 +59,14 @@ impl Window {
         }
     }
 
-    /// Mean square of what gain and level leave unexplained, m².
+    /// Mean square that gain, level and resistance leave unexplained, m².
     fn unexplained(&self, c: &Vector3<f64>) -> f64 {
         let squares = self.yy - 2.0 * c.dot(&self.right) + c.dot(&(self.normal * c));
         squares.max(0.0) / self.n as f64
     }
 }
 
-/// `values` less their least-squares straight line over `times`.
+/// Returns `values` without their least-squares straight line over `times`.
 pub(super) fn without_line(times: &[f64], mut values: Vec<f64>) -> Vec<f64> {
     let n = times.len() as f64;
     let (mean_t, mean_v) = (times.iter().sum::<f64>() / n, values.iter().sum::<f64>() / n);
@@ -79,45 +82,46 @@ pub(super) fn without_line(times: &[f64], mut values: Vec<f64>) -> Vec<f64> {
     values
 }
 
-/// Gain and rolling resistance of the rig, and the level of each session, that
-/// explain the windows best.
+/// The best fit of one axis: gain and rolling resistance of the rig, and the level of
+/// each session.
 #[derive(Clone, Debug)]
-pub(super) struct Explained {
+pub(super) struct AxisFit {
     pub(super) gain: f64,
     pub(super) resistance_m_s2: f64,
-    /// Per session; none where it has no window.
+    /// Per session; `None` if it has no window.
     pub(super) sessions: Vec<Option<SessionFit>>,
-    /// Mean square left over in the kept windows, m².
+    /// Mean square residual of the kept windows, m².
     pub(super) left: f64,
-    /// Share of the variance explained.
+    /// Fraction of the variance explained.
     pub(super) share: f64,
     /// Standard error of the gain.
     pub(super) gain_error: f64,
 }
 
-/// What one session says by itself.
+/// The fit of one session by itself.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SessionFit {
     /// Acceleration at a command of zero, under the rig's gain, m/s².
     pub(super) offset_m_s2: f64,
     pub(super) offset_error_m_s2: f64,
-    /// Gain of this session alone.
+    /// Gain of this session by itself.
     pub(super) gain: f64,
     pub(super) gain_error: f64,
 }
 
-/// How much an unlikely gain costs: a gain off by a factor of e weighs like
-/// half as much again left over. It only decides where the data hardly do;
-/// gains from 0.5 to 2 have been seen on real rigs.
+/// Weight of the prior of the gain: a gain off by a factor of e costs half of the
+/// residual in addition. It only decides if the data hardly do; gains from 0.5 to 2 have
+/// been seen on real rigs.
 const GAIN_PRIOR: f64 = 0.5;
-/// The same for a rolling resistance: one of so many m/s² weighs like half as much
-/// again left over. On a circle a resistance makes up for a lag that is too short:
-/// without this 5 of 61 axes of drawn rigs were learnt with gains off by more than a
-/// quarter, with it 1. On real rigs 0.08 has been seen.
+/// Weight of the prior of the rolling resistance: one of [`LIKELY_RESISTANCE_M_S2`] costs
+/// half of the residual in addition. On a circle a resistance can replace a part of the
+/// lag: without this prior 5 of 61 axes of simulated rigs were learnt with gains off by
+/// more than a quarter, with it 1.
 const RESISTANCE_PRIOR: f64 = 0.5;
+/// Scale of the prior of the rolling resistance, m/s²: 0.08 has been seen on real rigs.
 const LIKELY_RESISTANCE_M_S2: f64 = 0.1;
 
-impl Explained {
+impl AxisFit {
     fn cost(&self) -> f64 {
         let unlikely = self.gain.abs().ln();
         let resisted = self.resistance_m_s2 / LIKELY_RESISTANCE_M_S2;
@@ -126,10 +130,10 @@ impl Explained {
     }
 }
 
-/// Least squares over windows with a gain and a resistance for all and an offset
-/// for each session: the offsets are eliminated first.
+/// Least squares over windows, with one gain and one resistance for all and an offset for
+/// each session; the offsets are eliminated first.
 #[derive(Clone, Debug, Default)]
-struct Solution {
+struct RigFit {
     gain: f64,
     resistance: f64,
     offsets: Vec<Option<f64>>,
@@ -137,20 +141,20 @@ struct Solution {
     gain_variance: f64,
 }
 
-impl Solution {
-    fn of(&self, window: &Window) -> Vector3<f64> {
+impl RigFit {
+    fn of(&self, window: &FitWindow) -> Vector3<f64> {
         let offset = self.offsets[window.session].unwrap_or(0.0);
         Vector3::new(self.gain, offset, self.resistance)
     }
 
-    fn solve(windows: &[Window], n_sessions: usize) -> Option<Self> {
+    fn solve(windows: &[FitWindow], n_sessions: usize) -> Option<Self> {
         let sums = session_sums(windows, n_sessions);
         let free = Self::solved(&sums, true)?;
-        // A resistance that would drive the ball is none.
+        // A negative resistance would drive the ball.
         if free.resistance > 0.0 { Some(free) } else { Self::solved(&sums, false) }
     }
 
-    fn solved(sums: &[Option<Sums>], resisted: bool) -> Option<Self> {
+    fn solved(sums: &[Option<NormalEquations>], resisted: bool) -> Option<Self> {
         let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
         for (n, r) in sums.iter().flatten() {
             let by_level = Vector2::new(n[(0, 1)], n[(2, 1)]) / n[(1, 1)];
@@ -164,7 +168,8 @@ impl Solution {
         }
         let inverse = normal.try_inverse()?;
         let c = inverse * right;
-        let offset = |(n, r): &Sums| (r.y - n[(1, 0)] * c.x - n[(1, 2)] * c.y) / n[(1, 1)];
+        let offset =
+            |(n, r): &NormalEquations| (r.y - n[(1, 0)] * c.x - n[(1, 2)] * c.y) / n[(1, 1)];
         Some(Self {
             gain: c.x,
             resistance: c.y,
@@ -174,33 +179,34 @@ impl Solution {
     }
 }
 
-type Sums = (Matrix3<f64>, Vector3<f64>);
+type NormalEquations = (Matrix3<f64>, Vector3<f64>);
 
-fn session_sums(windows: &[Window], n_sessions: usize) -> Vec<Option<Sums>> {
+fn session_sums(windows: &[FitWindow], n_sessions: usize) -> Vec<Option<NormalEquations>> {
     let mut sums = vec![None; n_sessions];
     for w in windows {
-        let (n, r): &mut Sums = sums[w.session].get_or_insert_default();
+        let (n, r): &mut NormalEquations = sums[w.session].get_or_insert_default();
         *n += w.normal;
         *r += w.right;
     }
     sums
 }
 
-/// Least trimmed squares over windows: fit, drop the worst, fit again.
-fn explain(windows: &mut [Window], n_sessions: usize) -> Option<Explained> {
+/// Least trimmed squares over windows: fit, drop the worst, repeat.
+fn explain(windows: &mut [FitWindow], n_sessions: usize) -> Option<AxisFit> {
     let keep = ((windows.len() as f64 * KEPT).ceil() as usize).min(windows.len());
     let mut kept = windows.len();
-    let mut found = Solution::default();
-    for _ in 0..4 {
-        let next = Solution::solve(&windows[..kept], n_sessions)?;
-        // A session whose windows were all left out keeps its level.
+    let mut found = RigFit::default();
+    for _ in 0..TRIM_ROUNDS {
+        let next = RigFit::solve(&windows[..kept], n_sessions)?;
+        // A session whose windows were all dropped keeps its level.
         let before = found.offsets.iter().chain(core::iter::repeat(&None));
         let offsets = next.offsets.iter().zip(before).map(|(now, before)| now.or(*before));
-        found = Solution { offsets: offsets.collect(), ..next };
+        found = RigFit { offsets: offsets.collect(), ..next };
         let mut left: Vec<f64> = windows.iter().map(|w| w.unexplained(&found.of(w))).collect();
         let usual = median(&mut left).unwrap_or(0.0);
-        let relative =
-            |w: &Window| w.unexplained(&found.of(w)) / (usual + MOTION_SHARE * w.yy / w.n as f64);
+        let relative = |w: &FitWindow| {
+            w.unexplained(&found.of(w)) / (usual + MOTION_SHARE * w.yy / w.n as f64)
+        };
         windows.sort_by(|a, b| relative(a).total_cmp(&relative(b)));
         kept = keep;
     }
@@ -209,7 +215,7 @@ fn explain(windows: &mut [Window], n_sessions: usize) -> Option<Explained> {
     let left =
         kept.iter().map(|w| w.unexplained(&found.of(w)) * w.n as f64).sum::<f64>() / n as f64;
     let total = kept.iter().map(|w| w.yy).sum::<f64>() / n as f64;
-    // What is left over is coloured: it counts as one reading a window, not n.
+    // The residual is correlated: each window counts as one reading, not n.
     let variance = left * n as f64 / kept.len() as f64;
     let sessions = session_sums(kept, n_sessions)
         .into_iter()
@@ -217,7 +223,7 @@ fn explain(windows: &mut [Window], n_sessions: usize) -> Option<Explained> {
             sums.and_then(|sums| session_fit(&sums, found.gain, found.resistance, variance))
         })
         .collect();
-    Some(Explained {
+    Some(AxisFit {
         gain: found.gain,
         resistance_m_s2: found.resistance,
         sessions,
@@ -227,9 +233,14 @@ fn explain(windows: &mut [Window], n_sessions: usize) -> Option<Explained> {
     })
 }
 
-/// A session's level under the rig's gain, and its own gain, where `variance`
-/// is that of a reading.
-fn session_fit((n, r): &Sums, gain: f64, resistance: f64, variance: f64) -> Option<SessionFit> {
+/// Returns a session's level under the rig's gain, and its own gain, where `variance` is
+/// that of a reading.
+fn session_fit(
+    (n, r): &NormalEquations,
+    gain: f64,
+    resistance: f64,
+    variance: f64,
+) -> Option<SessionFit> {
     let offset = |k: f64| (r.y - n[(1, 0)] * k - n[(1, 2)] * resistance) / n[(1, 1)];
     let own = n[(0, 0)] - n[(0, 1)] * n[(1, 0)] / n[(1, 1)];
     let pulled =
@@ -243,13 +254,13 @@ fn session_fit((n, r): &Sums, gain: f64, resistance: f64, variance: f64) -> Opti
     (n[(1, 1)] > 0.0 && own > 0.0).then_some(fit)
 }
 
-/// Step of dead time and lag at which the search ends, s.
+/// Step of dead time and lag at which the search ends, s. Chosen.
 const FINEST_STEP_S: f64 = 0.001;
-/// Steps of the search at most; a dozen are common. Beyond it the best so far is
+/// Most steps of the search, of which a dozen is common; beyond it the best so far is
 /// taken.
 const MOST_SEARCH_STEPS: usize = 200;
-/// Where the search looks next: dead time and lag trade off against each
-/// other along a narrow valley, so it also looks across both.
+/// Directions of the search. Dead time and lag trade off along a narrow valley, so it is
+/// also searched diagonally.
 const DIRECTIONS: [(f64, f64); 10] = [
     (1.0, 0.0),
     (-1.0, 0.0),
@@ -263,7 +274,7 @@ const DIRECTIONS: [(f64, f64); 10] = [
     (-1.0, 2.0),
 ];
 
-/// The recordings of one axis, ready to be fitted.
+/// The recordings of one axis and their windows.
 pub(super) struct Fitter<'a> {
     pub(super) rig: &'a Rig,
     pub(super) recordings: &'a [Recording],
@@ -272,7 +283,7 @@ pub(super) struct Fitter<'a> {
 }
 
 impl Fitter<'_> {
-    /// Windows in which the ball moves.
+    /// Number of windows with a moving ball.
     pub(super) fn n_windows(&self) -> usize {
         self.stretches.iter().map(Vec::len).sum()
     }
@@ -291,7 +302,7 @@ impl Fitter<'_> {
         Some(TwinModel::new(self.rig.ladder(Profile::Default), axis))
     }
 
-    fn explain(&self, dead_time_s: f64, lag_s: f64) -> Option<Explained> {
+    fn explain(&self, dead_time_s: f64, lag_s: f64) -> Option<AxisFit> {
         let model = self.model(dead_time_s, lag_s, 1.0, 0.0, 0.0)?;
         let mut windows = Vec::with_capacity(self.n_windows());
         for (session, (recording, stretches)) in
@@ -300,7 +311,7 @@ impl Fitter<'_> {
             let path = recording.twin_path(&model, self.axis);
             windows.extend(stretches.iter().map(|s| {
                 let resisted = &recording.resisted[self.axis][s.clone()];
-                Window::new(
+                FitWindow::new(
                     session,
                     &recording.moments[s.clone()],
                     &path[s.clone()],
@@ -312,11 +323,11 @@ impl Fitter<'_> {
         explain(&mut windows, self.recordings.len())
     }
 
-    /// Dead time and lag that leave the least: a coarse grid, then a pattern
-    /// search that halves its steps.
-    pub(super) fn search(&self) -> Option<(f64, f64, Explained)> {
-        let mut best: Option<(f64, f64, Explained)> = None;
-        let try_at = |dead: f64, lag: f64, best: &mut Option<(f64, f64, Explained)>| {
+    /// Searches the dead time and lag with the least cost: a coarse grid, then a pattern
+    /// search with decreasing steps.
+    pub(super) fn search(&self) -> Option<(f64, f64, AxisFit)> {
+        let mut best: Option<(f64, f64, AxisFit)> = None;
+        let try_at = |dead: f64, lag: f64, best: &mut Option<(f64, f64, AxisFit)>| {
             if dead < 0.0 || lag < 0.0 {
                 return;
             }
@@ -340,7 +351,7 @@ impl Fitter<'_> {
             for (d, l) in DIRECTIONS {
                 try_at(dead + d * step, lag + l * step, &mut best);
             }
-            // A cost that is no number is never undercut either.
+            // Also ends if the cost is NaN.
             let better = best.as_ref().is_some_and(|(.., after)| after.cost() < before);
             if !better {
                 step /= 2.0;
@@ -354,9 +365,9 @@ impl Fitter<'_> {
 mod tests {
     use super::*;
 
-    /// A window over 1.2 s in which the twin's path swings by `asked` m, and the
-    /// ball's by `gain` times that and by `off` m at another pace.
-    fn window(asked: f64, gain: f64, off: f64, phase: f64) -> Window {
+    /// A window of 1.2 s in which the twin's path swings by `asked` m, and the ball's by
+    /// `gain` times that plus `off` m at another frequency.
+    fn window(asked: f64, gain: f64, off: f64, phase: f64) -> FitWindow {
         let times: Vec<f64> = (0..60).map(|i| 0.02 * f64::from(i)).collect();
         let of =
             |f: &dyn Fn(f64) -> f64| without_line(&times, times.iter().map(|&t| f(t)).collect());
@@ -364,7 +375,7 @@ mod tests {
         let y = of(&|t| gain * asked * (4.0 * t + phase).sin() + off * (11.0 * t).sin());
         let causes = [z, of(&|t| t * t / 2.0), of(&|t| t * t * t)];
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        Window {
+        FitWindow {
             session: 0,
             yy: dot(&y, &y),
             normal: Matrix3::from_fn(|i, j| dot(&causes[i], &causes[j])),
@@ -373,11 +384,11 @@ mod tests {
         }
     }
 
-    /// Two windows of fifteen are of large motion, which is explained to a fifth, the
-    /// rest of a ball that sticks; and in one, somebody pushed.
+    /// Of fifteen windows two are of large motion, explained to a fifth, twelve of a ball
+    /// that sticks, and one holds a push.
     #[test]
     fn windows_of_large_motion_tell_the_gain_of_a_ball_that_sticks() {
-        let mut windows: Vec<Window> =
+        let mut windows: Vec<FitWindow> =
             (0..12).map(|i| window(0.01, 0.5, 3e-4, 0.6 * f64::from(i))).collect();
         windows.extend([0.0, 1.5].map(|phase| window(0.06, 0.9, 6e-3, phase)));
         windows.push(window(0.01, 1.0, 0.05, 1.0));

@@ -1,13 +1,12 @@
-//! Learning a rig from healthy sessions.
+//! Learns the parameters of a rig from healthy sessions.
 //!
-//! In windows of a second or two the measured path of one axis is fitted by
-//! `x₀ + v₀ t + k·z(t) + b t²/2 + c·r(t)`, where z is the twin's path under the
-//! recorded commands and r what rolling resistance adds: k (gain), b (level) and
-//! c (resistance) are the rig's, x₀ and v₀ the window's own.
-//! Dead time and lag are searched for. The worst fifth of the windows is left
-//! out (least trimmed squares, Rousseeuw 1984), so that hands pushing the ball
-//! do not count. Fitting the path instead of its second difference explains
-//! 94–98 % of real recordings where differences explain 10–60 %.
+//! In windows of about a second the measured path of one axis is fitted by `x₀ + v₀ t +
+//! k·z(t) + b t²/2 + c·r(t)`, where z is the twin's path under the recorded commands and
+//! r the effect of rolling resistance. k (gain), b (level) and c (resistance) belong to
+//! the rig, x₀ and v₀ to the window. Dead time and lag are searched for. The worst fifth
+//! of the windows is dropped (least trimmed squares, Rousseeuw 1984), so that pushes by
+//! hand do not count. Fitting the path instead of its second difference explains 94–98 %
+//! of the variance of real recordings where differences explain 10–60 %.
 
 mod certificate;
 mod fit;
@@ -22,39 +21,41 @@ mod widening;
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
-use fit::{Explained, Fitter, SessionFit};
+use fit::{AxisFit, Fitter, SessionFit};
 use prospects::prospects;
 pub(super) use recording::MOVING_M;
 use recording::{Recording, Stretch};
-use sessions::{Estimate, Population, between, combined};
+use sessions::{Estimate, Population, combined, session_spread};
 use spread::{healthy_spread, level_at_rest};
 
 use super::{Misfit, Plausibility, Rig};
-use crate::diagnosis::{AxisCalibration, Calibration, SensorCalibration, SessionEstimate};
+use crate::diagnosis::{
+    AxisCalibration, Calibration, CalibrationOrigin, SensorCalibration, SessionEstimate,
+};
 use crate::vocabulary::{Axis, FaultCode, FaultKind, PerAxis, Sample};
 
-/// Lengths of a window, s, the better first: a ball that sticks every other
-/// second offers only short stretches of motion.
+/// Lengths of a window, s, the preferred first: a ball that sticks every other second
+/// offers only short stretches of motion. Chosen.
 pub(super) const WINDOWS_S: [f64; 2] = [1.2, 0.6];
-/// Least windows with a moving ball to learn from.
+/// Least number of windows with a moving ball. Chosen.
 const LEAST_WINDOWS: usize = 6;
-/// Largest relative standard error of the gain.
+/// Largest relative standard error of the gain. Chosen.
 const WORST_GAIN_ERROR: f64 = 0.2;
-/// Least share of the paths' variance that the fit must explain.
+/// Least fraction of the paths' variance that the fit must explain. Chosen.
 const LEAST_EXPLAINED: f64 = 0.5;
-/// Standard deviation of commands that move a ball, rad: 0.3°. With less, what is
-/// not explained was not asked for.
+/// Standard deviation of commands that move a ball, rad: 0.3°. With less, unexplained
+/// motion was not commanded. Chosen.
 pub(super) const MOVING_RAD: f64 = 0.005;
 
-/// How far levels lie apart from session to session, rad. It counts as one
-/// session: levels differ between rigs by more than gains do.
+/// Spread of levels from session to session, rad. The population counts as one session,
+/// since levels differ more between rigs than gains do.
 const LEVELS: Population =
     Population { deviation: AxisCalibration::POPULATION_LEVEL_SPREAD_RAD, n_sessions: 1.0 };
-/// How far gains lie apart from session to session, as a share.
+/// Spread of gains from session to session, as a fraction.
 const GAINS: Population =
     Population { deviation: AxisCalibration::POPULATION_GAIN_SPREAD, n_sessions: 2.0 };
 
-/// Why nothing can be learnt.
+/// Why a rig cannot be learnt.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CannotCalibrate {
     #[error("session {session}: {misfit}")]
@@ -87,56 +88,49 @@ pub enum CannotCalibrate {
     )]
     Unexplained { axis: Axis, percent: f64 },
     #[error(
-        "there is too little to test what was learnt: {what} teaches nothing by itself ({reason}); \
-         record twice as long, or several sessions"
+        "there is too little data to test what was learnt: nothing can be learnt from {what} alone \
+         ({reason}); record twice as long, or several sessions"
     )]
     Untested { what: &'static str, reason: Box<CannotCalibrate> },
     #[error(
-        "judged by what the rest taught, session {session} would be accused of {code} at {at_s:.2} s{of_kind}; \
-         leave it out if the rig was not healthy there, or record more sessions",
+        "judged by what the other data taught, session {session} would report {code} at {at_s:.2} s{of_kind}; \
+         leave it out if the rig was not healthy then, or record more sessions",
         code = code.as_str(), of_kind = kind.map_or(String::new(), |k| format!(" ({})", k.as_str()))
     )]
     AccusesItself { session: usize, code: FaultCode, kind: Option<FaultKind>, at_s: f64 },
 }
 
-/// Learns gain, dead time, lag, level, noise and breakaway of each axis from
-/// healthy `sessions` of `rig`. `data_sha256` names the data, `made_at` says
-/// when (RFC 3339); both are only noted.
+/// Learns gain, dead time, lag, level, noise and breakaway of each axis from healthy
+/// `sessions` of `rig`. The [`origin`](Calibration::origin) is left empty, for the
+/// caller to state.
 ///
 /// An axis without commands or without positions is left out.
 ///
 /// # Errors
 /// [`CannotCalibrate`], which says what is missing.
-pub fn calibrate(
-    rig: &Rig,
-    sessions: &[Vec<Sample>],
-    data_sha256: &str,
-    made_at: &str,
-) -> Result<Calibration, CannotCalibrate> {
+pub fn calibrate(rig: &Rig, sessions: &[Vec<Sample>]) -> Result<Calibration, CannotCalibrate> {
     check_fit(rig, sessions)?;
-    let taught = teach(rig, sessions).map_err(|reason| with_cause(rig, sessions, reason))?;
-    let learnt = Calibration {
-        data_sha256: data_sha256.to_owned(),
-        n_samples: sessions.iter().map(|s| s.len() as u64).sum(),
-        made_at: made_at.to_owned(),
-        ..taught
-    };
+    let taught =
+        learn_untested(rig, sessions).map_err(|reason| with_cause(rig, sessions, reason))?;
+    let learnt = Calibration { n_samples: sessions.iter().map(|s| s.len() as u64).sum(), ..taught };
     proof::prove(rig, learnt, sessions)
 }
 
+/// Checks that the sessions fit the description of `rig`.
+///
 /// # Errors
-/// What in a session and the description of `rig` cannot be of one rig.
+/// The first contradiction between a session and the description of `rig`.
 fn check_fit(rig: &Rig, sessions: &[Vec<Sample>]) -> Result<(), CannotCalibrate> {
     misfit(rig, sessions, Misfit::prevents_learning).map_or(Ok(()), Err)
 }
 
-/// The first of what does not fit that is `wanted`.
+/// Returns the first misfit that is `wanted`.
 fn misfit(
     rig: &Rig,
     sessions: &[Vec<Sample>],
     wanted: impl Fn(Misfit) -> bool,
 ) -> Option<CannotCalibrate> {
-    // What an earlier calibration took for granted is open again.
+    // An earlier calibration must not hide a misfit.
     let rig = Rig { calibration: None, ..rig.clone() };
     sessions.iter().zip(1..).find_map(|(samples, session)| {
         let found = Plausibility::of(&rig, samples).misfits().into_iter().find(|m| wanted(*m))?;
@@ -144,7 +138,8 @@ fn misfit(
     })
 }
 
-/// `reason`, or what explains it: axes that are swapped or have the wrong sign.
+/// Returns the cause of `reason` if it is known (swapped axes or a wrong sign), else
+/// `reason`.
 fn with_cause(rig: &Rig, sessions: &[Vec<Sample>], reason: CannotCalibrate) -> CannotCalibrate {
     let is_cause = |m: Misfit| matches!(m, Misfit::Swapped { .. } | Misfit::WrongSign { .. });
     match reason {
@@ -155,7 +150,7 @@ fn with_cause(rig: &Rig, sessions: &[Vec<Sample>], reason: CannotCalibrate) -> C
     }
 }
 
-/// How well a gain would be known.
+/// How well a gain would be known, in words.
 fn known(percent: f64) -> String {
     match percent.is_finite() {
         true => format!("it would be known to ±{percent:.0} %"),
@@ -163,8 +158,8 @@ fn known(percent: f64) -> String {
     }
 }
 
-/// What `sessions` teach of `rig`, not yet tested.
-fn teach(rig: &Rig, sessions: &[Vec<Sample>]) -> Result<Calibration, CannotCalibrate> {
+/// Learns from `sessions` of `rig` without testing the result.
+fn learn_untested(rig: &Rig, sessions: &[Vec<Sample>]) -> Result<Calibration, CannotCalibrate> {
     let recordings: Vec<Recording> = sessions.iter().map(|s| Recording::new(rig, s)).collect();
     let learn = |axis: Axis| {
         let present = recordings.iter().any(|r| r.has(axis));
@@ -182,39 +177,36 @@ fn teach(rig: &Rig, sessions: &[Vec<Sample>]) -> Result<Calibration, CannotCalib
         axes,
         sensor: SensorCalibration { refresh_s, ..SensorCalibration::default() },
         sessions: (0..recordings.len()).map(of_session).collect(),
-        data_sha256: String::new(),
+        origin: CalibrationOrigin::default(),
         n_samples: 0,
         duration_s: recordings.iter().map(Recording::duration_s).sum(),
-        made_at: String::new(),
         certificate: None,
         prospects: None,
     };
     Ok(likelihood::with_model_errors(rig, learnt, sessions))
 }
 
-/// [`calibrate`], and what can be found by it: [`Calibration::prospects`].
+/// Like [`calibrate`], and also computes [`Calibration::prospects`].
 ///
 /// # Errors
 /// As for [`calibrate`].
-pub fn calibrate_and_foresee(
+pub fn calibrate_with_prospects(
     rig: &Rig,
     sessions: &[Vec<Sample>],
-    data_sha256: &str,
-    made_at: &str,
 ) -> Result<Calibration, CannotCalibrate> {
-    let mut calibration = calibrate(rig, sessions, data_sha256, made_at)?;
+    let mut calibration = calibrate(rig, sessions)?;
     let learnt = Rig { calibration: Some(calibration.clone()), ..rig.clone() };
     calibration.prospects = prospects(&learnt, sessions);
     Ok(calibration)
 }
 
-/// What was learnt of one axis, and what each session says of it by itself.
+/// The learnt parameters of one axis, and the estimates of each session.
 struct LearntAxis {
     calibration: AxisCalibration,
     sessions: Vec<Option<SessionEstimate>>,
 }
 
-/// Learns from long windows, or from short ones where there are too few.
+/// Learns from long windows, or from short ones if there are too few.
 fn learn_axis(
     rig: &Rig,
     recordings: &[Recording],
@@ -245,7 +237,8 @@ fn learn_in_windows(
     let slope = found.gain * axis.drive_sign() * rig.ball.rolling_gravity();
     let levels = levels(recordings, axis, dead_time_s + lag_s, slope, &found);
     let known: Vec<Estimate> = levels.iter().flatten().copied().collect();
-    let level = between(&known, &LEVELS).ok_or(CannotCalibrate::TooShort { axis, n_windows })?;
+    let level =
+        session_spread(&known, &LEVELS).ok_or(CannotCalibrate::TooShort { axis, n_windows })?;
     let healthy = {
         let (gain, resistance) = (found.gain, found.resistance_m_s2);
         let levels: Vec<f64> = levels.iter().map(|l| l.map_or(level.mean, |l| l.value)).collect();
@@ -272,9 +265,9 @@ fn learn_in_windows(
     Ok(LearntAxis { calibration, sessions: by_session(&levels, &found) })
 }
 
-/// That the command of `axis`, which `swings` or is nearly held, explains the
-/// ball's motion, and by a gain that is known well enough.
-fn check_explained(axis: Axis, found: &Explained, swings: bool) -> Result<(), CannotCalibrate> {
+/// Checks that the command of `axis` explains the ball's motion, with a gain that is
+/// known well enough. `swings` tells whether the command moves.
+fn check_explained(axis: Axis, found: &AxisFit, swings: bool) -> Result<(), CannotCalibrate> {
     let error = found.gain_error / found.gain.abs();
     let unexplained = found.share.is_nan() || found.share < LEAST_EXPLAINED;
     let percent = 100.0 * found.share.max(0.0);
@@ -293,14 +286,14 @@ fn check_explained(axis: Axis, found: &Explained, swings: bool) -> Result<(), Ca
     Ok(())
 }
 
-/// The level of each session, rad, by the ball's motion and by where it rested,
-/// where one radian accelerates the ball by `slope` m/s².
+/// Returns the level of each session, rad, from the ball's motion and from where it
+/// rested. One radian accelerates the ball by `slope` m/s².
 fn levels(
     recordings: &[Recording],
     axis: Axis,
     delay_s: f64,
     slope: f64,
-    found: &Explained,
+    found: &AxisFit,
 ) -> Vec<Option<Estimate>> {
     let in_motion = |s: &SessionFit| Estimate {
         value: s.offset_m_s2 / slope,
@@ -312,18 +305,18 @@ fn levels(
     found.sessions.iter().zip(recordings).map(level).collect()
 }
 
-/// Standard deviation of the gain from session to session, as a share of it.
-fn gain_spread(found: &Explained) -> f64 {
+/// Standard deviation of the gain from session to session, as a fraction.
+fn gain_spread(found: &AxisFit) -> f64 {
     let share = |s: &SessionFit| Estimate {
         value: s.gain / found.gain,
         error: (s.gain_error / found.gain).abs(),
     };
     let gains: Vec<Estimate> = found.sessions.iter().flatten().map(share).collect();
-    between(&gains, &GAINS).map_or(GAINS.deviation, |g| g.deviation)
+    session_spread(&gains, &GAINS).map_or(GAINS.deviation, |g| g.deviation)
 }
 
-/// What each session says by itself; none where it has no level.
-fn by_session(levels: &[Option<Estimate>], found: &Explained) -> Vec<Option<SessionEstimate>> {
+/// Returns the estimates of each session; `None` if it has no level.
+fn by_session(levels: &[Option<Estimate>], found: &AxisFit) -> Vec<Option<SessionEstimate>> {
     let estimate = |(level, fit): (&Option<Estimate>, &Option<SessionFit>)| {
         let level = (*level)?;
         let gain = fit.map(|f| (f.gain, f.gain_error));
@@ -343,8 +336,8 @@ pub(in crate::engine) mod tests {
     use crate::plant::{RollingState, ServoModel, Twin, TwinAxis, TwinModel};
     use crate::vocabulary::SimTime;
 
-    /// A rig with known gain, dead time, lag and level under a sum of sines,
-    /// made by the twin itself: the ball never rests and never leaves.
+    /// A session of a rig with known gain, dead time, lag and level under a sum of sines,
+    /// simulated by the twin: the ball never rests and never leaves the plate.
     pub(in crate::engine) fn session(seconds: f64, amplitude: f64, gain: f64) -> Vec<Sample> {
         let rig = Rig::chapter("a");
         let servo = ServoModel::new(0.2, 0.05, 100.0).unwrap();
@@ -352,7 +345,7 @@ pub(in crate::engine) mod tests {
             TwinAxis { servo, dead_time_s: 0.06, gain, level_rad: 0.01, resistance_m_s2: 0.0 };
         let mut twin = Twin::new(TwinModel::new(rig.ladder(Profile::Default), axis));
         let times: Vec<f64> = (0..(seconds / 0.01) as u32).map(|i| f64::from(i) * 0.01).collect();
-        // The level is compensated, as a controller would.
+        // The level is compensated, as by a controller.
         let command = |w: f64, t: f64| -0.01 + amplitude * ((w * t).cos() + (2.7 * w * t).sin());
         let (mut commands, mut paths) = (Vec::new(), [Vec::new(), Vec::new()]);
         for &t in &times {
@@ -363,7 +356,7 @@ pub(in crate::engine) mod tests {
             paths[1].push(twin.motion().position.y);
         }
         let [x, y] = paths.map(|path| without_line(&times, path));
-        // A reading in whole tenths of a millimetre.
+        // Readings are rounded to tenths of a millimetre.
         let read = |position: f64| Some((position * 1e4).round() * 1e-4);
         (0..times.len())
             .map(|i| Sample {
@@ -380,7 +373,7 @@ pub(in crate::engine) mod tests {
     #[test]
     fn validate_that_what_was_put_in_is_learnt() {
         let rig = Rig::chapter("a");
-        let learnt = calibrate(&rig, &[session(60.0, 0.03, 0.85)], "", "").unwrap();
+        let learnt = calibrate(&rig, &[session(60.0, 0.03, 0.85)]).unwrap();
         for axis in Axis::ALL {
             let found = learnt.axes[axis].unwrap();
             assert!((found.gain - 0.85).abs() < 0.01, "{axis:?} {found:?}");
@@ -394,7 +387,7 @@ pub(in crate::engine) mod tests {
     #[test]
     fn refusals_say_what_is_missing() {
         let rig = Rig::chapter("a");
-        let refused = |s: Vec<Sample>| calibrate(&rig, &[s], "", "").unwrap_err();
+        let refused = |s: Vec<Sample>| calibrate(&rig, &[s]).unwrap_err();
         assert!(matches!(refused(session(4.0, 0.03, 1.0)), CannotCalibrate::TooShort { .. }));
         assert!(matches!(refused(session(60.0, 0.03, -1.0)), CannotCalibrate::Reversed { .. }));
         let mut blind = session(60.0, 0.03, 1.0);
@@ -404,8 +397,8 @@ pub(in crate::engine) mod tests {
         assert_eq!(refused(blind), CannotCalibrate::NoAxis);
     }
 
-    /// A panel reads a ball at rest better than one that rolls, and a twin has
-    /// nothing to be wrong about.
+    /// A ball at rest is read with less noise than a rolling one, and its twin makes no
+    /// error.
     #[test]
     fn a_ball_at_rest_makes_no_rig_look_better() {
         let rig = Rig::chapter("a");
@@ -414,7 +407,7 @@ pub(in crate::engine) mod tests {
         let last = *rolling.last().unwrap();
         let later = |i: u32| Sample { t_s: last.t_s + 0.01 * f64::from(i), ..last };
         with_rest.extend((1..9000).map(later));
-        let learnt = |s: Vec<Sample>| calibrate(&rig, &[s], "", "").unwrap().axes.x.unwrap();
+        let learnt = |s: Vec<Sample>| calibrate(&rig, &[s]).unwrap().axes.x.unwrap();
         let (rolling, with_rest) = (learnt(rolling), learnt(with_rest));
         assert!((with_rest.noise_m / rolling.noise_m - 1.0).abs() < 0.05, "{with_rest:?}");
         assert!(
@@ -427,7 +420,7 @@ pub(in crate::engine) mod tests {
     fn an_axis_without_readings_is_left_out() {
         let mut one_sided = session(60.0, 0.03, 1.0);
         one_sided.iter_mut().for_each(|s| s.y_m = None);
-        let learnt = calibrate(&Rig::chapter("a"), &[one_sided], "", "").unwrap();
+        let learnt = calibrate(&Rig::chapter("a"), &[one_sided]).unwrap();
         assert!(learnt.axes.x.is_some() && learnt.axes.y.is_none());
     }
 }

@@ -1,36 +1,38 @@
-//! A calibration proves itself: each of its sessions is judged, with less
-//! patience than later, by what the others taught. Where that alarms, the rig
-//! varies more than the others showed: the limit in question is widened until it
-//! is quiet, or the calibration is refused.
+//! Cross-validation of a calibration: each session is judged, with shorter times than
+//! later, by what was learnt from the others. Where that alarms, the rig varies more than
+//! the others showed: the limit concerned is widened until there is no alarm, or the
+//! calibration is refused.
 
 use super::self_test::{SelfTest, judge};
 use super::widening::Widening;
-use super::{CannotCalibrate, certificate, teach};
+use super::{CannotCalibrate, certificate, learn_untested};
 use crate::diagnosis::{AxisCalibration, Calibration, Settings};
 use crate::engine::{Rig, Setup};
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use crate::vocabulary::{Axis, FaultCode, Sample};
 
-/// Sessions are judged in so many groups at most: each costs a calibration.
+/// Most groups of sessions (folds); each costs a calibration. Chosen.
 const MOST_GROUPS: usize = 4;
-/// Share of the time that confirms a fault later which no healthy session may
-/// reach.
+/// Factor on the times that confirm a fault, for the tests: no healthy session may fail
+/// for longer than this fraction. Chosen.
 pub(super) const PATIENCE: f64 = 0.6;
-/// Times that anything is widened at most.
-const MOST_STEPS: usize = 40;
-/// Length of a session of which half need not teach anything by itself, s.
+/// Most rounds of widening. Chosen.
+const MOST_WIDENINGS: usize = 40;
+/// Duration from which on a session is judged by itself if its halves cannot be learnt,
+/// s. Chosen.
 const LONG_S: f64 = 60.0;
-/// By how much more than in the tests a path may bend where there was one test, as a
-/// share: the most of few tests is likely to be exceeded. Chosen, not measured: a fifth
-/// more of three tests, hardly anything of twenty.
+/// Margin on the largest deviation of the path in one test, as a fraction; it is divided
+/// by the number of tests, since the largest of few is likely to be exceeded. Chosen, not
+/// measured: a fifth for three tests, hardly anything for twenty.
 const FEW_TESTS: f64 = 0.6;
-/// Most scatter that is taken over from the tests, m: more is no noise but a
-/// motion that the fit does not follow.
+/// Largest scatter that is taken over from the tests, m: more is not noise but motion
+/// that the fit does not follow. Chosen.
 const MOST_SCATTER_M: f64 = 1e-3;
 
-/// `learnt` as widened until `sessions` are quiet, each judged by what the others
-/// teach; of one session, each half by what the other does.
+/// Returns `learnt`, widened until no session gives an alarm, each judged by what was
+/// learnt from the others; of a single session, each half by what was learnt from the
+/// other.
 ///
 /// # Errors
 /// [`CannotCalibrate::Untested`] if there is too little to judge by, and
@@ -43,7 +45,7 @@ pub(super) fn prove(
     let folds = folds(rig, &learnt, sessions)?;
     let mut widening = Widening::default();
     let mut tests = Vec::new();
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MOST_WIDENINGS {
         tests = folds.iter().flat_map(|fold| fold.tests(rig, &widening)).collect();
         let asked = tests.iter().filter(|test| widening.widen(test)).count();
         if asked == 0 {
@@ -56,7 +58,7 @@ pub(super) fn prove(
     Err(accusation(&tests))
 }
 
-/// `learnt` with the most that any test has shown of what is only counted.
+/// Returns `learnt` with the largest values seen in the tests, and its certificate.
 fn with_most(mut learnt: Calibration, tests: &[SelfTest]) -> Calibration {
     for axis in Axis::ALL {
         let most_nats = tests.iter().map(|t| t.most_nats[axis].0).fold(0.0, f64::max);
@@ -74,8 +76,8 @@ fn with_most(mut learnt: Calibration, tests: &[SelfTest]) -> Calibration {
     learnt
 }
 
-/// What the first test that was not quiet accuses its session of: where nothing
-/// is confirmed, of the servo with the most evidence against it.
+/// The accusation of the first test with an alarm; without one, of the servo with the
+/// largest evidence against it.
 fn accusation(tests: &[SelfTest]) -> CannotCalibrate {
     let alarmed = tests.iter().find_map(|t| Some((t.session, t.alarm?)));
     if let Some((session, alarm)) = alarmed {
@@ -91,7 +93,7 @@ fn accusation(tests: &[SelfTest]) -> CannotCalibrate {
     CannotCalibrate::AccusesItself { session, code, kind: None, at_s }
 }
 
-/// Sessions to judge by what the others teach.
+/// Sessions to be judged, and what was learnt from the others.
 struct Fold {
     taught: Calibration,
     judged: Vec<(usize, Vec<Sample>)>,
@@ -106,8 +108,8 @@ impl Fold {
     }
 }
 
-/// `settings` that alarm sooner than they will later, and not by the weight of
-/// evidence, which is only measured.
+/// Returns `settings` with shorter times, and without alarms by evidence, which is only
+/// measured.
 fn impatient(settings: &Settings) -> Settings {
     Settings {
         fail_s: PATIENCE * settings.fail_s,
@@ -128,7 +130,7 @@ fn folds(
 ) -> Result<Vec<Fold>, CannotCalibrate> {
     if let [session] = sessions {
         return halves(rig, session).or_else(|reason| match learnt.duration_s >= LONG_S {
-            // Long enough to be judged by what it taught itself.
+            // Long enough to be judged by what was learnt from itself.
             true => Ok(vec![Fold { taught: learnt.clone(), judged: vec![(1, session.clone())] }]),
             false => Err(reason),
         });
@@ -139,27 +141,27 @@ fn folds(
         let (judged, teaching): (Vec<usize>, Vec<usize>) = (0..sessions.len()).partition(of_group);
         let teaching: Vec<Vec<Sample>> = teaching.iter().map(|&i| sessions[i].clone()).collect();
         let judged = judged.iter().map(|&i| (i + 1, sessions[i].clone())).collect();
-        taught(rig, "one group of sessions", &teaching, judged)
+        fold_of(rig, "one group of sessions", &teaching, judged)
     };
     (0..n_groups).map(fold).collect()
 }
 
-/// Each half of a session, to be judged by what the other teaches.
+/// Each half of a session, to be judged by what was learnt from the other.
 fn halves(rig: &Rig, session: &[Sample]) -> Result<Vec<Fold>, CannotCalibrate> {
     let (first, second) = session.split_at(session.len() / 2);
     let fold = |teaching: &[Sample], judged: &[Sample]| {
-        taught(rig, "half of the recording", &[teaching.to_vec()], vec![(1, judged.to_vec())])
+        fold_of(rig, "half of the recording", &[teaching.to_vec()], vec![(1, judged.to_vec())])
     };
     Ok(vec![fold(first, second)?, fold(second, first)?])
 }
 
-fn taught(
+fn fold_of(
     rig: &Rig,
     what: &'static str,
     teaching: &[Vec<Sample>],
     judged: Vec<(usize, Vec<Sample>)>,
 ) -> Result<Fold, CannotCalibrate> {
-    match teach(rig, teaching) {
+    match learn_untested(rig, teaching) {
         Ok(taught) => Ok(Fold { taught, judged }),
         Err(reason) => Err(CannotCalibrate::Untested { what, reason: Box::new(reason) }),
     }

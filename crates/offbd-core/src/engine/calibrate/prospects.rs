@@ -1,45 +1,44 @@
-//! How soon a fault would be found: had it come during the healthy recording.
+//! How soon each fault would be found if it occurred during the healthy recording.
 //!
-//! At moments spread over the sessions a fault is put in, and the engine judges
-//! on from there what would have been read: the recorded readings, with their
-//! noise, pushes and gaps, and what the fault adds to them. That is how far two
-//! twins part of which one has the fault. Somebody controls the ball, so the
-//! commands answer what the fault adds, as those of a controller of
-//! [`CONTROL_RAD_S`] that is well damped.
+//! Faults are injected at times spread over the sessions. From there on the engine judges
+//! the recorded readings, with their noise, pushes and gaps, plus the effect of the
+//! fault: the difference between two twins of which one has the fault. The rig is
+//! controlled, so the commands respond to that effect like those of a well damped
+//! controller with a bandwidth of [`CONTROL_RAD_S`].
 
-use crate::diagnosis::{Calibration, FaultMemory, Prospects, ServoProspects};
+use crate::diagnosis::{Calibration, FaultMemory, Prospects, ServoProspects, Transition};
 use crate::engine::frame::{Moment, moment};
-use crate::engine::{AxisMapping, Engine, Input, Output, Rig, Setup};
+use crate::engine::{AxisMapping, Engine, Input, Rig, Setup};
 use crate::maths::median;
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use crate::plant::{RollingState, Twin};
 use crate::vocabulary::{Axis, FaultCode, FaultStatus, PerAxis, Sample};
 
-/// Moments, over all sessions, at which a fault is put in.
+/// Times, over all sessions, at which a fault is injected. Chosen.
 const ONSETS: usize = 12;
-/// Seconds of a session before the first of them.
+/// Time before the first of them in a session, s. Chosen.
 const SETTLING_S: f64 = 5.0;
-/// Seconds after which a fault counts as not found.
+/// Time after which a fault counts as not found, s. Chosen.
 const HORIZON_S: f64 = 10.0;
-/// Shares of the gain that may be lost, the smallest first.
+/// Tried losses of gain as fractions, the smallest first.
 const LOSSES: [f64; 8] = [0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.7, 1.0];
-/// Angles, degrees, that a horn may slip by, the smallest first.
+/// Tried slips of the horn, degrees, the smallest first.
 const SLIPS_DEG: [f64; 8] = [0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0];
-/// Bandwidth of the control that answers what a fault adds, rad/s: as fast as a
-/// loop with 0.2 s of delay, lag and filtering allows with some margin.
+/// Bandwidth of the controller that responds to the fault, rad/s: what a loop with 0.2 s
+/// of delay, lag and filtering allows with some margin.
 const CONTROL_RAD_S: f64 = 2.0;
-/// Its damping ratio.
-const DAMPING: f64 = 0.7;
-/// A reading less the mean of its neighbours scatters by √(3/2) of one's noise.
-const OF_NEIGHBOURS: f64 = 0.816_496_580_927_726;
+/// Damping ratio of that controller. Chosen.
+const CONTROL_DAMPING: f64 = 0.7;
+/// √(2/3): a reading less the mean of its neighbours scatters by √(3/2) of its noise.
+const NEIGHBOUR_NOISE: f64 = 0.816_496_580_927_726;
 
-/// What a fault does to the readings.
+/// A fault that is injected.
 #[derive(Clone, Copy)]
 enum Fault {
-    /// The servo of an axis answers this share less.
+    /// The servo of an axis answers this fraction less.
     Loss(Axis, f64),
-    /// The plate is off by this angle about the axis' servo, rad.
+    /// The plate is off by this angle about the servo of an axis, rad.
     Slip(Axis, f64),
     Stuck,
     Frozen,
@@ -56,24 +55,25 @@ impl Fault {
     }
 }
 
-/// How soon faults would have been confirmed in `sessions` of `rig`, which they
-/// calibrated; none where the sessions are shorter than 15 s or `rig` is not
-/// calibrated.
+/// Returns how soon faults would have been confirmed in `sessions`, from which `rig` was
+/// learnt; `None` if the sessions are shorter than 15 s or `rig` is not calibrated.
 pub(super) fn prospects(rig: &Rig, sessions: &[Vec<Sample>]) -> Option<Prospects> {
     let learnt = rig.calibration.as_ref()?;
     let plain = Rig { mapping: AxisMapping::default(), ..rig.clone() };
     let setup = Setup::new(plain, None).ok()?;
     let spans: Vec<f64> = sessions.iter().map(|s| usable_s(s)).collect();
     let total: f64 = spans.iter().sum();
-    let course = |(samples, &span): (&Vec<Sample>, &f64)| {
-        (span > 0.0).then(|| Course::new(rig, samples, span, (ONSETS as f64 * span / total).ceil()))
+    let session = |(samples, &span): (&Vec<Sample>, &f64)| {
+        (span > 0.0)
+            .then(|| TrialSession::new(rig, samples, span, (ONSETS as f64 * span / total).ceil()))
     };
-    let courses: Vec<Course> = sessions.iter().zip(&spans).filter_map(course).collect();
-    let trials = Trials::new(rig, &setup, &courses);
+    let sessions_tried: Vec<TrialSession> =
+        sessions.iter().zip(&spans).filter_map(session).collect();
+    let trials = Trials::new(rig, &setup, &sessions_tried);
     (!trials.starts.is_empty()).then(|| trials.prospects(learnt))
 }
 
-/// Seconds of a session in which a fault may be put.
+/// Time of a session in which a fault may begin, s.
 fn usable_s(samples: &[Sample]) -> f64 {
     let times = || samples.iter().map(|s| s.t_s).filter(|t| t.is_finite());
     let (first, last) =
@@ -81,13 +81,13 @@ fn usable_s(samples: &[Sample]) -> f64 {
     (last - first - SETTLING_S - HORIZON_S).max(0.0)
 }
 
-/// One session in the plate frame, and where the faults are put in.
-struct Course {
+/// One session in the plate frame, and the indices at which faults begin.
+struct TrialSession {
     moments: Vec<Moment>,
     onsets: Vec<usize>,
 }
 
-impl Course {
+impl TrialSession {
     fn new(rig: &Rig, samples: &[Sample], span_s: f64, n: f64) -> Self {
         let mut moments: Vec<Moment> =
             samples.iter().filter_map(|s| moment(&rig.mapping, s)).collect();
@@ -99,15 +99,15 @@ impl Course {
         Self { moments, onsets }
     }
 
-    /// The noise of a reading, as its neighbours show it, m.
+    /// The noise of a reading, estimated from its neighbours, m.
     fn noise(&self, axis: Axis, i: usize) -> f64 {
         let read = |k: usize| self.moments.get(k).and_then(|m| m.position[axis]);
         let (Some(a), Some(b), Some(c)) = (read(i - 1), read(i), read(i + 1)) else { return 0.0 };
-        OF_NEIGHBOURS * (b - (a + c) / 2.0)
+        NEIGHBOUR_NOISE * (b - (a + c) / 2.0)
     }
 }
 
-/// A moment as a device with the plate's own axes would send it.
+/// Converts a moment to the sample of a device with the plate's own axes.
 fn sample(moment: &Moment) -> Sample {
     Sample {
         seq: None,
@@ -119,9 +119,9 @@ fn sample(moment: &Moment) -> Sample {
     }
 }
 
-/// A session judged up to here, in which nothing was found.
-struct Start<'a> {
-    course: &'a Course,
+/// The engine and twin at the onset of a fault; nothing was found before.
+struct TrialStart<'a> {
+    session: &'a TrialSession,
     from: usize,
     engine: Engine,
     twin: Twin,
@@ -129,23 +129,23 @@ struct Start<'a> {
 
 struct Trials<'a> {
     rig: &'a Rig,
-    starts: Vec<Start<'a>>,
+    starts: Vec<TrialStart<'a>>,
 }
 
 impl<'a> Trials<'a> {
-    fn new(rig: &'a Rig, setup: &Setup, courses: &'a [Course]) -> Self {
+    fn new(rig: &'a Rig, setup: &Setup, sessions_tried: &'a [TrialSession]) -> Self {
         let mut starts = Vec::new();
-        for course in courses {
+        for session in sessions_tried {
             let mut engine = Engine::new(setup.clone(), FaultMemory::default());
             let mut twin = Twin::new(setup.twin);
-            let mut outputs = Vec::new();
-            for (i, m) in course.moments.iter().enumerate() {
-                if course.onsets.contains(&i) && !outputs.iter().any(|o| confirmed(o).is_some()) {
+            let mut transitions = Vec::new();
+            for (i, m) in session.moments.iter().enumerate() {
+                if session.onsets.contains(&i) && !transitions.iter().any(confirms) {
                     let (engine, twin) = (engine.clone(), twin.clone());
-                    starts.push(Start { course, from: i, engine, twin });
+                    starts.push(TrialStart { session, from: i, engine, twin });
                 }
-                outputs.retain(|o| confirmed(o).is_some());
-                engine.handle(Input::Sample(sample(m)), &mut outputs);
+                transitions.retain(confirms);
+                engine.handle(Input::Sample(sample(m)), &mut transitions);
                 twin.advance(m.at, m.command, &RollingState::default());
             }
         }
@@ -171,33 +171,34 @@ impl<'a> Trials<'a> {
         }
     }
 
-    /// The smallest of `sizes`, in rising order, from which on half of the trials
-    /// find every one; none where they do not find the largest.
+    /// Returns the smallest of the ascending `sizes` from which on half of the trials
+    /// find the fault at every size; `None` if they do not find the largest.
     fn least(&self, sizes: &[f64], fault: impl Fn(f64) -> Fault) -> Option<f64> {
         let found = |&size: &f64| self.median_s(fault(size)).is_some();
         sizes.iter().rev().copied().take_while(found).last()
     }
 
-    /// Seconds within which half of the trials find it; none where fewer do.
+    /// Returns the median delay, s; `None` if fewer than half of the trials find the
+    /// fault.
     fn median_s(&self, fault: Fault) -> Option<f64> {
         let delay = |start| self.delay_s(start, fault).unwrap_or(f64::INFINITY);
         let mut delays: Vec<f64> = self.starts.iter().map(delay).collect();
         median(&mut delays).filter(|delay| delay.is_finite())
     }
 
-    /// Seconds from the onset to the confirmation; none if the ball leaves the
-    /// plate or the time is up before.
-    fn delay_s(&self, start: &Start<'_>, fault: Fault) -> Option<f64> {
+    /// Returns the time from the onset to the confirmation, s; `None` if the ball leaves
+    /// the plate or the time is over.
+    fn delay_s(&self, start: &TrialStart<'_>, fault: Fault) -> Option<f64> {
         let mut trial = Trial::new(self.rig, start, fault);
-        let onset = start.course.moments[start.from].at;
-        let mut outputs = Vec::new();
-        for i in start.from..start.course.moments.len() {
+        let onset = start.session.moments[start.from].at;
+        let mut transitions = Vec::new();
+        for i in start.from..start.session.moments.len() {
             let moment = trial.moment(i)?;
             if moment.at - onset > HORIZON_S {
                 return None;
             }
-            trial.engine.handle(Input::Sample(sample(&moment)), &mut outputs);
-            if outputs.drain(..).any(|o| confirmed(&o) == Some(fault.code())) {
+            trial.engine.handle(Input::Sample(sample(&moment)), &mut transitions);
+            if transitions.drain(..).any(|t| confirms(&t) && t.code == fault.code()) {
                 return Some(moment.at - onset);
             }
         }
@@ -208,26 +209,26 @@ impl<'a> Trials<'a> {
 /// A session from the onset of a fault on.
 struct Trial<'a> {
     rig: &'a Rig,
-    start: &'a Start<'a>,
+    start: &'a TrialStart<'a>,
     fault: Fault,
     engine: Engine,
     healthy: Twin,
     faulty: Twin,
-    /// What the ball is beside its recorded place: m, m/s.
+    /// Position (m) and velocity (m/s) of the ball relative to the recording.
     beside: PerAxis<(f64, f64)>,
 }
 
 impl<'a> Trial<'a> {
-    fn new(rig: &'a Rig, start: &'a Start<'a>, fault: Fault) -> Self {
+    fn new(rig: &'a Rig, start: &'a TrialStart<'a>, fault: Fault) -> Self {
         let (engine, healthy) = (start.engine.clone(), start.twin.clone());
         let (faulty, beside) = (healthy.clone(), PerAxis::default());
         Self { rig, start, fault, engine, healthy, faulty, beside }
     }
 
-    /// What is commanded and read at moment `i`; none once the ball is off the
+    /// Returns the commands and readings of moment `i`; `None` once the ball is off the
     /// plate.
     fn moment(&mut self, i: usize) -> Option<Moment> {
-        let recorded = &self.start.course.moments[i];
+        let recorded = &self.start.session.moments[i];
         let mut moment = *recorded;
         for axis in Axis::ALL {
             let limit = self.rig.servo.angle_limit_rad;
@@ -241,7 +242,7 @@ impl<'a> Trial<'a> {
         (self.rig.plate.edge_distance_m(x, y) > 0.0).then_some(moment)
     }
 
-    /// Carries the ball's distance from its recorded place on to this moment.
+    /// Advances the ball's distance from the recording to this moment.
     fn part(&mut self, recorded: &Moment, moment: &Moment) {
         let (still, answered) = (RollingState::default(), self.answered(moment));
         self.healthy.advance(moment.at, recorded.command, &still);
@@ -256,19 +257,19 @@ impl<'a> Trial<'a> {
         });
     }
 
-    /// Where the ball is, or seems to be, held.
+    /// Where the ball is held, or appears to be.
     fn held(&self) -> PerAxis<Option<f64>> {
         match self.fault {
-            Fault::Stuck | Fault::Frozen => self.start.course.moments[self.start.from].position,
+            Fault::Stuck | Fault::Frozen => self.start.session.moments[self.start.from].position,
             _ => PerAxis::default(),
         }
     }
 
-    /// What a controller adds to the command to bring the ball back, rad.
+    /// The command that a controller adds to bring the ball back, rad.
     fn control(&self, axis: Axis) -> f64 {
         let (position_m, velocity_m_s) = self.beside[axis];
         let wanted = CONTROL_RAD_S * CONTROL_RAD_S * position_m
-            + 2.0 * DAMPING * CONTROL_RAD_S * velocity_m_s;
+            + 2.0 * CONTROL_DAMPING * CONTROL_RAD_S * velocity_m_s;
         -wanted / (axis.drive_sign() * self.rig.ball.rolling_gravity())
     }
 
@@ -283,25 +284,21 @@ impl<'a> Trial<'a> {
         commands
     }
 
-    /// What the sensor reads at moment `i`.
+    /// The sensor's readings at moment `i`.
     fn read(&self, i: usize) -> PerAxis<Option<f64>> {
-        let course = self.start.course;
-        let (recorded, held) = (course.moments[i].position, self.held());
+        let session = self.start.session;
+        let (recorded, held) = (session.moments[i].position, self.held());
         PerAxis::from_fn(|axis| match self.fault {
             Fault::Loss(..) | Fault::Slip(..) => recorded[axis].map(|p| p + self.beside[axis].0),
-            Fault::Stuck => held[axis].map(|p| p + course.noise(axis, i)),
+            Fault::Stuck => held[axis].map(|p| p + session.noise(axis, i)),
             Fault::Frozen => held[axis],
             Fault::Unseen => None,
         })
     }
 }
 
-/// The code that `output` confirms.
-fn confirmed(output: &Output) -> Option<FaultCode> {
-    match output {
-        Output::Transition(t) if t.status == FaultStatus::Confirmed => Some(t.code),
-        _ => None,
-    }
+fn confirms(transition: &Transition) -> bool {
+    transition.status == FaultStatus::Confirmed
 }
 
 #[cfg(test)]
@@ -313,7 +310,7 @@ mod tests {
     fn foreseen() -> Prospects {
         let mut rig = Rig::chapter("a");
         let sessions = [session(60.0, 0.03, 1.0)];
-        rig.calibration = Some(calibrate(&rig, &sessions, "", "").unwrap());
+        rig.calibration = Some(calibrate(&rig, &sessions).unwrap());
         prospects(&rig, &sessions).unwrap()
     }
 
@@ -335,7 +332,7 @@ mod tests {
         let mut rig = Rig::chapter("a");
         let session = session(60.0, 0.03, 1.0);
         assert_eq!(prospects(&rig, core::slice::from_ref(&session)), None);
-        rig.calibration = Some(calibrate(&rig, core::slice::from_ref(&session), "", "").unwrap());
+        rig.calibration = Some(calibrate(&rig, core::slice::from_ref(&session)).unwrap());
         assert_eq!(prospects(&rig, &[session[..1400].to_vec()]), None);
     }
 }

@@ -1,6 +1,5 @@
-//! A healthy session, made ready to be learnt from: in the plate frame, in
-//! order, without readings at the edge and outliers, cut into stretches of
-//! motion.
+//! Prepares a healthy session for learning: in the plate frame, in order of time, without
+//! outliers and readings at the edge, cut into stretches of motion.
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
@@ -13,22 +12,24 @@ use crate::engine::Rig;
 use crate::engine::edge::Edge;
 use crate::engine::frame::{Moment, Repeats, moment};
 use crate::maths::median;
-use crate::plant::{LONGEST_SPAN_S, RollingState, Twin, TwinModel, resisting};
+use crate::plant::{LONGEST_SPAN_S, RollingState, Twin, TwinModel, resistance_share};
 use crate::vocabulary::{Axis, PerAxis, Sample, SimTime};
 
-/// Samples that a window must hold; it grows where that takes longer.
+/// Least samples in a window, which is extended if necessary. Chosen.
 const WINDOW_SAMPLES: usize = 10;
-/// Periods without a reading that end a window.
+/// Sample periods without a reading that end a window. Chosen.
 const MISSING_PERIODS: f64 = 2.5;
-/// Periods from which on a sensor is slower than its log.
+/// Ratio of the time between different readings to the sample period from which on a
+/// sensor is slower than its log. Chosen.
 const SLOWER: f64 = 1.4;
-/// A window counts as motion when the readings of each third span this, m: a
-/// ball that sticks for part of it answers no gain.
+/// Span of the readings in each third of a window that counts as motion, m: a ball that
+/// sticks for part of it tells no gain. Chosen.
 pub(in crate::engine) const MOVING_M: f64 = 0.002;
-/// Time over which a velocity is the slope of the path, s.
+/// Time over which a velocity is measured as the slope of the path, s. Chosen.
 const SLOPE_S: f64 = 0.16;
-/// Noise assumed by the outlier gate before anything is known, m.
-const ASSUMED_NOISE_M: f64 = 2e-3;
+/// Noise assumed by the outlier gate before the rig is learnt, m: that of a coarse
+/// camera.
+const GATE_NOISE_M: f64 = 2e-3;
 
 /// A stretch of consecutive samples.
 pub(super) type Stretch = Range<usize>;
@@ -37,17 +38,17 @@ pub(super) type Stretch = Range<usize>;
 pub(super) struct Recording {
     pub(super) moments: Vec<Moment>,
     pub(super) gap_s: f64,
-    /// The ball's velocity at every moment, m/s.
+    /// The ball's velocity at each moment, m/s.
     velocity: Vec<Vector2<f64>>,
-    /// Path that a rolling resistance of 1 m/s² adds at every moment, m.
+    /// The path that a rolling resistance of 1 m/s² adds at each moment, m.
     pub(super) resisted: PerAxis<Vec<f64>>,
-    /// Longest time for which readings were the same to the bit, s.
+    /// Longest time for which readings were bit-identical, s.
     pub(super) longest_repeat_s: PerAxis<f64>,
-    /// Whether the ball was read at the edge, or may have met a rim since the reading
-    /// before.
+    /// Whether the ball was read at the edge, or may have met a rim since the previous
+    /// reading.
     bounced: Vec<bool>,
-    /// Time between two readings of a sensor that is logged faster than it reads,
-    /// s; zero for one that is not.
+    /// Time between two readings of a sensor that is slower than its log, s; zero
+    /// otherwise.
     pub(super) refresh_s: f64,
     /// Median time between samples, s.
     pub(super) period_s: f64,
@@ -82,8 +83,8 @@ impl Recording {
         recording
     }
 
-    /// Takes away readings that are those before, of a sensor that is logged
-    /// faster than it reads.
+    /// Removes readings that only repeat the previous one, of a sensor that is slower
+    /// than its log.
     fn drop_repeats(&mut self) {
         let mut repeats = Repeats::new(self.refresh_s);
         for m in &mut self.moments {
@@ -93,15 +94,15 @@ impl Recording {
         }
     }
 
-    /// Takes away readings at the edge and outliers: no ball rolls there.
+    /// Removes outliers and readings at the edge, where no ball rolls freely.
     fn drop_unusable(&mut self, rig: &Rig) {
         let (mut gate, mut edge) = (OutlierGate::default(), Edge::new(rig));
         self.bounced = vec![false; self.moments.len()];
         let is_read = |m: &Moment| Axis::ALL.iter().any(|&a| m.position[a].is_some());
         let read = self.moments.iter_mut().zip(&mut self.bounced).filter(|(m, _)| is_read(m));
         for (m, bounced) in read {
-            let usable = gate.take(m.at.seconds(), m.position, ASSUMED_NOISE_M).usable();
-            edge.take(m, 0.0, usable);
+            let usable = gate.take(m.at.seconds(), m.position, GATE_NOISE_M).usable();
+            edge.take(m, 0.0, !usable);
             *bounced = edge.at_edge;
             if edge.at_edge || !usable {
                 m.position = PerAxis::default();
@@ -109,8 +110,8 @@ impl Recording {
         }
     }
 
-    /// Velocities as slopes over [`SLOPE_S`], the last one where nothing is read;
-    /// zero along an axis that is not measured.
+    /// Returns velocities as slopes over [`SLOPE_S`], the previous one where nothing is
+    /// read; zero along an axis that is not measured.
     fn velocities(&self) -> Vec<Vector2<f64>> {
         let is_read = |m: &&Moment| m.position != PerAxis::default();
         let read: Vec<&Moment> = self.moments.iter().filter(is_read).collect();
@@ -144,7 +145,7 @@ impl Recording {
         let (mut position, mut speed, mut before) = (0.0, 0.0, None);
         let step = |(m, v): (&Moment, &Vector2<f64>)| {
             let dt = before.replace(m.at).map_or(0.0, |b: SimTime| m.at - b);
-            let a = -resisting(v[axis as usize]);
+            let a = -resistance_share(v[axis as usize]);
             position += dt * (speed + dt * a / 2.0);
             speed += dt * a;
             position
@@ -172,8 +173,8 @@ impl Recording {
         }
     }
 
-    /// Stretches of one window each in which `axis` is measured and the ball
-    /// moves throughout, found from the left without overlap.
+    /// Returns stretches of one window each in which `axis` is measured and the ball
+    /// moves throughout, from the start, without overlap.
     pub(super) fn stretches(&self, axis: Axis, window_s: f64) -> Vec<Stretch> {
         let mut found = Vec::new();
         let (mut start, mut last) = (0, None);
@@ -203,12 +204,12 @@ impl Recording {
         found
     }
 
-    /// Longest time without a reading within a stretch, s.
+    /// Longest time without a reading in a stretch, s.
     fn break_s(&self) -> f64 {
         MISSING_PERIODS * self.period_s.max(self.refresh_s)
     }
 
-    /// The twin's free path along `axis` at every moment.
+    /// Returns the twin's free path along `axis` at each moment.
     pub(super) fn twin_path(&self, model: &TwinModel, axis: Axis) -> Vec<f64> {
         let mut twin = Twin::new(*model);
         let mut before: Option<SimTime> = None;
@@ -230,8 +231,8 @@ impl Recording {
     }
 }
 
-/// Time between two readings that differ, s, where that is longer than from one
-/// sample to the next.
+/// Returns the time between two different readings, s, if it is longer than the sample
+/// period; zero otherwise.
 fn refresh_s(moments: &[Moment], period_s: f64) -> f64 {
     let mut last: Option<&Moment> = None;
     let mut steps = Vec::new();
@@ -246,7 +247,7 @@ fn refresh_s(moments: &[Moment], period_s: f64) -> f64 {
     median(&mut steps).filter(|&step_s| step_s > SLOWER * period_s).unwrap_or(0.0)
 }
 
-/// Longest time for which readings of `axis` were the same to the bit, s.
+/// Longest time for which readings of `axis` were bit-identical, s.
 fn longest_repeat_s(moments: &[Moment], axis: Axis, gap_s: f64) -> f64 {
     let (mut longest_s, mut repeated_s): (f64, f64) = (0.0, 0.0);
     for pair in moments.windows(2) {
@@ -262,7 +263,7 @@ fn longest_repeat_s(moments: &[Moment], axis: Axis, gap_s: f64) -> f64 {
     longest_s
 }
 
-/// From the smallest to the largest reading, m.
+/// Difference between the largest and the smallest reading, m.
 fn span_m(moments: &[Moment], axis: Axis) -> f64 {
     let readings = moments.iter().filter_map(|m| m.position[axis]);
     let (low, high) = readings.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
@@ -274,7 +275,7 @@ mod tests {
     use super::*;
 
     /// A ball that crosses a plate of 0.38 m along x at 0.5 m/s, read at 25 Hz: it is
-    /// seen before the rim and after it, and never at it.
+    /// read before and after the rim, but not at it.
     #[test]
     fn a_window_ends_where_the_ball_may_have_met_a_rim() {
         let rig = Rig::chapter("a");

@@ -1,4 +1,4 @@
-//! What is refused before anything is learnt, and that every calibration ends.
+//! Tests of refusals, and that every calibration ends.
 
 use proptest::prelude::*;
 
@@ -9,7 +9,7 @@ use crate::engine::{Engine, Input, Setup};
 use crate::plant::steps;
 
 fn refused(rig: &Rig, sessions: &[Vec<Sample>]) -> String {
-    calibrate(rig, sessions, "", "").unwrap_err().to_string()
+    calibrate(rig, sessions).unwrap_err().to_string()
 }
 
 fn changed(change: impl Fn(&mut Sample)) -> Vec<Sample> {
@@ -60,11 +60,11 @@ fn no_refusal_shows_what_is_no_number() {
     }
 }
 
-/// Steps of the twins that a calibration may take for each sample. Learning,
-/// testing and foreseeing take some 3000 of a session that fits.
-const MOST_STEPS: u64 = 30_000;
+/// Most steps of the twins that a calibration may take per sample. With prospects it
+/// takes some 3000 for a plausible session.
+const MOST_LEARNING_STEPS: u64 = 30_000;
 
-/// Clocks that go faster or slower, stand, jump and go back.
+/// Clocks that are too fast or too slow, stand still, jump and go back.
 fn clock() -> impl Strategy<Value = (f64, Vec<(usize, f64)>)> {
     let jump = (0.0..10.0_f64, any::<bool>())
         .prop_map(|(exponent, back)| if back { -1.0 } else { 1.0 } * 10_f64.powf(exponent));
@@ -72,10 +72,11 @@ fn clock() -> impl Strategy<Value = (f64, Vec<(usize, f64)>)> {
         .prop_map(|(exponent, jumps)| (10_f64.powf(exponent), jumps))
 }
 
-/// The same of an engine that judges: five seconds in steps of a sliding ball.
+/// Most steps of the twin that judging may take per sample: five seconds of a sliding
+/// ball.
 const MOST_JUDGED_STEPS: u64 = 500;
 
-/// A healthy session of 24 s at 25 Hz by such a clock.
+/// A healthy session of 24 s at 25 Hz with such a clock.
 fn by_clock(scale: f64, jumps: &[(usize, f64)]) -> Vec<Sample> {
     let mut samples: Vec<Sample> = session(24.0, 0.03, 1.0).into_iter().step_by(4).collect();
     for (i, s) in samples.iter_mut().enumerate() {
@@ -94,8 +95,8 @@ proptest! {
     ) {
         let rig = Rig { sample_rate_hz: 25.0, ..Rig::chapter("a") };
         let samples = by_clock(if is_scaled { scale } else { 1.0 }, &jumps);
-        let most = MOST_STEPS * samples.len() as u64;
-        let _ = steps::within(most, || calibrate_and_foresee(&rig, &[samples], "", ""));
+        let most = MOST_LEARNING_STEPS * samples.len() as u64;
+        let _ = steps::within(most, || calibrate_with_prospects(&rig, &[samples]));
     }
 
     #[test]
@@ -105,9 +106,11 @@ proptest! {
         let mut engine = Engine::new(Setup::new(rig, None).unwrap(), FaultMemory::default());
         let most = MOST_JUDGED_STEPS * samples.len() as u64;
         steps::within(most, || {
-            let mut outputs = Vec::new();
-            samples.iter().for_each(|s| engine.handle(Input::Sample(*s), &mut outputs));
-            engine.handle(Input::End, &mut outputs);
+            let mut transitions = Vec::new();
+            for sample in &samples {
+                engine.handle(Input::Sample(*sample), &mut transitions);
+            }
+            engine.handle(Input::End, &mut transitions);
         });
     }
 }

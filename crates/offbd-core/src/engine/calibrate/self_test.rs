@@ -1,35 +1,35 @@
-//! A healthy session judged by what was learnt: how well it is foretold, and how
-//! near each monitor came to an alarm.
+//! Judges a healthy session by what was learnt: the likelihood of its readings, and how
+//! close each monitor came to an alarm.
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use alloc::collections::VecDeque;
 
-use crate::diagnosis::{Evidence, FaultMemory};
-use crate::engine::{Engine, Input, Output, Setup};
+use crate::diagnosis::{Evidence, FaultMemory, Transition};
+use crate::engine::{Engine, Input, Setup};
 use crate::vocabulary::{Axis, FaultCode, FaultKind, FaultStatus, PerAxis, Sample};
 
-/// Time for which scatter must last to count, s.
+/// Time for which scatter must persist to count, s. Chosen.
 const LASTING_S: f64 = 0.2;
 
-/// How one session was judged.
+/// The result of one session.
 pub(super) struct SelfTest {
-    /// Number of the session among those that were learnt from, from 1 on.
+    /// Number of the session among those given, from 1 on.
     pub(super) session: usize,
-    /// The first fault that was confirmed.
+    /// The first confirmed fault.
     pub(super) alarm: Option<Accusation>,
-    /// Most evidence against each servo, nats, and when that was, s.
+    /// Largest evidence against each servo, nats, and its time, s.
     pub(super) most_nats: PerAxis<(f64, f64)>,
-    /// The most that the path of each axis bent from the twin's, m.
+    /// Largest deviation of the path of each axis from the twin's, m.
     pub(super) most_path_error_m: PerAxis<f64>,
     pub(super) most_outliers: f64,
-    /// Most scatter that lasted, m.
+    /// Largest scatter that persisted, m.
     pub(super) most_scatter_m: f64,
-    /// The nearest that each monitor came to an alarm by the time of its failures,
-    /// 0 to 1, and the seconds that it could judge.
+    /// The closest approach of each monitor to an alarm by duration of failure, 0 to 1,
+    /// and the time for which it could judge, s.
     pub(super) nearest: [(f64, f64); FaultCode::COUNT],
-    /// How well the readings of each axis were foretold, nats.
-    pub(super) foretold_nats: PerAxis<f64>,
+    /// Log-likelihood of the readings of each axis, nats.
+    pub(super) log_likelihood_nats: PerAxis<f64>,
 }
 
 /// A fault that a healthy session was accused of.
@@ -42,13 +42,13 @@ pub(super) struct Accusation {
     pub(super) unseen_s: f64,
 }
 
-/// Judges `samples`, the session with that number, by `setup`.
+/// Judges `samples`, session number `session`, with `setup`.
 pub(super) fn judge(setup: &Setup, session: usize, samples: &[Sample]) -> SelfTest {
     let mut engine = Engine::new(setup.clone(), FaultMemory::default());
-    let (mut outputs, mut alarm, mut most_outliers) = (Vec::new(), None, 0.0_f64);
-    let (mut scatter, mut nats) = (Lasting::default(), PerAxis::<(f64, f64)>::default());
+    let (mut transitions, mut alarm, mut most_outliers) = (Vec::new(), None, 0.0_f64);
+    let (mut scatter, mut nats) = (SustainedMaximum::default(), PerAxis::<(f64, f64)>::default());
     for &sample in samples {
-        engine.handle(Input::Sample(sample), &mut outputs);
+        engine.handle(Input::Sample(sample), &mut transitions);
         let seen = engine.evidence();
         most_outliers = most_outliers.max(f64::from(seen.outliers));
         scatter.take(sample.t_s, seen.scatter_m.unwrap_or(0.0));
@@ -58,8 +58,8 @@ pub(super) fn judge(setup: &Setup, session: usize, samples: &[Sample]) -> SelfTe
                 nats[axis] = (reached[axis], sample.t_s);
             }
         }
-        alarm = alarm.or_else(|| outputs.iter().find_map(confirmed));
-        outputs.clear();
+        alarm = alarm.or_else(|| transitions.iter().find_map(confirmed));
+        transitions.clear();
     }
     SelfTest {
         session,
@@ -69,28 +69,27 @@ pub(super) fn judge(setup: &Setup, session: usize, samples: &[Sample]) -> SelfTe
         most_outliers,
         most_scatter_m: scatter.most,
         nearest: engine.nearest(),
-        foretold_nats: engine.foretold_nats(),
+        log_likelihood_nats: engine.log_likelihood_nats(),
     }
 }
 
-fn confirmed(output: &Output) -> Option<Accusation> {
-    let Output::Transition(t) = output else { return None };
+fn confirmed(t: &Transition) -> Option<Accusation> {
     let Evidence { still_s, unseen_s, .. } = t.evidence;
     let (at_s, code, kind) = (t.at.seconds(), t.code, t.suspicion.kind);
     let alarm = Accusation { at_s, code, kind, still_s, unseen_s };
     (t.status == FaultStatus::Confirmed).then_some(alarm)
 }
 
-/// The most that a quantity has stayed above for [`LASTING_S`].
+/// The largest value that a quantity has exceeded for [`LASTING_S`].
 #[derive(Default)]
-struct Lasting {
-    /// The values that no later one has undercut, and when each was last seen, s.
+struct SustainedMaximum {
+    /// The values that no later one has undercut, with their times, s.
     low: VecDeque<(f64, f64)>,
     since_s: Option<f64>,
     most: f64,
 }
 
-impl Lasting {
+impl SustainedMaximum {
     fn take(&mut self, t_s: f64, value: f64) {
         while self.low.back().is_some_and(|&(_, v)| v >= value) {
             self.low.pop_back();
@@ -111,7 +110,7 @@ mod tests {
 
     #[test]
     fn only_what_lasts_counts() {
-        let mut lasting = Lasting::default();
+        let mut lasting = SustainedMaximum::default();
         for i in 0..200 {
             // A peak of 0.1 s, a plateau of 0.3 s.
             let value = match i {

@@ -1,20 +1,20 @@
-//! How a healthy rig scatters about its calibrated twin: noise, residual, and
-//! the tilt that a ball at rest withstands.
+//! The scatter of a healthy rig about its calibrated twin: noise, residual, and the tilt
+//! that a ball at rest withstands.
 
 use super::fit::Fitter;
 use super::recording::Recording;
 use super::sessions::Estimate;
 use crate::diagnosis::Settings;
-use crate::engine::pipeline::{FULL_WINDOW, LEAST_SAMPLES};
+use crate::engine::pipeline::{FULL_WINDOW_SHARE, LEAST_SAMPLES};
 use crate::maths::{SlidingQuadratic, median, quantile, robust_deviation};
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use crate::vocabulary::Axis;
 
-/// A ball whose readings span less than this over a while is at rest, m.
+/// Span of the readings below which a ball counts as at rest, m. Chosen.
 const REST_SPAN_M: f64 = 0.003;
 
-/// How a healthy rig scatters about the twin.
+/// The scatter of a healthy rig about the twin.
 pub(super) struct Healthy {
     pub(super) noise_m: f64,
     pub(super) residual_m_s2: f64,
@@ -24,11 +24,11 @@ pub(super) struct Healthy {
     pub(super) rest_s: f64,
 }
 
-/// Rest after which the plate's tilt counts as withstood, s.
+/// Time of rest after which the plate's tilt counts as withstood, s. Chosen.
 const REST_S: f64 = 0.5;
-/// Share of the withstood tilts that the breakaway angle covers.
+/// Quantile of the withstood tilts that is the breakaway angle. Chosen.
 const REST_SHARE: f64 = 0.95;
-/// Share of the accelerations that count as familiar.
+/// Quantile of the accelerations up to which they are familiar. Chosen.
 const FAMILIAR_SHARE: f64 = 0.95;
 
 pub(super) fn healthy_spread(
@@ -55,17 +55,17 @@ pub(super) fn healthy_spread(
             }
             let Some(position) = m.position[axis] else { continue };
             filter.push(m.at.seconds(), position, z, window_s);
-            let Some(fit) = filter.fit().filter(|f| f.span_s > FULL_WINDOW * window_s) else {
+            let Some(fit) = filter.fit().filter(|f| f.span_s > FULL_WINDOW_SHARE * window_s) else {
                 continue;
             };
-            // A ball at rest answers nothing, and its readings err least.
+            // A ball at rest does not respond, and its readings have the least errors.
             if fit.measured.velocity.abs() * window_s > REST_SPAN_M {
                 scatters.push(fit.scatter);
                 residuals.push(fit.deviation.acceleration);
                 driven.push((fit.measured.acceleration - fit.deviation.acceleration).abs());
             }
         }
-        let rest = Rest::of(recording, axis, Some(level), dead + lag);
+        let rest = RestStatistics::of(recording, axis, Some(level), dead + lag);
         withstood.extend(rest.tilts);
         rest_s = rest.longest_s.max(rest_s);
         longest_repeat_s = longest_repeat_s.max(recording.longest_repeat_s[axis]);
@@ -80,35 +80,38 @@ pub(super) fn healthy_spread(
     }
 }
 
-/// Standard deviation of the tilt under which a ball rests, rad, before the rig's
-/// own is known, and how long one rest counts once, s.
+/// Standard deviation of the tilt of a plate on which a ball rests, rad, before that of
+/// the rig is known. Chosen.
 const RESTING_TILT_RAD: f64 = 0.01;
+/// Duration of rest that counts as one independent estimate, s. Chosen.
 const REST_COUNTS_S: f64 = 2.0;
+/// Least number of estimates that the error of a level is based on. Chosen.
+const LEAST_RESTS: f64 = 0.25;
 
-/// The level by which the ball of `recording` has rested, if it has: that which
-/// balances the commands.
+/// Returns the level that balances the commands while the ball of `recording` rests, if
+/// it has rested.
 pub(super) fn level_at_rest(recording: &Recording, axis: Axis, delay_s: f64) -> Option<Estimate> {
-    let mut rest = Rest::of(recording, axis, None, delay_s);
+    let mut rest = RestStatistics::of(recording, axis, None, delay_s);
     let n = rest.seconds / REST_COUNTS_S;
     let command = median(&mut rest.commands).filter(|_| n > 0.0)?;
-    Some(Estimate { value: -command, error: RESTING_TILT_RAD / n.max(0.25).sqrt() })
+    Some(Estimate { value: -command, error: RESTING_TILT_RAD / n.max(LEAST_RESTS).sqrt() })
 }
 
-/// A ball at rest: for how long, and the tilts, rad, that it has withstood.
+/// A ball at rest: duration, commands, and the tilts, rad, that it has withstood.
 #[derive(Default)]
-struct Rest {
-    /// Commands of a delay ago, rad.
+struct RestStatistics {
+    /// The commands one delay earlier, rad.
     commands: Vec<f64>,
     tilts: Vec<f64>,
     seconds: f64,
-    /// In one piece.
+    /// The longest single rest, s.
     longest_s: f64,
 }
 
-impl Rest {
-    /// The tilt is the command of a delay ago plus the level, while the readings
-    /// stay within [`REST_SPAN_M`]; one beyond [`MOST_BREAKAWAY_RAD`] is held by
-    /// something else.
+impl RestStatistics {
+    /// Collects the rests in a recording, in which the readings stay within
+    /// [`REST_SPAN_M`]. The tilt is the command one delay earlier plus the level; beyond
+    /// [`MOST_BREAKAWAY_RAD`] something else holds the ball.
     fn of(recording: &Recording, axis: Axis, level: Option<f64>, delay_s: f64) -> Self {
         let moments = &recording.moments;
         let mut rest = Self::default();
@@ -139,6 +142,6 @@ impl Rest {
     }
 }
 
-/// Tilt that no ball withstands by itself, rad: light balls under servos in
-/// whole degrees have been seen to stand at nearly 3°.
+/// Largest tilt that a ball withstands by itself, rad: light balls with servos that move
+/// in whole degrees have been seen to stand at nearly 3°.
 pub(super) const MOST_BREAKAWAY_RAD: f64 = 0.055;

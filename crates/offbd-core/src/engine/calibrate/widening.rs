@@ -1,30 +1,29 @@
-//! By how much a rig varies more than its recordings taught: factors on what was
-//! learnt, widened step by step until a healthy session is quiet.
+//! Factors on the learnt parameters, widened step by step until a healthy session gives
+//! no alarm: the rig varies more than its recordings showed.
 
 use super::self_test::{Accusation, SelfTest};
 use super::spread::MOST_BREAKAWAY_RAD;
 use crate::diagnosis::{AxisCalibration, Calibration};
 use crate::vocabulary::{Axis, FaultCode, FaultKind, PerAxis};
 
-/// By how much at a time.
-const STEP: f64 = 1.25;
-/// Most evidence against a healthy servo, nats: what confirms a fault is kept
-/// within what a monitor can gather.
+/// Factor of one step. Chosen.
+const WIDENING_STEP: f64 = 1.25;
+/// Largest evidence against a healthy servo, nats. Chosen: what confirms a fault stays
+/// within what a monitor can accumulate.
 const MOST_HEALTHY_NATS: f64 = 22.0;
-/// What the twin may leave out at most, m/s²: beyond it nothing is found.
+/// Largest model error, m/s². Chosen: beyond it nothing is found.
 const MOST_ERROR_M_S2: f64 = 0.4;
-/// Most standard deviation of the readings, m: twice that of the worst
-/// ultrasonic sensor seen.
+/// Largest standard deviation of the readings, m: twice that of the worst ultrasonic
+/// sensor seen.
 const MOST_NOISE_M: f64 = 0.03;
-/// Least tilt that a ball withstands once it has withstood more than was learnt,
-/// rad.
+/// Least breakaway that is widened, rad. Chosen.
 const LEAST_BREAKAWAY_RAD: f64 = 0.008;
-/// Least repeat that is widened, s.
-const LEAST_REPEAT_S: f64 = 0.1;
-/// Scatter that lasts without being noise, in deviations of a reading: just
-/// below what the evaluator takes for noise.
+/// Least repeat that is widened, s. Chosen.
+const LEAST_WIDENED_REPEAT_S: f64 = 0.1;
+/// Persistent scatter that is not noise, in standard deviations of a reading. Chosen: one
+/// step of widening below what the evaluator takes for noise.
 const LASTING_DEVIATIONS: f64 = 2.8;
-/// Stillness below which a ball that was called stuck was held back, s.
+/// Time of stillness below which a ball called stuck was only held back, s. Chosen.
 const STOOD_S: f64 = 0.2;
 
 /// The factors of one axis.
@@ -50,7 +49,7 @@ impl AxisWidening {
             false => learnt.breakaway_rad,
         };
         let longest_repeat_s = match self.repeat > 1.0 {
-            true => self.repeat * learnt.longest_repeat_s.max(LEAST_REPEAT_S),
+            true => self.repeat * learnt.longest_repeat_s.max(LEAST_WIDENED_REPEAT_S),
             false => learnt.longest_repeat_s,
         };
         AxisCalibration {
@@ -64,18 +63,18 @@ impl AxisWidening {
     }
 }
 
-/// The factors of a rig, and what is added to the sensor's limits.
+/// The factors of a rig, and additions to the sensor's limits.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Widening {
     axes: PerAxis<AxisWidening>,
     outliers: f64,
     unseen_s: f64,
-    /// A factor on the scatter that lasts; zero where that was not widened.
+    /// Factor on the persistent scatter; zero until widened.
     scatter: f64,
 }
 
 impl Widening {
-    /// `learnt`, as wide as this.
+    /// Returns `learnt` widened by these factors.
     pub(super) fn of(&self, learnt: &Calibration) -> Calibration {
         let mut wide = learnt.clone();
         for axis in Axis::ALL {
@@ -90,12 +89,12 @@ impl Widening {
         wide
     }
 
-    /// Widens what `test` asks for. Returns whether it asked for anything.
+    /// Widens what `test` requires. Returns whether it required anything.
     pub(super) fn widen(&mut self, test: &SelfTest) -> bool {
         let mut asked = false;
         for axis in Axis::ALL {
             if test.most_nats[axis].0 > MOST_HEALTHY_NATS {
-                self.axes[axis].model_error *= STEP;
+                self.axes[axis].model_error *= WIDENING_STEP;
                 asked = true;
             }
         }
@@ -110,23 +109,25 @@ impl Widening {
         let mut each =
             |f: fn(&mut AxisWidening)| Axis::ALL.into_iter().for_each(|a| f(&mut axes[a]));
         match (alarm.code, alarm.kind) {
-            (FaultCode::XServo, _) => axes.x.residual *= STEP,
-            (FaultCode::YServo, _) => axes.y.residual *= STEP,
-            (FaultCode::StuckBall, _) if alarm.still_s < STOOD_S => each(|a| a.model_error *= STEP),
-            (FaultCode::StuckBall, _) => each(|a| a.breakaway *= STEP),
-            (FaultCode::Sensor, Some(FaultKind::Frozen)) => each(|a| a.repeat *= STEP),
+            (FaultCode::XServo, _) => axes.x.residual *= WIDENING_STEP,
+            (FaultCode::YServo, _) => axes.y.residual *= WIDENING_STEP,
+            (FaultCode::StuckBall, _) if alarm.still_s < STOOD_S => {
+                each(|a| a.model_error *= WIDENING_STEP)
+            }
+            (FaultCode::StuckBall, _) => each(|a| a.breakaway *= WIDENING_STEP),
+            (FaultCode::Sensor, Some(FaultKind::Frozen)) => each(|a| a.repeat *= WIDENING_STEP),
             (FaultCode::Sensor, Some(FaultKind::Spikes)) => self.outliers += 1.0,
             (FaultCode::Sensor, Some(FaultKind::Dropout)) => {
-                self.unseen_s = STEP * self.unseen_s.max(alarm.unseen_s);
+                self.unseen_s = WIDENING_STEP * self.unseen_s.max(alarm.unseen_s);
             }
             (FaultCode::Sensor, Some(FaultKind::Noise)) => {
-                self.scatter = STEP * self.scatter.max(1.0);
+                self.scatter = WIDENING_STEP * self.scatter.max(1.0);
             }
-            (FaultCode::Sensor, _) => each(|a| a.noise *= STEP),
+            (FaultCode::Sensor, _) => each(|a| a.noise *= WIDENING_STEP),
         }
     }
 
-    /// Whether a rig as wide as that would be judged by nothing.
+    /// Whether a rig that is widened so far cannot be diagnosed.
     pub(super) fn is_beyond(&self, learnt: &Calibration) -> bool {
         let wide = self.of(learnt);
         let beyond = |a: &AxisCalibration| {

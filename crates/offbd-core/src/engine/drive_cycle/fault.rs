@@ -1,10 +1,10 @@
-//! The faults that a drive cycle is tried with.
+//! The faults that a drive cycle is tested with.
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use crate::vocabulary::{Axis, FaultCode, FaultKind, PerAxis};
 
-/// A fault that is there from the start of the cycle.
+/// A fault that is present from the start of the cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TriedFault {
     /// A servo answers half of its command.
@@ -13,23 +13,23 @@ pub enum TriedFault {
     Dead(Axis),
     /// The ball is stuck to the plate.
     Stuck,
-    /// The readings are all the same to the bit.
+    /// The readings are bit-identical.
     Frozen,
     /// No ball is seen.
     Unseen,
-    /// The readings scatter `NOISE` times as far as healthy ones.
+    /// The readings scatter `TRIED_NOISE_FACTOR` times as far as healthy ones.
     Noise,
     /// One reading in five is anywhere on the plate.
     Spikes,
 }
 
-/// Times the healthy scatter of the readings that a noisy sensor has.
-pub(super) const NOISE: f64 = 12.0;
-/// Share of a spiky sensor's readings that are anywhere on the plate.
-pub(super) const SPIKES: f64 = 0.2;
+/// Ratio of a noisy sensor's scatter to the healthy one. Chosen.
+pub(super) const TRIED_NOISE_FACTOR: f64 = 12.0;
+/// Fraction of a spiky sensor's readings that are anywhere on the plate. Chosen.
+pub(super) const SPIKE_SHARE: f64 = 0.2;
 
 impl TriedFault {
-    /// All that a rig with these axes can have, those hardest to find first.
+    /// Returns all faults that a rig with these axes can have, the hardest to find first.
     pub fn of(axes: PerAxis<bool>) -> Vec<Self> {
         let has = |axis: &Axis| axes[*axis];
         let servos = |fault: fn(Axis) -> Self| Axis::ALL.into_iter().filter(has).map(fault);
@@ -37,7 +37,7 @@ impl TriedFault {
         servos(Self::HalfGain).chain(servos(Self::Dead)).chain(others).collect()
     }
 
-    /// The code that it should be found by.
+    /// The code that should report it.
     #[must_use]
     pub const fn code(self) -> FaultCode {
         match self {
@@ -47,7 +47,7 @@ impl TriedFault {
         }
     }
 
-    /// In which way it is wrong; none for the ball, of which there is but one.
+    /// The kind that should be reported; `None` for the ball, which has only one.
     #[must_use]
     pub const fn kind(self) -> Option<FaultKind> {
         match self {
@@ -61,7 +61,7 @@ impl TriedFault {
         }
     }
 
-    /// In plain words.
+    /// A description for people.
     #[must_use]
     pub const fn words(self) -> &'static str {
         match self {

@@ -1,43 +1,42 @@
-//! The control by which a drive cycle is run.
+//! The control law that runs a drive cycle.
 //!
-//! Commands alone would let the ball run off: a plate half a degree off level
-//! moves it a quarter of a metre in three seconds. So each command is what the
-//! cycle says beforehand and a correction by how far the ball is from its set
-//! point: in proportion, by its sum over time, which finds the session's level, and by
-//! its filtered rate. Reads no clock.
+//! Commands alone would let the ball run off: a plate half a degree off level moves it a
+//! quarter of a metre in three seconds. So each command is the feedforward of the cycle
+//! plus a PID correction of the ball's distance from its set point; the integral finds
+//! the session's level. Reads no clock.
 
 use super::{DriveCycle, Feedback};
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use crate::vocabulary::{PerAxis, Sample};
 
-/// How long a correction stands while no ball is seen, s; a lone missing reading
-/// must not make the plate twitch.
+/// Time for which a correction is held while no ball is seen, s: a single missing reading
+/// must not make the plate twitch. Chosen.
 const BLIND_S: f64 = 0.3;
-/// Share of the limit that the sum over time may ask for.
-const SUMMED: f64 = 0.5;
+/// Limit of the integral part as a fraction of the command's limit. Chosen.
+const INTEGRAL_LIMIT_SHARE: f64 = 0.5;
 
-/// What one axis remembers.
+/// The controller's state for one axis.
 #[derive(Clone, Copy, Debug, Default)]
-struct Memory {
+struct AxisControl {
     error: Option<f64>,
     rate: f64,
-    /// Command that the sum over time has come to.
+    /// The integral part of the command.
     summed: f64,
     correction: f64,
     unseen_s: f64,
 }
 
-/// A drive cycle being run; in the numbers of the device.
+/// The controller of a running drive cycle, in the numbers of the device.
 #[derive(Clone, Debug, Default)]
 pub struct DriveLaw {
-    memory: PerAxis<Memory>,
+    memory: PerAxis<AxisControl>,
     last_s: Option<f64>,
 }
 
 impl DriveLaw {
-    /// The commands for the reading of `t_s` seconds after the start, in `sample`;
-    /// its commands are not looked at. Times must not go back.
+    /// Returns the commands that follow from the reading in `sample`, taken `t_s` seconds
+    /// after the start; its commands are ignored. Times must not decrease.
     pub fn command(&mut self, cycle: &DriveCycle, sample: &Sample) -> PerAxis<Option<f64>> {
         let dt = self.last_s.replace(sample.t_s).map_or(0.0, |last_s| sample.t_s - last_s);
         let Some(row) = cycle.row(sample.t_s) else { return PerAxis::default() };
@@ -53,7 +52,7 @@ impl DriveLaw {
     }
 }
 
-impl Memory {
+impl AxisControl {
     fn correct(
         &mut self,
         error: Option<f64>,
@@ -64,7 +63,7 @@ impl Memory {
         let Some(error) = error else { return self.blind(dt) };
         let change = self.error.filter(|_| dt > 0.0).map_or(0.0, |last| (error - last) / dt);
         self.rate += (change - self.rate) * dt / (cycle.filter_s + dt);
-        let most = SUMMED * cycle.limit;
+        let most = INTEGRAL_LIMIT_SHARE * cycle.limit;
         self.summed = (self.summed + gains.integral * error * dt).clamp(-most, most);
         self.error = Some(error);
         self.unseen_s = 0.0;
@@ -81,8 +80,8 @@ impl Memory {
 }
 
 impl DriveCycle {
-    /// The row in force at `t_s` seconds after the start: the nearest one, the
-    /// last one after the end.
+    /// Returns the row at `t_s` seconds after the start: the nearest one, the last one
+    /// after the end.
     #[must_use]
     pub fn row(&self, t_s: f64) -> Option<&Sample> {
         // Negative and huge times saturate.
@@ -121,7 +120,7 @@ mod tests {
     fn a_missing_reading_keeps_the_correction_and_long_darkness_drops_it() {
         let gains =
             Feedback { reading: Axis::X, proportional: 2.0, integral: 0.0, derivative: 0.0 };
-        let mut memory = Memory::default();
+        let mut memory = AxisControl::default();
         let cycle = DriveCycle { limit: 10.0, ..empty() };
         let mut correct = |error| memory.correct(error, 0.125, &gains, &cycle);
         assert_eq!(correct(Some(0.5)), 1.0);
@@ -133,7 +132,7 @@ mod tests {
     fn the_sum_over_time_finds_a_level_up_to_half_of_the_limit() {
         let gains =
             Feedback { reading: Axis::X, proportional: 0.0, integral: 1.0, derivative: 0.0 };
-        let mut memory = Memory::default();
+        let mut memory = AxisControl::default();
         let cycle = DriveCycle { limit: 0.5, ..empty() };
         let mut correct = || memory.correct(Some(0.25), 0.5, &gains, &cycle);
         assert_eq!([0; 4].map(|_| correct()), [0.125, 0.25, 0.25, 0.25]);

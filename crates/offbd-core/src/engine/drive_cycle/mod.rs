@@ -1,13 +1,13 @@
-//! The drive cycle of a rig: the shortest motion in which every monitor comes to a
-//! result and every fault that can be found is found.
+//! The drive cycle of a rig: the shortest motion in which every monitor has a result and
+//! every detectable fault is found.
 //!
 //! Vehicles have drive cycles for readiness. Here the motion is chosen from a small
-//! family ([`motion`]) by trying its members, the shortest first, on the learnt rig
-//! itself ([`trial`]): healthy, in sessions as different as were learnt, no test may
-//! fail and the ball may not come to the edge; then with every fault that is there
-//! from the start ([`fault`]). The member in which the most monitors pass and the
-//! most faults are found is taken, of equally good ones the shortest. What none
-//! reaches is named. Nothing of it is chance, and the work has a bound.
+//! family ([`motion`]) by simulating its members on the learnt rig ([`trial`]), the
+//! shortest first. On the healthy rig, in sessions that differ as much as was learnt, no
+//! test may fail and the ball may not reach the edge. Then each fault is present from the
+//! start ([`fault`]). The member in which most monitors pass and most faults are found is
+//! taken, the shortest of equally good ones. What no member achieves is reported. The
+//! search is deterministic and bounded.
 
 mod fault;
 mod law;
@@ -28,20 +28,20 @@ use search::{Best, Search};
 use super::Rig;
 use crate::vocabulary::{Axis, FaultCode, Invalid, PerAxis, Sample};
 
-/// How a correction follows from one reading, in the numbers of the device.
+/// The gains of the correction of one command, in the numbers of the device.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Feedback {
-    /// Which of the device's readings: the plate's axes may be swapped.
+    /// Which of the device's readings is used: the axes may be swapped.
     pub reading: Axis,
     /// Command per distance from the set point (set point − reading); signed.
     pub proportional: f64,
-    /// Command per distance and second; signed.
+    /// Command per integral of that distance over time, 1/s; signed.
     pub integral: f64,
-    /// Command per rate of that distance, s; signed.
+    /// Command per rate of change of that distance, s; signed.
     pub derivative: f64,
 }
 
-/// Why a monitor comes to no result on the healthy rig.
+/// Why a monitor has no result on the healthy rig.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NotReached {
     /// The rig has no such servo, or no readings along its axis.
@@ -58,47 +58,47 @@ pub struct MonitorVerdict {
     pub passed: Result<f64, NotReached>,
 }
 
-/// How a fault that is there from the start is found.
+/// Whether and when a fault that is present from the start is found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FaultVerdict {
     pub fault: TriedFault,
-    /// When it is confirmed, s after the start, in the slowest trial; none where
-    /// not every trial did.
+    /// Time of confirmation in the slowest trial, s after the start; `None` unless every
+    /// trial confirmed it.
     pub after_s: Option<f64>,
-    /// A cause that reads alike and is named beside it.
+    /// A rival cause that is named as well.
     pub beside: Option<FaultCode>,
 }
 
-/// A drive cycle, in the numbers of the device: its axes, signs and units.
+/// A drive cycle in the numbers of the device: its axes, signs and units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DriveCycle {
     pub duration_s: f64,
     /// Duration of one motion to both sides and back, s.
     pub period_s: f64,
-    /// Such motions along each axis.
+    /// Number of such motions along each axis.
     pub repeats: u32,
     pub order: Order,
-    /// Largest distance of the set points from the plate's middle, m, per plate
-    /// axis; zero along one that the rig has not.
+    /// Largest distance of the set points from the plate's middle, m, per plate axis;
+    /// zero along an axis that the rig lacks.
     pub amplitude_m: PerAxis<f64>,
-    /// Largest tilt that is commanded beforehand, rad, per plate axis.
+    /// Largest feedforward tilt, rad, per plate axis.
     pub tilt_rad: PerAxis<f64>,
-    /// How far a session's level may be from the learnt one, rad, per plate axis: so
-    /// far it was tried.
+    /// Largest difference of a session's level from the learnt one that was tried, rad,
+    /// per plate axis.
     pub level_within_rad: PerAxis<f64>,
-    /// Rows a second.
+    /// Rows per second.
     pub rate_hz: f64,
     /// Commands and set points over time, evenly spaced from zero to the end.
     pub rows: Vec<Sample>,
-    /// How to correct each command; none for an axis without a servo.
+    /// The gains of each correction; `None` for an axis without a servo.
     pub feedback: PerAxis<Option<Feedback>>,
-    /// Time constant of the filter of the correction's rate, s.
+    /// Time constant of the filter of the derivative part, s.
     pub filter_s: f64,
-    /// Largest command, either way.
+    /// Largest command in either direction.
     pub limit: f64,
     /// One per code, in the order of [`FaultCode::ALL`].
     pub monitors: Vec<MonitorVerdict>,
-    /// Those hardest to find first.
+    /// The faults, the hardest to find first.
     pub faults: Vec<FaultVerdict>,
 }
 
@@ -118,13 +118,13 @@ pub enum NoDriveCycle {
     )]
     NoRoom { axis: Axis, room_m: f64 },
     #[error(
-        "/servo/angle_limit_rad: within it and within the plate no motion moves the ball enough to \
-         overcome its friction"
+        "/servo/angle_limit_rad: no motion within this limit and the plate tilts enough to overcome \
+         the friction of the ball"
     )]
     TooLittleTilt,
     #[error(
-        "of the motions that plate and servos allow none keeps a healthy ball clear of the edge and \
-         every test of it from failing"
+        "no motion within the limits of plate and servos keeps a healthy ball clear of the edge \
+         without a failed test"
     )]
     NotSafe,
 }
@@ -142,7 +142,7 @@ impl DriveCycle {
     }
 }
 
-/// The drive cycle of `rig`.
+/// Returns the drive cycle of `rig`.
 ///
 /// # Errors
 /// [`NoDriveCycle`], which says what to change.

@@ -1,9 +1,9 @@
 //! The family of motions from which a drive cycle is chosen.
 //!
-//! One idea: a *doublet* that leads the ball from the middle to one side, to the
-//! other, and back to the middle, where it ends as it began: at rest, and not
-//! accelerated. It is p(τ) = C·A·sin²(πτ)·sin(2πτ) for τ from 0 to 1. Repeated,
-//! along one axis after the other or along both at once, it makes the family.
+//! Its element is a *doublet* that moves the ball from the middle to one side, to the
+//! other, and back to the middle. It starts and ends at rest, without acceleration: p(τ)
+//! = C·A·sin²(πτ)·sin(2πτ) for τ from 0 to 1. Doublets are repeated, along one axis after
+//! the other or along both at once.
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
@@ -11,37 +11,37 @@ use core::f64::consts::{FRAC_1_SQRT_2, TAU};
 
 use crate::vocabulary::{Axis, PerAxis};
 
-/// How the axes share the time.
+/// The timing of both axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
-    /// Both at once: a ball that stands is stuck then, whatever the servos do.
+    /// Both at once: a ball that stands is then stuck, whatever the servos do.
     AtOnce,
-    /// Both, y a quarter of a period after x.
+    /// Both, with y a quarter of a period after x.
     Staggered,
     /// First x, then y.
     InTurn,
 }
 
-/// One member of the family: where the ball is asked to be, and to accelerate.
+/// One member of the family: position and acceleration over time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Motion {
+pub(super) struct DriveMotion {
     pub order: Order,
     /// Duration of one doublet, s.
     pub period_s: f64,
-    /// Doublets along each axis.
+    /// Number of doublets along each axis.
     pub repeats: u32,
-    /// Largest distance from the middle, m; zero along an axis that the rig has not.
+    /// Largest distance from the middle, m; zero along an axis that the rig lacks.
     pub amplitude_m: PerAxis<f64>,
 }
 
-/// Durations of a doublet, s: faster, and a servo's lag hides its gain; slower,
-/// and the ball needs more room than a plate has for less tilt than a level's error.
+/// Durations of a doublet, s. Chosen: in faster ones a servo's lag hides its gain; slower
+/// ones need more room than a plate has, or less tilt than the level's error.
 const PERIODS_S: [f64; 7] = [1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0];
-/// Most doublets along one axis.
+/// Most doublets along one axis. Chosen.
 const MOST_REPEATS: u32 = 4;
-/// Shares of the room that a ball has, the gentlest first.
+/// Fractions of the ball's room, the smallest first. Chosen.
 const SHARES: [f64; 5] = [0.25, 0.4, 0.55, 0.7, 0.85];
-/// The lag of a staggered y as a share of a period.
+/// Lag of y in staggered order, as a fraction of a period.
 const LAG: f64 = 0.25;
 
 /// 1/max(sin²(πτ)·sin(2πτ)), which is at τ = 1/3.
@@ -49,10 +49,10 @@ const PEAK: f64 = 1.539_600_717_839_002;
 /// Largest |d²p/dτ²|/(C·A·4π²) = max |sin 2θ − sin(θ)/2|, θ = 2πτ, rounded up.
 const PEAK_CURVATURE: f64 = 1.37;
 
-impl Motion {
-    /// All members for a ball with `room_m` to each side along each axis that the
-    /// rig has, the shortest first and, of equally short ones, the gentlest.
-    /// `round`: the room along both axes at once is a disc's.
+impl DriveMotion {
+    /// Returns all members for a ball with `room_m` to each side along each axis that the
+    /// rig has, by duration, then by amplitude. With `round` the room along both axes at
+    /// once is that of a disc.
     pub(super) fn family(room_m: PerAxis<Option<f64>>, round: bool) -> Vec<Self> {
         let mut all = Vec::new();
         for order in Self::orders(&room_m) {
@@ -66,12 +66,12 @@ impl Motion {
                 }
             }
         }
-        // Stable: what is equally long stays in the order of its amplitudes.
+        // The sort is stable: equal durations stay in the order of their amplitudes.
         all.sort_by(|a, b| a.duration_s().total_cmp(&b.duration_s()));
         all
     }
 
-    /// One axis alone has nothing to share.
+    /// The orders for the axes that the rig has.
     fn orders(room_m: &PerAxis<Option<f64>>) -> &'static [Order] {
         match (room_m.x, room_m.y) {
             (Some(_), Some(_)) => &[Order::AtOnce, Order::Staggered, Order::InTurn],
@@ -79,13 +79,13 @@ impl Motion {
         }
     }
 
-    /// From the first command to the last, s.
+    /// Duration from the first command to the last, s.
     pub(super) fn duration_s(&self) -> f64 {
         let (_, end_s) = self.span_s(Axis::X);
         if self.amplitude_m.y > 0.0 { end_s.max(self.span_s(Axis::Y).1) } else { end_s }
     }
 
-    /// When the doublets along `axis` begin and end, s.
+    /// Start and end of the doublets along `axis`, s.
     fn span_s(&self, axis: Axis) -> (f64, f64) {
         let long_s = f64::from(self.repeats) * self.period_s;
         let begin_s = match (axis, self.order) {
@@ -98,20 +98,20 @@ impl Motion {
         (begin_s, begin_s + long_s)
     }
 
-    /// The angle θ = 2πτ of the doublet along `axis`; none where it does not move.
+    /// The angle θ = 2πτ of the doublet along `axis`; `None` while it does not move.
     fn angle(&self, axis: Axis, t_s: f64) -> Option<f64> {
         let (begin_s, end_s) = self.span_s(axis);
         let moves = self.amplitude_m[axis] > 0.0 && (begin_s..=end_s).contains(&t_s);
         moves.then(|| TAU * (t_s - begin_s) / self.period_s)
     }
 
-    /// Where the ball is asked to be along `axis`, m from the middle.
+    /// The set point along `axis`, m from the middle.
     pub(super) fn position_m(&self, axis: Axis, t_s: f64) -> f64 {
         let Some(angle) = self.angle(axis, t_s) else { return 0.0 };
         PEAK * self.amplitude_m[axis] * (angle / 2.0).sin().powi(2) * angle.sin()
     }
 
-    /// The acceleration that goes with it, m/s².
+    /// The acceleration of the set point, m/s².
     pub(super) fn acceleration_m_s2(&self, axis: Axis, t_s: f64) -> f64 {
         let Some(angle) = self.angle(axis, t_s) else { return 0.0 };
         let scale = PEAK * self.amplitude_m[axis] * (TAU / self.period_s).powi(2);
@@ -132,13 +132,13 @@ mod tests {
     const ROOM: PerAxis<Option<f64>> = PerAxis { x: Some(0.1), y: Some(0.06) };
 
     proptest! {
-        /// The second difference of the position is the acceleration; neither
-        /// leaves what is said of it.
+        /// The second difference of the position is the acceleration; both stay within
+        /// their stated bounds.
         #[test]
         fn validate_the_acceleration_is_that_of_the_path(
-            index in 0..Motion::family(ROOM, false).len(), share in 0.0..1.0_f64,
+            index in 0..DriveMotion::family(ROOM, false).len(), share in 0.0..1.0_f64,
         ) {
-            let motion = Motion::family(ROOM, false)[index];
+            let motion = DriveMotion::family(ROOM, false)[index];
             let (t_s, h) = (share * motion.duration_s(), 1e-4);
             for axis in Axis::ALL {
                 let p = |t| motion.position_m(axis, t);
@@ -153,7 +153,7 @@ mod tests {
 
     #[test]
     fn every_motion_ends_where_it_began_and_the_family_is_in_order() {
-        let family = Motion::family(ROOM, false);
+        let family = DriveMotion::family(ROOM, false);
         assert!(family.windows(2).all(|pair| pair[0].duration_s() <= pair[1].duration_s()));
         for motion in family {
             for t_s in [0.0, motion.duration_s()] {
@@ -167,7 +167,7 @@ mod tests {
 
     #[test]
     fn an_axis_that_is_not_there_does_not_move_and_takes_no_time() {
-        for motion in Motion::family(PerAxis { x: None, y: Some(0.1) }, false) {
+        for motion in DriveMotion::family(PerAxis { x: None, y: Some(0.1) }, false) {
             assert_eq!(motion.duration_s(), f64::from(motion.repeats) * motion.period_s);
             assert_eq!(motion.position_m(Axis::X, 0.3), 0.0);
             assert!(motion.position_m(Axis::Y, 0.3) > 0.0);

@@ -1,11 +1,9 @@
-//! A fixed sequence that looks like noise: no chance is in it, so that equal rigs
-//! get equal cycles.
+//! Deterministic pseudo-random noise, so that equal rigs get equal cycles.
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 
-/// The mixing function of SplitMix64 (Steele, Lea & Flood 2014), as a number in
-/// [0, 1).
+/// The mixing function of SplitMix64 (Steele, Lea & Flood 2014), scaled to [0, 1).
 pub(super) fn uniform(stream: u64, index: u64) -> f64 {
     let mut z = index
         .wrapping_mul(0x9e37_79b9_7f4a_7c15)
@@ -16,8 +14,8 @@ pub(super) fn uniform(stream: u64, index: u64) -> f64 {
     ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// A number of mean zero and standard deviation one, within ±3.5: the sum of four
-/// uniform ones, whose variance is a third.
+/// Returns noise with mean zero and standard deviation one, within ±3.5: the sum of four
+/// uniform numbers, whose variance is a third.
 pub(super) fn normal(stream: u64, index: u64) -> f64 {
     let sum: f64 = (0..4).map(|k| uniform(stream.wrapping_mul(4).wrapping_add(k), index)).sum();
     (sum - 2.0) * 3.0_f64.sqrt()

@@ -1,7 +1,7 @@
-//! The search for the cycle of one rig: the shortest member of the family in which
-//! the trials go best. All of it in the plate's frame.
+//! The search for the cycle of one rig: the shortest member of the family with the best
+//! trials. All in the plate's frame.
 
-use super::motion::Motion;
+use super::motion::DriveMotion;
 use super::trial::{Variant, run};
 use super::{DriveCycle, FaultVerdict, MonitorVerdict, NoDriveCycle, NotReached, TriedFault};
 use crate::diagnosis::{AxisCalibration, Candidate};
@@ -11,43 +11,45 @@ use crate::no_std::*;
 use crate::plant::PlateShape;
 use crate::vocabulary::{Axis, FaultCode, PerAxis};
 
-/// Most samples of a trial a second: a rig that logs faster is judged the better.
+/// Highest sample rate of a trial, Hz; a rig that logs faster is judged better. Chosen.
 const MAX_TRIED_HZ: f64 = 120.0;
-/// Samples that are judged in the search; then the best found so far is taken. A
-/// few seconds of one core.
+/// Most samples judged in the search; beyond it the best result so far is taken. Chosen:
+/// a few seconds of one core.
 const MAX_JUDGED: u64 = 3_000_000;
-/// Room that is left between the set points and where the edge may act, m.
+/// Distance between the set points and where the edge may act, m. Chosen.
 pub(super) const MARGIN_M: f64 = 0.005;
-/// Share of the servos' limit that the cycle commands beforehand; the rest is for
-/// the correction.
+/// Largest feedforward as a fraction of the servos' limit; the rest is for the
+/// correction. Chosen.
 pub(super) const COMMANDED: f64 = 0.8;
-/// Tilts of the learnt breakaway that the ball's largest acceleration takes at
-/// least: from there on the monitors take it as asked to move.
+/// Least peak tilt of a motion, in learnt breakaways: from there on the monitors count
+/// the ball as asked to move.
 const LEAST_BREAKAWAYS: f64 = 1.5;
-/// Share of the cycle in which a trial must have found a fault: a rig is not quite
+/// Fraction of the cycle in which a trial must find a fault. Chosen: a rig is not exactly
 /// its twin.
 pub(super) const IN_TIME: f64 = 0.85;
-/// What is missing where a monitor does not pass; where a fault is not found; where
-/// another cause is named beside it; and where a servo that answers half is not found,
-/// which is harder than anything else, and worth less of a person's time.
+/// Penalty of a monitor that does not pass. The penalties are chosen in the order of
+/// importance, each larger than all smaller ones together.
 const MONITOR_WEIGHT: usize = 10_000;
+/// Penalty of a fault that is not found.
 const FAULT_WEIGHT: usize = 100;
+/// Penalty of a found fault with another cause named beside it.
 const BESIDE_WEIGHT: usize = 10;
+/// Penalty of a servo that answers half and is not found: the hardest fault, and the
+/// least important.
 const HALF_WEIGHT: usize = 1;
-/// Shares of the level's spread between sessions that are tried one after the other.
-/// What a rig's sessions differ by is assumed large before it has several, and may be
-/// more than a small plate can bear.
+/// Fractions of the level's spread between sessions that are tried in turn. The spread of
+/// a rig with few sessions is assumed large, and may be too large for a small plate.
 const SPREADS: [f64; 3] = [1.0, 0.5, 0.25];
 
-/// What the trials of one motion came to.
+/// The results of the trials of one motion.
 #[derive(Clone, Debug)]
-pub(super) struct Found {
+pub(super) struct TrialResults {
     pub monitors: Vec<MonitorVerdict>,
     pub faults: Vec<FaultVerdict>,
 }
 
-impl Found {
-    /// How much is missing; zero where everything is found.
+impl TrialResults {
+    /// The sum of the penalties; zero if everything is found.
     pub(super) fn missing(&self) -> usize {
         let lacking = |m: &&MonitorVerdict| m.passed == Err(NotReached::TooLittleMotion);
         let monitors = self.monitors.iter().filter(lacking).count();
@@ -61,12 +63,12 @@ impl Found {
     }
 }
 
-/// The best motion, the share of the level's spread that it was tried with, and what
-/// its trials came to.
+/// The best motion, the fraction of the level's spread that it was tried with, and the
+/// results of its trials.
 pub(super) struct Best {
-    pub motion: Motion,
+    pub motion: DriveMotion,
     pub spread: f64,
-    pub found: Found,
+    pub found: TrialResults,
 }
 
 /// The search for the cycle of one rig; all in the plate's frame.
@@ -91,8 +93,8 @@ impl Search {
         self.setup.rig.calibration.as_ref()?.axes[axis].as_ref()
     }
 
-    /// The motions that may serve, the shortest first.
-    pub(super) fn family(&self) -> Result<Vec<Motion>, NoDriveCycle> {
+    /// Returns the admissible motions, the shortest first.
+    pub(super) fn family(&self) -> Result<Vec<DriveMotion>, NoDriveCycle> {
         let rig = &self.setup.rig;
         let room_m = |axis| rig.plate.half_extent_m(axis) - rig.contact_room_m() - MARGIN_M;
         let axes = || Axis::ALL.into_iter().filter(|&axis| self.learnt(axis).is_some());
@@ -101,21 +103,21 @@ impl Search {
         }
         let rooms = PerAxis::from_fn(|axis| self.learnt(axis).map(|_| room_m(axis)));
         let round = matches!(rig.plate.shape(), PlateShape::Round { .. });
-        let mut family = Motion::family(rooms, round);
+        let mut family = DriveMotion::family(rooms, round);
         family.retain(|motion| axes().all(|axis| self.serves(motion, axis)));
         if family.is_empty() { Err(NoDriveCycle::TooLittleTilt) } else { Ok(family) }
     }
 
-    /// Whether `motion` is within the servos' limits and beyond friction.
-    fn serves(&self, motion: &Motion, axis: Axis) -> bool {
+    /// Whether `motion` is within the servos' limits and overcomes friction.
+    fn serves(&self, motion: &DriveMotion, axis: Axis) -> bool {
         let Some(learnt) = self.learnt(axis) else { return true };
         let tilt_rad = self.tilt_rad(motion, axis);
         let most_rad = COMMANDED * self.setup.rig.servo.angle_limit_rad - learnt.level_rad.abs();
         (LEAST_BREAKAWAYS * learnt.breakaway_rad..=most_rad).contains(&tilt_rad)
     }
 
-    /// Largest tilt that `motion` takes beside the level, rad.
-    pub(super) fn tilt_rad(&self, motion: &Motion, axis: Axis) -> f64 {
+    /// Largest tilt of `motion` without the level, rad.
+    pub(super) fn tilt_rad(&self, motion: &DriveMotion, axis: Axis) -> f64 {
         motion.peak_m_s2(axis) / self.slope_m_s2(axis).abs()
     }
 
@@ -125,10 +127,10 @@ impl Search {
         axis.drive_sign() * gain * self.setup.rig.ball.rolling_gravity()
     }
 
-    /// The best of `family`: of equally good ones the one that bears most, then the
-    /// shortest. None where no member keeps a healthy ball on the plate and its tests
-    /// from failing.
-    pub(super) fn best(&self, family: &[Motion]) -> Option<Best> {
+    /// Returns the best of `family`: of equally good ones the one with the largest
+    /// spread, then the shortest. `None` if no member keeps a healthy ball on the plate
+    /// and its tests from failing.
+    pub(super) fn best(&self, family: &[DriveMotion]) -> Option<Best> {
         let mut best: Option<Best> = None;
         let mut n_judged = 0;
         for spread in SPREADS {
@@ -145,18 +147,18 @@ impl Search {
         best
     }
 
-    /// What the trials of `motion` come to; none where they miss as much as
-    /// `below`, or a healthy one goes wrong.
+    /// Returns the results of `motion`; `None` if its penalty reaches `below`, or if a
+    /// healthy trial fails.
     pub(super) fn try_out(
         &self,
-        motion: &Motion,
+        motion: &DriveMotion,
         spread: f64,
         below: usize,
         n_judged: &mut u64,
-    ) -> Option<Found> {
+    ) -> Option<TrialResults> {
         let cycle = self.cycle(motion, &AxisMapping::default());
         let monitors = self.healthy(&cycle, spread, n_judged)?;
-        let mut found = Found { monitors, faults: Vec::new() };
+        let mut found = TrialResults { monitors, faults: Vec::new() };
         for fault in TriedFault::of(cycle.axes()) {
             if found.missing() >= below {
                 return None;
@@ -166,7 +168,8 @@ impl Search {
         (found.missing() < below).then_some(found)
     }
 
-    /// When each monitor passes in every session; none where one goes wrong.
+    /// Returns when each monitor passes in every session; `None` if a test fails or the
+    /// ball reaches the edge.
     fn healthy(
         &self,
         cycle: &DriveCycle,
@@ -175,12 +178,12 @@ impl Search {
     ) -> Option<Vec<MonitorVerdict>> {
         let mut passed = [Some(0.0_f64); FaultCode::COUNT];
         for variant in Variant::all(spread) {
-            let ran = run(&self.setup, cycle, variant, None);
-            *n_judged += ran.n_judged;
-            if ran.at_edge || ran.failed {
+            let outcome = run(&self.setup, cycle, variant, None);
+            *n_judged += outcome.n_judged;
+            if outcome.at_edge || outcome.failed {
                 return None;
             }
-            for (all, this) in passed.iter_mut().zip(ran.passed_s) {
+            for (all, this) in passed.iter_mut().zip(outcome.passed_s) {
                 *all = all.zip(this).map(|(all, this)| all.max(this));
             }
         }
@@ -192,7 +195,7 @@ impl Search {
         Some(FaultCode::ALL.iter().zip(passed).map(verdict).collect())
     }
 
-    /// How `fault` is found in every session.
+    /// Returns how `fault` is found in the sessions.
     fn faulty(
         &self,
         cycle: &DriveCycle,
@@ -202,9 +205,9 @@ impl Search {
     ) -> FaultVerdict {
         let mut verdict = FaultVerdict { fault, after_s: Some(0.0), beside: None };
         for variant in Variant::all(spread) {
-            let ran = run(&self.setup, cycle, variant, Some(fault));
-            *n_judged += ran.n_judged;
-            let named = ran.confirmed.and_then(|(at_s, transition)| {
+            let outcome = run(&self.setup, cycle, variant, Some(fault));
+            *n_judged += outcome.n_judged;
+            let named = outcome.confirmed.and_then(|(at_s, transition)| {
                 let rivals = &transition.suspicion.candidates;
                 let beside = rivals.iter().map(|c| c.code).find(|&code| code != fault.code());
                 let named = |c: &Candidate| (c.code, c.kind) == (fault.code(), fault.kind());

@@ -1,7 +1,7 @@
-//! A motion as a table of commands and set points, with the corrections that keep the
-//! ball on it, for a device whose numbers are those of a mapping.
+//! A motion as a table of commands and set points with feedback gains, in the numbers of
+//! a device.
 
-use super::motion::Motion;
+use super::motion::DriveMotion;
 use super::search::Search;
 use super::{DriveCycle, Feedback};
 use crate::engine::AxisMapping;
@@ -9,24 +9,28 @@ use crate::engine::AxisMapping;
 use crate::no_std::*;
 use crate::vocabulary::{Axis, PerAxis, Sample};
 
-/// Most rows of a cycle a second; a device that turns faster uses each for longer.
+/// Most rows per second; a faster device uses each row repeatedly. Chosen.
 const MAX_ROWS_HZ: f64 = 100.0;
-/// The bandwidth of the correction times all delays of the loop, and its largest,
-/// rad/s: as the simulated rigs' loops have it.
+/// Bandwidth of the correction times the delay of the loop: as in the loops of the
+/// simulated rigs.
 const LOOP_SHARE: f64 = 0.25;
+/// Largest bandwidth of the correction, rad/s: as in the loops of the simulated rigs.
 const MOST_RAD_S: f64 = 3.0;
-/// Periods that a loop takes: one to answer, half of one in which a command holds.
+/// Delay of the loop in sample periods: one to respond, and half of one in which a
+/// command is held.
 const LOOP_PERIODS: f64 = 1.5;
-/// Its damping ratio, and its integral action as a share of the bandwidth.
-const DAMPING: f64 = 0.9;
-const INTEGRAL: f64 = 0.25;
-/// Shortest filter of the correction's rate, s, and in periods.
+/// Damping ratio of the correction. Chosen.
+const LOOP_DAMPING: f64 = 0.9;
+/// Integral gain in terms of the bandwidth. Chosen.
+const INTEGRAL_SHARE: f64 = 0.25;
+/// Shortest time constant of the derivative's filter, s. Chosen.
 const FILTER_S: f64 = 0.05;
+/// Shortest time constant of the derivative's filter in sample periods. Chosen.
 const FILTER_PERIODS: f64 = 2.0;
 
 impl Search {
-    /// `motion` as a table for a device whose numbers are those of `mapping`.
-    pub(super) fn cycle(&self, motion: &Motion, mapping: &AxisMapping) -> DriveCycle {
+    /// Returns `motion` as a table for a device with the given `mapping`.
+    pub(super) fn cycle(&self, motion: &DriveMotion, mapping: &AxisMapping) -> DriveCycle {
         let rig = &self.setup.rig;
         let rate_hz = rig.sample_rate_hz.min(MAX_ROWS_HZ);
         let duration_s = motion.duration_s();
@@ -50,10 +54,10 @@ impl Search {
         }
     }
 
-    fn row(&self, motion: &Motion, mapping: &AxisMapping, t_s: f64) -> Sample {
+    fn row(&self, motion: &DriveMotion, mapping: &AxisMapping, t_s: f64) -> Sample {
         let command = |axis: Axis| {
             let learnt = self.learnt(axis)?;
-            // The servo is late by this much.
+            // Feedforward by the delay of the servo.
             let ahead_s = learnt.dead_time_s + learnt.lag_s;
             let wanted = motion.acceleration_m_s2(axis, t_s + ahead_s) / self.slope_m_s2(axis);
             Some((wanted - learnt.level_rad) / mapping.command_unit_rad)
@@ -71,7 +75,7 @@ impl Search {
         Sample { seq: None, t_s, cmd_qx_rad, cmd_qy_rad, x_m, y_m }
     }
 
-    /// Pole placement on ẍ = slope·command, as fast as the delays allow.
+    /// Pole placement for ẍ = slope·command, as fast as the delays allow.
     fn feedback(&self, mapping: &AxisMapping) -> PerAxis<Option<Feedback>> {
         let rig = &self.setup.rig;
         let refresh_s = rig.calibration.as_ref().map_or(0.0, |c| c.sensor.refresh_s);
@@ -86,8 +90,8 @@ impl Search {
             Some(Feedback {
                 reading: if mapping.swap { axis.other() } else { axis },
                 proportional: w * w * per_m,
-                integral: INTEGRAL * w * w * w * per_m,
-                derivative: 2.0 * DAMPING * w * per_m,
+                integral: INTEGRAL_SHARE * w * w * w * per_m,
+                derivative: 2.0 * LOOP_DAMPING * w * per_m,
             })
         })
     }

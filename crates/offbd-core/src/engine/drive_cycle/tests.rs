@@ -2,11 +2,11 @@ use proptest::prelude::*;
 
 use super::search::{COMMANDED, IN_TIME, MARGIN_M};
 use super::*;
-use crate::diagnosis::{AxisCalibration, Calibration, SensorCalibration};
+use crate::diagnosis::{AxisCalibration, Calibration, CalibrationOrigin, SensorCalibration};
 use crate::engine::AxisMapping;
 use crate::plant::{Plate, PlateShape};
 
-/// An axis as one learns it from several sessions of a good rig.
+/// An axis as learnt from several sessions of a good rig.
 const GOOD: AxisCalibration = AxisCalibration {
     gain: 0.95,
     dead_time_s: 0.04,
@@ -31,10 +31,9 @@ fn learnt(x: Option<AxisCalibration>, y: Option<AxisCalibration>) -> Rig {
         axes: PerAxis { x, y },
         sensor: SensorCalibration { most_scatter_m: 3e-4, ..SensorCalibration::default() },
         sessions: Vec::new(),
-        data_sha256: String::new(),
+        origin: CalibrationOrigin::default(),
         n_samples: 6000,
         duration_s: 60.0,
-        made_at: String::new(),
         certificate: None,
         prospects: None,
     };
@@ -109,7 +108,7 @@ fn a_rig_without_a_cycle_is_told_why() {
     assert!(why(bad).contains("/sample_rate_hz"));
 }
 
-/// On a plate so small that no ball may move far enough, what is not tested is named.
+/// On a plate too small for the ball to move far enough, untested faults are reported.
 #[test]
 fn what_a_small_plate_leaves_untested_is_named() {
     let far_off = AxisCalibration { level_spread_rad: 0.02, breakaway_rad: 0.01, ..GOOD };
@@ -120,7 +119,7 @@ fn what_a_small_plate_leaves_untested_is_named() {
     assert!(cycle.level_within_rad.x < far_off.level_spread_rad);
 }
 
-/// The device's own axes, signs and units: the same motion in other numbers.
+/// A device with other axes, signs and units gets the same motion in its numbers.
 #[test]
 fn the_rows_and_corrections_are_in_the_numbers_of_the_device() {
     let mapping = AxisMapping {
@@ -155,7 +154,7 @@ fn the_rows_and_corrections_are_in_the_numbers_of_the_device() {
 }
 
 prop_compose! {
-    /// Axes as the simulated rigs have them.
+    /// Axes like those of the simulated rigs.
     fn axis()(
         gain in 0.7..1.3_f64, dead_time_s in 0.0..0.2_f64, lag_s in 0.01..0.15_f64,
         level_rad in -0.03..0.03_f64, breakaway_rad in 0.0..0.02_f64,
@@ -165,7 +164,7 @@ prop_compose! {
 }
 
 proptest! {
-    /// Whatever is chosen of the family is within the servos' limits and on the plate.
+    /// Every member of the family is within the servos' limits and on the plate.
     #[test]
     fn every_member_stays_within_the_limits_and_on_the_plate(
         x in axis(), y in axis(), length_m in 0.1..0.5_f64, width_m in 0.1..0.5_f64,

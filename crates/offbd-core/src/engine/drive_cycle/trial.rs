@@ -1,10 +1,10 @@
-//! A drive cycle tried beforehand: a ball that obeys the twin of a learnt rig, run
-//! by the cycle's law and judged by the rig's own engine.
+//! A simulated trial of a drive cycle: a ball that follows the twin of a learnt rig, run
+//! by the cycle's control law and judged by the rig's own engine.
 //!
-//! The trial's rig differs from the learnt one as sessions differ: in level and
-//! gain, by as much as was learnt of that; what the twin leaves out acts on the
-//! ball, its readings have the learnt noise, and it sticks up to the learnt
-//! breakaway. Its device takes one period to answer a reading.
+//! The rig of a trial differs from the learnt one as sessions differ, in level and gain,
+//! by the learnt spread. The learnt model error acts on the ball, its readings have the
+//! learnt noise, and it sticks up to the learnt breakaway. The device takes one period to
+//! respond to a reading.
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
@@ -12,34 +12,33 @@ use core::f64::consts::{SQRT_2, TAU};
 
 use nalgebra::Vector2;
 
-use super::fault::{NOISE, SPIKES, TriedFault};
+use super::fault::{SPIKE_SHARE, TRIED_NOISE_FACTOR, TriedFault};
 use super::noise::{normal, uniform};
 use super::{DriveCycle, DriveLaw};
 use crate::diagnosis::{FaultMemory, Transition};
-use crate::engine::{Engine, Input, Output, Reach, Setup};
+use crate::engine::{Engine, Input, Reach, Setup};
 use crate::plant::{PlateShape, RollingState, Twin, TwinModel};
 use crate::vocabulary::{Axis, FaultCode, FaultStatus, PerAxis, Sample, SimTime};
 
-/// Speed below which friction may stop a ball, m/s.
+/// Speed below which friction may stop a ball, m/s. Chosen.
 const STICKS_M_S: f64 = 0.003;
-/// Period of what the twin leaves out, s: it lasts for half a second to one side,
-/// as the model of the monitors has it.
+/// Period of the simulated model error, s. Chosen: it keeps its sign for about as long as
+/// the correlation time that the monitors assume (0.5 s).
 const LEFT_OUT_S: f64 = 1.7;
-/// What a servo that answers half answers in a trial: a little more, since a rig is not
-/// quite its twin.
-const HALF: f64 = 0.55;
-/// Where the ball is put down, as a share of the half plate.
-const START: f64 = 0.1;
+/// Gain of a servo that answers half. Chosen: a little more than half, since a rig is not
+/// exactly its twin.
+const HALF_GAIN: f64 = 0.55;
+/// Initial position of the ball as a fraction of the half plate. Chosen.
+const START_SHARE: f64 = 0.1;
 
-/// In which way a trial's session differs from the mean of the rig's.
+/// How the session of a trial differs from the rig's mean.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Variant {
-    /// Level and gain, in standard deviations, and the side on which the ball is
-    /// put down.
+    /// Level and gain in standard deviations, and the side on which the ball starts.
     pub off: PerAxis<f64>,
-    /// Share of the level's standard deviation that counts.
+    /// Fraction of the level's standard deviation that is applied.
     pub spread: f64,
-    /// Which noise.
+    /// Stream of the noise.
     pub stream: u64,
 }
 
@@ -58,34 +57,34 @@ impl Variant {
     }
 }
 
-/// What a trial came to.
+/// The outcome of a trial.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Ran {
-    /// When each monitor passed for the first time, s; none if it did not, or
-    /// could judge for too short a time to have found a fault.
+pub(super) struct TrialOutcome {
+    /// Time at which each monitor first passed, s; `None` if it did not, or could judge
+    /// for too short a time to find a fault.
     pub passed_s: [Option<f64>; FaultCode::COUNT],
-    /// The first fault that was confirmed, and when, s.
+    /// Time, s, and transition of the first confirmed fault.
     pub confirmed: Option<(f64, Transition)>,
-    /// A test failed.
+    /// Whether a test failed.
     pub failed: bool,
-    /// The ball came to the edge.
+    /// Whether the ball reached the edge.
     pub at_edge: bool,
-    /// Samples that were judged.
+    /// Number of judged samples.
     pub n_judged: u64,
 }
 
-/// Runs `cycle` on a rig like the one of `setup`, whose sensor reads in the plate's
-/// own frame, with a fault or without.
+/// Runs `cycle` on a rig like that of `setup`, whose sensor reads in the plate's own
+/// frame, with or without a fault.
 pub(super) fn run(
     setup: &Setup,
     cycle: &DriveCycle,
     variant: Variant,
     fault: Option<TriedFault>,
-) -> Ran {
+) -> TrialOutcome {
     let mut engine = Engine::new(setup.clone(), FaultMemory::default());
     let mut plant = Plant::new(setup, variant, fault);
     let (mut law, mut commands) = (DriveLaw::default(), cycle.first_commands());
-    let (mut ran, mut outputs) = (Ran::default(), Vec::new());
+    let (mut outcome, mut transitions) = (TrialOutcome::default(), Vec::new());
     let period_s = 1.0 / setup.rig.sample_rate_hz;
     let n = (cycle.duration_s / period_s).floor() as u64;
     for i in 0..=n {
@@ -94,40 +93,39 @@ pub(super) fn run(
         let read = plant.read(i);
         let sample = Sample { cmd_qx_rad: commands.y, cmd_qy_rad: commands.x, t_s, ..read };
         commands = law.command(cycle, &sample);
-        outputs.clear();
-        engine.handle(Input::Sample(sample), &mut outputs);
-        ran.n_judged += 1;
-        ran.at_edge |= plant.at_edge();
-        ran.take(t_s, &engine, &mut outputs);
-        let spoilt = fault.is_none() && (ran.at_edge || ran.failed);
-        if spoilt || ran.confirmed.is_some() {
-            return ran;
+        transitions.clear();
+        engine.handle(Input::Sample(sample), &mut transitions);
+        outcome.n_judged += 1;
+        outcome.at_edge |= plant.at_edge();
+        outcome.take(t_s, &engine, &mut transitions);
+        let spoilt = fault.is_none() && (outcome.at_edge || outcome.failed);
+        if spoilt || outcome.confirmed.is_some() {
+            return outcome;
         }
     }
     let monitors = engine.state().monitors;
-    for (passed_s, monitor) in ran.passed_s.iter_mut().zip(monitors) {
+    for (passed_s, monitor) in outcome.passed_s.iter_mut().zip(monitors) {
         *passed_s = passed_s.filter(|_| monitor.reach == Reach::Judged);
     }
-    ran
+    outcome
 }
 
-impl Ran {
-    fn take(&mut self, t_s: f64, engine: &Engine, outputs: &mut Vec<Output>) {
+impl TrialOutcome {
+    fn take(&mut self, t_s: f64, engine: &Engine, transitions: &mut Vec<Transition>) {
         for (&code, passed_s) in FaultCode::ALL.iter().zip(&mut self.passed_s) {
             let completed = engine.memory().record(code).status.completed_this_cycle();
             *passed_s = passed_s.or(completed.then_some(t_s));
         }
-        for output in outputs.drain(..) {
-            let Output::Transition(transition) = output else { continue };
+        for transition in transitions.drain(..) {
             self.failed |= transition.byte.test_failed();
             if transition.status == FaultStatus::Confirmed && self.confirmed.is_none() {
-                self.confirmed = Some((t_s, *transition));
+                self.confirmed = Some((t_s, transition));
             }
         }
     }
 }
 
-/// The trial's rig in motion.
+/// The simulated rig of a trial.
 struct Plant<'a> {
     setup: &'a Setup,
     variant: Variant,
@@ -144,7 +142,7 @@ impl<'a> Plant<'a> {
     fn new(setup: &'a Setup, variant: Variant, fault: Option<TriedFault>) -> Self {
         let start = |axis: Axis| {
             let half_m = setup.rig.plate.half_extent_m(axis);
-            if has(setup, axis) { START * variant.off[axis] * half_m } else { 0.0 }
+            if has(setup, axis) { START_SHARE * variant.off[axis] * half_m } else { 0.0 }
         };
         Self {
             twin: Twin::new(model(setup, variant)),
@@ -159,7 +157,7 @@ impl<'a> Plant<'a> {
         }
     }
 
-    /// Goes on to `t_s`; from then on `commands` hold.
+    /// Advances to `t_s`, from when on `commands` hold.
     fn advance(&mut self, t_s: f64, commands: PerAxis<Option<f64>>) {
         let Some(at) = SimTime::new(t_s) else { return };
         let answered = PerAxis::from_fn(|axis| commands[axis].map(|c| self.share(axis) * c));
@@ -174,11 +172,11 @@ impl<'a> Plant<'a> {
         }
     }
 
-    /// How much of its command the servo of `axis` answers.
+    /// The fraction of its command that the servo of `axis` answers.
     fn share(&self, axis: Axis) -> f64 {
         match self.fault {
             Some(TriedFault::Dead(of)) if of == axis => 0.0,
-            Some(TriedFault::HalfGain(of)) if of == axis => HALF,
+            Some(TriedFault::HalfGain(of)) if of == axis => HALF_GAIN,
             _ => 1.0,
         }
     }
@@ -195,7 +193,7 @@ impl<'a> Plant<'a> {
         self.velocity = motion.velocity + beyond * dt;
     }
 
-    /// Acceleration along `axis` that the twin leaves out, m/s².
+    /// The simulated model error along `axis`, m/s².
     fn left_out(&self, axis: Axis) -> f64 {
         let learnt = self.setup.rig.calibration.as_ref().and_then(|c| c.axes[axis]);
         let size = learnt.map_or(0.0, |l| SQRT_2 * l.model_error_m_s2);
@@ -220,7 +218,7 @@ impl<'a> Plant<'a> {
         self.edge_m() < self.setup.rig.contact_room_m()
     }
 
-    /// A rim stops the ball; without one it falls.
+    /// Stops the ball at a rim, or drops it off a plate without one.
     fn hold_at_the_edge(&mut self) {
         let (plate, side_m) = (&self.setup.rig.plate, self.setup.rig.ball.radius_m());
         if !plate.rim() {
@@ -244,7 +242,7 @@ impl<'a> Plant<'a> {
         }
     }
 
-    /// What the sensor says at the `i`th sample.
+    /// The sensor's reading at the `i`th sample.
     fn read(&mut self, i: u64) -> Sample {
         let refresh_s = self.setup.rig.calibration.as_ref().map_or(0.0, |c| c.sensor.refresh_s);
         let held = |&(at_s, _): &(f64, Sample)| {
@@ -263,7 +261,7 @@ impl<'a> Plant<'a> {
             return Sample::default();
         }
         let stream = 8 * self.variant.stream;
-        let spike = self.fault == Some(TriedFault::Spikes) && uniform(stream, i) < SPIKES;
+        let spike = self.fault == Some(TriedFault::Spikes) && uniform(stream, i) < SPIKE_SHARE;
         let along = |axis: Axis| {
             let (stream, half_m) =
                 (stream + 1 + axis as u64, self.setup.rig.plate.half_extent_m(axis));
@@ -279,7 +277,11 @@ impl<'a> Plant<'a> {
     fn noise_m(&self, axis: Axis) -> f64 {
         let learnt = self.setup.rig.calibration.as_ref().and_then(|c| c.axes[axis]);
         let healthy_m = learnt.map_or(0.0, |l| l.noise_m);
-        if self.fault == Some(TriedFault::Noise) { NOISE * healthy_m } else { healthy_m }
+        if self.fault == Some(TriedFault::Noise) {
+            TRIED_NOISE_FACTOR * healthy_m
+        } else {
+            healthy_m
+        }
     }
 }
 
@@ -288,7 +290,7 @@ fn has(setup: &Setup, axis: Axis) -> bool {
     setup.rig.calibration.as_ref().is_some_and(|c| c.axes[axis].is_some())
 }
 
-/// The twin of the session that `variant` is.
+/// The twin of the session described by `variant`.
 fn model(setup: &Setup, variant: Variant) -> TwinModel {
     let mut twin = setup.twin;
     for axis in Axis::ALL {

@@ -1,10 +1,9 @@
-//! Whether a rig's description and its data can be of one rig: rate, units,
-//! plate, commands and axes, held against each other before anything is judged
-//! or learnt.
+//! Plausibility of a rig's description and its data: sample rate, units, plate, commands
+//! and axes are compared before anything is judged or learnt.
 //!
-//! One idea: what does not fit is named with its numbers, and a cause is only
-//! suggested where it makes the numbers fit. One pass over the samples as they
-//! were sent, those included that the engine refuses; bounded memory.
+//! A contradiction is reported with its numbers; a cause is only suggested if it removes
+//! the contradiction. One pass over the samples as sent, including those that the engine
+//! rejects; bounded memory.
 
 mod period;
 mod response;
@@ -14,61 +13,61 @@ mod tests;
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use period::Periods;
-use response::{Answers, Responses};
+use response::{AxisResponse, ResponseCorrelator};
 
 use super::Rig;
 use super::frame::{Moment, moment};
 use crate::vocabulary::{Axis, PerAxis, Sample};
 
-/// Samples, readings or commands from which on a share of them says anything:
-/// fewer come in a fraction of a second.
-const LEAST: u32 = 20;
-/// Factor by which a rate may be off: a log that leaves out two samples of three
-/// is thin, but it is the same clock.
+/// Least number of samples, readings or commands for a fraction of them to count. Chosen:
+/// they arrive within a second.
+const LEAST_COUNT: u32 = 20;
+/// Factor by which a sample rate may be off. Chosen: a log that leaves out two samples of
+/// three still has the same clock.
 const RATE_FACTOR: f64 = 3.0;
-/// Share that counts as most.
-const MOST: f64 = 0.5;
-/// Share that must fit under another unit for that to be suggested.
-const FITS: f64 = 0.9;
-/// How many times too small a plate must be entered for positions on it to count
-/// as far off: a plate measured wrong by as much is less likely than another unit.
-const FAR: f64 = 5.0;
-/// What a command may exceed its limit by: half a degree of rounding, rad.
+/// Fraction that counts as most.
+const MAJORITY: f64 = 0.5;
+/// Fraction that must fit with another unit for that unit to be suggested. Chosen.
+const FITTING_SHARE: f64 = 0.9;
+/// Factor by which positions must exceed the plate to count as far off. Chosen: a plate
+/// measured wrong by as much is less likely than another unit.
+const FAR_FACTOR: f64 = 5.0;
+/// Tolerance of a command's limit, rad: half a degree of rounding.
 const ROUNDING_RAD: f64 = 0.009;
-/// Angle that no plate is tilted by, rad: at 45° nothing rolls back.
+/// Angle that no plate is tilted by, rad. Chosen.
 const STEEP_RAD: f64 = core::f64::consts::FRAC_PI_4;
-/// Share of steep commands from which on they are not in radians.
-const SOME: f64 = 0.25;
-/// Length below which "no fault" says nothing, s: a window must fill, and what
-/// fails must last, before most faults are confirmed (1 to 2 s, by `calibrate`'s own
-/// forecast on the chapter's rig).
-const LEAST_S: f64 = 3.0;
-/// Units of a position other than the stated one, in it: centimetres and
-/// millimetres for metres.
+/// Fraction of steep commands from which on they are not in radians. Chosen.
+const STEEP_SHARE: f64 = 0.25;
+/// Duration below which "no fault" tells nothing, s: a window must fill and a failure
+/// must last before a fault is confirmed (1 to 2 s for most, by the prospects of the
+/// chapter's rig).
+const LEAST_SESSION_S: f64 = 3.0;
+/// Position units other than the stated one, in terms of it: centimetres and millimetres
+/// for metres.
 const POSITION_UNITS: [f64; 2] = [0.01, 0.001];
-/// A degree for a radian.
+/// One degree in radians.
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
 
-/// Something in which a rig's description and its data do not fit.
+/// A contradiction between a rig's description and its data.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Misfit {
-    #[error("no position was read: there is no ball to judge by")]
+    #[error("no sample has a position: without a ball nothing can be judged")]
     NoReadings,
     #[error("there are no commands: neither the servos nor the ball can be judged")]
     NoCommands,
     #[error("no axis has both commands and positions: x needs qy, y needs qx")]
     NoAxis,
-    #[error("{duration_s:.1} s are too short to be judged; record at least {LEAST_S} s")]
+    #[error("{duration_s:.1} s are too short to be judged; record at least {LEAST_SESSION_S} s")]
     Short { duration_s: f64 },
     #[error(
-        "a sample comes every {} s, by the asset file's sample_rate_hz of {stated_hz} every {} s: {}",
+        "a sample comes every {} s, but by the asset file's sample_rate_hz of {stated_hz} every {} s: {}",
         digits(*period_s), digits(stated_hz.recip()), clock_hint(*per_second)
     )]
     Rate {
         /// Median time between samples.
         period_s: f64,
         stated_hz: f64,
-        /// Units of the device's clock in a second, where that explains it.
+        /// Units of the device's clock per second, if that explains it.
         per_second: Option<f64>,
     },
     #[error(
@@ -76,9 +75,9 @@ pub enum Misfit {
         100.0 * share, unit_hint("axes.position_unit_m", units_m)
     )]
     Positions {
-        /// Of the positions, those outside.
+        /// Fraction of the positions that lie outside.
         share: f64,
-        /// Units under which they would lie on it, m.
+        /// Units with which they would lie on the plate, m.
         units_m: [Option<f64>; POSITION_UNITS.len()],
     },
     #[error(
@@ -86,16 +85,16 @@ pub enum Misfit {
         100.0 * share, unit_hint("axes.command_unit_rad", &[*unit_rad])
     )]
     Commands {
-        /// Of the commands, those beyond.
+        /// Fraction of the commands that are beyond the limit.
         share: f64,
         limit_rad: f64,
-        /// The unit under which they would be within, rad.
+        /// The unit with which they would be within the limit, rad.
         unit_rad: Option<f64>,
     },
     #[error("the commands never change: nothing shows how the servos answer")]
     CommandsHeld,
     #[error(
-        "{axis} has no commands or no positions: nothing is said of the servo of {command}",
+        "{axis} has no commands or no positions: the servo of {command} is not judged",
         axis = axis.as_str(), command = axis.command()
     )]
     OneAxis {
@@ -117,7 +116,7 @@ pub enum Misfit {
 }
 
 impl Misfit {
-    /// One word for programs.
+    /// The identifier of the misfit.
     #[must_use]
     pub const fn as_str(self) -> &'static str {
         match self {
@@ -135,7 +134,7 @@ impl Misfit {
         }
     }
 
-    /// Whether "no fault" would be a verdict from nothing.
+    /// Whether a verdict "no fault" would be meaningless.
     #[must_use]
     pub const fn prevents_judging(self) -> bool {
         !matches!(
@@ -162,7 +161,7 @@ impl Misfit {
     }
 }
 
-/// Three significant digits.
+/// Rounds to three significant digits.
 fn digits(value: f64) -> f64 {
     let scale = 10_f64.powi(2 - value.abs().log10().floor() as i32);
     if scale.is_finite() && scale > 0.0 { (value * scale).round() / scale } else { value }
@@ -184,7 +183,7 @@ fn unit_hint(element: &str, units: &[Option<f64>]) -> String {
     }
 }
 
-/// A number out of another.
+/// A count out of a total.
 #[derive(Clone, Copy, Debug, Default)]
 struct Count {
     n: u32,
@@ -197,9 +196,9 @@ impl Count {
         self.of = self.of.saturating_add(1);
     }
 
-    /// None where there are too few to say.
+    /// The fraction; `None` if the total is too small.
     fn share(self) -> Option<f64> {
-        (self.of >= LEAST).then(|| f64::from(self.n) / f64::from(self.of))
+        (self.of >= LEAST_COUNT).then(|| f64::from(self.n) / f64::from(self.of))
     }
 
     fn exceeds(self, share: f64) -> bool {
@@ -207,64 +206,64 @@ impl Count {
     }
 }
 
-/// Where the positions lie.
+/// Counts of where the positions lie.
 #[derive(Clone, Copy, Debug, Default)]
-struct Places {
+struct PositionCounts {
     outside: Count,
     far: Count,
-    /// On the plate under each of [`POSITION_UNITS`].
+    /// On the plate with each of [`POSITION_UNITS`].
     fit: [Count; POSITION_UNITS.len()],
 }
 
-/// How large the commands are.
+/// Counts of the commands' sizes.
 #[derive(Clone, Copy, Debug, Default)]
-struct Sizes {
+struct CommandCounts {
     beyond: Count,
     steep: Count,
-    /// Within the limit if they are in degrees.
+    /// Within the limit if in degrees.
     fit: Count,
 }
 
 /// What has been seen of one axis.
 #[derive(Clone, Copy, Debug, Default)]
-struct Seen {
+struct SeenAxis {
     read: bool,
     command: Option<f64>,
     changed: bool,
     n_commands: u32,
 }
 
-/// The samples of one session held against the description of its rig.
+/// The comparison of one session's samples with the description of its rig.
 #[derive(Clone, Debug)]
 pub struct Plausibility {
     rig: Rig,
-    /// The axes that the rig's calibration knows, if there is one.
+    /// The axes in the rig's calibration, if there is one.
     learnt: Option<PerAxis<bool>>,
     span_s: Option<(f64, f64)>,
     periods: Periods,
-    places: Places,
-    sizes: Sizes,
-    seen: PerAxis<Seen>,
-    responses: Responses,
+    places: PositionCounts,
+    sizes: CommandCounts,
+    seen: PerAxis<SeenAxis>,
+    responses: ResponseCorrelator,
 }
 
 impl Plausibility {
-    /// Nothing seen yet of `rig`.
+    /// Builds a comparison for `rig` without samples.
     #[must_use]
     pub fn new(rig: &Rig) -> Self {
         Self {
-            responses: Responses::new(rig.sample_rate_hz),
+            responses: ResponseCorrelator::new(rig.sample_rate_hz),
             learnt: rig.calibration.as_ref().map(|c| c.axes.map(|axis| axis.is_some())),
             rig: Rig { calibration: None, ..rig.clone() },
             span_s: None,
             periods: Periods::default(),
-            places: Places::default(),
-            sizes: Sizes::default(),
+            places: PositionCounts::default(),
+            sizes: CommandCounts::default(),
             seen: PerAxis::default(),
         }
     }
 
-    /// All that was found of a whole session.
+    /// Compares a whole session.
     #[must_use]
     pub fn of(rig: &Rig, samples: &[Sample]) -> Self {
         let mut plausibility = Self::new(rig);
@@ -272,7 +271,7 @@ impl Plausibility {
         plausibility
     }
 
-    /// Takes the next sample as it was sent, in whatever order they come.
+    /// Takes the next sample as sent, in any order.
     pub fn take(&mut self, sample: &Sample) {
         let Some(mut moment) = moment(&self.rig.mapping, sample) else { return };
         let finite = |value: Option<f64>| value.filter(|v| v.is_finite());
@@ -317,7 +316,7 @@ impl Plausibility {
         let out_m = -self.rig.ball.radius_m();
         let fits = |unit: f64| plate.edge_distance_m(unit * x, unit * y) >= out_m;
         self.places.outside.take(!fits(1.0));
-        self.places.far.take(!fits(1.0 / FAR));
+        self.places.far.take(!fits(1.0 / FAR_FACTOR));
         for (count, unit) in self.places.fit.iter_mut().zip(POSITION_UNITS) {
             count.take(fits(unit));
         }
@@ -333,7 +332,7 @@ impl Plausibility {
         }
     }
 
-    /// What does not fit, the worst first.
+    /// Returns the contradictions, the worst first.
     #[must_use]
     pub fn misfits(&self) -> Vec<Misfit> {
         let mut found: Vec<Misfit> =
@@ -349,7 +348,7 @@ impl Plausibility {
     }
 
     fn rate(&self) -> Option<Misfit> {
-        let (period_s, stated_hz) = (self.periods.median_s(LEAST)?, self.rig.sample_rate_hz);
+        let (period_s, stated_hz) = (self.periods.median_s(LEAST_COUNT)?, self.rig.sample_rate_hz);
         let fits = |per_second: f64| {
             let factor = period_s / per_second * stated_hz;
             (RATE_FACTOR.recip()..=RATE_FACTOR).contains(&factor)
@@ -359,7 +358,7 @@ impl Plausibility {
     }
 
     fn missing(&self) -> Option<Misfit> {
-        let any = |of: fn(&Seen) -> bool| Axis::ALL.iter().any(|&axis| of(&self.seen[axis]));
+        let any = |of: fn(&SeenAxis) -> bool| Axis::ALL.iter().any(|&axis| of(&self.seen[axis]));
         if !any(|seen| seen.read) {
             return Some(Misfit::NoReadings);
         }
@@ -371,34 +370,35 @@ impl Plausibility {
     }
 
     fn positions(&self) -> Option<Misfit> {
-        let share = self.places.outside.share().filter(|&share| share > MOST)?;
-        let Places { far, fit, .. } = &self.places;
+        let share = self.places.outside.share().filter(|&share| share > MAJORITY)?;
+        let PositionCounts { far, fit, .. } = &self.places;
         let units_m = core::array::from_fn(|i| {
-            let fits = far.exceeds(MOST) && fit[i].exceeds(FITS);
+            let fits = far.exceeds(MAJORITY) && fit[i].exceeds(FITTING_SHARE);
             fits.then_some(POSITION_UNITS[i] * self.rig.mapping.position_unit_m)
         });
         Some(Misfit::Positions { share, units_m })
     }
 
     fn commands(&self) -> Option<Misfit> {
-        let share = self.sizes.beyond.share().filter(|&share| share > MOST)?;
-        let in_degrees = self.sizes.steep.exceeds(SOME) && self.sizes.fit.exceeds(FITS);
+        let share = self.sizes.beyond.share().filter(|&share| share > MAJORITY)?;
+        let in_degrees =
+            self.sizes.steep.exceeds(STEEP_SHARE) && self.sizes.fit.exceeds(FITTING_SHARE);
         let unit_rad = in_degrees.then_some(DEGREE * self.rig.mapping.command_unit_rad);
         Some(Misfit::Commands { share, limit_rad: self.rig.servo.angle_limit_rad, unit_rad })
     }
 
     fn short(&self) -> Option<Misfit> {
         let duration_s = self.span_s.map_or(0.0, |(first, newest)| newest - first);
-        (duration_s < LEAST_S).then_some(Misfit::Short { duration_s })
+        (duration_s < LEAST_SESSION_S).then_some(Misfit::Short { duration_s })
     }
 
     fn held(&self) -> Option<Misfit> {
-        let enough = Axis::ALL.iter().any(|&axis| self.seen[axis].n_commands >= LEAST);
+        let enough = Axis::ALL.iter().any(|&axis| self.seen[axis].n_commands >= LEAST_COUNT);
         let changed = Axis::ALL.iter().any(|&axis| self.seen[axis].changed);
         (enough && !changed).then_some(Misfit::CommandsHeld)
     }
 
-    /// An axis that is not there, unless the rig is known to lack it.
+    /// A missing axis, unless the calibration lacks it, too.
     fn one_axis(&self) -> Option<Misfit> {
         let known = |axis: Axis| self.learnt.is_none_or(|learnt| learnt[axis]);
         let lacks = |&axis: &Axis| {
@@ -407,19 +407,20 @@ impl Plausibility {
         Axis::ALL.into_iter().find(lacks).map(|axis| Misfit::OneAxis { axis })
     }
 
-    /// Axes that are swapped or have the wrong sign, where the data say so
-    /// clearly. Of a rig that is learnt it is known: there it is the servo.
+    /// Axes that are swapped or have the wrong sign, if the data show it clearly. Not for
+    /// a learnt rig, whose axes are known: there it is a servo fault.
     fn answers(&self) -> Vec<Misfit> {
         if self.learnt.is_some() {
             return Vec::new();
         }
         let answers = PerAxis::from_fn(|axis| self.responses.answers(axis));
-        let are = |wanted: Answers| Axis::ALL.into_iter().filter(move |&a| answers[a] == wanted);
+        let are =
+            |wanted: AxisResponse| Axis::ALL.into_iter().filter(move |&a| answers[a] == wanted);
         let swap = self.rig.mapping.swap;
-        if are(Answers::Own).next().is_none() && are(Answers::Against).next().is_none() {
-            return are(Answers::Other).map(|axis| Misfit::Swapped { axis, swap }).collect();
+        if are(AxisResponse::Own).next().is_none() && are(AxisResponse::Against).next().is_none() {
+            return are(AxisResponse::Other).map(|axis| Misfit::Swapped { axis, swap }).collect();
         }
         let sign = |axis: Axis| Misfit::WrongSign { axis, sign: self.rig.mapping.sign[axis] };
-        are(Answers::Against).map(sign).collect()
+        are(AxisResponse::Against).map(sign).collect()
     }
 }

@@ -1,25 +1,25 @@
-//! The median time between samples, in bounded memory: a histogram over times
-//! that grow by a quarter from one class to the next.
+//! The median time between samples in bounded memory: a histogram with classes that each
+//! span a quarter more than the one below.
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 
-/// Shortest and longest time that are told apart, as powers of ten of a second:
-/// faster than any sensor, and a clock in microseconds that ticks once a second.
+/// Shortest and longest time that are distinguished, as powers of ten of a second: faster
+/// than any sensor, and a clock in microseconds with a sample per second.
 const FROM_DECADE: i32 = -6;
 const TO_DECADE: i32 = 7;
-/// Classes to a decade.
+/// Classes per decade.
 const PER_DECADE: i32 = 10;
 const CLASSES: usize = ((TO_DECADE - FROM_DECADE) * PER_DECADE) as usize;
 
-/// Times of one class.
+/// The times in one class.
 #[derive(Clone, Copy, Debug, Default)]
 struct Class {
     n: u32,
     sum_s: f64,
 }
 
-/// Times between samples.
+/// Histogram of the times between samples.
 #[derive(Clone, Debug)]
 pub(super) struct Periods {
     classes: [Class; CLASSES],
@@ -33,7 +33,7 @@ impl Default for Periods {
 }
 
 impl Periods {
-    /// Takes the time since the newest sample; one that came late says nothing.
+    /// Takes the time since the newest sample; a sample that came late is ignored.
     pub(super) fn take(&mut self, dt_s: f64) {
         if dt_s > 0.0 && dt_s.is_finite() {
             let place = (dt_s.log10() - f64::from(FROM_DECADE)) * f64::from(PER_DECADE);
@@ -44,7 +44,8 @@ impl Periods {
         }
     }
 
-    /// The mean of the class that holds the median; none of fewer than `least`.
+    /// Returns the mean of the class that holds the median; `None` for fewer than `least`
+    /// times.
     pub(super) fn median_s(&self, least: u32) -> Option<f64> {
         if self.n < least {
             return None;

@@ -1,10 +1,9 @@
-//! Which command the ball's motion along an axis answers, and with which sign.
+//! Which command the ball's motion along an axis responds to, and with which sign.
 //!
-//! Readings and commands are averaged over blocks of time. The second difference
-//! of three positions is the acceleration seen through a triangular window, so
-//! it is correlated with the commands of some delay before through the same
-//! window. A controlled ball correlates with much: only what explains half of
-//! the motion, twice as much as anything else, is taken as an answer.
+//! Readings and commands are averaged over blocks of time. The second difference of three
+//! positions is the acceleration seen through a triangular window, so it is correlated
+//! with earlier commands through the same window. A controlled ball correlates with much:
+//! a response must explain half of the motion and twice as much as anything else.
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
@@ -13,46 +12,47 @@ use alloc::collections::VecDeque;
 use crate::engine::frame::Moment;
 use crate::vocabulary::{Axis, PerAxis};
 
-/// Length of a block, s, where it holds enough samples: a delay of 80–300 ms from
-/// command to acceleration, as seen on real rigs, is then at most three.
-const BLOCK_S: f64 = 0.1;
-/// Samples that a block holds at least.
+/// Length of a block, s, if it holds enough samples: a delay of 80 to 300 ms from command
+/// to acceleration, as seen on real rigs, is at most three blocks.
+const RESPONSE_BLOCK_S: f64 = 0.1;
+/// Least samples in a block. Chosen.
 const BLOCK_SAMPLES: f64 = 2.0;
-/// Blocks from one position of a second difference to the next.
+/// Blocks between the positions of a second difference. Chosen.
 const SPAN: usize = 3;
-/// Delays that are tried: 0 to 3 blocks.
+/// Number of delays that are tried: 0 to 3 blocks.
 const DELAYS: usize = 4;
-/// Blocks that are held: a difference needs two spans and the one in the middle,
-/// its earliest command half a triangle and the longest delay before that.
+/// Blocks that are kept: two spans and the middle one for a difference; half a triangle
+/// and the longest delay before the middle for the earliest command.
 const HELD: usize = 2 * SPAN + DELAYS - 1;
-/// Differences from which on a correlation counts: fifteen seconds of blocks.
-const LEAST: f64 = 150.0;
-/// Share of the motion that a command must explain for the motion to answer it.
-const CLEAR: f64 = 0.5;
-/// Share of what is explained best that anything else may explain.
-const RIVAL: f64 = 0.5;
+/// Least number of differences for a correlation to count: fifteen seconds of blocks.
+/// Chosen.
+const LEAST_DIFFERENCES: f64 = 150.0;
+/// Fraction of the motion that a command must explain. Chosen.
+const CLEAR_SHARE: f64 = 0.5;
+/// Largest fraction of the best explanation that any other may explain. Chosen.
+const RIVAL_SHARE: f64 = 0.5;
 
-/// What the motion along an axis answers.
+/// The command that the motion along an axis responds to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Answers {
+pub(super) enum AxisResponse {
     /// Its own command.
     Own,
-    /// Its own command, to the opposite side.
+    /// Its own command, in the opposite direction.
     Against,
-    /// The other axis' command, to either side.
+    /// The other axis' command, in either direction.
     Other,
-    /// Nothing that is clear.
+    /// No clear response.
     Unclear,
 }
 
-/// A mean as it grows.
+/// A running mean.
 #[derive(Clone, Copy, Debug, Default)]
-struct Mean {
+struct RunningMean {
     n: u32,
     sum: f64,
 }
 
-impl Mean {
+impl RunningMean {
     fn take(&mut self, value: Option<f64>) {
         if let Some(value) = value {
             self.n += 1;
@@ -67,12 +67,12 @@ impl Mean {
 
 /// One block: mean positions and commands.
 #[derive(Clone, Copy, Debug, Default)]
-struct Block {
-    position: PerAxis<Mean>,
-    command: PerAxis<Mean>,
+struct ResponseBlock {
+    position: PerAxis<RunningMean>,
+    command: PerAxis<RunningMean>,
 }
 
-/// A correlation as it grows.
+/// A running correlation.
 #[derive(Clone, Copy, Debug, Default)]
 struct Correlation {
     n: f64,
@@ -89,41 +89,41 @@ impl Correlation {
         self.products += a * b;
     }
 
-    /// In [−1, 1]; zero where there is too little to say.
+    /// The correlation, in [−1, 1]; zero for too few differences.
     fn value(&self) -> f64 {
         let [a, b] = self.sums;
         let spread = |i: usize| self.squares[i] - self.sums[i] * self.sums[i] / self.n;
         let value = (self.products - a * b / self.n) / (spread(0) * spread(1)).sqrt();
-        if self.n >= LEAST && value.is_finite() { value } else { 0.0 }
+        if self.n >= LEAST_DIFFERENCES && value.is_finite() { value } else { 0.0 }
     }
 }
 
-/// The motion along one axis against both commands, at every delay.
-type Tried = PerAxis<[Correlation; DELAYS]>;
+/// Correlations of the motion along one axis with both commands, for each delay.
+type AxisCorrelations = PerAxis<[Correlation; DELAYS]>;
 
-/// The motion along both axes against both commands.
+/// Correlates the motion along both axes with both commands.
 #[derive(Clone, Debug)]
-pub(super) struct Responses {
+pub(super) struct ResponseCorrelator {
     block_s: f64,
-    /// Number of the block that is being filled.
+    /// Number of the current block.
     number: f64,
-    filling: Block,
-    held: VecDeque<Block>,
-    tried: PerAxis<Tried>,
+    filling: ResponseBlock,
+    held: VecDeque<ResponseBlock>,
+    tried: PerAxis<AxisCorrelations>,
 }
 
-impl Responses {
+impl ResponseCorrelator {
     pub(super) fn new(sample_rate_hz: f64) -> Self {
         Self {
-            block_s: BLOCK_S.max(BLOCK_SAMPLES / sample_rate_hz),
+            block_s: RESPONSE_BLOCK_S.max(BLOCK_SAMPLES / sample_rate_hz),
             number: f64::NAN,
-            filling: Block::default(),
+            filling: ResponseBlock::default(),
             held: VecDeque::with_capacity(HELD),
             tried: PerAxis::default(),
         }
     }
 
-    /// Takes a moment; one that comes after its block is over is left out.
+    /// Takes a moment; one later than the end of its block is ignored.
     pub(super) fn take(&mut self, moment: &Moment) {
         let number = (moment.at.seconds() / self.block_s).floor();
         if number < self.number {
@@ -139,8 +139,8 @@ impl Responses {
         }
     }
 
-    /// Ends the block that is being filled; unless the next one `follows`, what
-    /// was before is forgotten.
+    /// Ends the current block; unless the next one `follows` it directly, earlier blocks
+    /// are dropped.
     fn close(&mut self, follows: bool) {
         let block = core::mem::take(&mut self.filling);
         if !follows {
@@ -176,7 +176,7 @@ impl Responses {
         Some(at(last)? - 2.0 * at(last - SPAN)? + at(last - 2 * SPAN)?)
     }
 
-    /// The command through the same window, so many blocks before.
+    /// The command through the same window, `delay` blocks earlier.
     fn command(&self, axis: Axis, delay: usize) -> Option<f64> {
         let middle = HELD - 1 - SPAN - delay;
         let weighted = |offset: usize| {
@@ -186,19 +186,20 @@ impl Responses {
         (0..2 * SPAN - 1).map(weighted).sum()
     }
 
-    /// What the motion along `axis` answers.
-    pub(super) fn answers(&self, axis: Axis) -> Answers {
+    /// Returns the command that the motion along `axis` responds to.
+    pub(super) fn answers(&self, axis: Axis) -> AxisResponse {
         let best = |of: Axis| {
             let values = self.tried[axis][of].iter().map(Correlation::value);
             values.fold(0.0, |best: f64, r| if r.abs() > best.abs() { r } else { best })
         };
         let (own, other) = (best(axis) * axis.drive_sign(), best(axis.other()));
-        let clear = |r: f64, rival: f64| r * r >= CLEAR && rival * rival <= RIVAL * r * r;
+        let clear =
+            |r: f64, rival: f64| r * r >= CLEAR_SHARE && rival * rival <= RIVAL_SHARE * r * r;
         match (clear(own, other), clear(other, own)) {
-            (true, _) if own > 0.0 => Answers::Own,
-            (true, _) => Answers::Against,
-            (_, true) => Answers::Other,
-            _ => Answers::Unclear,
+            (true, _) if own > 0.0 => AxisResponse::Own,
+            (true, _) => AxisResponse::Against,
+            (_, true) => AxisResponse::Other,
+            _ => AxisResponse::Unclear,
         }
     }
 }

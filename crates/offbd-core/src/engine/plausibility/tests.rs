@@ -1,7 +1,7 @@
 use super::*;
 use crate::engine::calibrate::tests::session;
 
-/// A healthy session of the chapter's rig, changed row by row.
+/// A healthy session of the chapter's rig, with each row changed.
 fn changed(change: impl Fn(&mut Sample)) -> Vec<Sample> {
     let mut samples = session(30.0, 0.03, 0.9);
     samples.iter_mut().for_each(change);
@@ -12,7 +12,7 @@ fn misfits(samples: &[Sample]) -> Vec<Misfit> {
     Plausibility::of(&Rig::chapter("a"), samples).misfits()
 }
 
-/// What is said of a session, in one string.
+/// The misfits of a session as one string.
 fn said(samples: &[Sample]) -> String {
     misfits(samples).iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
 }
@@ -29,7 +29,7 @@ fn a_session_that_fits_is_left_in_peace() {
 #[test]
 fn a_clock_in_milliseconds_is_named() {
     let ms = changed(|s| s.t_s *= 1e3);
-    let words = "a sample comes every 10 s, by the asset file's sample_rate_hz of 100 every 0.01 s: \
+    let words = "a sample comes every 10 s, but by the asset file's sample_rate_hz of 100 every 0.01 s: \
                  is t_s in ms?";
     assert_eq!(said(&ms), words);
     assert!(said(&changed(|s| s.t_s *= 1e6)).ends_with("is t_s in µs?"));
@@ -98,14 +98,13 @@ fn a_wrong_sign_is_named_of_its_axis() {
     assert_eq!(misfits(&wrong), [Misfit::WrongSign { axis: Axis::Y, sign: 1.0 }]);
 }
 
-/// What is known of a rig is not asked again: a servo that answers the wrong way
-/// is then a fault, and an axis that is missing was never there.
+/// A calibration settles the axes: a servo in the opposite direction is then a fault, and
+/// an axis that it lacks is not missed.
 #[test]
 fn a_calibration_answers_for_the_axes() {
     let mut rig = Rig::chapter("a");
     let beam = changed(|s| s.y_m = None);
-    rig.calibration =
-        Some(crate::engine::calibrate(&rig, core::slice::from_ref(&beam), "", "").unwrap());
+    rig.calibration = Some(crate::engine::calibrate(&rig, core::slice::from_ref(&beam)).unwrap());
     let found = |samples: &[Sample]| Plausibility::of(&rig, samples).misfits();
     assert_eq!(found(&beam), []);
     assert_eq!(found(&changed(|s| scale(&mut s.x_m, -1.0))), []);
@@ -114,7 +113,7 @@ fn a_calibration_answers_for_the_axes() {
 
 #[test]
 fn motion_that_answers_nothing_is_no_question_of_axes() {
-    // A sensor that sways by itself, out of step with every command.
+    // A sensor that sways by itself, unrelated to any command.
     let noise = changed(|s| {
         s.x_m = Some(0.05 * (1.9 * s.t_s).sin());
         s.y_m = Some(0.05 * (2.3 * s.t_s).cos());

@@ -1,9 +1,9 @@
-//! What calibrations promise against what comes: false alarms and delays.
+//! Certificates of calibrations: predicted against observed false alarms and delays.
 //!
-//! Rigs as they are seen in the world, no two alike, are learnt from three
-//! healthy sessions of two minutes each. What each calibration promises is kept;
-//! then the rig is watched for hours while it is healthy, with hands and gusts,
-//! and every fault of which a delay was promised is put into sessions of it.
+//! Random rigs with the properties of real ones are calibrated on three healthy sessions
+//! of two minutes each. Each calibration predicts rates of false alarms and detection
+//! delays. Then healthy sessions of the rig, hours in total, with pushes and gusts, give
+//! the observed rates, and sessions with each fault give the observed delays.
 
 mod measure;
 mod show;
@@ -12,15 +12,17 @@ use rayon::prelude::*;
 
 use super::{Chart, ChartError, Effort};
 
-/// Rigs that are drawn, hours for which each is watched, and sessions that each
-/// fault is put into.
-struct Plan {
+/// The extent of the measurement.
+struct CertificatePlan {
+    /// Number of rigs drawn.
     n_rigs: u64,
+    /// Healthy time of each rig, h.
     healthy_h: u64,
+    /// Number of sessions with each fault.
     n_faulty: u64,
 }
 
-impl Plan {
+impl CertificatePlan {
     const fn of(effort: Effort) -> Self {
         match effort {
             Effort::Full => Self { n_rigs: 80, healthy_h: 4, n_faulty: 8 },
@@ -29,15 +31,16 @@ impl Plan {
     }
 }
 
-/// Seeds of the rigs: others than those that the promises were made by.
+/// Seed of the first rig. Chosen apart from the seeds with which the predictions were
+/// developed.
 const FIRST_SEED: u64 = 91_000_000;
 
-/// Measures and draws.
+/// Measures, and returns the chart.
 ///
 /// # Errors
-/// [`ChartError`] if a rig cannot be simulated, or a record is no JSON.
+/// [`ChartError`] if a rig cannot be simulated, or a record cannot be written as JSON.
 pub fn make(effort: Effort) -> Result<Chart, ChartError> {
-    let plan = Plan::of(effort);
+    let plan = CertificatePlan::of(effort);
     let rigs = (0..plan.n_rigs).into_par_iter();
     let measured = rigs
         .map(|n| measure::rig(&plan, FIRST_SEED + n))

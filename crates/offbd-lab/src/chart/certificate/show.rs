@@ -1,26 +1,27 @@
-//! The records as a drawing and as a table.
+//! Presents the records as a drawing and as a table.
 
-use super::measure::{Alarms, Delay, Measured};
-use crate::chart::{Axis, Figure, Look, Panel, Scale, Series, Stroke, Table};
+use super::measure::{DetectionDelay, FalseAlarms, RigResult};
+use crate::chart::{Axis, ChartTable, Figure, Look, Panel, Scale, Series, Stroke};
 use offbd_core::maths::median;
 
-/// Monitors of rigs are put together in so many groups, by what they promise.
+/// Number of groups of monitors, by predicted rate; chosen.
 const GROUPS: usize = 6;
-/// Alarms below which a factor of two is chance.
+/// Number of alarms below which a factor of two is within chance; chosen.
 const FEW: f64 = 3.0;
-/// Rates and delays drawn.
+/// Range of the rates drawn, per hour.
 const PER_H: (f64, f64) = (1e-3, 10.0);
+/// Range of the delays drawn, s.
 const DELAYS_S: (f64, f64) = (0.2, 10.0);
 
-/// Monitors that promise about the same, together.
-struct Group {
+/// Monitors with about the same predicted rate.
+struct MonitorGroup {
     promised: f64,
     came: u32,
     watched_h: f64,
 }
 
-impl Group {
-    fn of(alarms: &[&Alarms]) -> Self {
+impl MonitorGroup {
+    fn of(alarms: &[&FalseAlarms]) -> Self {
         Self {
             promised: alarms.iter().map(|a| a.promised_per_h * a.watched_h).sum(),
             came: alarms.iter().map(|a| a.came).sum(),
@@ -28,25 +29,25 @@ impl Group {
         }
     }
 
-    /// What was promised and what came, per hour. Where nothing came, at most as
-    /// much as one alarm in that time.
+    /// Returns the predicted and the observed rate, per hour. Without an alarm, the observed
+    /// rate is that of one alarm, as an upper limit.
     fn point(&self) -> (f64, f64) {
         let came = f64::from(self.came.max(1));
         (self.promised / self.watched_h, came / self.watched_h)
     }
 }
 
-fn alarms(measured: &[Measured]) -> Vec<&Alarms> {
-    let mut all: Vec<&Alarms> = measured.iter().flat_map(|m| &m.monitors).collect();
+fn alarms(measured: &[RigResult]) -> Vec<&FalseAlarms> {
+    let mut all: Vec<&FalseAlarms> = measured.iter().flat_map(|m| &m.monitors).collect();
     all.sort_by(|a, b| a.promised_per_h.total_cmp(&b.promised_per_h));
     all
 }
 
-fn delays(measured: &[Measured]) -> impl Iterator<Item = &Delay> {
+fn delays(measured: &[RigResult]) -> impl Iterator<Item = &DetectionDelay> {
     measured.iter().flat_map(|m| &m.delays)
 }
 
-fn faults(measured: &[Measured]) -> Vec<&'static str> {
+fn faults(measured: &[RigResult]) -> Vec<&'static str> {
     let mut names: Vec<&str> = Vec::new();
     for delay in delays(measured) {
         if !names.contains(&delay.fault) {
@@ -56,20 +57,22 @@ fn faults(measured: &[Measured]) -> Vec<&'static str> {
     names
 }
 
-pub(super) fn figure(measured: &[Measured]) -> Figure {
+pub(super) fn figure(measured: &[RigResult]) -> Figure {
     Figure {
         title: "Calibrations: what they promise and what comes".to_owned(),
         subtitle: conclusion(measured),
         columns: 2,
         panel_height: 900,
-        panels: vec![rates(measured), soonness(measured)],
+        panels: vec![rates(measured), delay_panel(measured)],
     }
 }
 
-fn rates(measured: &[Measured]) -> Panel {
+fn rates(measured: &[RigResult]) -> Panel {
     let all = alarms(measured);
-    let groups: Vec<Group> = all.chunks(all.len().div_ceil(GROUPS).max(1)).map(Group::of).collect();
-    let seen = |came: bool| groups.iter().filter(move |g| (g.came > 0) == came).map(Group::point);
+    let groups: Vec<MonitorGroup> =
+        all.chunks(all.len().div_ceil(GROUPS).max(1)).map(MonitorGroup::of).collect();
+    let seen =
+        |came: bool| groups.iter().filter(move |g| (g.came > 0) == came).map(MonitorGroup::point);
     let scale = || Scale::Log(PER_H.0, PER_H.1);
     let mut panel = Panel::new(
         "false alarms of a monitor, in groups of equal size",
@@ -83,7 +86,7 @@ fn rates(measured: &[Measured]) -> Panel {
     panel
 }
 
-fn soonness(measured: &[Measured]) -> Panel {
+fn delay_panel(measured: &[RigResult]) -> Panel {
     let scale = || Scale::Log(DELAYS_S.0, DELAYS_S.1);
     let mut panel = Panel::new(
         "median delay of a fault, each point a rig",
@@ -99,7 +102,8 @@ fn soonness(measured: &[Measured]) -> Panel {
     panel
 }
 
-/// The line on which promises are kept, and those at twice and half of it.
+/// Returns the line of equal predicted and observed values, and the lines at twice and
+/// half of it.
 fn within_two((low, high): (f64, f64)) -> [Series; 3] {
     let line = |name: &str, factor: f64, dash| {
         let look = Look { dash, ..Look::BLACK };
@@ -116,8 +120,8 @@ fn within_two((low, high): (f64, f64)) -> [Series; 3] {
     ]
 }
 
-fn conclusion(measured: &[Measured]) -> String {
-    let all = Group::of(&alarms(measured));
+fn conclusion(measured: &[RigResult]) -> String {
+    let all = MonitorGroup::of(&alarms(measured));
     let learnt = measured.iter().filter(|m| m.refused.is_none()).count();
     let hours: f64 = measured.iter().filter_map(|m| m.monitors.first()).map(|a| a.watched_h).sum();
     let (kept, n) = kept(delays(measured));
@@ -130,32 +134,32 @@ fn conclusion(measured: &[Measured]) -> String {
     )
 }
 
-/// Delays that came within a factor of two of the promise, of those promised. A
-/// promise that a fault will not be found is kept if it was not.
-fn kept<'a>(delays: impl Iterator<Item = &'a Delay>) -> (usize, usize) {
+/// Counts the delays within a factor of two of the prediction, and all predicted ones. A
+/// prediction that a fault will not be detected is met if it was not.
+fn kept<'a>(delays: impl Iterator<Item = &'a DetectionDelay>) -> (usize, usize) {
     delays.fold((0, 0), |(kept, n), delay| (kept + usize::from(is_kept(delay)), n + 1))
 }
 
-fn is_kept(delay: &Delay) -> bool {
+fn is_kept(delay: &DetectionDelay) -> bool {
     match (delay.promised_s, delay.came_s) {
         (Some(promised_s), Some(came_s)) => (0.5..=2.0).contains(&(came_s / promised_s)),
         (promised_s, came_s) => promised_s.is_none() && came_s.is_none(),
     }
 }
 
-/// False alarms by monitor, then delays by fault.
-pub(super) fn table(measured: &[Measured]) -> Table {
+/// Returns a table of the false alarms by monitor and of the delays by fault.
+pub(super) fn table(measured: &[RigResult]) -> ChartTable {
     let heading = vec!["of", "promised", "came", "unit", "within a factor of 2"];
     let mut rows = Vec::new();
     for code in offbd_core::vocabulary::FaultCode::ALL {
-        let of: Vec<&Alarms> =
+        let of: Vec<&FalseAlarms> =
             alarms(measured).into_iter().filter(|a| a.code == code.as_str()).collect();
-        rows.push(row(&format!("{code}, false alarms"), &Group::of(&of)));
+        rows.push(row(&format!("{code}, false alarms"), &MonitorGroup::of(&of)));
     }
-    rows.push(row("all false alarms", &Group::of(&alarms(measured))));
+    rows.push(row("all false alarms", &MonitorGroup::of(&alarms(measured))));
     for fault in faults(measured) {
         let of = || delays(measured).filter(|d| d.fault == fault);
-        let middle = |value: fn(&Delay) -> Option<f64>| {
+        let middle = |value: fn(&DetectionDelay) -> Option<f64>| {
             let mut values: Vec<f64> = of().map(|d| value(d).unwrap_or(f64::INFINITY)).collect();
             let middle = median(&mut values).filter(|s| s.is_finite());
             middle.map_or("> 10".to_owned(), |s| format!("{s:.2}"))
@@ -164,10 +168,10 @@ pub(super) fn table(measured: &[Measured]) -> Table {
         let (promised, came) = (middle(|d| d.promised_s), middle(|d| d.came_s));
         rows.push(vec![fault.to_owned(), promised, came, "s".to_owned(), format!("{kept} of {n}")]);
     }
-    Table { heading, right: vec![1, 2, 4], rows }
+    ChartTable { heading, right: vec![1, 2, 4], rows }
 }
 
-fn row(name: &str, group: &Group) -> Vec<String> {
+fn row(name: &str, group: &MonitorGroup) -> Vec<String> {
     let ratio = f64::from(group.came) / group.promised;
     let kept = match (0.5..=2.0).contains(&ratio) {
         _ if group.promised.max(f64::from(group.came)) < FEW => "too few to tell",
@@ -176,7 +180,7 @@ fn row(name: &str, group: &Group) -> Vec<String> {
     };
     vec![
         name.to_owned(),
-        // A sum of nothing is −0.
+        // The sum of no values is −0; adding zero makes it 0.
         format!("{:.1}", group.promised + 0.0),
         group.came.to_string(),
         format!("in {:.0} h", group.watched_h + 0.0),

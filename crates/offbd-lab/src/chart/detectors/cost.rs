@@ -1,10 +1,9 @@
-//! CPU time per sample: the whole pipeline by profile, and the loops of the
-//! detectors beside it.
+//! CPU time per sample, of the whole pipeline by profile and of the simple detectors.
 
 use std::hint::black_box;
 
-use super::bench::Bench;
-use super::method::{CHAPTER_M_S2, Detector, Method, Watch};
+use super::calibrated_rig::CalibratedRig;
+use super::method::{CHAPTER_M_S2, DetectionMethod, Detector, DetectorState};
 use super::trace::{Moment, follow};
 use crate::chart::ChartError;
 use crate::simulation::Preset;
@@ -13,60 +12,60 @@ use offbd_core::diagnosis::{FaultMemory, Profile};
 use offbd_core::engine::{Engine, Input, Setup};
 use offbd_core::vocabulary::Sample;
 
-/// What one sample costs.
+/// The CPU time of one sample.
 #[derive(Clone, Debug)]
-pub(super) struct Cost {
+pub(super) struct SampleCost {
     pub(super) what: String,
-    /// Of one sample, s.
+    /// CPU time per sample, s.
     pub(super) time: CpuTime,
 }
 
-/// Loops whose own cost is measured; that of the weighed explanations is part
-/// of the engine.
-const LOOPS: [(Method, f64); 3] = [
-    (Method::Chapter, CHAPTER_M_S2),
-    (Method::Debounced, 0.15),
-    (Method::Cusum { drift: 0.5 }, 100.0),
+/// Detectors whose own cost is measured, with their thresholds; that of the likelihood
+/// ratio is part of the engine's.
+const LOOPS: [(DetectionMethod, f64); 3] = [
+    (DetectionMethod::Chapter, CHAPTER_M_S2),
+    (DetectionMethod::Debounced, 0.15),
+    (DetectionMethod::Cusum { drift: 0.5 }, 100.0),
 ];
 
-/// Measures on a minute of the chapter's rig; the whole pipeline by profile
-/// default comes first.
-pub(super) fn measure(bench: &Bench, repeats: usize) -> Result<Vec<Cost>, ChartError> {
-    let samples = Bench::minute(Preset::Chapter)?;
+/// Measures on a minute of the chapter's rig. The first result is the whole pipeline with
+/// the profile `default`.
+pub(super) fn measure(rig: &CalibratedRig, repeats: usize) -> Result<Vec<SampleCost>, ChartError> {
+    let samples = CalibratedRig::minute(Preset::Chapter)?;
     let per_sample = |run: CpuTime| {
         let n = samples.len() as f64;
         CpuTime { minimum_s: run.minimum_s / n, median_s: run.median_s / n }
     };
     let mut costs = Vec::new();
     for profile in Profile::ALL {
-        let setup = bench.setup(profile);
+        let setup = rig.setup(profile);
         let time = cpu_time(repeats, || judge(setup, &samples));
         let what = format!("engine, {profile}");
-        costs.push(Cost { what, time: per_sample(time) });
+        costs.push(SampleCost { what, time: per_sample(time) });
     }
     let trace =
-        follow(&[Profile::Default, Profile::Textbook].map(|p| bench.setup(p).clone()), &samples);
+        follow(&[Profile::Default, Profile::Textbook].map(|p| rig.setup(p).clone()), &samples);
     for (method, threshold) in LOOPS {
         let detector = Detector { method, threshold, chosen: true };
         let moments: &[Moment] = detector.moments(&trace);
         let time = cpu_time(repeats, || {
-            let mut watch = Watch::new(detector, bench.healthy_m_s2);
+            let mut watch = DetectorState::new(detector, rig.healthy_m_s2);
             for moment in moments {
                 black_box(watch.take(black_box(moment)));
             }
         });
         let what = method.name();
-        costs.push(Cost { what, time: per_sample(time) });
+        costs.push(SampleCost { what, time: per_sample(time) });
     }
     Ok(costs)
 }
 
 fn judge(setup: &Setup, samples: &[Sample]) {
     let mut engine = Engine::new(setup.clone(), FaultMemory::default());
-    let mut outputs = Vec::new();
+    let mut transitions = Vec::new();
     for sample in samples {
-        engine.handle(Input::Sample(black_box(*sample)), &mut outputs);
-        black_box(&outputs);
-        outputs.clear();
+        engine.handle(Input::Sample(black_box(*sample)), &mut transitions);
+        black_box(&transitions);
+        transitions.clear();
     }
 }

@@ -1,7 +1,7 @@
-//! The faults that are simulated, and how they read.
+//! The simulated faults, and their names.
 
-/// All kinds, at two or three sizes where they have one: from what is clear to
-/// what is hardly there.
+/// All kinds of faults, those with a size at two or three sizes, from obvious to barely
+/// detectable.
 pub(super) const ALL: [&str; 26] = [
     "x_servo:dead",
     "y_servo:hold",
@@ -31,7 +31,7 @@ pub(super) const ALL: [&str; 26] = [
     "sensor:jump=0.01,0",
 ];
 
-/// One of each code, and one that is small.
+/// One fault of each code, and a small one.
 pub(super) const FEW: [&str; 5] = [
     "x_servo:dead",
     "y_servo:gain=0.2",
@@ -40,12 +40,12 @@ pub(super) const FEW: [&str; 5] = [
     "sensor:jump=0.035,-0.02",
 ];
 
-/// Whether it is one that a residual shows as what it is.
+/// Returns whether a fault is one of a servo, which a residual can isolate.
 pub(super) fn is_servo(fault: &str) -> bool {
     fault.contains("_servo:")
 }
 
-/// A fault in words: `gain 0.5`, `offset 2.9°`.
+/// Returns the name of a fault: `servo gain 0.5`, `servo offset 2.9°`.
 pub(super) fn words(fault: &str) -> String {
     let (_, what) = fault.split_once(':').unwrap_or(("", fault));
     let (kind, size) = what.split_once('=').unwrap_or((what, ""));

@@ -1,39 +1,41 @@
-//! The methods: each says at every judged moment which servo it accuses.
+//! The detection methods: at each judged time, each returns the accused servo, if any.
 
 use super::trace::{AxisMoment, Moment, Trace};
-use offbd_core::diagnosis::{Debounce, Pace, Profile, Qualified, Settings, Test};
+use offbd_core::diagnosis::{Debounce, DebounceTimes, Profile, Qualified, Settings, Test};
 use offbd_core::vocabulary::{Axis, FaultCode, PerAxis};
 
-/// Drift of the CUSUM, in healthy deviations: half of the shift to be found;
-/// Page's for a shift by one, and one that forgives what healthy rigs do.
+/// Drifts of the CUSUM, in healthy standard deviations: half of the shift to be detected.
+/// Page's for a shift of one deviation, and a larger one that tolerates the model errors
+/// of healthy rigs.
 const DRIFTS: [f64; 2] = [0.5, 3.0];
 
-/// Longest time that one moment stands for, s: a gap is not evidence.
+/// Maximum interval that one time counts for in the debounce, s; chosen: a gap in the log
+/// is no evidence.
 const LONGEST_S: f64 = 0.2;
 
-/// A way to tell a sick servo, with one threshold to set.
+/// A method that detects servo faults, with one threshold.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Method {
-    /// The chapter's: the residual at a moment, through its window and gate.
+pub(super) enum DetectionMethod {
+    /// The chapter's rule: the current residual, with the chapter's window and gate.
     Chapter,
-    /// The residual through a longer window, for a while.
+    /// The residual over a longer window, debounced.
     Debounced,
-    /// The residual in healthy deviations, added up on both sides.
+    /// A two-sided CUSUM of the residual in healthy standard deviations.
     Cusum { drift: f64 },
-    /// Two explanations of the motion, weighed.
+    /// The log-likelihood ratio of two models of the servo, faulty and healthy.
     Weighed,
 }
 
-/// All, in the order of the legend.
-pub(super) const METHODS: [Method; 5] = [
-    Method::Weighed,
-    Method::Chapter,
-    Method::Debounced,
-    Method::Cusum { drift: DRIFTS[0] },
-    Method::Cusum { drift: DRIFTS[1] },
+/// All methods, in the order of the legend.
+pub(super) const METHODS: [DetectionMethod; 5] = [
+    DetectionMethod::Weighed,
+    DetectionMethod::Chapter,
+    DetectionMethod::Debounced,
+    DetectionMethod::Cusum { drift: DRIFTS[0] },
+    DetectionMethod::Cusum { drift: DRIFTS[1] },
 ];
 
-impl Method {
+impl DetectionMethod {
     pub(super) fn name(self) -> String {
         match self {
             Self::Chapter => "chapter's rule".to_owned(),
@@ -51,7 +53,8 @@ impl Method {
         }
     }
 
-    /// Thresholds swept, least and most: from crying always to never.
+    /// Returns the least and the greatest threshold of the sweep: from constant alarms to
+    /// none.
     const fn range(self) -> [f64; 2] {
         match self {
             Self::Chapter => [0.003, 10.0],
@@ -61,7 +64,8 @@ impl Method {
         }
     }
 
-    /// Thresholds that are somebody's choice, beside the sweep.
+    /// Returns the thresholds in use: the chapter's or the engine's, in addition to the
+    /// sweep.
     fn chosen(self) -> Vec<f64> {
         let settings = Settings::of(Profile::Default);
         match self {
@@ -72,24 +76,25 @@ impl Method {
     }
 }
 
-/// The chapter's own limit, m/s² (application 3).
+/// The chapter's limit of the residual, m/s² (application 3).
 pub(super) const CHAPTER_M_S2: f64 = 0.01;
 
 /// A method at a threshold.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Detector {
-    pub(super) method: Method,
+    pub(super) method: DetectionMethod,
     pub(super) threshold: f64,
-    /// Somebody's choice.
+    /// Whether the threshold is in use, not part of the sweep.
     pub(super) chosen: bool,
 }
 
-/// All methods at `n` thresholds each and those chosen, ascending by method.
+/// Returns all methods at `n` thresholds each and at those in use, ascending within each
+/// method.
 pub(super) fn all(n: usize) -> Vec<Detector> {
     METHODS.iter().flat_map(|&method| sweep(method, n)).collect()
 }
 
-fn sweep(method: Method, n: usize) -> Vec<Detector> {
+fn sweep(method: DetectionMethod, n: usize) -> Vec<Detector> {
     let [least, most] = method.range();
     let share = |i: usize| i as f64 / (n.max(2) - 1) as f64;
     let swept = (0..n).map(|i| (least * (most / least).powf(share(i)), false));
@@ -103,46 +108,48 @@ fn sweep(method: Method, n: usize) -> Vec<Detector> {
 }
 
 impl Detector {
-    /// The evidence that it looks at.
+    /// Returns the evidence that the method uses.
     pub(super) fn moments(self, trace: &Trace) -> &[Moment] {
-        if self.method == Method::Chapter { &trace.textbook } else { &trace.judged }
+        if self.method == DetectionMethod::Chapter { &trace.textbook } else { &trace.judged }
     }
 
-    /// Moments at which a servo is accused, and which: the worse, if both are.
+    /// Returns the times of alarm with the accused servo; if both are suspect, the one with
+    /// the stronger evidence.
     pub(super) fn alarms(
         self,
         trace: &Trace,
         healthy_m_s2: &PerAxis<f64>,
     ) -> impl Iterator<Item = (f64, Axis)> {
-        let mut watch = Watch::new(self, *healthy_m_s2);
+        let mut watch = DetectorState::new(self, *healthy_m_s2);
         self.moments(trace).iter().filter_map(move |m| Some((m.t_s, watch.take(m)?)))
     }
 }
 
-/// A detector over a session.
+/// A detector with its state during a session.
 #[derive(Clone, Debug)]
-pub(super) struct Watch {
+pub(super) struct DetectorState {
     detector: Detector,
     healthy_m_s2: PerAxis<f64>,
-    pace: Pace,
+    pace: DebounceTimes,
     last_s: Option<f64>,
-    axes: PerAxis<AxisWatch>,
+    axes: PerAxis<AxisDetectorState>,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
-struct AxisWatch {
+struct AxisDetectorState {
     debounce: Debounce,
     /// Sums upward and downward, in healthy deviations.
     sums: [f64; 2],
 }
 
-impl Watch {
+impl DetectorState {
     pub(super) fn new(detector: Detector, healthy_m_s2: PerAxis<f64>) -> Self {
-        let pace = Pace::of(FaultCode::XServo, None, false, &Settings::of(Profile::Default));
+        let pace =
+            DebounceTimes::of(FaultCode::XServo, None, false, &Settings::of(Profile::Default));
         Self { detector, healthy_m_s2, pace, last_s: None, axes: PerAxis::default() }
     }
 
-    /// Takes a moment and returns the servo accused, if one is.
+    /// Takes the evidence of one time; returns the accused servo, if any.
     pub(super) fn take(&mut self, moment: &Moment) -> Option<Axis> {
         let dt = self.last_s.map_or(0.0, |last| (moment.t_s - last).min(LONGEST_S));
         self.last_s = Some(moment.t_s);
@@ -154,14 +161,15 @@ impl Watch {
         }
     }
 
-    /// How much speaks against the servo of `axis`; none below the threshold.
+    /// Returns the strength of the evidence against the servo of `axis`; `None` below the
+    /// threshold.
     fn weight(&mut self, axis: Axis, e: &AxisMoment, dt: f64) -> Option<f64> {
         let (threshold, watch) = (self.detector.threshold, &mut self.axes[axis]);
         let beyond = |value: f64| (value >= threshold).then_some(value);
         match self.detector.method {
-            Method::Chapter => beyond(e.residual_m_s2?.abs()),
-            Method::Weighed => beyond(e.nats),
-            Method::Debounced => {
+            DetectionMethod::Chapter => beyond(e.residual_m_s2?.abs()),
+            DetectionMethod::Weighed => beyond(e.nats),
+            DetectionMethod::Debounced => {
                 let test = match e.residual_m_s2 {
                     None => Test::NotTested,
                     Some(r) if r.abs() >= threshold => Test::Prefailed,
@@ -170,13 +178,13 @@ impl Watch {
                 let failed = watch.debounce.update(test, dt, &self.pace) >= Qualified::Failed;
                 e.residual_m_s2.filter(|_| failed).map(f64::abs)
             }
-            Method::Cusum { drift } => {
+            DetectionMethod::Cusum { drift } => {
                 let z = e.residual_m_s2? / self.healthy_m_s2[axis];
                 for (sum, z) in watch.sums.iter_mut().zip([z, -z]) {
                     *sum = (*sum + z - drift).max(0.0);
                 }
                 let alarm = beyond(watch.sums[0].max(watch.sums[1]))?;
-                // It starts anew, as Page's does.
+                // Restart after an alarm, as in Page's test.
                 watch.sums = [0.0; 2];
                 Some(alarm)
             }
@@ -188,10 +196,10 @@ impl Watch {
 mod tests {
     use super::*;
 
-    /// Moments 0.05 s apart with residuals of the x servo.
-    fn first(method: Method, threshold: f64, residuals: &[Option<f64>]) -> Option<usize> {
+    /// Returns the index of the first alarm of the x servo, for residuals 0.05 s apart.
+    fn first(method: DetectionMethod, threshold: f64, residuals: &[Option<f64>]) -> Option<usize> {
         let detector = Detector { method, threshold, chosen: false };
-        let mut watch = Watch::new(detector, PerAxis { x: 0.1, y: 0.1 });
+        let mut watch = DetectorState::new(detector, PerAxis { x: 0.1, y: 0.1 });
         residuals.iter().enumerate().position(|(i, &residual_m_s2)| {
             let x = AxisMoment { residual_m_s2, nats: i as f64 };
             let axes = PerAxis { x, y: AxisMoment::default() };
@@ -199,31 +207,31 @@ mod tests {
         })
     }
 
-    /// By hand: a step to 0.2 at moment 10 is seen at once by the chapter's
-    /// rule, 0.6 s later with the debounce, and by the CUSUM once
-    /// n·(2 − 0.5) ≥ 12, n = 8; on the lower side likewise.
+    /// Calculated by hand: a step to 0.2 at index 10 is detected at once by the chapter's
+    /// rule, 0.6 s later with the debounce, and by the CUSUM once n·(2 − 0.5) ≥ 12, n = 8;
+    /// likewise for a negative step.
     #[test]
     fn validate_when_a_step_is_seen() {
         let step = |size: f64| -> Vec<Option<f64>> {
             (0..60).map(|i| Some(if i < 10 { 0.0 } else { size })).collect()
         };
-        let cusum = Method::Cusum { drift: 0.5 };
+        let cusum = DetectionMethod::Cusum { drift: 0.5 };
         for size in [0.2, -0.2] {
-            assert_eq!(first(Method::Chapter, 0.15, &step(size)), Some(10));
-            let debounced = first(Method::Debounced, 0.15, &step(size));
+            assert_eq!(first(DetectionMethod::Chapter, 0.15, &step(size)), Some(10));
+            let debounced = first(DetectionMethod::Debounced, 0.15, &step(size));
             assert!(matches!(debounced, Some(21 | 22)), "{debounced:?}");
             assert_eq!(first(cusum, 12.0, &step(size)), Some(10 + 8 - 1));
-            assert_eq!(first(Method::Weighed, 12.0, &step(size)), Some(12));
+            assert_eq!(first(DetectionMethod::Weighed, 12.0, &step(size)), Some(12));
         }
-        assert_eq!(first(Method::Chapter, 0.25, &step(0.2)), None);
+        assert_eq!(first(DetectionMethod::Chapter, 0.25, &step(0.2)), None);
         assert_eq!(first(cusum, 12.0, &step(0.04)), None);
     }
 
     #[test]
     fn what_may_not_be_judged_accuses_nobody() {
         let now_and_then: Vec<_> = (0..60).map(|i| (i % 12 == 0).then_some(9.0)).collect();
-        assert_eq!(first(Method::Debounced, 1.0, &now_and_then), None);
-        assert_eq!(first(Method::Chapter, 1.0, &now_and_then[1..12]), None);
+        assert_eq!(first(DetectionMethod::Debounced, 1.0, &now_and_then), None);
+        assert_eq!(first(DetectionMethod::Chapter, 1.0, &now_and_then[1..12]), None);
     }
 
     #[test]

@@ -1,44 +1,47 @@
-//! Detectors of servo faults: delay against false alarms, and what each finds.
+//! Detectors of servo faults: detection delay against false alarms, and the detected
+//! share of each fault.
 //!
-//! Simulated rigs are learnt from a healthy session each; then healthy ones with
-//! hands and gusts tell how often a method cries wolf, and one for each fault
-//! and size how soon it cries rightly. Every session is simulated once and goes
-//! once through an engine of each profile; all thresholds of all methods are
-//! swept over the evidence that the engines left.
+//! Simulated rigs are calibrated on a healthy session each. Further healthy sessions, with
+//! pushes and gusts, give the rate of false alarms of each method; sessions with each fault
+//! and size give its delay. Every session is simulated once and processed once by an
+//! engine of each profile; all thresholds of all methods are then applied to the evidence
+//! that the engines recorded.
 
-mod bench;
+mod calibrated_rig;
 mod cost;
 mod faults;
 mod method;
 mod record;
+mod session_result;
 mod show;
-mod tally;
 mod trace;
 
 use rayon::prelude::*;
 
 use super::{Chart, ChartError, Effort};
 use crate::simulation::{Preset, Reference};
-use bench::{Bench, Session};
-use tally::Tally;
+use calibrated_rig::{CalibratedRig, Session};
+use session_result::SessionResult;
 
-pub use record::Record;
+pub use record::DetectorRecord;
 
-/// What is measured.
-struct Plan {
+/// The extent of the measurement.
+struct DetectorPlan {
     references: &'static [Reference],
-    /// Healthy sessions of each rig and reference, and their length, s.
+    /// Number of healthy sessions of each rig and reference.
     n_healthy: u64,
+    /// Duration of a healthy session, s.
     healthy_s: f64,
-    /// Sessions of each rig, reference and fault.
+    /// Number of sessions of each rig, reference and fault.
     n_faulty: u64,
     faults: &'static [&'static str],
-    /// Thresholds of each method.
+    /// Number of thresholds of each method.
     n: usize,
+    /// Number of timed measurements.
     repeats: usize,
 }
 
-impl Plan {
+impl DetectorPlan {
     const fn of(effort: Effort) -> Self {
         match effort {
             Effort::Full => Self {
@@ -62,7 +65,7 @@ impl Plan {
         }
     }
 
-    /// All sessions, each with its own seed.
+    /// Returns all sessions, each with its own seed.
     fn sessions(&self) -> Vec<Session> {
         let mut all = Vec::new();
         for preset in Preset::ALL {
@@ -83,22 +86,22 @@ impl Plan {
     }
 }
 
-/// Measures and draws.
+/// Measures, and returns the chart.
 ///
 /// # Errors
-/// [`ChartError`] if a rig cannot be simulated or learnt, or a record is no
-/// JSON.
+/// [`ChartError`] if a rig cannot be simulated or calibrated, or a record cannot be
+/// written as JSON.
 pub fn make(effort: Effort) -> Result<Chart, ChartError> {
-    let plan = Plan::of(effort);
-    let benches = Preset::ALL.into_iter().map(Bench::new).collect::<Result<Vec<_>, _>>()?;
+    let plan = DetectorPlan::of(effort);
+    let rigs = Preset::ALL.into_iter().map(CalibratedRig::new).collect::<Result<Vec<_>, _>>()?;
     let detectors = method::all(plan.n);
     let run = |session: &Session| {
-        let bench = &benches[session.preset as usize];
-        Ok(Tally::of(&detectors, &bench.run(session)?, &bench.healthy_m_s2))
+        let rig = &rigs[session.preset as usize];
+        Ok(SessionResult::of(&detectors, &rig.run(session)?, &rig.healthy_m_s2))
     };
-    let tallies: Vec<Tally> =
+    let tallies: Vec<SessionResult> =
         plan.sessions().par_iter().map(run).collect::<Result<_, ChartError>>()?;
-    let costs = cost::measure(&benches[0], plan.repeats)?;
+    let costs = cost::measure(&rigs[0], plan.repeats)?;
     let found = record::gather(&detectors, &tallies, plan.faults, costs);
     Ok(Chart {
         name: "detectors",

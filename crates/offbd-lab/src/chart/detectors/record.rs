@@ -1,90 +1,92 @@
-//! All sessions together, as records.
+//! Summarises all sessions as records.
 
 use serde::{Deserialize, Serialize};
 
-use super::cost::Cost;
+use super::cost::SampleCost;
 use super::faults;
 use super::method::Detector;
-use super::tally::{Outcome, Tally};
+use super::session_result::{DetectorOutcome, SessionResult};
 use offbd_core::maths::quantile;
 
-/// One line of what was measured.
+/// One record of the chart.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "of", rename_all = "kebab-case")]
-pub enum Record {
+pub enum DetectorRecord {
     /// A method at one threshold, over all servo faults.
-    Method(Curve),
-    /// A method at its working point, over one fault.
-    Fault(Kind),
-    /// What a sample costs.
-    Cost(Price),
+    Method(ThresholdResult),
+    /// A method at its operating point, over one fault.
+    Fault(FaultResult),
+    /// CPU time per sample.
+    Cost(CostResult),
 }
 
-/// A method at one threshold.
+/// The result of a method at one threshold.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Curve {
+pub struct ThresholdResult {
     pub method: String,
-    /// None for the engine's verdict, which has several.
+    /// `None` for the engine's verdict, which has several thresholds.
     pub threshold: Option<f64>,
-    /// Unit of the threshold, or the verdict's word.
+    /// Unit of the threshold, or the status that counts: `pending` or `confirmed`.
     pub unit: String,
-    /// A threshold that is somebody's choice.
+    /// Whether the threshold is in use.
     pub chosen: bool,
-    /// The working point at which the faults are compared.
+    /// Whether it is the operating point at which the faults are compared.
     pub working: bool,
     pub false_alarms: u32,
     /// Healthy time, h.
     pub healthy_h: f64,
-    /// 95 % upper bound where there was none: 3/T (the rule of three).
+    /// Upper 95 % confidence limit if there was no false alarm: 3/T (rule of three).
     pub fewer_than_per_h: Option<f64>,
     #[serde(flatten)]
-    pub found: Found,
+    pub found: DetectionStatistics,
 }
 
-/// A method at its working point over the sessions with one fault.
+/// The result of a method at its operating point over the sessions with one fault.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Kind {
+pub struct FaultResult {
     pub method: String,
     /// As on the command line of `offbd simulate`, without onset.
     pub fault: String,
     #[serde(flatten)]
-    pub found: Found,
+    pub found: DetectionStatistics,
 }
 
-/// What was found of faults that had a chance to be seen.
+/// Detection statistics of faults that had a chance to be detected.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Found {
+pub struct DetectionStatistics {
     pub n_faults: u32,
     pub n_detected: u32,
-    /// Detected, and the first alarm accused what is broken.
+    /// Number of faults detected whose first alarm accused the faulty component.
     pub n_right: u32,
-    /// Delay after the first chance, s; a missed fault counts as never found.
+    /// Median delay after the first chance, s; a missed fault counts as infinite, `None`
+    /// if the median is.
     pub median_s: Option<f64>,
+    /// 90 % quantile of the delay, s, likewise.
     pub p90_s: Option<f64>,
 }
 
 /// CPU time per sample.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Price {
+pub struct CostResult {
     pub what: String,
-    /// The minimum over repeats, ns.
+    /// Minimum over the repeated measurements, ns.
     pub cost_ns: f64,
-    /// Over that of the whole pipeline by profile default.
+    /// Ratio to the cost of the whole pipeline with the profile `default`.
     pub ratio: f64,
-    /// Median over minimum of the repeats.
+    /// Median over minimum of the repeated measurements.
     pub spread: f64,
 }
 
-/// The engine's verdict in the records.
+/// Name of the engine's verdict in the records.
 pub(super) const VERDICT: &str = "offbd, verdict";
 
-impl Curve {
+impl ThresholdResult {
     pub(super) fn per_h(&self) -> f64 {
         f64::from(self.false_alarms) / self.healthy_h
     }
 }
 
-impl Found {
+impl DetectionStatistics {
     pub(super) fn detected(&self) -> f64 {
         f64::from(self.n_detected) / f64::from(self.n_faults)
     }
@@ -94,20 +96,20 @@ impl Found {
     }
 }
 
-/// What a session came to for one detector or verdict.
-type Pick<'a> = &'a dyn Fn(&Tally) -> Outcome;
+/// Selects the outcome of one detector or verdict in a session's result.
+type OutcomeSelector<'a> = &'a dyn Fn(&SessionResult) -> DetectorOutcome;
 
-/// All records: curves, faults at the working points, costs.
+/// Returns all records: thresholds, faults at the operating points, costs.
 pub(super) fn gather(
     detectors: &[Detector],
-    tallies: &[Tally],
+    tallies: &[SessionResult],
     faults: &[&str],
-    costs: Vec<Cost>,
-) -> Vec<Record> {
-    let mut curves: Vec<Curve> = detectors
+    costs: Vec<SampleCost>,
+) -> Vec<DetectorRecord> {
+    let mut curves: Vec<ThresholdResult> = detectors
         .iter()
         .enumerate()
-        .map(|(i, d)| Curve {
+        .map(|(i, d)| ThresholdResult {
             threshold: Some(d.threshold),
             chosen: d.chosen,
             ..curve(d.method.name(), d.method.unit(), tallies, &|t| t.outcomes[i])
@@ -115,32 +117,37 @@ pub(super) fn gather(
         .collect();
     for (i, word) in ["pending", "confirmed"].into_iter().enumerate() {
         let verdict = curve(VERDICT.to_owned(), word, tallies, &|t| t.verdicts[i]);
-        curves.push(Curve { chosen: true, ..verdict });
+        curves.push(ThresholdResult { chosen: true, ..verdict });
     }
     mark_working(&mut curves);
     let mut kinds = Vec::new();
     for (i, at) in curves.iter().enumerate().filter(|(_, c)| c.working) {
-        let pick = |t: &Tally| match i.checked_sub(detectors.len()) {
+        let pick = |t: &SessionResult| match i.checked_sub(detectors.len()) {
             None => t.outcomes[i],
             Some(k) => t.verdicts[k],
         };
-        kinds.extend(faults.iter().map(|fault| Kind {
+        kinds.extend(faults.iter().map(|fault| FaultResult {
             method: at.method.clone(),
             fault: (*fault).to_owned(),
             found: found(tallies.iter().filter(|t| t.fault == Some(*fault)), &pick),
         }));
     }
-    let prices = prices(costs).into_iter().map(Record::Cost);
-    let curves = curves.into_iter().map(Record::Method);
-    curves.chain(kinds.into_iter().map(Record::Fault)).chain(prices).collect()
+    let prices = prices(costs).into_iter().map(DetectorRecord::Cost);
+    let curves = curves.into_iter().map(DetectorRecord::Method);
+    curves.chain(kinds.into_iter().map(DetectorRecord::Fault)).chain(prices).collect()
 }
 
-fn curve(method: String, unit: &str, tallies: &[Tally], pick: Pick<'_>) -> Curve {
+fn curve(
+    method: String,
+    unit: &str,
+    tallies: &[SessionResult],
+    pick: OutcomeSelector<'_>,
+) -> ThresholdResult {
     let healthy = || tallies.iter().filter(|t| t.fault.is_none());
     let healthy_h = healthy().map(|t| t.seconds).sum::<f64>() / 3600.0;
     let false_alarms = healthy().map(|t| pick(t).alarms).sum();
     let servo = tallies.iter().filter(|t| t.fault.is_some_and(faults::is_servo));
-    Curve {
+    ThresholdResult {
         method,
         threshold: None,
         unit: unit.to_owned(),
@@ -153,13 +160,17 @@ fn curve(method: String, unit: &str, tallies: &[Tally], pick: Pick<'_>) -> Curve
     }
 }
 
-fn found<'a>(tallies: impl Iterator<Item = &'a Tally>, pick: Pick<'_>) -> Found {
-    let outcomes: Vec<Outcome> = tallies.filter(|t| t.counts).map(pick).collect();
+fn found<'a>(
+    tallies: impl Iterator<Item = &'a SessionResult>,
+    pick: OutcomeSelector<'_>,
+) -> DetectionStatistics {
+    let outcomes: Vec<DetectorOutcome> = tallies.filter(|t| t.counts).map(pick).collect();
     let mut delays: Vec<f64> =
         outcomes.iter().map(|o| o.delay_s.unwrap_or(f64::INFINITY)).collect();
-    let count = |which: fn(&Outcome) -> bool| outcomes.iter().filter(|o| which(o)).count() as u32;
+    let count =
+        |which: fn(&DetectorOutcome) -> bool| outcomes.iter().filter(|o| which(o)).count() as u32;
     let mut at = |share| quantile(&mut delays, share).filter(|s| s.is_finite());
-    Found {
+    DetectionStatistics {
         n_faults: outcomes.len() as u32,
         n_detected: count(|o| o.delay_s.is_some()),
         n_right: count(|o| o.right),
@@ -168,9 +179,10 @@ fn found<'a>(tallies: impl Iterator<Item = &'a Tally>, pick: Pick<'_>) -> Found 
     }
 }
 
-/// The chapter's own limit, the confirmed verdict, and of every other method
-/// the least threshold with as few false alarms as it has at all.
-fn mark_working(curves: &mut [Curve]) {
+/// Marks the operating points: the greatest threshold in use of the methods that have one,
+/// which is the chapter's limit and the confirmed verdict; of the others, the least
+/// threshold with their minimum of false alarms.
+fn mark_working(curves: &mut [ThresholdResult]) {
     let n = curves.len();
     let mut first = 0;
     while first < n {
@@ -186,9 +198,9 @@ fn mark_working(curves: &mut [Curve]) {
     }
 }
 
-fn prices(costs: Vec<Cost>) -> Vec<Price> {
+fn prices(costs: Vec<SampleCost>) -> Vec<CostResult> {
     let whole_s = costs.first().map_or(f64::NAN, |c| c.time.minimum_s);
-    let price = |cost: Cost| Price {
+    let price = |cost: SampleCost| CostResult {
         what: cost.what,
         cost_ns: cost.time.minimum_s * 1e9,
         ratio: cost.time.minimum_s / whole_s,

@@ -1,47 +1,48 @@
-//! The records as drawings and as a table.
+//! Presents the records as drawings and as a table.
 
 use super::faults;
 use super::method::METHODS;
-use super::record::{Curve, Kind, Price, Record, VERDICT};
+use super::record::{CostResult, DetectorRecord, FaultResult, ThresholdResult, VERDICT};
 use crate::chart::{
-    Axis, Category, Figure, Look, Mark, Marker, Panel, Regions, Scale, Series, Stroke, Table,
+    Axis, Category, ChartTable, Figure, Look, Mark, Marker, Panel, Regions, Scale, Series, Stroke,
 };
 
-/// Most alarms that can be counted, and a margin, per hour.
+/// Upper end of the axis of false alarms, per hour. Chosen: at most 360, one every 10 s,
+/// can be counted.
 const MOST_PER_H: f64 = 600.0;
 
-/// Delays drawn, s.
+/// Range of the delays drawn, s.
 const DELAYS_S: (f64, f64) = (0.1, 30.0);
 
-fn curves(records: &[Record]) -> impl Iterator<Item = &Curve> {
-    records.iter().filter_map(|r| if let Record::Method(c) = r { Some(c) } else { None })
+fn curves(records: &[DetectorRecord]) -> impl Iterator<Item = &ThresholdResult> {
+    records.iter().filter_map(|r| if let DetectorRecord::Method(c) = r { Some(c) } else { None })
 }
 
-fn kinds(records: &[Record]) -> impl Iterator<Item = &Kind> {
-    records.iter().filter_map(|r| if let Record::Fault(k) = r { Some(k) } else { None })
+fn kinds(records: &[DetectorRecord]) -> impl Iterator<Item = &FaultResult> {
+    records.iter().filter_map(|r| if let DetectorRecord::Fault(k) = r { Some(k) } else { None })
 }
 
-fn prices(records: &[Record]) -> impl Iterator<Item = &Price> {
-    records.iter().filter_map(|r| if let Record::Cost(p) = r { Some(p) } else { None })
+fn prices(records: &[DetectorRecord]) -> impl Iterator<Item = &CostResult> {
+    records.iter().filter_map(|r| if let DetectorRecord::Cost(p) = r { Some(p) } else { None })
 }
 
-/// Names and looks, the engine's verdict last.
+/// Returns the names and looks of all methods, the engine's verdict last.
 fn methods() -> Vec<(String, Look)> {
     let swept = METHODS.iter().enumerate().map(|(i, m)| (m.name(), Look::of(i)));
     swept.chain([(VERDICT.to_owned(), Look { marker: Marker::Star, ..Look::BLACK })]).collect()
 }
 
-pub(super) fn figures(records: &[Record]) -> Vec<(&'static str, Figure)> {
+pub(super) fn figures(records: &[DetectorRecord]) -> Vec<(&'static str, Figure)> {
     vec![("delay", delay(records)), ("faults", by_fault(records))]
 }
 
-/// Delay and detected share over false alarms.
-fn delay(records: &[Record]) -> Figure {
+/// Draws the delay and the detected share over the false alarms.
+fn delay(records: &[DetectorRecord]) -> Figure {
     let seconds = Scale::Log(DELAYS_S.0, DELAYS_S.1);
     let seconds = Axis::new("median delay after the first chance (s)", seconds);
     let share = Axis::new("servo faults found (%)", Scale::Linear(0.0, 103.0));
-    // What is found at once is drawn at the lower edge.
-    let median = |c: &Curve| c.found.median_s.map(|s| s.max(DELAYS_S.0));
+    // A delay of zero is drawn at the lower edge.
+    let median = |c: &ThresholdResult| c.found.median_s.map(|s| s.max(DELAYS_S.0));
     Figure {
         title: "Servo faults: how soon they are found, and for how many false alarms".to_owned(),
         subtitle: conclusion(records),
@@ -54,13 +55,13 @@ fn delay(records: &[Record]) -> Figure {
     }
 }
 
-/// One measure over false alarms, with `text` at the thresholds in use.
+/// Draws one quantity over the false alarms; `text`: with labels at the thresholds in use.
 fn panel(
-    records: &[Record],
+    records: &[DetectorRecord],
     title: &str,
     y: Axis,
     text: bool,
-    value: impl Fn(&Curve) -> Option<f64>,
+    value: impl Fn(&ThresholdResult) -> Option<f64>,
 ) -> Panel {
     let healthy_h = curves(records).map(|c| c.healthy_h).fold(0.0, f64::max);
     let x = Axis::new("false alarms per hour of healthy time", alarms(healthy_h));
@@ -68,18 +69,18 @@ fn panel(
     panel.series.push(edge(&panel.y.scale, healthy_h));
     for (name, look) in methods() {
         let shown = shown(records, &name);
-        let at = |c: &Curve| Some((place(c), value(c)?));
+        let at = |c: &ThresholdResult| Some((place(c), value(c)?));
         let points = shown.iter().filter_map(|c| at(c)).collect();
         let stroke = if name == VERDICT { Stroke::Markers } else { Stroke::LineAndMarkers };
         let chosen = shown.iter().filter(|c| c.chosen && name != VERDICT);
-        let text = |c: &Curve| if text { setting(c) } else { String::new() };
+        let text = |c: &ThresholdResult| if text { setting(c) } else { String::new() };
         panel.marks.extend(chosen.filter_map(|c| Some(mark(text(c), at(c)?))));
         panel.series.push(Series::new(name, look, stroke, points));
     }
     panel
 }
 
-/// The line left of which nothing was seen.
+/// Returns the line that separates the thresholds without a false alarm, on its left.
 fn edge(y: &Scale, healthy_h: f64) -> Series {
     let (look, x) = (Look { dash: Some((4, 10)), ..Look::BLACK }, 0.7 / healthy_h);
     let line = vec![(x, y.ends().0), (x, y.ends().1)];
@@ -92,17 +93,18 @@ fn alarms(healthy_h: f64) -> Scale {
     Scale::Log(0.25 / healthy_h, MOST_PER_H)
 }
 
-/// Where a curve's point stands: none seen in T hours is left of one in T.
-fn place(curve: &Curve) -> f64 {
+/// Returns the x coordinate of a result: its rate; without an alarm in T hours, a value
+/// left of 1/T.
+fn place(curve: &ThresholdResult) -> f64 {
     match curve.false_alarms {
         0 => 0.4 / curve.healthy_h,
         _ => curve.per_h(),
     }
 }
 
-/// Of the thresholds without a false alarm, the least: greater ones are only
-/// slower.
-fn shown<'a>(records: &'a [Record], method: &str) -> Vec<&'a Curve> {
+/// Returns the results drawn: of the thresholds without a false alarm only the least, as
+/// greater ones only increase the delay, and those in use.
+fn shown<'a>(records: &'a [DetectorRecord], method: &str) -> Vec<&'a ThresholdResult> {
     let mut silent = 0;
     let all = curves(records).filter(|c| c.method == method);
     all.filter(|c| {
@@ -116,15 +118,15 @@ fn mark(text: String, at: (f64, f64)) -> Mark {
     Mark { name: "thresholds that are in use".to_owned(), text, at }
 }
 
-/// The threshold in a few words.
-fn setting(curve: &Curve) -> String {
+/// Returns the threshold with its unit.
+fn setting(curve: &ThresholdResult) -> String {
     match curve.threshold {
         Some(threshold) => format!("{} {}", brief(threshold), curve.unit),
         None => curve.unit.clone(),
     }
 }
 
-/// Two digits.
+/// Rounds to two significant digits.
 fn brief(value: f64) -> String {
     let digits = 1 - value.abs().log10().floor() as i32;
     if digits <= 0 {
@@ -135,24 +137,23 @@ fn brief(value: f64) -> String {
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-/// The working points, in the order of the legend; of the weighed explanations
-/// the verdict stands for all.
-fn working(records: &[Record]) -> Vec<&Curve> {
+/// Returns the operating points, in the order of the records.
+fn working(records: &[DetectorRecord]) -> Vec<&ThresholdResult> {
     curves(records).filter(|c| c.working).collect()
 }
 
-/// Detected, and accused rightly, by fault: a row for each, a column for each
+/// Draws the detected and the correctly isolated share: a row per fault, a column per
 /// method.
-fn by_fault(records: &[Record]) -> Figure {
+fn by_fault(records: &[DetectorRecord]) -> Figure {
     let mut faults: Vec<&str> = Vec::new();
     for kind in kinds(records) {
         if kind.found.n_faults > 0 && !faults.contains(&kind.fault.as_str()) {
             faults.push(&kind.fault);
         }
     }
-    // Rows count from below.
+    // Rows are numbered from the bottom.
     faults.reverse();
-    let panel = |title: &str, share: fn(&Kind) -> f64| {
+    let panel = |title: &str, share: fn(&FaultResult) -> f64| {
         let columns = columns().iter().map(|(short, _)| (*short).to_owned()).collect();
         let rows = faults.iter().map(|f| faults::words(f)).collect();
         let x = Axis::new("", Scale::Names(columns));
@@ -172,8 +173,8 @@ fn by_fault(records: &[Record]) -> Figure {
     }
 }
 
-/// Shares as shades.
-fn grid(records: &[Record], faults: &[&str], share: fn(&Kind) -> f64) -> Regions {
+/// Returns the shares as a map of shades.
+fn grid(records: &[DetectorRecord], faults: &[&str], share: fn(&FaultResult) -> f64) -> Regions {
     let shade = |(i, name): (usize, &&str)| Category {
         name: (*name).to_owned(),
         look: Look::step(i, SHARES.len()),
@@ -192,11 +193,12 @@ fn grid(records: &[Record], faults: &[&str], share: fn(&Kind) -> f64) -> Regions
     }
 }
 
-/// Shares from which on the next shade holds, and what the shades are called.
+/// Lower limits of the shades but the first.
 const LEAST: [f64; 4] = [0.05, 0.5, 0.8, 0.95];
+/// Names of the shades.
 const SHARES: [&str; 5] = ["below 5 %", "5 to 50 %", "50 to 80 %", "80 to 95 %", "95 % and more"];
 
-/// The methods beside each other, by a short name.
+/// The methods compared by fault, with a short name.
 fn columns() -> [(&'static str, String); 4] {
     [
         ("chapter", METHODS[1].name()),
@@ -206,8 +208,8 @@ fn columns() -> [(&'static str, String); 4] {
     ]
 }
 
-/// The settings compared, in words.
-fn working_points(records: &[Record]) -> String {
+/// Describes the operating points in words.
+fn working_points(records: &[DetectorRecord]) -> String {
     let all = columns().into_iter().filter_map(|(short, method)| {
         let at = working(records).into_iter().find(|c| c.method == method)?;
         let median = at.found.median_s.map_or_else(|| "never".to_owned(), brief);
@@ -220,25 +222,25 @@ fn working_points(records: &[Record]) -> String {
     )
 }
 
-/// False alarms in words.
-fn rate(curve: &Curve) -> String {
+/// Describes the rate of false alarms in words.
+fn rate(curve: &ThresholdResult) -> String {
     match curve.fewer_than_per_h {
         Some(most) => format!("fewer than {} false alarms an hour", brief(most)),
         None => format!("{} false alarms an hour", brief(curve.per_h())),
     }
 }
 
-/// The same as a number.
-fn per_h(curve: &Curve) -> String {
+/// Returns the rate of false alarms per hour as text.
+fn per_h(curve: &ThresholdResult) -> String {
     match curve.fewer_than_per_h {
         Some(most) => format!("< {}", brief(most)),
         None => brief(curve.per_h()),
     }
 }
 
-fn conclusion(records: &[Record]) -> String {
+fn conclusion(records: &[DetectorRecord]) -> String {
     let at = |method: &str| working(records).into_iter().find(|c| c.method == method);
-    let said = |name: &str, c: &Curve| {
+    let said = |name: &str, c: &ThresholdResult| {
         let median = c.found.median_s.map_or_else(|| "–".to_owned(), |s| format!("{s:.1} s"));
         let found = 100.0 * c.found.detected();
         format!("{name} finds {found:.0} % (median delay {median}) with {}", rate(c))
@@ -251,9 +253,9 @@ fn conclusion(records: &[Record]) -> String {
     format!("Of servo faults with a chance, {}.", all.join("; "))
 }
 
-/// Chosen and working points, then costs.
-pub(super) fn table(records: &[Record]) -> Table {
-    let mut table = Table {
+/// Returns a table of the thresholds in use, the operating points and the costs.
+pub(super) fn table(records: &[DetectorRecord]) -> ChartTable {
+    let mut table = ChartTable {
         heading: vec!["method", "set to", "false/h", "found %", "right %", "median s", "90 % s"],
         right: vec![2, 3, 4, 5, 6],
         rows: curves(records).filter(|c| c.chosen || c.working).map(row).collect(),
@@ -266,7 +268,7 @@ pub(super) fn table(records: &[Record]) -> Table {
     table
 }
 
-fn row(c: &Curve) -> Vec<String> {
+fn row(c: &ThresholdResult) -> Vec<String> {
     let seconds = |s: Option<f64>| s.map_or_else(|| "never".to_owned(), |s| format!("{s:.2}"));
     let percent = |share: f64| format!("{:.0}", 100.0 * share);
     vec![

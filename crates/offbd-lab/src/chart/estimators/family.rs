@@ -1,36 +1,37 @@
-//! Which estimators are compared, and over which tunings.
+//! The families of estimators compared, and the range of their tunings.
 
 use crate::estimators::{
-    At, Averages, Butterworth, Difference, Estimator, Kalman, SavitzkyGolay, SlidingFit,
+    Averages, Butterworth, Difference, Estimator, EvaluationPoint, Kalman, SavitzkyGolay,
+    SlidingFit,
 };
 
-/// A kind of estimator with one number to tune.
+/// A family of estimators with one tuning parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Family {
     Difference,
     Averages,
     SlidingFit,
-    SavitzkyGolay { order: usize, at: At },
+    SavitzkyGolay { order: usize, at: EvaluationPoint },
     Butterworth,
     Kalman,
 }
 
-/// All that are measured, in the order of the legend.
+/// All families measured, in the order of the legend.
 pub(super) const FAMILIES: [Family; 10] = [
     Family::SlidingFit,
     Family::Kalman,
     Family::Averages,
-    Family::SavitzkyGolay { order: 4, at: At::Centre },
-    Family::SavitzkyGolay { order: 3, at: At::End },
+    Family::SavitzkyGolay { order: 4, at: EvaluationPoint::Centre },
+    Family::SavitzkyGolay { order: 3, at: EvaluationPoint::End },
     Family::Butterworth,
     Family::Difference,
-    Family::SavitzkyGolay { order: 2, at: At::Centre },
-    Family::SavitzkyGolay { order: 3, at: At::Centre },
-    Family::SavitzkyGolay { order: 4, at: At::End },
+    Family::SavitzkyGolay { order: 2, at: EvaluationPoint::Centre },
+    Family::SavitzkyGolay { order: 3, at: EvaluationPoint::Centre },
+    Family::SavitzkyGolay { order: 4, at: EvaluationPoint::End },
 ];
 
-/// How many of them are drawn: of the others, two have the quadratic's errors,
-/// and order 4 at the end is worse than order 3.
+/// Number of families drawn. Of the others, two have the errors of the quadratic fit, and
+/// order 4 at the end is worse than order 3.
 pub(super) const DRAWN: usize = 7;
 
 impl Family {
@@ -40,7 +41,7 @@ impl Family {
             Self::Averages => "moving average, differenced".to_owned(),
             Self::SlidingFit => "quadratic fit".to_owned(),
             Self::SavitzkyGolay { order, at } => {
-                let at = if at == At::Centre { "centre" } else { "end" };
+                let at = if at == EvaluationPoint::Centre { "centre" } else { "end" };
                 format!("Savitzky–Golay {order}, {at}")
             }
             Self::Butterworth => "Butterworth, differenced".to_owned(),
@@ -48,7 +49,7 @@ impl Family {
         }
     }
 
-    /// What is tuned, with its unit.
+    /// Returns the name of the tuning parameter, with its unit.
     pub(super) const fn setting(self) -> &'static str {
         match self {
             Self::Butterworth => "cutoff_hz",
@@ -57,7 +58,7 @@ impl Family {
         }
     }
 
-    /// The tuning in a few words.
+    /// Returns a value of the tuning parameter with its unit.
     pub(super) fn tuning(self, value: f64) -> String {
         match self {
             Self::Butterworth => format!("{value:.2} Hz"),
@@ -66,8 +67,8 @@ impl Family {
         }
     }
 
-    /// `n` values of the setting at a sampling period, from quick to smooth, as
-    /// far as the period tells them apart.
+    /// Returns up to `n` values of the tuning parameter, from fast to smooth, without those
+    /// that are equal at this sampling period.
     pub(super) fn sweep(self, n: usize, period_s: f64) -> Vec<f64> {
         let mut values = match self {
             Self::Butterworth => {
@@ -84,21 +85,20 @@ impl Family {
         values
     }
 
-    /// The shortest window, s.
+    /// Returns the shortest window, s.
     fn least(self, period_s: f64) -> f64 {
         let n = match self {
             Self::SavitzkyGolay { order, .. } => order,
             Self::SlidingFit => 4,
-            // Down to the raw positions.
+            // The raw positions.
             Self::Difference => return 2.0 * period_s,
             _ => 2,
         };
         (n as f64 * period_s).max(0.02)
     }
 
-    /// The nearest window that fits the grid: from its oldest to its newest
-    /// position an even number of periods; for means of n three times n
-    /// positions.
+    /// Returns the nearest window on the grid: an even number of periods from the oldest to
+    /// the newest position; for means over n, 3n positions.
     fn whole(self, window_s: f64, period_s: f64) -> f64 {
         let n = window_s / period_s;
         let n = match self {
@@ -108,8 +108,8 @@ impl Family {
         n * period_s
     }
 
-    /// The estimator with its setting, for positions every `period_s` with noise
-    /// of `sigma` (m), which only the Kalman filter asks for.
+    /// Creates the estimator for positions every `period_s` with noise of `sigma` (m), which
+    /// only the Kalman filter uses.
     pub(super) fn build(self, value: f64, period_s: f64, sigma: f64) -> Option<Box<dyn Estimator>> {
         let n = (value / period_s).round() as usize;
         Some(match self {
@@ -126,7 +126,7 @@ impl Family {
     }
 }
 
-/// `n` values from `first` to `last`, by equal factors.
+/// Returns `n` logarithmically spaced values from `first` to `last`.
 fn spread(n: usize, first: f64, last: f64) -> Vec<f64> {
     let share = |i: usize| i as f64 / (n.max(2) - 1) as f64;
     (0..n).map(|i| first * (last / first).powf(share(i))).collect()

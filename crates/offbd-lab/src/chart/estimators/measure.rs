@@ -1,4 +1,4 @@
-//! One configuration against the truth: error, delay and cost.
+//! Measures one estimator against the truth: error, delay and cost.
 
 use std::hint::black_box;
 
@@ -10,43 +10,46 @@ use super::family::Family;
 use super::signal;
 use crate::timing::{CpuTime, cpu_time};
 
-/// Time for estimators to settle, not judged, s.
+/// Settling time of the estimators, not evaluated, s; chosen.
 const SETTLE_S: f64 = 5.0;
 
-/// Longest delay looked for, s.
+/// Longest delay searched for, s; chosen.
 const LONGEST_S: f64 = 1.2;
 
-/// Readings by which the delay is found: enough to see every step.
+/// Number of readings from which the delay is estimated. Chosen: enough to include every
+/// step of the signal.
 const DELAY_READINGS: usize = 2500;
 
-/// Readings in one timed run.
+/// Number of readings in one timed run; chosen.
 const TIMED: usize = 2000;
 
-/// A recording: true and noisy positions at an even rate.
-pub(super) struct Recording {
+/// A test signal: true and noisy positions at a constant rate.
+pub(super) struct TestSignal {
     pub(super) rate_hz: f64,
     pub(super) noise_m: f64,
     truth: Vec<f64>,
     noisy: Vec<f64>,
 }
 
-/// What a configuration is worth.
+/// Delay and errors of an estimator.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Measured {
-    /// By which the truth is shifted to agree best with the estimate without
-    /// noise, s.
+pub(super) struct EstimatorErrors {
+    /// Delay of the truth at which it agrees best with the estimate from noiseless
+    /// positions, s.
     pub(super) delay_s: f64,
-    /// Rms against the truth so delayed, m/s².
+    /// Rms error against the truth delayed by `delay_s`, m/s².
     pub(super) error: f64,
-    /// Rms against the truth of the moment, m/s².
+    /// Rms error against the truth without delay, m/s².
     pub(super) undelayed: f64,
-    /// Of the error, the share without noise, and that of noise alone, m/s² rms.
+    /// Rms error without noise, m/s².
     pub(super) distortion: f64,
+    /// Rms of the noise of the estimate, m/s².
     pub(super) noise: f64,
 }
 
-impl Recording {
-    /// `seconds` at `rate_hz`, with white noise of `noise_m` rms by `seed`.
+impl TestSignal {
+    /// Creates a signal of `seconds` at `rate_hz`, with white noise of `noise_m` rms drawn
+    /// by `seed`.
     pub(super) fn new(rate_hz: f64, noise_m: f64, seconds: f64, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let times = (0..(seconds * rate_hz) as usize).map(|k| k as f64 / rate_hz);
@@ -56,8 +59,7 @@ impl Recording {
         Self { rate_hz, noise_m, truth, noisy }
     }
 
-    /// Estimates from these positions, from the end of settling on: times and
-    /// values.
+    /// Returns times and values of the estimates from `positions`, after settling.
     fn estimates(&self, family: Family, value: f64, positions: &[f64]) -> Option<Vec<(f64, f64)>> {
         let period_s = 1.0 / self.rate_hz;
         let mut estimator = family.build(value, period_s, self.noise_m)?;
@@ -66,13 +68,13 @@ impl Recording {
         Some(all.filter(|(t, _)| *t >= SETTLE_S).collect())
     }
 
-    /// The worth of `family` at `value`; none where it cannot be built.
-    pub(super) fn measure(&self, family: Family, value: f64) -> Option<Measured> {
+    /// Measures `family` at the tuning `value`; `None` if it cannot be created.
+    pub(super) fn measure(&self, family: Family, value: f64) -> Option<EstimatorErrors> {
         let clean = self.estimates(family, value, &self.truth)?;
         let noisy = self.estimates(family, value, &self.noisy)?;
         let delay_s = delay(&clean);
         let noise = rms(clean.iter().zip(&noisy).map(|(c, n)| n.1 - c.1));
-        Some(Measured {
+        Some(EstimatorErrors {
             delay_s,
             error: disagreement(&noisy, delay_s),
             undelayed: disagreement(&noisy, 0.0),
@@ -81,7 +83,7 @@ impl Recording {
         })
     }
 
-    /// CPU time per sample.
+    /// Measures the CPU time per sample.
     pub(super) fn cost(&self, family: Family, value: f64, repeats: usize) -> Option<CpuTime> {
         let mut estimator = family.build(value, 1.0 / self.rate_hz, self.noise_m)?;
         let positions = &self.noisy[..self.noisy.len().min(TIMED)];
@@ -95,14 +97,15 @@ impl Recording {
     }
 }
 
-/// Rms of the truth over the judged part: the error of saying nothing, m/s².
-pub(super) fn saying_nothing(seconds: f64) -> f64 {
+/// Returns the rms of the truth over the evaluated part, m/s²: the error of an estimate
+/// that is always zero.
+pub(super) fn error_of_zero(seconds: f64) -> f64 {
     let n = ((seconds - SETTLE_S) * 1e3) as usize;
     rms((0..n).map(|k| signal::acceleration(SETTLE_S + k as f64 * 1e-3)))
 }
 
-/// The delay at which the truth agrees best: the best of a grid of 10 ms, then
-/// by golden section to a tenth of a millisecond.
+/// Returns the delay at which the truth agrees best: the best on a grid of 10 ms, refined
+/// by golden-section search to 0.1 ms.
 fn delay(clean: &[(f64, f64)]) -> f64 {
     let stride = clean.len().div_ceil(DELAY_READINGS).max(1);
     let few: Vec<(f64, f64)> = clean.iter().step_by(stride).copied().collect();
@@ -130,14 +133,14 @@ fn rms(values: impl Iterator<Item = f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimators::At;
+    use crate::estimators::EvaluationPoint;
 
-    /// At 200 Hz without noise: a symmetric window is half of itself late, the
-    /// raw second difference one sample, and noise adds as its gain says.
+    /// At 200 Hz without noise: a symmetric window delays by half its length, the raw second
+    /// difference by one sample. The noise agrees with the theoretical gain.
     #[test]
     fn validate_delay_and_noise_of_known_filters() {
-        let recording = Recording::new(200.0, 5e-4, 40.0, 3);
-        let golay = Family::SavitzkyGolay { order: 4, at: At::Centre };
+        let recording = TestSignal::new(200.0, 5e-4, 40.0, 3);
+        let golay = Family::SavitzkyGolay { order: 4, at: EvaluationPoint::Centre };
         for (family, value, wanted_s) in [
             (Family::SlidingFit, 0.3, 0.15),
             (golay, 0.3, 0.15),
@@ -147,7 +150,7 @@ mod tests {
             let found = recording.measure(family, value).unwrap();
             assert!((found.delay_s - wanted_s).abs() < 2e-3, "{family:?}: {found:?}");
         }
-        // 7000 readings, correlated within a window of 61: 20 %.
+        // 7000 readings, correlated within a window of 61: a tolerance of 20 %.
         let n = 61.0_f64;
         let gain = (720.0 / (n * (n * n - 1.0) * (n * n - 4.0))).sqrt() * 200.0 * 200.0;
         let found = recording.measure(Family::SlidingFit, 0.3).unwrap();

@@ -1,11 +1,11 @@
 //! Estimators of acceleration: error against delay and cost.
 //!
-//! A known motion is sampled at several rates with noise of several sizes; each
-//! estimator runs over a sweep of its tuning. Its delay is that by which the
-//! truth agrees best with what it says of noiseless positions; its error is
-//! taken against the truth so delayed, since the engine sends its prediction
-//! through the same filter and loses the delay there. There it loses the
-//! distortion too, which this chart counts: it judges estimators by themselves.
+//! A known motion is sampled at several rates with noise of several sizes; each estimator
+//! runs over a sweep of its tuning. Its delay is that of the truth at which it agrees best
+//! with the estimates from noiseless positions. Its error is measured against the truth so
+//! delayed, because the engine passes its prediction through the same filter, which
+//! cancels the delay. That cancels the distortion as well, which this chart counts: it
+//! compares the estimators alone.
 
 mod family;
 mod measure;
@@ -14,24 +14,25 @@ mod show;
 mod signal;
 
 use family::{DRAWN, FAMILIES, Family};
-use measure::Recording;
+use measure::TestSignal;
 use offbd_core::diagnosis::{Profile, Settings};
-pub use record::Record;
+pub use record::EstimatorRecord;
 
 use super::{Chart, ChartError, Effort, front};
 use crate::timing::CpuTime;
 
-/// What is measured.
-struct Plan {
+/// The extent of the measurement.
+struct EstimatorPlan {
     rates_hz: &'static [f64],
     noises_m: &'static [f64],
     seconds: f64,
-    /// Tunings of each family.
+    /// Number of tunings of each family.
     n: usize,
+    /// Number of timed measurements.
     repeats: usize,
 }
 
-impl Plan {
+impl EstimatorPlan {
     const fn of(effort: Effort) -> Self {
         match effort {
             Effort::Full => Self {
@@ -48,26 +49,27 @@ impl Plan {
     }
 }
 
-/// Measures and draws.
+/// Measures, and returns the chart.
 ///
 /// # Errors
-/// [`ChartError::Records`] if a record is no JSON.
+/// [`ChartError::Records`] if a record cannot be written as JSON.
 pub fn make(effort: Effort) -> Result<Chart, ChartError> {
-    let plan = Plan::of(effort);
-    let records: Vec<Record> =
+    let plan = EstimatorPlan::of(effort);
+    let records: Vec<EstimatorRecord> =
         plan.rates_hz.iter().flat_map(|&rate_hz| at_rate(&plan, rate_hz)).collect();
     let values = records.iter().map(serde_json::to_value).collect::<Result<_, _>>()?;
     Ok(Chart {
         name: "estimators",
         records: values,
-        figures: show::figures(&records, measure::saying_nothing(plan.seconds)),
+        figures: show::figures(&records, measure::error_of_zero(plan.seconds)),
         table: show::table(&records),
         versions: Vec::new(),
     })
 }
 
-/// Every family at every tuning; the engine's own last.
-fn configurations(plan: &Plan, period_s: f64) -> Vec<(Family, f64, bool)> {
+/// Returns every family at every tuning; the engine's own estimator last, marked by
+/// `true`.
+fn configurations(plan: &EstimatorPlan, period_s: f64) -> Vec<(Family, f64, bool)> {
     let sweep = |family: &Family| {
         let family = *family;
         family.sweep(plan.n, period_s).into_iter().map(move |value| (family, value, false))
@@ -77,19 +79,20 @@ fn configurations(plan: &Plan, period_s: f64) -> Vec<(Family, f64, bool)> {
     all
 }
 
-fn at_rate(plan: &Plan, rate_hz: f64) -> Vec<Record> {
-    let recording = |&noise_m: &f64| Recording::new(rate_hz, noise_m, plan.seconds, 1);
-    let recordings: Vec<Recording> = plan.noises_m.iter().map(recording).collect();
+fn at_rate(plan: &EstimatorPlan, rate_hz: f64) -> Vec<EstimatorRecord> {
+    let recording = |&noise_m: &f64| TestSignal::new(rate_hz, noise_m, plan.seconds, 1);
+    let recordings: Vec<TestSignal> = plan.noises_m.iter().map(recording).collect();
     let Some(first) = recordings.first() else { return Vec::new() };
     let configurations = configurations(plan, 1.0 / rate_hz);
-    // What an estimator costs does not depend on the noise.
+    // The cost of an estimator does not depend on the noise.
     let costs: Vec<Option<CpuTime>> =
         configurations.iter().map(|c| first.cost(c.0, c.1, plan.repeats)).collect();
     let mut records = Vec::new();
     for recording in &recordings {
         let judge =
             |(c, cost): (&(Family, f64, bool), &Option<CpuTime>)| record(recording, *c, (*cost)?);
-        let mut panel: Vec<Record> = configurations.iter().zip(&costs).filter_map(judge).collect();
+        let mut panel: Vec<EstimatorRecord> =
+            configurations.iter().zip(&costs).filter_map(judge).collect();
         mark_front(&mut panel);
         records.append(&mut panel);
     }
@@ -97,12 +100,12 @@ fn at_rate(plan: &Plan, rate_hz: f64) -> Vec<Record> {
 }
 
 fn record(
-    recording: &Recording,
+    recording: &TestSignal,
     (family, value, offbd): (Family, f64, bool),
     cost: CpuTime,
-) -> Option<Record> {
+) -> Option<EstimatorRecord> {
     let measured = recording.measure(family, value)?;
-    Some(Record {
+    Some(EstimatorRecord {
         rate_hz: recording.rate_hz,
         noise_m: recording.noise_m,
         family: family.name(),
@@ -120,10 +123,10 @@ fn record(
     })
 }
 
-/// Marks the front among those of one rate and noise that are drawn.
-fn mark_front(panel: &mut [Record]) {
+/// Marks the Pareto front among the drawn families at one rate and noise.
+fn mark_front(panel: &mut [EstimatorRecord]) {
     let drawn: Vec<String> = FAMILIES[..DRAWN].iter().map(|f| f.name()).collect();
-    let point = |r: &Record| {
+    let point = |r: &EstimatorRecord| {
         let is_drawn = drawn.contains(&r.family);
         (if is_drawn { r.delay_s } else { f64::NAN }, r.error_m_s2)
     };

@@ -1,33 +1,35 @@
 use serde::{Deserialize, Serialize};
 
-/// One configuration at one rate and noise.
+/// The result of one estimator at one tuning, rate and noise.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Record {
-    /// Samples per second.
+pub struct EstimatorRecord {
+    /// Sampling rate, Hz.
     pub rate_hz: f64,
     /// White noise of the positions, m rms.
     pub noise_m: f64,
     pub family: String,
-    /// What is tuned: `window_s`, `cutoff_hz` or `jerk_density_m2_s5`.
+    /// The tuning parameter: `window_s`, `cutoff_hz` or `jerk_density_m2_s5`.
     pub setting: String,
+    /// Value of the tuning parameter.
     pub value: f64,
-    /// The estimator's own delay: by which the truth agrees best with what it
-    /// says of positions without noise, s.
+    /// Delay of the truth at which it agrees best with the estimate from noiseless
+    /// positions, s.
     pub delay_s: f64,
-    /// Rms against the truth of `delay_s` before, m/s².
+    /// Rms error against the truth delayed by `delay_s`, m/s².
     pub error_m_s2: f64,
-    /// Rms against the truth of the moment, m/s².
+    /// Rms error against the truth without delay, m/s².
     pub undelayed_error_m_s2: f64,
-    /// What of the error is there without noise, m/s² rms.
+    /// Rms error without noise, m/s².
     pub distortion_m_s2: f64,
-    /// What noise alone makes, m/s² rms.
+    /// Rms of the noise of the estimate, m/s².
     pub noise_m_s2: f64,
-    /// CPU time per sample, ns: the minimum over repeats.
+    /// CPU time per sample, ns: the minimum over the repeated measurements.
     pub cost_ns: f64,
-    /// Median over minimum of the repeats.
+    /// Median over minimum of the repeated measurements.
     pub spread: f64,
-    /// No other drawn one has both less delay and less error at this rate and noise.
+    /// Whether it is on the Pareto front of delay and error among the drawn families at
+    /// this rate and noise.
     pub front: bool,
-    /// What the engine uses.
+    /// Whether it is the estimator that the engine uses.
     pub offbd: bool,
 }

@@ -1,15 +1,15 @@
-//! The maps drawn: regions of the cheapest model with the choices on top, and
-//! errors by model.
+//! Draws the maps: regions of the cheapest model with the choices marked, and errors by
+//! model.
 
-use super::Ground;
+use super::ContactMap;
 use super::errors::SMALLER;
-use super::judge::{Cell, TOLERANCES_M, Tally, Verdict};
+use super::judge::{ChoiceVerdict, DecisionCounts, MotionCell, TOLERANCES_M};
 use crate::chart::{
     Axis, Category, Figure, Look, Mark, Marker, Panel, Regions, Scale, Series, Stroke,
 };
 use crate::scene::Model;
 
-/// One category for each model, and the last for cells without a truth.
+/// One category per model, and the last one for cells without a reference solution.
 const MODELS: [(&str, (u8, u8, u8), Marker); 6] = [
     ("planar", (0xDC, 0xEB, 0xF7), Marker::Ring),
     ("rolling", (0x9E, 0xCA, 0xE1), Marker::Circle),
@@ -19,10 +19,10 @@ const MODELS: [(&str, (u8, u8, u8), Marker); 6] = [
     ("no truth: thrown about", (0xC8, 0xC8, 0xC8), Marker::Cross),
 ];
 
-/// The accuracies wanted, as people write them.
+/// The wanted accuracies, as text.
 const TOLERANCE_NAMES: [&str; TOLERANCES_M.len()] = ["10⁻³ m", "10⁻⁴ m", "10⁻⁵ m"];
 
-/// Upper ends of the bins of an error, m.
+/// Upper limits of the bins of an error, m, with their names.
 const BINS_M: [(f64, &str); 7] = [
     (1e-7, "below 10⁻⁷ m"),
     (1e-6, "10⁻⁶"),
@@ -35,34 +35,34 @@ const BINS_M: [(f64, &str); 7] = [
 
 const DEAR: Look = Look { rgb: (0xB0, 0x10, 0x30), marker: Marker::Cross, dash: None };
 
-pub(super) fn regions(grounds: &[Ground]) -> Figure {
-    let panels = grounds.iter().flat_map(|ground| {
+pub(super) fn regions(maps: &[ContactMap]) -> Figure {
+    let panels = maps.iter().flat_map(|map| {
         (0..TOLERANCES_M.len()).map(move |k| {
-            let title = format!("{}, within {}", ground.name, TOLERANCE_NAMES[k]);
-            region_panel(ground, k, title)
+            let title = format!("{}, within {}", map.name, TOLERANCE_NAMES[k]);
+            region_panel(map, k, title)
         })
     });
     Figure {
         title: "The cheapest model that is good enough, and what is chosen".to_owned(),
-        subtitle: verdicts(grounds),
+        subtitle: verdicts(maps),
         columns: TOLERANCES_M.len(),
         panel_height: 620,
         panels: panels.collect(),
     }
 }
 
-/// What was decided how, from the numbers.
-fn verdicts(grounds: &[Ground]) -> String {
-    let tallies: Vec<Tally> = grounds
+/// Summarises the choices as the subtitle.
+fn verdicts(maps: &[ContactMap]) -> String {
+    let tallies: Vec<DecisionCounts> = maps
         .iter()
-        .flat_map(|ground| (0..TOLERANCES_M.len()).map(|k| Tally::of(&ground.cells, k)))
+        .flat_map(|map| (0..TOLERANCES_M.len()).map(|k| DecisionCounts::of(&map.cells, k)))
         .collect();
-    let sum = |f: fn(&Tally) -> usize| tallies.iter().map(f).sum::<usize>();
-    let mut factors: Vec<f64> = grounds
+    let sum = |f: fn(&DecisionCounts) -> usize| tallies.iter().map(f).sum::<usize>();
+    let mut factors: Vec<f64> = maps
         .iter()
-        .flat_map(|ground| &ground.cells)
+        .flat_map(|map| &map.cells)
         .flat_map(|cell| &cell.judged)
-        .filter(|judged| judged.verdict == Verdict::TooDear)
+        .filter(|judged| judged.verdict == ChoiceVerdict::TooDear)
         .filter_map(|judged| judged.cost_factor)
         .collect();
     let worst = factors.iter().copied().fold(1.0, f64::max);
@@ -76,64 +76,68 @@ fn verdicts(grounds: &[Ground]) -> String {
     )
 }
 
-fn axes(ground: &Ground) -> (Axis, Axis) {
+fn axes(map: &ContactMap) -> (Axis, Axis) {
     let around = |values: &[f64]| {
         let half = (values[1] / values[0]).sqrt();
         Scale::Log(values[0] / half, values[values.len() - 1] * half)
     };
     (
-        Axis::new("amplitude, rad", around(&ground.amplitudes)),
-        Axis::new("frequency, Hz", around(&ground.frequencies)),
+        Axis::new("amplitude, rad", around(&map.amplitudes)),
+        Axis::new("frequency, Hz", around(&map.frequencies)),
     )
 }
 
-fn map(ground: &Ground, categories: Vec<Category>, category: impl Fn(&Cell) -> usize) -> Regions {
-    let columns = ground.amplitudes.len();
-    let of = |i: usize, j: usize| category(&ground.cells[j * columns + i]);
-    Regions::centred_log(categories, &ground.amplitudes, &ground.frequencies, of)
+fn regions_of(
+    map: &ContactMap,
+    categories: Vec<Category>,
+    category: impl Fn(&MotionCell) -> usize,
+) -> Regions {
+    let columns = map.amplitudes.len();
+    let of = |i: usize, j: usize| category(&map.cells[j * columns + i]);
+    Regions::centred_log(categories, &map.amplitudes, &map.frequencies, of)
 }
 
-fn region_panel(ground: &Ground, k: usize, title: String) -> Panel {
-    let (x, y) = axes(ground);
+fn region_panel(map: &ContactMap, k: usize, title: String) -> Panel {
+    let (x, y) = axes(map);
     let categories = MODELS.map(|(name, rgb, marker)| Category {
         name: name.to_owned(),
         look: Look { rgb, marker, dash: None },
     });
     let mut panel = Panel::new(title, x, y);
-    panel.regions = Some(map(ground, categories.to_vec(), |cell| {
+    panel.regions = Some(regions_of(map, categories.to_vec(), |cell| {
         let known = |model: Model| Model::ALL.iter().position(|&m| m == model);
         cell.judged[k].cheapest.and_then(known).unwrap_or(Model::ALL.len())
     }));
     let decided = |verdict| {
-        let cells = ground.cells.iter().filter(move |c| c.judged[k].verdict == verdict);
+        let cells = map.cells.iter().filter(move |c| c.judged[k].verdict == verdict);
         cells.map(|cell| (cell.amplitude, cell.frequency))
     };
-    let dear = decided(Verdict::TooDear).collect();
+    let dear = decided(ChoiceVerdict::TooDear).collect();
     panel.series.push(Series::new("chosen: dearer than need be", DEAR, Stroke::Markers, dear));
     let mark = |at| Mark { name: "chosen: too cheap".to_owned(), text: String::new(), at };
-    panel.marks = decided(Verdict::TooCheap).map(mark).collect();
+    panel.marks = decided(ChoiceVerdict::TooCheap).map(mark).collect();
     panel
 }
 
-pub(super) fn errors(grounds: &[Ground]) -> Figure {
-    let panels = grounds
-        .iter()
-        .flat_map(|ground| (0..SMALLER.len()).map(move |model| error_panel(ground, model)));
+pub(super) fn errors(maps: &[ContactMap]) -> Figure {
+    let panels =
+        maps.iter().flat_map(|map| (0..SMALLER.len()).map(move |model| error_panel(map, model)));
     Figure {
         title: "Error of each model against the compliant one".to_owned(),
-        subtitle: reaches(grounds),
+        subtitle: reaches(maps),
         columns: SMALLER.len(),
         panel_height: 560,
         panels: panels.collect(),
     }
 }
 
-/// How many cells each model takes, from the numbers.
-fn reaches(grounds: &[Ground]) -> String {
+/// Counts the cells in which each model is accurate enough, as the subtitle.
+fn reaches(maps: &[ContactMap]) -> String {
     let limit = TOLERANCES_M[1];
-    let known = || grounds.iter().flat_map(|g| &g.cells).filter(|cell| cell.has_truth(limit));
+    let known = || maps.iter().flat_map(|g| &g.cells).filter(|cell| cell.has_truth(limit));
     let able = |model| {
-        let within = |cell: &&Cell| cell.errors.by_model().any(|(m, e)| m == model && e <= limit);
+        let within =
+            |cell: &&MotionCell| cell.errors.by_model().any(|(m, e)| m == model && e <= limit);
         format!("{model} in {}", known().filter(within).count())
     };
     format!(
@@ -145,14 +149,14 @@ fn reaches(grounds: &[Ground]) -> String {
     )
 }
 
-fn error_panel(ground: &Ground, model: usize) -> Panel {
-    let (x, y) = axes(ground);
+fn error_panel(map: &ContactMap, model: usize) -> Panel {
+    let (x, y) = axes(map);
     let bins = BINS_M.iter().enumerate().map(|(i, (_, name))| Category {
         name: (*name).to_owned(),
         look: Look::step(i, BINS_M.len()),
     });
-    let mut panel = Panel::new(format!("{}, {}", SMALLER[model], ground.name), x, y);
-    panel.regions = Some(map(ground, bins.collect(), |cell| {
+    let mut panel = Panel::new(format!("{}, {}", SMALLER[model], map.name), x, y);
+    panel.regions = Some(regions_of(map, bins.collect(), |cell| {
         if !cell.has_truth(TOLERANCES_M[0]) {
             return BINS_M.len();
         }

@@ -1,6 +1,5 @@
-//! Which model is good enough where: errors of the smaller models against the
-//! compliant one over amplitude and frequency of the plate's motion, and what
-//! `choose` makes of it.
+//! Fidelity of the models: errors of the simpler models against the compliant one over
+//! amplitude and frequency of the plate's motion, and the choices of `choose`.
 
 mod draw;
 mod errors;
@@ -8,66 +7,66 @@ mod judge;
 
 use serde::Serialize;
 
-use super::{Chart, ChartError, Effort, Table};
-use judge::{Cell, TOLERANCES_M, Verdict};
+use super::{Chart, ChartError, ChartTable, Effort};
+use judge::{ChoiceVerdict, MotionCell, TOLERANCES_M};
 use offbd_core::plant::Contact;
 
-/// The contacts compared, by their names.
+/// The contacts compared, with their names.
 const CONTACTS: [(&str, Contact); 2] =
     [("chapter's contact", Contact::CHAPTER), ("soft contact", Contact::SOFT)];
 
-/// All cells of one contact.
-struct Ground {
+/// All cells of one contact, a map over amplitude and frequency.
+struct ContactMap {
     name: &'static str,
     amplitudes: Vec<f64>,
     frequencies: Vec<f64>,
     /// Cell (i, j) at `j · columns + i`: amplitude i, frequency j.
-    cells: Vec<Cell>,
+    cells: Vec<MotionCell>,
 }
 
-/// One cell.
+/// The record of one cell.
 #[derive(Clone, Debug, Serialize)]
-struct Record {
+struct FidelityRecord {
     contact: &'static str,
     amplitude_rad: f64,
     frequency_hz: f64,
-    /// How far two runs of the truth differ, m.
+    /// Distance between two runs of the reference solution, m.
     truth_spread_m: Option<f64>,
-    /// Worst error of position by model, m; none where a model gives no number.
+    /// Largest error of the position by model, m; `None` if the run failed.
     errors_m: Vec<(&'static str, Option<f64>)>,
     decisions: Vec<Decision>,
 }
 
-/// What was chosen for one accuracy.
+/// The choice for one accuracy.
 #[derive(Clone, Debug, Serialize)]
 struct Decision {
     tolerance_m: f64,
-    /// The cheapest model that meets it, by the errors above.
+    /// The cheapest model that meets the tolerance, by its error.
     cheapest: Option<&'static str>,
     chosen: Option<String>,
-    /// Error of the chosen run against the truth, m.
+    /// Error of the chosen run against the reference solution, m.
     chosen_error_m: Option<f64>,
-    verdict: Verdict,
-    /// CPU time of the chosen run over that of the cheapest that meets it.
+    verdict: ChoiceVerdict,
+    /// CPU time of the chosen run over that of the cheapest one that meets the tolerance.
     cost_factor: Option<f64>,
 }
 
-/// Measures and draws.
+/// Measures, and returns the chart.
 ///
 /// # Errors
-/// If a record is no JSON.
+/// [`ChartError::Records`] if a record cannot be written as JSON.
 pub fn make(effort: Effort) -> Result<Chart, ChartError> {
-    let grounds: Vec<Ground> =
-        CONTACTS.iter().map(|(name, contact)| Ground::measure(name, contact, effort)).collect();
+    let maps: Vec<ContactMap> =
+        CONTACTS.iter().map(|(name, contact)| ContactMap::measure(name, contact, effort)).collect();
     let mut records = Vec::new();
-    for record in grounds.iter().flat_map(Ground::records) {
+    for record in maps.iter().flat_map(ContactMap::records) {
         records.push(serde_json::to_value(record)?);
     }
-    let figures = vec![("regions", draw::regions(&grounds)), ("errors", draw::errors(&grounds))];
-    Ok(Chart { name: "fidelity", records, figures, table: table(&grounds), versions: Vec::new() })
+    let figures = vec![("regions", draw::regions(&maps)), ("errors", draw::errors(&maps))];
+    Ok(Chart { name: "fidelity", records, figures, table: table(&maps), versions: Vec::new() })
 }
 
-impl Ground {
+impl ContactMap {
     fn measure(name: &'static str, contact: &Contact, effort: Effort) -> Self {
         let n = match effort {
             Effort::Full => (6, 5),
@@ -79,12 +78,12 @@ impl Ground {
         };
         let (amplitudes, frequencies) = (spread(1e-3, 1.3, n.0), spread(0.1, 10.0, n.1));
         let pairs = frequencies.iter().flat_map(|&f| amplitudes.iter().map(move |&a| (a, f)));
-        let cells = pairs.map(|(a, f)| Cell::measure(contact, a, f)).collect();
+        let cells = pairs.map(|(a, f)| MotionCell::measure(contact, a, f)).collect();
         Self { name, amplitudes, frequencies, cells }
     }
 
-    fn records(&self) -> impl Iterator<Item = Record> {
-        self.cells.iter().map(|cell| Record {
+    fn records(&self) -> impl Iterator<Item = FidelityRecord> {
+        self.cells.iter().map(|cell| FidelityRecord {
             contact: self.name,
             amplitude_rad: cell.amplitude,
             frequency_hz: cell.frequency,
@@ -95,7 +94,7 @@ impl Ground {
     }
 }
 
-impl Cell {
+impl MotionCell {
     fn decision(&self, k: usize) -> Decision {
         let judged = &self.judged[k];
         Decision {
@@ -113,19 +112,19 @@ fn finite(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }
 
-/// For each contact and accuracy: how many cells are decided how.
-fn table(grounds: &[Ground]) -> Table {
+/// Returns a table of the verdicts by contact and accuracy.
+fn table(maps: &[ContactMap]) -> ChartTable {
     let mut rows = Vec::new();
-    for ground in grounds {
+    for map in maps {
         for (k, tolerance) in TOLERANCES_M.iter().enumerate() {
-            let tally = judge::Tally::of(&ground.cells, k);
-            let mut row = vec![ground.name.to_owned(), format!("{tolerance:.0e}")];
+            let tally = judge::DecisionCounts::of(&map.cells, k);
+            let mut row = vec![map.name.to_owned(), format!("{tolerance:.0e}")];
             row.extend([tally.judged, tally.too_cheap, tally.too_dear].map(|n| n.to_string()));
             row.extend([tally.median_factor, tally.worst_factor].map(|f| format!("{f:.1}")));
             rows.push(row);
         }
     }
-    Table {
+    ChartTable {
         heading: vec!["contact", "m", "cells", "too cheap", "too dear", "median factor", "worst"],
         right: vec![1, 2, 3, 4, 5, 6],
         rows,

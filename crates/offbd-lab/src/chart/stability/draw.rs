@@ -1,14 +1,14 @@
-//! The maps drawn: a panel for each method, predictions on top.
+//! Draws the maps: one panel per method, with the predicted limits.
 
-use super::map::{Map, Sweep, chapter_ratio};
+use super::map::{StabilityMap, Sweep, chapter_ratio};
 use super::measure::Fate;
-use super::theory::Limits;
+use super::theory::PredictedLimits;
 use crate::chart::{Axis, Category, Figure, Look, Marker, Panel, Regions, Scale, Series, Stroke};
 
-/// A fate with its name, colour and sign.
-type Kind = (Fate, &'static str, (u8, u8, u8), Marker);
+/// A fate with its name, colour and marker.
+type FateStyle = (Fate, &'static str, (u8, u8, u8), Marker);
 
-const FATES: [Kind; 4] = [
+const FATES: [FateStyle; 4] = [
     (Fate::Stable, "stable", (0xD4, 0xEC, 0xDF), Marker::Ring),
     (Fate::Touchdown, "stable, but a touchdown fails", (0xF7, 0xE3, 0x9C), Marker::Triangle),
     (Fate::Chatter, "chatter: only slip and energy show it", (0xE6, 0x9F, 0x00), Marker::Plus),
@@ -19,10 +19,10 @@ const SLIP: Look = Look { rgb: (0, 0, 0), marker: Marker::Ring, dash: None };
 const NORMAL: Look = Look { rgb: (0x00, 0x3C, 0x78), marker: Marker::Ring, dash: Some((16, 10)) };
 const MEASURED: Look = Look { rgb: (0, 0, 0), marker: Marker::Circle, dash: None };
 
-/// Every so many columns show their measured limit.
+/// The measured limit is drawn for every n-th column; chosen for legibility.
 const EACH: usize = 3;
 
-pub(super) fn figure(maps: &[Map]) -> Figure {
+pub(super) fn figure(maps: &[StabilityMap]) -> Figure {
     let sweep = maps[0].sweep;
     Figure {
         title: title(sweep),
@@ -43,11 +43,11 @@ fn title(sweep: Sweep) -> String {
     }
 }
 
-/// What the maps say, from their numbers.
-fn subtitle(maps: &[Map]) -> String {
+/// Summarises the maps as the subtitle.
+fn subtitle(maps: &[StabilityMap]) -> String {
     let limits: usize = maps.iter().map(|map| map.limits.len()).sum();
-    let worst = maps.iter().filter_map(Map::worst_off).fold(0.0, f64::max);
-    let explicit: Vec<&Map> = maps.iter().filter(|map| !map.limits.is_empty()).collect();
+    let worst = maps.iter().filter_map(StabilityMap::worst_off).fold(0.0, f64::max);
+    let explicit: Vec<&StabilityMap> = maps.iter().filter(|map| !map.limits.is_empty()).collect();
     let clamped = explicit.iter().map(|map| map.chatter_over_clamp()).fold(0.0, f64::max);
     format!(
         "The {limits} measured limits of the explicit methods lie within {:.1} % of the eigenvalues'. \
@@ -58,9 +58,9 @@ fn subtitle(maps: &[Map]) -> String {
     )
 }
 
-/// What becomes of the methods that theory says are stable everywhere.
-fn implicit(maps: &[Map]) -> String {
-    let told = maps.iter().filter(|map| map.limits.is_empty()).map(|map| {
+/// Summarises the methods that are stable everywhere in theory.
+fn implicit(maps: &[StabilityMap]) -> String {
+    let results = maps.iter().filter(|map| map.limits.is_empty()).map(|map| {
         let fails = map.cells.len() - map.count(Fate::Stable);
         if fails == 0 {
             return format!("{} takes every step", map.method);
@@ -68,10 +68,10 @@ fn implicit(maps: &[Map]) -> String {
         let share = 100.0 * fails as f64 / map.cells.len() as f64;
         format!("{} fails at touchdown in {share:.0} % of its cells", map.method)
     });
-    format!("{}.", told.collect::<Vec<_>>().join(", "))
+    format!("{}.", results.collect::<Vec<_>>().join(", "))
 }
 
-fn panel(map: &Map) -> Panel {
+fn panel(map: &StabilityMap) -> Panel {
     let [values, steps] = map.sweep.ranges();
     let label = match map.sweep {
         Sweep::Threshold => "slip threshold, m/s",
@@ -89,7 +89,7 @@ fn panel(map: &Map) -> Panel {
     panel
 }
 
-fn regions(map: &Map) -> Regions {
+fn regions(map: &StabilityMap) -> Regions {
     let categories = FATES.map(|(_, name, rgb, marker)| Category {
         name: name.to_owned(),
         look: Look { rgb, marker, dash: None },
@@ -100,17 +100,17 @@ fn regions(map: &Map) -> Regions {
     })
 }
 
-/// The predicted limits of both modes over the range swept.
-fn theory(map: &Map) -> Vec<Series> {
-    let predicted: Vec<(f64, Limits)> = map
+/// Returns the predicted limits of both modes over the range swept.
+fn theory(map: &StabilityMap) -> Vec<Series> {
+    let predicted: Vec<(f64, PredictedLimits)> = map
         .values
         .iter()
         .filter_map(|&value| {
             let held = map.sweep.held(value);
-            Some((value, Limits::of(map.method, &held.model, held.normal_m_s2())?))
+            Some((value, PredictedLimits::of(map.method, &held.model, held.normal_m_s2())?))
         })
         .collect();
-    let line = |name, look, limit: fn(&Limits) -> f64| {
+    let line = |name, look, limit: fn(&PredictedLimits) -> f64| {
         let points = predicted.iter().map(|(value, limits)| (*value, limit(limits))).collect();
         Series::new(name, look, Stroke::Line, points)
     };

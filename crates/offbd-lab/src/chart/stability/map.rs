@@ -1,22 +1,22 @@
-//! One map: a method's fate over the step and one number of the contact.
+//! One map: the fate of a method over the step size and one parameter of the contact.
 
-use super::measure::{Fate, Held};
-use super::theory::Limits;
-use super::{LimitRecord, Record};
+use super::measure::{BallOnHeldPlate, Fate};
+use super::theory::PredictedLimits;
+use super::{StabilityLimitRecord, StabilityRecord};
 use crate::chart::Effort;
 use crate::scene::Method;
 use offbd_core::plant::{Ball, Contact};
 
-/// Which number of the contact is swept; the others are the chapter's.
+/// The parameter of the contact that is swept; the others are the chapter's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Sweep {
     Threshold,
-    /// The damping goes along, so that the damping ratio stays the chapter's.
+    /// Stiffness, with the damping changed so that the damping ratio is the chapter's.
     Stiffness,
     Damping,
 }
 
-/// The chapter's damping ratio D/(2·√(K·m)).
+/// Returns the chapter's damping ratio D/(2·√(K·m)).
 pub(super) fn chapter_ratio() -> f64 {
     let contact = Contact::CHAPTER;
     let critical = 2.0 * (contact.stiffness_n_per_m() * Ball::default().mass_kg()).sqrt();
@@ -34,7 +34,7 @@ impl Sweep {
         }
     }
 
-    /// Ends of the range swept, and of the steps, s.
+    /// Returns the range of the parameter, in SI units, and that of the steps, s.
     pub(super) const fn ranges(self) -> [(f64, f64); 2] {
         match self {
             Self::Threshold => [(1e-6, 1e-1), (1e-7, 1e-2)],
@@ -43,7 +43,7 @@ impl Sweep {
         }
     }
 
-    pub(super) fn held(self, value: f64) -> Held {
+    pub(super) fn held(self, value: f64) -> BallOnHeldPlate {
         let c = Contact::CHAPTER;
         let critical = 2.0 * (value * Ball::default().mass_kg()).sqrt();
         let (k, d, threshold) = match self {
@@ -52,31 +52,32 @@ impl Sweep {
             Self::Damping => (c.stiffness_n_per_m(), value, c.slip_threshold_m_s()),
         };
         let contact = Contact::new(k, d, c.friction(), threshold);
-        Held::new(contact.unwrap_or(Contact::CHAPTER))
+        BallOnHeldPlate::new(contact.unwrap_or(Contact::CHAPTER))
     }
 }
 
-/// The largest stable step of one column, s.
+/// The largest stable step for one value of the parameter, s.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Limit {
+pub(super) struct MeasuredLimit {
+    /// Value of the parameter.
     pub value: f64,
     pub predicted: f64,
     pub measured: f64,
 }
 
 /// One method's map.
-pub(super) struct Map {
+pub(super) struct StabilityMap {
     pub sweep: Sweep,
     pub method: Method,
     pub values: Vec<f64>,
     pub steps: Vec<f64>,
-    /// Fate and last slip of cell (i, j) at `j · columns + i`.
+    /// Fate and final slip error of cell (i, j) at `j · columns + i`.
     pub cells: Vec<(Fate, f64)>,
-    /// Empty for methods without a limit.
-    pub limits: Vec<Limit>,
+    /// Empty for methods that are stable at any step in theory.
+    pub limits: Vec<MeasuredLimit>,
 }
 
-impl Map {
+impl StabilityMap {
     pub(super) fn measure(sweep: Sweep, method: Method, effort: Effort) -> Self {
         let (columns, rows) = match effort {
             Effort::Full => (30, 30),
@@ -84,12 +85,12 @@ impl Map {
         };
         let [values, steps] = sweep.ranges();
         let (values, steps) = (spread(values, columns), spread(steps, rows));
-        let held: Vec<Held> = values.iter().map(|&value| sweep.held(value)).collect();
+        let held: Vec<BallOnHeldPlate> = values.iter().map(|&value| sweep.held(value)).collect();
         let cells = steps.iter().flat_map(|&h| held.iter().map(move |held| held.fate(method, h)));
         let cells = cells.collect();
         let limits = values.iter().zip(&held).filter_map(|(&value, held)| {
-            let predicted = Limits::of(method, &held.model, held.normal_m_s2())?.least();
-            Some(Limit { value, predicted, measured: measured(held, method, predicted)? })
+            let predicted = PredictedLimits::of(method, &held.model, held.normal_m_s2())?.least();
+            Some(MeasuredLimit { value, predicted, measured: measured(held, method, predicted)? })
         });
         let limits = limits.collect();
         Self { sweep, method, values, steps, cells, limits }
@@ -99,8 +100,8 @@ impl Map {
         self.cells.iter().filter(|cell| cell.0 == fate).count()
     }
 
-    /// The largest slip that chatters, over what full friction changes of it in
-    /// one step.
+    /// Returns the largest slip of the cells that chatter, as a multiple of the change of
+    /// slip by full friction in one step.
     pub(super) fn chatter_over_clamp(&self) -> f64 {
         let each = self.cells.iter().enumerate().filter(|(_, cell)| cell.0 == Fate::Chatter);
         let over = each.map(|(cell, (_, off))| {
@@ -110,17 +111,17 @@ impl Map {
         over.fold(0.0, f64::max)
     }
 
-    /// The largest relative difference of measured and predicted limit.
+    /// Returns the largest relative difference of measured and predicted limit.
     pub(super) fn worst_off(&self) -> Option<f64> {
-        let off = |limit: &Limit| (limit.measured / limit.predicted - 1.0).abs();
+        let off = |limit: &MeasuredLimit| (limit.measured / limit.predicted - 1.0).abs();
         self.limits.iter().map(off).reduce(f64::max)
     }
 
-    pub(super) fn records(&self) -> impl Iterator<Item = Record> {
+    pub(super) fn records(&self) -> impl Iterator<Item = StabilityRecord> {
         self.cells.iter().enumerate().map(|(cell, &(fate, off))| {
             let (i, j) = (cell % self.values.len(), cell / self.values.len());
             let contact = self.sweep.held(self.values[i]).model.contact;
-            Record {
+            StabilityRecord {
                 sweep: self.sweep.word(),
                 method: self.method.name(),
                 stiffness_n_per_m: contact.stiffness_n_per_m(),
@@ -133,8 +134,8 @@ impl Map {
         })
     }
 
-    pub(super) fn limit_records(&self) -> impl Iterator<Item = LimitRecord> {
-        self.limits.iter().map(|limit| LimitRecord {
+    pub(super) fn limit_records(&self) -> impl Iterator<Item = StabilityLimitRecord> {
+        self.limits.iter().map(|limit| StabilityLimitRecord {
             sweep: self.sweep.word(),
             method: self.method.name(),
             swept: limit.value,
@@ -144,18 +145,18 @@ impl Map {
     }
 }
 
-/// `n` values from the first to the second, evenly on a logarithmic axis.
+/// Returns `n` logarithmically spaced values from `low` to `high`.
 fn spread((low, high): (f64, f64), n: usize) -> Vec<f64> {
     let share = |i: usize| i as f64 / (n - 1) as f64;
     (0..n).map(|i| low * (high / low).powf(share(i))).collect()
 }
 
-/// Ratio of the ends of the interval that the bisection leaves.
+/// Ratio of the ends of the interval at which the bisection stops; chosen.
 const CLOSE: f64 = 1.002;
 
-/// The largest step at which a disturbance dies out, by bisection around the
-/// prediction; `None` where it is not between a tenth and ten times of it.
-fn measured(held: &Held, method: Method, predicted: f64) -> Option<f64> {
+/// Returns the largest step at which a disturbance decays, by bisection around the
+/// prediction; `None` if it is not between a tenth and ten times the prediction.
+fn measured(held: &BallOnHeldPlate, method: Method, predicted: f64) -> Option<f64> {
     let (mut low, mut high) = (predicted / 10.0, predicted * 10.0);
     if !held.dies_out(method, low) || held.dies_out(method, high) {
         return None;

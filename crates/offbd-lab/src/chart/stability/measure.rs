@@ -1,7 +1,7 @@
-//! What becomes of a ball on a held plate, step after step by one method.
+//! Determines the fate of a ball on a plate at rest, stepped by one method.
 //!
-//! Judged by slip and by the energy normal to the plate, never by position: a
-//! slip that chatters leaves the position as good as right.
+//! The criteria are slip and the energy normal to the plate, not the position: a slip that
+//! chatters hardly affects the position.
 
 use serde::Serialize;
 
@@ -12,52 +12,54 @@ use crate::scene::Method;
 use offbd_core::maths::{EULER, MIDPOINT, RK4, System, semi_implicit_euler};
 use offbd_core::plant::{Ball, Body, Contact, Ground, Motion, Plate, PlateMotion, Tilt};
 
-/// What becomes of the ball.
+/// The fate of a ball.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Fate {
-    /// A small disturbance dies out, and the ball may begin off the plate.
+    /// A small disturbance decays, and a ball that starts just touching the plate settles.
     Stable,
-    /// A small disturbance dies out, but a ball that begins where it only
-    /// touches comes to slip or is thrown off.
+    /// A small disturbance decays, but a ball that starts just touching the plate slips
+    /// away or is thrown off.
     Touchdown,
-    /// The slip stays away from the creep that friction needs.
+    /// The slip does not return to the creep that friction needs.
     Chatter,
-    /// Thrown off the plate, or no number any more.
+    /// The ball is thrown off the plate, or the state is not finite any more.
     BlownUp,
 }
 
-/// Steps in which a disturbance must die out or grow.
+/// Number of steps in which a disturbance must decay or grow; chosen.
 const STEPS: usize = 600;
 
-/// A landing has this long at least to settle, s: six times the slower of the
-/// chapter's normal modes.
+/// Minimum time for a landing to settle, s. Chosen: over six time constants of the slower
+/// of the chapter's normal modes.
 const LANDING_S: f64 = 8e-3;
 
-/// The first slip beside the creep along each axis, over v_thr.
+/// Initial disturbance of the slip along each axis, in units of v_thr; chosen small enough
+/// to stay in the linear range of friction.
 const KICK: f64 = 0.01;
 
-/// The first depth beside that at rest, as a part of it.
+/// Initial disturbance of the depth as a share of the depth at rest; chosen.
 const PRESS: f64 = 1e-3;
 
-/// A disturbance that is larger by this part at the end has grown: a spring
-/// that is hardly damped takes long to show it.
+/// Relative increase from which on a disturbance counts as grown. Chosen small: with
+/// little damping the normal mode grows slowly.
 const GROWN: f64 = 1e-6;
 
-/// Energy normal to the plate over weight times depth at rest: above, the ball
-/// was thrown off. At the start it is 1 at most.
+/// Energy normal to the plate, in units of weight times depth at rest, above which the
+/// ball counts as thrown off. Chosen: the initial energy is at most 1.
 const THROWN: f64 = 10.0;
 
-/// Slip over v_thr that no landing leaves behind by itself.
+/// Slip error in units of v_thr above which a landing counts as failed. Chosen: no landing
+/// that succeeds leaves as much.
 const SLIPS: f64 = 3.0;
 
-/// A ball on a plate held at π/20 about both axes.
-pub(super) struct Held {
+/// A ball on a plate at rest, tilted by π/20 about both axes.
+pub(super) struct BallOnHeldPlate {
     pub model: Compliant,
     plate: PlateMotion,
 }
 
-impl System<9> for Held {
+impl System<9> for BallOnHeldPlate {
     const POSITIONS: usize = 3;
 
     #[inline]
@@ -66,13 +68,13 @@ impl System<9> for Held {
     }
 }
 
-impl Stiff<9> for Held {
+impl Stiff<9> for BallOnHeldPlate {
     fn jacobian(&self, _: f64, y: &[f64; 9]) -> [[f64; 9]; 9] {
         self.model.jacobian(y, &self.plate)
     }
 }
 
-impl Held {
+impl BallOnHeldPlate {
     pub(super) fn new(contact: Contact) -> Self {
         let body = Body::ball(&Ball::default(), &Plate::default());
         let angle = std::f64::consts::PI / 20.0;
@@ -82,7 +84,7 @@ impl Held {
         }
     }
 
-    /// Normal force at rest over mass, m/s².
+    /// Returns the normal force at rest per mass, m/s².
     pub(super) fn normal_m_s2(&self) -> f64 {
         -self.plate.gravity.z
     }
@@ -91,7 +93,7 @@ impl Held {
         self.model.body.mass_kg() * self.normal_m_s2() / self.model.contact.stiffness_n_per_m()
     }
 
-    /// The slip that carries the friction of the rolling ball, m/s.
+    /// Returns the creep, the slip that carries the friction of the rolling ball, m/s.
     fn creep(&self) -> [f64; 2] {
         let (body, contact) = (&self.model.body, &self.model.contact);
         let share = 1.0 / (body.slip_ease() * body.mass_kg());
@@ -99,8 +101,7 @@ impl Held {
         [-self.plate.gravity.x * share * per, -self.plate.gravity.y * share * per]
     }
 
-    /// Pressed in and creeping as it must, but for a small slip and a
-    /// thousandth of the depth.
+    /// Returns the equilibrium of depth and creep with small disturbances of both.
     fn settled(&self) -> [f64; 9] {
         let mut at = Motion::at_rest(&self.model.body);
         let kick = KICK * self.model.contact.slip_threshold_m_s();
@@ -110,24 +111,24 @@ impl Held {
         at.to_row()
     }
 
-    /// Slip beside the creep, over v_thr.
+    /// Returns the slip error, the distance of the slip from the creep, in units of v_thr.
     fn slip_off(&self, y: &[f64; 9]) -> f64 {
         let at = Motion::from_row(y);
         let (slip, creep) = (self.model.body.slip(&at.velocity, &at.spin), self.creep());
         (slip[0] - creep[0]).hypot(slip[1] - creep[1]) / self.model.contact.slip_threshold_m_s()
     }
 
-    /// Energy normal to the plate beyond that of the settled ball, over weight
-    /// times depth.
-    fn thrown(&self, y: &[f64; 9]) -> f64 {
+    /// Returns the energy normal to the plate above that of the ball at rest, in units of
+    /// weight times depth at rest.
+    fn normal_energy(&self, y: &[f64; 9]) -> f64 {
         let (sag, g) = (self.sag(), self.normal_m_s2());
         let above = y[2] - self.model.body.rest_height_m();
         let spring = above.min(0.0).powi(2) / sag;
         (y[5] * y[5] / 2.0 + g * (above + spring / 2.0)) / (g * sag) + 0.5
     }
 
-    /// What becomes of it by `method` with steps of `h`, and the last slip
-    /// beside the creep, over v_thr.
+    /// Returns the fate of the ball by `method` with steps of `h`, and the final slip error
+    /// in units of v_thr.
     pub(super) fn fate(&self, method: Method, h: f64) -> (Fate, f64) {
         let end = self.run(method, self.settled(), h, STEPS);
         let off = self.slip_off(&end);
@@ -139,27 +140,27 @@ impl Held {
         }
         let steps = STEPS.max((LANDING_S / h).ceil() as usize);
         let landed = self.run(method, Motion::at_rest(&self.model.body).to_row(), h, steps);
-        let holds = self.thrown(&landed) <= THROWN && self.slip_off(&landed) <= SLIPS;
+        let holds = self.normal_energy(&landed) <= THROWN && self.slip_off(&landed) <= SLIPS;
         (if holds { Fate::Stable } else { Fate::Touchdown }, off)
     }
 
-    /// Whether a small disturbance of the settled ball dies out.
+    /// Returns whether a small disturbance of the equilibrium decays.
     pub(super) fn dies_out(&self, method: Method, h: f64) -> bool {
         self.grew(&self.run(method, self.settled(), h, STEPS)) == [false; 2]
     }
 
-    /// Whether the disturbances of slip and of the normal mode have grown; what
-    /// is no number has.
+    /// Returns whether the disturbances of slip and of the normal mode have grown; NaN
+    /// counts as grown.
     fn grew(&self, end: &[f64; 9]) -> [bool; 2] {
         let start = self.settled();
         let within = |end: f64, start: f64| end <= start * (1.0 + GROWN);
         [
             !within(self.slip_off(end), self.slip_off(&start)),
-            !within(self.thrown(end), self.thrown(&start)),
+            !within(self.normal_energy(end), self.normal_energy(&start)),
         ]
     }
 
-    /// What full friction changes of the slip within `h`, over v_thr.
+    /// Returns the change of slip by full friction within `h`, in units of v_thr.
     pub(super) fn full_friction(&self, h: f64) -> f64 {
         let (body, contact) = (&self.model.body, &self.model.contact);
         let rate = body.slip_ease() * body.mass_kg() * contact.friction() * self.normal_m_s2();
@@ -178,7 +179,7 @@ impl Held {
                 Method::Rodas4 => RODAS4.step(self, 0.0, &y, h).map_or([f64::NAN; 9], |to| to.y),
                 _ => contact.step(&Motion::from_row(&y), &self.plate).to_row(),
             };
-            if !self.thrown(&y).is_finite() {
+            if !self.normal_energy(&y).is_finite() {
                 break;
             }
         }

@@ -1,6 +1,6 @@
-//! Where each method fails on the compliant model: the step against the slip
-//! threshold, the stiffness and the damping, measured by slip and energy, with
-//! the limits that the eigenvalues predict.
+//! Stability of each method on the compliant model: the step size against slip threshold,
+//! stiffness and damping, judged by slip and energy, with the limits that the eigenvalues
+//! predict.
 
 mod draw;
 mod map;
@@ -9,12 +9,13 @@ mod theory;
 
 use serde::Serialize;
 
-use super::{Chart, ChartError, Effort, Table};
+use super::{Chart, ChartError, ChartTable, Effort};
 use crate::scene::Method;
-use map::{Map, Sweep};
+use map::{StabilityMap, Sweep};
 use measure::Fate;
 
-/// Explicit methods first, then those that should take any step.
+/// The methods compared: explicit ones first, then those that are stable at any step in
+/// theory.
 const METHODS: [Method; 7] = [
     Method::Euler,
     Method::SemiImplicitEuler,
@@ -25,9 +26,9 @@ const METHODS: [Method; 7] = [
     Method::ContactStep,
 ];
 
-/// One run of one method at one step.
+/// The record of one run of one method at one step size.
 #[derive(Clone, Debug, Serialize)]
-struct Record {
+struct StabilityRecord {
     sweep: &'static str,
     method: &'static str,
     stiffness_n_per_m: f64,
@@ -35,14 +36,14 @@ struct Record {
     slip_threshold_m_s: f64,
     step_s: f64,
     fate: Fate,
-    /// Slip beside the creep that friction needs, over v_thr; none where the
-    /// state is no number any more.
+    /// Final distance of the slip from the creep that friction needs, in units of v_thr;
+    /// `None` if the state is not finite any more.
     slip_off: Option<f64>,
 }
 
-/// One column of one map: its largest stable step.
+/// The record of the largest stable step for one value of the swept parameter.
 #[derive(Clone, Debug, Serialize)]
-struct LimitRecord {
+struct StabilityLimitRecord {
     sweep: &'static str,
     method: &'static str,
     swept: f64,
@@ -50,14 +51,16 @@ struct LimitRecord {
     measured_s: f64,
 }
 
-/// Measures and draws.
+/// Measures, and returns the chart.
 ///
 /// # Errors
-/// If a record is no JSON.
+/// [`ChartError::Records`] if a record cannot be written as JSON.
 pub fn make(effort: Effort) -> Result<Chart, ChartError> {
-    let maps: Vec<Vec<Map>> = Sweep::ALL
+    let maps: Vec<Vec<StabilityMap>> = Sweep::ALL
         .iter()
-        .map(|&sweep| METHODS.iter().map(|&method| Map::measure(sweep, method, effort)).collect())
+        .map(|&sweep| {
+            METHODS.iter().map(|&method| StabilityMap::measure(sweep, method, effort)).collect()
+        })
         .collect();
     let mut records = Vec::new();
     for map in maps.iter().flatten() {
@@ -72,8 +75,8 @@ pub fn make(effort: Effort) -> Result<Chart, ChartError> {
     Ok(Chart { name: "stability", records, figures, table: table(&maps), versions: Vec::new() })
 }
 
-/// For each map: how far measured and predicted limits differ.
-fn table(maps: &[Vec<Map>]) -> Table {
+/// Returns a table of the differences of measured and predicted limits, and of the fates.
+fn table(maps: &[Vec<StabilityMap>]) -> ChartTable {
     let rows = maps.iter().flatten().map(|map| {
         let count = |fate| map.count(fate).to_string();
         let mut row = vec![map.sweep.word().to_owned(), map.method.name().to_owned()];
@@ -83,7 +86,7 @@ fn table(maps: &[Vec<Map>]) -> Table {
         row.extend([Fate::Stable, Fate::Touchdown, Fate::Chatter, Fate::BlownUp].map(count));
         row
     });
-    Table {
+    ChartTable {
         heading: vec!["sweep", "method", "off by %", "stable", "touchdown", "chatter", "blown up"],
         right: vec![2, 3, 4, 5, 6],
         rows: rows.collect(),

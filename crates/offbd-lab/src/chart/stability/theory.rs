@@ -12,14 +12,14 @@ use crate::scene::Method;
 
 /// Predicted largest stable steps, s.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Limits {
+pub(super) struct PredictedLimits {
     pub slip: f64,
     pub normal: f64,
 }
 
-impl Limits {
-    /// Of an explicit `method` for a ball that presses with `normal_m_s2` per
-    /// kilogram; `None` for the methods that are stable everywhere.
+impl PredictedLimits {
+    /// Returns the limits of an explicit `method` for a normal force per mass of
+    /// `normal_m_s2`; `None` for methods that are stable at any step.
     pub(super) fn of(method: Method, model: &Compliant, normal_m_s2: f64) -> Option<Self> {
         let reach = real_reach(method)?;
         let (body, contact) = (&model.body, &model.contact);
@@ -35,7 +35,7 @@ impl Limits {
     }
 }
 
-/// How far the stability region reaches along the negative real axis.
+/// Returns the extent of the stability region along the negative real axis.
 fn real_reach(method: Method) -> Option<f64> {
     match method {
         Method::Euler | Method::SemiImplicitEuler | Method::Midpoint => Some(2.0),
@@ -44,7 +44,7 @@ fn real_reach(method: Method) -> Option<f64> {
     }
 }
 
-/// Factors 1/k! of the stability polynomial.
+/// Returns the coefficients 1/k! of the stability polynomial.
 fn polynomial(method: Method) -> &'static [f64] {
     match method {
         Method::Euler => &[1.0, 1.0],
@@ -53,7 +53,7 @@ fn polynomial(method: Method) -> &'static [f64] {
     }
 }
 
-/// What one step of `h` does to (p, v) of p'' = −k·p − d·v.
+/// Returns the amplification matrix of one step of `h` for (p, v) of p'' = −k·p − d·v.
 fn amplification(method: Method, k: f64, d: f64, h: f64) -> Matrix2<f64> {
     if method == Method::SemiImplicitEuler {
         return Matrix2::new(1.0 - h * h * k, h * (1.0 - h * d), -h * k, 1.0 - h * d);
@@ -66,17 +66,18 @@ fn amplification(method: Method, k: f64, d: f64, h: f64) -> Matrix2<f64> {
 fn spectral_radius(m: &Matrix2<f64>) -> f64 {
     let (half, determinant) = (m.trace() / 2.0, m.determinant());
     let square = half * half - determinant;
-    // Roots that rounding alone sets apart are a pair.
+    // Roots that differ by rounding only count as a complex pair.
     if square < 1e-14 { determinant.abs().sqrt() } else { half.abs() + square.sqrt() }
 }
 
-/// Steps of the search for the first step at which the radius passes 1.
+/// Factor between the steps of the search for the first one with a spectral radius above
+/// 1; chosen.
 const GROWTH: f64 = 1.002;
 
 fn normal_limit(method: Method, k: f64, d: f64) -> f64 {
     let outside = |h: f64| spectral_radius(&amplification(method, k, d, h)) > 1.0 + 1e-12;
-    // The two roots are at most d and √k fast, and hardly damped ones fail
-    // first by d/k.
+    // Start well below the limit: the roots are at most of order d and √k, and with little
+    // damping the limit is of order d/k.
     let mut h = 1e-3 * (1.0 / (d + k.sqrt())).min(d / k);
     while !outside(h * GROWTH) {
         h *= GROWTH;

@@ -2,17 +2,17 @@
 
 use nalgebra::Vector2;
 
-use super::Charted;
-use super::record::Record;
+use super::ChartedScene;
+use super::record::WorkPrecisionRecord;
 use crate::scene::{Configuration, Failure, Method, Model, Pace, Samples, choose, run};
 use crate::timing::{CpuTime, cpu_time};
 use offbd_core::plant::Motion;
 
-/// The truth: the compliant model by RODAS at this tolerance, m. Against an
-/// independent solution (`tests/it/reference.rs`) it is within 1e-9 m.
+/// Tolerance of the reference solution, the compliant model by RODAS, m. It agrees with an
+/// independent solution (`tests/it/reference.rs`) within 1e-9 m.
 const TRUTH_M: f64 = 1e-9;
 
-/// Moments at which positions are compared.
+/// Number of intervals at whose ends positions are compared; chosen.
 const COMPARED: f64 = 200.0;
 
 /// Steps charted, s.
@@ -22,18 +22,18 @@ pub(super) const STEPS_S: [f64; 13] =
 /// Tolerances charted, m.
 pub(super) const TOLERANCES_M: [f64; 8] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9];
 
-/// Accuracies asked of the automatic choice, m.
+/// Accuracies requested from the automatic choice, m.
 pub(super) const ASKED_M: [f64; 5] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
 
-/// A scene with its truth.
-pub(super) struct Bench {
-    charted: Charted,
+/// A scene with its reference solution, on which configurations are measured.
+pub(super) struct SceneBenchmark {
+    charted: ChartedScene,
     truth: Vec<Vector2<f64>>,
     repeats: usize,
 }
 
-impl Bench {
-    pub(super) fn new(charted: Charted, repeats: usize) -> Self {
+impl SceneBenchmark {
+    pub(super) fn new(charted: ChartedScene, repeats: usize) -> Self {
         let pace = Pace::Tolerance(TRUTH_M);
         let truth = Configuration::new(Model::Compliant, Method::Rodas4, pace)
             .ok()
@@ -42,8 +42,8 @@ impl Bench {
         Self { charted, truth, repeats }
     }
 
-    /// Error and cost of `configuration`.
-    pub(super) fn record(&self, configuration: &Configuration) -> Record {
+    /// Measures error and cost of `configuration`.
+    pub(super) fn record(&self, configuration: &Configuration) -> WorkPrecisionRecord {
         let (setting, value) = match configuration.pace() {
             Pace::Step(h) => ("step_s", h),
             Pace::Tolerance(tolerance) => ("tolerance_m", tolerance),
@@ -53,7 +53,7 @@ impl Bench {
             Err(failure) => (None, Some(failure.to_string())),
         };
         let cost = error.map(|_| self.cost(configuration));
-        Record {
+        WorkPrecisionRecord {
             scene: self.charted.name.clone(),
             engine: "offbd".to_owned(),
             model: configuration.model().to_string(),
@@ -70,14 +70,14 @@ impl Bench {
         }
     }
 
-    /// What the program chooses for `asked_m`; none where nothing meets it.
-    pub(super) fn chosen(&self, asked_m: f64) -> Option<Record> {
-        let Charted { scene, laws, .. } = &self.charted;
+    /// Measures the automatic choice for `asked_m`; `None` if no candidate meets it.
+    pub(super) fn chosen(&self, asked_m: f64) -> Option<WorkPrecisionRecord> {
+        let ChartedScene { scene, laws, .. } = &self.charted;
         let choice = choose(scene, laws, asked_m).ok()?;
         let choosing = cpu_time(1, || {
             let _ = choose(scene, laws, asked_m);
         });
-        Some(Record {
+        Some(WorkPrecisionRecord {
             asked_m: Some(asked_m),
             choosing_us_per_s: Some(choosing.us_per_s(scene.duration_s)),
             ..self.record(&choice.configuration)
@@ -86,11 +86,11 @@ impl Bench {
 
     fn error(&self, path: &[Vector2<f64>]) -> f64 {
         let apart = path.iter().zip(&self.truth).map(|(a, b)| (a - b).norm());
-        // A distance that is no number must not be lost.
+        // NaN must propagate: `max` would drop it.
         apart.fold(0.0, |worst, d| if d.is_nan() || d > worst { d } else { worst })
     }
 
-    /// CPU time of a run without samples.
+    /// Measures the CPU time of a run without samples.
     fn cost(&self, configuration: &Configuration) -> CpuTime {
         let mut laws = self.charted.laws.clone();
         cpu_time(self.repeats, || {
@@ -99,7 +99,10 @@ impl Bench {
     }
 }
 
-fn path(charted: &Charted, configuration: &Configuration) -> Result<Vec<Vector2<f64>>, Failure> {
+fn path(
+    charted: &ChartedScene,
+    configuration: &Configuration,
+) -> Result<Vec<Vector2<f64>>, Failure> {
     let mut path = Vec::new();
     let mut sink = |_: f64, at: &Motion| path.push(at.position.xy());
     let mut samples = Samples::new(charted.scene.duration_s / COMPARED, &mut sink);
@@ -107,8 +110,8 @@ fn path(charted: &Charted, configuration: &Configuration) -> Result<Vec<Vector2<
     Ok(path)
 }
 
-/// Every model by every method at every pace that makes sense: explicit steps
-/// of the compliant model, and long ones of nothing else.
+/// Returns every model by every method at the charted paces: tolerances for adaptive
+/// methods, else steps; short steps for the compliant model only.
 pub(super) fn configurations(quick: bool) -> Vec<Configuration> {
     let thin = |i: usize| !quick || i.is_multiple_of(3);
     let mut all = Vec::new();
@@ -130,8 +133,8 @@ pub(super) fn configurations(quick: bool) -> Vec<Configuration> {
     all
 }
 
-/// The shortest step charted, s: those below a fifth of a millisecond are for
-/// the contact alone.
+/// Returns the shortest step charted, s: only the compliant contact needs steps below
+/// 0.2 ms.
 fn shortest(model: Model, quick: bool) -> f64 {
     match (model, quick) {
         (_, true) => 1e-3,
@@ -140,7 +143,8 @@ fn shortest(model: Model, quick: bool) -> f64 {
     }
 }
 
-/// Left to choose its steps, it creeps along the limit of stability.
+/// Returns whether an explicit method would adapt its steps to the limit of stability of
+/// the stiff contact; it is charted with fixed steps instead.
 fn is_stiffly_explicit(model: Model, method: Method) -> bool {
     model == Model::Compliant && method == Method::Dopri5
 }

@@ -4,62 +4,64 @@ use serde::{Deserialize, Serialize};
 
 use crate::chart::{ChartError, Document};
 
-/// One configuration of one engine on one scene. Peers write the same.
+/// The result of one configuration of one engine on one scene; `benches/peers` writes the
+/// same records.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Record {
+pub struct WorkPrecisionRecord {
     pub scene: String,
-    /// `offbd`, or somebody else's.
+    /// `offbd`, or the name of another engine.
     pub engine: String,
     pub model: String,
     pub method: String,
-    /// What `value` is: `step_s`, `tolerance`, or an engine's own.
+    /// Name of the parameter: `step_s`, `tolerance_m`, or one of another engine.
     pub setting: String,
+    /// Value of the parameter.
     pub value: f64,
-    /// Worst distance from the truth in x, y over the scene's samples, m; none
-    /// where the run failed.
+    /// Largest distance from the reference solution in x, y over the samples, m; `None` if
+    /// the run failed.
     pub error_m: Option<f64>,
-    /// CPU microseconds per simulated second, minimum over repeats.
+    /// CPU time per simulated second, µs/s, minimum over the repeated measurements.
     pub cpu_us_per_s: Option<f64>,
-    /// Median over minimum of the repeats.
+    /// Median over minimum of the repeated measurements.
     #[serde(default)]
     pub spread: Option<f64>,
-    /// Why there is no error.
+    /// Why the run failed.
     #[serde(default)]
     pub note: Option<String>,
-    /// No other of ours on this scene is both cheaper and nearer.
+    /// Whether it is on the Pareto front of offbd's records on this scene.
     #[serde(default)]
     pub front: bool,
-    /// The accuracy asked for, m, where the program chose.
+    /// The requested accuracy, m, of an automatic choice.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub asked_m: Option<f64>,
-    /// What choosing cost, CPU microseconds per simulated second.
+    /// CPU time of choosing per simulated second, µs/s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub choosing_us_per_s: Option<f64>,
 }
 
-impl Record {
-    /// Cost and error where both are there.
+impl WorkPrecisionRecord {
+    /// Returns cost and error, if both are known, finite and positive.
     pub(super) fn point(&self) -> Option<(f64, f64)> {
         let finite = |value: Option<f64>| value.filter(|v| v.is_finite() && *v > 0.0);
         Some((finite(self.cpu_us_per_s)?, finite(self.error_m)?))
     }
 }
 
-/// What other engines measured, and their versions.
+/// The records of other engines, and their versions.
 #[derive(Clone, Debug, Default)]
 pub struct Peers {
-    pub records: Vec<Record>,
+    pub records: Vec<WorkPrecisionRecord>,
     pub versions: Vec<(String, String)>,
 }
 
-/// The records and versions of a file that another engine's run wrote.
+/// Reads the records and versions of other engines from a file.
 ///
 /// # Errors
-/// [`ChartError::Peers`] naming the file.
+/// [`ChartError::Peers`] naming the file, if it cannot be read or is invalid.
 pub fn read(path: &Path) -> Result<Peers, ChartError> {
     let failed = |reason: String| ChartError::Peers { path: path.to_owned(), reason };
     let bytes = std::fs::read(path).map_err(|e| failed(e.to_string()))?;
-    let document: Document<Record> =
+    let document: Document<WorkPrecisionRecord> =
         serde_json::from_slice(&bytes).map_err(|e| failed(e.to_string()))?;
     let versions = document.versions.into_iter().filter(|(name, _)| name != "offbd");
     Ok(Peers { records: document.records, versions: versions.collect() })

@@ -1,11 +1,11 @@
-//! The records as drawings and as a table.
+//! Presents the records as drawings and as a table.
 
 use std::collections::BTreeSet;
 
-use super::record::Record;
-use crate::chart::{Axis, Figure, Look, Panel, Scale, Series, Stroke, Table, front};
+use super::record::WorkPrecisionRecord;
+use crate::chart::{Axis, ChartTable, Figure, Look, Panel, Scale, Series, Stroke, front};
 
-/// Ours as they are drawn: a name, the models and methods in it.
+/// Groups of offbd's configurations as they are drawn: a name, models and methods.
 const FAMILIES: [(&str, &[&str], &[&str]); 6] = [
     ("rolling", &["rolling"], &["midpoint", "rk4", "dopri5"]),
     ("creeping", &["creeping"], &["midpoint", "rk4", "dopri5"]),
@@ -19,20 +19,26 @@ const FAMILIES: [(&str, &[&str], &[&str]); 6] = [
     ),
 ];
 
-/// Errors drawn, m.
+/// Range of the errors drawn, m.
 const ERRORS_M: (f64, f64) = (1e-9, 3e-2);
 
-fn scenes(records: &[Record]) -> Vec<&str> {
+fn scenes(records: &[WorkPrecisionRecord]) -> Vec<&str> {
     let mut seen = BTreeSet::new();
     records.iter().map(|r| r.scene.as_str()).filter(|scene| seen.insert(*scene)).collect()
 }
 
-fn on<'a>(records: &'a [Record], scene: &'a str) -> impl Iterator<Item = &'a Record> {
+fn on<'a>(
+    records: &'a [WorkPrecisionRecord],
+    scene: &'a str,
+) -> impl Iterator<Item = &'a WorkPrecisionRecord> {
     records.iter().filter(move |r| r.scene == scene)
 }
 
-/// Our models and methods, and, with peers, ours beside theirs.
-pub(super) fn figures(ours: &[Record], peers: &[Record]) -> Vec<(&'static str, Figure)> {
+/// Draws offbd's models and methods, and, if there are peers, offbd beside them.
+pub(super) fn figures(
+    ours: &[WorkPrecisionRecord],
+    peers: &[WorkPrecisionRecord],
+) -> Vec<(&'static str, Figure)> {
     let mut figures = vec![("models", figure(ours, peers, own_panel, models_title(ours)))];
     if !peers.is_empty() {
         figures.insert(0, ("peers", figure(ours, peers, peer_panel, peers_title(ours, peers))));
@@ -41,12 +47,12 @@ pub(super) fn figures(ours: &[Record], peers: &[Record]) -> Vec<(&'static str, F
 }
 
 fn figure(
-    ours: &[Record],
-    peers: &[Record],
-    panel: fn(&[Record], &[Record], &str, &Scale) -> Panel,
+    ours: &[WorkPrecisionRecord],
+    peers: &[WorkPrecisionRecord],
+    panel: fn(&[WorkPrecisionRecord], &[WorkPrecisionRecord], &str, &Scale) -> Panel,
     (title, subtitle): (String, String),
 ) -> Figure {
-    let costs = ours.iter().chain(peers).filter_map(Record::point);
+    let costs = ours.iter().chain(peers).filter_map(WorkPrecisionRecord::point);
     let costs = costs.filter(|(_, error)| (ERRORS_M.0..ERRORS_M.1).contains(error)).map(|p| p.0);
     let y = Scale::log_around(costs, 0.05);
     let scenes = scenes(ours);
@@ -62,28 +68,39 @@ fn empty(scene: &str, y: &Scale) -> Panel {
     Panel::new(format!("{law}, {contact}"), x, y)
 }
 
-/// Error across, cost up, so that down and left is better.
+/// Swaps cost and error: error along x, cost along y, so that down and left is better.
 fn place(point: (f64, f64)) -> (f64, f64) {
     (point.1, point.0)
 }
 
-fn own_panel(ours: &[Record], _: &[Record], scene: &str, y: &Scale) -> Panel {
+fn own_panel(
+    ours: &[WorkPrecisionRecord],
+    _: &[WorkPrecisionRecord],
+    scene: &str,
+    y: &Scale,
+) -> Panel {
     let mut panel = empty(scene, y);
     panel.series.push(best(on(ours, scene), "Pareto front", Look::BLACK, Stroke::Front));
     for (i, (name, models, methods)) in FAMILIES.iter().enumerate() {
-        let member = |r: &&Record| {
+        let member = |r: &&WorkPrecisionRecord| {
             r.asked_m.is_none()
                 && models.contains(&r.model.as_str())
                 && methods.contains(&r.method.as_str())
         };
-        let points = on(ours, scene).filter(member).filter_map(Record::point).map(place);
+        let points =
+            on(ours, scene).filter(member).filter_map(WorkPrecisionRecord::point).map(place);
         panel.series.push(Series::new(*name, Look::of(i), Stroke::Markers, points.collect()));
     }
     panel.series.push(chosen(ours, scene));
     panel
 }
 
-fn peer_panel(ours: &[Record], peers: &[Record], scene: &str, y: &Scale) -> Panel {
+fn peer_panel(
+    ours: &[WorkPrecisionRecord],
+    peers: &[WorkPrecisionRecord],
+    scene: &str,
+    y: &Scale,
+) -> Panel {
     let mut panel = empty(scene, y);
     let engines: BTreeSet<&str> = peers.iter().map(|r| r.engine.as_str()).collect();
     for (i, engine) in engines.iter().enumerate() {
@@ -100,40 +117,48 @@ fn peer_panel(ours: &[Record], peers: &[Record], scene: &str, y: &Scale) -> Pane
     panel
 }
 
-/// The front of some records.
+/// Returns the Pareto front of some records as a series.
 fn best<'a>(
-    records: impl Iterator<Item = &'a Record>,
+    records: impl Iterator<Item = &'a WorkPrecisionRecord>,
     name: &str,
     look: Look,
     stroke: Stroke,
 ) -> Series {
-    let points: Vec<(f64, f64)> =
-        records.filter(|r| r.asked_m.is_none()).filter_map(Record::point).map(place).collect();
+    let points: Vec<(f64, f64)> = records
+        .filter(|r| r.asked_m.is_none())
+        .filter_map(WorkPrecisionRecord::point)
+        .map(place)
+        .collect();
     let mut points: Vec<(f64, f64)> = front(&points).into_iter().map(|on| on.point).collect();
     points.retain(|(error, _)| (ERRORS_M.0..=ERRORS_M.1).contains(error));
     Series::new(name, look, stroke, points)
 }
 
-/// What the program chose.
-fn chosen(ours: &[Record], scene: &str) -> Series {
-    let chosen = on(ours, scene).filter(|r| r.asked_m.is_some()).filter_map(Record::point);
+/// Returns the automatic choices as a series.
+fn chosen(ours: &[WorkPrecisionRecord], scene: &str) -> Series {
+    let chosen =
+        on(ours, scene).filter(|r| r.asked_m.is_some()).filter_map(WorkPrecisionRecord::point);
     let look = Look { marker: crate::chart::Marker::Star, ..Look::BLACK };
     Series::new("chosen for 1e-2 to 1e-6 m", look, Stroke::Markers, chosen.map(place).collect())
 }
 
-/// The cheapest charted configuration of ours on `scene` within `error_m`.
-fn cheapest<'a>(ours: &'a [Record], scene: &'a str, error_m: f64) -> Option<&'a Record> {
+/// Returns the cheapest charted configuration of offbd on `scene` within `error_m`.
+fn cheapest<'a>(
+    ours: &'a [WorkPrecisionRecord],
+    scene: &'a str,
+    error_m: f64,
+) -> Option<&'a WorkPrecisionRecord> {
     let fits = on(ours, scene).filter(|r| r.asked_m.is_none());
     let fits = fits.filter(|r| r.point().is_some_and(|(_, error)| error <= error_m));
     fits.min_by(|a, b| cost(a).total_cmp(&cost(b)))
 }
 
-fn cost(record: &Record) -> f64 {
+fn cost(record: &WorkPrecisionRecord) -> f64 {
     record.cpu_us_per_s.unwrap_or(f64::INFINITY)
 }
 
-fn models_title(ours: &[Record]) -> (String, String) {
-    let chosen: Vec<&Record> = ours.iter().filter(|r| r.asked_m.is_some()).collect();
+fn models_title(ours: &[WorkPrecisionRecord]) -> (String, String) {
+    let chosen: Vec<&WorkPrecisionRecord> = ours.iter().filter(|r| r.asked_m.is_some()).collect();
     let kept = chosen.iter().filter(|r| r.error_m <= r.asked_m).count();
     let ratios =
         chosen.iter().filter_map(|r| Some(cost(r) / cost(cheapest(ours, &r.scene, r.asked_m?)?)));
@@ -146,9 +171,11 @@ fn models_title(ours: &[Record]) -> (String, String) {
     ("Speed against accuracy: models and methods".to_owned(), subtitle)
 }
 
-fn peers_title(ours: &[Record], peers: &[Record]) -> (String, String) {
+fn peers_title(ours: &[WorkPrecisionRecord], peers: &[WorkPrecisionRecord]) -> (String, String) {
     const BODIES: [&str; 4] = ["drake", "mujoco", "pybullet", "rapier"];
-    let within = |records: &[Record], error_m: f64, wanted: &dyn Fn(&Record) -> bool| {
+    let within = |records: &[WorkPrecisionRecord],
+                  error_m: f64,
+                  wanted: &dyn Fn(&WorkPrecisionRecord) -> bool| {
         let fits = on(records, "sine").filter(|r| r.asked_m.is_none() && wanted(r));
         let fits = fits.filter(|r| r.point().is_some_and(|(_, error)| error <= error_m));
         fits.map(cost).fold(f64::INFINITY, f64::min)
@@ -163,8 +190,8 @@ fn peers_title(ours: &[Record], peers: &[Record]) -> (String, String) {
     ("Speed against accuracy: beside other people's engines and solvers".to_owned(), subtitle)
 }
 
-/// What was chosen, beside the cheapest that was charted.
-pub(super) fn table(ours: &[Record]) -> Table {
+/// Returns a table of the automatic choices, with the cheapest charted configuration.
+pub(super) fn table(ours: &[WorkPrecisionRecord]) -> ChartTable {
     let heading = vec![
         "scene",
         "asked m",
@@ -175,7 +202,7 @@ pub(super) fn table(ours: &[Record]) -> Table {
         "cheapest charted",
         "ratio",
     ];
-    let mut table = Table { heading, right: vec![1, 3, 4, 5, 7], rows: Vec::new() };
+    let mut table = ChartTable { heading, right: vec![1, 3, 4, 5, 7], rows: Vec::new() };
     for record in ours.iter().filter(|r| r.asked_m.is_some()) {
         let asked = record.asked_m.unwrap_or(f64::NAN);
         let other = cheapest(ours, &record.scene, asked);

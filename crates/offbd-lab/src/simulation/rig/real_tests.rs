@@ -1,4 +1,4 @@
-//! What real rigs do that the presets do not.
+//! Properties of real rigs that the presets lack.
 
 use super::*;
 use crate::simulation::{ControllerModel, Preset, Refresh, SensorModel, ServoTruth, Variety};
@@ -13,7 +13,8 @@ fn run(model: RigModel, reference: Reference, seconds: f64) -> Vec<Sample> {
     std::iter::from_fn(|| Some(rig.next_sample())).take_while(|s| s.t_s < seconds).collect()
 }
 
-/// Lengths of the runs of rows with equal positions, the first and last left out.
+/// Returns the lengths of the runs of rows with equal positions, without the first and
+/// the last run.
 fn runs(samples: &[Sample]) -> Vec<usize> {
     let equal = |a: &Sample, b: &Sample| a.x_m == b.x_m && a.y_m == b.y_m;
     let lengths: Vec<usize> = samples.chunk_by(equal).map(<[Sample]>::len).collect();
@@ -36,10 +37,10 @@ fn a_rig_off_level_rests_under_a_command_of_minus_its_level() {
         for axis in Axis::ALL {
             let commands = last.iter().map(|s| s.command(axis).unwrap());
             let mean = commands.sum::<f64>() / last.len() as f64;
-            // A ball at rest leaves the plate anywhere within its breakaway tilt.
+            // A ball at rest allows any tilt of the plate within its breakaway tilt.
             let plate_rad = gain * mean + level_deg.to_radians();
             assert!(plate_rad.abs() < 1.5 * breakaway_rad, "{axis:?}: {plate_rad} rad off");
-            // Without an integral it would rest 26 mm off: 1.9°·g/ω².
+            // Without an integral the ball would rest 26 mm off: 1.9°·g/ω².
             assert!(last.iter().all(|s| s.position(axis).is_none_or(|m| m.abs() < 0.015)));
         }
     }
@@ -70,12 +71,12 @@ fn an_origin_off_centre_shifts_where_the_ball_is_held() {
     assert!(samples[2999].x_m.unwrap().abs() < 0.02);
 }
 
-/// The beam guides the ball: pushes across do nothing, and y is in no row.
+/// The beam guides the ball: pushes along y have no effect, and no row has a y.
 #[test]
 fn a_beam_has_no_y() {
-    let hands = Disturbances { pushes_per_minute: 60.0, gusts_per_minute: 10.0 };
+    let disturbances = Disturbances { pushes_per_minute: 60.0, gusts_per_minute: 10.0 };
     for reference in Reference::ALL {
-        let mut rig = SimulatedRig::new(chapter().along_x(), reference, hands, 5).unwrap();
+        let mut rig = SimulatedRig::new(chapter().along_x(), reference, disturbances, 5).unwrap();
         for _ in 0..2000 {
             let sample = rig.next_sample();
             assert_eq!((sample.cmd_qx_rad, sample.y_m), (None, None));
@@ -86,13 +87,13 @@ fn a_beam_has_no_y() {
     }
 }
 
-/// Once its integral has balanced the plate, but for a bounce now and then.
+/// After the integral has levelled the plate, apart from occasional bounces.
 #[test]
 fn every_real_rig_keeps_its_ball_off_the_rim() {
     let kept = |seed: u64, reference: Reference| {
         let model = Variety::Real.rig(seed).unwrap().of_session(seed);
         let mut rig = SimulatedRig::new(model, reference, Disturbances::default(), seed).unwrap();
-        let reach = rig.table.reach();
+        let reach = rig.ball_on_plate.reach();
         let (mut n, mut at_rim) = (0_u32, 0_u32);
         while rig.now_s < 80.0 {
             rig.next_sample();
@@ -119,7 +120,7 @@ proptest! {
     ) {
         let mut model = chapter();
         let refresh = Refresh::Rows(k);
-        // So noisy that no two readings are alike; in time for their row.
+        // So noisy that no two readings are equal; without latency.
         model.sensor = SensorModel {
             refresh,
             jitter,
@@ -138,8 +139,8 @@ proptest! {
     fn servos_in_whole_degrees_get_whole_degrees(seed in any::<u64>()) {
         let mut model = chapter();
         model.controller.resolution_rad = 1.0_f64.to_radians();
-        let hands = Disturbances { pushes_per_minute: 60.0, gusts_per_minute: 0.0 };
-        let mut rig = SimulatedRig::new(model, Reference::Steps, hands, seed).unwrap();
+        let disturbances = Disturbances { pushes_per_minute: 60.0, gusts_per_minute: 0.0 };
+        let mut rig = SimulatedRig::new(model, Reference::Steps, disturbances, seed).unwrap();
         for _ in 0..1000 {
             let sample = rig.next_sample();
             for command in [sample.cmd_qx_rad, sample.cmd_qy_rad].into_iter().flatten() {

@@ -17,8 +17,8 @@ fn run(rig: &mut SimulatedRig, until_s: f64) -> Vec<Sample> {
     std::iter::from_fn(|| Some(rig.next_sample())).take_while(|s| s.t_s < until_s).collect()
 }
 
-/// Application 1 of the chapter: a pulse of 10 % of the ball's weight along x
-/// for 0.1 s at 10 s; back within 2 cm of the centre by 17 s, to stay.
+/// Application 1 of the chapter: a pulse of 10 % of the ball's weight along x for 0.1 s
+/// at 10 s; the ball is back within 2 cm of the centre by 17 s, and stays there.
 #[test]
 fn validate_the_chapters_impulse_is_settled_within_its_figures() {
     let mut rig = rig(Preset::Chapter, Reference::Hold, 3);
@@ -26,10 +26,10 @@ fn validate_the_chapters_impulse_is_settled_within_its_figures() {
     let before = rig.truth().position;
     assert!(before.norm() < 0.02);
     rig.push(Vector2::new(0.1 * 9.81, 0.0), 0.1);
-    // It leaves with F t/((1 + κ) m) = 0.07 m/s; a critically damped loop of
-    // natural frequency ω turns it round at v/(e ω). What the integral holds
-    // against stiction takes up to half of it; the loop's delays, 0.13 s at
-    // 0.07 m/s, let it roll as far again.
+    // The ball starts with F t/((1 + κ) m) = 0.07 m/s; a critically damped loop of
+    // natural frequency ω turns it round at v/(e ω). The integral held against stiction
+    // reduces that distance by up to half; the loop's delays, 0.13 s at 0.07 m/s, up to
+    // double it.
     let turning_m = 0.07 / (std::f64::consts::E * rig.model.controller.bandwidth_rad_s);
     let mut farthest = 0.0_f64;
     while rig.now_s < 30.0 {
@@ -47,7 +47,7 @@ fn every_preset_follows_every_reference_without_the_rim() {
         for reference in Reference::ALL {
             let mut rig = rig(preset, reference, 2);
             run(&mut rig, 10.0);
-            let reach = rig.table.reach();
+            let reach = rig.ball_on_plate.reach();
             for _ in 0..2000 {
                 rig.next_sample();
                 let share = rig.truth().position.component_div(&reach).amax();
@@ -64,7 +64,7 @@ fn equal_seeds_give_equal_samples_and_others_do_not() {
     assert_ne!(samples(1), samples(2));
 }
 
-/// FNV-1a over the bits of the numbers, absent ones as all ones.
+/// FNV-1a hash over the bits of the numbers; absent numbers count as all ones.
 fn fingerprint(samples: &[Sample]) -> u64 {
     let numbers = samples.iter().flat_map(|s| {
         [Some(s.t_s), s.cmd_qx_rad, s.cmd_qy_rad, s.x_m, s.y_m]
@@ -73,17 +73,17 @@ fn fingerprint(samples: &[Sample]) -> u64 {
     numbers.fold(0xcbf2_9ce4_8422_2325, |hash, bits| (hash ^ bits).wrapping_mul(0x100_0000_01b3))
 }
 
-/// What a seed reproduces stays: new properties draw from streams of their own.
+/// The samples of a seed must not change: new properties draw from streams of their own.
 #[test]
 fn regress_the_presets_samples() {
-    let hands = Disturbances { pushes_per_minute: 5.0, gusts_per_minute: 3.0 };
+    let disturbances = Disturbances { pushes_per_minute: 5.0, gusts_per_minute: 3.0 };
     for (preset, wanted) in [
         (Preset::Chapter, 0x46df_a69f_2b12_6d44),
         (Preset::Pingpong, 0x2195_ff89_25fc_9d39),
         (Preset::Touch, 0x6fc3_372d_949e_c6b1),
     ] {
         let model = preset.model().unwrap().of_session(4);
-        let mut rig = SimulatedRig::new(model, Reference::Steps, hands, 4).unwrap();
+        let mut rig = SimulatedRig::new(model, Reference::Steps, disturbances, 4).unwrap();
         let samples = run(&mut rig, 20.0);
         assert_eq!(fingerprint(&samples), wanted, "{preset}");
     }

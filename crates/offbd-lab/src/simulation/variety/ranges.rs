@@ -1,55 +1,55 @@
-//! The ranges from which [`Variety::Real`](super::Variety::Real) draws, and where
-//! they come from: recordings of eight real rigs, data sheets, and what people
-//! write of their own.
+//! The ranges from which [`Variety::Real`](super::Variety::Real) draws. Sources:
+//! recordings of eight real rigs, data sheets, and published descriptions by builders.
 
 use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 
 use super::super::noise::Noise;
 
-/// Numbers from one to another, both included.
-pub(super) type Span = RangeInclusive<f64>;
+/// A closed interval.
+pub(super) type ValueRange = RangeInclusive<f64>;
 
-/// One of `span`, each as likely as the other.
-pub(super) fn even(noise: &mut Noise, span: &Span) -> f64 {
+/// Draws from `span` with a uniform distribution.
+pub(super) fn even(noise: &mut Noise, span: &ValueRange) -> f64 {
     noise.uniform(*span.start(), *span.end())
 }
 
-/// One of `span`, each factor as likely as the other.
-pub(super) fn by_factor(noise: &mut Noise, span: &Span) -> f64 {
+/// Draws from `span` with a log-uniform distribution.
+pub(super) fn by_factor(noise: &mut Noise, span: &ValueRange) -> f64 {
     noise.uniform(span.start().ln(), span.end().ln()).exp()
 }
 
-/// A kind of rig: how it looks at its ball, and how large it is.
+/// A kind of rig: its sensor and its size.
 #[derive(Debug)]
-pub(super) struct Kind {
+pub(super) struct RigKind {
     pub word: &'static str,
-    /// Share of the rigs that are drawn; all shares make one.
+    /// Share of the rigs drawn; all shares sum to one.
     pub share: f64,
     /// Ball and beam.
     pub one_axis: bool,
-    /// Looks per second; the log has as many rows or more.
-    pub looks_hz: Span,
+    /// Readings per second; the log has at least as many rows.
+    pub looks_hz: ValueRange,
     /// Standard deviation of a reading, m.
-    pub noise_m: Span,
-    /// Pixel or count, m.
-    pub quantum_m: Span,
-    /// From a look to its reading, s.
-    pub latency_s: Span,
-    /// Along x, m; the width is this share of it.
-    pub length_m: Span,
-    pub width_share: Span,
+    pub noise_m: ValueRange,
+    /// Quantisation step: pixel or count, m.
+    pub quantum_m: ValueRange,
+    /// Delay of a reading, s.
+    pub latency_s: ValueRange,
+    /// Length of the plate along x, m.
+    pub length_m: ValueRange,
+    /// Width of the plate as a share of its length.
+    pub width_share: ValueRange,
     /// Share of ping-pong balls; the others are of steel.
     pub light: f64,
-    /// Largest command, rad.
-    pub limit_rad: Span,
+    /// Limit of the command's magnitude, rad.
+    pub limit_rad: ValueRange,
 }
 
-/// Cameras look at 5 to 60 Hz, ultrasound at about ten with 8 to 15 mm of noise,
-/// resistive panels at their loop's 50 to 150 Hz with up to some tenths of a
-/// millimetre. Half a pixel to three of a camera on a plate is 0.2 to 2 mm.
-pub(super) const KINDS: [Kind; 4] = [
-    Kind {
+/// The kinds of rigs. Cameras have 5 to 60 Hz; ultrasonic sensors about 10 Hz and 8 to
+/// 15 mm of noise; resistive panels the 50 to 150 Hz of their loop and up to some tenths
+/// of a millimetre. Half a pixel to three pixels of a camera are 0.2 to 2 mm on a plate.
+pub(super) const KINDS: [RigKind; 4] = [
+    RigKind {
         word: "camera",
         share: 0.45,
         one_axis: false,
@@ -62,7 +62,7 @@ pub(super) const KINDS: [Kind; 4] = [
         light: 0.7,
         limit_rad: 0.14..=0.3,
     },
-    Kind {
+    RigKind {
         word: "panel",
         share: 0.25,
         one_axis: false,
@@ -75,7 +75,7 @@ pub(super) const KINDS: [Kind; 4] = [
         light: 0.0,
         limit_rad: 0.1..=0.2,
     },
-    Kind {
+    RigKind {
         word: "beam",
         share: 0.15,
         one_axis: true,
@@ -88,7 +88,7 @@ pub(super) const KINDS: [Kind; 4] = [
         light: 0.5,
         limit_rad: 0.14..=0.3,
     },
-    Kind {
+    RigKind {
         word: "ultrasound",
         share: 0.15,
         one_axis: true,
@@ -103,86 +103,104 @@ pub(super) const KINDS: [Kind; 4] = [
     },
 ];
 
-/// Share of the logs that hold each reading for two to four rows (as one real camera
-/// did for three), and of those that are faster than their sensor by a factor and
-/// in no step with it (as a panel of 60 Hz under a log of 120).
+/// Share of the logs that repeat each reading for a whole number of rows; chosen.
 pub(super) const IN_STEP: f64 = 0.3;
-pub(super) const HOLD_ROWS: Span = 2.0..=4.0;
+/// Number of rows with the same reading in such a log; observed on one real camera: 3.
+pub(super) const HOLD_ROWS: ValueRange = 2.0..=4.0;
+/// Share of the logs that are faster than their sensor and not synchronised with it;
+/// chosen.
 pub(super) const OUT_OF_STEP: f64 = 0.2;
-pub(super) const ROWS_PER_LOOK: Span = 1.1..=3.0;
-/// Fastest log that is drawn, rows per second.
+/// Log rate over sensor rate in such a log; observed: a panel of 60 Hz and a log of
+/// 120 Hz.
+pub(super) const ROWS_PER_LOOK: ValueRange = 1.1..=3.0;
+/// Highest log rate drawn, rows per second; chosen.
 pub(super) const FASTEST_LOG_HZ: f64 = 200.0;
-/// Share of the sensors with a dead band, which is so many of their steps and
-/// standard deviations of noise, and no wider than a limit, m: beyond that nobody
-/// could hold a ball by it. Healthy readings stand for 0.2 to 1.8 s, those of
-/// ultrasound for 6.6 s.
+/// Share of the sensors with a dead band; chosen.
 pub(super) const STEADIED: f64 = 0.3;
-pub(super) const DEAD_BAND_DEVIATIONS: Span = 1.0..=3.0;
+/// Width of a dead band in sums of quantisation step and standard deviation of the noise.
+/// Chosen: healthy readings then repeat for 0.2 to 1.8 s, ultrasonic ones for 6.6 s.
+pub(super) const DEAD_BAND_DEVIATIONS: ValueRange = 1.0..=3.0;
+/// Upper limit of a dead band, m; chosen: with a wider one no controller could hold a
+/// ball.
 pub(super) const WIDEST_DEAD_BAND_M: f64 = 0.02;
-/// Share of the readings in which no ball is seen, and of those far off.
-pub(super) const MISSING: Span = 0.0..=0.01;
-pub(super) const OUTLIERS: Span = 0.0..=1e-3;
-/// Standard deviation of the log's period, as a share of it.
-pub(super) const JITTER: Span = 0.0..=0.15;
-/// Share of the rigs whose origin is off centre, and by how much of the plate's
-/// sides: a corner of the picture taken for the plate's.
+/// Share of readings without a ball.
+pub(super) const MISSING: ValueRange = 0.0..=0.01;
+/// Share of readings that are outliers.
+pub(super) const OUTLIERS: ValueRange = 0.0..=1e-3;
+/// Standard deviation of the log's period as a share of it.
+pub(super) const JITTER: ValueRange = 0.0..=0.15;
+/// Share of the rigs whose origin is off centre; chosen.
 pub(super) const OFF_CENTRE: f64 = 0.5;
-pub(super) const ORIGIN_SHARE: Span = -0.06..=0.06;
-/// By how much their owners measure it wrong, by hand, m.
-pub(super) const ORIGIN_ERROR_M: Span = -0.003..=0.003;
+/// Offset of the origin as a share of the plate's sides; chosen: a corner of the image is
+/// taken for a corner of the plate.
+pub(super) const ORIGIN_SHARE: ValueRange = -0.06..=0.06;
+/// Error of the owner's measurement of the origin, by hand, m.
+pub(super) const ORIGIN_ERROR_M: ValueRange = -0.003..=0.003;
 
-/// Command to first movement, and lag, s: together the 80 to 300 ms of real rigs
-/// from command to acceleration, less the sensor's part.
-pub(super) const DEAD_TIME_S: Span = 0.02..=0.1;
-pub(super) const LAG_S: Span = 0.03..=0.12;
-/// A hobby servo under load: 60° in 0.1 to 0.25 s.
-pub(super) const SERVO_RATE_RAD_S: Span = 4.0..=10.0;
-/// Plate angle per command; 0.46 to 1.05 where a rig was learnt from many sessions.
-pub(super) const GAIN: Span = 0.6..=1.15;
+/// Time from command to first movement, s. Together with [`LAG_S`]: the 80 to 300 ms from
+/// command to acceleration observed on real rigs, less the sensor's part.
+pub(super) const DEAD_TIME_S: ValueRange = 0.02..=0.1;
+/// Lag of a servo, s.
+pub(super) const LAG_S: ValueRange = 0.03..=0.12;
+/// Rate limit of a servo, rad/s: a hobby servo under load turns 60° in 0.1 to 0.25 s.
+pub(super) const SERVO_RATE_RAD_S: ValueRange = 4.0..=10.0;
+/// Plate angle per command; calibrations of rigs with many sessions gave 0.46 to 1.05.
+pub(super) const GAIN: ValueRange = 0.6..=1.15;
 /// Play of the linkage, rad: up to 0.3°.
-pub(super) const PLAY_RAD: Span = 0.0..=0.005;
-/// Shares of the servos that take whole degrees, and halves; the others take anything.
+pub(super) const PLAY_RAD: ValueRange = 0.0..=0.005;
+/// Share of the servos with a resolution of 1°; chosen.
 pub(super) const WHOLE_DEGREES: f64 = 0.4;
+/// Share of the servos with a resolution of 0.5°; chosen. The others are continuous.
 pub(super) const HALF_DEGREES: f64 = 0.2;
 
-/// Mean level of a rig, rad: up to 1°, and no more of the largest command than a
-/// controller can spare.
+/// Limit of the mean level of a rig, rad: 1°; chosen.
 pub(super) const LEVEL_RAD: f64 = PI / 180.0;
+/// The same as a share of the command's limit. Chosen so that the controller keeps most of
+/// its range.
 pub(super) const LEVEL_OF_LIMIT: f64 = 1.0 / 8.0;
-/// Largest standard deviation of the level between sessions, rad, and as a share of
-/// the largest command: one real rig had −0.6° to 3.6° within a day, 1.1°.
+/// Largest standard deviation of the level between sessions, rad; observed on one real
+/// rig: 1.1°, −0.6° to 3.6° within a day.
 pub(super) const LEVEL_SPREAD_RAD: f64 = 1.1 * PI / 180.0;
+/// The same as a share of the command's limit; chosen.
 pub(super) const LEVEL_SPREAD_OF_LIMIT: f64 = 1.0 / 12.0;
-/// Standard deviation of the gain between sessions, as a share of it.
-pub(super) const GAIN_SPREAD: Span = 0.0..=0.03;
+/// Standard deviation of the gain between sessions as a share of it.
+pub(super) const GAIN_SPREAD: ValueRange = 0.0..=0.03;
 
-/// Breakaway tilt, rad: of a ping-pong ball 0.3° to 2°, of a steel ball to 0.7°.
-pub(super) const LIGHT_BREAKAWAY_RAD: Span = 0.3 * PI / 180.0..=2.0 * PI / 180.0;
-pub(super) const HEAVY_BREAKAWAY_RAD: Span = 0.1 * PI / 180.0..=0.7 * PI / 180.0;
-/// Drag of the rolling ball as a share of the breakaway tilt.
-pub(super) const DRAG_SHARE: Span = 0.1..=0.6;
-/// Speed after over speed before the rim.
-pub(super) const RESTITUTION: Span = 0.2..=0.7;
-/// A ping-pong ball, and balls of steel: m, kg/m³.
+/// Breakaway tilt of a ping-pong ball, rad: 0.3° to 2°.
+pub(super) const LIGHT_BREAKAWAY_RAD: ValueRange = 0.3 * PI / 180.0..=2.0 * PI / 180.0;
+/// Breakaway tilt of a steel ball, rad: 0.1° to 0.7°.
+pub(super) const HEAVY_BREAKAWAY_RAD: ValueRange = 0.1 * PI / 180.0..=0.7 * PI / 180.0;
+/// Rolling resistance as a share of the breakaway tilt.
+pub(super) const DRAG_SHARE: ValueRange = 0.1..=0.6;
+/// Coefficient of restitution of the rim.
+pub(super) const RESTITUTION: ValueRange = 0.2..=0.7;
+/// Radius of a ping-pong ball, m: 40 mm in diameter.
 pub(super) const LIGHT_RADIUS_M: f64 = 0.02;
+/// Mass of a ping-pong ball, kg: 2.7 g.
 pub(super) const LIGHT_MASS_KG: f64 = 0.0027;
-pub(super) const HEAVY_RADIUS_M: Span = 0.0075..=0.02;
+/// Radius of a steel ball, m.
+pub(super) const HEAVY_RADIUS_M: ValueRange = 0.0075..=0.02;
+/// Density of steel, kg/m³.
 pub(super) const STEEL_KG_M3: f64 = 7800.0;
 
-/// Bandwidth of the loop times all its delays: tuned lazily to eagerly. It crosses
-/// over at twice the bandwidth, where even the eager one keeps some 35° of phase.
-/// A fourth of a radian per look is what the slowest loops come to.
-pub(super) const LOOP_SHARE: Span = 0.2..=0.32;
+/// Bandwidth of the loop times the sum of its delays. Chosen: from slow to aggressive
+/// tuning. The crossover is at twice the bandwidth, where even the aggressive loop keeps a
+/// phase margin of some 35°.
+pub(super) const LOOP_SHARE: ValueRange = 0.2..=0.32;
+/// Upper limit of the bandwidth times the period of the log, rad; chosen: that of the
+/// slowest loops.
 pub(super) const TURN_PER_PERIOD_RAD: f64 = 0.25;
-/// Share of the wanted acceleration that is commanded ahead, on circles and the like.
-pub(super) const FEEDFORWARD: Span = 0.6..=1.0;
-pub(super) const DAMPING: Span = 0.8..=1.2;
-/// Integral action, share of the bandwidth. It balances the level, in ten seconds to
-/// forty.
-pub(super) const INTEGRAL: Span = 0.15..=0.35;
-/// Filter of the derivative, s. Without one it makes the commands as noisy as the
-/// readings are.
-pub(super) const DERIVATIVE_FILTER_S: Span = 0.0..=0.1;
+/// Feedforward: share of the reference acceleration, on circles and Lissajous figures;
+/// chosen.
+pub(super) const FEEDFORWARD: ValueRange = 0.6..=1.0;
+/// Damping ratio of the closed loop.
+pub(super) const DAMPING: ValueRange = 0.8..=1.2;
+/// Rate of the integral action as a share of the bandwidth. Chosen so that it compensates
+/// the level within 10 to 40 s.
+pub(super) const INTEGRAL: ValueRange = 0.15..=0.35;
+/// Time constant of the derivative's filter, s; chosen. Without a filter, the commands
+/// take on the noise of the readings.
+pub(super) const DERIVATIVE_FILTER_S: ValueRange = 0.0..=0.1;
 
 #[cfg(test)]
 pub(super) use tests::outside;
@@ -193,8 +211,8 @@ mod tests {
     use crate::simulation::{Refresh, RigModel};
     use offbd_core::vocabulary::Axis;
 
-    /// What of `model` is outside of what its kind may have: written from the
-    /// documentation, not from the drawing.
+    /// Returns the properties of `model` that are outside the range of its kind, as
+    /// documented, independently of the code that draws them.
     pub(crate) fn outside(model: &RigModel) -> Vec<&'static str> {
         let word = model.rig.name.split('-').next().unwrap();
         let kind = KINDS.iter().find(|kind| kind.word == word).unwrap();
@@ -246,8 +264,8 @@ mod tests {
         checks.into_iter().filter(|(_, within)| !within).map(|(name, _)| name).collect()
     }
 
-    /// Whether `value` is in `span`, but for what a product rounds.
-    fn has(span: &Span, value: f64) -> bool {
+    /// Returns whether `value` is in `span`, up to the rounding error of a product.
+    fn has(span: &ValueRange, value: f64) -> bool {
         let slack = 1e-12 * span.start().abs().max(span.end().abs());
         (span.start() - slack..=span.end() + slack).contains(&value)
     }

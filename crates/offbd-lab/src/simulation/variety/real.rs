@@ -1,5 +1,5 @@
-//! Draws one rig of [`Variety::Real`](super::Variety::Real), part by part, from the
-//! [ranges](super::ranges).
+//! Draws a rig of [`Variety::Real`](super::Variety::Real), one part after the other, from
+//! the [ranges](super::ranges).
 
 use super::super::ball::Surface;
 use super::super::controller::ControllerModel;
@@ -9,12 +9,12 @@ use super::super::refresh::Refresh;
 use super::super::sensor::SensorModel;
 use super::super::servo::ServoTruth;
 use super::super::session::SessionSpread;
-use super::ranges::{self, KINDS, Kind, by_factor, even};
+use super::ranges::{self, KINDS, RigKind, by_factor, even};
 use offbd_core::engine::{Rig, ServoSpec};
 use offbd_core::plant::{Ball, Plate, PlateShape};
 use offbd_core::vocabulary::{Axis, Invalid, PerAxis};
 
-/// The rig that `noise` draws; its name is its kind and `seed`.
+/// Draws a rig from `noise`; its name consists of its kind and `seed`.
 pub(super) fn rig(seed: u64, noise: &mut Noise) -> Result<RigModel, Invalid> {
     let kind = kind(noise);
     let light = noise.happens(kind.light);
@@ -39,7 +39,7 @@ pub(super) fn rig(seed: u64, noise: &mut Noise) -> Result<RigModel, Invalid> {
     Ok(if kind.one_axis { model.along_x() } else { model })
 }
 
-fn kind(noise: &mut Noise) -> &'static Kind {
+fn kind(noise: &mut Noise) -> &'static RigKind {
     let mut left = noise.uniform(0.0, 1.0);
     let drawn = KINDS.iter().find(|kind| {
         left -= kind.share;
@@ -57,7 +57,7 @@ fn ball(light: bool, noise: &mut Noise) -> Result<Ball, Invalid> {
     Ball::new(radius_m, volume_m3 * ranges::STEEL_KG_M3, 0.4)
 }
 
-fn plate(kind: &Kind, noise: &mut Noise) -> Result<Plate, Invalid> {
+fn plate(kind: &RigKind, noise: &mut Noise) -> Result<Plate, Invalid> {
     let length_m = even(noise, &kind.length_m);
     let width_m = length_m * even(noise, &kind.width_share);
     Plate::new(PlateShape::Rectangle { length_m, width_m }, 0.01, true)
@@ -73,7 +73,7 @@ fn servos(limit_rad: f64, noise: &mut Noise) -> PerAxis<ServoTruth> {
         gain: even(noise, &ranges::GAIN),
         level_rad: 0.0,
     };
-    // One linkage is like the other within a twentieth.
+    // The gains of both linkages agree within 5 %; chosen.
     PerAxis::from_fn(|_| ServoTruth {
         gain: both.gain * noise.uniform(0.95, 1.05),
         level_rad: noise.uniform(-level_rad, level_rad),
@@ -91,7 +91,7 @@ fn surface(light: bool, noise: &mut Noise) -> Surface {
     }
 }
 
-fn sensor(kind: &Kind, rig: &Rig, refresh: Refresh, noise: &mut Noise) -> SensorModel {
+fn sensor(kind: &RigKind, rig: &Rig, refresh: Refresh, noise: &mut Noise) -> SensorModel {
     let noise_m = by_factor(noise, &kind.noise_m);
     let quantum_m = by_factor(noise, &kind.quantum_m);
     SensorModel {
@@ -107,7 +107,8 @@ fn sensor(kind: &Kind, rig: &Rig, refresh: Refresh, noise: &mut Noise) -> Sensor
     }
 }
 
-/// How a sensor of so many looks a second meets its log, and the log's rate, Hz.
+/// Draws how a sensor with `looks_hz` readings per second relates to its log, and the
+/// log's rate, Hz.
 fn refresh(looks_hz: f64, noise: &mut Noise) -> (Refresh, f64) {
     let kind = noise.uniform(0.0, 1.0);
     let most = (ranges::FASTEST_LOG_HZ / looks_hz).max(1.0);
@@ -128,7 +129,7 @@ fn dead_band(scatter_m: f64, noise: &mut Noise) -> f64 {
     if noise.happens(ranges::STEADIED) { band_m } else { 0.0 }
 }
 
-fn origin(kind: &Kind, rig: &Rig, noise: &mut Noise) -> PerAxis<f64> {
+fn origin(kind: &RigKind, rig: &Rig, noise: &mut Noise) -> PerAxis<f64> {
     let off = noise.happens(ranges::OFF_CENTRE);
     PerAxis::from_fn(|axis: Axis| {
         let share = even(noise, &ranges::ORIGIN_SHARE);
@@ -137,8 +138,8 @@ fn origin(kind: &Kind, rig: &Rig, noise: &mut Noise) -> PerAxis<f64> {
     })
 }
 
-/// The rig as its owner describes it, who has measured where the middle of the
-/// plate lies in the readings, by hand.
+/// Returns the rig as its owner describes it, with the reading at the plate's centre
+/// measured by hand.
 fn with_origin(mut rig: Rig, sensor: &SensorModel, noise: &mut Noise) -> Rig {
     rig.mapping.origin_m = sensor.origin_m.map(|origin_m| {
         let measured_m = origin_m + even(noise, &ranges::ORIGIN_ERROR_M);
@@ -147,8 +148,8 @@ fn with_origin(mut rig: Rig, sensor: &SensorModel, noise: &mut Noise) -> Rig {
     rig
 }
 
-/// Whoever builds a rig tunes its loop to its delays: those of the servo, of the
-/// sensor, of the derivative's filter, and one look.
+/// Draws a controller. Builders tune the loop to its delays: those of the servo, the
+/// sensor, the derivative's filter, and one period of the sensor.
 fn controller(
     limit_rad: f64,
     looks_hz: f64,

@@ -1,13 +1,13 @@
-//! What real rigs do that a model on paper does not: sessions that differ in
-//! level and gain, sensors that repeat themselves or read slowly, one axis only,
-//! recordings that teach too little. Simulated sessions, changed accordingly.
+//! Properties of real rigs that an ideal model lacks: sessions that differ in level and
+//! gain, sensors that repeat readings or are slow, rigs with one axis, recordings that are
+//! insufficient for calibration. The sessions are simulated and modified accordingly.
 
 use offbd_core::diagnosis::{Calibration, FaultMemory};
 use offbd_core::engine::{CannotCalibrate, Engine, Input, Rig, Setup, calibrate};
 use offbd_core::vocabulary::{FaultCode, Sample};
 use offbd_lab::simulation::{Preset, Reference};
 
-use super::{confirmed, outputs, session};
+use super::{confirmed, session, transitions};
 
 const SECONDS: f64 = 90.0;
 
@@ -20,8 +20,8 @@ fn healthy(preset: Preset, seed: u64) -> Vec<Sample> {
     session(preset, reference, SECONDS, seed, "")
 }
 
-/// The same session on a plate that is off level by `level_rad` more: what moves
-/// the ball as before is commanded otherwise.
+/// Returns the same session on a plate whose level is off by a further `level_rad`: the
+/// motion is the same, the commands differ.
 fn off_level(samples: &[Sample], level_rad: f64) -> Vec<Sample> {
     let shift = |c: f64| c - level_rad;
     let of = |s: &Sample| Sample {
@@ -32,12 +32,12 @@ fn off_level(samples: &[Sample], level_rad: f64) -> Vec<Sample> {
     samples.iter().map(of).collect()
 }
 
-/// Every `n`th sample.
+/// Returns every `n`th sample.
 fn thinned(samples: &[Sample], n: usize) -> Vec<Sample> {
     samples.iter().step_by(n).copied().collect()
 }
 
-/// The same session by a sensor that gives a new reading every `n`th sample only.
+/// Returns the same session with a sensor that has a new reading every `n`th sample only.
 fn refreshed(samples: &[Sample], n: usize) -> Vec<Sample> {
     let of = |i: usize| Sample {
         x_m: samples[i - i % n].x_m,
@@ -48,7 +48,7 @@ fn refreshed(samples: &[Sample], n: usize) -> Vec<Sample> {
 }
 
 fn learnt_from(rig: &Rig, sessions: &[Vec<Sample>]) -> Setup {
-    let calibration = calibrate(rig, sessions, "", "").unwrap();
+    let calibration = calibrate(rig, sessions).unwrap();
     Setup::new(Rig { calibration: Some(calibration), ..rig.clone() }, None).unwrap()
 }
 
@@ -76,12 +76,12 @@ fn a_session_is_healthy_where_the_levels_of_sessions_are() {
     }
     for (seed, level) in [(11, -1.0), (12, 1.0), (13, 1.5)] {
         let samples = off_level(&healthy(Preset::Chapter, seed), level * DEGREE);
-        let found = confirmed(&outputs(&setup, &samples));
+        let found = confirmed(&transitions(&setup, &samples));
         assert!(found.is_empty(), "off level by {level}°: {found:?}");
     }
 }
 
-/// However far sessions lie apart, within one a level does not jump.
+/// A jump of the level within a session is a fault, however much sessions differ.
 #[test]
 fn a_horn_that_slips_is_found_where_sessions_differ_by_as_much() {
     let rig = rig(Preset::Chapter);
@@ -92,14 +92,14 @@ fn a_horn_that_slips_is_found_where_sessions_differ_by_as_much() {
     let setup = learnt_from(&rig, &sessions);
     let samples =
         session(Preset::Chapter, Reference::Steps, SECONDS, 21, "x_servo:offset=0.035@40");
-    let found = confirmed(&outputs(&setup, &samples));
+    let found = confirmed(&transitions(&setup, &samples));
     let (code, at) = *found.first().expect("a slip of 2° is missed");
     assert_eq!(code, FaultCode::XServo);
     assert!((40.0..46.0).contains(&at), "{at}");
 }
 
-/// A rig that nobody has shown healthy: its servos, its ball and its noise may be
-/// what they are by design.
+/// Without calibration, faults of servos, ball and noise are not distinguishable from
+/// properties of the rig.
 #[test]
 fn a_rig_that_is_not_learnt_confirms_only_what_needs_no_learning() {
     let setup = Setup::new(rig(Preset::Chapter), None).unwrap();
@@ -107,19 +107,19 @@ fn a_rig_that_is_not_learnt_confirms_only_what_needs_no_learning() {
         ["x_servo:dead@20", "y_servo:reversed@20", "stuck_ball:glued@20", "sensor:noise@20"]
     {
         let samples = session(Preset::Chapter, Reference::Steps, 60.0, 7, fault);
-        let found = confirmed(&outputs(&setup, &samples));
+        let found = confirmed(&transitions(&setup, &samples));
         assert!(found.is_empty(), "{fault}: {found:?}");
     }
     for fault in ["sensor:freeze@20", "sensor:dropout@20", "sensor:jump=0.1,0@20"] {
         let samples = session(Preset::Chapter, Reference::Steps, 60.0, 7, fault);
-        let found = confirmed(&outputs(&setup, &samples));
+        let found = confirmed(&transitions(&setup, &samples));
         let (code, at) = *found.first().unwrap_or_else(|| panic!("{fault} is missed"));
         assert!(code == FaultCode::Sensor && (20.0..26.0).contains(&at), "{fault} at {at}");
     }
 }
 
-/// A sensor that refreshes slower than it is logged delays nothing and is not
-/// frozen: what is learnt is that of the same sensor logged at its own rate.
+/// A sensor that is logged faster than it refreshes does not count as delayed or frozen:
+/// the calibration agrees with that of the same sensor logged at its own rate.
 #[test]
 fn a_sensor_that_repeats_its_readings_teaches_the_same() {
     let rig = rig(Preset::Chapter);
@@ -131,19 +131,19 @@ fn a_sensor_that_repeats_its_readings_teaches_the_same() {
     assert!((repeated_x.gain / own.gain - 1.0).abs() < 0.08, "{repeated_x:?} {own:?}");
     let delay = |a: offbd_core::diagnosis::AxisCalibration| a.dead_time_s + a.lag_s;
     assert!((delay(repeated_x) - delay(own)).abs() < 0.015, "{repeated_x:?} {own:?}");
-    let found = confirmed(&outputs(&repeated, &refreshed(&healthy(Preset::Chapter, 5), 3)));
+    let found = confirmed(&transitions(&repeated, &refreshed(&healthy(Preset::Chapter, 5), 3)));
     assert!(found.is_empty(), "{found:?}");
 }
 
-/// Readings that repeat for longer than any healthy ones did are frozen, wherever
-/// the ball is and whatever is commanded.
+/// Readings that repeat for longer than any healthy ones count as frozen, wherever the
+/// ball is and whatever is commanded.
 #[test]
 fn frozen_readings_are_told_by_the_longest_healthy_repeat() {
     for preset in Preset::ALL {
         let setup = learnt_from(&rig(preset), &[healthy(preset, 1), healthy(preset, 3)]);
         for seed in 30..34 {
             let samples = session(preset, Reference::Circle, 60.0, seed, "sensor:freeze@30");
-            let found = confirmed(&outputs(&setup, &samples));
+            let found = confirmed(&transitions(&setup, &samples));
             let (code, at) = *found.first().unwrap_or_else(|| panic!("{preset} {seed}: missed"));
             assert_eq!(code, FaultCode::Sensor, "{preset} {seed}");
             assert!((30.0..36.0).contains(&at), "{preset} {seed}: {at}");
@@ -151,7 +151,7 @@ fn frozen_readings_are_told_by_the_longest_healthy_repeat() {
     }
 }
 
-/// The axis that is not there makes the other's limits no wider.
+/// A missing axis does not widen the limits of the other one.
 #[test]
 fn noise_is_found_on_a_rig_with_one_axis() {
     let one_axis = |samples: Vec<Sample>| -> Vec<Sample> {
@@ -160,20 +160,20 @@ fn noise_is_found_on_a_rig_with_one_axis() {
     let sessions = [1, 3].map(|seed| one_axis(healthy(Preset::Pingpong, seed)));
     let setup = learnt_from(&rig(Preset::Pingpong), &sessions);
     let clean = one_axis(session(Preset::Pingpong, Reference::Circle, 60.0, 8, ""));
-    assert!(confirmed(&outputs(&setup, &clean)).is_empty());
+    assert!(confirmed(&transitions(&setup, &clean)).is_empty());
     let noise_m = x_of(setup.rig.calibration.as_ref().unwrap()).noise_m;
-    // A deviation of eight times the learnt one, in a fixed pattern.
+    // Eight times the calibrated noise, in a fixed pattern.
     let pattern = [1.0, -0.4, 0.7, -1.5, 0.2, 1.3, -0.9, -0.6];
     let noisy = clean.iter().enumerate().map(|(i, s)| match s.t_s >= 30.0 {
         true => Sample { x_m: s.x_m.map(|x| x + 8.0 * noise_m * pattern[i * 5 % 8]), ..*s },
         false => *s,
     });
-    let found = confirmed(&outputs(&setup, &noisy.collect::<Vec<_>>()));
+    let found = confirmed(&transitions(&setup, &noisy.collect::<Vec<_>>()));
     let (code, at) = *found.first().expect("noise is missed");
     assert!(code == FaultCode::Sensor && (30.0..33.0).contains(&at), "{found:?}");
 }
 
-/// A step is a displacement that leaves the velocity as it was, however slow the
+/// A jump of the readings without a change of velocity is detected even with a slow
 /// sensor.
 #[test]
 fn a_step_is_seen_by_a_sensor_at_ten_hertz() {
@@ -183,15 +183,15 @@ fn a_step_is_seen_by_a_sensor_at_ten_hertz() {
     let mut rig = rig(Preset::Chapter);
     rig.sample_rate_hz = 10.0;
     let setup = learnt_from(&rig, &[thin(1, ""), thin(3, "")]);
-    assert!(confirmed(&outputs(&setup, &thin(5, ""))).is_empty());
+    assert!(confirmed(&transitions(&setup, &thin(5, ""))).is_empty());
     for seed in 40..44 {
-        let found = confirmed(&outputs(&setup, &thin(seed, "sensor:jump=0.06,0@40")));
+        let found = confirmed(&transitions(&setup, &thin(seed, "sensor:jump=0.06,0@40")));
         let (code, at) = *found.first().unwrap_or_else(|| panic!("{seed}: missed"));
         assert!(code == FaultCode::Sensor && (40.0..42.0).contains(&at), "{seed}: {found:?}");
     }
 }
 
-/// Where no ball can be, the sensor is wrong, and not the ball over the edge.
+/// Readings far outside the plate are a fault of the sensor, not a ball past the edge.
 #[test]
 fn readings_far_off_the_plate_are_the_sensors() {
     let setup = learnt_from(
@@ -202,12 +202,12 @@ fn readings_far_off_the_plate_are_the_sensors() {
     for s in samples.iter_mut().filter(|s| s.t_s >= 30.0) {
         s.x_m = s.x_m.map(|x| x + 3.0);
     }
-    let found = confirmed(&outputs(&setup, &samples));
+    let found = confirmed(&transitions(&setup, &samples));
     let (code, at) = *found.first().expect("missed");
     assert!(code == FaultCode::Sensor && (30.0..31.0).contains(&at), "{found:?}");
 }
 
-/// What is accepted is silent on what it was learnt from; the rest is refused.
+/// A calibration that is accepted gives no alarm on its own sessions; others are refused.
 #[test]
 fn a_calibration_accuses_none_of_its_own_sessions() {
     for preset in Preset::ALL {
@@ -217,31 +217,31 @@ fn a_calibration_accuses_none_of_its_own_sessions() {
                 [vec![whole.clone()], vec![refreshed(&whole, 4)], vec![thinned(&whole, 3)]]
             {
                 let rig = rig(preset);
-                let Ok(calibration) = calibrate(&rig, &sessions, "", "") else { continue };
+                let Ok(calibration) = calibrate(&rig, &sessions) else { continue };
                 let setup =
                     Setup::new(Rig { calibration: Some(calibration), ..rig }, None).unwrap();
-                let found = confirmed(&outputs(&setup, &sessions[0]));
+                let found = confirmed(&transitions(&setup, &sessions[0]));
                 assert!(found.is_empty(), "{preset} {seed}: {found:?}");
             }
         }
     }
 }
 
-/// Two sessions of which one is of another rig: neither teaches the other.
+/// Two sessions, one of which behaves like another rig, are refused.
 #[test]
 fn sessions_that_contradict_each_other_are_refused_or_make_wide() {
     let sessions = [
         healthy(Preset::Chapter, 1),
         session(Preset::Chapter, Reference::Steps, SECONDS, 3, "x_servo:dead@10"),
     ];
-    let error = calibrate(&rig(Preset::Chapter), &sessions, "", "").unwrap_err();
+    let error = calibrate(&rig(Preset::Chapter), &sessions).unwrap_err();
     let named =
         matches!(error, CannotCalibrate::Untested { .. } | CannotCalibrate::AccusesItself { .. });
     assert!(named, "{error}");
 }
 
-/// A ball that was never seen at rest may stand at a degree: what was not
-/// observed is not zero.
+/// If the ball was never observed at rest, its breakaway tilt is unknown, not zero: it may
+/// rest at one degree.
 #[test]
 fn a_breakaway_that_was_not_observed_is_not_zero() {
     let rig = rig(Preset::Chapter);
@@ -249,7 +249,7 @@ fn a_breakaway_that_was_not_observed_is_not_zero() {
     let setup = learnt_from(&rig, &sessions);
     assert_eq!(x_of(setup.rig.calibration.as_ref().unwrap()).rest_s, 0.0);
     let mut engine = Engine::new(setup, FaultMemory::default());
-    let mut outputs = Vec::new();
+    let mut transitions = Vec::new();
     // The ball rests in the middle while the plate is held at half a degree.
     for i in 0..2000_u32 {
         let tremble = if i % 2 == 0 { 1e-4 } else { 0.0 };
@@ -261,14 +261,14 @@ fn a_breakaway_that_was_not_observed_is_not_zero() {
             x_m: Some(tremble),
             y_m: Some(tremble),
         };
-        engine.handle(Input::Sample(sample), &mut outputs);
+        engine.handle(Input::Sample(sample), &mut transitions);
     }
-    let found = confirmed(&outputs);
+    let found = confirmed(&transitions);
     assert!(found.iter().all(|&(code, _)| code != FaultCode::StuckBall), "{found:?}");
 }
 
-/// A rig that its twin fits so badly that neither accelerations nor likelihoods say
-/// anything: the path itself does, where it is known how far a healthy one bends.
+/// On a rig with a poorly fitting twin, neither accelerations nor likelihoods are
+/// conclusive, but the path error is, if that of healthy sessions is known.
 #[test]
 fn on_a_rig_that_is_fitted_badly_the_path_accuses_the_servo() {
     let mut learnt = learnt_from(
@@ -281,7 +281,7 @@ fn on_a_rig_that_is_fitted_badly_the_path_accuses_the_servo() {
     (axis.model_error_m_s2, axis.residual_m_s2) = (1.0, 1.0);
     let fault = "x_servo:gain=0.3@20";
     let judged = |setup: &Setup| {
-        confirmed(&outputs(setup, &session(Preset::Chapter, Reference::Circle, 60.0, 6, fault)))
+        confirmed(&transitions(setup, &session(Preset::Chapter, Reference::Circle, 60.0, 6, fault)))
     };
     assert_eq!(judged(&learnt).first().map(|f| f.0), Some(FaultCode::XServo));
     let axes = &mut learnt.rig.calibration.as_mut().unwrap().axes;

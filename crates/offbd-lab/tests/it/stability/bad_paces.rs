@@ -1,4 +1,4 @@
-//! Numbers that are no steps, tolerances, durations or intervals.
+//! Invalid steps, tolerances, durations and sampling intervals.
 
 use super::scenes::{compliant, s1, sampled, scene};
 use offbd_core::plant::{Ball, Contact, Plate};
@@ -54,14 +54,14 @@ fn a_scene_of_no_length_is_named() {
     for bad in NONSENSE.into_iter().filter(|&d| d != f64::MIN_POSITIVE).chain(long) {
         assert_eq!(element(of(bad)), "/duration_s", "{bad}");
     }
-    // The shortest scene that there is runs too.
+    // The shortest possible scene runs.
     let tiny = of(f64::MIN_POSITIVE).unwrap();
     let (outcome, samples) =
         sampled(&tiny, &s1(), &compliant(Method::ContactStep, Pace::Step(1e-3)), 1.0).unwrap();
-    assert_eq!((outcome.tally.steps, samples.len()), (1, 1));
+    assert_eq!((outcome.statistics.steps, samples.len()), (1, 1));
 }
 
-/// An interval that is none gives the start and no more; it never hangs.
+/// An invalid interval gives a sample of the start only; sampling never hangs.
 #[test]
 fn samples_at_no_interval_are_the_start_alone() {
     let scene = scene(Contact::CHAPTER, 0.01);
@@ -73,13 +73,13 @@ fn samples_at_no_interval_are_the_start_alone() {
     }
 }
 
-/// A step longer than the scene is the scene.
+/// A step longer than the scene is shortened to it.
 #[test]
 fn a_step_longer_than_the_scene_is_one_step() {
     let scene = scene(Contact::CHAPTER, 0.05);
     let configuration = compliant(Method::ContactStep, Pace::Step(10.0));
     let (outcome, _) = sampled(&scene, &s1(), &configuration, 0.05).unwrap();
-    assert_eq!(outcome.tally.steps, 1);
+    assert_eq!(outcome.statistics.steps, 1);
 }
 
 proptest! {

@@ -1,5 +1,5 @@
-//! Between the slip limit and the normal limit nothing blows up: the clamp of
-//! friction turns the instability into chatter, which the position hides.
+//! Between the slip limit and the normal limit the solution does not diverge: the clamp of
+//! friction turns the instability into chatter, which the position does not show.
 
 use super::scenes::{KAPPA, apart, compliant, s1, sampled, scene, settled, slip_speed, tight};
 use offbd_core::plant::{Contact, Motion};
@@ -9,20 +9,22 @@ use std::f64::consts::PI;
 const DURATION_S: f64 = 0.4;
 const SAMPLE_S: f64 = 1e-3;
 
-/// The start's transient is over after this, s: the normal mode decays at 836 1/s.
+/// Time after which the initial transient has decayed, s: the normal mode decays at
+/// 836 1/s.
 const SETTLED_S: f64 = 0.02;
 
 fn s1a() -> Scene {
     scene(Contact::CHAPTER, DURATION_S)
 }
 
-/// Gravity along x, along y and into the plate under S1, m/s².
+/// Returns gravity along x, along y and into the plate in scene S1, m/s².
 fn pull() -> [f64; 3] {
     let (sin, cos) = (PI / 20.0).sin_cos();
     [9.81 * cos * sin, 9.81 * sin, 9.81 * cos * cos]
 }
 
-/// The slip that carries the rolling ball's friction: F·v_thr/(μ·F_z), m/s.
+/// Returns the creep, the slip that carries the friction of the rolling ball,
+/// F·v_thr/(μ·F_z), m/s.
 fn creep() -> f64 {
     let [x, y, normal] = pull();
     let contact = Contact::CHAPTER;
@@ -30,13 +32,13 @@ fn creep() -> f64 {
     friction * contact.slip_threshold_m_s() / (contact.friction() * normal)
 }
 
-/// What friction takes away while the ball creeps over the whole scene, J.
+/// Returns the energy that friction dissipates by creep over the whole scene, J.
 fn creep_loss() -> f64 {
     let [x, y, _] = pull();
     0.051 * KAPPA / (1.0 + KAPPA) * x.hypot(y) * creep() * DURATION_S
 }
 
-/// ∫ F·s dt over the samples, J.
+/// Returns the dissipated energy ∫ F·s dt over the samples, J.
 fn friction_loss(scene: &Scene, samples: &[(f64, Motion)], every_s: f64) -> f64 {
     let model = scene.compliant();
     let power = samples.iter().map(|(_, at)| {
@@ -85,8 +87,8 @@ fn every_explicit_method_chatters_between_the_limits() {
     }
 }
 
-/// A hundred times the explicit limit, and the slip is right. From the depth
-/// at rest: a Rosenbrock step that begins off the plate is an explicit one.
+/// At a hundred times the explicit limit the creep is accurate. The start is at the depth
+/// at rest: a Rosenbrock step that starts off the plate is an explicit one.
 #[test]
 fn validate_the_creep_of_l_stable_methods_at_one_millisecond() {
     let scene = settled(s1a());

@@ -1,14 +1,14 @@
-//! Six decades of stiffness, damping, friction and threshold, and six of the
-//! step: a number comes out, or an error that says why.
+//! Six decades of stiffness, damping, friction and slip threshold, and six of the step: a
+//! run gives finite numbers or an error with the reason.
 
 use super::scenes::{compliant, s1, s3, scene};
 use offbd_core::plant::Contact;
 use offbd_lab::scene::{
-    Configuration, Failure, Laws, Method, Model, Outcome, Pace, Scene, choose, run,
+    Configuration, Failure, Laws, Method, Model, Pace, RunOutcome, Scene, choose, run,
 };
 use proptest::prelude::*;
 
-/// Ends and middle of six decades around the chapter's numbers.
+/// Ends and middle of six decades around the chapter's numbers, N/m.
 const STIFFNESS: [f64; 3] = [1e3, 1e6, 1e9];
 const DAMPING: [f64; 3] = [1.0, 1e3, 1e6];
 const FRICTION: [f64; 3] = [1e-4, 0.1, 100.0];
@@ -26,7 +26,7 @@ fn laws() -> [Laws; 2] {
     [s1(), s3()]
 }
 
-/// The end of a run, all numbers.
+/// Runs a scene; returns an error unless all numbers at its end are finite.
 fn ends(scene: &Scene, laws: &Laws, configuration: &Configuration) -> Result<(), String> {
     match run(scene, &mut laws.clone(), configuration, None) {
         Ok(outcome) if outcome.end.to_row().iter().all(|value| value.is_finite()) => Ok(()),
@@ -35,8 +35,8 @@ fn ends(scene: &Scene, laws: &Laws, configuration: &Configuration) -> Result<(),
     }
 }
 
-/// Numbers, or that they are none any more.
-fn is_said(found: &Result<Outcome, Failure>) -> bool {
+/// Returns whether a run gave finite numbers, or the error that they are not.
+fn is_finite_or_reported(found: &Result<RunOutcome, Failure>) -> bool {
     match found {
         Ok(outcome) => outcome.end.to_row().iter().all(|value| value.is_finite()),
         Err(failure) => matches!(failure, Failure::NotFinite { .. }),
@@ -59,8 +59,8 @@ fn the_contact_step_and_the_rigid_plate_take_any_contact() {
     }
 }
 
-/// Every fifth of the grid, which meets every value of every number: a spring
-/// of 1e9 N/m hardly damped swings 22 000 times a second.
+/// Every fifth contact of the grid, which includes every value of every parameter: a
+/// spring of 1e9 N/m with little damping oscillates at 22 kHz.
 #[test]
 fn rosenbrock_methods_take_any_contact_by_tolerance() {
     for contact in grid().step_by(5) {
@@ -74,7 +74,7 @@ fn rosenbrock_methods_take_any_contact_by_tolerance() {
     }
 }
 
-/// Either a choice, whose configuration then runs, or word that none is good
+/// Either a choice whose configuration runs, or an error that no candidate is accurate
 /// enough.
 #[test]
 fn a_choice_or_a_reason_on_any_contact() {
@@ -114,13 +114,13 @@ proptest! {
             for method in [Method::Rodas3, Method::Rodas4] {
                 let configuration = compliant(method, Pace::Step(h));
                 let found = run(&scene, &mut laws.clone(), &configuration, None);
-                prop_assert!(is_said(&found), "{:?}", found);
+                prop_assert!(is_finite_or_reported(&found), "{:?}", found);
             }
         }
     }
 }
 
-/// From a microsecond to longer than the plate's own motion.
+/// Steps from a microsecond to longer than the plate's motion.
 #[test]
 fn every_step_of_six_decades_ends_in_a_number_or_says_why_not() {
     let scene = scene(Contact::CHAPTER, 0.1);
@@ -129,7 +129,7 @@ fn every_step_of_six_decades_ends_in_a_number_or_says_why_not() {
             for &method in Model::Compliant.methods() {
                 let configuration = compliant(method, Pace::Step(h));
                 let found = run(&scene, &mut laws.clone(), &configuration, None);
-                assert!(is_said(&found), "{method} at {h} s: {found:?}");
+                assert!(is_finite_or_reported(&found), "{method} at {h} s: {found:?}");
                 let sure = method == Method::ContactStep || h <= 1e-6;
                 assert!(!sure || found.is_ok(), "{method} at {h} s: {found:?}");
             }

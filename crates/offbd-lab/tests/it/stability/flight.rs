@@ -1,6 +1,5 @@
-//! A body in flight over a plate that turns: seen from the world it falls as
-//! Galilei says, which checks gravity, Coriolis, centrifugal and Euler terms
-//! together.
+//! A body in flight over a turning plate: in the world frame it is in free fall, which
+//! checks gravity, Coriolis, centrifugal and Euler terms together.
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use offbd_core::maths::{DOPRI5, System};
@@ -11,7 +10,7 @@ use offbd_lab::scene::{Drive, Law, Laws, Term};
 const MASS: f64 = 0.051;
 const G: f64 = 9.81;
 
-/// Both angles swing widely and fast: up to 0.9 rad and 14 rad/s.
+/// Large and fast swings of both angles: up to 0.9 rad and 14 rad/s.
 fn wild() -> Laws {
     let sine = |amplitude, frequency, phase| {
         Law::new(&[Term::Sine { amplitude, frequency, phase }, Term::Constant(0.1)])
@@ -19,7 +18,7 @@ fn wild() -> Laws {
     Laws::new(sine(0.6, 2.3, 0.4), sine(0.8, 2.9, 1.1), Vec::new())
 }
 
-/// R = Rx(qx)·Ry(qy), and Ω, both from the angles alone.
+/// Returns R = Rx(qx)·Ry(qy), and Ω, computed from the angles.
 fn frame(laws: &Laws, t: f64) -> (Matrix3<f64>, Vector3<f64>) {
     let Tilt { angle, rate, .. } = laws.tilt(t);
     let about_x = Rotation3::from_axis_angle(&Vector3::x_axis(), angle.x);
@@ -29,7 +28,7 @@ fn frame(laws: &Laws, t: f64) -> (Matrix3<f64>, Vector3<f64>) {
     ((about_x * about_y).into_inner(), omega)
 }
 
-/// Position, velocity and angular velocity in the world.
+/// Returns position, velocity and angular velocity in the world frame.
 fn world(laws: &Laws, t: f64, at: &Motion) -> [Vector3<f64>; 3] {
     let (r, omega) = frame(laws, t);
     let velocity = at.velocity + omega.cross(&at.position);
@@ -55,7 +54,7 @@ impl Flight {
         plate
     }
 
-    /// The worst of `off` on the way through half a second.
+    /// Returns the largest value of `off` over half a second.
     fn worst(&self, start: &Motion, mut off: impl FnMut(f64, [Vector3<f64>; 3]) -> f64) -> f64 {
         let (h, mut y, mut worst) = (1e-4, start.to_row(), 0.0_f64);
         for i in 1..=5000 {
@@ -75,7 +74,7 @@ impl System<9> for Flight {
     }
 }
 
-/// Thrown so that it stays above the plate throughout.
+/// A throw that stays above the plate.
 fn thrown() -> Motion {
     Motion {
         position: Vector3::new(0.05, -0.03, 1.5),
@@ -84,8 +83,8 @@ fn thrown() -> Motion {
     }
 }
 
-/// Thirty turns of rounding and a fifth-order method at h·Ω = 1e-3 leave less
-/// than this, m, m/s and J.
+/// Tolerance in m, m/s and J: the errors of rounding and of a fifth-order method at
+/// h·Ω = 1e-3 are smaller.
 const NEGLIGIBLE: f64 = 1e-11;
 
 #[test]

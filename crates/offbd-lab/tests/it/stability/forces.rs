@@ -1,4 +1,4 @@
-//! The contact's forces and their derivatives, at random states.
+//! The contact forces and their derivatives at random states.
 
 use nalgebra::Vector3;
 use offbd_core::plant::{Ball, Body, Contact, Ground, Motion, Plate, PlateMotion, Tilt};
@@ -11,7 +11,7 @@ fn variants() -> [Compliant; 4] {
     [model, model.with_cone(), model.with_push_only(), model.with_cone().with_push_only()]
 }
 
-/// Up to 1e-5 m in or above the plate, with slips of a few thresholds.
+/// Motions up to 1e-5 m in or above the plate, with slips of a few thresholds.
 fn motions() -> impl Strategy<Value = Motion> {
     let side = prop::array::uniform2(-0.1..0.1_f64);
     let slip = prop::array::uniform2(-4e-4..4e-4_f64);
@@ -32,11 +32,11 @@ fn plates() -> impl Strategy<Value = PlateMotion> {
     })
 }
 
-/// Steps of the differences: the thresholds are 1e-4 m/s of slip and 0 m of
-/// depth, and the force is linear or smooth between them.
+/// Steps of the difference quotients, in the units of the state: the force is linear or
+/// smooth except at a slip of 1e-4 m/s and a depth of 0 m.
 const STEPS: [f64; 9] = [1e-6, 1e-6, 1e-8, 1e-8, 1e-8, 1e-6, 1e-6, 1e-6, 1e-4];
 
-/// Far enough from every kink that no difference reaches over one.
+/// Returns whether the state is so far from every kink that no difference spans one.
 fn away_from_kinks(model: &Compliant, at: &Motion) -> bool {
     let contact = &model.contact;
     let threshold = contact.slip_threshold_m_s();
@@ -47,7 +47,7 @@ fn away_from_kinks(model: &Compliant, at: &Motion) -> bool {
     far(x.abs()) && far(y.abs()) && far(x.hypot(y)) && depth.abs() > 3e-8 && push.abs() > 0.02
 }
 
-/// Column `j` of the Jacobian by central differences.
+/// Returns column `j` of the Jacobian by central differences.
 fn differences(model: &Compliant, y: &[f64; 9], plate: &PlateMotion, j: usize) -> [f64; 9] {
     let ends = [-STEPS[j], STEPS[j]].map(|d| {
         let mut at = *y;

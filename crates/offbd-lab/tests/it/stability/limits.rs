@@ -1,6 +1,6 @@
-//! The largest stable step of each explicit method on the compliant model,
-//! measured by the growth of a small disturbance, against its stability
-//! function on the mode's eigenvalues.
+//! The largest stable step of each explicit method on the compliant model, measured by the
+//! growth of a small disturbance, against the prediction of its stability function and the
+//! eigenvalues.
 
 use super::scenes::{KAPPA, OnPlate, step};
 use nalgebra::Matrix2;
@@ -12,14 +12,14 @@ use std::f64::consts::PI;
 const EXPLICIT: [Method; 4] =
     [Method::Euler, Method::SemiImplicitEuler, Method::Midpoint, Method::Rk4];
 
-/// Steps over which a disturbance may grow. Near the limit |R| = 1 + ε, and a
-/// transient by a factor C hides ε < ln C/STEPS: 0.8 % for C = 20.
+/// Number of steps over which a disturbance may grow. Near the limit |R| = 1 + ε, and
+/// transient growth by a factor C hides ε < ln C/STEPS: 0.8 % for C = 20.
 const STEPS: usize = 400;
 
-/// Half the interval that the bisection ends with, as a part of the step.
+/// Half of the final interval of the bisection as a share of the step.
 const WIDTH: f64 = 1e-3;
 
-/// Measured against predicted.
+/// Allowed relative difference of measured and predicted limit.
 const WITHIN: f64 = 0.05;
 
 fn model(contact: Contact) -> Compliant {
@@ -31,8 +31,8 @@ fn on_s1(model: &Compliant) -> OnPlate<'_> {
     OnPlate { model, plate: Tilt::constant(PI / 20.0, PI / 20.0).motion() }
 }
 
-/// Pressed in as far as the plate's normal force asks, and creeping as fast as
-/// friction asks: F = 2/7 of what pulls along the plate.
+/// Returns the equilibrium of the rolling ball: the depth that carries the normal force,
+/// and the creep that carries the friction, 2/7 of gravity along the plate.
 fn settled(system: &OnPlate<'_>) -> [f64; 9] {
     let (model, pull) = (system.model, system.plate.gravity);
     let mass = model.body.mass_kg();
@@ -45,7 +45,7 @@ fn settled(system: &OnPlate<'_>) -> [f64; 9] {
     at.to_row()
 }
 
-/// Whether a disturbance `kick` of the settled state grows, by `size` of the
+/// Returns whether a disturbance `kick` of the equilibrium grows, measured by `size` of the
 /// difference of two runs.
 fn grows(
     system: &OnPlate<'_>,
@@ -70,7 +70,7 @@ fn grows(
     apart(&moved, &calm) > start
 }
 
-/// Bisects for the largest step at which `unstable` is false.
+/// Returns the largest step at which `unstable` is false, by bisection.
 fn largest_stable(guess: f64, unstable: impl Fn(f64) -> bool) -> f64 {
     let (mut stable, mut too_long) = (guess / 4.0, guess * 4.0);
     assert!(!unstable(stable) && unstable(too_long), "no limit near {guess:e} s");
@@ -81,7 +81,7 @@ fn largest_stable(guess: f64, unstable: impl Fn(f64) -> bool) -> f64 {
     (stable * too_long).sqrt()
 }
 
-/// The factors 1/k! of the method's stability polynomial.
+/// Returns the coefficients 1/k! of the method's stability polynomial.
 fn polynomial(method: Method) -> &'static [f64] {
     match method {
         Method::Euler => &[1.0, 1.0],
@@ -90,7 +90,7 @@ fn polynomial(method: Method) -> &'static [f64] {
     }
 }
 
-/// What one step does to (p, v) of p'' = −k·p − d·v.
+/// Returns the amplification matrix of one step for (p, v) of p'' = −k·p − d·v.
 fn amplification(method: Method, k: f64, d: f64, h: f64) -> Matrix2<f64> {
     if method == Method::SemiImplicitEuler {
         return Matrix2::new(1.0 - h * h * k, h * (1.0 - h * d), -h * k, 1.0 - h * d);
@@ -108,7 +108,7 @@ fn spectral_radius(m: &Matrix2<f64>) -> f64 {
     if square < 0.0 { determinant.sqrt() } else { half.abs() + square.sqrt() }
 }
 
-/// The first step at which the predicted spectral radius passes 1.
+/// Returns the first step at which the predicted spectral radius exceeds 1.
 fn predicted(method: Method, k: f64, d: f64) -> f64 {
     let outside = |h: f64| spectral_radius(&amplification(method, k, d, h)) > 1.0 + 1e-12;
     let mut h = 1e-3 / (d + k.sqrt());
@@ -138,8 +138,7 @@ fn validate_the_slip_limit_against_the_stability_function() {
     }
 }
 
-/// Two real roots (chapter and soft), and a complex pair where the damper is
-/// weak.
+/// Two real roots (chapter and soft), and a complex pair with a weak damper.
 #[test]
 fn validate_the_normal_limit_against_the_amplification_matrix() {
     let weak = Contact::new(800_000.0, 50.0, 0.6, 1e-4).unwrap();
@@ -161,7 +160,7 @@ fn validate_the_normal_limit_against_the_amplification_matrix() {
     }
 }
 
-/// Where the chapter's numbers lie: eigenvalues as the physics page states them.
+/// The predicted limits of the chapter's contact, the soft contact and a weak damper, µs.
 #[test]
 fn validate_the_predictions_themselves() {
     let mass = Ball::default().mass_kg();

@@ -1,7 +1,6 @@
-//! Where the methods fail, each against a prediction made beforehand: the
-//! largest stable steps against the eigenvalues, chatter, extremes of the
-//! contact, bad paces, hours at rest, orders of convergence, and the physics
-//! that must hold whatever the method.
+//! Stability of the methods, against predictions: the largest stable steps against the
+//! eigenvalues, chatter, extreme contacts, invalid paces, hours at rest, orders of
+//! convergence, and physical laws that hold whatever the method.
 
 mod bad_paces;
 mod chatter;

@@ -1,4 +1,4 @@
-//! Observed orders of convergence: slopes fitted over five halvings.
+//! Observed orders of convergence: slopes fitted over five halvings of the step.
 
 use super::scenes::{apart, compliant, s2, s3, sampled, scene, step, tight};
 use offbd_core::maths::System;
@@ -8,7 +8,7 @@ use offbd_lab::scene::{Configuration, Laws, Method, Model, Pace, Scene};
 
 const HALVINGS: usize = 5;
 
-/// Least-squares slope of log error over log step.
+/// Returns the least-squares slope of log error over log step.
 fn slope(errors: &[f64]) -> f64 {
     let n = errors.len() as f64;
     let points: Vec<(f64, f64)> =
@@ -19,7 +19,7 @@ fn slope(errors: &[f64]) -> f64 {
     over / points.iter().map(|p| (p.0 - x).powi(2)).sum::<f64>()
 }
 
-/// The errors at `first` and its halvings.
+/// Returns the errors at the step `first` and its halvings.
 fn halved(first: f64, error: impl Fn(f64) -> f64) -> Vec<f64> {
     (0..=HALVINGS).map(|i| error(first / 2_f64.powi(i as i32))).collect()
 }
@@ -30,7 +30,7 @@ fn check(name: &str, errors: &[f64], order: f64, band: f64) {
     assert!((found - order).abs() <= band, "{name}: order {found}, not {order}: {errors:?}");
 }
 
-/// ẍ = −x³ + f(t), driven such that x = sin(ωt): not linear, not autonomous.
+/// ẍ = −x³ + f(t), driven such that x = sin(ωt): nonlinear and not autonomous.
 struct Driven;
 
 const OMEGA: f64 = 1.3;
@@ -50,7 +50,7 @@ impl Stiff<2> for Driven {
     }
 }
 
-/// Error of position and velocity after 4 s.
+/// Returns the error of position and velocity after 4 s.
 fn driven_error(method: Method, h: f64) -> f64 {
     let end = 4.0;
     let n = (end / h).round() as usize;
@@ -78,7 +78,7 @@ fn validate_orders_on_a_driven_oscillator() {
     }
 }
 
-/// Worst error of position over the samples.
+/// Returns the largest errors of the position over the samples, by step.
 fn scene_errors(
     (scene, laws): (&Scene, &Laws),
     truth: &Configuration,
@@ -96,7 +96,7 @@ fn scene_errors(
 fn validate_orders_on_the_rolling_ball() {
     let (scene, laws) = (scene(Contact::CHAPTER, 2.0), s2());
     let of = |method, pace| Configuration::new(Model::Rolling, method, pace).unwrap();
-    // Few steps, so that their rounding stays below the finest error.
+    // Few steps, so that rounding errors stay below the finest error.
     let truth = of(Method::Dopri5, Pace::Step(2e-3));
     for (method, order, first) in [
         (Method::Euler, 1.0, 1.0 / 100.0),
@@ -110,7 +110,7 @@ fn validate_orders_on_the_rolling_ball() {
     }
 }
 
-/// The slow motion is of second order, whatever the contact does.
+/// The contact step is of second order in the slow motion, whatever the contact.
 #[test]
 fn validate_the_contact_step_on_slow_motion() {
     let (scene, laws) = (scene(Contact::CHAPTER, 2.0), s2());
@@ -120,9 +120,9 @@ fn validate_the_contact_step_on_slow_motion() {
     check("sine contact-step", &errors, 2.0, 0.2);
 }
 
-/// Where slip begins and ends, and where the ball lands, a step does not meet
-/// the moment: first order. How near it comes depends on where in a step the
-/// moment falls, so errors are means over steps of up to a quarter less.
+/// Steps do not end at the times at which slip begins or ends and the ball lands: the
+/// contact step is of first order then. Its error depends on the position of these times
+/// within a step, so errors are averaged over steps that are up to a quarter shorter.
 #[test]
 fn validate_the_contact_step_through_slip_and_landing() {
     const PHASES: u32 = 8;

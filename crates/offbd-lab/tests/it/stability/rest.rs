@@ -1,11 +1,11 @@
-//! Hours at rest: nothing moves, nothing is gained.
+//! Hours at rest: nothing moves, and no energy is gained.
 
 use super::scenes::{compliant, held, scene};
 use nalgebra::Vector3;
 use offbd_core::plant::{Contact, Motion};
 use offbd_lab::scene::{Configuration, LONGEST_SCENE_S, Method, Model, Pace, Scene, run};
 
-/// Off the centre, pressed in as deep as the ball's weight asks.
+/// Returns a scene with the ball off the centre, at its depth at rest.
 fn resting(contact: Contact) -> Scene {
     let mut scene = scene(contact, LONGEST_SCENE_S);
     let sag = 0.051 * 9.81 / contact.stiffness_n_per_m();
@@ -13,14 +13,14 @@ fn resting(contact: Contact) -> Scene {
     scene
 }
 
-/// How far the ball has gone from where it started, m, and how fast it goes, m/s.
+/// Returns the distance of the ball from its start, m, and its speed, m/s.
 fn drift(scene: &Scene, end: &Motion) -> (f64, f64) {
     let start = &scene.initial;
     let turning = end.spin.norm() * 0.0127;
     ((end.position - start.position).norm(), end.velocity.norm().max(turning))
 }
 
-/// Runs `hours` one after the other, each where the one before has ended.
+/// Runs `hours` one after the other, each from the end of the previous one.
 fn rests(contact: Contact, configuration: &Configuration, hours: u32, deep: bool) {
     let first = resting(contact);
     let mut scene = first.clone();
@@ -35,8 +35,8 @@ fn rests(contact: Contact, configuration: &Configuration, hours: u32, deep: bool
     let (gone, speed) = drift(&first, &end);
     let name = format!("{} {}", configuration.model(), configuration.method());
     println!("{name}: {gone:e} m, {speed:e} m/s after {hours} h");
-    // Rounding alone: an ulp of 0.05 m is 7e-18, and a walk of a million of
-    // them stays within a thousand.
+    // Only rounding: an ulp of 0.05 m is 7e-18, and a random walk of a million of them
+    // covers about a thousand.
     assert!(gone < 1e-14, "{name} moved by {gone:e} m");
     assert!(speed < 1e-14, "{name} moves with {speed:e} m/s");
 }

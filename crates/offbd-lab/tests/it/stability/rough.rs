@@ -1,5 +1,5 @@
-//! The L-stable methods at a fixed millisecond, seventy times the explicit limit
-//! and more, through all that is rough: slip, lift-off, landing, the edge.
+//! The L-stable methods at a fixed step of 1 ms, at least seventy times the explicit limit,
+//! through slip, lift-off, landing and the edge.
 
 use super::scenes::{apart, compliant, s1, s3, sampled, scene, settled, tight};
 use offbd_core::plant::{Contact, Motion};
@@ -7,8 +7,8 @@ use offbd_lab::scene::{Configuration, Laws, Method, Pace, Scene};
 
 const SAMPLE_S: f64 = 1e-3;
 
-/// Kinetic energy relative to the plate, with the spring's and, as a size,
-/// the height's, J.
+/// Returns the kinetic energy relative to the plate plus that of the spring and the
+/// magnitude of the potential energy, J.
 fn energy(scene: &Scene, at: &Motion) -> f64 {
     let body = scene.body();
     let depth = (body.rest_height_m() - at.position.z).max(0.0);
@@ -22,7 +22,7 @@ fn most_energy(scene: &Scene, samples: &[(f64, Motion)]) -> f64 {
     samples.iter().map(|(_, at)| energy(scene, at)).fold(0.0, f64::max)
 }
 
-/// Runs by `configurations` and compares each with the truth, m.
+/// Runs the configurations `each`, and compares them with the reference solution.
 fn check(name: &str, scene: &Scene, laws: &Laws, each: &[Configuration], within_m: f64) {
     let (_, truth) = sampled(scene, laws, &tight(), SAMPLE_S).unwrap();
     let most = most_energy(scene, &truth);
@@ -45,15 +45,15 @@ fn tilting(contact: Contact) -> Scene {
     scene(contact, 0.4)
 }
 
-/// The chapter's first exercise: over the nearer edge, then down.
+/// The chapter's first exercise: the ball rolls over the nearer edge and falls.
 fn over_the_edge(contact: Contact) -> Scene {
     let mut scene = scene(contact, 0.6);
     scene.edges = true;
     scene
 }
 
-/// The contact step takes everything, from a ball that only touches: the stiff
-/// landing, the soft one, the edge.
+/// The contact step is stable in all scenes, from a ball that just touches the plate: the
+/// stiff and the soft landing, and the edge.
 #[test]
 fn the_contact_step_through_slip_flight_landing_and_edge() {
     let each = [at_1_ms(Method::ContactStep)];
@@ -63,8 +63,8 @@ fn the_contact_step_through_slip_flight_landing_and_edge() {
     check("edge B", &over_the_edge(Contact::SOFT), &s1(), &each, 1e-5);
 }
 
-/// The Rosenbrock methods do as long as no step begins off the plate: slip and
-/// the edge, from the depth at rest.
+/// The Rosenbrock methods are stable as long as no step starts off the plate: slip and the
+/// edge, from the depth at rest.
 #[test]
 fn rosenbrock_methods_through_slip_and_over_the_edge() {
     let each = [at_1_ms(Method::Rodas3), at_1_ms(Method::Rodas4)];
@@ -76,10 +76,9 @@ fn rosenbrock_methods_through_slip_and_over_the_edge() {
     check("edge B", &settled(over_the_edge(Contact::SOFT)), &s1(), &each, 1e-5);
 }
 
-/// A step that begins off the plate has no contact in its one Jacobian: it is
-/// explicit, and L-stability is no help. So touchdown fails at ten times the
-/// explicit limit of the normal mode (107 µs) and passes below it, and a
-/// tolerance finds that out by itself.
+/// A step that starts off the plate has no contact in its only Jacobian: it is explicit,
+/// and L-stability does not help. So touchdown fails at ten times the explicit limit of
+/// the normal mode (107 µs) and succeeds below it; adaptive steps handle it.
 #[test]
 fn validate_rosenbrock_methods_are_explicit_at_touchdown() {
     let (scene, laws) = (settled(tilting(Contact::CHAPTER)), s3());

@@ -1,4 +1,4 @@
-//! The scenes that the tests share, and ways to run them.
+//! Scenes shared by the tests, and functions to run them.
 
 use std::f64::consts::PI;
 
@@ -8,8 +8,8 @@ use offbd_lab::methods::Stiff;
 use offbd_lab::methods::{RODAS3, RODAS4};
 use offbd_lab::models::Compliant;
 use offbd_lab::scene::{
-    Configuration, Failure, Law, Laws, Method, Model, Outcome, Pace, Samples, Scene, Subject, Term,
-    run,
+    Configuration, Failure, Law, Laws, Method, Model, Pace, RunOutcome, Samples, Scene, Subject,
+    Term, run,
 };
 
 /// κ of the chapter's ball.
@@ -21,7 +21,7 @@ pub fn scene(contact: Contact, duration_s: f64) -> Scene {
     Scene::new(ball, Plate::default(), contact, duration_s).unwrap()
 }
 
-/// The same from the depth at which the ball's weight rests.
+/// Returns the same scene with the ball at its depth at rest.
 pub fn settled(mut scene: Scene) -> Scene {
     let weight = scene.body().mass_kg() * 9.81;
     scene.initial.position.z -= weight / scene.contact.stiffness_n_per_m();
@@ -32,7 +32,7 @@ pub fn law(terms: &[Term]) -> Law {
     Law::new(terms)
 }
 
-/// Both angles held.
+/// Constant angles.
 pub fn held(qx: f64, qy: f64) -> Laws {
     Laws::new(law(&[Term::Constant(qx)]), law(&[Term::Constant(qy)]), Vec::new())
 }
@@ -48,7 +48,7 @@ pub fn s2() -> Laws {
     Laws::new(sine(0.7, 0.0), sine(0.9, 0.5), Vec::new())
 }
 
-/// S3: tilts within 0.15 s so far that the ball slips, leaves and lands.
+/// S3: tilts so far within 0.15 s that the ball slips, leaves the plate and lands.
 pub fn s3() -> Laws {
     let step = Term::Smoothstep { to: 1.2, start: 0.0, duration: 0.15 };
     Laws::new(Law::default(), law(&[step]), Vec::new())
@@ -58,18 +58,18 @@ pub fn compliant(method: Method, pace: Pace) -> Configuration {
     Configuration::new(Model::Compliant, method, pace).unwrap()
 }
 
-/// The truth that methods are measured against.
+/// The configuration of the reference solution.
 pub fn tight() -> Configuration {
     compliant(Method::Rodas4, Pace::Tolerance(1e-10))
 }
 
-/// A run with its samples.
+/// Runs a scene; returns the outcome and the samples.
 pub fn sampled(
     scene: &Scene,
     laws: &Laws,
     configuration: &Configuration,
     every_s: f64,
-) -> Result<(Outcome, Vec<(f64, Motion)>), Failure> {
+) -> Result<(RunOutcome, Vec<(f64, Motion)>), Failure> {
     let mut taken = Vec::new();
     let mut sink = |t: f64, at: &Motion| taken.push((t, *at));
     let mut samples = Samples::new(every_s, &mut sink);
@@ -77,20 +77,20 @@ pub fn sampled(
     Ok((outcome, taken))
 }
 
-/// Worst distance in (x, y) of two runs sampled alike, m.
+/// Returns the largest distance in (x, y) of two runs with the same sampling, m.
 pub fn apart(a: &[(f64, Motion)], b: &[(f64, Motion)]) -> f64 {
     assert_eq!(a.len(), b.len());
     let each = a.iter().zip(b).map(|(a, b)| (a.1.position.xy() - b.1.position.xy()).norm());
     each.fold(0.0, f64::max)
 }
 
-/// Speed of the contact point over the plate, m/s.
+/// Returns the speed of the contact point relative to the plate, m/s.
 pub fn slip_speed(scene: &Scene, at: &Motion) -> f64 {
     let [x, y] = scene.body().slip(&at.velocity, &at.spin);
     x.hypot(y)
 }
 
-/// The compliant model on a plate that stands still.
+/// The compliant model on a plate at rest.
 pub struct OnPlate<'a> {
     pub model: &'a Compliant,
     pub plate: PlateMotion,
@@ -110,7 +110,7 @@ impl Stiff<9> for OnPlate<'_> {
     }
 }
 
-/// One step by any method but the contact step.
+/// Returns the state after one step by any method that steps general systems.
 pub fn step<const N: usize>(
     method: Method,
     system: &impl Stiff<N>,

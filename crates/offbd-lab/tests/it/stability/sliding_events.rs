@@ -1,6 +1,6 @@
-//! When the sliding model says that the ball slips, leaves and lands, against a
-//! computation of its own: one axis in the plate frame by small fixed steps,
-//! the flight as a parabola in the world.
+//! The times at which the sliding model slips, leaves the plate and lands, against an
+//! independent computation: one axis in the plate frame by small fixed steps, and the
+//! flight as a parabola in the world frame.
 
 use super::scenes::{KAPPA, held, s3, sampled, scene};
 use offbd_core::plant::{Ball, Body, Contact, Ground, Hold, Motion, Phase, Plate, Sliding, Tilt};
@@ -28,7 +28,7 @@ fn angle(t: f64) -> [f64; 3] {
 /// x, ẋ and the spin about y of a ball on the plate.
 type State = [f64; 3];
 
-/// Free acceleration along x and along the normal, at the resting height.
+/// Returns the free acceleration along x and along the normal, at the resting height.
 fn free(t: f64, [x, v, _]: State) -> [f64; 2] {
     let [q, rate, acceleration] = angle(t);
     [
@@ -37,7 +37,7 @@ fn free(t: f64, [x, v, _]: State) -> [f64; 2] {
     ]
 }
 
-/// Friction per mass that keeps the ball rolling.
+/// Returns the friction per mass that keeps the ball rolling.
 fn rolling_friction(t: f64, y: State) -> f64 {
     let [along, _] = free(t, y);
     (-R * angle(t)[2] - along) / (1.0 + 1.0 / KAPPA)
@@ -61,7 +61,7 @@ fn rk4(t: f64, y: State, h: f64, slips: bool) -> State {
     std::array::from_fn(|i| y[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]))
 }
 
-/// Steps until `margin` is below 0, halving the last step down to nothing.
+/// Integrates until `margin` turns negative, halving the last step down to 1e-14 s.
 fn until(
     mut t: f64,
     mut y: State,
@@ -80,13 +80,13 @@ fn until(
     (t, y)
 }
 
-/// (x, z) of the world's axes for a vector of the plate's.
+/// Returns the (x, z) components in the world frame of a vector in the plate frame.
 fn to_world(q: f64, [x, z]: [f64; 2]) -> [f64; 2] {
     let (sin, cos) = q.sin_cos();
     [cos * x + sin * z, -sin * x + cos * z]
 }
 
-/// When the parabola from (t, x, v) meets the plate again.
+/// Returns the time at which the parabola from (t, x, v) meets the plate again.
 fn landing(t0: f64, [x, v, _]: State) -> f64 {
     let [q, rate, _] = angle(t0);
     let p = to_world(q, [x, GAP]);
@@ -108,8 +108,8 @@ fn landing(t0: f64, [x, v, _]: State) -> f64 {
     below
 }
 
-/// Locating a moment at which two forces meet, from two integrations of 1e-12
-/// and 1e-10 m accuracy: forces change by some 1e3 m/s³.
+/// Tolerance of the time of an event, s. An event is where two forces are equal, which
+/// change by some 1e3 m/s³; the two integrations are accurate to 1e-12 and 1e-10 m.
 const SAME_MOMENT_S: f64 = 1e-8;
 
 #[test]
@@ -135,7 +135,7 @@ fn validate_the_moments_of_s3() {
     assert!(found.len() >= expected.len());
 }
 
-/// Bisects for the largest held angle at which `rolls`.
+/// Returns the largest constant angle at which `rolls` is true, by bisection.
 fn steepest(rolls: impl Fn(f64) -> bool) -> f64 {
     let (mut holds, mut slips) = (0.1, 1.5);
     while slips - holds > 1e-9 {
@@ -165,8 +165,8 @@ fn validate_the_onset_of_slip_on_a_held_plate() {
     assert!((ran - theory).abs() < 1e-6, "{ran} for {theory}");
 }
 
-/// A ball that lands on a plate that falls away is stopped all the same, and
-/// flies on: it does not go through the plate.
+/// A ball that lands on a plate that falls away does not penetrate it: its normal velocity
+/// is set to zero, and it flies on.
 #[test]
 fn a_landing_on_a_plate_that_falls_away_is_one() {
     let wave = Term::Sine { amplitude: 0.05, frequency: 10.0, phase: 0.0 };
@@ -175,13 +175,13 @@ fn a_landing_on_a_plate_that_falls_away_is_one() {
         Configuration::new(Model::Sliding, Method::Dopri5, Pace::Tolerance(1e-6)).unwrap();
     let (outcome, path) =
         sampled(&scene(Contact::CHAPTER, 2.0), &laws, &configuration, 1e-3).unwrap();
-    assert!(outcome.tally.steps < 20_000, "{} steps", outcome.tally.steps);
+    assert!(outcome.statistics.steps < 20_000, "{} steps", outcome.statistics.steps);
     let lowest = path.iter().map(|(_, at)| at.position.z).fold(f64::INFINITY, f64::min);
     assert!(lowest > GAP - 1e-6, "{:e} m into the plate", GAP - lowest);
 }
 
-/// Slip that ends, ends: the ball rolls on at 5/7 of its speed. Were the last
-/// of it taken for slip the other way, it would turn over every 1e-8 s.
+/// When slip ends, the ball rolls on at 5/7 of its speed. If the remainder were taken for
+/// slip in the other direction, the phase would alternate every 1e-8 s.
 #[test]
 fn validate_slip_ends_in_rolling() {
     let configuration =
@@ -192,5 +192,5 @@ fn validate_slip_ends_in_rolling() {
     assert!((outcome.end.velocity.x - 0.5).abs() < 1e-6, "{}", outcome.end.velocity.x);
     let found: Vec<&str> = outcome.events.iter().map(|event| event.what).collect();
     assert_eq!(found, ["slips", "rolls"]);
-    assert!(outcome.tally.steps < 1000, "{} steps", outcome.tally.steps);
+    assert!(outcome.statistics.steps < 1000, "{} steps", outcome.statistics.steps);
 }

@@ -1,20 +1,20 @@
-//! Deviation and enable of both axes, as the chapter plots them.
+//! Plots deviation and enable of both axes, as in the chapter.
 
-use super::bench::{DURATION_S, Judged, Signal};
+use super::ideal_rig::{DURATION_S, DeviationSignal, ProfileVerdict};
 use crate::cli::lab::scene::plots;
 use offbd_lab::chart::{Axis, Figure, Look, Panel, Scale, Series, Stroke};
 
 /// The chapter's limit, m/s².
 const LIMIT_M_S2: f64 = 0.01;
 
-/// Deviations between which the logarithmic axis runs, m/s²: below is what a
-/// log in steps of 10 µm makes of nothing.
+/// Range of the logarithmic axis of deviations, m/s². Chosen: smaller deviations are due to
+/// the log's resolution of 10 µm.
 const DEVIATIONS_M_S2: (f64, f64) = (1e-5, 10.0);
 
 const AXES: [&str; 2] = ["x axis: qy", "y axis: qx"];
 
-/// Deviations above, enable below; x on the left, y on the right.
-pub(super) fn deviation(name: &str, judged: &Judged) -> Figure {
+/// Draws deviations above, enable below; x on the left, y on the right.
+pub(super) fn deviation(name: &str, judged: &ProfileVerdict) -> Figure {
     let mut panels: Vec<Panel> = [0, 1].map(|i| deviations(&judged.signals, i)).into();
     panels.extend([0, 1].map(|i| enable(&judged.signals, i)));
     let subtitle = format!(
@@ -27,7 +27,7 @@ pub(super) fn deviation(name: &str, judged: &Judged) -> Figure {
     figure
 }
 
-fn deviations(signals: &[Signal], i: usize) -> Panel {
+fn deviations(signals: &[DeviationSignal], i: usize) -> Panel {
     let (low, high) = DEVIATIONS_M_S2;
     let mut panel = Panel::new(
         AXES[i],
@@ -47,7 +47,7 @@ fn deviations(signals: &[Signal], i: usize) -> Panel {
     panel
 }
 
-fn enable(signals: &[Signal], i: usize) -> Panel {
+fn enable(signals: &[DeviationSignal], i: usize) -> Panel {
     let mut panel = Panel::new(
         "",
         plots::time_axis(DURATION_S),
@@ -57,8 +57,8 @@ fn enable(signals: &[Signal], i: usize) -> Panel {
     panel
 }
 
-/// A line that jumps where the signal does.
-fn steps(signals: &[Signal], i: usize) -> Vec<(f64, f64)> {
+/// Returns a line that jumps with the signal.
+fn steps(signals: &[DeviationSignal], i: usize) -> Vec<(f64, f64)> {
     let mut points: Vec<(f64, f64)> = Vec::new();
     for signal in signals {
         let value = if signal.enabled[i] { 1.0 } else { 0.0 };

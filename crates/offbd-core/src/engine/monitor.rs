@@ -1,0 +1,260 @@
+//! One monitor over time: debounce, onset, and updates of the fault memory.
+
+use crate::diagnosis::{
+    Candidate, Debounce, DebounceTimes, Evidence, FaultMemory, Finding, Qualified, ServoAnswer,
+    Settings, Suspicion, Test, Transition,
+};
+#[cfg(not(feature = "std"))]
+use crate::no_std::*;
+use crate::vocabulary::{FaultCode, FaultKind, SimTime};
+
+/// Evidence from which on the monitor is suspicious, as a fraction of what makes the test
+/// fail. Chosen.
+const SUSPICIOUS_WEIGHT: f64 = 0.5;
+
+/// The state of the monitor of one code.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Monitor {
+    debounce: Debounce,
+    /// Evidence as a fraction of what makes the test fail.
+    weight: f64,
+    test: Test,
+    /// Time of this session for which it could judge, s.
+    judged_s: f64,
+    /// Onset of the present failure.
+    since: Option<SimTime>,
+    kind: Option<FaultKind>,
+    rival: Option<Candidate>,
+    /// Largest evidence so far, nats.
+    most_nats: f64,
+    /// Closest approach to a trip by duration of failure, 0 to 1.
+    nearest: f64,
+}
+
+impl Monitor {
+    pub(super) fn counter(&self) -> i8 {
+        // In range by construction.
+        let weighed = (127.0 * self.weight.clamp(0.0, 1.0)) as i8;
+        if self.weight > 0.0 {
+            self.debounce.counter().max(weighed)
+        } else {
+            self.debounce.counter()
+        }
+    }
+
+    pub(super) const fn most_nats(&self) -> f64 {
+        self.most_nats
+    }
+
+    pub(super) const fn nearest(&self) -> f64 {
+        self.nearest
+    }
+
+    pub(super) const fn test(&self) -> Test {
+        self.test
+    }
+
+    pub(super) const fn judged_s(&self) -> f64 {
+        self.judged_s
+    }
+
+    /// Takes the finding for the last `dt` seconds. A servo fails by duration of failure,
+    /// like every monitor, or by evidence, which has been `rising` since a time; it
+    /// passes only if neither is suspicious.
+    pub(super) fn update(
+        &mut self,
+        code: FaultCode,
+        finding: &Finding,
+        at: SimTime,
+        dt: f64,
+        settings: &Settings,
+        rising: Option<SimTime>,
+    ) -> Qualified {
+        self.test = finding.test;
+        if finding.test != Test::NotTested {
+            self.judged_s += dt;
+        }
+        let test = match finding.gone && self.debounce.failed() {
+            true => Test::Prefailed,
+            false => finding.test,
+        };
+        let times = DebounceTimes::of(code, finding.kind, finding.rival.is_some(), settings);
+        let timed = self.debounce.update(test, dt, &times);
+        self.nearest = self.nearest.max(self.debounce.progress(&times));
+        let gathered_s = rising.map_or(0.0, |since| at - since);
+        let weighed = match gathered_s >= settings.gather_s {
+            true => self.weigh(finding, settings),
+            false => Qualified::No,
+        };
+        if timed.max(weighed) >= Qualified::Failed || finding.test == Test::Prefailed {
+            // A deviation shows in the filter half a window after its onset.
+            let filtered = at + -settings.window_s / 2.0;
+            self.since = self.since.or(rising).or(Some(filtered));
+            self.kind = finding.kind.or(self.kind);
+            self.rival = finding.rival;
+        } else if !self.suspicious() {
+            (self.since, self.kind, self.rival) = (None, None, None);
+        }
+        match timed.max(weighed) {
+            Qualified::Passed if self.weight > SUSPICIOUS_WEIGHT => Qualified::No,
+            qualified => qualified,
+        }
+    }
+
+    /// Evaluates the evidence. If the ball has left the plate no more can follow, and
+    /// what suspects the servo confirms its fault.
+    fn weigh(&mut self, finding: &Finding, settings: &Settings) -> Qualified {
+        let Some(nats) = finding.nats else {
+            let failed = finding.gone && self.weight >= 1.0;
+            return if failed { Qualified::Tripped } else { Qualified::No };
+        };
+        self.most_nats = self.most_nats.max(nats);
+        self.weight = nats / settings.suspect_nats;
+        match nats {
+            n if n >= settings.confirm_nats => Qualified::Tripped,
+            n if n >= settings.suspect_nats && finding.gone => Qualified::Tripped,
+            n if n >= settings.suspect_nats => Qualified::Failed,
+            _ => Qualified::No,
+        }
+    }
+
+    fn suspicious(&self) -> bool {
+        self.debounce.suspicious() || self.weight > SUSPICIOUS_WEIGHT
+    }
+
+    /// Withdraws the suspicion: another cause explains the readings.
+    pub(super) fn exonerate(&mut self) {
+        self.debounce.exonerate();
+        self.weight = 0.0;
+        (self.since, self.kind, self.rival) = (None, None, None);
+    }
+
+    /// Updates the fault memory, and emits a transition if the status byte changed.
+    pub(super) fn apply(
+        &self,
+        code: FaultCode,
+        qualified: Qualified,
+        settings: &Settings,
+        evidence: &Evidence,
+        memory: &mut FaultMemory,
+        transitions: &mut Vec<Transition>,
+    ) {
+        let record = memory.record(code);
+        let failing = record.status.test_failed();
+        // A failure that continues from the last session is reported in this one, too.
+        let failed = failing && record.status.failed_this_cycle();
+        match qualified {
+            Qualified::No => {}
+            Qualified::Passed => {
+                if memory.passed(code) && failing {
+                    self.announce(code, evidence, memory, transitions);
+                }
+            }
+            Qualified::Failed if failed => self.name(code, evidence, memory, transitions),
+            Qualified::Failed => self.fail(code, evidence, memory, transitions),
+            Qualified::Tripped if failed && record.tripped_this_cycle => {
+                self.name(code, evidence, memory, transitions);
+            }
+            Qualified::Tripped => {
+                if !failed {
+                    self.fail(code, evidence, memory, transitions);
+                }
+                if memory.trip(code, &self.suspicion(code, evidence), &settings.memory) {
+                    self.announce(code, evidence, memory, transitions);
+                }
+            }
+        }
+    }
+
+    fn fail(
+        &self,
+        code: FaultCode,
+        evidence: &Evidence,
+        memory: &mut FaultMemory,
+        transitions: &mut Vec<Transition>,
+    ) {
+        if memory.failed(code, &self.suspicion(code, evidence), evidence) {
+            self.announce(code, evidence, memory, transitions);
+        }
+    }
+
+    /// Reports the kind of a fault that was confirmed before its kind was known.
+    fn name(
+        &self,
+        code: FaultCode,
+        evidence: &Evidence,
+        memory: &mut FaultMemory,
+        transitions: &mut Vec<Transition>,
+    ) {
+        let unnamed = self.kind.is_some() && memory.record(code).kind().is_none();
+        if unnamed && memory.set_kind(code, &self.suspicion(code, evidence)) {
+            self.announce(code, evidence, memory, transitions);
+        }
+    }
+
+    /// The present suspicion.
+    fn suspicion(&self, code: FaultCode, evidence: &Evidence) -> Suspicion {
+        let candidates = match (self.rival, code.axis()) {
+            (Some(rival), _) => {
+                let own = Candidate { code, kind: self.kind, weight: 1.0 - rival.weight };
+                let own_first = own.weight >= rival.weight;
+                if own_first { vec![own, rival] } else { vec![rival, own] }
+            }
+            (None, Some(axis)) => kinds(code, evidence.axes[axis].answer),
+            (None, None) => Vec::new(),
+        };
+        Suspicion { onset: self.since, kind: self.kind, candidates }
+    }
+
+    fn announce(
+        &self,
+        code: FaultCode,
+        evidence: &Evidence,
+        memory: &FaultMemory,
+        transitions: &mut Vec<Transition>,
+    ) {
+        let Some(at) = evidence.at else { return };
+        transitions.push(transition(code, at, evidence, memory));
+    }
+}
+
+/// Least likelihood of a kind to be listed as a candidate. Chosen.
+const LEAST_LIKELIHOOD: f64 = 0.05;
+
+/// Returns the possible kinds of a servo fault, the likeliest first; empty if there is
+/// only one.
+fn kinds(code: FaultCode, answer: Option<ServoAnswer>) -> Vec<Candidate> {
+    let Some(answer) = answer else { return Vec::new() };
+    let mut found: Vec<Candidate> = answer
+        .kinds()
+        .filter(|&(_, weight)| weight >= LEAST_LIKELIHOOD)
+        .map(|(kind, weight)| Candidate { code, kind: Some(kind), weight })
+        .collect();
+    if found.len() < 2 {
+        return Vec::new();
+    }
+    let sum: f64 = found.iter().map(|c| c.weight).sum();
+    for candidate in &mut found {
+        candidate.weight /= sum;
+    }
+    found.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+    found
+}
+
+/// Returns the transition to the present record of `code` in `memory`.
+pub(super) fn transition(
+    code: FaultCode,
+    at: SimTime,
+    evidence: &Evidence,
+    memory: &FaultMemory,
+) -> Transition {
+    let record = memory.record(code);
+    Transition {
+        at,
+        code,
+        status: record.word(),
+        byte: record.status,
+        suspicion: record.suspicion.clone().unwrap_or_default(),
+        evidence: evidence.clone(),
+    }
+}

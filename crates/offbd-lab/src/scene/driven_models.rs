@@ -1,0 +1,133 @@
+//! The models as systems of differential equations on a driven plate.
+
+use super::drive::{Drive, DrivenPlate};
+use crate::methods::Stiff;
+use crate::models::{Compliant, Creeping};
+use offbd_core::maths::System;
+use offbd_core::plant::{Motion, Phase, PlateMotion, Rolling, Sliding};
+
+/// A model on a driven plate: a system whose state represents a motion.
+pub(super) trait DrivenModel<const N: usize>: System<N> {
+    /// Whether accelerations are continuous within a piece; a stiff contact makes them
+    /// jump.
+    const SMOOTH: bool;
+
+    /// Returns the motion that the state `y` represents at time `t`.
+    fn motion(&self, t: f64, y: &[f64; N]) -> Motion;
+}
+
+/// A model of a ball that stays on the plate and does not slip, except by creep.
+pub(super) trait RollingModel {
+    /// Returns the derivatives of the state (x, y, two velocities as the model defines
+    /// them, wz).
+    fn rate(&self, y: &[f64; 5], plate: &PlateMotion) -> [f64; 5];
+
+    /// Returns the state for a ball in the motion `from`.
+    fn enter(&self, from: &Motion, plate: &PlateMotion) -> [f64; 5];
+
+    /// Returns the motion of the ball in the state `y`.
+    fn leave(&self, y: &[f64; 5], plate: &PlateMotion) -> Motion;
+}
+
+impl RollingModel for Rolling {
+    #[inline]
+    fn rate(&self, y: &[f64; 5], plate: &PlateMotion) -> [f64; 5] {
+        self.rate(y, plate)
+    }
+
+    fn enter(&self, from: &Motion, _: &PlateMotion) -> [f64; 5] {
+        self.enter(from)
+    }
+
+    fn leave(&self, y: &[f64; 5], _: &PlateMotion) -> Motion {
+        self.leave(y)
+    }
+}
+
+impl RollingModel for Creeping {
+    #[inline]
+    fn rate(&self, y: &[f64; 5], plate: &PlateMotion) -> [f64; 5] {
+        self.rate(y, plate).0
+    }
+
+    fn enter(&self, from: &Motion, plate: &PlateMotion) -> [f64; 5] {
+        self.enter(from, plate)
+    }
+
+    fn leave(&self, y: &[f64; 5], plate: &PlateMotion) -> Motion {
+        self.leave(y, plate)
+    }
+}
+
+pub(super) struct DrivenRolling<'a, M, D> {
+    pub model: &'a M,
+    pub plate: DrivenPlate<'a, D>,
+}
+
+impl<M: RollingModel, D: Drive> System<5> for DrivenRolling<'_, M, D> {
+    const POSITIONS: usize = 2;
+
+    #[inline]
+    fn rate(&self, t: f64, y: &[f64; 5]) -> [f64; 5] {
+        self.model.rate(y, &self.plate.at(t))
+    }
+}
+
+impl<M: RollingModel, D: Drive> DrivenModel<5> for DrivenRolling<'_, M, D> {
+    const SMOOTH: bool = true;
+
+    fn motion(&self, t: f64, y: &[f64; 5]) -> Motion {
+        self.model.leave(y, &self.plate.at(t))
+    }
+}
+
+pub(super) struct DrivenSliding<'a, D> {
+    pub model: &'a Sliding,
+    pub phase: Phase,
+    pub plate: DrivenPlate<'a, D>,
+}
+
+impl<D: Drive> System<9> for DrivenSliding<'_, D> {
+    const POSITIONS: usize = 3;
+
+    #[inline]
+    fn rate(&self, t: f64, y: &[f64; 9]) -> [f64; 9] {
+        self.model.rate(&self.phase, y, &self.plate.at(t))
+    }
+}
+
+impl<D: Drive> DrivenModel<9> for DrivenSliding<'_, D> {
+    const SMOOTH: bool = true;
+
+    fn motion(&self, _: f64, y: &[f64; 9]) -> Motion {
+        Motion::from_row(y)
+    }
+}
+
+pub(super) struct DrivenCompliant<'a, D> {
+    pub model: &'a Compliant,
+    pub plate: DrivenPlate<'a, D>,
+}
+
+impl<D: Drive> System<9> for DrivenCompliant<'_, D> {
+    const POSITIONS: usize = 3;
+
+    #[inline]
+    fn rate(&self, t: f64, y: &[f64; 9]) -> [f64; 9] {
+        self.model.rate(y, &self.plate.at(t))
+    }
+}
+
+impl<D: Drive> Stiff<9> for DrivenCompliant<'_, D> {
+    fn jacobian(&self, t: f64, y: &[f64; 9]) -> [[f64; 9]; 9] {
+        self.model.jacobian(y, &self.plate.at(t))
+    }
+}
+
+impl<D: Drive> DrivenModel<9> for DrivenCompliant<'_, D> {
+    const SMOOTH: bool = false;
+
+    fn motion(&self, _: f64, y: &[f64; 9]) -> Motion {
+        Motion::from_row(y)
+    }
+}

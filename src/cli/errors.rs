@@ -1,0 +1,34 @@
+//! Errors with their own exit code: unusable input (3), and arguments that do not fit
+//! together (2).
+
+use std::fmt::Display;
+use std::path::Path;
+
+/// An input that cannot be used, and the reason.
+#[derive(Debug, thiserror::Error)]
+#[error("{input}: {reason}")]
+pub(super) struct InputError {
+    input: String,
+    reason: String,
+}
+
+impl InputError {
+    pub(super) fn new(input: impl Display, reason: impl Display) -> Self {
+        Self { input: input.to_string(), reason: reason.to_string() }
+    }
+
+    /// An error of the file at `path`.
+    pub(super) fn file(path: &Path, reason: impl Display) -> Self {
+        Self::new(path.display(), reason)
+    }
+}
+
+/// Arguments that are valid on their own, but do not fit together or to the input.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub(super) struct BadArgument(pub String);
+
+/// Reads the file at `path`.
+pub(super) fn read(path: &Path) -> Result<Vec<u8>, InputError> {
+    std::fs::read(path).map_err(|e| InputError::file(path, e))
+}

@@ -1,0 +1,28 @@
+//! A loaded asset.
+
+use super::learning_record::LearningRecord;
+use super::session::OpenSession;
+use crate::service::writing::EngineGeneration;
+use crate::store::AssetRow;
+use crate::wire::stored::StoredProvenance;
+use offbd_core::diagnosis::FaultMemory;
+use offbd_core::engine::Rig;
+use offbd_core::vocabulary::FaultCode;
+
+/// The provenance of each code's fault memory entry, in the order of [`FaultCode::ALL`].
+pub(super) type Provenance = [StoredProvenance; FaultCode::COUNT];
+
+/// An asset that is loaded on its shard.
+pub(super) struct Asset {
+    pub(super) row: AssetRow,
+    pub(super) rig: Rig,
+    /// The fault memory as last written.
+    pub(super) memory: FaultMemory,
+    /// The provenance of its entries, as last written.
+    pub(super) provenance: Provenance,
+    pub(super) open: Option<OpenSession>,
+    /// The progress of the automatic calibration.
+    pub(super) learning: LearningRecord,
+    pub(super) generation: EngineGeneration,
+    pub(super) deleted: bool,
+}

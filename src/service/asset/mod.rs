@@ -1,0 +1,37 @@
+//! The asset as an actor: its commands ([`AssetCommand`]), the threads that execute them
+//! ([`Shards`]), and its state: the rig, the fault memory, the open session with the
+//! engine, and the progress of its automatic calibration.
+//!
+//! Nothing here writes to the store: the changes that result from a command are collected
+//! in a [`turn::Turn`] and handed to the writer. The reply is sent once they are durable.
+//!
+//! - `command`, `shard`, `turn`: commands, the threads, the execution of a command.
+//! - `actor`, `load`, `state`: the asset, loading it from the store, queries.
+//! - `ingest`, `sessions`, `session`, `recent`: samples, sessions, the engine of a session.
+//! - `memory`, `trend`: the fault memory, servo estimates over the sessions.
+//! - `learning`, `learning_record`: automatic calibration.
+//! - `registry`, `presence`: the asset file, the time of the last telemetry.
+
+mod actor;
+mod command;
+mod ingest;
+mod learning;
+mod learning_record;
+mod load;
+mod memory;
+mod presence;
+mod recent;
+mod registry;
+mod session;
+mod sessions;
+mod shard;
+mod state;
+mod trend;
+mod turn;
+
+pub(super) use command::{Answer, AssetCommand, Reply};
+pub(super) use learning_record::{LearningRecord, TrainingSession};
+pub(super) use presence::Presences;
+pub(super) use shard::Shards;
+pub(super) use trend::{MAX_ROWS as MAX_TREND_ROWS, TrendPoint, points as trend_points};
+pub(super) use turn::Environment;

@@ -1,0 +1,71 @@
+//! When telemetry of each asset last arrived, for the fleet overview. Kept only in memory:
+//! lost by a restart, and set again by the next batch.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use crate::store::Micros;
+
+/// The last telemetry of one asset.
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::service) struct Presence {
+    session: String,
+    pub(in crate::service) seen_at: Micros,
+    /// Lag of the last batch behind the fastest batch of the session, s.
+    pub(in crate::service) lag_s: f64,
+    /// Smallest difference of arrival time and device clock in the session, s.
+    least_offset_s: f64,
+}
+
+/// The presence of every asset that has sent telemetry.
+#[derive(Clone, Debug, Default)]
+pub(in crate::service) struct Presences {
+    by_asset: Arc<Mutex<BTreeMap<String, Presence>>>,
+}
+
+impl Presences {
+    fn lock(&self) -> MutexGuard<'_, BTreeMap<String, Presence>> {
+        self.by_asset.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Records that a batch of `session`, whose last sample has the time `t_s`, arrived at
+    /// `at`.
+    pub(in crate::service) fn record(&self, asset: &str, session: &str, at: Micros, t_s: f64) {
+        let offset_s = at as f64 / 1e6 - t_s;
+        let mut all = self.lock();
+        let before = all.get(asset).filter(|before| before.session == session);
+        let least_offset_s = before.map_or(offset_s, |before| before.least_offset_s.min(offset_s));
+        let lag_s = offset_s - least_offset_s;
+        let session = session.to_owned();
+        let presence = Presence { session, seen_at: at, lag_s, least_offset_s };
+        all.insert(asset.to_owned(), presence);
+    }
+
+    pub(in crate::service) fn of(&self, asset: &str) -> Option<Presence> {
+        self.lock().get(asset).cloned()
+    }
+
+    pub(in crate::service) fn remove(&self, asset: &str) {
+        self.lock().remove(asset);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lag_is_measured_against_the_fastest_batch_of_the_session() {
+        let presences = Presences::default();
+        let lag_s = |at_s: f64, t_s: f64, session: &str| {
+            presences.record("a", session, (at_s * 1e6) as Micros, t_s);
+            presences.of("a").unwrap().lag_s
+        };
+        assert!(lag_s(1000.5, 0.5, "one").abs() < 1e-6);
+        assert!((lag_s(1003.5, 1.0, "one") - 2.5).abs() < 1e-6, "3 s for 0.5 s of samples");
+        assert!(lag_s(1003.6, 3.7, "one").abs() < 1e-6, "the fastest so far");
+        assert!(lag_s(2000.0, 0.0, "two").abs() < 1e-6, "another session, another clock");
+        presences.remove("a");
+        assert_eq!(presences.of("a"), None);
+    }
+}

@@ -1,0 +1,151 @@
+//! Opening, ending and deleting the sessions of an asset.
+
+use uuid::Uuid;
+
+use super::actor::Asset;
+use super::session::OpenSession;
+use super::trend;
+use super::turn::Turn;
+use crate::service::clock::rfc3339;
+use crate::service::limits::check_session_name;
+use crate::service::{ServiceError, views};
+use crate::store::{SessionProgress, SessionRow, Write};
+use crate::wire::asset;
+use crate::wire::stored::StoredMemory;
+use crate::wire::words::SessionState;
+use offbd_core::engine::{Input, Setup};
+
+/// The result of switching to the session that a batch names.
+pub(super) enum SessionSwitch {
+    /// The session is open now.
+    Open,
+    /// The session ended earlier.
+    Ended(Box<SessionRow>),
+}
+
+impl Asset {
+    /// Ends the open session and opens a new one, for live samples or, with `importing`, for
+    /// a recording; returns its id. Without a name it is named by the current time.
+    pub(super) fn open_session(
+        &mut self,
+        name: Option<String>,
+        importing: bool,
+        turn: &mut Turn<'_>,
+    ) -> Result<String, ServiceError> {
+        if self.open.as_ref().is_some_and(|open| open.importing) {
+            let what = "a recording is being imported into this asset";
+            return Err(ServiceError::Busy { what });
+        }
+        let name = name.unwrap_or_else(|| rfc3339(turn.at));
+        let open = self.open.as_ref().is_some_and(|open| open.name == name);
+        if open || matches!(self.switch(&name, turn)?, SessionSwitch::Ended(_)) {
+            let asset = self.row.name.clone();
+            return Err(ServiceError::SessionExists { asset, name });
+        }
+        let Some(open) = &mut self.open else {
+            return Err(ServiceError::Unavailable { what: "the session could not be opened" });
+        };
+        open.importing = importing;
+        Ok(open.id.clone())
+    }
+
+    /// Ends the session `id` if it is open.
+    pub(super) fn end_session(
+        &mut self,
+        id: &str,
+        turn: &mut Turn<'_>,
+    ) -> Result<(), ServiceError> {
+        if self.open.as_ref().is_some_and(|open| open.id == id) {
+            self.end(turn)?;
+        }
+        Ok(())
+    }
+
+    /// Hides the session `id`, whose data are deleted later, and ends it if it is open.
+    pub(super) fn delete_session(
+        &mut self,
+        id: String,
+        turn: &mut Turn<'_>,
+    ) -> Result<(), ServiceError> {
+        let open = self.open.as_ref().is_some_and(|open| open.id == id);
+        if self.learning.remove(&id, open) {
+            self.write_learning(turn)?;
+        }
+        if open {
+            self.end(turn)?;
+        }
+        turn.writes.push(Write::HideSession { session: id, at: turn.at });
+        Ok(())
+    }
+
+    /// Opens the session `name` if it is not open, and ends the one that was open.
+    pub(super) fn switch(
+        &mut self,
+        name: &str,
+        turn: &mut Turn<'_>,
+    ) -> Result<SessionSwitch, ServiceError> {
+        if self.open.as_ref().is_some_and(|open| open.name == name) {
+            return Ok(SessionSwitch::Open);
+        }
+        check_session_name(name)?;
+        let handles = &turn.env.handles;
+        handles.fence()?;
+        if let Some(row) = handles.wait(handles.store.session_named(&self.row.name, name))? {
+            return Ok(SessionSwitch::Ended(Box::new(row)));
+        }
+        self.end(turn)?;
+        self.open(name.to_owned(), turn)?;
+        Ok(SessionSwitch::Open)
+    }
+
+    /// Opens a session. No session must be open.
+    fn open(&mut self, name: String, turn: &mut Turn<'_>) -> Result<(), ServiceError> {
+        let id = Uuid::now_v7().to_string();
+        let setup = Setup::new(self.rig.clone(), None)?;
+        turn.writes.push(Write::OpenSession(SessionRow {
+            id: id.clone(),
+            asset: self.row.name.clone(),
+            name: name.clone(),
+            state: SessionState::Open.to_string(),
+            opened_at: turn.at,
+            ended_at: None,
+            setup: views::to_json(&asset::view(&self.rig))?,
+            baseline: views::to_json(&StoredMemory::of(&self.memory))?,
+            progress: SessionProgress::default(),
+            verdict: None,
+            verdict_hash: None,
+        }));
+        let refines = self.learning.refines();
+        self.open = Some(OpenSession::new(id, name, setup, self.memory.clone(), refines));
+        self.write_memory(None, turn)
+    }
+
+    /// Opens a session named by the current time.
+    pub(super) fn open_nameless(&mut self, turn: &mut Turn<'_>) -> Result<(), ServiceError> {
+        self.open(rfc3339(turn.at), turn)
+    }
+
+    /// Ends the open session, if there is one: finalizes its verdict, trends and fault
+    /// memory.
+    pub(super) fn end(&mut self, turn: &mut Turn<'_>) -> Result<(), ServiceError> {
+        let Some(mut open) = self.open.take() else { return Ok(()) };
+        turn.engine_changed = true;
+        open.judging.input(Input::End);
+        open.report(&self.row.name, turn.at, &mut turn.writes)?;
+        let summary = open.summary();
+        turn.writes.push(Write::EndSession {
+            session: open.id.clone(),
+            ended_at: turn.at,
+            verdict: views::to_json(&summary)?,
+            hash: summary.verdict_hash.clone(),
+        });
+        let mut trends = trend::ended(&self.row.name, &open, turn)?;
+        let warns = |write: &Write| matches!(write, Write::Trend(row) if row.warnings.is_some());
+        let has_warning = trends.iter().any(warns);
+        turn.writes.append(&mut trends);
+        self.gather(&open, &summary, has_warning, turn)?;
+        let memory = open.judging.engine().memory().clone();
+        self.replace_memory(memory, Some(&open.occurrence(turn.at)), None, turn)?;
+        self.learn_if_due(turn)
+    }
+}

@@ -1,0 +1,152 @@
+//! The trace of a session, for plots: evaluates the recording again and keeps a limited
+//! number of points.
+
+use std::ops::ControlFlow;
+
+use crate::judging::Judging;
+use crate::service::playback::play;
+use crate::service::replay_settings;
+use crate::service::writing::Handles;
+use crate::service::{ServiceError, views};
+use crate::store::SessionRow;
+use crate::wire::service::ReplaySettingsView;
+use crate::wire::trace::{TracePoint, TraceView};
+use offbd_core::engine::Input;
+
+/// Limit of the samples of a session, which take several seconds of one core. A request for
+/// a longer session is refused.
+pub(in crate::service) const MAX_EVALUATED: i64 = 2_000_000;
+
+/// Limit of the points of a trace; a range with more points is decimated.
+pub const MAX_TRACE_POINTS: u32 = 20_000;
+
+/// The time range, the number of points and the settings of a trace.
+#[derive(Clone, Debug)]
+pub struct TraceQuery {
+    /// Start on the device's clock, s.
+    pub from_s: f64,
+    /// End on the device's clock, s.
+    pub to_s: f64,
+    /// Limit of points.
+    pub points: u32,
+    pub settings: ReplaySettingsView,
+}
+
+/// Computes the trace of `session`; ends early if the service shuts down.
+pub(in crate::service) fn trace(
+    handles: &Handles,
+    session: &SessionRow,
+    query: &TraceQuery,
+) -> Result<TraceView, ServiceError> {
+    let setup = replay_settings::setup(session, &query.settings, None)?;
+    let expected = expected_points(session, query, setup.settings.period_s);
+    let mut judging = Judging::new(setup, views::memory(&session.baseline)?);
+    let mut decimator = Decimator::new(query.points, expected);
+    play(handles, &session.id, |input| {
+        let is_sample = matches!(input, Input::Sample(_));
+        judging.input(input);
+        let point = is_sample.then(|| TracePoint::of(&judging.engine().state())).flatten();
+        let Some(point) = point.filter(|point| point.t_s() >= query.from_s) else {
+            return match handles.closing.is_cancelled() {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
+            };
+        };
+        if point.t_s() > query.to_s || handles.closing.is_cancelled() {
+            return ControlFlow::Break(());
+        }
+        decimator.push(point);
+        ControlFlow::Continue(())
+    })?;
+    Ok(decimator.view())
+}
+
+/// Returns the expected number of points in the range, assuming evenly spaced samples and
+/// evidence that is renewed every `period_s`.
+fn expected_points(session: &SessionRow, query: &TraceQuery, period_s: f64) -> f64 {
+    let progress = session.progress;
+    let (first, last) = (progress.first_t_s.unwrap_or(0.0), progress.last_t_s.unwrap_or(0.0));
+    let range_s = (query.to_s.min(last) - query.from_s.max(first)).max(0.0);
+    let share = if last > first { range_s / (last - first) } else { 1.0 };
+    let n_samples = progress.n_samples as f64 * share;
+    if period_s > 0.0 { n_samples.min(range_s / period_s) } else { n_samples }
+}
+
+/// Decimates a stream of points of unknown length evenly, independently of their times:
+/// keeps every n-th point; when it is full, it drops every other point and doubles n.
+struct Decimator {
+    points: Vec<TracePoint>,
+    limit: usize,
+    stride: u64,
+    n_seen: u64,
+}
+
+impl Decimator {
+    /// Keeps at most `limit` points, 1 to [`MAX_TRACE_POINTS`], of about `expected`.
+    fn new(limit: u32, expected: f64) -> Self {
+        let limit = limit.clamp(1, MAX_TRACE_POINTS);
+        let stride = (expected / f64::from(limit)).ceil().max(1.0) as u64;
+        Self { points: Vec::new(), limit: limit as usize, stride, n_seen: 0 }
+    }
+
+    /// Adds the next point; one that is not later than the last is ignored.
+    fn push(&mut self, point: TracePoint) {
+        if self.points.last().is_some_and(|last| last.t_s() >= point.t_s()) {
+            return;
+        }
+        let n_seen = self.n_seen;
+        self.n_seen += 1;
+        if n_seen.is_multiple_of(self.stride) && self.points.len() == self.limit {
+            let mut keep = [false, true].into_iter().cycle();
+            self.points.retain(|_| keep.next() == Some(false));
+            self.stride *= 2;
+        }
+        if n_seen.is_multiple_of(self.stride) && self.points.len() < self.limit {
+            self.points.push(point);
+        }
+    }
+
+    fn view(&self) -> TraceView {
+        let mut view = TraceView::default();
+        self.points.iter().for_each(|point| view.push(point));
+        view
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use offbd_core::diagnosis::Evidence;
+    use offbd_core::engine::State;
+    use offbd_core::vocabulary::SimTime;
+    use proptest::prelude::*;
+
+    fn thinned(most: u32, times_s: impl Iterator<Item = f64>) -> Vec<f64> {
+        let mut decimator = Decimator::new(most, 0.0);
+        for t_s in times_s {
+            let at = SimTime::new(t_s);
+            let evidence = Evidence { at, ..Evidence::default() };
+            let state = State { at, evidence, ..State::default() };
+            decimator.push(TracePoint::of(&state).unwrap());
+        }
+        decimator.view().t_s
+    }
+
+    #[test]
+    fn a_gap_in_time_does_not_increase_the_number_of_points() {
+        let dense = (0..10_000).map(|i| f64::from(i) * 0.01);
+        let all = thinned(500, dense.chain([1e9]));
+        assert!((250..=500).contains(&all.len()), "{}", all.len());
+    }
+
+    proptest! {
+        #[test]
+        fn the_points_are_within_the_limit_and_evenly_spread(most in 1..60_u32, n in 1..2000_u32) {
+            let kept = thinned(most, (0..n).map(f64::from));
+            prop_assert!(kept.len() <= most as usize);
+            prop_assert!(kept.len() >= (n.min(most) as usize).div_ceil(2));
+            let steps: Vec<f64> = kept.windows(2).map(|w| w[1] - w[0]).collect();
+            prop_assert!(steps.windows(2).all(|w| w[0] == w[1]), "{:?}", kept);
+        }
+    }
+}

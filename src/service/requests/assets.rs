@@ -1,0 +1,133 @@
+//! The registry of assets.
+
+use crate::service::asset::AssetCommand;
+use crate::service::{Service, ServiceError, views};
+use crate::wire::asset::{self, AssetView};
+use crate::wire::service::{Page, StateView, WatchView};
+use offbd_core::engine::Rig;
+use offbd_core::vocabulary::Invalid;
+
+/// Parses an asset file. An error of the JSON syntax has an empty pointer, because it
+/// concerns the whole document.
+fn parse(document: &[u8]) -> Result<Rig, Invalid> {
+    let json = serde_json::from_slice::<serde::de::IgnoredAny>(document);
+    json.map_err(|error| Invalid::new("", error.to_string()))?;
+    asset::parse(document)
+}
+
+impl Service {
+    /// Returns the asset file of `name`.
+    ///
+    /// # Errors
+    /// [`ServiceError::UnknownAsset`].
+    pub async fn asset(&self, name: &str) -> Result<AssetView, ServiceError> {
+        let row = self.inner.handles.store.asset(name).await?;
+        let row = row.ok_or_else(|| ServiceError::UnknownAsset { name: name.to_owned() })?;
+        views::from_json(&row.document)
+    }
+
+    /// Returns a page of asset files, sorted by name.
+    ///
+    /// # Errors
+    /// [`ServiceError::Invalid`] for an invalid cursor.
+    pub async fn assets(
+        &self,
+        cursor: Option<&str>,
+        limit: u32,
+    ) -> Result<Page<AssetView>, ServiceError> {
+        let after = cursor.map(views::cursor::<String>).transpose()?.unwrap_or_default();
+        let rows = self.inner.handles.store.assets(&after, limit + 1).await?;
+        views::page(rows, limit, |row| row.name.clone(), |row| views::from_json(&row.document))
+    }
+
+    /// Registers an asset.
+    ///
+    /// # Errors
+    /// [`ServiceError::Invalid`] with the invalid element of the asset file;
+    /// [`ServiceError::AssetExists`]; [`ServiceError::RegistryFull`].
+    pub async fn create_asset(&self, document: &[u8]) -> Result<AssetView, ServiceError> {
+        let rig = parse(document)?;
+        self.create(&rig).await?;
+        Ok(asset::view(&rig))
+    }
+
+    async fn create(&self, rig: &Rig) -> Result<(), ServiceError> {
+        let limit = self.inner.limits.assets;
+        let n_assets = self.inner.handles.store.n_assets().await?;
+        if usize::try_from(n_assets).is_ok_and(|n| n >= limit) {
+            return Err(ServiceError::RegistryFull { limit });
+        }
+        let document = views::to_json(&asset::view(rig))?;
+        self.inner.shards.call(&rig.name, |reply| AssetCommand::Create { document, reply }).await
+    }
+
+    /// Replaces the asset file of `name`, or registers the asset; returns the file and
+    /// whether the asset is new. An open session keeps the file that it started with; the
+    /// next one uses the new file.
+    ///
+    /// # Errors
+    /// [`ServiceError::Invalid`] with the invalid element, `/name` if it differs from
+    /// `name`.
+    pub async fn put_asset(
+        &self,
+        name: &str,
+        document: &[u8],
+    ) -> Result<(AssetView, bool), ServiceError> {
+        let rig = parse(document)?;
+        if rig.name != name {
+            let reason = format!("`{}` differs from `{name}` in the path", rig.name);
+            return Err(Invalid::new("/name", reason).into());
+        }
+        let view = asset::view(&rig);
+        let replace = |reply| AssetCommand::Replace { rig: Box::new(rig.clone()), reply };
+        match self.inner.shards.call(name, replace).await {
+            Ok(()) => Ok((view, false)),
+            Err(ServiceError::UnknownAsset { .. }) => {
+                self.create(&rig).await?;
+                Ok((view, true))
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Deletes an asset with its sessions, recordings and faults, and revokes the tokens
+    /// of its devices. The asset is hidden immediately; its data are deleted in parts, even
+    /// if the caller is dropped. Its name cannot be used again before the deletion is
+    /// complete.
+    ///
+    /// # Errors
+    /// [`ServiceError::UnknownAsset`], also while it is being deleted;
+    /// [`ServiceError::NotStored`] if the store does not accept a part; the next sweep of
+    /// retention continues the deletion.
+    pub async fn delete_asset(&self, name: &str) -> Result<(), ServiceError> {
+        let (this, name) = (self.clone(), name.to_owned());
+        let deletion = async move {
+            this.inner.shards.call(&name, |reply| AssetCommand::Delete { reply }).await?;
+            this.inner.principals.clear();
+            this.inner.deleter.asset(&name).await
+        };
+        self.inner.deleter.run_to_completion(deletion).await
+    }
+
+    /// Returns the state of the twin of `name`, including samples that are not durable yet.
+    ///
+    /// # Errors
+    /// [`ServiceError::UnknownAsset`].
+    pub async fn state(&self, name: &str) -> Result<StateView, ServiceError> {
+        self.inner.shards.call(name, |reply| AssetCommand::State { reply }).await
+    }
+
+    /// Returns the state of the twin, and the trace after the first `seen` points of the
+    /// session with the id `session`.
+    ///
+    /// # Errors
+    /// [`ServiceError::UnknownAsset`].
+    pub async fn watch(
+        &self,
+        name: &str,
+        session: Option<String>,
+        seen: u64,
+    ) -> Result<WatchView, ServiceError> {
+        self.inner.shards.call(name, |reply| AssetCommand::Watch { session, seen, reply }).await
+    }
+}

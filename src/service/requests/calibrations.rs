@@ -1,0 +1,124 @@
+//! Starting, listing and activating calibrations.
+
+use uuid::Uuid;
+
+use crate::service::asset::AssetCommand;
+use crate::service::clock::rfc3339;
+use crate::service::job::Job;
+use crate::service::limits::MAX_CALIBRATION_SESSIONS;
+use crate::service::{Service, ServiceError, views};
+use crate::store::{CalibrationRow, Write};
+use crate::wire::service::{CalibrationJobView, Page};
+use crate::wire::words::JobState;
+use offbd_core::vocabulary::Invalid;
+
+impl Service {
+    /// Queues a job that calibrates `asset` from its `sessions`.
+    ///
+    /// # Errors
+    /// [`ServiceError::Invalid`] for a session of another asset; [`ServiceError::Busy`].
+    pub async fn calibrate(
+        &self,
+        asset: &str,
+        sessions: Vec<String>,
+    ) -> Result<CalibrationJobView, ServiceError> {
+        self.asset(asset).await?;
+        if !(1..=MAX_CALIBRATION_SESSIONS).contains(&sessions.len()) {
+            let reason = format!("must name 1 to {MAX_CALIBRATION_SESSIONS} sessions");
+            return Err(Invalid::new("/sessions", reason).into());
+        }
+        for (i, id) in sessions.iter().enumerate() {
+            let row = self.inner.handles.store.session(id).await?;
+            if row.is_none_or(|row| row.asset != asset) {
+                let reason = format!("asset `{asset}` has no session `{id}`");
+                return Err(Invalid::new(format!("/sessions/{i}"), reason).into());
+            }
+        }
+        let permit = self.reserve_job()?;
+        let row = CalibrationRow {
+            id: Uuid::now_v7().to_string(),
+            asset: asset.to_owned(),
+            state: JobState::Queued.to_string(),
+            sessions: views::to_json(&sessions)?,
+            made_at: self.inner.handles.clock.now(),
+            active: 0,
+            document: None,
+            error: None,
+        };
+        self.inner.handles.write(Write::PutCalibration(row.clone())).await?;
+        permit.send(Job::Calibration(row.id.clone()));
+        view(row)
+    }
+
+    /// Returns a calibration.
+    ///
+    /// # Errors
+    /// [`ServiceError::UnknownCalibration`].
+    pub async fn calibration(
+        &self,
+        asset: &str,
+        id: &str,
+    ) -> Result<CalibrationJobView, ServiceError> {
+        view(self.calibration_row(asset, id).await?)
+    }
+
+    pub(in crate::service) async fn calibration_row(
+        &self,
+        asset: &str,
+        id: &str,
+    ) -> Result<CalibrationRow, ServiceError> {
+        let row = self.inner.handles.store.calibration(id).await?.filter(|row| row.asset == asset);
+        let (asset, id) = (asset.to_owned(), id.to_owned());
+        row.ok_or(ServiceError::UnknownCalibration { asset, id })
+    }
+
+    /// Returns a page of the calibrations of `asset`, newest first.
+    ///
+    /// # Errors
+    /// [`ServiceError::UnknownAsset`]; [`ServiceError::Invalid`] for an invalid cursor.
+    pub async fn calibrations(
+        &self,
+        asset: &str,
+        cursor: Option<&str>,
+        limit: u32,
+    ) -> Result<Page<CalibrationJobView>, ServiceError> {
+        self.asset(asset).await?;
+        let before = cursor.map(views::cursor::<(i64, String)>).transpose()?;
+        let before = before.as_ref().map(|(made_at, id)| (*made_at, id.as_str()));
+        let rows = self.inner.handles.store.calibrations(asset, before, limit + 1).await?;
+        views::page(rows, limit, |row| (row.made_at, row.id.clone()), view)
+    }
+
+    /// Writes a calibration to the asset file. An open session keeps the calibration that
+    /// it started with; the next one uses the new one.
+    ///
+    /// # Errors
+    /// [`ServiceError::UnknownCalibration`]; [`ServiceError::NotDone`].
+    pub async fn activate_calibration(
+        &self,
+        asset: &str,
+        id: &str,
+    ) -> Result<CalibrationJobView, ServiceError> {
+        let row = self.calibration_row(asset, id).await?;
+        let Some(document) = row.document else {
+            return Err(ServiceError::NotDone { id: row.id, state: row.state });
+        };
+        let (id, calibration) = (row.id.clone(), Box::new(views::from_json(&document)?));
+        let activate = |reply| AssetCommand::Activate { id, calibration, reply };
+        self.inner.shards.call(asset, activate).await?;
+        self.calibration(asset, &row.id).await
+    }
+}
+
+fn view(row: CalibrationRow) -> Result<CalibrationJobView, ServiceError> {
+    Ok(CalibrationJobView {
+        id: row.id,
+        asset: row.asset,
+        state: views::word(&row.state)?,
+        sessions: views::from_json(&row.sessions)?,
+        made_at: rfc3339(row.made_at),
+        active: row.active != 0,
+        calibration: row.document.as_deref().map(views::from_json).transpose()?,
+        error: row.error,
+    })
+}

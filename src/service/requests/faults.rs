@@ -1,0 +1,138 @@
+//! The fault memory, of one asset and of the fleet.
+
+use crate::service::asset::AssetCommand;
+use crate::service::{Service, ServiceError, views};
+use crate::store::{FaultFilter, FaultOrder};
+use crate::wire::service::{FaultEntryView, MonitorView, Page};
+use crate::wire::words::{CodeWord, FaultSort, StatusFilter, StatusWord};
+use offbd_core::vocabulary::FaultCode;
+
+/// Returns the statuses that `filter` selects; an empty list selects all.
+fn statuses(filter: StatusFilter) -> Vec<&'static str> {
+    match filter {
+        StatusFilter::Active => vec![StatusWord::Pending.as_str(), StatusWord::Confirmed.as_str()],
+        StatusFilter::All => Vec::new(),
+        one => vec![one.as_str()],
+    }
+}
+
+const fn order(sort: FaultSort) -> FaultOrder {
+    match sort {
+        FaultSort::Newest => FaultOrder::Newest,
+        FaultSort::Oldest => FaultOrder::Oldest,
+        FaultSort::Asset => FaultOrder::Asset,
+    }
+}
+
+fn code(word: &str) -> Result<FaultCode, ServiceError> {
+    word.parse().map_err(ServiceError::UnknownCode)
+}
+
+fn take(monitors: &mut Vec<MonitorView>, code: CodeWord) -> Option<MonitorView> {
+    let at = monitors.iter().position(|monitor| monitor.code == code)?;
+    Some(monitors.swap_remove(at))
+}
+
+/// The parameters of a query for faults.
+#[derive(Clone, Debug, Default)]
+pub struct FaultQuery {
+    /// `active` by default.
+    pub status: Option<StatusFilter>,
+    pub asset: Option<String>,
+    pub code: Option<String>,
+    pub acknowledged: Option<bool>,
+    /// `-changed_at` by default.
+    pub sort: Option<FaultSort>,
+    pub cursor: Option<String>,
+}
+
+impl Service {
+    /// Returns a page of the faults of the fleet.
+    ///
+    /// # Errors
+    /// [`ServiceError::Invalid`] for an invalid parameter.
+    pub async fn faults(
+        &self,
+        query: FaultQuery,
+        limit: u32,
+    ) -> Result<Page<FaultEntryView>, ServiceError> {
+        let filter = FaultFilter {
+            statuses: statuses(query.status.unwrap_or(StatusFilter::Active)),
+            asset: query.asset,
+            code: query.code.as_deref().map(code).transpose()?.map(FaultCode::as_str),
+            acknowledged: query.acknowledged,
+            order: query.sort.map(order).unwrap_or_default(),
+            after: query.cursor.as_deref().map(views::cursor).transpose()?,
+        };
+        let rows = self.inner.handles.store.faults(&filter, limit + 1).await?;
+        let key =
+            |row: &crate::store::FaultRow| (row.changed_at, row.asset.clone(), row.code.clone());
+        views::page(rows, limit, key, views::fault)
+    }
+
+    /// Returns the faults of one asset, in the order of their codes.
+    ///
+    /// # Errors
+    /// [`ServiceError::UnknownAsset`]; [`ServiceError::Invalid`] for an invalid status.
+    pub async fn asset_faults(
+        &self,
+        asset: &str,
+        status: Option<StatusFilter>,
+    ) -> Result<Page<FaultEntryView>, ServiceError> {
+        self.asset(asset).await?;
+        let (asset, sort) = (Some(asset.to_owned()), Some(FaultSort::Asset));
+        let query = FaultQuery { status, asset: asset.clone(), sort, ..FaultQuery::default() };
+        let mut page = self.faults(query, FaultCode::COUNT as u32).await?;
+        let mut monitors = self.monitors(asset.as_deref().unwrap_or_default()).await;
+        for entry in &mut page.items {
+            entry.monitor = take(&mut monitors, entry.record.code);
+        }
+        Ok(page)
+    }
+
+    /// Returns the monitors of the open session; none without one, or if the shard is busy.
+    async fn monitors(&self, asset: &str) -> Vec<MonitorView> {
+        let monitors = self.inner.shards.call(asset, |reply| AssetCommand::Monitors { reply });
+        monitors.await.unwrap_or_default()
+    }
+
+    /// Returns the fault memory entry of one code; a code that never failed is `cleared`.
+    ///
+    /// # Errors
+    /// [`ServiceError::UnknownAsset`]; [`ServiceError::UnknownCode`].
+    pub async fn fault(&self, asset: &str, word: &str) -> Result<FaultEntryView, ServiceError> {
+        let code = code(word)?;
+        self.asset(asset).await?;
+        let mut entry = match self.inner.handles.store.fault(asset, code.as_str()).await? {
+            Some(row) => views::fault(row)?,
+            None => views::never_failed(&self.inner.handles.store, asset, code).await?,
+        };
+        entry.monitor = take(&mut self.monitors(asset).await, code.into());
+        Ok(entry)
+    }
+
+    /// Erases the fault memory entry of a code on request of a person.
+    ///
+    /// # Errors
+    /// [`ServiceError::UnknownAsset`]; [`ServiceError::UnknownCode`].
+    pub async fn clear(&self, asset: &str, word: &str, actor: String) -> Result<(), ServiceError> {
+        let code = code(word)?;
+        self.inner.shards.call(asset, |reply| AssetCommand::Clear { code, actor, reply }).await
+    }
+
+    /// Acknowledges the current occurrence of a code on request of a person.
+    ///
+    /// # Errors
+    /// As for [`Self::clear`], and [`ServiceError::NothingToAcknowledge`].
+    pub async fn acknowledge(
+        &self,
+        asset: &str,
+        word: &str,
+        actor: String,
+    ) -> Result<FaultEntryView, ServiceError> {
+        let code = code(word)?;
+        let acknowledge = |reply| AssetCommand::Acknowledge { code, actor, reply };
+        self.inner.shards.call(asset, acknowledge).await?;
+        self.fault(asset, word).await
+    }
+}

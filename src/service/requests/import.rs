@@ -1,0 +1,98 @@
+//! Imports a recording as a session. Its samples are processed like live telemetry.
+
+use std::collections::VecDeque;
+
+use crate::service::PendingBatch;
+use crate::service::{Service, ServiceError};
+use crate::wire::service::{ImportView, SessionView};
+use crate::wire::telemetry::{AckView, Batch, RowView};
+
+/// Batches of an import that wait for their acknowledgement at a time.
+const MAX_PENDING: usize = 4;
+
+/// Limit of rejected rows in the result; further ones are only counted.
+const MAX_LISTED: usize = 100;
+
+/// Samples in one batch of an import.
+const BATCH: usize = 2048;
+
+impl Service {
+    /// Imports `recording` as the session `name` and ends it. The asset's open session is
+    /// ended first; until the import is complete, live telemetry of the asset is refused
+    /// with [`ServiceError::Busy`]. Continues if the caller is dropped.
+    ///
+    /// # Errors
+    /// [`ServiceError::SessionExists`]; [`ServiceError::Invalid`] for an invalid name.
+    pub async fn import(
+        &self,
+        asset: &str,
+        name: Option<String>,
+        recording: Batch,
+    ) -> Result<ImportView, ServiceError> {
+        let (this, asset) = (self.clone(), asset.to_owned());
+        let task = tokio::spawn(async move {
+            let session = this.open_for(&asset, name, true).await?;
+            let imported = this.run_import(&asset, session.clone(), recording).await;
+            let session = this.end_session(&session.id).await?;
+            Ok(ImportView { session, ..imported? })
+        });
+        task.await.unwrap_or(Err(ServiceError::Unavailable { what: "the import failed" }))
+    }
+
+    async fn run_import(
+        &self,
+        asset: &str,
+        session: SessionView,
+        recording: Batch,
+    ) -> Result<ImportView, ServiceError> {
+        let name = session.name.clone();
+        let mut counts = ImportCounts { view: empty(session), pending: VecDeque::new() };
+        let mut rows = recording.rows.into_iter().peekable();
+        let mut first = 0;
+        while rows.peek().is_some() {
+            let rows: Vec<_> = rows.by_ref().take(BATCH).collect();
+            let n = rows.len();
+            let batch = Batch { session: Some(name.clone()), id: None, rows };
+            if counts.pending.len() >= MAX_PENDING {
+                counts.settle().await?;
+            }
+            counts.pending.push_back((first, self.submit_when_ready(asset, batch, true).await?));
+            first += n;
+        }
+        while !counts.pending.is_empty() {
+            counts.settle().await?;
+        }
+        Ok(counts.view)
+    }
+}
+
+const fn empty(session: SessionView) -> ImportView {
+    ImportView { session, accepted: 0, duplicate: 0, late: 0, rejected: 0, rejections: Vec::new() }
+}
+
+/// The counts of an import, and its batches without an acknowledgement.
+struct ImportCounts {
+    view: ImportView,
+    pending: VecDeque<(usize, PendingBatch)>,
+}
+
+impl ImportCounts {
+    async fn settle(&mut self) -> Result<(), ServiceError> {
+        if let Some((first, pending)) = self.pending.pop_front() {
+            self.add(first, pending.acknowledged().await?);
+        }
+        Ok(())
+    }
+
+    fn add(&mut self, first: usize, ack: AckView) {
+        let view = &mut self.view;
+        view.accepted += ack.accepted as u64;
+        view.duplicate += ack.duplicate as u64;
+        view.late += ack.late.len() as u64;
+        view.rejected += ack.rejected.len() as u64;
+        let room = MAX_LISTED.saturating_sub(view.rejections.len());
+        let rows = ack.rejected.into_iter().take(room);
+        let offset = |row: RowView| RowView { index: first + row.index, ..row };
+        view.rejections.extend(rows.map(offset));
+    }
+}

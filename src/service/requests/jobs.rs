@@ -1,0 +1,31 @@
+//! The queue of background jobs.
+
+use tokio::sync::mpsc;
+
+use crate::service::job::Job;
+use crate::service::{Service, ServiceError};
+
+impl Service {
+    /// Queues the jobs that a previous process left unfinished, as far as there is room.
+    pub(in crate::service) async fn resume_jobs(&self) -> Result<(), ServiceError> {
+        let replays = self.inner.handles.store.unfinished_replays().await?;
+        let calibrations = self.inner.handles.store.unfinished_calibrations().await?;
+        let jobs = replays.into_iter().map(|row| Job::Replay(row.id));
+        for job in jobs.chain(calibrations.into_iter().map(|row| Job::Calibration(row.id))) {
+            if self.inner.jobs.try_send(job).is_err() {
+                tracing::warn!("the queue is too short for all unfinished jobs; restart later");
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Reserves room in the queue before a job is stored.
+    ///
+    /// # Errors
+    /// [`ServiceError::Busy`] if the queue is full.
+    pub(in crate::service) fn reserve_job(&self) -> Result<mpsc::Permit<'_, Job>, ServiceError> {
+        let full = |_| ServiceError::Busy { what: "the queue of background jobs is full" };
+        self.inner.jobs.try_reserve().map_err(full)
+    }
+}

@@ -1,0 +1,29 @@
+//! The public methods of [`Service`](super::Service), by subject: each file has an
+//! `impl Service` block. Queries read the store; changes of an asset are sent as commands
+//! to its shard, others directly to the writer.
+
+mod assets;
+mod audit;
+mod calibrations;
+mod drive_cycles;
+mod events;
+mod faults;
+mod fleet;
+mod history;
+mod import;
+mod jobs;
+mod learning;
+mod principals;
+mod readiness;
+mod recordings;
+mod replays;
+mod sessions;
+mod telemetry;
+mod tokens;
+mod traces;
+mod trends;
+
+pub use faults::FaultQuery;
+pub use readiness::QueueLoad;
+pub use sessions::RecordingReader;
+pub use telemetry::PendingBatch;

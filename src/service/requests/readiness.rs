@@ -1,0 +1,65 @@
+//! Readiness of the service, and the length of its queues.
+
+use std::sync::atomic::Ordering;
+
+use tokio::sync::mpsc;
+
+use crate::service::start::Inner;
+use crate::service::upkeep::STALLED_AFTER;
+use crate::service::{Limits, Service, ServiceError};
+use crate::store::StoreError;
+
+/// The length of the queues.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct QueueLoad {
+    /// Samples between arrival and commit.
+    pub samples: usize,
+    /// Commands in the queue of each shard.
+    pub shards: Vec<usize>,
+    /// Write sets in the queue of the writer.
+    pub writer: usize,
+}
+
+fn waiting<T>(queue: &mpsc::Sender<T>) -> usize {
+    queue.max_capacity() - queue.capacity()
+}
+
+impl Service {
+    /// Returns the configured limits.
+    #[must_use]
+    pub fn limits(&self) -> &Limits {
+        &self.inner.limits
+    }
+
+    /// Checks that the store responds, the shards and the writer run, and ingest is not
+    /// stalled.
+    ///
+    /// # Errors
+    /// [`ServiceError::Unavailable`], [`ServiceError::Outage`] or [`ServiceError::Stalled`]
+    /// with the reason.
+    pub async fn ready(&self) -> Result<(), ServiceError> {
+        if self.inner.handles.writer().is_closed() {
+            return Err(ServiceError::Unavailable { what: "the writer has stopped" });
+        }
+        if self.inner.shards.iter().any(mpsc::Sender::is_closed) {
+            return Err(ServiceError::Unavailable { what: "a shard has stopped" });
+        }
+        if let Some(reason) = self.inner.outage.borrow().clone() {
+            return Err(ServiceError::Outage { reason });
+        }
+        if self.inner.stalled.load(Ordering::Relaxed) {
+            return Err(ServiceError::Stalled { seconds: STALLED_AFTER.as_secs() });
+        }
+        let outage = |error: StoreError| ServiceError::Outage { reason: error.to_string() };
+        self.inner.handles.store.ping().await.map_err(outage)
+    }
+
+    /// Returns the current length of the queues.
+    #[must_use]
+    pub fn load(&self) -> QueueLoad {
+        let Inner { shards, handles, in_flight, limits, .. } = &*self.inner;
+        let samples = limits.in_flight_samples - in_flight.available_permits();
+        let shards = shards.iter().map(waiting).collect();
+        QueueLoad { samples, shards, writer: waiting(handles.writer()) }
+    }
+}

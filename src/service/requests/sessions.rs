@@ -1,0 +1,141 @@
+//! Opening, ending, deleting and listing sessions, and reading their recordings.
+
+use crate::service::asset::AssetCommand;
+use crate::service::{Service, ServiceError, views};
+use crate::store::{SessionFilter, SessionRow, Store};
+use crate::wire::service::{Page, SessionView};
+use crate::wire::words::SessionState;
+use offbd_core::vocabulary::Sample;
+
+/// Reads the samples of a session chunk by chunk, in order of arrival.
+pub struct RecordingReader {
+    store: Store,
+    session: String,
+    next: i64,
+}
+
+impl RecordingReader {
+    /// Reads the next chunk; returns `None` at the end.
+    ///
+    /// # Errors
+    /// [`ServiceError::Store`].
+    pub async fn next(&mut self) -> Result<Option<Vec<Sample>>, ServiceError> {
+        let samples = self.store.samples_from(&self.session, self.next).await?;
+        let n = samples.as_ref().map_or(0, Vec::len);
+        self.next += i64::try_from(n).unwrap_or(i64::MAX);
+        Ok(samples)
+    }
+}
+
+impl Service {
+    /// Ends the asset's open session and opens a new one, by default named by the current
+    /// time.
+    ///
+    /// # Errors
+    /// [`ServiceError::SessionExists`]; [`ServiceError::Invalid`] for an invalid name.
+    pub async fn open_session(
+        &self,
+        asset: &str,
+        name: Option<String>,
+    ) -> Result<SessionView, ServiceError> {
+        self.open_for(asset, name, false).await
+    }
+
+    /// Opens a session for live samples or, with `importing`, for a recording.
+    pub(in crate::service) async fn open_for(
+        &self,
+        asset: &str,
+        name: Option<String>,
+        importing: bool,
+    ) -> Result<SessionView, ServiceError> {
+        let open = |reply| AssetCommand::OpenSession { name, importing, reply };
+        let id = self.inner.shards.call(asset, open).await?;
+        self.session(&id).await
+    }
+
+    /// Returns the asset of a session; `None` if there is no such session.
+    ///
+    /// # Errors
+    /// [`ServiceError::Store`] if the store cannot be read.
+    pub async fn asset_of_session(&self, id: &str) -> Result<Option<String>, ServiceError> {
+        Ok(self.inner.handles.store.session(id).await?.map(|row| row.asset))
+    }
+
+    /// Ends a session; has no effect on one that has ended.
+    ///
+    /// # Errors
+    /// [`ServiceError::UnknownSession`].
+    pub async fn end_session(&self, id: &str) -> Result<SessionView, ServiceError> {
+        let row = self.session_row(id).await?;
+        let end = |reply| AssetCommand::EndSession { session: row.id, reply };
+        self.inner.shards.call(&row.asset, end).await?;
+        self.session(id).await
+    }
+
+    /// Deletes a session with its recording and transitions. The asset's fault memory is
+    /// not changed. The session is hidden immediately; its data are deleted in parts, even
+    /// if the caller is dropped. Its name cannot be used again before the deletion is
+    /// complete.
+    ///
+    /// # Errors
+    /// [`ServiceError::UnknownSession`], also while it is being deleted;
+    /// [`ServiceError::NotStored`] if the store does not accept a part; the next sweep of
+    /// retention continues the deletion.
+    pub async fn delete_session(&self, id: &str) -> Result<(), ServiceError> {
+        let SessionRow { id, asset, .. } = self.session_row(id).await?;
+        let this = self.clone();
+        let deletion = async move {
+            let delete = |reply| AssetCommand::DeleteSession { session: id.clone(), reply };
+            this.inner.shards.call(&asset, delete).await?;
+            this.inner.deleter.session(&id).await
+        };
+        self.inner.deleter.run_to_completion(deletion).await
+    }
+
+    /// Returns a session.
+    ///
+    /// # Errors
+    /// [`ServiceError::UnknownSession`].
+    pub async fn session(&self, id: &str) -> Result<SessionView, ServiceError> {
+        views::session(self.session_row(id).await?)
+    }
+
+    pub(in crate::service) async fn session_row(
+        &self,
+        id: &str,
+    ) -> Result<SessionRow, ServiceError> {
+        let row = self.inner.handles.store.session(id).await?;
+        row.ok_or_else(|| ServiceError::UnknownSession { id: id.to_owned() })
+    }
+
+    /// Sessions, newest first; `state` is `open` or `ended`.
+    ///
+    /// # Errors
+    /// [`ServiceError::Invalid`] for an invalid cursor.
+    pub async fn sessions(
+        &self,
+        asset: Option<String>,
+        state: Option<SessionState>,
+        cursor: Option<&str>,
+        limit: u32,
+    ) -> Result<Page<SessionView>, ServiceError> {
+        let before = cursor.map(views::cursor::<(i64, String)>).transpose()?;
+        let state = state.map(|state| state.to_string());
+        let filter = SessionFilter { asset, state, before };
+        let rows = self.inner.handles.store.sessions(&filter, limit + 1).await?;
+        views::page(rows, limit, |row| (row.opened_at, row.id.clone()), views::session)
+    }
+
+    /// Returns a session and a reader of its recording.
+    ///
+    /// # Errors
+    /// [`ServiceError::UnknownSession`].
+    pub async fn recording(
+        &self,
+        id: &str,
+    ) -> Result<(SessionView, RecordingReader), ServiceError> {
+        let session = self.session(id).await?;
+        let store = self.inner.handles.store.clone();
+        Ok((session, RecordingReader { store, session: id.to_owned(), next: 0 }))
+    }
+}

@@ -1,0 +1,199 @@
+//! Starts the service and its threads and tasks.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64};
+
+use futures_util::{StreamExt, stream};
+use tokio::sync::{Semaphore, mpsc, watch};
+use tokio::task::JoinHandle;
+use tokio_util::sync::CancellationToken;
+
+use super::access::{PrincipalCache, Provider};
+use super::asset::{AssetCommand, Environment, Presences, Shards};
+use super::job::{self, Job};
+use super::jobs::{self, JobContext};
+use super::limits::{MAX_DRIVE_CYCLES, MAX_RECORDINGS, MAX_TRACES};
+use super::upkeep::{Deleter, Sweeper, Watchdog};
+use super::writing::{Committer, Events, Handles, Outage};
+use super::{Limits, ServiceError};
+use crate::store::{Store, Writer};
+
+/// A handle to the running service. Cheap to clone; all clones share one service.
+#[derive(Clone)]
+pub struct Service {
+    pub(super) inner: Arc<Inner>,
+}
+
+pub(super) struct Inner {
+    pub(super) handles: Handles,
+    pub(super) limits: Limits,
+    pub(super) events: Events,
+    pub(super) presences: Presences,
+    pub(super) principals: PrincipalCache,
+    pub(super) provider: Option<Provider>,
+    pub(super) shards: Shards,
+    pub(super) outage: watch::Receiver<Outage>,
+    pub(super) deleter: Deleter,
+    pub(super) jobs: mpsc::Sender<Job>,
+    pub(super) job_context: JobContext,
+    /// One permit for each sample between arrival and commit.
+    pub(super) in_flight: Arc<Semaphore>,
+    /// Whether the samples in flight are at their limit and nothing is committed.
+    pub(super) stalled: Arc<AtomicBool>,
+    /// One permit for each fault recording that is being computed.
+    pub(super) recordings: Arc<Semaphore>,
+    /// One permit for each trace that is being computed.
+    pub(super) traces: Arc<Semaphore>,
+    /// One permit for each drive cycle that is being computed.
+    pub(super) drive_cycles: Arc<Semaphore>,
+}
+
+/// The threads and tasks of a [`Service`]; they end when all its clones are dropped.
+pub struct Workers {
+    shards: Vec<std::thread::JoinHandle<()>>,
+    jobs: Vec<JoinHandle<()>>,
+    closing: CancellationToken,
+    committer: std::thread::JoinHandle<Option<Writer>>,
+}
+
+impl Workers {
+    /// Interrupts background jobs and deletions, which restart or continue with the next
+    /// start. From now on an unavailable database is awaited for a few seconds only; then
+    /// the write sets that wait for it are refused.
+    pub fn close(&self) {
+        self.closing.cancel();
+    }
+
+    /// Calls [`Self::close`], waits until all queued commands are executed and committed,
+    /// and closes the store's writer. All clones of the service must be dropped before.
+    pub async fn finish(self) {
+        self.close();
+        for worker in self.jobs {
+            if worker.await.is_err() {
+                tracing::error!("a worker panicked");
+            }
+        }
+        for shard in self.shards {
+            if joined(shard).await.is_none() {
+                tracing::error!("a shard panicked");
+            }
+        }
+        let Some(writer) = joined(self.committer).await else {
+            return tracing::error!("the writer panicked");
+        };
+        let Some(writer) = writer else { return };
+        if let Err(error) = writer.close().await {
+            tracing::error!(%error, "cannot close the store");
+        }
+    }
+}
+
+/// Waits for a thread; returns `None` if it panicked.
+async fn joined<T: Send + 'static>(thread: std::thread::JoinHandle<T>) -> Option<T> {
+    tokio::task::spawn_blocking(|| thread.join()).await.ok()?.ok()
+}
+
+impl Service {
+    /// Starts the shards and the writer on the current tokio runtime. Tokens of the
+    /// identity `provider` are accepted in addition to the service's own.
+    ///
+    /// # Errors
+    /// [`ServiceError`] if the store cannot be read or no thread can be started.
+    pub async fn start(
+        store: Store,
+        writer: Writer,
+        limits: Limits,
+        provider: Option<Provider>,
+    ) -> Result<(Self, Workers), ServiceError> {
+        let events = Events::new(store.clone());
+        let (sets, queue) = mpsc::channel(limits.commit_queue);
+        let (outage_sender, outage) = watch::channel(None);
+        let closing = CancellationToken::new();
+        let n_commits = Arc::new(AtomicU64::new(0));
+        let committer = Committer {
+            writer,
+            queue,
+            events: events.clone(),
+            outage: outage_sender,
+            n_commits: n_commits.clone(),
+            closing: closing.clone(),
+            journal_bytes: limits.journal_bytes,
+        };
+        let committer = committer.spawn()?;
+        let presences = Presences::default();
+        let (jobs, jobs_queue) = mpsc::channel(job::MAX_QUEUED);
+        let handles = Handles::new(store, sets, closing.clone());
+        let env = Environment {
+            handles: handles.clone(),
+            presences: presences.clone(),
+            jobs: jobs.clone(),
+        };
+        let (shards, threads) = Shards::start(&limits, env)?;
+        let job_context = JobContext::new(handles.clone(), shards.clone());
+        let mut workers = jobs::spawn(limits.jobs, &job_context, jobs_queue);
+        let deleter = Deleter::new(handles.clone());
+        let sweeper = Sweeper {
+            handles: handles.clone(),
+            deleter: deleter.clone(),
+            retention: limits.retention.clone(),
+        };
+        workers.push(tokio::spawn(sweeper.run()));
+        let in_flight = Arc::new(Semaphore::new(limits.in_flight_samples));
+        let stalled = Arc::new(AtomicBool::new(false));
+        let watchdog = Watchdog {
+            in_flight: in_flight.clone(),
+            batch_samples: limits.longest_batch(),
+            n_commits,
+            stalled: stalled.clone(),
+            closing: closing.clone(),
+        };
+        workers.push(tokio::spawn(watchdog.run()));
+        let recordings = Arc::new(Semaphore::new(MAX_RECORDINGS));
+        let traces = Arc::new(Semaphore::new(MAX_TRACES));
+        let drive_cycles = Arc::new(Semaphore::new(MAX_DRIVE_CYCLES));
+        let inner = Inner {
+            handles,
+            limits,
+            events,
+            presences,
+            principals: PrincipalCache::default(),
+            provider,
+            shards,
+            outage,
+            deleter,
+            jobs,
+            job_context,
+            in_flight,
+            stalled,
+            recordings,
+            traces,
+            drive_cycles,
+        };
+        let workers = Workers { shards: threads, jobs: workers, closing, committer };
+        Ok((Self { inner: Arc::new(inner) }, workers))
+    }
+
+    /// Loads the assets that have an open session, so that their first batch after a
+    /// restart is not delayed, and queues unfinished jobs again. Returns the number of
+    /// these assets.
+    ///
+    /// # Errors
+    /// [`ServiceError::Unavailable`] if the store cannot be read.
+    pub async fn resume(&self) -> Result<usize, ServiceError> {
+        let assets = self.inner.handles.store.assets_in_session().await?;
+        let load = |asset: &String| {
+            let (this, asset) = (self.clone(), asset.clone());
+            async move {
+                if let Err(error) =
+                    this.inner.shards.call(&asset, |reply| AssetCommand::Load { reply }).await
+                {
+                    tracing::error!(asset, %error, "cannot load the asset");
+                }
+            }
+        };
+        let concurrent = self.inner.limits.shards;
+        stream::iter(&assets).for_each_concurrent(concurrent, load).await;
+        self.resume_jobs().await?;
+        Ok(assets.len())
+    }
+}

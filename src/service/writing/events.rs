@@ -1,0 +1,140 @@
+//! Publishes fault transitions once they are durable.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use tokio::sync::broadcast;
+use tokio::sync::broadcast::error::RecvError;
+
+use crate::service::ServiceError;
+use crate::store::{ActionRow, EventRow, Store, TransitionRow};
+
+/// Events buffered for slow subscribers; one that lags further behind reads the events from
+/// the store.
+const MAX_BUFFERED: usize = 1024;
+
+/// Events read from the store per query.
+const PAGE: u32 = 256;
+
+/// A fault transition.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Event {
+    /// Unique and increasing.
+    pub id: i64,
+    pub asset: String,
+    /// The id of the session; `None` if none was open.
+    pub session: Option<String>,
+    /// The fault line, JSON.
+    pub document: String,
+}
+
+impl From<EventRow> for Event {
+    fn from(row: EventRow) -> Self {
+        Self { id: row.id, asset: row.asset, session: row.session, document: row.document }
+    }
+}
+
+impl Event {
+    pub(in crate::service) fn of_transition(row: TransitionRow) -> Self {
+        let session = Some(row.session);
+        Self { id: row.id, asset: row.asset, session, document: row.document }
+    }
+
+    /// None for an act that changed nothing, or that a transition tells of.
+    pub(in crate::service) fn of_act(row: ActionRow) -> Option<Self> {
+        let document = row.event?;
+        Some(Self { id: row.id, asset: row.asset, session: row.session, document })
+    }
+
+    /// Returns the fault line with `asset` and `session_id`, a JSON object.
+    #[must_use]
+    pub fn line(&self) -> String {
+        let rest = self.document.strip_prefix('{').unwrap_or(&self.document);
+        // Names and ids need no escaping: letters, digits, `-`, `_`, `.`.
+        let session = self.session.as_ref().map(|id| format!("\"{id}\""));
+        let session = session.as_deref().unwrap_or("null");
+        format!(r#"{{"asset":"{}","session_id":{session},{rest}"#, self.asset)
+    }
+}
+
+/// The publisher of events. Cheap to clone.
+#[derive(Clone, Debug)]
+pub(in crate::service) struct Events {
+    store: Store,
+    sender: broadcast::Sender<Arc<Event>>,
+}
+
+impl Events {
+    pub(in crate::service) fn new(store: Store) -> Self {
+        Self { store, sender: broadcast::Sender::new(MAX_BUFFERED) }
+    }
+
+    pub(in crate::service) fn publish(&self, event: Event) {
+        // Fails without subscribers, which is not an error.
+        let _ = self.sender.send(Arc::new(event));
+    }
+
+    pub(in crate::service) async fn feed(
+        &self,
+        asset: Option<String>,
+        after: Option<i64>,
+    ) -> Result<EventFeed, ServiceError> {
+        let receiver = self.sender.subscribe();
+        let newest = self.store.last_event().await?;
+        let last = after.map_or(newest, |id| id.min(newest));
+        let (store, backlog) = (self.store.clone(), VecDeque::new());
+        Ok(EventFeed { store, receiver, asset, last, backlog, behind: after.is_some() })
+    }
+}
+
+/// A subscription to the events of one asset or of all: each event once, in order.
+#[derive(Debug)]
+pub struct EventFeed {
+    store: Store,
+    receiver: broadcast::Receiver<Arc<Event>>,
+    asset: Option<String>,
+    last: i64,
+    backlog: VecDeque<Arc<Event>>,
+    /// Whether missed events must be read from the store.
+    behind: bool,
+}
+
+impl EventFeed {
+    /// Returns the id of the last event delivered, after which the feed continues.
+    #[must_use]
+    pub const fn last(&self) -> i64 {
+        self.last
+    }
+
+    /// Waits for the next event; returns `None` once the service has ended. Cancel safe.
+    ///
+    /// # Errors
+    /// [`ServiceError::Store`] if missed events cannot be read.
+    pub async fn next(&mut self) -> Result<Option<Arc<Event>>, ServiceError> {
+        loop {
+            if let Some(event) = self.backlog.pop_front() {
+                self.last = event.id;
+                return Ok(Some(event));
+            }
+            if self.behind {
+                let rows = self.store.events(self.asset.as_deref(), self.last, PAGE).await?;
+                self.behind = rows.len() == PAGE as usize;
+                self.backlog.extend(rows.into_iter().map(|row| Arc::new(Event::from(row))));
+                continue;
+            }
+            match self.receiver.recv().await {
+                Ok(event) if event.id > self.last && self.matches(&event) => {
+                    self.last = event.id;
+                    return Ok(Some(event));
+                }
+                Ok(_) => {}
+                Err(RecvError::Lagged(_)) => self.behind = true,
+                Err(RecvError::Closed) => return Ok(None),
+            }
+        }
+    }
+
+    fn matches(&self, event: &Event) -> bool {
+        self.asset.as_ref().is_none_or(|asset| *asset == event.asset)
+    }
+}

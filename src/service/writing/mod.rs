@@ -1,0 +1,11 @@
+//! The single writer: changes are submitted through [`Handles`] and committed in groups;
+//! committed fault transitions are published as [`Event`]s.
+
+mod commit;
+mod events;
+mod handles;
+
+pub(super) use commit::{Committer, EngineGeneration, Outage, WriteSet};
+pub(super) use events::Events;
+pub use events::{Event, EventFeed};
+pub(super) use handles::Handles;

@@ -1,0 +1,204 @@
+//! The location of the database, an SQLite file or a PostgreSQL server, and connections
+//! to it.
+//!
+//! Statements are the same for both, through sqlx's `Any`. What differs is here, in
+//! `checkpoint.rs` and `backup.rs` (SQLite only), and in the error codes of `mod.rs`.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use std::time::Duration;
+
+use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, percent_encode};
+use sqlx::any::{AnyConnectOptions, AnyPoolOptions, install_default_drivers};
+use sqlx::postgres::PgConnectOptions;
+use sqlx::{AnyConnection, AnyPool, AssertSqlSafe, ConnectOptions, Executor};
+
+use super::StoreError;
+use super::checkpoint::AUTOCHECKPOINT_PAGES;
+use super::write::WriterRole;
+
+/// Connections for reading; a reader without one waits.
+const MAX_READERS: u32 = 4;
+
+/// Page cache of a connection to a file, KiB. That of the main writer has room for the
+/// pages of a large group, because pages that do not fit are written twice; readers
+/// rarely need a page again.
+const MAIN_CACHE_KIB: u32 = 8192;
+const CACHE_KIB: u32 = 512;
+
+/// How long a reader waits for a free connection before it fails.
+const READER_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// Longest time to establish a connection.
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// The advisory lock of PostgreSQL that the main writer of a database holds while it is
+/// connected.
+const WRITER_LOCK: i64 = i64::from_be_bytes(*b"\0\0\0offbd");
+
+/// How long a writer waits for the lock: the server may still be processing the last
+/// statement of a process that was killed.
+const LOCK_TIMEOUT: &str = "5s";
+
+/// The location of a database.
+#[derive(Clone, PartialEq, Eq)]
+pub enum Location {
+    /// An SQLite file.
+    File(PathBuf),
+    /// The URL of a PostgreSQL database, the password included.
+    Server(String),
+}
+
+impl Location {
+    /// Parses a URL `sqlite:FILE` or `postgres://…`.
+    ///
+    /// # Errors
+    /// The reason why it is invalid, without the URL, which may contain a password.
+    pub fn of_url(url: &str) -> Result<Self, String> {
+        if let Some(file) = url.strip_prefix("sqlite://").or_else(|| url.strip_prefix("sqlite:")) {
+            let named = !file.is_empty();
+            return named.then(|| Self::File(file.into())).ok_or("names no file".to_owned());
+        }
+        if !url.starts_with("postgres://") && !url.starts_with("postgresql://") {
+            return Err("is neither `sqlite:FILE` nor `postgres://…`".to_owned());
+        }
+        match PgConnectOptions::from_str(url) {
+            Ok(_) => Ok(Self::Server(url.to_owned())),
+            Err(error) => Err(format!("is not a valid PostgreSQL URL: {error}")),
+        }
+    }
+
+    /// The path of an SQLite file; `None` for PostgreSQL.
+    #[must_use]
+    pub fn file(&self) -> Option<&Path> {
+        match self {
+            Self::File(file) => Some(file),
+            Self::Server(_) => None,
+        }
+    }
+
+    fn options(&self) -> Result<AnyConnectOptions, StoreError> {
+        install_default_drivers();
+        match self {
+            Self::File(file) => Ok(file_url(file, "rwc")?.parse()?),
+            Self::Server(url) => Ok(url.parse()?),
+        }
+    }
+
+    /// Opens a connection that may write. For the main writer it has a large page cache
+    /// and, in PostgreSQL, takes the lock of the database. An SQLite file is locked by
+    /// the caller.
+    pub(super) async fn writer(&self, role: WriterRole) -> Result<AnyConnection, StoreError> {
+        let options = self.options()?;
+        let connect = async {
+            let mut connection = options.connect().await?;
+            connection.execute(AssertSqlSafe(self.writer_settings(role))).await?;
+            if role == WriterRole::Main && matches!(self, Self::Server(_)) {
+                let lock = format!(
+                    "SET lock_timeout = '{LOCK_TIMEOUT}'; SELECT pg_advisory_lock({WRITER_LOCK});
+                     SET lock_timeout = DEFAULT"
+                );
+                connection.execute(AssertSqlSafe(lock)).await.map_err(lock_error)?;
+            }
+            Ok(connection)
+        };
+        within(connect).await
+    }
+
+    /// A pool of connections that may only read.
+    pub(super) fn readers(&self) -> Result<AnyPool, StoreError> {
+        let pool =
+            AnyPoolOptions::new().max_connections(MAX_READERS).acquire_timeout(READER_TIMEOUT);
+        let (pool, read_only) = match self {
+            // Idle connections are kept: they cost nothing, and closing and reopening them
+            // would fragment the memory.
+            Self::File(_) => (
+                pool.idle_timeout(None).max_lifetime(None),
+                format!("PRAGMA query_only = on; PRAGMA cache_size = -{CACHE_KIB}"),
+            ),
+            Self::Server(_) => (pool, "SET default_transaction_read_only = on".to_owned()),
+        };
+        let pool = pool.after_connect(move |connection, _| {
+            let read_only = read_only.clone();
+            Box::pin(async move { connection.execute(AssertSqlSafe(read_only)).await.map(drop) })
+        });
+        Ok(pool.connect_lazy_with(self.options()?))
+    }
+
+    /// The settings of a connection that writes: a commit is on the disk when it returns,
+    /// whatever the server's own configuration is.
+    fn writer_settings(&self, role: WriterRole) -> String {
+        match self {
+            Self::File(_) => {
+                let is_main = role == WriterRole::Main;
+                let cache = if is_main { MAIN_CACHE_KIB } else { CACHE_KIB };
+                format!(
+                    "PRAGMA journal_mode = wal; PRAGMA synchronous = full; \
+                     PRAGMA cache_size = -{cache}; \
+                     PRAGMA wal_autocheckpoint = {AUTOCHECKPOINT_PAGES}"
+                )
+            }
+            Self::Server(_) => "SET synchronous_commit = on".to_owned(),
+        }
+    }
+
+    /// The statement that begins a transaction that writes.
+    pub(super) const fn begin(&self) -> &'static str {
+        match self {
+            Self::File(_) => "BEGIN IMMEDIATE",
+            Self::Server(_) => "BEGIN",
+        }
+    }
+}
+
+/// Converts the error of a failed attempt to take the writer's lock.
+fn lock_error(error: sqlx::Error) -> StoreError {
+    /// `lock_not_available`
+    const NOT_AVAILABLE: &str = "55P03";
+    let code = error.as_database_error().and_then(|error| error.code());
+    if code.is_some_and(|code| code == NOT_AVAILABLE) { StoreError::InUse } else { error.into() }
+}
+
+/// What is not escaped in a path.
+const UNESCAPED: &AsciiSet = &NON_ALPHANUMERIC.remove(b'/').remove(b'-').remove(b'.').remove(b'_');
+
+/// The URL of a file, with the mode `rw`, or `rwc` to create a missing file. Bytes with a
+/// meaning in a URL are escaped.
+pub(super) fn file_url(file: &Path, mode: &str) -> Result<String, StoreError> {
+    let file = std::path::absolute(file).map_err(sqlx::Error::Io)?;
+    let path = percent_encode(file.as_os_str().as_encoded_bytes(), UNESCAPED);
+    Ok(format!("sqlite://{path}?mode={mode}"))
+}
+
+async fn within<T>(connect: impl Future<Output = Result<T, StoreError>>) -> Result<T, StoreError> {
+    let late = |_| sqlx::Error::Io(std::io::ErrorKind::TimedOut.into());
+    tokio::time::timeout(CONNECT_TIMEOUT, connect).await.map_err(late)?
+}
+
+/// Shows the location without the password.
+impl fmt::Display for Location {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File(file) => write!(f, "{}", file.display()),
+            Self::Server(url) => match PgConnectOptions::from_str(url) {
+                Ok(o) => {
+                    let database = o.get_database().unwrap_or(o.get_username());
+                    match o.get_socket() {
+                        Some(socket) => write!(f, "postgres:{}/{database}", socket.display()),
+                        None => {
+                            write!(f, "postgres://{}:{}/{database}", o.get_host(), o.get_port())
+                        }
+                    }
+                }
+                Err(_) => f.write_str("postgres:"),
+            },
+        }
+    }
+}
+
+impl fmt::Debug for Location {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}

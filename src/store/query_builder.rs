@@ -1,0 +1,43 @@
+//! A builder for queries that depend on filters, with numbered placeholders, which both
+//! SQLite and PostgreSQL understand.
+
+use sqlx::any::{AnyArguments, AnyRow};
+use sqlx::query::QueryAs;
+use sqlx::{Any, Arguments, AssertSqlSafe, Encode, FromRow, Type};
+
+use super::StoreError;
+
+#[derive(Default)]
+pub(super) struct QueryBuilder {
+    sql: String,
+    arguments: AnyArguments,
+}
+
+impl QueryBuilder {
+    pub(super) fn new(sql: &'static str) -> Self {
+        Self { sql: sql.to_owned(), ..Self::default() }
+    }
+
+    /// Appends constant SQL.
+    pub(super) fn push(&mut self, sql: &'static str) -> &mut Self {
+        self.sql.push_str(sql);
+        self
+    }
+
+    /// Appends a placeholder and binds `value` to it.
+    pub(super) fn bind<'v>(
+        &mut self,
+        value: impl Encode<'v, Any> + Type<Any>,
+    ) -> Result<&mut Self, StoreError> {
+        self.arguments.add(value).map_err(sqlx::Error::Encode)?;
+        self.sql.push_str(&format!("${}", self.arguments.len()));
+        Ok(self)
+    }
+
+    /// The finished query. Its SQL consists of constants and placeholders only.
+    pub(super) fn rows<T: for<'r> FromRow<'r, AnyRow>>(
+        self,
+    ) -> QueryAs<'static, Any, T, AnyArguments> {
+        sqlx::query_as_with(AssertSqlSafe(self.sql), self.arguments)
+    }
+}

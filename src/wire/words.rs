@@ -1,0 +1,296 @@
+//! The closed sets of words in the API: each is an enum here, an `enum` in `openapi.yaml`
+//! and a union type in the dashboard's TypeScript.
+//!
+//! The core serialises nothing, so its enums are mirrored here. A variant that is added
+//! there and not here does not compile.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use offbd_core::diagnosis::Profile;
+use offbd_core::diagnosis::trend::Parameter;
+use offbd_core::engine::{Misfit, Order};
+use offbd_core::plant::Rung;
+use offbd_core::vocabulary::{Axis, FaultCode, FaultKind, FaultStatus, UnknownWord};
+
+/// Defines an enum whose variants are serialised as the given words.
+macro_rules! words {
+    ($(#[$doc:meta])* $name:ident as $schema:ident {
+        $($(#[$vdoc:meta])* $variant:ident = $word:tt),+ $(,)?
+    }) => {
+        $(#[$doc])*
+        #[derive(
+            Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema,
+        )]
+        #[schema(as = $schema)]
+        pub enum $name { $($(#[$vdoc])* #[serde(rename = $word)] $variant),+ }
+
+        impl $name {
+            /// All words, in the order of declaration.
+            pub const ALL: &'static [Self] = &[$(Self::$variant),+];
+
+            /// Returns the word used in JSON, in the store and in logs.
+            #[must_use]
+            pub const fn as_str(self) -> &'static str {
+                match self { $(Self::$variant => $word),+ }
+            }
+        }
+
+        impl fmt::Display for $name {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.pad(self.as_str())
+            }
+        }
+
+        impl FromStr for $name {
+            type Err = UnknownWord;
+            fn from_str(word: &str) -> Result<Self, UnknownWord> {
+                Self::ALL.iter().copied().find(|v| v.as_str() == word).ok_or_else(|| UnknownWord {
+                    word: word.to_owned(),
+                    expected: [$($word),+].join(", "),
+                })
+            }
+        }
+    };
+}
+
+/// Defines [`words!`] for an enum of the core, with conversions in both directions.
+macro_rules! mirrored {
+    ($(#[$doc:meta])* $name:ident as $schema:ident of $core:ident {
+        $($variant:ident = $word:tt),+ $(,)?
+    }) => {
+        words! { $(#[$doc])* $name as $schema { $($variant = $word),+ } }
+
+        impl From<$core> for $name {
+            fn from(word: $core) -> Self {
+                match word { $($core::$variant => Self::$variant),+ }
+            }
+        }
+
+        impl From<$name> for $core {
+            fn from(word: $name) -> Self {
+                match word { $($name::$variant => Self::$variant),+ }
+            }
+        }
+    };
+}
+
+mirrored! {
+    /// Fault code: the part of the rig that has the fault.
+    CodeWord as FaultCode of FaultCode {
+        XServo = "x_servo", YServo = "y_servo", StuckBall = "stuck_ball", Sensor = "sensor",
+    }
+}
+
+mirrored! {
+    /// Kind of a fault: the failure mode.
+    KindWord as FaultKind of FaultKind {
+        Dead = "dead", Held = "held", Gain = "gain", Reversed = "reversed", Offset = "offset",
+        Slow = "slow", Intermittent = "intermittent", Frozen = "frozen", Dropout = "dropout",
+        Noise = "noise", Spikes = "spikes", Jump = "jump",
+    }
+}
+
+mirrored! {
+    /// Status of a fault code, a summary of its ISO 14229 status byte.
+    StatusWord as FaultStatus of FaultStatus {
+        Pending = "pending", Confirmed = "confirmed", Healed = "healed", Cleared = "cleared",
+    }
+}
+
+mirrored! {
+    /// A direction of ball motion.
+    AxisWord as Axis of Axis { X = "x", Y = "y" }
+}
+
+mirrored! {
+    /// Named set of settings of the diagnosis: `default` for real rigs, `textbook` for the
+    /// rule of the chapter.
+    ProfileWord as Profile of Profile { Default = "default", Textbook = "textbook" }
+}
+
+mirrored! {
+    /// A parameter of a servo that is tracked over sessions: gain, offset in m/s², delay in
+    /// s.
+    ParameterWord as ServoParameter of Parameter {
+        Gain = "gain", Offset = "offset", Delay = "delay",
+    }
+}
+
+mirrored! {
+    /// A plant model of the twin, in the order of computing cost.
+    ModelWord as PlantModel of Rung {
+        Planar = "planar", Rolling = "rolling", Sliding = "sliding",
+    }
+}
+
+mirrored! {
+    /// Order of a drive cycle's motions along the two axes: simultaneously, y a quarter of a
+    /// period after x, or first x and then y.
+    CycleOrderWord as DriveCycleOrder of Order {
+        AtOnce = "at_once", Staggered = "staggered", InTurn = "in_turn",
+    }
+}
+
+words! {
+    /// The plate angle that a servo turns: `qy` moves the ball along x, `qx` along y.
+    CommandWord as PlateAngle { Qx = "qx", Qy = "qy" }
+}
+
+impl From<Axis> for CommandWord {
+    fn from(axis: Axis) -> Self {
+        match axis {
+            Axis::X => Self::Qy,
+            Axis::Y => Self::Qx,
+        }
+    }
+}
+
+words! {
+    /// A contradiction between data and asset file.
+    MisfitWord as Misfit {
+        NoReadings = "no_readings", NoCommands = "no_commands", NoAxis = "no_axis",
+        Short = "short", Rate = "rate", Positions = "positions", Commands = "commands",
+        CommandsHeld = "commands_held", OneAxis = "one_axis", Swapped = "swapped",
+        WrongSign = "wrong_sign",
+    }
+}
+
+impl From<&Misfit> for MisfitWord {
+    fn from(misfit: &Misfit) -> Self {
+        match misfit {
+            Misfit::NoReadings => Self::NoReadings,
+            Misfit::NoCommands => Self::NoCommands,
+            Misfit::NoAxis => Self::NoAxis,
+            Misfit::Short { .. } => Self::Short,
+            Misfit::Rate { .. } => Self::Rate,
+            Misfit::Positions { .. } => Self::Positions,
+            Misfit::Commands { .. } => Self::Commands,
+            Misfit::CommandsHeld => Self::CommandsHeld,
+            Misfit::OneAxis { .. } => Self::OneAxis,
+            Misfit::Swapped { .. } => Self::Swapped,
+            Misfit::WrongSign { .. } => Self::WrongSign,
+        }
+    }
+}
+
+words! {
+    /// The kind of a line of a verdict.
+    LineWord as LineType { Fault = "fault", Summary = "summary" }
+}
+
+words! {
+    /// State of a session: an ended one accepts no more samples.
+    SessionState as SessionState { Open = "open", Ended = "ended" }
+}
+
+words! {
+    /// State of a background job.
+    JobState as JobState {
+        Queued = "queued", Running = "running", Done = "done", Failed = "failed",
+    }
+}
+
+words! {
+    /// How a transition differs between two verdicts.
+    ChangeWord as TransitionChange {
+        /// In both verdicts, with equal time, kind and onset.
+        Same = "same",
+        /// In both verdicts at the same time, with a different kind or onset.
+        Altered = "altered",
+        /// In both verdicts, at different times.
+        Moved = "moved",
+        /// Only in the recorded verdict.
+        OnlyRecorded = "only_recorded",
+        /// Only in the replayed verdict.
+        OnlyReplayed = "only_replayed",
+    }
+}
+
+words! {
+    /// Selects faults by status.
+    StatusFilter as FaultStatusFilter {
+        /// Pending or confirmed.
+        Active = "active",
+        Pending = "pending", Confirmed = "confirmed", Healed = "healed", Cleared = "cleared",
+        All = "all",
+    }
+}
+
+words! {
+    /// Order of a list of faults.
+    FaultSort as FaultSort {
+        /// The latest change first.
+        Newest = "-changed_at",
+        /// The earliest change first.
+        Oldest = "changed_at",
+        /// By name of the asset.
+        Asset = "asset",
+    }
+}
+
+words! {
+    /// An entry of the history of a fault code: the status it changed to, or the action of a
+    /// person.
+    HistoryWord as HistoryEvent {
+        Pending = "pending", Confirmed = "confirmed", Healed = "healed", Cleared = "cleared",
+        Acknowledge = "acknowledge", Clear = "clear",
+    }
+}
+
+words! {
+    /// Role of a token, in the order of its rights.
+    Role as Role {
+        /// The device of one asset.
+        Device = "device",
+        /// May read everything and change nothing.
+        Viewer = "viewer",
+        /// May also operate the assets and handle their faults.
+        Operator = "operator",
+        /// May do everything.
+        Admin = "admin",
+    }
+}
+
+words! {
+    /// Whether the service requires a token.
+    AuthenticationWord as Authentication { Required = "required", Off = "off" }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Checks that the words of a core enum equal those of its mirror.
+    fn assert_equal_words<C: Copy + Into<W>, W: Copy + fmt::Display + Serialize>(
+        core: &[C],
+        words: &[W],
+        name: impl Fn(C) -> &'static str,
+    ) {
+        assert_eq!(core.len(), words.len());
+        for &word in core {
+            let mirrored: W = word.into();
+            assert_eq!(mirrored.to_string(), name(word));
+            assert_eq!(serde_json::to_value(mirrored).unwrap(), name(word));
+        }
+    }
+
+    #[test]
+    fn the_words_equal_those_of_the_core() {
+        assert_equal_words(FaultCode::ALL, CodeWord::ALL, FaultCode::as_str);
+        assert_equal_words(FaultKind::ALL, KindWord::ALL, FaultKind::as_str);
+        assert_equal_words(FaultStatus::ALL, StatusWord::ALL, FaultStatus::as_str);
+        assert_equal_words(&Axis::ALL, AxisWord::ALL, Axis::as_str);
+        assert_equal_words(&Axis::ALL, CommandWord::ALL, Axis::command);
+        assert_equal_words(&Profile::ALL, ProfileWord::ALL, Profile::as_str);
+        assert_equal_words(&Parameter::ALL, ParameterWord::ALL, Parameter::as_str);
+        assert_equal_words(
+            &[Rung::Planar, Rung::Rolling, Rung::Sliding],
+            ModelWord::ALL,
+            Rung::name,
+        );
+    }
+}
