@@ -1,4 +1,4 @@
-// What the formatter cannot see: mistakes, misused hooks, and pieces too long to take in at a look.
+// Checks beyond formatting: errors, misuse of hooks, and overly long files and functions.
 import eslint from "@eslint/js";
 import hooks from "eslint-plugin-react-hooks";
 import { defineConfig } from "eslint/config";
@@ -11,10 +11,9 @@ export default defineConfig(
   eslint.configs.recommended,
   {
     rules: {
-      // A file is seen at one look, and so is a function; what is about one thing is not longer.
       "max-lines": ["error", 150],
       "max-lines-per-function": ["error", { max: 50, skipBlankLines: true, skipComments: true }],
-      // The formatter breaks lines at 110 columns; words that it cannot break may be a little longer.
+      // The formatter breaks lines at 110 columns; strings that it cannot break may be slightly longer.
       "max-len": ["error", { code: 120, ignoreUrls: true }],
       "one-var": ["error", { initialized: "never" }],
     },
@@ -25,20 +24,20 @@ export default defineConfig(
     plugins: { "react-hooks": hooks },
     languageOptions: { parserOptions: { projectService: { allowDefaultProject: ["vite.config.ts"] } } },
     rules: {
-      // Handlers of events may be asynchronous: nobody waits for what they return.
+      // Event handlers may be asynchronous: their result is ignored.
       "@typescript-eslint/no-misused-promises": ["error", { checksVoidReturn: { attributes: false } }],
       "react-hooks/rules-of-hooks": "error",
       "react-hooks/exhaustive-deps": "error",
     },
   },
-  // Runs in Node, whose types the page has no use for.
+  // Runs in Node, whose types are not installed.
   { files: ["vite.config.ts"], extends: [typescript.configs.disableTypeChecked] },
   {
-    // Functions in a test run in Node or, handed to the browser, in the page.
+    // Functions in a test run in Node or, passed to the browser, in the page.
     files: ["**/*.{mjs,js}"],
     languageOptions: { globals: { ...globals.node, ...globals.browser } },
     rules: {
-      // A test tells a story from its beginning to its end.
+      // Tests of a whole workflow are longer.
       "max-lines": ["error", 200],
       "max-lines-per-function": ["error", { max: 80, skipBlankLines: true, skipComments: true }],
     },

@@ -3,10 +3,10 @@ import { join } from "node:path";
 import { brotliCompressSync, constants } from "node:zlib";
 import { defineConfig, type Plugin } from "vite";
 
-/** Files below this many bytes gain nothing by being packed. */
-const WORTH_PACKING = 1024;
+/** Smallest size of a file that is compressed, bytes. */
+const MIN_BYTES = 1024;
 
-/** Writes a brotli copy beside every file, so that the service need not pack. */
+/** Writes a Brotli copy beside every file, so that the service need not compress. */
 function brotli(): Plugin {
   let out = "";
   return {
@@ -19,7 +19,7 @@ function brotli(): Plugin {
         if (!entry.isFile() || path.endsWith(".br")) continue;
         const bytes = readFileSync(path);
         const quality = { [constants.BROTLI_PARAM_QUALITY]: 10 };
-        if (bytes.length > WORTH_PACKING)
+        if (bytes.length > MIN_BYTES)
           writeFileSync(`${path}.br`, brotliCompressSync(bytes, { params: quality }));
       }
     },
@@ -35,8 +35,8 @@ export default defineConfig({
     chunkSizeWarningLimit: 1000,
   },
   plugins: [brotli()],
-  // `npx vite` shows changes at once, against a service on its usual port.
-  // The program of the drive cycle lies beside the service's sources.
+  // `npx vite` shows changes at once, with a service on the default port. The program of the
+  // drive cycle is outside `web/`.
   server: {
     fs: { allow: [".."] },
     proxy: { "/api": { target: "http://127.0.0.1:8087", ws: true }, "/healthz": "http://127.0.0.1:8087" },

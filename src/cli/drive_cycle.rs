@@ -94,7 +94,7 @@ fn write_table(out: &mut impl Write, cycle: &DriveCycleView) -> anyhow::Result<(
     let mut faults = table::table(&["if", "then", "after", "beside"], &[2]);
     for fault in &cycle.faults {
         let after = seconds(fault.after_s, Some("not for sure"));
-        let beside = fault.beside.clone().unwrap_or_default();
+        let beside = fault.beside.map(|code| code.to_string()).unwrap_or_default();
         faults.add_row([fault.fault.clone(), fault.code.to_string(), after, beside]);
     }
     write_lines(out, &faults)

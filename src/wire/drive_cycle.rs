@@ -84,7 +84,7 @@ pub struct CycleFaultView {
     pub after_s: Option<f64>,
     /// Code of another cause that would explain the same readings and is named as well;
     /// null if there is none.
-    pub beside: Option<String>,
+    pub beside: Option<CodeWord>,
 }
 
 /// The gains of the correction added to a command, from the distance of the ball to its
@@ -160,7 +160,7 @@ fn fault(verdict: &FaultVerdict) -> CycleFaultView {
         kind: verdict.fault.kind().map(KindWord::from),
         fault: verdict.fault.words().to_owned(),
         after_s: verdict.after_s,
-        beside: verdict.beside.map(|code| code.to_string()),
+        beside: verdict.beside.map(CodeWord::from),
     }
 }
 

@@ -1,11 +1,11 @@
-/** Light, dark, or as the system has it; and the colours that pictures on canvas need. */
+/** The theme (light, dark, or that of the system), and its colours for drawings on a canvas. */
 
 export type Theme = "system" | "light" | "dark";
 
 const KEY = "offbd.theme";
 const listeners = new Set<() => void>();
-/** Asked for in every frame, changed by the theme alone. */
-const known = new Map<string, string>();
+/** Cached colours: they are read in every frame and change only with the theme. */
+const cache = new Map<string, string>();
 
 export const theme = () => (localStorage.getItem(KEY) ?? "system") as Theme;
 
@@ -18,7 +18,7 @@ function apply(): void {
   const wanted = theme();
   document.documentElement.style.colorScheme = wanted === "system" ? "light dark" : wanted;
   document.documentElement.dataset.theme = isDark() ? "dark" : "light";
-  known.clear();
+  cache.clear();
   listeners.forEach((listener) => listener());
 }
 
@@ -32,12 +32,12 @@ export function onTheme(listener: () => void): () => void {
   return () => listeners.delete(listener);
 }
 
-/** The value of a custom property of the style sheet, as the theme has it now. */
+/** Returns the value of a custom property of the style sheet in the current theme. */
 export function colour(name: string): string {
-  let value = known.get(name);
+  let value = cache.get(name);
   if (value === undefined) {
     value = getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
-    known.set(name, value);
+    cache.set(name, value);
   }
   return value;
 }

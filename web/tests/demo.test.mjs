@@ -1,4 +1,4 @@
-// The demo: a rig broken by a button, seen live, understood, repaired, cleared.
+// The demo: a fault is injected by a button, shown live, explained, repaired and cleared.
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import { ask, browser, demo, page } from "./support.mjs";
@@ -15,7 +15,7 @@ after(async () => {
   await show?.stop();
 });
 
-/** The first event of the fleet for which `wanted` is true, as it arrives; Node 18 has no EventSource. */
+/** Resolves with the first event of the fleet for which `wanted` is true; Node 18 has no EventSource. */
 async function event(base, wanted) {
   const answer = await fetch(`${base}/api/v1/events`);
   const found = (async () => {
@@ -30,7 +30,7 @@ async function event(base, wanted) {
   return { found };
 }
 
-test("a fault is seen within two seconds of its event, on the fleet and on the rig", async () => {
+test("a fault is shown within two seconds of its event, on the pages of the fleet and the rig", async () => {
   const fleet = await page(chromium);
   const rig = await page(chromium);
   const buttons = await page(chromium);
@@ -40,8 +40,8 @@ test("a fault is seen within two seconds of its event, on the fleet and on the r
   await rig.getByRole("heading", { name: "Monitors" }).waitFor();
   await buttons.goto(`${show.url}/learn`);
   const confirmed = await event(show.url, (line) => line.code === "y_servo" && line.status === "confirmed");
-  await buttons.getByRole("button", { name: "Break: Y servo, dead" }).click();
-  await buttons.getByText("Broken now").waitFor();
+  await buttons.getByRole("button", { name: "Inject: Y servo, dead" }).click();
+  await buttons.getByText("Injected faults").waitFor();
   const line = await confirmed.found;
   await Promise.all([
     fleet.getByRole("region", { name: "Rigs" }).getByText("Y servo").waitFor({ timeout: 2000 }),
@@ -54,7 +54,7 @@ test("a fault is seen within two seconds of its event, on the fleet and on the r
     if (view !== rig) await view.done();
   }
 
-  // The rig's page moves: the twin's tilt and the session's samples change.
+  // The rig's page is live: the twin's tilt and the session's samples change.
   const samples = rig.locator("dt:text-is('Samples') + dd");
   const before = await samples.textContent();
   await rig.waitForFunction(
@@ -65,7 +65,7 @@ test("a fault is seen within two seconds of its event, on the fleet and on the r
   );
   assert.match(await rig.getByLabel("Tilt of the twin's plate").textContent(), /qx .*° +qy .*°/);
 
-  // From there to the fault, its sentence, its bits, its charts.
+  // The fault's page: its sentence, status bits and charts.
   await rig
     .getByRole("link", { name: /Look at it/ })
     .first()
@@ -73,7 +73,7 @@ test("a fault is seen within two seconds of its event, on the fleet and on the r
   await rig.getByRole("heading", { name: /Status byte/ }).waitFor();
   await rig.getByText("The test fails right now.").waitFor();
   await rig.getByRole("img", { name: /Residual along y/ }).waitFor();
-  await rig.getByLabel("Your name, kept with what you do").fill("ada");
+  await rig.getByLabel("Your name, recorded with the action").fill("ada");
   await rig.getByRole("button", { name: "Acknowledge" }).click();
   await rig.getByText("ada acknowledged it").waitFor();
   await ask(show.url, "DELETE", "/demo/faults");
@@ -84,11 +84,11 @@ test("a fault is seen within two seconds of its event, on the fleet and on the r
   await rig.done();
 });
 
-test("the script takes over again, and a visitor who ends the session does not stop the show", async () => {
+test("the script resumes, and the demo continues after a visitor ends the session", async () => {
   const view = await page(chromium);
   await view.goto(`${show.url}/learn`);
-  await view.getByRole("button", { name: "Back to the script" }).click();
-  await view.getByText("A script breaks and repairs it").waitFor();
+  await view.getByRole("button", { name: "Resume the script" }).click();
+  await view.getByText("A script injects and repairs faults").waitFor();
   await view.goto(`${show.url}/rigs/demo-rig`);
   const session = view.locator("dt:text-is('Session') + dd");
   await session.getByText("demo-").waitFor();
@@ -103,7 +103,7 @@ test("the script takes over again, and a visitor who ends the session does not s
   await view.done();
 });
 
-test("the textbook's limit is broken by a rig that the default calls whole", async () => {
+test("a rig that is healthy by the default profile exceeds the textbook's limit", async () => {
   const view = await page(chromium);
   await view.goto(`${show.url}/learn`);
   await view.getByRole("heading", { name: "textbook" }).waitFor();

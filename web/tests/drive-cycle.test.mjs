@@ -1,4 +1,4 @@
-// The drive cycle on a rig's page: worked out, shown, taken along, and run by the program that is given.
+// The drive cycle on a rig's page: computed, shown, downloaded, and run by the offered program.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { readFileSync, writeFileSync } from "node:fs";
@@ -22,18 +22,18 @@ after(async () => {
   remove(work);
 });
 
-/** What a button downloads, as text. */
+/** Presses a button and returns the downloaded text. */
 async function downloaded(view, word) {
   const coming = view.waitForEvent("download");
   await view.getByRole("button", { name: word }).click();
   return readFileSync(await (await coming).path(), "utf8");
 }
 
-test("a learnt rig's cycle is shown with what it finds, downloaded, and run by its program", async () => {
+test("the cycle of a learnt rig is shown with its detectable faults, downloaded, and run by the program", async () => {
   const view = await page(chromium);
   await view.goto(`${service.url}/rigs/learnt`);
   const card = view.locator("#drive-cycle");
-  await card.getByRole("button", { name: "Work it out" }).click();
+  await card.getByRole("button", { name: "Compute the drive cycle" }).click();
   await card.getByRole("img", { name: /Set points over/ }).waitFor();
   const stuck = card.getByRole("row").filter({ hasText: "the ball is stuck" });
   assert.match(await stuck.textContent(), /Stuck ball.*\d\.\d+\ss/);
@@ -63,13 +63,13 @@ test("a learnt rig's cycle is shown with what it finds, downloaded, and run by i
   assert.ok(Math.abs(Number(qy) - corrected) < 1e-4, `${qy} is not ${corrected}`);
   assert.ok(
     Math.abs(Number(qx) - cycle.rows.cmd_qx_rad[0]) < 1e-6,
-    "where nothing is seen nothing is corrected",
+    "without a reading there is no correction",
   );
   assert.deepEqual(view.errors, []);
   await view.done();
 });
 
-test("a rig that is not learnt has none, and is told why", async () => {
+test("a rig that is not learnt has no drive cycle, and the page says why", async () => {
   const view = await page(chromium);
   await view.goto(`${service.url}/rigs/new`);
   const card = view.locator("#drive-cycle");

@@ -1,4 +1,4 @@
-// The fleet: empty, many, sick, and a service that goes away and comes back.
+// The fleet: empty, large, with a fault, and with a service that restarts.
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import { ask, browser, directory, page, recordings, remove, serve } from "./support.mjs";
@@ -16,7 +16,7 @@ after(async () => {
   remove(work);
 });
 
-test("an empty fleet says what to do", async () => {
+test("an empty fleet offers the set-up", async () => {
   const empty = await serve(directory());
   const view = await page(chromium);
   await view.goto(empty.url);
@@ -32,7 +32,7 @@ test("an empty fleet says what to do", async () => {
 
 const N = 3000;
 
-test("thousands of rigs: found, filtered, and only those in sight are in the document", async () => {
+test("thousands of rigs can be searched and filtered, and only visible rows are in the document", async () => {
   service = await serve(`${work}/many`);
   for (let i = 0; i < N; i += 100) {
     await Promise.all(
@@ -56,7 +56,7 @@ test("thousands of rigs: found, filtered, and only those in sight are in the doc
   assert.match(view.url(), /search=rig-2999/);
   await view.getByRole("searchbox").fill("");
 
-  // A fault shows at once, first of all, and can be filtered.
+  // A fault is shown at once at the top, and can be filtered.
   await ask(service.url, "POST", "/assets/rig-7/telemetry?session=now", rig.sick, "text/csv");
   await view
     .getByRole("region", { name: "Rigs" })
@@ -68,7 +68,7 @@ test("thousands of rigs: found, filtered, and only those in sight are in the doc
   await view.done();
 });
 
-test("when the service comes back, the page catches up", async () => {
+test("after a restart of the service, the page catches up", async () => {
   const view = await page(chromium, { viewport: { width: 1500, height: 900 } });
   await view.goto(`${service.url}/?search=rig-8`);
   await view
@@ -90,7 +90,7 @@ test("when the service comes back, the page catches up", async () => {
     .first()
     .waitFor();
   await view.getByText("The service does not answer").waitFor({ state: "detached" });
-  // What was missed has come as events too, each once.
+  // The missed events arrive, each once.
   const feed = view.getByRole("region", { name: "Events" });
   await feed.getByText("confirmed").waitFor();
   assert.equal(await feed.getByRole("listitem").count(), 2);

@@ -1,4 +1,4 @@
-// A rig that learns by itself, from its registration to a click.
+// Automatic calibration, from the registration of a rig to its confirmation.
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import { ask, browser, directory, page, recordings, remove, serve } from "./support.mjs";
@@ -18,7 +18,7 @@ after(async () => {
   remove(work);
 });
 
-/** Sends the lines of the healthy recording from one to another as a device does. */
+/** Sends lines `from` to `to` of the healthy recording as a device does. */
 function send(asset, from, to) {
   const [head, ...lines] = rig.healthy.trim().split("\n");
   const body = `${head}\n${lines.slice(from, to).join("\n")}\n`;
@@ -27,7 +27,7 @@ function send(asset, from, to) {
 
 const panel = (view) => view.getByRole("region", { name: "Learning" });
 
-test("gathered, offered, confirmed with a click", async () => {
+test("motion is gathered, a calibration offered and confirmed", async () => {
   await ask(service.url, "POST", "/assets", { name: "new" });
   const view = await page(chromium);
   await view.goto(`${service.url}/rigs/new`);
@@ -51,24 +51,27 @@ test("gathered, offered, confirmed with a click", async () => {
   await view.getByRole("heading", { name: "Ready: was the rig healthy?" }).waitFor();
   await panel(view).getByRole("link", { name: "first" }).waitFor();
   await panel(view).getByRole("button", { name: "Yes, use what was learnt" }).click();
-  await view.getByRole("heading", { name: "Learnt by itself" }).waitFor();
+  await view.getByRole("heading", { name: "Learnt automatically" }).waitFor();
   await panel(view)
-    .getByText(/Learnt from 1 session; the next healthy ones refine it until 5 have taught/)
+    .getByText(/Learnt from 1 session; further healthy sessions refine it until it is based on 5/)
     .waitFor();
   const { calibration } = await ask(service.url, "GET", "/assets/new");
-  assert.ok(Math.abs(calibration.x.gain - rig.learnt.calibration.x.gain) < 0.05, "as learnt by hand");
+  assert.ok(
+    Math.abs(calibration.x.gain - rig.learnt.calibration.x.gain) < 0.05,
+    "as in the manual calibration",
+  );
   assert.deepEqual(view.errors, []);
   await view.done();
 });
 
-test("somebody who says no starts again", async () => {
+test("a rejected calibration starts again", async () => {
   await ask(service.url, "POST", "/assets", { name: "odd" });
   await send("odd", 0, 7000);
   const view = await page(chromium);
   await view.goto(service.url);
   await view.getByRole("link", { name: /odd.*was it healthy\?/ }).click();
   await panel(view).getByRole("button", { name: "No, start again" }).click();
-  await view.getByRole("heading", { name: "This rig is not learnt yet" }).waitFor();
+  await view.getByRole("heading", { name: "This rig has not been learnt yet" }).waitFor();
   const learning = await ask(service.url, "GET", "/assets/odd/learning");
   assert.deepEqual([learning.state, learning.sessions], ["gathering", []]);
   assert.deepEqual(view.errors, []);

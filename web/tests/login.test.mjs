@@ -1,4 +1,4 @@
-// A service that asks who is there, and the page's way in.
+// The login of a service that requires a token.
 import assert from "node:assert/strict";
 import { readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
@@ -36,17 +36,17 @@ const asks = (method, path, token, body) =>
     body: JSON.stringify(body),
   });
 
-test("whoever is not known finds the way in and nothing else", async () => {
+test("without authentication, only the login is shown", async () => {
   await view.getByLabel("Token").waitFor();
   assert.doesNotMatch(await view.textContent("body"), /bench-1/);
   const wrong = await view.evaluate(`${AXE}; axe.run().then((found) => found.violations.map((v) => v.id))`);
   assert.deepEqual(wrong, []);
   await view.getByLabel("Token").fill("offbd_wrong");
   await view.getByRole("button", { name: "Log in" }).click();
-  await view.getByText("none of this service").waitFor();
+  await view.getByText("the token is unknown, revoked or expired").waitFor();
 });
 
-test("a token opens the page where it was asked for", async () => {
+test("a token opens the requested page", async () => {
   await view.getByLabel("Token").fill(admin);
   await view.getByRole("button", { name: "Log in" }).click();
   await view.getByRole("heading", { name: "Set up bench-1" }).waitFor();
@@ -66,17 +66,17 @@ test("a token opens the page where it was asked for", async () => {
 test("a device's snippet shows a token of its own", async () => {
   const snippet = view.getByRole("region", { name: "Python snippet" });
   assert.match(await snippet.textContent(), /Bearer offbd_TOKEN/);
-  await view.getByRole("button", { name: "Make a token for this rig" }).click();
+  await view.getByRole("button", { name: "Create a token for this rig" }).click();
   await snippet.getByText(/Bearer offbd_[0-9a-f]{64}/).waitFor();
   const [token] = /offbd_[0-9a-f]{64}/.exec(await snippet.textContent());
   const sample = { seq: 1, t_s: 0, cmd_qx_rad: 0, cmd_qy_rad: 0, x_m: 0, y_m: 0 };
   const sent = await asks("POST", "/assets/bench-1/telemetry", token, { samples: [sample] });
   assert.equal((await sent.json()).accepted, 1);
-  await view.getByText(/Samples (are coming|have come)/).waitFor();
+  await view.getByText(/Receiving samples|Samples received/).waitFor();
   assert.equal((await asks("POST", "/assets", token, { name: "other" })).status, 403);
 });
 
-test("who leaves is not known any more", async () => {
+test("after the logout, the login is shown again", async () => {
   await view.getByRole("button", { name: "Log out" }).click();
   await view.getByLabel("Token").waitFor();
   await view.reload();

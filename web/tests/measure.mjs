@@ -1,6 +1,6 @@
-// What the page costs: time to the first interaction, frames, scripting per
-// frame, and a fleet of thousands. Prints figures; judges nothing, for they are
-// the machine's. BINARY names the program.
+// Measures the page: time to the first interaction, frame rate, scripting per frame, and a fleet
+// of thousands. Prints the figures without limits, as they depend on the machine. BINARY is the
+// path of the program.
 import { ask, browser, demo, directory, page, remove, serve } from "./support.mjs";
 
 const SECONDS = 8;
@@ -66,7 +66,7 @@ async function opened(of, url, what, ready) {
     await view.done();
   }
   console.log(
-    `${what}: ${times.map((ms) => ms.toFixed(0)).join(", ")} ms from the address to the first interaction`,
+    `${what}: ${times.map((ms) => ms.toFixed(0)).join(", ")} ms from the request to the first interaction`,
   );
 }
 

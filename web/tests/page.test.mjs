@@ -1,4 +1,4 @@
-// What is served: small, cacheable, from here alone; and readable by everybody.
+// The served page: size, caching, no third-party requests, accessibility.
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import { get } from "node:http";
@@ -41,7 +41,7 @@ const fetched = (path, headers = {}) =>
     }).on("error", failed);
   });
 
-test("the page is asked for by its hash, its parts are kept for ever", async () => {
+test("the page is revalidated by its ETag, its parts are immutable", async () => {
   const html = await fetched("/", { accept: "text/html" });
   assert.equal(html.status, 200);
   assert.match(html.headers["content-security-policy"], /default-src 'self'/);
@@ -59,7 +59,7 @@ test("the page is asked for by its hash, its parts are kept for ever", async () 
   assert.notEqual(packed.headers.etag, plain.headers.etag);
 });
 
-test("the page's own addresses are the page, others are problems", async () => {
+test("addresses of views return the page, others a problem", async () => {
   const html = { accept: "text/html,*/*" };
   assert.match((await fetched("/rigs/bench", html)).headers["content-type"], /text\/html/);
   for (const [path, headers] of [
@@ -73,25 +73,25 @@ test("the page's own addresses are the page, others are problems", async () => {
   }
 });
 
-test("the first load is small and asks nobody else", async () => {
+test("the first load is small and requests nothing from other hosts", async () => {
   const view = await page(chromium);
   let bytes = 0;
-  const elsewhere = [];
+  const foreign = [];
   const client = await view.context().newCDPSession(view);
   await client.send("Network.enable");
   client.on("Network.loadingFinished", ({ encodedDataLength }) => (bytes += encodedDataLength));
-  view.on("request", (request) => request.url().startsWith(service.url) || elsewhere.push(request.url()));
+  view.on("request", (request) => request.url().startsWith(service.url) || foreign.push(request.url()));
   await view.goto(`${service.url}/rigs/bench/faults/x_servo`);
   await view.getByRole("heading", { name: "Before and after" }).waitFor();
   await view.goto(service.url);
   await view.getByText("bench").first().waitFor();
   assert.ok(bytes > 10_000 && bytes < FIRST_LOAD, `${bytes} bytes`);
-  assert.deepEqual(elsewhere, []);
+  assert.deepEqual(foreign, []);
   assert.deepEqual(view.errors, []);
   await view.done();
 });
 
-/** Views with the sign that they are there. */
+/** The views, each with a text that it shows. */
 const VIEWS = () => [
   ["/", "bench"],
   ["/rigs/bench", "Monitors"],
@@ -104,12 +104,12 @@ const VIEWS = () => [
   ["/rigs/bench/set-up?step=check", "Signs and units"],
   ["/rigs/bench/set-up?step=learn", "What was learnt"],
   ["/learn", "Why 0.01"],
-  ["/nowhere", "There is nothing here"],
+  ["/nowhere", "Page not found"],
 ];
 
 for (const colorScheme of ["light", "dark"]) {
   for (const width of [390, 1280]) {
-    test(`every view is usable by everybody, ${colorScheme}, ${width} px wide`, async () => {
+    test(`every view is accessible, ${colorScheme}, ${width} px wide`, async () => {
       const view = await page(chromium, { colorScheme, viewport: { width, height: 800 } });
       for (const [path, sign] of VIEWS()) {
         await view.goto(service.url + path);
@@ -134,7 +134,7 @@ for (const colorScheme of ["light", "dark"]) {
   }
 }
 
-test("a rig that is not there, a fault that is not, a session that is not: said in words", async () => {
+test("an unknown rig, fault or session gives a message", async () => {
   const view = await page(chromium);
   for (const [path, words] of [
     ["/rigs/nobody", "there is no asset `nobody`"],
@@ -151,7 +151,7 @@ test("a rig that is not there, a fault that is not, a session that is not: said 
   await view.done();
 });
 
-test("the keyboard reaches it all, the theme is kept", async () => {
+test("the page works by keyboard, and the theme is stored", async () => {
   const view = await page(chromium);
   await view.goto(service.url);
   await view.getByRole("link", { name: /bench/ }).first().waitFor();

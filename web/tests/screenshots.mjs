@@ -1,5 +1,5 @@
-// Takes the pictures that are looked at and shown: every view, three sizes, two
-// themes. Run by scripts/screenshots; the first argument is the directory.
+// Takes screenshots of every view in three sizes and two themes. Run by
+// scripts/screenshots; the first argument is the directory.
 import { mkdirSync } from "node:fs";
 import { join } from "node:path";
 import { ask, browser, demo, directory, drifting, page, recordings, remove, serve } from "./support.mjs";
@@ -14,7 +14,7 @@ const SIZES = {
 const THEMES = ["light", "dark"];
 mkdirSync(out, { recursive: true });
 
-/** Moments in which pictures settle. */
+/** Waits until the view has settled. */
 const settle = (view, ms = 1500) => view.waitForTimeout(ms);
 
 async function shoot(of, name, url, ready, act) {
@@ -66,7 +66,7 @@ try {
     settle(view),
   );
   await shoot(of, "asset", `${base}/rigs/demo-rig`, heading("Monitors"), async (view) => {
-    // A healthy moment, then a servo dies.
+    // A healthy rig whose servo is then reversed.
     await ask(base, "DELETE", "/demo/faults");
     await ask(base, "DELETE", "/assets/demo-rig/faults/x_servo");
     await settle(view, 5000);
@@ -103,7 +103,7 @@ try {
     settle(view, 5000),
   );
   await shoot(of, "learn-rig", `${base}/rigs/bench-1/set-up?step=learn`, heading("What was learnt"));
-  await shoot(of, "demo", `${base}/learn`, heading("Break it"), (view) => settle(view));
+  await shoot(of, "demo", `${base}/learn`, heading("Inject faults"), (view) => settle(view));
   await shoot(of, "missing", `${base}/rigs/nobody`, heading("nobody"));
 } finally {
   await of.close();

@@ -1,4 +1,4 @@
-// Recordings: imported from anybody's CSV, played back, judged again, taken away.
+// Recordings: imported from CSV, played back, judged again, downloaded, deleted.
 import assert from "node:assert/strict";
 import { readFileSync, writeFileSync } from "node:fs";
 import { after, before, test } from "node:test";
@@ -21,8 +21,8 @@ after(async () => {
 });
 
 /**
- * The healthy recording as another would have written it: semicolons and decimal commas, degrees,
- * millimetres, milliseconds, x the other way round.
+ * The healthy recording in a foreign format: semicolons and decimal commas, degrees, millimetres,
+ * milliseconds, x with the opposite sign.
  */
 function foreign() {
   const rows = rig.healthy
@@ -38,7 +38,7 @@ function foreign() {
   return ["time [ms];ball x (mm);ball y (mm);qx (deg);qy (deg)", ...lines].join("\n");
 }
 
-test("a foreign file is mapped, its sign is found wrong, corrected, imported", async () => {
+test("a foreign file is mapped, its wrong sign detected and corrected, and it is imported", async () => {
   const file = `${work}/foreign.csv`;
   writeFileSync(file, foreign());
   const view = await page(chromium);
@@ -67,7 +67,7 @@ test("a foreign file is mapped, its sign is found wrong, corrected, imported", a
   await view.done();
 });
 
-test("a file that is dropped opens the dialogue; one that is none is said to be none", async () => {
+test("a dropped file opens the dialogue; a file that is not a recording is refused", async () => {
   const view = await page(chromium);
   await view.goto(`${service.url}/sessions`);
   await view.getByText("Drop a recording").waitFor();
@@ -111,7 +111,7 @@ test("played back, scrubbed, judged again, recorded, downloaded, deleted", async
   await moment.fill("25");
   await view.getByText("25.00 s").waitFor();
 
-  // At 25 s the ball has left the twin behind: the picture is of that moment.
+  // At 25 s the ball has left the twin behind: the 3D view shows that moment.
   await view.getByText("Loading 3D").waitFor({ state: "detached" });
   await view
     .getByLabel("Tilt of the twin's plate")
@@ -162,8 +162,8 @@ test("played back, scrubbed, judged again, recorded, downloaded, deleted", async
   await view.done();
 });
 
-test("what was not judged is said, of a moment and of what was judged again", async () => {
-  // Three tenths of a second: less than any fault takes to be confirmed.
+test("a session that is too short is shown as not judged", async () => {
+  // 0.3 s: shorter than the confirmation of any fault.
   const moment = rig.healthy.split("\n").slice(0, 31).join("\n");
   const { session } = await ask(
     service.url,
@@ -175,7 +175,7 @@ test("what was not judged is said, of a moment and of what was judged again", as
   const view = await page(chromium);
   await view.goto(`${service.url}/sessions/${session.id}`);
   await view.getByText("Not judged", { exact: true }).waitFor();
-  const shares = view.getByRole("table", { name: "Judged, of the session" });
+  const shares = view.getByRole("table", { name: "Judged part of the session" });
   assert.equal(await shares.getByRole("cell", { name: "not judged" }).count(), 4);
   await view.goto(`${service.url}/sessions`);
   await view

@@ -1,4 +1,4 @@
-// A rig in five minutes, by a device that sends millimetres the wrong way round.
+// The set-up of a rig whose device sends millimetres with swapped axes and a wrong sign.
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import { ask, browser, directory, page, recordings, remove, serve } from "./support.mjs";
@@ -18,7 +18,7 @@ after(async () => {
   remove(work);
 });
 
-/** The healthy recording as rows of a device whose x and y are swapped, in mm, y the wrong way. */
+/** The healthy recording as rows of a device with swapped axes, mm, and the sign of y inverted. */
 function rows(from, to) {
   const number = (cell) => (cell === "" ? null : Number(cell));
   return rig.healthy
@@ -43,12 +43,12 @@ test("described, connected, corrected, learnt", async () => {
   await view.goto(`${service.url}/set-up`);
   await view.getByLabel("Name").fill("bench 1");
   assert.ok(
-    await view.getByRole("button", { name: "Register and go on" }).isDisabled(),
+    await view.getByRole("button", { name: "Register and continue" }).isDisabled(),
     "a name with a blank",
   );
   await view.getByLabel("Name").fill("bench-1");
   await view.getByLabel("Ball's position").selectOption({ label: "mm" });
-  await view.getByRole("button", { name: "Register and go on" }).click();
+  await view.getByRole("button", { name: "Register and continue" }).click();
   await view.getByText("Waiting for the first sample").waitFor();
   for (const word of ["curl", "Python", "Arduino / ESP32"]) {
     await view.getByRole("button", { name: word, exact: true }).click();
@@ -57,24 +57,24 @@ test("described, connected, corrected, learnt", async () => {
   const send = (from, to) =>
     ask(service.url, "POST", "/assets/bench-1/telemetry", { samples: rows(from, to) });
   await send(0, 20);
-  await view.getByText(/Samples (are coming|have come)/).waitFor();
+  await view.getByText(/Receiving samples|Samples received/).waitFor();
   await view.getByRole("button", { name: "Check it" }).click();
   await view.getByRole("heading", { name: "Signs and units" }).waitFor();
 
-  // While the page watches, a device sends; the wrong axes are found and put right.
+  // A device sends while the page is open; the wrong axes are detected and corrected.
   let at = 20;
   const device = async (until) => {
     for (; at < 9000 && !(await until()); at += 50) await send(at, Math.min(at + 50, 9000));
   };
   await device(() => view.getByText("follows the other command").first().isVisible());
-  await view.getByRole("button", { name: "Put it right" }).click();
+  await view.getByRole("button", { name: "Correct the axes" }).click();
   await view.getByText(/x and y swapped/).waitFor();
   const { axes } = await ask(service.url, "GET", "/assets/bench-1");
   assert.deepEqual([axes.swap, axes.x_sign, axes.y_sign, axes.position_unit_m], [true, 1, -1, 0.001]);
-  // The next session is whole, however long the page took to tell.
+  // The next session is complete, however long the detection took.
   at = 0;
-  await device(async () => (await view.getByText("moves as the command asks").count()) === 2);
-  await view.getByRole("button", { name: "Good: learn it" }).click();
+  await device(async () => (await view.getByText("moves as commanded").count()) === 2);
+  await view.getByRole("button", { name: "Continue: learn the rig" }).click();
 
   await device(() => false);
   await view.getByText("recording", { exact: false }).first().waitFor();
@@ -94,7 +94,7 @@ test("described, connected, corrected, learnt", async () => {
   await view.done();
 });
 
-test("a recording in which nothing moves is refused, in words", async () => {
+test("a recording without motion is refused with a message", async () => {
   await ask(service.url, "POST", "/assets", { name: "still" });
   const lines = Array.from({ length: 3000 }, (_, i) => `${(i / 100).toFixed(2)},0,0,0.01,0.01`);
   await ask(

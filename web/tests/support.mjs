@@ -1,4 +1,4 @@
-// The real program, a real browser, and rigs to show in it.
+// Starts the real program and a browser, and provides recordings of rigs.
 import assert from "node:assert/strict";
 import { execFileSync, spawn } from "node:child_process";
 import { existsSync, mkdtempSync, readFileSync, rmSync } from "node:fs";
@@ -19,20 +19,20 @@ const BROWSERS = [
   "/usr/bin/google-chrome",
 ];
 
-/** Longest wait for anything that should be there in a moment, ms. */
+/** Timeout for anything that should appear immediately, ms. */
 export const SOON = 20_000;
 
 export const directory = () => mkdtempSync(join(tmpdir(), "offbd-web-"));
 
-/** What a stream says until it names an address. */
+/** Reads a stream until it contains an address; returns its port. */
 function address(child, stream) {
   return new Promise((found, failed) => {
-    let said = "";
-    const late = setTimeout(() => failed(new Error(`no address came:\n${said}`)), SOON * 3);
-    child.once("exit", (code) => failed(new Error(`it ended with ${code}:\n${said}`)));
+    let output = "";
+    const late = setTimeout(() => failed(new Error(`no address was printed:\n${output}`)), SOON * 3);
+    child.once("exit", (code) => failed(new Error(`it ended with ${code}:\n${output}`)));
     child[stream].on("data", (bytes) => {
-      if (said.length < 1e5) said += bytes;
-      const port = /(?:http:\/\/|address=)127\.0\.0\.1:(\d+)/.exec(stripVTControlCharacters(said))?.[1];
+      if (output.length < 1e5) output += bytes;
+      const port = /(?:http:\/\/|address=)127\.0\.0\.1:(\d+)/.exec(stripVTControlCharacters(output))?.[1];
       if (!port) return;
       clearTimeout(late);
       found(Number(port));
@@ -42,12 +42,12 @@ function address(child, stream) {
 
 const running = new Set();
 
-// A test that fails leaves its programs behind; they would keep it from ending.
+// Programs left by a failed test would prevent Node from exiting.
 after(() => {
   for (const child of running) child.kill("SIGKILL");
 });
 
-/** A running program; `stop` ends it as Ctrl-C would. */
+/** Starts the program; `stop` ends it as Ctrl-C would. */
 async function run(args, stream) {
   assert.ok(existsSync(BINARY), `${BINARY} is missing; build it with cargo build, or name another in BINARY`);
   const child = spawn(BINARY, args, {
@@ -71,7 +71,7 @@ export const serve = (data, port = 0, ...more) =>
   run(["serve", "--data", data, "--listen", `127.0.0.1:${port}`, ...more], "stderr");
 export const demo = (...args) => run(["demo", "--port", "0", ...args], "stdout");
 
-/** Runs a command of the program to its end; what it prints. */
+/** Runs a command of the program and returns its output. */
 export const offbd = (...args) =>
   execFileSync(BINARY, args, { encoding: "utf8", stdio: ["ignore", "pipe", "pipe"] });
 
@@ -101,7 +101,7 @@ export function recordings(where) {
   };
 }
 
-/** Registers a learnt rig whose x servo loses 2 % of its gain in each of `n` sessions. */
+/** Registers a learnt rig whose x servo loses 2 % of its gain with each of `n` sessions. */
 export async function drifting(base, where, learnt, name = "weak", n = 12) {
   await ask(base, "POST", "/assets", { ...learnt, name });
   for (let i = 0; i < n; i++) {
@@ -128,7 +128,7 @@ export async function drifting(base, where, learnt, name = "weak", n = 12) {
   }
 }
 
-/** Asks the interface; an answer that is no success is an error. */
+/** Sends a request to the API; throws on an unsuccessful response. */
 export async function ask(base, method, path, body, type = "application/json") {
   const answer = await fetch(`${base}/api/v1${path}`, {
     method,
@@ -154,11 +154,11 @@ export async function browser() {
   });
 }
 
-/** What a browser says when it cannot reach a service that is down; all else is an error of the page. */
+/** Browser messages about an unreachable service; others are errors of the page. */
 const UNREACHABLE =
   /ERR_CONNECTION_REFUSED|ERR_CONNECTION_RESET|ERR_INCOMPLETE_CHUNKED_ENCODING|ERR_EMPTY_RESPONSE/;
 
-/** A page that remembers what went wrong in it. */
+/** Opens a page that collects its errors. */
 export async function page(of, options = {}) {
   const context = await of.newContext({
     viewport: { width: 1280, height: 800 },
@@ -170,7 +170,7 @@ export async function page(of, options = {}) {
   const errors = [];
   view.on("pageerror", (error) => errors.push(String(error)));
   view.on("console", (message) => {
-    // WebGL without a graphics card says that it is slow.
+    // WebGL without a graphics card warns that it is slow.
     const expected = UNREACHABLE.test(message.text()) || /GPU stall|GL Driver Message/.test(message.text());
     if (["error", "warning"].includes(message.type()) && !expected) errors.push(message.text());
   });

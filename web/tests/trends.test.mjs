@@ -1,4 +1,4 @@
-// Drift before fault: a servo that weakens from session to session.
+// Drift warnings: a servo that weakens from session to session.
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import { browser, directory, drifting, page, recordings, remove, serve } from "./support.mjs";
@@ -18,7 +18,7 @@ after(async () => {
   remove(work);
 });
 
-test("the fleet warns of a fault on its way, and the rig's page shows why", async () => {
+test("the fleet warns of a drifting servo, and the rig's page shows its trend", async () => {
   const view = await page(chromium);
   await view.goto(service.url);
   const row = view.getByRole("list", { name: "Rigs" }).getByRole("listitem").filter({ hasText: "weak" });
@@ -31,12 +31,12 @@ test("the fleet warns of a fault on its way, and the rig's page shows why", asyn
   await row.getByRole("link").click();
 
   await view
-    .getByRole("list", { name: "Faults on their way" })
+    .getByRole("list", { name: "Drift warnings" })
     .getByText(/gain is .* and falls; at this slope it reaches/)
     .waitFor();
   const drift = view.locator("#drift");
   assert.equal(await drift.getByRole("img").count(), 6, "three parameters of two servos");
-  const chart = drift.getByRole("img", { name: /Gain of the x servo over 12 sessions.*it is warned of/ });
+  const chart = drift.getByRole("img", { name: /Gain of the x servo over 12 sessions.*warning/ });
   assert.equal(await chart.locator("circle").count(), 12);
   assert.equal(await drift.getByText(/at the limit in \d+ sessions/).count(), 1);
   assert.deepEqual(view.errors, []);

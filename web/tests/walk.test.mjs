@@ -1,5 +1,5 @@
-// The walk of README.md, from the demo to understanding a fault, step by step in
-// a fresh browser. What it says in italics or bold is to be found on the page.
+// The walkthrough of README.md, from the demo to the explanation of a fault. The words that it
+// has in italics or bold must be on the page.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { after, before, test } from "node:test";
@@ -24,18 +24,18 @@ after(async () => {
   await show?.stop();
 });
 
-/** Presses what the walk calls `words`, which must stand in it. */
+/** Presses the element that the walkthrough calls `words`. */
 async function press(words, role = "button", name = words) {
   assert.ok(WALK.replace(/\s+/g, " ").includes(words), `the walk does not say “${words}”`);
   await view.getByRole(role, { name }).first().click();
 }
 
-test("from the demo to understanding a fault", async () => {
+test("from the demo to the explanation of a fault", async () => {
   await view.goto(show.url);
   await view.getByRole("link", { name: /demo-rig/ }).waitFor();
 
   await press("Demo", "link");
-  await press("dead", "button", "Break: X servo, dead");
+  await press("dead", "button", "Inject: X servo, dead");
   await press("Watch demo-rig", "link");
   const monitor = view
     .getByRole("listitem")
@@ -47,7 +47,7 @@ test("from the demo to understanding a fault", async () => {
 
   await press("Look at it", "link", /X servo.*Look at it/);
   assert.match(await view.locator(".sentence").textContent(), /^[A-Z].*\.$/);
-  await view.getByRole("heading", { name: "What it may be" }).waitFor();
+  await view.getByRole("heading", { name: "Possible causes" }).waitFor();
   await view.getByRole("heading", { name: /Status byte/ }).waitFor();
   await view.getByRole("row").filter({ hasText: "confirmedDTC" }).waitFor();
   await view.getByRole("img", { name: /Residual along x/ }).waitFor();
@@ -59,9 +59,9 @@ test("from the demo to understanding a fault", async () => {
   await press("Demo", "link");
   await view.getByRole("heading", { name: "textbook" }).waitFor();
   await press("Repair all");
-  await view.getByText("The simulated rig is whole.").waitFor();
+  await view.getByText("The simulated rig is healthy.").waitFor();
   await view.goto(`${show.url}/rigs/demo-rig/faults/x_servo`);
-  await view.getByLabel("Your name, kept with what you do").fill("ada");
+  await view.getByLabel("Your name, recorded with the action").fill("ada");
   await press("acknowledge", "button", "Acknowledge");
   await view.locator("dt:text-is('Acknowledged') + dd").getByText("ada").waitFor();
   await press("clear", "button", "Clear");

@@ -1,31 +1,30 @@
 /**
- * The one place that knows how a request proves who sends it: by a cookie that
- * the service gives for a token and no script can read. It goes along with
- * requests and with streams alike.
+ * Adds the credentials of the caller: an HttpOnly cookie that the service sets at the login.
+ * Requests and streams both send it.
  */
 export function withCredentials(init: RequestInit): RequestInit {
   return { ...init, credentials: "same-origin" };
 }
 
-/** The address of a stream, which cannot carry headers. */
+/** Returns the URL of a stream; a stream cannot send headers of its own. */
 export function streamUrl(path: string): string {
   return path;
 }
 
 const listeners = new Set<() => void>();
 
-/** Calls `listener` whenever the service does not know who asks; the answer ends that. */
+/** Calls `listener` on every response with status 401; returns a function that unsubscribes it. */
 export function onUnauthenticated(listener: () => void): () => void {
   listeners.add(listener);
   return () => listeners.delete(listener);
 }
 
-/** Tells the page that the service does not know who asks, or no longer. */
+/** Notifies the page that the caller is not authenticated, or no longer. */
 export function announceUnauthenticated(): void {
   listeners.forEach((listener) => listener());
 }
 
-/** What a person who acts is called; kept with the act where no token says it. */
+/** The user's name, recorded with an action if no token identifies the user. */
 export function actor(): string {
   return localStorage.getItem("offbd.actor") || "dashboard";
 }

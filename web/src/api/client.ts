@@ -1,4 +1,4 @@
-/** What the page asks of the service, each by a name. */
+/** The requests of the page to the service. */
 import { actor, withCredentials } from "./access";
 import { BASE, failure, get, getAll, LOGIN, query, request, segment, send } from "./request";
 import type {
@@ -7,7 +7,9 @@ import type {
   Caller,
   Demo,
   DriveCycle,
+  FaultCode,
   FaultEntry,
+  FaultFilter,
   FaultLine,
   FaultRecording,
   FleetEntry,
@@ -16,11 +18,13 @@ import type {
   Learning,
   NewToken,
   Page,
+  Profile,
   Replay,
   ReplaySettings,
-  Session,
-  State,
   ServiceHealth,
+  Session,
+  SessionState,
+  State,
   Trace,
   Trends,
 } from "./types";
@@ -44,24 +48,25 @@ export const api = {
   state: (name: string) => get<State>(`/assets/${segment(name)}/state`),
   driveCycle: (name: string) => get<DriveCycle>(`/assets/${segment(name)}/drive-cycle`),
   trends: (name: string) => get<Trends>(`/assets/${segment(name)}/trends`),
-  faultsOf: (name: string, status = "all") =>
+  faultsOf: (name: string, status: FaultFilter = "all") =>
     get<Page<FaultEntry>>(`/assets/${segment(name)}/faults${query({ status })}`).then((page) => page.items),
-  fault: (name: string, code: string) => get<FaultEntry>(`/assets/${segment(name)}/faults/${segment(code)}`),
-  /** The seconds around the last occurrence, as recorded and as judged. */
-  faultRecording: (name: string, code: string, stretch: { before_s: number; after_s: number }) =>
-    get<FaultRecording>(`/assets/${segment(name)}/faults/${segment(code)}/recording${query(stretch)}`),
-  history: (name: string, code: string) =>
+  fault: (name: string, code: FaultCode) =>
+    get<FaultEntry>(`/assets/${segment(name)}/faults/${segment(code)}`),
+  /** The recorded and judged seconds around the last occurrence. */
+  faultRecording: (name: string, code: FaultCode, range: { before_s: number; after_s: number }) =>
+    get<FaultRecording>(`/assets/${segment(name)}/faults/${segment(code)}/recording${query(range)}`),
+  history: (name: string, code: FaultCode) =>
     get<Page<HistoryEntry>>(
       `/assets/${segment(name)}/faults/${segment(code)}/history${query({ limit: 200 })}`,
     ),
-  acknowledge: (name: string, code: string) =>
+  acknowledge: (name: string, code: FaultCode) =>
     send<FaultEntry>(
       "POST",
       `/assets/${segment(name)}/faults/${segment(code)}/acknowledge${query({ by: actor() })}`,
     ),
-  clear: (name: string, code: string) =>
+  clear: (name: string, code: FaultCode) =>
     send<void>("DELETE", `/assets/${segment(name)}/faults/${segment(code)}${query({ by: actor() })}`),
-  sessions: (values: { asset?: string; state?: string; cursor?: string | null; limit?: number }) =>
+  sessions: (values: { asset?: string; state?: SessionState; cursor?: string | null; limit?: number }) =>
     get<Page<Session>>(`/sessions${query(values)}`),
   session: (session: string) => get<Session>(`/sessions/${segment(session)}`),
   sessionFaults: (session: string) => getAll<FaultLine>(`/sessions/${segment(session)}/faults`, {}, 2000),
@@ -69,8 +74,8 @@ export const api = {
   deleteSession: (session: string) => send<void>("DELETE", `/sessions/${segment(session)}`),
   trace: (
     session: string,
-    stretch: { from_s?: number; to_s?: number; points?: number; profile?: string } = {},
-  ) => get<Trace>(`/sessions/${segment(session)}/trace${query(stretch)}`),
+    range: { from_s?: number; to_s?: number; points?: number; profile?: Profile } = {},
+  ) => get<Trace>(`/sessions/${segment(session)}/trace${query(range)}`),
   importCsv: (asset: string, name: string, csv: string) =>
     request<ImportResult>(`${BASE}/assets/${segment(asset)}/sessions/import${query({ name })}`, {
       method: "POST",
@@ -90,7 +95,7 @@ export const api = {
   discardLearning: (asset: string) => send<Learning>("POST", `/assets/${segment(asset)}/learning/discard`),
   activate: (asset: string, job: string) =>
     send<CalibrationJob>("POST", `/assets/${segment(asset)}/calibrations/${segment(job)}/activate`),
-  /** The recording as a file; asked for like all else, so that it needs no other way to be allowed. */
+  /** Fetches the recording as CSV, with the same credentials as all requests. */
   recording: async (session: string) => {
     const init = withCredentials({ headers: { accept: "text/csv" } });
     const response = await fetch(`${BASE}/sessions/${segment(session)}/telemetry`, init);
@@ -98,7 +103,7 @@ export const api = {
     return response.blob();
   },
   demo: () => get<Demo>("/demo"),
-  breakDemo: (fault: string) => send<void>("POST", "/demo/faults", { fault }),
+  injectDemoFault: (fault: string) => send<void>("POST", "/demo/faults", { fault }),
   repairDemo: () => send<void>("DELETE", "/demo/faults"),
   resumeDemoScript: () => send<void>("POST", "/demo/script"),
 };

@@ -1,6 +1,6 @@
 /**
- * Fault events of the whole fleet, over one connection for the whole page. After
- * a loss it is opened anew from the last event seen, so that none is missed.
+ * Fault events of the whole fleet, over one connection for the whole page. After a lost
+ * connection, the stream resumes after the last received event.
  */
 import { streamUrl } from "./access";
 import type { FaultLine } from "./types";
@@ -9,25 +9,28 @@ export type ConnectionState = "connecting" | "live" | "lost";
 
 export type FaultEvent = FaultLine & { event: number };
 
-/** First and longest wait before another attempt. */
+/** First and longest delay before a retry, ms. */
 const RETRY_MS = [500, 5000] as const;
 
 class FaultEvents {
   private source?: EventSource;
   private lastEvent?: number;
-  private wait: number = RETRY_MS[0];
+  private delay: number = RETRY_MS[0];
   private listeners = new Set<(line: FaultEvent) => void>();
   private watchers = new Set<(state: ConnectionState) => void>();
   state: ConnectionState = "connecting";
 
-  /** Calls `listener` with every event from now on; the answer ends that. */
+  /** Calls `listener` with every event from now on; returns a function that unsubscribes it. */
   listen(listener: (line: FaultEvent) => void): () => void {
     this.listeners.add(listener);
     if (!this.source) this.open();
     return () => this.listeners.delete(listener);
   }
 
-  /** Calls `watcher` with the state of the connection, now and whenever it changes. */
+  /**
+   * Calls `watcher` with the state of the connection, now and at every change; returns a
+   * function that unsubscribes it.
+   */
   watch(watcher: (state: ConnectionState) => void): () => void {
     this.watchers.add(watcher);
     watcher(this.state);
@@ -35,22 +38,22 @@ class FaultEvents {
   }
 
   /**
-   * An EventSource reconnects by itself after a connection that broke, but gives up for good on
-   * an answer that is no stream, as a proxy's 502 while the service restarts, or a 401 before
-   * somebody logs in. So it is closed on any error, and opened anew here.
+   * An EventSource reconnects by itself after a broken connection, but gives up on a response
+   * that is not a stream, such as a proxy's 502 while the service restarts, or a 401 before the
+   * login. So it is closed on any error and opened again here.
    */
   private open() {
     const after = this.lastEvent === undefined ? "" : `?after=${this.lastEvent}`;
     const source = (this.source = new EventSource(streamUrl(`/api/v1/events${after}`)));
     source.onopen = () => {
-      this.wait = RETRY_MS[0];
+      this.delay = RETRY_MS[0];
       this.setState("live");
     };
     source.onerror = () => {
       source.close();
       this.setState("lost");
-      setTimeout(() => this.open(), this.wait);
-      this.wait = Math.min(this.wait * 2, RETRY_MS[1]);
+      setTimeout(() => this.open(), this.delay);
+      this.delay = Math.min(this.delay * 2, RETRY_MS[1]);
     };
     source.addEventListener("begin", (message) => (this.lastEvent = Number(message.lastEventId)));
     source.addEventListener("fault", (message: MessageEvent<string>) => {

@@ -1,18 +1,20 @@
+import type { JobState } from "./types";
+
 const INTERVAL_MS = 300;
 
-/** Fetches until `done` is true of an answer; `show` is told each. */
+/** Fetches repeatedly until `done` returns true for a response; calls `show` with every response. */
 export async function poll<T>(
   fetch: () => Promise<T>,
-  done: (answer: T) => boolean,
-  show: (answer: T) => void = () => {},
+  done: (response: T) => boolean,
+  show: (response: T) => void = () => {},
 ): Promise<T> {
   for (;;) {
-    const answer = await fetch();
-    show(answer);
-    if (done(answer)) return answer;
+    const response = await fetch();
+    show(response);
+    if (done(response)) return response;
     await new Promise((resume) => setTimeout(resume, INTERVAL_MS));
   }
 }
 
-/** Whether a job of the service has come to its end, good or bad. */
-export const isFinished = (job: { state: string }) => job.state === "done" || job.state === "failed";
+/** Whether a background job has ended, successfully or not. */
+export const isFinished = (job: { state: JobState }) => job.state === "done" || job.state === "failed";

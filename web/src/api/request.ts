@@ -1,11 +1,11 @@
-/** Requests to the interface. What goes wrong is a `ProblemError` with the service's own words. */
+/** HTTP requests to the service. An error response is thrown as a `ProblemError` with its detail. */
 import { announceUnauthenticated, withCredentials } from "./access";
 import type { Page, Problem } from "./types";
 
 export const BASE = "/api/v1";
 export const LOGIN = `${BASE}/login`;
 
-/** Longest wait for an answer; an import may take longer. */
+/** Default timeout of a request, ms; an import sets its own. */
 const TIMEOUT_MS = 70_000;
 
 export class ProblemError extends Error {
@@ -13,27 +13,28 @@ export class ProblemError extends Error {
     readonly status: number,
     readonly problem: Partial<Problem>,
   ) {
-    super(problem.detail ?? problem.title ?? `the service answered ${status}`);
+    super(problem.detail ?? problem.title ?? `The service answered with status ${status}.`);
   }
 }
 
-/** What an answer that is no success says. */
+/** Returns the error for an unsuccessful response. */
 export async function failure(response: Response): Promise<ProblemError> {
   const problem = (await response.json().catch(() => ({}))) as Partial<Problem>;
   return new ProblemError(response.status, problem);
 }
 
-/** True where the service does not know who asks. */
+/** Whether the service requires a valid token. */
 export const isUnauthenticated = (error: unknown) => error instanceof ProblemError && error.status === 401;
 
-/** True where the service could not be reached at all. */
+/** Whether the service could not be reached or did not answer in time. */
 function isUnreachable(error: unknown): boolean {
   return error instanceof TypeError || (error instanceof DOMException && error.name === "TimeoutError");
 }
 
-/** What a person is told of an error. */
+/** Returns the text of an error for the user. */
 export function errorText(error: unknown): string {
-  if (isUnreachable(error)) return "The service does not answer. The page goes on as soon as it does.";
+  if (isUnreachable(error))
+    return "The service does not answer. The page updates when it is available again.";
   return error instanceof Error ? error.message : String(error);
 }
 
@@ -58,23 +59,23 @@ export const send = <T>(method: string, path: string, body?: unknown) =>
 
 type QueryValues = Record<string, string | number | boolean | null | undefined>;
 
-/** `values` as the query of an address; those that are missing or empty are left out. */
+/** Returns `values` as the query of a URL, without missing and empty values. */
 export function query(values: QueryValues): string {
   const given = Object.entries(values).filter(([, value]) => value != null && value !== "");
   return given.length ? `?${new URLSearchParams(given.map(([key, value]) => [key, String(value)]))}` : "";
 }
 
-/** A name or id as one segment of a path. */
+/** Encodes a name or id as one segment of a path. */
 export const segment = encodeURIComponent;
 
-/** Every page of a list, until there are `most` items. */
-export async function getAll<T>(path: string, values: QueryValues, most = 20_000): Promise<T[]> {
+/** Fetches all pages of a list, up to at least `limit` items. */
+export async function getAll<T>(path: string, values: QueryValues, limit = 20_000): Promise<T[]> {
   const items: T[] = [];
   let cursor: string | null | undefined;
   do {
     const page: Page<T> = await get(path + query({ ...values, limit: 500, cursor }));
     items.push(...page.items);
     cursor = page.next;
-  } while (cursor && items.length < most);
+  } while (cursor && items.length < limit);
   return items;
 }

@@ -1,4 +1,4 @@
-/** The state and trace of one asset as they happen, over a WebSocket that reconnects by itself. */
+/** The live state and trace of one asset, over a WebSocket that reconnects by itself. */
 import { streamUrl } from "./access";
 import type { FaultEvent } from "./events";
 import type { State, Trace } from "./types";
@@ -13,23 +13,23 @@ export interface StreamListener {
 
 type Frame = ({ type: "state" } & StateFrame) | ({ type: "fault" } & FaultEvent);
 
-/** First and longest wait before another attempt. */
+/** First and longest delay before a retry, ms. */
 const RETRY_MS = [400, 5000] as const;
 
-/** Silence after which a connection counts as lost: states come many times a second. */
+/** Time without a message after which a connection counts as lost, ms; states arrive many times per second. */
 const SILENCE_MS = 6000;
 
-/** How often silence is looked for. */
-const WATCH_MS = 1000;
+/** Interval of the check for silence, ms. */
+const CHECK_MS = 1000;
 
 class RigStream {
   private socket?: WebSocket;
-  private wait: number = RETRY_MS[0];
+  private delay: number = RETRY_MS[0];
   private lastFault?: number;
   private closed = false;
-  private heardAt = 0;
+  private receivedAt = 0;
   private retry?: ReturnType<typeof setTimeout>;
-  private readonly watchdog = setInterval(() => this.closeIfSilent(), WATCH_MS);
+  private readonly watchdog = setInterval(() => this.closeIfSilent(), CHECK_MS);
 
   constructor(
     private readonly asset: string,
@@ -56,22 +56,22 @@ class RigStream {
   private open(): void {
     const socket = new WebSocket(this.address());
     this.socket = socket;
-    this.heardAt = performance.now();
+    this.receivedAt = performance.now();
     socket.onopen = () => {
-      this.wait = RETRY_MS[0];
+      this.delay = RETRY_MS[0];
       this.listener.connection?.("live");
     };
     socket.onmessage = (message: MessageEvent<string>) => this.receive(JSON.parse(message.data) as Frame);
     socket.onclose = () => {
       if (this.closed || this.socket !== socket) return;
       this.listener.connection?.("lost");
-      this.retry = setTimeout(() => this.open(), this.wait);
-      this.wait = Math.min(this.wait * 2, RETRY_MS[1]);
+      this.retry = setTimeout(() => this.open(), this.delay);
+      this.delay = Math.min(this.delay * 2, RETRY_MS[1]);
     };
   }
 
   private receive(frame: Frame): void {
-    this.heardAt = performance.now();
+    this.receivedAt = performance.now();
     if (frame.type === "state") this.listener.state?.(frame);
     if (frame.type === "fault") {
       this.lastFault = frame.event;
@@ -81,11 +81,11 @@ class RigStream {
 
   private closeIfSilent(): void {
     const isOpen = this.socket?.readyState === WebSocket.OPEN;
-    if (isOpen && performance.now() - this.heardAt > SILENCE_MS) this.socket?.close();
+    if (isOpen && performance.now() - this.receivedAt > SILENCE_MS) this.socket?.close();
   }
 }
 
-/** Follows `asset` with `statesPerSecond` states and their traces; the answer ends that. */
+/** Streams `statesPerSecond` states of `asset` with their traces; returns a function that closes the stream. */
 export function followRig(asset: string, statesPerSecond: number, listener: StreamListener): () => void {
   const stream = new RigStream(asset, statesPerSecond, listener);
   return () => stream.close();

@@ -1,16 +1,35 @@
-/** The interface's own types, under short names. `npm run types` makes them from openapi.yaml. */
-import type { components } from "../../generated/schema";
+/** The types of the API under short names. `npm run types` generates them from openapi.yaml. */
+import type { components, operations } from "../../generated/schema";
 
 type Schemas = components["schemas"];
 
+// Closed vocabularies.
+export type Axis = Schemas["Axis"];
+export type DriveCycleOrder = Schemas["DriveCycleOrder"];
+export type FaultCode = Schemas["FaultCode"];
+export type FaultKind = Schemas["FaultKind"];
+export type FaultStatus = Schemas["FaultStatus"];
+export type HistoryEvent = Schemas["HistoryEvent"];
+export type JobState = Schemas["JobState"];
+export type LearningState = Schemas["LearningState"];
+export type Outcome = Schemas["Outcome"];
+export type PlateAngle = Schemas["PlateAngle"];
+export type Profile = Schemas["Profile"];
+export type ServoParameter = Schemas["ServoParameter"];
+export type SessionState = Schemas["SessionState"];
+
+/** Selects faults of a list by status. */
+export type FaultFilter = NonNullable<
+  NonNullable<operations["list_asset_faults"]["parameters"]["query"]>["status"]
+>;
+
 export type Asset = Schemas["AssetView"];
 export type AssetAxes = Schemas["AxesView"];
-export type Axis = "x" | "y";
 export type AxisCalibration = Schemas["AxisCalibrationView"];
 export type MonitorCertificate = Schemas["MonitorCertificateView"];
 export type Prospects = Schemas["ProspectsView"];
 export type ServoProspects = Schemas["ServoProspectsView"];
-export type AxisTrace = Schemas["AxisTraceView"];
+export type Candidate = Schemas["CandidateView"];
 export type Calibration = Schemas["CalibrationView"];
 export type CalibrationJob = Schemas["CalibrationJobView"];
 export type Caller = Schemas["CallerView"];
@@ -19,7 +38,6 @@ export type Evidence = Schemas["EvidenceView"];
 export type FaultEntry = Schemas["FaultEntryView"];
 export type FaultLine = Schemas["FaultView"] & { asset?: string; session_id?: string };
 export type FleetEntry = Schemas["FleetEntryView"];
-export type FleetFault = Schemas["FleetFaultView"];
 export type ServiceHealth = Schemas["HealthView"];
 export type HistoryEntry = Schemas["HistoryView"];
 export type ImportResult = Schemas["ImportView"];
@@ -44,10 +62,13 @@ export interface Page<T> {
   next?: string | null;
 }
 
-/** What the demo says of its rig; only the demo answers this. */
+/** The state of the demo's rig; only the demo serves it. */
 export interface Demo {
   asset: string;
+  /** Whether the script injects and repairs faults. */
   script: boolean;
+  /** The injected faults, as `x_servo:dead`. */
   broken: string[];
+  /** The faults that can be injected. */
   buttons: string[];
 }

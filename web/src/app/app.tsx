@@ -1,4 +1,4 @@
-/** The page's frame: what is on top and at the bottom of every view. */
+/** The frame of the page: header, current view and footer. */
 import { api } from "../api/client";
 import { useQuery } from "../hooks/use-query";
 import { Suspense } from "../parts/lazy";
@@ -13,7 +13,7 @@ export function App() {
   const isDemo = health.data?.demo ?? false;
   const loading = (
     <main>
-      <Loading what="the view" />
+      <Loading what="the page" />
     </main>
   );
   return (
@@ -28,7 +28,7 @@ export function App() {
         </Suspense>
       </div>
       <footer>
-        <a href="/docs/">Interface</a>
+        <a href="/docs/">API</a>
         <a href="/openapi.yaml">openapi.yaml</a>
         <a href="/metrics">Metrics</a>
         <span class="quiet">offbd {health.data?.version}</span>

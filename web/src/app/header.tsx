@@ -11,7 +11,7 @@ const CONNECTION: Record<ConnectionState, string> = {
   lost: "connection lost",
 };
 
-/** The views, each with whether the address is one of its own. */
+/** The links to the views, and whether each is the current view. */
 function tabs([first, , third]: string[], isDemo: boolean) {
   const isSetUp = first === "set-up" || third === "set-up";
   return [
@@ -22,11 +22,11 @@ function tabs([first, , third]: string[], isDemo: boolean) {
   ];
 }
 
-/** What is on top of every view. */
+/** The header of every view. */
 export function Header({ segments, isDemo }: { segments: string[]; isDemo: boolean }) {
   const [connection, setConnection] = useState(faultEvents.state);
   useEffect(() => faultEvents.watch(setConnection), []);
-  // The connection is wanted on every view, though only some show its events.
+  // Every view shows the state of the connection, so it is open on all of them.
   useEffect(() => faultEvents.listen(() => {}), []);
   return (
     <header class="top">

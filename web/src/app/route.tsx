@@ -1,4 +1,5 @@
-/** Which view an address asks for. */
+/** Maps addresses to views. */
+import type { FaultCode } from "../api/types";
 import { EmptyState } from "../parts/empty-state";
 import { lazy } from "../parts/lazy";
 import { FleetPage } from "../pages/fleet";
@@ -11,13 +12,14 @@ const SessionPage = lazy(() => import("../pages/session").then((module) => modul
 const SetUpPage = lazy(() => import("../pages/set-up").then((module) => module.SetUpPage));
 const LearnPage = lazy(() => import("../pages/learn").then((module) => module.LearnPage));
 
-/** The view at an address of `segments`; a service that is no demo has no demo to show. */
+/** The view at the path of `segments`; `isDemo` selects the controls of the demo. */
 export function Route({ segments, isDemo }: { segments: string[]; isDemo: boolean }) {
   const [first, name, second, code] = segments;
   if (!first) return <FleetPage />;
   if (first === "rigs" && name) {
     if (!second) return <AssetPage name={name} />;
-    if (second === "faults" && code) return <FaultPage name={name} code={code} />;
+    // The service answers 404 for an unknown code.
+    if (second === "faults" && code) return <FaultPage name={name} code={code as FaultCode} />;
     if (second === "set-up") return <SetUpPage key={name} name={name} />;
   }
   if (first === "set-up") return <SetUpPage />;
@@ -26,9 +28,9 @@ export function Route({ segments, isDemo }: { segments: string[]; isDemo: boolea
   if (first === "learn") return <LearnPage isDemo={isDemo} />;
   return (
     <main>
-      <EmptyState title="There is nothing here">
+      <EmptyState title="Page not found">
         <p>
-          <Link to="/">To the fleet</Link>
+          <Link to="/">Go to the fleet</Link>
         </p>
       </EmptyState>
     </main>

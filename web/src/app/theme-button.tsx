@@ -7,7 +7,7 @@ const THEMES: Record<Theme, { next: Theme; symbol: string }> = {
   dark: { next: "system", symbol: "☾" },
 };
 
-/** Goes from the system's colours to the light ones, the dark ones, and back. */
+/** Switches between the system's colours, the light theme and the dark theme. */
 export function ThemeButton() {
   const [chosen, setChosen] = useState(theme());
   const { next, symbol } = THEMES[chosen];

@@ -1,7 +1,7 @@
 import { useEffect } from "preact/hooks";
 import { useLatest } from "./use-latest";
 
-/** Calls `draw` before each frame while the tab is seen. */
+/** Calls `draw` before each frame while the tab is visible. */
 export function useAnimationFrame(draw: (now: number) => void): void {
   const latest = useLatest(draw);
   useEffect(() => {

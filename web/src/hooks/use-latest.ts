@@ -1,6 +1,6 @@
 import { useRef } from "preact/hooks";
 
-/** The latest `value`, for callbacks that outlive the rendering in which they were made. */
+/** A reference to the latest `value`, for callbacks that outlive the rendering that created them. */
 export function useLatest<T>(value: T): { readonly current: T } {
   const latest = useRef(value);
   latest.current = value;

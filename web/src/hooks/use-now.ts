@@ -1,6 +1,6 @@
 import { useEffect, useState } from "preact/hooks";
 
-/** The time, anew every `interval` ms, so that "3 s ago" stays true. */
+/** The current time, ms since 1970, updated every `interval` ms. */
 export function useNow(interval = 1000): number {
   const [now, setNow] = useState(Date.now());
   useEffect(() => {

@@ -8,23 +8,23 @@ export interface Query<T> {
 }
 
 /**
- * Fetches once for each `key`, and every `interval` ms after the last answer if given. Keeps the
- * last answer while fetching fails; an answer that a later fetch has overtaken counts for nothing.
+ * Fetches when `key` changes, and again `interval` ms after each response if given. Keeps the last
+ * data while fetching fails; ignores the response of a fetch if a later one has started.
  */
 export function useQuery<T>(fetch: () => Promise<T>, key: unknown, interval?: number): Query<T> {
-  const [answer, setAnswer] = useState<{ key: unknown; data?: T; error?: unknown }>({ key });
+  const [response, setResponse] = useState<{ key: unknown; data?: T; error?: unknown }>({ key });
   const latestFetch = useLatest(fetch);
-  /** Counts fetches, so that an answer knows whether it is of the newest. */
+  /** Number of the latest fetch; responses of earlier ones are ignored. */
   const newest = useRef(0);
-  const forgetAnswers = useCallback(() => void newest.current++, []);
+  const ignorePending = useCallback(() => void newest.current++, []);
   const refetch = useCallback(async () => {
     const turn = ++newest.current;
     try {
       const data = await latestFetch.current();
-      if (turn === newest.current) setAnswer({ key, data });
+      if (turn === newest.current) setResponse({ key, data });
     } catch (error) {
       if (turn !== newest.current) return;
-      setAnswer((before) => ({ key, data: before.key === key ? before.data : undefined, error }));
+      setResponse((before) => ({ key, data: before.key === key ? before.data : undefined, error }));
     }
   }, [key, latestFetch]);
   useEffect(() => {
@@ -37,10 +37,10 @@ export function useQuery<T>(fetch: () => Promise<T>, key: unknown, interval?: nu
     void loop();
     return () => {
       stopped = true;
-      forgetAnswers();
+      ignorePending();
       clearTimeout(timer);
     };
-  }, [refetch, forgetAnswers, interval]);
-  const { data, error } = answer.key === key ? answer : {};
+  }, [refetch, ignorePending, interval]);
+  const { data, error } = response.key === key ? response : {};
   return { data, error, refetch };
 }

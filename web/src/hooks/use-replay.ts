@@ -3,7 +3,7 @@ import { api } from "../api/client";
 import { isFinished, poll } from "../api/poll";
 import type { Replay, ReplaySettings } from "../api/types";
 
-/** Judging a session with other settings: how far it is, what came of it, and what begins it. */
+/** Judges a session again with other settings: the replay job, and the function that starts it. */
 export function useReplay(session: string) {
   const [replay, setReplay] = useState<Replay>();
   const judge = async (settings: ReplaySettings) => {

@@ -7,20 +7,20 @@ import { useLatest } from "./use-latest";
 
 interface Options {
   statesPerSecond: number;
-  /** Shortest time between two renderings, ms: the buffer has every sample all the same. */
+  /** Shortest interval between two renderings, ms; the buffer receives every sample regardless. */
   renderInterval?: number;
   newSession?: () => void;
   fault?: (line: FaultEvent) => void;
 }
 
-/** A rig as it happens: its state, and the trace of its session in a buffer that is not rendered. */
+/** The live state of a rig, and the trace of its session in a buffer, which does not cause renderings. */
 export function useRigStream(name: string, options: Options) {
   const { statesPerSecond, renderInterval = 0 } = options;
   const buffer = useMemo(() => new TraceBuffer(), []);
   const [state, setState] = useState<State>();
   const [connection, setConnection] = useState<"live" | "lost">();
-  /** When the last sample came, ms since 1970, and which it was. */
-  const heard = useRef({ at: 0, t_s: -1, session: "" });
+  /** The last received sample, and the time of its arrival, ms since 1970. */
+  const lastSample = useRef({ at: 0, t_s: -1, session: "" });
   const latest = useLatest(options);
   useEffect(() => {
     let renderedAt = -Infinity;
@@ -28,14 +28,14 @@ export function useRigStream(name: string, options: Options) {
       connection: setConnection,
       state: (frame) => {
         const session = frame.session_id ?? "";
-        if (session !== heard.current.session) {
-          heard.current.session = session;
+        if (session !== lastSample.current.session) {
+          lastSample.current.session = session;
           buffer.clear();
           latest.current.newSession?.();
         }
         if (frame.trace) buffer.append(frame.trace);
-        if (frame.t_s != null && frame.t_s !== heard.current.t_s)
-          Object.assign(heard.current, { t_s: frame.t_s, at: Date.now() });
+        if (frame.t_s != null && frame.t_s !== lastSample.current.t_s)
+          Object.assign(lastSample.current, { t_s: frame.t_s, at: Date.now() });
         if (performance.now() - renderedAt < renderInterval) return;
         renderedAt = performance.now();
         setState(frame);
@@ -43,8 +43,8 @@ export function useRigStream(name: string, options: Options) {
       fault: (line) => latest.current.fault?.(line),
     });
   }, [name, statesPerSecond, renderInterval, buffer, latest]);
-  /** Whether no sample has come for `limit` ms before `now`. */
-  const isSilent = (now: number, limit: number) => now - heard.current.at >= limit;
+  /** Whether no sample has arrived for `limit` ms before `now`. */
+  const isSilent = (now: number, limit: number) => now - lastSample.current.at >= limit;
   return { state, buffer, connection, isSilent };
 }
 

@@ -1,6 +1,6 @@
 import { useEffect } from "preact/hooks";
 
-/** Gives the browser's tab the title of a page. */
+/** Sets the title of the browser tab. */
 export function useTitle(title: string): void {
   useEffect(() => {
     document.title = `${title} · offbd`;

@@ -1,4 +1,4 @@
-/** What is known along one axis, as flat columns of equal length: one value for each moment. */
+/** The quantities along one axis as columns of equal length, with one value per moment. */
 import type { Trace } from "../api/types";
 
 export type Column = (number | null)[];
@@ -41,7 +41,7 @@ export function appendTrace(to: AxisColumns, from: Trace["x"], n: number): void 
     to.command.push(from.command_rad[i] ?? null);
     to.plate.push(from.plate_angle_rad[i] ?? null);
     to.position.push(from.position_m[i] ?? null);
-    // Where no ball was seen, where the twin was says nothing.
+    // Without a measured position, the twin's position has no meaning.
     to.twinPosition.push(from.position_m[i] == null ? null : (from.twin_position_m[i] ?? null));
     to.measured.push(from.measured_m_s2[i] ?? null);
     to.twin.push(from.twin_m_s2[i] ?? null);

@@ -1,10 +1,10 @@
-/** A growing trace as flat columns, for charts and pictures; the oldest moments go first. */
+/** A growing trace as columns, for charts and drawings; the oldest moments are dropped. */
 import type { Axis, Trace } from "../api/types";
 import { appendTrace, dropOldest, emptyColumns, type NumberColumn } from "./axis-columns";
 
 export const AXES: readonly Axis[] = ["x", "y"];
 
-/** Moments that are kept: far more than a screen is wide, 100 s at 100 Hz. */
+/** Number of moments that are kept: 100 s at 100 Hz. */
 const CAPACITY = 10_000;
 
 export class TraceBuffer {
@@ -12,7 +12,7 @@ export class TraceBuffer {
   x = emptyColumns();
   y = emptyColumns();
 
-  /** A whole trace, of which nothing is dropped. */
+  /** Returns a buffer with a whole trace, of which nothing is dropped. */
   static of(trace: Trace): TraceBuffer {
     const buffer = new TraceBuffer(Infinity);
     buffer.append(trace);
@@ -39,7 +39,7 @@ export class TraceBuffer {
     const n = trace.t_s.length;
     for (let i = 0; i < n; i++) this.t.push(trace.t_s[i]!);
     for (const axis of AXES) appendTrace(this[axis], trace[axis], n);
-    // Not at every batch: moving all columns for a few moments would cost more than they take.
+    // Dropping moves all columns, so it is done only for a tenth of the capacity at once.
     const over = this.t.length - this.capacity;
     if (over > this.capacity / 10) this.drop(over);
   }
@@ -49,7 +49,7 @@ export class TraceBuffer {
     for (const axis of AXES) dropOldest(this[axis], n);
   }
 
-  /** The index of the last moment not after `t`; that of the first moment if all are. */
+  /** Returns the index of the last moment not after `t`, or 0 if all moments are after `t`. */
   index(t: number): number {
     let low = 0;
     let high = this.t.length - 1;
@@ -61,14 +61,14 @@ export class TraceBuffer {
     return low;
   }
 
-  /** A column's value at `t`, between its moments along a line. */
+  /** Returns the value of a column at `t`, linearly interpolated; null if the value is missing. */
   at(axis: Axis, name: NumberColumn, t: number): number | null {
     const column = this[axis][name];
     const i = this.index(t);
     const here = column[i] ?? null;
     const next = column[i + 1] ?? null;
     if (here === null || next === null) return here;
-    const share = (t - this.t[i]!) / (this.t[i + 1]! - this.t[i]!);
-    return here + (next - here) * Math.min(Math.max(share, 0), 1);
+    const fraction = (t - this.t[i]!) / (this.t[i + 1]! - this.t[i]!);
+    return here + (next - here) * Math.min(Math.max(fraction, 0), 1);
   }
 }

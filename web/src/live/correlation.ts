@@ -1,5 +1,6 @@
-/** Whether the ball follows its commands, and which way round: told by correlations. */
+/** Correlations that show whether the ball follows its commands, and in which direction. */
 
+/** Pearson's correlation coefficient; NaN for fewer than five values or constant values. */
 export function correlation(a: number[], b: number[]): number {
   const n = a.length;
   if (n < 5) return NaN;
@@ -18,7 +19,7 @@ export function correlation(a: number[], b: number[]): number {
   return aa > 0 && bb > 0 ? ab / Math.sqrt(aa * bb) : NaN;
 }
 
-/** How the ball's acceleration along an axis goes with that axis' own command and with the other's. */
+/** Correlation of the ball's acceleration along an axis with the command of that axis and of the other axis. */
 export interface Correlations {
   own: number;
   other: number;
@@ -26,15 +27,15 @@ export interface Correlations {
 
 export type SignVerdict = "agrees" | "reversed" | "swapped" | "unclear";
 
-/** Correlations at least so strong count; measured on simulated rigs, healthy ones come to 0.8 and more. */
+/** Smallest significant correlation; healthy simulated rigs reach 0.8 and more. */
 const STRONG = 0.4;
 
-/** How much stronger the other command's must be before the axes count as swapped. */
-const CLEARLY = 1.5;
+/** Ratio of the other axis' correlation to the own one from which the axes count as swapped. */
+const SWAPPED_RATIO = 1.5;
 
 export function judgeSign({ own, other }: Correlations): SignVerdict {
   if (Number.isNaN(own)) return "unclear";
-  if (Math.abs(other) > STRONG && Math.abs(other) > CLEARLY * Math.abs(own)) return "swapped";
+  if (Math.abs(other) > STRONG && Math.abs(other) > SWAPPED_RATIO * Math.abs(own)) return "swapped";
   if (Math.abs(own) < STRONG) return "unclear";
   return own > 0 ? "agrees" : "reversed";
 }

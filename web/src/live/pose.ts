@@ -1,4 +1,4 @@
-/** What the three-dimensional view shows of a moment. */
+/** The pose of plate and ball at one moment, for the 3D view. */
 import type { TraceBuffer } from "./buffer";
 
 export interface PlanePoint {
@@ -11,11 +11,11 @@ export interface Pose {
   qx: number;
   qy: number;
   ball: PlanePoint | null;
-  /** Where the twin has the ball. */
+  /** The twin's ball. */
   ghost: PlanePoint | null;
 }
 
-/** Where the ball, or the twin's, is at `t` on the plate, m. */
+/** Returns the position of the ball, or of the twin's ball, on the plate at `t`, m. */
 export function ballAt(
   buffer: TraceBuffer,
   column: "position" | "twinPosition",
@@ -26,7 +26,7 @@ export function ballAt(
   return x === null || y === null ? null : { x, y };
 }
 
-/** The ball moves along x by the plate's turning about y, and along y by that about x. */
+/** Returns the pose at `t`. The plate's angle about y (qy) moves the ball along x, that about x (qx) along y. */
 export const poseAt = (buffer: TraceBuffer, t: number): Pose => ({
   qx: buffer.at("y", "plate", t) ?? 0,
   qy: buffer.at("x", "plate", t) ?? 0,

@@ -1,13 +1,13 @@
-/** The seconds around a fault, made into a trace that the charts can draw. */
+/** Converts the recording of a fault to a trace for the charts. */
 import type { FaultRecording, Trace } from "../api/types";
 import type { Column } from "./axis-columns";
 
 type Columns = FaultRecording["columns"];
 
-/** Longest time in which nothing is judged that lines are drawn across, s. */
+/** Longest interval without a judged row across which lines are drawn, s. */
 const LONGEST_GAP_S = 0.2;
 
-/** The rows that were judged, and others where none was for a while. */
+/** Returns the judged rows, and some of the others in gaps between judged rows. */
 function drawable(columns: Columns): Columns {
   let last = -Infinity;
   const kept = columns.t_s.flatMap((t, i) => {
@@ -20,7 +20,7 @@ function drawable(columns: Columns): Columns {
   return Object.fromEntries(entries) as Columns;
 }
 
-/** A recording does not say where the twin and its plate were: these columns are empty. */
+/** Returns the trace of a recording; it has no positions of the twin and its plate. */
 export function traceOfRecording({ columns }: FaultRecording): Trace {
   const c = drawable(columns);
   const none: Column = c.t_s.map(() => null);

@@ -1,4 +1,4 @@
-/** Sizes of a rig, for pictures of it; those of the book chapter's rig where none are given. */
+/** Dimensions of a rig for drawings; missing ones are those of the book chapter's rig. */
 import type { Asset } from "../api/types";
 
 export interface PlateSize {

@@ -1,4 +1,4 @@
-/** Does the rig do what the twin says? Signs and axes, from the two accelerations. */
+/** Checks the signs and the order of the axes by comparing measured and twin accelerations. */
 import type { AssetAxes, Axis } from "../api/types";
 import type { TraceBuffer } from "./buffer";
 import { correlation, judgeSign, type Correlations, type SignVerdict } from "./correlation";
@@ -7,14 +7,14 @@ export interface Signs {
   x: Correlations;
   y: Correlations;
   verdict: Record<Axis, SignVerdict>;
-  /** Seconds with something to compare. */
+  /** Duration of the samples with enough acceleration to compare, s. */
   seconds: number;
 }
 
-/** Accelerations of the twin smaller than this say nothing, m/s²: about a degree of tilt. */
-const LEAST_ACCELERATION = 0.12;
+/** Smallest acceleration of the twin that is compared, m/s²: about 1° of tilt. */
+const MIN_ACCELERATION = 0.12;
 
-/** Correlation of what was measured along one axis with what the twin says along another. */
+/** Correlation of the measured acceleration along one axis with the twin's along the same or the other axis. */
 function correlate(buffer: TraceBuffer, measuredAxis: Axis, twinAxis: Axis): number {
   const measured: number[] = [];
   const twin: number[] = [];
@@ -34,11 +34,11 @@ export function compareSigns(buffer: TraceBuffer): Signs {
   const n = buffer.t.length;
   const period = n > 1 ? (buffer.last - buffer.first) / (n - 1) : 0;
   const twin = (axis: Axis, i: number) => Math.abs(buffer[axis].twin[i] ?? 0);
-  const tilted = buffer.t.filter((_, i) => Math.max(twin("x", i), twin("y", i)) > LEAST_ACCELERATION);
+  const tilted = buffer.t.filter((_, i) => Math.max(twin("x", i), twin("y", i)) > MIN_ACCELERATION);
   return { x, y, verdict: { x: judgeSign(x), y: judgeSign(y) }, seconds: tilted.length * period };
 }
 
-/** The axes of a device that sends metres and radians the way the twin has them. */
+/** The axes of a device that sends metres and radians with the twin's signs. */
 export const DEFAULT_AXES: AssetAxes = {
   swap: false,
   x_sign: 1,
@@ -49,7 +49,7 @@ export const DEFAULT_AXES: AssetAxes = {
   command_unit_rad: 1,
 };
 
-/** The axes with which the rig would do what the twin says. */
+/** Returns the axes with which the measurements agree with the twin. */
 export function correctedAxes(axes: AssetAxes, { x, y, verdict }: Signs): AssetAxes {
   if (verdict.x === "swapped" && verdict.y === "swapped") {
     const xSign = y.other < 0 ? -1 : 1;

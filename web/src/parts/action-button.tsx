@@ -7,11 +7,11 @@ interface Props {
   children: ComponentChildren;
   class?: string;
   disabled?: boolean;
-  /** The accessible name, where the text alone does not say enough. */
+  /** The accessible name, if the text alone is not sufficient. */
   label?: string;
 }
 
-/** A button that waits for its action to end, and says what went wrong. */
+/** A button that is disabled while its action runs and shows the error of the action. */
 export function ActionButton({ action, children, class: className, disabled, label }: Props) {
   const [isBusy, setBusy] = useState(false);
   const [error, setError] = useState<unknown>();

@@ -1,9 +1,9 @@
 import { useState } from "preact/hooks";
 
-/** How long the button says that the text was copied, ms. */
+/** Duration of the confirmation on the button, ms. */
 const COPIED_MS = 2000;
 
-/** A text to be copied, with the button that does it. */
+/** A text with a button that copies it. */
 export function CodeBlock({ children, label }: { children: string; label: string }) {
   const [isCopied, setCopied] = useState(false);
   const copy = async () => {

@@ -1,7 +1,7 @@
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef } from "preact/hooks";
 
-/** A dialog of the browser's own: it keeps the focus and closes on Escape. */
+/** A modal dialog of the browser, which traps the focus and closes on Escape. */
 export function Dialog({
   title,
   close,

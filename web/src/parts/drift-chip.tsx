@@ -2,7 +2,7 @@ import type { FleetEntry } from "../api/types";
 import { codeTitle } from "../words/fault-names";
 import { sentence } from "../words/sentence";
 
-/** A parameter that drifts, and how soon that is a fault. */
+/** A drifting parameter, and the number of sessions until it is a fault. */
 export function DriftChip({ warning }: { warning: FleetEntry["warnings"][number] }) {
   const { code, parameter, sessions_left, summary } = warning;
   return (

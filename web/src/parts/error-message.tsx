@@ -1,6 +1,6 @@
 import { errorText } from "../api/request";
 
-/** What went wrong, if anything did, and a button to try again if there is a way. */
+/** The text of an error, if there is one, with a button to try again if `retry` is given. */
 export function ErrorMessage({ error, retry }: { error: unknown; retry?: () => Promise<unknown> }) {
   if (!error) return null;
   return (

@@ -2,7 +2,7 @@ import type { ComponentChildren } from "preact";
 
 export type Fact = [name: string, value: ComponentChildren];
 
-/** A definition list in columns: names and their values. */
+/** A definition list of names and values, in columns. */
 export function Facts({ facts }: { facts: Fact[] }) {
   return (
     <dl class="facts">

@@ -1,12 +1,13 @@
+import type { FaultCode, FaultKind } from "../api/types";
 import { faultTitle } from "../words/fault-names";
-import { chipClass, standingText } from "../words/fault-standing";
-import type { FaultStanding } from "../words/severity";
+import { chipClass, stateText } from "../words/fault-state";
+import type { FaultState } from "../words/severity";
 
-/** A fault and how it stands. */
-export function FaultChip({ fault }: { fault: FaultStanding & { code: string; kind?: string | null } }) {
+/** A fault and its state. */
+export function FaultChip({ fault }: { fault: FaultState & { code: FaultCode; kind?: FaultKind | null } }) {
   return (
     <span class={chipClass(fault)}>
-      <b>{faultTitle(fault.code, fault.kind)}</b> <span>{standingText(fault)}</span>
+      <b>{faultTitle(fault.code, fault.kind)}</b> <span>{stateText(fault)}</span>
     </span>
   );
 }

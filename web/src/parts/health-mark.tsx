@@ -9,7 +9,7 @@ const MARKS: Record<RigHealth, { symbol: string; word: string }> = {
   idle: { symbol: "○", word: "no session" },
 };
 
-/** Colour, shape and word together: none of them alone carries the meaning. */
+/** The health of a rig by colour, shape and word; the meaning does not depend on colour alone. */
 export function HealthMark({ health }: { health: RigHealth }) {
   const { symbol, word } = MARKS[health];
   return (

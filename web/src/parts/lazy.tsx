@@ -1,4 +1,4 @@
-/** Views that are loaded when they are first shown. */
+/** Views that are loaded when they are first shown; a small part of preact/compat. */
 import type { ComponentChildren, ComponentType, VNode } from "preact";
 import { createContext } from "preact";
 import { useContext, useEffect, useState } from "preact/hooks";
@@ -6,7 +6,7 @@ import { LoadFailed } from "./load-failed";
 
 const Fallback = createContext<ComponentChildren>(null);
 
-/** What is shown while a view inside is loading. */
+/** Shows `fallback` while a lazy view inside is loading. */
 export function Suspense({
   fallback,
   children,
@@ -17,7 +17,7 @@ export function Suspense({
   return <Fallback.Provider value={fallback}>{children}</Fallback.Provider>;
 }
 
-/** A component whose code `load` brings; preact/compat has the same, and much more that is not needed. */
+/** Returns a component whose code is loaded by `load` at its first rendering. */
 export function lazy<P extends object>(load: () => Promise<ComponentType<P>>): (props: P) => VNode {
   let loaded: ComponentType<P> | undefined;
   return function Lazy(props: P) {

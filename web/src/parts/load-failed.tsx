@@ -1,11 +1,11 @@
-/** What stands in the place of a view whose code cannot be loaded. */
+/** The message if the code of a view could not be loaded. */
 export function LoadFailed() {
   return (
     <main>
       <p class="trouble" role="alert">
-        This part of the page cannot be loaded; the service may have been replaced by a newer one.{" "}
+        This part of the page could not be loaded. The service may have been updated.{" "}
         <button type="button" onClick={() => location.reload()}>
-          Load the page anew
+          Reload the page
         </button>
       </p>
     </main>

@@ -1,7 +1,7 @@
-/** How long a browser may take to begin saving what it is given, ms. */
+/** Time after which the URL of a download is revoked, ms. */
 const SAVING_MS = 10_000;
 
-/** Lets the browser save `content` under `name`, as a download. */
+/** Downloads `content` as a file called `name`. */
 export function saveFile(content: Blob, name: string): void {
   const url = URL.createObjectURL(content);
   Object.assign(document.createElement("a"), { href: url, download: name }).click();

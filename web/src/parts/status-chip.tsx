@@ -1,11 +1,11 @@
-import { chipClass, standingText } from "../words/fault-standing";
-import type { FaultStanding } from "../words/severity";
+import { chipClass, stateText } from "../words/fault-state";
+import type { FaultState } from "../words/severity";
 
-/** How a fault stands, where the fault itself is named beside it. */
-export function StatusChip({ fault }: { fault: FaultStanding }) {
+/** The state of a fault that is named beside the chip. */
+export function StatusChip({ fault }: { fault: FaultState }) {
   return (
     <span class={chipClass(fault)}>
-      <b>{standingText(fault)}</b>
+      <b>{stateText(fault)}</b>
     </span>
   );
 }

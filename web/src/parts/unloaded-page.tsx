@@ -2,7 +2,7 @@ import { ErrorMessage } from "./error-message";
 import { Loading } from "./loading";
 
 interface Props {
-  /** The heading that stands above an error. */
+  /** The heading above an error. */
   title?: string;
   /** What is loading. */
   what: string;
@@ -10,7 +10,7 @@ interface Props {
   retry: () => Promise<unknown>;
 }
 
-/** A page whose data is not there: still loading, or what went wrong. */
+/** A page without data: either loading or with an error. */
 export function UnloadedPage({ title, what, error, retry }: Props) {
   return (
     <main>

@@ -1,9 +1,9 @@
-/** A list of which only the rows in sight are in the document. */
+/** A list of which only the visible rows are in the document. */
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
 
-/** Rows beyond the edges that are there already when they come into sight. */
-const BEYOND = 6;
+/** Number of rows above and below the visible ones that are also in the document. */
+const OVERSCAN = 6;
 
 interface Props<T> {
   items: T[];
@@ -18,11 +18,11 @@ export function VirtualList<T>({ items, rowHeight, label, row, id }: Props<T>) {
   const [range, setRange] = useState<[number, number]>([0, 30]);
   useEffect(() => {
     const measure = () => {
-      // A scroll may come after the list has gone and before this is cleaned up.
+      // A scroll event may arrive between the unmount and the cleanup.
       if (!element.current) return;
       const box = element.current.getBoundingClientRect();
-      const first = Math.max(Math.floor(-box.top / rowHeight) - BEYOND, 0);
-      const last = Math.ceil((innerHeight - box.top) / rowHeight) + BEYOND;
+      const first = Math.max(Math.floor(-box.top / rowHeight) - OVERSCAN, 0);
+      const last = Math.ceil((innerHeight - box.top) / rowHeight) + OVERSCAN;
       setRange((before) => (before[0] === first && before[1] === last ? before : [first, last]));
     };
     measure();

@@ -3,7 +3,7 @@ import { navigate } from "./navigation";
 
 type Props = { to: string; children: ComponentChildren; class?: string; "aria-current"?: "page" };
 
-/** A link within the page: followed without loading anew, unless another tab or a download is asked for. */
+/** A link within the page, followed without a reload unless a modifier key requests a new tab or a download. */
 export function Link({ to, children, ...rest }: Props) {
   const follow = (event: MouseEvent) => {
     const hasModifier = event.metaKey || event.ctrlKey || event.shiftKey || event.altKey;

@@ -1,7 +1,7 @@
-/** The page's own addresses: a path picks a view, and changes without loading the page anew. */
+/** Client-side navigation: the path selects a view and changes without a reload. */
 import { useLayoutEffect, useState } from "preact/hooks";
 
-/** The event by which `navigate` tells that the address has changed; the browser's own tells of "back" alone. */
+/** The event of a change by `navigate`; `popstate` reports only the back and forward buttons. */
 const NAVIGATED = "offbd:navigated";
 
 export function navigate(path: string, replace = false): void {
@@ -9,7 +9,7 @@ export function navigate(path: string, replace = false): void {
   dispatchEvent(new Event(NAVIGATED));
 }
 
-/** Where the page is: its path in decoded segments, and its query. */
+/** The current address: the decoded segments of its path, and its query. */
 export function useLocation(): { segments: string[]; query: URLSearchParams } {
   const [address, setAddress] = useState(location.pathname + location.search);
   useLayoutEffect(() => {

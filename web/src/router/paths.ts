@@ -1,20 +1,21 @@
-/** The addresses of the page's views. */
+/** The addresses of the views. */
+import type { FaultCode } from "../api/types";
 
-/** A path of `segments`, whatever is in them. */
+/** Joins `segments` to a path and encodes each. */
 export const path = (...segments: string[]) => `/${segments.map(encodeURIComponent).join("/")}`;
 
 export type SetUpStep = "describe" | "connect" | "check" | "learn";
 
 export const rigPath = (name: string) => path("rigs", name);
-export const faultPath = (name: string, code: string) => path("rigs", name, "faults", code);
+export const faultPath = (name: string, code: FaultCode) => path("rigs", name, "faults", code);
 
 export const setUpPath = (name: string, step?: SetUpStep) =>
   path("rigs", name, "set-up") + (step ? `?step=${step}` : "");
 
-/** All sessions, or those of one rig. */
+/** The address of all sessions, or of those of one rig. */
 export const sessionsPath = (asset?: string) =>
   asset ? `/sessions?asset=${encodeURIComponent(asset)}` : "/sessions";
 
-/** A session, at the moment `t_s` of the device's clock if given. */
+/** The address of a session, at the time `t_s` of the device's clock if given. */
 export const sessionPath = (id: string, t_s?: number | null) =>
   path("sessions", id) + (t_s == null ? "" : `?t=${t_s.toFixed(2)}`);

@@ -1,33 +1,40 @@
-/** What the codes and kinds of fault of the service are called on the page. */
+/** Titles and descriptions of the fault codes and fault kinds of the service. */
+import type { FaultCode, FaultKind } from "../api/types";
 
-const CODE: Record<string, { title: string; meaning: string }> = {
+const CODE: Record<FaultCode, { title: string; meaning: string }> = {
   x_servo: { title: "X servo", meaning: "moves the ball along x: turns the plate about y (qy)" },
   y_servo: { title: "Y servo", meaning: "moves the ball along y: turns the plate about x (qx)" },
-  stuck_ball: { title: "Stuck ball", meaning: "the ball does not roll where the plate asks it to" },
-  sensor: { title: "Position sensor", meaning: "measures where the ball is" },
+  stuck_ball: { title: "Stuck ball", meaning: "the ball does not roll although the plate is tilted" },
+  sensor: { title: "Position sensor", meaning: "measures the position of the ball" },
 };
 
-const KIND: Record<string, string> = {
-  dead: "no power: the plate has gone back to zero",
-  held: "stays where it is",
-  hold: "stays where it is",
+const KIND: Record<FaultKind, string> = {
+  dead: "no power: the plate returns to zero",
+  held: "holds its angle whatever the command",
   gain: "moves too little or too much",
-  reversed: "moves the wrong way round",
-  offset: "off by a constant angle, as with a slipped horn",
-  slow: "follows far too slowly",
-  intermittent: "comes and goes, as with a loose contact",
+  reversed: "moves in the wrong direction",
+  offset: "constant angle error, as with a slipped horn",
+  slow: "follows the command far too slowly",
+  intermittent: "fails intermittently, as with a loose contact",
   frozen: "repeats its last reading",
-  freeze: "repeats its last reading",
   dropout: "gives no readings",
-  noise: "is far noisier than learnt",
-  spikes: "gives lone readings far off",
-  jump: "is off by a constant shift",
-  glued: "fixed to the plate",
-  sticky: "moves only on a large tilt",
+  noise: "is much noisier than learnt",
+  spikes: "gives single readings that are far off",
+  jump: "readings are shifted by a constant offset",
 };
 
-export const codeTitle = (code: string) => CODE[code]?.title ?? code.replaceAll("_", " ");
-export const codeMeaning = (code: string) => CODE[code]?.meaning ?? "";
-export const kindMeaning = (kind?: string | null) =>
-  kind ? (KIND[kind] ?? kind.replaceAll("_", " ")) : "the evidence does not say in which way";
-export const faultTitle = (code: string, kind?: string | null) => codeTitle(code) + (kind ? `, ${kind}` : "");
+/** Returns a word of the service that this version of the page does not know as plain text. */
+const plain = (word: string) => word.replaceAll("_", " ");
+
+const isFaultCode = (code: string): code is FaultCode => Object.hasOwn(CODE, code);
+
+/** Returns the title of a fault code; an unknown code, as in a mistyped address, as plain text. */
+export const codeTitle = (code: string) => (isFaultCode(code) ? CODE[code].title : plain(code));
+
+export const codeMeaning = (code: FaultCode) => CODE[code]?.meaning ?? "";
+
+export const kindMeaning = (kind?: FaultKind | null) =>
+  kind ? (KIND[kind] ?? plain(kind)) : "the kind of fault is not known";
+
+export const faultTitle = (code: FaultCode, kind?: FaultKind | null) =>
+  codeTitle(code) + (kind ? `, ${kind}` : "");

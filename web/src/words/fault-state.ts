@@ -1,8 +1,8 @@
-/** How a fault stands, for its chip: a class of the style sheet, and words. */
-import { severity, type FaultStanding } from "./severity";
+/** The state of a fault on its chip: a class of the style sheet, and text. */
+import { severity, type FaultState } from "./severity";
 
-export const chipClass = (fault: FaultStanding) =>
+export const chipClass = (fault: FaultState) =>
   `chip chip-${["none", "pending", "known", "confirmed"][severity(fault)]}`;
 
-export const standingText = ({ status, acknowledged }: FaultStanding) =>
+export const stateText = ({ status, acknowledged }: FaultState) =>
   acknowledged && status !== "cleared" ? `${status}, acknowledged` : status;

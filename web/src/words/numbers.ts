@@ -1,9 +1,9 @@
-/** How numbers are written: with a true minus sign and a narrow space before the unit. */
+/** Formats numbers with a true minus sign and a narrow space before the unit. */
 
-/** What stands where there is no number. */
+/** The text for a missing number. */
 export const NONE = "–";
 
-/** A number with `digits` after the point and its unit; a dash where there is none. */
+/** Formats a number with `digits` decimals and its unit; a missing number as a dash. */
 export function number(value: number | null | undefined, digits: number, unit = ""): string {
   if (value === null || value === undefined || !Number.isFinite(value)) return NONE;
   const rounded = value.toFixed(digits);
@@ -19,8 +19,8 @@ export const millimetres = (m: number | null | undefined, digits = 1) =>
 
 export const seconds = (s: number | null | undefined, digits = 2) => number(s, digits, "s");
 
-/** A whole number in groups of three digits. */
+/** Formats an integer in groups of three digits. */
 export const count = (n: number) => n.toLocaleString("en").replaceAll(",", "\u202f");
 
-/** A number of things: 1 session, 2 sessions. */
+/** Formats a number with its noun: 1 session, 2 sessions. */
 export const plural = (n: number, noun: string) => `${n} ${noun}${n === 1 ? "" : "s"}`;

@@ -1,4 +1,4 @@
-/** What a fault line says, without the code that stands before it, as a sentence. */
+/** Returns the summary of a fault line as a sentence, without its leading code. */
 export function sentence(summary: string): string {
   const text = summary.replace(/^[^:]*: /, "").replace(/-(?=\d)/g, "−");
   return `${capitalised(text)}.`;

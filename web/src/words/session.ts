@@ -1,5 +1,5 @@
 import type { Session } from "../api/types";
 
-/** From the first to the last sample, s; nothing where there is none. */
+/** Time from the first to the last sample, s; null without samples. */
 export const sessionLength = ({ first_t_s, last_t_s }: Session) =>
   first_t_s != null && last_t_s != null ? last_t_s - first_t_s : null;

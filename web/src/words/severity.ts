@@ -1,20 +1,22 @@
-/** How a rig stands, as one word for its worst fault, warning, or silence. */
+import type { FaultStatus } from "../api/types";
+
+/** The health of a rig: its worst fault, a drift warning, or missing data. */
 export type RigHealth = "fault" | "suspect" | "drift" | "ok" | "silent" | "idle";
 
-/** How a fault stands in the rig's fault memory. */
-export type FaultStanding = { status: string; acknowledged?: boolean };
+/** The state of a fault in the rig's fault memory. */
+export type FaultState = { status: FaultStatus; acknowledged?: boolean };
 
-/** How bad a fault is: the higher, the worse; 0 where it is not active. */
-export function severity(fault: FaultStanding): number {
+/** The severity of a fault, 0 (not active) to 3 (confirmed, not acknowledged). */
+export function severity(fault: FaultState): number {
   if (fault.status === "confirmed") return fault.acknowledged ? 2 : 3;
   return fault.status === "pending" ? 1 : 0;
 }
 
-/** How bad the worst of `faults` is. */
-export const worstSeverity = (faults: FaultStanding[]) => Math.max(0, ...faults.map(severity));
+/** The greatest severity of `faults`. */
+export const worstSeverity = (faults: FaultState[]) => Math.max(0, ...faults.map(severity));
 
-/** What a rig's faults alone say of its health; nothing where none is active. */
-export function healthByFaults(faults: FaultStanding[]): RigHealth | undefined {
+/** The health of a rig by its faults alone; undefined if none is active. */
+export function healthByFaults(faults: FaultState[]): RigHealth | undefined {
   const worst = worstSeverity(faults);
   if (worst >= 2) return "fault";
   return worst === 1 ? "suspect" : undefined;

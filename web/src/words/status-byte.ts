@@ -1,18 +1,16 @@
-/** The status byte of a fault: which of its bits say what. */
-
-/** Bits of the ISO 14229-1 status byte (annex D.2), from bit 7 down to bit 0. */
+/** The bits of the ISO 14229-1 status byte (annex D.2), from bit 7 down to bit 0. */
 export const STATUS_BITS = [
   {
     bit: 7,
     name: "warningIndicatorRequested",
-    on: "A warning lamp is asked for.",
-    off: "No warning lamp is asked for.",
+    on: "A warning lamp is requested.",
+    off: "No warning lamp is requested.",
   },
   {
     bit: 6,
     name: "testNotCompletedThisOperationCycle",
-    on: "The test has not come to a result in this session.",
-    off: "The test has come to a result in this session.",
+    on: "The test has not completed in this session.",
+    off: "The test has completed in this session.",
   },
   {
     bit: 5,
@@ -23,8 +21,8 @@ export const STATUS_BITS = [
   {
     bit: 4,
     name: "testNotCompletedSinceLastClear",
-    on: "The test has not come to a result since the last clear.",
-    off: "The test has come to a result since the last clear.",
+    on: "The test has not completed since the code was last cleared.",
+    off: "The test has completed since the code was last cleared.",
   },
   {
     bit: 3,
@@ -35,7 +33,7 @@ export const STATUS_BITS = [
   {
     bit: 2,
     name: "pendingDTC",
-    on: "Pending: it failed in this session or the one before.",
+    on: "Pending: it failed in this session or the previous one.",
     off: "Not pending.",
   },
   {
@@ -47,5 +45,5 @@ export const STATUS_BITS = [
   { bit: 0, name: "testFailed", on: "The test fails right now.", off: "The test does not fail right now." },
 ] as const;
 
-/** Whether the test of a fault line fails: one that passes again says how a fault stands. */
+/** Whether the test of a fault line fails; false for a line that reports a test that passes again. */
 export const isFailing = (line: { status_byte: string }) => (parseInt(line.status_byte, 16) & 1) === 1;

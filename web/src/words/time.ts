@@ -1,4 +1,4 @@
-/** How moments and lengths of time are written. */
+/** Formats times and durations. */
 import { NONE } from "./numbers";
 
 const MINUTE_S = 60;
@@ -6,10 +6,9 @@ const HOUR_S = 3600;
 const DAY_S = 86_400;
 
 /**
- * A length of time in two parts at most: 3 min 20 s. It is rounded to the smaller part before
- * it is split, so that what comes to a whole of the larger part is carried into it.
- * Intl.DurationFormat would write it, but not every browser in use has that yet, and it does
- * not round.
+ * Formats a duration with at most two units: 3 min 20 s. It is rounded to the smaller unit before
+ * it is split, so that 119.6 s is 2 min 0 s. Intl.DurationFormat does not round, and not every
+ * browser in use has it yet.
  */
 export function duration(s: number | null | undefined): string {
   if (s === null || s === undefined) return NONE;
@@ -24,13 +23,13 @@ export function duration(s: number | null | undefined): string {
   return `${Math.floor(inHours / 24)}\u202fd ${inHours % 24}\u202fh`;
 }
 
-/** How long ago `moment` was, in whole seconds below a minute. */
+/** Returns how long ago `moment` was, in whole seconds below a minute. */
 export function timeAgo(moment: string | null | undefined, now = Date.now()): string {
   if (!moment) return "never";
   const s = Math.max(0, (now - Date.parse(moment)) / 1000);
   return s < 2 ? "now" : `${duration(s < MINUTE_S ? Math.round(s) : s).replace(".0", "")} ago`;
 }
 
-/** A moment as date and time of day, the way the browser's language has it. */
+/** Formats a moment as date and time of day in the browser's locale. */
 export const dateTime = (moment: string | null | undefined) =>
   moment ? new Date(moment).toLocaleString(undefined, { dateStyle: "medium", timeStyle: "medium" }) : NONE;

@@ -1,52 +1,55 @@
-/** What a session came to, in words. */
-import type { Summary } from "../api/types";
+/** The verdict of a session as text. */
+import type { Candidate, FaultCode, Outcome, Summary } from "../api/types";
 import { codeTitle, faultTitle } from "./fault-names";
 import { capitalised } from "./sentence";
 import { duration } from "./time";
 
-/** How much of a session was judged: its share, and how long. */
+/** Returns the judged share of a session and its duration. */
 export const judgedShare = (monitor: { judged_share?: number; judged_s?: number }) =>
   `${Math.round((monitor.judged_share ?? 0) * 100)} %, ${duration(monitor.judged_s ?? 0)}`;
 
-type Cause = { code: string; kind?: string | null; weight: number };
-
-/** Causes in different parts of the rig that the evidence cannot tell apart, the heaviest first; else nothing. */
-export function ambiguousCauses(candidates: Cause[]): string {
-  if (!candidates.some((cause) => cause.code !== candidates[0]!.code)) return "";
+/**
+ * Returns the candidates with their weights if they are in different parts of the rig, so that the
+ * evidence does not distinguish them; otherwise an empty string.
+ */
+export function ambiguousCauses(candidates: Candidate[]): string {
+  if (!candidates.some(({ code }) => code !== candidates[0]!.code)) return "";
   const [first, ...others] = candidates.map(
     ({ code, kind, weight }) => `${faultTitle(code, kind)} (${Math.round(weight * 100)} %)`,
   );
   return `Cannot tell: ${first} or ${others.join(" or ")}`;
 }
 
-/** A fault of the summary, or the causes among which its monitor could not tell. */
-function faultFound(summary: Summary, code: string): string {
+/** Returns the title of a fault, or its candidates if its monitor could not distinguish them. */
+function faultText(summary: Summary, code: FaultCode): string {
   const monitor = summary.monitors?.find((each) => each.code === code && each.outcome === "cannot tell");
   return ambiguousCauses(monitor?.candidates ?? []) || codeTitle(code);
 }
 
 export interface Verdict {
   text: string;
-  /** The class of the style sheet that gives it its colour. */
+  /** The class of the style sheet for its colour. */
   look: string;
 }
 
-/** What a session came to, what of it was not judged, and how that is to look. */
+/** Returns the result of a session, with the monitors that did not judge it, and its style. */
 export function verdict(summary: Summary): Verdict {
   if (summary.outcome === "not judged") return { text: "Not judged", look: "quiet" };
-  const titles = (outcome: string) => {
+  const titles = (outcome: Outcome) => {
     const monitors = (summary.monitors ?? []).filter((monitor) => monitor.outcome === outcome);
     return monitors.map((monitor) => codeTitle(monitor.code)).join(", ");
   };
-  const found = summary.faults.map((code) => faultFound(summary, code)).join(", ");
+  const found = summary.faults.map((code) => faultText(summary, code)).join(", ");
   const pending = titles("pending");
-  const sound = titles("no fault");
-  const unlearnt = titles("not learnt");
-  const unjudged = titles("not judged");
-  const rest = [unlearnt && `not learnt: ${unlearnt}`, unjudged && `not judged: ${unjudged}`].filter(Boolean);
+  const passed = titles("no fault");
+  const notLearnt = titles("not learnt");
+  const notJudged = titles("not judged");
+  const rest = [notLearnt && `not learnt: ${notLearnt}`, notJudged && `not judged: ${notJudged}`].filter(
+    Boolean,
+  );
   const text = (first: string) => capitalised([first, ...rest].filter(Boolean).join("; "));
   if (found) return { text: text(found), look: "status-confirmed" };
   if (pending) return { text: text(`Pending only: ${pending}`), look: "status-pending" };
-  if (rest.length) return { text: text(sound && `No fault of ${sound}`), look: "quiet" };
+  if (rest.length) return { text: text(passed && `No fault of ${passed}`), look: "quiet" };
   return { text: "No fault", look: "status-ok" };
 }

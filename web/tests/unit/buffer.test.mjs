@@ -1,4 +1,4 @@
-// The trace as columns, and the clock by which it is shown.
+// The trace buffer, and the clock of the live view.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { TraceBuffer } from "../../src/live/buffer.ts";
@@ -31,14 +31,14 @@ test("moments are appended, with residual and limits on both sides", () => {
   assert.deepEqual([buffer.x.limit[0], buffer.x.limitBelow[0]], [0.5, -0.5]);
 });
 
-test("where no ball is seen there is no residual, and the twin is not shown", () => {
+test("without a position there is no residual, and the twin is not shown", () => {
   const buffer = TraceBuffer.of(trace(0, 3, (i) => i !== 1));
   assert.equal(buffer.x.residual[1], null);
   assert.equal(buffer.x.twinPosition[1], null);
   assert.equal(buffer.x.twinPosition[2], 0.02);
 });
 
-test("a full buffer keeps the newest moments, in all columns alike", () => {
+test("a full buffer keeps the newest moments in all columns", () => {
   const buffer = new TraceBuffer(100);
   for (let i = 0; i < 37; i++) buffer.append(trace(i * 0.13, 13));
   assert.ok(buffer.t.length >= 100 && buffer.t.length <= 110, `${buffer.t.length} moments`);
@@ -60,7 +60,7 @@ test("the index of a moment is that of the last one not after it", () => {
   assert.equal(new TraceBuffer().index(1), 0);
 });
 
-test("values between moments lie on the line; beyond the last and beside gaps they stay", () => {
+test("values are interpolated between moments, but not beyond the last one or next to gaps", () => {
   const buffer = TraceBuffer.of(trace(0, 3, (i) => i !== 2));
   assert.ok(Math.abs(buffer.at("x", "command", 0.005) - 0.005) < 1e-12);
   assert.equal(buffer.at("x", "command", 99), 0.02);
@@ -68,7 +68,7 @@ test("values between moments lie on the line; beyond the last and beside gaps th
   assert.equal(buffer.at("x", "position", 0.02), null);
 });
 
-test("the plate's angle about y is that of the x axis, and the other way about", () => {
+test("the plate's angle about y is that of the x axis, and vice versa", () => {
   const both = trace(0, 2);
   const buffer = TraceBuffer.of({
     ...both,
@@ -77,7 +77,7 @@ test("the plate's angle about y is that of the x axis, and the other way about",
   assert.deepEqual(poseAt(buffer, 0), { qx: 5, qy: 0, ball: null, ghost: null });
 });
 
-test("of a recording the judged rows are drawn, and others only across gaps", () => {
+test("of a recording, judged rows are drawn, and others only in gaps", () => {
   const t_s = Array.from({ length: 100 }, (_, i) => Number((i * 0.01).toFixed(2)));
   const column = (of) => t_s.map(of);
   const limit = column((t, i) => (i >= 50 && i % 2 === 0 ? 0.5 : null));
@@ -91,7 +91,7 @@ test("of a recording the judged rows are drawn, and others only across gaps", ()
   assert.ok(drawn.x.twin_position_m.every((value) => value === null));
 });
 
-test("the clock follows bursts evenly, behind the newest moment, and jumps when it is lost", () => {
+test("the clock follows batches evenly with a delay, and jumps after a large deviation", () => {
   const clock = new PlayoutClock(0.25);
   let shown = clock.tick(0, 10);
   assert.equal(shown, 9.75);
@@ -100,13 +100,13 @@ test("the clock follows bursts evenly, behind the newest moment, and jumps when 
     const newest = 10 + Math.floor(now / 100) / 10;
     const next = clock.tick(now, newest);
     assert.ok(next > shown && next <= newest, `${next} after ${shown}`);
-    assert.ok(next - shown < 0.016 * 1.5 + 1e-9, "never faster than half as fast again");
+    assert.ok(next - shown < 0.016 * 1.5 + 1e-9, "at most 1.5 times as fast");
     shown = next;
   }
   assert.equal(clock.tick(3016, 100), 99.75);
 });
 
-test("a clock that is behind catches up half as fast again at most, one that is ahead slows down", () => {
+test("a clock that is behind runs at most 1.5 times as fast, one that is ahead slows down", () => {
   const clock = new PlayoutClock(0.25);
   clock.tick(0, 10);
   // 1.5 s have come at once: the clock stands at 9.75 s and should be at 11.25 s.

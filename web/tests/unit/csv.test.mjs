@@ -1,4 +1,4 @@
-// Tables of anybody's making, and the session file that is made of them.
+// Foreign CSV tables, and the session files made from them.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { toColumns, toCsv } from "../../src/pages/import/columns.ts";
@@ -17,7 +17,7 @@ test("a plain table is read, comments and blank lines left out", () => {
   ]);
 });
 
-test("the separator is the one that the first line has most of", () => {
+test("the separator is the most frequent one in the first line", () => {
   for (const separator of [",", ";", "\t"]) {
     const table = read(
       ["t", "x", "y"].join(separator),
@@ -33,7 +33,7 @@ test("a line of blanks is no row, one of empty cells is", () => {
   assert.deepEqual(read("t,x,y", "0,1,2", ",,").rows[1], ["", "", ""]);
 });
 
-test("semicolons bring the decimal comma with them", () => {
+test("with semicolons, the comma is the decimal separator", () => {
   assert.deepEqual(read("t;x;y", "0,5;1,25;-2", "1;;3,0").rows, [
     ["0.5", "1.25", "-2"],
     ["1", "", "3.0"],
@@ -53,7 +53,7 @@ test("separators within quotes separate nothing", () => {
   ]);
 });
 
-test("separators within quoted names do not decide which separates", () => {
+test("separators within quoted names do not count for the choice of the separator", () => {
   const { header, rows } = read(
     '"t; in s, not ms; of the device; really";"ball x, y up";y',
     "0;1;2",
@@ -83,7 +83,7 @@ test("line ends of any system and a byte order mark change nothing", () => {
   assert.deepEqual(readTable('\uFEFF"t",x,y\r\n0,1,"2"\n1,2,3\r\n').rows, wanted.rows, "line ends mixed");
 });
 
-test("what is no table is refused in words", () => {
+test("a file that is not a table is refused with a message", () => {
   assert.throws(() => read("t,x", "0,1", "1,2"), /fewer than three columns/);
   assert.throws(() => read("0,1,2", "1,2,3", "2,3,4"), /has numbers/);
   assert.throws(() => read("t,x,y", "0,1,2"), /no rows/);
@@ -91,7 +91,7 @@ test("what is no table is refused in words", () => {
   assert.throws(() => read("t,x,y", "0,1,2", '1,"2,3', "2,3,4"), /row 3.*quote/i);
 });
 
-test("columns are known by their names, in whatever unit these say", () => {
+test("columns and units are recognized by name", () => {
   const mapping = guessMapping(
     read("time [ms];ball x (mm);ball y (mm);qx (deg);qy (deg)", "0;1;2;3;4", "10;1;2;3;4"),
   );
@@ -101,14 +101,14 @@ test("columns are known by their names, in whatever unit these say", () => {
   assert.equal(mapping.cmd_qx_rad.factor, Math.PI / 180);
 });
 
-test("where the names say nothing, the sizes of the numbers do", () => {
+test("without a unit in the name, the size of the values decides", () => {
   const mapping = guessMapping(read("t,qx,qy,x,y", "0,5,0,100,3", "10,2,1,50,4", "20,3,1,20,1"));
   assert.deepEqual([mapping.t_s.factor, mapping.x_m.factor, mapping.y_m.factor], [1e-3, 1e-3, 1e-3]);
   const metric = guessMapping(read("t,qx,qy,x,y", "0,0.1,0,0.1,0", "0.01,0.1,0,0.05,0"));
   for (const { factor } of Object.values(metric)) assert.equal(factor, 1);
 });
 
-test("cells that are no numbers are readings that are missing", () => {
+test("cells that are not numbers are missing readings", () => {
   const table = read("t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m", "0,0,0,nan,", "1,0,0,None,lost", "2,0,0,-,0.5");
   const columns = toColumns(table, guessMapping(table));
   assert.deepEqual(columns.x_m, [null, null, null]);
@@ -123,7 +123,7 @@ test("factor and sign are applied; a role without a column has no readings", () 
   assert.deepEqual(columns.cmd_qx_rad, [null, null]);
 });
 
-test("what is written is read again as it was", () => {
+test("a written session file is read back unchanged", () => {
   const next = random(7);
   for (let round = 0; round < 50; round++) {
     const value = (scale) => (next() < 0.1 ? null : Number(((next() - 0.5) * scale).toPrecision(9)));

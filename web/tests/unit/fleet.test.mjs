@@ -1,8 +1,8 @@
-// The fleet's list without its page: health, events, search and order.
+// The list of rigs without its page: health, events, search and order.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { afterEvent, healthOf, withLine } from "../../src/pages/fleet/fleet-state.ts";
-import { chosenRows, countRows, placesByName, rowOf } from "../../src/pages/fleet/rows.ts";
+import { chosenRows, countRows, nameRanks, rowOf } from "../../src/pages/fleet/rows.ts";
 
 const NOW = Date.parse("2026-01-01T12:00:00Z");
 const ago = (seconds) => new Date(NOW - seconds * 1000).toISOString();
@@ -36,7 +36,7 @@ test("a rig's health is its worst fault, then drift, then silence", () => {
   assert.equal(healthOf(rig("a", { session_id: null }), NOW), "idle");
 });
 
-test("an event changes its fault alone, and keeps that it is acknowledged", () => {
+test("an event changes only its fault, and keeps the acknowledgement", () => {
   const known = { ...fault("pending"), acknowledged: true };
   const before = rig("a", { faults: [known, fault("confirmed", "sensor")] });
   const confirmed = afterEvent(before, line("confirmed"), new Date(NOW));
@@ -52,15 +52,15 @@ test("an event changes its fault alone, and keeps that it is acknowledged", () =
     healed.faults.map(({ code }) => code),
     ["sensor"],
   );
-  assert.equal(before.faults.length, 2, "as it was");
+  assert.equal(before.faults.length, 2, "unchanged");
 });
 
-test("an event that tells of the same change replaces the one before, and there are fifty at most", () => {
+test("an event about the same change replaces the previous one, and at most fifty are kept", () => {
   const first = line("pending", { event: 1 });
-  const retold = line("pending", { event: 2, kind: "gain" });
-  assert.deepEqual(withLine([first], retold), [retold]);
+  const repeated = line("pending", { event: 2, kind: "gain" });
+  assert.deepEqual(withLine([first], repeated), [repeated]);
   const other = line("confirmed", { event: 3 });
-  assert.deepEqual(withLine([retold], other), [other, retold]);
+  assert.deepEqual(withLine([repeated], other), [other, repeated]);
   let lines = [];
   for (let event = 0; event < 80; event++)
     lines = withLine(lines, line("pending", { event, onset_s: event }));
@@ -73,11 +73,11 @@ const fleet = [
   rig("lab", { faults: [fault("confirmed", "sensor")], last_seen: ago(2) }),
   rig("attic", { session_id: null, last_seen: null }),
 ];
-const places = placesByName(fleet.map(({ asset }) => asset));
-const rows = fleet.map((entry) => rowOf(entry, places, NOW));
+const ranks = nameRanks(fleet.map(({ asset }) => asset));
+const rows = fleet.map((entry) => rowOf(entry, ranks, NOW));
 const names = (...choice) => chosenRows(rows, ...choice).map(({ entry }) => entry.asset);
 
-test("rigs are ordered as wanted, equal ones by name, and numbers in names count", () => {
+test("rigs are sorted as selected, equal ones by name in natural order", () => {
   assert.deepEqual(names("all", "", "name"), ["attic", "bench-2", "bench-10", "lab"]);
   assert.deepEqual(names("all", "", "severity"), ["lab", "bench-2", "bench-10", "attic"]);
   assert.deepEqual(names("all", "", "lag"), ["bench-10", "bench-2", "attic", "lab"]);
@@ -85,13 +85,13 @@ test("rigs are ordered as wanted, equal ones by name, and numbers in names count
   assert.deepEqual(names("all", "", "nonsense"), names("all", "", "severity"));
 });
 
-test("every word of a search must be found, in names, sessions or faults", () => {
+test("every word of a search must occur in the name, session or faults", () => {
   assert.deepEqual(names("all", "bench", "name"), ["bench-2", "bench-10"]);
   assert.deepEqual(names("all", "SENSOR position", "name"), ["lab"]);
   assert.deepEqual(names("all", "bench no-such", "name"), []);
 });
 
-test("a filter leaves the rigs of one health, and they are counted", () => {
+test("a filter selects and counts the rigs of one health", () => {
   assert.deepEqual(names("fault", "", "name"), ["lab"]);
   assert.deepEqual([countRows(rows, "all"), countRows(rows, "ok"), countRows(rows, "drift")], [4, 2, 0]);
 });

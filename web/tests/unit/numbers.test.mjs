@@ -1,4 +1,4 @@
-// How numbers and units are written.
+// Formats of numbers and units.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { count, degrees, millimetres, number, plural, seconds } from "../../src/words/numbers.ts";
@@ -9,12 +9,12 @@ test("a number has its digits, a true minus sign, and a narrow space before its 
   assert.equal(seconds(0.123), "0.12\u202fs");
 });
 
-test("what rounds to zero has no sign", () => {
+test("a number that rounds to zero has no sign", () => {
   assert.equal(number(-0.04, 1), "0.0");
   assert.equal(number(-0, 0), "0");
 });
 
-test("where there is no number there is a dash", () => {
+test("a missing number is a dash", () => {
   for (const missing of [null, undefined, NaN, Infinity]) assert.equal(number(missing, 1, "s"), "–");
   assert.equal(degrees(null), "–");
   assert.equal(millimetres(undefined), "–");

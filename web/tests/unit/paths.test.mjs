@@ -14,14 +14,14 @@ test("paths lead to the views", () => {
   assert.equal(sessionsPath("a b"), "/sessions?asset=a%20b");
 });
 
-test("a session is opened at a moment, the first one included", () => {
+test("a session is opened at a time, including 0", () => {
   assert.equal(sessionPath("7"), "/sessions/7");
   assert.equal(sessionPath("7", null), "/sessions/7");
   assert.equal(sessionPath("7", 0), "/sessions/7?t=0.00");
   assert.equal(sessionPath("7", 12.345), "/sessions/7?t=12.35");
 });
 
-test("whatever is in a segment comes back from the address", () => {
+test("any name survives the encoding in an address", () => {
   for (const name of ["a/b", "100 %", "?x=1#y", "ünï", "..%2F"]) {
     const url = new URL(path("rigs", name), "http://host");
     assert.deepEqual(url.pathname.split("/").map(decodeURIComponent), ["", "rigs", name]);

@@ -1,5 +1,5 @@
-// Runs the tests that need neither browser nor server. Node before 22 reads no TypeScript, so
-// esbuild, which Vite brings, bundles each test with the sources it imports.
+// Runs the tests that need neither browser nor server. Node before 22 does not run TypeScript, so
+// esbuild, a dependency of Vite, bundles each test with its sources.
 //
 //   npm run unit              all of them
 //   npm run unit -- csv time  those of csv.test.mjs and time.test.mjs
@@ -14,7 +14,7 @@ const names = process.argv.slice(2);
 const tests = readdirSync(here).filter((file) => file.endsWith(".test.mjs"));
 const chosen = tests.filter((file) => !names.length || names.includes(file.replace(".test.mjs", "")));
 
-// Below node_modules, where packages are found and git does not look.
+// Below node_modules, where packages are resolved and which git ignores.
 const bundles = fileURLToPath(new URL("../../node_modules/.cache/unit", import.meta.url));
 rmSync(bundles, { recursive: true, force: true });
 await build({

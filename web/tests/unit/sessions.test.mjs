@@ -1,4 +1,4 @@
-// A session's page without the page: what is shown of a moment, and by which settings it is judged.
+// The logic of the pages of sessions, the demo and drive cycles.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { cycleCsv } from "../../src/pages/asset/drive-cycle/cycle-csv.ts";
@@ -8,7 +8,7 @@ import { sharesAlongX } from "../../src/pages/learn/shares.ts";
 import { replaySettings } from "../../src/pages/session/replay-settings.ts";
 import { visibleRange } from "../../src/pages/session/visible-range.ts";
 
-test("the charts show the span about the moment, within the recording", () => {
+test("the charts show the span around the moment, within the recording", () => {
   assert.deepEqual(visibleRange(50, 30, 0, 90), [32, 62]);
   assert.deepEqual(visibleRange(2, 30, 0, 90), [0, 30]);
   assert.deepEqual(visibleRange(90, 30, 0, 90), [72, 90]);
@@ -16,7 +16,7 @@ test("the charts show the span about the moment, within the recording", () => {
   assert.deepEqual(visibleRange(0.1, 10, 0, 0.2), [0, 1], "a short recording");
 });
 
-test("a replay is asked for what the form says alone", () => {
+test("a replay requests only the settings of the form", () => {
   const empty = { profile: "", debounce: "", isUnlearnt: false };
   assert.deepEqual(replaySettings(empty), {});
   assert.deepEqual(replaySettings({ ...empty, profile: "textbook" }), { profile: "textbook" });
@@ -29,13 +29,13 @@ test("the demo's faults are grouped by code and named in words", () => {
   const groups = faultsByCode(["x_servo:dead", "sensor:noise", "x_servo:slow"]);
   assert.deepEqual([...groups.keys()], ["x_servo", "sensor"]);
   assert.deepEqual(
-    groups.get("x_servo").map(({ kind }) => kind),
+    groups.get("x_servo").map(({ effect }) => effect),
     ["dead", "slow"],
   );
   assert.equal(faultList(["x_servo:dead", "sensor:noise"]), "x servo, dead; sensor, noise");
 });
 
-test("the example is the chosen session, else the best without a fault", () => {
+test("the example is the chosen session, otherwise the preferred one without a fault", () => {
   const session = (id, asset, faults, state = "ended") => ({
     id,
     asset,
@@ -55,7 +55,7 @@ test("the example is the chosen session, else the best without a fault", () => {
   assert.equal(chosen([]), undefined);
 });
 
-test("shares count what is beyond the limit, of all and of what is judged", () => {
+test("shares count the moments beyond the limit, among all and among the judged ones", () => {
   const x = {
     measured_m_s2: [0, 1, 1, null, 0],
     twin_m_s2: [0, 0, 0, 0, 0],

@@ -1,4 +1,4 @@
-// The set-up without its page: what the form makes of a rig, what is learnt from, what is pasted.
+// The logic of the set-up: the form, the choice of sessions, the calibration, the snippets.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { assetOf, DEGREE, describeAsset, isName } from "../../src/pages/set-up/description.ts";
@@ -17,7 +17,7 @@ test("a new rig is described as that of the book chapter", () => {
   assert.deepEqual([axes.swap, axes.x_sign, axes.position_unit_m], [false, 1, 1]);
 });
 
-test("what the form makes is described as it was typed", () => {
+test("an asset converts back to the description that it was made from", () => {
   const next = random(5);
   const typed = (most) => Number((next() * most).toPrecision(4));
   for (let i = 0; i < 200; i++) {
@@ -37,14 +37,14 @@ test("what the form makes is described as it was typed", () => {
       commandUnit: [1, DEGREE][i % 2],
     };
     const back = describeAsset(assetOf(description));
-    // Only the sizes of the plate's own shape are kept.
+    // Only the dimensions of the chosen shape are kept.
     const { length, width, diameter } = back;
     const kept = description.isRound ? { length, width } : { diameter };
     assert.deepEqual(back, { ...description, ...kept });
   }
 });
 
-test("what the form does not ask for stays as it was", () => {
+test("properties that are not in the form keep their values", () => {
   const before = {
     name: "bench",
     plate: { thickness_m: 0.005, diameter_m: 0.3, rim: false },
@@ -66,7 +66,7 @@ test("a name has letters, digits, dash, underline and point", () => {
 
 const session = (id, length, more = {}) => ({ id, first_t_s: 0, last_t_s: length, state: "ended", ...more });
 
-test("the newest session is proposed if it is a minute long and nothing was found in it", () => {
+test("the newest session is proposed if it is a minute long and has no fault", () => {
   const proposed = (...sessions) => [...proposedSessions(sessions)];
   assert.deepEqual(proposed(session("new", 60), session("old", 90)), ["new"]);
   assert.deepEqual(proposed(session("new", 59), session("old", 90)), []);
@@ -75,15 +75,15 @@ test("the newest session is proposed if it is a minute long and nothing was foun
   assert.deepEqual([...proposedSessions()], []);
 });
 
-test("a choice changes by one session, and is as long as its sessions together", () => {
+test("a choice changes by one session, and its duration is that of its sessions", () => {
   const chosen = new Set(["a", "b"]);
   assert.deepEqual([...withChoice(chosen, "c", true)], ["a", "b", "c"]);
   assert.deepEqual([...withChoice(chosen, "a", false)], ["b"]);
-  assert.deepEqual([...chosen], ["a", "b"], "as it was");
+  assert.deepEqual([...chosen], ["a", "b"], "unchanged");
   assert.equal(totalLength([session("a", 30), session("b", null), session("c", 40)], chosen), 30);
 });
 
-/** Answers requests in the place of a service; what was asked for. */
+/** Replaces `fetch` by one that returns `answers`; returns the requests. */
 function fakeService(answers) {
   const requests = [];
   globalThis.fetch = (path, { method = "GET", body } = {}) => {
@@ -93,9 +93,9 @@ function fakeService(answers) {
   return requests;
 }
 
-test("learning ends the open sessions, waits for the job, and puts it into force", async () => {
+test("learning ends the open sessions, waits for the job, and activates the calibration", async () => {
   const job = (state) => ({ id: "7", state });
-  const requests = fakeService([{}, job("queued"), job("running"), job("done"), job("active")]);
+  const requests = fakeService([{}, job("queued"), job("running"), job("done"), job("done")]);
   const shown = [];
   const sessions = [
     session("a", 60, { state: "open" }),
@@ -110,10 +110,10 @@ test("learning ends the open sessions, waits for the job, and puts it into force
     ["GET", "/assets/bench/calibrations/7"],
     ["POST", "/assets/bench/calibrations/7/activate"],
   ]);
-  assert.deepEqual(shown, ["queued", "running", "done", "active"]);
+  assert.deepEqual(shown, ["queued", "running", "done", "done"]);
 });
 
-test("what cannot be learnt is not put into force", async () => {
+test("a failed calibration is not activated", async () => {
   const requests = fakeService([
     { id: "7", state: "queued" },
     { id: "7", state: "failed", error: "it rested" },
@@ -124,14 +124,14 @@ test("what cannot be learnt is not put into force", async () => {
   assert.equal(requests.length, 2);
 });
 
-test("rates of false alarms are in the unit that is easiest to imagine", () => {
+test("rates of false alarms are in the most readable unit", () => {
   assert.equal(falseAlarmRate(null), "unknown");
-  assert.equal(falseAlarmRate(2), "2.0 an hour");
-  assert.equal(falseAlarmRate(0.5), "12.0 a day");
+  assert.equal(falseAlarmRate(2), "2.0 per hour");
+  assert.equal(falseAlarmRate(0.5), "12.0 per day");
   assert.equal(falseAlarmRate(1 / 24 / 10), "one in 10 days");
 });
 
-test("snippets lead to the rig, from another machine if it is this one", () => {
+test("snippets have the address of the rig, with a placeholder for localhost on other machines", () => {
   const [curl, python, arduino] = snippets("bench 1", "http://127.0.0.1:8087");
   for (const { text } of [curl, python]) {
     assert.match(text, /http:\/\/127\.0\.0\.1:8087\/api\/v1\/assets\/bench%201\/telemetry/);
@@ -141,7 +141,7 @@ test("snippets lead to the rig, from another machine if it is this one", () => {
   assert.match(elsewhere.text, /"https:\/\/rigs\.example\/api/);
 });
 
-test("a token stands in each snippet exactly where the service asks for one", () => {
+test("snippets contain a token only if the service requires one", () => {
   for (const { language, text } of snippets("bench-1", "http://host", "offbd_secret")) {
     assert.match(text, /authorization"?[:,] ?"?Bearer offbd_secret/, language);
   }

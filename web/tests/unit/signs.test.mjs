@@ -1,4 +1,4 @@
-// Signs and axes of a rig, told from what was measured and what the twin says.
+// Signs and axes of a rig, from measured and twin accelerations.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { TraceBuffer } from "../../src/live/buffer.ts";
@@ -30,7 +30,7 @@ const times = (factor, column) => column.map((value) => factor * value);
 
 const compared = (rig) => compareSigns(TraceBuffer.of(trace(rig)));
 
-test("correlation is 1 with itself, −1 with its opposite, and unknown of too few or of none that vary", () => {
+test("correlation is 1 with itself, −1 with its opposite, and NaN for few or constant values", () => {
   const a = [1, 2, 3, 5, 8, 13];
   assert.ok(Math.abs(correlation(a, a) - 1) < 1e-12);
   assert.ok(Math.abs(correlation(a, times(-2, a)) + 1) < 1e-12);
@@ -38,7 +38,7 @@ test("correlation is 1 with itself, −1 with its opposite, and unknown of too f
   assert.ok(Number.isNaN(correlation(a, times(0, a))));
 });
 
-test("a sign is told by the stronger correlation, or not at all", () => {
+test("the stronger correlation decides the sign, if it is strong enough", () => {
   assert.equal(judgeSign({ own: 0.8, other: 0.1 }), "agrees");
   assert.equal(judgeSign({ own: -0.8, other: 0.1 }), "reversed");
   assert.equal(judgeSign({ own: 0.1, other: -0.8 }), "swapped");
@@ -46,27 +46,27 @@ test("a sign is told by the stronger correlation, or not at all", () => {
   assert.equal(judgeSign({ own: NaN, other: 0.9 }), "unclear");
 });
 
-test("a rig that does what the twin says agrees, and its axes stay", () => {
+test("a rig that agrees with the twin keeps its axes", () => {
   const signs = compared({ x: ({ x }) => x, y: ({ y }) => y });
   assert.deepEqual(signs.verdict, { x: "agrees", y: "agrees" });
   assert.ok(signs.seconds > 8 && signs.seconds <= 10, `${signs.seconds} s`);
   assert.deepEqual(correctedAxes(DEFAULT_AXES, signs), DEFAULT_AXES);
 });
 
-test("a reversed axis is turned, with its offset", () => {
+test("a reversed axis is corrected with its offset", () => {
   const signs = compared({ x: ({ x }) => times(-1, x), y: ({ y }) => y });
   assert.deepEqual(signs.verdict, { x: "reversed", y: "agrees" });
   const axes = { ...DEFAULT_AXES, x_offset_m: 0.01, y_offset_m: 0.02 };
   assert.deepEqual(correctedAxes(axes, signs), { ...axes, x_sign: -1, x_offset_m: -0.01 });
 });
 
-test("without motion nothing is told", () => {
+test("without motion the signs are unclear", () => {
   const still = compared({ x: ({ x }) => times(0, x), y: ({ y }) => times(0, y) });
   assert.equal(compareSigns(new TraceBuffer()).seconds, 0);
   assert.deepEqual(still.verdict, { x: "unclear", y: "unclear" });
 });
 
-/** What a rig's ball does along x and y when its axes are wired wrong in each way that there is. */
+/** All combinations of swapped axes and signs. */
 const WIRINGS = [false, true].flatMap((swap) =>
   [1, -1].flatMap((x_sign) => [1, -1].map((y_sign) => ({ swap, x_sign, y_sign }))),
 );

@@ -1,4 +1,4 @@
-// How lengths of time are written: in two parts at most, rounded so that no part is a whole of the next.
+// Formats of durations: at most two units, with rounding that carries into the larger unit.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { duration, timeAgo } from "../../src/words/time.ts";
@@ -41,7 +41,7 @@ test("no duration shows sixty seconds, sixty minutes or twenty-four hours", () =
   }
 });
 
-test("a duration is never further from the truth than half of its smaller unit", () => {
+test("the rounding error of a duration is at most half of its smaller unit", () => {
   const SECONDS = { s: 1, min: 60, h: 3600, d: 86_400 };
   for (let seconds = 60; seconds < 400_000; seconds *= 1.003) {
     const parts = plain(duration(seconds)).match(/\d+ \w+/g);
@@ -52,12 +52,12 @@ test("a duration is never further from the truth than half of its smaller unit",
       },
       [0, 0],
     );
-    // What carries is written with the next larger unit, and is still this near.
+    // This holds for carried durations too.
     assert.ok(Math.abs(shown - seconds) <= smallest / 2, `${seconds} s is shown as ${shown} s`);
   }
 });
 
-test("how long ago something was", () => {
+test("times relative to now", () => {
   const now = Date.parse("2026-01-01T12:00:00Z");
   const before = (seconds) => plain(timeAgo(new Date(now - seconds * 1000).toISOString(), now));
   assert.equal(before(0.5), "now");

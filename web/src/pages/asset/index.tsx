@@ -1,11 +1,11 @@
-/** One rig, live: the plate and ball, what was measured, what the twin says, what follows. */
+/** The page of one rig: live view, monitors, charts, drive cycle and trends. */
 import { api } from "../../api/client";
 import { useQuery } from "../../hooks/use-query";
 import { useTitle } from "../../hooks/use-title";
 import { UnloadedPage } from "../../parts/unloaded-page";
 import { LiveRig } from "./live-rig";
 
-/** How often the rig's description and its faults are fetched, ms; events tell of changes before. */
+/** Polling intervals of the rig's description and its faults, ms; events report changes earlier. */
 const ASSET_MS = 15_000;
 const FAULTS_MS = 5000;
 

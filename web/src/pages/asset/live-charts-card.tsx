@@ -2,11 +2,11 @@ import { ALL_CHARTS } from "../../parts/charts/chart-kinds";
 import { RigCharts } from "../../parts/charts/rig-charts";
 import type { LiveCharts } from "./use-live-charts";
 
-/** Seconds that the charts can show. */
+/** Selectable time spans of the charts, s. */
 const SPANS = [10, 30, 60];
 
 export function LiveChartsCard({ charts }: { charts: LiveCharts }) {
-  const { group, span, setSpan, isHeld, setHeld } = charts;
+  const { group, span, setSpan, isPaused, setPaused } = charts;
   return (
     <section class="card">
       <div class="card-head">
@@ -17,15 +17,15 @@ export function LiveChartsCard({ charts }: { charts: LiveCharts }) {
               {s} s
             </button>
           ))}
-          <button type="button" class="small" aria-pressed={isHeld} onClick={() => setHeld(!isHeld)}>
-            {isHeld ? "▶ go on" : "❚❚ hold"}
+          <button type="button" class="small" aria-pressed={isPaused} onClick={() => setPaused(!isPaused)}>
+            {isPaused ? "▶ resume" : "❚❚ pause"}
           </button>
         </div>
       </div>
       <RigCharts group={group} kinds={ALL_CHARTS} height={136} />
       <p class="quiet small-text">
-        Time on the device's clock, s. The residual counts only while the ground is tinted (the gate is open);
-        the band is the limit.
+        Time on the device's clock, s. The band around the residual is its limit. The residual is judged only
+        where the background is shaded: there the enable condition (the gate) holds.
       </p>
     </section>
   );

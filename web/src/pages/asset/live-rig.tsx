@@ -20,7 +20,7 @@ import { useLiveRig } from "./use-live-rig";
 interface Props {
   asset: Asset;
   faults: FaultEntry[];
-  /** Fetches the rig's description and its faults anew. */
+  /** Fetches the rig's description and its faults again. */
   refetch: () => Promise<unknown>;
 }
 
@@ -33,7 +33,7 @@ export function LiveRig({ asset, faults, refetch }: Props) {
       <AssetHeader name={asset.name} health={healthOf(active, state, isSilent)} session={state?.session_id} />
       {connection === "lost" && (
         <p class="trouble" role="alert">
-          The connection is lost; trying again. What is shown is the last that came.
+          Connection lost; reconnecting. The page shows the last received data.
         </p>
       )}
       <ActiveFaults asset={asset.name} faults={active} />
@@ -41,8 +41,8 @@ export function LiveRig({ asset, faults, refetch }: Props) {
       <LearningCard name={asset.name} state={state} changed={refetch} />
       {state && !state.session_id && (
         <p class="note">
-          No session is open. As soon as the rig sends, it is shown here.{" "}
-          <Link to={setUpPath(asset.name, "connect")}>How to send</Link>
+          No session is open. A session is opened by the first sample.{" "}
+          <Link to={setUpPath(asset.name, "connect")}>How to send samples</Link>
         </p>
       )}
       <div class="live-top">

@@ -2,7 +2,7 @@ import type { Monitor } from "../../api/types";
 import { codeTitle } from "../../words/fault-names";
 import { judgedShare } from "../../words/verdict";
 
-/** The fault detection counter of ISO 14229-1 goes from here, passed, to there, failed. */
+/** Range of the fault detection counter of ISO 14229-1. */
 const PASSED = -128;
 const FAILED = 127;
 
@@ -13,7 +13,7 @@ function resultText({ counter, enabled }: Monitor): string {
 }
 
 function readinessText({ complete_this_cycle, complete_since_clear }: Monitor): string {
-  if (complete_this_cycle) return "has come to a result in this session";
+  if (complete_this_cycle) return "the test has completed in this session";
   return complete_since_clear ? "no result in this session yet" : "no result yet";
 }
 

@@ -5,15 +5,15 @@ export function Monitors({ monitors }: { monitors: Monitor[] }) {
   return (
     <section class="card">
       <h2>Monitors</h2>
-      {monitors.length === 0 && <p class="quiet">Waiting for the first state.</p>}
+      {monitors.length === 0 && <p class="quiet">Waiting for data.</p>}
       <ul class="monitors">
         {monitors.map((monitor) => (
           <MonitorRow monitor={monitor} />
         ))}
       </ul>
       <p class="quiet small-text">
-        The bar is the fault detection counter, −128 (passed) to 127 (failed). ✓: the monitor is ready, it has
-        come to a result in this session.
+        The bar shows the fault detection counter, from −128 (passed) to 127 (failed). ✓: the test has
+        completed in this session.
       </p>
     </section>
   );

@@ -4,7 +4,7 @@ import { Link } from "../../router/link";
 import { sessionPath } from "../../router/paths";
 import { count, degrees, millimetres, seconds } from "../../words/numbers";
 
-/** The latest numbers of the rig. */
+/** The latest values of the rig. */
 export function NowCard({ state }: { state?: State }) {
   const evidence = state?.evidence;
   const session = state?.session_id ? (
@@ -22,7 +22,7 @@ export function NowCard({ state }: { state?: State }) {
           ["Samples", count(state?.samples ?? 0)],
           ["Ball", `${millimetres(evidence?.x.position_m)}, ${millimetres(evidence?.y.position_m)}`],
           ["Command", `qx ${degrees(evidence?.y.command_rad)}, qy ${degrees(evidence?.x.command_rad)}`],
-          ["Window", seconds(evidence?.window_s)],
+          ["Estimation window", seconds(evidence?.window_s)],
           ["Scatter of readings", millimetres(evidence?.scatter_m, 2)],
         ]}
       />

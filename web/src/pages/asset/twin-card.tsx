@@ -5,7 +5,7 @@ import { setUpPath } from "../../router/paths";
 import { count, NONE, number } from "../../words/numbers";
 import { dateTime } from "../../words/time";
 
-/** What was learnt of both servos. */
+/** The calibration of both servos. */
 function servoFacts({ calibration }: Asset): Fact[] {
   const { x, y } = calibration ?? {};
   if (!x || !y) return [];
@@ -16,7 +16,7 @@ function servoFacts({ calibration }: Asset): Fact[] {
   ];
 }
 
-/** The twin that the rig is compared with. */
+/** The twin with which the rig is compared. */
 export function TwinCard({ asset, state }: { asset: Asset; state?: State }) {
   const { calibration } = asset;
   const learnt =
@@ -26,8 +26,8 @@ export function TwinCard({ asset, state }: { asset: Asset; state?: State }) {
       <h2>The twin</h2>
       <Facts
         facts={[
-          ["Fidelity in use", state?.fidelity ?? NONE],
-          ["Why", state?.fidelity_reason ?? NONE],
+          ["Plant model", state?.fidelity ?? NONE],
+          ["Reason", state?.fidelity_reason ?? NONE],
           ["Profile", asset.diagnostics?.profile ?? "default"],
           ["Learnt", learnt ?? "not yet"],
           ...servoFacts(asset),

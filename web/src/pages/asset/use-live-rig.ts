@@ -6,16 +6,16 @@ import { faultMark } from "../../parts/charts/fault-marks";
 import type { Mark } from "../../parts/charts/overlays";
 import { useLiveCharts } from "./use-live-charts";
 
-/** States a second; the trace that comes with each has every judged sample. */
+/** States per second; the trace of each has every judged sample. */
 const STATES_PER_SECOND = 20;
 
-/** Texts that change more often cannot be read, ms. */
+/** Shortest interval between two renderings, so that the text is readable, ms. */
 const RENDER_MS = 150;
 
-/** A rig that has sent nothing for so long is silent, ms. */
+/** Time without a sample after which a rig counts as silent, ms. */
 const SILENT_MS = 10_000;
 
-/** The rig as it happens, and the charts of it, in which its faults are marked. */
+/** The live state of the rig, and its charts with marks at the faults. */
 export function useLiveRig(name: string, faultChanged: () => void) {
   const group = useMemo(() => new ChartGroup(), []);
   const marks = useRef<Mark[]>([]);

@@ -8,25 +8,25 @@ import { Link } from "../../router/link";
 import { sessionPath } from "../../router/paths";
 import { RecordingCharts } from "./recording-charts";
 
-/** Seconds shown before and after the occurrence. */
-const STRETCH = { before_s: 6, after_s: 6 };
+/** Range of the charts around the occurrence. */
+const RANGE = { before_s: 6, after_s: 6 };
 
-/** The recording may end so much before its stretch does, s. */
+/** Time by which a complete recording may end before its range does, s. */
 const TOLERANCE_S = 0.5;
 
-/** How long to wait for what comes after the fault in a session that runs, ms. */
+/** Delay before an incomplete recording of a running session is fetched again, ms. */
 const RETRY_MS = 1000;
 
-const isWhole = ({ complete, columns, to_s }: FaultRecording) =>
+const isComplete = ({ complete, columns, to_s }: FaultRecording) =>
   complete || columns.t_s.at(-1)! >= to_s - TOLERANCE_S;
 
-/** The seconds before and after the last occurrence, as recorded and as judged. */
+/** The recorded and judged seconds before and after the last occurrence. */
 export function AroundOccurrence({ fault, session }: { fault: FaultEntry; session: string }) {
   const { asset, code } = fault;
-  const fetchRecording = () => api.faultRecording(asset, code, STRETCH);
+  const fetchRecording = () => api.faultRecording(asset, code, RANGE);
   const { data: recording, error, refetch } = useQuery(fetchRecording, `${asset} ${code} recording`);
   useEffect(() => {
-    if (!recording || isWhole(recording)) return;
+    if (!recording || isComplete(recording)) return;
     const timer = setTimeout(() => void refetch(), RETRY_MS);
     return () => clearTimeout(timer);
   }, [recording, refetch]);
@@ -38,7 +38,7 @@ export function AroundOccurrence({ fault, session }: { fault: FaultEntry; sessio
         <div class="page-tools">
           {recording && (
             <button type="button" onClick={() => saveJson(recording, `${asset}-${code}.json`)}>
-              Save the evidence
+              Download JSON
             </button>
           )}
           <Link class="button" to={sessionPath(session, start)}>

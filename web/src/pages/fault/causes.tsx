@@ -3,19 +3,19 @@ import { Facts } from "../../parts/facts";
 import { codeMeaning, faultTitle, kindMeaning } from "../../words/fault-names";
 import { faultFacts } from "./fault-facts";
 
-/** The candidates of the diagnosis; where it named none, the fault itself unless it is cleared. */
+/** The candidates of the diagnosis; without any, the fault itself unless it is cleared. */
 function candidatesOf({ candidates, status, code, kind }: FaultEntry): FaultEntry["candidates"] {
   if (candidates.length) return candidates;
   return status === "cleared" ? [] : [{ code, kind, weight: 1 }];
 }
 
-/** What the fault may be, and what is on record of it. */
+/** The possible causes of the fault, and its record. */
 export function Causes({ fault }: { fault: FaultEntry }) {
   const candidates = candidatesOf(fault);
   return (
     <section class="card">
-      <h2>What it may be</h2>
-      {candidates.length === 0 && <p class="quiet">Nothing is suspected.</p>}
+      <h2>Possible causes</h2>
+      {candidates.length === 0 && <p class="quiet">None.</p>}
       <ul class="candidates">
         {candidates.map(({ code, kind, weight }) => (
           <li>

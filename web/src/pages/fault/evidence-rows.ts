@@ -1,4 +1,4 @@
-/** The evidence of one moment as rows of a table: what each says of both axes. */
+/** The evidence at one moment as rows of a table with a column for each axis. */
 import type { Evidence } from "../../api/types";
 import { degrees, millimetres, NONE, number } from "../../words/numbers";
 
@@ -13,7 +13,7 @@ interface Cell {
 const acceleration = (value?: number | null) => number(value, 3, "m/s²");
 
 const ROWS: [name: string, text: (axis: AxisEvidence) => string][] = [
-  ["Command behind the axis", (axis) => degrees(axis.command_rad, 2)],
+  ["Command", (axis) => degrees(axis.command_rad, 2)],
   ["Position", (axis) => millimetres(axis.position_m)],
   ["Velocity", (axis) => number(axis.velocity_m_s, 3, "m/s")],
   ["Measured acceleration", (axis) => acceleration(axis.measured_m_s2)],
@@ -21,19 +21,22 @@ const ROWS: [name: string, text: (axis: AxisEvidence) => string][] = [
   ["Residual", (axis) => acceleration(axis.residual_m_s2)],
   ["Limit", (axis) => acceleration(axis.limit_m_s2)],
   ["Gate", (axis) => (axis.enabled ? "open" : "closed")],
-  ["Evidence against the servo", (axis) => number(axis.nats, 1, "nats")],
-  ["Path off the twin's over 2 s", (axis) => millimetres(axis.path_error_m)],
+  ["Evidence of a servo fault", (axis) => number(axis.nats, 1, "nats")],
+  ["RMS deviation from the twin's path, 2 s", (axis) => millimetres(axis.path_error_m)],
 ];
 
 /** A value with its standard error. */
 const estimate = (value: number, error: number, digits: number, unit = "") =>
   `${number(value, digits)} ± ${number(error, digits, unit)}`;
 
-/** How the ball answers the commands along an axis, where that was estimated. */
+/** Estimates of the servo's response along an axis. */
 const ANSWER_ROWS: [name: string, text: (answer: Answer) => string][] = [
-  ["Answers this share of its command", (a) => estimate(a.gain, a.gain_error, 2)],
-  ["Acceleration that nothing asks for", (a) => estimate(a.offset_m_s2, a.offset_error_m_s2, 2, "m/s²")],
-  ["Delay beyond the twin's", (a) => estimate(a.delay_s * 1e3, a.delay_error_s * 1e3, 0, "ms")],
+  ["Gain relative to the twin", (a) => estimate(a.gain, a.gain_error, 2)],
+  [
+    "Acceleration not explained by the command",
+    (a) => estimate(a.offset_m_s2, a.offset_error_m_s2, 2, "m/s²"),
+  ],
+  ["Delay in addition to the twin's", (a) => estimate(a.delay_s * 1e3, a.delay_error_s * 1e3, 0, "ms")],
 ];
 
 const isBeyondLimit = (axis: AxisEvidence) =>

@@ -1,25 +1,25 @@
 import type { Evidence } from "../../api/types";
-import { millimetres, seconds } from "../../words/numbers";
+import { millimetres, plural, seconds } from "../../words/numbers";
 import { evidenceRows } from "./evidence-rows";
 
-/** What the table leaves out of the evidence, in words. */
+/** The values of the evidence that belong to no axis, as text. */
 function remarks(evidence: Evidence): string {
   const { healthy_scatter_m, jump } = evidence;
-  const healthy = healthy_scatter_m ? `, of healthy readings ${millimetres(healthy_scatter_m, 2)}` : "";
-  const jumped = jump ? `; readings stepped by ${millimetres(jump.size_m, 0)} at ${seconds(jump.t_s)}` : "";
+  const healthy = healthy_scatter_m ? ` (healthy: ${millimetres(healthy_scatter_m, 2)})` : "";
+  const jumped = jump ? `; readings jumped by ${millimetres(jump.size_m, 0)} at ${seconds(jump.t_s)}` : "";
   return (
-    `Window ${seconds(evidence.window_s)}; no ball seen for ${seconds(evidence.unseen_s)}; ` +
+    `Estimation window ${seconds(evidence.window_s)}; ball not seen for ${seconds(evidence.unseen_s)}; ` +
     `readings identical for ${seconds(evidence.identical_s)}; ball at rest for ${seconds(evidence.still_s)}; ` +
-    `${evidence.outliers} readings set aside in 10 s; ` +
+    `${plural(evidence.outliers, "outlier")} in 10 s; ` +
     `scatter ${millimetres(evidence.scatter_m, 2)}${healthy}${jumped}.`
   );
 }
 
-/** The numbers at one moment, as a table: the innovation record or a freeze frame. */
+/** The evidence at one moment as a table: the innovation record or a freeze frame. */
 export function EvidenceTable({ evidence }: { evidence: Evidence }) {
   return (
     <>
-      <div class="scroll" tabIndex={0} role="region" aria-label="Numbers at that moment">
+      <div class="scroll" tabIndex={0} role="region" aria-label="Evidence at that time">
         <table class="numbers">
           <thead>
             <tr>

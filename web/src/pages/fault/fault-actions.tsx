@@ -1,14 +1,14 @@
 import { useState } from "preact/hooks";
 import { actor, rememberActor } from "../../api/access";
 import { api } from "../../api/client";
-import type { FaultEntry } from "../../api/types";
+import type { FaultCode, FaultEntry } from "../../api/types";
 import { ActionButton } from "../../parts/action-button";
 
-/** What a person can do about the fault, under a name that is kept with it. */
+/** The actions on the fault, and the name that is recorded with them. */
 export function FaultActions({ fault, refetch }: { fault: FaultEntry; refetch: () => Promise<unknown> }) {
   const { asset, code, acknowledged } = fault;
   const [name, setName] = useState(actor());
-  const asActor = (action: (asset: string, code: string) => Promise<unknown>) => async () => {
+  const asActor = (action: (asset: string, code: FaultCode) => Promise<unknown>) => async () => {
     rememberActor(name);
     await action(asset, code);
     await refetch();
@@ -22,7 +22,7 @@ export function FaultActions({ fault, refetch }: { fault: FaultEntry; refetch: (
           size={12}
           maxLength={60}
           onInput={(e) => setName(e.currentTarget.value)}
-          aria-label="Your name, kept with what you do"
+          aria-label="Your name, recorded with the action"
         />
       </label>
       <ActionButton class="primary" disabled={acknowledged} action={asActor(api.acknowledge)}>

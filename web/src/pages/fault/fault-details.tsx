@@ -43,7 +43,7 @@ export function FaultDetails({ fault, history, error, refetch }: Props) {
       {freeze_frame && (
         <section class="card">
           <h2>Freeze frame</h2>
-          <p class="quiet small-text">The numbers at the first failure of the current occurrence.</p>
+          <p class="quiet small-text">The evidence at the first failure of the current occurrence.</p>
           <EvidenceTable evidence={freeze_frame} />
         </section>
       )}

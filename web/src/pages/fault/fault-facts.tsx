@@ -1,4 +1,4 @@
-/** What is on record of a fault, as names and values. */
+/** The record of a fault as names and values. */
 import type { FaultEntry } from "../../api/types";
 import type { Fact } from "../../parts/facts";
 import { Link } from "../../router/link";
@@ -14,7 +14,7 @@ export function faultFacts(fault: FaultEntry): Fact[] {
     ["Occurrences", `${occurrences} since the last clear, in ${sessions}`],
     ...occurrenceFacts("First", fault.first_occurrence, fault.first_onset_s),
     ...(occurrences > 1 ? occurrenceFacts("Last", fault.last_occurrence, fault.last_onset_s) : []),
-    ...judgedByFacts(fault),
+    ...settingsFacts(fault),
     ["Acknowledged", doneBy(acknowledgement) ?? (occurrences ? "not yet" : "nothing to acknowledge")],
     ["Cleared", doneBy(fault.cleared) ?? "never"],
     ...recoveryFacts(fault),
@@ -22,7 +22,7 @@ export function faultFacts(fault: FaultEntry): Fact[] {
   ];
 }
 
-/** When and in which session it failed anew. */
+/** The time and session of an occurrence. */
 function occurrenceFacts(
   which: string,
   occurrence: FaultEntry["last_occurrence"],
@@ -32,43 +32,35 @@ function occurrenceFacts(
   const { noted_at, session, session_id } = occurrence;
   const value = (
     <>
-      {dateTime(noted_at)}, {onset_s == null ? "in" : `${seconds(onset_s)} into the clock of`}{" "}
+      {dateTime(noted_at)}, {onset_s == null ? "in" : `at ${seconds(onset_s)} of`}{" "}
       <Link to={sessionPath(session_id, onset_s)}>{session}</Link>
     </>
   );
   return [[`${which} occurrence`, value]];
 }
 
-function judgedByFacts({ last_occurrence }: FaultEntry): Fact[] {
+function settingsFacts({ last_occurrence }: FaultEntry): Fact[] {
   if (!last_occurrence) return [];
   const { calibration_id, settings_id } = last_occurrence;
-  const calibration = calibration_id ? (
-    <>
-      calibration <code>{calibration_id}</code>
-    </>
-  ) : (
-    "a rig that has not been learnt"
-  );
   return [
-    ["Judged by", calibration],
+    ["Calibration", calibration_id ? <code>{calibration_id}</code> : "none: the rig was not learnt"],
     ["Settings", <code>{settings_id}</code>],
   ];
 }
 
-const doneBy = (act: FaultEntry["cleared"]) =>
-  act && (
+const doneBy = (action: FaultEntry["cleared"]) =>
+  action && (
     <>
-      by <b>{act.by}</b>, {dateTime(act.at)}
+      by <b>{action.by}</b>, {dateTime(action.at)}
     </>
   );
 
-/** How many good sessions it takes until the fault heals, and then until it is erased. */
+/** The number of sessions without the fault until it heals, and then until it is erased. */
 function recoveryFacts(fault: FaultEntry): Fact[] {
-  const progress = (wanted?: number | null, counted?: number | null) =>
-    `${plural(wanted ?? 0, "good session")}; there were ${counted ?? 0}`;
+  const progress = (required?: number | null, counted?: number | null) =>
+    `${plural(required ?? 0, "session")} without the fault; ${counted ?? 0} so far`;
   if (fault.status === "confirmed")
     return [["Heals after", progress(fault.healing_cycles, fault.healing_counter)]];
-  if (fault.status === "healed")
-    return [["Is erased after", progress(fault.aging_cycles, fault.aging_counter)]];
+  if (fault.status === "healed") return [["Erased after", progress(fault.aging_cycles, fault.aging_counter)]];
   return [];
 }

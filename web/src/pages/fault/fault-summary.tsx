@@ -4,7 +4,7 @@ import { codeMeaning, codeTitle } from "../../words/fault-names";
 import { sentence } from "../../words/sentence";
 import { isActive } from "./is-active";
 
-/** The fault in a sentence, or that it is not active. */
+/** The fault in one sentence, or the note that it is not active. */
 export function FaultSummary({ fault, history }: { fault: FaultEntry; history: HistoryEntry[] }) {
   const { code, status } = fault;
   const latest = history.find(({ fault, what }) => fault && (what === "confirmed" || what === "pending"));
@@ -14,8 +14,8 @@ export function FaultSummary({ fault, history }: { fault: FaultEntry; history: H
       <p>
         {codeTitle(code)}: {codeMeaning(code)}.{" "}
         {status === "healed"
-          ? "Enough good sessions followed, so it has healed."
-          : "Nothing of it has been found since it was last cleared."}
+          ? "It healed after enough sessions without the fault."
+          : "It has not been detected since it was last cleared."}
       </p>
     </EmptyState>
   );

@@ -1,7 +1,8 @@
-/** One fault: what was seen, what it may be, since when, and what people did about it. */
+/** The page of one fault: evidence, possible causes, record and history. */
 import { useEffect } from "preact/hooks";
 import { api } from "../../api/client";
 import { faultEvents } from "../../api/events";
+import type { FaultCode } from "../../api/types";
 import { useLatest } from "../../hooks/use-latest";
 import { useQuery } from "../../hooks/use-query";
 import { useTitle } from "../../hooks/use-title";
@@ -9,10 +10,10 @@ import { UnloadedPage } from "../../parts/unloaded-page";
 import { codeTitle } from "../../words/fault-names";
 import { FaultDetails } from "./fault-details";
 
-/** How often both are fetched, ms; events tell of changes before. */
+/** Polling interval, ms; events report changes earlier. */
 const INTERVAL_MS = 5000;
 
-export function FaultPage({ name, code }: { name: string; code: string }) {
+export function FaultPage({ name, code }: { name: string; code: FaultCode }) {
   useTitle(`${codeTitle(code)} of ${name}`);
   const fault = useQuery(() => api.fault(name, code), `${name} ${code}`, INTERVAL_MS);
   const fetchHistory = () => api.history(name, code).then((page) => page.items);

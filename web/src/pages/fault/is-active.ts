@@ -1,4 +1,4 @@
 import type { FaultEntry } from "../../api/types";
 
-/** Whether the fault is there now, or may be. */
+/** Whether the fault is pending or confirmed. */
 export const isActive = ({ status }: FaultEntry) => status === "pending" || status === "confirmed";

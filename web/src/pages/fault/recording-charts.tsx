@@ -15,10 +15,8 @@ function marksOf({ onset_s, failed_s, confirmed_s }: FaultRecording): Mark[] {
   return marks;
 }
 
-const isAxis = (axis?: string | null): axis is Axis => axis === "x" || axis === "y";
-
-/** The charts of a recording, along the axis of its fault or along both. */
-export function RecordingCharts({ recording, axis }: { recording: FaultRecording; axis?: string | null }) {
+/** The charts of a recording for the axis of its fault, or for both axes. */
+export function RecordingCharts({ recording, axis }: { recording: FaultRecording; axis?: Axis | null }) {
   const group = useMemo(() => new ChartGroup(), []);
   const buffer = useMemo(() => TraceBuffer.of(traceOfRecording(recording)), [recording]);
   useEffect(() => {
@@ -28,7 +26,7 @@ export function RecordingCharts({ recording, axis }: { recording: FaultRecording
     const end = Math.min(to_s, Math.max(buffer.last, failed_s + 1));
     group.draw(buffer, [Math.max(from_s, buffer.first), end]);
   }, [buffer, group, recording]);
-  if (!buffer.t.length) return <p class="quiet">The recording has nothing from these seconds.</p>;
-  const axes = isAxis(axis) ? [axis] : [...AXES];
+  if (!buffer.t.length) return <p class="quiet">The recording has no data in this range.</p>;
+  const axes = axis ? [axis] : [...AXES];
   return <RigCharts group={group} kinds={ALL_CHARTS} axes={axes} height={150} measuredOnly />;
 }

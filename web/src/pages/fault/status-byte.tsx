@@ -1,6 +1,6 @@
 import { STATUS_BITS } from "../../words/status-byte";
 
-/** The status byte, bit by bit. */
+/** The bits of the status byte. */
 export function StatusByte({ byte }: { byte: string }) {
   const bits = Number.parseInt(byte, 16);
   return (

@@ -1,29 +1,29 @@
-import type { HistoryEntry } from "../../api/types";
+import type { FaultCode, HistoryEntry, HistoryEvent } from "../../api/types";
 import { Link } from "../../router/link";
 import { sessionPath } from "../../router/paths";
 import { faultTitle } from "../../words/fault-names";
 import { seconds } from "../../words/numbers";
 
-const WHAT: Record<string, string> = {
+const EVENT: Record<HistoryEvent, string> = {
   pending: "became pending",
   confirmed: "was confirmed",
   healed: "healed",
-  cleared: "is off the record",
+  cleared: "was cleared",
   acknowledge: "acknowledged",
   clear: "cleared",
 };
 
-/** One entry in words: somebody did something, or the fault became something. */
-export function TimelineText({ entry, code }: { entry: HistoryEntry; code: string }) {
+/** One entry as text: the action of a user, or a change of the fault's status. */
+export function TimelineText({ entry, code }: { entry: HistoryEntry; code: FaultCode }) {
   const { what, by, fault, session_id } = entry;
   if (by)
     return (
       <span>
-        <b>{by}</b> {WHAT[what]} it
+        <b>{by}</b> {EVENT[what]} it
       </span>
     );
   const t_s = fault?.onset_s ?? fault?.t_s;
-  // Its name alone where the session is gone.
+  // Without a link if the session was deleted.
   const session = session_id ? (
     <Link to={sessionPath(session_id, t_s)}>{fault?.session}</Link>
   ) : (
@@ -31,7 +31,7 @@ export function TimelineText({ entry, code }: { entry: HistoryEntry; code: strin
   );
   return (
     <span>
-      {faultTitle(code, fault?.kind)} <b>{WHAT[what] ?? what}</b>
+      {faultTitle(code, fault?.kind)} <b>{EVENT[what] ?? what}</b>
       {fault && (
         <>
           {" "}

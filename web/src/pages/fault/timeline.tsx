@@ -1,13 +1,13 @@
-import type { HistoryEntry } from "../../api/types";
+import type { FaultCode, HistoryEntry } from "../../api/types";
 import { dateTime } from "../../words/time";
 import { TimelineText } from "./timeline-text";
 
-/** What happened to the fault, and who did what about it, the latest first. */
-export function Timeline({ history, code }: { history: HistoryEntry[]; code: string }) {
+/** The status changes of the fault and the actions of users, the latest first. */
+export function Timeline({ history, code }: { history: HistoryEntry[]; code: FaultCode }) {
   return (
     <section class="card">
-      <h2>Over time</h2>
-      {history.length === 0 && <p class="quiet">It has never happened.</p>}
+      <h2>History</h2>
+      {history.length === 0 && <p class="quiet">No entries.</p>}
       <ol class="timeline">
         {history.map((entry) => (
           <li key={entry.id} class={`what-${entry.what}`}>

@@ -3,16 +3,16 @@ import { Link } from "../../router/link";
 import { faultPath } from "../../router/paths";
 import { sentence } from "../../words/sentence";
 
-/** Lines that are shown. */
+/** Number of displayed lines. */
 const SHOWN = 20;
 
-/** Changes of any fault since the page was opened, the newest first. */
+/** Fault changes since the page was opened, the newest first. */
 export function EventFeed({ lines }: { lines: FaultEvent[] }) {
   return (
     <section class={`feed${lines.length ? "" : " none"}`} aria-label="Events">
       <h2>Events</h2>
       {lines.length === 0 && (
-        <p class="quiet">None since this page was opened. Changes of any fault appear here as they happen.</p>
+        <p class="quiet">No fault changes since this page was opened. New ones appear here immediately.</p>
       )}
       <ol aria-live="polite">
         {lines.slice(0, SHOWN).map((line) => (

@@ -15,7 +15,7 @@ export function FleetList({ view: { rows, shown }, now }: { view: FleetView; now
         <span>Faults</span>
         <span>Session</span>
         <span class="n">Lag</span>
-        <span class="n">Last heard</span>
+        <span class="n">Last seen</span>
       </div>
       {shown.length ? (
         <VirtualList

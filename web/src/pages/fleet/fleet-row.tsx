@@ -1,4 +1,4 @@
-import type { FleetEntry } from "../../api/types";
+import type { LearningState } from "../../api/types";
 import { DriftChip } from "../../parts/drift-chip";
 import { FaultChip } from "../../parts/fault-chip";
 import { HealthMark } from "../../parts/health-mark";
@@ -9,20 +9,19 @@ import { severity } from "../../words/severity";
 import { timeAgo } from "../../words/time";
 import type { FleetRow as Row } from "./rows";
 
-/** Later than this is worth a colour, s. */
+/** Lag from which on it is highlighted, s. */
 const LATE_S = 2;
 
-/** What is said of a rig that is not learnt. */
-const NOT_LEARNT: Record<FleetEntry["learning"], { word: string; meaning: string }> = {
+/** Note beside the name of a rig that is not learnt. */
+const NOT_LEARNT: Record<LearningState, { word: string; meaning: string }> = {
   gathering: {
     word: "not learnt",
-    meaning:
-      "It learns by itself as soon as enough motion has come; until then only faults of the sensor are confirmed",
+    meaning: "Learnt automatically after enough motion; until then, only sensor faults are confirmed",
   },
-  learning: { word: "being learnt", meaning: "Enough motion has come" },
+  learning: { word: "being learnt", meaning: "There is enough motion; the calibration is running" },
   offered: {
     word: "was it healthy?",
-    meaning: "What was learnt waits for somebody to say that the rig was healthy",
+    meaning: "A calibration is ready: confirm that the rig was healthy",
   },
   learnt: { word: "", meaning: "" },
 };

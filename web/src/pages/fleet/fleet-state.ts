@@ -1,13 +1,13 @@
-/** What the fleet's answers and events say of each rig. */
+/** The state of each rig by its fleet entry and events. */
 import type { FaultEvent } from "../../api/events";
 import type { FaultLine, FleetEntry } from "../../api/types";
 import { healthByFaults, type RigHealth } from "../../words/severity";
 
-/** A rig with an open session that has sent nothing for so long is silent, ms. */
+/** Time without a sample after which a rig with an open session counts as silent, ms. */
 const SILENT_MS = 10_000;
 
-/** Event lines that the page keeps. */
-const MOST_LINES = 50;
+/** Number of event lines that the page keeps. */
+const MAX_LINES = 50;
 
 export function healthOf(entry: FleetEntry, now: number): RigHealth {
   const byFaults = healthByFaults(entry.faults);
@@ -17,7 +17,7 @@ export function healthOf(entry: FleetEntry, now: number): RigHealth {
   return entry.last_seen && now - Date.parse(entry.last_seen) < SILENT_MS ? "ok" : "silent";
 }
 
-/** An entry as it is after an event. */
+/** Returns the entry after an event. */
 export function afterEvent(entry: FleetEntry, line: FaultLine, now = new Date()): FleetEntry {
   const others = entry.faults.filter((fault) => fault.code !== line.code);
   const isActive = line.status === "pending" || line.status === "confirmed";
@@ -33,10 +33,10 @@ export function afterEvent(entry: FleetEntry, line: FaultLine, now = new Date())
   return { ...entry, faults: [...others, fault] };
 }
 
-/** Whether an event tells of the same change once more, as when its kind shows later. */
+/** Whether two events report the same change, as when the kind is determined later. */
 const isSameChange = (a: FaultLine, b: FaultLine) =>
   (["asset", "session", "code", "status", "onset_s"] as const).every((key) => a[key] === b[key]);
 
-/** The event lines with a new one on top, in the place of those that told of the same change. */
+/** Returns the event lines with a new one first; it replaces lines about the same change. */
 export const withLine = (lines: FaultEvent[], line: FaultEvent): FaultEvent[] =>
-  [line, ...lines.filter((known) => !isSameChange(known, line))].slice(0, MOST_LINES);
+  [line, ...lines.filter((known) => !isSameChange(known, line))].slice(0, MAX_LINES);

@@ -14,7 +14,7 @@ const FILTERS: { key: HealthFilter; word: string }[] = [
 
 const SEARCH = "Search rigs, faults, sessions";
 
-/** Filters, search and order of the fleet's list. */
+/** Filters, search and order of the list of rigs. */
 export function FleetTools({ view: { rows, filter, search, sort, change } }: { view: FleetView }) {
   return (
     <div class="tools">

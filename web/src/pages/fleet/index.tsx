@@ -1,4 +1,4 @@
-/** All rigs: which is sick, which is silent, which lags. */
+/** The page of all rigs: health, faults and lag. */
 import { useNow } from "../../hooks/use-now";
 import { useTitle } from "../../hooks/use-title";
 import { ErrorMessage } from "../../parts/error-message";

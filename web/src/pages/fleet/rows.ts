@@ -1,4 +1,4 @@
-/** The rows of the fleet's list: which are shown, and in which order. */
+/** The rows of the list of rigs: filter, search and order. */
 import type { FleetEntry } from "../../api/types";
 import { codeTitle } from "../../words/fault-names";
 import { worstSeverity, type RigHealth } from "../../words/severity";
@@ -8,8 +8,8 @@ export interface FleetRow {
   entry: FleetEntry;
   health: RigHealth;
   worst: number;
-  /** Its place among all rigs by name. */
-  place: number;
+  /** Rank among all rigs by name. */
+  nameRank: number;
 }
 
 export type HealthFilter = RigHealth | "all";
@@ -17,27 +17,27 @@ export type HealthFilter = RigHealth | "all";
 export const SORTS = {
   severity: "worst first",
   name: "by name",
-  seen: "last heard first",
+  seen: "last seen first",
   lag: "greatest lag first",
 } as const;
 
 export type Sort = keyof typeof SORTS;
 
-/** bench-2 comes before bench-10. */
+/** Sorts bench-2 before bench-10. */
 const NAMES = new Intl.Collator("en", { numeric: true });
 
-/** The place of each name among `names`, as a person orders them. */
-export const placesByName = (names: string[]) =>
-  new Map([...names].sort((a, b) => NAMES.compare(a, b)).map((name, place) => [name, place]));
+/** The rank of each name in natural order. */
+export const nameRanks = (names: string[]) =>
+  new Map([...names].sort((a, b) => NAMES.compare(a, b)).map((name, rank) => [name, rank]));
 
-export const rowOf = (entry: FleetEntry, places: Map<string, number>, now: number): FleetRow => ({
+export const rowOf = (entry: FleetEntry, ranks: Map<string, number>, now: number): FleetRow => ({
   entry,
   health: healthOf(entry, now),
   worst: worstSeverity(entry.faults),
-  place: places.get(entry.asset) ?? 0,
+  nameRank: ranks.get(entry.asset) ?? 0,
 });
 
-/** Whether every word of `text` is found in what the row says. */
+/** Whether the entry contains every word of `text`. */
 function matches({ asset, session, faults, warnings }: FleetEntry, text: string): boolean {
   const words = [
     asset,
@@ -52,22 +52,22 @@ function matches({ asset, session, faults, warnings }: FleetEntry, text: string)
     .every((word) => haystack.includes(word));
 }
 
-/** Where rigs of equal severity stand among each other. */
-const RANK: Record<RigHealth, number> = { fault: 0, suspect: 1, drift: 2, silent: 3, ok: 4, idle: 5 };
+/** Order of rigs of equal severity. */
+const HEALTH_RANK: Record<RigHealth, number> = { fault: 0, suspect: 1, drift: 2, silent: 3, ok: 4, idle: 5 };
 
 const COMPARE: Record<Sort, (a: FleetRow, b: FleetRow) => number> = {
-  severity: (a, b) => b.worst - a.worst || RANK[a.health] - RANK[b.health],
+  severity: (a, b) => b.worst - a.worst || HEALTH_RANK[a.health] - HEALTH_RANK[b.health],
   name: () => 0,
   seen: (a, b) => (b.entry.last_seen ?? "").localeCompare(a.entry.last_seen ?? ""),
   lag: (a, b) => (b.entry.lag_s ?? -1) - (a.entry.lag_s ?? -1),
 };
 
-/** The rows that a filter and a search leave, in order. */
+/** Returns the rows that match the filter and the search, in order. */
 export function chosenRows(rows: FleetRow[], filter: HealthFilter, text: string, sort: string): FleetRow[] {
   const compare = COMPARE[sort in SORTS ? (sort as Sort) : "severity"];
   return rows
     .filter((row) => (filter === "all" || row.health === filter) && (!text || matches(row.entry, text)))
-    .sort((a, b) => compare(a, b) || a.place - b.place);
+    .sort((a, b) => compare(a, b) || a.nameRank - b.nameRank);
 }
 
 export const countRows = (rows: FleetRow[], filter: HealthFilter) =>

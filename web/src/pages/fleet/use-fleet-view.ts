@@ -1,21 +1,21 @@
 import { useMemo, useRef } from "preact/hooks";
 import type { FleetEntry } from "../../api/types";
 import { navigate, useLocation } from "../../router/navigation";
-import { chosenRows, placesByName, rowOf, type HealthFilter } from "./rows";
+import { chosenRows, nameRanks, rowOf, type HealthFilter } from "./rows";
 
-/** The place of each rig by name; ordering thousands of names takes too long for every second. */
-function usePlaces(fleet: FleetEntry[]): Map<string, number> {
+/** The rank of each rig by name; sorting thousands of names every second would take too long. */
+function useNameRanks(fleet: FleetEntry[]): Map<string, number> {
   const names = fleet.map((entry) => entry.asset);
   const known = useRef<string[]>([]);
   const isSame = names.length === known.current.length && names.every((name, i) => name === known.current[i]);
   if (!isSame) known.current = names;
   const stableNames = known.current;
-  return useMemo(() => placesByName(stableNames), [stableNames]);
+  return useMemo(() => nameRanks(stableNames), [stableNames]);
 }
 
 const NO_RIGS: FleetEntry[] = [];
 
-/** The fleet as the address wants it: searched, filtered and sorted. */
+/** The fleet with the search, filter and order of the address. */
 export function useFleetView(fleet: FleetEntry[] = NO_RIGS, now: number) {
   const { query } = useLocation();
   const search = query.get("search") ?? "";
@@ -27,8 +27,8 @@ export function useFleetView(fleet: FleetEntry[] = NO_RIGS, now: number) {
     else next.delete(key);
     navigate(`/${next.size ? `?${next}` : ""}`, true);
   };
-  const places = usePlaces(fleet);
-  const rows = useMemo(() => fleet.map((entry) => rowOf(entry, places, now)), [fleet, places, now]);
+  const ranks = useNameRanks(fleet);
+  const rows = useMemo(() => fleet.map((entry) => rowOf(entry, ranks, now)), [fleet, ranks, now]);
   const shown = useMemo(() => chosenRows(rows, filter, search, sort), [rows, filter, search, sort]);
   return { search, filter, sort, rows, shown, change };
 }

@@ -6,42 +6,42 @@ import { useLatest } from "../../hooks/use-latest";
 import { useQuery } from "../../hooks/use-query";
 import { afterEvent, withLine } from "./fleet-state";
 
-/** Time between two looks at the whole fleet: longer for a larger one, ms. */
+/** Polling interval for a fleet of `n` rigs, ms. */
 const intervalFor = (n: number) => 2000 + 2 * n;
 
-/** Entries that events have changed since the answer of the service that they belong to. */
+/** Entries that events have changed since the last response of the service. */
 interface Patches {
-  answer?: FleetEntry[];
+  base?: FleetEntry[];
   entries: Map<string, FleetEntry>;
 }
 
-/** The fleet as it is now: fetched in a rhythm, and changed at once by every event. */
+/** The current fleet: polled, and updated immediately by every event. */
 export function useFleet() {
   const [interval, setPollInterval] = useState(intervalFor(0));
-  const { data: answer, error, refetch } = useQuery(api.fleet, "fleet", interval);
+  const { data: polled, error, refetch } = useQuery(api.fleet, "fleet", interval);
   const [patches, setPatches] = useState<Patches>({ entries: new Map() });
   const [lines, setLines] = useState<FaultEvent[]>([]);
   const current = useRef(new Map<string, FleetEntry>());
 
-  const n = answer?.length;
+  const n = polled?.length;
   useEffect(() => {
     if (n !== undefined) setPollInterval(intervalFor(n));
   }, [n]);
 
   const fleet = useMemo(() => {
-    const patched = patches.answer === answer ? patches.entries : new Map<string, FleetEntry>();
-    const entries = answer?.map((entry) => patched.get(entry.asset) ?? entry);
+    const patched = patches.base === polled ? patches.entries : new Map<string, FleetEntry>();
+    const entries = polled?.map((entry) => patched.get(entry.asset) ?? entry);
     current.current = new Map(entries?.map((entry) => [entry.asset, entry]));
     return entries;
-  }, [answer, patches]);
+  }, [polled, patches]);
 
-  const latestAnswer = useLatest(answer);
+  const latestPolled = useLatest(polled);
   useEffect(() => {
     const patch = (entry: FleetEntry) => {
       current.current.set(entry.asset, entry);
       setPatches((before) => {
-        const known = before.answer === latestAnswer.current ? before.entries : [];
-        return { answer: latestAnswer.current, entries: new Map(known).set(entry.asset, entry) };
+        const known = before.base === latestPolled.current ? before.entries : [];
+        return { base: latestPolled.current, entries: new Map(known).set(entry.asset, entry) };
       });
     };
     return faultEvents.listen((line) => {
@@ -50,9 +50,9 @@ export function useFleet() {
       if (entry) patch(afterEvent(entry, line));
       else void refetch();
     });
-  }, [refetch, latestAnswer]);
+  }, [refetch, latestPolled]);
 
-  // What happened while the connection was lost is in the next answer.
+  // After a lost connection, the missed changes are fetched.
   useEffect(() => {
     let before = faultEvents.state;
     return faultEvents.watch((state) => {

@@ -1,11 +1,11 @@
 import { useEffect, useState } from "preact/hooks";
 
-/** Narrower windows are laid out for a phone, as in the style sheet, px. */
+/** Width below which the layout is that of a phone, as in the style sheet, px. */
 const PHONE_WIDTH = 700;
 
 const height = () => (innerWidth < PHONE_WIDTH ? 104 : 56);
 
-/** Rows are as high as this, px; on a phone they have two lines more. */
+/** The height of a row, px; on a phone it has two more lines. */
 export function useRowHeight(): number {
   const [rowHeight, setRowHeight] = useState(height);
   useEffect(() => {

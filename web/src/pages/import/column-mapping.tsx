@@ -1,6 +1,6 @@
 import { MappingRow } from "./mapping-row";
 import type { MappedColumn, Mapping } from "./mapping";
-import { ROLES, type Role } from "./roles";
+import { QUANTITIES, type Quantity } from "./quantities";
 import type { Table } from "./table";
 
 interface Props {
@@ -9,16 +9,16 @@ interface Props {
   change: (mapping: Mapping) => void;
 }
 
-/** Which column of the file is what, in which unit, which way round. */
+/** The table that assigns a column, a unit and a sign to each quantity. */
 export function ColumnMapping({ table, mapping, change }: Props) {
-  const set = (role: Role, part: Partial<MappedColumn>) =>
-    change({ ...mapping, [role]: { ...mapping[role], ...part } });
+  const set = (quantity: Quantity, part: Partial<MappedColumn>) =>
+    change({ ...mapping, [quantity]: { ...mapping[quantity], ...part } });
   return (
     <div class="scroll">
       <table class="mapping">
         <thead>
           <tr>
-            <th>Is</th>
+            <th>Quantity</th>
             <th>Column</th>
             <th>Unit</th>
             <th>Sign</th>
@@ -26,8 +26,13 @@ export function ColumnMapping({ table, mapping, change }: Props) {
           </tr>
         </thead>
         <tbody>
-          {ROLES.map((role) => (
-            <MappingRow role={role} column={mapping[role]} table={table} set={(part) => set(role, part)} />
+          {QUANTITIES.map((quantity) => (
+            <MappingRow
+              quantity={quantity}
+              column={mapping[quantity]}
+              table={table}
+              set={(part) => set(quantity, part)}
+            />
           ))}
         </tbody>
       </table>

@@ -1,36 +1,36 @@
-/** The columns of a recording in the service's units, and the session file that is made of them. */
+/** The columns of a recording in the units of the service, and its session file. */
 import type { Mapping } from "./mapping";
-import { ROLES, type Role } from "./roles";
+import { QUANTITIES, type Quantity } from "./quantities";
 import { numbersOf, type Table } from "./table";
 
-export type Columns = Record<Role, (number | null)[]>;
+export type Columns = Record<Quantity, (number | null)[]>;
 
-/** Digits that are written: more than any sensor has, without the noise of binary fractions. */
+/** Significant digits of a value: more than any sensor has, without binary rounding noise. */
 const DIGITS = 12;
 
 export function toColumns(table: Table, mapping: Mapping): Columns {
-  const column = (role: Role) => {
-    const { index, factor, sign } = mapping[role];
+  const column = (quantity: Quantity) => {
+    const { index, factor, sign } = mapping[quantity];
     if (index === null) return table.rows.map(() => null);
     return numbersOf(table, index).map((value) => (value === null ? null : value * factor * sign));
   };
-  return Object.fromEntries(ROLES.map((role) => [role, column(role)])) as Columns;
+  return Object.fromEntries(QUANTITIES.map((quantity) => [quantity, column(quantity)])) as Columns;
 }
 
 const cell = (value: number | null | undefined) =>
   value == null ? "" : `${Number(value.toPrecision(DIGITS))}`;
 
-/** The session file that the service takes: numbers and fixed names, none of which needs quotes. */
+/** Returns the session file; numbers and column names need no quotes. */
 export function toCsv(columns: Columns): string {
   const rows = columns.t_s.flatMap((t, i) =>
-    t === null ? [] : [ROLES.map((role) => cell(columns[role][i])).join(",")],
+    t === null ? [] : [QUANTITIES.map((quantity) => cell(columns[quantity][i])).join(",")],
   );
-  return `${ROLES.join(",")}\n${rows.join("\n")}\n`;
+  return `${QUANTITIES.join(",")}\n${rows.join("\n")}\n`;
 }
 
 export const finite = (column: (number | null)[]) => column.filter((value) => value !== null);
 
-/** The smallest and the largest of `values`; there may be too many for the arguments of Math.min. */
+/** Returns the smallest and the largest of `values`, which may be too many for the arguments of Math.min. */
 export function extent(values: number[]): [low: number, high: number] {
   let low = Infinity;
   let high = -Infinity;

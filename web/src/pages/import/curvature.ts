@@ -1,6 +1,6 @@
 /**
- * Second derivative of the parabola through the readings of `column` from index `from` to `to`,
- * by least squares; null where there are too few.
+ * Fits a parabola to the readings of `column` from index `from` to `to` by least squares and returns
+ * its second derivative; null if there are too few readings.
  */
 export function curvature(
   t: (number | null)[],
@@ -10,7 +10,7 @@ export function curvature(
 ): number | null {
   const middle = t[(from + to) >> 1];
   if (middle == null) return null;
-  // Sums of the powers of time, and of the readings times these.
+  // Sums of the powers of time, and of their products with the readings.
   const s = [0, 0, 0, 0, 0];
   const b = [0, 0, 0];
   for (let i = from; i <= to; i++) {
@@ -27,19 +27,19 @@ export function curvature(
   return solve(s as Sums, b as [number, number, number]);
 }
 
-/** Fewer readings make no parabola. */
-const LEAST_READINGS = 6;
+/** Smallest number of readings for a fit. */
+const MIN_READINGS = 6;
 
-/** Readings at the same moments make none either. */
-const LEAST_DETERMINANT = 1e-18;
+/** Smallest determinant: readings at too few distinct times are singular. */
+const MIN_DETERMINANT = 1e-18;
 
 type Sums = [number, number, number, number, number];
 
 /** Twice the parabola's leading coefficient, by Cramer's rule on the normal equations. */
 function solve([s0, s1, s2, s3, s4]: Sums, [b0, b1, b2]: [number, number, number]): number | null {
-  if (s0 < LEAST_READINGS) return null;
+  if (s0 < MIN_READINGS) return null;
   const determinant = s0 * (s2 * s4 - s3 * s3) - s1 * (s1 * s4 - s2 * s3) + s2 * (s1 * s3 - s2 * s2);
-  if (Math.abs(determinant) < LEAST_DETERMINANT) return null;
+  if (Math.abs(determinant) < MIN_DETERMINANT) return null;
   const leading = s0 * (s2 * b2 - s3 * b1) - s1 * (s1 * b2 - s2 * b1) + b0 * (s1 * s3 - s2 * s2);
   return (2 * leading) / determinant;
 }

@@ -1,13 +1,13 @@
 import { colour } from "../../theme";
 import { extent, finite, type Columns } from "./columns";
 
-/** Points drawn at most. */
-const MOST_POINTS = 4000;
+/** Largest number of drawn points. */
+const MAX_POINTS = 4000;
 
-/** Room about the ball's way, px. */
+/** Margin around the path, px. */
 const MARGIN = 20;
 
-/** Draws the ball's way in a file, as large as the canvas has room for it. */
+/** Draws the path of the ball in a file, scaled to the canvas. */
 export function drawPreview(canvas: HTMLCanvasElement, { t_s, x_m, y_m }: Columns): void {
   const { clientWidth: width, clientHeight: height } = canvas;
   Object.assign(canvas, { width: width * devicePixelRatio, height: height * devicePixelRatio });
@@ -21,9 +21,9 @@ export function drawPreview(canvas: HTMLCanvasElement, { t_s, x_m, y_m }: Column
   context.strokeStyle = colour("measured");
   context.lineWidth = 1.2;
   context.beginPath();
-  const step = Math.max(Math.floor(t_s.length / MOST_POINTS), 1);
-  // Whether the line goes on from the point before: it has a gap where no ball was seen.
-  let goesOn = false;
+  const step = Math.max(Math.floor(t_s.length / MAX_POINTS), 1);
+  // The line has a gap where the position is missing.
+  let isContinued = false;
   for (let i = 0; i < t_s.length; i += step) {
     const x = x_m[i];
     const y = y_m[i];
@@ -31,10 +31,10 @@ export function drawPreview(canvas: HTMLCanvasElement, { t_s, x_m, y_m }: Column
     if (isSeen) {
       const px = width / 2 + (x - (left + right) / 2) * scale;
       const py = height / 2 - (y - (bottom + top) / 2) * scale;
-      if (goesOn) context.lineTo(px, py);
+      if (isContinued) context.lineTo(px, py);
       else context.moveTo(px, py);
     }
-    goesOn = isSeen;
+    isContinued = isSeen;
   }
   context.stroke();
 }

@@ -1,10 +1,10 @@
 import { ActionButton } from "../../parts/action-button";
 import { count } from "../../words/numbers";
 import type { Mapping } from "./mapping";
-import { ROLE_WORDS, ROLES, type Role } from "./roles";
+import { QUANTITIES, QUANTITY_TITLES, type Quantity } from "./quantities";
 
-/** Without these there is nothing to judge; a recording without commands is still one. */
-const NEEDED: Role[] = ["t_s", "x_m", "y_m"];
+/** The required quantities; a recording without commands can be imported. */
+const REQUIRED: Quantity[] = ["t_s", "x_m", "y_m"];
 
 interface Props {
   mapping: Mapping;
@@ -15,12 +15,14 @@ interface Props {
 }
 
 export function ImportButtons({ mapping, nRows, hasAsset, send, cancel }: Props) {
-  const missing = ROLES.filter((role) => mapping[role].index === null);
-  const isReady = hasAsset && !NEEDED.some((role) => missing.includes(role));
+  const missing = QUANTITIES.filter((quantity) => mapping[quantity].index === null);
+  const isReady = hasAsset && !REQUIRED.some((quantity) => missing.includes(quantity));
   return (
     <div class="form-end">
       {missing.length > 0 && (
-        <span class="quiet">Still to choose: {missing.map((role) => ROLE_WORDS[role]).join(", ")}</span>
+        <span class="quiet">
+          Not assigned: {missing.map((quantity) => QUANTITY_TITLES[quantity]).join(", ")}
+        </span>
       )}
       <button type="button" onClick={cancel}>
         Cancel

@@ -18,7 +18,7 @@ interface Props {
   fileName: string;
   assets: string[];
   wantedAsset?: string;
-  /** Called with what came of it, where not all rows went in. */
+  /** Called with the result if not all rows were accepted. */
   imported: (result: ImportResult) => void;
   cancel: () => void;
 }

@@ -3,20 +3,20 @@ import { navigate } from "../../router/navigation";
 import { sessionPath } from "../../router/paths";
 import { count } from "../../words/numbers";
 
-/** Rows that are named. */
+/** Number of listed rejections. */
 const SHOWN = 8;
 
-/** From the index of a sample to the row of the file: the first row has the names. */
+/** Row number of the first sample: the first row of the file has the column names. */
 const FIRST_ROW = 2;
 
-/** What came of an import of which not all rows went in. */
+/** The result of an import of which not all rows were accepted. */
 export function ImportOutcome({ result }: { result: ImportResult }) {
   const { accepted, rejected, late, duplicate, rejections, session } = result;
   return (
     <div>
       <p role="status">
-        {count(accepted)} samples are in. {count(rejected)} rows were no samples, {count(late)} came too late
-        to be judged, {count(duplicate)} were there already.
+        {count(accepted)} samples were imported. {count(rejected)} rows were rejected, {count(late)} were too
+        late to be judged, {count(duplicate)} were duplicates.
       </p>
       {rejections.length > 0 && (
         <ul class="plain quiet">

@@ -6,7 +6,7 @@ interface Props {
   setSession: (name: string) => void;
 }
 
-/** The rig to which the recording is imported, and what the session is called. */
+/** The rig to which the recording is imported, and the name of the session. */
 export function ImportTarget({ assets, asset, setAsset, session, setSession }: Props) {
   return (
     <>
@@ -31,8 +31,8 @@ export function ImportTarget({ assets, asset, setAsset, session, setSession }: P
       </div>
       {!assets.includes(asset) && asset && (
         <p class="note">
-          There is no rig <b>{asset}</b> yet; it is registered as the book chapter's rig. Its set-up can be
-          changed later.
+          There is no rig <b>{asset}</b> yet. It will be registered with the dimensions of the book chapter's
+          rig; its set-up can be changed later.
         </p>
       )}
     </>

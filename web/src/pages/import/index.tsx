@@ -1,4 +1,4 @@
-/** A dropped file becomes a session: its columns are mapped, looked at, and checked. */
+/** The dialog for importing a file as a session: column mapping, preview and checks. */
 import { useState } from "preact/hooks";
 import type { ImportResult } from "../../api/types";
 import { Dialog } from "../../parts/dialog";
@@ -10,7 +10,7 @@ interface Props {
   file: File;
   /** The names of all rigs. */
   assets: string[];
-  /** The rig whose sessions are looked at, if one is chosen. */
+  /** The rig that the list of sessions is filtered by, if any. */
   asset?: string;
   close: () => void;
 }

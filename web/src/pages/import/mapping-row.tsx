@@ -1,21 +1,21 @@
 import type { MappedColumn } from "./mapping";
-import { ROLE_WORDS, UNITS, type Role } from "./roles";
+import { QUANTITY_TITLES, UNITS, type Quantity } from "./quantities";
 import { SignChoice } from "./sign-choice";
 import type { Table } from "./table";
 
-/** Values of the column that are shown. */
+/** Number of displayed values. */
 const SHOWN = 4;
 
 interface Props {
-  role: Role;
+  quantity: Quantity;
   column: MappedColumn;
   table: Table;
   set: (part: Partial<MappedColumn>) => void;
 }
 
-/** The column of the file that has a role. */
-export function MappingRow({ role, column: { index, factor, sign }, table, set }: Props) {
-  const word = ROLE_WORDS[role];
+/** The column, unit and sign of a quantity. */
+export function MappingRow({ quantity, column: { index, factor, sign }, table, set }: Props) {
+  const word = QUANTITY_TITLES[quantity];
   const firstRows = table.rows.slice(0, SHOWN);
   const chooseColumn = (value: string) => set({ index: value === "" ? null : Number(value) });
   return (
@@ -39,12 +39,12 @@ export function MappingRow({ role, column: { index, factor, sign }, table, set }
           value={factor}
           onChange={(e) => set({ factor: Number(e.currentTarget.value) })}
         >
-          {UNITS[role].map((unit) => (
+          {UNITS[quantity].map((unit) => (
             <option value={unit.factor}>{unit.word}</option>
           ))}
         </select>
       </td>
-      <td>{role !== "t_s" && <SignChoice word={word} sign={sign} choose={(sign) => set({ sign })} />}</td>
+      <td>{quantity !== "t_s" && <SignChoice word={word} sign={sign} choose={(sign) => set({ sign })} />}</td>
       <td class="quiet clip">
         {index === null ? "" : firstRows.map((row) => row[index] || "empty").join(", ")}
       </td>

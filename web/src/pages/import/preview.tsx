@@ -3,13 +3,13 @@ import { count, millimetres, number, seconds } from "../../words/numbers";
 import { extent, finite, type Columns } from "./columns";
 import { drawPreview } from "./draw-preview";
 
-/** From where to where a column goes. */
+/** Formats the range of a column. */
 function rangeText(column: (number | null)[]): string {
   const [low, high] = extent(finite(column));
   return `from ${millimetres(low, 0)} to ${millimetres(high, 0)}`;
 }
 
-/** What the file would be as a session: the ball's way, and a few numbers that show a wrong unit. */
+/** A preview of the session: the path of the ball, and values that reveal a wrong unit. */
 export function Preview({ columns }: { columns: Columns }) {
   const canvas = useRef<HTMLCanvasElement>(null);
   useEffect(() => drawPreview(canvas.current!, columns), [columns]);
@@ -19,10 +19,10 @@ export function Preview({ columns }: { columns: Columns }) {
   const rate = length > 0 ? (t.length - 1) / length : null;
   const nSeen = x_m.filter((x, i) => x !== null && y_m[i] !== null).length;
   const commands = [...finite(cmd_qx_rad), ...finite(cmd_qy_rad)].map(Math.abs);
-  const steepest = Math.max(extent(commands)[1], 0);
+  const largestAngle = Math.max(extent(commands)[1], 0);
   return (
     <div class="preview">
-      <canvas ref={canvas} class="xy" role="img" aria-label="The ball's way in the file" />
+      <canvas ref={canvas} class="xy" role="img" aria-label="Path of the ball in the file" />
       <ul class="plain">
         <li>
           {count(t.length)} rows over {seconds(length, 1)}: {number(rate, 1, "Hz")}
@@ -31,7 +31,7 @@ export function Preview({ columns }: { columns: Columns }) {
         <li>
           x {rangeText(x_m)}, y {rangeText(y_m)}
         </li>
-        <li>Steepest command {number((steepest * 180) / Math.PI, 1, "°")}</li>
+        <li>Largest command {number((largestAngle * 180) / Math.PI, 1, "°")}</li>
       </ul>
     </div>
   );

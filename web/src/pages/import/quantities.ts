@@ -1,9 +1,9 @@
-/** What a column of a recording can be, and in which units. */
+/** The quantities of a recording, their titles and units. */
 
-export const ROLES = ["t_s", "cmd_qx_rad", "cmd_qy_rad", "x_m", "y_m"] as const;
-export type Role = (typeof ROLES)[number];
+export const QUANTITIES = ["t_s", "cmd_qx_rad", "cmd_qy_rad", "x_m", "y_m"] as const;
+export type Quantity = (typeof QUANTITIES)[number];
 
-export const ROLE_WORDS: Record<Role, string> = {
+export const QUANTITY_TITLES: Record<Quantity, string> = {
   t_s: "Time",
   cmd_qx_rad: "Command qx (about x)",
   cmd_qy_rad: "Command qy (about y)",
@@ -13,7 +13,7 @@ export const ROLE_WORDS: Record<Role, string> = {
 
 export interface Unit {
   word: string;
-  /** From this unit to that of the role. */
+  /** Factor from this unit to that of the session file. */
   factor: number;
 }
 
@@ -34,7 +34,7 @@ const LENGTH: Unit[] = [
   { word: "in", factor: 0.0254 },
 ];
 
-export const UNITS: Record<Role, Unit[]> = {
+export const UNITS: Record<Quantity, Unit[]> = {
   t_s: TIME,
   cmd_qx_rad: ANGLE,
   cmd_qy_rad: ANGLE,

@@ -3,19 +3,19 @@ import { judgeSign } from "../../live/correlation";
 import { count } from "../../words/numbers";
 import { finite, type Columns } from "./columns";
 import type { Mapping } from "./mapping";
-import type { Role } from "./roles";
+import type { Quantity } from "./quantities";
 import { checkSigns } from "./sign-check";
 import { SignRemark } from "./sign-remark";
 
-/** Beyond these a unit must be wrong. */
+/** Limits beyond which a unit must be wrong. */
 const LARGEST_POSITION_M = 2;
 const LARGEST_ANGLE_RAD = 1.6;
 
 const isBeyond = (limit: number, ...columns: (number | null)[][]) =>
   columns.some((column) => finite(column).some((value) => Math.abs(value) > limit));
 
-/** Rows whose time is not later than that of the row before. */
-function countStandstills({ t_s }: Columns): number {
+/** Counts the rows whose time is not after that of the previous row. */
+function countNonIncreasing({ t_s }: Columns): number {
   const t = finite(t_s);
   return t.slice(1).filter((value, i) => value <= t[i]!).length;
 }
@@ -26,22 +26,20 @@ interface Props {
   change: (mapping: Mapping) => void;
 }
 
-/** What looks wrong with the columns as they are mapped, and buttons that put it right. */
+/** Checks of the mapped columns, with buttons that correct them. */
 export function SanityCheck({ columns, mapping, change }: Props) {
   const check = useMemo(() => checkSigns(columns), [columns]);
-  const nStandstills = countStandstills(columns);
+  const nNonIncreasing = countNonIncreasing(columns);
   const isFar = isBeyond(LARGEST_POSITION_M, columns.x_m, columns.y_m);
   const isSteep = isBeyond(LARGEST_ANGLE_RAD, columns.cmd_qx_rad, columns.cmd_qy_rad);
   const swap = () => change({ ...mapping, x_m: mapping.y_m, y_m: mapping.x_m });
-  const flip = (role: Role) =>
-    change({ ...mapping, [role]: { ...mapping[role], sign: mapping[role].sign === 1 ? -1 : 1 } });
+  const flip = (quantity: Quantity) =>
+    change({ ...mapping, [quantity]: { ...mapping[quantity], sign: mapping[quantity].sign === 1 ? -1 : 1 } });
   return (
     <ul class="sanity" aria-label="Sanity check">
-      {nStandstills > 0 && (
-        <li class="warn">Time stands still or goes back in {count(nStandstills)} rows.</li>
-      )}
-      {isFar && <li class="warn">The ball is metres away: is the unit of its position right?</li>}
-      {isSteep && <li class="warn">The plate tilts beyond 90°: is the unit of the commands right?</li>}
+      {nNonIncreasing > 0 && <li class="warn">Time does not increase in {count(nNonIncreasing)} rows.</li>}
+      {isFar && <li class="warn">Positions exceed 2 m: check the unit of the ball's position.</li>}
+      {isSteep && <li class="warn">Commands exceed 90°: check the unit of the commands.</li>}
       {(["x", "y"] as const).map((axis) => (
         <SignRemark
           axis={axis}

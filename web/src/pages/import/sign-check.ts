@@ -1,23 +1,23 @@
-/** Does the ball of a recording go where its plate tilts? */
+/** Checks whether the ball of a recording accelerates in the direction of the commanded tilt. */
 import { correlation, type Correlations } from "../../live/correlation";
 import type { Columns } from "./columns";
 import { curvature } from "./curvature";
 
 export interface SignCheck {
-  /** Correlation of the ball's acceleration along x and y with the two slopes. */
+  /** Correlations of the ball's acceleration along each axis with the slopes along both. */
   x: Correlations;
   y: Correlations;
 }
 
-/** Half of the window over which a curve is fitted, s. */
+/** Half the length of the window of a fit, s. */
 const HALF_S = 0.3;
 
-/** How much later than its command a plate has usually turned, s. */
+/** Usual delay of the plate angle after its command, s. */
 const SERVO_DELAY_S = 0.08;
 
-/** Where the time between two samples is not known, or none, s. */
-const USUAL_PERIOD_S = 0.01;
-const LEAST_PERIOD_S = 1e-4;
+/** Default and smallest sample period, s. */
+const DEFAULT_PERIOD_S = 0.01;
+const MIN_PERIOD_S = 1e-4;
 
 function mean(column: (number | null)[], from: number, to: number): number | null {
   const known = column.slice(Math.max(from, 0), to + 1).filter((value) => value !== null);
@@ -25,14 +25,14 @@ function mean(column: (number | null)[], from: number, to: number): number | nul
 }
 
 /**
- * +qy moves the ball toward +x, +qx toward −y. The ball's curvature over a short
- * window is compared with both commands over the same window, a servo's delay before.
+ * Correlates the curvature of the path over short windows with both commands over the same window,
+ * shifted by the delay of a servo. By convention, +qy moves the ball toward +x, +qx toward −y.
  */
 export function checkSigns(columns: Columns): SignCheck {
   const { t_s: t, cmd_qx_rad, cmd_qy_rad } = columns;
   const n = t.length;
-  const period = n > 1 ? ((t[n - 1] ?? 0) - (t[0] ?? 0)) / (n - 1) : USUAL_PERIOD_S;
-  const samples = (seconds: number) => Math.round(seconds / Math.max(period, LEAST_PERIOD_S));
+  const period = n > 1 ? ((t[n - 1] ?? 0) - (t[0] ?? 0)) / (n - 1) : DEFAULT_PERIOD_S;
+  const samples = (seconds: number) => Math.round(seconds / Math.max(period, MIN_PERIOD_S));
   const half = Math.max(samples(HALF_S), 3);
   const delay = samples(SERVO_DELAY_S);
   const acceleration = { x: [] as number[], y: [] as number[] };

@@ -1,11 +1,11 @@
 interface Props {
-  /** What the column is called. */
+  /** Title of the quantity. */
   word: string;
   sign: 1 | -1;
   choose: (sign: 1 | -1) => void;
 }
 
-/** Which way round a column is. */
+/** Selects the sign of a column. */
 export function SignChoice({ word, sign, choose }: Props) {
   return (
     <select

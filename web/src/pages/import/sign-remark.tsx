@@ -2,7 +2,7 @@ import type { Axis } from "../../api/types";
 import type { SignVerdict } from "../../live/correlation";
 import { number } from "../../words/numbers";
 
-/** Which way the ball must go. */
+/** Sign convention of each axis. */
 const RULE: Record<Axis, string> = {
   x: "+qy moves the ball toward +x",
   y: "+qx moves the ball toward −y",
@@ -11,13 +11,13 @@ const RULE: Record<Axis, string> = {
 interface Props {
   axis: Axis;
   verdict: SignVerdict;
-  /** Of the ball's acceleration along the axis with the axis' own command. */
+  /** Correlation of the ball's acceleration along the axis with the command of that axis. */
   correlation: number;
   flip: () => void;
   swap: () => void;
 }
 
-/** Whether the ball goes the right way along an axis, and a button that puts it right. */
+/** The result of the sign check of an axis, with a button that corrects it. */
 export function SignRemark({ axis, verdict, correlation, flip, swap }: Props) {
   const strength = number(correlation, 2);
   if (verdict === "agrees")
@@ -29,7 +29,7 @@ export function SignRemark({ axis, verdict, correlation, flip, swap }: Props) {
   if (verdict === "reversed")
     return (
       <li class="warn">
-        {axis}: the ball goes the other way ({RULE[axis]} is the rule; correlation {strength}).{" "}
+        {axis}: the ball goes the other way; {RULE[axis]} by convention (correlation {strength}).{" "}
         <button type="button" class="small" onClick={flip}>
           Flip {axis}
         </button>
@@ -46,7 +46,7 @@ export function SignRemark({ axis, verdict, correlation, flip, swap }: Props) {
     );
   return (
     <li>
-      {axis}: cannot tell the sign; the ball hardly moves with the command (correlation {strength}).
+      {axis}: the sign is unclear; the ball hardly follows the command (correlation {strength}).
     </li>
   );
 }

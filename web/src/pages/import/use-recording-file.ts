@@ -2,7 +2,7 @@ import { useEffect, useState } from "preact/hooks";
 import { guessMapping, type Mapping } from "./mapping";
 import { readTable, type Table } from "./table";
 
-/** Longest file that is read here, bytes: the service takes no longer one either, by default. */
+/** Largest file, bytes; also the default limit of the service. */
 const MAX_BYTES = 64 << 20;
 
 export interface RecordingFile {
@@ -11,12 +11,12 @@ export interface RecordingFile {
 }
 
 async function read(file: File): Promise<RecordingFile> {
-  if (file.size > MAX_BYTES) throw new Error("The file is longer than 64 MiB; split it.");
+  if (file.size > MAX_BYTES) throw new Error("The file is larger than 64 MiB. Split it.");
   const table = readTable(await file.text());
   return { table, mapping: guessMapping(table) };
 }
 
-/** A file as a table with a mapping that can be changed, or why it is none; nothing while it is read. */
+/** Reads a file as a table with an editable mapping, or returns the problem; neither while it is being read. */
 export function useRecordingFile(file: File) {
   const [recording, setRecording] = useState<RecordingFile>();
   const [problem, setProblem] = useState<string>();

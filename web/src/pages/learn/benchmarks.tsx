@@ -1,40 +1,40 @@
-/** Measured beforehand: what the twin's choice of model is made from. */
-const PICTURES = import.meta.glob<string>("../../../../docs/charts/*.png", {
+/** The benchmarks on which the choice of the twin's model is based. */
+const CHART_FILES = import.meta.glob<string>("../../../../docs/charts/*.png", {
   eager: true,
   query: "?url",
   import: "default",
 });
 
 const addressOf = (name: string) =>
-  Object.entries(PICTURES).find(([path]) => path.endsWith(`/${name}.png`))?.[1];
+  Object.entries(CHART_FILES).find(([path]) => path.endsWith(`/${name}.png`))?.[1];
 
 const CHARTS = [
   {
     name: "work-precision",
     title: "Speed against accuracy, beside other libraries",
     text:
-      "CPU time for a simulated second against the error of the ball's position, on six scenes. " +
-      "Down and left is better.",
+      "CPU time per simulated second against the error of the ball's position, in six scenes. " +
+      "Lower left is better.",
   },
   {
     name: "work-precision-models",
     title: "Speed against accuracy, model by model",
-    text: "The ladder from small angles over rolling, creeping and sliding to spring and damper.",
+    text: "The models from small angles to rolling, creep, sliding, and contact with spring and damper.",
   },
   {
     name: "fidelity",
-    title: "Which model where",
-    text: "The cheapest model that keeps within the wanted accuracy, by scene.",
+    title: "Choice of the model",
+    text: "The cheapest model with the required accuracy in each scene.",
   },
   {
     name: "stability",
-    title: "Where methods break",
-    text: "Step against stiffness: where each method stays stable.",
+    title: "Stability of the methods",
+    text: "Step size against stiffness: the region in which each method is stable.",
   },
   {
     name: "estimators",
-    title: "How to differentiate noise",
-    text: "Error against delay of the filters that could measure acceleration.",
+    title: "Differentiating noisy positions",
+    text: "Error against delay of filters that estimate the acceleration.",
   },
 ];
 
@@ -47,13 +47,11 @@ export function Benchmarks() {
     <section class="card" id="charts">
       <h2>Speed against accuracy</h2>
       <p>
-        The twin runs the cheapest model that is good enough. What that choice is made from was measured;{" "}
-        <code>offbd chart work-precision</code> measures it on your machine.
+        The twin runs the cheapest model that is accurate enough. The choice is based on these benchmarks;{" "}
+        <code>offbd chart work-precision</code> repeats them on your machine.
       </p>
       {charts.length === 0 && (
-        <p class="note">
-          This program was built without the pictures; they are in docs/charts of the repository.
-        </p>
+        <p class="note">This build does not include the charts; they are in docs/charts of the repository.</p>
       )}
       <div class="gallery">
         {charts.map(({ title, text, address }) => (

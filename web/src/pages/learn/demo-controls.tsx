@@ -8,10 +8,10 @@ import { rigPath } from "../../router/paths";
 import { DemoFaultButtons } from "./demo-fault-buttons";
 import { DemoStatus } from "./demo-status";
 
-/** Visitors of one demo see each other's buttons, ms. */
+/** Polling interval, ms: other visitors of the demo may change its state too. */
 const INTERVAL_MS = 700;
 
-/** What breaks and repairs the simulated rig of the demo. */
+/** The controls that inject and repair faults of the demo's simulated rig. */
 export function DemoControls() {
   const { data: demo, error, refetch } = useQuery(api.demo, "demo", INTERVAL_MS);
   if (!demo) return error ? <ErrorMessage error={error} /> : <Loading what="the demo" />;
@@ -27,14 +27,14 @@ export function DemoControls() {
           </Link>
           <ActionButton action={thenRefetch(api.repairDemo)}>Repair all</ActionButton>
           <ActionButton action={thenRefetch(api.resumeDemoScript)} disabled={script}>
-            Back to the script
+            Resume the script
           </ActionButton>
         </div>
       </div>
-      <DemoFaultButtons demo={demo} breakRig={(fault) => thenRefetch(() => api.breakDemo(fault))()} />
+      <DemoFaultButtons demo={demo} inject={(fault) => thenRefetch(() => api.injectDemoFault(fault))()} />
       <p class="quiet small-text">
-        A fault shows as soon as the rig is asked to do what it no longer can: mostly within one to three
-        seconds. It stays on record when the rig is repaired; clear it on its page.
+        A fault is detected when a command depends on the broken part, mostly within one to three seconds. It
+        stays on record after the repair; clear it on its page.
       </p>
     </section>
   );

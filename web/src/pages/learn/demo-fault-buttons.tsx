@@ -1,29 +1,29 @@
 import type { Demo } from "../../api/types";
 import { ActionButton } from "../../parts/action-button";
-import { codeTitle, kindMeaning } from "../../words/fault-names";
-import { faultsByCode } from "./demo-faults";
+import { codeTitle } from "../../words/fault-names";
+import { effectMeaning, faultsByCode } from "./demo-faults";
 
 interface Props {
   demo: Demo;
-  breakRig: (fault: string) => Promise<unknown>;
+  inject: (fault: string) => Promise<unknown>;
 }
 
-/** A button for each fault that the simulated rig can have. */
-export function DemoFaultButtons({ demo: { buttons, broken }, breakRig }: Props) {
+/** A button for each fault that can be injected. */
+export function DemoFaultButtons({ demo: { buttons, broken }, inject }: Props) {
   return (
     <div class="breakers">
       {[...faultsByCode(buttons)].map(([code, faults]) => (
         <fieldset>
           <legend>{codeTitle(code)}</legend>
-          {faults.map(({ id, kind }) => (
+          {faults.map(({ id, effect }) => (
             <ActionButton
               class={broken.includes(id) ? "danger" : ""}
-              action={() => breakRig(id)}
-              label={`Break: ${codeTitle(code)}, ${kind}`}
+              action={() => inject(id)}
+              label={`Inject: ${codeTitle(code)}, ${effect}`}
             >
-              <b>{kind}</b>
+              <b>{effect}</b>
               <br />
-              <span class="quiet small-text">{kindMeaning(kind)}</span>
+              <span class="quiet small-text">{effectMeaning(effect)}</span>
             </ActionButton>
           ))}
         </fieldset>

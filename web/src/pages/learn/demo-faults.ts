@@ -1,24 +1,45 @@
-/** The faults that the demo can have: `code:kind`, as the service names them. */
+/** The faults that the demo injects: `code:effect`, as on the command line of `offbd simulate`. */
 
 export interface DemoFault {
-  /** What the service calls it. */
+  /** The identifier in the requests to the service. */
   id: string;
   code: string;
-  kind: string;
+  /** The simulated effect. It is not the `FaultKind` of the diagnosis: `hold` is diagnosed as `held`. */
+  effect: string;
 }
 
-const parse = (id: string): DemoFault => {
-  const [code = "", kind = ""] = id.split(":");
-  return { id, code, kind };
+const EFFECT: Partial<Record<string, string>> = {
+  dead: "no power: the plate returns to zero",
+  hold: "holds its angle whatever the command",
+  gain: "moves too little or too much",
+  reversed: "moves in the wrong direction",
+  offset: "constant angle error, as with a slipped horn",
+  slow: "follows the command far too slowly",
+  intermittent: "fails intermittently, as with a loose contact",
+  glued: "fixed to the plate",
+  sticky: "moves only at a large tilt",
+  freeze: "repeats its last reading",
+  dropout: "gives no readings",
+  noise: "much noisier readings",
+  spikes: "single readings that are far off",
+  jump: "readings shifted by a constant offset",
 };
 
-/** The faults by their code, in the order in which the service names them. */
+/** Describes an injected effect; an unknown one is returned as it is. */
+export const effectMeaning = (effect: string) => EFFECT[effect] ?? effect;
+
+const parse = (id: string): DemoFault => {
+  const [code = "", effect = ""] = id.split(":");
+  return { id, code, effect };
+};
+
+/** Groups the faults by code, in the order of the service. */
 export function faultsByCode(ids: string[]): Map<string, DemoFault[]> {
   const groups = new Map<string, DemoFault[]>();
   for (const fault of ids.map(parse)) groups.set(fault.code, [...(groups.get(fault.code) ?? []), fault]);
   return groups;
 }
 
-/** Faults in words: x servo, dead; sensor, noise. */
+/** Returns the faults as text: x servo, dead; sensor, noise. */
 export const faultList = (ids: string[]) =>
   ids.map((id) => id.replace(":", ", ").replace("_", " ")).join("; ");

@@ -1,21 +1,21 @@
 import type { Demo } from "../../api/types";
 import { faultList } from "./demo-faults";
 
-/** What is broken now, and by whose hands. */
+/** The injected faults, and whether the script or a visitor controls them. */
 export function DemoStatus({ demo: { broken, script } }: { demo: Demo }) {
   return (
     <p class="grow" role="status">
       {broken.length ? (
         <>
-          Broken now: <b>{faultList(broken)}</b>.
+          Injected faults: <b>{faultList(broken)}</b>.
         </>
       ) : (
-        "The simulated rig is whole."
+        "The simulated rig is healthy."
       )}{" "}
       <span class="quiet">
         {script
-          ? "A script breaks and repairs it by itself until you press a button."
-          : "It is in your hands."}
+          ? "A script injects and repairs faults until you press a button."
+          : "The script is paused: you control the faults."}
       </span>
     </p>
   );

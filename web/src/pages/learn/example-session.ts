@@ -5,7 +5,7 @@ const DEMO_RIG = "demo-rig";
 
 const isFaultless = ({ verdict }: Session) => verdict?.faults.length === 0;
 
-/** What is looked for, the best first, when nobody has chosen a session. */
+/** Criteria for the default session, in the order of preference. */
 const PREFERENCES: ((session: Session) => boolean)[] = [
   (session) => isFaultless(session) && session.asset === DEMO_RIG,
   isFaultless,
@@ -13,7 +13,7 @@ const PREFERENCES: ((session: Session) => boolean)[] = [
   () => true,
 ];
 
-/** The session with `id`, else the one that shows best that a healthy rig breaks the textbook's limit. */
+/** Returns the session with `id`, otherwise the best example of a healthy rig beyond the textbook's limit. */
 export function exampleSession(sessions: Session[], id: string): Session | undefined {
   const wanted = [(session: Session) => session.id === id, ...PREFERENCES];
   for (const isWanted of wanted) {

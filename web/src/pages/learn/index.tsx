@@ -1,4 +1,4 @@
-/** The demo's buttons, and what there is to learn: why a textbook's limit fails, what speed costs. */
+/** The controls of the demo, the comparison with the textbook's limit, and the benchmarks. */
 import { useTitle } from "../../hooks/use-title";
 import { Benchmarks } from "./benchmarks";
 import { DemoControls } from "./demo-controls";
@@ -8,12 +8,12 @@ export function LearnPage({ isDemo }: { isDemo: boolean }) {
   useTitle(isDemo ? "Demo" : "Learn");
   return (
     <main>
-      <h1>{isDemo ? "Break it" : "Learn"}</h1>
+      <h1>{isDemo ? "Inject faults" : "Learn"}</h1>
       {isDemo ? (
         <DemoControls />
       ) : (
         <p class="note">
-          In <code>offbd demo</code> this page breaks a simulated rig at the press of a button.
+          With <code>offbd demo</code>, this page injects faults into a simulated rig.
         </p>
       )}
       <Textbook />

@@ -1,6 +1,6 @@
 import { useEffect, useMemo } from "preact/hooks";
 import { api } from "../../api/client";
-import type { Session } from "../../api/types";
+import type { Profile, Session } from "../../api/types";
 import { useQuery } from "../../hooks/use-query";
 import { TraceBuffer } from "../../live/buffer";
 import { ChartGroup } from "../../parts/charts/chart-group";
@@ -9,11 +9,11 @@ import { ErrorMessage } from "../../parts/error-message";
 import { duration } from "../../words/time";
 import { JudgedFacts } from "./judged-facts";
 
-/** Seconds of a session that the comparison shows. */
+/** Duration of the shown part of a session, s. */
 const SHOWN_S = 20;
 
-/** A session as it is judged by one profile. */
-export function JudgedByProfile({ session, profile }: { session: Session; profile: string }) {
+/** A session judged with one profile. */
+export function JudgedByProfile({ session, profile }: { session: Session; profile: Profile }) {
   const from = session.first_t_s ?? 0;
   const fetchTrace = () => api.trace(session.id, { from_s: from, to_s: from + SHOWN_S, profile });
   const { data: trace, error, refetch } = useQuery(fetchTrace, `${session.id} ${profile}`);

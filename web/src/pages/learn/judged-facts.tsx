@@ -1,5 +1,5 @@
 import { useMemo } from "preact/hooks";
-import type { Session, Trace } from "../../api/types";
+import type { Profile, Session, Trace } from "../../api/types";
 import { useReplay } from "../../hooks/use-replay";
 import { ActionButton } from "../../parts/action-button";
 import { Facts } from "../../parts/facts";
@@ -11,29 +11,29 @@ const percent = (share?: number | null) => number(share == null ? share : 100 * 
 
 interface Props {
   session: Session;
-  profile: string;
+  profile: Profile;
   trace?: Trace;
 }
 
-/** What a profile makes of the seconds that are shown and, if asked to, of the whole session. */
+/** The result of a profile for the shown part and, on request, for the whole session. */
 export function JudgedFacts({ session, profile, trace }: Props) {
   const shares = useMemo(() => trace && sharesAlongX(trace), [trace]);
   const { replay, judge } = useReplay(session.id);
   const result = replay?.result;
   const isGateClosed = shares && !shares.judged;
-  const judgeAll = <ActionButton action={() => judge({ profile })}>Judge it all</ActionButton>;
+  const judgeAll = <ActionButton action={() => judge({ profile })}>Judge the whole session</ActionButton>;
   const whole = result ? verdict(result.summary).text : replay ? "judging…" : judgeAll;
   return (
     <Facts
       facts={[
         ["Beyond the limit", percent(shares?.beyond)],
-        ["Judged: the gate is open", percent(shares?.judged)],
+        ["Judged (gate open)", percent(shares?.judged)],
         [
-          "Beyond the limit, of what is judged",
-          isGateClosed ? "nothing: the gate never opened" : percent(shares?.beyondOfJudged),
+          "Beyond the limit, of the judged part",
+          isGateClosed ? "none: the gate was never open" : percent(shares?.beyondOfJudged),
         ],
         ["Whole session", whole],
-        ["Changes of status", result ? count(result.faults.length) : NONE],
+        ["Status changes", result ? count(result.faults.length) : NONE],
       ]}
     />
   );

@@ -1,17 +1,17 @@
 import type { Trace } from "../../api/types";
 
 export interface Shares {
-  /** Of all moments, those beyond the limit. */
+  /** Fraction of all moments beyond the limit. */
   beyond: number | null;
-  /** Of all moments, those that are judged. */
+  /** Fraction of all moments that are judged. */
   judged: number | null;
-  /** Of the judged moments, those beyond the limit. */
+  /** Fraction of the judged moments beyond the limit. */
   beyondOfJudged: number | null;
 }
 
 const share = (part: number[], whole: number[]) => (whole.length ? part.length / whole.length : null);
 
-/** How often the ball's acceleration along x is beyond the limit. */
+/** Computes how often the residual along x is beyond its limit. */
 export function sharesAlongX({ x }: Trace): Shares {
   const { measured_m_s2: measured, twin_m_s2: twin, limit_m_s2: limit, enabled } = x;
   const known = measured.flatMap((value, i) => (value != null && twin[i] != null ? [i] : []));

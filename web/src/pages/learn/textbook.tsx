@@ -1,5 +1,6 @@
 import { useState } from "preact/hooks";
 import { api } from "../../api/client";
+import type { Profile } from "../../api/types";
 import { useQuery } from "../../hooks/use-query";
 import { ErrorMessage } from "../../parts/error-message";
 import { exampleSession } from "./example-session";
@@ -8,15 +9,17 @@ import { TextbookText } from "./textbook-text";
 
 const INTERVAL_MS = 10_000;
 
-/** A shorter session shows nothing. */
-const LEAST_SAMPLES = 500;
+/** Smallest number of samples of an example. */
+const MIN_SAMPLES = 500;
+
+const PROFILES: Profile[] = ["default", "textbook"];
 
 const fetchSessions = async () => {
   const { items } = await api.sessions({ limit: 50 });
-  return items.filter((session) => session.samples > LEAST_SAMPLES);
+  return items.filter((session) => session.samples > MIN_SAMPLES);
 };
 
-/** One session without a fault, judged by both profiles. */
+/** One session without a fault, judged with both profiles. */
 export function Textbook() {
   const { data: sessions, error } = useQuery(fetchSessions, "sessions", INTERVAL_MS);
   const [id, setId] = useState("");
@@ -28,7 +31,7 @@ export function Textbook() {
       <ErrorMessage error={error} />
       {sessions?.length === 0 && (
         <p class="note">
-          There is no session to show it on yet. Run <code>offbd demo</code>, or import a recording.
+          There is no session to compare yet. Run <code>offbd demo</code>, or import a recording.
         </p>
       )}
       {chosen && (
@@ -44,7 +47,7 @@ export function Textbook() {
             </select>
           </label>
           <div class="pair">
-            {["default", "textbook"].map((profile) => (
+            {PROFILES.map((profile) => (
               <JudgedByProfile key={chosen.id + profile} session={chosen} profile={profile} />
             ))}
           </div>

@@ -14,12 +14,12 @@ export function DeleteDialog({ session, close }: { session: Session; close: () =
   return (
     <Dialog title="Delete this session?" close={close}>
       <p>
-        The recording of {count(session.samples)} samples and its verdict are gone for good. The rig's fault
-        memory keeps what the session left in it.
+        This permanently deletes the recording of {count(session.samples)} samples and its verdict. The fault
+        memory of the rig is not changed.
       </p>
       <div class="form-end">
         <button type="button" onClick={close}>
-          Keep it
+          Cancel
         </button>
         <ActionButton class="danger" action={deleteSession}>
           Delete

@@ -2,17 +2,17 @@ import type { FaultLine, Replay } from "../../api/types";
 import { faultTitle } from "../../words/fault-names";
 import { NONE, seconds } from "../../words/numbers";
 
-/** Rows that are shown. */
+/** Number of displayed rows. */
 const SHOWN = 200;
 
-/** Where two verdicts of a session differ. */
+/** The differences between two verdicts of a session. */
 export function Differences({ differences }: Pick<NonNullable<Replay["result"]>, "differences">) {
   return (
     <div class="scroll differences" tabIndex={0} role="region" aria-label="Differences">
       <table class="list">
         <thead>
           <tr>
-            <th class="n">At</th>
+            <th class="n">Time</th>
             <th>Recorded</th>
             <th>Judged again</th>
           </tr>

@@ -14,20 +14,20 @@ interface Props {
   seek: (t: number) => void;
 }
 
-/** What the session is, and what was found in it. */
+/** The data of the session and its verdict. */
 export function FoundCard({ session, faults, seek }: Props) {
   const { verdict: summary, rejected } = session;
   const result = summary && verdict(summary);
   const hash = summary && <Hash hash={summary.verdict_hash} title={summary.verdict_hash} />;
   return (
     <section class="card">
-      <h2>What was found</h2>
+      <h2>Verdict</h2>
       <Facts
         facts={[
           ["State", session.state === "open" ? "open" : `ended ${dateTime(session.ended_at)}`],
           ["Samples", `${count(session.samples)}${rejected ? `, ${count(rejected)} rejected` : ""}`],
           ["Length", duration(sessionLength(session))],
-          ["Hash", hash ?? "once it has ended"],
+          ["Hash", hash ?? "when the session has ended"],
         ]}
       />
       {result && <p class={result.look}>{result.text}</p>}

@@ -5,22 +5,22 @@ import { sentence } from "../../words/sentence";
 import { isFailing } from "../../words/status-byte";
 import { ambiguousCauses } from "../../words/verdict";
 
-/** So much before the fault begins is where the button leads, s. */
+/** Time before the onset to which the button leads, s. */
 const LEAD_S = 0.5;
 
-/** How the fault stands; where its test no longer fails, that it passes. */
-function standing(line: FaultLine): { text: string; look: string } {
+/** The status of the fault, or the note that its test passes again. */
+function status(line: FaultLine): { text: string; look: string } {
   const hasPassed = !isFailing(line);
   const isOver = line.status === "cleared" || line.status === "healed";
   return {
-    text: hasPassed && !isOver ? "passes again" : line.status,
+    text: hasPassed && !isOver ? "test passes again" : line.status,
     look: hasPassed ? "quiet" : `status-${line.status}`,
   };
 }
 
-/** A fault of the session, with a button that leads to its moment. */
+/** A fault of the session, with a button that leads to its onset. */
 export function FoundFault({ line, seek }: { line: FaultLine; seek: (t: number) => void }) {
-  const { text, look } = standing(line);
+  const { text, look } = status(line);
   return (
     <li>
       <button

@@ -1,6 +1,6 @@
 import { NONE } from "../../words/numbers";
 
-/** Letters that are shown: enough to tell two apart. */
+/** Number of displayed characters, enough to distinguish two hashes. */
 const SHOWN = 12;
 
 /** The beginning of a verdict's hash. */

@@ -1,4 +1,4 @@
-/** One session: played back in pictures and charts, judged again with other settings. */
+/** The page of one session: playback, verdict, and judging again with other settings. */
 import { api } from "../../api/client";
 import type { Asset } from "../../api/types";
 import { useQuery } from "../../hooks/use-query";
@@ -6,7 +6,7 @@ import { useTitle } from "../../hooks/use-title";
 import { UnloadedPage } from "../../parts/unloaded-page";
 import { SessionDetails } from "./session-details";
 
-/** An answer that never comes: nothing is fetched before it is known of which rig. */
+/** A promise that never resolves, while the rig of the session is not known yet. */
 const never = () => new Promise<Asset>(() => {});
 
 export function SessionPage({ id }: { id: string }) {

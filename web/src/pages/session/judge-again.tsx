@@ -10,11 +10,11 @@ export function JudgeAgain({ session }: { session: Session }) {
   return (
     <section class="card">
       <h2>Judge it again</h2>
-      <p class="quiet">With other settings, on the same samples. Nothing of the session changes.</p>
+      <p class="quiet">Judges the same samples with other settings. The session itself is not changed.</p>
       <ReplayFields judge={(form) => judge(replaySettings(form))} />
       {replay && !isFinished(replay) && (
         <p role="status">
-          Judging… <progress value={replay.progress} max={1} aria-label="Share judged" />
+          Judging… <progress value={replay.progress} max={1} aria-label="Progress" />
         </p>
       )}
       {replay?.error && (

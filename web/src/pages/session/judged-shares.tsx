@@ -2,12 +2,12 @@ import type { JudgedMonitor } from "../../api/types";
 import { codeTitle } from "../../words/fault-names";
 import { judgedShare } from "../../words/verdict";
 
-/** How much of the session each monitor could judge, and what it came to. */
+/** The part of the session that each monitor judged, and its outcome. */
 export function JudgedShares({ monitors }: { monitors: JudgedMonitor[] }) {
   if (monitors.length === 0) return null;
   return (
     <table class="list judged">
-      <caption class="quiet small-text">Judged, of the session</caption>
+      <caption class="quiet small-text">Judged part of the session</caption>
       <thead>
         <tr>
           <th scope="col">Monitor</th>

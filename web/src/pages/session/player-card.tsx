@@ -2,23 +2,23 @@ import type { TraceBuffer } from "../../live/buffer";
 import { ALL_CHARTS } from "../../parts/charts/chart-kinds";
 import { RigCharts } from "../../parts/charts/rig-charts";
 import { NumberChoice } from "./number-choice";
-import { ProfileChoice } from "./profile-choice";
+import { ProfileChoice, type ProfileOrRecorded } from "./profile-choice";
 import type { Playback } from "./use-playback";
 import type { PlaybackCharts } from "./use-playback-charts";
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10];
-/** Seconds that the charts can show; 0 for all. */
+/** Selectable time spans of the charts, s; 0 for the whole recording. */
 const SPANS = [10, 30, 60, 0];
 
 interface Props {
   buffer: TraceBuffer;
   playback: Playback;
   charts: PlaybackCharts;
-  profile: string;
-  setProfile: (profile: string) => void;
+  profile: ProfileOrRecorded;
+  setProfile: (profile: ProfileOrRecorded) => void;
 }
 
-/** The charts, and what plays them. */
+/** The charts and the controls of the playback. */
 export function PlayerCard({ buffer, playback, charts, profile, setProfile }: Props) {
   const { isPlaying, toggle, seek, speed, setSpeed } = playback;
   const { group, span, setSpan, slider, clock } = charts;
@@ -45,7 +45,9 @@ export function PlayerCard({ buffer, playback, charts, profile, setProfile }: Pr
         <ProfileChoice label="Judged by" class="inline" chosen={profile} choose={setProfile} />
       </div>
       <RigCharts group={group} kinds={ALL_CHARTS} height={136} onSeek={seek} />
-      <p class="quiet small-text">Click a chart to go there; space plays, arrow keys step by a second.</p>
+      <p class="quiet small-text">
+        Click a chart to go to that time. Space plays or pauses, the arrow keys step by one second.
+      </p>
     </section>
   );
 }

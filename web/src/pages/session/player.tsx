@@ -5,24 +5,25 @@ import { RigView } from "../../parts/rig-view/rig-view";
 import { XyTrace } from "../../parts/xy-trace/xy-trace";
 import { FoundCard } from "./found-card";
 import { PlayerCard } from "./player-card";
+import type { ProfileOrRecorded } from "./profile-choice";
 import { useHotkeys } from "./use-hotkeys";
 import { usePlayback } from "./use-playback";
 import { usePlaybackCharts } from "./use-playback-charts";
 
-/** Seconds that a tail in the plan view is long. */
+/** Duration of the path in the plan view, s. */
 const TAIL_S = 4;
 
 interface Props {
   session: Session;
   asset: Asset;
   faults: FaultLine[];
-  /** Nothing while it is fetched; the player keeps its moment meanwhile. */
+  /** Undefined while it is fetched; the player keeps its current time. */
   buffer?: TraceBuffer;
-  profile: string;
-  setProfile: (profile: string) => void;
+  profile: ProfileOrRecorded;
+  setProfile: (profile: ProfileOrRecorded) => void;
 }
 
-/** A recording in pictures and charts of the same moment. */
+/** The playback of a recording: drawings and charts of the same moment. */
 export function Player({ session, asset, faults, buffer, profile, setProfile }: Props) {
   const playback = usePlayback(buffer);
   const charts = usePlaybackCharts(buffer, faults, playback);

@@ -3,7 +3,7 @@ import { ActionButton } from "../../parts/action-button";
 import { ProfileChoice } from "./profile-choice";
 import type { ReplayForm } from "./replay-settings";
 
-/** The settings by which a session is judged again. */
+/** The form for the settings with which a session is judged again. */
 export function ReplayFields({ judge }: { judge: (form: ReplayForm) => Promise<void> }) {
   const [form, setForm] = useState<ReplayForm>({ profile: "textbook", debounce: "", isUnlearnt: false });
   const set = (part: Partial<ReplayForm>) => setForm((before) => ({ ...before, ...part }));
@@ -28,7 +28,7 @@ export function ReplayFields({ judge }: { judge: (form: ReplayForm) => Promise<v
           checked={form.isUnlearnt}
           onChange={(e) => set({ isUnlearnt: e.currentTarget.checked })}
         />{" "}
-        without what was learnt
+        without the calibration
       </label>
       <ActionButton class="primary" action={() => judge(form)}>
         Judge again

@@ -1,11 +1,12 @@
 import type { ReplaySettings } from "../../api/types";
+import type { ProfileOrRecorded } from "./profile-choice";
 
-/** What the form of a replay asks for; what is empty stays as it was recorded. */
+/** The form of a replay; empty fields keep the settings of the recording. */
 export interface ReplayForm {
-  profile: string;
-  /** s, as typed. */
+  profile: ProfileOrRecorded;
+  /** Debounce time as typed, s. */
   debounce: string;
-  /** Without what was learnt. */
+  /** Whether to judge without the calibration. */
   isUnlearnt: boolean;
 }
 

@@ -7,10 +7,10 @@ import { Hash } from "./hash";
 
 type Result = NonNullable<Replay["result"]>;
 
-/** What the session came to when it was recorded, and when it was judged again. */
+/** The recorded verdict and that of the replay. */
 export function ReplayVerdict({ session, result }: { session: Session; result: Result }) {
   const { same, differences, recorded_hash, summary } = result;
-  const recorded = session.verdict ? verdict(session.verdict).text : "once it has ended";
+  const recorded = session.verdict ? verdict(session.verdict).text : "when the session has ended";
   return (
     <div class="verdicts">
       <p role="status" class={same ? "status-ok" : "status-pending"}>

@@ -7,9 +7,10 @@ import { ErrorMessage } from "../../parts/error-message";
 import { Loading } from "../../parts/loading";
 import { JudgeAgain } from "./judge-again";
 import { Player } from "./player";
+import type { ProfileOrRecorded } from "./profile-choice";
 import { SessionHeader } from "./session-header";
 
-/** Moments of a whole session that are drawn; a longer one is thinned out. */
+/** Largest number of drawn moments; longer sessions are thinned out. */
 const POINTS = 12_000;
 
 interface Props {
@@ -20,8 +21,8 @@ interface Props {
 }
 
 export function SessionDetails({ session, asset, faults, refetch }: Props) {
-  /** By which the session is judged for the charts; empty where as it was recorded. */
-  const [profile, setProfile] = useState("");
+  /** The profile with which the session is judged for the charts. */
+  const [profile, setProfile] = useState<ProfileOrRecorded>("");
   const fetchTrace = () => api.trace(session.id, { points: POINTS, profile: profile || undefined });
   const trace = useQuery(fetchTrace, `${session.id} ${profile}`);
   const { data } = trace;

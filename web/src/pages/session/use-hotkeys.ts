@@ -2,11 +2,11 @@ import { useEffect } from "preact/hooks";
 import { useLatest } from "../../hooks/use-latest";
 import type { Playback } from "./use-playback";
 
-/** Seconds by which an arrow key moves. */
+/** Step of each arrow key, s. */
 const STEPS: Record<string, number> = { ArrowLeft: -1, ArrowRight: 1 };
 
-/** What has the focus may have a use of its own for these keys. */
-const OTHER_USES = "input, select, button, canvas, a";
+/** Focused elements that handle these keys themselves. */
+const HANDLES_KEYS = "input, select, button, canvas, a";
 
 /** Space plays, arrow keys step by a second. */
 export function useHotkeys(playback: Playback): void {
@@ -15,7 +15,7 @@ export function useHotkeys(playback: Playback): void {
     const pressed = (event: KeyboardEvent) => {
       const { toggle, seek, t } = latest.current;
       const step = STEPS[event.key];
-      if ((event.target as HTMLElement).closest(OTHER_USES)) return;
+      if ((event.target as HTMLElement).closest(HANDLES_KEYS)) return;
       if (event.key !== " " && !step) return;
       event.preventDefault();
       if (step) seek(t.current + step);

@@ -8,13 +8,13 @@ import { seconds } from "../../words/numbers";
 import type { Playback } from "./use-playback";
 import { visibleRange } from "./visible-range";
 
-/** Charts are drawn in every second frame: they move by less than a pixel in one. */
+/** Charts are drawn in every second frame: they move by less than a pixel per frame. */
 const CHART_EVERY = 2;
 
-/** The charts, the slider and the clock of a recording, drawn as it is played without rendering anew. */
+/** The charts, the slider and the clock of the playback, updated without rendering components. */
 export function usePlaybackCharts(buffer: TraceBuffer | undefined, faults: FaultLine[], { t }: Playback) {
   const group = useMemo(() => new ChartGroup(), []);
-  /** Seconds that are shown; 0 for all. */
+  /** Time span of the charts, s; 0 for the whole recording. */
   const [span, setSpan] = useState<number>(30);
   const slider = useRef<HTMLInputElement>(null);
   const clock = useRef<HTMLOutputElement>(null);
@@ -22,7 +22,7 @@ export function usePlaybackCharts(buffer: TraceBuffer | undefined, faults: Fault
   const frame = useRef(0);
   useEffect(() => group.setMarks(faults.map(faultMark)), [group, faults]);
   useEffect(() => {
-    // Another buffer is drawn though the moment is the same.
+    // A new buffer is drawn even if the time is the same.
     drawn.current = "";
   }, [buffer]);
   useAnimationFrame(() => {

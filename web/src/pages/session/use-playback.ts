@@ -3,20 +3,20 @@ import { useAnimationFrame } from "../../hooks/use-animation-frame";
 import type { TraceBuffer } from "../../live/buffer";
 import { useLocation } from "../../router/navigation";
 
-/** A tab that was hidden does not catch up: longest step of one frame, s. */
+/** Longest step of one frame, s: a tab that was hidden does not catch up. */
 const LONGEST_STEP_S = 0.1;
 
-/** The moment of the address, if it has one. */
+/** The start time in the address, if there is one, s. */
 function useStart(): number | undefined {
   const text = useLocation().query.get("t");
   const start = Number(text ?? NaN);
   return Number.isFinite(start) ? start : undefined;
 }
 
-/** The moment of a recording that is shown: played, held, or moved to. It stays when the buffer changes. */
+/** The playback of a recording. The current time stays when the buffer changes. */
 export function usePlayback(buffer: TraceBuffer | undefined) {
   const start = useStart();
-  /** s on the device's clock; a ref, for it changes with every frame. */
+  /** Current time, s on the device's clock; a ref, as it changes with every frame. */
   const t = useRef(NaN);
   const [isPlaying, setPlaying] = useState(false);
   const [speed, setSpeed] = useState<number>(1);

@@ -1,12 +1,12 @@
-/** Of the time shown, so much lies before the moment that is played. */
+/** Fraction of the visible range before the current time. */
 const SHARE_BEFORE = 0.6;
 
-/** A recording is shown over at least this, s, however short it is. */
-const LEAST_S = 1;
+/** Smallest visible range, s. */
+const MIN_S = 1;
 
-/** The seconds that the charts show about the moment `t`: `span` of them, or all if it is 0. */
+/** Returns the range of the charts around the time `t`, `span` seconds long, or everything if `span` is 0. */
 export function visibleRange(t: number, span: number, first: number, last: number): [number, number] {
   if (span === 0) return [first, last];
   const from = Math.max(first, t - span * SHARE_BEFORE);
-  return [from, Math.min(from + span, Math.max(last, from + LEAST_S))];
+  return [from, Math.min(from + span, Math.max(last, from + MIN_S))];
 }

@@ -1,13 +1,13 @@
 import { useRef } from "preact/hooks";
 import { useFileDrop } from "./use-file-drop";
 
-/** Where a recording is dropped, or chosen, to be imported. */
+/** The area for dropping or choosing a recording to import. */
 export function DropZone({ take }: { take: (file: File) => void }) {
   const isOver = useFileDrop(take);
   const input = useRef<HTMLInputElement>(null);
   const chosen = ({ currentTarget }: { currentTarget: HTMLInputElement }) => {
     const file = currentTarget.files?.[0];
-    // Emptied, so that the same file can be chosen once more.
+    // Reset, so that the same file can be chosen again.
     currentTarget.value = "";
     if (file) take(file);
   };
@@ -22,7 +22,7 @@ export function DropZone({ take }: { take: (file: File) => void }) {
         tabIndex={-1}
         onChange={chosen}
       />
-      <span>{isOver ? "Let go to import" : "Drop a recording (CSV) here, or"}</span>{" "}
+      <span>{isOver ? "Release to import" : "Drop a recording (CSV) here, or"}</span>{" "}
       {!isOver && (
         <button type="button" onClick={() => input.current?.click()}>
           choose a file

@@ -1,4 +1,4 @@
-/** Recordings: the list, and the place where others are imported. */
+/** The page of all sessions, with the import of recordings. */
 import { useState } from "preact/hooks";
 import { api } from "../../api/client";
 import { useQuery } from "../../hooks/use-query";
@@ -14,7 +14,7 @@ import { RigChoice } from "./rig-choice";
 import { SessionTable } from "./session-table";
 import { useSessions } from "./use-sessions";
 
-/** Not loaded before a file is there: it brings the reader of CSV. */
+/** Loaded when a file is chosen, as it contains the CSV parser. */
 const ImportDialog = lazy(() => import("../import").then((module) => module.ImportDialog));
 
 const fetchNames = () => api.fleet().then((fleet) => fleet.map((entry) => entry.asset));

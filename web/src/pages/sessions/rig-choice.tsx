@@ -1,7 +1,7 @@
 import { navigate } from "../../router/navigation";
 import { sessionsPath } from "../../router/paths";
 
-/** Whose sessions are shown. */
+/** Selects the rig whose sessions are listed. */
 export function RigChoice({ names, chosen }: { names: string[]; chosen: string }) {
   return (
     <label class="inline">

@@ -9,7 +9,7 @@ export function SessionTable({ sessions }: { sessions: Session[] }) {
           <tr>
             <th>Session</th>
             <th>Rig</th>
-            <th>Began</th>
+            <th>Started</th>
             <th class="n">Length</th>
             <th class="n">Samples</th>
             <th>Verdict</th>

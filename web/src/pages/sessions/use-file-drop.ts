@@ -3,11 +3,11 @@ import { useLatest } from "../../hooks/use-latest";
 
 const hasFiles = (event: DragEvent) => event.dataTransfer?.types.includes("Files") ?? false;
 
-/** Hands over a file that is dropped anywhere on the page; whether one is held above it. */
+/** Passes files that are dropped anywhere on the page to `take`; returns whether one is being dragged over it. */
 export function useFileDrop(take: (file: File) => void): boolean {
   const [isOver, setOver] = useState(false);
   const latestTake = useLatest(take);
-  // Listening from the moment the words are there: an effect after the paint loses a file dropped at once.
+  // A layout effect, as an effect after the paint would miss a file that is dropped immediately.
   useLayoutEffect(() => {
     const dragOver = (event: DragEvent) => {
       if (!hasFiles(event)) return;

@@ -3,24 +3,24 @@ import { api } from "../../api/client";
 import type { Session } from "../../api/types";
 import { useQuery } from "../../hooks/use-query";
 
-/** Sessions that are fetched at once. */
+/** Number of sessions per page. */
 const PAGE = 100;
 const INTERVAL_MS = 5000;
 
-/** Sessions beyond the first page, of one rig or of all. */
-interface Rest {
+/** Sessions after the first page, of one rig or of all. */
+interface FurtherPages {
   asset: string;
   items: Session[];
   next?: string | null;
 }
 
-/** The sessions of a rig, or of all: the first page as it is now, others when `loadMore` is asked. */
+/** The sessions of one rig or of all: the first page is polled, `loadMore` fetches the next one. */
 export function useSessions(asset: string) {
   const fetchFirst = () => api.sessions({ asset, limit: PAGE });
   const { data: first, error, refetch } = useQuery(fetchFirst, `sessions ${asset}`, INTERVAL_MS);
-  const [loaded, setLoaded] = useState<Rest>();
+  const [loaded, setLoaded] = useState<FurtherPages>();
   const rest = loaded?.asset === asset ? loaded : undefined;
-  // What begins meanwhile pushes sessions of the first page into the rest.
+  // New sessions push sessions of the first page to the further pages.
   const known = new Set(first?.items.map((session) => session.id));
   const others = (rest?.items ?? []).filter((session) => !known.has(session.id));
   const next = rest ? rest.next : first?.next;

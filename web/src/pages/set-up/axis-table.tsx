@@ -1,7 +1,7 @@
 import type { ComponentChildren } from "preact";
 import { NONE } from "../../words/numbers";
 
-/** What a row says of an axis. */
+/** A row: its name and the text for an axis. */
 export type AxisRow<T> = [name: string, text: (of: T) => string];
 
 interface Props<T> {
@@ -9,11 +9,11 @@ interface Props<T> {
   rows: AxisRow<T>[];
   x?: T | null;
   y?: T | null;
-  /** Further rows, which are not of one axis. */
+  /** Further rows, which belong to both axes. */
   children?: ComponentChildren;
 }
 
-/** Numbers of both axes beside each other. */
+/** A table with a column for each axis. */
 export function AxisTable<T>({ caption, rows, x, y, children }: Props<T>) {
   return (
     <table class="numbers">

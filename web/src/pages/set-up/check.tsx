@@ -7,20 +7,20 @@ import { LiveCard } from "./live-card";
 import { SignsCard } from "./signs-card";
 import { useWatchedRig } from "./use-watched-rig";
 
-/** How often signs are compared, ms. */
+/** Interval of the comparison, ms. */
 const COMPARE_MS = 1000;
 
-/** Seconds that a tail in the plan view is long. */
+/** Duration of the path in the plan view, s. */
 const TAIL_S = 3;
 
 interface Props {
   asset: Asset;
-  /** Fetches the rig's description anew. */
+  /** Fetches the rig's description again. */
   changed: () => Promise<void>;
   next: () => void;
 }
 
-/** Whether the rig does what the twin says: signs, axes and units. */
+/** The check of signs, axes and units against the twin. */
 export function Check({ asset, changed, next }: Props) {
   const { state, buffer, isSending } = useWatchedRig(asset.name);
   const playout = useMemo(() => new PlayoutClock(), []);
@@ -30,7 +30,7 @@ export function Check({ asset, changed, next }: Props) {
     return () => clearInterval(timer);
   }, [buffer]);
   const axes: AssetAxes = { ...DEFAULT_AXES, ...asset.axes };
-  // What came before had other axes: it says nothing of these, and is kept in a session of its own.
+  // Earlier samples had other axes, so a new session starts and the comparison is reset.
   const change = async (part: Partial<AssetAxes>) => {
     await api.putAsset({ ...asset, axes: { ...axes, ...part } });
     if (state?.session_id) await api.endSession(state.session_id);
@@ -44,7 +44,7 @@ export function Check({ asset, changed, next }: Props) {
   };
   return (
     <div class="pair">
-      <LiveCard asset={asset} state={state} buffer={buffer} isSending={isSending} moment={moment} />
+      <LiveCard asset={asset} state={state} isSending={isSending} moment={moment} />
       <SignsCard axes={axes} signs={signs} evidence={state?.evidence} change={change} next={next} />
     </div>
   );

@@ -1,13 +1,13 @@
-/** Which sessions the rig is learnt from. */
+/** The choice of the sessions from which the rig is learnt. */
 import type { Session } from "../../api/types";
 import { sessionLength } from "../../words/session";
 
-/** Rolling for so long is what calibration asks for, s. */
+/** Recommended duration of the motion for a calibration, s. */
 export const MINUTE_S = 60;
 
 /**
- * What is proposed: the newest session, if it is long enough and nothing was found in it. An
- * earlier one may have come before the axes were put right.
+ * Returns the proposed choice: the newest session, if it is long enough and has no fault. Earlier
+ * sessions may have been recorded before the axes were corrected.
  */
 export function proposedSessions(sessions: Session[] = []): ReadonlySet<string> {
   const newest = sessions[0];
@@ -15,7 +15,7 @@ export function proposedSessions(sessions: Session[] = []): ReadonlySet<string> 
   return new Set(isUsable ? [newest.id] : []);
 }
 
-/** The choice with one session added or removed. */
+/** Returns the choice with one session added or removed. */
 export function withChoice(chosen: ReadonlySet<string>, id: string, isWanted: boolean): Set<string> {
   const next = new Set(chosen);
   if (isWanted) next.add(id);
@@ -23,7 +23,7 @@ export function withChoice(chosen: ReadonlySet<string>, id: string, isWanted: bo
   return next;
 }
 
-/** How long the chosen sessions are together, s. */
+/** Returns the total duration of the chosen sessions, s. */
 export const totalLength = (sessions: Session[], chosen: ReadonlySet<string>) =>
   sessions
     .filter(({ id }) => chosen.has(id))

@@ -6,17 +6,17 @@ import { SamplesStatus } from "./samples-status";
 import { snippets } from "./snippets";
 import { useWatchedRig } from "./use-watched-rig";
 
-/** What stands in a snippet until there is a token for the device. */
-const NO_TOKEN_YET = "offbd_TOKEN";
+/** Placeholder in the snippets until a token has been created. */
+const TOKEN_PLACEHOLDER = "offbd_TOKEN";
 
 const LOCAL = /localhost|127\.0\.0\.1/;
 const LOCAL_NOTE =
-  " A device needs this computer's name or address instead of 127.0.0.1, " +
-  "and the service must listen there (--listen 0.0.0.0:8087).";
+  " A device on the network needs the name or address of this computer instead of 127.0.0.1, " +
+  "and the service must listen on it (--listen 0.0.0.0:8087).";
 
-/** How the device sends, and whether it does. */
+/** Snippets for sending samples, and whether samples arrive. */
 export function Connect({ name, next }: { name: string; next: () => void }) {
-  const [token, setToken] = useState(NO_TOKEN_YET);
+  const [token, setToken] = useState(TOKEN_PLACEHOLDER);
   const isTokenNeeded = useCaller()?.authentication === "required";
   const all = snippets(name, location.origin, isTokenNeeded ? token : undefined);
   const [language, setLanguage] = useState("Python");
@@ -25,8 +25,8 @@ export function Connect({ name, next }: { name: string; next: () => void }) {
   return (
     <section class="card">
       <p>
-        Send samples as they come, ten times a second or so. The service answers once they are stored; what is
-        sent twice counts once.
+        Send samples in batches, about ten times per second. The service answers after they are stored;
+        duplicates count once.
       </p>
       <div class="chips" role="group" aria-label="Language">
         {all.map((each) => (
@@ -43,7 +43,7 @@ export function Connect({ name, next }: { name: string; next: () => void }) {
         {all.find((each) => each.language === language)!.text}
       </CodeBlock>
       <p class="quiet small-text">
-        <DeviceToken asset={name} made={setToken} />
+        <DeviceToken asset={name} created={setToken} />
         {LOCAL.test(location.hostname) && LOCAL_NOTE}
       </p>
       <SamplesStatus state={hasSent ? state : undefined} isSending={isSending} />

@@ -9,7 +9,7 @@ import { PlateFields } from "./plate-fields";
 import { UnitFields } from "./unit-fields";
 
 interface Props {
-  /** The rig as it is described so far; missing where it is new. */
+  /** The registered rig; missing if it is new. */
   asset?: Asset;
   done: (name: string) => void;
 }
@@ -17,7 +17,7 @@ interface Props {
 export function Describe({ asset, done }: Props) {
   const [description, setDescription] = useState(() => describeAsset(asset));
   const set = (part: Partial<Description>) => setDescription((before) => ({ ...before, ...part }));
-  const keep = async () => {
+  const save = async () => {
     const wanted = assetOf(description, asset);
     await (asset ? api.putAsset(wanted) : api.createAsset(wanted));
     done(description.name);
@@ -25,16 +25,14 @@ export function Describe({ asset, done }: Props) {
   const fields = { description, set };
   return (
     <form class="card" onSubmit={(e) => e.preventDefault()}>
-      <p>
-        What you know on day one. What is left as it is, is the book chapter's rig; the rest is learnt later.
-      </p>
+      <p>Enter what you know. The defaults are those of the book chapter's rig; the rest is learnt later.</p>
       <NameFields {...fields} isRegistered={asset !== undefined} />
       <BallFields {...fields} />
       <PlateFields {...fields} />
       <UnitFields {...fields} />
       <div class="form-end">
-        <ActionButton class="primary" action={keep} disabled={!isName(description.name)}>
-          {asset ? "Keep and go on" : "Register and go on"}
+        <ActionButton class="primary" action={save} disabled={!isName(description.name)}>
+          {asset ? "Save and continue" : "Register and continue"}
         </ActionButton>
       </div>
     </form>

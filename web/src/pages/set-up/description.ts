@@ -1,11 +1,11 @@
-/** What an owner says of a rig on day one, as the form has it, and the asset that it makes. */
+/** Converts between the set-up form and the asset file. */
 import type { Asset } from "../../api/types";
 import { DEFAULT_AXES } from "../../live/signs";
 
 /** A description in the units of the form: mm, g and degrees. */
 export interface Description {
   name: string;
-  /** Samples a second. */
+  /** Samples per second. */
   rate: number;
   radius: number;
   mass: number;
@@ -17,25 +17,25 @@ export interface Description {
   hasRim: boolean;
   /** Largest angle of the plate. */
   limit: number;
-  /** Metres and radians for one of the device's units. */
+  /** One unit of the device in metres and in radians. */
   positionUnit: number;
   commandUnit: number;
 }
 
-/** The fields that are numbers somebody types. */
+/** The fields with typed numbers. */
 export type NumberField = "rate" | "radius" | "mass" | "length" | "width" | "diameter" | "limit";
 
-/** Moments of inertia over mass times radius squared. */
+/** Inertia factors: moment of inertia over mass times radius squared. */
 export const SOLID = 0.4;
 export const HOLLOW = 0.667;
 
 /** One degree in radians. */
 export const DEGREE = Math.PI / 180;
 
-/** Without the noise of binary fractions, which a form would show. */
+/** Rounds off binary noise, which the form would show. */
 const rounded = (n: number) => Number(n.toPrecision(6));
 
-/** The rig of the book chapter, for what nobody has said. */
+/** The rig of the book chapter, for missing values. */
 const DEFAULT = {
   rate: 100,
   ball: { radius_m: 0.0127, mass_kg: 0.051, inertia_factor: SOLID },
@@ -45,7 +45,7 @@ const DEFAULT = {
 
 export function describeAsset(asset?: Asset): Description {
   const { plate, ball, servo, axes } = asset ?? {};
-  const millimetres = (m: number | null | undefined, usual: number) => rounded((m ?? usual) * 1e3);
+  const millimetres = (m: number | null | undefined, fallback: number) => rounded((m ?? fallback) * 1e3);
   return {
     name: asset?.name ?? "",
     rate: asset?.sample_rate_hz ?? DEFAULT.rate,
@@ -63,7 +63,7 @@ export function describeAsset(asset?: Asset): Description {
   };
 }
 
-/** The asset of a description; what the form does not ask for stays as it was. */
+/** Returns the asset of a description; properties that are not in the form keep their values. */
 export function assetOf(description: Description, before?: Asset): Asset {
   const { name, rate, radius, mass, inertia, isRound, length, width, diameter } = description;
   const { hasRim, limit, positionUnit, commandUnit } = description;
@@ -81,5 +81,5 @@ export function assetOf(description: Description, before?: Asset): Asset {
   } as Asset;
 }
 
-/** Whether the service takes `name` for a rig. */
+/** Whether `name` is a valid name of a rig. */
 export const isName = (name: string) => /^[A-Za-z0-9._-]{1,128}$/.test(name);

@@ -4,31 +4,33 @@ import { useCaller } from "../../parts/login/caller";
 
 interface Props {
   asset: string;
-  /** Called with the token that was made. */
-  made: (secret: string) => void;
+  /** Called with the created token. */
+  created: (secret: string) => void;
 }
 
-/** By which token the device sends: a place for it, or a new one for who may make it. */
-export function DeviceToken({ asset, made }: Props) {
+/** The note on the device's token; administrators can create one. */
+export function DeviceToken({ asset, created }: Props) {
   const caller = useCaller();
   if (caller?.authentication !== "required")
     return (
-      <>The service asks for no token. Whoever reaches this address can send; keep it within your network.</>
+      <>
+        The service requires no token: anyone who reaches this address can send. Keep it within your network.
+      </>
     );
-  const make = async () => made((await api.createDeviceToken(asset)).secret);
+  const create = async () => created((await api.createDeviceToken(asset)).secret);
   return (
     <>
-      The device shows its token; put it where the snippet says <code>offbd_TOKEN</code>.
+      The device authenticates with a token; put it in the place of <code>offbd_TOKEN</code>.
       {caller.role === "admin" ? (
         <>
           {" "}
-          <ActionButton class="small" action={make}>
-            Make a token for this rig
+          <ActionButton class="small" action={create}>
+            Create a token for this rig
           </ActionButton>{" "}
-          It is shown this once.
+          It is shown only once.
         </>
       ) : (
-        " An administrator makes one."
+        " An administrator can create one."
       )}
     </>
   );

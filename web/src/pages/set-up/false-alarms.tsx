@@ -3,11 +3,11 @@ import { codeTitle } from "../../words/fault-names";
 import { number, seconds } from "../../words/numbers";
 import { falseAlarmRate } from "./false-alarm-rate";
 
-/** How near each monitor came to an alarm on healthy recordings that it had not learnt from, and how often it will. */
+/** The certificate: validation of each monitor on healthy recordings that were not used for learning. */
 export function FalseAlarms({ certificate }: { certificate: MonitorCertificate[] }) {
   return (
     <>
-      <h3>False alarms to expect</h3>
+      <h3>Expected false alarms</h3>
       <table class="numbers">
         <thead>
           <tr>
@@ -16,7 +16,7 @@ export function FalseAlarms({ certificate }: { certificate: MonitorCertificate[]
               judged
             </th>
             <th scope="col" class="n">
-              nearest to an alarm
+              closest to an alarm
             </th>
             <th scope="col" class="n">
               false alarms

@@ -1,4 +1,4 @@
-/** A rig in five minutes: describe it, connect it, check its signs, learn it. */
+/** The set-up of a rig in four steps: describe, connect, check, learn. */
 import { api } from "../../api/client";
 import { useQuery } from "../../hooks/use-query";
 import { useTitle } from "../../hooks/use-title";
@@ -12,13 +12,13 @@ import { Describe } from "./describe";
 import { Learn } from "./learn";
 import { Steps } from "./steps";
 
-/** The step of the address; a rig that has no name yet is described first. */
+/** The step in the address; a new rig is described first. */
 function useStep(name?: string): SetUpStep {
   const { query } = useLocation();
   return (name ? (query.get("step") ?? "describe") : "describe") as SetUpStep;
 }
 
-/** The set-up of a rig, or of a new one where `name` is missing. */
+/** The set-up of a rig, or of a new one if `name` is missing. */
 export function SetUpPage({ name }: { name?: string }) {
   const title = name ? `Set up ${name}` : "Set up a rig";
   useTitle(title);

@@ -3,9 +3,9 @@ import { isFinished, poll } from "../../api/poll";
 import type { CalibrationJob, Session } from "../../api/types";
 
 /**
- * Learns a rig from the sessions with `ids` and puts what was learnt into force; those of
- * `sessions` among them that are open end by that. `show` is told how the job stands. True where
- * it came to something.
+ * Calibrates a rig from the sessions with `ids` and activates the calibration. Sessions among them
+ * that are open are ended first. Calls `show` with every state of the job; returns whether the
+ * calibration succeeded.
  */
 export async function learnFrom(
   asset: string,

@@ -11,14 +11,14 @@ import { LengthStatus } from "./length-status";
 import { NoSession } from "./no-session";
 import { SessionChoice } from "./session-choice";
 
-/** A session that is recorded grows. */
+/** Polling interval, ms: a session that is being recorded grows. */
 const INTERVAL_MS = 2000;
 
-/** The calibration: from which sessions, and what came of it. */
+/** The calibration: the choice of sessions, and the result. */
 export function Learn({ asset, changed }: { asset: Asset; changed: () => Promise<void> }) {
   const fetchSessions = () => api.sessions({ asset: asset.name, limit: 20 }).then((page) => page.items);
   const { data: sessions, error } = useQuery(fetchSessions, `${asset.name} sessions`, INTERVAL_MS);
-  /** Missing until somebody has chosen; until then it is what is proposed, which may change. */
+  /** The user's choice; before it, the proposal applies, which may change. */
   const [ownChoice, setOwnChoice] = useState<ReadonlySet<string>>();
   const [job, setJob] = useState<CalibrationJob>();
   const chosen = ownChoice ?? proposedSessions(sessions);
@@ -28,11 +28,11 @@ export function Learn({ asset, changed }: { asset: Asset; changed: () => Promise
   return (
     <div class="pair">
       <section class="card">
-        <h2>From a healthy minute</h2>
+        <h2>Healthy sessions</h2>
         <p>
-          Let the ball roll all over the plate for a minute or two: circles, figures of eight. The rig must be
-          healthy while it does; what it does now is what it is held to later. A ball that rests teaches
-          nothing.
+          Let the ball roll over the whole plate for a minute or two, in circles or figures of eight. The rig
+          must be healthy meanwhile: later sessions are compared with this motion. A resting ball gives no
+          information.
         </p>
         <ErrorMessage error={error} />
         {sessions?.length === 0 && <NoSession asset={asset.name} />}

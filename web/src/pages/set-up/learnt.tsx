@@ -2,7 +2,7 @@ import { isFinished } from "../../api/poll";
 import type { Asset, CalibrationJob } from "../../api/types";
 import { CalibrationDetails } from "./calibration-details";
 
-/** How the learning goes, and what was learnt. */
+/** The progress of the calibration, and its result. */
 export function Learnt({ asset, job }: { asset: Asset; job?: CalibrationJob }) {
   const { calibration } = asset;
   return (
@@ -23,7 +23,9 @@ export function Learnt({ asset, job }: { asset: Asset; job?: CalibrationJob }) {
           <b>Learnt.</b> The next session is judged by it.
         </p>
       )}
-      {!calibration && !job && <p class="quiet">Nothing yet. Until then only large faults are found.</p>}
+      {!calibration && !job && (
+        <p class="quiet">Nothing yet. Until then, only sensor faults are confirmed.</p>
+      )}
       {calibration && <CalibrationDetails name={asset.name} calibration={calibration} />}
     </section>
   );

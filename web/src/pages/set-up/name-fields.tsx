@@ -1,6 +1,6 @@
 import { NumberInput, type FieldsProps } from "./number-input";
 
-/** What the rig is called, which cannot be changed later, and how often it sends. */
+/** The name of the rig, which is fixed after the registration, and its sample rate. */
 export function NameFields({ isRegistered, ...fields }: FieldsProps & { isRegistered: boolean }) {
   const { description, set } = fields;
   return (
@@ -20,7 +20,7 @@ export function NameFields({ isRegistered, ...fields }: FieldsProps & { isRegist
             aria-describedby="name-rule"
           />
         </label>
-        <NumberInput {...fields} field="rate" label="Samples a second" unit="Hz" />
+        <NumberInput {...fields} field="rate" label="Sample rate" unit="Hz" />
       </div>
       <p id="name-rule" class="quiet small-text">
         Letters, digits, “-”, “_” and “.”.

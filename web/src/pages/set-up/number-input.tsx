@@ -11,7 +11,7 @@ interface Props extends FieldsProps {
   unit: string;
 }
 
-/** A number of the description, with its unit. */
+/** An input for a number of the description, with its unit. */
 export function NumberInput({ description, set, field, label, unit }: Props) {
   return (
     <label>

@@ -2,26 +2,26 @@ import type { Prospects, ServoProspects } from "../../api/types";
 import { degrees, NONE, number, seconds } from "../../words/numbers";
 import { AxisTable, type AxisRow } from "./axis-table";
 
-const foundAfter = (s?: number | null) => (s == null ? "not in 10 s" : seconds(s, 1));
+const foundAfter = (s?: number | null) => (s == null ? "not within 10 s" : seconds(s, 1));
 
 const ROWS: AxisRow<ServoProspects>[] = [
-  ["A servo that answers nothing", (servo) => foundAfter(servo.dead_s)],
-  ["One that answers half", (servo) => foundAfter(servo.half_gain_s)],
-  ["One whose horn has slipped by 1°", (servo) => foundAfter(servo.offset_1deg_s)],
+  ["Servo without response", (servo) => foundAfter(servo.dead_s)],
+  ["Servo with half its gain", (servo) => foundAfter(servo.half_gain_s)],
+  ["Servo horn slipped by 1°", (servo) => foundAfter(servo.offset_1deg_s)],
   [
-    "Smallest loss of its answer that is found",
+    "Smallest detectable loss of gain",
     ({ least_gain_loss: loss }) => (loss == null ? NONE : number(loss * 100, 0, "%")),
   ],
-  ["Smallest slip that is found", ({ least_offset_rad: slip }) => degrees(slip, 1)],
+  ["Smallest detectable slip", ({ least_offset_rad: slip }) => degrees(slip, 1)],
 ];
 
-/** How soon a fault would have been confirmed, had it come during the sessions learnt from. */
+/** Time to confirmation of each fault if it occurred during the sessions used for learning. */
 export function ProspectsTable({ prospects }: { prospects: Prospects }) {
   const { trials, x, y } = prospects;
   const ofBothAxes = [
-    { name: "A ball that sticks", after_s: prospects.stuck_s },
-    { name: "Readings that freeze", after_s: prospects.frozen_s },
-    { name: "No ball seen", after_s: prospects.unseen_s },
+    { name: "Ball stuck", after_s: prospects.stuck_s },
+    { name: "Readings frozen", after_s: prospects.frozen_s },
+    { name: "Ball not seen", after_s: prospects.unseen_s },
   ];
   return (
     <>
@@ -36,8 +36,8 @@ export function ProspectsTable({ prospects }: { prospects: Prospects }) {
         ))}
       </AxisTable>
       <p class="quiet">
-        Each fault was put into the sessions that were learnt from, at {trials} moments: with more motion,
-        smaller faults are found, and sooner.
+        Each fault was injected into the sessions used for learning, at {trials} times. With more motion,
+        smaller faults are detected, and earlier.
       </p>
     </>
   );

@@ -1,14 +1,14 @@
 import type { State } from "../../api/types";
 import { count, millimetres, seconds } from "../../words/numbers";
 
-/** What is known of the last sample. */
+/** Describes the last judged sample. */
 function lastSample({ t_s, evidence }: State): string {
-  if (t_s == null) return "; they are judged as soon as later ones follow.";
+  if (t_s == null) return "; they are judged when later samples arrive.";
   const ball = `${millimetres(evidence.x.position_m)}, ${millimetres(evidence.y.position_m)}`;
   return `, the last at ${seconds(t_s)} on the device's clock: ball at ${ball}.`;
 }
 
-/** Whether samples come; `state` is missing as long as none has. */
+/** Whether samples arrive; `state` is missing before the first one. */
 export function SamplesStatus({ state, isSending }: { state?: State; isSending: boolean }) {
   if (!state)
     return (
@@ -18,7 +18,7 @@ export function SamplesStatus({ state, isSending }: { state?: State; isSending: 
     );
   return (
     <div class="wait wait-good" role="status">
-      <b>{isSending ? "Samples are coming." : "Samples have come."}</b> {count(state.samples)} in session{" "}
+      <b>{isSending ? "Receiving samples." : "Samples received."}</b> {count(state.samples)} in session{" "}
       <b>{state.session}</b>
       {lastSample(state)}
     </div>

@@ -1,15 +1,16 @@
 import type { Session } from "../../api/types";
+import { codeTitle } from "../../words/fault-names";
 import { sessionLength } from "../../words/session";
 import { dateTime, duration } from "../../words/time";
 
 interface Props {
   session: Session;
   isChosen: boolean;
-  /** Called with what the box shows: what is proposed may have changed since it was drawn. */
+  /** Called with the state of the box: the proposal may have changed since the rendering. */
   choose: (isWanted: boolean) => void;
 }
 
-/** A session that the rig can be learnt from. */
+/** A session that can be chosen for learning. */
 export function SessionChoice({ session, isChosen, choose }: Props) {
   const faults = session.verdict?.faults;
   return (
@@ -22,7 +23,7 @@ export function SessionChoice({ session, isChosen, choose }: Props) {
           <br />
           <span class="quiet">
             {dateTime(session.opened_at)}, {duration(sessionLength(session) ?? 0)}
-            {faults?.length ? `, found: ${faults.join(", ")}` : ""}
+            {faults?.length ? `, fault: ${faults.map(codeTitle).join(", ")}` : ""}
           </span>
         </span>
       </label>

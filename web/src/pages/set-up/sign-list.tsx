@@ -3,13 +3,13 @@ import type { Signs } from "../../live/signs";
 import { number } from "../../words/numbers";
 
 const VERDICTS: Record<SignVerdict, { text: string; look: string }> = {
-  agrees: { text: "moves as the command asks", look: "good" },
-  reversed: { text: "moves the wrong way round", look: "warn" },
+  agrees: { text: "moves as commanded", look: "good" },
+  reversed: { text: "moves in the wrong direction", look: "warn" },
   swapped: { text: "follows the other command", look: "warn" },
-  unclear: { text: "cannot be told yet", look: "" },
+  unclear: { text: "not clear yet", look: "" },
 };
 
-/** Which way round the ball moves along each axis. */
+/** The result of the sign check for each axis. */
 export function SignList({ signs }: { signs: Signs }) {
   return (
     <ul class="sanity" role="status">

@@ -5,7 +5,7 @@ import { number, seconds } from "../../words/numbers";
 import { SignList } from "./sign-list";
 import { UnitWarnings } from "./unit-warnings";
 
-/** Seconds of tilting after which the check has something to say. */
+/** Duration of tilted samples that the check needs, s. */
 const ENOUGH_S = 3;
 
 const isWrong = ({ verdict: { x, y } }: Signs) =>
@@ -21,7 +21,7 @@ interface Props {
   next: () => void;
 }
 
-/** Which way round the rig's axes are, and what puts them right. */
+/** The check of the rig's axes, with a button that corrects them. */
 export function SignsCard({ axes, signs, evidence, change, next }: Props) {
   const seen = signs?.seconds ?? 0;
   const known = seen >= ENOUGH_S ? signs : undefined;
@@ -30,14 +30,14 @@ export function SignsCard({ axes, signs, evidence, change, next }: Props) {
     <section class="card">
       <h2>Signs and units</h2>
       <p>
-        Let the rig move the ball about, by its controller or by hand. Tilt by +qy: the ball must go to the
-        right (+x). Tilt by +qx: it must go down (−y).
+        Let the rig move the ball, by its controller or by hand. With +qy, the ball must go to the right (+x);
+        with +qx, it must go down (−y).
       </p>
       <UnitWarnings evidence={evidence} change={change} />
       {!known && (
         <p role="status">
           {seen > 0
-            ? `Tilting seen for ${seconds(seen, 1)} of ${ENOUGH_S} s…`
+            ? `${seconds(seen, 1)} of ${ENOUGH_S} s with a tilted plate…`
             : "Waiting for the ball to move…"}
         </p>
       )}
@@ -45,21 +45,21 @@ export function SignsCard({ axes, signs, evidence, change, next }: Props) {
       {known && isWrong(known) && (
         <p>
           <ActionButton class="primary" action={() => change(correctedAxes(axes, known))}>
-            Put it right
+            Correct the axes
           </ActionButton>{" "}
           <span class="quiet">
-            Changes the axes in the set-up and begins a new session; the device stays as it is.
+            Changes the axes in the set-up and starts a new session; the device is not changed.
           </span>
         </p>
       )}
       <p class="quiet small-text">
-        In the set-up: {axes.swap ? "x and y swapped, " : ""}x sign {sign(axes.x_sign)}, y sign{" "}
+        Current axes: {axes.swap ? "x and y swapped, " : ""}x sign {sign(axes.x_sign)}, y sign{" "}
         {sign(axes.y_sign)}, position unit {axes.position_unit_m} m, command unit{" "}
         {number(axes.command_unit_rad, 4)} rad.
       </p>
       <div class="form-end">
         <button type="button" class={agrees ? "primary" : ""} onClick={next}>
-          {agrees ? "Good: learn it" : "Go on without"}
+          {agrees ? "Continue: learn the rig" : "Continue anyway"}
         </button>
       </div>
     </section>

@@ -1,14 +1,14 @@
-/** What a device's owner pastes to send the first samples. */
+/** Code snippets that send samples to the service. */
 
 export interface Snippet {
   language: string;
   text: string;
 }
 
-/** The snippets for `asset`; where the service asks for a token, `token` stands in them. */
+/** Returns the snippets for `asset`, with `token` if the service requires one. */
 export function snippets(asset: string, origin: string, token?: string): Snippet[] {
   const urlFrom = (origin: string) => `${origin}/api/v1/assets/${encodeURIComponent(asset)}/telemetry`;
-  // A microcontroller is another machine: to it, this one has a name that the page does not know.
+  // A microcontroller is a separate machine and cannot reach the service at localhost.
   const remote = origin.replace(/\/\/(localhost|127\.0\.0\.1)/, "//SERVER");
   return [
     { language: "curl", text: curl(urlFrom(origin), token) },
@@ -19,7 +19,7 @@ export function snippets(asset: string, origin: string, token?: string): Snippet
 
 function curl(url: string, token?: string): string {
   const header = token ? `-H 'authorization: Bearer ${token}' ` : "";
-  return `# One sample: seconds on the device's clock, commanded angles in rad, ball in m.
+  return `# One sample: time on the device's clock in s, commanded angles in rad, ball position in m.
 curl ${header}--json '{"samples":[{"seq":1,"t_s":0.00,"cmd_qx_rad":0.0,"cmd_qy_rad":0.02,"x_m":0.010,"y_m":-0.004}]}' \\
   ${url}
 
@@ -35,14 +35,14 @@ function python(url: string, token?: string): string {
 URL = "${url}"
 
 def read_rig():
-    """Yours: commanded plate angles in rad, the ball's position in m (None if unseen)."""
+    """Replace this: commanded plate angles in rad, ball position in m (None if not seen)."""
     return 0.0, 0.0, 0.0, 0.0          # qx, qy, x, y
 
 def send(samples):
     request = urllib.request.Request(
         URL, json.dumps({"samples": samples}).encode(), {"content-type": "application/json"${header}})
     with urllib.request.urlopen(request, timeout=5) as answer:
-        return json.load(answer)       # {"accepted": 10, "rejected": [], ...}: durable
+        return json.load(answer)       # {"accepted": 10, "rejected": [], ...}: stored
 
 seq, batch, start = 0, [], time.monotonic()
 while True:
@@ -54,7 +54,7 @@ while True:
         try:
             send(batch)
             batch = []
-        except OSError as error:       # kept, and sent again: samples count once
+        except OSError as error:       # keep the batch and retry: duplicates count once
             print("not sent:", error)
             batch = batch[-6000:]
     time.sleep(0.01)
@@ -82,7 +82,7 @@ void sample(float qx, float qy, float x, float y) {   // rad and m; every 10 ms
   http.addHeader("content-type", "application/json");${header}
   int status = http.POST("{\\"samples\\":[" + batch + "]}");
   http.end();
-  if (status == 200 || n > 200) { batch = ""; n = 0; }  // else sent again with the next
+  if (status == 200 || n > 200) { batch = ""; n = 0; }  // otherwise retried with the next batch
 }
 
 void setup() {
@@ -91,7 +91,7 @@ void setup() {
 }
 
 void loop() {
-  sample(/* qx */ 0, /* qy */ 0, /* x */ 0, /* y */ 0);   // yours
+  sample(/* qx */ 0, /* qy */ 0, /* x */ 0, /* y */ 0);   // your values
   delay(10);
 }
 `;

@@ -9,7 +9,7 @@ const STEPS: { key: SetUpStep; word: string }[] = [
 
 interface Props {
   current: SetUpStep;
-  /** Missing before the rig is registered: then there is nowhere to go. */
+  /** Missing before the rig is registered: the other steps need it. */
   goTo?: (step: SetUpStep) => void;
 }
 

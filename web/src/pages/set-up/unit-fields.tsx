@@ -35,8 +35,8 @@ export function UnitFields({ description, set }: FieldsProps) {
         </label>
       </div>
       <p class="quiet small-text">
-        Commands are the angles of the plate, not those of the servo's horn. +qy moves the ball toward +x, +qx
-        toward −y; the check comes two steps on.
+        Commands are angles of the plate, not of the servo horn. +qy moves the ball toward +x, +qx toward −y;
+        step 3 checks this.
       </p>
     </fieldset>
   );

@@ -2,7 +2,7 @@ import type { AssetAxes, Evidence } from "../../api/types";
 import { ActionButton } from "../../parts/action-button";
 import { DEGREE } from "./description";
 
-/** Beyond these a unit must be wrong. */
+/** Limits beyond which a unit must be wrong. */
 const LARGEST_POSITION_M = 2;
 const LARGEST_ANGLE_RAD = 1.6;
 
@@ -11,7 +11,7 @@ interface Props {
   change: (axes: Partial<AssetAxes>) => Promise<void>;
 }
 
-/** Numbers that no rig has, with a button for the unit that they probably are in. */
+/** Warnings of implausible values, with a button for the probable unit. */
 export function UnitWarnings({ evidence, change }: Props) {
   const axes = evidence ? [evidence.x, evidence.y] : [];
   const isFar = axes.some((axis) => Math.abs(axis.position_m ?? 0) > LARGEST_POSITION_M);
@@ -20,13 +20,13 @@ export function UnitWarnings({ evidence, change }: Props) {
     <>
       {isFar && (
         <p class="trouble" role="alert">
-          The ball is metres away.{" "}
+          The position of the ball exceeds 2 m.{" "}
           <ActionButton action={() => change({ position_unit_m: 0.001 })}>Positions are in mm</ActionButton>
         </p>
       )}
       {isSteep && (
         <p class="trouble" role="alert">
-          The plate tilts beyond 90°.{" "}
+          A command exceeds 90°.{" "}
           <ActionButton action={() => change({ command_unit_rad: DEGREE })}>
             Commands are in degrees
           </ActionButton>

@@ -3,10 +3,10 @@ import { useRigStream } from "../../hooks/use-rig-stream";
 
 const STATES_PER_SECOND = 10;
 
-/** A device that has sent nothing for so long does not send any more, ms. */
+/** Time without a sample after which a device counts as not sending, ms. */
 const SILENT_MS = 5000;
 
-/** The rig's stream for the steps that wait for it. */
+/** The rig's stream, for the steps that show live data. */
 export function useWatchedRig(name: string) {
   const { state, buffer, isSilent } = useRigStream(name, { statesPerSecond: STATES_PER_SECOND });
   const now = useNow(1000);

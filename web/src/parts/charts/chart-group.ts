@@ -4,7 +4,7 @@ import type { ChartKind } from "./chart-kinds";
 import type { LineChart } from "./line-chart";
 import type { Mark } from "./overlays";
 
-/** Charts that are drawn together from one buffer; no component is rendered anew for it. */
+/** Charts that are drawn together from one buffer, without rendering components. */
 export class ChartGroup {
   private charts = new Map<string, { chart: LineChart; kind: ChartKind; axis: Axis }>();
   private marks: Mark[] = [];
@@ -23,7 +23,7 @@ export class ChartGroup {
     this.charts.forEach(({ chart }) => chart.setMarks(marks));
   }
 
-  /** Draws the moments of `range`; `playhead` is the moment shown elsewhere on the page. */
+  /** Draws the moments of `range`; `playhead` is the current time of the playback. */
   draw(buffer: TraceBuffer, range: [number, number], playhead: number | null = null): void {
     const from = Math.max(buffer.index(range[0]) - 1, 0);
     const to = buffer.index(range[1]) + 2;

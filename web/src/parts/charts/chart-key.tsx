@@ -1,6 +1,6 @@
 import type { ChartKind } from "./chart-kinds";
 
-/** Which line is what; the chart's own name says it to whoever does not see it. */
+/** The legend of a chart; screen readers use the label of the chart instead. */
 export function ChartKey({ kind }: { kind: ChartKind }) {
   const lines = kind.lines.filter((line) => line.label);
   return (

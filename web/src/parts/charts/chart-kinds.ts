@@ -1,5 +1,5 @@
-/** What can be charted of a rig along each axis, and how. */
-import type { Axis } from "../../api/types";
+/** The kinds of charts of a rig, for each axis. */
+import type { Axis, PlateAngle } from "../../api/types";
 import type { NumberColumn } from "../../live/axis-columns";
 import type { Line } from "./chart-options";
 
@@ -7,41 +7,42 @@ export interface ChartKind {
   title: (axis: Axis) => string;
   unit: string;
   digits: number;
-  /** The scale never shows less than this much either side of zero. */
-  least: number;
-  /** The columns of the buffer that are drawn, each times its factor. */
+  /** Smallest extent of the scale on either side of zero. */
+  minExtent: number;
+  /** The columns of the buffer that are drawn, each multiplied by its factor. */
   lines: (Line & { column: NumberColumn; factor?: number })[];
+  /** Indices of the upper and lower line between which the band is filled. */
   band?: [number, number];
-  /** Whether the ground is tinted where the residual is judged. */
+  /** Whether the background is shaded where the residual is judged. */
   showsGates: boolean;
-  /** What it shows, for whoever does not see it. */
+  /** Description for screen readers. */
   about: string;
 }
 
 const DEGREES = 180 / Math.PI;
 const DASHED = [6, 3];
 
-/** The command that moves the ball along an axis. */
-const COMMAND: Record<Axis, string> = { x: "qy", y: "qx" };
+/** The commanded plate angle that moves the ball along an axis. */
+const COMMAND: Record<Axis, PlateAngle> = { x: "qy", y: "qx" };
 
 const acceleration: ChartKind = {
   title: (axis) => `Acceleration along ${axis}`,
   unit: "m/s²",
   digits: 1,
-  least: 0.5,
+  minExtent: 0.5,
   showsGates: false,
   lines: [
     { column: "measured", label: "measured", colour: "measured" },
     { column: "twin", label: "twin", colour: "twin", dash: DASHED },
   ],
-  about: "what the ball did, and what the twin says a healthy rig would have done",
+  about: "the measured acceleration, and the twin's prediction for a healthy rig",
 };
 
 const residual: ChartKind = {
   title: (axis) => `Residual along ${axis}`,
   unit: "m/s²",
   digits: 1,
-  least: 0.3,
+  minExtent: 0.3,
   showsGates: true,
   band: [1, 2],
   lines: [
@@ -49,45 +50,45 @@ const residual: ChartKind = {
     { column: "limit", label: "limit", colour: "limit", width: 1 },
     { column: "limitBelow", label: "", colour: "limit", width: 1 },
   ],
-  about: "outside the band, while the ground is tinted, it counts against the servo",
+  about: "outside the band, while the background is shaded, it is evidence of a servo fault",
 };
 
 const position: ChartKind = {
   title: (axis) => `Position ${axis}`,
   unit: "mm",
   digits: 0,
-  least: 20,
+  minExtent: 20,
   showsGates: false,
   lines: [
     { column: "position", label: "measured", colour: "measured", factor: 1000 },
     { column: "twinPosition", label: "twin", colour: "twin", dash: DASHED, factor: 1000 },
   ],
-  about: "where the ball is, and where the twin would be",
+  about: "the measured position of the ball, and the twin's",
 };
 
 const command: ChartKind = {
   title: (axis) => `Command ${COMMAND[axis]}`,
   unit: "°",
   digits: 0,
-  least: 2,
+  minExtent: 2,
   showsGates: false,
   lines: [
     { column: "command", label: "command", colour: "command", factor: DEGREES },
     { column: "plate", label: "twin's plate", colour: "twin", dash: DASHED, factor: DEGREES },
   ],
-  about: "the plate angle that is asked for, and the one that the twin's servo has reached",
+  about: "the commanded plate angle, and the angle of the twin's plate",
 };
 
 export const CHART_KINDS = { acceleration, residual, position, command };
 
 export type ChartKindName = keyof typeof CHART_KINDS;
 
-/** All kinds, in the order in which a rig's page shows them. */
+/** All kinds, in the order on the page of a rig. */
 export const ALL_CHARTS: ChartKindName[] = ["residual", "acceleration", "command", "position"];
 
 const TWIN_POSITIONS: NumberColumn[] = ["twinPosition", "plate"];
 
-/** A kind without the lines of where the twin and its plate were. */
+/** Returns a kind without the lines of the twin's position and plate angle. */
 export const withoutTwinPositions = (kind: ChartKind): ChartKind => ({
   ...kind,
   lines: kind.lines.filter(({ column }) => !TWIN_POSITIONS.includes(column)),

@@ -1,4 +1,4 @@
-/** How a chart over time looks: the options of uPlot that it is built with. */
+/** The uPlot options of a chart over time. */
 import type uPlot from "uplot";
 import { colour } from "../../theme";
 
@@ -13,29 +13,29 @@ export interface Line {
 export interface LineChartOptions {
   lines: Line[];
   unit: string;
-  /** Digits after the point on the axis. */
+  /** Decimals of the axis labels. */
   digits?: number;
   height: number;
-  /** Two lines between which the band is filled: the upper and the lower. */
+  /** Indices of the upper and lower line between which the band is filled. */
   band?: [number, number];
-  /** The scale never shows less than this much either side of zero. */
-  least?: number;
+  /** Smallest extent of the scale on either side of zero. */
+  minExtent?: number;
   /** Charts with the same key share their cursor. */
   sync?: string;
   onSeek?: (t: number) => void;
 }
 
-/** How much larger than usual letters are: the style sheet enlarges all on a wall. */
+/** Scale of the text: the style sheet enlarges it on large screens. */
 export const textScale = () => parseFloat(getComputedStyle(document.documentElement).fontSize) / 16;
 
 const withTrueMinus = (text: string) => text.replace("-", "−");
 
-/** The values that are shown, with room above and below. */
-function valueRange(low: number | null, high: number | null, least: number): [number, number] {
-  const bottom = Math.min(Number.isFinite(low) ? low! : 0, -least);
-  const top = Math.max(Number.isFinite(high) ? high! : 0, least);
-  const room = Math.max((top - bottom) * 0.08, 1e-6);
-  return [bottom - room, top + room];
+/** Returns the range of the value axis, with a margin above and below. */
+function valueRange(low: number | null, high: number | null, minExtent: number): [number, number] {
+  const bottom = Math.min(Number.isFinite(low) ? low! : 0, -minExtent);
+  const top = Math.max(Number.isFinite(high) ? high! : 0, minExtent);
+  const margin = Math.max((top - bottom) * 0.08, 1e-6);
+  return [bottom - margin, top + margin];
 }
 
 const series = (line: Line): uPlot.Series => ({
@@ -67,14 +67,14 @@ function axes(digits: number): uPlot.Axis[] {
 type BuiltOptions = Omit<uPlot.Options, "width" | "height" | "hooks">;
 
 export function chartOptions(options: LineChartOptions, range: () => [number, number]): BuiltOptions {
-  const { lines, digits = 1, band, sync, least = 0 } = options;
+  const { lines, digits = 1, band, sync, minExtent = 0 } = options;
   return {
     series: [{ label: "t" }, ...lines.map(series)],
     ms: 1e-3,
     legend: { show: false },
     scales: {
       x: { time: false, range },
-      y: { range: (_, low, high) => valueRange(low, high, least) },
+      y: { range: (_, low, high) => valueRange(low, high, minExtent) },
     },
     axes: axes(digits),
     bands: band ? [{ series: [band[0] + 1, band[1] + 1], fill: colour("band") }] : [],

@@ -1,10 +1,10 @@
-/** Moments at which a fault changed, marked in the charts of its rig. */
-import type { FaultLine } from "../../api/types";
+/** Marks of fault transitions in the charts of a rig. */
+import type { FaultLine, FaultStatus } from "../../api/types";
 import { codeTitle } from "../../words/fault-names";
 import { isFailing } from "../../words/status-byte";
 import type { Mark } from "./overlays";
 
-const COLOURS: Record<string, string> = { confirmed: "bad", pending: "warn" };
+const COLOURS: Partial<Record<FaultStatus, string>> = { confirmed: "bad", pending: "warn" };
 
 export const faultMark = (line: FaultLine): Mark => ({
   t: line.t_s,

@@ -1,4 +1,4 @@
-/** A chart over time: uPlot with this page's colours, shaded gates, marks and a shared cursor. */
+/** A chart over time: uPlot with the colours of the theme, shaded gates, marks and a shared cursor. */
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import { onTheme } from "../../theme";
@@ -13,7 +13,7 @@ export class LineChart {
   private range: [number, number] = [0, 1];
   private gates: boolean[] = [];
   private marks: Mark[] = [];
-  /** The moment that is shown elsewhere on the page, marked by a line. */
+  /** The current time of the playback, marked by a line. */
   private playhead: number | null = null;
   private readonly cleanups: (() => void)[] = [];
 
@@ -25,7 +25,7 @@ export class LineChart {
     this.build();
     const resized = new ResizeObserver(() => this.plot?.setSize(this.size()));
     resized.observe(element);
-    // Colours are part of what is built.
+    // The colours are set when the plot is built.
     this.cleanups.push(
       () => resized.disconnect(),
       onTheme(() => this.build()),
@@ -37,7 +37,7 @@ export class LineChart {
     this.plot?.destroy();
   }
 
-  /** Shows `data` over `range`; `gates` says of each moment whether the residual may be judged. */
+  /** Shows `data` over `range`; `gates` has whether the residual is judged at each moment. */
   show(
     data: ChartData,
     range: [number, number],

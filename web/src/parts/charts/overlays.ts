@@ -1,4 +1,4 @@
-/** What is drawn behind and above the lines of a chart: where the gate is open, and marked moments. */
+/** Overlays of a chart: the shading where the gate is open, and marks. */
 import type uPlot from "uplot";
 import { colour } from "../../theme";
 import { textScale } from "./chart-options";
@@ -10,7 +10,7 @@ export interface Mark {
   colour: string;
 }
 
-/** Where the gate is open the ground is tinted. */
+/** Shades the background where the gate is open. */
 export function shadeGates(plot: uPlot, times: number[], gates: boolean[]): void {
   const { ctx, bbox } = plot;
   ctx.save();
@@ -32,13 +32,13 @@ export function shadeGates(plot: uPlot, times: number[], gates: boolean[]): void
   ctx.restore();
 }
 
-/** Vertical lines at `marks`, with their labels beside them. */
+/** Draws vertical lines at `marks` with their labels. */
 export function drawMarks(plot: uPlot, marks: Mark[]): void {
   const { ctx } = plot;
   const lineHeight = 12 * textScale() * devicePixelRatio;
   ctx.save();
   ctx.font = `${lineHeight * 0.92}px system-ui, sans-serif`;
-  // Where each row of labels ends: those that would cover each other go into rows.
+  // The end of each row of labels: labels that would overlap are put into separate rows.
   const rowEnds: number[] = [];
   for (const mark of marks) {
     const x = Math.round(plot.valToPos(mark.t, "x", true));

@@ -15,7 +15,7 @@ interface Props {
   measuredOnly?: boolean;
 }
 
-/** One chart of a rig: it joins its group, which draws it. */
+/** One chart of a rig; it is drawn by its group. */
 export function RigChart({ group, kind: name, axis, height, onSeek, measuredOnly }: Props) {
   const element = useRef<HTMLDivElement>(null);
   const seek = useLatest(onSeek);
@@ -25,9 +25,9 @@ export function RigChart({ group, kind: name, axis, height, onSeek, measuredOnly
     [name, measuredOnly],
   );
   useEffect(() => {
-    const { lines, unit, digits, band, least } = kind;
+    const { lines, unit, digits, band, minExtent } = kind;
     const onSeek = canSeek ? (t: number) => seek.current?.(t) : undefined;
-    const options = { lines, unit, digits, height, band, least, sync: "rig", onSeek };
+    const options = { lines, unit, digits, height, band, minExtent, sync: "rig", onSeek };
     const chart = new LineChart(element.current!, options);
     group.add(name + axis, chart, kind, axis);
     return () => {

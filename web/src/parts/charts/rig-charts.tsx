@@ -9,7 +9,7 @@ interface Props {
   height?: number;
   axes?: Axis[];
   onSeek?: (t: number) => void;
-  /** Leaves out the lines of where the twin was: a recording has none. */
+  /** Leaves out the twin's position and plate angle, which the recording of a fault does not have. */
   measuredOnly?: boolean;
 }
 

@@ -4,5 +4,5 @@ import type { Caller } from "../../api/types";
 
 export const CallerContext = createContext<Caller | undefined>(undefined);
 
-/** Who uses the page; a service without tokens lets everyone do everything. */
+/** The user of the page and their rights; without authentication, everyone has all rights. */
 export const useCaller = () => useContext(CallerContext);

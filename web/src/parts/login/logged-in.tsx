@@ -3,7 +3,7 @@ import { api } from "../../api/client";
 import { ActionButton } from "../action-button";
 import { useCaller } from "./caller";
 
-/** Who is logged in, and the button to log out; nothing where no token is asked for. */
+/** The logged-in user and the button to log out; empty if the service requires no token. */
 export function LoggedIn() {
   const caller = useCaller();
   if (!caller?.name) return null;

@@ -8,7 +8,7 @@ import { UnloadedPage } from "../unloaded-page";
 import { CallerContext } from "./caller";
 import { LoginPage } from "./login-page";
 
-/** The page for whoever the service knows; for others, where it asks for a token, the login. */
+/** Shows the page to an authenticated caller, and the login if the service requires a token. */
 export function LoginGate({ children }: { children: ComponentChildren }) {
   const caller = useQuery(api.caller, "caller");
   const { refetch } = caller;

@@ -9,13 +9,13 @@ import {
 } from "three";
 import { colour } from "../../theme";
 
-/** The ball, and the twin's, which is seen through and a little larger so that neither hides the other. */
+/** The ball and the twin's; the latter is translucent and slightly larger, so that neither hides the other. */
 const LOOKS = {
   ball: { colour: "measured", scale: 1, roughness: 0.25, metalness: 0.35, opacity: 1, shadow: 0.3 },
   ghost: { colour: "twin", scale: 1.02, roughness: 0.9, metalness: 0, opacity: 0.45, shadow: 0.12 },
 };
 
-/** A ball on the plate with its shadow; not seen until somebody says where it is. */
+/** Builds a ball with its shadow; it is invisible until it has a position. */
 export function buildBall(kind: keyof typeof LOOKS, radius: number): Group {
   const look = LOOKS[kind];
   const isGhost = kind === "ghost";

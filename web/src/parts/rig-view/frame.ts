@@ -14,7 +14,7 @@ const AXES: [letter: string, direction: Vector3, hue: number][] = [
   ["z", new Vector3(0, 0, 1), 0x2563eb],
 ];
 
-/** A frame of reference: arrows x red, y green, z blue, each with its letter followed by `suffix`. */
+/** Builds a frame of reference: arrows x red, y green, z blue, labelled with letter and `suffix`. */
 export function buildFrame(length: number, suffix = "", opacity = 1): Group {
   const group = new Group();
   for (const [letter, direction, hue] of AXES) {

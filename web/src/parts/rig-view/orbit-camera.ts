@@ -3,21 +3,21 @@ import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 
 export type ViewName = "free" | "top" | "along x" | "along y";
 
-/** Where the camera stands in each view, in multiples of its distance. */
-const PLACES: Record<ViewName, [number, number, number]> = {
+/** Position of the camera in each view, in multiples of its distance. */
+const POSITIONS: Record<ViewName, [number, number, number]> = {
   free: [0.55, -0.95, 0.75],
   top: [0, -0.001, 1.35],
   "along x": [-1.35, 0, 0.12],
   "along y": [0, -1.35, 0.12],
 };
 
-/** The camera, moved about the plate by the pointer, by keys, and to views that have a name. */
+/** The camera, which orbits the plate by pointer and keys, and has named views. */
 export class OrbitCamera {
   readonly camera = new PerspectiveCamera(38, 1, 0.01, 20);
   private readonly controls: OrbitControls;
   private view: ViewName = "free";
 
-  /** `size` is the longer side of what is looked at, m. */
+  /** `size` is the longer side of the plate, m. */
   constructor(
     canvas: HTMLCanvasElement,
     private readonly size: number,
@@ -36,14 +36,14 @@ export class OrbitCamera {
 
   look(view: ViewName): void {
     this.view = view;
-    // A narrow picture needs more distance to show the whole width.
+    // A narrow canvas needs more distance to show the whole width.
     const distance = this.size * 1.45 * Math.max(1, 1.25 / this.camera.aspect);
-    this.camera.position.set(...PLACES[view]).multiplyScalar(distance);
+    this.camera.position.set(...POSITIONS[view]).multiplyScalar(distance);
     this.controls.target.set(0, 0, 0);
     this.controls.update();
   }
 
-  /** Turns about the plate, and up or down unless that leads below it or over the top, rad. */
+  /** Turns the camera around the plate and up or down, rad, but not below the plate or over the top. */
   turn(about: number, up: number): void {
     const offset = this.camera.position.clone().sub(this.controls.target);
     offset.applyAxisAngle(new Vector3(0, 0, 1), about);

@@ -1,4 +1,4 @@
-/** The plate in three dimensions: slab, edges, grid, and the foot that it stands on. */
+/** The plate in 3D: slab, edges, grid, and the foot below it. */
 import {
   BoxGeometry,
   BufferGeometry,
@@ -16,18 +16,18 @@ import type { Asset } from "../../api/types";
 import { plateSize, type PlateSize } from "../../live/rig-size";
 import { colour } from "../../theme";
 
-/** Distance between the lines of the grid, m. */
+/** Distance between grid lines, m. */
 const GRID_M = 0.05;
 
-/** Above the plate by so much that it is seen, m. */
+/** Height of the grid above the plate, so that it is visible, m. */
 const GRID_HEIGHT_M = 0.0002;
 
-/** A thinner plate would not be seen from the side, m. */
-const LEAST_THICKNESS_M = 0.004;
+/** Smallest drawn thickness, so that the plate is visible from the side, m. */
+const MIN_THICKNESS_M = 0.004;
 
-const thickness = ({ plate }: Asset) => Math.max(plate?.thickness_m ?? 0, LEAST_THICKNESS_M);
+const thickness = ({ plate }: Asset) => Math.max(plate?.thickness_m ?? 0, MIN_THICKNESS_M);
 
-/** What turns with the plate; its upper face is at z = 0. */
+/** Builds the parts that turn with the plate; its upper face is at z = 0. */
 export function buildPlate(asset: Asset): Object3D[] {
   const size = plateSize(asset);
   const height = thickness(asset);
@@ -45,7 +45,7 @@ export function buildPlate(asset: Asset): Object3D[] {
   return [slab, edges, buildGrid(size)];
 }
 
-/** What the plate stands on; it does not turn. `size` is the longer side of the plate, m. */
+/** Builds the foot, which does not turn. `size` is the longer side of the plate, m. */
 export function buildFoot(asset: Asset, size: number): Object3D {
   const shape = new ConeGeometry(size * 0.05, size * 0.22, 32);
   const foot = new Mesh(shape, new MeshStandardMaterial({ color: colour("edge"), roughness: 0.8 }));
@@ -56,7 +56,7 @@ export function buildFoot(asset: Asset, size: number): Object3D {
 
 function buildGrid({ length, width, isRound }: PlateSize): LineSegments {
   const points: number[] = [];
-  // Where a line at `offset` from the middle ends: at the edge of a round plate, or of a straight one.
+  // Half the length of a grid line at `offset` from the centre of a round or rectangular plate.
   const end = (offset: number, side: number) =>
     isRound ? Math.sqrt(Math.max((length / 2) ** 2 - offset * offset, 0)) : side / 2;
   for (let x = -Math.floor(length / 2 / GRID_M) * GRID_M; x <= length / 2; x += GRID_M) {

@@ -1,15 +1,15 @@
 import { useRef, useState } from "preact/hooks";
 import { saveFile } from "../save-file";
 
-/** Frames a second of a video. */
+/** Frames per second of a video. */
 const VIDEO_HZ = 60;
 const BITS_PER_SECOND = 8e6;
 const FORMATS = ["video/webm;codecs=vp9", "video/webm", "video/mp4"];
 
-/** How often what is recorded is handed over, ms. */
+/** Duration of the parts in which the recorder delivers the video, ms. */
 const PART_MS = 1000;
 
-/** Records what is drawn as a video, which is saved when it is stopped. */
+/** Records the canvas as a video, which is downloaded when the recording is stopped. */
 export function RecordButton({ canvas, name }: { canvas: () => HTMLCanvasElement | null; name: string }) {
   const recorder = useRef<MediaRecorder | null>(null);
   const [isRecording, setRecording] = useState(false);

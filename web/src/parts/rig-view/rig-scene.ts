@@ -1,7 +1,7 @@
 /**
- * The plate and the ball in three dimensions, with the twin as a ghost. Frames
- * and signs are those of ARCHITECTURE.md: z up, the joint in the middle of the
- * plate's upper face, world from plate = Rx(qx)·Ry(qy). Loaded only where it is shown.
+ * The plate and the ball in 3D, with the twin's ball as a ghost. Frames and signs are those of
+ * ARCHITECTURE.md: z up, the joint in the centre of the plate's upper face, world from plate =
+ * Rx(qx)·Ry(qy). Loaded only when it is shown.
  */
 import { AmbientLight, Color, DirectionalLight, Group, HemisphereLight, Scene, WebGLRenderer } from "three";
 import type { Asset } from "../../api/types";
@@ -21,12 +21,12 @@ export class RigScene {
   private readonly plate = new Group();
   private readonly worldFrame = new Group();
   private readonly trail = new Trail();
-  /** The longer side of the plate, m: everything else is sized by it. */
+  /** The longer side of the plate, m; scales everything else. */
   private readonly size: number;
   private plateFrame = new Group();
   private ball = new Group();
   private ghost = new Group();
-  /** Whether anything has changed since the last picture. */
+  /** Whether anything has changed since the last rendering. */
   private isDirty = true;
   private readonly cleanups: (() => void)[] = [];
 
@@ -67,7 +67,7 @@ export class RigScene {
     this.isDirty = true;
   }
 
-  /** Turns the camera about the plate: for keys. */
+  /** Turns the camera around the plate, rad. */
   turn(about: number, up: number): void {
     this.camera.turn(about, up);
     this.isDirty = true;
@@ -92,11 +92,11 @@ export class RigScene {
     if (!width || !height) return;
     this.renderer.setSize(width, height, false);
     this.camera.setAspect(width / height);
-    // A new size empties the canvas; it must not be seen empty.
+    // Resizing clears the canvas, so it is drawn at once.
     this.renderer.render(this.scene, this.camera.camera);
   }
 
-  /** Everything in the scene, in the colours of now. */
+  /** Builds everything in the scene with the colours of the current theme. */
   private build(): void {
     this.scene.clear();
     this.plate.clear();
@@ -112,7 +112,7 @@ export class RigScene {
     this.ball = buildBall("ball", ballRadius(this.asset));
     this.ghost = buildBall("ghost", ballRadius(this.asset));
     this.plate.add(this.ball, this.ghost);
-    // The world's frame stands still below the plate's.
+    // The world frame is fixed, below the plate frame.
     const world = buildFrame(this.size * 0.22, "₀", 0.45);
     world.position.set(-this.size * 0.62, -this.size * 0.45, -this.size * 0.22);
     this.worldFrame.add(world);

@@ -3,15 +3,14 @@ import type { Asset } from "../../api/types";
 import { useAnimationFrame } from "../../hooks/use-animation-frame";
 import type { Pose } from "../../live/pose";
 import { degrees } from "../../words/numbers";
-
 import { RecordButton } from "./record-button";
 import { useScene } from "./use-scene";
 import { ViewButtons } from "./view-buttons";
 
-/** Size of a step by an arrow key, rad. */
+/** Rotation per press of an arrow key, rad. */
 const STEP = 0.12;
 
-/** By how much an arrow key turns the view about the plate, and up. */
+/** Rotation of the camera around the plate and up by each arrow key. */
 const KEYS: Record<string, [about: number, up: number]> = {
   ArrowLeft: [-STEP, 0],
   ArrowRight: [STEP, 0],
@@ -19,18 +18,18 @@ const KEYS: Record<string, [about: number, up: number]> = {
   ArrowDown: [0, STEP],
 };
 
-/** Shortest time between two texts of the tilt: faster ones cannot be read, ms. */
+/** Shortest interval between two updates of the tilt text, so that it is readable, ms. */
 const TEXT_MS = 120;
 
 interface Props {
   asset: Asset;
-  /** The pose to show now; asked before each frame. */
+  /** Returns the pose to show; called before each frame. */
   pose: () => Pose | null;
-  /** What a video file is called. */
+  /** Name of a video file without its extension. */
   name: string;
 }
 
-/** The three-dimensional view in its frame: loaded when shown, moved by keys, recorded as a video. */
+/** The 3D view with its controls; it is loaded when it is shown. */
 export function RigView({ asset, pose, name }: Props) {
   const canvas = useRef<HTMLCanvasElement>(null);
   const tilt = useRef<HTMLOutputElement>(null);
@@ -58,10 +57,12 @@ export function RigView({ asset, pose, name }: Props) {
         tabIndex={0}
         onKeyDown={turn}
         role="img"
-        aria-label="Plate and ball in three dimensions; the twin is the see-through ball. Arrow keys turn the view."
+        aria-label="Plate and ball in 3D; the translucent ball is the twin's. Arrow keys rotate the view."
       />
       {state === "failed" && (
-        <p class="stage-note">This browser shows no 3D (WebGL). The charts have all of it.</p>
+        <p class="stage-note">
+          The 3D view, which needs WebGL, could not be loaded. The charts show the same data.
+        </p>
       )}
       {state === "loading" && <p class="stage-note">Loading 3D…</p>}
       <output ref={tilt} class="stage-tilt" aria-label="Tilt of the twin's plate">

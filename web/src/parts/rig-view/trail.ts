@@ -2,20 +2,20 @@ import { BufferGeometry, Float32BufferAttribute, Line, LineBasicMaterial } from 
 import type { PlanePoint } from "../../live/pose";
 import { colour } from "../../theme";
 
-/** Moments of the ball's trail: 3 s at 60 frames a second. */
+/** Number of points of the trail: 3 s at 60 frames per second. */
 const LENGTH = 180;
 
-/** Above the plate by so much that it is seen, m. */
+/** Height of the trail above the plate, so that it is visible, m. */
 const HEIGHT_M = 0.0006;
 
-/** The line that the ball leaves on the plate. */
+/** The trail of the ball on the plate. */
 export class Trail {
-  /** Three numbers for each moment; one buffer for good, so that nothing piles up. */
+  /** Three coordinates per point; one buffer that is never reallocated. */
   private readonly points = new Float32BufferAttribute(new Float32Array(LENGTH * 3), 3);
   private n = 0;
   private line?: Line;
 
-  /** The line anew, in the colours of now; its points stay. */
+  /** Builds the line with the colours of the current theme; keeps its points. */
   build(): Line {
     const material = new LineBasicMaterial({ color: colour("measured"), transparent: true, opacity: 0.7 });
     const line = new Line(new BufferGeometry().setAttribute("position", this.points), material);

@@ -4,17 +4,17 @@ import type { Asset } from "../../api/types";
 import { useLatest } from "../../hooks/use-latest";
 import type { RigScene } from "./rig-scene";
 
-/** Longest wait for a moment in which the page has nothing else to do, ms. */
+/** Longest wait for the page to be idle, ms. */
 const IDLE_MS = 1500;
 
-/** The next moment in which the page has nothing else to do. */
+/** Resolves when the page is idle. */
 const idle = () =>
   new Promise<void>((resume) => {
     if ("requestIdleCallback" in window) requestIdleCallback(() => resume(), { timeout: IDLE_MS });
     else setTimeout(resume, IDLE_MS / 5);
   });
 
-/** The scene on `canvas`: loaded when the page is idle, built anew when the rig's shape changes. */
+/** The scene on `canvas`: loaded when the page is idle, rebuilt when the shape of the rig changes. */
 export function useScene(canvas: RefObject<HTMLCanvasElement | null>, asset: Asset) {
   const scene = useRef<RigScene | null>(null);
   const [state, setState] = useState<"loading" | "shown" | "failed">("loading");
@@ -23,7 +23,7 @@ export function useScene(canvas: RefObject<HTMLCanvasElement | null>, asset: Ass
   useEffect(() => {
     let isGone = false;
     const load = async () => {
-      // First what can be read and pressed, then what takes long to load.
+      // Text and controls come first: the code of the scene is large.
       await idle();
       const { RigScene } = await import("./rig-scene");
       if (isGone) return;

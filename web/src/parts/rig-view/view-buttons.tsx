@@ -5,7 +5,7 @@ import type { RigScene } from "./rig-scene";
 
 const VIEWS: ViewName[] = ["free", "top", "along x", "along y"];
 
-/** From where the scene is looked at, and whether its frames of reference are shown. */
+/** Buttons for the views of the camera and for the frames of reference. */
 export function ViewButtons({ scene }: { scene: RefObject<RigScene | null> }) {
   const [view, setView] = useState<ViewName>("free");
   const [hasFrames, setFrames] = useState(true);

@@ -1,18 +1,18 @@
 import type { PlateSize } from "../../live/rig-size";
 
-/** Room about the plate, px. */
+/** Margin around the plate, px. */
 const MARGIN = 24;
 
-/** A canvas on which the plate is seen from above: x to the right, y up. */
+/** A canvas with the plate seen from above: x to the right, y up. */
 export interface PlanView {
   context: CanvasRenderingContext2D;
-  /** Pixels for a metre. */
+  /** Pixels per metre. */
   scale: number;
-  /** Where a point of the plate, m, is on the canvas. */
-  place: (x: number, y: number) => [number, number];
+  /** Converts a point of the plate, m, to a point of the canvas, px. */
+  toCanvas: (x: number, y: number) => [number, number];
 }
 
-/** The canvas, empty, with as many pixels as the screen shows of it. */
+/** Clears the canvas and fits its resolution to the screen. */
 export function planView(canvas: HTMLCanvasElement, plate: PlateSize): PlanView {
   const { clientWidth: width, clientHeight: height } = canvas;
   const ratio = devicePixelRatio;
@@ -22,5 +22,5 @@ export function planView(canvas: HTMLCanvasElement, plate: PlateSize): PlanView 
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
   context.clearRect(0, 0, width, height);
   const scale = Math.min((width - MARGIN) / plate.length, (height - MARGIN) / plate.width);
-  return { context, scale, place: (x, y) => [width / 2 + x * scale, height / 2 - y * scale] };
+  return { context, scale, toCanvas: (x, y) => [width / 2 + x * scale, height / 2 - y * scale] };
 }

@@ -5,11 +5,11 @@ import { drawXyTrace, type TraceMoment } from "./draw-xy-trace";
 
 interface Props {
   asset: Asset;
-  /** What to draw now; asked before each frame. */
+  /** Returns what to draw; called before each frame. */
   moment: () => TraceMoment | null;
 }
 
-/** The ball's way over the plate from above, with the twin's beside it. */
+/** The paths of the ball and of the twin's ball, seen from above. */
 export function XyTrace({ asset, moment }: Props) {
   const canvas = useRef<HTMLCanvasElement>(null);
   const drawn = useRef("");
@@ -23,6 +23,6 @@ export function XyTrace({ asset, moment }: Props) {
     drawn.current = key;
     drawXyTrace(element, asset, now);
   });
-  const label = "The ball's way over the plate seen from above, x to the right, y up";
+  const label = "Path of the ball on the plate, seen from above: x to the right, y up";
   return <canvas ref={canvas} class="xy" role="img" aria-label={label} />;
 }

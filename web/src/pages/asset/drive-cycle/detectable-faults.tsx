@@ -2,17 +2,17 @@ import type { DriveCycle } from "../../../api/types";
 import { codeTitle } from "../../../words/fault-names";
 import { seconds } from "../../../words/numbers";
 
-/** Which faults the cycle finds, as what and how soon, and which monitors it does not test. */
-export function FindableFaults({ cycle }: { cycle: DriveCycle }) {
+/** The faults that the cycle detects, with code and time, and the monitors that it does not test. */
+export function DetectableFaults({ cycle }: { cycle: DriveCycle }) {
   const untested = cycle.monitors.filter((monitor) => monitor.why_not);
   return (
     <div>
       <table class="numbers">
         <thead>
           <tr>
-            <th scope="col">If</th>
-            <th scope="col">found as</th>
-            <th scope="col">within</th>
+            <th scope="col">Fault</th>
+            <th scope="col">Reported as</th>
+            <th scope="col">Within</th>
           </tr>
         </thead>
         <tbody>
@@ -23,7 +23,7 @@ export function FindableFaults({ cycle }: { cycle: DriveCycle }) {
                 {codeTitle(code)}
                 {beside && <span class="quiet"> or {codeTitle(beside).toLowerCase()}</span>}
               </td>
-              <td>{after_s == null ? <span class="quiet">not for sure</span> : seconds(after_s)}</td>
+              <td>{after_s == null ? <span class="quiet">not in every trial</span> : seconds(after_s)}</td>
             </tr>
           ))}
         </tbody>

@@ -1,20 +1,20 @@
 import program from "../../../../../src/wire/drive_cycle/run.py?raw";
-import type { DriveCycle } from "../../../api/types";
+import type { DriveCycle, DriveCycleOrder } from "../../../api/types";
 import { CodeBlock } from "../../../parts/code-block";
 import { Facts } from "../../../parts/facts";
 import { saveFile, saveJson } from "../../../parts/save-file";
 import { millimetres, number, seconds } from "../../../words/numbers";
 import { cycleCsv } from "./cycle-csv";
-import { FindableFaults } from "./findable-faults";
+import { DetectableFaults } from "./detectable-faults";
 import { SetPointPlot } from "./set-point-plot";
 
-const ORDER: Record<string, string> = {
-  at_once: "along both axes at once",
-  staggered: "along both axes, y a little later",
+const ORDER: Record<DriveCycleOrder, string> = {
+  at_once: "along both axes simultaneously",
+  staggered: "along both axes, y a quarter of a period later",
   in_turn: "along x, then along y",
 };
 
-/** The larger of both angles, rad, in degrees with the space that other units have. */
+/** Formats the larger of two angles, rad, in degrees. */
 const larger = ({ x, y }: { x: number; y: number }) => number((Math.max(x, y) * 180) / Math.PI, 1, "°");
 
 export function DriveCycleDetails({ cycle }: { cycle: DriveCycle }) {
@@ -27,15 +27,15 @@ export function DriveCycleDetails({ cycle }: { cycle: DriveCycle }) {
           <Facts
             facts={[
               ["Duration", seconds(cycle.duration_s)],
-              ["Motion", ORDER[cycle.order] ?? cycle.order],
-              ["From the middle, x, y", `${millimetres(amplitude_m.x)}, ${millimetres(amplitude_m.y)}`],
-              ["Tilt at most", larger(cycle.tilt_rad)],
-              ["Level may differ by", larger(cycle.level_within_rad)],
+              ["Motion", ORDER[cycle.order]],
+              ["Amplitude x, y", `${millimetres(amplitude_m.x)}, ${millimetres(amplitude_m.y)}`],
+              ["Largest tilt", larger(cycle.tilt_rad)],
+              ["Tolerated change of level", larger(cycle.level_within_rad)],
             ]}
           />
           <SetPointPlot cycle={cycle} />
         </div>
-        <FindableFaults cycle={cycle} />
+        <DetectableFaults cycle={cycle} />
       </div>
       <div class="chips">
         <button type="button" onClick={() => saveJson(cycle, "drive-cycle.json")}>
@@ -48,8 +48,8 @@ export function DriveCycleDetails({ cycle }: { cycle: DriveCycle }) {
       <details>
         <summary>A program for the device</summary>
         <p class="quiet small-text">
-          It runs the JSON beside it and records what happens. A device with a controller of its own plays the
-          set points of the CSV instead. Numbers are in the device's own axes and units.
+          It runs drive-cycle.json from its own directory and records the motion. A device with a position
+          controller follows the set points of the CSV instead. All values are in the device's axes and units.
         </p>
         <CodeBlock label="Drive cycle program">{program}</CodeBlock>
       </details>

@@ -3,11 +3,11 @@ import { seconds } from "../../../words/numbers";
 
 const WIDTH = 320;
 const HEIGHT = 120;
-/** Room above and below the lines. */
-const ROOM = 6;
+/** Margin above and below the lines. */
+const MARGIN = 6;
 const MIDDLE = HEIGHT / 2;
 
-/** Where the drive cycle wants the ball, over time. */
+/** The set points of the ball in the drive cycle over time. */
 export function SetPointPlot({ cycle: { rows, duration_s } }: { cycle: DriveCycle }) {
   const values = [...rows.x_m, ...rows.y_m].filter((value) => value !== null);
   const largest = Math.max(...values.map(Math.abs), 1e-9);
@@ -15,7 +15,7 @@ export function SetPointPlot({ cycle: { rows, duration_s } }: { cycle: DriveCycl
     const placed = column.flatMap((value, i) => {
       if (value === null) return [];
       const x = (WIDTH * rows.t_s[i]!) / duration_s;
-      return [`${x},${MIDDLE - ((MIDDLE - ROOM) * value) / largest}`];
+      return [`${x},${MIDDLE - ((MIDDLE - MARGIN) * value) / largest}`];
     });
     return placed.join(" ");
   };

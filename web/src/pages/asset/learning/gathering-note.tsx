@@ -1,11 +1,11 @@
 import { Link } from "../../../router/link";
 import { setUpPath } from "../../../router/paths";
 
-/** What to know, and what to do instead, while the rig gathers motion to learn from. */
+/** A note on the automatic calibration while the service gathers motion, and the alternative. */
 export function GatheringNote({ name }: { name: string }) {
   return (
     <p class="quiet small-text">
-      Until then only faults of the sensor are confirmed. The rig learns by itself while it runs; or{" "}
+      Until then, only sensor faults are confirmed. The rig is learnt automatically while it runs, or you can{" "}
       <Link to={setUpPath(name, "learn")}>choose the recordings yourself</Link>.
     </p>
   );

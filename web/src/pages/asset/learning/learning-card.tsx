@@ -1,6 +1,6 @@
 import { useEffect } from "preact/hooks";
 import { api } from "../../../api/client";
-import type { Learning, State } from "../../../api/types";
+import type { Learning, LearningState, State } from "../../../api/types";
 import { useQuery } from "../../../hooks/use-query";
 import { ActionButton } from "../../../parts/action-button";
 import { ErrorMessage } from "../../../parts/error-message";
@@ -8,24 +8,24 @@ import { GatheringNote } from "./gathering-note";
 import { MotionProgress } from "./motion-progress";
 import { TeachingSessions } from "./teaching-sessions";
 
-const TITLES: Record<Learning["state"], string> = {
-  gathering: "This rig is not learnt yet",
-  learning: "Being learnt",
+const TITLES: Record<LearningState, string> = {
+  gathering: "This rig has not been learnt yet",
+  learning: "Learning",
   offered: "Ready: was the rig healthy?",
-  learnt: "Learnt by itself",
+  learnt: "Learnt automatically",
 };
 
-/** How often it is fetched once the rig is learnt: before, every state has it, ms. */
+/** Polling interval once the rig is learnt, ms; before, every state contains the progress. */
 const INTERVAL_MS = 15_000;
 
 interface Props {
   name: string;
   state?: State;
-  /** Called when what was learnt has been accepted or discarded. */
+  /** Called when the calibration has been accepted or discarded. */
   changed: () => Promise<unknown>;
 }
 
-/** A rig that learns by itself: how far it is, the question whether it was healthy, what was learnt. */
+/** The automatic calibration of a rig: its progress, and the question whether the rig was healthy. */
 export function LearningCard({ name, state, changed }: Props) {
   const { data, error, refetch } = useQuery(() => api.learning(name), `${name} learning`, INTERVAL_MS);
   const live = state?.learning;

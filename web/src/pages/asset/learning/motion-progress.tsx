@@ -1,6 +1,6 @@
 import type { Learning } from "../../../api/types";
 
-/** How much motion along each axis has been gathered of what is wanted. */
+/** The gathered motion along each axis, of the required motion. */
 export function MotionProgress({ learning: { x_s, y_s, wanted_s } }: { learning: Learning }) {
   const axes = [
     { axis: "x", gathered: x_s },

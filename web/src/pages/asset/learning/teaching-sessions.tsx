@@ -2,7 +2,7 @@ import type { Learning } from "../../../api/types";
 import { Link } from "../../../router/link";
 import { sessionPath } from "../../../router/paths";
 
-/** The sessions that the rig learns, or has learnt, from. */
+/** The sessions on which the calibration is based. */
 export function TeachingSessions({ sessions }: { sessions: Learning["sessions"] }) {
   if (!sessions.length) return null;
   return (

@@ -1,18 +1,18 @@
 import type { Trend, TrendPoint } from "../../../api/types";
 import { number } from "../../../words/numbers";
-import { isSureDrift, parameterOf, parameterText } from "./parameters";
+import { isSignificant, parameterOf, parameterText } from "./parameters";
 import { TrendPlot } from "./trend-plot";
 
-/** One parameter of one servo over the sessions, with what it comes to in words. */
+/** One parameter of one servo over the sessions, with its trend as text. */
 export function TrendChart({ trend, points }: { trend: Trend; points: TrendPoint[] }) {
   const parameter = parameterOf(trend);
   const { title, factor, digits } = parameter;
   const text = (value: number, moreDigits = 0) => parameterText(parameter, value, moreDigits);
-  const slope = `${text(trend.slope, 1)} a session`;
+  const slope = `${text(trend.slope, 1)} per session`;
   const sessionsLeft = trend.warning?.sessions_left;
   const label =
     `${title} of the ${trend.axis} servo over ${trend.sessions} sessions: now ${text(trend.level)}, ${slope}, ` +
-    `limits ${text(trend.limit_low)} and ${text(trend.limit_high)}${trend.warning ? "; it is warned of" : ""}`;
+    `limits ${text(trend.limit_low)} and ${text(trend.limit_high)}${trend.warning ? "; warning" : ""}`;
   return (
     <figure class={`trend${trend.warning ? " warned" : ""}`}>
       <figcaption>
@@ -24,7 +24,7 @@ export function TrendChart({ trend, points }: { trend: Trend; points: TrendPoint
       <TrendPlot trend={trend} points={points} label={label} />
       <p class="quiet small-text">
         limits {number(trend.limit_low * factor, digits)} and {text(trend.limit_high)};{" "}
-        {isSureDrift(trend) ? slope : "no sure drift"}
+        {isSignificant(trend) ? slope : "no significant drift"}
         {sessionsLeft != null && <b class="late">; at the limit in {Math.round(sessionsLeft)} sessions</b>}
       </p>
     </figure>

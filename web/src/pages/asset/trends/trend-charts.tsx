@@ -1,23 +1,23 @@
 import type { Trends } from "../../../api/types";
 import { TrendChart } from "./trend-chart";
 
-/** A chart for each parameter that is followed, or why there is none. */
+/** A chart for each tracked parameter, or the reason why there is none. */
 export function TrendCharts({ trends: { trends, points, calibration_id } }: { trends: Trends }) {
-  if (!calibration_id) return <p class="quiet">Nothing is followed until the rig has been learnt.</p>;
+  if (!calibration_id) return <p class="quiet">There are no trends before the rig has been learnt.</p>;
   const estimated = points.filter((point) => point.calibration_id === calibration_id);
   if (!trends.length)
     return (
       <p class="quiet">
-        {estimated.length} of 7 sessions that it takes have been estimated since the rig was learnt; each
-        needs twenty seconds in which the ball moves. A session counts once it has ended.
+        {estimated.length} of 7 required sessions have an estimate since the rig was learnt. An estimate needs
+        20 s of ball motion and is made when the session ends.
       </p>
     );
   return (
     <>
       <p class="quiet small-text">
-        One dot for each session since the rig was learnt, oldest on the left. A line that surely leads beyond
-        a limit (dashed) within 20 sessions is warned of. Compare like with like: another motion may move the
-        dots too.
+        One dot per session since the rig was learnt, oldest on the left. The page warns of a significant
+        trend that reaches a limit (dashed) within 20 sessions. Compare sessions with similar motion: a
+        different motion may shift the estimates too.
       </p>
       <div class="trends">
         {trends.map((trend) => (

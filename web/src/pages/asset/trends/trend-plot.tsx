@@ -1,26 +1,27 @@
 import type { Trend, TrendPoint } from "../../../api/types";
-import { estimates, isSureDrift, parameterOf, parameterText } from "./parameters";
+import { estimates, isSignificant, parameterOf, parameterText } from "./parameters";
 
 const WIDTH = 300;
 const HEIGHT = 110;
-/** Room at the sides and above and below. */
-const SIDE = 8;
-const HEAD = 6;
+/** Horizontal and vertical margins. */
+const MARGIN_X = 8;
+const MARGIN_Y = 6;
 
-/** Where values and sessions are in the plot. */
+/** Returns the scales from sessions and values to points of the plot. */
 function scales(trend: Trend, values: (number | null)[]) {
   const known = values.filter((value) => value !== null);
   const low = Math.min(trend.limit_low, ...known);
   const high = Math.max(trend.limit_high, ...known);
-  const room = (high - low) * 0.06;
+  const margin = (high - low) * 0.06;
   const last = Math.max(values.length - 1, 1);
   return {
-    x: (i: number) => SIDE + (WIDTH - 2 * SIDE) * (i / last),
-    y: (value: number) => HEAD + (HEIGHT - 2 * HEAD) * (1 - (value - low + room) / (high - low + 2 * room)),
+    x: (i: number) => MARGIN_X + (WIDTH - 2 * MARGIN_X) * (i / last),
+    y: (value: number) =>
+      MARGIN_Y + (HEIGHT - 2 * MARGIN_Y) * (1 - (value - low + margin) / (high - low + 2 * margin)),
   };
 }
 
-/** A dot for each session, the line through them where it is sure, and the limits. */
+/** A dot for each session, the fitted line if it is significant, and the limits. */
 export function TrendPlot({ trend, points, label }: { trend: Trend; points: TrendPoint[]; label: string }) {
   const parameter = parameterOf(trend);
   const values = estimates(trend, points);
@@ -34,7 +35,7 @@ export function TrendPlot({ trend, points, label }: { trend: Trend; points: Tren
         <line class="limit" x1={0} x2={WIDTH} y1={y(limit)} y2={y(limit)} />
       ))}
       <line class="nominal" x1={0} x2={WIDTH} y1={y(trend.nominal)} y2={y(trend.nominal)} />
-      {isSureDrift(trend) && (
+      {isSignificant(trend) && (
         <line class="slope" x1={x(0)} x2={x(last)} y1={y(fitted(0))} y2={y(fitted(last))} />
       )}
       {values.map(

@@ -2,12 +2,12 @@ import type { Trends } from "../../../api/types";
 import { codeTitle } from "../../../words/fault-names";
 import { sentence } from "../../../words/sentence";
 
-/** Parameters on their way to a fault, on top of the rig's page. */
+/** Warnings of drifting parameters at the top of the rig's page. */
 export function TrendWarnings({ trends }: { trends?: Trends }) {
   const warnings = trends?.trends.flatMap((trend) => trend.warning ?? []) ?? [];
   if (!warnings.length) return null;
   return (
-    <ul class="banner-list" aria-label="Faults on their way">
+    <ul class="banner-list" aria-label="Drift warnings">
       {warnings.map(({ code, parameter, summary }) => (
         <li>
           <a href="#drift" class="banner">

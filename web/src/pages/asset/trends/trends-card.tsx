@@ -4,7 +4,7 @@ import { ErrorMessage } from "../../../parts/error-message";
 import { Loading } from "../../../parts/loading";
 import { TrendCharts } from "./trend-charts";
 
-/** Drift before fault: what each session estimated of both servos, the line through it, and its limits. */
+/** The trends of both servos: estimates per session, fitted lines, and limits. */
 export function TrendsCard({ query: { data, error, refetch } }: { query: Query<Trends> }) {
   return (
     <section class="card" id="drift">
