@@ -269,3 +269,21 @@ async fn an_ended_session_accepts_no_new_samples() {
     client.post("assets/a/sessions", &json!({"name":"one"})).await.problem(409);
     client.post("assets/a/sessions", &json!({"name":"two"})).await.problem(409);
 }
+
+/// A device that sends until it gets 200 must get there, also with a row that was rejected.
+#[tokio::test]
+async fn a_batch_with_an_invalid_row_is_acknowledged_again_after_its_session_has_ended() {
+    let fixture = service().await;
+    let client = &fixture.client;
+    let mut samples = rig(100, 100);
+    samples[7].x_m = Some(1e9);
+    let first = client.telemetry("a", Some("one"), &samples).await;
+    client.end("a", "one").await;
+    client.telemetry("a", Some("two"), &samples[..3]).await;
+    let again = client.telemetry("a", Some("one"), &samples).await;
+    assert_eq!((&first["accepted"], &again["duplicate"]), (&json!(99), &json!(99)));
+    assert_eq!(again["rejected"], first["rejected"]);
+    assert_eq!(again["rejected"][0]["index"], 7);
+    assert_eq!(client.session("a", "one").await["rejected"], 1);
+    assert_eq!(client.session("a", "two").await["rejected"], 0, "another session's row");
+}

@@ -3,10 +3,10 @@
 use super::actor::Asset;
 use super::sessions::SessionSwitch;
 use super::turn::Turn;
-use crate::service::ServiceError;
+use crate::service::{ServiceError, views};
 use crate::store::{SessionRow, Write};
 use crate::wire::telemetry::{AckView, Batch, RowView, sample_key, sample_keys};
-use offbd_core::engine::Admission;
+use offbd_core::engine::{Admission, rejection};
 use offbd_core::vocabulary::Sample;
 
 /// Limit of the chunks of a session that are searched for retransmitted samples; older
@@ -40,7 +40,11 @@ impl Asset {
         if let (Some(open), Some((_, last))) = (&self.open, samples.last()) {
             turn.env.presences.record(&self.row.name, &open.id, turn.at, last.t_s);
         }
-        self.count_rejected(ack.rejected.len(), turn);
+        if ack.session_id.is_none()
+            || ack.session_id == self.open.as_ref().map(|open| open.id.clone())
+        {
+            self.count_rejected(ack.rejected.len(), turn);
+        }
         self.learn_if_due(turn)?;
         ack.rejected.sort_by_key(|row| row.index);
         count(&ack);
@@ -170,36 +174,48 @@ fn count(ack: &AckView) {
     outcome("late", ack.late.len());
 }
 
-/// Acknowledges samples of an ended session as duplicates.
+/// Whether the recording contains exactly this sample, so that it is a retransmission.
+fn is_recorded(session: &str, sample: &Sample, turn: &Turn<'_>) -> Result<bool, ServiceError> {
+    let (handles, range) = (&turn.env.handles, (sample.t_s, sample.t_s));
+    let chunks = handles.store.chunks_between(session, range, MAX_CHUNKS_SEARCHED);
+    Ok(handles.wait(chunks)?.iter().flatten().any(|recorded| recorded == sample))
+}
+
+/// Acknowledges samples for a session that has ended, if they are recorded already. Rows
+/// that the engine rejects were never recorded, and are rejected again.
 ///
 /// # Errors
-/// [`ServiceError::SessionEnded`] if one of them is not recorded.
+/// [`ServiceError::SessionEnded`] if another one is not recorded.
 fn retransmitted(
     row: &SessionRow,
     samples: &[(usize, Sample)],
     turn: &Turn<'_>,
     ack: &mut AckView,
 ) -> Result<(), ServiceError> {
-    let times = samples.iter().map(|(_, sample)| sample.t_s).filter(|t_s| t_s.is_finite());
-    let first = times.clone().fold(f64::INFINITY, f64::min);
-    let last = times.fold(f64::NEG_INFINITY, f64::max);
+    let rig = views::rig(&row.setup)?;
+    let mut recorded = Vec::with_capacity(samples.len());
+    for (index, sample) in samples {
+        match rejection(&rig, sample) {
+            None => recorded.push(sample),
+            Some(why) => {
+                count_unjudged(why.as_str());
+                ack.rejected.push(RowView { index: *index, reason: why.to_string() });
+            }
+        }
+    }
+    let times = recorded.iter().map(|sample| sample.t_s);
+    let range =
+        (times.clone().fold(f64::INFINITY, f64::min), times.fold(f64::NEG_INFINITY, f64::max));
     let handles = &turn.env.handles;
-    let chunks = handles.store.chunks_between(&row.id, (first, last), MAX_CHUNKS_SEARCHED);
+    let chunks = handles.store.chunks_between(&row.id, range, MAX_CHUNKS_SEARCHED);
     let known = sample_keys(handles.wait(chunks)?.iter().flatten());
-    if !samples.iter().all(|(_, sample)| known.contains(&sample_key(sample))) {
+    if !recorded.iter().all(|sample| known.contains(&sample_key(sample))) {
         let (asset, name) = (row.asset.clone(), row.name.clone());
         return Err(ServiceError::SessionEnded { asset, name });
     }
-    ack.duplicate += samples.len();
+    ack.duplicate += recorded.len();
     ack.session = Some(row.name.clone());
     ack.session_id = Some(row.id.clone());
     ack.last_seq = row.progress.last_seq.and_then(|seq| u64::try_from(seq).ok());
     Ok(())
-}
-
-/// Whether the recording contains exactly this sample, so that it is a retransmission.
-fn is_recorded(session: &str, sample: &Sample, turn: &Turn<'_>) -> Result<bool, ServiceError> {
-    let (handles, range) = (&turn.env.handles, (sample.t_s, sample.t_s));
-    let chunks = handles.store.chunks_between(session, range, MAX_CHUNKS_SEARCHED);
-    Ok(handles.wait(chunks)?.iter().flatten().any(|recorded| recorded == sample))
 }

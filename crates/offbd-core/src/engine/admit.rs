@@ -5,7 +5,7 @@
 
 use alloc::collections::VecDeque;
 
-use super::{Admission, AxisMapping, Rejection};
+use super::{Admission, AxisMapping, Rejection, Rig};
 use crate::vocabulary::Sample;
 
 /// Largest plausible time, s. Chosen: over 30 000 years.
@@ -110,6 +110,13 @@ pub(super) struct Admit {
     suspect: Option<SuspectedClockJump>,
 }
 
+/// Returns why the engine of `rig` would reject `sample`, whatever came before it; `None`
+/// if it would not.
+#[must_use]
+pub fn rejection(rig: &Rig, sample: &Sample) -> Option<Rejection> {
+    Admit::new(&rig.mapping).check(sample).err()
+}
+
 impl Admit {
     pub(super) fn new(mapping: &AxisMapping) -> Self {
         Self {
@@ -140,6 +147,7 @@ impl Admit {
         Admission::Accepted
     }
 
+    /// Checks the numbers of a sample, whatever came before it.
     fn check(&self, sample: &Sample) -> Result<(), Rejection> {
         let fields = [
             ("t_s", Some(sample.t_s), MAX_TIME_S),

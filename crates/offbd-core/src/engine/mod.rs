@@ -23,6 +23,7 @@ mod types;
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
+pub use admit::rejection;
 pub use calibrate::{CannotCalibrate, calibrate, calibrate_with_prospects};
 pub use drive_cycle::{
     DriveCycle, DriveLaw, FaultVerdict, Feedback, MonitorVerdict, NoDriveCycle, NotReached, Order,

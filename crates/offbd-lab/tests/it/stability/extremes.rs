@@ -136,3 +136,16 @@ fn every_step_of_six_decades_ends_in_a_number_or_says_why_not() {
         }
     }
 }
+
+/// The planar model is for balls: for a block the error states that, and not that a number
+/// is not finite, which would blame the step.
+#[test]
+fn a_planar_run_of_a_block_is_an_error_that_names_the_block() {
+    let mut scene = scene(Contact::CHAPTER, 0.4);
+    scene.subject = Scene::block(0.02, 0.1, &scene.plate).unwrap();
+    for &method in Model::Planar.methods() {
+        let configuration = Configuration::new(Model::Planar, method, Pace::Step(1e-3)).unwrap();
+        let failure = run(&scene, &mut s1(), &configuration, None).unwrap_err();
+        assert_eq!(failure.to_string(), "a block does not roll at 0.000000 s", "{method}");
+    }
+}
