@@ -29,6 +29,6 @@ pub use memory::{FaultMemory, FaultRecord, InUse, MemoryRules};
 pub use outlier::{GateOutcome, OutlierGate, PositionJump, UNKNOWN_NOISE_M};
 pub use scatter::{Scatter, bend_m, blur_m};
 pub use servo::{AxisPrior, LearntPrior, ServoAnswer, ServoEstimate, ServoFilterBank, TwinPath};
-pub use settings::{Profile, Settings};
+pub use settings::{LONGEST_GAP_S, Profile, Settings};
 pub use status::StatusByte;
 pub use stillness::{AxisStillness, Reading, Stillness};

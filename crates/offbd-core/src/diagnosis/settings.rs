@@ -51,6 +51,9 @@ impl FromStr for Profile {
 
 /// Sample periods without a sample that make a gap, if longer than `gap_s`. Chosen.
 const GAP_PERIODS: f64 = 4.0;
+/// Longest interval between samples that is not a gap, s: the longest that the twin
+/// computes in one call.
+pub const LONGEST_GAP_S: f64 = 5.0;
 
 /// Time for which a jump of the readings counts as evidence, s; the debounce that the
 /// owner asks for is added. Chosen.
@@ -182,10 +185,10 @@ impl Settings {
     }
 
     /// Returns the interval without a sample that makes a gap, s, for samples `period_s`
-    /// apart.
+    /// apart; at most [`LONGEST_GAP_S`].
     #[must_use]
     pub fn gap_after_s(&self, period_s: f64) -> f64 {
-        self.gap_s.max(GAP_PERIODS * period_s)
+        self.gap_s.max(GAP_PERIODS * period_s).min(LONGEST_GAP_S)
     }
 
     /// Time for which a jump of the readings counts as evidence, s.

@@ -15,9 +15,9 @@ use super::monitor::Monitor;
 use super::{MonitorState, Reach, Readiness, Rig, Setup, State};
 use crate::diagnosis::{
     AxisEvidence, AxisPrior, DebounceTimes, Evaluator, Evidence, FaultMemory, Finding, GateOutcome,
-    InUse, LearntPrior, Limits, OutlierGate, PositionJump, Profile, Qualified, Reading, Scatter,
-    SensorLimits, ServoEstimate, ServoFilterBank, Settings, Stillness, Surroundings, Test,
-    Transition, TwinPath, UNKNOWN_NOISE_M, bend_m, blur_m,
+    InUse, LONGEST_GAP_S, LearntPrior, Limits, OutlierGate, PositionJump, Profile, Qualified,
+    Reading, Scatter, SensorLimits, ServoEstimate, ServoFilterBank, Settings, Stillness,
+    Surroundings, Test, Transition, TwinPath, UNKNOWN_NOISE_M, bend_m, blur_m,
 };
 use crate::plant::{LONGEST_SPAN_S, RollingState, Twin};
 use crate::vocabulary::{Axis, CLOCK_RESOLUTION_S, FaultCode, PerAxis, Sample, SimTime};
@@ -37,6 +37,8 @@ const LEAST_JUDGED_SAMPLES: f64 = LEAST_SAMPLES / 2.0;
 /// Distance of the twin's free path from the ball at which the twin is rebased, m.
 /// Chosen: seldom reached, and small enough that positions keep their digits.
 const REBASE_M: f64 = 1.0;
+
+const _: () = assert!(LONGEST_GAP_S <= LONGEST_SPAN_S, "the twin computes whatever is no gap");
 
 /// The state of the stages.
 #[derive(Clone, Debug)]
@@ -197,7 +199,7 @@ impl Pipeline {
     }
 
     fn gap_s(&self) -> f64 {
-        self.settings.gap_after_s(self.period_s.unwrap_or(0.0)).min(LONGEST_SPAN_S)
+        self.settings.gap_after_s(self.period_s.unwrap_or(0.0))
     }
 
     /// The window needed for the least number of samples, s.

@@ -105,6 +105,9 @@ impl fmt::Display for Fidelity {
                 f,
                 "small angles would neglect up to {left_out:.1e} m/s², {accuracy:.1e} is allowed"
             ),
+            Rung::Sliding if self.demand.is_infinite() => {
+                write!(f, "rolling needs the plate to pull, or needed it a moment ago")
+            }
             Rung::Sliding => write!(
                 f,
                 "rolling needs {:.0} % of the available friction, or needed it a moment ago",

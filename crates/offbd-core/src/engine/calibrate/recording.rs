@@ -12,7 +12,7 @@ use crate::engine::Rig;
 use crate::engine::edge::Edge;
 use crate::engine::frame::{Moment, Repeats, moment};
 use crate::maths::median;
-use crate::plant::{LONGEST_SPAN_S, RollingState, Twin, TwinModel, resistance_share};
+use crate::plant::{RollingState, Twin, TwinModel, resistance_share};
 use crate::vocabulary::{Axis, PerAxis, Sample, SimTime};
 
 /// Least samples in a window, which is extended if necessary. Chosen.
@@ -62,7 +62,7 @@ impl Recording {
         moments.dedup_by_key(|m| m.at);
         let mut steps: Vec<f64> = moments.windows(2).map(|w| w[1].at - w[0].at).collect();
         let period_s = median(&mut steps).unwrap_or(0.0);
-        let gap_s = Settings::default().gap_after_s(period_s).min(LONGEST_SPAN_S);
+        let gap_s = Settings::default().gap_after_s(period_s);
         let (velocity, resisted, bounced) = Default::default();
         let longest_repeat_s = PerAxis::from_fn(|axis| longest_repeat_s(&moments, axis, gap_s));
         let refresh_s = refresh_s(&moments, period_s);
