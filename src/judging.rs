@@ -6,7 +6,7 @@
 //! only that of the summary.
 
 use offbd_core::diagnosis::{Evidence, FaultMemory, Transition};
-use offbd_core::engine::{Admission, Engine, Input, Misfit, Plausibility, Setup};
+use offbd_core::engine::{Admission, Engine, Input, Misfit, Plausibility, Rejection, Setup};
 use offbd_core::vocabulary::Sample;
 
 use crate::wire::basis::Basis;
@@ -17,33 +17,13 @@ use crate::wire::verdict::{SummaryView, Verdict};
 pub struct Counts {
     /// Samples that were neither duplicates nor rejected.
     pub n_samples: u64,
-    /// Samples of these whose time was too late, or too far ahead, to be judged.
+    /// Samples of these that are not judged: their time was too late, or a step of the
+    /// clock that no other confirmed.
     pub n_set_aside: u64,
     /// Earliest and latest time of the judged samples, s on the device's clock.
     pub span_s: Option<(f64, f64)>,
-}
-
-impl Counts {
-    fn count(&mut self, t_s: f64, admission: Admission) {
-        match admission {
-            Admission::Accepted => {
-                let (first, last) = self.span_s.unwrap_or((t_s, t_s));
-                self.span_s = Some((first.min(t_s), last.max(t_s)));
-                self.n_samples += 1;
-            }
-            Admission::SetAside(_) => {
-                self.n_samples += 1;
-                self.n_set_aside += 1;
-            }
-            Admission::Duplicate | Admission::Rejected(_) => {}
-        }
-    }
-
-    /// Time from the earliest to the latest judged sample, s.
-    #[must_use]
-    pub fn duration_s(&self) -> f64 {
-        self.span_s.map_or(0.0, |(first, last)| last - first)
-    }
+    /// Time from the first of these to the last, s.
+    pub duration_s: f64,
 }
 
 /// A session that is being judged.
@@ -53,7 +33,8 @@ pub struct Judging {
     basis: Basis,
     plausibility: Plausibility,
     verdict: Verdict,
-    counts: Counts,
+    /// Samples that were neither duplicates nor rejected.
+    n_samples: u64,
     /// The changes of faults that the last input caused.
     transitions: Vec<Transition>,
 }
@@ -67,14 +48,24 @@ impl Judging {
             plausibility: Plausibility::new(&setup.rig),
             engine: Engine::new(setup, memory),
             verdict: Verdict::default(),
-            counts: Counts::default(),
+            n_samples: 0,
             transitions: Vec::new(),
         }
     }
 
-    /// Takes one sample.
+    /// Takes one sample that may be a retransmission.
     pub fn sample(&mut self, sample: Sample) -> Admission {
         self.observe(Input::Sample(sample), |_| {}).unwrap_or(Admission::Duplicate)
+    }
+
+    /// Takes one sample that is no retransmission.
+    pub fn new_sample(&mut self, sample: Sample) -> Admission {
+        self.observe(Input::NewSample(sample), |_| {}).unwrap_or(Admission::Duplicate)
+    }
+
+    /// Notes that a sample was rejected by the caller, who has looked it up.
+    pub fn note_rejected(&mut self, why: Rejection) {
+        self.engine.note_rejected(why);
     }
 
     /// Takes one input. Returns the admission of a sample, `None` for other inputs.
@@ -85,16 +76,14 @@ impl Judging {
     /// Takes one input like [`Judging::input`], and calls `observer` with the evidence of
     /// each sample that is judged thereby, in order of time.
     pub fn observe(&mut self, input: Input, observer: impl FnMut(&Evidence)) -> Option<Admission> {
-        let sample = if let Input::Sample(sample) = &input { Some(*sample) } else { None };
-        if let Some(sample) = &sample {
+        if let Input::Sample(sample) | Input::NewSample(sample) = &input {
             self.plausibility.take(sample);
         }
         self.transitions.clear();
         let admission = self.engine.observe(input, &mut self.transitions, observer);
         self.verdict.take(admission, &self.transitions);
-        if let (Some(sample), Some(admission)) = (sample, admission) {
-            self.counts.count(sample.t_s, admission);
-        }
+        let is_recorded = matches!(admission, Some(Admission::Accepted | Admission::SetAside(_)));
+        self.n_samples += u64::from(is_recorded);
         admission
     }
 
@@ -118,8 +107,13 @@ impl Judging {
 
     /// The counts of the samples so far.
     #[must_use]
-    pub const fn counts(&self) -> &Counts {
-        &self.counts
+    pub fn counts(&self) -> Counts {
+        Counts {
+            n_samples: self.n_samples,
+            n_set_aside: self.engine.n_set_aside(),
+            span_s: self.engine.span_s(),
+            duration_s: self.engine.duration_s(),
+        }
     }
 
     /// Returns whether a fault has been confirmed in this session.
@@ -137,9 +131,8 @@ impl Judging {
     /// The summary of the session, with the name `session` and `n_rejected` rejected rows.
     #[must_use]
     pub fn summary(&self, session: &str, n_rejected: u64) -> SummaryView {
-        let Counts { n_samples, .. } = self.counts;
         self.verdict
-            .summary(session, n_samples, n_rejected, self.counts.duration_s())
+            .summary(session, self.n_samples, n_rejected, self.engine.duration_s())
             .with_monitors(self.verdict.monitors(&self.engine.state()))
             .with_misfits(&self.misfits())
     }

@@ -24,7 +24,8 @@ pub(super) struct JudgedSession {
     pub summary: SummaryView,
     /// The first [`MAX_NAMED_ROWS`] rejected rows.
     pub bad_rows: Vec<RowError>,
-    /// Rows whose time was too late, or too far ahead, to be judged.
+    /// Rows that are not judged: their time was too late, or a step of the clock that no
+    /// other row confirmed.
     pub n_set_aside: u64,
     /// The estimate of each servo; `None` if there was too little motion.
     pub estimates: PerAxis<Option<ServoEstimate>>,
@@ -102,7 +103,12 @@ impl FileSession {
     }
 
     fn sample(&mut self, sample: Sample, line: u64) {
-        if let Admission::Rejected(reason) = self.judging.sample(sample) {
+        let admission = match self.judging.sample(sample) {
+            // Rows as old as this are no retransmissions in a recording.
+            Admission::Unknown => self.judging.new_sample(sample),
+            admission => admission,
+        };
+        if let Admission::Rejected(reason) = admission {
             self.reject(RowError { line, reason: reason.to_string() });
         }
         self.note_faults();
@@ -118,7 +124,7 @@ impl FileSession {
         self.judging.input(Input::End);
         self.note_faults();
         let misfits = self.judging.misfits();
-        let counts = *self.judging.counts();
+        let counts = self.judging.counts();
         if counts.span_s.is_none() {
             return Err(no_row(&misfits));
         }

@@ -35,6 +35,7 @@ use MetricKind::{Counter, Gauge, Seconds, Sizes};
 /// Every metric with its kind and its description.
 const METRICS: &[(&str, MetricKind, &str)] = &[
     ("offbd_ack_seconds", Seconds, "Time from the arrival of a batch to its acknowledgement"),
+    ("offbd_assets_untested", Gauge, "Assets whose samples are not judged"),
     ("offbd_bodies_bytes", Gauge, "Bytes of request bodies in memory"),
     ("offbd_build_info", Gauge, "Always 1; the label has the version"),
     ("offbd_commit_failures_total", Counter, "Failed commits, including retried ones"),
@@ -142,7 +143,7 @@ fn initialize_series() {
     }
     zero("offbd_refused_total", "status", &["401", "403", "405", "421", "429", "503"]);
     zero("offbd_samples_total", "outcome", &["accepted", "duplicate", "rejected", "late"]);
-    let reasons = ["form", "not_finite", "absurd", "late", "jump"];
+    let reasons = ["form", "not_finite", "absurd", "conflict", "too_old", "late", "jump"];
     zero("offbd_samples_unjudged_total", "reason", &reasons);
     zero("offbd_sessions_expired_total", "reason", &["age", "size"]);
     zero("offbd_turned_away_total", "queue", &["samples", "shard"]);
@@ -178,6 +179,7 @@ fn sample_gauges(app: &App) {
     let load = app.service.load();
     gauge!("offbd_samples_in_flight").set(load.samples as f64);
     gauge!("offbd_samples_in_flight_limit").set(app.service.limits().in_flight_samples as f64);
+    gauge!("offbd_assets_untested").set(app.service.n_untested() as f64);
     gauge!("offbd_writer_queue").set(load.writer as f64);
     for (shard, waiting) in load.shards.iter().enumerate() {
         gauge!("offbd_shard_queue", "shard" => shard.to_string()).set(*waiting as f64);

@@ -77,13 +77,18 @@ pub(super) struct SessionQuery {
 /// Formats: JSON rows as below; JSON columns (`{"t_s":[…],"x_m":[…],…}`); either document
 /// as MessagePack; NDJSON with one sample per line; CSV with the header of a session file.
 /// An invalid row is reported by its index; the valid rows are ingested. Within a session
-/// a sample is identified by `seq`, or by `t_s` if it has no `seq`; a sample that is sent
-/// again is counted as a duplicate and ignored, so that a batch can be retried safely.
+/// a sample is identified by `seq`, or by `t_s` if it has no `seq`. A sample that is sent
+/// again with the same values is counted as a duplicate and ignored, so that a batch can be
+/// retried safely; with other values it is rejected as a conflict.
 ///
 /// Without a session name the samples are added to the asset's open session, or to a new
-/// one. If the clock of such a device goes back by more than 10 s, together with its
-/// `seq`, the device has restarted and a new session is opened. A session name other than
-/// that of the open session ends the open session and opens one of that name.
+/// one: two conflicting samples in a row, or two whose clock has gone back by more than
+/// 10 s to times that are no gap of the recording, show that the device has restarted, and
+/// a new session is opened. A session name other than that of the open session ends the
+/// open session and opens one of that name.
+///
+/// A jump of the clock is followed once five samples in a row agree; a single wrong time
+/// costs one sample. Samples that fill a gap later are recorded and not judged.
 #[utoipa::path(post, path = "/assets/{asset}/telemetry", tag = "telemetry",
     operation_id = "post_telemetry",
     params(("asset" = String, description = "Name of the asset"), SessionQuery),

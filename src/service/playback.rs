@@ -28,7 +28,7 @@ pub(super) fn play(
             while let Some((_, action)) = actions.next_if(|(after, _)| *after <= n_played) {
                 let _ = take(action);
             }
-            if take(Input::Sample(sample)).is_break() {
+            if take(Input::NewSample(sample)).is_break() {
                 return Ok(());
             }
             n_played += 1;

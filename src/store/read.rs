@@ -50,6 +50,13 @@ pub(super) const SESSION: &str =
 const VISIBLE: &str = "expired_at IS NULL
     AND asset NOT IN (SELECT name FROM asset WHERE deleted_at IS NOT NULL) AND ";
 
+/// Most ranges of time in one query. Chosen: beyond it, chunks between two ranges are read
+/// as well.
+const MAX_TIME_RANGES: usize = 32;
+
+/// Gap that separates two ranges of time in a query, s. Chosen.
+const LONG_GAP_S: f64 = 10.0;
+
 impl Store {
     /// The asset `name`.
     ///
@@ -200,31 +207,36 @@ impl Store {
         Ok(Some(samples.split_off(usize::try_from(index - first_index).unwrap_or_default())))
     }
 
-    /// The samples of `session` in the journal, and those of its chunks that may have a
-    /// sample with a `t_s` from `first` to `last`: the latest chunks first, at most
-    /// `limit` of them.
-    pub async fn chunks_between(
+    /// The recorded samples of `session` with one of the `times`, which ascend. Returns
+    /// `None` if more than `limit` chunks would have to be searched.
+    pub async fn samples_at(
         &self,
         session: &str,
-        (first, last): (f64, f64),
+        times: &[f64],
         limit: u32,
-    ) -> Result<Vec<Vec<Sample>>, StoreError> {
-        let mut chunks = Vec::from_iter(self.journal.run(session)?.map(|run| run.samples));
-        let rows: Vec<(i64, Vec<u8>)> = sqlx::query_as(
-            "SELECT first_index, data FROM chunk
-             WHERE session = $1 AND min_t_s <= $3 AND max_t_s >= $2
-             ORDER BY first_index DESC LIMIT $4",
-        )
-        .bind(session)
-        .bind(first)
-        .bind(last)
-        .bind(i64::from(limit))
-        .fetch_all(&self.pool)
-        .await?;
-        for (first_index, data) in rows {
-            chunks.push(decode(session, first_index, &data)?);
+    ) -> Result<Option<Vec<Sample>>, StoreError> {
+        let is_asked = |sample: &Sample| {
+            let after = times.partition_point(|&t_s| t_s <= sample.t_s);
+            after > 0 && times[after - 1] == sample.t_s
+        };
+        // The journal first: what is folded meanwhile is in the chunks then.
+        let journal = self.journal.run(session)?.map(|run| run.samples).unwrap_or_default();
+        let mut found: Vec<Sample> = journal.into_iter().filter(is_asked).collect();
+        let mut query = QueryBuilder::new("SELECT first_index, data FROM chunk WHERE session = ");
+        query.bind(session.to_owned())?.push(" AND (");
+        for (i, (first, last)) in time_ranges(times).into_iter().enumerate() {
+            query.push(if i > 0 { " OR (min_t_s <= " } else { "(min_t_s <= " }).bind(last)?;
+            query.push(" AND max_t_s >= ").bind(first)?.push(")");
         }
-        Ok(chunks)
+        query.push(") ORDER BY first_index DESC LIMIT ").bind(i64::from(limit) + 1)?;
+        let rows: Vec<(i64, Vec<u8>)> = query.rows().fetch_all(&self.pool).await?;
+        if rows.len() > limit as usize {
+            return Ok(None);
+        }
+        for (first_index, data) in rows {
+            found.extend(decode(session, first_index, &data)?.into_iter().filter(is_asked));
+        }
+        Ok(Some(found))
     }
 
     /// The actions of people in `session`, in order.
@@ -469,6 +481,19 @@ fn push_page(query: &mut QueryBuilder, filter: &FaultFilter) -> Result<(), Store
         FaultOrder::Asset => " ORDER BY asset, code",
     });
     Ok(())
+}
+
+/// Cuts ascending `times` into at most [`MAX_TIME_RANGES`] ranges without long gaps.
+fn time_ranges(times: &[f64]) -> Vec<(f64, f64)> {
+    let mut ranges: Vec<(f64, f64)> = Vec::new();
+    for &t_s in times {
+        let is_full = ranges.len() == MAX_TIME_RANGES;
+        match ranges.last_mut() {
+            Some((_, last)) if is_full || t_s - *last <= LONG_GAP_S => *last = t_s,
+            _ => ranges.push((t_s, t_s)),
+        }
+    }
+    ranges
 }
 
 fn decode(session: &str, first_index: i64, data: &[u8]) -> Result<Vec<Sample>, StoreError> {

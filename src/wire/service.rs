@@ -16,7 +16,7 @@ use super::words::{
     ModelWord, ProfileWord, SessionState, StatusWord,
 };
 use offbd_core::diagnosis::StatusByte;
-use offbd_core::engine::{MonitorState, State};
+use offbd_core::engine::{MonitorState, State, Unjudged};
 use offbd_core::vocabulary::{Axis, FaultCode, PerAxis};
 
 /// One page of a list.
@@ -158,10 +158,29 @@ pub struct FleetEntryView {
     /// Delay of the last batch, relative to the smallest delay of a batch in the session, s;
     /// null until a batch arrives.
     pub lag_s: Option<f64>,
+    /// Why the rig is not tested at present: its latest samples are not judged; null if
+    /// they are.
+    #[serde(default)]
+    pub unjudged: Option<UnjudgedView>,
     /// Pending and confirmed faults.
     pub faults: Vec<FleetFaultView>,
     /// Warnings of expected faults: drifts of a servo from session to session.
     pub warnings: Vec<TrendWarningView>,
+}
+
+/// The latest samples of a rig, if they are not judged.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct UnjudgedView {
+    /// Number of consecutive samples that are not judged.
+    pub samples: u64,
+    /// Why the last of them is not judged.
+    pub reason: String,
+}
+
+/// Returns the view of a run of unjudged samples.
+#[must_use]
+pub fn unjudged_view(run: Unjudged) -> UnjudgedView {
+    UnjudgedView { samples: run.n, reason: run.why.to_string() }
 }
 
 /// Summary of an active fault.
@@ -246,8 +265,13 @@ pub struct StateView {
     pub samples: u64,
     /// Number of samples judged in this session.
     pub judged: u64,
-    /// Number of samples that wait for an earlier one.
+    /// Number of samples that wait for an earlier one, or until a jump of the clock is
+    /// confirmed.
     pub waiting: usize,
+    /// Why the rig is not tested at present: its latest samples are not judged, and the
+    /// evidence is that before them; null if they are judged.
+    #[serde(default)]
+    pub unjudged: Option<UnjudgedView>,
     /// The twin's ball position relative to the plate, m.
     pub twin_position_m: XyView,
     /// The twin's ball velocity relative to the plate, m/s.
@@ -279,6 +303,7 @@ pub fn state_view(asset: &str, session: Option<(&str, &str, u64)>, state: &State
         samples: session.map_or(0, |(_, _, samples)| samples),
         judged: state.n_judged,
         waiting: state.n_waiting,
+        unjudged: state.unjudged.map(unjudged_view),
         twin_position_m: xy(&state.twin_position_m),
         twin_velocity_m_s: xy(&state.twin_velocity_m_s),
         plate_angle_rad: xy(&state.plate_angle_rad),

@@ -8,8 +8,6 @@
 mod cells;
 mod lenient;
 
-use std::collections::BTreeSet;
-
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -163,8 +161,8 @@ pub struct AckView {
     pub duplicate: usize,
     /// Invalid rows, which are neither recorded nor judged.
     pub rejected: Vec<RowView>,
-    /// Samples that are recorded but not judged, because they are too late or their time is
-    /// far ahead.
+    /// Samples that are recorded but not judged: those that are too late, and those after a
+    /// jump of the clock, which are judged once the next samples confirm it.
     pub late: Vec<RowView>,
     /// Highest `seq` recorded in the session; null if no sample has one.
     pub last_seq: Option<u64>,
@@ -213,15 +211,10 @@ pub enum SampleKey {
     Time(u64),
 }
 
-/// Returns the keys of `samples`.
-pub fn sample_keys<'a>(samples: impl IntoIterator<Item = &'a Sample>) -> BTreeSet<SampleKey> {
-    samples.into_iter().map(sample_key).collect()
-}
-
 /// Returns the key of a sample.
 #[must_use]
 pub fn sample_key(sample: &Sample) -> SampleKey {
-    sample.seq.map_or_else(|| SampleKey::Time(sample.t_s.to_bits()), SampleKey::Seq)
+    sample.seq.map_or_else(|| SampleKey::Time((sample.t_s + 0.0).to_bits()), SampleKey::Seq)
 }
 
 #[cfg(test)]

@@ -258,8 +258,10 @@ impl StoreTest {
             prop_assert_eq!(row.progress, wanted.progress());
             prop_assert!(rows.contains(&row));
             let Some(last) = wanted.samples.last() else { continue };
-            let chunks = self.store.chunks_between(&wanted.id, (last.t_s, last.t_s), 100).await;
-            prop_assert!(chunks.unwrap().concat().contains(last));
+            let found = self.store.samples_at(&wanted.id, &[last.t_s], 100).await;
+            prop_assert!(found.unwrap().unwrap().contains(last));
+            let none = self.store.samples_at(&wanted.id, &[last.t_s + 0.125], 100).await;
+            prop_assert_eq!(none.unwrap().unwrap(), []);
         }
         Ok(())
     }

@@ -23,6 +23,7 @@ mod openapi;
 mod outage;
 mod outcome;
 mod retention;
+mod same_sample;
 mod same_verdict;
 mod service;
 mod support;

@@ -1,17 +1,15 @@
 //! Evaluating and recording a batch of samples.
 
 use super::actor::Asset;
+use super::recorded::RecordedSamples;
+use super::session::OpenSession;
 use super::sessions::SessionSwitch;
 use super::turn::Turn;
 use crate::service::{ServiceError, views};
 use crate::store::{SessionRow, Write};
-use crate::wire::telemetry::{AckView, Batch, RowView, sample_key, sample_keys};
-use offbd_core::engine::{Admission, rejection};
+use crate::wire::telemetry::{AckView, Batch, RowView};
+use offbd_core::engine::{Admission, Recognition, Rejection, rejection};
 use offbd_core::vocabulary::Sample;
-
-/// Limit of the chunks of a session that are searched for retransmitted samples; older
-/// samples are not found.
-const MAX_CHUNKS_SEARCHED: u32 = 32;
 
 impl Asset {
     /// Evaluates and records a batch; `importing` is set for a recording that is being
@@ -31,14 +29,15 @@ impl Asset {
         if !samples.is_empty() {
             match batch.session {
                 Some(name) => match self.switch(&name, turn)? {
-                    SessionSwitch::Open => drop(self.record(&samples, false, turn, &mut ack)?),
+                    SessionSwitch::Open => self.record_named(&samples, turn, &mut ack)?,
                     SessionSwitch::Ended(row) => retransmitted(&row, &samples, turn, &mut ack)?,
                 },
                 None => self.record_nameless(&samples, turn, &mut ack)?,
             }
         }
         if let (Some(open), Some((_, last))) = (&self.open, samples.last()) {
-            turn.env.presences.record(&self.row.name, &open.id, turn.at, last.t_s);
+            let unjudged = open.judging.engine().unjudged();
+            turn.env.presences.record(&self.row.name, &open.id, turn.at, last.t_s, unjudged);
         }
         if ack.session_id.is_none()
             || ack.session_id == self.open.as_ref().map(|open| open.id.clone())
@@ -51,78 +50,96 @@ impl Asset {
         Ok(ack)
     }
 
+    /// Records samples of the open session, which their batch has named.
+    pub(super) fn record_named(
+        &mut self,
+        samples: &[(usize, Sample)],
+        turn: &mut Turn<'_>,
+        ack: &mut AckView,
+    ) -> Result<(), ServiceError> {
+        let Some(open) = &self.open else { return Ok(()) };
+        let mut recorded = RecordedSamples::unremembered(open, samples, turn)?;
+        self.record(samples, &mut recorded, turn, ack)
+    }
+
     /// Records samples without a session name: in the open session, or in a new one if
-    /// none is open or the device has restarted.
+    /// none is open or the device has started anew.
     fn record_nameless(
         &mut self,
         samples: &[(usize, Sample)],
         turn: &mut Turn<'_>,
         ack: &mut AckView,
     ) -> Result<(), ServiceError> {
-        let mut rest = samples;
-        let mut detect_restart = true;
-        loop {
-            if self.open.is_none() {
-                self.open_nameless(turn)?;
-            }
-            let n_recorded = self.record(rest, detect_restart, turn, ack)?;
-            rest = &rest[n_recorded..];
-            let (Some((_, first)), Some(open)) = (rest.first(), &self.open) else {
-                return Ok(());
-            };
-            // Once per batch: a clock that jumps back and forth must not open many sessions.
-            detect_restart = false;
-            if !is_recorded(&open.id, first, turn)? {
-                self.end(turn)?;
-            }
+        let Some(open) = &mut self.open else {
+            self.open_nameless(turn)?;
+            return self.record_named(samples, turn, ack);
+        };
+        let mut recorded = RecordedSamples::unremembered(open, samples, turn)?;
+        let n_continued = open.continued_by(samples, &recorded);
+        let (samples, rest) = samples.split_at(n_continued);
+        self.record(samples, &mut recorded, turn, ack)?;
+        if rest.is_empty() {
+            return Ok(());
         }
+        // Once per batch: a clock that jumps back and forth must not open many sessions.
+        self.end(turn)?;
+        self.open_nameless(turn)?;
+        self.record_named(rest, turn, ack)
     }
 
     /// Evaluates and records `samples`, each with its index in the batch, in the open
-    /// session; with `detect_restart` only those before a restart of the device. Returns
-    /// how many were processed.
-    pub(super) fn record(
+    /// session; `recorded` are the earlier ones that its engine does not remember.
+    fn record(
         &mut self,
         samples: &[(usize, Sample)],
-        detect_restart: bool,
+        recorded: &mut RecordedSamples,
         turn: &mut Turn<'_>,
         ack: &mut AckView,
-    ) -> Result<usize, ServiceError> {
-        let Some(open) = &mut self.open else { return Ok(samples.len()) };
+    ) -> Result<(), ServiceError> {
+        let Some(open) = &mut self.open else { return Ok(()) };
         turn.engine_changed = true;
-        let first_index = open.progress.n_samples;
-        let mut recorded = Vec::with_capacity(samples.len());
+        let (first_index, n_dropped) = (open.progress.n_samples, open.n_unconfirmed());
+        let mut new = Vec::with_capacity(samples.len());
         let mut transitions = Vec::new();
-        let mut n_processed = 0;
+        // New samples that are in `recorded` too.
+        let mut n_added = 0;
         for (index, sample) in samples {
-            if detect_restart && open.seems_restarted(sample) {
-                break;
-            }
-            n_processed += 1;
             let row = |reason: String| RowView { index: *index, reason };
-            match open.take(sample) {
-                Admission::Accepted => recorded.push(*sample),
+            let mut admission = open.take(sample);
+            if admission == Admission::Unknown {
+                recorded.add(&new[n_added..]);
+                n_added = new.len();
+                admission = take_old(open, sample, recorded);
+            }
+            match admission {
+                Admission::Accepted => new.push(*sample),
                 Admission::SetAside(why) => {
-                    recorded.push(*sample);
-                    count_unjudged(why.as_str());
+                    new.push(*sample);
+                    // A jump may still be confirmed.
+                    let is_late = matches!(why, Rejection::Late { .. });
+                    count_unjudged(why.as_str(), u64::from(is_late));
                     ack.late.push(row(why.to_string()));
                 }
                 Admission::Duplicate => ack.duplicate += 1,
                 Admission::Rejected(why) => {
-                    count_unjudged(why.as_str());
+                    count_unjudged(why.as_str(), 1);
                     ack.rejected.push(row(why.to_string()));
+                }
+                Admission::Unknown => {
+                    count_unjudged(Rejection::TooOld.as_str(), 1);
+                    ack.rejected.push(row(Rejection::TooOld.to_string()));
                 }
             }
             open.report(&self.row.name, turn.at, &mut transitions)?;
         }
-        ack.accepted += recorded.len();
+        count_unjudged("jump", open.n_unconfirmed() - n_dropped);
+        ack.accepted += new.len();
         ack.session = Some(open.name.clone());
         ack.session_id = Some(open.id.clone());
         ack.last_seq = open.progress.last_seq.and_then(|seq| u64::try_from(seq).ok());
-        self.append(first_index, recorded, turn);
+        self.append(first_index, new, turn);
         turn.writes.append(&mut transitions);
-        self.write_memory(None, turn)?;
-        Ok(n_processed)
+        self.write_memory(None, turn)
     }
 
     fn append(&mut self, first_index: i64, samples: Vec<Sample>, turn: &mut Turn<'_>) {
@@ -143,6 +160,19 @@ impl Asset {
     }
 }
 
+/// Evaluates a sample that is older than those the engine remembers. Returns
+/// [`Admission::Unknown`] if it could not be looked up.
+fn take_old(open: &mut OpenSession, sample: &Sample, recorded: &RecordedSamples) -> Admission {
+    let rejection = match recorded.recognise(open.judging.engine().recognise(sample), sample) {
+        Recognition::New => return open.take_new(sample),
+        Recognition::Same => return Admission::Duplicate,
+        Recognition::Conflict => Rejection::conflict(sample),
+        Recognition::Taken | Recognition::Unknown => return Admission::Unknown,
+    };
+    open.judging.note_rejected(rejection);
+    Admission::Rejected(rejection)
+}
+
 /// Returns the valid samples, each with its row index; adds the other rows to the
 /// rejections.
 fn samples(rows: Vec<Result<Sample, String>>, ack: &mut AckView) -> Vec<(usize, Sample)> {
@@ -151,7 +181,7 @@ fn samples(rows: Vec<Result<Sample, String>>, ack: &mut AckView) -> Vec<(usize, 
         match row {
             Ok(sample) => samples.push((index, sample)),
             Err(reason) => {
-                count_unjudged("form");
+                count_unjudged("form", 1);
                 ack.rejected.push(RowView { index, reason });
             }
         }
@@ -159,9 +189,9 @@ fn samples(rows: Vec<Result<Sample, String>>, ack: &mut AckView) -> Vec<(usize, 
     samples
 }
 
-/// Counts a sample that is not evaluated. `reason` is a metric label with few values.
-fn count_unjudged(reason: &'static str) {
-    metrics::counter!("offbd_samples_unjudged_total", "reason" => reason).increment(1);
+/// Counts `n` samples that are not evaluated. `reason` is a metric label with few values.
+fn count_unjudged(reason: &'static str, n: u64) {
+    metrics::counter!("offbd_samples_unjudged_total", "reason" => reason).increment(n);
 }
 
 fn count(ack: &AckView) {
@@ -172,13 +202,6 @@ fn count(ack: &AckView) {
     outcome("duplicate", ack.duplicate);
     outcome("rejected", ack.rejected.len());
     outcome("late", ack.late.len());
-}
-
-/// Whether the recording contains exactly this sample, so that it is a retransmission.
-fn is_recorded(session: &str, sample: &Sample, turn: &Turn<'_>) -> Result<bool, ServiceError> {
-    let (handles, range) = (&turn.env.handles, (sample.t_s, sample.t_s));
-    let chunks = handles.store.chunks_between(session, range, MAX_CHUNKS_SEARCHED);
-    Ok(handles.wait(chunks)?.iter().flatten().any(|recorded| recorded == sample))
 }
 
 /// Acknowledges samples for a session that has ended, if they are recorded already. Rows
@@ -198,18 +221,13 @@ fn retransmitted(
         match rejection(&rig, sample) {
             None => recorded.push(sample),
             Some(why) => {
-                count_unjudged(why.as_str());
+                count_unjudged(why.as_str(), 1);
                 ack.rejected.push(RowView { index: *index, reason: why.to_string() });
             }
         }
     }
-    let times = recorded.iter().map(|sample| sample.t_s);
-    let range =
-        (times.clone().fold(f64::INFINITY, f64::min), times.fold(f64::NEG_INFINITY, f64::max));
-    let handles = &turn.env.handles;
-    let chunks = handles.store.chunks_between(&row.id, range, MAX_CHUNKS_SEARCHED);
-    let known = sample_keys(handles.wait(chunks)?.iter().flatten());
-    if !recorded.iter().all(|sample| known.contains(&sample_key(sample))) {
+    let found = RecordedSamples::find(&row.id, recorded.iter().copied(), turn)?;
+    if !found.contain_all(&recorded) {
         let (asset, name) = (row.asset.clone(), row.name.clone());
         return Err(ServiceError::SessionEnded { asset, name });
     }

@@ -59,8 +59,8 @@ fn reopen(env: &Environment, row: &SessionRow, refines: bool) -> Result<OpenSess
     let mut open = OpenSession::new(row.id.clone(), row.name.clone(), setup, baseline, refines);
     play(&env.handles, &row.id, |input| {
         match input {
-            Input::Sample(sample) => {
-                open.take(&sample);
+            Input::NewSample(sample) => {
+                open.take_new(&sample);
             }
             action => {
                 open.judging.input(action);

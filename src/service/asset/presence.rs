@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::store::Micros;
+use offbd_core::engine::Unjudged;
 
 /// The last telemetry of one asset.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,6 +14,8 @@ pub(in crate::service) struct Presence {
     pub(in crate::service) seen_at: Micros,
     /// Lag of the last batch behind the fastest batch of the session, s.
     pub(in crate::service) lag_s: f64,
+    /// The present run of unjudged samples, if the rig counts as not tested.
+    pub(in crate::service) unjudged: Option<Unjudged>,
     /// Smallest difference of arrival time and device clock in the session, s.
     least_offset_s: f64,
 }
@@ -29,16 +32,35 @@ impl Presences {
     }
 
     /// Records that a batch of `session`, whose last sample has the time `t_s`, arrived at
-    /// `at`.
-    pub(in crate::service) fn record(&self, asset: &str, session: &str, at: Micros, t_s: f64) {
+    /// `at`; `unjudged` is the run of unjudged samples after it.
+    pub(in crate::service) fn record(
+        &self,
+        asset: &str,
+        session: &str,
+        at: Micros,
+        t_s: f64,
+        unjudged: Option<Unjudged>,
+    ) {
         let offset_s = at as f64 / 1e6 - t_s;
         let mut all = self.lock();
         let before = all.get(asset).filter(|before| before.session == session);
         let least_offset_s = before.map_or(offset_s, |before| before.least_offset_s.min(offset_s));
         let lag_s = offset_s - least_offset_s;
         let session = session.to_owned();
-        let presence = Presence { session, seen_at: at, lag_s, least_offset_s };
+        let presence = Presence { session, seen_at: at, lag_s, unjudged, least_offset_s };
         all.insert(asset.to_owned(), presence);
+    }
+
+    /// Number of assets whose last samples were not judged.
+    pub(in crate::service) fn n_untested(&self) -> usize {
+        self.lock().values().filter(|presence| presence.unjudged.is_some()).count()
+    }
+
+    /// Records that `asset` has no open session, so that nothing is to be judged.
+    pub(in crate::service) fn end_session(&self, asset: &str) {
+        if let Some(presence) = self.lock().get_mut(asset) {
+            presence.unjudged = None;
+        }
     }
 
     pub(in crate::service) fn of(&self, asset: &str) -> Option<Presence> {
@@ -58,7 +80,7 @@ mod tests {
     fn lag_is_measured_against_the_fastest_batch_of_the_session() {
         let presences = Presences::default();
         let lag_s = |at_s: f64, t_s: f64, session: &str| {
-            presences.record("a", session, (at_s * 1e6) as Micros, t_s);
+            presences.record("a", session, (at_s * 1e6) as Micros, t_s, None);
             presences.of("a").unwrap().lag_s
         };
         assert!(lag_s(1000.5, 0.5, "one").abs() < 1e-6);

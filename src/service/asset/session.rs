@@ -11,10 +11,6 @@ use offbd_core::diagnosis::FaultMemory;
 use offbd_core::engine::{Admission, Setup, UsableMotion};
 use offbd_core::vocabulary::Sample;
 
-/// How far the clock of a device without session names must go back to count as a restart,
-/// s. A smaller step back makes the samples late.
-const RESTART_S: f64 = 10.0;
-
 /// An open session and its engine.
 pub(super) struct OpenSession {
     pub(super) id: String,
@@ -28,10 +24,8 @@ pub(super) struct OpenSession {
     pub(super) recent: RecentTrace,
     /// Motion usable for calibration; `None` if it is not counted.
     pub(super) motion: Option<UsableMotion>,
-    /// The latest time of an accepted sample.
-    latest_t_s: f64,
-    /// Whether the last sample was more than [`RESTART_S`] older than the latest.
-    stepped_back: bool,
+    /// Consecutive samples so far that show a restart of the device.
+    pub(super) n_restart_signs: u32,
 }
 
 impl OpenSession {
@@ -54,50 +48,40 @@ impl OpenSession {
             n_transitions: 0,
             importing: false,
             recent: RecentTrace::default(),
-            latest_t_s: f64::NEG_INFINITY,
-            stepped_back: false,
+            n_restart_signs: 0,
         }
     }
 
-    /// Evaluates one sample.
+    /// Evaluates one sample that may be a retransmission.
     pub(super) fn take(&mut self, sample: &Sample) -> Admission {
         let admission = self.judging.sample(*sample);
+        self.note(sample, admission)
+    }
+
+    /// Evaluates one sample that is no retransmission.
+    pub(super) fn take_new(&mut self, sample: &Sample) -> Admission {
+        let admission = self.judging.new_sample(*sample);
+        self.note(sample, admission)
+    }
+
+    fn note(&mut self, sample: &Sample, admission: Admission) -> Admission {
         if let (Admission::Accepted, Some(motion)) = (admission, &mut self.motion) {
             motion.take(sample);
         }
         if matches!(admission, Admission::Accepted | Admission::SetAside(_)) {
-            self.count(sample, admission == Admission::Accepted);
+            let progress = &mut self.progress;
+            progress.n_samples += 1;
+            (progress.first_t_s, progress.last_t_s) = self.judging.counts().span_s.unzip();
+            let seq = sample.seq.and_then(|seq| i64::try_from(seq).ok());
+            progress.last_seq = progress.last_seq.max(seq);
         }
         self.recent.push(|| self.judging.engine().state());
         admission
     }
 
-    fn count(&mut self, sample: &Sample, in_time: bool) {
-        self.stepped_back = self.is_far_behind(sample);
-        if in_time {
-            self.latest_t_s = self.latest_t_s.max(sample.t_s);
-        }
-        let progress = &mut self.progress;
-        progress.n_samples += 1;
-        (progress.first_t_s, progress.last_t_s) = self.judging.counts().span_s.unzip();
-        let seq = sample.seq.and_then(|seq| i64::try_from(seq).ok());
-        progress.last_seq = progress.last_seq.max(seq);
-    }
-
-    fn is_far_behind(&self, sample: &Sample) -> bool {
-        sample.t_s < self.latest_t_s - RESTART_S
-    }
-
-    /// Whether the device has restarted before `sample`: its clock has gone back by more
-    /// than [`RESTART_S`] and `seq` has not increased. Without `seq` two such samples in a
-    /// row are required, because a single one may be a clock error.
-    pub(super) fn seems_restarted(&self, sample: &Sample) -> bool {
-        let seq = sample.seq.and_then(|seq| i64::try_from(seq).ok());
-        self.is_far_behind(sample)
-            && match (seq, self.progress.last_seq) {
-                (Some(seq), Some(last)) => seq <= last,
-                _ => self.stepped_back,
-            }
+    /// Samples that are not judged because no other confirmed their step of the clock.
+    pub(super) fn n_unconfirmed(&self) -> u64 {
+        self.judging.engine().n_unconfirmed()
     }
 
     /// Appends the transitions caused by the last input to `writes`, with the time `at`.

@@ -130,6 +130,7 @@ impl Asset {
     pub(super) fn end(&mut self, turn: &mut Turn<'_>) -> Result<(), ServiceError> {
         let Some(mut open) = self.open.take() else { return Ok(()) };
         turn.engine_changed = true;
+        turn.env.presences.end_session(&self.row.name);
         open.judging.input(Input::End);
         open.report(&self.row.name, turn.at, &mut turn.writes)?;
         let summary = open.summary();

@@ -335,7 +335,7 @@ mod tests {
         let ingest = |asset: &mut Asset, turn: &mut Turn<'_>| {
             asset.open_nameless(turn)?;
             let sample = Sample { t_s: 1.0, x_m: Some(0.0), ..Sample::default() };
-            asset.record(&[(0, sample)], false, turn, &mut Default::default())?;
+            asset.record_named(&[(0, sample)], turn, &mut Default::default())?;
             // The error occurs before any write is collected.
             turn.writes.clear();
             Ok(())

@@ -90,7 +90,7 @@ struct ReplayRun<'a> {
 impl ReplayRun<'_> {
     fn take(&mut self, context: &JobContext, id: &str, input: Input) -> ControlFlow<()> {
         let n_recorded = u64::try_from(self.session.progress.n_samples).unwrap_or_default();
-        if self.n_played >= n_recorded && matches!(input, Input::Sample(_)) {
+        if self.n_played >= n_recorded && matches!(input, Input::NewSample(_)) {
             return ControlFlow::Break(());
         }
         if self.n_played.is_multiple_of(CHECK_EVERY) {
@@ -100,7 +100,7 @@ impl ReplayRun<'_> {
         if self.stopped {
             return ControlFlow::Break(());
         }
-        self.n_played += u64::from(matches!(input, Input::Sample(_)));
+        self.n_played += u64::from(matches!(input, Input::NewSample(_)));
         self.put(input);
         ControlFlow::Continue(())
     }

@@ -160,7 +160,7 @@ fn evaluate(
     let mut judging = Judging::new(setup, views::memory(&session.baseline)?);
     let (mut n_evaluated, mut ended) = (0, true);
     play(handles, &session.id, |input| {
-        if let Input::Sample(sample) = &input {
+        if let Input::NewSample(sample) = &input {
             n_evaluated += 1;
             builder.sample(sample);
             let closing = n_evaluated % CHECK_EVERY == 0 && handles.closing.is_cancelled();

@@ -43,7 +43,7 @@ pub(in crate::service) fn trace(
     let mut judging = Judging::new(setup, views::memory(&session.baseline)?);
     let mut decimator = Decimator::new(query.points, expected);
     play(handles, &session.id, |input| {
-        let is_sample = matches!(input, Input::Sample(_));
+        let is_sample = matches!(input, Input::NewSample(_));
         judging.input(input);
         let point = is_sample.then(|| TracePoint::of(&judging.engine().state())).flatten();
         let Some(point) = point.filter(|point| point.t_s() >= query.from_s) else {

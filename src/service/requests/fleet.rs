@@ -7,7 +7,7 @@ use crate::service::clock::rfc3339;
 use crate::service::{Service, ServiceError, views};
 use crate::store::{AssetRow, FaultRow, Micros, SessionRow, WarningRow};
 use crate::wire::asset::AssetView;
-use crate::wire::service::{FleetEntryView, FleetFaultView, Page};
+use crate::wire::service::{FleetEntryView, FleetFaultView, Page, unjudged_view};
 use crate::wire::stored::StoredRecord;
 use crate::wire::trend::TrendWarningView;
 
@@ -92,7 +92,8 @@ impl Service {
             samples: u64::try_from(progress.n_samples).unwrap_or_default(),
             last_t_s: progress.last_t_s,
             last_seen: seen.map(rfc3339),
-            lag_s: presence.map(|p| p.lag_s),
+            lag_s: presence.as_ref().map(|p| p.lag_s),
+            unjudged: presence.and_then(|p| p.unjudged).map(unjudged_view),
             asset: row.name,
         })
     }

@@ -62,4 +62,10 @@ impl Service {
         let shards = shards.iter().map(waiting).collect();
         QueueLoad { samples, shards, writer: waiting(handles.writer()) }
     }
+
+    /// Returns the number of assets whose latest samples are not judged.
+    #[must_use]
+    pub fn n_untested(&self) -> usize {
+        self.inner.presences.n_untested()
+    }
 }

@@ -4,6 +4,7 @@ const MARKS: Record<RigHealth, { symbol: string; word: string }> = {
   fault: { symbol: "▲", word: "fault" },
   suspect: { symbol: "◆", word: "suspected" },
   drift: { symbol: "◇", word: "drifting" },
+  untested: { symbol: "◌", word: "not tested" },
   ok: { symbol: "●", word: "no fault" },
   silent: { symbol: "○", word: "silent" },
   idle: { symbol: "○", word: "no session" },

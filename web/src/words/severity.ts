@@ -1,7 +1,7 @@
 import type { FaultStatus } from "../api/types";
 
-/** The health of a rig: its worst fault, a drift warning, or missing data. */
-export type RigHealth = "fault" | "suspect" | "drift" | "ok" | "silent" | "idle";
+/** The health of a rig: its worst fault, a drift warning, or samples that are missing or not judged. */
+export type RigHealth = "fault" | "suspect" | "drift" | "untested" | "ok" | "silent" | "idle";
 
 /** The state of a fault in the rig's fault memory. */
 export type FaultState = { status: FaultStatus; acknowledged?: boolean };

@@ -33,6 +33,7 @@ test("a rig's health is its worst fault, then drift, then silence", () => {
   assert.equal(healthOf(rig("a", { warnings: [{}] }), NOW), "drift");
   assert.equal(healthOf(rig("a"), NOW), "ok");
   assert.equal(healthOf(rig("a", { last_seen: ago(11) }), NOW), "silent");
+  assert.equal(healthOf(rig("a", { unjudged: { samples: 10, reason: "late" } }), NOW), "untested");
   assert.equal(healthOf(rig("a", { session_id: null }), NOW), "idle");
 });
 

@@ -1,8 +1,8 @@
 //! Second stage: puts samples in order of time.
 //!
 //! A sample waits for earlier ones for at most the reorder window, measured in the
-//! samples' own time. One whose `seq` follows directly on the last released does not
-//! wait. The order depends on the samples alone.
+//! samples' own time. One whose `seq` follows directly on the last released, with a time
+//! soon after it, does not wait. The order depends on the samples alone.
 
 use alloc::collections::VecDeque;
 
@@ -31,13 +31,14 @@ impl Align {
         self.waiting.insert(self.waiting.len() - after, sample);
     }
 
-    /// Returns the next sample in order if it is due.
-    pub(super) fn pop(&mut self, reorder_s: f64) -> Option<Sample> {
+    /// Returns the next sample in order if it is due, or if it follows the last one by at
+    /// most two sample intervals.
+    pub(super) fn pop(&mut self, reorder_s: f64, interval_s: f64) -> Option<Sample> {
         let next = self.waiting.front()?;
-        let follows = match (self.released.and_then(|r| r.seq), next.seq) {
-            (Some(last), Some(seq)) => last.checked_add(1) == Some(seq),
-            _ => false,
-        };
+        let follows = self.released.is_some_and(|last| {
+            let seq = last.seq.and_then(|seq| seq.checked_add(1));
+            seq.is_some() && seq == next.seq && next.t_s - last.t_s <= 2.0 * interval_s
+        });
         let due = self.newest_s - next.t_s >= reorder_s || self.waiting.len() > MAX_WAITING;
         if follows || due { self.flush() } else { None }
     }
@@ -47,6 +48,11 @@ impl Align {
         let next = self.waiting.pop_front()?;
         self.released = Some(next);
         Some(next)
+    }
+
+    /// Forgets the time of the samples released; none must wait.
+    pub(super) fn restart(&mut self) {
+        *self = Self::default();
     }
 
     /// Time of the last released sample, s.
@@ -72,7 +78,7 @@ mod tests {
         let mut out = Vec::new();
         for &s in samples {
             align.push(s);
-            while let Some(s) = align.pop(0.1) {
+            while let Some(s) = align.pop(0.1, 0.1) {
                 out.push(s.t_s);
             }
         }
@@ -95,9 +101,9 @@ mod tests {
         for (seq, t) in [(7, 0.0), (8, 0.01), (9, 0.15)] {
             align.push(sample(Some(seq), t));
         }
-        let out: Vec<f64> = core::iter::from_fn(|| align.pop(0.1)).map(|s| s.t_s).collect();
+        let out: Vec<f64> = core::iter::from_fn(|| align.pop(0.1, 0.1)).map(|s| s.t_s).collect();
         assert_eq!(out, [0.0, 0.01, 0.15]);
         align.push(sample(Some(11), 0.16));
-        assert!(align.pop(0.1).is_none(), "seq 10 may still come");
+        assert!(align.pop(0.1, 0.1).is_none(), "seq 10 may still come");
     }
 }

@@ -1,11 +1,12 @@
 //! The amount of data in a session, in seconds, independent of the enable conditions.
 
+use super::span::Span;
 use crate::vocabulary::{Axis, FaultCode, Sample};
 
 /// Time covered by data so far, s. Gaps between samples do not count.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Coverage {
-    first_s: Option<f64>,
+    span: Span,
     last_s: Option<f64>,
     /// Time with samples, s.
     sampled_s: f64,
@@ -16,7 +17,7 @@ pub(super) struct Coverage {
 impl Coverage {
     /// Takes the next sample in order; an interval longer than `gap_s` does not count.
     pub(super) fn take(&mut self, sample: &Sample, gap_s: f64) {
-        self.first_s.get_or_insert(sample.t_s);
+        self.span.take(sample.t_s);
         let dt = self.last_s.replace(sample.t_s).map_or(0.0, |last_s| sample.t_s - last_s);
         if !(0.0..=gap_s).contains(&dt) {
             return;
@@ -27,11 +28,16 @@ impl Coverage {
         }
     }
 
+    /// The clock is set back before the next sample.
+    pub(super) fn set_back(&mut self) {
+        self.span.set_back();
+    }
+
     /// Returns `judged_s` as a fraction of the session from its first sample to its last,
     /// gaps included, since nothing is judged in a gap. At most 1: a judgement counts for
     /// the period before it, which may begin before the first sample.
     pub(super) fn share(&self, judged_s: f64) -> f64 {
-        let session_s = self.last_s.zip(self.first_s).map_or(0.0, |(last, first)| last - first);
+        let session_s = self.span.duration_s();
         if session_s > 0.0 { (judged_s / session_s).min(1.0) } else { 0.0 }
     }
 

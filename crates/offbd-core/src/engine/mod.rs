@@ -1,6 +1,6 @@
 //! The engine: the pipeline of one rig as a synchronous state machine.
 //!
-//! admit → align → twin step → estimate acceleration → residual → enable conditions →
+//! admit → clock → align → twin step → estimate acceleration → residual → enable conditions →
 //! monitors → isolation → fault memory. Time comes from the samples. Equal inputs in
 //! equal order give bit-identical outputs, however they are batched. Never fails on data:
 //! a bad sample gives an output that says so. Independent of files, sockets, clocks and
@@ -10,15 +10,18 @@ mod acceleration_filter;
 mod admit;
 mod align;
 mod calibrate;
+mod clock;
 mod coverage;
 mod drive_cycle;
 mod edge;
 mod frame;
+mod ledger;
 mod monitor;
 mod motion;
 mod pipeline;
 mod plausibility;
 mod rig;
+mod span;
 mod types;
 
 #[cfg(not(feature = "std"))]
@@ -29,15 +32,18 @@ pub use drive_cycle::{
     DriveCycle, DriveLaw, FaultVerdict, Feedback, MonitorVerdict, NoDriveCycle, NotReached, Order,
     TriedFault, drive_cycle,
 };
+pub use ledger::Recognition;
 pub use motion::{UsableMotion, WANTED_MOTION_S};
 pub use plausibility::{Misfit, Plausibility};
 pub use rig::{AxisMapping, DiagnosticsSpec, MAX_NAME, Rig, ServoSpec, Setup};
-pub use types::{Admission, Input, MonitorState, Reach, Readiness, Rejection, State};
+pub use types::{Admission, Input, MonitorState, Reach, Readiness, Rejection, State, Unjudged};
 
 use admit::Admit;
 use align::Align;
+use clock::{ClockContext, ClockDecision, DeviceClock};
 use coverage::Coverage;
 use pipeline::Pipeline;
+use span::Span;
 
 use crate::diagnosis::{Evidence, FaultMemory, ServoEstimate, Transition};
 use crate::vocabulary::{FaultCode, PerAxis, Sample};
@@ -45,7 +51,11 @@ use crate::vocabulary::{FaultCode, PerAxis, Sample};
 /// Version of the judgement: raised with every change that gives another verdict on some
 /// recording by the same settings, so that verdicts of different versions can be told
 /// apart.
-pub const JUDGEMENT: u32 = 1;
+pub const JUDGEMENT: u32 = 2;
+
+/// Consecutive unjudged samples after which a rig counts as not tested. Chosen: a few late
+/// samples are common.
+const UNTESTED_AFTER: u64 = 10;
 
 /// The pipeline of one rig for one session (one operation cycle).
 #[derive(Clone, Debug)]
@@ -53,9 +63,14 @@ pub struct Engine {
     setup: Setup,
     memory: FaultMemory,
     admit: Admit,
+    clock: DeviceClock,
     align: Align,
+    span: Span,
     coverage: Coverage,
     pipeline: Pipeline,
+    /// Samples that were too late to be judged.
+    n_late: u64,
+    unjudged: Option<Unjudged>,
 }
 
 impl Engine {
@@ -66,9 +81,13 @@ impl Engine {
         memory.start_cycle();
         Self {
             admit: Admit::new(&setup.rig.mapping),
+            clock: DeviceClock::new(1.0 / setup.rig.sample_rate_hz),
             align: Align::default(),
+            span: Span::default(),
             coverage: Coverage::default(),
             pipeline: Pipeline::new(&setup),
+            n_late: 0,
+            unjudged: None,
             memory,
             setup,
         }
@@ -101,7 +120,12 @@ impl Engine {
         mut seen: impl FnMut(&Evidence),
     ) -> Option<Admission> {
         match input {
-            Input::Sample(sample) => return Some(self.sample(sample, transitions, &mut seen)),
+            Input::Sample(sample) => {
+                return Some(self.sample(&sample, false, transitions, &mut seen));
+            }
+            Input::NewSample(sample) => {
+                return Some(self.sample(&sample, true, transitions, &mut seen));
+            }
             Input::Clear(code) => self.clear(code, transitions),
             Input::Acknowledge(code) => drop(self.memory.acknowledge(code)),
             Input::End => self.end(transitions, &mut seen),
@@ -111,18 +135,91 @@ impl Engine {
 
     fn sample(
         &mut self,
-        sample: Sample,
+        sample: &Sample,
+        is_new: bool,
         transitions: &mut Vec<Transition>,
         seen: &mut impl FnMut(&Evidence),
     ) -> Admission {
-        let admission = self.admit.take(&sample, self.align.released_s());
-        if admission == Admission::Accepted {
-            self.align.push(sample);
-            while let Some(next) = self.align.pop(self.setup.settings.reorder_s) {
-                self.judge(&next, transitions, seen);
-            }
+        let decided = self.admit.take(sample, is_new);
+        let admission = decided.unwrap_or_else(|| self.take_new(sample, transitions, seen));
+        if let Admission::Rejected(why) | Admission::SetAside(why) = admission {
+            self.count_unjudged(why);
         }
         admission
+    }
+
+    /// Takes a sample that is valid and new.
+    fn take_new(
+        &mut self,
+        sample: &Sample,
+        transitions: &mut Vec<Transition>,
+        seen: &mut impl FnMut(&Evidence),
+    ) -> Admission {
+        let gap_s = self.gap_s();
+        let context = ClockContext {
+            released_s: self.align.released_s(),
+            in_stretch: sample.seq.is_none() && self.admit.has_stretch_at(sample.t_s),
+            reorder_s: self.setup.settings.reorder_s,
+            gap_s,
+        };
+        self.admit.note(sample, gap_s);
+        match self.clock.take(sample, &context) {
+            ClockDecision::Follows => self.arrange(sample, transitions, seen),
+            ClockDecision::Doubted { step_s } => {
+                return Admission::SetAside(Rejection::Jump { step_s });
+            }
+            ClockDecision::Believed { held, set_back } => {
+                if set_back {
+                    self.set_clock_back(transitions, seen);
+                }
+                held.iter().for_each(|sample| self.arrange(sample, transitions, seen));
+            }
+            ClockDecision::Late { behind_s } => {
+                self.n_late += 1;
+                return Admission::SetAside(Rejection::Late { behind_s });
+            }
+        }
+        Admission::Accepted
+    }
+
+    /// Puts a sample in order of time and judges those that are due.
+    fn arrange(
+        &mut self,
+        sample: &Sample,
+        transitions: &mut Vec<Transition>,
+        seen: &mut impl FnMut(&Evidence),
+    ) {
+        self.unjudged = None;
+        self.span.take(sample.t_s);
+        self.align.push(*sample);
+        let (reorder_s, interval_s) = (self.setup.settings.reorder_s, self.clock.interval_s());
+        while let Some(next) = self.align.pop(reorder_s, interval_s) {
+            self.judge(&next, transitions, seen);
+        }
+    }
+
+    fn set_clock_back(
+        &mut self,
+        transitions: &mut Vec<Transition>,
+        seen: &mut impl FnMut(&Evidence),
+    ) {
+        while let Some(next) = self.align.flush() {
+            self.judge(&next, transitions, seen);
+        }
+        self.align.restart();
+        self.span.set_back();
+        self.coverage.set_back();
+        self.pipeline.set_clock_back();
+    }
+
+    fn count_unjudged(&mut self, why: Rejection) {
+        let n = self.unjudged.map_or(0, |run| run.n) + 1;
+        self.unjudged = Some(Unjudged { n, why });
+    }
+
+    /// The interval without a sample that makes a gap, s.
+    fn gap_s(&self) -> f64 {
+        self.setup.settings.gap_after_s(1.0 / self.setup.rig.sample_rate_hz)
     }
 
     fn judge(
@@ -131,7 +228,7 @@ impl Engine {
         transitions: &mut Vec<Transition>,
         seen: &mut impl FnMut(&Evidence),
     ) {
-        let gap_s = self.setup.settings.gap_after_s(1.0 / self.setup.rig.sample_rate_hz);
+        let gap_s = self.gap_s();
         self.coverage.take(sample, gap_s);
         self.pipeline.judge(&self.setup, sample, &mut self.memory, transitions);
         seen(self.pipeline.evidence());
@@ -148,6 +245,7 @@ impl Engine {
     }
 
     fn end(&mut self, transitions: &mut Vec<Transition>, seen: &mut impl FnMut(&Evidence)) {
+        self.clock.drop_held();
         while let Some(next) = self.align.flush() {
             self.judge(&next, transitions, seen);
         }
@@ -197,9 +295,68 @@ impl Engine {
         self.pipeline.servo_estimates()
     }
 
-    /// The state after the last judged sample.
+    /// Notes that a sample was rejected by the caller, who has looked it up.
+    pub fn note_rejected(&mut self, why: Rejection) {
+        self.count_unjudged(why);
+    }
+
+    /// Returns what is known of a sample; its numbers must be finite.
+    #[must_use]
+    pub fn recognise(&self, sample: &Sample) -> Recognition {
+        self.admit.recognise(sample)
+    }
+
+    /// Whether a sample of the past that is new can be one that was lost and is sent late,
+    /// and does not overlap with those taken: its `seq` or, without one, its time is after
+    /// the first one, and for times in a gap.
+    #[must_use]
+    pub fn fits_gap(&self, sample: &Sample) -> bool {
+        self.admit.fits_gap(sample)
+    }
+
+    /// New samples that are not judged, because they came too late or because no other
+    /// confirmed their step of the clock.
+    #[must_use]
+    pub const fn n_set_aside(&self) -> u64 {
+        self.n_late + self.clock.n_dropped()
+    }
+
+    /// Those of them whose step of the clock no other sample confirmed.
+    #[must_use]
+    pub const fn n_unconfirmed(&self) -> u64 {
+        self.clock.n_dropped()
+    }
+
+    /// Earliest and latest time of the samples that are judged or wait for it, s.
+    #[must_use]
+    pub const fn span_s(&self) -> Option<(f64, f64)> {
+        self.span.whole_s()
+    }
+
+    /// Time from the first of these samples to the last, s. A clock that was set back does
+    /// not count twice.
+    #[must_use]
+    pub fn duration_s(&self) -> f64 {
+        self.span.duration_s()
+    }
+
+    /// The present run of unjudged samples, if it is so long that the rig counts as not
+    /// tested.
+    #[must_use]
+    pub fn unjudged(&self) -> Option<Unjudged> {
+        self.unjudged.filter(|run| run.n >= UNTESTED_AFTER)
+    }
+
+    /// The state after the last judged sample. No monitor is enabled while the samples go
+    /// unjudged.
     #[must_use]
     pub fn state(&self) -> State {
-        self.pipeline.state(&self.memory, &self.coverage, self.align.n_waiting())
+        let n_waiting = self.align.n_waiting() + self.clock.n_held();
+        let mut state = self.pipeline.state(&self.memory, &self.coverage, n_waiting);
+        state.unjudged = self.unjudged();
+        if state.unjudged.is_some() {
+            state.monitors.iter_mut().for_each(|monitor| monitor.readiness.enabled = false);
+        }
+        state
     }
 }

@@ -5,6 +5,8 @@
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
+use core::mem;
+
 use nalgebra::Vector2;
 
 use super::acceleration_filter::AccelerationFilter;
@@ -66,6 +68,8 @@ pub(super) struct Pipeline {
     evidence: Evidence,
     monitors: [Monitor; FaultCode::COUNT],
     n_judged: u64,
+    /// Whether the next sample is on a clock that was set back.
+    clock_set_back: bool,
 }
 
 impl Pipeline {
@@ -127,6 +131,7 @@ impl Pipeline {
             evidence: Evidence::default(),
             monitors: Default::default(),
             n_judged: 0,
+            clock_set_back: false,
         }
     }
 
@@ -182,6 +187,10 @@ impl Pipeline {
     /// a gap or a jump of the clock the pipeline restarts.
     fn tick(&mut self, at: SimTime) -> Option<f64> {
         let dt = match self.now {
+            Some(_) if mem::take(&mut self.clock_set_back) => {
+                self.restart();
+                0.0
+            }
             Some(now) if at <= now => return None,
             Some(now) if at - now > self.gap_s() => {
                 self.restart();
@@ -205,6 +214,11 @@ impl Pipeline {
     /// The window needed for the least number of samples, s.
     fn least_window_s(&self) -> f64 {
         LEAST_SAMPLES * self.period_s.unwrap_or(0.0)
+    }
+
+    /// The clock is set back before the next sample.
+    pub(super) const fn set_clock_back(&mut self) {
+        self.clock_set_back = true;
     }
 
     /// Forgets the motion; the debounce counters are kept.
@@ -619,6 +633,7 @@ impl Pipeline {
             at: self.now,
             n_judged: self.n_judged,
             n_waiting,
+            unjudged: None,
             twin_position_m: PerAxis::from_fn(|a| beside_ball(a).0),
             twin_velocity_m_s: PerAxis::from_fn(|a| beside_ball(a).1),
             plate_angle_rad: self.twin.plate_angle(),

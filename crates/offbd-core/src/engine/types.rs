@@ -9,8 +9,11 @@ use crate::vocabulary::{Brief, FaultCode, PerAxis, Sample, SimTime};
 /// An input of the engine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Input {
-    /// A row of telemetry, in order of arrival.
+    /// A row of telemetry, in order of arrival; it may be a retransmission.
     Sample(Sample),
+    /// A row that is no retransmission: one of a recording, or one that the recording does
+    /// not contain.
+    NewSample(Sample),
     /// A person clears a code.
     Clear(FaultCode),
     /// A person acknowledges the current occurrence of a code.
@@ -24,10 +27,14 @@ pub enum Input {
 pub enum Admission {
     /// New: to be recorded; judged at once or in its turn.
     Accepted,
-    /// New and to be recorded, but too late or too far ahead to be judged.
+    /// New and to be recorded, but too late to be judged, or to be judged only if the next
+    /// samples confirm a jump of the clock.
     SetAside(Rejection),
-    /// Already known: neither recorded nor judged again.
+    /// Already known, with the same values: neither recorded nor judged again.
     Duplicate,
+    /// Older than the samples that the engine remembers, and nothing was done with it. If
+    /// the recording does not contain it, it can be passed as [`Input::NewSample`].
+    Unknown,
     /// Invalid: neither recorded nor judged.
     Rejected(Rejection),
 }
@@ -41,10 +48,15 @@ pub enum Rejection {
     Absurd { field: &'static str, value: f64, limit: f64 },
     #[error("t_s is {behind_s:.3} s before the last judged sample: recorded, not judged")]
     Late { behind_s: f64 },
+    #[error("t_s jumps by {step_s:.1} s: recorded, judged once the next samples confirm the jump")]
+    Jump { step_s: f64 },
     #[error(
-        "t_s jumps {ahead_s:.0} s ahead: recorded, not judged unless the clock continues from there"
+        "another sample with this {key} is recorded, with other values: a device that starts \
+         anew needs a new session, and two devices need two names"
     )]
-    Jump { ahead_s: f64 },
+    Conflict { key: &'static str },
+    #[error("too old to tell whether it is recorded: send it in a batch that spans less time")]
+    TooOld,
 }
 
 impl Rejection {
@@ -56,8 +68,25 @@ impl Rejection {
             Self::Absurd { .. } => "absurd",
             Self::Late { .. } => "late",
             Self::Jump { .. } => "jump",
+            Self::Conflict { .. } => "conflict",
+            Self::TooOld => "too_old",
         }
     }
+
+    /// The key of `sample` is that of another sample.
+    #[must_use]
+    pub const fn conflict(sample: &Sample) -> Self {
+        Self::Conflict { key: if sample.seq.is_some() { "seq" } else { "t_s" } }
+    }
+}
+
+/// A run of samples none of which is judged.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unjudged {
+    /// Consecutive samples that are not judged.
+    pub n: u64,
+    /// Why the last of them is not judged.
+    pub why: Rejection,
 }
 
 /// Whether a monitor has a result.
@@ -106,6 +135,9 @@ pub struct State {
     pub n_judged: u64,
     /// Samples waiting for an earlier one.
     pub n_waiting: usize,
+    /// The present run of unjudged samples, if it is so long that the rig counts as not
+    /// tested; the evidence and the monitors are those before it.
+    pub unjudged: Option<Unjudged>,
     /// The twin's position relative to the plate, drawn beside the measured one, m.
     pub twin_position_m: PerAxis<f64>,
     /// The twin's velocity, m/s.

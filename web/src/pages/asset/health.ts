@@ -8,5 +8,6 @@ export function healthOf(faults: FaultEntry[], state: State | undefined, isSilen
   const byFaults = healthByFaults(faults);
   if (byFaults) return byFaults;
   if (!state?.session_id) return "idle";
-  return isSilent ? "silent" : "ok";
+  if (isSilent) return "silent";
+  return state.unjudged ? "untested" : "ok";
 }

@@ -3,6 +3,7 @@ import { RigView } from "../../parts/rig-view/rig-view";
 import { XyTrace } from "../../parts/xy-trace/xy-trace";
 import { Link } from "../../router/link";
 import { setUpPath } from "../../router/paths";
+import { count } from "../../words/numbers";
 import { ActiveFaults } from "./active-faults";
 import { AssetHeader } from "./asset-header";
 import { DriveCycleCard } from "./drive-cycle/drive-cycle-card";
@@ -34,6 +35,12 @@ export function LiveRig({ asset, faults, refetch }: Props) {
       {connection === "lost" && (
         <p class="trouble" role="alert">
           Connection lost; reconnecting. The page shows the last received data.
+        </p>
+      )}
+      {state?.unjudged && (
+        <p class="trouble" role="alert">
+          Not tested: the last {count(state.unjudged.samples)} samples are not judged ({state.unjudged.reason}
+          ).
         </p>
       )}
       <ActiveFaults asset={asset.name} faults={active} />

@@ -48,7 +48,12 @@ export function FleetRow({ row: { entry, health }, now }: { row: Row; now: numbe
         {entry.warnings.map((warning) => (
           <DriftChip warning={warning} />
         ))}
-        {!faults.length && !entry.warnings.length && <span class="quiet">none</span>}
+        {entry.unjudged && (
+          <span class="quiet clip" title={entry.unjudged.reason}>
+            {entry.unjudged.reason}
+          </span>
+        )}
+        {!faults.length && !entry.warnings.length && !entry.unjudged && <span class="quiet">none</span>}
       </span>
       <span class="quiet clip">{entry.session ?? "–"}</span>
       <span class={`n${(entry.lag_s ?? 0) > LATE_S ? " late" : ""}`}>

@@ -14,7 +14,8 @@ export function healthOf(entry: FleetEntry, now: number): RigHealth {
   if (byFaults) return byFaults;
   if (entry.warnings.length) return "drift";
   if (!entry.session_id) return "idle";
-  return entry.last_seen && now - Date.parse(entry.last_seen) < SILENT_MS ? "ok" : "silent";
+  if (!entry.last_seen || now - Date.parse(entry.last_seen) >= SILENT_MS) return "silent";
+  return entry.unjudged ? "untested" : "ok";
 }
 
 /** Returns the entry after an event. */

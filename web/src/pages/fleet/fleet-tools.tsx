@@ -7,6 +7,7 @@ const FILTERS: { key: HealthFilter; word: string }[] = [
   { key: "fault", word: "Fault" },
   { key: "suspect", word: "Suspected" },
   { key: "drift", word: "Drifting" },
+  { key: "untested", word: "Not tested" },
   { key: "ok", word: "No fault" },
   { key: "silent", word: "Silent" },
   { key: "idle", word: "No session" },

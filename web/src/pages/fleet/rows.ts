@@ -53,7 +53,15 @@ function matches({ asset, session, faults, warnings }: FleetEntry, text: string)
 }
 
 /** Order of rigs of equal severity. */
-const HEALTH_RANK: Record<RigHealth, number> = { fault: 0, suspect: 1, drift: 2, silent: 3, ok: 4, idle: 5 };
+const HEALTH_RANK: Record<RigHealth, number> = {
+  fault: 0,
+  suspect: 1,
+  drift: 2,
+  untested: 3,
+  silent: 4,
+  ok: 5,
+  idle: 6,
+};
 
 const COMPARE: Record<Sort, (a: FleetRow, b: FleetRow) => number> = {
   severity: (a, b) => b.worst - a.worst || HEALTH_RANK[a.health] - HEALTH_RANK[b.health],

@@ -108,7 +108,7 @@ proptest! {
         steps::within(most, || {
             let mut transitions = Vec::new();
             for sample in &samples {
-                engine.handle(Input::Sample(*sample), &mut transitions);
+                engine.handle(Input::NewSample(*sample), &mut transitions);
             }
             engine.handle(Input::End, &mut transitions);
         });

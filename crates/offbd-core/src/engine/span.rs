@@ -1,0 +1,38 @@
+//! The time from the first sample of a session to its last, on a clock that may be set
+//! back.
+
+/// The times of samples so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Span {
+    /// Time before the clock was last set back, s.
+    finished_s: f64,
+    /// First and last time since, s.
+    present_s: Option<(f64, f64)>,
+    /// Earliest and latest time of all, s.
+    whole_s: Option<(f64, f64)>,
+}
+
+impl Span {
+    pub(super) fn take(&mut self, t_s: f64) {
+        let with = |span: Option<(f64, f64)>| {
+            let (first, last) = span.unwrap_or((t_s, t_s));
+            Some((first.min(t_s), last.max(t_s)))
+        };
+        (self.present_s, self.whole_s) = (with(self.present_s), with(self.whole_s));
+    }
+
+    /// The clock is set back before the next sample.
+    pub(super) fn set_back(&mut self) {
+        (self.finished_s, self.present_s) = (self.duration_s(), None);
+    }
+
+    /// Time from the first sample to the last, gaps included, s.
+    pub(super) fn duration_s(&self) -> f64 {
+        self.finished_s + self.present_s.map_or(0.0, |(first, last)| last - first)
+    }
+
+    /// Earliest and latest time, s.
+    pub(super) const fn whole_s(&self) -> Option<(f64, f64)> {
+        self.whole_s
+    }
+}

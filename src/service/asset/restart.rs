@@ -1,0 +1,78 @@
+//! Detects that a device without session names has started anew.
+
+use super::recorded::RecordedSamples;
+use super::session::OpenSession;
+use offbd_core::engine::Recognition;
+use offbd_core::vocabulary::Sample;
+
+/// How far the clock must go back for samples that are not recorded yet to show a restart,
+/// s. Below it, they are late. Chosen.
+const RESTART_S: f64 = 10.0;
+
+/// Consecutive samples that show a restart until it is certain: one may have a wrong time.
+const CERTAIN_AFTER: u32 = 2;
+
+/// What one sample shows about a restart.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Sign {
+    /// It continues the session.
+    Continues,
+    /// It is recorded already: a retransmission, or a device that starts anew with the
+    /// values it had before.
+    Repeats,
+    /// It is not part of the session.
+    StartsAnew,
+}
+
+impl OpenSession {
+    /// Returns how many of the first `samples` belong to this session; the device has
+    /// started anew before the others. A device starts anew if samples have the keys of
+    /// recorded ones and other values, or if its clock goes back to times that are no gap
+    /// of the recording.
+    pub(super) fn continued_by(
+        &mut self,
+        samples: &[(usize, Sample)],
+        recorded: &RecordedSamples,
+    ) -> usize {
+        let mut latest_s = self.judging.counts().span_s.map_or(f64::NEG_INFINITY, |(_, last)| last);
+        let mut start = None;
+        for (i, (_, sample)) in samples.iter().enumerate() {
+            match self.sign(sample, latest_s, recorded) {
+                Sign::Continues => {
+                    (start, self.n_restart_signs) = (None, 0);
+                    latest_s = latest_s.max(sample.t_s);
+                }
+                Sign::Repeats => {
+                    start.get_or_insert(i);
+                }
+                Sign::StartsAnew => {
+                    let start = *start.get_or_insert(i);
+                    self.n_restart_signs += 1;
+                    if self.n_restart_signs >= CERTAIN_AFTER {
+                        return start;
+                    }
+                }
+            }
+        }
+        samples.len()
+    }
+
+    fn sign(&self, sample: &Sample, latest_s: f64, recorded: &RecordedSamples) -> Sign {
+        let engine = self.judging.engine();
+        let is_far_behind = sample.t_s < latest_s - RESTART_S;
+        match recorded.recognise(engine.recognise(sample), sample) {
+            Recognition::Conflict => Sign::StartsAnew,
+            Recognition::Same => Sign::Repeats,
+            Recognition::New if is_far_behind && !self.continues_count(sample) => {
+                if engine.fits_gap(sample) { Sign::Continues } else { Sign::StartsAnew }
+            }
+            Recognition::New | Recognition::Taken | Recognition::Unknown => Sign::Continues,
+        }
+    }
+
+    /// Whether the count goes on, so that only the clock was set back.
+    fn continues_count(&self, sample: &Sample) -> bool {
+        let seq = sample.seq.and_then(|seq| i64::try_from(seq).ok());
+        seq.is_some_and(|seq| self.progress.last_seq.is_none_or(|last| seq > last))
+    }
+}
