@@ -109,7 +109,7 @@ async fn copy_most(
 ) -> Result<bool, StoreError> {
     let connection = match connection {
         Some(connection) => connection,
-        none => none.insert(location.writer(WriterRole::Auxiliary).await?),
+        none => none.insert(location.writer(WriterRole::Auxiliary, None).await?.0),
     };
     let mut before = 0;
     for _ in 0..COPIES {
@@ -150,7 +150,8 @@ mod tests {
         let file = location.file().unwrap();
         let copy = file.with_extension("copy");
         std::fs::copy(file, &copy).unwrap();
-        let mut connection = Location::File(copy).writer(WriterRole::Auxiliary).await.unwrap();
+        let mut connection =
+            Location::File(copy).writer(WriterRole::Auxiliary, None).await.unwrap().0;
         let count = sqlx::query_scalar("SELECT count(*) FROM asset");
         count.fetch_one(&mut connection).await.unwrap()
     }

@@ -17,6 +17,7 @@ use sqlx::{AnyConnection, AnyPool, AssertSqlSafe, ConnectOptions, Executor};
 use super::StoreError;
 use super::checkpoint::AUTOCHECKPOINT_PAGES;
 use super::write::WriterRole;
+use super::writer_lock::{self, Backend};
 
 /// Connections for reading; a reader without one waits.
 const MAX_READERS: u32 = 4;
@@ -32,14 +33,6 @@ const READER_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Longest time to establish a connection.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(10);
-
-/// The advisory lock of PostgreSQL that the main writer of a database holds while it is
-/// connected.
-const WRITER_LOCK: i64 = i64::from_be_bytes(*b"\0\0\0offbd");
-
-/// How long a writer waits for the lock: the server may still be processing the last
-/// statement of a process that was killed.
-const LOCK_TIMEOUT: &str = "5s";
 
 /// The location of a database.
 #[derive(Clone, PartialEq, Eq)]
@@ -87,21 +80,25 @@ impl Location {
     }
 
     /// Opens a connection that may write. For the main writer it has a large page cache
-    /// and, in PostgreSQL, takes the lock of the database. An SQLite file is locked by
-    /// the caller.
-    pub(super) async fn writer(&self, role: WriterRole) -> Result<AnyConnection, StoreError> {
+    /// and, in PostgreSQL, takes the lock of the database from the connection `lost`, if
+    /// that still holds it; returns what the server knows the new one as. An SQLite file
+    /// is locked by the caller.
+    pub(super) async fn writer(
+        &self,
+        role: WriterRole,
+        lost: Option<&Backend>,
+    ) -> Result<(AnyConnection, Option<Backend>), StoreError> {
         let options = self.options()?;
         let connect = async {
             let mut connection = options.connect().await?;
             connection.execute(AssertSqlSafe(self.writer_settings(role))).await?;
-            if role == WriterRole::Main && matches!(self, Self::Server(_)) {
-                let lock = format!(
-                    "SET lock_timeout = '{LOCK_TIMEOUT}'; SELECT pg_advisory_lock({WRITER_LOCK});
-                     SET lock_timeout = DEFAULT"
-                );
-                connection.execute(AssertSqlSafe(lock)).await.map_err(lock_error)?;
-            }
-            Ok(connection)
+            let backend = match self {
+                Self::Server(_) if role == WriterRole::Main => {
+                    Some(writer_lock::take(&mut connection, lost).await?)
+                }
+                _ => None,
+            };
+            Ok((connection, backend))
         };
         within(connect).await
     }
@@ -150,14 +147,6 @@ impl Location {
             Self::Server(_) => "BEGIN",
         }
     }
-}
-
-/// Converts the error of a failed attempt to take the writer's lock.
-fn lock_error(error: sqlx::Error) -> StoreError {
-    /// `lock_not_available`
-    const NOT_AVAILABLE: &str = "55P03";
-    let code = error.as_database_error().and_then(|error| error.code());
-    if code.is_some_and(|code| code == NOT_AVAILABLE) { StoreError::InUse } else { error.into() }
 }
 
 /// What is not escaped in a path.

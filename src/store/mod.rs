@@ -36,6 +36,7 @@ mod read;
 mod rows;
 mod tail;
 mod write;
+mod writer_lock;
 
 use std::path::PathBuf;
 use std::time::Duration;

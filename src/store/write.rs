@@ -22,6 +22,7 @@ use super::checkpoint::{self, Checkpointer};
 use super::journal::{Journal, JournalChanges};
 use super::multi_row::{MultiRowStatement, in_parts};
 use super::tail::{Run, Tails};
+use super::writer_lock::Backend;
 use super::{
     AccessWrite, ActionRow, AssetRow, CalibrationRow, FaultRow, Location, MIGRATIONS, Micros,
     ReplayRow, SessionProgress, SessionRow, StoreError, TransitionRow, TrendRow,
@@ -117,6 +118,8 @@ pub struct Writer {
     location: Location,
     /// `None` after a failure, until [`Writer::reconnect`].
     connection: Option<AnyConnection>,
+    /// The last connection as PostgreSQL knows it.
+    backend: Option<Backend>,
     /// The last id given to an event.
     last_id: i64,
     /// Transactions that the database has committed and counted.
@@ -136,7 +139,7 @@ pub struct Writer {
 
 impl Writer {
     pub(super) async fn open(location: &Location, role: WriterRole) -> Result<Self, StoreError> {
-        let mut connection = location.writer(role).await?;
+        let (mut connection, backend) = location.writer(role, None).await?;
         MIGRATIONS.run_direct(None, &mut connection, false).await?;
         let last_id = counter(&mut connection, "event").await?;
         let n_commits = counter(&mut connection, "commit").await?;
@@ -145,6 +148,7 @@ impl Writer {
         Ok(Self {
             location: location.clone(),
             connection: Some(connection),
+            backend,
             last_id,
             n_commits,
             role,
@@ -241,7 +245,9 @@ impl Writer {
     }
 
     async fn connect_again(&mut self) -> Result<bool, StoreError> {
-        let mut connection = self.location.writer(self.role).await?;
+        let lost = self.backend.as_ref();
+        let (mut connection, backend) = self.location.writer(self.role, lost).await?;
+        self.backend = backend.or(self.backend.take());
         // The update of `probe` checks that the database accepts durable changes. The
         // update of `commit`, with the same value, waits until the lost connection's
         // transaction has ended.

@@ -87,9 +87,11 @@ async fn a_restarted_database_server_loses_nothing() {
 const PASS: usize = 0;
 const LOSE_THE_ANSWER: usize = 1;
 const LOSE_THE_COMMIT: usize = 2;
+const FORGET_THE_CONNECTION: usize = 3;
 
 /// Forwards connections from the socket in `from` to that in `to`. As `next_commit` says, it
-/// drops the next commit or its answer, and closes the connection.
+/// drops the next commit or its answer, and closes the connection, or forgets it: the server
+/// is not told.
 async fn proxy(from: PathBuf, to: PathBuf, next_commit: Arc<AtomicUsize>) {
     let listener = UnixListener::bind(from.join(".s.PGSQL.5432")).unwrap();
     while let Ok((client, _)) = listener.accept().await {
@@ -115,6 +117,7 @@ async fn forward(
                 let is_commit = data.windows(6).any(|word| word == b"COMMIT");
                 match if is_commit { next_commit.swap(PASS, Ordering::SeqCst) } else { PASS } {
                     LOSE_THE_COMMIT => return Ok(()),
+                    FORGET_THE_CONNECTION => break,
                     LOSE_THE_ANSWER => {
                         server.write_all(data).await?;
                         let n = server.read(&mut down).await?;
@@ -131,6 +134,10 @@ async fn forward(
             },
         }
     }
+    drop(client);
+    // For the server the connection is open, and its transaction too.
+    while server.read(&mut down).await? > 0 {}
+    Ok(())
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -152,7 +159,7 @@ async fn a_commit_with_a_lost_answer_is_neither_lost_nor_repeated() {
     let load = DeviceLoad::start(3, &fixture.client, fixture.data.path(), Some(&url));
     for i in 0..40 {
         load.link.wait_for_samples(50).await;
-        next_commit.store(1 + i % 2, Ordering::SeqCst);
+        next_commit.store(1 + i % 3, Ordering::SeqCst);
         eventually(|| async { (next_commit.load(Ordering::SeqCst) == PASS).then_some(()) }).await;
     }
     // The service finds out whether a commit was done and retries it if not; no device

@@ -126,7 +126,7 @@ pub(in crate::service) fn fault_recording(
     let from_s =
         failure.onset_s.unwrap_or(failure.failed_s).min(failure.failed_s) - window.before_s;
     let to_s = failure.confirmed_s.unwrap_or(failure.failed_s) + window.after_s;
-    let rows = evaluate(handles, session, setup, from_s, to_s)?;
+    let rows = evaluate(handles, session, setup, failure.failed_s, (from_s, to_s))?;
     let view = RecordingView {
         asset: session.asset.clone(),
         code: code.into(),
@@ -146,30 +146,31 @@ pub(in crate::service) fn fault_recording(
 }
 
 /// Returns the samples from `from_s` to `to_s` in order of time, each with the evidence of
-/// its evaluation.
+/// its evaluation. The end of the range is reached after the failure at `failed_s`: the
+/// clock may have passed these times before, and have been set back.
 fn evaluate(
     handles: &Handles,
     session: &SessionRow,
     setup: Setup,
-    from_s: f64,
-    to_s: f64,
+    failed_s: f64,
+    (from_s, to_s): (f64, f64),
 ) -> Result<Vec<RecordingRow>, ServiceError> {
-    // A sample is evaluated once its reordering window has passed.
-    let stop_s = to_s + 2.0 * setup.settings.reorder_s;
     let mut builder = RecordingBuilder::new(from_s, to_s);
     let mut judging = Judging::new(setup, views::memory(&session.baseline)?);
-    let (mut n_evaluated, mut ended) = (0, true);
+    let (mut n_evaluated, mut has_failed, mut ended) = (0, false, true);
     play(handles, &session.id, |input| {
         if let Input::NewSample(sample) = &input {
             n_evaluated += 1;
             builder.sample(sample);
             let closing = n_evaluated % CHECK_EVERY == 0 && handles.closing.is_cancelled();
-            ended = sample.t_s <= stop_s && !closing;
+            let is_past = judging.engine().evidence().at.is_some_and(|at| at.seconds() > to_s);
+            ended = !(closing || has_failed && is_past);
             if !ended || n_evaluated > MAX_EVALUATED || builder.samples.len() > MAX_ROWS {
                 return ControlFlow::Break(());
             }
         }
         judging.observe(input, |evidence| builder.evidence(evidence));
+        has_failed |= judging.transitions().iter().any(|t| t.at.seconds() == failed_s);
         ControlFlow::Continue(())
     })?;
     if n_evaluated > MAX_EVALUATED {
