@@ -81,7 +81,7 @@ impl Judging {
         }
         self.transitions.clear();
         let admission = self.engine.observe(input, &mut self.transitions, observer);
-        self.verdict.take(admission, &self.transitions);
+        self.verdict.take(self.engine.n_accepted(), &self.transitions);
         let is_recorded = matches!(admission, Some(Admission::Accepted | Admission::SetAside(_)));
         self.n_samples += u64::from(is_recorded);
         admission

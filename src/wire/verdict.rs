@@ -308,9 +308,10 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Adds the decision on an input and the transitions that it caused.
-    pub fn take(&mut self, admission: Option<Admission>, transitions: &[Transition]) {
-        self.n_accepted += u64::from(admission == Some(Admission::Accepted));
+    /// Adds the transitions that an input caused; `n_accepted` is
+    /// [`Engine::n_accepted`](offbd_core::engine::Engine::n_accepted) after it.
+    pub fn take(&mut self, n_accepted: u64, transitions: &[Transition]) {
+        self.n_accepted = n_accepted;
         for transition in transitions {
             self.add_to_hash(transition);
             self.note(transition);

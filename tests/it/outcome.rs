@@ -62,7 +62,8 @@ fn summary_after(
     let mut verdict = Verdict::default();
     for input in samples.iter().map(|&s| Input::Sample(s)).chain([Input::End]) {
         let mut transitions = Vec::new();
-        verdict.take(engine.handle(input, &mut transitions), &transitions);
+        engine.handle(input, &mut transitions);
+        verdict.take(engine.n_accepted(), &transitions);
     }
     let summary = verdict.summary("s", samples.len() as u64, 0, 0.0);
     (summary.with_monitors(verdict.monitors(&engine.state())), engine.memory().clone())

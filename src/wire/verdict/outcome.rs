@@ -161,7 +161,7 @@ mod tests {
         let (status, evidence) = (FaultStatus::Confirmed, Evidence::default());
         let transition = Transition { at, code, status, byte, suspicion, evidence };
         let mut verdict = Verdict::default();
-        verdict.take(None, &[transition]);
+        verdict.take(0, &[transition]);
         verdict.monitors(&State::default()).swap_remove(code as usize)
     }
 

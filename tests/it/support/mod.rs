@@ -390,7 +390,8 @@ pub fn judgement(name: &str, samples: &[Sample]) -> Judgement {
     let (mut transitions, mut n_transitions) = (Vec::new(), 0);
     for input in samples.iter().map(|s| Input::Sample(*s)).chain([Input::End]) {
         transitions.clear();
-        verdict.take(engine.handle(input, &mut transitions), &transitions);
+        engine.handle(input, &mut transitions);
+        verdict.take(engine.n_accepted(), &transitions);
         n_transitions += transitions.len();
     }
     let faults = verdict.confirmed().iter().map(ToString::to_string).collect();

@@ -68,6 +68,7 @@ pub struct Engine {
     span: Span,
     coverage: Coverage,
     pipeline: Pipeline,
+    n_accepted: u64,
     /// Samples that were too late to be judged.
     n_late: u64,
     unjudged: Option<Unjudged>,
@@ -86,6 +87,7 @@ impl Engine {
             span: Span::default(),
             coverage: Coverage::default(),
             pipeline: Pipeline::new(&setup),
+            n_accepted: 0,
             n_late: 0,
             unjudged: None,
             memory,
@@ -190,6 +192,7 @@ impl Engine {
         seen: &mut impl FnMut(&Evidence),
     ) {
         self.unjudged = None;
+        self.n_accepted += 1;
         self.span.take(sample.t_s);
         self.align.push(*sample);
         let (reorder_s, interval_s) = (self.setup.settings.reorder_s, self.clock.interval_s());
@@ -312,6 +315,12 @@ impl Engine {
     #[must_use]
     pub fn fits_gap(&self, sample: &Sample) -> bool {
         self.admit.fits_gap(sample)
+    }
+
+    /// Samples that are judged or wait for an earlier one.
+    #[must_use]
+    pub const fn n_accepted(&self) -> u64 {
+        self.n_accepted
     }
 
     /// New samples that are not judged, because they came too late or because no other
