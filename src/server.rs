@@ -29,7 +29,7 @@ pub use self::traces::Traces;
 use crate::config::Config;
 use crate::http::{self, AccessPolicy, App, BodyBudget, ExtraRoutes, RateLimit, RateLimits};
 use crate::service::{Clock, Service, Workers};
-use crate::store::{self, Location, Store};
+use crate::store::{self, CheckReport, Location, Store};
 
 /// A running server.
 pub struct Server {
@@ -255,4 +255,18 @@ pub fn check(config: &Config) -> Result<String> {
         config.log.level,
         config.workers.shards,
     ))
+}
+
+/// Checks the contents of the store; nothing is changed. Returns `None` if there is no
+/// embedded store yet.
+///
+/// # Errors
+/// If the store cannot be read, or has the schema of another version.
+pub async fn check_store(config: &Config) -> Result<Option<CheckReport>> {
+    let location = config.location()?;
+    if location.file().is_some_and(|file| !file.exists()) {
+        return Ok(None);
+    }
+    let report = store::check(&location).await;
+    report.map(Some).with_context(|| format!("cannot check the store {location}"))
 }

@@ -9,6 +9,7 @@ use super::logging::LoggingArgs;
 use super::output;
 use crate::config::{Config, ConfigError, Flags};
 use crate::server::{self, Traces};
+use crate::store::CheckReport;
 
 /// The arguments of the service's configuration. They override the environment, which
 /// overrides the file, which overrides the defaults.
@@ -64,10 +65,15 @@ pub(super) struct MigrateArgs {
     config: ConfigArgs,
 }
 
-/// Checks the configuration and prints a summary.
+/// Checks the configuration, and the contents of the store with --data or --database.
+///
+/// Every recording is checked against its checksums, and every stored document.
+/// Nothing is changed, and the service may be running.
 #[derive(Clone, Debug, Args)]
-#[command(after_help = "Examples:\n  offbd check --config offbd.toml\n\n\
-    Exit status: 0 valid, 3 invalid; the error names the key.")]
+#[command(after_help = "Examples:\n  offbd check --config offbd.toml\n  \
+    offbd check --data /var/lib/offbd\n\n\
+    Exit status: 0 valid, 3 invalid configuration; the error names the key;\n\
+    1 damaged store; each finding is printed.")]
 pub(super) struct CheckArgs {
     #[command(flatten)]
     config: ConfigArgs,
@@ -89,5 +95,19 @@ pub(super) fn migrate(args: &MigrateArgs) -> anyhow::Result<()> {
 }
 
 pub(super) fn check(args: &CheckArgs) -> anyhow::Result<()> {
-    output::print_line(&server::check(&args.config.load()?)?)
+    let config = args.config.load()?;
+    output::print_line(&server::check(&config)?)?;
+    if args.config.data.is_none() && args.config.database.is_none() {
+        return Ok(());
+    }
+    let Some(report) = super::runtime()?.block_on(server::check_store(&config))? else {
+        return output::print_line("checked  nothing: there is no store yet");
+    };
+    report.findings.iter().try_for_each(|finding| output::print_line(finding))?;
+    let CheckReport { n_sessions, n_samples, n_documents, findings } = report;
+    output::print_line(&format!(
+        "checked  {n_sessions} sessions, {n_samples} samples, {n_documents} documents"
+    ))?;
+    anyhow::ensure!(findings.is_empty(), "the store is damaged: {} findings", findings.len());
+    Ok(())
 }

@@ -104,6 +104,13 @@ impl ServiceError {
 
 impl From<StoreError> for ServiceError {
     fn from(error: StoreError) -> Self {
-        Self::Store(Arc::new(error))
+        match error {
+            StoreError::Deleted { session } => Self::UnknownSession { id: session },
+            StoreError::Chunk { .. }
+            | StoreError::Incomplete { .. }
+            | StoreError::Journal { .. }
+            | StoreError::UnknownValue { .. } => Self::corrupt(error),
+            error => Self::Store(Arc::new(error)),
+        }
     }
 }

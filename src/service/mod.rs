@@ -66,11 +66,12 @@ mod upkeep;
 mod views;
 mod writing;
 
+pub use crate::store::RecordingReader;
 pub use clock::{Clock, parse_timestamp};
 pub use error::ServiceError;
 pub use limits::{Limits, RETRY_AFTER_S, Retention};
 pub use reanalysis::fault_recording::RecordingWindow;
 pub use reanalysis::trace::{MAX_TRACE_POINTS, TraceQuery};
-pub use requests::{FaultQuery, PendingBatch, QueueLoad, RecordingReader};
+pub use requests::{FaultQuery, PendingBatch, QueueLoad};
 pub use start::{Service, Workers};
 pub use writing::{Event, EventFeed};

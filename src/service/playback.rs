@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use super::ServiceError;
 use super::writing::Handles;
-use crate::store::ActionKind;
+use crate::store::{ActionKind, SessionRow};
 use offbd_core::engine::Input;
 use offbd_core::vocabulary::FaultCode;
 
@@ -12,18 +12,19 @@ use offbd_core::vocabulary::FaultCode;
 /// sample. Blocks on the store, so it must not run on a thread of the runtime.
 pub(super) fn play(
     handles: &Handles,
-    session: &str,
+    session: &SessionRow,
     mut take: impl FnMut(Input) -> ControlFlow<()>,
 ) -> Result<(), ServiceError> {
     let mut actions = Vec::new();
-    for row in handles.wait(handles.store.actions(session))? {
+    for row in handles.wait(handles.store.actions(&session.id))? {
         let kind: ActionKind = row.kind.parse()?;
         let code: FaultCode = row.code.parse().map_err(ServiceError::corrupt)?;
         actions.push((row.after_index, input(kind, code)));
     }
     let mut actions = actions.into_iter().peekable();
     let mut n_played = 0;
-    while let Some(samples) = handles.wait(handles.store.samples_from(session, n_played))? {
+    let mut recording = handles.store.recording(session, 0);
+    while let Some(samples) = handles.wait(recording.next())? {
         for sample in samples {
             while let Some((_, action)) = actions.next_if(|(after, _)| *after <= n_played) {
                 let _ = take(action);

@@ -10,13 +10,14 @@ use tokio_util::sync::CancellationToken;
 
 use super::access::{PrincipalCache, Provider};
 use super::asset::{AssetCommand, Environment, Presences, Shards};
+use super::clock::Clock;
 use super::job::{self, Job};
 use super::jobs::{self, JobContext};
 use super::limits::{MAX_DRIVE_CYCLES, MAX_RECORDINGS, MAX_TRACES};
 use super::upkeep::{Deleter, Sweeper, Watchdog};
 use super::writing::{Committer, Events, Handles, Outage};
 use super::{Limits, ServiceError};
-use crate::store::{Store, Writer};
+use crate::store::{Store, Write, Writer};
 
 /// A handle to the running service. Cheap to clone; all clones share one service.
 #[derive(Clone)]
@@ -93,6 +94,16 @@ async fn joined<T: Send + 'static>(thread: std::thread::JoinHandle<T>) -> Option
     tokio::task::spawn_blocking(|| thread.join()).await.ok()?.ok()
 }
 
+/// Discards the sessions of imports that a stop has interrupted.
+async fn discard_imports(handles: &Handles) -> Result<(), ServiceError> {
+    let at = Clock.now();
+    for session in handles.store.importing_sessions().await? {
+        tracing::warn!(session, "an import was interrupted; its session is discarded");
+        handles.write(Write::DiscardSession { session, at }).await?;
+    }
+    Ok(())
+}
+
 impl Service {
     /// Starts the shards and the writer on the current tokio runtime. Tokens of the
     /// identity `provider` are accepted in addition to the service's own.
@@ -123,6 +134,7 @@ impl Service {
         let presences = Presences::default();
         let (jobs, jobs_queue) = mpsc::channel(job::MAX_QUEUED);
         let handles = Handles::new(store, sets, closing.clone());
+        discard_imports(&handles).await?;
         let env = Environment {
             handles: handles.clone(),
             presences: presences.clone(),

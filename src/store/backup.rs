@@ -6,11 +6,12 @@ use std::path::{Path, PathBuf};
 use sqlx::any::AnyConnectOptions;
 use sqlx::{AnyConnection, ConnectOptions, Connection};
 
+use super::check::check_copy;
 use super::{Location, MIGRATIONS, StoreError};
 
 /// Copies the database file at `location` to the new file `copy`, also while a service
 /// uses it. The copy is a consistent state of the database with all commits before the
-/// call, and is on the disk on return.
+/// call; its contents are checked, and it is on the disk on return.
 ///
 /// # Errors
 /// [`StoreError`] if there is no such database, `copy` exists, or it cannot be written.
@@ -24,7 +25,7 @@ pub async fn back_up(location: &Location, copy: &Path) -> Result<(), StoreError>
     sqlx::query("VACUUM INTO $1").bind(target).execute(&mut connection).await?;
     connection.close().await?;
     let mut written = open(&part).await?;
-    check_integrity(&mut written).await?;
+    check_copy(&mut written, location).await?;
     written.close().await?;
     publish(&part, copy)
 }
@@ -45,10 +46,11 @@ pub async fn restore(location: &Location, copy: &Path, replace: bool) -> Result<
     remove_if_exists(&part)?;
     std::fs::copy(copy, &part).map_err(file_error(copy))?;
     let mut connection = open(&part).await?;
-    check_integrity(&mut connection).await?;
+    check_structure(&mut connection).await?;
     // Fails if the file is not a database of offbd.
     sqlx::query("SELECT version FROM _sqlx_migrations").execute(&mut connection).await?;
     MIGRATIONS.run_direct(None, &mut connection, false).await?;
+    check_copy(&mut connection, location).await?;
     connection.close().await?;
     if file.exists() {
         set_aside(file)?;
@@ -77,7 +79,7 @@ async fn open(file: &Path) -> Result<AnyConnection, StoreError> {
     Ok(url.parse::<AnyConnectOptions>()?.connect().await?)
 }
 
-async fn check_integrity(connection: &mut AnyConnection) -> Result<(), StoreError> {
+async fn check_structure(connection: &mut AnyConnection) -> Result<(), StoreError> {
     let found: String =
         sqlx::query_scalar("PRAGMA integrity_check(1)").fetch_one(connection).await?;
     if found == "ok" { Ok(()) } else { Err(StoreError::Damaged { found }) }

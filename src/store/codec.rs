@@ -1,10 +1,13 @@
 //! The format of a chunk: samples as bytes, by column, compressed without loss.
 //!
-//! A chunk is a format byte, the number of samples, and then the columns `seq`, `t_s`,
-//! the two commands and the two positions. Each column states which samples have a value
+//! A chunk is a format byte, the number of samples, the columns `seq`, `t_s`, the two
+//! commands and the two positions, and a checksum. Each column states which samples have a value
 //! (none, all, or a bitmap). The values follow as plain little-endian words or, if that
 //! is shorter, compressed by `pco`; of numbers that increase by one, only the first is
 //! stored. Every bit of a number is kept, also of −0.0, subnormals and NaN.
+//!
+//! The checksum is a CRC-32 of the key of the chunk (its session and its first index) and
+//! of its bytes: damaged data, and data in the wrong place, are never read as samples.
 
 use pco::data_types::Number;
 use pco::standalone::{simple_compress, simple_decompress};
@@ -38,9 +41,13 @@ pub enum Packing {
 }
 
 /// The format byte.
-const FORMAT: u8 = 1;
+const FORMAT: u8 = 2;
+/// The format without a checksum, of earlier versions.
+const FORMAT_UNCHECKED: u8 = 1;
 /// Bytes of the header: format and number of samples.
 const HEADER: usize = 5;
+/// Bytes of the checksum.
+const CHECKSUM: usize = 4;
 // Which samples have a value in a column.
 const NONE: u8 = 0;
 const ALL: u8 = 1;
@@ -55,7 +62,9 @@ const COUNTING: u8 = 2;
 pub enum CodecError {
     #[error("the chunk ends at byte {at}, within its {what}")]
     Short { at: usize, what: &'static str },
-    #[error("format {found} is unknown; this version reads format {FORMAT}")]
+    #[error("the checksum does not match: the data are damaged")]
+    Checksum,
+    #[error("format {found} is unknown; this version reads formats 1 to {FORMAT}")]
     Format { found: u8 },
     #[error("the chunk has {found} samples; at most {MAX_CHUNK_SAMPLES} are allowed")]
     TooMany { found: usize },
@@ -103,10 +112,30 @@ impl Word for f64 {
     }
 }
 
-/// Encodes `samples`, at most [`MAX_CHUNK_SAMPLES`], as a chunk.
+/// The place of a chunk.
+#[derive(Clone, Copy, Debug)]
+pub struct ChunkKey<'a> {
+    /// Id of the session.
+    pub session: &'a str,
+    /// Index of the first sample in the session.
+    pub first_index: i64,
+}
+
+impl ChunkKey<'_> {
+    fn checksum(&self, bytes: &[u8]) -> [u8; CHECKSUM] {
+        let mut hasher = crc32fast::Hasher::new();
+        hasher.update(self.session.as_bytes());
+        hasher.update(&self.first_index.to_le_bytes());
+        hasher.update(bytes);
+        hasher.finalize().to_le_bytes()
+    }
+}
+
+/// Encodes `samples`, at most [`MAX_CHUNK_SAMPLES`], as the chunk `key`.
 #[must_use]
-pub fn encode(samples: &[Sample], packing: Packing) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(HEADER + samples.len() * size_of::<[u64; 6]>() + 12);
+pub fn encode(samples: &[Sample], packing: Packing, key: ChunkKey<'_>) -> Vec<u8> {
+    let columns = samples.len() * size_of::<[u64; 6]>() + 12;
+    let mut bytes = Vec::with_capacity(HEADER + columns + CHECKSUM);
     bytes.push(FORMAT);
     let n = u32::try_from(samples.len()).unwrap_or(u32::MAX);
     bytes.extend_from_slice(&n.to_le_bytes());
@@ -116,14 +145,17 @@ pub fn encode(samples: &[Sample], packing: Packing) -> Vec<u8> {
     put_column(&mut bytes, samples, packing, |s| s.cmd_qy_rad);
     put_column(&mut bytes, samples, packing, |s| s.x_m);
     put_column(&mut bytes, samples, packing, |s| s.y_m);
+    let checksum = key.checksum(&bytes);
+    bytes.extend_from_slice(&checksum);
     bytes
 }
 
-/// Decodes a chunk.
+/// Decodes the chunk `key`.
 ///
 /// # Errors
-/// [`CodecError`] if `bytes` is not a result of [`encode`].
-pub fn decode(bytes: &[u8]) -> Result<Vec<Sample>, CodecError> {
+/// [`CodecError`] if `bytes` is not a result of [`encode`] with this key.
+pub fn decode(bytes: &[u8], key: ChunkKey<'_>) -> Result<Vec<Sample>, CodecError> {
+    let bytes = checked(bytes, key)?;
     let mut reader = ByteReader { bytes, at: 0 };
     let n = header(&mut reader)?;
     let seq = column::<u64>(&mut reader, n)?;
@@ -148,14 +180,25 @@ pub fn decode(bytes: &[u8]) -> Result<Vec<Sample>, CodecError> {
     (0..n).map(|i| sample(i).ok_or(CodecError::NoTime)).collect()
 }
 
-/// Returns the number of samples of a chunk according to its header.
-pub(super) fn n_samples(bytes: &[u8]) -> Result<usize, CodecError> {
-    header(&mut ByteReader { bytes, at: 0 })
+/// Returns the number of samples of the chunk `key` after checking its checksum.
+pub(super) fn n_samples(bytes: &[u8], key: ChunkKey<'_>) -> Result<usize, CodecError> {
+    header(&mut ByteReader { bytes: checked(bytes, key)?, at: 0 })
+}
+
+/// Checks the checksum. Returns the bytes before it.
+fn checked<'b>(bytes: &'b [u8], key: ChunkKey<'_>) -> Result<&'b [u8], CodecError> {
+    if bytes.first() != Some(&FORMAT) {
+        return Ok(bytes);
+    }
+    match bytes.split_last_chunk::<CHECKSUM>() {
+        Some((data, found)) if key.checksum(data) == *found => Ok(data),
+        _ => Err(CodecError::Checksum),
+    }
 }
 
 fn header(reader: &mut ByteReader<'_>) -> Result<usize, CodecError> {
     let header = reader.take(HEADER, "header")?;
-    if header[0] != FORMAT {
+    if ![FORMAT, FORMAT_UNCHECKED].contains(&header[0]) {
         return Err(CodecError::Format { found: header[0] });
     }
     let n = u32::from_le_bytes([header[1], header[2], header[3], header[4]]) as usize;
@@ -290,6 +333,16 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    const KEY: ChunkKey<'_> = ChunkKey { session: "s", first_index: 8192 };
+
+    /// A chunk as the versions without a checksum wrote it.
+    fn unchecked(samples: &[Sample]) -> Vec<u8> {
+        let mut bytes = encode(samples, Packing::Compact, KEY);
+        bytes.truncate(bytes.len() - CHECKSUM);
+        bytes[0] = FORMAT_UNCHECKED;
+        bytes
+    }
+
     fn edge_case() -> impl Strategy<Value = f64> {
         prop_oneof![
             any::<u64>().prop_map(f64::from_bits),
@@ -335,7 +388,7 @@ mod tests {
         #[test]
         fn every_bit_survives(samples in proptest::collection::vec(sample(), 0..1200)) {
             for packing in [Packing::Plain, Packing::Compact] {
-                let back = decode(&encode(&samples, packing)).expect("own bytes");
+                let back = decode(&encode(&samples, packing, KEY), KEY).expect("own bytes");
                 prop_assert_eq!(bits(&back), bits(&samples));
             }
         }
@@ -347,16 +400,38 @@ mod tests {
             let seq = |i| Some(first + i + u64::from(i >= gap));
             let sample = |i| Sample { seq: seq(i), t_s: i as f64, ..Sample::default() };
             let samples: Vec<_> = (0..n).map(sample).collect();
-            let bytes = encode(&samples, Packing::Plain);
-            prop_assert_eq!(bits(&decode(&bytes).expect("own bytes")), bits(&samples));
+            let bytes = encode(&samples, Packing::Plain, KEY);
+            prop_assert_eq!(bits(&decode(&bytes, KEY).expect("own bytes")), bits(&samples));
             let nameless: Vec<_> = samples.iter().map(|s| Sample { seq: None, ..*s }).collect();
-            let extra = bytes.len() - encode(&nameless, Packing::Plain).len();
+            let extra = bytes.len() - encode(&nameless, Packing::Plain, KEY).len();
             prop_assert_eq!(extra == 9, gap == 0 || gap >= n, "{} bytes", extra);
         }
 
         #[test]
+        fn one_changed_bit_or_another_key_is_noticed(
+            samples in proptest::collection::vec(sample(), 0..700),
+            bit in any::<proptest::sample::Index>(),
+        ) {
+            let mut bytes = encode(&samples, Packing::Compact, KEY);
+            let bit = bit.index(8 * bytes.len());
+            let next = ChunkKey { first_index: 8193, ..KEY };
+            prop_assert_eq!(decode(&bytes, next), Err(CodecError::Checksum));
+            let other = ChunkKey { session: "t", ..KEY };
+            prop_assert_eq!(decode(&bytes, other), Err(CodecError::Checksum));
+            bytes[bit / 8] ^= 1 << (bit % 8);
+            prop_assert!(decode(&bytes, KEY).is_err());
+            prop_assert!(n_samples(&bytes, KEY).is_err());
+        }
+
+        #[test]
+        fn chunks_of_earlier_versions_are_read(samples in proptest::collection::vec(sample(), 0..700)) {
+            let back = decode(&unchecked(&samples), KEY).expect("the former format");
+            prop_assert_eq!(bits(&back), bits(&samples));
+        }
+
+        #[test]
         fn any_bytes_are_read_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..300)) {
-            let _ = decode(&bytes);
+            let _ = decode(&bytes, KEY);
         }
 
         #[test]
@@ -364,9 +439,9 @@ mod tests {
             samples in proptest::collection::vec(sample(), 1..40),
             cut in 0.0..1.0f64,
         ) {
-            let bytes = encode(&samples, Packing::Compact);
+            let bytes = encode(&samples, Packing::Compact, KEY);
             let keep = (bytes.len() as f64 * cut) as usize;
-            prop_assert!(decode(&bytes[..keep]).is_err());
+            prop_assert!(decode(&bytes[..keep], KEY).is_err());
         }
     }
 
@@ -386,7 +461,7 @@ mod tests {
                 }
             })
             .collect();
-        let bytes = encode(&samples, Packing::Compact);
+        let bytes = encode(&samples, Packing::Compact, KEY);
         assert!(bytes.len() * 3 < samples.len() * 48, "{} bytes", bytes.len());
     }
 }

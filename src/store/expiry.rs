@@ -76,6 +76,15 @@ impl Store {
         self.sizes(query).await
     }
 
+    /// The sessions of imports that are not complete.
+    ///
+    /// # Errors
+    /// [`StoreError`] if the database fails.
+    pub async fn importing_sessions(&self) -> Result<Vec<String>, StoreError> {
+        let sql = "SELECT id FROM session WHERE state = 'open' AND importing = 1 ORDER BY id";
+        Ok(sqlx::query_scalar(sql).fetch_all(&self.pool).await?)
+    }
+
     /// Hidden assets that are not deleted yet.
     pub async fn hidden_assets(&self) -> Result<Vec<String>, StoreError> {
         Ok(sqlx::query_scalar("SELECT name FROM asset WHERE deleted_at IS NOT NULL ORDER BY name")

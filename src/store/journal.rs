@@ -19,9 +19,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use serde::{Deserialize, Serialize, Serializer};
 use sqlx::AnyConnection;
 
-use super::codec::{self, Packing};
+use super::codec::{self, ChunkKey, Packing};
 use super::tail::{FULL_CHUNK_SAMPLES, Run};
-use super::{SessionProgress, SessionRow, StoreError};
+use super::{SessionProgress, SessionRow, StoreError, decode_chunk};
 use offbd_core::vocabulary::Sample;
 
 /// Samples from which on a run is folded by its own commit: it fills whole pages anyway.
@@ -109,7 +109,8 @@ struct EncodedRun {
 impl EncodedRun {
     fn of(run: &Run) -> Self {
         let Run { first_index, progress, ref samples, .. } = *run;
-        let chunk = codec::encode(samples, Packing::Plain);
+        let key = ChunkKey { session: &run.session, first_index };
+        let chunk = codec::encode(samples, Packing::Plain, key);
         Self { first_index, n_samples: samples.len(), progress, chunk }
     }
 
@@ -201,7 +202,8 @@ impl Journal {
         changes.runs = runs.into_iter().map(|run| (EncodedRun::of(&run), run.session)).collect();
         let entries: Vec<_> =
             changes.runs.iter().map(|(run, session)| run.entry(session)).collect();
-        let data = rmp_serde::to_vec(&entries).map_err(|e| StoreError::journal(id, &e))?;
+        let entries = rmp_serde::to_vec(&entries).map_err(|e| StoreError::journal(id, &e))?;
+        let data = seal(id, &entries);
         changes.appended_row = Some((id, data.len()));
         sqlx::query("INSERT INTO journal (id, data) VALUES ($1, $2)")
             .bind(id)
@@ -319,16 +321,16 @@ impl JournalContents {
         data: &[u8],
         folded: &HashMap<String, SessionProgress>,
     ) -> Result<(), StoreError> {
-        let entries: Vec<JournalEntry<'_>> =
-            rmp_serde::from_slice(data).map_err(|e| StoreError::journal(id, &e))?;
+        let entries = entries(id, data)?;
         self.add_row(id, data.len());
         for entry in entries {
             let progress = entry.progress();
             if !folded.get(entry.session).is_some_and(|folded| progress.is_beyond(folded)) {
                 continue;
             }
+            let key = ChunkKey { session: entry.session, first_index: entry.first_index };
             let n_samples =
-                codec::n_samples(entry.chunk).map_err(|e| StoreError::journal(id, &e))?;
+                codec::n_samples(entry.chunk, key).map_err(|e| StoreError::journal(id, &e))?;
             let chunk = entry.chunk.to_vec();
             let run = EncodedRun { first_index: entry.first_index, n_samples, progress, chunk };
             self.add_run(id, entry.session.to_owned(), run);
@@ -348,14 +350,62 @@ impl UnfoldedSession {
         let mut samples = Vec::with_capacity(self.n_samples);
         for chunk in &self.chunks {
             let first_index = self.first_index + samples.len() as i64;
-            samples.extend(codec::decode(chunk).map_err(|source| StoreError::Chunk {
-                session: session.to_owned(),
-                first_index,
-                source,
-            })?);
+            samples.extend(decode_chunk(chunk, ChunkKey { session, first_index })?);
         }
         Ok(samples)
     }
+}
+
+/// A run of samples in a row of the journal.
+pub(super) struct JournalRun {
+    pub(super) session: String,
+    pub(super) first_index: i64,
+    pub(super) n: i64,
+}
+
+/// Returns the runs in the row `id` after checking all checksums.
+///
+/// # Errors
+/// [`StoreError::Journal`] if the row is damaged.
+pub(super) fn runs(id: i64, data: &[u8]) -> Result<Vec<JournalRun>, StoreError> {
+    let run = |entry: &JournalEntry<'_>| {
+        let JournalEntry { session, first_index, .. } = *entry;
+        let samples = codec::decode(entry.chunk, ChunkKey { session, first_index })
+            .map_err(|error| StoreError::journal(id, &error))?;
+        Ok(JournalRun { session: session.to_owned(), first_index, n: samples.len() as i64 })
+    };
+    entries(id, data)?.iter().map(run).collect()
+}
+
+fn entries(id: i64, data: &[u8]) -> Result<Vec<JournalEntry<'_>>, StoreError> {
+    rmp_serde::from_slice(unseal(id, data)?).map_err(|e| StoreError::journal(id, &e))
+}
+
+/// The first byte of a row with a checksum. No MessagePack document begins with it, so that
+/// rows of earlier versions are told apart.
+const SEALED: u8 = 0xc1;
+
+/// Returns the row `id` with the contents `entries`: a CRC-32 of both, and the contents.
+fn seal(id: i64, entries: &[u8]) -> Vec<u8> {
+    [&[SEALED][..], &checksum(id, entries), entries].concat()
+}
+
+/// Returns the contents of the row `id` after checking its checksum.
+fn unseal(id: i64, data: &[u8]) -> Result<&[u8], StoreError> {
+    if data.first() != Some(&SEALED) {
+        return Ok(data);
+    }
+    match data[1..].split_first_chunk() {
+        Some((found, entries)) if checksum(id, entries) == *found => Ok(entries),
+        _ => Err(StoreError::journal(id, &codec::CodecError::Checksum)),
+    }
+}
+
+fn checksum(id: i64, entries: &[u8]) -> [u8; 4] {
+    let mut hasher = crc32fast::Hasher::new();
+    hasher.update(&id.to_le_bytes());
+    hasher.update(entries);
+    hasher.finalize().to_le_bytes()
 }
 
 /// The progress in the rows of the open sessions, by id. Other sessions are folded

@@ -103,6 +103,30 @@ impl Location {
         within(connect).await
     }
 
+    /// Opens a connection that may only read; the database must exist.
+    pub(super) async fn reader(&self) -> Result<AnyConnection, StoreError> {
+        install_default_drivers();
+        let (url, read_only) = match self {
+            Self::File(file) => (file_url(file, "rw")?, "PRAGMA query_only = on"),
+            Self::Server(url) => (url.clone(), "SET default_transaction_read_only = on"),
+        };
+        let options: AnyConnectOptions = url.parse()?;
+        let connect = async {
+            let mut connection = options.connect().await?;
+            connection.execute(read_only).await?;
+            Ok(connection)
+        };
+        within(connect).await
+    }
+
+    /// The statement that begins a transaction that reads one state of the database.
+    pub(super) const fn begin_read(&self) -> &'static str {
+        match self {
+            Self::File(_) => "BEGIN",
+            Self::Server(_) => "BEGIN ISOLATION LEVEL REPEATABLE READ",
+        }
+    }
+
     /// A pool of connections that may only read.
     pub(super) fn readers(&self) -> Result<AnyPool, StoreError> {
         let pool =

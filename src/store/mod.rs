@@ -22,6 +22,7 @@
 
 mod access;
 mod backup;
+mod check;
 mod checkpoint;
 pub mod codec;
 mod expiry;
@@ -33,6 +34,7 @@ mod migrations;
 mod multi_row;
 mod query_builder;
 mod read;
+mod recording;
 mod rows;
 mod tail;
 mod write;
@@ -42,14 +44,17 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use migrations::MIGRATIONS;
+use offbd_core::vocabulary::Sample;
 use sqlx::AnyPool;
 use write::WriterRole;
 
 pub use access::{AccessWrite, AuditRow, LAST_ID, MAX_LOGINS, TokenRow};
 pub use backup::{back_up, restore};
+pub use check::{CheckReport, check};
 pub use expiry::SessionSize;
 pub use location::Location;
 pub use read::{FaultFilter, FaultOrder, SessionFilter};
+pub use recording::RecordingReader;
 pub use rows::{
     ActionKind, ActionRow, AssetRow, CalibrationRow, EventRow, FaultRow, Micros, ReplayRow,
     SessionProgress, SessionRow, TransitionRow, TrendEntry, TrendRow, WarningRow,
@@ -69,6 +74,10 @@ pub enum StoreError {
     Migration(#[from] sqlx::migrate::MigrateError),
     #[error("chunk {first_index} of session {session}: {source}")]
     Chunk { session: String, first_index: i64, source: codec::CodecError },
+    #[error("session {session} is damaged: sample {found} of {expected} is missing")]
+    Incomplete { session: String, found: i64, expected: i64 },
+    #[error("session {session} has been deleted")]
+    Deleted { session: String },
     #[error("journal row {id}: {reason}")]
     Journal { id: i64, reason: String },
     #[error("{column} has the value `{found}`, which is unknown to this version")]
@@ -89,6 +98,11 @@ pub enum StoreError {
     File { file: PathBuf, source: std::io::Error },
     #[error("the copy is damaged: {found}")]
     Damaged { found: String },
+    #[error(
+        "the database has schema {found}, and this version has {expected}: start the service \
+         or run `offbd migrate` first"
+    )]
+    Schema { found: i64, expected: i64 },
 }
 
 impl StoreError {
@@ -119,12 +133,15 @@ impl StoreError {
             Self::InUse | Self::UnexpectedCommits { .. } => true,
             Self::Migration(_)
             | Self::Chunk { .. }
+            | Self::Incomplete { .. }
+            | Self::Deleted { .. }
             | Self::Journal { .. }
             | Self::UnknownValue { .. }
             | Self::NotSqlite
             | Self::Exists { .. }
             | Self::File { .. }
-            | Self::Damaged { .. } => false,
+            | Self::Damaged { .. }
+            | Self::Schema { .. } => false,
         }
     }
 }
@@ -138,6 +155,13 @@ fn is_invalid_change(code: &str) -> bool {
         return ["22", "23", "42"].iter().any(|class| code.starts_with(class));
     }
     code.parse::<i32>().is_ok_and(|code| [1, 18, 19, 20, 25].contains(&(code & 0xff)))
+}
+
+fn decode_chunk(bytes: &[u8], key: codec::ChunkKey<'_>) -> Result<Vec<Sample>, StoreError> {
+    codec::decode(bytes, key).map_err(|source| {
+        let codec::ChunkKey { session, first_index } = key;
+        StoreError::Chunk { session: session.to_owned(), first_index, source }
+    })
 }
 
 /// The store for reading. Clones share the connections.

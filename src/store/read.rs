@@ -1,9 +1,10 @@
 //! Queries of the store.
 
+use super::codec::ChunkKey;
 use super::query_builder::QueryBuilder;
 use super::{
     ActionRow, AssetRow, CalibrationRow, EventRow, FaultRow, Micros, ReplayRow, SessionRow, Store,
-    StoreError, TransitionRow, TrendEntry, codec,
+    StoreError, TransitionRow, TrendEntry, decode_chunk,
 };
 use offbd_core::vocabulary::Sample;
 
@@ -42,7 +43,7 @@ pub struct FaultFilter {
 }
 
 pub(super) const SESSION: &str =
-    "SELECT id, asset, name, state, opened_at, ended_at, setup, baseline,
+    "SELECT id, asset, name, state, opened_at, ended_at, setup, baseline, importing,
     n_samples, n_rejected, first_t_s, last_t_s, last_seq, verdict, verdict_hash FROM session
     WHERE ";
 
@@ -184,8 +185,8 @@ impl Store {
     }
 
     /// Samples of `session` from `index` on, as many as are stored together (in one chunk
-    /// or in the journal); `None` at the end of the recording.
-    pub async fn samples_from(
+    /// or in the journal); `None` if the sample at `index` is not there.
+    pub(super) async fn samples_from(
         &self,
         session: &str,
         index: i64,
@@ -203,8 +204,9 @@ impl Store {
         .await?;
         let row = row.filter(|(first_index, n, _)| index < first_index + n);
         let Some((first_index, _, data)) = row else { return Ok(None) };
-        let mut samples = decode(session, first_index, &data)?;
-        Ok(Some(samples.split_off(usize::try_from(index - first_index).unwrap_or_default())))
+        let mut samples = decode_chunk(&data, ChunkKey { session, first_index })?;
+        let at = usize::try_from(index - first_index).unwrap_or_default();
+        Ok((at < samples.len()).then(|| samples.split_off(at)))
     }
 
     /// The recorded samples of `session` with one of the `times`, which ascend. Returns
@@ -234,7 +236,8 @@ impl Store {
             return Ok(None);
         }
         for (first_index, data) in rows {
-            found.extend(decode(session, first_index, &data)?.into_iter().filter(is_asked));
+            let samples = decode_chunk(&data, ChunkKey { session, first_index })?;
+            found.extend(samples.into_iter().filter(is_asked));
         }
         Ok(Some(found))
     }
@@ -494,13 +497,4 @@ fn time_ranges(times: &[f64]) -> Vec<(f64, f64)> {
         }
     }
     ranges
-}
-
-fn decode(session: &str, first_index: i64, data: &[u8]) -> Result<Vec<Sample>, StoreError> {
-    let session = || session.to_owned();
-    codec::decode(data).map_err(|source| StoreError::Chunk {
-        session: session(),
-        first_index,
-        source,
-    })
 }

@@ -59,6 +59,8 @@ pub struct SessionRow {
     /// The fault memory when the session was opened.
     pub baseline: String,
     pub progress: SessionProgress,
+    /// 1 for a recording that is being imported, 0 otherwise.
+    pub importing: i64,
     /// `None` while the session is open; so is the hash.
     pub verdict: Option<String>,
     pub verdict_hash: Option<String>,
@@ -74,6 +76,7 @@ from_row!(
         ended_at,
         setup,
         baseline,
+        importing,
         verdict,
         verdict_hash
     }[progress]

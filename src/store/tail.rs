@@ -11,9 +11,9 @@ use std::collections::BTreeMap;
 
 use sqlx::AnyConnection;
 
-use super::codec::Packing;
+use super::codec::{ChunkKey, Packing};
 use super::multi_row::{MultiRowStatement, in_parts};
-use super::{SessionProgress, StoreError, codec};
+use super::{SessionProgress, StoreError, codec, decode_chunk};
 use offbd_core::vocabulary::Sample;
 
 /// Samples in a full chunk; a longer run is cut into several.
@@ -175,6 +175,7 @@ async fn insert(connection: &mut AnyConnection, chunks: &[NewChunk<'_>]) -> Resu
     for part in in_parts(chunks) {
         let mut query = sqlx::query(INSERT.sql(part.len()));
         for NewChunk { session, first_index, samples, packing } in part {
+            let key = ChunkKey { session, first_index: *first_index };
             let times = || samples.iter().map(|sample| sample.t_s);
             query = query
                 .bind(*session)
@@ -182,7 +183,7 @@ async fn insert(connection: &mut AnyConnection, chunks: &[NewChunk<'_>]) -> Resu
                 .bind(samples.len() as i64)
                 .bind(times().fold(f64::INFINITY, f64::min))
                 .bind(times().fold(f64::NEG_INFINITY, f64::max))
-                .bind(codec::encode(samples, *packing));
+                .bind(codec::encode(samples, *packing, key));
         }
         query.execute(&mut *connection).await?;
     }
@@ -230,12 +231,8 @@ async fn take_small(
 
 fn decode_all(session: &str, chunks: &[(i64, Vec<u8>)]) -> Result<Vec<Sample>, StoreError> {
     let mut samples = Vec::new();
-    for (first_index, data) in chunks {
-        samples.extend(codec::decode(data).map_err(|source| StoreError::Chunk {
-            session: session.to_owned(),
-            first_index: *first_index,
-            source,
-        })?);
+    for &(first_index, ref data) in chunks {
+        samples.extend(decode_chunk(data, ChunkKey { session, first_index })?);
     }
     Ok(samples)
 }

@@ -69,6 +69,12 @@ pub enum Write {
     DeleteSession {
         session: String,
     },
+    /// Ends an open session without a verdict and hides it from all readers. The first
+    /// step of its deletion.
+    DiscardSession {
+        session: String,
+        at: Micros,
+    },
     /// Hides an ended session from all readers. The first step of its deletion.
     HideSession {
         session: String,
@@ -414,6 +420,7 @@ impl GroupCommit<'_> {
             }
             Write::DeleteSession { session } => self.delete_session(db, session).await,
             Write::HideSession { session, at } => deletion::hide_session(db, session, *at).await,
+            Write::DiscardSession { session, at } => self.discard_session(db, session, *at).await,
             Write::DropChunks { session, limit } => {
                 deletion::drop_chunks(db, session, *limit).await
             }
@@ -500,8 +507,8 @@ async fn update_asset(db: &mut AnyConnection, row: &AssetRow) -> Result<(), Stor
 
 async fn open_session(db: &mut AnyConnection, row: &SessionRow) -> Result<(), StoreError> {
     sqlx::query(
-        "INSERT INTO session (id, asset, name, state, opened_at, setup, baseline, n_samples,
-         n_rejected) VALUES ($1, $2, $3, 'open', $4, $5, $6, 0, 0)",
+        "INSERT INTO session (id, asset, name, state, opened_at, setup, baseline, importing,
+         n_samples, n_rejected) VALUES ($1, $2, $3, 'open', $4, $5, $6, $7, 0, 0)",
     )
     .bind(&row.id)
     .bind(&row.asset)
@@ -509,6 +516,7 @@ async fn open_session(db: &mut AnyConnection, row: &SessionRow) -> Result<(), St
     .bind(row.opened_at)
     .bind(&row.setup)
     .bind(&row.baseline)
+    .bind(row.importing)
     .execute(db)
     .await?;
     Ok(())
@@ -522,7 +530,8 @@ async fn end_session(
     hash: &str,
 ) -> Result<(), StoreError> {
     sqlx::query(
-        "UPDATE session SET state = 'ended', ended_at = $2, verdict = $3, verdict_hash = $4,
+        "UPDATE session SET state = 'ended', importing = 0, ended_at = $2, verdict = $3,
+         verdict_hash = $4,
          n_bytes = (SELECT CAST(COALESCE(SUM(LENGTH(data)), 0) AS BIGINT) FROM chunk
                     WHERE chunk.session = session.id)
          WHERE id = $1",

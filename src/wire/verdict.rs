@@ -17,7 +17,7 @@ use super::words::{AxisWord, CodeWord, CommandWord, KindWord, LineWord, MisfitWo
 use offbd_core::diagnosis::{
     AxisEvidence, Candidate, Evidence, ServoAnswer, Suspicion, Transition,
 };
-use offbd_core::engine::{Admission, Misfit};
+use offbd_core::engine::Misfit;
 use offbd_core::vocabulary::{FaultCode, FaultStatus};
 
 /// A transition: a change of a fault's status. If the kind of a fault is determined only

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::support::process::Process;
 use crate::support::{ServiceFixture, connection, rig, url};
-use offbd::store::codec::{self, Packing};
+use offbd::store::codec::{self, ChunkKey, Packing};
 use offbd::store::{
     AssetRow, Location, SessionFilter, SessionProgress, SessionRow, Store, Write, Writer,
 };
@@ -120,6 +120,7 @@ fn session(id: &str, asset: &str) -> SessionRow {
         setup: "{}".to_owned(),
         baseline: "{}".to_owned(),
         progress: SessionProgress::default(),
+        importing: 0,
         verdict: None,
         verdict_hash: None,
     }
@@ -240,9 +241,9 @@ impl StoreTest {
 
     async fn read(&self, session: &str, from: usize) -> Vec<Sample> {
         let mut samples: Vec<Sample> = Vec::new();
-        let index = |n: usize| i64::try_from(from + n).unwrap();
-        while let Some(part) = self.store.samples_from(session, index(samples.len())).await.unwrap()
-        {
+        let row = self.store.session(session).await.unwrap().unwrap();
+        let mut reader = self.store.recording(&row, i64::try_from(from).unwrap());
+        while let Some(part) = reader.next().await.unwrap() {
             assert!(!part.is_empty());
             samples.extend(part);
         }
@@ -370,12 +371,21 @@ async fn create_old_database(data: &Path, samples: &[Sample]) {
             .bind(part.len() as i64)
             .bind(part[0].t_s)
             .bind(part[part.len() - 1].t_s)
-            .bind(codec::encode(part, Packing::Plain))
+            .bind(without_checksum(part))
             .execute(&mut db)
             .await
             .unwrap();
     }
     db.close().await.unwrap();
+}
+
+/// The chunk of the first format, which had no checksum.
+fn without_checksum(samples: &[Sample]) -> Vec<u8> {
+    let key = ChunkKey { session: "old", first_index: 0 };
+    let mut chunk = codec::encode(samples, Packing::Plain, key);
+    chunk.truncate(chunk.len() - 4);
+    chunk[0] = 1;
+    chunk
 }
 
 #[tokio::test]

@@ -10,6 +10,7 @@ mod backup;
 mod bad_input;
 mod cli;
 mod crash;
+mod damage;
 mod fault_memory;
 mod fuzz;
 mod journal;

@@ -1,7 +1,7 @@
 //! Retention: old sessions are deleted, and those with faults are kept longer.
 
 use crate::support::{ServiceFixture, eventually, rig};
-use offbd::store::codec::{self, Packing};
+use offbd::store::codec::{self, ChunkKey, Packing};
 use offbd_core::vocabulary::Sample;
 use serde_json::Value;
 use sqlx::{AssertSqlSafe, Executor};
@@ -66,7 +66,8 @@ async fn old_sessions_are_deleted_and_those_with_faults_are_kept_longer() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn above_the_size_limit_the_oldest_sessions_without_faults_are_deleted() {
     let (healthy, sick) = (rig(500, 500), rig(1500, 500));
-    let size = |samples: &[Sample]| codec::encode(samples, Packing::Compact).len();
+    let key = ChunkKey { session: "", first_index: 0 };
+    let size = |samples: &[Sample]| codec::encode(samples, Packing::Compact, key).len();
     let bytes = size(&healthy) * 2 + size(&sick) + 10;
     let fixture = ServiceFixture::start_with(|config| {
         config.retention.bytes_per_asset = Some(bytes);

@@ -34,6 +34,8 @@ pub(in crate::service) enum AssetCommand {
     OpenSession { name: Option<String>, importing: bool, reply: Reply<String> },
     /// Ends the session with this id if it is open.
     EndSession { session: String, reply: Reply<()> },
+    /// Discards the session with this id, whose import failed.
+    DiscardImport { session: String, reply: Reply<()> },
     /// Hides the session with this id, and ends it if it is open.
     DeleteSession { session: String, reply: Reply<()> },
 

@@ -57,7 +57,7 @@ fn reopen(env: &Environment, row: &SessionRow, refines: bool) -> Result<OpenSess
     let setup = Setup::new(views::rig(&row.setup)?, None)?;
     let baseline = views::memory(&row.baseline)?;
     let mut open = OpenSession::new(row.id.clone(), row.name.clone(), setup, baseline, refines);
-    play(&env.handles, &row.id, |input| {
+    play(&env.handles, row, |input| {
         match input {
             Input::NewSample(sample) => {
                 open.take_new(&sample);
@@ -78,5 +78,6 @@ fn reopen(env: &Environment, row: &SessionRow, refines: bool) -> Result<OpenSess
         );
     }
     open.progress = row.progress;
+    open.importing = row.importing != 0;
     Ok(open)
 }

@@ -47,6 +47,10 @@ impl Asset {
         actor: String,
         turn: &mut Turn<'_>,
     ) -> Result<(), ServiceError> {
+        if self.open.as_ref().is_some_and(|open| open.importing) {
+            let what = "a recording is being imported into this asset";
+            return Err(ServiceError::Busy { what });
+        }
         let mut memory = self.memory.clone();
         match kind {
             ActionKind::Clear => memory.clear(code),
@@ -83,13 +87,14 @@ impl Asset {
         self.open.as_ref().map_or(&self.memory, |open| open.judging.engine().memory())
     }
 
-    /// Writes the changes of the engine's fault memory.
+    /// Writes the changes of the engine's fault memory; those of an import are written when
+    /// it is complete.
     pub(super) fn write_memory(
         &mut self,
         action: Option<&PersonAction>,
         turn: &mut Turn<'_>,
     ) -> Result<(), ServiceError> {
-        let Some(open) = &self.open else { return Ok(()) };
+        let Some(open) = self.open.as_ref().filter(|open| !open.importing) else { return Ok(()) };
         if action.is_none() && *open.judging.engine().memory() == self.memory {
             return Ok(());
         }

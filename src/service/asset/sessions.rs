@@ -38,15 +38,12 @@ impl Asset {
         }
         let name = name.unwrap_or_else(|| rfc3339(turn.at));
         let open = self.open.as_ref().is_some_and(|open| open.name == name);
-        if open || matches!(self.switch(&name, turn)?, SessionSwitch::Ended(_)) {
+        if open || matches!(self.switch_to(&name, importing, turn)?, SessionSwitch::Ended(_)) {
             let asset = self.row.name.clone();
             return Err(ServiceError::SessionExists { asset, name });
         }
-        let Some(open) = &mut self.open else {
-            return Err(ServiceError::Unavailable { what: "the session could not be opened" });
-        };
-        open.importing = importing;
-        Ok(open.id.clone())
+        let failed = ServiceError::Unavailable { what: "the session could not be opened" };
+        self.open.as_ref().map(|open| open.id.clone()).ok_or(failed)
     }
 
     /// Ends the session `id` if it is open.
@@ -78,10 +75,35 @@ impl Asset {
         Ok(())
     }
 
-    /// Opens the session `name` if it is not open, and ends the one that was open.
+    /// Discards the session `id` of an import that failed. The fault memory is that before
+    /// the import.
+    pub(super) fn discard_import(
+        &mut self,
+        id: String,
+        turn: &mut Turn<'_>,
+    ) -> Result<(), ServiceError> {
+        if self.open.as_ref().is_some_and(|open| open.id == id && open.importing) {
+            self.open = None;
+            turn.engine_changed = true;
+            turn.writes.push(Write::DiscardSession { session: id, at: turn.at });
+        }
+        Ok(())
+    }
+
+    /// Opens the session `name` for live samples if it is not open, and ends the one that
+    /// was open.
     pub(super) fn switch(
         &mut self,
         name: &str,
+        turn: &mut Turn<'_>,
+    ) -> Result<SessionSwitch, ServiceError> {
+        self.switch_to(name, false, turn)
+    }
+
+    fn switch_to(
+        &mut self,
+        name: &str,
+        importing: bool,
         turn: &mut Turn<'_>,
     ) -> Result<SessionSwitch, ServiceError> {
         if self.open.as_ref().is_some_and(|open| open.name == name) {
@@ -94,12 +116,17 @@ impl Asset {
             return Ok(SessionSwitch::Ended(Box::new(row)));
         }
         self.end(turn)?;
-        self.open(name.to_owned(), turn)?;
+        self.open(name.to_owned(), importing, turn)?;
         Ok(SessionSwitch::Open)
     }
 
     /// Opens a session. No session must be open.
-    fn open(&mut self, name: String, turn: &mut Turn<'_>) -> Result<(), ServiceError> {
+    fn open(
+        &mut self,
+        name: String,
+        importing: bool,
+        turn: &mut Turn<'_>,
+    ) -> Result<(), ServiceError> {
         let id = Uuid::now_v7().to_string();
         let setup = Setup::new(self.rig.clone(), None)?;
         turn.writes.push(Write::OpenSession(SessionRow {
@@ -112,17 +139,20 @@ impl Asset {
             setup: views::to_json(&asset::view(&self.rig))?,
             baseline: views::to_json(&StoredMemory::of(&self.memory))?,
             progress: SessionProgress::default(),
+            importing: importing.into(),
             verdict: None,
             verdict_hash: None,
         }));
         let refines = self.learning.refines();
-        self.open = Some(OpenSession::new(id, name, setup, self.memory.clone(), refines));
+        let mut open = OpenSession::new(id, name, setup, self.memory.clone(), refines);
+        open.importing = importing;
+        self.open = Some(open);
         self.write_memory(None, turn)
     }
 
     /// Opens a session named by the current time.
     pub(super) fn open_nameless(&mut self, turn: &mut Turn<'_>) -> Result<(), ServiceError> {
-        self.open(rfc3339(turn.at), turn)
+        self.open(rfc3339(turn.at), false, turn)
     }
 
     /// Ends the open session, if there is one: finalizes its verdict, trends and fault

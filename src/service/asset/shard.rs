@@ -143,6 +143,9 @@ impl Shard {
             C::EndSession { session, reply } => {
                 self.change(name, reply, |a, turn| a.end_session(&session, turn));
             }
+            C::DiscardImport { session, reply } => {
+                self.change(name, reply, |a, turn| a.discard_import(session, turn));
+            }
             C::DeleteSession { session, reply } => {
                 self.change(name, reply, |a, turn| a.delete_session(session, turn));
             }

@@ -9,7 +9,7 @@ use crate::service::asset::{AssetCommand, LearningRecord, Reply, TrainingSession
 use crate::service::clock::rfc3339;
 use crate::service::limits::MAX_CALIBRATION_SAMPLES;
 use crate::service::{ServiceError, views};
-use crate::store::{CalibrationRow, Store, Write};
+use crate::store::{CalibrationRow, SessionRow, Store, Write};
 use crate::wire::asset;
 use crate::wire::session_csv;
 use crate::wire::words::JobState;
@@ -111,16 +111,16 @@ async fn latest(
     room: usize,
 ) -> Result<Vec<Sample>, ServiceError> {
     let TrainingSession { id, n_samples, .. } = session;
-    if store.session(id).await?.is_none() {
-        return Err(ServiceError::UnknownSession { id: id.clone() });
-    }
-    let mut next = (n_samples - i64::try_from(room).unwrap_or(i64::MAX)).max(0);
+    let first = (n_samples - i64::try_from(room).unwrap_or(i64::MAX)).max(0);
+    let wanted = usize::try_from(n_samples - first).unwrap_or_default();
+    let mut reader = store.recording(&session_row(store, id).await?, first);
     let mut samples: Vec<Sample> = Vec::new();
-    while let Some(chunk) = store.samples_from(id, next).await?.filter(|_| next < *n_samples) {
-        let remaining = usize::try_from(n_samples - next).unwrap_or(usize::MAX);
-        next += i64::try_from(chunk.len()).unwrap_or(i64::MAX);
-        samples.extend(chunk.into_iter().take(remaining));
+    while samples.len() < wanted
+        && let Some(chunk) = reader.next().await?
+    {
+        samples.extend(chunk);
     }
+    samples.truncate(wanted);
     Ok(samples)
 }
 
@@ -133,10 +133,15 @@ async fn rig(store: &Store, asset: &str) -> Result<Rig, ServiceError> {
     Ok(rig)
 }
 
+async fn session_row(store: &Store, id: &str) -> Result<SessionRow, ServiceError> {
+    let row = store.session(id).await?;
+    row.ok_or_else(|| ServiceError::UnknownSession { id: id.to_owned() })
+}
+
 async fn recording(store: &Store, id: &str, room: usize) -> Result<Vec<Sample>, ServiceError> {
+    let mut reader = store.recording(&session_row(store, id).await?, 0);
     let mut samples: Vec<Sample> = Vec::new();
-    let next = |n: usize| i64::try_from(n).unwrap_or(i64::MAX);
-    while let Some(chunk) = store.samples_from(id, next(samples.len())).await? {
+    while let Some(chunk) = reader.next().await? {
         samples.extend(chunk);
         if samples.len() > room {
             let (what, limit) =

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use crate::service::PendingBatch;
+use crate::service::asset::AssetCommand;
 use crate::service::{Service, ServiceError};
 use crate::wire::service::{ImportView, SessionView};
 use crate::wire::telemetry::{AckView, Batch, RowView};
@@ -19,10 +20,13 @@ const BATCH: usize = 2048;
 impl Service {
     /// Imports `recording` as the session `name` and ends it. The asset's open session is
     /// ended first; until the import is complete, live telemetry of the asset is refused
-    /// with [`ServiceError::Busy`]. Continues if the caller is dropped.
+    /// with [`ServiceError::Busy`]. Continues if the caller is dropped. An import that fails
+    /// leaves neither a session nor faults; one that a stop interrupts is discarded at the
+    /// next start.
     ///
     /// # Errors
-    /// [`ServiceError::SessionExists`]; [`ServiceError::Invalid`] for an invalid name.
+    /// [`ServiceError::SessionExists`]; [`ServiceError::Invalid`] for an invalid name; those
+    /// of the samples' batches.
     pub async fn import(
         &self,
         asset: &str,
@@ -32,11 +36,25 @@ impl Service {
         let (this, asset) = (self.clone(), asset.to_owned());
         let task = tokio::spawn(async move {
             let session = this.open_for(&asset, name, true).await?;
-            let imported = this.run_import(&asset, session.clone(), recording).await;
-            let session = this.end_session(&session.id).await?;
-            Ok(ImportView { session, ..imported? })
+            let id = session.id.clone();
+            match this.run_import(&asset, session, recording).await {
+                Ok(imported) => {
+                    Ok(ImportView { session: this.end_session(&id).await?, ..imported })
+                }
+                Err(error) => {
+                    this.discard_import(&asset, id).await?;
+                    Err(error)
+                }
+            }
         });
         task.await.unwrap_or(Err(ServiceError::Unavailable { what: "the import failed" }))
+    }
+
+    async fn discard_import(&self, asset: &str, id: String) -> Result<(), ServiceError> {
+        let session = id.clone();
+        let discard = |reply| AssetCommand::DiscardImport { session, reply };
+        self.inner.shards.call(asset, discard).await?;
+        self.inner.deleter.session(&id).await
     }
 
     async fn run_import(

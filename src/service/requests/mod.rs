@@ -25,5 +25,4 @@ mod trends;
 
 pub use faults::FaultQuery;
 pub use readiness::QueueLoad;
-pub use sessions::RecordingReader;
 pub use telemetry::PendingBatch;

@@ -2,30 +2,9 @@
 
 use crate::service::asset::AssetCommand;
 use crate::service::{Service, ServiceError, views};
-use crate::store::{SessionFilter, SessionRow, Store};
+use crate::store::{RecordingReader, SessionFilter, SessionRow};
 use crate::wire::service::{Page, SessionView};
 use crate::wire::words::SessionState;
-use offbd_core::vocabulary::Sample;
-
-/// Reads the samples of a session chunk by chunk, in order of arrival.
-pub struct RecordingReader {
-    store: Store,
-    session: String,
-    next: i64,
-}
-
-impl RecordingReader {
-    /// Reads the next chunk; returns `None` at the end.
-    ///
-    /// # Errors
-    /// [`ServiceError::Store`].
-    pub async fn next(&mut self) -> Result<Option<Vec<Sample>>, ServiceError> {
-        let samples = self.store.samples_from(&self.session, self.next).await?;
-        let n = samples.as_ref().map_or(0, Vec::len);
-        self.next += i64::try_from(n).unwrap_or(i64::MAX);
-        Ok(samples)
-    }
-}
 
 impl Service {
     /// Ends the asset's open session and opens a new one, by default named by the current
@@ -134,8 +113,8 @@ impl Service {
         &self,
         id: &str,
     ) -> Result<(SessionView, RecordingReader), ServiceError> {
-        let session = self.session(id).await?;
-        let store = self.inner.handles.store.clone();
-        Ok((session, RecordingReader { store, session: id.to_owned(), next: 0 }))
+        let row = self.session_row(id).await?;
+        let recording = self.inner.handles.store.recording(&row, 0);
+        Ok((views::session(row)?, recording))
     }
 }

@@ -36,6 +36,25 @@ impl GroupCommit<'_> {
         Ok(())
     }
 
+    /// Ends the open `session` without a verdict, and hides it.
+    pub(super) async fn discard_session(
+        &mut self,
+        db: &mut AnyConnection,
+        session: &str,
+        at: Micros,
+    ) -> Result<(), StoreError> {
+        self.discard(session);
+        sqlx::query(
+            "UPDATE session SET state = 'ended', ended_at = $2, expired_at = $2
+             WHERE id = $1 AND state = 'open'",
+        )
+        .bind(session)
+        .bind(at)
+        .execute(db)
+        .await?;
+        Ok(())
+    }
+
     /// Deletes `session`, with what is left of its chunks and transitions.
     pub(super) async fn delete_session(
         &mut self,

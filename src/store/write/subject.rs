@@ -17,6 +17,7 @@ impl Write {
             }
             Self::EndSession { session, .. } => format!("the end of session {session}"),
             Self::DeleteSession { session }
+            | Self::DiscardSession { session, .. }
             | Self::HideSession { session, .. }
             | Self::DropChunks { session, .. }
             | Self::DropTransitions { session, .. } => format!("the deletion of session {session}"),

@@ -3,6 +3,7 @@
 
 use offbd::service::access::Role;
 use offbd::service::access::jwt::{KeySet, MAX_SUBJECT, verify};
+use offbd::store::codec::ChunkKey;
 use offbd::wire::telemetry::{self, Batch, BatchError};
 use offbd::wire::{asset, scene, session_csv};
 use offbd_core::diagnosis::FaultMemory;
@@ -144,7 +145,8 @@ fn scene_file(input: &[u8]) -> String {
 
 /// A chunk, the compressed form of samples in the store.
 fn chunk(input: &[u8]) -> String {
-    match offbd::store::codec::decode(input) {
+    let key = ChunkKey { session: "s", first_index: 0 };
+    match offbd::store::codec::decode(input, key) {
         Ok(samples) => format!("{} samples", samples.len().min(3)),
         Err(error) => kind(&error.to_string()),
     }

@@ -1,0 +1,299 @@
+//! Goes through a database and names what is damaged: the structure of the database, the
+//! checksum and the place of every chunk and journal row, and every stored document.
+
+use std::collections::BTreeMap;
+
+use futures_util::TryStreamExt;
+use serde::de::IgnoredAny;
+use sqlx::{AnyConnection, Connection, Executor};
+
+use super::codec::ChunkKey;
+use super::from_row::from_row;
+use super::journal::JournalRun;
+use super::{Location, MIGRATIONS, StoreError, decode_chunk, journal};
+
+/// Most findings that are listed; the search ends there.
+const MAX_FINDINGS: usize = 1000;
+
+/// Chunks that are read at a time, some 50 kB each.
+const CHUNKS_AT_ONCE: i64 = 16;
+
+/// The stored documents, each with the key of its row.
+const DOCUMENTS: &[(&str, &str)] = &[
+    ("asset file of", "SELECT name, document FROM asset"),
+    ("learning record of", "SELECT name, learning FROM asset WHERE learning IS NOT NULL"),
+    ("set-up of session", "SELECT id, setup FROM session"),
+    ("fault memory before session", "SELECT id, baseline FROM session"),
+    ("verdict of session", "SELECT id, verdict FROM session WHERE verdict IS NOT NULL"),
+    ("transition", "SELECT CAST(id AS TEXT), document FROM transition"),
+    ("fault of", "SELECT asset || ', ' || code, record FROM fault"),
+    ("provenance of the fault of", "SELECT asset || ', ' || code, provenance FROM fault"),
+    ("settings of replay", "SELECT id, settings FROM replay"),
+    ("result of replay", "SELECT id, result FROM replay WHERE result IS NOT NULL"),
+    ("sessions of calibration", "SELECT id, sessions FROM calibration"),
+    ("calibration", "SELECT id, document FROM calibration WHERE document IS NOT NULL"),
+];
+
+/// What a check went through and what it found.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct CheckReport {
+    pub n_sessions: u64,
+    pub n_samples: u64,
+    pub n_documents: u64,
+    /// What is damaged, in words; at most 1000 findings.
+    pub findings: Vec<String>,
+}
+
+impl CheckReport {
+    fn add(&mut self, finding: String) {
+        if self.findings.len() < MAX_FINDINGS {
+            self.findings.push(finding);
+        }
+    }
+}
+
+/// Checks the contents of the database at `location`, also while a service uses it.
+/// Nothing is changed.
+///
+/// # Errors
+/// [`StoreError`] if the database cannot be opened or has the schema of another version.
+pub async fn check(location: &Location) -> Result<CheckReport, StoreError> {
+    let mut db = location.reader().await?;
+    check_version(&mut db).await?;
+    let mut report = CheckReport::default();
+    if location.file().is_some() {
+        check_structure(&mut db, &mut report).await?;
+    }
+    check_open(&mut db, location, &mut report).await;
+    check_ended(&mut db, &mut report).await;
+    check_documents(&mut db, &mut report).await;
+    db.close().await?;
+    Ok(report)
+}
+
+/// Checks the contents of the SQLite database of `db`.
+///
+/// # Errors
+/// [`StoreError::Damaged`] with the first finding.
+pub(super) async fn check_copy(db: &mut AnyConnection, file: &Location) -> Result<(), StoreError> {
+    let mut report = CheckReport::default();
+    check_structure(db, &mut report).await?;
+    check_open(db, file, &mut report).await;
+    check_ended(db, &mut report).await;
+    check_documents(db, &mut report).await;
+    match report.findings.into_iter().next() {
+        Some(found) => Err(StoreError::Damaged { found }),
+        None => Ok(()),
+    }
+}
+
+async fn check_version(db: &mut AnyConnection) -> Result<(), StoreError> {
+    let found: i64 =
+        sqlx::query_scalar("SELECT MAX(version) FROM _sqlx_migrations").fetch_one(db).await?;
+    let expected = MIGRATIONS.iter().map(|migration| migration.version).max().unwrap_or_default();
+    if found == expected { Ok(()) } else { Err(StoreError::Schema { found, expected }) }
+}
+
+/// SQLite's own check of pages, indexes and constraints.
+async fn check_structure(
+    db: &mut AnyConnection,
+    report: &mut CheckReport,
+) -> Result<(), StoreError> {
+    let found: Vec<String> = sqlx::query_scalar("PRAGMA integrity_check").fetch_all(db).await?;
+    found.into_iter().filter(|line| line != "ok").for_each(|line| report.add(line));
+    Ok(())
+}
+
+/// A session as its row describes it.
+struct CheckedSession {
+    id: String,
+    n_samples: i64,
+}
+
+from_row!(CheckedSession { id, n_samples });
+
+/// Checks the open sessions and the journal, which change together, in one transaction.
+async fn check_open(db: &mut AnyConnection, location: &Location, report: &mut CheckReport) {
+    let checked = async {
+        db.execute(location.begin_read()).await?;
+        let mut runs = journal_runs(db, report).await?;
+        for session in sessions(db, "open").await? {
+            let n_folded = check_chunks(db, &session, report).await;
+            check_journal(
+                &session,
+                n_folded,
+                &runs.remove(&session.id).unwrap_or_default(),
+                report,
+            );
+            report.n_sessions += 1;
+        }
+        db.execute("ROLLBACK").await?;
+        Ok::<_, StoreError>(())
+    };
+    if let Err(error) = checked.await {
+        report.add(format!("the open sessions cannot be read: {error}"));
+    }
+}
+
+async fn check_ended(db: &mut AnyConnection, report: &mut CheckReport) {
+    let found = sessions(db, "ended").await;
+    let found = found.unwrap_or_else(|error| {
+        report.add(format!("the sessions cannot be read: {error}"));
+        Vec::new()
+    });
+    for session in found {
+        let n = check_chunks(db, &session, report).await;
+        if n != session.n_samples && is_visible(db, &session.id).await {
+            let CheckedSession { id, n_samples } = &session;
+            report.add(format!("session {id}: {n} of {n_samples} samples are there"));
+        }
+        report.n_sessions += 1;
+    }
+}
+
+const VISIBLE: &str = "expired_at IS NULL
+    AND asset NOT IN (SELECT name FROM asset WHERE deleted_at IS NOT NULL)";
+
+async fn sessions(
+    db: &mut AnyConnection,
+    state: &'static str,
+) -> Result<Vec<CheckedSession>, StoreError> {
+    let sql = format!(
+        "SELECT id, n_samples FROM session WHERE state = '{state}' AND {VISIBLE} ORDER BY id"
+    );
+    Ok(sqlx::query_as(sqlx::AssertSqlSafe(sql)).fetch_all(db).await?)
+}
+
+/// Whether the session is still there: retention may have deleted it meanwhile.
+async fn is_visible(db: &mut AnyConnection, id: &str) -> bool {
+    let sql = format!("SELECT id FROM session WHERE id = $1 AND {VISIBLE}");
+    let found = sqlx::query_scalar::<_, String>(sqlx::AssertSqlSafe(sql)).bind(id);
+    found.fetch_optional(db).await.map_or(true, |id| id.is_some())
+}
+
+/// A row of the table of chunks.
+struct StoredChunk {
+    first_index: i64,
+    n: i64,
+    min_t_s: f64,
+    max_t_s: f64,
+    data: Vec<u8>,
+}
+
+from_row!(StoredChunk { first_index, n, min_t_s, max_t_s, data });
+
+/// Checks the chunks of `session`. Returns the number of samples from the start on without
+/// a gap.
+async fn check_chunks(
+    db: &mut AnyConnection,
+    session: &CheckedSession,
+    report: &mut CheckReport,
+) -> i64 {
+    let (mut next, mut n_good) = (0, 0);
+    loop {
+        let chunks: Result<Vec<StoredChunk>, _> = sqlx::query_as(
+            "SELECT first_index, n, min_t_s, max_t_s, data FROM chunk
+             WHERE session = $1 AND first_index >= $2 ORDER BY first_index LIMIT $3",
+        )
+        .bind(&session.id)
+        .bind(next)
+        .bind(CHUNKS_AT_ONCE)
+        .fetch_all(&mut *db)
+        .await;
+        let chunks = chunks.unwrap_or_else(|error| {
+            report.add(format!("session {} from chunk {next} on: {error}", session.id));
+            Vec::new()
+        });
+        let Some(last) = chunks.last() else { return n_good };
+        next = last.first_index + 1;
+        for chunk in &chunks {
+            match check_chunk(&session.id, chunk) {
+                Ok(n) => {
+                    report.n_samples += n.unsigned_abs();
+                    if chunk.first_index == n_good {
+                        n_good += n;
+                    }
+                }
+                Err(finding) => report.add(finding),
+            }
+        }
+    }
+}
+
+/// Checks one chunk. Returns the number of its samples, or what is damaged.
+fn check_chunk(session: &str, chunk: &StoredChunk) -> Result<i64, String> {
+    let StoredChunk { first_index, n, min_t_s, max_t_s, ref data } = *chunk;
+    let key = ChunkKey { session, first_index };
+    let samples = decode_chunk(data, key).map_err(|error| error.to_string())?;
+    let times = || samples.iter().map(|sample| sample.t_s);
+    let found = (times().fold(f64::INFINITY, f64::min), times().fold(f64::NEG_INFINITY, f64::max));
+    if i64::try_from(samples.len()) != Ok(n) || found != (min_t_s, max_t_s) {
+        return Err(format!("chunk {first_index} of session {session}: its row is damaged"));
+    }
+    Ok(n)
+}
+
+/// The runs of each session in the journal, in order.
+async fn journal_runs(
+    db: &mut AnyConnection,
+    report: &mut CheckReport,
+) -> Result<BTreeMap<String, Vec<JournalRun>>, StoreError> {
+    let rows: Vec<(i64, Vec<u8>)> =
+        sqlx::query_as("SELECT id, data FROM journal ORDER BY id").fetch_all(db).await?;
+    let mut runs: BTreeMap<String, Vec<JournalRun>> = BTreeMap::new();
+    for (id, data) in rows {
+        match journal::runs(id, &data) {
+            Ok(found) => {
+                for run in found {
+                    runs.entry(run.session.clone()).or_default().push(run);
+                }
+            }
+            Err(error) => report.add(error.to_string()),
+        }
+    }
+    Ok(runs)
+}
+
+/// Checks that the chunks of an open session and its runs in the journal follow each other.
+fn check_journal(
+    session: &CheckedSession,
+    n_folded: i64,
+    runs: &[JournalRun],
+    report: &mut CheckReport,
+) {
+    let CheckedSession { id, n_samples } = session;
+    if n_folded != *n_samples {
+        report.add(format!("session {id}: {n_folded} of {n_samples} samples are there"));
+        return;
+    }
+    let mut next = n_folded;
+    for run in runs.iter().filter(|run| run.first_index >= n_folded) {
+        if run.first_index != next {
+            report.add(format!("session {id}: sample {next} is missing in the journal"));
+            return;
+        }
+        next += run.n;
+        report.n_samples += run.n.unsigned_abs();
+    }
+}
+
+async fn check_documents(db: &mut AnyConnection, report: &mut CheckReport) {
+    for &(what, sql) in DOCUMENTS {
+        let mut rows = sqlx::query_as::<_, (String, String)>(sql).fetch(&mut *db);
+        loop {
+            match rows.try_next().await {
+                Ok(Some((key, document))) => {
+                    report.n_documents += 1;
+                    if let Err(error) = serde_json::from_str::<IgnoredAny>(&document) {
+                        report.add(format!("{what} {key}: {error}"));
+                    }
+                }
+                Ok(None) => break,
+                Err(error) => {
+                    report.add(format!("{what}: {error}"));
+                    break;
+                }
+            }
+        }
+    }
+}
