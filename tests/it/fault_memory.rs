@@ -273,3 +273,23 @@ async fn a_recording_is_found_after_ten_thousand_other_transitions() {
     }
     assert_eq!(fixture.client.get(path).await.expect(200), before);
 }
+
+/// Who acknowledged a fault is known for as long as the asset, also if the acknowledgement
+/// changed no status and its session is deleted.
+#[tokio::test]
+async fn actions_of_people_outlive_the_recording() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
+    client.asset("a").await;
+    client.telemetry("a", Some("s"), &rig(1500, 500)).await;
+    let acknowledge = "assets/a/faults/x_servo/acknowledge?by=";
+    for person in ["ann", "bob"] {
+        client.post(&format!("{acknowledge}{person}"), &json!(null)).await.expect(200);
+    }
+    let id = client.end("a", "s").await["id"].as_str().unwrap().to_owned();
+    client.delete(&format!("sessions/{id}")).await.expect(204);
+    let history = client.get("assets/a/faults/x_servo/history").await.expect(200);
+    let entries = history["items"].as_array().unwrap();
+    let acts: Vec<_> = entries.iter().map(|entry| (&entry["by"], &entry["session_id"])).collect();
+    assert_eq!(acts, [(&json!("bob"), &json!(null)), (&json!("ann"), &json!(null))]);
+}
