@@ -124,6 +124,8 @@ async fn warn_of_access(config: &Config, policy: &AccessPolicy, store: &Store) -
 /// writer's connection takes a lock instead.
 fn lock(location: &Location) -> Result<Option<File>> {
     let Some(file) = location.file() else { return Ok(None) };
+    // A link to the file must not be another lock.
+    let file = std::fs::canonicalize(file).unwrap_or_else(|_| file.to_owned());
     let path = file.with_extension("lock");
     if let Some(directory) = path.parent() {
         std::fs::create_dir_all(directory)

@@ -103,11 +103,13 @@ impl Guard {
     /// Without authentication, requires an IP address or `localhost` in `Host`, as a
     /// defence against DNS rebinding.
     fn check_host(&self, parts: &Parts) -> Result<(), Denial> {
-        let Some(host) = host(&parts.headers) else { return Ok(()) };
         let policy = &self.app.policy;
-        let name = host.host().trim_matches(['[', ']']);
-        let is_address = name == "localhost" || name.parse::<IpAddr>().is_ok();
-        if policy.required || is_address || policy.origins.iter().any(|o| has_host(o, &host)) {
+        // HTTP/2 has the host in the URI.
+        let host = parts.uri.authority().cloned().or_else(|| host(&parts.headers));
+        let is_permitted = host.is_some_and(|host| {
+            is_local(&host) || policy.origins.iter().any(|origin| has_host(origin, &host))
+        });
+        if policy.required || is_permitted {
             return Ok(());
         }
         let detail = "without authentication `Host` must be an IP address or localhost; \
@@ -294,6 +296,16 @@ fn audit_entry(action: String, parts: &Parts) -> AuditEntry {
 
 fn host(headers: &HeaderMap) -> Option<Authority> {
     headers.get(HOST)?.to_str().ok()?.parse().ok()
+}
+
+/// Whether `host` is an IP address or `localhost`, with or without a port, and nothing else.
+fn is_local(host: &Authority) -> bool {
+    let (name, text) = (host.host(), host.as_str());
+    let rest = text.strip_prefix(name).unwrap_or(text);
+    let is_port = |port: &str| !port.is_empty() && port.bytes().all(|byte| byte.is_ascii_digit());
+    let address = name.strip_prefix('[').and_then(|name| name.strip_suffix(']')).unwrap_or(name);
+    (name == "localhost" || address.parse::<IpAddr>().is_ok())
+        && (rest.is_empty() || rest.strip_prefix(':').is_some_and(is_port))
 }
 
 /// Whether `origin` has the host and port `host`.

@@ -1,16 +1,21 @@
 //! Response headers for browsers: cross-origin access (CORS) and the content security
 //! policy.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use axum::body::{Body, Bytes, HttpBody};
 use axum::extract::Request;
-use axum::http::Method;
 use axum::http::header::{
-    ACCEPT, AUTHORIZATION, CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HeaderName,
-    HeaderValue, LOCATION, REFERRER_POLICY, RETRY_AFTER, WWW_AUTHENTICATE, X_CONTENT_TYPE_OPTIONS,
+    ACCEPT, AUTHORIZATION, CACHE_CONTROL, CONNECTION, CONTENT_SECURITY_POLICY, CONTENT_TYPE,
+    HeaderName, HeaderValue, LOCATION, REFERRER_POLICY, RETRY_AFTER, STRICT_TRANSPORT_SECURITY,
+    WWW_AUTHENTICATE, X_CONTENT_TYPE_OPTIONS,
 };
+use axum::http::{Method, Version};
 use axum::middleware::Next;
 use axum::response::Response;
+use futures_util::{StreamExt, stream};
 use tower_http::cors::CorsLayer;
 
 /// The content security policy of responses that are not pages.
@@ -22,6 +27,36 @@ const DOCS: &str = "default-src 'self'; style-src 'self' 'unsafe-inline'; \
 
 /// How long a browser may cache the result of a preflight request.
 const PREFLIGHT_MAX_AGE: Duration = Duration::from_secs(3600);
+
+/// Tells browsers to connect with TLS only, for half a year.
+const TLS_ONLY: HeaderValue = HeaderValue::from_static("max-age=15768000");
+
+/// Adds `Strict-Transport-Security` to the response.
+pub(super) async fn require_tls(request: Request, next: Next) -> Response {
+    let mut response = next.run(request).await;
+    response.headers_mut().insert(STRICT_TRANSPORT_SECURITY, TLS_ONLY);
+    response
+}
+
+/// Announces that the connection is closed after a response that does not wait for the
+/// whole request body, as the server cannot find the next request then.
+pub(super) async fn announce_close(request: Request, next: Next) -> Response {
+    if request.body().is_end_stream() || request.version() > Version::HTTP_11 {
+        return next.run(request).await;
+    }
+    let is_read = Arc::new(AtomicBool::new(false));
+    let at_end = is_read.clone();
+    let end = stream::once(async move {
+        at_end.store(true, Ordering::Relaxed);
+        Ok(Bytes::new())
+    });
+    let request = request.map(|body| Body::from_stream(body.into_data_stream().chain(end)));
+    let mut response = next.run(request).await;
+    if !is_read.load(Ordering::Relaxed) {
+        response.headers_mut().insert(CONNECTION, HeaderValue::from_static("close"));
+    }
+    response
+}
 
 /// Sets the security headers that the response does not set itself.
 pub(super) async fn secure(request: Request, next: Next) -> Response {

@@ -33,6 +33,10 @@ const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 /// Adds the middleware to `router`, listed from the outside in. As one layer, because
 /// axum boxes each layer separately for every request.
 pub(super) fn add(router: Router, policy: &AccessPolicy) -> Router {
+    let router = match policy.encrypted {
+        true => router.layer(from_fn(headers::require_tls)),
+        false => router,
+    };
     router.layer((
         SetRequestIdLayer::new(REQUEST_ID, MakeRequestUuid),
         PropagateRequestIdLayer::new(REQUEST_ID),
@@ -40,6 +44,7 @@ pub(super) fn add(router: Router, policy: &AccessPolicy) -> Router {
         CompressionLayer::new(),
         headers::cors(&policy.origins),
         from_fn(headers::secure),
+        from_fn(headers::announce_close),
         from_fn(set_instance),
         CatchPanicLayer::custom(panicked),
         from_fn(count),

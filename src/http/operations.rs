@@ -10,6 +10,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::{App, Problem};
+use crate::service::ServiceError;
 
 /// The health of the process.
 #[derive(Debug, Serialize, ToSchema)]
@@ -39,9 +40,15 @@ pub(super) async fn healthz(State(app): State<App>) -> Json<HealthView> {
 pub(super) async fn readyz(State(app): State<App>) -> Result<Json<HealthView>, Problem> {
     if app.closing.is_cancelled() {
         let what = "the service is shutting down";
-        return Err(crate::service::ServiceError::Unavailable { what }.into());
+        return Err(ServiceError::Unavailable { what }.into());
     }
-    app.service.ready().await?;
+    app.service.ready().await.map_err(|error| match error {
+        // The database's own words are not for everybody.
+        ServiceError::Outage { .. } if app.policy.required => {
+            Problem::from(ServiceError::Outage { reason: "see the log".to_owned() })
+        }
+        error => error.into(),
+    })?;
     Ok(healthy(app.demo))
 }
 

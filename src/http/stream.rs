@@ -315,7 +315,8 @@ impl StreamConnection {
             StreamEvent::Frame(Some(Ok(message))) => self.receive(message).await,
             StreamEvent::Frame(Some(Err(error))) => {
                 tracing::debug!(%error, asset = self.asset, "the stream failed");
-                Err(CloseReason::Close(close_code::SIZE, "a malformed frame, or one too long"))
+                let (code, reason) = failure(&error);
+                Err(CloseReason::Close(code, reason))
             }
             StreamEvent::Frame(None) => Err(CloseReason::Gone),
         }
@@ -471,5 +472,17 @@ fn ack_frame(id: Option<&str>, ack: Result<AckView, ServiceError>) -> String {
             }
             frame.to_string()
         }
+    }
+}
+
+/// Returns the close code and the reason for a frame that could not be read (RFC 6455,
+/// section 7.4.1).
+fn failure(error: &axum::Error) -> (u16, &'static str) {
+    use tokio_tungstenite::tungstenite::Error;
+    let source = std::error::Error::source(error).and_then(|source| source.downcast_ref());
+    match source {
+        Some(Error::Capacity(_)) => (close_code::SIZE, "the message is too long"),
+        Some(Error::Utf8(_)) => (close_code::INVALID, "a text message is not UTF-8"),
+        _ => (close_code::PROTOCOL, "a malformed frame"),
     }
 }

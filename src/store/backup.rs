@@ -7,6 +7,7 @@ use sqlx::any::AnyConnectOptions;
 use sqlx::{AnyConnection, ConnectOptions, Connection};
 
 use super::check::check_copy;
+use super::location::create_private;
 use super::{Location, MIGRATIONS, StoreError};
 
 /// Copies the database file at `location` to the new file `copy`, also while a service
@@ -21,6 +22,7 @@ pub async fn back_up(location: &Location, copy: &Path) -> Result<(), StoreError>
     let part = with_suffix(copy, ".part");
     remove_if_exists(&part)?;
     let mut connection = open(file).await?;
+    create_private(&part)?;
     let target = part.to_string_lossy().into_owned();
     sqlx::query("VACUUM INTO $1").bind(target).execute(&mut connection).await?;
     connection.close().await?;
@@ -44,7 +46,10 @@ pub async fn restore(location: &Location, copy: &Path, replace: bool) -> Result<
     }
     let part = with_suffix(file, ".part");
     remove_if_exists(&part)?;
-    std::fs::copy(copy, &part).map_err(file_error(copy))?;
+    create_private(&part)?;
+    let mut target = File::options().write(true).open(&part).map_err(file_error(&part))?;
+    let mut source = File::open(copy).map_err(file_error(copy))?;
+    std::io::copy(&mut source, &mut target).map_err(file_error(copy))?;
     let mut connection = open(&part).await?;
     check_structure(&mut connection).await?;
     // Fails if the file is not a database of offbd.

@@ -79,6 +79,20 @@ impl Location {
         }
     }
 
+    /// Identifies the SQLite file, so that a removed or replaced one is noticed; `None` for
+    /// PostgreSQL and where files have no identity.
+    #[cfg(unix)]
+    pub(super) fn file_identity(&self) -> Option<(u64, u64)> {
+        use std::os::unix::fs::MetadataExt;
+        let metadata = std::fs::metadata(self.file()?).ok()?;
+        Some((metadata.dev(), metadata.ino()))
+    }
+
+    #[cfg(not(unix))]
+    pub(super) fn file_identity(&self) -> Option<(u64, u64)> {
+        None
+    }
+
     /// Opens a connection that may write. For the main writer it has a large page cache
     /// and, in PostgreSQL, takes the lock of the database from the connection `lost`, if
     /// that still holds it; returns what the server knows the new one as. An SQLite file
@@ -89,6 +103,9 @@ impl Location {
         lost: Option<&Backend>,
     ) -> Result<(AnyConnection, Option<Backend>), StoreError> {
         let options = self.options()?;
+        if let Self::File(file) = self {
+            create_private(file)?;
+        }
         let connect = async {
             let mut connection = options.connect().await?;
             connection.execute(AssertSqlSafe(self.writer_settings(role))).await?;
@@ -170,6 +187,21 @@ impl Location {
             Self::File(_) => "BEGIN IMMEDIATE",
             Self::Server(_) => "BEGIN",
         }
+    }
+}
+
+/// Creates `file` if it is missing, readable by its owner only; SQLite gives its other
+/// files the same permissions.
+pub(super) fn create_private(file: &Path) -> Result<(), StoreError> {
+    let mut options = std::fs::OpenOptions::new();
+    options.write(true).create_new(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    match options.open(file) {
+        Err(error) if error.kind() != std::io::ErrorKind::AlreadyExists => {
+            Err(StoreError::File { file: file.to_owned(), source: error })
+        }
+        _ => Ok(()),
     }
 }
 

@@ -96,6 +96,8 @@ pub enum StoreError {
     Exists { file: PathBuf },
     #[error("{}: {source}", file.display())]
     File { file: PathBuf, source: std::io::Error },
+    #[error("{} was removed or replaced while the service was running; restart it", file.display())]
+    FileGone { file: PathBuf },
     #[error("the copy is damaged: {found}")]
     Damaged { found: String },
     #[error(
@@ -130,7 +132,7 @@ impl StoreError {
                 error,
                 sqlx::Error::Encode(_) | sqlx::Error::ColumnDecode { .. } | sqlx::Error::Decode(_)
             ),
-            Self::InUse | Self::UnexpectedCommits { .. } => true,
+            Self::InUse | Self::UnexpectedCommits { .. } | Self::FileGone { .. } => true,
             Self::Migration(_)
             | Self::Chunk { .. }
             | Self::Incomplete { .. }

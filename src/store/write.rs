@@ -13,6 +13,7 @@ mod fold;
 mod subject;
 
 use std::collections::HashSet;
+use std::path::Path;
 use std::time::Duration;
 
 use sqlx::{AnyConnection, Connection};
@@ -124,6 +125,8 @@ pub struct Writer {
     location: Location,
     /// `None` after a failure, until [`Writer::reconnect`].
     connection: Option<AnyConnection>,
+    /// The SQLite file that the writer has opened.
+    file_identity: Option<(u64, u64)>,
     /// The last connection as PostgreSQL knows it.
     backend: Option<Backend>,
     /// The last id given to an event.
@@ -153,6 +156,7 @@ impl Writer {
         let n_bytes_before = journal.n_bytes();
         Ok(Self {
             location: location.clone(),
+            file_identity: location.file_identity(),
             connection: Some(connection),
             backend,
             last_id,
@@ -196,6 +200,7 @@ impl Writer {
         sets: &mut [&mut Vec<Write>],
         relocation: Option<&Relocation>,
     ) -> Result<(), StoreError> {
+        self.check_file()?;
         if self.connection.is_none() && self.reconnect().await? {
             // The caller of that commit did not call `reconnect`.
             tracing::warn!("a commit whose outcome was unknown has succeeded");
@@ -250,7 +255,18 @@ impl Writer {
         attempt.await.unwrap_or_else(late)
     }
 
+    /// Checks that the SQLite file is still there: what is written to a removed file is lost
+    /// when the service stops.
+    fn check_file(&self) -> Result<(), StoreError> {
+        if self.location.file_identity() == self.file_identity {
+            return Ok(());
+        }
+        let file = self.location.file().unwrap_or(Path::new("")).to_owned();
+        Err(StoreError::FileGone { file })
+    }
+
     async fn connect_again(&mut self) -> Result<bool, StoreError> {
+        self.check_file()?;
         let lost = self.backend.as_ref();
         let (mut connection, backend) = self.location.writer(self.role, lost).await?;
         self.backend = backend.or(self.backend.take());

@@ -27,6 +27,7 @@ mod retention;
 mod same_sample;
 mod same_verdict;
 mod service;
+mod small;
 mod support;
 #[cfg(feature = "otel")]
 mod traces;

@@ -150,9 +150,16 @@ impl Asset {
         self.write_memory(None, turn)
     }
 
-    /// Opens a session named by the current time.
+    /// Opens a session named by the current time, or by the next microsecond whose name is
+    /// not used yet: the clock may stand still or go back.
     pub(super) fn open_nameless(&mut self, turn: &mut Turn<'_>) -> Result<(), ServiceError> {
-        self.open(rfc3339(turn.at), false, turn)
+        let handles = &turn.env.handles;
+        handles.fence()?;
+        let mut at = turn.at;
+        while handles.wait(handles.store.session_named(&self.row.name, &rfc3339(at)))?.is_some() {
+            at += 1;
+        }
+        self.open(rfc3339(at), false, turn)
     }
 
     /// Ends the open session, if there is one: finalizes its verdict, trends and fault

@@ -45,7 +45,11 @@ impl Service {
             document: None,
             error: None,
         };
-        self.inner.handles.write(Write::PutCalibration(row.clone())).await?;
+        if let Err(error) = self.inner.handles.write(Write::PutCalibration(row.clone())).await {
+            // The asset may have been deleted meanwhile.
+            self.asset(&row.asset).await?;
+            return Err(error);
+        }
         permit.send(Job::Calibration(row.id.clone()));
         view(row)
     }

@@ -35,7 +35,11 @@ impl Service {
             result: None,
             error: None,
         };
-        self.inner.handles.write(Write::PutReplay(row.clone())).await?;
+        if let Err(error) = self.inner.handles.write(Write::PutReplay(row.clone())).await {
+            // The session may have been deleted meanwhile.
+            self.session_row(&row.session).await?;
+            return Err(error);
+        }
         permit.send(Job::Replay(row.id.clone()));
         view(row, 0.0)
     }

@@ -229,6 +229,29 @@ impl Visitor<'_> for BatchKeyVisitor {
     }
 }
 
+/// The known keys of an object that have been read. Of a repeated key one value would be
+/// lost.
+#[derive(Default)]
+struct SeenKeys {
+    bits: u16,
+}
+
+impl SeenKeys {
+    /// Notes a key; returns its name if it has been read before.
+    fn repeats(&mut self, key: BatchKey) -> Option<&'static str> {
+        let (bit, name) = match key {
+            BatchKey::Session => (0, "session"),
+            BatchKey::Id => (1, "id"),
+            BatchKey::Samples => (2, "samples"),
+            BatchKey::Field(field) => (3 + field, FIELDS[field]),
+            BatchKey::Unknown => return None,
+        };
+        let is_repeated = self.bits & (1 << bit) != 0;
+        self.bits |= 1 << bit;
+        is_repeated.then_some(name)
+    }
+}
+
 struct BatchDocumentVisitor {
     limit: usize,
 }
@@ -242,7 +265,11 @@ impl<'de> Visitor<'de> for BatchDocumentVisitor {
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<BatchDocument, A::Error> {
         let mut document = BatchDocument::default();
+        let mut seen = SeenKeys::default();
         while let Some(key) = map.next_key()? {
+            if let Some(name) = seen.repeats(key) {
+                return Err(A::Error::duplicate_field(name));
+            }
             match key {
                 BatchKey::Session => document.session = map.next_value()?,
                 BatchKey::Id => document.id = map.next_value::<Option<BatchId>>()?.map(|id| id.0),

@@ -105,8 +105,16 @@ impl Rig {
     /// [`Invalid`] naming the element.
     pub fn check(&self) -> Result<(), Invalid> {
         let plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
-        if self.name.is_empty() || self.name.len() > MAX_NAME || !self.name.chars().all(plain) {
-            let reason = format!("must be 1 to {MAX_NAME} letters, digits, `-`, `_` or `.`");
+        // Clients remove the path segments `.` and `..` from URLs.
+        let is_path = self.name == "." || self.name == "..";
+        if self.name.is_empty()
+            || self.name.len() > MAX_NAME
+            || !self.name.chars().all(plain)
+            || is_path
+        {
+            let reason = format!(
+                "must be 1 to {MAX_NAME} letters, digits, `-`, `_` or `.`, and not `.` or `..`"
+            );
             return Err(Invalid::new("/name", reason));
         }
         positive("/sample_rate_hz", self.sample_rate_hz, 100_000.0)?;
