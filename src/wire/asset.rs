@@ -57,7 +57,7 @@ pub struct BallView {
     /// Radius, in (0, 1] m.
     #[schema(exclusive_minimum = 0, maximum = 1)]
     pub radius_m: f64,
-    /// Mass, in (0, 100] kg.
+    /// Mass, in [1e-6, 100] kg.
     #[schema(exclusive_minimum = 0, maximum = 100)]
     pub mass_kg: f64,
     /// κ in the moment of inertia κ m r², in [0, 1]: 0.4 for a solid ball, 0.667 for a

@@ -69,7 +69,7 @@ impl Default for SceneView {
 pub struct BlockView {
     /// Length of an edge, in (0, 1] m.
     pub edge_m: f64,
-    /// Mass, in (0, 100] kg.
+    /// Mass, in [1e-6, 100] kg.
     pub mass_kg: f64,
 }
 

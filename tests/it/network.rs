@@ -215,6 +215,9 @@ async fn validate_curl_and_a_websocket_client_connect_over_tls() {
     let trusted = format!("--cacert {}", files.certificate.display());
     let health = curl(words(&format!("{trusted} https://{address}/healthz"))).await;
     assert!(String::from_utf8_lossy(&health.stdout).contains("\"ok\""), "{health:?}");
+    let headers = curl(words(&format!("{trusted} -i https://{address}/healthz"))).await;
+    let headers = String::from_utf8_lossy(&headers.stdout).to_lowercase();
+    assert!(headers.contains("strict-transport-security: max-age="), "{headers}");
     let asset = format!("{trusted} --json {{\"name\":\"a\"}} https://{address}/api/v1/assets");
     let made = curl(words(&asset)).await;
     assert!(String::from_utf8_lossy(&made.stdout).contains("\"name\":\"a\""), "{made:?}");

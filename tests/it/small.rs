@@ -1,7 +1,7 @@
 //! Small promises at the edge of the service: names, headers, files and closing codes.
 
 use crate::support::{ServiceFixture, eventually, on_postgres, rig};
-use futures_util::{SinkExt, StreamExt};
+use futures_util::StreamExt;
 use reqwest::Method;
 use serde_json::json;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};

@@ -16,7 +16,7 @@ pub struct Ball {
 }
 
 impl Ball {
-    /// A ball of `radius_m` in (0, 1], `mass_kg` in (0, 100] and
+    /// A ball of `radius_m` in (0, 1], `mass_kg` in [1e-6, 100] and
     /// `inertia_factor` κ in [0, 1], where I = κ m r² (solid 2/5, hollow 2/3).
     ///
     /// # Errors
@@ -24,7 +24,7 @@ impl Ball {
     pub fn new(radius_m: f64, mass_kg: f64, inertia_factor: f64) -> Result<Self, Invalid> {
         Ok(Self {
             radius_m: positive("/ball/radius_m", radius_m, 1.0)?,
-            mass_kg: positive("/ball/mass_kg", mass_kg, 100.0)?,
+            mass_kg: in_range("/ball/mass_kg", mass_kg, 1e-6..=100.0)?,
             inertia_factor: in_range("/ball/inertia_factor", inertia_factor, 0.0..=1.0)?,
         })
     }

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::{Ball, Plate};
-use crate::vocabulary::{Axis, Invalid, positive};
+use crate::vocabulary::{Axis, Invalid, in_range, positive};
 
 /// The parameters of the contact; immutable.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -103,14 +103,14 @@ impl Body {
         }
     }
 
-    /// A cube with an edge in (0, 1] m and a mass in (0, 100] kg that slides without
+    /// A cube with an edge in (0, 1] m and a mass in [1e-6, 100] kg that slides without
     /// turning: application problem 2 of the chapter.
     ///
     /// # Errors
     /// [`Invalid`] naming the element under `/block`.
     pub fn block(edge_m: f64, mass_kg: f64, plate: &Plate) -> Result<Self, Invalid> {
         Ok(Self {
-            mass: positive("/block/mass_kg", mass_kg, 100.0)?,
+            mass: in_range("/block/mass_kg", mass_kg, 1e-6..=100.0)?,
             arm: 0.0,
             ease: 0.0,
             rest_height: (plate.thickness_m() + positive("/block/edge_m", edge_m, 1.0)?) / 2.0,

@@ -82,7 +82,7 @@ impl Scene {
         Ok(scene)
     }
 
-    /// Creates a block with an edge in (0, 1] m and a mass in (0, 100] kg.
+    /// Creates a block with an edge in (0, 1] m and a mass in [1e-6, 100] kg.
     ///
     /// # Errors
     /// [`Invalid`] naming the element.
