@@ -78,6 +78,12 @@ async fn collect(body: Body, limit: usize, budget: &BodyBudget) -> Result<Budget
     Ok(read)
 }
 
+impl AsRef<[u8]> for BudgetedBody {
+    fn as_ref(&self) -> &[u8] {
+        &self.bytes
+    }
+}
+
 impl BudgetedBody {
     fn reserve(&mut self, n: usize, budget: &BodyBudget) -> Result<(), Problem> {
         let n = u32::try_from(n).unwrap_or(u32::MAX);

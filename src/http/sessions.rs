@@ -1,6 +1,7 @@
 //! `/sessions`: opening, ending, importing, listing and exporting sessions.
 
 use std::cmp::Ordering;
+use std::io::Cursor;
 
 use axum::Json;
 use axum::body::{Body, Bytes};
@@ -14,10 +15,10 @@ use serde::Deserialize;
 use super::negotiate::weight_of_first;
 use super::telemetry::TelemetryFormat;
 use super::{App, AssetPath, PageQuery, Path, Problem, Query, body, page_limit, query_word};
-use crate::service::{RecordingReader, Service, ServiceError};
+use crate::service::{RecordingReader, Service};
 use crate::wire::service::{ImportView, Page, SessionView};
 use crate::wire::session_csv::{write_header, write_rows};
-use crate::wire::telemetry::sample_view;
+use crate::wire::telemetry::{csv_rows, sample_view};
 use crate::wire::verdict::FaultView;
 use crate::wire::words::SessionState;
 use offbd_core::vocabulary::{Invalid, Sample};
@@ -127,11 +128,9 @@ pub(super) async fn import(
     let limits = app.service.limits();
     let timeout = limits.body_timeout * IMPORT_TIMEOUT_FACTOR;
     let read = body::read(body, limits.import_bytes, timeout, &app.budget).await?;
-    let parse = move || TelemetryFormat::Csv.parse(&read.bytes, MAX_IMPORT_ROWS);
-    let parsed = tokio::task::spawn_blocking(parse).await;
-    let failed = |_| ServiceError::Unavailable { what: "parsing the file failed" };
-    let recording = parsed.map_err(failed)??;
-    let imported = app.service.import(&asset, query.name, recording).await?;
+    // The rows are parsed while they are imported, so that only the file is in memory.
+    let rows = csv_rows(Cursor::new(read))?;
+    let imported = app.service.import(&asset, query.name, rows, MAX_IMPORT_ROWS).await?;
     Ok(created(&imported.session.id.clone(), imported))
 }
 

@@ -8,6 +8,8 @@
 mod cells;
 mod lenient;
 
+use std::io::Read;
+
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -113,14 +115,24 @@ pub fn ndjson(document: &[u8], limit: usize) -> Result<Batch, BatchError> {
 /// # Errors
 /// [`BatchError`] if the header is not that of a session file, or there are too many rows.
 pub fn csv(document: &[u8], limit: usize) -> Result<Batch, BatchError> {
-    let malformed = |reason| BatchError::Malformed { pointer: String::new(), reason };
-    let reader = SessionCsvReader::new(document).map_err(|e| malformed(e.to_string()))?;
     let mut rows = Vec::new();
-    for row in reader {
+    for row in csv_rows(document)? {
         check_length(rows.len() + 1, limit)?;
-        rows.push(row.map_err(|e| shorten(&e.to_string())).and_then(check_seq));
+        rows.push(row);
     }
     Ok(Batch { rows, ..Batch::default() })
+}
+
+/// Parses CSV with the header of a session file, row by row.
+///
+/// # Errors
+/// [`BatchError::Malformed`] if the header is not that of a session file.
+pub fn csv_rows<R: Read>(
+    document: R,
+) -> Result<impl Iterator<Item = Result<Sample, String>>, BatchError> {
+    let malformed = |reason| BatchError::Malformed { pointer: String::new(), reason };
+    let reader = SessionCsvReader::new(document).map_err(|e| malformed(e.to_string()))?;
+    Ok(reader.map(|row| row.map_err(|e| shorten(&e.to_string())).and_then(check_seq)))
 }
 
 fn check_seq(sample: Sample) -> Result<Sample, String> {

@@ -7,6 +7,7 @@ use crate::service::asset::AssetCommand;
 use crate::service::{Service, ServiceError};
 use crate::wire::service::{ImportView, SessionView};
 use crate::wire::telemetry::{AckView, Batch, RowView};
+use offbd_core::vocabulary::Sample;
 
 /// Batches of an import that wait for their acknowledgement at a time.
 const MAX_PENDING: usize = 4;
@@ -18,26 +19,27 @@ const MAX_LISTED: usize = 100;
 const BATCH: usize = 2048;
 
 impl Service {
-    /// Imports `recording` as the session `name` and ends it. The asset's open session is
+    /// Imports `rows`, at most `limit`, as the session `name` and ends it. The asset's open session is
     /// ended first; until the import is complete, live telemetry of the asset is refused
     /// with [`ServiceError::Busy`]. Continues if the caller is dropped. An import that fails
     /// leaves neither a session nor faults; one that a stop interrupts is discarded at the
     /// next start.
     ///
     /// # Errors
-    /// [`ServiceError::SessionExists`]; [`ServiceError::Invalid`] for an invalid name; those
-    /// of the samples' batches.
+    /// [`ServiceError::SessionExists`]; [`ServiceError::Invalid`] for an invalid name;
+    /// [`ServiceError::TooMany`] if there are more rows; those of the samples' batches.
     pub async fn import(
         &self,
         asset: &str,
         name: Option<String>,
-        recording: Batch,
+        rows: impl Iterator<Item = Result<Sample, String>> + Send + 'static,
+        limit: usize,
     ) -> Result<ImportView, ServiceError> {
         let (this, asset) = (self.clone(), asset.to_owned());
         let task = tokio::spawn(async move {
             let session = this.open_for(&asset, name, true).await?;
             let id = session.id.clone();
-            match this.run_import(&asset, session, recording).await {
+            match this.run_import(&asset, session, rows, limit).await {
                 Ok(imported) => {
                     Ok(ImportView { session: this.end_session(&id).await?, ..imported })
                 }
@@ -61,15 +63,19 @@ impl Service {
         &self,
         asset: &str,
         session: SessionView,
-        recording: Batch,
+        rows: impl Iterator<Item = Result<Sample, String>> + Send,
+        limit: usize,
     ) -> Result<ImportView, ServiceError> {
         let name = session.name.clone();
         let mut counts = ImportCounts { view: empty(session), pending: VecDeque::new() };
-        let mut rows = recording.rows.into_iter().peekable();
+        let mut rows = rows.peekable();
         let mut first = 0;
         while rows.peek().is_some() {
             let rows: Vec<_> = rows.by_ref().take(BATCH).collect();
             let n = rows.len();
+            if first + n > limit {
+                return Err(ServiceError::TooMany { what: "rows in an imported file", limit });
+            }
             let batch = Batch { session: Some(name.clone()), id: None, rows };
             if counts.pending.len() >= MAX_PENDING {
                 counts.settle().await?;
