@@ -19,7 +19,7 @@ const MAX_ASSET_BYTES: usize = 64 << 10;
 
 async fn read_document(app: &App, body: Body) -> Result<Vec<u8>, Problem> {
     let timeout = app.service.limits().body_timeout;
-    Ok(body::read(body, MAX_ASSET_BYTES, timeout, &app.budget).await?.bytes)
+    Ok(body::read(body, MAX_ASSET_BYTES, timeout, &app.budget.whole()).await?.bytes)
 }
 
 /// Lists the assets by name.

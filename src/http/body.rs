@@ -1,6 +1,7 @@
 //! Reading request bodies under limits of size, time and total memory.
 
-use std::sync::Arc;
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::time::Duration;
 
 use axum::body::Body;
@@ -17,13 +18,46 @@ use super::Problem;
 pub struct BodyBudget {
     bytes: Arc<Semaphore>,
     limit: usize,
+    /// What is left of the share of each caller who has a body in memory.
+    shares: Arc<Mutex<HashMap<String, Weak<Semaphore>>>>,
 }
+
+/// The bytes that one caller may have in memory: half of the budget, so that one caller
+/// never turns away all others.
+#[derive(Clone, Debug)]
+pub(super) struct BodyShare {
+    all: Arc<Semaphore>,
+    own: Option<Arc<Semaphore>>,
+}
+
+/// Shares from which on those of callers without a body in memory are removed.
+const MANY_SHARES: usize = 1024;
 
 impl BodyBudget {
     #[must_use]
     pub fn new(bytes: usize) -> Self {
         let limit = bytes.min(Semaphore::MAX_PERMITS);
-        Self { bytes: Arc::new(Semaphore::new(limit)), limit }
+        Self { bytes: Arc::new(Semaphore::new(limit)), limit, shares: Arc::default() }
+    }
+
+    /// Returns the share of the caller with this id.
+    pub(super) fn share_of(&self, caller: &str) -> BodyShare {
+        let mut shares = self.shares.lock().unwrap_or_else(PoisonError::into_inner);
+        if shares.len() >= MANY_SHARES {
+            shares.retain(|_, share| share.strong_count() > 0);
+        }
+        let known = shares.get(caller).and_then(Weak::upgrade);
+        let own = known.unwrap_or_else(|| {
+            let own = Arc::new(Semaphore::new(self.limit / 2));
+            shares.insert(caller.to_owned(), Arc::downgrade(&own));
+            own
+        });
+        BodyShare { all: self.bytes.clone(), own: Some(own) }
+    }
+
+    /// Returns the whole budget, for callers that cannot be told apart and for small bodies.
+    pub(super) fn whole(&self) -> BodyShare {
+        BodyShare { all: self.bytes.clone(), own: None }
     }
 
     /// Returns the bytes in memory now.
@@ -35,7 +69,8 @@ impl BodyBudget {
 /// A request body and its permits of the [`BodyBudget`], released on drop.
 pub(super) struct BudgetedBody {
     pub(super) bytes: Vec<u8>,
-    permit: Option<OwnedSemaphorePermit>,
+    /// Of the caller's share, if there is one, and of the whole budget.
+    permits: Vec<OwnedSemaphorePermit>,
 }
 
 /// Reads a body of at most `limit` bytes within `time`.
@@ -47,16 +82,16 @@ pub(super) async fn read(
     body: Body,
     limit: usize,
     time: Duration,
-    budget: &BodyBudget,
+    share: &BodyShare,
 ) -> Result<BudgetedBody, Problem> {
-    timeout(time, collect(body, limit, budget)).await.unwrap_or_else(|_| {
+    timeout(time, collect(body, limit, share)).await.unwrap_or_else(|_| {
         let detail = format!("the body was not complete within {} s", time.as_secs());
         Err(Problem::new(StatusCode::REQUEST_TIMEOUT, "slow-body", "Request timeout", detail))
     })
 }
 
-async fn collect(body: Body, limit: usize, budget: &BodyBudget) -> Result<BudgetedBody, Problem> {
-    let mut read = BudgetedBody { bytes: Vec::new(), permit: None };
+async fn collect(body: Body, limit: usize, share: &BodyShare) -> Result<BudgetedBody, Problem> {
+    let mut read = BudgetedBody { bytes: Vec::new(), permits: Vec::new() };
     let mut frames = body.into_data_stream();
     while let Some(frame) = frames.next().await {
         let frame = frame.map_err(|error| {
@@ -72,7 +107,7 @@ async fn collect(body: Body, limit: usize, budget: &BodyBudget) -> Result<Budget
                 detail,
             ));
         }
-        read.reserve(frame.len(), budget)?;
+        read.reserve(frame.len(), share)?;
         read.bytes.extend_from_slice(&frame);
     }
     Ok(read)
@@ -85,16 +120,18 @@ impl AsRef<[u8]> for BudgetedBody {
 }
 
 impl BudgetedBody {
-    fn reserve(&mut self, n: usize, budget: &BodyBudget) -> Result<(), Problem> {
+    fn reserve(&mut self, n: usize, share: &BodyShare) -> Result<(), Problem> {
         let n = u32::try_from(n).unwrap_or(u32::MAX);
-        let permit = budget.bytes.clone().try_acquire_many_owned(n).map_err(|_| {
-            let detail = "the limit of request bodies in memory is reached; \
-                the request was not processed, retry it";
-            Problem::new(StatusCode::TOO_MANY_REQUESTS, "busy", "Too many requests", detail)
-        })?;
-        match &mut self.permit {
-            Some(held) => held.merge(permit),
-            none => *none = Some(permit),
+        for (i, bytes) in share.own.iter().chain([&share.all]).enumerate() {
+            let permit = bytes.clone().try_acquire_many_owned(n).map_err(|_| {
+                let detail = "the limit of request bodies in memory is reached; \
+                    the request was not processed, retry it";
+                Problem::new(StatusCode::TOO_MANY_REQUESTS, "busy", "Too many requests", detail)
+            })?;
+            match self.permits.get_mut(i) {
+                Some(held) => held.merge(permit),
+                None => self.permits.push(permit),
+            }
         }
         Ok(())
     }

@@ -20,6 +20,7 @@ use axum::response::{IntoResponse, Response};
 use axum::{RequestPartsExt, extract};
 use serde::Deserialize;
 
+use super::body::BodyShare;
 use super::credential::{bearer, client_address, credential};
 use super::rates::RateLimits;
 use super::routes::{RouteRule, RouteRules};
@@ -88,6 +89,9 @@ impl Guard {
         if let Some(caller) = &caller {
             self.check_right(caller, rule.right, &mut parts).await?;
             parts.extensions.insert(caller.clone());
+        }
+        if !is_safe(&parts.method) {
+            parts.extensions.insert(self.body_share(caller.as_ref(), &parts));
         }
         let entry = is_audited(rule.right, &parts.method).then(|| audit_entry(rule.action, &parts));
         let response = next.run(Request::from_parts(parts, body)).await;
@@ -180,6 +184,19 @@ impl Guard {
             (Some(Credential::Jwt(_)), Some(token)) => Ok(service.verify(token).await),
             (Some(credential), _) => Ok(service.authenticate(&credential).await?),
             (None, _) => Ok(None),
+        }
+    }
+
+    /// The memory for the body of a request: a share for each token, and without tokens for
+    /// each address of another machine.
+    fn body_share(&self, caller: Option<&Caller>, parts: &Parts) -> BodyShare {
+        let budget = &self.app.budget;
+        if let Some(principal) = caller.and_then(Caller::principal) {
+            return budget.share_of(&principal.id);
+        }
+        match client_address(parts).filter(|address| !address.is_loopback()) {
+            Some(address) => budget.share_of(&address.to_string()),
+            None => budget.whole(),
         }
     }
 

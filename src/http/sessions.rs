@@ -3,15 +3,16 @@
 use std::cmp::Ordering;
 use std::io::Cursor;
 
-use axum::Json;
 use axum::body::{Body, Bytes};
 use axum::extract::State;
 use axum::http::header::{ACCEPT, CONTENT_DISPOSITION, CONTENT_TYPE, LOCATION};
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
+use axum::{Extension, Json};
 use futures_util::{Stream, StreamExt};
 use serde::Deserialize;
 
+use super::body::BodyShare;
 use super::negotiate::weight_of_first;
 use super::telemetry::TelemetryFormat;
 use super::{App, AssetPath, PageQuery, Path, Problem, Query, body, page_limit, query_word};
@@ -87,7 +88,7 @@ pub(super) async fn small_json<T: Default + serde::de::DeserializeOwned>(
     body: Body,
 ) -> Result<T, Problem> {
     let timeout = app.service.limits().body_timeout;
-    let read = body::read(body, MAX_SMALL_BYTES, timeout, &app.budget).await?;
+    let read = body::read(body, MAX_SMALL_BYTES, timeout, &app.budget.whole()).await?;
     if read.bytes.trim_ascii().is_empty() {
         return Ok(T::default());
     }
@@ -115,6 +116,7 @@ pub(super) async fn import(
     State(app): State<App>,
     AssetPath(asset): AssetPath,
     Query(query): Query<ImportQuery>,
+    Extension(share): Extension<BodyShare>,
     headers: HeaderMap,
     body: Body,
 ) -> Result<impl IntoResponse, Problem> {
@@ -127,7 +129,7 @@ pub(super) async fn import(
     app.service.asset(&asset).await?;
     let limits = app.service.limits();
     let timeout = limits.body_timeout * IMPORT_TIMEOUT_FACTOR;
-    let read = body::read(body, limits.import_bytes, timeout, &app.budget).await?;
+    let read = body::read(body, limits.import_bytes, timeout, &share).await?;
     // The rows are parsed while they are imported, so that only the file is in memory.
     let rows = csv_rows(Cursor::new(read))?;
     let imported = app.service.import(&asset, query.name, rows, MAX_IMPORT_ROWS).await?;

@@ -1,12 +1,13 @@
 //! `/assets/{asset}/telemetry`: ingest of samples.
 
-use axum::Json;
 use axum::body::Body;
 use axum::extract::State;
 use axum::http::header::CONTENT_TYPE;
 use axum::http::{HeaderMap, StatusCode};
+use axum::{Extension, Json};
 use serde::Deserialize;
 
+use super::body::BodyShare;
 use super::{App, AssetPath, Problem, Query, body};
 use crate::wire::telemetry::{self, AckView, Batch, BatchError, RowsView};
 use offbd_core::vocabulary::Invalid;
@@ -110,12 +111,13 @@ pub(super) async fn post(
     State(app): State<App>,
     AssetPath(asset): AssetPath,
     Query(query): Query<SessionQuery>,
+    Extension(share): Extension<BodyShare>,
     headers: HeaderMap,
     body: Body,
 ) -> Result<Json<AckView>, Problem> {
     let format = TelemetryFormat::of(&headers)?;
     let limits = app.service.limits();
-    let read = body::read(body, limits.batch_bytes, limits.body_timeout, &app.budget).await?;
+    let read = body::read(body, limits.batch_bytes, limits.body_timeout, &share).await?;
     let mut batch = format.parse(&read.bytes, limits.batch_samples)?;
     drop(read);
     batch.session = session_name(batch.session, query.session)?;

@@ -550,6 +550,7 @@ async fn end_session(
          verdict_hash = $4,
          n_bytes = (SELECT CAST(COALESCE(SUM(LENGTH(data)), 0) AS BIGINT) FROM chunk
                     WHERE chunk.session = session.id)
+             + LENGTH(setup) + LENGTH(baseline) + LENGTH($3)
          WHERE id = $1",
     )
     .bind(session)

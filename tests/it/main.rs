@@ -8,6 +8,7 @@ mod architecture;
 mod arrival;
 mod backup;
 mod bad_input;
+mod bounds;
 mod cli;
 mod crash;
 mod damage;

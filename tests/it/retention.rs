@@ -66,9 +66,20 @@ async fn old_sessions_are_deleted_and_those_with_faults_are_kept_longer() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn above_the_size_limit_the_oldest_sessions_without_faults_are_deleted() {
     let (healthy, sick) = (rig(500, 500), rig(1500, 500));
+    // What each takes up in a store: its samples and its row.
+    let fixture = ServiceFixture::start().await;
+    fixture.client.asset("a").await;
+    for (name, samples) in [("healthy", &healthy), ("sick", &sick)] {
+        record_ended(&fixture, name, samples, 1).await;
+    }
+    let sizes: Vec<i64> = sqlx::query_scalar("SELECT n_bytes FROM session ORDER BY name")
+        .fetch_all(&mut fixture.store().await)
+        .await
+        .unwrap();
     let key = ChunkKey { session: "", first_index: 0 };
-    let size = |samples: &[Sample]| codec::encode(samples, Packing::Compact, key).len();
-    let bytes = size(&healthy) * 2 + size(&sick) + 10;
+    let chunk = |samples: &[Sample]| codec::encode(samples, Packing::Compact, key).len() as i64;
+    assert!(sizes[0] > chunk(&healthy) + 1000 && sizes[1] > chunk(&sick) + 1000, "{sizes:?}");
+    let bytes = (sizes[0] * 5 / 2 + sizes[1]) as usize;
     let fixture = ServiceFixture::start_with(|config| {
         config.retention.bytes_per_asset = Some(bytes);
         config.retention.sweep_s = 1;

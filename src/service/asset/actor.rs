@@ -2,6 +2,7 @@
 
 use super::learning_record::LearningRecord;
 use super::session::OpenSession;
+use super::session_rate::SessionRate;
 use crate::service::writing::EngineGeneration;
 use crate::store::AssetRow;
 use crate::wire::stored::StoredProvenance;
@@ -21,6 +22,7 @@ pub(super) struct Asset {
     /// The provenance of its entries, as last written.
     pub(super) provenance: Provenance,
     pub(super) open: Option<OpenSession>,
+    pub(super) session_rate: SessionRate,
     /// The progress of the automatic calibration.
     pub(super) learning: LearningRecord,
     pub(super) generation: EngineGeneration,

@@ -75,7 +75,11 @@ impl Asset {
             return self.record_named(samples, turn, ack);
         };
         let mut recorded = RecordedSamples::unremembered(open, samples, turn)?;
-        let n_continued = open.continued_by(samples, &recorded);
+        // At most as often as sessions may begin; otherwise conflicts are rejected.
+        let n_continued = match self.session_rate.allows(turn.at) {
+            true => open.continued_by(samples, &recorded),
+            false => samples.len(),
+        };
         let (samples, rest) = samples.split_at(n_continued);
         self.record(samples, &mut recorded, turn, ack)?;
         if rest.is_empty() {

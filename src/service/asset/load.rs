@@ -6,6 +6,7 @@ use std::ops::ControlFlow;
 use super::actor::{Asset, Provenance};
 use super::learning_record::LearningRecord;
 use super::session::OpenSession;
+use super::session_rate::SessionRate;
 use super::turn::Environment;
 use crate::service::playback::play;
 use crate::service::writing::EngineGeneration;
@@ -32,7 +33,8 @@ pub(super) fn load(env: &Environment, name: &str) -> Result<Asset, ServiceError>
     let refines = learning.refines();
     let open = session.map(|session| reopen(env, &session, refines)).transpose()?;
     let (generation, deleted) = (EngineGeneration::default(), false);
-    Ok(Asset { row, rig, memory, provenance, open, learning, generation, deleted })
+    let session_rate = SessionRate::default();
+    Ok(Asset { row, rig, memory, provenance, open, session_rate, learning, generation, deleted })
 }
 
 /// Returns the stored fault memory of `asset` and the provenance of its entries.

@@ -25,6 +25,7 @@ mod recorded;
 mod registry;
 mod restart;
 mod session;
+mod session_rate;
 mod sessions;
 mod shard;
 mod state;

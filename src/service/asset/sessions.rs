@@ -115,6 +115,10 @@ impl Asset {
         if let Some(row) = handles.wait(handles.store.session_named(&self.row.name, name))? {
             return Ok(SessionSwitch::Ended(Box::new(row)));
         }
+        if !self.session_rate.allows(turn.at) {
+            let what = "sessions of this asset begin too often";
+            return Err(ServiceError::Busy { what });
+        }
         self.end(turn)?;
         self.open(name.to_owned(), importing, turn)?;
         Ok(SessionSwitch::Open)
@@ -127,6 +131,7 @@ impl Asset {
         importing: bool,
         turn: &mut Turn<'_>,
     ) -> Result<(), ServiceError> {
+        self.session_rate.count(turn.at);
         let id = Uuid::now_v7().to_string();
         let setup = Setup::new(self.rig.clone(), None)?;
         turn.writes.push(Write::OpenSession(SessionRow {

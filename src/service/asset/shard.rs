@@ -286,6 +286,7 @@ impl Shard {
 mod tests {
     use super::*;
     use crate::service::asset::presence::Presences;
+    use crate::service::asset::session_rate::SessionRate;
     use crate::service::writing::Handles;
     use crate::store::{Location, Store};
     use offbd_core::engine::Rig;
@@ -306,6 +307,7 @@ mod tests {
             memory: Default::default(),
             provenance: Default::default(),
             open: None,
+            session_rate: SessionRate::default(),
             learning: Default::default(),
             generation: EngineGeneration::default(),
             deleted: false,
