@@ -133,7 +133,7 @@ impl Service {
         let committer = committer.spawn()?;
         let presences = Presences::default();
         let (jobs, jobs_queue) = mpsc::channel(job::MAX_QUEUED);
-        let handles = Handles::new(store, sets, closing.clone());
+        let handles = Handles::new(store, sets, outage.clone(), closing.clone());
         discard_imports(&handles).await?;
         let env = Environment {
             handles: handles.clone(),

@@ -116,6 +116,12 @@ impl StoreError {
         error.is_unique_violation() || error.is_foreign_key_violation()
     }
 
+    /// The error of a query that takes too long.
+    #[must_use]
+    pub fn too_slow() -> Self {
+        sqlx::Error::Io(std::io::ErrorKind::TimedOut.into()).into()
+    }
+
     fn journal(id: i64, error: &dyn std::fmt::Display) -> Self {
         Self::Journal { id, reason: error.to_string() }
     }

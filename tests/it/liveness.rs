@@ -329,3 +329,32 @@ async fn a_change_that_always_fails_is_rejected_and_the_others_are_committed() {
     fixture.client.asset("good").await;
     assert_eq!(fixture.client.recording("b", "s").await, samples);
 }
+
+/// While the database is unavailable, an asset that must be read from it is answered with
+/// 503, and does not hold up those that are in memory.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn an_asset_that_is_not_in_memory_does_not_hold_up_its_shard() {
+    let mut fixture = ServiceFixture::start_with(|config| config.workers.shards = 1).await;
+    fixture.client.asset("idle").await;
+    fixture.client.asset("busy").await;
+    fixture.restart().await;
+    let client = &fixture.client;
+    let samples = rig(200, 200);
+    client.telemetry("busy", Some("s"), &samples[..100]).await;
+    let lock = fixture.lock_store().await;
+    let sending = tokio::spawn({
+        let (client, rest) = (client.clone(), samples[100..].to_vec());
+        async move { client.telemetry("busy", Some("s"), &rest).await }
+    });
+    readiness(client, 503).await;
+    for _ in 0..3 {
+        client.get("assets/idle/state").await.problem(503);
+        let state = client.get("assets/busy/state").await.expect(200);
+        assert_eq!(state["samples"], 200, "judged, and not acknowledged yet");
+    }
+    lock.release().await;
+    assert_eq!(sending.await.unwrap()["accepted"], 100);
+    readiness(client, 200).await;
+    eventually(|| async { (client.get("assets/idle/state").await.status == 200).then_some(()) })
+        .await;
+}

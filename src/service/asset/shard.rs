@@ -286,11 +286,13 @@ impl Shard {
 mod tests {
     use super::*;
     use crate::service::asset::presence::Presences;
+    use crate::service::asset::session::OpenSession;
     use crate::service::asset::session_rate::SessionRate;
     use crate::service::writing::Handles;
     use crate::store::{Location, Store};
-    use offbd_core::engine::Rig;
+    use offbd_core::engine::{Rig, Setup};
     use offbd_core::vocabulary::Sample;
+    use tokio::sync::watch;
     use tokio_util::sync::CancellationToken;
 
     fn asset() -> Box<Asset> {
@@ -322,7 +324,8 @@ mod tests {
         let location = Location::File(data.path().join("test.sqlite"));
         let (store, _writer) = Store::open(&location).await.unwrap();
         let ((jobs, _), (writer, _)) = (mpsc::channel(1), mpsc::channel(1));
-        let handles = Handles::new(store, writer, CancellationToken::new());
+        let (_, outage) = watch::channel(None);
+        let handles = Handles::new(store, writer, outage, CancellationToken::new());
         let env = Environment { handles, presences: Presences::default(), jobs };
         let mut shard = Shard { env, running: BTreeMap::from([("a".to_owned(), asset())]) };
         let (reply, answer) = Reply::new();
@@ -338,7 +341,9 @@ mod tests {
     async fn an_engine_that_is_ahead_of_the_store_is_dropped() {
         assert!(is_kept(|_, _| Ok(())).await, "nothing has changed");
         let ingest = |asset: &mut Asset, turn: &mut Turn<'_>| {
-            asset.open_nameless(turn)?;
+            let setup = Setup::new(asset.rig.clone(), None)?;
+            let (id, memory) = ("1".to_owned(), asset.memory.clone());
+            asset.open = Some(OpenSession::new(id, "s".to_owned(), setup, memory, false));
             let sample = Sample { t_s: 1.0, x_m: Some(0.0), ..Sample::default() };
             asset.record_named(&[(0, sample)], turn, &mut Default::default())?;
             // The error occurs before any write is collected.

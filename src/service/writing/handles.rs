@@ -2,14 +2,17 @@
 //! clock, the runtime, and the shutdown signal.
 
 use std::future::Future;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use tokio::runtime::Handle;
-use tokio::sync::{mpsc, oneshot};
+use tokio::sync::{mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 
-use super::commit::{EngineGeneration, WriteSet};
+use super::commit::{EngineGeneration, Outage, WriteSet};
 use crate::service::{Clock, ServiceError};
-use crate::store::{Store, Write};
+use crate::store::{Store, StoreError, Write};
 
 /// The shared handles of the service. Cheap to clone.
 #[derive(Clone)]
@@ -20,16 +23,29 @@ pub(in crate::service) struct Handles {
     /// Cancelled when the service shuts down.
     pub(in crate::service) closing: CancellationToken,
     writer: mpsc::Sender<WriteSet>,
+    outage: watch::Receiver<Outage>,
+    /// Whether a fence has timed out and is not complete yet.
+    is_stuck: Arc<AtomicBool>,
 }
+
+/// Longest time for a fence. Chosen: much longer than a commit, and short enough for the
+/// other assets of a shard to wait.
+const FENCE_TIMEOUT: Duration = Duration::from_secs(5);
+
+/// Longest time for one read of the store. Chosen: twice the time that a reader waits for
+/// a connection; a database that takes longer is unavailable.
+const READ_TIMEOUT: Duration = Duration::from_secs(20);
 
 impl Handles {
     /// Returns handles on the current runtime.
     pub(in crate::service) fn new(
         store: Store,
         writer: mpsc::Sender<WriteSet>,
+        outage: watch::Receiver<Outage>,
         closing: CancellationToken,
     ) -> Self {
-        Self { store, clock: Clock, runtime: Handle::current(), closing, writer }
+        let (clock, runtime, is_stuck) = (Clock, Handle::current(), Arc::default());
+        Self { store, clock, runtime, closing, writer, outage, is_stuck }
     }
 
     /// Returns the writer's queue, for its state and length.
@@ -69,20 +85,53 @@ impl Handles {
 
     /// Blocks until everything submitted so far is committed or refused, so that the next
     /// read sees it. Must not run on a thread of the runtime.
+    ///
+    /// # Errors
+    /// [`ServiceError::Outage`] after 5 s, and at once as long as that fence is not complete,
+    /// so that assets that must be read do not hold up the others of their shard.
     pub(in crate::service) fn fence(&self) -> Result<(), ServiceError> {
-        let (sender, receiver) = oneshot::channel();
+        if self.is_stuck.load(Ordering::SeqCst) {
+            return Err(self.stuck());
+        }
+        let (sender, mut receiver) = oneshot::channel();
+        let is_stuck = self.is_stuck.clone();
         let completion = Box::new(move |_| {
+            // In this order, so that a fence that times out now sees one of the two.
             let _ = sender.send(());
+            is_stuck.store(false, Ordering::SeqCst);
         });
         let generation = EngineGeneration::default();
         self.submit(WriteSet { writes: Vec::new(), generation, completion });
         let stopped = |_| ServiceError::Unavailable { what: "the writer has stopped" };
-        receiver.blocking_recv().map_err(stopped)
+        let done = async { tokio::time::timeout(FENCE_TIMEOUT, &mut receiver).await };
+        if let Ok(done) = self.runtime.block_on(done) {
+            return done.map_err(stopped);
+        }
+        self.is_stuck.store(true, Ordering::SeqCst);
+        if receiver.try_recv().is_ok() {
+            self.is_stuck.store(false, Ordering::SeqCst);
+            return Ok(());
+        }
+        Err(self.stuck())
     }
 
-    /// Blocks until a query of the store completes. Must not run on a thread of the
-    /// runtime.
-    pub(in crate::service) fn wait<T>(&self, answer: impl Future<Output = T>) -> T {
-        self.runtime.block_on(answer)
+    fn stuck(&self) -> ServiceError {
+        let reason = self.outage.borrow().clone();
+        let reason = reason.unwrap_or_else(|| "nothing was committed for 5 s".to_owned());
+        ServiceError::Outage { reason }
+    }
+
+    /// Blocks until a read of the store completes. Must not run on a thread of the runtime.
+    ///
+    /// # Errors
+    /// Those of the read; [`StoreError`] if it takes longer than 20 s.
+    pub(in crate::service) fn wait<T, E: From<StoreError>>(
+        &self,
+        answer: impl Future<Output = Result<T, E>>,
+    ) -> Result<T, E> {
+        self.runtime.block_on(async {
+            let late = |_| StoreError::too_slow();
+            tokio::time::timeout(READ_TIMEOUT, answer).await.map_err(late)?
+        })
     }
 }
