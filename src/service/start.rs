@@ -10,7 +10,6 @@ use tokio_util::sync::CancellationToken;
 
 use super::access::{PrincipalCache, Provider};
 use super::asset::{AssetCommand, Environment, Presences, Shards};
-use super::clock::Clock;
 use super::job::{self, Job};
 use super::jobs::{self, JobContext};
 use super::limits::{MAX_DRIVE_CYCLES, MAX_RECORDINGS, MAX_TRACES};
@@ -96,7 +95,7 @@ async fn joined<T: Send + 'static>(thread: std::thread::JoinHandle<T>) -> Option
 
 /// Discards the sessions of imports that a stop has interrupted.
 async fn discard_imports(handles: &Handles) -> Result<(), ServiceError> {
-    let at = Clock.now();
+    let at = handles.clock.now();
     for session in handles.store.importing_sessions().await? {
         tracing::warn!(session, "an import was interrupted; its session is discarded");
         handles.write(Write::DiscardSession { session, at }).await?;
@@ -160,9 +159,6 @@ impl Service {
             closing: closing.clone(),
         };
         workers.push(tokio::spawn(watchdog.run()));
-        let recordings = Arc::new(Semaphore::new(MAX_RECORDINGS));
-        let traces = Arc::new(Semaphore::new(MAX_TRACES));
-        let drive_cycles = Arc::new(Semaphore::new(MAX_DRIVE_CYCLES));
         let inner = Inner {
             handles,
             limits,
@@ -177,9 +173,9 @@ impl Service {
             job_context,
             in_flight,
             stalled,
-            recordings,
-            traces,
-            drive_cycles,
+            recordings: Arc::new(Semaphore::new(MAX_RECORDINGS)),
+            traces: Arc::new(Semaphore::new(MAX_TRACES)),
+            drive_cycles: Arc::new(Semaphore::new(MAX_DRIVE_CYCLES)),
         };
         let workers = Workers { shards: threads, jobs: workers, closing, committer };
         Ok((Self { inner: Arc::new(inner) }, workers))

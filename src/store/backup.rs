@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use sqlx::any::AnyConnectOptions;
 use sqlx::{AnyConnection, ConnectOptions, Connection};
 
-use super::check::check_copy;
+use super::check::{check_copy, check_pages};
 use super::location::create_private;
 use super::{Location, MIGRATIONS, StoreError};
 
@@ -51,7 +51,7 @@ pub async fn restore(location: &Location, copy: &Path, replace: bool) -> Result<
     let mut source = File::open(copy).map_err(file_error(copy))?;
     std::io::copy(&mut source, &mut target).map_err(file_error(copy))?;
     let mut connection = open(&part).await?;
-    check_structure(&mut connection).await?;
+    check_pages(&mut connection).await?;
     // Fails if the file is not a database of offbd.
     sqlx::query("SELECT version FROM _sqlx_migrations").execute(&mut connection).await?;
     MIGRATIONS.run_direct(None, &mut connection, false).await?;
@@ -82,12 +82,6 @@ async fn open(file: &Path) -> Result<AnyConnection, StoreError> {
     sqlx::any::install_default_drivers();
     let url = super::location::file_url(file, "rw")?;
     Ok(url.parse::<AnyConnectOptions>()?.connect().await?)
-}
-
-async fn check_structure(connection: &mut AnyConnection) -> Result<(), StoreError> {
-    let found: String =
-        sqlx::query_scalar("PRAGMA integrity_check(1)").fetch_one(connection).await?;
-    if found == "ok" { Ok(()) } else { Err(StoreError::Damaged { found }) }
 }
 
 /// Renames the finished `part` to `file`; contents and name are on the disk on return.

@@ -10,6 +10,7 @@ use sqlx::{AnyConnection, Connection, Executor};
 use super::codec::ChunkKey;
 use super::from_row::from_row;
 use super::journal::JournalRun;
+use super::read::VISIBLE;
 use super::{Location, MIGRATIONS, StoreError, decode_chunk, journal};
 
 /// Most findings that are listed; the search ends there.
@@ -60,31 +61,51 @@ impl CheckReport {
 pub async fn check(location: &Location) -> Result<CheckReport, StoreError> {
     let mut db = location.reader().await?;
     check_version(&mut db).await?;
-    let mut report = CheckReport::default();
-    if location.file().is_some() {
-        check_structure(&mut db, &mut report).await?;
-    }
-    check_open(&mut db, location, &mut report).await;
-    check_ended(&mut db, &mut report).await;
-    check_documents(&mut db, &mut report).await;
+    let report = check_contents(&mut db, location).await?;
     db.close().await?;
     Ok(report)
 }
 
-/// Checks the contents of the SQLite database of `db`.
+/// Checks the contents of a copy of the database at `location`.
 ///
 /// # Errors
 /// [`StoreError::Damaged`] with the first finding.
-pub(super) async fn check_copy(db: &mut AnyConnection, file: &Location) -> Result<(), StoreError> {
+pub(super) async fn check_copy(
+    copy: &mut AnyConnection,
+    location: &Location,
+) -> Result<(), StoreError> {
+    whole(check_contents(copy, location).await?)
+}
+
+/// Checks the structure of an SQLite database, whatever its schema.
+///
+/// # Errors
+/// [`StoreError::Damaged`] with the first finding.
+pub(super) async fn check_pages(db: &mut AnyConnection) -> Result<(), StoreError> {
     let mut report = CheckReport::default();
     check_structure(db, &mut report).await?;
-    check_open(db, file, &mut report).await;
-    check_ended(db, &mut report).await;
-    check_documents(db, &mut report).await;
+    whole(report)
+}
+
+fn whole(report: CheckReport) -> Result<(), StoreError> {
     match report.findings.into_iter().next() {
         Some(found) => Err(StoreError::Damaged { found }),
         None => Ok(()),
     }
+}
+
+async fn check_contents(
+    db: &mut AnyConnection,
+    location: &Location,
+) -> Result<CheckReport, StoreError> {
+    let mut report = CheckReport::default();
+    if location.file().is_some() {
+        check_structure(db, &mut report).await?;
+    }
+    check_open(db, location, &mut report).await;
+    check_ended(db, &mut report).await;
+    check_documents(db, &mut report).await;
+    Ok(report)
 }
 
 async fn check_version(db: &mut AnyConnection) -> Result<(), StoreError> {
@@ -151,22 +172,18 @@ async fn check_ended(db: &mut AnyConnection, report: &mut CheckReport) {
     }
 }
 
-const VISIBLE: &str = "expired_at IS NULL
-    AND asset NOT IN (SELECT name FROM asset WHERE deleted_at IS NOT NULL)";
-
 async fn sessions(
     db: &mut AnyConnection,
     state: &'static str,
 ) -> Result<Vec<CheckedSession>, StoreError> {
-    let sql = format!(
-        "SELECT id, n_samples FROM session WHERE state = '{state}' AND {VISIBLE} ORDER BY id"
-    );
+    let sql =
+        format!("SELECT id, n_samples FROM session WHERE {VISIBLE} state = '{state}' ORDER BY id");
     Ok(sqlx::query_as(sqlx::AssertSqlSafe(sql)).fetch_all(db).await?)
 }
 
 /// Whether the session is still there: retention may have deleted it meanwhile.
 async fn is_visible(db: &mut AnyConnection, id: &str) -> bool {
-    let sql = format!("SELECT id FROM session WHERE id = $1 AND {VISIBLE}");
+    let sql = format!("SELECT id FROM session WHERE {VISIBLE} id = $1");
     let found = sqlx::query_scalar::<_, String>(sqlx::AssertSqlSafe(sql)).bind(id);
     found.fetch_optional(db).await.map_or(true, |id| id.is_some())
 }

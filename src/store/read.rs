@@ -48,7 +48,7 @@ pub(super) const SESSION: &str =
     WHERE ";
 
 /// The condition that neither the session nor its asset is hidden.
-const VISIBLE: &str = "expired_at IS NULL
+pub(super) const VISIBLE: &str = "expired_at IS NULL
     AND asset NOT IN (SELECT name FROM asset WHERE deleted_at IS NOT NULL) AND ";
 
 /// Most ranges of time in one query. Chosen: beyond it, chunks between two ranges are read

@@ -197,6 +197,16 @@ async fn conflicting_samples_are_rejected_by_name() {
 }
 
 #[tokio::test]
+async fn invalid_rows_do_not_show_a_restart() {
+    let fixture = service().await;
+    let mut samples = rig(2000, usize::MAX);
+    send(&fixture.client, None, &samples).await;
+    samples[1900..1910].iter_mut().for_each(|sample| sample.x_m = Some(1e9));
+    assert_eq!(send(&fixture.client, None, &samples[1800..]).await, [0, 190, 10, 0]);
+    assert_eq!(sessions(&fixture.client).await.len(), 1);
+}
+
+#[tokio::test]
 async fn a_rig_with_one_sample_a_minute_is_judged() {
     let fixture = service().await;
     let at = |i: usize| i as f64 * 60.0 + if i >= 100 { 7200.0 } else { 0.0 };

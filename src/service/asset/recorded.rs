@@ -10,7 +10,7 @@ use offbd_core::engine::Recognition;
 use offbd_core::vocabulary::Sample;
 
 /// Limit of the chunks of a recording that are searched for the samples of one batch. Chosen:
-/// a batch of a device spans few; half a second of work.
+/// a batch of a device spans few.
 const MAX_CHUNKS_SEARCHED: u32 = 256;
 
 /// The samples of a recording that have the times of a batch.

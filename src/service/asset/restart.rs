@@ -2,7 +2,7 @@
 
 use super::recorded::RecordedSamples;
 use super::session::OpenSession;
-use offbd_core::engine::Recognition;
+use offbd_core::engine::{Recognition, rejection};
 use offbd_core::vocabulary::Sample;
 
 /// How far the clock must go back for samples that are not recorded yet to show a restart,
@@ -37,6 +37,10 @@ impl OpenSession {
         let mut latest_s = self.judging.counts().span_s.map_or(f64::NEG_INFINITY, |(_, last)| last);
         let mut start = None;
         for (i, (_, sample)) in samples.iter().enumerate() {
+            if rejection(&self.judging.engine().setup().rig, sample).is_some() {
+                // An invalid row shows nothing.
+                continue;
+            }
             match self.sign(sample, latest_s, recorded) {
                 Sign::Continues => {
                     (start, self.n_restart_signs) = (None, 0);
