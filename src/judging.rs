@@ -8,6 +8,7 @@
 use offbd_core::diagnosis::{Evidence, FaultMemory, Transition};
 use offbd_core::engine::{Admission, Engine, Input, Misfit, Plausibility, Rejection, Setup};
 use offbd_core::vocabulary::Sample;
+use serde::{Deserialize, Serialize};
 
 use crate::wire::basis::Basis;
 use crate::wire::verdict::{SummaryView, Verdict};
@@ -26,8 +27,9 @@ pub struct Counts {
     pub duration_s: f64,
 }
 
-/// A session that is being judged.
-#[derive(Debug)]
+/// A session that is being judged. Its serialised form holds the whole state, to the bit; it
+/// is valid for one [`SNAPSHOT_FORMAT`](offbd_core::engine::SNAPSHOT_FORMAT).
+#[derive(Debug, Serialize, Deserialize)]
 pub struct Judging {
     engine: Engine,
     basis: Basis,
@@ -36,6 +38,7 @@ pub struct Judging {
     /// Samples that were neither duplicates nor rejected.
     n_samples: u64,
     /// The changes of faults that the last input caused.
+    #[serde(skip)]
     transitions: Vec<Transition>,
 }
 
@@ -76,14 +79,14 @@ impl Judging {
     /// Takes one input like [`Judging::input`], and calls `observer` with the evidence of
     /// each sample that is judged thereby, in order of time.
     pub fn observe(&mut self, input: Input, observer: impl FnMut(&Evidence)) -> Option<Admission> {
-        if let Input::Sample(sample) | Input::NewSample(sample) = &input {
-            self.plausibility.take(sample);
-        }
         self.transitions.clear();
         let admission = self.engine.observe(input, &mut self.transitions, observer);
         self.verdict.take(self.engine.n_accepted(), &self.transitions);
         let is_recorded = matches!(admission, Some(Admission::Accepted | Admission::SetAside(_)));
-        self.n_samples += u64::from(is_recorded);
+        if let (true, Input::Sample(sample) | Input::NewSample(sample)) = (is_recorded, &input) {
+            self.plausibility.take(sample);
+            self.n_samples += 1;
+        }
         admission
     }
 

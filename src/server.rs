@@ -14,6 +14,7 @@ use std::fs::{File, TryLockError};
 use std::net::SocketAddr;
 use std::num::NonZeroU32;
 use std::path::Path;
+use std::pin::pin;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -45,7 +46,8 @@ pub struct Server {
     lock: Option<File>,
 }
 
-/// Opens the store, resumes open sessions, and listens.
+/// Opens the store and listens. Engines are loaded when they are asked for; those that need
+/// a long recording are rebuilt meanwhile.
 ///
 /// # Errors
 /// If the configuration is invalid, the store cannot be opened, or the address is in use.
@@ -74,11 +76,11 @@ pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Ser
     let address = listener.local_addr()?;
     let limits = config.service_limits();
     let (service, workers) = Service::start(store.clone(), writer, limits, provider).await?;
-    let resumed = service.resume().await?;
     let closing = CancellationToken::new();
     let budget = BodyBudget::new(config.limits.bodies_bytes);
     let policy = Arc::new(policy(&config)?);
     warn_of_access(&config, &policy, &store).await?;
+    tokio::spawn(rebuild(service.clone(), closing.clone()));
     let app = App { service, budget, policy, closing: closing.clone(), demo: demo.is_some() };
     let router = http::router(app, demo.unwrap_or_default());
     let http = HttpListener::new(&config.limits, tls.clone(), closing.clone());
@@ -86,9 +88,17 @@ pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Ser
     tls.map(|tls| tokio::spawn(tls.watch(closing.clone())));
     keys.map(|keys| tokio::spawn(keys.watch(closing.clone())));
     tokio::spawn(http::keep_metrics(closing.clone()));
-    tracing::info!(%address, resumed, store = %store.location(), "serving");
+    tracing::info!(%address, store = %store.location(), "serving");
     let deadline = Duration::from_secs(config.limits.shutdown_s);
     Ok(Server { address, closing, deadline, serving, store, workers, lock })
+}
+
+/// Rebuilds the engines of long recordings while requests are served already.
+async fn rebuild(service: Service, closing: CancellationToken) {
+    let rebuilt = closing.run_until_cancelled(service.rebuild()).await;
+    if let Some(Err(error)) = rebuilt {
+        tracing::error!(%error, "cannot rebuild the engines; each is rebuilt when it is asked for");
+    }
 }
 
 /// Which requests need a token, which origins are allowed, and the rate limits.
@@ -177,8 +187,13 @@ impl Server {
 /// # Errors
 /// As for [`start`] and [`Server::shutdown`].
 pub async fn serve(config: Config) -> Result<()> {
-    let server = start(config).await?;
-    stop_signal().await?;
+    let mut stop = pin!(stop_signal());
+    let server = tokio::select! {
+        server = start(config) => server?,
+        // Nothing has been acknowledged yet.
+        stopped = &mut stop => return stopped,
+    };
+    stop.await?;
     tracing::info!("stopping");
     server.shutdown().await
 }

@@ -35,6 +35,7 @@ use MetricKind::{Counter, Gauge, Seconds, Sizes};
 /// Every metric with its kind and its description.
 const METRICS: &[(&str, MetricKind, &str)] = &[
     ("offbd_ack_seconds", Seconds, "Time from the arrival of a batch to its acknowledgement"),
+    ("offbd_assets_rebuilding", Gauge, "Assets whose engine is to be rebuilt after the start"),
     ("offbd_assets_untested", Gauge, "Assets whose samples are not judged"),
     ("offbd_bodies_bytes", Gauge, "Bytes of request bodies in memory"),
     ("offbd_build_info", Gauge, "Always 1; the label has the version"),
@@ -54,6 +55,7 @@ const METRICS: &[(&str, MetricKind, &str)] = &[
     ("offbd_refused_total", Counter, "Requests denied by the guard, by status"),
     ("offbd_samples_in_flight", Gauge, "Samples between arrival and commit"),
     ("offbd_samples_in_flight_limit", Gauge, "Limit of these: limits.in_flight_samples"),
+    ("offbd_samples_reevaluated_total", Counter, "Recorded samples evaluated again on loading"),
     ("offbd_samples_total", Counter, "Samples, by outcome"),
     ("offbd_samples_unjudged_total", Counter, "Samples rejected or set aside, by reason"),
     ("offbd_sessions_expired_total", Counter, "Sessions deleted by retention, by reason"),
@@ -179,6 +181,7 @@ fn sample_gauges(app: &App) {
     let load = app.service.load();
     gauge!("offbd_samples_in_flight").set(load.samples as f64);
     gauge!("offbd_samples_in_flight_limit").set(app.service.limits().in_flight_samples as f64);
+    gauge!("offbd_assets_rebuilding").set(app.service.n_rebuilding() as f64);
     gauge!("offbd_assets_untested").set(app.service.n_untested() as f64);
     gauge!("offbd_writer_queue").set(load.writer as f64);
     for (shard, waiting) in load.shards.iter().enumerate() {

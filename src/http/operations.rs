@@ -20,17 +20,21 @@ pub(super) struct HealthView {
     version: &'static str,
     /// Whether this is the demo, with a simulated rig.
     demo: bool,
+    /// Assets whose engine is still to be rebuilt after the start. Until then, requests that
+    /// need it are answered with 503 and `Retry-After`.
+    rebuilding: usize,
 }
 
-const fn healthy(demo: bool) -> Json<HealthView> {
-    Json(HealthView { status: "ok", version: env!("CARGO_PKG_VERSION"), demo })
+fn healthy(app: &App) -> Json<HealthView> {
+    let (demo, rebuilding) = (app.demo, app.service.n_rebuilding());
+    Json(HealthView { status: "ok", version: env!("CARGO_PKG_VERSION"), demo, rebuilding })
 }
 
 /// Liveness: succeeds while the process runs.
 #[utoipa::path(get, path = "/healthz", tag = "operation",
     responses((status = 200, body = HealthView)))]
 pub(super) async fn healthz(State(app): State<App>) -> Json<HealthView> {
-    healthy(app.demo)
+    healthy(&app)
 }
 
 /// Readiness: succeeds if the service can accept telemetry now.
@@ -49,7 +53,7 @@ pub(super) async fn readyz(State(app): State<App>) -> Result<Json<HealthView>, P
         }
         error => error.into(),
     })?;
-    Ok(healthy(app.demo))
+    Ok(healthy(&app))
 }
 
 pub(super) async fn openapi(yaml: Arc<str>) -> impl IntoResponse {

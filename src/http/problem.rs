@@ -33,6 +33,9 @@ pub struct Problem {
     /// Id of the request, as in `x-request-id` and in the log.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub instance: Option<Box<str>>,
+    /// Seconds for the header `Retry-After`.
+    #[serde(skip)]
+    pub retry_after_s: u64,
 }
 
 impl Problem {
@@ -51,6 +54,7 @@ impl Problem {
             pointer: None,
             parameter: None,
             instance: None,
+            retry_after_s: RETRY_AFTER_S,
         }
     }
 
@@ -71,7 +75,7 @@ impl IntoResponse for Problem {
         let headers = response.headers_mut();
         headers.insert(CONTENT_TYPE, HeaderValue::from_static("application/problem+json"));
         if matches!(status, StatusCode::SERVICE_UNAVAILABLE | StatusCode::TOO_MANY_REQUESTS) {
-            headers.insert(RETRY_AFTER, HeaderValue::from(RETRY_AFTER_S));
+            headers.insert(RETRY_AFTER, HeaderValue::from(self.retry_after_s));
         }
         if status == StatusCode::UNAUTHORIZED {
             headers.insert(WWW_AUTHENTICATE, HeaderValue::from_static("Bearer realm=\"offbd\""));
@@ -118,6 +122,10 @@ impl From<ServiceError> for Problem {
             E::Busy { .. } => new(StatusCode::TOO_MANY_REQUESTS, "busy", "Too many requests"),
             E::Unavailable { .. } | E::Outage { .. } | E::Stalled { .. } => {
                 new(StatusCode::SERVICE_UNAVAILABLE, "unavailable", "Service unavailable")
+            }
+            E::Rebuilding { retry_after_s } => {
+                let status = StatusCode::SERVICE_UNAVAILABLE;
+                Self { retry_after_s, ..new(status, "rebuilding", "Engine is being rebuilt") }
             }
             E::NotStored { .. } => new(StatusCode::SERVICE_UNAVAILABLE, "store", "Store error"),
             E::Store(_) => {

@@ -65,6 +65,11 @@ pub enum ServiceError {
     /// [`RETRY_AFTER_S`](super::RETRY_AFTER_S).
     #[error("{what}; the request was not processed, retry it")]
     Busy { what: &'static str },
+    /// The asset is being loaded, and its recording is long.
+    #[error(
+        "the engine of this asset is being rebuilt from its recording; retry in {retry_after_s} s"
+    )]
+    Rebuilding { retry_after_s: u64 },
     /// The store or a part of the service failed. Unacknowledged changes may not be
     /// stored; retry.
     #[error("{what}; unacknowledged data were not stored, retry")]
@@ -108,6 +113,7 @@ impl From<StoreError> for ServiceError {
             StoreError::Deleted { session } => Self::UnknownSession { id: session },
             StoreError::Chunk { .. }
             | StoreError::Incomplete { .. }
+            | StoreError::Snapshot { .. }
             | StoreError::Journal { .. }
             | StoreError::UnknownValue { .. } => Self::corrupt(error),
             error => Self::Store(Arc::new(error)),

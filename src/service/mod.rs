@@ -61,6 +61,7 @@ mod playback;
 mod reanalysis;
 mod replay_settings;
 mod requests;
+mod snapshots;
 mod start;
 mod upkeep;
 mod views;

@@ -8,11 +8,13 @@ use crate::store::{ActionKind, SessionRow};
 use offbd_core::engine::Input;
 use offbd_core::vocabulary::FaultCode;
 
-/// Passes the inputs of `session` to `take`, in their original order, until it breaks at a
-/// sample. Blocks on the store, so it must not run on a thread of the runtime.
+/// Passes the inputs of `session` from its sample `first` on to `take`, in their original
+/// order, until it breaks at a sample. Blocks on the store, so it must not run on a thread
+/// of the runtime.
 pub(super) fn play(
     handles: &Handles,
     session: &SessionRow,
+    first: i64,
     mut take: impl FnMut(Input) -> ControlFlow<()>,
 ) -> Result<(), ServiceError> {
     let mut actions = Vec::new();
@@ -21,9 +23,9 @@ pub(super) fn play(
         let code: FaultCode = row.code.parse().map_err(ServiceError::corrupt)?;
         actions.push((row.after_index, input(kind, code)));
     }
-    let mut actions = actions.into_iter().peekable();
-    let mut n_played = 0;
-    let mut recording = handles.store.recording(session, 0);
+    let mut actions = actions.into_iter().filter(|(after, _)| *after >= first).peekable();
+    let mut n_played = first;
+    let mut recording = handles.store.recording(session, first);
     while let Some(samples) = handles.wait(recording.next())? {
         for sample in samples {
             while let Some((_, action)) = actions.next_if(|(after, _)| *after <= n_played) {

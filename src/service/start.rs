@@ -1,7 +1,7 @@
 //! Starts the service and its threads and tasks.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 
 use futures_util::{StreamExt, stream};
 use tokio::sync::{Semaphore, mpsc, watch};
@@ -9,13 +9,13 @@ use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
 
 use super::access::{PrincipalCache, Provider};
-use super::asset::{AssetCommand, Environment, Presences, Shards};
+use super::asset::{AssetCommand, Environment, MANY_SAMPLES, Presences, Shards};
 use super::job::{self, Job};
 use super::jobs::{self, JobContext};
 use super::limits::{MAX_DRIVE_CYCLES, MAX_RECORDINGS, MAX_TRACES};
 use super::upkeep::{Deleter, Sweeper, Watchdog};
 use super::writing::{Committer, Events, Handles, Outage};
-use super::{Limits, ServiceError};
+use super::{Limits, ServiceError, snapshots};
 use crate::store::{Store, Write, Writer};
 
 /// A handle to the running service. Cheap to clone; all clones share one service.
@@ -40,6 +40,8 @@ pub(super) struct Inner {
     pub(super) in_flight: Arc<Semaphore>,
     /// Whether the samples in flight are at their limit and nothing is committed.
     pub(super) stalled: Arc<AtomicBool>,
+    /// Assets whose engine is still to be rebuilt after the start.
+    pub(super) n_rebuilding: AtomicUsize,
     /// One permit for each fault recording that is being computed.
     pub(super) recordings: Arc<Semaphore>,
     /// One permit for each trace that is being computed.
@@ -104,8 +106,9 @@ async fn discard_imports(handles: &Handles) -> Result<(), ServiceError> {
 }
 
 impl Service {
-    /// Starts the shards and the writer on the current tokio runtime. Tokens of the
-    /// identity `provider` are accepted in addition to the service's own.
+    /// Starts the shards and the writer on the current tokio runtime, and queues unfinished
+    /// jobs again. Tokens of the identity `provider` are accepted in addition to the
+    /// service's own.
     ///
     /// # Errors
     /// [`ServiceError`] if the store cannot be read or no thread can be started.
@@ -173,35 +176,38 @@ impl Service {
             job_context,
             in_flight,
             stalled,
+            n_rebuilding: AtomicUsize::new(0),
             recordings: Arc::new(Semaphore::new(MAX_RECORDINGS)),
             traces: Arc::new(Semaphore::new(MAX_TRACES)),
             drive_cycles: Arc::new(Semaphore::new(MAX_DRIVE_CYCLES)),
         };
         let workers = Workers { shards: threads, jobs: workers, closing, committer };
-        Ok((Self { inner: Arc::new(inner) }, workers))
+        let service = Self { inner: Arc::new(inner) };
+        service.resume_jobs().await?;
+        Ok((service, workers))
     }
 
-    /// Loads the assets that have an open session, so that their first batch after a
-    /// restart is not delayed, and queues unfinished jobs again. Returns the number of
-    /// these assets.
+    /// Loads the assets whose engine must evaluate a long recording again, because there is
+    /// no snapshot of it by this version, so that they are ready when they are asked for.
+    /// Those that are asked for meanwhile come first.
     ///
     /// # Errors
-    /// [`ServiceError::Unavailable`] if the store cannot be read.
-    pub async fn resume(&self) -> Result<usize, ServiceError> {
-        let assets = self.inner.handles.store.assets_in_session().await?;
-        let load = |asset: &String| {
-            let (this, asset) = (self.clone(), asset.clone());
-            async move {
-                if let Err(error) =
-                    this.inner.shards.call(&asset, |reply| AssetCommand::Load { reply }).await
-                {
-                    tracing::error!(asset, %error, "cannot load the asset");
-                }
+    /// [`ServiceError::Store`] if the store cannot be read.
+    pub async fn rebuild(&self) -> Result<(), ServiceError> {
+        let Inner { handles, shards, limits, n_rebuilding, .. } = &*self.inner;
+        let behind = handles.store.assets_behind(&snapshots::version(), MANY_SAMPLES).await?;
+        n_rebuilding.store(behind.len(), Ordering::Relaxed);
+        let load = async |asset: &String| {
+            let loaded = shards.call(asset, |reply| AssetCommand::Load { reply }).await;
+            n_rebuilding.fetch_sub(1, Ordering::Relaxed);
+            if let Err(error) = loaded {
+                tracing::error!(asset, %error, "cannot load the asset");
             }
         };
-        let concurrent = self.inner.limits.shards;
-        stream::iter(&assets).for_each_concurrent(concurrent, load).await;
-        self.resume_jobs().await?;
-        Ok(assets.len())
+        stream::iter(&behind).for_each_concurrent(limits.shards, load).await;
+        if !behind.is_empty() {
+            tracing::info!(n_assets = behind.len(), "all engines are rebuilt");
+        }
+        Ok(())
     }
 }

@@ -36,6 +36,7 @@ mod query_builder;
 mod read;
 mod recording;
 mod rows;
+mod snapshot;
 mod tail;
 mod write;
 mod writer_lock;
@@ -59,6 +60,7 @@ pub use rows::{
     ActionKind, ActionRow, AssetRow, CalibrationRow, EventRow, FaultRow, Micros, ReplayRow,
     SessionProgress, SessionRow, TransitionRow, TrendEntry, TrendRow, WarningRow,
 };
+pub use snapshot::Snapshot;
 pub use tail::{FULL_CHUNK_SAMPLES, MAX_TAIL_CHUNKS};
 pub use write::{Write, Writer};
 
@@ -78,6 +80,8 @@ pub enum StoreError {
     Incomplete { session: String, found: i64, expected: i64 },
     #[error("session {session} has been deleted")]
     Deleted { session: String },
+    #[error("the snapshot of session {session} after {n_samples} samples is damaged")]
+    Snapshot { session: String, n_samples: i64 },
     #[error("journal row {id}: {reason}")]
     Journal { id: i64, reason: String },
     #[error("{column} has the value `{found}`, which is unknown to this version")]
@@ -142,6 +146,7 @@ impl StoreError {
             Self::Migration(_)
             | Self::Chunk { .. }
             | Self::Incomplete { .. }
+            | Self::Snapshot { .. }
             | Self::Deleted { .. }
             | Self::Journal { .. }
             | Self::UnknownValue { .. }

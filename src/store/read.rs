@@ -97,11 +97,20 @@ impl Store {
         Ok(count.fetch_one(&self.pool).await?)
     }
 
-    /// The names of the assets that have an open session.
-    pub async fn assets_in_session(&self) -> Result<Vec<String>, StoreError> {
-        Ok(sqlx::query_scalar("SELECT asset FROM session WHERE state = 'open' ORDER BY asset")
-            .fetch_all(&self.pool)
-            .await?)
+    /// The names of the assets whose open session has at least `n_samples` samples after the
+    /// last snapshot by this `version` of the engine.
+    pub async fn assets_behind(
+        &self,
+        version: &str,
+        n_samples: i64,
+    ) -> Result<Vec<String>, StoreError> {
+        let rows = sqlx::query_scalar(
+            "SELECT asset FROM session WHERE state = 'open' AND n_samples >= $2 + COALESCE(
+                 (SELECT MAX(snapshot.n_samples) FROM snapshot
+                  WHERE snapshot.session = session.id AND version = $1), 0)
+             ORDER BY asset",
+        );
+        Ok(rows.bind(version).bind(n_samples).fetch_all(&self.pool).await?)
     }
 
     /// The session `id`.

@@ -26,7 +26,8 @@ use super::tail::{Run, Tails};
 use super::writer_lock::Backend;
 use super::{
     AccessWrite, ActionRow, AssetRow, CalibrationRow, FaultRow, Location, MIGRATIONS, Micros,
-    ReplayRow, SessionProgress, SessionRow, StoreError, TransitionRow, TrendRow,
+    ReplayRow, SessionProgress, SessionRow, Snapshot, StoreError, TransitionRow, TrendRow,
+    snapshot,
 };
 use offbd_core::vocabulary::Sample;
 
@@ -59,6 +60,12 @@ pub enum Write {
         first_index: i64,
         samples: Vec<Sample>,
         progress: SessionProgress,
+    },
+    /// Stores a snapshot of the engine of an open session.
+    PutSnapshot(Snapshot),
+    /// Removes all snapshots of a session.
+    RemoveSnapshots {
+        session: String,
     },
     EndSession {
         session: String,
@@ -430,8 +437,11 @@ impl GroupCommit<'_> {
             Write::CreateAsset(row) => create_asset(db, row).await,
             Write::UpdateAsset(row) => update_asset(db, row).await,
             Write::OpenSession(row) => open_session(db, row).await,
+            Write::PutSnapshot(row) => snapshot::put(db, row).await,
+            Write::RemoveSnapshots { session } => snapshot::remove_all(db, session).await,
             Write::EndSession { session, ended_at, verdict, hash } => {
                 self.fold_ended(db, session).await?;
+                snapshot::remove(db, session).await?;
                 end_session(db, session, *ended_at, verdict, hash).await
             }
             Write::DeleteSession { session } => self.delete_session(db, session).await,

@@ -1,6 +1,7 @@
 //! Short ids of what a verdict is based on: the calibration, and all other settings.
 
 use data_encoding::HEXLOWER;
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
@@ -9,7 +10,7 @@ use offbd_core::diagnosis::{MemoryRules, Settings};
 use offbd_core::engine::{JUDGEMENT, Setup};
 
 /// The ids of the calibration and the settings with which a fault was judged.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Basis {
     /// `id` of the calibration in the asset file; `None` if the rig is not learnt.
     pub calibration_id: Option<String>,

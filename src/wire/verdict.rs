@@ -298,13 +298,32 @@ const fn answer_view(answer: &ServoAnswer) -> AnswerView {
 ///
 /// The hash covers the number of judged samples and every transition (time, code, kind,
 /// status, byte, onset), so it differs if anything that matters differs.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Verdict {
+    #[serde(with = "hasher_state")]
     hasher: Sha256,
     n_accepted: u64,
     confirmed: Vec<FaultCode>,
     /// The suspicion of each code when its test last failed in this session.
     suspected: [Option<Suspicion>; FaultCode::COUNT],
+}
+
+/// The state of a hasher as bytes.
+mod hasher_state {
+    use serde::de::Error;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+    use sha2::Sha256;
+    use sha2::digest::common::hazmat::SerializableState;
+
+    pub(super) fn serialize<S: Serializer>(hasher: &Sha256, to: S) -> Result<S::Ok, S::Error> {
+        hasher.serialize().as_slice().serialize(to)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Sha256, D::Error> {
+        let state: Vec<u8> = Vec::deserialize(from)?;
+        let state = state.as_slice().try_into().map_err(D::Error::custom)?;
+        Sha256::deserialize(state).map_err(D::Error::custom)
+    }
 }
 
 impl Verdict {

@@ -4,7 +4,7 @@ use super::learning_record::LearningRecord;
 use super::session::OpenSession;
 use super::session_rate::SessionRate;
 use crate::service::writing::EngineGeneration;
-use crate::store::AssetRow;
+use crate::store::{AssetRow, Snapshot};
 use crate::wire::stored::StoredProvenance;
 use offbd_core::diagnosis::FaultMemory;
 use offbd_core::engine::Rig;
@@ -27,4 +27,6 @@ pub(super) struct Asset {
     pub(super) learning: LearningRecord,
     pub(super) generation: EngineGeneration,
     pub(super) deleted: bool,
+    /// Snapshots of the engine to be stored, taken while it was rebuilt.
+    pub(super) snapshots: Vec<Snapshot>,
 }

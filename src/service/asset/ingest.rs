@@ -5,7 +5,7 @@ use super::recorded::RecordedSamples;
 use super::session::OpenSession;
 use super::sessions::SessionSwitch;
 use super::turn::Turn;
-use crate::service::{ServiceError, views};
+use crate::service::{ServiceError, snapshots, views};
 use crate::store::{SessionRow, Write};
 use crate::wire::telemetry::{AckView, Batch, RowView};
 use offbd_core::engine::{Admission, Recognition, Rejection, rejection};
@@ -141,17 +141,26 @@ impl Asset {
         ack.session = Some(open.name.clone());
         ack.session_id = Some(open.id.clone());
         ack.last_seq = open.progress.last_seq.and_then(|seq| u64::try_from(seq).ok());
-        self.append(first_index, new, turn);
+        self.append(first_index, new, turn)?;
         turn.writes.append(&mut transitions);
         self.write_memory(None, turn)
     }
 
-    fn append(&mut self, first_index: i64, samples: Vec<Sample>, turn: &mut Turn<'_>) {
-        let Some(open) = &self.open else { return };
-        if !samples.is_empty() {
-            let (session, progress) = (open.id.clone(), open.progress);
-            turn.writes.push(Write::Append { session, first_index, samples, progress });
+    /// Records samples that the engine has evaluated, with a snapshot of it if one is due.
+    fn append(
+        &mut self,
+        first_index: i64,
+        samples: Vec<Sample>,
+        turn: &mut Turn<'_>,
+    ) -> Result<(), ServiceError> {
+        let Some(open) = self.open.as_mut().filter(|_| !samples.is_empty()) else { return Ok(()) };
+        let (session, progress) = (open.id.clone(), open.progress);
+        turn.writes.push(Write::Append { session, first_index, samples, progress });
+        let n = progress.n_samples;
+        if n - open.snapshot_at >= snapshots::INTERVAL && !open.importing {
+            turn.writes.push(Write::PutSnapshot(open.snapshot(n)?));
         }
+        Ok(())
     }
 
     /// Adds rejected rows to the count of the session.

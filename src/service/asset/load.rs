@@ -1,5 +1,5 @@
-//! Loads an asset from the store. Its open session is evaluated again from the recording,
-//! which restores the state of the engine.
+//! Loads an asset from the store. The state of the engine of its open session is that of the
+//! last snapshot; from there on, or from the start, the recording is evaluated again.
 
 use std::ops::ControlFlow;
 
@@ -7,34 +7,75 @@ use super::actor::{Asset, Provenance};
 use super::learning_record::LearningRecord;
 use super::session::OpenSession;
 use super::session_rate::SessionRate;
-use super::turn::Environment;
 use crate::service::playback::play;
-use crate::service::writing::EngineGeneration;
-use crate::service::{ServiceError, views};
-use crate::store::{FaultFilter, SessionRow, Store};
+use crate::service::writing::{EngineGeneration, Handles};
+use crate::service::{ServiceError, snapshots, views};
+use crate::store::{FaultFilter, SessionRow, Snapshot, Store};
 use crate::wire::stored::{StoredMemory, StoredRecord};
 use offbd_core::diagnosis::FaultMemory;
 use offbd_core::engine::{Input, Setup};
 use offbd_core::vocabulary::FaultCode;
 
-/// Loads the asset `name`.
-///
-/// # Errors
-/// [`ServiceError::UnknownAsset`]; [`ServiceError::Store`]; [`ServiceError::Corrupt`].
-pub(super) fn load(env: &Environment, name: &str) -> Result<Asset, ServiceError> {
-    let row = env.handles.wait(env.handles.store.asset(name))?;
-    let row = row.ok_or_else(|| ServiceError::UnknownAsset { name: name.to_owned() })?;
-    let rig = views::rig(&row.document)?;
-    let (memory, provenance) = env.handles.wait(stored_memory(&env.handles.store, name))?;
-    let session = env.handles.wait(env.handles.store.open_session(name))?;
-    let learning = env.handles.wait(env.handles.store.learning(name))?;
-    let learning: LearningRecord =
-        learning.as_deref().map(views::from_json).transpose()?.unwrap_or_default();
-    let refines = learning.refines();
-    let open = session.map(|session| reopen(env, &session, refines)).transpose()?;
-    let (generation, deleted) = (EngineGeneration::default(), false);
-    let session_rate = SessionRate::default();
-    Ok(Asset { row, rig, memory, provenance, open, session_rate, learning, generation, deleted })
+/// An asset as stored, whose open session is not up to date yet.
+pub(super) struct StoredAsset {
+    asset: Asset,
+    /// The open session, its engine, and the number of samples that this has evaluated.
+    open: Option<(SessionRow, OpenSession, i64)>,
+}
+
+impl StoredAsset {
+    /// Reads the asset `name`, and the last snapshot of its engine. Blocks on the store.
+    ///
+    /// # Errors
+    /// [`ServiceError::UnknownAsset`]; [`ServiceError::Store`]; [`ServiceError::Corrupt`].
+    pub(super) fn read(handles: &Handles, name: &str) -> Result<Self, ServiceError> {
+        handles.fence()?;
+        let row = handles.wait(handles.store.asset(name))?;
+        let row = row.ok_or_else(|| ServiceError::UnknownAsset { name: name.to_owned() })?;
+        let rig = views::rig(&row.document)?;
+        let (memory, provenance) = handles.wait(stored_memory(&handles.store, name))?;
+        let session = handles.wait(handles.store.open_session(name))?;
+        let learning = handles.wait(handles.store.learning(name))?;
+        let learning: LearningRecord =
+            learning.as_deref().map(views::from_json).transpose()?.unwrap_or_default();
+        let refines = learning.refines();
+        let reopen = |session| reopen(handles, session, refines);
+        Ok(Self {
+            open: session.map(reopen).transpose()?,
+            asset: Asset {
+                row,
+                rig,
+                memory,
+                provenance,
+                open: None,
+                session_rate: SessionRate::default(),
+                learning,
+                generation: EngineGeneration::default(),
+                deleted: false,
+                snapshots: Vec::new(),
+            },
+        })
+    }
+
+    /// Number of recorded samples that the engine has not evaluated yet.
+    pub(super) fn n_behind(&self) -> i64 {
+        self.open.as_ref().map_or(0, |(row, _, n_evaluated)| row.progress.n_samples - n_evaluated)
+    }
+
+    /// Evaluates the rest of the recording. Blocks on the store.
+    ///
+    /// # Errors
+    /// [`ServiceError::Unavailable`] if the service is shutting down;
+    /// [`ServiceError::Store`]; [`ServiceError::Corrupt`].
+    pub(super) fn catch_up(self, handles: &Handles) -> Result<Asset, ServiceError> {
+        let n_behind = self.n_behind().unsigned_abs();
+        metrics::counter!("offbd_samples_reevaluated_total").increment(n_behind);
+        let Self { mut asset, open } = self;
+        if let Some((row, open, n_evaluated)) = open {
+            asset.open = Some(evaluate(handles, &row, open, n_evaluated, &mut asset.snapshots)?);
+        }
+        Ok(asset)
+    }
 }
 
 /// Returns the stored fault memory of `asset` and the provenance of its entries.
@@ -55,22 +96,63 @@ async fn stored_memory(
     Ok((memory, provenance))
 }
 
-fn reopen(env: &Environment, row: &SessionRow, refines: bool) -> Result<OpenSession, ServiceError> {
+/// Returns the open session of `row` with its engine as of the last snapshot, or as at its
+/// start, and the number of samples that the engine has evaluated.
+fn reopen(
+    handles: &Handles,
+    row: SessionRow,
+    refines: bool,
+) -> Result<(SessionRow, OpenSession, i64), ServiceError> {
     let setup = Setup::new(views::rig(&row.setup)?, None)?;
     let baseline = views::memory(&row.baseline)?;
     let mut open = OpenSession::new(row.id.clone(), row.name.clone(), setup, baseline, refines);
-    play(&env.handles, row, |input| {
-        match input {
-            Input::NewSample(sample) => {
-                open.take_new(&sample);
-            }
-            action => {
-                open.judging.input(action);
-            }
+    open.importing = row.importing != 0;
+    let restored = snapshots::restore(handles, &row, i64::MAX)?;
+    let Some(restored) = restored.filter(|r| r.motion.is_some() == open.motion.is_some()) else {
+        return Ok((row, open, 0));
+    };
+    (open.judging, open.motion) = (restored.judging, restored.motion);
+    open.progress.n_samples = restored.n_samples;
+    open.snapshot_at = restored.n_samples;
+    Ok((row, open, restored.n_samples))
+}
+
+/// Evaluates the recording of the open session `row` from the sample `n_evaluated` on; adds
+/// the snapshots that are due to `snapshots`.
+fn evaluate(
+    handles: &Handles,
+    row: &SessionRow,
+    mut open: OpenSession,
+    n_evaluated: i64,
+    due: &mut Vec<Snapshot>,
+) -> Result<OpenSession, ServiceError> {
+    let (mut n, mut failure) = (n_evaluated, None);
+    play(handles, row, n_evaluated, |input| {
+        let Input::NewSample(sample) = input else {
+            open.judging.input(input);
+            return ControlFlow::Continue(());
+        };
+        open.take_new(&sample);
+        n += 1;
+        if n % snapshots::INTERVAL != 0 {
+            return ControlFlow::Continue(());
         }
-        ControlFlow::Continue(())
+        let closing = ServiceError::Unavailable { what: "the service is shutting down" };
+        failure = match open.snapshot(n) {
+            Ok(_) if handles.closing.is_cancelled() => Some(closing),
+            Ok(snapshot) => {
+                due.retain(|earlier| earlier.kept);
+                due.push(snapshot);
+                None
+            }
+            Err(error) => Some(error),
+        };
+        if failure.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })?;
-    open.n_transitions = env.handles.wait(env.handles.store.n_transitions(&row.id))?;
+    if let Some(error) = failure {
+        return Err(error);
+    }
+    open.n_transitions = handles.wait(handles.store.n_transitions(&row.id))?;
     if open.progress.n_samples != row.progress.n_samples {
         tracing::warn!(
             session = row.id,
@@ -80,6 +162,5 @@ fn reopen(env: &Environment, row: &SessionRow, refines: bool) -> Result<OpenSess
         );
     }
     open.progress = row.progress;
-    open.importing = row.importing != 0;
     Ok(open)
 }

@@ -5,8 +5,9 @@
 //! Nothing here writes to the store: the changes that result from a command are collected
 //! in a [`turn::Turn`] and handed to the writer. The reply is sent once they are durable.
 //!
-//! - `command`, `shard`, `turn`: commands, the threads, the execution of a command.
-//! - `actor`, `load`, `state`: the asset, loading it from the store, queries.
+//! - `command`, `shards`, `shard`, `turn`: commands, their queues, the threads, the execution
+//!   of a command.
+//! - `actor`, `loader`, `load`, `state`: the asset, loading it from the store, queries.
 //! - `ingest`, `sessions`, `session`, `recent`: samples, sessions, the engine of a session.
 //! - `memory`, `trend`: the fault memory, servo estimates over the sessions.
 //! - `learning`, `learning_record`: automatic calibration.
@@ -18,6 +19,7 @@ mod ingest;
 mod learning;
 mod learning_record;
 mod load;
+mod loader;
 mod memory;
 mod presence;
 mod recent;
@@ -28,13 +30,15 @@ mod session;
 mod session_rate;
 mod sessions;
 mod shard;
+mod shards;
 mod state;
 mod trend;
 mod turn;
 
 pub(super) use command::{Answer, AssetCommand, Reply};
 pub(super) use learning_record::{LearningRecord, TrainingSession};
+pub(super) use loader::MANY_SAMPLES;
 pub(super) use presence::Presences;
-pub(super) use shard::Shards;
+pub(super) use shards::Shards;
 pub(super) use trend::{MAX_ROWS as MAX_TREND_ROWS, TrendPoint, points as trend_points};
 pub(super) use turn::Environment;

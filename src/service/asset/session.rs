@@ -3,8 +3,8 @@
 use super::recent::RecentTrace;
 use crate::judging::Judging;
 use crate::service::clock::rfc3339;
-use crate::service::{ServiceError, views};
-use crate::store::{Micros, SessionProgress, TransitionRow, Write};
+use crate::service::{ServiceError, snapshots, views};
+use crate::store::{Micros, SessionProgress, Snapshot, TransitionRow, Write};
 use crate::wire::stored::StoredOccurrence;
 use crate::wire::verdict::{SummaryView, fault_view};
 use offbd_core::diagnosis::FaultMemory;
@@ -24,6 +24,8 @@ pub(super) struct OpenSession {
     pub(super) recent: RecentTrace,
     /// Motion usable for calibration; `None` if it is not counted.
     pub(super) motion: Option<UsableMotion>,
+    /// Number of samples at the last snapshot of the engine.
+    pub(super) snapshot_at: i64,
     /// Consecutive samples so far that show a restart of the device.
     pub(super) n_restart_signs: u32,
 }
@@ -48,6 +50,7 @@ impl OpenSession {
             n_transitions: 0,
             importing: false,
             recent: RecentTrace::default(),
+            snapshot_at: 0,
             n_restart_signs: 0,
         }
     }
@@ -77,6 +80,12 @@ impl OpenSession {
         }
         self.recent.push(|| self.judging.engine().state());
         admission
+    }
+
+    /// Returns a snapshot of the engine, which has evaluated `n_samples` recorded samples.
+    pub(super) fn snapshot(&mut self, n_samples: i64) -> Result<Snapshot, ServiceError> {
+        let last = std::mem::replace(&mut self.snapshot_at, n_samples);
+        snapshots::take(&self.id, n_samples, last, &self.judging, self.motion.as_ref())
     }
 
     /// Samples that are not judged because no other confirmed their step of the clock.

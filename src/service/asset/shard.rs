@@ -1,123 +1,69 @@
-//! A shard: a thread that runs the engines of its assets.
+//! A shard: a thread that runs the engines of its assets. An asset is loaded by its first
+//! command, on another thread; its commands wait meanwhile.
 
 use std::collections::BTreeMap;
-use std::hash::{DefaultHasher, Hash, Hasher};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Arc;
 use std::thread::JoinHandle;
 
 use tokio::sync::mpsc;
 
 use super::actor::Asset;
 use super::command::{AssetCommand, Reply};
-use super::load::load;
+use super::loader::{LoadResult, Loader};
+use super::shards::ShardMessage;
 use super::turn::{Environment, Turn};
-use crate::service::writing::EngineGeneration;
-use crate::service::{Limits, ServiceError};
+use crate::service::ServiceError;
+use crate::service::writing::{EngineGeneration, WriteSet};
 use crate::store::{AssetRow, Write};
 
-/// A command for the asset of this name.
-pub(in crate::service) struct ShardMessage {
-    asset: String,
-    command: AssetCommand,
+/// An asset of a shard.
+enum Slot {
+    /// Boxed, because it is large and is moved out for each command.
+    Running(Box<Asset>),
+    Loading(Loading),
 }
 
-/// The queues of all shards. The hash of its name assigns each asset to one shard. Cheap to
-/// clone.
-#[derive(Clone)]
-pub(in crate::service) struct Shards(Arc<[mpsc::Sender<ShardMessage>]>);
-
-impl Shards {
-    /// Starts a thread for each shard; returns the queues and the threads.
-    pub(in crate::service) fn start(
-        limits: &Limits,
-        env: Environment,
-    ) -> Result<(Self, Vec<JoinHandle<()>>), ServiceError> {
-        let start = |number| {
-            let (sender, queue) = mpsc::channel(limits.shard_queue);
-            Shard::spawn(number, env.clone(), queue).map(|thread| (sender, thread))
-        };
-        let started: Vec<_> = (0..limits.shards).map(start).collect::<Result<_, _>>()?;
-        let (senders, threads): (Vec<_>, Vec<_>) = started.into_iter().unzip();
-        Ok((Self(senders.into()), threads))
-    }
-
-    pub(in crate::service) fn iter(&self) -> impl Iterator<Item = &mpsc::Sender<ShardMessage>> {
-        self.0.iter()
-    }
-
-    fn of(&self, asset: &str) -> &mpsc::Sender<ShardMessage> {
-        let mut hasher = DefaultHasher::new();
-        asset.hash(&mut hasher);
-        let number = hasher.finish() % self.0.len().max(1) as u64;
-        &self.0[usize::try_from(number).unwrap_or_default()]
-    }
-
-    /// Queues `command` for `asset`.
-    ///
-    /// # Errors
-    /// [`ServiceError::Busy`] if the queue is full.
-    pub(in crate::service) fn try_send(
-        &self,
-        asset: &str,
-        command: AssetCommand,
-    ) -> Result<(), ServiceError> {
-        let message = ShardMessage { asset: asset.to_owned(), command };
-        self.of(asset).try_send(message).map_err(ServiceError::from_full)
-    }
-
-    /// Queues `command` for `asset`; waits while the queue is full.
-    ///
-    /// # Errors
-    /// [`ServiceError::Unavailable`] if the service is shutting down.
-    pub(in crate::service) async fn send(
-        &self,
-        asset: &str,
-        command: AssetCommand,
-    ) -> Result<(), ServiceError> {
-        let message = ShardMessage { asset: asset.to_owned(), command };
-        let closing = |_| ServiceError::Unavailable { what: "the service is shutting down" };
-        self.of(asset).send(message).await.map_err(closing)
-    }
-
-    /// Queues the command that `make` returns and waits for its reply.
-    ///
-    /// # Errors
-    /// [`ServiceError::Busy`] if the queue is full; those of the command.
-    pub(in crate::service) async fn call<T>(
-        &self,
-        asset: &str,
-        make: impl FnOnce(Reply<T>) -> AssetCommand,
-    ) -> Result<T, ServiceError> {
-        let (reply, answer) = Reply::new();
-        self.try_send(asset, make(reply))?;
-        answer.wait().await
-    }
+/// An asset that is being loaded.
+#[derive(Default)]
+struct Loading {
+    /// The commands that wait for it.
+    waiting: Vec<AssetCommand>,
+    /// Why other commands are refused: it will take longer than a client should wait.
+    refusal: Option<ServiceError>,
 }
 
 /// The assets of one thread.
-struct Shard {
+pub(super) struct Shard {
     env: Environment,
-    /// Boxed, because they are large and are moved out for each command.
-    running: BTreeMap<String, Box<Asset>>,
+    loader: Loader,
+    slots: BTreeMap<String, Slot>,
+    /// Limit of the commands that wait for assets to be loaded.
+    max_waiting: usize,
+    n_waiting: usize,
+    n_running: metrics::Gauge,
 }
 
 impl Shard {
-    fn spawn(
+    fn new(number: usize, env: Environment, loader: Loader, max_waiting: usize) -> Self {
+        let n_running = metrics::gauge!("offbd_engines", "shard" => number.to_string());
+        Self { env, loader, slots: BTreeMap::new(), max_waiting, n_waiting: 0, n_running }
+    }
+
+    /// Starts the thread `number`, which executes the messages of `queue`.
+    pub(super) fn spawn(
         number: usize,
         env: Environment,
+        loader: Loader,
         mut queue: mpsc::Receiver<ShardMessage>,
     ) -> Result<JoinHandle<()>, ServiceError> {
         let work = move || {
-            let mut shard = Self { env, running: BTreeMap::new() };
-            let engines = metrics::gauge!("offbd_engines", "shard" => number.to_string());
-            while let Some(ShardMessage { asset, command }) = queue.blocking_recv() {
+            let mut shard = Self::new(number, env, loader, queue.max_capacity());
+            while let Some(message) = queue.blocking_recv() {
                 if shard.env.handles.writer().is_closed() {
                     // Nothing can be committed any more; dropping the reply reports an error.
                     continue;
                 }
-                shard.apply(&asset, command);
-                engines.set(f64::from(u32::try_from(shard.running.len()).unwrap_or(u32::MAX)));
+                shard.handle(message);
             }
         };
         let thread = std::thread::Builder::new().name(format!("shard-{number}"));
@@ -127,69 +73,167 @@ impl Shard {
         })
     }
 
-    fn apply(&mut self, name: &str, command: AssetCommand) {
-        use AssetCommand as C;
-        match command {
-            C::Create { document, reply } => self.create(name, document, reply),
-            C::Replace { rig, reply } => self.change(name, reply, |a, turn| a.replace(*rig, turn)),
-            C::Delete { reply } => self.change(name, reply, |a, turn| a.delete(turn)),
-            C::Ingest { batch, importing, request, reply } => {
-                let _span = tracing::debug_span!(parent: &request, "judge").entered();
-                self.change(name, reply, |a, turn| a.ingest(batch, importing, turn));
+    fn handle(&mut self, message: ShardMessage) {
+        match message {
+            ShardMessage::Command { asset, command } => self.dispatch(&asset, command),
+            ShardMessage::Rebuilding { asset, retry_after_s } => {
+                self.rebuilding(&asset, retry_after_s);
             }
-            C::OpenSession { name: session, importing, reply } => {
-                self.change(name, reply, |a, turn| a.open_session(session, importing, turn));
-            }
-            C::EndSession { session, reply } => {
-                self.change(name, reply, |a, turn| a.end_session(&session, turn));
-            }
-            C::DiscardImport { session, reply } => {
-                self.change(name, reply, |a, turn| a.discard_import(session, turn));
-            }
-            C::DeleteSession { session, reply } => {
-                self.change(name, reply, |a, turn| a.delete_session(session, turn));
-            }
-            C::Clear { code, actor, reply } => {
-                self.change(name, reply, |a, turn| a.clear(code, actor, turn));
-            }
-            C::Acknowledge { code, actor, reply } => {
-                self.change(name, reply, |a, turn| a.acknowledge(code, actor, turn));
-            }
-            C::Activate { id, calibration, reply } => {
-                self.change(name, reply, |a, turn| a.activate(*calibration, &id, turn));
-            }
-            C::FinishCalibration { row, reply } => {
-                self.change(name, reply, |a, turn| a.finish_calibration(*row, turn));
-            }
-            C::OfferedCalibration { reply } => {
-                self.change(name, reply, |a, _| Ok(a.offered_calibration()));
-            }
-            C::AcceptLearning { id, calibration, reply } => {
-                self.change(name, reply, |a, turn| a.accept_learning(*calibration, &id, turn));
-            }
-            C::DiscardLearning { reply } => {
-                self.change(name, reply, |a, turn| a.discard_learning(turn));
-            }
-            C::Load { reply } => self.query(name, reply, |_| ()),
-            C::State { reply } => self.query(name, reply, Asset::state),
-            C::Watch { session, seen, reply } => {
-                self.query(name, reply, |a| a.watch(session, seen));
-            }
-            C::Monitors { reply } => self.query(name, reply, Asset::monitors),
-            C::Learning { reply } => self.query(name, reply, Asset::learning),
+            ShardMessage::Loaded { asset, result } => self.loaded(&asset, *result),
         }
     }
 
-    /// Executes a command that changes the asset `name`, which is loaded if necessary. The
-    /// reply is sent once the changes are durable. If the engine panics, or is ahead of the
-    /// store when `change` fails, it is dropped and rebuilt by the next command.
+    /// Executes `command`, or lets it wait until the asset `name` is loaded.
+    fn dispatch(&mut self, name: &str, command: AssetCommand) {
+        match self.slots.remove(name) {
+            Some(Slot::Running(asset)) if !asset.generation.is_invalid() => {
+                self.n_running.decrement(1);
+                self.apply(name, Ok(asset), command);
+            }
+            Some(Slot::Loading(loading)) => self.wait(name, loading, command),
+            _ => {
+                let refusal = self.loader.load(name);
+                self.wait(name, Loading { refusal, ..Loading::default() }, command);
+            }
+        }
+    }
+
+    /// Lets `command` wait for the asset `name`, unless that is refused.
+    fn wait(&mut self, name: &str, mut loading: Loading, command: AssetCommand) {
+        let full = ServiceError::Busy { what: "too many requests wait for assets to be loaded" };
+        let is_full = self.n_waiting >= self.max_waiting;
+        match loading.refusal.clone().or(is_full.then_some(full)) {
+            Some(refusal) if !matches!(command, AssetCommand::Load { .. }) => {
+                self.apply(name, Err(refusal), command);
+            }
+            _ => {
+                self.n_waiting += 1;
+                loading.waiting.push(command);
+            }
+        }
+        self.slots.insert(name.to_owned(), Slot::Loading(loading));
+    }
+
+    /// Refuses the commands that wait for the asset `name`, because loading it takes long.
+    fn rebuilding(&mut self, name: &str, retry_after_s: u64) {
+        let Some(Slot::Loading(mut loading)) = self.slots.remove(name) else { return };
+        loading.refusal = Some(ServiceError::Rebuilding { retry_after_s });
+        let waiting = std::mem::take(&mut loading.waiting);
+        self.n_waiting -= waiting.len();
+        self.slots.insert(name.to_owned(), Slot::Loading(loading));
+        waiting.into_iter().for_each(|command| self.dispatch(name, command));
+    }
+
+    /// Executes the commands that wait for the asset `name`, or refuses them.
+    fn loaded(&mut self, name: &str, result: LoadResult) {
+        let Some(Slot::Loading(loading)) = self.slots.remove(name) else { return };
+        self.n_waiting -= loading.waiting.len();
+        let refusal = match result {
+            Ok(mut asset) => {
+                self.store_snapshots(&mut asset);
+                self.keep(name, asset);
+                None
+            }
+            Err(error) => Some(error),
+        };
+        let mut may_be_created = false;
+        for command in loading.waiting {
+            match &refusal {
+                Some(error) if !may_be_created => {
+                    may_be_created = matches!(command, AssetCommand::Create { .. });
+                    self.apply(name, Err(error.clone()), command);
+                }
+                _ => self.dispatch(name, command),
+            }
+        }
+    }
+
+    /// Stores the snapshots that were taken while the engine was rebuilt.
+    fn store_snapshots(&self, asset: &mut Asset) {
+        let writes: Vec<_> =
+            std::mem::take(&mut asset.snapshots).into_iter().map(Write::PutSnapshot).collect();
+        if !writes.is_empty() {
+            let (generation, completion) = (asset.generation.clone(), Box::new(|_| ()));
+            self.env.handles.submit(WriteSet { writes, generation, completion });
+        }
+    }
+
+    fn keep(&mut self, name: &str, asset: Box<Asset>) {
+        self.n_running.increment(1);
+        self.slots.insert(name.to_owned(), Slot::Running(asset));
+    }
+
+    /// Executes `command` for the asset `name`, or refuses it with the error.
+    fn apply(&mut self, name: &str, asset: LoadResult, command: AssetCommand) {
+        use AssetCommand as C;
+        match command {
+            C::Create { document, reply } => self.create(name, asset, document, reply),
+            C::Replace { rig, reply } => {
+                self.change(name, asset, reply, |a, turn| a.replace(*rig, turn));
+            }
+            C::Delete { reply } => self.change(name, asset, reply, |a, turn| a.delete(turn)),
+            C::Ingest { batch, importing, request, reply } => {
+                let _span = tracing::debug_span!(parent: &request, "judge").entered();
+                self.change(name, asset, reply, |a, turn| a.ingest(batch, importing, turn));
+            }
+            C::OpenSession { name: session, importing, reply } => {
+                let open =
+                    |a: &mut Asset, turn: &mut Turn<'_>| a.open_session(session, importing, turn);
+                self.change(name, asset, reply, open);
+            }
+            C::EndSession { session, reply } => {
+                self.change(name, asset, reply, |a, turn| a.end_session(&session, turn));
+            }
+            C::DiscardImport { session, reply } => {
+                self.change(name, asset, reply, |a, turn| a.discard_import(session, turn));
+            }
+            C::DeleteSession { session, reply } => {
+                self.change(name, asset, reply, |a, turn| a.delete_session(session, turn));
+            }
+            C::Clear { code, actor, reply } => {
+                self.change(name, asset, reply, |a, turn| a.clear(code, actor, turn));
+            }
+            C::Acknowledge { code, actor, reply } => {
+                self.change(name, asset, reply, |a, turn| a.acknowledge(code, actor, turn));
+            }
+            C::Activate { id, calibration, reply } => {
+                self.change(name, asset, reply, |a, turn| a.activate(*calibration, &id, turn));
+            }
+            C::FinishCalibration { row, reply } => {
+                self.change(name, asset, reply, |a, turn| a.finish_calibration(*row, turn));
+            }
+            C::OfferedCalibration { reply } => {
+                self.change(name, asset, reply, |a, _| Ok(a.offered_calibration()));
+            }
+            C::AcceptLearning { id, calibration, reply } => {
+                let accept =
+                    |a: &mut Asset, turn: &mut Turn<'_>| a.accept_learning(*calibration, &id, turn);
+                self.change(name, asset, reply, accept);
+            }
+            C::DiscardLearning { reply } => {
+                self.change(name, asset, reply, |a, turn| a.discard_learning(turn));
+            }
+            C::Load { reply } => self.query(name, asset, reply, |_| ()),
+            C::State { reply } => self.query(name, asset, reply, Asset::state),
+            C::Watch { session, seen, reply } => {
+                self.query(name, asset, reply, |a| a.watch(session, seen));
+            }
+            C::Monitors { reply } => self.query(name, asset, reply, Asset::monitors),
+            C::Learning { reply } => self.query(name, asset, reply, Asset::learning),
+        }
+    }
+
+    /// Executes a command that changes the asset `name`. The reply is sent once the changes
+    /// are durable. If the engine panics, or is ahead of the store when `change` fails, it
+    /// is dropped and rebuilt by the next command.
     fn change<T: Send + 'static>(
         &mut self,
         name: &str,
+        asset: LoadResult,
         reply: Reply<T>,
         change: impl FnOnce(&mut Asset, &mut Turn<'_>) -> Result<T, ServiceError>,
     ) {
-        let mut asset = match self.take(name) {
+        let mut asset = match asset {
             Ok(asset) => asset,
             Err(error) => return reply.send(Err(error)),
         };
@@ -202,12 +246,12 @@ impl Shard {
                 if asset.deleted {
                     self.env.presences.remove(name);
                 } else {
-                    self.running.insert(name.to_owned(), asset);
+                    self.keep(name, asset);
                 }
             }
             Ok(Err(error)) => {
                 if !turn.engine_changed && turn.writes.is_empty() {
-                    self.running.insert(name.to_owned(), asset);
+                    self.keep(name, asset);
                 } else {
                     generation.invalidate();
                 }
@@ -220,12 +264,18 @@ impl Shard {
         }
     }
 
-    /// Executes a query of the asset `name`, which is loaded if necessary. The reply may
-    /// show changes that are not durable yet.
-    fn query<T>(&mut self, name: &str, reply: Reply<T>, query: impl FnOnce(&Asset) -> T) {
-        let answer = self.take(name).map(|asset| {
+    /// Executes a query of the asset `name`. The reply may show changes that are not durable
+    /// yet.
+    fn query<T>(
+        &mut self,
+        name: &str,
+        asset: LoadResult,
+        reply: Reply<T>,
+        query: impl FnOnce(&Asset) -> T,
+    ) {
+        let answer = asset.map(|asset| {
             let answer = query(&asset);
-            self.running.insert(name.to_owned(), asset);
+            self.keep(name, asset);
             answer
         });
         reply.send(answer);
@@ -233,10 +283,10 @@ impl Shard {
 
     /// Registers the asset `name` unless it exists or one of this name is still being
     /// deleted.
-    fn create(&mut self, name: &str, document: String, reply: Reply<()>) {
-        let absent = match self.take(name) {
+    fn create(&mut self, name: &str, asset: LoadResult, document: String, reply: Reply<()>) {
+        let absent = match asset {
             Ok(asset) => {
-                self.running.insert(name.to_owned(), asset);
+                self.keep(name, asset);
                 Err(ServiceError::AssetExists { name: name.to_owned() })
             }
             Err(ServiceError::UnknownAsset { .. }) => self.check_not_being_deleted(name),
@@ -262,23 +312,6 @@ impl Shard {
             return Err(ServiceError::Busy { what: "an asset of this name is being deleted" });
         }
         Ok(())
-    }
-
-    /// Moves the asset out of the shard; loads it from the store if it is not running or
-    /// its engine is invalid.
-    fn take(&mut self, name: &str) -> Result<Box<Asset>, ServiceError> {
-        match self.running.remove(name) {
-            Some(asset) if !asset.generation.is_invalid() => Ok(asset),
-            _ => {
-                self.env.handles.fence()?;
-                let load = || load(&self.env, name).map(Box::new);
-                catch_unwind(AssertUnwindSafe(load)).unwrap_or_else(|_| {
-                    tracing::error!(asset = name, "rebuilding the engine panicked");
-                    let what = "the engine of the asset cannot be rebuilt";
-                    Err(ServiceError::Unavailable { what })
-                })
-            }
-        }
     }
 }
 
@@ -313,6 +346,7 @@ mod tests {
             learning: Default::default(),
             generation: EngineGeneration::default(),
             deleted: false,
+            snapshots: Vec::new(),
         })
     }
 
@@ -327,14 +361,16 @@ mod tests {
         let (_, outage) = watch::channel(None);
         let handles = Handles::new(store, writer, outage, CancellationToken::new());
         let env = Environment { handles, presences: Presences::default(), jobs };
-        let mut shard = Shard { env, running: BTreeMap::from([("a".to_owned(), asset())]) };
+        let (queue, _messages) = mpsc::channel(1);
+        let loader = Loader::new(env.handles.clone(), 1, &queue);
+        let mut shard = Shard::new(0, env, loader, 1);
         let (reply, answer) = Reply::new();
-        shard.change("a", reply, |asset, turn| {
+        shard.change("a", Ok(asset()), reply, |asset, turn| {
             change(asset, turn)?;
             Err::<(), _>(ServiceError::Unavailable { what: "a test" })
         });
         answer.wait().await.unwrap_err();
-        shard.running.contains_key("a")
+        shard.slots.contains_key("a")
     }
 
     #[tokio::test(flavor = "multi_thread")]

@@ -61,7 +61,7 @@ fn judge(context: &JobContext, row: &ReplayRow) -> Result<Option<ReplayResultVie
         n_played: 0,
         stopped: false,
     };
-    play(&context.handles, &session, |input| replay.take(context, &row.id, input))?;
+    play(&context.handles, &session, 0, |input| replay.take(context, &row.id, input))?;
     if replay.stopped {
         return Ok(None);
     }

@@ -158,7 +158,7 @@ fn evaluate(
     let mut builder = RecordingBuilder::new(from_s, to_s);
     let mut judging = Judging::new(setup, views::memory(&session.baseline)?);
     let (mut n_evaluated, mut has_failed, mut ended) = (0, false, true);
-    play(handles, session, |input| {
+    play(handles, session, 0, |input| {
         if let Input::NewSample(sample) = &input {
             n_evaluated += 1;
             builder.sample(sample);

@@ -42,7 +42,7 @@ pub(in crate::service) fn trace(
     let expected = expected_points(session, query, setup.settings.period_s);
     let mut judging = Judging::new(setup, views::memory(&session.baseline)?);
     let mut decimator = Decimator::new(query.points, expected);
-    play(handles, session, |input| {
+    play(handles, session, 0, |input| {
         let is_sample = matches!(input, Input::NewSample(_));
         judging.input(input);
         let point = is_sample.then(|| TracePoint::of(&judging.engine().state())).flatten();

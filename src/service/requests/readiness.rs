@@ -2,8 +2,6 @@
 
 use std::sync::atomic::Ordering;
 
-use tokio::sync::mpsc;
-
 use crate::service::start::Inner;
 use crate::service::upkeep::STALLED_AFTER;
 use crate::service::{Limits, Service, ServiceError};
@@ -18,10 +16,6 @@ pub struct QueueLoad {
     pub shards: Vec<usize>,
     /// Write sets in the queue of the writer.
     pub writer: usize,
-}
-
-fn waiting<T>(queue: &mpsc::Sender<T>) -> usize {
-    queue.max_capacity() - queue.capacity()
 }
 
 impl Service {
@@ -41,7 +35,7 @@ impl Service {
         if self.inner.handles.writer().is_closed() {
             return Err(ServiceError::Unavailable { what: "the writer has stopped" });
         }
-        if self.inner.shards.iter().any(mpsc::Sender::is_closed) {
+        if self.inner.shards.is_any_closed() {
             return Err(ServiceError::Unavailable { what: "a shard has stopped" });
         }
         if let Some(reason) = self.inner.outage.borrow().clone() {
@@ -59,8 +53,14 @@ impl Service {
     pub fn load(&self) -> QueueLoad {
         let Inner { shards, handles, in_flight, limits, .. } = &*self.inner;
         let samples = limits.in_flight_samples - in_flight.available_permits();
-        let shards = shards.iter().map(waiting).collect();
-        QueueLoad { samples, shards, writer: waiting(handles.writer()) }
+        let writer = handles.writer().max_capacity() - handles.writer().capacity();
+        QueueLoad { samples, shards: shards.n_queued(), writer }
+    }
+
+    /// Returns the number of assets whose engine is still to be rebuilt after the start.
+    #[must_use]
+    pub fn n_rebuilding(&self) -> usize {
+        self.inner.n_rebuilding.load(Ordering::Relaxed)
     }
 
     /// Returns the number of assets whose latest samples are not judged.

@@ -15,6 +15,10 @@ impl Write {
             Self::Append { session, samples, .. } => {
                 format!("{} samples of session {session}", samples.len())
             }
+            Self::PutSnapshot(row) => format!("a snapshot of session {}", row.session),
+            Self::RemoveSnapshots { session } => {
+                format!("the removal of the snapshots of session {session}")
+            }
             Self::EndSession { session, .. } => format!("the end of session {session}"),
             Self::DeleteSession { session }
             | Self::DiscardSession { session, .. }

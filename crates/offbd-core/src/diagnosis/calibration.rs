@@ -3,6 +3,7 @@
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use crate::vocabulary::{FaultCode, PerAxis};
+use serde::{Deserialize, Serialize};
 
 /// Acceleration that the twin does not explain on the best and on the worst simulated
 /// rigs, m/s².
@@ -10,7 +11,7 @@ const LEAST_MODEL_ERROR_M_S2: f64 = 0.015;
 pub(super) const MOST_MODEL_ERROR_M_S2: f64 = 0.04;
 
 /// The learnt parameters of one axis.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AxisCalibration {
     /// Measured over modelled acceleration, dimensionless.
     pub gain: f64,
@@ -67,7 +68,7 @@ impl AxisCalibration {
 }
 
 /// The estimates of one session for one axis.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SessionEstimate {
     /// Angle by which plate or servo horn is off level, rad.
     pub level_rad: f64,
@@ -77,7 +78,7 @@ pub struct SessionEstimate {
 }
 
 /// The learnt properties of the sensor, which reads both axes at once.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SensorCalibration {
     /// Time between two readings of a sensor that is slower than its log, s; zero for one
     /// that is not.
@@ -92,7 +93,7 @@ pub struct SensorCalibration {
 
 /// How soon a fault of one servo would be confirmed, and how small a fault is found;
 /// `None` if fewer than half of the trials found it within 10 s.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ServoProspects {
     /// Median delay for a servo that does not answer, s.
     pub dead_s: Option<f64>,
@@ -108,7 +109,7 @@ pub struct ServoProspects {
 
 /// How soon each fault would be confirmed on this rig if it occurred during the healthy
 /// recording; `None` as in [`ServoProspects`].
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Prospects {
     /// Number of times at which each fault was injected.
     pub n_trials: usize,
@@ -124,7 +125,7 @@ pub struct Prospects {
 
 /// Test result of one monitor on healthy recordings that were not used to learn, and the
 /// expected false alarms.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MonitorCertificate {
     /// Time for which the monitor could judge, s.
     pub judged_s: f64,
@@ -137,7 +138,7 @@ pub struct MonitorCertificate {
 
 /// What a calibration comes from, as its maker states it. Not interpreted here: it is
 /// carried along so that a verdict can name the calibration that it rests on.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CalibrationOrigin {
     /// SHA-256 of the data, lower-case hexadecimal; empty if not stated.
     pub data_sha256: String,
@@ -146,7 +147,7 @@ pub struct CalibrationOrigin {
 }
 
 /// A calibration: the parameters learnt per axis, and the data they come from.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
     /// Per axis; `None` if the rig has no such servo or no such readings.
     pub axes: PerAxis<Option<AxisCalibration>>,

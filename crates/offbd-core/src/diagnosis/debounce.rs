@@ -9,9 +9,10 @@
 
 use super::Settings;
 use crate::vocabulary::{FaultCode, FaultKind};
+use serde::{Deserialize, Serialize};
 
 /// The result of a monitor at one moment.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Test {
     /// The enable condition does not hold: neither passed nor failed.
     #[default]
@@ -21,7 +22,7 @@ pub enum Test {
 }
 
 /// The debounce times of one monitor, s.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DebounceTimes {
     /// Time of failure from zero to the upper end.
     pub fail_s: f64,
@@ -86,7 +87,7 @@ pub enum Qualified {
 }
 
 /// The debounce state of one monitor.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Debounce {
     /// In [−1, 1]; −1 is passed, 1 is failed.
     level: f64,

@@ -10,6 +10,7 @@ use super::{AxisEvidence, Candidate, Evidence, Limits, Profile, SensorLimits, Se
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use crate::vocabulary::{Axis, FaultCode, FaultKind, PerAxis};
+use serde::{Deserialize, Serialize};
 
 /// The chapter's enable condition (application 3): least command, rad.
 const TEXTBOOK_ENABLE_RAD: f64 = 0.08;
@@ -127,7 +128,7 @@ impl Finding {
 }
 
 /// The monitors of one rig.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Evaluator {
     profile: Profile,
     limits: PerAxis<Limits>,

@@ -5,10 +5,11 @@ use super::{PositionJump, ServoAnswer};
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use crate::vocabulary::{Axis, FaultCode, FaultKind, PerAxis, SimTime};
+use serde::{Deserialize, Serialize};
 
 /// The quantities of one axis at one moment. Accelerations are over the estimation
 /// window.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct AxisEvidence {
     /// Command in force, rad.
     pub command_rad: Option<f64>,
@@ -66,7 +67,7 @@ impl AxisEvidence {
 }
 
 /// The quantities at one moment; kept with a fault, they are its freeze frame.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Evidence {
     /// Time of the judged sample.
     pub at: Option<SimTime>,
@@ -93,7 +94,7 @@ pub struct Evidence {
 }
 
 /// A possible cause and its weight.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Candidate {
     pub code: FaultCode,
     pub kind: Option<FaultKind>,
@@ -102,7 +103,7 @@ pub struct Candidate {
 }
 
 /// A suspected fault: its onset, its kind and the causes that may explain it.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Suspicion {
     /// Estimated time at which the deviation began.
     pub onset: Option<SimTime>,

@@ -1,6 +1,7 @@
 //! The limits of the residual, the path and the readings.
 
 use crate::maths::window_for;
+use serde::{Deserialize, Serialize};
 
 use super::{AxisCalibration, Profile, SensorCalibration};
 
@@ -36,7 +37,7 @@ const UNKNOWN_SCATTER_M: f64 = 1e-3;
 const LEAST_SCATTER_M: f64 = 1e-4;
 
 /// The limits of the readings themselves.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SensorLimits {
     /// Recent outliers.
     pub outliers: f64,
@@ -60,7 +61,7 @@ impl SensorLimits {
 }
 
 /// The limits of one axis. That of the residual adapts: J0 + J1·|predicted| + J3·σ_a.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Limits {
     /// J0, m/s².
     floor_m_s2: f64,

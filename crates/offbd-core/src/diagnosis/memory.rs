@@ -9,11 +9,12 @@ use super::{Evidence, Suspicion};
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use crate::vocabulary::{FaultCode, FaultKind, FaultStatus, SimTime};
+use serde::{Deserialize, Serialize};
 
 use super::StatusByte;
 
 /// When a fault counts as confirmed, healed and aged.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MemoryRules {
     /// Operation cycles with a trip before bit 3 (confirmedDTC) is set; ≥ 1.
     pub confirmation_threshold: u8,
@@ -35,7 +36,7 @@ impl Default for MemoryRules {
 
 /// How often a monitor could have found its fault: the in-use performance ratio of SAE
 /// J1979. Neither clearing nor aging erases it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct InUse {
     /// Operation cycles that have ended.
     pub cycles: u32,
@@ -77,7 +78,7 @@ impl InUse {
 }
 
 /// The record of one code.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FaultRecord {
     pub status: StatusByte,
     /// Cycles in which the failure lasted for long enough to count as a trip.
@@ -148,7 +149,7 @@ impl FaultRecord {
 }
 
 /// The fault memory of one rig: a record per code.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FaultMemory {
     records: [FaultRecord; FaultCode::COUNT],
 }

@@ -7,6 +7,7 @@
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use nalgebra::Vector2;
+use serde::{Deserialize, Serialize};
 
 use crate::vocabulary::PerAxis;
 
@@ -38,7 +39,7 @@ const BELIEVED_AFTER: u32 = 4;
 const BELIEVED_AFTER_S: f64 = 0.12;
 
 /// A jump of the readings, farther than a ball can move.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PositionJump {
     /// Time of the first reading after the jump, s on the device's clock.
     pub at_s: f64,
@@ -68,7 +69,7 @@ impl GateOutcome {
 }
 
 /// A path off the track, on which readings persist.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct NewPath {
     since_s: f64,
     first_m: Vector2<f64>,
@@ -99,7 +100,7 @@ impl NewPath {
 }
 
 /// The last position and the velocity of the ball.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Track {
     at_s: f64,
     position_m: Vector2<f64>,
@@ -144,7 +145,7 @@ impl Track {
 
 /// An accepted reading far off the track: after a push the ball moves away from the
 /// track, after a jump the readings stay beside it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct SuspectedJump {
     before: Track,
     at_s: f64,
@@ -183,7 +184,7 @@ const BEND_S: f64 = 0.2;
 const JUMP_SHARE: f64 = 0.4;
 
 /// The gate. Both axes are read together and judged together.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct OutlierGate {
     track: Option<Track>,
     /// The track before its last reading if that reading was far off: if the next one

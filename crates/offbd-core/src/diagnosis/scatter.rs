@@ -7,6 +7,7 @@
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
+use serde::{Deserialize, Serialize};
 
 /// Time constant, s: several readings of a slow camera. Chosen.
 const SCATTER_MEMORY_S: f64 = 0.4;
@@ -47,7 +48,7 @@ pub fn bend_m(off_m_s2: f64, period_s: f64) -> f64 {
 }
 
 /// The scatter of the readings of one axis.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Scatter {
     before: Option<(f64, f64)>,
     last: Option<(f64, f64)>,

@@ -4,6 +4,7 @@
 use crate::no_std::*;
 use core::fmt;
 use core::str::FromStr;
+use serde::{Deserialize, Serialize};
 
 use super::limits::LEAST_FLOOR_M_S2;
 use super::servo::{BLOCK_S, MAX_NATS};
@@ -11,7 +12,7 @@ use super::{AxisCalibration, MemoryRules};
 use crate::vocabulary::{FaultCode, FaultKind, Invalid, UnknownWord, in_range, positive};
 
 /// A named set of [`Settings`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Profile {
     /// Debounced, with enable conditions and noise-dependent limits: for real rigs.
     #[default]
@@ -91,7 +92,7 @@ const EVIDENCE_FACTOR: f64 = 2.0;
 const EVIDENCE_MARGIN_NATS: f64 = 4.0;
 
 /// How a rig is judged; constant during a session.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     pub profile: Profile,
     /// Acceleration that the twin's model may neglect, m/s².

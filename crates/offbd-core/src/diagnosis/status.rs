@@ -12,9 +12,10 @@
 //! | 7 | warningIndicatorRequested |
 
 use core::fmt;
+use serde::{Deserialize, Serialize};
 
 /// The status byte. The initial value 0x50 means: nothing completed, nothing failed.
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StatusByte(u8);
 
 const TEST_FAILED: u8 = 0x01;

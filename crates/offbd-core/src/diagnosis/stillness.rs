@@ -6,6 +6,7 @@
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use crate::vocabulary::{Axis, PerAxis};
+use serde::{Deserialize, Serialize};
 
 /// Time constant of the fraction of missing readings, s. Chosen.
 const MISSING_MEMORY_S: f64 = 2.0;
@@ -37,7 +38,7 @@ pub struct Reading {
 }
 
 /// Stillness of the readings along one axis.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct AxisStillness {
     anchor_m: Option<f64>,
     /// Whether the previous reading had left the still range: two are needed, since among
@@ -128,7 +129,7 @@ impl AxisStillness {
 }
 
 /// The properties of the readings of one rig.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Stillness {
     pub axes: PerAxis<AxisStillness>,
     /// Time since a ball was last seen, s.

@@ -2,9 +2,10 @@
 
 use crate::maths::{Fit, SlidingQuadratic};
 use crate::vocabulary::{Axis, PerAxis};
+use serde::{Deserialize, Serialize};
 
 /// Measured and predicted paths of both axes over sliding windows.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct AccelerationFilter {
     /// Length of the windows, s.
     window_s: f64,

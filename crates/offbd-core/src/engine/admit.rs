@@ -6,6 +6,7 @@
 use super::ledger::{Ledger, Recognition};
 use super::{Admission, AxisMapping, Rejection, Rig};
 use crate::vocabulary::Sample;
+use serde::{Deserialize, Serialize};
 
 /// Largest plausible time, s. Chosen: over 30 000 years.
 const MAX_TIME_S: f64 = 1e12;
@@ -15,7 +16,7 @@ const MAX_POSITION_M: f64 = 50.0;
 const MAX_COMMAND_RAD: f64 = core::f64::consts::TAU;
 
 /// The stage: validation and retransmissions.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Admit {
     max_command: f64,
     max_position: f64,

@@ -5,6 +5,7 @@
 //! soon after it, does not wait. The order depends on the samples alone.
 
 use alloc::collections::VecDeque;
+use serde::{Deserialize, Serialize};
 
 use crate::vocabulary::Sample;
 
@@ -13,7 +14,7 @@ use crate::vocabulary::Sample;
 const MAX_WAITING: usize = 4096;
 
 /// The waiting samples.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Align {
     /// Ascending in time.
     waiting: VecDeque<Sample>,

@@ -5,6 +5,7 @@
 //! rate and for any size of the step. A clock that was set forward or back is followed.
 
 use core::mem;
+use serde::{Deserialize, Serialize};
 
 use crate::vocabulary::Sample;
 
@@ -54,7 +55,7 @@ pub(super) enum ClockDecision {
 }
 
 /// The clock of the device.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct DeviceClock {
     newest_s: Option<f64>,
     newest_seq: Option<u64>,

@@ -2,9 +2,10 @@
 
 use super::span::Span;
 use crate::vocabulary::{Axis, FaultCode, Sample};
+use serde::{Deserialize, Serialize};
 
 /// Time covered by data so far, s. Gaps between samples do not count.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Coverage {
     span: Span,
     last_s: Option<f64>,

@@ -4,9 +4,10 @@ use super::Rig;
 use super::frame::Moment;
 use crate::plant::Plate;
 use crate::vocabulary::{Axis, PerAxis, SimTime};
+use serde::{Deserialize, Serialize};
 
 /// The state of the ball relative to the edge.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Edge {
     plate: Plate,
     /// Distance from the edge within which the edge may act on the ball, m.

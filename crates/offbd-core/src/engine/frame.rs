@@ -2,6 +2,7 @@
 
 use super::AxisMapping;
 use crate::vocabulary::{Axis, PerAxis, Sample, SimTime};
+use serde::{Deserialize, Serialize};
 
 /// A sample in the plate frame: commands in rad, positions in m, per ball axis.
 #[derive(Clone, Copy, Debug)]
@@ -13,7 +14,7 @@ pub(super) struct Moment {
 
 /// Detects readings that only repeat the previous one, of a sensor that is slower than
 /// its log: they tell where the ball was, not where it is.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Repeats {
     /// Time between two readings of the sensor, s; zero if it keeps up with the log.
     refresh_s: f64,

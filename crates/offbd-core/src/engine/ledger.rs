@@ -6,6 +6,7 @@
 //! the caller can look them up in the recording.
 
 use alloc::collections::VecDeque;
+use serde::{Deserialize, Serialize};
 
 use crate::vocabulary::Sample;
 
@@ -59,7 +60,7 @@ impl Key for f64 {
 }
 
 /// The keys of one kind.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 struct Keys<K> {
     /// The latest keys, ascending, each with the fingerprint of its sample.
     recent: VecDeque<(K, u64)>,
@@ -159,7 +160,7 @@ fn later<K: Key>(a: Option<K>, b: Option<K>) -> Option<K> {
 }
 
 /// The samples taken so far.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Ledger {
     by_seq: Keys<u64>,
     by_time: Keys<f64>,

@@ -36,6 +36,7 @@ pub use ledger::Recognition;
 pub use motion::{UsableMotion, WANTED_MOTION_S};
 pub use plausibility::{Misfit, Plausibility};
 pub use rig::{AxisMapping, DiagnosticsSpec, MAX_NAME, Rig, ServoSpec, Setup};
+use serde::{Deserialize, Serialize};
 pub use types::{Admission, Input, MonitorState, Reach, Readiness, Rejection, State, Unjudged};
 
 use admit::Admit;
@@ -53,12 +54,21 @@ use crate::vocabulary::{FaultCode, PerAxis, Sample};
 /// apart.
 pub const JUDGEMENT: u32 = 2;
 
+/// Version of the serialised form of an [`Engine`], a [`Plausibility`] and a
+/// [`UsableMotion`]: raised with every change of their fields or of what these mean.
+pub const SNAPSHOT_FORMAT: u32 = 1;
+
 /// Consecutive unjudged samples after which a rig counts as not tested. Chosen: a few late
 /// samples are common.
 const UNTESTED_AFTER: u64 = 10;
 
 /// The pipeline of one rig for one session (one operation cycle).
-#[derive(Clone, Debug)]
+///
+/// Its serialised form holds the whole state to the bit, except [`Engine::unjudged`]: what
+/// was serialised goes on as the original does. It is valid for one [`JUDGEMENT`] and one
+/// [`SNAPSHOT_FORMAT`]. Data from elsewhere must not be deserialised, since only their types
+/// are checked.
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Engine {
     setup: Setup,
     memory: FaultMemory,
@@ -71,6 +81,8 @@ pub struct Engine {
     n_accepted: u64,
     /// Samples that were too late to be judged.
     n_late: u64,
+    /// Counted anew after a restart.
+    #[serde(skip)]
     unjudged: Option<Unjudged>,
 }
 

@@ -7,13 +7,14 @@ use crate::diagnosis::{
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use crate::vocabulary::{FaultCode, FaultKind, SimTime};
+use serde::{Deserialize, Serialize};
 
 /// Evidence from which on the monitor is suspicious, as a fraction of what makes the test
 /// fail. Chosen.
 const SUSPICIOUS_WEIGHT: f64 = 0.5;
 
 /// The state of the monitor of one code.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Monitor {
     debounce: Debounce,
     /// Evidence as a fraction of what makes the test fail.

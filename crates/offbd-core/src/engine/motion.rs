@@ -12,6 +12,7 @@ use super::{AxisMapping, Rig};
 use crate::diagnosis::Settings;
 use crate::plant::Plate;
 use crate::vocabulary::{Axis, PerAxis, Sample};
+use serde::{Deserialize, Serialize};
 
 /// Usable motion along an axis that suffices for learning, s. Calibration judges each
 /// half by what was learnt from the other: half of this is 25 of its windows of 1.2 s; it
@@ -30,7 +31,7 @@ const PIECE_READINGS: u32 = 4;
 const ANSWER_S: f64 = 2.0;
 
 /// Counts the seconds of usable motion along each axis of one session.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct UsableMotion {
     mapping: AxisMapping,
     plate: Plate,
@@ -91,7 +92,7 @@ impl UsableMotion {
 }
 
 /// The state of one axis.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 struct AxisMotion {
     /// Whether a position has been read.
     read: bool,
@@ -149,7 +150,7 @@ impl AxisMotion {
 }
 
 /// Consecutive readings.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Piece {
     first_s: f64,
     last_s: f64,

@@ -6,6 +6,7 @@
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use core::mem;
+use serde::{Deserialize, Serialize};
 
 use nalgebra::Vector2;
 
@@ -43,7 +44,7 @@ const REBASE_M: f64 = 1.0;
 const _: () = assert!(LONGEST_GAP_S <= LONGEST_SPAN_S, "the twin computes whatever is no gap");
 
 /// The state of the stages.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Pipeline {
     settings: Settings,
     twin: Twin,

@@ -7,10 +7,11 @@ use crate::plant::{
     Ball, Contact, LONGEST_DEAD_TIME_S, Ladder, Plate, ServoModel, TwinAxis, TwinModel,
 };
 use crate::vocabulary::{Axis, Invalid, PerAxis, in_range, positive};
+use serde::{Deserialize, Serialize};
 
 /// How a device's numbers relate to the plate frame. Applied when a sample is judged; the
 /// recording keeps the numbers as sent.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AxisMapping {
     /// Whether the device's x is the plate's y and vice versa.
     pub swap: bool,
@@ -34,7 +35,7 @@ impl Default for AxisMapping {
 }
 
 /// The parameters of the servos as known to the owner; the same for both.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ServoSpec {
     pub angle_limit_rad: f64,
     pub dead_time_s: f64,
@@ -52,7 +53,7 @@ impl Default for ServoSpec {
 }
 
 /// The owner's requirements on the diagnosis.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DiagnosticsSpec {
     pub profile: Profile,
     /// Wanted false alarms per rig and year, above zero.
@@ -62,7 +63,7 @@ pub struct DiagnosticsSpec {
 }
 
 /// A rig as described by its asset file.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Rig {
     pub name: String,
     pub sample_rate_hz: f64,
@@ -164,7 +165,7 @@ impl Rig {
 }
 
 /// Everything that an engine needs to judge one rig; immutable.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Setup {
     pub rig: Rig,
     pub settings: Settings,

@@ -1,8 +1,9 @@
 //! The time from the first sample of a session to its last, on a clock that may be set
 //! back.
 
+use serde::{Deserialize, Serialize};
 /// The times of samples so far.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Span {
     /// Time before the clock was last set back, s.
     finished_s: f64,

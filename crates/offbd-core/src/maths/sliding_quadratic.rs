@@ -11,6 +11,7 @@
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use alloc::collections::VecDeque;
+use serde::{Deserialize, Serialize};
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -18,7 +19,7 @@ use nalgebra::{Matrix3, Vector3};
 /// window. 4096 is 0.5 s at 8 kHz.
 const MAX_POINTS: usize = 4096;
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Point {
     t: f64,
     measured: f64,
@@ -34,7 +35,7 @@ pub fn window_for(noise: f64, period_s: f64, error: f64) -> f64 {
 }
 
 /// Sums over the window, weighted with powers of u = t − origin.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct PowerSums {
     u: [f64; 5],
     measured: [f64; 3],
@@ -59,7 +60,7 @@ impl PowerSums {
 }
 
 /// Position, velocity and acceleration of a fitted path at its newest reading.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FittedPath {
     pub position: f64,
     pub velocity: f64,
@@ -78,7 +79,7 @@ impl FittedPath {
 }
 
 /// The fits of a window.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Fit {
     /// The measured path.
     pub measured: FittedPath,
@@ -95,7 +96,7 @@ pub struct Fit {
 }
 
 /// The filter; see the module documentation.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct SlidingQuadratic {
     points: VecDeque<Point>,
     origin: f64,

@@ -3,12 +3,13 @@
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use crate::vocabulary::{Axis, Invalid, in_range, positive};
+use serde::{Deserialize, Serialize};
 
 /// Standard gravity as the chapter rounds it, m/s².
 pub const GRAVITY_M_S2: f64 = 9.81;
 
 /// A homogeneous or hollow ball.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ball {
     radius_m: f64,
     mass_kg: f64,
@@ -69,7 +70,7 @@ impl Default for Ball {
 }
 
 /// The outline of the plate.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum PlateShape {
     /// `length_m` along x, `width_m` along y.
     Rectangle { length_m: f64, width_m: f64 },
@@ -78,7 +79,7 @@ pub enum PlateShape {
 }
 
 /// The plate: outline, thickness, and whether a rim keeps the ball on it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plate {
     shape: PlateShape,
     thickness_m: f64,

@@ -1,12 +1,13 @@
 //! The body on the plate and its contact: spring, damper, friction.
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 use super::{Ball, Plate};
 use crate::vocabulary::{Axis, Invalid, in_range, positive};
 
 /// The parameters of the contact; immutable.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Contact {
     stiffness_n_per_m: f64,
     damping_n_s_per_m: f64,
@@ -80,7 +81,7 @@ impl Default for Contact {
 }
 
 /// The body on the plate: a ball, or a block that slides without turning.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Body {
     mass: f64,
     /// Lever arm of friction about the centre, m: the radius of a ball; 0 for a block,
@@ -163,7 +164,7 @@ impl Body {
 
 /// Position (m), velocity (m/s) and spin (rad/s) of a body relative to the plate, in the
 /// plate frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Motion {
     pub position: Vector3<f64>,
     pub velocity: Vector3<f64>,
@@ -197,7 +198,7 @@ impl Motion {
 }
 
 /// Where the plate supports a body.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Ground {
     /// A plate of infinite extent.
     Endless,

@@ -18,6 +18,7 @@
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use core::fmt;
+use serde::{Deserialize, Serialize};
 
 use nalgebra::{Vector2, Vector3};
 
@@ -40,7 +41,7 @@ const CALM_SHARE: f64 = 0.5;
 const MAX_ROLLING_DEMAND: f64 = 0.9;
 
 /// The models of one ball on one plate, and the wanted accuracy; immutable.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ladder {
     planar: Planar,
     rolling: Rolling,
@@ -52,7 +53,7 @@ pub struct Ladder {
 }
 
 /// A model of the lockstep twin, the cheapest first.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Rung {
     Planar,
     #[default]
@@ -72,7 +73,7 @@ impl Rung {
 }
 
 /// The model in use and the quantities that selected it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Fidelity {
     pub rung: Rung,
     /// Bound of the acceleration that the planar model neglects, m/s².

@@ -16,13 +16,14 @@
 //! and Euler terms, all of second order. [`Planar::left_out`] bounds them.
 
 use nalgebra::Vector2;
+use serde::{Deserialize, Serialize};
 
 use super::servo::{ServoState, Sweep};
 use super::tilt::Tilt;
 use super::{Ball, GRAVITY_M_S2, Plate, RollingState};
 
 /// The planar model of one ball on one plate.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Planar {
     gain: f64,
     offset: f64,
@@ -121,7 +122,7 @@ impl Planar {
 }
 
 /// What one servo adds to the ball's path over a step.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PathIncrement {
     pub position_m: f64,
     pub velocity_m_s: f64,

@@ -14,6 +14,7 @@
 //! tilt about one axis, up to tan(angle) = (1 + 1/κ)·μ.
 
 use nalgebra::{Vector2, Vector3};
+use serde::{Deserialize, Serialize};
 
 use super::contact::Motion;
 use super::tilt::PlateMotion;
@@ -21,7 +22,7 @@ use super::{Ball, Plate};
 use crate::maths::{MIDPOINT, RK4, System};
 
 /// The state of a rolling ball relative to the plate.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RollingState {
     /// (x, y) in the plate frame, m.
     pub position: Vector2<f64>,
@@ -45,7 +46,7 @@ impl RollingState {
 }
 
 /// The contact forces that rolling requires, per kilogram of ball.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Grip {
     /// Friction force along x and y per mass, m/s².
     pub friction: [f64; 2],
@@ -64,7 +65,7 @@ impl Grip {
 }
 
 /// The rolling model of one ball on one plate.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Rolling {
     radius: f64,
     kappa: f64,

@@ -6,9 +6,10 @@
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use crate::vocabulary::{Invalid, in_range, positive};
+use serde::{Deserialize, Serialize};
 
 /// The parameters of a servo; immutable.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ServoModel {
     angle_limit_rad: f64,
     lag_s: f64,
@@ -107,7 +108,7 @@ impl ServoModel {
 }
 
 /// A servo's motion over a step.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Sweep {
     /// The state at the end.
     pub servo: ServoState,
@@ -136,7 +137,7 @@ impl Sweep {
 }
 
 /// The state of a servo: angle (rad), rate (rad/s), acceleration (rad/s²).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ServoState {
     pub angle: f64,
     pub rate: f64,

@@ -20,12 +20,13 @@
 //! instantaneous landing.
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 use super::contact::{Body, Ground, Motion};
 use super::tilt::PlateMotion;
 
 /// How the contact holds along one axis.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Hold {
     /// No slip along this axis.
     Stick,
@@ -58,7 +59,7 @@ impl Phase {
 }
 
 /// The sliding model of one body on one rigid plate.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sliding {
     pub body: Body,
     friction: f64,

@@ -10,6 +10,7 @@
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use alloc::collections::VecDeque;
+use serde::{Deserialize, Serialize};
 
 use nalgebra::Vector2;
 
@@ -37,7 +38,7 @@ pub const LONGEST_DEAD_TIME_S: f64 = 5.0;
 const LEAST_TURN_S: f64 = 1e-3;
 
 /// One axis of the twin: how the ball responds to the servo that drives it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TwinAxis {
     pub servo: ServoModel,
     /// Time from a command to the servo's first movement, s.
@@ -63,7 +64,7 @@ pub fn resistance_share(velocity_m_s: f64) -> f64 {
 }
 
 /// The parameters of the twin; immutable.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TwinModel {
     pub ladder: Ladder,
     pub axes: PerAxis<TwinAxis>,
@@ -78,7 +79,7 @@ impl TwinModel {
 }
 
 /// Motion per axis: position (m), velocity (m/s), acceleration (m/s²).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TwinMotion {
     pub position: Vector2<f64>,
     pub velocity: Vector2<f64>,
@@ -86,7 +87,7 @@ pub struct TwinMotion {
 }
 
 /// Commands, rad, with the time from which each holds, s.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 struct CommandHistory {
     entries: VecDeque<(f64, f64)>,
 }
@@ -116,7 +117,7 @@ impl CommandHistory {
 }
 
 /// The twin's state.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Twin {
     model: TwinModel,
     now: Option<SimTime>,

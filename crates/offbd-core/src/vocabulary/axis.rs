@@ -1,13 +1,14 @@
 //! The two directions in which the ball moves on the plate.
 
 use core::ops::{Index, IndexMut};
+use serde::{Deserialize, Serialize};
 
 /// A direction of ball motion in the plate frame.
 ///
 /// The *x servo* is the one that moves the ball along x; it turns the plate
 /// about y by `qy`. The *y servo* turns it about x by `qx`, and +qx moves the
 /// ball toward −y.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Axis {
     X,
     Y,
@@ -56,7 +57,7 @@ impl Axis {
 }
 
 /// One value for each axis.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PerAxis<T> {
     pub x: T,
     pub y: T,

@@ -1,10 +1,11 @@
 //! One row of telemetry.
 
 use super::Axis;
+use serde::{Deserialize, Serialize};
 
 /// What a device reports at one moment: the commanded plate angles in force and the
 /// measured position of the ball.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Default, Serialize, Deserialize)]
 pub struct Sample {
     /// Sequence number within the session, if the device counts.
     pub seq: Option<u64>,

@@ -2,6 +2,7 @@
 
 use core::cmp::Ordering;
 use core::ops::{Add, Sub};
+use serde::{Deserialize, Serialize};
 
 /// Resolution of a clock in milliseconds, s.
 pub(crate) const CLOCK_RESOLUTION_S: f64 = 1e-3;
@@ -9,7 +10,7 @@ pub(crate) const CLOCK_RESOLUTION_S: f64 = 1e-3;
 /// A time on a session's clock, in seconds: always finite and totally ordered.
 ///
 /// It comes from the samples (`t_s`); the core never reads a clock.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SimTime(f64);
 
 impl SimTime {

@@ -9,6 +9,7 @@
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
 
 use super::filter::{PARAMETERS, ServoFilter};
 use crate::vocabulary::FaultKind;
@@ -42,7 +43,7 @@ const NAMED_LIKELIHOOD: f64 = 0.5;
 
 /// The recent effective parameters of a servo relative to the twin's, with their standard
 /// errors.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ServoAnswer {
     /// Acceleration that no command explains, m/s².
     pub offset_m_s2: f64,

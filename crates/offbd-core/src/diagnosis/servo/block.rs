@@ -2,6 +2,7 @@
 //! as single readings do, at a fraction of the cost.
 
 use crate::vocabulary::CLOCK_RESOLUTION_S;
+use serde::{Deserialize, Serialize};
 
 /// Length of a block, s: a tenth of the time in which the plainest fault shows. Slower
 /// readings make one block each.
@@ -9,7 +10,7 @@ pub(in crate::diagnosis) const BLOCK_S: f64 = 0.05;
 
 /// The twin's free path along one axis: position (m), velocity (m/s), acceleration
 /// (m/s²).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TwinPath {
     pub position_m: f64,
     pub velocity_m_s: f64,
@@ -17,7 +18,7 @@ pub struct TwinPath {
 }
 
 /// Means over a block of readings of one axis.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct ReadingBlock {
     pub(super) t: f64,
     pub(super) measured_m: f64,
@@ -33,7 +34,7 @@ impl ReadingBlock {
 }
 
 /// Averages readings into blocks.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(super) struct BlockBuilder {
     since: f64,
     last: Option<f64>,

@@ -3,6 +3,7 @@
 use super::filter::{PARAMETERS, ParameterPrior, ServoFilter};
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
+use serde::{Deserialize, Serialize};
 
 /// Least time of motion for an estimate, s. Chosen.
 const LEAST_MOTION_S: f64 = 20.0;
@@ -25,7 +26,7 @@ pub struct ServoEstimate {
 
 /// Sums over a session. The filter of the broken servo is read once per its memory, when
 /// its information is new, and weighted by its information beyond the prior.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(super) struct SessionEstimator {
     seconds: f64,
     since_s: f64,

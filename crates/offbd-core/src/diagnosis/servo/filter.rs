@@ -19,13 +19,14 @@
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
+use serde::{Deserialize, Serialize};
 
 /// Number of parameters of a servo, in the order offset, gain, delay.
 pub(super) const PARAMETERS: usize = 3;
 const STATES: usize = 2 + PARAMETERS;
 
 /// The prior distribution of the parameters under a hypothesis.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct ParameterPrior {
     /// Standard deviation of each parameter: m/s², 1, s.
     pub(super) deviation: [f64; PARAMETERS],
@@ -55,7 +56,7 @@ const PUSH_NATS: f64 = 1.0;
 const START_DEVIATION_M_S: f64 = 0.5;
 
 /// The filter. The covariance is in m, m/s and the units of the parameters.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) struct ServoFilter {
     prior: ParameterPrior,
     state: [f64; STATES],

@@ -26,6 +26,7 @@ pub use answer::ServoAnswer;
 pub(super) use block::BLOCK_S;
 pub use block::TwinPath;
 pub use estimate::ServoEstimate;
+use serde::{Deserialize, Serialize};
 
 use block::{BlockBuilder, ReadingBlock};
 use estimate::SessionEstimator;
@@ -100,7 +101,7 @@ const GUST_S: f64 = 2.0;
 pub(super) const MAX_NATS: f64 = 40.0;
 
 /// What is known of an axis before a session; immutable.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AxisPrior {
     /// Standard deviation of a reading, m.
     pub noise_m: f64,
@@ -115,7 +116,7 @@ pub struct AxisPrior {
 }
 
 /// What was learnt of an axis from healthy sessions.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LearntPrior {
     /// Acceleration that the twin does not explain, over half a second, m/s².
     pub model_error_m_s2: f64,
@@ -163,7 +164,7 @@ impl AxisPrior {
 }
 
 /// The two hypotheses about one axis, each a Kalman filter.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ServoFilterBank {
     prior: AxisPrior,
     builder: BlockBuilder,

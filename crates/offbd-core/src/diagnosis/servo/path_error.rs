@@ -7,6 +7,7 @@
 //! cannot be seen.
 
 use alloc::collections::VecDeque;
+use serde::{Deserialize, Serialize};
 
 use crate::maths::kinked_parabola_rms;
 
@@ -24,7 +25,7 @@ const POINT_S: f64 = 0.15;
 const BREAK_S: f64 = 0.6;
 
 /// The recent path along one axis relative to the twin's.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct PathError {
     points: VecDeque<(f64, f64)>,
     /// Number and sums of time and deviation of the blocks since the last point, and the

@@ -14,6 +14,7 @@ mod tests;
 use crate::no_std::*;
 use period::Periods;
 use response::{AxisResponse, ResponseCorrelator};
+use serde::{Deserialize, Serialize};
 
 use super::Rig;
 use super::frame::{Moment, moment};
@@ -184,7 +185,7 @@ fn unit_hint(element: &str, units: &[Option<f64>]) -> String {
 }
 
 /// A count out of a total.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct Count {
     n: u32,
     of: u32,
@@ -207,7 +208,7 @@ impl Count {
 }
 
 /// Counts of where the positions lie.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct PositionCounts {
     outside: Count,
     far: Count,
@@ -216,7 +217,7 @@ struct PositionCounts {
 }
 
 /// Counts of the commands' sizes.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct CommandCounts {
     beyond: Count,
     steep: Count,
@@ -225,7 +226,7 @@ struct CommandCounts {
 }
 
 /// What has been seen of one axis.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct SeenAxis {
     read: bool,
     command: Option<f64>,
@@ -234,7 +235,7 @@ struct SeenAxis {
 }
 
 /// The comparison of one session's samples with the description of its rig.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Plausibility {
     rig: Rig,
     /// The axes in the rig's calibration, if there is one.

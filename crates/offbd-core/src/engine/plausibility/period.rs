@@ -3,6 +3,9 @@
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
+use alloc::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
 
 /// Shortest and longest time that are distinguished, as powers of ten of a second: faster
 /// than any sensor, and a clock in microseconds with a sample per second.
@@ -10,26 +13,21 @@ const FROM_DECADE: i32 = -6;
 const TO_DECADE: i32 = 7;
 /// Classes per decade.
 const PER_DECADE: i32 = 10;
-const CLASSES: usize = ((TO_DECADE - FROM_DECADE) * PER_DECADE) as usize;
+const LAST_CLASS: u8 = ((TO_DECADE - FROM_DECADE) * PER_DECADE - 1) as u8;
 
 /// The times in one class.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct Class {
     n: u32,
     sum_s: f64,
 }
 
 /// Histogram of the times between samples.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Periods {
-    classes: [Class; CLASSES],
+    /// The classes that are not empty.
+    classes: BTreeMap<u8, Class>,
     n: u32,
-}
-
-impl Default for Periods {
-    fn default() -> Self {
-        Self { classes: [Class::default(); CLASSES], n: 0 }
-    }
 }
 
 impl Periods {
@@ -37,7 +35,7 @@ impl Periods {
     pub(super) fn take(&mut self, dt_s: f64) {
         if dt_s > 0.0 && dt_s.is_finite() {
             let place = (dt_s.log10() - f64::from(FROM_DECADE)) * f64::from(PER_DECADE);
-            let class = &mut self.classes[(place.max(0.0) as usize).min(CLASSES - 1)];
+            let class = self.classes.entry((place as u8).min(LAST_CLASS)).or_default();
             class.n = class.n.saturating_add(1);
             class.sum_s += dt_s;
             self.n = self.n.saturating_add(1);
@@ -51,7 +49,7 @@ impl Periods {
             return None;
         }
         let mut below = 0_u32;
-        let class = self.classes.iter().find(|class| {
+        let class = self.classes.values().find(|class| {
             below = below.saturating_add(class.n);
             below > self.n / 2
         })?;

@@ -8,6 +8,7 @@
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use alloc::collections::VecDeque;
+use serde::{Deserialize, Serialize};
 
 use crate::engine::frame::Moment;
 use crate::vocabulary::{Axis, PerAxis};
@@ -46,7 +47,7 @@ pub(super) enum AxisResponse {
 }
 
 /// A running mean.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct RunningMean {
     n: u32,
     sum: f64,
@@ -66,14 +67,14 @@ impl RunningMean {
 }
 
 /// One block: mean positions and commands.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct ResponseBlock {
     position: PerAxis<RunningMean>,
     command: PerAxis<RunningMean>,
 }
 
 /// A running correlation.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct Correlation {
     n: f64,
     sums: [f64; 2],
@@ -102,7 +103,7 @@ impl Correlation {
 type AxisCorrelations = PerAxis<[Correlation; DELAYS]>;
 
 /// Correlates the motion along both axes with both commands.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct ResponseCorrelator {
     block_s: f64,
     /// Number of the current block.

@@ -1,0 +1,105 @@
+//! The queues of all shards.
+
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::sync::Arc;
+use std::thread::JoinHandle;
+
+use tokio::sync::mpsc;
+
+use super::command::{AssetCommand, Reply};
+use super::loader::{LoadResult, Loader};
+use super::shard::Shard;
+use super::turn::Environment;
+use crate::service::{Limits, ServiceError};
+
+/// A message to a shard.
+pub(super) enum ShardMessage {
+    /// A command for an asset.
+    Command { asset: String, command: AssetCommand },
+    /// Loading an asset takes long, because its engine must evaluate a long recording.
+    Rebuilding { asset: String, retry_after_s: u64 },
+    /// An asset is loaded, or cannot be loaded.
+    Loaded { asset: String, result: Box<LoadResult> },
+}
+
+/// The queues of all shards. The hash of its name assigns each asset to one shard. Cheap to
+/// clone.
+#[derive(Clone)]
+pub(in crate::service) struct Shards(Arc<[mpsc::Sender<ShardMessage>]>);
+
+impl Shards {
+    /// Starts a thread for each shard; returns the queues and the threads.
+    pub(in crate::service) fn start(
+        limits: &Limits,
+        env: Environment,
+    ) -> Result<(Self, Vec<JoinHandle<()>>), ServiceError> {
+        let (mut senders, mut threads) = (Vec::new(), Vec::new());
+        let mut first_loader: Option<Loader> = None;
+        for number in 0..limits.shards {
+            let (sender, queue) = mpsc::channel(limits.shard_queue);
+            let new = || Loader::new(env.handles.clone(), limits.shards, &sender);
+            let loader = first_loader.get_or_insert_with(new).of(&sender);
+            threads.push(Shard::spawn(number, env.clone(), loader, queue)?);
+            senders.push(sender);
+        }
+        Ok((Self(senders.into()), threads))
+    }
+
+    /// Whether the thread of a shard has ended.
+    pub(in crate::service) fn is_any_closed(&self) -> bool {
+        self.0.iter().any(mpsc::Sender::is_closed)
+    }
+
+    /// Returns the number of messages in each queue.
+    pub(in crate::service) fn n_queued(&self) -> Vec<usize> {
+        self.0.iter().map(|queue| queue.max_capacity() - queue.capacity()).collect()
+    }
+
+    fn of(&self, asset: &str) -> &mpsc::Sender<ShardMessage> {
+        let mut hasher = DefaultHasher::new();
+        asset.hash(&mut hasher);
+        let number = hasher.finish() % self.0.len().max(1) as u64;
+        &self.0[usize::try_from(number).unwrap_or_default()]
+    }
+
+    /// Queues `command` for `asset`.
+    ///
+    /// # Errors
+    /// [`ServiceError::Busy`] if the queue is full.
+    pub(in crate::service) fn try_send(
+        &self,
+        asset: &str,
+        command: AssetCommand,
+    ) -> Result<(), ServiceError> {
+        let message = ShardMessage::Command { asset: asset.to_owned(), command };
+        self.of(asset).try_send(message).map_err(ServiceError::from_full)
+    }
+
+    /// Queues `command` for `asset`; waits while the queue is full.
+    ///
+    /// # Errors
+    /// [`ServiceError::Unavailable`] if the service is shutting down.
+    pub(in crate::service) async fn send(
+        &self,
+        asset: &str,
+        command: AssetCommand,
+    ) -> Result<(), ServiceError> {
+        let message = ShardMessage::Command { asset: asset.to_owned(), command };
+        let closing = |_| ServiceError::Unavailable { what: "the service is shutting down" };
+        self.of(asset).send(message).await.map_err(closing)
+    }
+
+    /// Queues the command that `make` returns and waits for its reply.
+    ///
+    /// # Errors
+    /// [`ServiceError::Busy`] if the queue is full; those of the command.
+    pub(in crate::service) async fn call<T>(
+        &self,
+        asset: &str,
+        make: impl FnOnce(Reply<T>) -> AssetCommand,
+    ) -> Result<T, ServiceError> {
+        let (reply, answer) = Reply::new();
+        self.try_send(asset, make(reply))?;
+        answer.wait().await
+    }
+}

@@ -1,0 +1,79 @@
+//! Snapshots of the engines of sessions, so that an engine need not judge a long recording
+//! again from its start. The recording is what counts: without a usable snapshot, it is
+//! judged from the start.
+
+use super::ServiceError;
+use super::views;
+use super::writing::Handles;
+use crate::judging::Judging;
+use crate::store::{SessionRow, Snapshot};
+use crate::wire::basis::Basis;
+use offbd_core::engine::{JUDGEMENT, SNAPSHOT_FORMAT, Setup, UsableMotion};
+
+/// Samples of a session between two snapshots. Chosen: judging as many again takes some 20 ms,
+/// and the snapshots, of about 15 kB each, are a tenth of what the samples themselves take.
+pub(super) const INTERVAL: i64 = 16_384;
+
+/// Samples of a session between two snapshots that are kept, so that a stretch of a long
+/// recording can be judged again by itself: about 1 s of one core.
+pub(super) const KEPT_INTERVAL: i64 = 1 << 20;
+
+/// The engine of a session at some sample.
+pub(super) struct RestoredEngine {
+    /// Samples after which it had this state.
+    pub(super) n_samples: i64,
+    pub(super) judging: Judging,
+    /// The motion counted for a calibration, if it was counted.
+    pub(super) motion: Option<UsableMotion>,
+}
+
+/// The version of a snapshot; others cannot be read, or would be continued differently.
+pub(super) fn version() -> String {
+    format!("{JUDGEMENT}.{SNAPSHOT_FORMAT}")
+}
+
+/// Returns a snapshot of the engine of `session` after `n_samples` samples; `last` is the
+/// number of samples at the previous one.
+pub(super) fn take(
+    session: &str,
+    n_samples: i64,
+    last: i64,
+    judging: &Judging,
+    motion: Option<&UsableMotion>,
+) -> Result<Snapshot, ServiceError> {
+    Ok(Snapshot {
+        session: session.to_owned(),
+        n_samples,
+        kept: n_samples / KEPT_INTERVAL > last / KEPT_INTERVAL,
+        version: version(),
+        state: rmp_serde::to_vec(&(judging, motion)).map_err(ServiceError::corrupt)?,
+    })
+}
+
+/// Returns the engine of `session` from its last snapshot that is not after the sample
+/// `at_most`; `None` if there is none for the settings of the session. Blocks on the store.
+pub(super) fn restore(
+    handles: &Handles,
+    session: &SessionRow,
+    at_most: i64,
+) -> Result<Option<RestoredEngine>, ServiceError> {
+    let at_most = at_most.min(session.progress.n_samples);
+    let snapshot = handles.wait(handles.store.snapshot(&session.id, &version(), at_most));
+    let restored = snapshot.map_err(ServiceError::from).and_then(|s| s.map(read).transpose());
+    let restored = match restored {
+        Ok(restored) => restored,
+        Err(error @ ServiceError::Corrupt { .. }) => {
+            tracing::error!(session = session.id, %error, "a snapshot is not used");
+            None
+        }
+        Err(error) => return Err(error),
+    };
+    let basis = Basis::of(&Setup::new(views::rig(&session.setup)?, None)?);
+    Ok(restored.filter(|restored| *restored.judging.basis() == basis))
+}
+
+fn read(snapshot: Snapshot) -> Result<RestoredEngine, ServiceError> {
+    let (judging, motion) =
+        rmp_serde::from_slice(&snapshot.state).map_err(ServiceError::corrupt)?;
+    Ok(RestoredEngine { n_samples: snapshot.n_samples, judging, motion })
+}

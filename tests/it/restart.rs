@@ -1,0 +1,160 @@
+//! After a restart the engine of an open session goes on where it was: from a snapshot, or
+//! else from the recording, while the other assets are served.
+
+use crate::support::process::Process;
+use crate::support::{Client, batch, connection, on_postgres, rig, url};
+use offbd_core::vocabulary::Sample;
+use serde_json::{Value, json};
+use sqlx::{AssertSqlSafe, Executor};
+use tempfile::TempDir;
+
+/// Samples that a batch of a test has.
+const BATCH: usize = 5000;
+
+/// Returns a recording of `n` samples that is long for a test, and quickly made: the same
+/// session again and again, in which the x servo dies, on a clock that goes on.
+fn long_rig(n: usize) -> Vec<Sample> {
+    let one = rig(20_000, 15_000);
+    let sample = |i: usize| {
+        let sample = one[i % one.len()];
+        Sample { seq: Some(i as u64), t_s: i as f64 * 0.01, ..sample }
+    };
+    (0..n).map(sample).collect()
+}
+
+async fn send(client: &Client, asset: &str, samples: &[Sample]) {
+    for part in samples.chunks(BATCH) {
+        client.telemetry(asset, Some("s"), part).await;
+    }
+}
+
+/// Returns the number of samples that the service has evaluated again to load its assets.
+async fn n_evaluated_again(client: &Client) -> f64 {
+    let text = client.get("/metrics").await.text;
+    let line = text.lines().find(|line| line.starts_with("offbd_samples_reevaluated_total"));
+    line.map_or(0.0, |line| line.rsplit(' ').next().unwrap().parse().unwrap())
+}
+
+/// Ends session `s` of `asset`; returns its verdict hash and its transitions.
+async fn outcome(client: &Client, asset: &str) -> (Value, Value) {
+    let session = client.end(asset, "s").await;
+    let id = session["id"].as_str().unwrap();
+    let mut faults = client.get(&format!("sessions/{id}/faults?limit=500")).await.expect(200);
+    for fault in faults["items"].as_array_mut().unwrap() {
+        for of_this_asset in ["id", "asset", "session_id", "at", "noted_at"] {
+            fault.as_object_mut().unwrap().remove(of_this_asset);
+        }
+    }
+    (session["verdict"]["verdict_hash"].clone(), faults["items"].clone())
+}
+
+/// Kills the service, executes `sql` in its store, and starts it again.
+async fn restart_after(service: Process, data: &TempDir, sql: &'static str) -> Process {
+    drop(service);
+    let mut store = connection(&url(data.path())).await;
+    store.execute(AssertSqlSafe(sql)).await.unwrap();
+    drop(store);
+    Process::start(data.path())
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn an_engine_goes_on_from_its_snapshot() {
+    let data = tempfile::tempdir().unwrap();
+    let mut service = Process::start(data.path());
+    let samples = long_rig(45_000);
+    service.client.asset("a").await;
+    // With actions before and after the snapshot, and at its very sample.
+    for (from, to) in [(0, 20_000), (20_000, 35_000), (35_000, 45_000)] {
+        send(&service.client, "a", &samples[from..to]).await;
+        service.client.delete("assets/a/faults/x_servo").await.expect(204);
+        if to < 45_000 {
+            drop(service);
+            service = Process::start(data.path());
+            assert_eq!(n_evaluated_again(&service.client).await, 0.0, "nobody has asked yet");
+            service.client.get("assets/a/state").await.expect(200);
+            let n = n_evaluated_again(&service.client).await;
+            assert!(n < 16_384.0 + BATCH as f64, "{n}");
+        }
+    }
+    let client = &service.client;
+    let live = outcome(client, "a").await;
+    assert!(live.1.as_array().unwrap().len() > 1, "{live:?}");
+    // Without a snapshot, the recording is evaluated from its start.
+    let id = client.session("a", "s").await["id"].as_str().unwrap().to_owned();
+    let replay = client.post(&format!("sessions/{id}/replays"), &json!({})).await.expect(202);
+    let path = format!("replays/{}", replay["id"].as_str().unwrap());
+    let replayed = loop {
+        let replay = client.get(&path).await.expect(200);
+        if replay["state"] == "done" {
+            break replay;
+        }
+        assert_ne!(replay["state"], "failed", "{replay}");
+    };
+    assert_eq!(replayed["result"]["summary"]["verdict_hash"], live.0, "{replayed}");
+}
+
+/// A snapshot that cannot be used costs time, and changes nothing.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_snapshot_that_is_damaged_or_of_another_version_is_not_used() {
+    let data = tempfile::tempdir().unwrap();
+    let mut service = Process::start(data.path());
+    let samples = long_rig(30_000);
+    service.client.asset("a").await;
+    service.client.asset("b").await;
+    let (first, rest) = samples.split_at(20_000);
+    send(&service.client, "b", &samples).await;
+    let expected = outcome(&service.client, "b").await;
+    let damage = if on_postgres() {
+        "UPDATE snapshot SET data = set_byte(data, 700, get_byte(data, 700) # 4)"
+    } else {
+        "UPDATE snapshot SET data =
+         CAST(substr(data, 1, 700) || x'f1' || substr(data, 702) AS BLOB)"
+    };
+    let spoil = [damage, "UPDATE snapshot SET version = '0.0'"];
+    send(&service.client, "a", first).await;
+    for sql in spoil {
+        service = restart_after(service, &data, sql).await;
+        service.client.get("assets/a/state").await.expect(200);
+        let n = n_evaluated_again(&service.client).await;
+        assert_eq!(n, 20_000.0, "{sql}");
+    }
+    send(&service.client, "a", rest).await;
+    assert_eq!(outcome(&service.client, "a").await, expected);
+}
+
+/// While the engine of one asset is rebuilt from a long recording, the others are served.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_long_recording_holds_up_only_its_own_asset() {
+    let data = tempfile::tempdir().unwrap();
+    let mut service = Process::start(data.path());
+    let samples = long_rig(300_000);
+    for asset in ["long", "other"] {
+        service.client.asset(asset).await;
+    }
+    send(&service.client, "long", &samples[..299_000]).await;
+    service = restart_after(service, &data, "DELETE FROM snapshot").await;
+    let client = &service.client;
+    let body = batch(Some("s"), &samples[299_000..]);
+    let refused = client.post("assets/long/telemetry", &body).await;
+    let problem = refused.problem(503);
+    assert_eq!(problem["type"], "urn:offbd:problem:rebuilding", "{problem}");
+    assert!(refused.headers.contains_key("retry-after"));
+    client.telemetry("other", None, &samples[..100]).await;
+    client.get("/readyz").await.expect(200);
+    client.get("fleet").await.expect(200);
+    let ack = loop {
+        let answer = client.post("assets/long/telemetry", &body).await;
+        if answer.status == 200 {
+            break answer.json();
+        }
+        assert_eq!(answer.problem(503)["type"], "urn:offbd:problem:rebuilding");
+    };
+    assert_eq!(ack["accepted"], 1000, "{ack}");
+    assert_eq!(client.get("/readyz").await.expect(200)["rebuilding"], 0);
+    // The rebuilt engine has left a snapshot.
+    drop(service);
+    let service = Process::start(data.path());
+    service.client.get("assets/long/state").await.expect(200);
+    let n = n_evaluated_again(&service.client).await;
+    assert!(n < 20_000.0, "{n}");
+}
