@@ -32,6 +32,14 @@ pub(super) fn version() -> String {
     format!("{JUDGEMENT}.{SNAPSHOT_FORMAT}")
 }
 
+/// Returns the serialised state of an engine.
+pub(super) fn state(
+    judging: &Judging,
+    motion: Option<&UsableMotion>,
+) -> Result<Vec<u8>, ServiceError> {
+    rmp_serde::to_vec(&(judging, motion)).map_err(ServiceError::corrupt)
+}
+
 /// Returns a snapshot of the engine of `session` after `n_samples` samples; `last` is the
 /// number of samples at the previous one.
 pub(super) fn take(
@@ -46,22 +54,23 @@ pub(super) fn take(
         n_samples,
         kept: n_samples / KEPT_INTERVAL > last / KEPT_INTERVAL,
         version: version(),
-        state: rmp_serde::to_vec(&(judging, motion)).map_err(ServiceError::corrupt)?,
+        state: state(judging, motion)?,
     })
 }
 
-/// Returns the engine of `session` from its last snapshot that is not after the sample
-/// `at_most`; `None` if there is none for the settings of the session. Blocks on the store.
-pub(super) fn restore(
+/// Returns the last snapshot of `session` that is not after the sample `at_most`, with the
+/// engine in it; `None` if there is none for the settings of the session. Blocks on the
+/// store.
+pub(super) fn last(
     handles: &Handles,
     session: &SessionRow,
     at_most: i64,
-) -> Result<Option<RestoredEngine>, ServiceError> {
+) -> Result<Option<(Snapshot, RestoredEngine)>, ServiceError> {
     let at_most = at_most.min(session.progress.n_samples);
     let snapshot = handles.wait(handles.store.snapshot(&session.id, &version(), at_most));
-    let restored = snapshot.map_err(ServiceError::from).and_then(|s| s.map(read).transpose());
-    let restored = match restored {
-        Ok(restored) => restored,
+    let read = snapshot.map_err(ServiceError::from).and_then(|s| s.map(read).transpose());
+    let found = match read {
+        Ok(found) => found,
         Err(error @ ServiceError::Corrupt { .. }) => {
             tracing::error!(session = session.id, %error, "a snapshot is not used");
             None
@@ -69,11 +78,12 @@ pub(super) fn restore(
         Err(error) => return Err(error),
     };
     let basis = Basis::of(&Setup::new(views::rig(&session.setup)?, None)?);
-    Ok(restored.filter(|restored| *restored.judging.basis() == basis))
+    Ok(found.filter(|(_, restored)| *restored.judging.basis() == basis))
 }
 
-fn read(snapshot: Snapshot) -> Result<RestoredEngine, ServiceError> {
+fn read(snapshot: Snapshot) -> Result<(Snapshot, RestoredEngine), ServiceError> {
     let (judging, motion) =
         rmp_serde::from_slice(&snapshot.state).map_err(ServiceError::corrupt)?;
-    Ok(RestoredEngine { n_samples: snapshot.n_samples, judging, motion })
+    let restored = RestoredEngine { n_samples: snapshot.n_samples, judging, motion };
+    Ok((snapshot, restored))
 }

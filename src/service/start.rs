@@ -13,7 +13,7 @@ use super::asset::{AssetCommand, Environment, MANY_SAMPLES, Presences, Shards};
 use super::job::{self, Job};
 use super::jobs::{self, JobContext};
 use super::limits::{MAX_DRIVE_CYCLES, MAX_RECORDINGS, MAX_TRACES};
-use super::upkeep::{Deleter, Sweeper, Watchdog};
+use super::upkeep::{Deleter, Scrubber, Sweeper, Watchdog};
 use super::writing::{Committer, Events, Handles, Outage};
 use super::{Limits, ServiceError, snapshots};
 use crate::store::{Store, Write, Writer};
@@ -152,6 +152,8 @@ impl Service {
             retention: limits.retention.clone(),
         };
         workers.push(tokio::spawn(sweeper.run()));
+        let scrubber = Scrubber { handles: handles.clone(), shards: shards.clone() };
+        workers.push(tokio::spawn(scrubber.run()));
         let in_flight = Arc::new(Semaphore::new(limits.in_flight_samples));
         let stalled = Arc::new(AtomicBool::new(false));
         let watchdog = Watchdog {

@@ -1,5 +1,6 @@
 //! Goes through a database and names what is damaged: the structure of the database, the
-//! checksum and the place of every chunk and journal row, and every stored document.
+//! checksum and the place of every chunk, journal row and snapshot, and every stored
+//! document.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +12,7 @@ use super::codec::ChunkKey;
 use super::from_row::from_row;
 use super::journal::JournalRun;
 use super::read::VISIBLE;
-use super::{Location, MIGRATIONS, StoreError, decode_chunk, journal};
+use super::{Location, MIGRATIONS, Snapshot, StoreError, decode_chunk, journal};
 
 /// Most findings that are listed; the search ends there.
 const MAX_FINDINGS: usize = 1000;
@@ -104,6 +105,7 @@ async fn check_contents(
     }
     check_open(db, location, &mut report).await;
     check_ended(db, &mut report).await;
+    check_snapshots(db, &mut report).await;
     check_documents(db, &mut report).await;
     Ok(report)
 }
@@ -291,6 +293,29 @@ fn check_journal(
         }
         next += run.n;
         report.n_samples += run.n.unsigned_abs();
+    }
+}
+
+async fn check_snapshots(db: &mut AnyConnection, report: &mut CheckReport) {
+    let mut rows = sqlx::query_as::<_, (String, i64, String, Vec<u8>)>(
+        "SELECT session, n_samples, version, data FROM snapshot",
+    )
+    .fetch(db);
+    loop {
+        match rows.try_next().await {
+            Ok(Some((session, n_samples, version, data))) => {
+                let snapshot =
+                    Snapshot { session, n_samples, kept: false, version, state: Vec::new() };
+                if let Err(error) = snapshot.open(&data) {
+                    report.add(error.to_string());
+                }
+            }
+            Ok(None) => break,
+            Err(error) => {
+                report.add(format!("the snapshots cannot be read: {error}"));
+                break;
+            }
+        }
     }
 }
 

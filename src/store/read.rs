@@ -97,6 +97,12 @@ impl Store {
         Ok(count.fetch_one(&self.pool).await?)
     }
 
+    /// The id of the session that follows the session `id` in the order of ids.
+    pub async fn session_after(&self, id: &str) -> Result<Option<String>, StoreError> {
+        let next = "SELECT id FROM session WHERE id > $1 ORDER BY id LIMIT 1";
+        Ok(sqlx::query_scalar(next).bind(id).fetch_optional(&self.pool).await?)
+    }
+
     /// The names of the assets whose open session has at least `n_samples` samples after the
     /// last snapshot by this `version` of the engine.
     pub async fn assets_behind(

@@ -28,7 +28,8 @@ impl Snapshot {
         hasher.finalize().to_le_bytes()
     }
 
-    fn open(mut self, data: &[u8]) -> Result<Self, StoreError> {
+    /// Returns the snapshot with the state in `data`, after checking its checksum.
+    pub(super) fn open(mut self, data: &[u8]) -> Result<Self, StoreError> {
         let (checksum, state) = data.split_first_chunk().unwrap_or((&[0; 4], &[]));
         self.state = state.to_owned();
         if self.checksum() == *checksum {
@@ -95,8 +96,7 @@ impl Store {
         .fetch_optional(&self.pool)
         .await?;
         let open = |(n_samples, kept, data): (i64, i64, Vec<u8>)| {
-            let (session, version) = (session.to_owned(), version.to_owned());
-            let state = Vec::new();
+            let (session, version, state) = (session.to_owned(), version.to_owned(), Vec::new());
             Snapshot { session, n_samples, kept: kept != 0, version, state }.open(&data)
         };
         row.map(open).transpose()

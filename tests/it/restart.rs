@@ -2,10 +2,10 @@
 //! else from the recording, while the other assets are served.
 
 use crate::support::process::Process;
-use crate::support::{Client, batch, connection, on_postgres, rig, url};
+use crate::support::{Client, batch, connection, eventually, on_postgres, rig, url};
 use offbd_core::vocabulary::Sample;
 use serde_json::{Value, json};
-use sqlx::{AssertSqlSafe, Executor};
+use sqlx::{AnyConnection, AssertSqlSafe, Executor};
 use tempfile::TempDir;
 
 /// Samples that a batch of a test has.
@@ -120,6 +120,58 @@ async fn a_snapshot_that_is_damaged_or_of_another_version_is_not_used() {
     }
     send(&service.client, "a", rest).await;
     assert_eq!(outcome(&service.client, "a").await, expected);
+}
+
+/// The scrub names what is damaged, and replaces an engine that differs from its recording.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn the_scrub_finds_damaged_recordings_and_engines_that_differ() {
+    let data = tempfile::tempdir().unwrap();
+    let service = Process::start(data.path());
+    let samples = long_rig(30_000);
+    for asset in ["damaged", "live", "through"] {
+        service.client.asset(asset).await;
+        send(&service.client, asset, &samples[..20_000]).await;
+    }
+    service.client.end("damaged", "s").await;
+    send(&service.client, "through", &samples[20_000..]).await;
+    let expected = outcome(&service.client, "through").await;
+    let live = service.client.session("live", "s").await["id"].as_str().unwrap().to_owned();
+    drop(service);
+    let mut store = connection(&url(data.path())).await;
+    put_off_by_one(&mut store, &live).await;
+    let damage = "DELETE FROM chunk WHERE first_index > 0 AND session IN
+                  (SELECT id FROM session WHERE asset = 'damaged')";
+    store.execute(damage).await.unwrap();
+    drop(store);
+    let service = Process::start(data.path());
+    service.client.get("assets/live/state").await.expect(200);
+    eventually(|| async {
+        let text = service.client.get("/metrics").await.text;
+        let found =
+            |kind| text.contains(&format!("offbd_scrub_findings_total{{kind=\"{kind}\"}} 1"));
+        (found("recording") && found("engine")).then_some(())
+    })
+    .await;
+    send(&service.client, "live", &samples[20_000..]).await;
+    assert_eq!(outcome(&service.client, "live").await, expected);
+}
+
+/// Stores the snapshot of `session` as one after a sample less, with a valid checksum.
+async fn put_off_by_one(store: &mut AnyConnection, session: &str) {
+    let select = "SELECT n_samples, version, data FROM snapshot WHERE session = $1";
+    let (n, version, data): (i64, String, Vec<u8>) =
+        sqlx::query_as(select).bind(session).fetch_one(&mut *store).await.unwrap();
+    let mut hasher = crc32fast::Hasher::new();
+    for part in [session.as_bytes(), &(n - 1).to_le_bytes(), version.as_bytes(), &data[4..]] {
+        hasher.update(part);
+    }
+    let data = [&hasher.finalize().to_le_bytes(), &data[4..]].concat();
+    sqlx::query("UPDATE snapshot SET n_samples = n_samples - 1, data = $2 WHERE session = $1")
+        .bind(session)
+        .bind(data)
+        .execute(store)
+        .await
+        .unwrap();
 }
 
 /// While the engine of one asset is rebuilt from a long recording, the others are served.

@@ -27,6 +27,8 @@ pub(super) struct Asset {
     pub(super) learning: LearningRecord,
     pub(super) generation: EngineGeneration,
     pub(super) deleted: bool,
+    /// Whether it is to be loaded again before its next command.
+    pub(super) dropped: bool,
     /// Snapshots of the engine to be stored, taken while it was rebuilt.
     pub(super) snapshots: Vec<Snapshot>,
 }

@@ -55,6 +55,10 @@ pub(in crate::service) enum AssetCommand {
     /// Discards the motion gathered for the automatic calibration.
     DiscardLearning { reply: Reply<()> },
 
+    /// Removes the snapshots of the open session and drops its engine, which the next command
+    /// rebuilds from the recording.
+    Rebuild { reply: Reply<()> },
+
     /// Loads the asset if it is not running, and evaluates its open session again.
     Load { reply: Reply<()> },
     /// Returns the state of the twin.

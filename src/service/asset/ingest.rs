@@ -157,7 +157,7 @@ impl Asset {
         let (session, progress) = (open.id.clone(), open.progress);
         turn.writes.push(Write::Append { session, first_index, samples, progress });
         let n = progress.n_samples;
-        if n - open.snapshot_at >= snapshots::INTERVAL && !open.importing {
+        if n - open.snapshot_at >= snapshots::INTERVAL {
             turn.writes.push(Write::PutSnapshot(open.snapshot(n)?));
         }
         Ok(())

@@ -52,6 +52,7 @@ impl StoredAsset {
                 learning,
                 generation: EngineGeneration::default(),
                 deleted: false,
+                dropped: false,
                 snapshots: Vec::new(),
             },
         })
@@ -107,7 +108,7 @@ fn reopen(
     let baseline = views::memory(&row.baseline)?;
     let mut open = OpenSession::new(row.id.clone(), row.name.clone(), setup, baseline, refines);
     open.importing = row.importing != 0;
-    let restored = snapshots::restore(handles, &row, i64::MAX)?;
+    let restored = snapshots::last(handles, &row, i64::MAX)?.map(|(_, restored)| restored);
     let Some(restored) = restored.filter(|r| r.motion.is_some() == open.motion.is_some()) else {
         return Ok((row, open, 0));
     };

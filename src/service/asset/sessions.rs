@@ -167,6 +167,15 @@ impl Asset {
         self.open(rfc3339(at), false, turn)
     }
 
+    /// Removes the snapshots of the open session, and drops its engine.
+    pub(super) fn rebuild(&mut self, turn: &mut Turn<'_>) -> Result<(), ServiceError> {
+        if let Some(open) = &self.open {
+            turn.writes.push(Write::RemoveSnapshots { session: open.id.clone() });
+            self.dropped = true;
+        }
+        Ok(())
+    }
+
     /// Ends the open session, if there is one: finalizes its verdict, trends and fault
     /// memory.
     pub(super) fn end(&mut self, turn: &mut Turn<'_>) -> Result<(), ServiceError> {

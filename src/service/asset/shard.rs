@@ -213,6 +213,7 @@ impl Shard {
             C::DiscardLearning { reply } => {
                 self.change(name, asset, reply, |a, turn| a.discard_learning(turn));
             }
+            C::Rebuild { reply } => self.change(name, asset, reply, |a, turn| a.rebuild(turn)),
             C::Load { reply } => self.query(name, asset, reply, |_| ()),
             C::State { reply } => self.query(name, asset, reply, Asset::state),
             C::Watch { session, seen, reply } => {
@@ -245,7 +246,7 @@ impl Shard {
                 turn.commit(generation, answer, reply);
                 if asset.deleted {
                     self.env.presences.remove(name);
-                } else {
+                } else if !asset.dropped {
                     self.keep(name, asset);
                 }
             }
@@ -346,6 +347,7 @@ mod tests {
             learning: Default::default(),
             generation: EngineGeneration::default(),
             deleted: false,
+            dropped: false,
             snapshots: Vec::new(),
         })
     }

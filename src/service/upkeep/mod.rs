@@ -1,9 +1,12 @@
-//! Background upkeep: deletion in parts, retention, and the watchdog of ingest.
+//! Background upkeep: deletion in parts, retention, the scrub of stored data, and the
+//! watchdog of ingest.
 
 mod deletion;
 mod retention;
+mod scrub;
 mod watchdog;
 
 pub(super) use deletion::Deleter;
 pub(super) use retention::Sweeper;
+pub(super) use scrub::Scrubber;
 pub(super) use watchdog::{STALLED_AFTER, Watchdog};

@@ -1,0 +1,208 @@
+//! The background scrub: reads every recording now and then, so that damage is known before
+//! the data are needed, and compares the snapshot of every open session with its recording,
+//! judged again from the start.
+
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+use crate::judging::Judging;
+use crate::service::asset::{AssetCommand, Shards};
+use crate::service::playback::play;
+use crate::service::writing::Handles;
+use crate::service::{ServiceError, snapshots, views};
+use crate::store::{SessionRow, Snapshot};
+use crate::wire::words::SessionState;
+use offbd_core::diagnosis::FaultMemory;
+use offbd_core::engine::{Admission, Input, Setup, UsableMotion};
+
+/// Samples after which the scrub pauses.
+const SAMPLES_AT_ONCE: i64 = 8192;
+
+/// Duration of a pause, as a multiple of the work before it: a twentieth of a core. Chosen.
+const PAUSE_FACTOR: u32 = 19;
+
+/// Longest pause within a session, so that it does not delay a shutdown.
+const LONGEST_PAUSE: Duration = Duration::from_secs(1);
+
+/// Pause after a session. Chosen.
+const PAUSE_AFTER_SESSION: Duration = Duration::from_millis(50);
+
+/// Pause after all sessions. Chosen: damage is rare.
+const PAUSE_AFTER_ALL: Duration = Duration::from_secs(3600);
+
+/// The kinds of findings, as a label of a metric.
+const RECORDING: &str = "recording";
+const ENGINE: &str = "engine";
+
+/// The background task of the scrub.
+pub(in crate::service) struct Scrubber {
+    pub(in crate::service) handles: Handles,
+    pub(in crate::service) shards: Shards,
+}
+
+/// What the scrub found in a session.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Finding {
+    /// The recording cannot be read.
+    Damage(String),
+    /// The engine has another state than the recording gives.
+    Snapshot,
+}
+
+impl Scrubber {
+    /// Goes through all sessions again and again until the service shuts down.
+    pub(in crate::service) async fn run(self) {
+        count_sessions(0);
+        for kind in [RECORDING, ENGINE] {
+            count_findings(kind, 0);
+        }
+        let closing = self.handles.closing.clone();
+        closing.run_until_cancelled(self.forever()).await;
+    }
+
+    async fn forever(self) {
+        let mut last = String::new();
+        loop {
+            let pause = match self.next(&mut last).await {
+                Ok(true) => PAUSE_AFTER_SESSION,
+                Ok(false) => PAUSE_AFTER_ALL,
+                Err(error) => {
+                    tracing::warn!(%error, "the scrub cannot read a session; it goes on later");
+                    PAUSE_AFTER_ALL
+                }
+            };
+            tokio::time::sleep(pause).await;
+        }
+    }
+
+    /// Examines the session after `last`, which becomes `last`. Returns `false` after the
+    /// last one.
+    async fn next(&self, last: &mut String) -> Result<bool, ServiceError> {
+        let store = &self.handles.store;
+        let Some(id) = store.session_after(last).await? else {
+            last.clear();
+            return Ok(false);
+        };
+        last.clone_from(&id);
+        let Some(session) = store.session(&id).await? else { return Ok(true) };
+        let (asset, handles) = (session.asset.clone(), self.handles.clone());
+        let found = tokio::task::spawn_blocking(move || examine(&handles, &session, pause)).await;
+        match found {
+            Ok(Ok(None)) => count_sessions(1),
+            Ok(Ok(Some(finding))) => self.report(&id, &asset, finding).await,
+            // It was deleted meanwhile.
+            Ok(Err(ServiceError::UnknownSession { .. })) => {}
+            Ok(Err(error)) => return Err(error),
+            Err(_) => tracing::error!(session = id, "the scrub of a session panicked"),
+        }
+        Ok(true)
+    }
+
+    async fn report(&self, session: &str, asset: &str, finding: Finding) {
+        let kind = match finding {
+            Finding::Damage(what) => {
+                tracing::error!(session, asset, what, "a recording is damaged");
+                RECORDING
+            }
+            Finding::Snapshot => {
+                tracing::error!(session, asset, "an engine differs from its recording");
+                let rebuilt = self.shards.call(asset, |reply| AssetCommand::Rebuild { reply });
+                if let Err(error) = rebuilt.await {
+                    tracing::error!(session, asset, %error, "the engine cannot be rebuilt");
+                }
+                ENGINE
+            }
+        };
+        count_findings(kind, 1);
+    }
+}
+
+fn count_sessions(n: u64) {
+    metrics::counter!("offbd_scrub_sessions_total").increment(n);
+}
+
+fn count_findings(kind: &'static str, n: u64) {
+    metrics::counter!("offbd_scrub_findings_total", "kind" => kind).increment(n);
+}
+
+/// Waits for a multiple of the time that the work before took.
+fn pause(worked: Duration) {
+    std::thread::sleep((worked * PAUSE_FACTOR).min(LONGEST_PAUSE));
+}
+
+/// Reads the recording of `session`, and judges it again if there is a snapshot to compare
+/// with. Calls `pause` now and then with the duration of the work since the last call.
+/// Returns `None` also if the service shuts down. Blocks on the store.
+#[expect(clippy::disallowed_methods, reason = "pauses are a multiple of the work")]
+fn examine(
+    handles: &Handles,
+    session: &SessionRow,
+    pause: impl Fn(Duration),
+) -> Result<Option<Finding>, ServiceError> {
+    let (mut comparison, mut n, mut since) = (None, 0, Instant::now());
+    let played = Comparison::start(handles, session).and_then(|started| {
+        comparison = started;
+        play(handles, session, 0, |input| {
+            if let Some(comparison) = &mut comparison {
+                comparison.take(input, n);
+            }
+            n += i64::from(matches!(input, Input::NewSample(_)));
+            if n % SAMPLES_AT_ONCE == 0 {
+                pause(since.elapsed());
+                since = Instant::now();
+            }
+            match handles.closing.is_cancelled() {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
+            }
+        })
+    });
+    match played {
+        Err(ServiceError::Corrupt { what }) => return Ok(Some(Finding::Damage(what))),
+        played => played?,
+    }
+    let differs = comparison.is_some_and(|comparison| comparison.differs == Some(true));
+    Ok(differs.then_some(Finding::Snapshot))
+}
+
+/// Compares a snapshot with the engine that evaluates the recording from its start.
+struct Comparison {
+    snapshot: Snapshot,
+    judging: Judging,
+    motion: Option<UsableMotion>,
+    /// The result, once the sample of the snapshot is reached.
+    differs: Option<bool>,
+}
+
+impl Comparison {
+    /// Returns `None` if `session` has ended, or has no snapshot of its present settings.
+    fn start(handles: &Handles, session: &SessionRow) -> Result<Option<Self>, ServiceError> {
+        if session.state != SessionState::Open.as_str() {
+            return Ok(None);
+        }
+        let Some((snapshot, restored)) = snapshots::last(handles, session, i64::MAX)? else {
+            return Ok(None);
+        };
+        let setup = Setup::new(views::rig(&session.setup)?, None)?;
+        let motion = restored.motion.map(|_| UsableMotion::new(&setup.rig));
+        let baseline: FaultMemory = views::memory(&session.baseline)?;
+        let judging = Judging::new(setup, baseline);
+        Ok(Some(Self { snapshot, judging, motion, differs: None }))
+    }
+
+    /// Takes the next input, after `n` samples.
+    fn take(&mut self, input: Input, n: i64) {
+        if self.differs.is_some() {
+            return;
+        }
+        let admission = self.judging.input(input);
+        let Input::NewSample(sample) = input else { return };
+        if let (Some(Admission::Accepted), Some(motion)) = (admission, &mut self.motion) {
+            motion.take(&sample);
+        }
+        if n + 1 == self.snapshot.n_samples {
+            let state = snapshots::state(&self.judging, self.motion.as_ref());
+            self.differs = Some(state.is_ok_and(|state| state != self.snapshot.state));
+        }
+    }
+}
