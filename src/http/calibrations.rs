@@ -12,14 +12,14 @@ use utoipa::ToSchema;
 use super::sessions::small_json;
 use super::{App, AssetItemPath, AssetPath, PageQuery, Problem, Query, page_limit};
 use crate::service::Service;
-use crate::wire::service::{CalibrationJobView, Page};
+use crate::wire::service::{CalibrationJobView, Page, TrainingDataView};
 
 /// The sessions to calibrate from.
 #[derive(Debug, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct NewCalibration {
-    /// Ids of 1 to 32 healthy sessions of the asset.
-    sessions: Vec<String>,
+    /// 1 to 32 healthy sessions of the asset, or stretches of them.
+    sessions: Vec<TrainingDataView>,
 }
 
 /// Starts a background job that calibrates the rig from healthy sessions.

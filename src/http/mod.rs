@@ -62,7 +62,7 @@ use self::guard::Guard;
 use self::routes::{GuardedRouter, RouteRules};
 use crate::service::Service;
 use crate::service::access::Right;
-use offbd_core::vocabulary::{Invalid, UnknownWord};
+use offbd_core::vocabulary::{Invalid, TimeRange, UnknownWord};
 
 /// The state shared by all handlers.
 #[derive(Clone)]
@@ -125,6 +125,26 @@ fn query_word<T: FromStr<Err = UnknownWord>>(
 ) -> Result<Option<T>, Problem> {
     let word = word.map(str::parse).transpose();
     Ok(word.map_err(|error: UnknownWord| Invalid::new(name, error.to_string()))?)
+}
+
+/// Returns the range of the query parameters `from_s` and `to_s`, of which one or both may be
+/// missing.
+///
+/// # Errors
+/// A [`Problem`] if they are not numbers or in the wrong order.
+fn time_range(from_s: Option<f64>, to_s: Option<f64>) -> Result<TimeRange, Problem> {
+    for (name, t_s) in [("?from_s", from_s), ("?to_s", to_s)] {
+        if t_s.is_some_and(|t_s| !t_s.is_finite()) {
+            return Err(Invalid::new(name, "must be a finite number of seconds").into());
+        }
+    }
+    let TimeRange { from_s: first, to_s: last } = TimeRange::ALL;
+    let range = TimeRange { from_s: from_s.unwrap_or(first), to_s: to_s.unwrap_or(last) };
+    if range.from_s > range.to_s {
+        let reason = format!("must not be less than from_s, which is {}", range.from_s);
+        return Err(Invalid::new("?to_s", reason).into());
+    }
+    Ok(range)
 }
 
 /// The query parameters; rejected with a [`Problem`] if invalid.

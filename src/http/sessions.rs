@@ -15,7 +15,9 @@ use serde::Deserialize;
 use super::body::BodyShare;
 use super::negotiate::weight_of_first;
 use super::telemetry::TelemetryFormat;
-use super::{App, AssetPath, PageQuery, Path, Problem, Query, body, page_limit, query_word};
+use super::{
+    App, AssetPath, PageQuery, Path, Problem, Query, body, page_limit, query_word, time_range,
+};
 use crate::service::{RecordingReader, Service};
 use crate::wire::service::{ImportView, Page, SessionView};
 use crate::wire::session_csv::{write_header, write_rows};
@@ -188,21 +190,35 @@ pub(super) async fn end(
     Ok(Json(service.end_session(&id).await?))
 }
 
-/// Returns the recording in order of arrival: as CSV, or as JSON rows if `Accept` prefers
-/// `application/json`.
+/// The range of a recording.
+#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[into_params(parameter_in = Query)]
+pub(super) struct RecordingRangeQuery {
+    /// First time on the device's clock, s; the start of the session by default.
+    from_s: Option<f64>,
+    /// Last time on the device's clock, s; the end of the session by default.
+    to_s: Option<f64>,
+}
+
+/// Returns the recording, or a stretch of it, in order of arrival: as CSV, or as JSON rows if
+/// `Accept` prefers `application/json`.
 #[utoipa::path(get, path = "/sessions/{id}/telemetry", tag = "sessions",
     operation_id = "get_recording",
-    params(("id" = String, description = "The service's id of the session")),
+    params(("id" = String, description = "The service's id of the session"),
+        RecordingRangeQuery),
     responses((status = 200, content((String = "text/csv"),
             (crate::wire::telemetry::RowsView = "application/json"))),
-        (status = 404, body = Problem), (status = 406, body = Problem)))]
+        (status = 400, body = Problem), (status = 404, body = Problem),
+        (status = 406, body = Problem), (status = 422, body = Problem)))]
 pub(super) async fn telemetry(
     State(service): State<Service>,
     Path(id): Path<String>,
+    Query(query): Query<RecordingRangeQuery>,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     let format = RecordingFormat::negotiate(&headers, RecordingFormat::Csv)?;
-    let (session, recording) = service.recording(&id).await?;
+    let range = time_range(query.from_s, query.to_s)?;
+    let (session, recording) = service.recording(&id, range).await?;
     let file = format!("attachment; filename=\"{id}.{}\"", format.suffix());
     let with_seq = session.last_seq.is_some();
     let start = format.start(&session.name, with_seq);

@@ -5,7 +5,7 @@ use axum::Json;
 use axum::extract::State;
 use serde::Deserialize;
 
-use super::{Path, Problem, Query, query_word};
+use super::{Path, Problem, Query, query_word, time_range};
 use crate::service::{MAX_TRACE_POINTS, Service, TraceQuery};
 use crate::wire::service::ReplaySettingsView;
 use crate::wire::trace::TraceView;
@@ -30,14 +30,15 @@ pub(super) struct TraceRangeQuery {
 const DEFAULT_POINTS: u32 = 5000;
 
 /// Returns the time series of a session or of a part of it: positions, accelerations,
-/// limits and gates of rig and twin. The service evaluates the recording again from its
-/// start to compute them; nothing stored is changed.
+/// limits and gates of rig and twin. The service evaluates the recording again to compute
+/// them, from its start or from a stored state of the engine shortly before the range;
+/// nothing stored is changed.
 #[utoipa::path(get, path = "/sessions/{id}/trace", tag = "sessions",
     operation_id = "get_trace",
     params(("id" = String, description = "The service's id of the session"), TraceRangeQuery),
     responses((status = 200, body = TraceView), (status = 400, body = Problem),
         (status = 404, body = Problem),
-        (status = 413, body = Problem, description = "The session is too long"),
+        (status = 413, body = Problem, description = "The range is too long"),
         (status = 422, body = Problem), (status = 429, body = Problem)))]
 pub(super) async fn trace(
     State(service): State<Service>,
@@ -46,8 +47,7 @@ pub(super) async fn trace(
 ) -> Result<Json<TraceView>, Problem> {
     let profile = query_word("?profile", query.profile.as_deref())?;
     let range = TraceQuery {
-        from_s: query.from_s.unwrap_or(f64::NEG_INFINITY),
-        to_s: query.to_s.unwrap_or(f64::INFINITY),
+        range: time_range(query.from_s, query.to_s)?,
         points: query.points.unwrap_or(DEFAULT_POINTS).clamp(1, MAX_TRACE_POINTS),
         settings: ReplaySettingsView { profile, ..Default::default() },
     };

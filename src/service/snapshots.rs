@@ -15,8 +15,8 @@ use offbd_core::engine::{JUDGEMENT, SNAPSHOT_FORMAT, Setup, UsableMotion};
 pub(super) const INTERVAL: i64 = 16_384;
 
 /// Samples of a session between two snapshots that are kept, so that a stretch of a long
-/// recording can be judged again by itself: about 1 s of one core.
-pub(super) const KEPT_INTERVAL: i64 = 1 << 20;
+/// recording can be judged again by itself: some 0.3 s of one core.
+pub(super) const KEPT_INTERVAL: i64 = 1 << 18;
 
 /// The engine of a session at some sample.
 pub(super) struct RestoredEngine {
@@ -86,4 +86,21 @@ fn read(snapshot: Snapshot) -> Result<(Snapshot, RestoredEngine), ServiceError> 
         rmp_serde::from_slice(&snapshot.state).map_err(ServiceError::corrupt)?;
     let restored = RestoredEngine { n_samples: snapshot.n_samples, judging, motion };
     Ok((snapshot, restored))
+}
+
+/// Returns the engine of `session` with `setup` at or before the sample `at_most`: from a
+/// snapshot if there is one for this set-up, otherwise at the start of the session. Blocks on
+/// the store.
+pub(super) fn engine_before(
+    handles: &Handles,
+    session: &SessionRow,
+    setup: Setup,
+    at_most: i64,
+) -> Result<(i64, Judging), ServiceError> {
+    let found = last(handles, session, at_most)?.map(|(_, restored)| restored);
+    let fits = |restored: &RestoredEngine| *restored.judging.basis() == Basis::of(&setup);
+    if let Some(restored) = found.filter(fits) {
+        return Ok((restored.n_samples, restored.judging));
+    }
+    Ok((0, Judging::new(setup, views::memory(&session.baseline)?)))
 }

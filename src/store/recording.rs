@@ -1,7 +1,7 @@
-//! Reading the recording of a session from its start to its end.
+//! Reading the recording of a session, or a stretch of it.
 
 use super::{SessionRow, Store, StoreError};
-use offbd_core::vocabulary::Sample;
+use offbd_core::vocabulary::{Sample, TimeRange};
 
 /// Reads the samples that a session has when the reader is made, in order of arrival. The
 /// end is known from the number of samples: a missing part is an error and not the end.
@@ -11,6 +11,7 @@ pub struct RecordingReader {
     session: String,
     next: i64,
     end: i64,
+    range: TimeRange,
 }
 
 impl Store {
@@ -18,7 +19,52 @@ impl Store {
     #[must_use]
     pub fn recording(&self, session: &SessionRow, first: i64) -> RecordingReader {
         let (next, end) = (first.max(0), session.progress.n_samples);
-        RecordingReader { store: self.clone(), session: session.id.clone(), next, end }
+        let (store, session, range) = (self.clone(), session.id.clone(), TimeRange::ALL);
+        RecordingReader { store, session, next, end, range }
+    }
+
+    /// Returns a reader of the samples of `session` whose times are in `range`.
+    ///
+    /// # Errors
+    /// [`StoreError::Database`].
+    pub async fn stretch(
+        &self,
+        session: &SessionRow,
+        range: TimeRange,
+    ) -> Result<RecordingReader, StoreError> {
+        let (next, end) = self.indexes(session, range).await?;
+        let (store, session) = (self.clone(), session.id.clone());
+        Ok(RecordingReader { store, session, next, end, range })
+    }
+
+    /// Returns indexes of `session` between which all samples with times in `range` are: the
+    /// first of them at most, and one after the last at least.
+    ///
+    /// # Errors
+    /// [`StoreError::Database`].
+    pub async fn indexes(
+        &self,
+        session: &SessionRow,
+        range: TimeRange,
+    ) -> Result<(i64, i64), StoreError> {
+        let n_samples = session.progress.n_samples;
+        if range == TimeRange::ALL {
+            return Ok((0, n_samples));
+        }
+        // Samples after the last chunk are in the journal.
+        let (first, end, n_folded): (Option<i64>, Option<i64>, i64) = sqlx::query_as(
+            "SELECT MIN(CASE WHEN max_t_s >= $2 THEN first_index END),
+                 MAX(CASE WHEN min_t_s <= $3 THEN first_index + n END),
+                 COALESCE(MAX(first_index + n), 0)
+             FROM chunk WHERE session = $1",
+        )
+        .bind(&session.id)
+        .bind(range.from_s)
+        .bind(range.to_s)
+        .fetch_one(&self.pool)
+        .await?;
+        let end = if n_folded < n_samples { n_samples } else { end.unwrap_or(0) };
+        Ok((first.unwrap_or(n_folded).min(end), end))
     }
 }
 
@@ -30,14 +76,17 @@ impl RecordingReader {
     /// [`StoreError::Incomplete`] and [`StoreError::Chunk`] if the recording is damaged;
     /// [`StoreError::Database`].
     pub async fn next(&mut self) -> Result<Option<Vec<Sample>>, StoreError> {
-        if self.next >= self.end {
-            return Ok(None);
+        while self.next < self.end {
+            let samples = self.store.samples_from(&self.session, self.next).await;
+            let Some(mut samples) = samples? else { return Err(self.missing().await?) };
+            samples.truncate(usize::try_from(self.end - self.next).unwrap_or(usize::MAX));
+            self.next += i64::try_from(samples.len()).unwrap_or(i64::MAX);
+            samples.retain(|sample| self.range.contains(sample.t_s));
+            if !samples.is_empty() {
+                return Ok(Some(samples));
+            }
         }
-        let samples = self.store.samples_from(&self.session, self.next).await;
-        let Some(mut samples) = samples? else { return Err(self.missing().await?) };
-        samples.truncate(usize::try_from(self.end - self.next).unwrap_or(usize::MAX));
-        self.next += i64::try_from(samples.len()).unwrap_or(i64::MAX);
-        Ok(Some(samples))
+        Ok(None)
     }
 
     /// Why the next sample is not there.

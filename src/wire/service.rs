@@ -17,7 +17,7 @@ use super::words::{
 };
 use offbd_core::diagnosis::StatusByte;
 use offbd_core::engine::{MonitorState, State, Unjudged};
-use offbd_core::vocabulary::{Axis, FaultCode, PerAxis};
+use offbd_core::vocabulary::{Axis, FaultCode, PerAxis, TimeRange};
 
 /// One page of a list.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
@@ -445,14 +445,55 @@ pub struct ReplayView {
     pub error: Option<String>,
 }
 
+/// Samples that a calibration learns from: a session by its id, or a stretch of one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(untagged)]
+pub enum TrainingDataView {
+    /// The id of a session.
+    Session(String),
+    Stretch(StretchView),
+}
+
+/// A stretch of a session.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StretchView {
+    /// Id of the session.
+    pub session: String,
+    /// First time on the device's clock, s.
+    pub from_s: f64,
+    /// Last time on the device's clock, s.
+    pub to_s: f64,
+}
+
+impl TrainingDataView {
+    /// The id of the session.
+    #[must_use]
+    pub fn session(&self) -> &str {
+        match self {
+            Self::Session(id) => id,
+            Self::Stretch(stretch) => &stretch.session,
+        }
+    }
+
+    /// The range of times; all of the session without one.
+    #[must_use]
+    pub const fn range(&self) -> TimeRange {
+        match *self {
+            Self::Session(_) => TimeRange::ALL,
+            Self::Stretch(StretchView { from_s, to_s, .. }) => TimeRange { from_s, to_s },
+        }
+    }
+}
+
 /// A calibration job of an asset, with its result.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct CalibrationJobView {
     pub id: String,
     pub asset: String,
     pub state: JobState,
-    /// Ids of the sessions it learns from.
-    pub sessions: Vec<String>,
+    /// The sessions, or stretches of sessions, it learns from.
+    pub sessions: Vec<TrainingDataView>,
     /// Time of creation, RFC 3339.
     pub made_at: String,
     /// Whether this calibration is in use: in the asset file.

@@ -2,7 +2,8 @@
 //! else from the recording, while the other assets are served.
 
 use crate::support::process::Process;
-use crate::support::{Client, batch, connection, eventually, on_postgres, rig, url};
+use crate::support::{Client, batch, connection, eventually, on_postgres, read_csv, rig, url};
+use offbd::wire::telemetry::sample_view;
 use offbd_core::vocabulary::Sample;
 use serde_json::{Value, json};
 use sqlx::{AnyConnection, AssertSqlSafe, Executor};
@@ -209,4 +210,62 @@ async fn a_long_recording_holds_up_only_its_own_asset() {
     service.client.get("assets/long/state").await.expect(200);
     let n = n_evaluated_again(&service.client).await;
     assert!(n < 20_000.0, "{n}");
+}
+
+/// A stretch of a recording that is too long to be evaluated as a whole can be looked at,
+/// exported and learnt from, with the same result as from the start.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_stretch_of_a_long_recording_is_served_by_itself() {
+    const N: usize = 2_100_000;
+    let data = tempfile::tempdir().unwrap();
+    let mut service = Process::start(data.path());
+    service.client.asset("a").await;
+    // Columns in MessagePack are the fastest way in.
+    let samples = long_rig(N);
+    for part in samples.chunks(10_000) {
+        let rows = serde_json::to_value(part.iter().map(sample_view).collect::<Vec<_>>()).unwrap();
+        let batch = json!({"session": "s", "samples": rows});
+        service.client.post_packed("assets/a/telemetry", &batch).await.expect(200);
+    }
+    let id = service.client.end("a", "s").await["id"].as_str().unwrap().to_owned();
+    let client = &service.client;
+    let whole = client.get(&format!("sessions/{id}/trace")).await;
+    assert_eq!(whole.problem(413)["type"], "urn:offbd:problem:too-large");
+    // Late, so that from the start it would be too much; and early, to compare.
+    let late = client.get(&format!("sessions/{id}/trace?from_s=20950&to_s=20980")).await;
+    assert!(late.expect(200)["t_s"].as_array().unwrap().len() > 500);
+    let early = format!("sessions/{id}/trace?from_s=5000&to_s=5030");
+    let with_snapshot = client.get(&early).await.expect(200);
+    let fault = client.get("assets/a/faults/x_servo/recording").await.expect(200);
+
+    let exported = format!("sessions/{id}/telemetry?from_s=5000&to_s=5000.5");
+    let rows = read_csv(&client.get(&exported).await.text);
+    assert_eq!(rows, samples[500_000..=500_050]);
+    let outside = format!("sessions/{id}/telemetry?from_s=1e6");
+    assert_eq!(read_csv(&client.get(&outside).await.text), []);
+    for (query, parameter) in [("from_s=2&to_s=1", "to_s"), ("from_s=NaN", "from_s")] {
+        let answer = client.get(&format!("sessions/{id}/telemetry?{query}")).await;
+        assert_eq!(answer.problem(400)["parameter"], parameter, "{query}");
+    }
+
+    let stretch = json!({"session": id, "from_s": 200.0, "to_s": 340.0});
+    let body = json!({"sessions": [stretch]});
+    let job = client.post("assets/a/calibrations", &body).await.expect(202);
+    assert_eq!(job["sessions"], body["sessions"]);
+    let path = format!("assets/a/calibrations/{}", job["id"].as_str().unwrap());
+    let done = eventually(|| async {
+        let job = client.get(&path).await.expect(200);
+        (job["state"] == "done" || job["state"] == "failed").then_some(job)
+    });
+    assert_eq!(done.await["error"], Value::Null);
+    let reversed = json!({"sessions": [{"session": id, "from_s": 2.0, "to_s": 1.0}]});
+    let problem = client.post("assets/a/calibrations", &reversed).await.problem(422);
+    assert_eq!(problem["pointer"], "/sessions/0/to_s");
+
+    service = restart_after(service, &data, "DELETE FROM snapshot").await;
+    let client = &service.client;
+    assert_eq!(client.get(&early).await.expect(200), with_snapshot);
+    assert_eq!(client.get("assets/a/faults/x_servo/recording").await.expect(200), fault);
+    let late = client.get(&format!("sessions/{id}/trace?from_s=20950&to_s=20980")).await;
+    late.problem(413);
 }

@@ -11,6 +11,7 @@ use crate::service::limits::MAX_CALIBRATION_SAMPLES;
 use crate::service::{ServiceError, views};
 use crate::store::{CalibrationRow, SessionRow, Store, Write};
 use crate::wire::asset;
+use crate::wire::service::TrainingDataView;
 use crate::wire::session_csv;
 use crate::wire::words::JobState;
 use offbd_core::diagnosis::{Calibration, CalibrationOrigin};
@@ -69,8 +70,8 @@ fn learn(store: &Store, runtime: &Handle, row: &CalibrationRow) -> Result<Calibr
     Ok(Calibration { origin, ..calibration })
 }
 
-/// Returns the recordings that a calibration learns from: whole sessions if a person
-/// requested it, otherwise those in the rig's learning record. Deleted sessions are
+/// Returns the recordings that a calibration learns from: the sessions and stretches that a
+/// person chose, otherwise those in the rig's learning record. Deleted sessions are
 /// omitted; a calibration that `refines` another one fails instead.
 async fn recordings(
     store: &Store,
@@ -92,9 +93,9 @@ async fn recordings(
         }
         return Ok(sessions);
     }
-    let ids: Vec<String> = views::from_json(&row.sessions)?;
-    for id in &ids {
-        let samples = recording(store, id, room).await?;
+    let chosen: Vec<TrainingDataView> = views::from_json(&row.sessions)?;
+    for data in &chosen {
+        let samples = recording(store, data, room).await?;
         room -= samples.len();
         sessions.push(samples);
     }
@@ -138,8 +139,18 @@ async fn session_row(store: &Store, id: &str) -> Result<SessionRow, ServiceError
     row.ok_or_else(|| ServiceError::UnknownSession { id: id.to_owned() })
 }
 
-async fn recording(store: &Store, id: &str, room: usize) -> Result<Vec<Sample>, ServiceError> {
-    let mut reader = store.recording(&session_row(store, id).await?, 0);
+/// Returns the samples of `data`.
+///
+/// # Errors
+/// [`ServiceError::TooMany`] if there are more than `room`; [`ServiceError::UnknownSession`]
+/// if the session has been deleted.
+async fn recording(
+    store: &Store,
+    data: &TrainingDataView,
+    room: usize,
+) -> Result<Vec<Sample>, ServiceError> {
+    let row = session_row(store, data.session()).await?;
+    let mut reader = store.stretch(&row, data.range()).await?;
     let mut samples: Vec<Sample> = Vec::new();
     while let Some(chunk) = reader.next().await? {
         samples.extend(chunk);

@@ -4,10 +4,9 @@
 
 use std::ops::ControlFlow;
 
-use crate::judging::Judging;
 use crate::service::playback::play;
 use crate::service::writing::Handles;
-use crate::service::{ServiceError, views};
+use crate::service::{ServiceError, snapshots, views};
 use crate::store::{SessionRow, Store};
 use crate::wire::basis::Basis;
 use crate::wire::recording::{ColumnsView, RecordingRow, RecordingView};
@@ -15,13 +14,14 @@ use crate::wire::verdict::FaultView;
 use crate::wire::words::StatusWord;
 use offbd_core::diagnosis::{Evidence, StatusByte};
 use offbd_core::engine::{Input, Setup};
-use offbd_core::vocabulary::{FaultCode, Invalid, Sample};
+use offbd_core::vocabulary::{FaultCode, Invalid, Sample, TimeRange};
 
 /// Longest time before the onset or after the confirmation, s.
 const MAX_WINDOW_S: f64 = 60.0;
 
-/// Limit of the samples from the start of the session to the end of the window: a day at
-/// 100 Hz. Beyond it the request is refused.
+/// Limit of the samples to evaluate: up to the end of the window, from the last snapshot
+/// before it, or from the start of the session without one; a day at 100 Hz. Beyond it the
+/// request is refused.
 const MAX_EVALUATED: usize = 10_000_000;
 
 /// Limit of rows: the longest window at 1 kHz, with margin. Beyond it the request is
@@ -156,9 +156,11 @@ fn evaluate(
     (from_s, to_s): (f64, f64),
 ) -> Result<Vec<RecordingRow>, ServiceError> {
     let mut builder = RecordingBuilder::new(from_s, to_s);
-    let mut judging = Judging::new(setup, views::memory(&session.baseline)?);
+    let range = TimeRange { from_s, to_s };
+    let (first, _) = handles.wait(handles.store.indexes(session, range))?;
+    let (first, mut judging) = snapshots::engine_before(handles, session, setup, first)?;
     let (mut n_evaluated, mut has_failed, mut ended) = (0, false, true);
-    play(handles, session, 0, |input| {
+    play(handles, session, first, |input| {
         if let Input::NewSample(sample) = &input {
             n_evaluated += 1;
             builder.sample(sample);
@@ -174,7 +176,7 @@ fn evaluate(
         ControlFlow::Continue(())
     })?;
     if n_evaluated > MAX_EVALUATED {
-        let what = "samples from the start of the session to the end of the window";
+        let what = "samples to evaluate for this window";
         return Err(ServiceError::TooMany { what, limit: MAX_EVALUATED });
     }
     if builder.samples.len() > MAX_ROWS {

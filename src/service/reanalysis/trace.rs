@@ -3,19 +3,19 @@
 
 use std::ops::ControlFlow;
 
-use crate::judging::Judging;
 use crate::service::playback::play;
 use crate::service::replay_settings;
 use crate::service::writing::Handles;
-use crate::service::{ServiceError, views};
+use crate::service::{ServiceError, snapshots};
 use crate::store::SessionRow;
 use crate::wire::service::ReplaySettingsView;
 use crate::wire::trace::{TracePoint, TraceView};
 use offbd_core::engine::Input;
+use offbd_core::vocabulary::TimeRange;
 
-/// Limit of the samples of a session, which take several seconds of one core. A request for
-/// a longer session is refused.
-pub(in crate::service) const MAX_EVALUATED: i64 = 2_000_000;
+/// Limit of the samples to evaluate, which take several seconds of one core. A request for a
+/// longer range is refused.
+const MAX_EVALUATED: i64 = 2_000_000;
 
 /// Limit of the points of a trace; a range with more points is decimated.
 pub const MAX_TRACE_POINTS: u32 = 20_000;
@@ -23,16 +23,17 @@ pub const MAX_TRACE_POINTS: u32 = 20_000;
 /// The time range, the number of points and the settings of a trace.
 #[derive(Clone, Debug)]
 pub struct TraceQuery {
-    /// Start on the device's clock, s.
-    pub from_s: f64,
-    /// End on the device's clock, s.
-    pub to_s: f64,
+    pub range: TimeRange,
     /// Limit of points.
     pub points: u32,
     pub settings: ReplaySettingsView,
 }
 
 /// Computes the trace of `session`; ends early if the service shuts down.
+///
+/// # Errors
+/// [`ServiceError::TooMany`] if too many samples must be evaluated: those of the range, and
+/// those from the last snapshot before it, or from the start of the session, without one.
 pub(in crate::service) fn trace(
     handles: &Handles,
     session: &SessionRow,
@@ -40,19 +41,25 @@ pub(in crate::service) fn trace(
 ) -> Result<TraceView, ServiceError> {
     let setup = replay_settings::setup(session, &query.settings, None)?;
     let expected = expected_points(session, query, setup.settings.period_s);
-    let mut judging = Judging::new(setup, views::memory(&session.baseline)?);
+    let (first, end) = handles.wait(handles.store.indexes(session, query.range))?;
+    let (first, mut judging) = snapshots::engine_before(handles, session, setup, first)?;
+    if end - first > MAX_EVALUATED {
+        let what = "samples to evaluate for this range";
+        let limit = usize::try_from(MAX_EVALUATED).unwrap_or(usize::MAX);
+        return Err(ServiceError::TooMany { what, limit });
+    }
     let mut decimator = Decimator::new(query.points, expected);
-    play(handles, session, 0, |input| {
+    play(handles, session, first, |input| {
         let is_sample = matches!(input, Input::NewSample(_));
         judging.input(input);
         let point = is_sample.then(|| TracePoint::of(&judging.engine().state())).flatten();
-        let Some(point) = point.filter(|point| point.t_s() >= query.from_s) else {
+        let Some(point) = point.filter(|point| point.t_s() >= query.range.from_s) else {
             return match handles.closing.is_cancelled() {
                 true => ControlFlow::Break(()),
                 false => ControlFlow::Continue(()),
             };
         };
-        if point.t_s() > query.to_s || handles.closing.is_cancelled() {
+        if point.t_s() > query.range.to_s || handles.closing.is_cancelled() {
             return ControlFlow::Break(());
         }
         decimator.push(point);
@@ -66,7 +73,7 @@ pub(in crate::service) fn trace(
 fn expected_points(session: &SessionRow, query: &TraceQuery, period_s: f64) -> f64 {
     let progress = session.progress;
     let (first, last) = (progress.first_t_s.unwrap_or(0.0), progress.last_t_s.unwrap_or(0.0));
-    let range_s = (query.to_s.min(last) - query.from_s.max(first)).max(0.0);
+    let range_s = (query.range.to_s.min(last) - query.range.from_s.max(first)).max(0.0);
     let share = if last > first { range_s / (last - first) } else { 1.0 };
     let n_samples = progress.n_samples as f64 * share;
     if period_s > 0.0 { n_samples.min(range_s / period_s) } else { n_samples }

@@ -8,26 +8,31 @@ use crate::service::job::Job;
 use crate::service::limits::MAX_CALIBRATION_SESSIONS;
 use crate::service::{Service, ServiceError, views};
 use crate::store::{CalibrationRow, Write};
-use crate::wire::service::{CalibrationJobView, Page};
+use crate::wire::service::{CalibrationJobView, Page, TrainingDataView};
 use crate::wire::words::JobState;
 use offbd_core::vocabulary::Invalid;
 
 impl Service {
-    /// Queues a job that calibrates `asset` from its `sessions`.
+    /// Queues a job that calibrates `asset` from its `sessions`, or stretches of them.
     ///
     /// # Errors
-    /// [`ServiceError::Invalid`] for a session of another asset; [`ServiceError::Busy`].
+    /// [`ServiceError::Invalid`] for a session of another asset or an empty stretch; [`ServiceError::Busy`].
     pub async fn calibrate(
         &self,
         asset: &str,
-        sessions: Vec<String>,
+        sessions: Vec<TrainingDataView>,
     ) -> Result<CalibrationJobView, ServiceError> {
         self.asset(asset).await?;
         if !(1..=MAX_CALIBRATION_SESSIONS).contains(&sessions.len()) {
             let reason = format!("must name 1 to {MAX_CALIBRATION_SESSIONS} sessions");
             return Err(Invalid::new("/sessions", reason).into());
         }
-        for (i, id) in sessions.iter().enumerate() {
+        for (i, data) in sessions.iter().enumerate() {
+            let (id, range) = (data.session(), data.range());
+            if range.from_s > range.to_s {
+                let reason = format!("must not be less than from_s, which is {}", range.from_s);
+                return Err(Invalid::new(format!("/sessions/{i}/to_s"), reason).into());
+            }
             let row = self.inner.handles.store.session(id).await?;
             if row.is_none_or(|row| row.asset != asset) {
                 let reason = format!("asset `{asset}` has no session `{id}`");

@@ -5,6 +5,7 @@ use crate::service::{Service, ServiceError, views};
 use crate::store::{RecordingReader, SessionFilter, SessionRow};
 use crate::wire::service::{Page, SessionView};
 use crate::wire::words::SessionState;
+use offbd_core::vocabulary::TimeRange;
 
 impl Service {
     /// Ends the asset's open session and opens a new one, by default named by the current
@@ -105,16 +106,17 @@ impl Service {
         views::page(rows, limit, |row| (row.opened_at, row.id.clone()), views::session)
     }
 
-    /// Returns a session and a reader of its recording.
+    /// Returns a session and a reader of the part of its recording in `range`.
     ///
     /// # Errors
     /// [`ServiceError::UnknownSession`].
     pub async fn recording(
         &self,
         id: &str,
+        range: TimeRange,
     ) -> Result<(SessionView, RecordingReader), ServiceError> {
         let row = self.session_row(id).await?;
-        let recording = self.inner.handles.store.recording(&row, 0);
+        let recording = self.inner.handles.store.stretch(&row, range).await?;
         Ok((views::session(row)?, recording))
     }
 }

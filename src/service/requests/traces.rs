@@ -1,6 +1,6 @@
 //! The trace of a session, for plots.
 
-use crate::service::reanalysis::trace::{MAX_EVALUATED, trace};
+use crate::service::reanalysis::trace::trace;
 use crate::service::{Service, ServiceError, TraceQuery};
 use crate::wire::trace::TraceView;
 
@@ -9,13 +9,9 @@ impl Service {
     ///
     /// # Errors
     /// [`ServiceError::UnknownSession`]; [`ServiceError::Invalid`] for invalid settings;
-    /// [`ServiceError::TooMany`] if the session is too long; [`ServiceError::Busy`].
+    /// [`ServiceError::TooMany`] if the range is too long; [`ServiceError::Busy`].
     pub async fn trace(&self, id: &str, query: TraceQuery) -> Result<TraceView, ServiceError> {
         let session = self.session_row(id).await?;
-        if session.progress.n_samples > MAX_EVALUATED {
-            let limit = usize::try_from(MAX_EVALUATED).unwrap_or(usize::MAX);
-            return Err(ServiceError::TooMany { what: "samples in the session", limit });
-        }
         let busy = |_| ServiceError::Busy { what: "the limit of concurrent traces is reached" };
         let permit = self.inner.traces.clone().try_acquire_owned().map_err(busy)?;
         let handles = self.inner.handles.clone();

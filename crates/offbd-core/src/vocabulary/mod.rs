@@ -15,4 +15,4 @@ pub use fault::{FaultCode, FaultKind, FaultStatus, UnknownWord};
 pub use number::{Brief, Invalid, in_range, positive};
 pub use sample::Sample;
 pub(crate) use time::CLOCK_RESOLUTION_S;
-pub use time::SimTime;
+pub use time::{SimTime, TimeRange};

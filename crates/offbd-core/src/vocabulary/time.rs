@@ -57,3 +57,21 @@ impl Add<f64> for SimTime {
         Self((self.0 + seconds).clamp(f64::MIN, f64::MAX))
     }
 }
+
+/// A range of times on the device's clock, s; both ends are included.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TimeRange {
+    pub from_s: f64,
+    pub to_s: f64,
+}
+
+impl TimeRange {
+    /// All times.
+    pub const ALL: Self = Self { from_s: f64::NEG_INFINITY, to_s: f64::INFINITY };
+
+    /// Whether `t_s` is in the range.
+    #[must_use]
+    pub fn contains(&self, t_s: f64) -> bool {
+        (self.from_s..=self.to_s).contains(&t_s)
+    }
+}
