@@ -114,7 +114,7 @@ fn policy(config: &Config) -> Result<AccessPolicy> {
 
 /// Logs warnings about an insecure or unusable configuration.
 async fn warn_of_access(config: &Config, policy: &AccessPolicy, store: &Store) -> Result<()> {
-    if policy.required && config.jwt.is_none() && store.n_tokens(Clock.now()).await? == 0 {
+    if policy.required && config.jwt.is_none() && store.n_tokens(Clock::System.now()).await? == 0 {
         tracing::warn!(
             "there is no valid token, so every request is refused; create one with \
              `offbd token create --name NAME --role admin`, with the same --data and --config"

@@ -87,7 +87,7 @@ pub(super) fn run(args: &TokenArgs) -> anyhow::Result<()> {
 
 async fn create(args: &CreateArgs) -> anyhow::Result<()> {
     const DAY: Micros = 86_400_000_000;
-    let expires_at = args.days.map(|days| Clock.now() + Micros::from(days) * DAY);
+    let expires_at = args.days.map(|days| Clock::System.now() + Micros::from(days) * DAY);
     let CreateArgs { name, role, asset, .. } = args.clone();
     let wanted = NewToken { name, role, asset, expires_at };
     let created = tokens::create_token(&args.config.load()?, wanted).await;

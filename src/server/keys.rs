@@ -114,7 +114,7 @@ impl KeyRefresher {
         let document = document.with_context(|| format!("`jwt.jwks`: cannot read {location}"))?;
         let keys = KeySet::parse(&document).with_context(|| format!("`jwt.jwks`: {location}"))?;
         tracing::debug!(location, keys = keys.n_keys(), "the provider's keys are read");
-        self.feed.publish(keys, Clock.now());
+        self.feed.publish(keys, Clock::System.now());
         Ok(())
     }
 }

@@ -34,7 +34,8 @@ async fn open_store(config: &Config) -> Result<(Store, Writer)> {
 
 async fn write(mut writer: Writer, change: AccessWrite, act: &str, id: &str) -> Result<()> {
     let (act, target) = (act.to_owned(), format!("/api/v1/tokens/{id}"));
-    let entry = AuditEntry { action: act, target, address: None }.row((ACTOR, None), Clock.now());
+    let entry =
+        AuditEntry { action: act, target, address: None }.row((ACTOR, None), Clock::System.now());
     let changes = [change, AccessWrite::Audit(entry)];
     let mut set = changes.map(Write::Access).to_vec();
     writer.commit(&mut [&mut set]).await?;
@@ -46,7 +47,7 @@ async fn write(mut writer: Writer, change: AccessWrite, act: &str, id: &str) -> 
 /// # Errors
 /// If the token is invalid, its name is taken, or the store cannot be written.
 pub async fn create_token(config: &Config, wanted: NewToken) -> Result<String> {
-    let minted = mint(wanted, ACTOR, Clock.now())?;
+    let minted = mint(wanted, ACTOR, Clock::System.now())?;
     let (store, writer) = open_store(config).await?;
     let name = &minted.row.name;
     if store.token_named(name).await?.is_some() {
@@ -93,6 +94,6 @@ pub async fn revoke_token(config: &Config, name_or_id: &str) -> Result<()> {
         None => store.token(name_or_id).await?.filter(|row| row.revoked_at.is_none()),
     };
     let Some(row) = found else { bail!("no token `{name_or_id}` is in force") };
-    let change = AccessWrite::RevokeToken { id: row.id.clone(), at: Clock.now() };
+    let change = AccessWrite::RevokeToken { id: row.id.clone(), at: Clock::System.now() };
     write(writer, change, "revoke_token", &row.id).await
 }

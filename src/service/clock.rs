@@ -2,16 +2,26 @@
 
 use crate::store::Micros;
 
-/// Reads the wall clock.
-#[derive(Clone, Copy, Debug)]
-pub struct Clock;
+/// The wall clock.
+#[derive(Clone, Debug)]
+pub enum Clock {
+    /// That of the system.
+    System,
+    /// A time that a simulation sets.
+    #[cfg(test)]
+    Simulated(std::sync::Arc<std::sync::atomic::AtomicI64>),
+}
 
 impl Clock {
     /// Returns the current time.
     #[must_use]
     #[expect(clippy::disallowed_methods, reason = "the only place that reads the clock")]
-    pub fn now(self) -> Micros {
-        jiff::Timestamp::now().as_microsecond()
+    pub fn now(&self) -> Micros {
+        match self {
+            Self::System => jiff::Timestamp::now().as_microsecond(),
+            #[cfg(test)]
+            Self::Simulated(now) => now.load(std::sync::atomic::Ordering::SeqCst),
+        }
     }
 }
 

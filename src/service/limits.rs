@@ -24,6 +24,9 @@ pub struct Limits {
     /// are folded into the recordings after each commit; the journal stays below twice
     /// this.
     pub journal_bytes: usize,
+    /// Samples of a session between two snapshots of its engine, which a restart has to
+    /// evaluate again.
+    pub snapshot_interval: i64,
     /// Samples in a batch; a longer batch is refused.
     pub batch_samples: usize,
     /// Bytes of a batch; a longer batch is refused.
@@ -47,6 +50,7 @@ impl Default for Limits {
             commit_queue: 1024,
             in_flight_samples: 500_000,
             journal_bytes: 16 << 20,
+            snapshot_interval: SNAPSHOT_INTERVAL,
             batch_samples: 10_000,
             batch_bytes: 4 << 20,
             import_bytes: 64 << 20,
@@ -63,6 +67,10 @@ impl Limits {
         self.batch_samples.min(self.in_flight_samples)
     }
 }
+
+/// Default of [`Limits::snapshot_interval`]. Chosen: judging as many again takes some 20 ms,
+/// and the snapshots, of about 15 kB each, are a tenth of what the samples themselves take.
+const SNAPSHOT_INTERVAL: i64 = 16_384;
 
 /// Time after which a client should retry, s (`Retry-After`).
 pub const RETRY_AFTER_S: u64 = 1;

@@ -10,13 +10,9 @@ use crate::store::{SessionRow, Snapshot};
 use crate::wire::basis::Basis;
 use offbd_core::engine::{JUDGEMENT, SNAPSHOT_FORMAT, Setup, UsableMotion};
 
-/// Samples of a session between two snapshots. Chosen: judging as many again takes some 20 ms,
-/// and the snapshots, of about 15 kB each, are a tenth of what the samples themselves take.
-pub(super) const INTERVAL: i64 = 16_384;
-
-/// Samples of a session between two snapshots that are kept, so that a stretch of a long
+/// Of the snapshots of a session, one in as many is kept, so that a stretch of a long
 /// recording can be judged again by itself: some 0.3 s of one core.
-pub(super) const KEPT_INTERVAL: i64 = 1 << 18;
+const KEPT_OF: i64 = 16;
 
 /// The engine of a session at some sample.
 pub(super) struct RestoredEngine {
@@ -40,19 +36,24 @@ pub(super) fn state(
     rmp_serde::to_vec(&(judging, motion)).map_err(ServiceError::corrupt)
 }
 
-/// Returns a snapshot of the engine of `session` after `n_samples` samples; `last` is the
-/// number of samples at the previous one.
+/// Returns whether the snapshot of a session after `n_samples` samples is kept; `last` is the
+/// number of samples at the previous one, and `interval` the usual one between two.
+pub(super) const fn is_kept(n_samples: i64, last: i64, interval: i64) -> bool {
+    n_samples / (KEPT_OF * interval) > last / (KEPT_OF * interval)
+}
+
+/// Returns a snapshot of the engine of `session` after `n_samples` samples.
 pub(super) fn take(
     session: &str,
     n_samples: i64,
-    last: i64,
+    kept: bool,
     judging: &Judging,
     motion: Option<&UsableMotion>,
 ) -> Result<Snapshot, ServiceError> {
     Ok(Snapshot {
         session: session.to_owned(),
         n_samples,
-        kept: n_samples / KEPT_INTERVAL > last / KEPT_INTERVAL,
+        kept,
         version: version(),
         state: state(judging, motion)?,
     })

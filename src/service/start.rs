@@ -9,13 +9,13 @@ use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
 
 use super::access::{PrincipalCache, Provider};
-use super::asset::{AssetCommand, Environment, MANY_SAMPLES, Presences, Shards};
+use super::asset::{AssetCommand, Environment, Loader, MANY_SAMPLES, Presences, Shard, Shards};
 use super::job::{self, Job};
 use super::jobs::{self, JobContext};
 use super::limits::{MAX_DRIVE_CYCLES, MAX_RECORDINGS, MAX_TRACES};
 use super::upkeep::{Deleter, Scrubber, Sweeper, Watchdog};
-use super::writing::{Committer, Events, Handles, Outage};
-use super::{Limits, ServiceError, snapshots};
+use super::writing::{Committer, Events, FIRST_RETRY, Handles, Outage};
+use super::{Clock, Limits, ServiceError, snapshots};
 use crate::store::{Store, Write, Writer};
 
 /// A handle to the running service. Cheap to clone; all clones share one service.
@@ -95,14 +95,32 @@ async fn joined<T: Send + 'static>(thread: std::thread::JoinHandle<T>) -> Option
     tokio::task::spawn_blocking(|| thread.join()).await.ok()?.ok()
 }
 
-/// Discards the sessions of imports that a stop has interrupted.
-async fn discard_imports(handles: &Handles) -> Result<(), ServiceError> {
-    let at = handles.clock.now();
-    for session in handles.store.importing_sessions().await? {
-        tracing::warn!(session, "an import was interrupted; its session is discarded");
-        handles.write(Write::DiscardSession { session, at }).await?;
+/// The parts of a service that work by themselves, before they are started.
+pub(super) struct Parts {
+    pub(super) committer: Committer,
+    pub(super) shards: Vec<Shard>,
+    pub(super) loader: Loader,
+    pub(super) jobs: mpsc::Receiver<Job>,
+    pub(super) sweeper: Sweeper,
+    pub(super) scrubber: Scrubber,
+    pub(super) watchdog: Watchdog,
+}
+
+impl Parts {
+    /// Starts the writer, then the other threads and tasks.
+    async fn start(self, service: &Service) -> Result<Workers, ServiceError> {
+        let Inner { limits, handles, job_context, .. } = &*service.inner;
+        let committer = self.committer.spawn()?;
+        // Before the sweeper, which deletes them.
+        service.discard_imports().await?;
+        let shards = self.shards.into_iter().map(Shard::spawn).collect::<Result<_, _>>()?;
+        let mut jobs = jobs::spawn(limits.jobs, job_context, self.jobs);
+        jobs.push(tokio::spawn(self.loader.run()));
+        jobs.push(tokio::spawn(self.sweeper.run()));
+        jobs.push(tokio::spawn(self.scrubber.run()));
+        jobs.push(tokio::spawn(self.watchdog.run()));
+        Ok(Workers { shards, jobs, closing: handles.closing.clone(), committer })
     }
-    Ok(())
 }
 
 impl Service {
@@ -118,11 +136,26 @@ impl Service {
         limits: Limits,
         provider: Option<Provider>,
     ) -> Result<(Self, Workers), ServiceError> {
+        let (service, parts) = Self::assemble(store, writer, limits, provider, Clock::System);
+        let workers = parts.start(&service).await?;
+        service.resume_jobs().await?;
+        Ok((service, workers))
+    }
+
+    /// Returns a service and its parts that are to be started, on the current tokio runtime.
+    pub(super) fn assemble(
+        store: Store,
+        writer: Writer,
+        limits: Limits,
+        provider: Option<Provider>,
+        clock: Clock,
+    ) -> (Self, Parts) {
         let events = Events::new(store.clone());
         let (sets, queue) = mpsc::channel(limits.commit_queue);
         let (outage_sender, outage) = watch::channel(None);
         let closing = CancellationToken::new();
         let n_commits = Arc::new(AtomicU64::new(0));
+        let handles = Handles::new(store, clock, &limits, sets, outage.clone(), closing.clone());
         let committer = Committer {
             writer,
             queue,
@@ -131,51 +164,50 @@ impl Service {
             n_commits: n_commits.clone(),
             closing: closing.clone(),
             journal_bytes: limits.journal_bytes,
+            first_retry: FIRST_RETRY,
         };
-        let committer = committer.spawn()?;
         let presences = Presences::default();
         let (jobs, jobs_queue) = mpsc::channel(job::MAX_QUEUED);
-        let handles = Handles::new(store, sets, outage.clone(), closing.clone());
-        discard_imports(&handles).await?;
         let env = Environment {
             handles: handles.clone(),
             presences: presences.clone(),
             jobs: jobs.clone(),
         };
-        let (shards, threads) = Shards::start(&limits, env)?;
-        let job_context = JobContext::new(handles.clone(), shards.clone());
-        let mut workers = jobs::spawn(limits.jobs, &job_context, jobs_queue);
+        let (queues, shards, loader) = Shards::new(&limits, &env);
         let deleter = Deleter::new(handles.clone());
-        let sweeper = Sweeper {
-            handles: handles.clone(),
-            deleter: deleter.clone(),
-            retention: limits.retention.clone(),
-        };
-        workers.push(tokio::spawn(sweeper.run()));
-        let scrubber = Scrubber { handles: handles.clone(), shards: shards.clone() };
-        workers.push(tokio::spawn(scrubber.run()));
         let in_flight = Arc::new(Semaphore::new(limits.in_flight_samples));
         let stalled = Arc::new(AtomicBool::new(false));
-        let watchdog = Watchdog {
-            in_flight: in_flight.clone(),
-            batch_samples: limits.longest_batch(),
-            n_commits,
-            stalled: stalled.clone(),
-            closing: closing.clone(),
+        let parts = Parts {
+            committer,
+            shards,
+            loader,
+            jobs: jobs_queue,
+            sweeper: Sweeper {
+                handles: handles.clone(),
+                deleter: deleter.clone(),
+                retention: limits.retention.clone(),
+            },
+            scrubber: Scrubber { handles: handles.clone(), shards: queues.clone() },
+            watchdog: Watchdog {
+                in_flight: in_flight.clone(),
+                batch_samples: limits.longest_batch(),
+                n_commits,
+                stalled: stalled.clone(),
+                closing,
+            },
         };
-        workers.push(tokio::spawn(watchdog.run()));
         let inner = Inner {
+            job_context: JobContext::new(handles.clone(), queues.clone()),
             handles,
             limits,
             events,
             presences,
             principals: PrincipalCache::default(),
             provider,
-            shards,
+            shards: queues,
             outage,
             deleter,
             jobs,
-            job_context,
             in_flight,
             stalled,
             n_rebuilding: AtomicUsize::new(0),
@@ -183,10 +215,18 @@ impl Service {
             traces: Arc::new(Semaphore::new(MAX_TRACES)),
             drive_cycles: Arc::new(Semaphore::new(MAX_DRIVE_CYCLES)),
         };
-        let workers = Workers { shards: threads, jobs: workers, closing, committer };
-        let service = Self { inner: Arc::new(inner) };
-        service.resume_jobs().await?;
-        Ok((service, workers))
+        (Self { inner: Arc::new(inner) }, parts)
+    }
+
+    /// Discards the sessions of imports that a stop has interrupted.
+    async fn discard_imports(&self) -> Result<(), ServiceError> {
+        let handles = &self.inner.handles;
+        let at = handles.clock.now();
+        for session in handles.store.importing_sessions().await? {
+            tracing::warn!(session, "an import was interrupted; its session is discarded");
+            handles.write(Write::DiscardSession { session, at }).await?;
+        }
+        Ok(())
     }
 
     /// Loads the assets whose engine must evaluate a long recording again, because there is

@@ -371,13 +371,13 @@ async fn a_token_expires_and_is_invalid_once_its_asset_is_deleted() {
     let none = json!({ "name": "x", "role": "device", "asset": "none" });
     service.admin.post("tokens", &none).await.problem(404);
     // Expires in 1.5 s.
-    let end = offbd::service::Clock.now() + 1_500_000;
+    let end = offbd::service::Clock::System.now() + 1_500_000;
     let wanted =
         NewToken { name: "brief".into(), role: Role::Viewer, asset: None, expires_at: Some(end) };
     let secret = tokens::create_token(&service.config, wanted).await.unwrap();
     let brief = service.fixture.client.with(&secret);
     eventually(|| async { (brief.get("assets").await.status == 401).then_some(()) }).await;
-    assert!(offbd::service::Clock.now() >= end, "not before it expires");
+    assert!(offbd::service::Clock::System.now() >= end, "not before it expires");
     let device = service.device("b").await;
     device.get("assets/b").await.expect(200);
     service.admin.delete("assets/b").await.expect(204);

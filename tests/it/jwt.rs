@@ -329,7 +329,7 @@ async fn a_stream_ends_when_its_token_expires() {
     let (_directory, path) = key_file(&[&key]);
     let fixture = service(path, |_| {}).await;
     // Expires in four seconds, including the leeway.
-    let end = offbd::service::Clock.now() as f64 / 1e6 + 4.0;
+    let end = offbd::service::Clock::System.now() as f64 / 1e6 + 4.0;
     let mut brief = provider::device("a");
     brief["exp"] = json!(end - LEEWAY_S);
     let device = fixture.client.with(&key.token(&brief));
@@ -337,7 +337,7 @@ async fn a_stream_ends_when_its_token_expires() {
     let mut events = Events::new(events);
     assert_eq!(events.any().await.0, "begin");
     assert!(events.ended().await);
-    assert!(offbd::service::Clock.now() as f64 / 1e6 >= end, "not before it expires");
+    assert!(offbd::service::Clock::System.now() as f64 / 1e6 >= end, "not before it expires");
     device.get("assets/a").await.problem(401);
 }
 

@@ -5,7 +5,7 @@ use super::recorded::RecordedSamples;
 use super::session::OpenSession;
 use super::sessions::SessionSwitch;
 use super::turn::Turn;
-use crate::service::{ServiceError, snapshots, views};
+use crate::service::{ServiceError, views};
 use crate::store::{SessionRow, Write};
 use crate::wire::telemetry::{AckView, Batch, RowView};
 use offbd_core::engine::{Admission, Recognition, Rejection, rejection};
@@ -156,10 +156,9 @@ impl Asset {
         let Some(open) = self.open.as_mut().filter(|_| !samples.is_empty()) else { return Ok(()) };
         let (session, progress) = (open.id.clone(), open.progress);
         turn.writes.push(Write::Append { session, first_index, samples, progress });
-        let n = progress.n_samples;
-        if n - open.snapshot_at >= snapshots::INTERVAL {
-            turn.writes.push(Write::PutSnapshot(open.snapshot(n)?));
-        }
+        let interval = turn.env.handles.snapshot_interval;
+        let snapshot = open.snapshot_if_due(progress.n_samples, interval)?;
+        turn.writes.extend(snapshot.map(Write::PutSnapshot));
         Ok(())
     }
 

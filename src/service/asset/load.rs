@@ -135,19 +135,18 @@ fn evaluate(
         };
         open.take_new(&sample);
         n += 1;
-        if n % snapshots::INTERVAL != 0 {
-            return ControlFlow::Continue(());
-        }
-        let closing = ServiceError::Unavailable { what: "the service is shutting down" };
-        failure = match open.snapshot(n) {
-            Ok(_) if handles.closing.is_cancelled() => Some(closing),
-            Ok(snapshot) => {
+        match open.snapshot_if_due(n, handles.snapshot_interval) {
+            Ok(None) => {}
+            Ok(Some(_)) if handles.closing.is_cancelled() => {
+                let what = "the service is shutting down";
+                failure = Some(ServiceError::Unavailable { what });
+            }
+            Ok(Some(snapshot)) => {
                 due.retain(|earlier| earlier.kept);
                 due.push(snapshot);
-                None
             }
-            Err(error) => Some(error),
-        };
+            Err(error) => failure = Some(error),
+        }
         if failure.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })?;
     if let Some(error) = failure {

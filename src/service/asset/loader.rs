@@ -4,7 +4,9 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use tokio::sync::mpsc::{Sender, WeakSender};
+use tokio::sync::mpsc::{
+    Sender, UnboundedReceiver, UnboundedSender, WeakSender, unbounded_channel,
+};
 use tokio::sync::{AcquireError, Semaphore};
 
 use super::actor::Asset;
@@ -31,21 +33,56 @@ const LONGEST_RETRY_S: i64 = 60;
 /// seconds of work.
 const MANY_ASSETS: usize = 256;
 
-/// What the loaders of all shards share.
+/// The queue of assets to load, as a shard sees it. Unbounded, since a shard requests each
+/// of its assets once at a time.
+#[derive(Clone)]
+pub(super) struct LoadQueue {
+    requests: UnboundedSender<LoadRequest>,
+    n_waiting: Arc<AtomicUsize>,
+    /// The queue of the shard, which gets the result.
+    shard: WeakSender<ShardMessage>,
+}
+
+impl LoadQueue {
+    /// Returns the queue for another shard.
+    pub(super) fn of(&self, shard: &Sender<ShardMessage>) -> Self {
+        Self { shard: shard.downgrade(), ..self.clone() }
+    }
+
+    /// Requests to load the asset `name`; the shard gets the result as a message. Returns why
+    /// commands must not wait for it, if many assets are to be loaded before.
+    pub(super) fn load(&self, name: &str) -> Option<ServiceError> {
+        let closing = ServiceError::Unavailable { what: "the service is shutting down" };
+        let Some(shard) = self.shard.upgrade() else { return Some(closing) };
+        let n_before = self.n_waiting.fetch_add(1, Ordering::Relaxed);
+        let request = LoadRequest { asset: name.to_owned(), shard };
+        if self.requests.send(request).is_err() {
+            return Some(closing);
+        }
+        let many = ServiceError::Busy { what: "many assets are being loaded" };
+        (n_before >= MANY_ASSETS).then_some(many)
+    }
+}
+
+/// A request to load an asset.
+pub(in crate::service) struct LoadRequest {
+    asset: String,
+    shard: Sender<ShardMessage>,
+}
+
+/// Executes the requests of all shards.
+pub(in crate::service) struct Loader {
+    handles: Handles,
+    requests: UnboundedReceiver<LoadRequest>,
+    limits: Arc<LoadLimits>,
+}
+
 struct LoadLimits {
     /// One permit for each asset that is being loaded, while it has few samples to evaluate.
     few: Semaphore,
     /// One permit for each asset that has many samples to evaluate.
     many: Semaphore,
-    n_waiting: AtomicUsize,
-}
-
-/// The loader of one shard. Cheap to clone.
-#[derive(Clone)]
-pub(super) struct Loader {
-    handles: Handles,
-    shard: WeakSender<ShardMessage>,
-    limits: Arc<LoadLimits>,
+    n_waiting: Arc<AtomicUsize>,
 }
 
 /// An asset after its first step.
@@ -56,60 +93,64 @@ enum Progress {
 }
 
 impl Loader {
-    /// Returns the loader of the first of `shards`, which is cloned for the others.
-    pub(super) fn new(handles: Handles, n_shards: usize, shard: &Sender<ShardMessage>) -> Self {
+    /// Returns the loader of `n_shards` shards, and the queue of the first of them.
+    pub(super) fn new(
+        handles: Handles,
+        n_shards: usize,
+        shard: &Sender<ShardMessage>,
+    ) -> (Self, LoadQueue) {
+        let (sender, requests) = unbounded_channel();
+        let n_waiting = Arc::new(AtomicUsize::new(0));
         let (few, many) = (Semaphore::new(2 * n_shards), Semaphore::new(n_shards));
-        let limits = LoadLimits { few, many, n_waiting: AtomicUsize::new(0) };
-        Self { handles, shard: shard.downgrade(), limits: Arc::new(limits) }
+        let limits = LoadLimits { few, many, n_waiting: n_waiting.clone() };
+        let queue = LoadQueue { requests: sender, n_waiting, shard: shard.downgrade() };
+        (Self { handles, requests, limits: Arc::new(limits) }, queue)
     }
 
-    /// Returns a loader for another shard, with the same limits.
-    pub(super) fn of(&self, shard: &Sender<ShardMessage>) -> Self {
-        Self { shard: shard.downgrade(), ..self.clone() }
+    /// Executes the requests, several at a time, until all shards have ended.
+    pub(in crate::service) async fn run(mut self) {
+        while let Some(LoadRequest { asset, shard }) = self.requests.recv().await {
+            let (handles, limits) = (self.handles.clone(), self.limits.clone());
+            tokio::spawn(async move {
+                let result = Box::new(load(&handles, &limits, &asset, &shard).await);
+                limits.n_waiting.fetch_sub(1, Ordering::Relaxed);
+                // Fails only if the thread of the shard has panicked.
+                let _ = shard.send(ShardMessage::Loaded { asset, result }).await;
+            });
+        }
     }
+}
 
-    /// Starts to load the asset `name`; its shard gets the result as a message. Returns why
-    /// requests must not wait for it, if many assets are to be loaded before.
-    pub(super) fn load(&self, name: &str) -> Option<ServiceError> {
-        let Some(shard) = self.shard.upgrade() else {
-            return Some(ServiceError::Unavailable { what: "the service is shutting down" });
-        };
-        let n_waiting = self.limits.n_waiting.fetch_add(1, Ordering::Relaxed);
-        let (this, name) = (self.clone(), name.to_owned());
-        self.handles.runtime.spawn(async move {
-            let result = Box::new(this.result(&name, &shard).await);
-            this.limits.n_waiting.fetch_sub(1, Ordering::Relaxed);
-            // Fails only if the thread of the shard has panicked.
-            let _ = shard.send(ShardMessage::Loaded { asset: name, result }).await;
-        });
-        let many = ServiceError::Busy { what: "many assets are being loaded" };
-        (n_waiting >= MANY_ASSETS).then_some(many)
-    }
+async fn load(
+    handles: &Handles,
+    limits: &LoadLimits,
+    name: &str,
+    shard: &Sender<ShardMessage>,
+) -> LoadResult {
+    let permit = limits.few.acquire().await.map_err(closed)?;
+    let (for_reading, asset) = (handles.clone(), name.to_owned());
+    let stored = match blocking(name, move || begin(&for_reading, &asset)).await? {
+        Progress::Loaded(asset) => return Ok(asset),
+        Progress::Behind(stored) => stored,
+    };
+    drop(permit);
+    let n_behind = stored.n_behind();
+    tracing::info!(asset = name, n_behind, "the engine is rebuilt from a long recording");
+    let retry_after_s = (1 + n_behind / SAMPLES_PER_S).min(LONGEST_RETRY_S).unsigned_abs();
+    let message = ShardMessage::Rebuilding { asset: name.to_owned(), retry_after_s };
+    let _ = shard.send(message).await;
+    let _permit = limits.many.acquire().await.map_err(closed)?;
+    let handles = handles.clone();
+    blocking(name, move || stored.catch_up(&handles).map(Box::new)).await
+}
 
-    async fn result(&self, name: &str, shard: &Sender<ShardMessage>) -> LoadResult {
-        let permit = self.limits.few.acquire().await.map_err(closed)?;
-        let (handles, asset) = (self.handles.clone(), name.to_owned());
-        let stored = blocking(name, move || {
-            let stored = StoredAsset::read(&handles, &asset)?;
-            if stored.n_behind() >= MANY_SAMPLES {
-                return Ok(Progress::Behind(Box::new(stored)));
-            }
-            stored.catch_up(&handles).map(|asset| Progress::Loaded(Box::new(asset)))
-        });
-        let stored = match stored.await? {
-            Progress::Loaded(asset) => return Ok(asset),
-            Progress::Behind(stored) => stored,
-        };
-        drop(permit);
-        let n_behind = stored.n_behind();
-        tracing::info!(asset = name, n_behind, "the engine is rebuilt from a long recording");
-        let retry_after_s = (1 + n_behind / SAMPLES_PER_S).min(LONGEST_RETRY_S).unsigned_abs();
-        let message = ShardMessage::Rebuilding { asset: name.to_owned(), retry_after_s };
-        let _ = shard.send(message).await;
-        let _permit = self.limits.many.acquire().await.map_err(closed)?;
-        let handles = self.handles.clone();
-        blocking(name, move || stored.catch_up(&handles).map(Box::new)).await
+/// Reads the asset `name`, and evaluates its recording unless that takes long.
+fn begin(handles: &Handles, name: &str) -> Result<Progress, ServiceError> {
+    let stored = StoredAsset::read(handles, name)?;
+    if stored.n_behind() >= MANY_SAMPLES {
+        return Ok(Progress::Behind(Box::new(stored)));
     }
+    stored.catch_up(handles).map(|asset| Progress::Loaded(Box::new(asset)))
 }
 
 fn closed(_: AcquireError) -> ServiceError {

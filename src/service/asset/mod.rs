@@ -37,8 +37,9 @@ mod turn;
 
 pub(super) use command::{Answer, AssetCommand, Reply};
 pub(super) use learning_record::{LearningRecord, TrainingSession};
-pub(super) use loader::MANY_SAMPLES;
+pub(super) use loader::{Loader, MANY_SAMPLES};
 pub(super) use presence::Presences;
+pub(super) use shard::Shard;
 pub(super) use shards::Shards;
 pub(super) use trend::{MAX_ROWS as MAX_TREND_ROWS, TrendPoint, points as trend_points};
 pub(super) use turn::Environment;

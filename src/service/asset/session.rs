@@ -82,10 +82,19 @@ impl OpenSession {
         admission
     }
 
-    /// Returns a snapshot of the engine, which has evaluated `n_samples` recorded samples.
-    pub(super) fn snapshot(&mut self, n_samples: i64) -> Result<Snapshot, ServiceError> {
+    /// Returns a snapshot of the engine, which has evaluated `n_samples` recorded samples, if
+    /// the last one was `interval` samples ago.
+    pub(super) fn snapshot_if_due(
+        &mut self,
+        n_samples: i64,
+        interval: i64,
+    ) -> Result<Option<Snapshot>, ServiceError> {
+        if n_samples - self.snapshot_at < interval {
+            return Ok(None);
+        }
         let last = std::mem::replace(&mut self.snapshot_at, n_samples);
-        snapshots::take(&self.id, n_samples, last, &self.judging, self.motion.as_ref())
+        let kept = snapshots::is_kept(n_samples, last, interval);
+        snapshots::take(&self.id, n_samples, kept, &self.judging, self.motion.as_ref()).map(Some)
     }
 
     /// Samples that are not judged because no other confirmed their step of the clock.

@@ -9,7 +9,7 @@ use tokio::sync::mpsc;
 
 use super::actor::Asset;
 use super::command::{AssetCommand, Reply};
-use super::loader::{LoadResult, Loader};
+use super::loader::{LoadQueue, LoadResult};
 use super::shards::ShardMessage;
 use super::turn::{Environment, Turn};
 use crate::service::ServiceError;
@@ -33,9 +33,11 @@ struct Loading {
 }
 
 /// The assets of one thread.
-pub(super) struct Shard {
+pub(in crate::service) struct Shard {
+    number: usize,
+    queue: mpsc::Receiver<ShardMessage>,
     env: Environment,
-    loader: Loader,
+    loads: LoadQueue,
     slots: BTreeMap<String, Slot>,
     /// Limit of the commands that wait for assets to be loaded.
     max_waiting: usize,
@@ -44,29 +46,27 @@ pub(super) struct Shard {
 }
 
 impl Shard {
-    fn new(number: usize, env: Environment, loader: Loader, max_waiting: usize) -> Self {
-        let n_running = metrics::gauge!("offbd_engines", "shard" => number.to_string());
-        Self { env, loader, slots: BTreeMap::new(), max_waiting, n_waiting: 0, n_running }
-    }
-
-    /// Starts the thread `number`, which executes the messages of `queue`.
-    pub(super) fn spawn(
+    /// Returns the shard `number`, which executes the messages of `queue`.
+    pub(super) fn new(
         number: usize,
         env: Environment,
-        loader: Loader,
-        mut queue: mpsc::Receiver<ShardMessage>,
-    ) -> Result<JoinHandle<()>, ServiceError> {
+        loads: LoadQueue,
+        queue: mpsc::Receiver<ShardMessage>,
+    ) -> Self {
+        let n_running = metrics::gauge!("offbd_engines", "shard" => number.to_string());
+        let max_waiting = queue.max_capacity();
+        let (slots, n_waiting) = (BTreeMap::new(), 0);
+        Self { number, queue, env, loads, slots, max_waiting, n_waiting, n_running }
+    }
+
+    /// Starts the thread of the shard, which ends when all senders of its queue are dropped.
+    pub(in crate::service) fn spawn(mut self) -> Result<JoinHandle<()>, ServiceError> {
+        let thread = std::thread::Builder::new().name(format!("shard-{}", self.number));
         let work = move || {
-            let mut shard = Self::new(number, env, loader, queue.max_capacity());
-            while let Some(message) = queue.blocking_recv() {
-                if shard.env.handles.writer().is_closed() {
-                    // Nothing can be committed any more; dropping the reply reports an error.
-                    continue;
-                }
-                shard.handle(message);
+            while let Some(message) = self.queue.blocking_recv() {
+                self.handle(message);
             }
         };
-        let thread = std::thread::Builder::new().name(format!("shard-{number}"));
         thread.spawn(work).map_err(|error| {
             tracing::error!(%error, "cannot start the thread of a shard");
             ServiceError::Unavailable { what: "cannot start the thread of a shard" }
@@ -74,6 +74,10 @@ impl Shard {
     }
 
     fn handle(&mut self, message: ShardMessage) {
+        if self.env.handles.writer().is_closed() {
+            // Nothing can be committed any more; dropping the reply reports an error.
+            return;
+        }
         match message {
             ShardMessage::Command { asset, command } => self.dispatch(&asset, command),
             ShardMessage::Rebuilding { asset, retry_after_s } => {
@@ -92,7 +96,7 @@ impl Shard {
             }
             Some(Slot::Loading(loading)) => self.wait(name, loading, command),
             _ => {
-                let refusal = self.loader.load(name);
+                let refusal = self.loads.load(name);
                 self.wait(name, Loading { refusal, ..Loading::default() }, command);
             }
         }
@@ -319,10 +323,12 @@ impl Shard {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::service::asset::Shards;
     use crate::service::asset::presence::Presences;
     use crate::service::asset::session::OpenSession;
     use crate::service::asset::session_rate::SessionRate;
     use crate::service::writing::Handles;
+    use crate::service::{Clock, Limits};
     use crate::store::{Location, Store};
     use offbd_core::engine::{Rig, Setup};
     use offbd_core::vocabulary::Sample;
@@ -361,11 +367,12 @@ mod tests {
         let (store, _writer) = Store::open(&location).await.unwrap();
         let ((jobs, _), (writer, _)) = (mpsc::channel(1), mpsc::channel(1));
         let (_, outage) = watch::channel(None);
-        let handles = Handles::new(store, writer, outage, CancellationToken::new());
+        let (limits, closing) =
+            (Limits { shards: 1, ..Limits::default() }, CancellationToken::new());
+        let handles = Handles::new(store, Clock::System, &limits, writer, outage, closing);
         let env = Environment { handles, presences: Presences::default(), jobs };
-        let (queue, _messages) = mpsc::channel(1);
-        let loader = Loader::new(env.handles.clone(), 1, &queue);
-        let mut shard = Shard::new(0, env, loader, 1);
+        let (_queues, mut shards, _loader) = Shards::new(&limits, &env);
+        let mut shard = shards.remove(0);
         let (reply, answer) = Reply::new();
         shard.change("a", Ok(asset()), reply, |asset, turn| {
             change(asset, turn)?;

@@ -2,7 +2,6 @@
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
-use std::thread::JoinHandle;
 
 use tokio::sync::mpsc;
 
@@ -28,21 +27,22 @@ pub(super) enum ShardMessage {
 pub(in crate::service) struct Shards(Arc<[mpsc::Sender<ShardMessage>]>);
 
 impl Shards {
-    /// Starts a thread for each shard; returns the queues and the threads.
-    pub(in crate::service) fn start(
+    /// Returns the queues, the shards that execute them, and the loader of their assets.
+    pub(in crate::service) fn new(
         limits: &Limits,
-        env: Environment,
-    ) -> Result<(Self, Vec<JoinHandle<()>>), ServiceError> {
-        let (mut senders, mut threads) = (Vec::new(), Vec::new());
-        let mut first_loader: Option<Loader> = None;
-        for number in 0..limits.shards {
+        env: &Environment,
+    ) -> (Self, Vec<Shard>, Loader) {
+        let (mut senders, mut queues) = (Vec::new(), Vec::new());
+        for _ in 0..limits.shards.max(1) {
             let (sender, queue) = mpsc::channel(limits.shard_queue);
-            let new = || Loader::new(env.handles.clone(), limits.shards, &sender);
-            let loader = first_loader.get_or_insert_with(new).of(&sender);
-            threads.push(Shard::spawn(number, env.clone(), loader, queue)?);
             senders.push(sender);
+            queues.push(queue);
         }
-        Ok((Self(senders.into()), threads))
+        let (loader, loads) = Loader::new(env.handles.clone(), senders.len(), &senders[0]);
+        let shard =
+            |(number, queue)| Shard::new(number, env.clone(), loads.of(&senders[number]), queue);
+        let shards = queues.into_iter().enumerate().map(shard).collect();
+        (Self(senders.into()), shards, loader)
     }
 
     /// Whether the thread of a shard has ended.
@@ -58,7 +58,7 @@ impl Shards {
     fn of(&self, asset: &str) -> &mpsc::Sender<ShardMessage> {
         let mut hasher = DefaultHasher::new();
         asset.hash(&mut hasher);
-        let number = hasher.finish() % self.0.len().max(1) as u64;
+        let number = hasher.finish() % self.0.len() as u64;
         &self.0[usize::try_from(number).unwrap_or_default()]
     }
 

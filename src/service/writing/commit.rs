@@ -19,7 +19,7 @@ const MAX_GROUP_SETS: usize = 512;
 
 /// Delay before the writer retries an unavailable database: the first, doubled with each
 /// attempt up to the longest.
-const RETRY_FIRST: Duration = Duration::from_millis(50);
+pub(in crate::service) const FIRST_RETRY: Duration = Duration::from_millis(50);
 const RETRY_LONGEST: Duration = Duration::from_secs(2);
 
 /// How often a group of write sets may fail while the database accepts other changes.
@@ -76,6 +76,8 @@ pub(in crate::service) struct Committer {
     pub(in crate::service) closing: CancellationToken,
     /// Bytes above which the journal is folded into the recordings.
     pub(in crate::service) journal_bytes: usize,
+    /// Delay before the first retry if the database is unavailable.
+    pub(in crate::service) first_retry: Duration,
 }
 
 /// Why write sets are not durable.
@@ -245,7 +247,7 @@ impl Committer {
     /// Waits until the database is available; returns whether the last commit has
     /// succeeded after all.
     async fn reconnect(&mut self) -> bool {
-        let mut wait = RETRY_FIRST;
+        let mut wait = self.first_retry;
         loop {
             tokio::time::sleep(wait).await;
             wait = (wait * 2).min(RETRY_LONGEST);

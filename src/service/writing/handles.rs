@@ -11,7 +11,7 @@ use tokio::sync::{mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 
 use super::commit::{EngineGeneration, Outage, WriteSet};
-use crate::service::{Clock, ServiceError};
+use crate::service::{Clock, Limits, ServiceError};
 use crate::store::{Store, StoreError, Write};
 
 /// The shared handles of the service. Cheap to clone.
@@ -22,11 +22,19 @@ pub(in crate::service) struct Handles {
     pub(in crate::service) runtime: Handle,
     /// Cancelled when the service shuts down.
     pub(in crate::service) closing: CancellationToken,
+    /// Samples of a session between two snapshots of its engine.
+    pub(in crate::service) snapshot_interval: i64,
     writer: mpsc::Sender<WriteSet>,
     outage: watch::Receiver<Outage>,
     /// Whether a fence has timed out and is not complete yet.
     is_stuck: Arc<AtomicBool>,
+    /// Commits what is queued, in a simulation without a writer thread.
+    #[cfg(test)]
+    pub(in crate::service) commit_queued: Arc<std::sync::OnceLock<CommitQueued>>,
 }
+
+#[cfg(test)]
+type CommitQueued = Box<dyn Fn() + Send + Sync>;
 
 /// Longest time for a fence. Chosen: much longer than a commit, and short enough for the
 /// other assets of a shard to wait.
@@ -40,12 +48,24 @@ impl Handles {
     /// Returns handles on the current runtime.
     pub(in crate::service) fn new(
         store: Store,
+        clock: Clock,
+        limits: &Limits,
         writer: mpsc::Sender<WriteSet>,
         outage: watch::Receiver<Outage>,
         closing: CancellationToken,
     ) -> Self {
-        let (clock, runtime, is_stuck) = (Clock, Handle::current(), Arc::default());
-        Self { store, clock, runtime, closing, writer, outage, is_stuck }
+        Self {
+            store,
+            clock,
+            runtime: Handle::current(),
+            closing,
+            snapshot_interval: limits.snapshot_interval,
+            writer,
+            outage,
+            is_stuck: Arc::default(),
+            #[cfg(test)]
+            commit_queued: Arc::default(),
+        }
     }
 
     /// Returns the writer's queue, for its state and length.
@@ -102,6 +122,10 @@ impl Handles {
         });
         let generation = EngineGeneration::default();
         self.submit(WriteSet { writes: Vec::new(), generation, completion });
+        #[cfg(test)]
+        if let Some(commit_queued) = self.commit_queued.get() {
+            commit_queued();
+        }
         let stopped = |_| ServiceError::Unavailable { what: "the writer has stopped" };
         let done = async { tokio::time::timeout(FENCE_TIMEOUT, &mut receiver).await };
         if let Ok(done) = self.runtime.block_on(done) {

@@ -5,7 +5,7 @@ mod commit;
 mod events;
 mod handles;
 
-pub(super) use commit::{Committer, EngineGeneration, Outage, WriteSet};
+pub(super) use commit::{Committer, EngineGeneration, FIRST_RETRY, Outage, WriteSet};
 pub(super) use events::Events;
 pub use events::{Event, EventFeed};
 pub(super) use handles::Handles;
