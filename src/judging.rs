@@ -37,6 +37,8 @@ pub struct Judging {
     verdict: Verdict,
     /// Samples that were neither duplicates nor rejected.
     n_samples: u64,
+    /// The latest time of these, also of those that are not judged, s.
+    newest_t_s: Option<f64>,
     /// The changes of faults that the last input caused.
     #[serde(skip)]
     transitions: Vec<Transition>,
@@ -52,6 +54,7 @@ impl Judging {
             engine: Engine::new(setup, memory),
             verdict: Verdict::default(),
             n_samples: 0,
+            newest_t_s: None,
             transitions: Vec::new(),
         }
     }
@@ -86,6 +89,7 @@ impl Judging {
         if let (true, Input::Sample(sample) | Input::NewSample(sample)) = (is_recorded, &input) {
             self.plausibility.take(sample);
             self.n_samples += 1;
+            self.newest_t_s = Some(self.newest_t_s.map_or(sample.t_s, |t_s| t_s.max(sample.t_s)));
         }
         admission
     }
@@ -117,6 +121,12 @@ impl Judging {
             span_s: self.engine.span_s(),
             duration_s: self.engine.duration_s(),
         }
+    }
+
+    /// The latest time of all samples, also of those that are not judged, s.
+    #[must_use]
+    pub const fn newest_t_s(&self) -> Option<f64> {
+        self.newest_t_s
     }
 
     /// Returns whether a fault has been confirmed in this session.

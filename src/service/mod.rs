@@ -61,6 +61,8 @@ mod playback;
 mod reanalysis;
 mod replay_settings;
 mod requests;
+#[cfg(test)]
+mod simulation;
 mod snapshots;
 mod start;
 mod upkeep;

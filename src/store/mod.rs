@@ -62,6 +62,8 @@ pub use rows::{
 };
 pub use snapshot::Snapshot;
 pub use tail::{FULL_CHUNK_SAMPLES, MAX_TAIL_CHUNKS};
+#[cfg(test)]
+pub use write::{CommitFault, CommitPoint, FaultPlan};
 pub use write::{Write, Writer};
 
 /// Longest time for the database to answer a ping.

@@ -147,6 +147,13 @@ impl Store {
         self.session_row(query).await
     }
 
+    /// The latest time in the last two chunks of `session`, s.
+    pub async fn newest_t_s(&self, session: &str) -> Result<Option<f64>, StoreError> {
+        let newest = "SELECT MAX(max_t_s) FROM (SELECT max_t_s FROM chunk WHERE session = $1
+                      ORDER BY first_index DESC LIMIT 2) AS newest";
+        Ok(sqlx::query_scalar(newest).bind(session).fetch_one(&self.pool).await?)
+    }
+
     /// Sessions that match `filter`, newest first.
     pub async fn sessions(
         &self,

@@ -9,8 +9,13 @@
 //! database was replaced; then the writer refuses all changes until a restart.
 
 mod deletion;
+#[cfg(test)]
+mod fault;
 mod fold;
 mod subject;
+
+#[cfg(test)]
+pub use fault::{CommitFault, CommitPoint, FaultPlan};
 
 use std::collections::HashSet;
 use std::path::Path;
@@ -151,6 +156,9 @@ pub struct Writer {
     refused: HashSet<String>,
     /// The journal's bytes after the last [`Writer::fold`].
     n_bytes_before: usize,
+    /// The faults of a simulation.
+    #[cfg(test)]
+    pub(crate) faults: FaultPlan,
 }
 
 impl Writer {
@@ -178,6 +186,8 @@ impl Writer {
             journal,
             refused: HashSet::new(),
             n_bytes_before,
+            #[cfg(test)]
+            faults: FaultPlan::default(),
         })
     }
 
@@ -336,6 +346,8 @@ impl Writer {
         let Some(connection) = &mut self.connection else {
             return Err(sqlx::Error::PoolClosed.into());
         };
+        #[cfg(test)]
+        self.faults.reach(CommitPoint::Begin)?;
         let mut transaction = connection.begin_with(self.location.begin()).await?;
         let mut group = GroupCommit {
             number: self.n_commits + 1,
@@ -358,7 +370,12 @@ impl Writer {
             count(&mut transaction, self.n_commits, self.last_id).await?;
             self.in_doubt = Some(changes);
         }
-        Ok(transaction.commit().await?)
+        #[cfg(test)]
+        self.faults.reach(CommitPoint::BeforeCommit)?;
+        transaction.commit().await?;
+        #[cfg(test)]
+        self.faults.reach(CommitPoint::AfterCommit)?;
+        Ok(())
     }
 }
 

@@ -126,9 +126,8 @@ async fn samples_sent_late_are_recorded_however_many() {
     let (gap, late) = (2000..17_000, |rows: std::ops::Range<usize>| samples[rows].to_vec());
     let live = [late(0..gap.start), late(gap.end..38_000)].concat();
     for session in [Some("t"), None] {
-        if session.is_none() {
-            client.end("a", "t").await;
-        }
+        let fixture = service().await;
+        let client = &fixture.client;
         assert_eq!(send(client, session, &live).await, [23_000, 0, 0, 4], "a jump is doubted");
         let [accepted, duplicate, rejected, n_late] =
             send(client, session, &late(gap.clone())).await;
@@ -139,6 +138,29 @@ async fn samples_sent_late_are_recorded_however_many() {
         let mut stored = client.recording("a", found[0]["name"].as_str().unwrap()).await;
         stored.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
         assert!(stored == samples, "{session:?}");
+    }
+}
+
+/// A person ends the session of a device without session names while answers are lost: what
+/// it sends again is not recorded a second time, in the next session.
+#[tokio::test]
+async fn retransmissions_after_the_end_of_a_session_are_duplicates() {
+    for samples in [rig(900, usize::MAX), unnumbered(&rig(900, usize::MAX))] {
+        let fixture = service().await;
+        let client = &fixture.client;
+        assert_eq!(send(client, None, &samples[..600]).await, [600, 0, 0, 0]);
+        let first = sessions(client).await[0]["name"].as_str().unwrap().to_owned();
+        client.end("a", &first).await;
+        let ack = client.telemetry("a", None, &samples[400..600]).await;
+        assert_eq!((&ack["duplicate"], &ack["session"]), (&json!(200), &json!(first)), "{ack}");
+        assert_eq!(sessions(client).await.len(), 1, "no session for duplicates alone");
+        // A batch of both, and an older one after the next session has begun.
+        assert_eq!(send(client, None, &samples[500..700]).await, [100, 100, 0, 0]);
+        assert_eq!(send(client, None, &samples[..600]).await, [0, 600, 0, 0]);
+        assert_eq!(send(client, None, &samples[600..]).await, [200, 100, 0, 0]);
+        let second = sessions(client).await[0]["name"].as_str().unwrap().to_owned();
+        assert_eq!(client.recording("a", &second).await, samples[600..]);
+        assert_eq!(client.recording("a", &first).await, samples[..600]);
     }
 }
 

@@ -1,6 +1,7 @@
 //! A loaded asset.
 
 use super::learning_record::LearningRecord;
+use super::sent_before::EndedSession;
 use super::session::OpenSession;
 use super::session_rate::SessionRate;
 use crate::service::writing::EngineGeneration;
@@ -23,6 +24,8 @@ pub(super) struct Asset {
     pub(super) provenance: Provenance,
     pub(super) open: Option<OpenSession>,
     pub(super) session_rate: SessionRate,
+    /// The last sessions that have ended, the newest first.
+    pub(super) ended: Vec<EndedSession>,
     /// The progress of the automatic calibration.
     pub(super) learning: LearningRecord,
     pub(super) generation: EngineGeneration,

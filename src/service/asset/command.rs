@@ -108,3 +108,17 @@ impl<T> Answer<T> {
         self.0.await.unwrap_or(Err(failed))
     }
 }
+
+#[cfg(test)]
+impl<T> Answer<T> {
+    /// Returns the reply if it is there, otherwise the answer.
+    pub(in crate::service) fn now(mut self) -> Result<Result<T, ServiceError>, Self> {
+        match self.0.try_recv() {
+            Ok(answer) => Ok(answer),
+            Err(oneshot::error::TryRecvError::Empty) => Err(self),
+            Err(oneshot::error::TryRecvError::Closed) => {
+                Ok(Err(ServiceError::Unavailable { what: "the engine of the asset failed" }))
+            }
+        }
+    }
+}

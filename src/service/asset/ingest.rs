@@ -70,6 +70,10 @@ impl Asset {
         turn: &mut Turn<'_>,
         ack: &mut AckView,
     ) -> Result<(), ServiceError> {
+        let samples = &self.without_sent_before(samples, turn, ack)?[..];
+        if samples.is_empty() {
+            return Ok(());
+        }
         let Some(open) = &mut self.open else {
             self.open_nameless(turn)?;
             return self.record_named(samples, turn, ack);

@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 
 use super::actor::{Asset, Provenance};
 use super::learning_record::LearningRecord;
+use super::sent_before::EndedSession;
 use super::session::OpenSession;
 use super::session_rate::SessionRate;
 use crate::service::playback::play;
@@ -39,6 +40,7 @@ impl StoredAsset {
         let learning: LearningRecord =
             learning.as_deref().map(views::from_json).transpose()?.unwrap_or_default();
         let refines = learning.refines();
+        let ended = EndedSession::read(handles, name)?;
         let reopen = |session| reopen(handles, session, refines);
         Ok(Self {
             open: session.map(reopen).transpose()?,
@@ -49,6 +51,7 @@ impl StoredAsset {
                 provenance,
                 open: None,
                 session_rate: SessionRate::default(),
+                ended,
                 learning,
                 generation: EngineGeneration::default(),
                 deleted: false,

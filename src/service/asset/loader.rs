@@ -107,6 +107,20 @@ impl Loader {
         (Self { handles, requests, limits: Arc::new(limits) }, queue)
     }
 
+    /// Executes the next request if there is one, on this thread.
+    #[cfg(test)]
+    pub(in crate::service) fn step(&mut self) -> bool {
+        let Ok(LoadRequest { asset, shard }) = self.requests.try_recv() else { return false };
+        self.limits.n_waiting.fetch_sub(1, Ordering::Relaxed);
+        let loaded = begin(&self.handles, &asset).map(|progress| match progress {
+            Progress::Loaded(asset) => asset,
+            Progress::Behind(stored) => Box::new(stored.catch_up(&self.handles).unwrap()),
+        });
+        let message = ShardMessage::Loaded { asset, result: Box::new(loaded) };
+        assert!(shard.try_send(message).is_ok(), "a simulation leaves room in the queues");
+        true
+    }
+
     /// Executes the requests, several at a time, until all shards have ended.
     pub(in crate::service) async fn run(mut self) {
         while let Some(LoadRequest { asset, shard }) = self.requests.recv().await {

@@ -9,6 +9,8 @@
 //!   of a command.
 //! - `actor`, `loader`, `load`, `state`: the asset, loading it from the store, queries.
 //! - `ingest`, `sessions`, `session`, `recent`: samples, sessions, the engine of a session.
+//! - `recorded`, `restart`, `sent_before`: which samples are there already, and when a device
+//!   has started anew.
 //! - `memory`, `trend`: the fault memory, servo estimates over the sessions.
 //! - `learning`, `learning_record`: automatic calibration.
 //! - `registry`, `presence`: the asset file, the time of the last telemetry.
@@ -26,6 +28,7 @@ mod recent;
 mod recorded;
 mod registry;
 mod restart;
+mod sent_before;
 mod session;
 mod session_rate;
 mod sessions;

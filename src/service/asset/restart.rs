@@ -9,7 +9,7 @@ use offbd_core::vocabulary::Sample;
 /// s. Below it, they are late. Chosen.
 const RESTART_S: f64 = 10.0;
 
-/// Consecutive samples that show a restart until it is certain: one may have a wrong time.
+/// Consecutive different samples that show a restart until it is certain: one may have a wrong time.
 const CERTAIN_AFTER: u32 = 2;
 
 /// What one sample shows about a restart.
@@ -42,6 +42,8 @@ impl OpenSession {
                 continue;
             }
             match self.sign(sample, latest_s, recorded) {
+                // What fills a hole between conflicts may be part of another run as well.
+                Sign::Continues if start.is_some() && !self.is_beyond(sample, latest_s) => {}
                 Sign::Continues => {
                     (start, self.n_restart_signs) = (None, 0);
                     latest_s = latest_s.max(sample.t_s);
@@ -51,7 +53,10 @@ impl OpenSession {
                 }
                 Sign::StartsAnew => {
                     let start = *start.get_or_insert(i);
-                    self.n_restart_signs += 1;
+                    // A retransmission of the same sample shows nothing new.
+                    if self.last_restart_sign.replace(*sample) != Some(*sample) {
+                        self.n_restart_signs += 1;
+                    }
                     if self.n_restart_signs >= CERTAIN_AFTER {
                         return start;
                     }
@@ -66,17 +71,22 @@ impl OpenSession {
         let is_far_behind = sample.t_s < latest_s - RESTART_S;
         match recorded.recognise(engine.recognise(sample), sample) {
             Recognition::Conflict => Sign::StartsAnew,
+            // It was sent late, before the device can have started anew.
+            Recognition::Same if engine.precedes(sample) => Sign::Continues,
             Recognition::Same => Sign::Repeats,
-            Recognition::New if is_far_behind && !self.continues_count(sample) => {
+            Recognition::New if is_far_behind && !self.is_beyond(sample, latest_s) => {
                 if engine.fits_gap(sample) { Sign::Continues } else { Sign::StartsAnew }
             }
             Recognition::New | Recognition::Taken | Recognition::Unknown => Sign::Continues,
         }
     }
 
-    /// Whether the count goes on, so that only the clock was set back.
-    fn continues_count(&self, sample: &Sample) -> bool {
-        let seq = sample.seq.and_then(|seq| i64::try_from(seq).ok());
-        seq.is_some_and(|seq| self.progress.last_seq.is_none_or(|last| seq > last))
+    /// Whether a sample is after all those recorded: by its number, since the clock of a
+    /// device that counts may have been set back, or else by its time.
+    fn is_beyond(&self, sample: &Sample, latest_s: f64) -> bool {
+        match sample.seq.and_then(|seq| i64::try_from(seq).ok()) {
+            Some(seq) => self.progress.last_seq.is_none_or(|last| seq > last),
+            None => sample.t_s > latest_s,
+        }
     }
 }

@@ -26,8 +26,10 @@ pub(super) struct OpenSession {
     pub(super) motion: Option<UsableMotion>,
     /// Number of samples at the last snapshot of the engine.
     pub(super) snapshot_at: i64,
-    /// Consecutive samples so far that show a restart of the device.
+    /// Consecutive different samples so far that show a restart of the device, and the last
+    /// of them.
     pub(super) n_restart_signs: u32,
+    pub(super) last_restart_sign: Option<Sample>,
 }
 
 impl OpenSession {
@@ -52,6 +54,7 @@ impl OpenSession {
             recent: RecentTrace::default(),
             snapshot_at: 0,
             n_restart_signs: 0,
+            last_restart_sign: None,
         }
     }
 

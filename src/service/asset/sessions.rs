@@ -3,6 +3,7 @@
 use uuid::Uuid;
 
 use super::actor::Asset;
+use super::sent_before::EndedSession;
 use super::session::OpenSession;
 use super::trend;
 use super::turn::Turn;
@@ -181,6 +182,7 @@ impl Asset {
     pub(super) fn end(&mut self, turn: &mut Turn<'_>) -> Result<(), ServiceError> {
         let Some(mut open) = self.open.take() else { return Ok(()) };
         turn.engine_changed = true;
+        self.note_ended(EndedSession::of(&open));
         turn.env.presences.end_session(&self.row.name);
         open.judging.input(Input::End);
         open.report(&self.row.name, turn.at, &mut turn.writes)?;

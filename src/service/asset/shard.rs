@@ -73,6 +73,13 @@ impl Shard {
         })
     }
 
+    /// Executes the next message, if there is one.
+    #[cfg(test)]
+    pub(in crate::service) fn step(&mut self) -> bool {
+        let message = self.queue.try_recv().ok();
+        message.map(|message| self.handle(message)).is_some()
+    }
+
     fn handle(&mut self, message: ShardMessage) {
         if self.env.handles.writer().is_closed() {
             // Nothing can be committed any more; dropping the reply reports an error.
@@ -350,6 +357,7 @@ mod tests {
             provenance: Default::default(),
             open: None,
             session_rate: SessionRate::default(),
+            ended: Vec::new(),
             learning: Default::default(),
             generation: EngineGeneration::default(),
             deleted: false,

@@ -30,6 +30,15 @@ impl PendingBatch {
     }
 }
 
+#[cfg(test)]
+impl PendingBatch {
+    /// Returns the answer if it is there, otherwise the batch.
+    pub(in crate::service) fn now(self) -> Result<Result<AckView, ServiceError>, Self> {
+        let submitted_at = self.submitted_at;
+        self.answer.now().map_err(|answer| Self { answer, submitted_at })
+    }
+}
+
 impl Service {
     /// Submits a batch for `asset` without waiting. Batches are evaluated in the order in
     /// which they are submitted.

@@ -110,6 +110,16 @@ impl Committer {
         })
     }
 
+    /// Commits at most `most` write sets of the queue. Returns whether there were any.
+    #[cfg(test)]
+    pub(in crate::service) async fn step(&mut self, most: usize) -> bool {
+        let next = std::iter::from_fn(|| self.queue.try_recv().ok());
+        let group: Vec<_> = next.take(most).collect();
+        let is_any = !group.is_empty();
+        assert!(self.commit(group).await && self.fold().await, "the service is not closing");
+        is_any
+    }
+
     /// Runs until all senders are dropped and the queue is empty. Returns `None` if the
     /// service shuts down while the database is unavailable.
     async fn run(mut self) -> Option<Writer> {

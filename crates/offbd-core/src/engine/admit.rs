@@ -71,6 +71,11 @@ impl Admit {
         self.ledger.fits_gap(sample)
     }
 
+    /// Whether a sample is before the first one.
+    pub(super) fn precedes(&self, sample: &Sample) -> bool {
+        self.ledger.precedes(sample)
+    }
+
     /// Whether samples without `seq` have been taken around `t_s`.
     pub(super) fn has_stretch_at(&self, t_s: f64) -> bool {
         self.ledger.has_stretch_at(t_s)

@@ -196,6 +196,14 @@ impl Ledger {
         }
     }
 
+    /// Whether the key of a sample is before the first one taken.
+    pub(super) fn precedes(&self, sample: &Sample) -> bool {
+        match sample.seq {
+            Some(seq) => self.by_seq.first.is_some_and(|first| seq < first),
+            None => self.by_time.first.is_some_and(|first| sample.t_s < first),
+        }
+    }
+
     /// Whether `t_s` lies in a stretch of samples without `seq`, and not in a gap.
     pub(super) fn has_stretch_at(&self, t_s: f64) -> bool {
         self.by_time.cover(t_s)

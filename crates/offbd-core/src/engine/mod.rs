@@ -329,6 +329,12 @@ impl Engine {
         self.admit.fits_gap(sample)
     }
 
+    /// Whether a sample is before the first one taken: its `seq` or, without one, its time.
+    #[must_use]
+    pub fn precedes(&self, sample: &Sample) -> bool {
+        self.admit.precedes(sample)
+    }
+
     /// Samples that are judged or wait for an earlier one.
     #[must_use]
     pub const fn n_accepted(&self) -> u64 {
