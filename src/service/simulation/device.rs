@@ -1,6 +1,8 @@
 //! A simulated device, and the model of what it was told.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::future::Future;
+use std::pin::Pin;
 
 use super::scenario::DeviceKind;
 use crate::service::{PendingBatch, ServiceError};
@@ -23,6 +25,9 @@ pub(super) fn content(sample: &Sample) -> Content {
     (number / SAMPLES_PER_RUN, number % SAMPLES_PER_RUN)
 }
 
+/// Waits until there is room for a batch.
+pub(super) type Submission = Pin<Box<dyn Future<Output = Result<PendingBatch, ServiceError>>>>;
+
 /// A batch that a device has sent.
 #[derive(Clone, Debug)]
 pub(super) struct SentBatch {
@@ -42,6 +47,8 @@ pub(super) struct Device {
     n_batches: usize,
     /// What is not acknowledged, in the order of measurement.
     pub(super) unacknowledged: VecDeque<SentBatch>,
+    /// The batch that waits for room, if it sends over one connection.
+    pub(super) submission: Option<(SentBatch, Submission)>,
     /// The answers on its connection, which it has not read.
     pub(super) answers: VecDeque<(SentBatch, PendingBatch)>,
     /// All samples that it has measured.
@@ -60,6 +67,7 @@ impl Device {
             clock_s: 0.0,
             n_batches: 0,
             unacknowledged: VecDeque::new(),
+            submission: None,
             answers: VecDeque::new(),
             measured: BTreeMap::new(),
             acknowledged: BTreeSet::new(),
@@ -128,6 +136,12 @@ impl Device {
         self.run += 1;
         (self.n_measured, self.clock_s) = (0, 0.0);
         self.unacknowledged.clear();
+        self.disconnect();
+    }
+
+    /// Loses the connection, with what is on it.
+    pub(super) fn disconnect(&mut self) {
+        self.submission = None;
         self.answers.clear();
     }
 

@@ -15,6 +15,9 @@ pub(super) struct DeviceKind {
     pub(super) named: bool,
     /// Whether it numbers its samples.
     pub(super) numbered: bool,
+    /// Whether it sends over one connection that waits for room: while a batch waits, no answer
+    /// is passed on.
+    pub(super) stream: bool,
     /// Batches that it sends before the first is acknowledged.
     pub(super) window: usize,
 }
@@ -98,8 +101,13 @@ fn step() -> impl Strategy<Value = Step> {
 
 /// Draws a scenario.
 pub(super) fn scenario() -> impl Strategy<Value = Scenario> {
-    let kind = (any::<bool>(), any::<bool>(), 1..5_usize)
-        .prop_map(|(named, numbered, window)| DeviceKind { named, numbered, window });
+    let kind = (any::<bool>(), any::<bool>(), any::<bool>(), 1..7_usize);
+    let kind = kind.prop_map(|(named, numbered, stream, window)| DeviceKind {
+        named,
+        numbered,
+        stream,
+        window,
+    });
     let devices = prop::collection::vec(kind, 1..=MAX_DEVICES);
     let steps = prop::collection::vec(step(), 20..160);
     (devices, steps).prop_map(|(devices, steps)| Scenario { devices, steps })

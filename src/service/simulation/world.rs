@@ -157,7 +157,7 @@ impl World {
     pub(super) fn kill(&mut self) {
         self.process = None;
         self.acts.clear();
-        self.devices.iter_mut().for_each(|device| device.answers.clear());
+        self.devices.iter_mut().for_each(Device::disconnect);
         self.start();
     }
 
@@ -183,9 +183,12 @@ impl World {
             Step::Reboot { device } => self.reboot(device % n),
             Step::DeviceClock { device, by_s } => self.devices[device % n].set_clock(by_s),
             Step::Read { device } => self.read(device % n)?,
-            Step::Disconnect { device } => self.devices[device % n].answers.clear(),
+            Step::Disconnect { device } => self.disconnect(device % n),
             Step::Deliver { which, copied } if !self.network.is_empty() => {
-                self.deliver(self.next_request(which % self.network.len()), copied);
+                let which = self.next_request(which % self.network.len());
+                if self.can_arrive(which) {
+                    self.deliver(which, copied);
+                }
             }
             Step::Lose { which } if !self.network.is_empty() => {
                 self.network.remove(which % self.network.len());
@@ -230,8 +233,12 @@ impl World {
     pub(super) fn round(&mut self) -> Result<bool, String> {
         self.now.fetch_add(10_000, Ordering::SeqCst);
         let mut worked = false;
-        while !self.network.is_empty() {
-            self.deliver(0, false);
+        let mut which = 0;
+        while which < self.network.len() {
+            match self.can_arrive(which) {
+                true => self.deliver(which, false),
+                false => which += 1,
+            }
         }
         worked |= self.work(|process| process.shards[0].step());
         worked |= self.work(|process| process.shards[1].step());
@@ -245,8 +252,11 @@ impl World {
     }
 
     fn resend(&mut self, device: usize) {
-        let Device { unacknowledged, answers, .. } = &self.devices[device];
-        let is_answered = |id| answers.iter().any(|(batch, _)| batch.id == id);
+        let Device { unacknowledged, submission, answers, .. } = &self.devices[device];
+        let is_answered = |id| {
+            submission.as_ref().is_some_and(|(batch, _)| batch.id == id)
+                || answers.iter().any(|(batch, _)| batch.id == id)
+        };
         let requests = unacknowledged
             .iter()
             .filter(|batch| !is_answered(batch.id))
@@ -255,20 +265,34 @@ impl World {
         self.network.extend(requests.into_iter().map(|batch| Request { device, batch }));
     }
 
-    fn reboot(&mut self, device: usize) {
-        self.devices[device].reboot();
-        if !self.devices[device].kind.named {
-            // Nobody could tell to which run they belong.
+    fn disconnect(&mut self, device: usize) {
+        self.devices[device].disconnect();
+        if self.devices[device].kind.stream {
             self.network.retain(|request| request.device != device);
         }
     }
 
-    /// Returns which request arrives if `which` is chosen: those of a device that does not
-    /// name its sessions arrive in order.
+    fn reboot(&mut self, device: usize) {
+        self.devices[device].reboot();
+        let DeviceKind { named, stream, .. } = self.devices[device].kind;
+        if stream || !named {
+            // Lost with the connection; or nobody could tell to which run they belong.
+            self.network.retain(|request| request.device != device);
+        }
+    }
+
+    /// Whether no other batch waits for room on the connection.
+    fn can_arrive(&self, which: usize) -> bool {
+        self.devices[self.network[which].device].submission.is_none()
+    }
+
+    /// Returns which request arrives if `which` is chosen: those on one connection, and those
+    /// of a device that does not name its sessions, arrive in order.
     fn next_request(&self, which: usize) -> usize {
         let device = self.network[which].device;
         let is_first = |request: &Request| request.device == device;
-        match self.devices[device].kind.named {
+        let DeviceKind { named, stream, .. } = self.devices[device].kind;
+        match named && !stream {
             true => which,
             false => self.network.iter().position(is_first).unwrap_or(which),
         }
@@ -276,9 +300,14 @@ impl World {
 
     fn deliver(&mut self, which: usize, copied: bool) {
         let request = self.network.remove(which);
+        let service = &self.process.as_ref().unwrap().service;
         let device = &mut self.devices[request.device];
         let batch = device.arriving(&request.batch);
-        let service = &self.process.as_ref().unwrap().service;
+        if device.kind.stream {
+            let submission = service.submit_when_ready(&device.asset, batch, false);
+            device.submission = Some((request.batch, Box::pin(submission)));
+            return;
+        }
         // Otherwise the device is told at once, and tries again.
         if let Ok(pending) = service.submit(&device.asset, batch) {
             device.answers.push_back((request.batch.clone(), pending));
@@ -291,6 +320,16 @@ impl World {
     /// Reads the answers of a device, in order, as far as they are there.
     fn read(&mut self, device: usize) -> Result<(), String> {
         let device = &mut self.devices[device];
+        if let Some((batch, mut submission)) = device.submission.take() {
+            match submission.as_mut().now_or_never() {
+                Some(Ok(pending)) => device.answers.push_back((batch, pending)),
+                Some(Err(_)) => {}
+                None => {
+                    device.submission = Some((batch, submission));
+                    return Ok(());
+                }
+            }
+        }
         while let Some((batch, pending)) = device.answers.pop_front() {
             match pending.now() {
                 Ok(answer) => device.note(&batch, answer)?,
@@ -372,8 +411,10 @@ impl World {
                 (0..self.devices.len()).for_each(|device| self.resend(device));
             }
             let worked = self.round()?;
-            let is_done = |device: &Device| device.unacknowledged.is_empty();
-            if !worked && self.acts.is_empty() && self.devices.iter().all(is_done) {
+            let is_done =
+                |device: &Device| device.unacknowledged.is_empty() && device.submission.is_none();
+            let is_quiet = !worked && self.network.is_empty() && self.acts.is_empty();
+            if is_quiet && self.devices.iter().all(is_done) {
                 return (0..self.devices.len()).try_for_each(|device| self.end(device));
             }
         }
