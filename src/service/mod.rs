@@ -8,7 +8,8 @@
 //!    the acknowledgement.
 //! 2. **Shard** (`asset`): the hash of the asset's name selects a shard, a thread with a
 //!    bounded queue that owns the engines of its assets and executes their commands one
-//!    after the other. It loads an asset from the store on its first command.
+//!    after the other. An asset is loaded from the store by its first command, beside the
+//!    shard; its commands wait meanwhile.
 //! 3. **Turn**: the shard executes the command. The engine evaluates the samples; all
 //!    resulting changes (samples, transitions, fault memory, session) are collected in a
 //!    `Turn` and handed to the writer as one `WriteSet`. The shard does not wait for the
@@ -27,9 +28,9 @@
 //!   in the order of its commands.
 //! - If a commit fails, the affected engines are ahead of the store. Their
 //!   `EngineGeneration` is invalidated: write sets of it that are still queued are refused,
-//!   and the engine is rebuilt from the store by the next command. The rebuild evaluates
-//!   the recording again and reaches the same state, because the result depends only on
-//!   the samples and actions, never on the clock.
+//!   and the asset is loaded again by the next command, on another thread. From the last
+//!   snapshot on, or from the start, the recording is evaluated again. The engine reaches the
+//!   same state, because it depends only on the samples and actions, never on the clock.
 //! - A client may send a batch again if it was not acknowledged: recorded samples are
 //!   counted as duplicates.
 //! - Every queue is bounded ([`Limits`]). If the queue of a shard is full, the request gets
@@ -45,6 +46,7 @@
 //! - `reanalysis`: evaluates a recording again for plots and for the recording of a
 //!   fault, without storing anything.
 //! - `upkeep`: deletion in parts, retention, the watchdog of ingest.
+//! - `simulation`, a test: the whole service without threads, with devices and faults.
 //! - [`access`]: roles and rights, tokens, JSON Web Tokens, audit entries.
 //!
 //! Contains no HTTP and no SQL. The wall clock is read only for timestamps that are stored
