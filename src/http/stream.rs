@@ -395,8 +395,8 @@ impl StreamConnection {
                 frame["type"] = "state".into();
                 self.send(frame.to_string()).await
             }
-            // Telemetry has priority: this state is skipped.
-            Err(ServiceError::Busy { .. }) => Ok(()),
+            // Telemetry has priority, or the engine is not ready: this state is skipped.
+            Err(ServiceError::Busy { .. } | ServiceError::Rebuilding { .. }) => Ok(()),
             Err(error) => self.send(ack_frame(None, Err(error))).await,
         }
     }

@@ -97,16 +97,17 @@ impl Shard {
     /// Executes `command`, or lets it wait until the asset `name` is loaded.
     fn dispatch(&mut self, name: &str, command: AssetCommand) {
         match self.slots.remove(name) {
-            Some(Slot::Running(asset)) if !asset.generation.is_invalid() => {
+            Some(Slot::Loading(loading)) => return self.wait(name, loading, command),
+            Some(Slot::Running(asset)) => {
                 self.n_running.decrement(1);
-                self.apply(name, Ok(asset), command);
+                if !asset.generation.is_invalid() {
+                    return self.apply(name, Ok(asset), command);
+                }
             }
-            Some(Slot::Loading(loading)) => self.wait(name, loading, command),
-            _ => {
-                let refusal = self.loads.load(name);
-                self.wait(name, Loading { refusal, ..Loading::default() }, command);
-            }
+            None => {}
         }
+        let refusal = self.loads.load(name);
+        self.wait(name, Loading { refusal, ..Loading::default() }, command);
     }
 
     /// Lets `command` wait for the asset `name`, unless that is refused.

@@ -1,8 +1,6 @@
 //! The inputs of the engine, its decisions on them and its state.
 
 use crate::diagnosis::Evidence;
-#[cfg(not(feature = "std"))]
-use crate::no_std::*;
 use crate::plant::Fidelity;
 use crate::vocabulary::{Brief, FaultCode, PerAxis, Sample, SimTime};
 
