@@ -128,10 +128,10 @@ fn query_word<T: FromStr<Err = UnknownWord>>(
 }
 
 /// Returns the range of the query parameters `from_s` and `to_s`, of which one or both may be
-/// missing.
+/// missing. It is empty if they are in the wrong order.
 ///
 /// # Errors
-/// A [`Problem`] if they are not numbers or in the wrong order.
+/// A [`Problem`] if one is not a finite number.
 fn time_range(from_s: Option<f64>, to_s: Option<f64>) -> Result<TimeRange, Problem> {
     for (name, t_s) in [("?from_s", from_s), ("?to_s", to_s)] {
         if t_s.is_some_and(|t_s| !t_s.is_finite()) {
@@ -139,12 +139,7 @@ fn time_range(from_s: Option<f64>, to_s: Option<f64>) -> Result<TimeRange, Probl
         }
     }
     let TimeRange { from_s: first, to_s: last } = TimeRange::ALL;
-    let range = TimeRange { from_s: from_s.unwrap_or(first), to_s: to_s.unwrap_or(last) };
-    if range.from_s > range.to_s {
-        let reason = format!("must not be less than from_s, which is {}", range.from_s);
-        return Err(Invalid::new("?to_s", reason).into());
-    }
-    Ok(range)
+    Ok(TimeRange { from_s: from_s.unwrap_or(first), to_s: to_s.unwrap_or(last) })
 }
 
 /// The query parameters; rejected with a [`Problem`] if invalid.

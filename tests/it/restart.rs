@@ -243,10 +243,10 @@ async fn a_stretch_of_a_long_recording_is_served_by_itself() {
     assert_eq!(rows, samples[500_000..=500_050]);
     let outside = format!("sessions/{id}/telemetry?from_s=1e6");
     assert_eq!(read_csv(&client.get(&outside).await.text), []);
-    for (query, parameter) in [("from_s=2&to_s=1", "to_s"), ("from_s=NaN", "from_s")] {
-        let answer = client.get(&format!("sessions/{id}/telemetry?{query}")).await;
-        assert_eq!(answer.problem(400)["parameter"], parameter, "{query}");
-    }
+    let reversed = format!("sessions/{id}/telemetry?from_s=2&to_s=1");
+    assert_eq!(read_csv(&client.get(&reversed).await.text), []);
+    let invalid = client.get(&format!("sessions/{id}/telemetry?from_s=NaN")).await;
+    assert_eq!(invalid.problem(400)["parameter"], "from_s");
 
     let stretch = json!({"session": id, "from_s": 200.0, "to_s": 340.0});
     let body = json!({"sessions": [stretch]});
