@@ -56,9 +56,33 @@ impl ColumnIndices {
     }
 }
 
+/// Longest row, bytes. Chosen: a row has a hundred, and other columns are rarely long.
+const MAX_ROW_BYTES: usize = 1 << 20;
+
+/// A source that fails if a row is too long to be read into memory, as it is if a quotation
+/// mark is not closed.
+struct RowLimit<R> {
+    source: R,
+    /// Bytes that may be read until the next row begins.
+    left: usize,
+}
+
+impl<R: Read> Read for RowLimit<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if self.left == 0 {
+            let reason = "a row is longer than 1 MiB; the rest of the file is not read";
+            return Err(io::Error::new(io::ErrorKind::InvalidData, reason));
+        }
+        let most = buffer.len().min(self.left);
+        let n = self.source.read(&mut buffer[..most])?;
+        self.left -= n;
+        Ok(n)
+    }
+}
+
 /// Reads samples row by row, in the order of the file.
 pub struct SessionCsvReader<R> {
-    csv: csv::Reader<R>,
+    csv: csv::Reader<RowLimit<R>>,
     indices: ColumnIndices,
     record: csv::ByteRecord,
 }
@@ -69,6 +93,7 @@ impl<R: Read> SessionCsvReader<R> {
     /// # Errors
     /// [`CsvError`] if a column is missing or repeated, or `source` cannot be read.
     pub fn new(source: R) -> Result<Self, CsvError> {
+        let source = RowLimit { source, left: MAX_ROW_BYTES };
         let mut csv = csv::ReaderBuilder::new().flexible(true).from_reader(source);
         let mut header = csv.byte_headers()?.clone();
         if let Some(first) = header.get(0)
@@ -130,6 +155,7 @@ impl<R: Read> Iterator for SessionCsvReader<R> {
     type Item = Result<Sample, RowError>;
 
     fn next(&mut self) -> Option<Self::Item> {
+        self.csv.get_mut().left = MAX_ROW_BYTES;
         match self.csv.read_byte_record(&mut self.record) {
             Ok(true) => Some(self.sample()),
             Ok(false) => None,
@@ -199,6 +225,21 @@ mod tests {
         let wanted =
             Sample { t_s: 1.5, cmd_qx_rad: Some(-0.1), x_m: Some(0.25), ..Sample::default() };
         assert_eq!(rows, [Ok(wanted)]);
+    }
+
+    #[test]
+    fn a_row_that_is_too_long_is_not_held_in_memory() {
+        let start = "t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n0,0,0,0,0\n1,0,0,0,\"";
+        for rest in ["0", "0\n"] {
+            let rest = rest.as_bytes().repeat(8 << 20);
+            let mut reader = SessionCsvReader::new(start.as_bytes().chain(&rest[..])).unwrap();
+            assert!(reader.next().unwrap().is_ok());
+            let error = reader.next().unwrap().unwrap_err();
+            assert!(error.reason.contains("longer than 1 MiB"), "{error}");
+            assert!(reader.next().is_none());
+        }
+        let header = SessionCsvReader::new(io::repeat(b'a'));
+        assert!(matches!(header, Err(CsvError::Header(_))));
     }
 
     #[test]
