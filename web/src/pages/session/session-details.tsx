@@ -6,9 +6,11 @@ import { TraceBuffer } from "../../live/buffer";
 import { ErrorMessage } from "../../parts/error-message";
 import { Loading } from "../../parts/loading";
 import { JudgeAgain } from "./judge-again";
+import { NumberChoice } from "./number-choice";
 import { Player } from "./player";
 import type { ProfileOrRecorded } from "./profile-choice";
 import { SessionHeader } from "./session-header";
+import { stretches, stretchText } from "./stretches";
 
 /** Largest number of drawn moments; longer sessions are thinned out. */
 const POINTS = 12_000;
@@ -23,14 +25,32 @@ interface Props {
 export function SessionDetails({ session, asset, faults, refetch }: Props) {
   /** The profile with which the session is judged for the charts. */
   const [profile, setProfile] = useState<ProfileOrRecorded>("");
-  const fetchTrace = () => api.trace(session.id, { points: POINTS, profile: profile || undefined });
-  const trace = useQuery(fetchTrace, `${session.id} ${profile}`);
+  const pieces = useMemo(() => stretches(session), [session]);
+  const texts = pieces.map((piece) => stretchText(piece, session.first_t_s ?? 0));
+  /** The shown stretch of a long recording; the last one by default. */
+  const [chosen, setChosen] = useState<number>();
+  const shown = Math.min(chosen ?? Infinity, pieces.length - 1);
+  const fetchTrace = () =>
+    api.trace(session.id, { ...pieces[shown], points: POINTS, profile: profile || undefined });
+  const trace = useQuery(fetchTrace, `${session.id} ${profile} ${shown}`);
   const { data } = trace;
   const buffer = useMemo(() => (data ? TraceBuffer.of(data) : undefined), [data]);
   return (
     <main class="asset">
       <SessionHeader session={session} refetch={refetch} />
       <ErrorMessage error={trace.error} retry={trace.refetch} />
+      {pieces.length > 1 && (
+        <p class="note">
+          This recording is long and shown in stretches.{" "}
+          <NumberChoice
+            label="Stretch"
+            values={pieces.map((_, i) => i)}
+            text={(i) => texts[i] ?? ""}
+            chosen={shown}
+            choose={setChosen}
+          />
+        </p>
+      )}
       {!buffer && !trace.error && <Loading what="the recording" />}
       {buffer?.t.length === 0 && <p class="note">Nothing has been recorded in this session.</p>}
       <Player
