@@ -13,7 +13,7 @@ use config::{Environment, File, FileFormat};
 use serde::Deserialize;
 
 use crate::service::access::jwt::ExpectedClaims;
-use crate::service::{Limits, Retention};
+use crate::service::{Limits, Retention, SessionLimits};
 use crate::store::Location;
 
 /// Name of the database file in the data directory.
@@ -239,6 +239,10 @@ pub struct LimitsConfig {
     pub bodies_bytes: usize,
     pub in_flight_samples: usize,
     pub journal_bytes: usize,
+    /// Samples from which on a session continues in another one.
+    pub session_samples: usize,
+    /// Age from which on a session continues in another one, hours.
+    pub session_hours: usize,
     pub assets: usize,
     pub body_timeout_s: u64,
     /// Longest time for the TLS handshake, and for the head of each request to arrive, s;
@@ -347,6 +351,8 @@ impl Default for LimitsConfig {
             bodies_bytes: 256 << 20,
             in_flight_samples: limits.in_flight_samples,
             journal_bytes: limits.journal_bytes,
+            session_samples: usize::try_from(limits.sessions.samples).unwrap_or(usize::MAX),
+            session_hours: (limits.sessions.age.as_secs() / 3600) as usize,
             assets: limits.assets,
             body_timeout_s: limits.body_timeout.as_secs(),
             header_timeout_s: 30,
@@ -354,6 +360,16 @@ impl Default for LimitsConfig {
             connections: 16_384,
             connections_per_address: 4096,
             shutdown_s: 20,
+        }
+    }
+}
+
+impl LimitsConfig {
+    fn sessions(&self) -> SessionLimits {
+        SessionLimits {
+            samples: i64::try_from(self.session_samples).unwrap_or(i64::MAX),
+            age: Duration::from_secs(self.session_hours as u64 * 3600),
+            ..SessionLimits::default()
         }
     }
 }
@@ -442,6 +458,8 @@ impl Config {
         let samples = limits.batch_samples;
         within("limits.in_flight_samples", limits.in_flight_samples, samples, 100_000_000)?;
         within("limits.journal_bytes", limits.journal_bytes, 1, 1 << 30)?;
+        within("limits.session_samples", limits.session_samples, 1000, 1_000_000_000)?;
+        within("limits.session_hours", limits.session_hours, 1, 24 * 366)?;
         let seconds = usize::try_from(limits.body_timeout_s).unwrap_or(usize::MAX);
         within("limits.body_timeout_s", seconds, 1, 3600)?;
         let seconds = usize::try_from(limits.shutdown_s).unwrap_or(usize::MAX);
@@ -511,6 +529,7 @@ impl Config {
             shard_queue: self.workers.queue,
             in_flight_samples: self.limits.in_flight_samples,
             journal_bytes: self.limits.journal_bytes,
+            sessions: self.limits.sessions(),
             batch_samples: self.limits.batch_samples,
             batch_bytes: self.limits.batch_bytes,
             import_bytes: self.limits.import_bytes,

@@ -86,8 +86,8 @@ pub(super) struct SessionQuery {
 /// one: two conflicting samples in a row, or two whose clock has gone back by more than
 /// 10 s to times that are no gap of the recording, show that the device has restarted, and
 /// a new session is opened; a device without session names should therefore wait for the
-/// acknowledgement of its first batch after it has started. A session name other than that of the open session ends the
-/// open session and opens one of that name.
+/// acknowledgement of its first batch after it has started. A session name other than that
+/// of the open session ends the open session and opens one of that name.
 ///
 /// A jump of the clock is followed once five samples in a row agree; a single wrong time
 /// costs one sample. Samples that fill a gap later are recorded and not judged.

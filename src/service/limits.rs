@@ -24,9 +24,8 @@ pub struct Limits {
     /// are folded into the recordings after each commit; the journal stays below twice
     /// this.
     pub journal_bytes: usize,
-    /// Samples of a session between two snapshots of its engine, which a restart has to
-    /// evaluate again.
-    pub snapshot_interval: i64,
+    /// How long sessions may be.
+    pub sessions: SessionLimits,
     /// Samples in a batch; a longer batch is refused.
     pub batch_samples: usize,
     /// Bytes of a batch; a longer batch is refused.
@@ -50,7 +49,7 @@ impl Default for Limits {
             commit_queue: 1024,
             in_flight_samples: 500_000,
             journal_bytes: 16 << 20,
-            snapshot_interval: SNAPSHOT_INTERVAL,
+            sessions: SessionLimits::default(),
             batch_samples: 10_000,
             batch_bytes: 4 << 20,
             import_bytes: 64 << 20,
@@ -68,9 +67,27 @@ impl Limits {
     }
 }
 
-/// Default of [`Limits::snapshot_interval`]. Chosen: judging as many again takes some 20 ms,
-/// and the snapshots, of about 15 kB each, are a tenth of what the samples themselves take.
-const SNAPSHOT_INTERVAL: i64 = 16_384;
+/// How long sessions may be, and how often the state of their engines is stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SessionLimits {
+    /// Recorded samples from which on a session continues in another one.
+    pub samples: i64,
+    /// Age from which on a session continues in another one.
+    pub age: Duration,
+    /// Samples between two snapshots of an engine, which a restart has to evaluate again.
+    pub snapshot_interval: i64,
+}
+
+impl Default for SessionLimits {
+    /// Chosen. A day, so that rigs that never stop have a verdict, a trend and something for
+    /// retention to delete every day. To evaluate as many samples as between two snapshots
+    /// takes some 20 ms, and the snapshots, of about 15 kB each, take a tenth of the space of
+    /// the samples.
+    fn default() -> Self {
+        let age = Duration::from_secs(24 * 3600);
+        Self { samples: 10_000_000, age, snapshot_interval: 16_384 }
+    }
+}
 
 /// Time after which a client should retry, s (`Retry-After`).
 pub const RETRY_AFTER_S: u64 = 1;

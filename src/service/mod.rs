@@ -74,7 +74,7 @@ mod writing;
 pub use crate::store::RecordingReader;
 pub use clock::{Clock, parse_timestamp};
 pub use error::ServiceError;
-pub use limits::{Limits, RETRY_AFTER_S, Retention};
+pub use limits::{Limits, RETRY_AFTER_S, Retention, SessionLimits};
 pub use reanalysis::fault_recording::RecordingWindow;
 pub use reanalysis::trace::{MAX_TRACE_POINTS, TraceQuery};
 pub use requests::{FaultQuery, PendingBatch, QueueLoad};

@@ -14,10 +14,8 @@ use offbd_core::engine::{JUDGEMENT, SNAPSHOT_FORMAT, Setup, UsableMotion};
 /// recording can be judged again by itself: some 0.3 s of one core.
 const KEPT_OF: i64 = 16;
 
-/// The engine of a session at some sample.
+/// The engine in a snapshot.
 pub(super) struct RestoredEngine {
-    /// Samples after which it had this state.
-    pub(super) n_samples: i64,
     pub(super) judging: Judging,
     /// The motion counted for a calibration, if it was counted.
     pub(super) motion: Option<UsableMotion>,
@@ -42,29 +40,12 @@ pub(super) const fn is_kept(n_samples: i64, last: i64, interval: i64) -> bool {
     n_samples / (KEPT_OF * interval) > last / (KEPT_OF * interval)
 }
 
-/// Returns a snapshot of the engine of `session` after `n_samples` samples.
-pub(super) fn take(
-    session: &str,
-    n_samples: i64,
-    kept: bool,
-    judging: &Judging,
-    motion: Option<&UsableMotion>,
-) -> Result<Snapshot, ServiceError> {
-    Ok(Snapshot {
-        session: session.to_owned(),
-        n_samples,
-        kept,
-        version: version(),
-        state: state(judging, motion)?,
-    })
-}
-
 /// Returns the last snapshot of `session` that is not after the sample `at_most`, with the
-/// engine in it; `None` if there is none for the settings of the session. Blocks on the
-/// store.
+/// engine in it; `None` if there is none for `setup`. Blocks on the store.
 pub(super) fn last(
     handles: &Handles,
     session: &SessionRow,
+    setup: &Setup,
     at_most: i64,
 ) -> Result<Option<(Snapshot, RestoredEngine)>, ServiceError> {
     let at_most = at_most.min(session.progress.n_samples);
@@ -78,30 +59,27 @@ pub(super) fn last(
         }
         Err(error) => return Err(error),
     };
-    let basis = Basis::of(&Setup::new(views::rig(&session.setup)?, None)?);
+    let basis = Basis::of(setup);
     Ok(found.filter(|(_, restored)| *restored.judging.basis() == basis))
 }
 
 fn read(snapshot: Snapshot) -> Result<(Snapshot, RestoredEngine), ServiceError> {
     let (judging, motion) =
         rmp_serde::from_slice(&snapshot.state).map_err(ServiceError::corrupt)?;
-    let restored = RestoredEngine { n_samples: snapshot.n_samples, judging, motion };
-    Ok((snapshot, restored))
+    Ok((snapshot, RestoredEngine { judging, motion }))
 }
 
-/// Returns the engine of `session` with `setup` at or before the sample `at_most`: from a
-/// snapshot if there is one for this set-up, otherwise at the start of the session. Blocks on
-/// the store.
+/// Returns the engine of `session` with `setup` at or before the sample `at_most`, and the
+/// number of samples it has evaluated: from a snapshot if there is one for `setup`, otherwise
+/// at the start of the session. Blocks on the store.
 pub(super) fn engine_before(
     handles: &Handles,
     session: &SessionRow,
     setup: Setup,
     at_most: i64,
 ) -> Result<(i64, Judging), ServiceError> {
-    let found = last(handles, session, at_most)?.map(|(_, restored)| restored);
-    let fits = |restored: &RestoredEngine| *restored.judging.basis() == Basis::of(&setup);
-    if let Some(restored) = found.filter(fits) {
-        return Ok((restored.n_samples, restored.judging));
+    match last(handles, session, &setup, at_most)? {
+        Some((snapshot, restored)) => Ok((snapshot.n_samples, restored.judging)),
+        None => Ok((0, Judging::new(setup, views::memory(&session.baseline)?))),
     }
-    Ok((0, Judging::new(setup, views::memory(&session.baseline)?)))
 }

@@ -42,12 +42,25 @@ pub(super) struct Inner {
     pub(super) stalled: Arc<AtomicBool>,
     /// Assets whose engine is still to be rebuilt after the start.
     pub(super) n_rebuilding: AtomicUsize,
-    /// One permit for each fault recording that is being computed.
+    pub(super) computing: Computing,
+}
+
+/// One permit for each long computation for a request.
+pub(super) struct Computing {
     pub(super) recordings: Arc<Semaphore>,
-    /// One permit for each trace that is being computed.
     pub(super) traces: Arc<Semaphore>,
-    /// One permit for each drive cycle that is being computed.
     pub(super) drive_cycles: Arc<Semaphore>,
+}
+
+impl Computing {
+    fn new() -> Self {
+        let permits = |n| Arc::new(Semaphore::new(n));
+        Self {
+            recordings: permits(MAX_RECORDINGS),
+            traces: permits(MAX_TRACES),
+            drive_cycles: permits(MAX_DRIVE_CYCLES),
+        }
+    }
 }
 
 /// The threads and tasks of a [`Service`]; they end when all its clones are dropped.
@@ -211,9 +224,7 @@ impl Service {
             in_flight,
             stalled,
             n_rebuilding: AtomicUsize::new(0),
-            recordings: Arc::new(Semaphore::new(MAX_RECORDINGS)),
-            traces: Arc::new(Semaphore::new(MAX_TRACES)),
-            drive_cycles: Arc::new(Semaphore::new(MAX_DRIVE_CYCLES)),
+            computing: Computing::new(),
         };
         (Self { inner: Arc::new(inner) }, parts)
     }

@@ -69,6 +69,8 @@ pub(super) fn session(row: SessionRow) -> Result<SessionView, ServiceError> {
         first_t_s: row.progress.first_t_s,
         last_t_s: row.progress.last_t_s,
         last_seq: row.progress.last_seq.map(count),
+        part: count(row.part),
+        first_part: row.first_part,
         verdict: row.verdict.as_deref().map(from_json).transpose()?,
     })
 }

@@ -44,7 +44,7 @@ pub struct FaultFilter {
 
 pub(super) const SESSION: &str =
     "SELECT id, asset, name, state, opened_at, ended_at, setup, baseline, importing,
-    n_samples, n_rejected, first_t_s, last_t_s, last_seq, verdict, verdict_hash FROM session
+    part, first_part, n_samples, n_rejected, first_t_s, last_t_s, last_seq, verdict, verdict_hash FROM session
     WHERE ";
 
 /// The condition that neither the session nor its asset is hidden.
@@ -145,6 +145,15 @@ impl Store {
         let mut query = QueryBuilder::new(SESSION);
         query.push("asset = ").bind(asset)?.push(" AND name = ").bind(name)?;
         self.session_row(query).await
+    }
+
+    /// The last parts of the session whose first part is `first`, the newest first.
+    pub async fn parts(&self, first: &str, limit: u32) -> Result<Vec<SessionRow>, StoreError> {
+        let mut query = QueryBuilder::new(SESSION);
+        query.push("id = ").bind(first.to_owned())?;
+        query.push(" OR first_part = ").bind(first.to_owned())?;
+        query.push(" ORDER BY part DESC LIMIT ").bind(i64::from(limit))?;
+        self.session_rows(query).await
     }
 
     /// The latest time in the last two chunks of `session`, s.

@@ -45,7 +45,7 @@ impl SessionProgress {
     }
 }
 
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct SessionRow {
     pub id: String,
     pub asset: String,
@@ -61,6 +61,10 @@ pub struct SessionRow {
     pub progress: SessionProgress,
     /// 1 for a recording that is being imported, 0 otherwise.
     pub importing: i64,
+    /// Number of the part, from 1, of a session that continues in another one.
+    pub part: i64,
+    /// The id of the first part; `None` in that itself.
+    pub first_part: Option<String>,
     /// `None` while the session is open; so is the hash.
     pub verdict: Option<String>,
     pub verdict_hash: Option<String>,
@@ -77,6 +81,8 @@ from_row!(
         setup,
         baseline,
         importing,
+        part,
+        first_part,
         verdict,
         verdict_hash
     }[progress]
@@ -86,6 +92,12 @@ impl SessionRow {
     #[must_use]
     pub fn is_open(&self) -> bool {
         self.state == "open"
+    }
+
+    /// Returns the id of the first part of the session.
+    #[must_use]
+    pub fn first_part(&self) -> &str {
+        self.first_part.as_deref().unwrap_or(&self.id)
     }
 }
 

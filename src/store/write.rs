@@ -551,7 +551,8 @@ async fn update_asset(db: &mut AnyConnection, row: &AssetRow) -> Result<(), Stor
 async fn open_session(db: &mut AnyConnection, row: &SessionRow) -> Result<(), StoreError> {
     sqlx::query(
         "INSERT INTO session (id, asset, name, state, opened_at, setup, baseline, importing,
-         n_samples, n_rejected) VALUES ($1, $2, $3, 'open', $4, $5, $6, $7, 0, 0)",
+         part, first_part, n_samples, n_rejected)
+         VALUES ($1, $2, $3, 'open', $4, $5, $6, $7, $8, $9, 0, 0)",
     )
     .bind(&row.id)
     .bind(&row.asset)
@@ -560,6 +561,8 @@ async fn open_session(db: &mut AnyConnection, row: &SessionRow) -> Result<(), St
     .bind(&row.setup)
     .bind(&row.baseline)
     .bind(row.importing)
+    .bind(row.part)
+    .bind(&row.first_part)
     .execute(db)
     .await?;
     Ok(())

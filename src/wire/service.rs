@@ -50,6 +50,11 @@ pub struct SessionView {
     pub last_t_s: Option<f64>,
     /// Highest recorded `seq`; null if no sample has one.
     pub last_seq: Option<u64>,
+    /// Number of the part, from 1: a session that has become too long continues in another
+    /// one, whose name ends with the number.
+    pub part: u64,
+    /// The service's id of the first part; null in that itself.
+    pub first_part: Option<String>,
     /// The verdict; null while the session is open.
     pub verdict: Option<SummaryView>,
 }

@@ -119,10 +119,7 @@ fn session(id: &str, asset: &str) -> SessionRow {
         ended_at: None,
         setup: "{}".to_owned(),
         baseline: "{}".to_owned(),
-        progress: SessionProgress::default(),
-        importing: 0,
-        verdict: None,
-        verdict_hash: None,
+        ..SessionRow::default()
     }
 }
 

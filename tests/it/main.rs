@@ -25,6 +25,7 @@ mod network;
 mod openapi;
 mod outage;
 mod outcome;
+mod parts;
 mod restart;
 mod retention;
 mod same_sample;

@@ -3,6 +3,7 @@
 use super::actor::Asset;
 use super::recorded::RecordedSamples;
 use super::session::OpenSession;
+use super::sent_before::MAX_SESSIONS;
 use super::sessions::SessionSwitch;
 use super::turn::Turn;
 use crate::service::{ServiceError, views};
@@ -29,7 +30,7 @@ impl Asset {
         if !samples.is_empty() {
             match batch.session {
                 Some(name) => match self.switch(&name, turn)? {
-                    SessionSwitch::Open => self.record_named(&samples, turn, &mut ack)?,
+                    SessionSwitch::Open => self.record_in_parts(&samples, turn, &mut ack)?,
                     SessionSwitch::Ended(row) => retransmitted(&row, &samples, turn, &mut ack)?,
                 },
                 None => self.record_nameless(&samples, turn, &mut ack)?,
@@ -50,7 +51,20 @@ impl Asset {
         Ok(ack)
     }
 
-    /// Records samples of the open session, which their batch has named.
+    /// Records samples of the open session, which their batch has named, unless an earlier
+    /// part of it has them.
+    fn record_in_parts(
+        &mut self,
+        samples: &[(usize, Sample)],
+        turn: &mut Turn<'_>,
+        ack: &mut AckView,
+    ) -> Result<(), ServiceError> {
+        self.continue_if_long(turn)?;
+        let samples = &self.without_earlier_parts(samples, turn, ack)?[..];
+        self.record_named(samples, turn, ack)
+    }
+
+    /// Records samples of the open session.
     pub(super) fn record_named(
         &mut self,
         samples: &[(usize, Sample)],
@@ -70,6 +84,7 @@ impl Asset {
         turn: &mut Turn<'_>,
         ack: &mut AckView,
     ) -> Result<(), ServiceError> {
+        self.continue_if_long(turn)?;
         let samples = &self.without_sent_before(samples, turn, ack)?[..];
         if samples.is_empty() {
             return Ok(());
@@ -160,7 +175,7 @@ impl Asset {
         let Some(open) = self.open.as_mut().filter(|_| !samples.is_empty()) else { return Ok(()) };
         let (session, progress) = (open.id.clone(), open.progress);
         turn.writes.push(Write::Append { session, first_index, samples, progress });
-        let interval = turn.env.handles.snapshot_interval;
+        let interval = turn.env.handles.sessions.snapshot_interval;
         let snapshot = open.snapshot_if_due(progress.n_samples, interval)?;
         turn.writes.extend(snapshot.map(Write::PutSnapshot));
         Ok(())
@@ -206,7 +221,7 @@ fn samples(rows: Vec<Result<Sample, String>>, ack: &mut AckView) -> Vec<(usize, 
 }
 
 /// Counts `n` samples that are not evaluated. `reason` is a metric label with few values.
-fn count_unjudged(reason: &'static str, n: u64) {
+pub(super) fn count_unjudged(reason: &'static str, n: u64) {
     metrics::counter!("offbd_samples_unjudged_total", "reason" => reason).increment(n);
 }
 
@@ -242,7 +257,11 @@ fn retransmitted(
             }
         }
     }
-    let found = RecordedSamples::find(&row.id, recorded.iter().copied(), turn)?;
+    let handles = &turn.env.handles;
+    let mut found = RecordedSamples::default();
+    for part in handles.wait(handles.store.parts(row.first_part(), MAX_SESSIONS))? {
+        found.merge(RecordedSamples::find(&part.id, recorded.iter().copied(), turn)?);
+    }
     if !found.contain_all(&recorded) {
         let (asset, name) = (row.asset.clone(), row.name.clone());
         return Err(ServiceError::SessionEnded { asset, name });

@@ -109,16 +109,17 @@ fn reopen(
 ) -> Result<(SessionRow, OpenSession, i64), ServiceError> {
     let setup = Setup::new(views::rig(&row.setup)?, None)?;
     let baseline = views::memory(&row.baseline)?;
-    let mut open = OpenSession::new(row.id.clone(), row.name.clone(), setup, baseline, refines);
-    open.importing = row.importing != 0;
-    let restored = snapshots::last(handles, &row, i64::MAX)?.map(|(_, restored)| restored);
-    let Some(restored) = restored.filter(|r| r.motion.is_some() == open.motion.is_some()) else {
+    let found = snapshots::last(handles, &row, &setup, i64::MAX)?;
+    let mut open = OpenSession::new(&row, setup, baseline, refines);
+    let counts_motion = open.motion.is_some();
+    let Some((snapshot, restored)) = found.filter(|(_, r)| r.motion.is_some() == counts_motion)
+    else {
         return Ok((row, open, 0));
     };
     (open.judging, open.motion) = (restored.judging, restored.motion);
-    open.progress.n_samples = restored.n_samples;
-    open.snapshot_at = restored.n_samples;
-    Ok((row, open, restored.n_samples))
+    open.progress.n_samples = snapshot.n_samples;
+    open.snapshot_at = snapshot.n_samples;
+    Ok((row, open, snapshot.n_samples))
 }
 
 /// Evaluates the recording of the open session `row` from the sample `n_evaluated` on; adds
@@ -138,7 +139,7 @@ fn evaluate(
         };
         open.take_new(&sample);
         n += 1;
-        match open.snapshot_if_due(n, handles.snapshot_interval) {
+        match open.snapshot_if_due(n, handles.sessions.snapshot_interval) {
             Ok(None) => {}
             Ok(Some(_)) if handles.closing.is_cancelled() => {
                 let what = "the service is shutting down";

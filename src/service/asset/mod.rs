@@ -23,6 +23,7 @@ mod learning_record;
 mod load;
 mod loader;
 mod memory;
+mod parts;
 mod presence;
 mod recent;
 mod recorded;

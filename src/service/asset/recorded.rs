@@ -63,6 +63,12 @@ impl RecordedSamples {
         Self::find(&open.id, old, turn)
     }
 
+    /// Adds what was found in another session.
+    pub(super) fn merge(&mut self, other: Self) {
+        self.by_key.extend(other.by_key);
+        self.is_partial |= other.is_partial;
+    }
+
     /// Adds samples that are recorded now.
     pub(super) fn add(&mut self, samples: &[Sample]) {
         self.by_key.extend(samples.iter().map(|sample| (sample_key(sample), *sample)));

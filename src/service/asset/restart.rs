@@ -9,9 +9,9 @@ use offbd_core::vocabulary::Sample;
 /// s. Below it, they are late. Chosen.
 const RESTART_S: f64 = 10.0;
 
-/// Consecutive different samples that show a restart until it is certain: one may have a
-/// wrong time.
-const CERTAIN_AFTER: u32 = 2;
+/// Consecutive different samples that show another run of the device until it is certain:
+/// one may have a wrong time.
+pub(super) const CERTAIN_AFTER: u32 = 2;
 
 /// What one sample shows about a restart.
 #[derive(Clone, Copy, PartialEq, Eq)]

@@ -1,32 +1,32 @@
-//! Recognises what a device without session names sends again after its session has ended:
-//! it must not be recorded a second time, in the next session.
+//! Recognises what a device sends again after its session has ended, or has continued in
+//! another: it must not be recorded a second time, in the next session.
 
 use std::collections::BTreeSet;
 
 use super::actor::Asset;
+use super::ingest::count_unjudged;
 use super::recorded::RecordedSamples;
+use super::restart::CERTAIN_AFTER;
 use super::session::OpenSession;
 use super::turn::Turn;
 use crate::service::ServiceError;
 use crate::service::writing::Handles;
 use crate::store::{SessionFilter, SessionRow};
-use crate::wire::telemetry::AckView;
-use offbd_core::engine::{Engine, Recognition};
+use crate::wire::telemetry::{AckView, RowView};
+use offbd_core::engine::{Engine, Recognition, Rejection};
 use offbd_core::vocabulary::Sample;
 
 /// Limit of the ended sessions that are searched, the newest first. Chosen: a retransmission
 /// is rarely older.
-const MAX_SESSIONS: usize = 4;
-
-/// Conflicting samples in a batch after which a session is certainly another run: one may
-/// have a wrong time.
-const CERTAIN_AFTER: u32 = 2;
+pub(super) const MAX_SESSIONS: u32 = 4;
 
 /// An ended session that a device may be sending again.
 #[derive(Clone, Debug)]
 pub(super) struct EndedSession {
     id: String,
     name: String,
+    /// The id of the first part of the session.
+    first_part: String,
     /// The latest time of its samples, also of those that were not judged, s.
     newest_t_s: Option<f64>,
     last_seq: Option<i64>,
@@ -40,22 +40,32 @@ pub(super) struct EndedSession {
 
 impl EndedSession {
     pub(super) fn of(open: &OpenSession) -> Self {
-        let (id, name) = (open.id.clone(), open.name.clone());
-        Self::new(id, name, open.judging.newest_t_s(), open.progress.last_seq)
-    }
-
-    const fn new(id: String, name: String, newest_t_s: Option<f64>, last_seq: Option<i64>) -> Self {
-        Self { id, name, newest_t_s, last_seq, is_other_run: false, is_same_run: false }
+        Self {
+            id: open.id.clone(),
+            name: open.name.clone(),
+            first_part: open.part.first.clone(),
+            newest_t_s: open.judging.newest_t_s(),
+            last_seq: open.progress.last_seq,
+            is_other_run: false,
+            is_same_run: false,
+        }
     }
 
     /// Reads the last ended sessions of `asset`, the newest first. Blocks on the store.
     pub(super) fn read(handles: &Handles, asset: &str) -> Result<Vec<Self>, ServiceError> {
         let (asset, state) = (Some(asset.to_owned()), Some("ended".to_owned()));
         let filter = SessionFilter { asset, state, ..SessionFilter::default() };
-        let rows = handles.wait(handles.store.sessions(&filter, MAX_SESSIONS as u32))?;
+        let rows = handles.wait(handles.store.sessions(&filter, MAX_SESSIONS))?;
         let session = |row: SessionRow| {
-            let newest_t_s = handles.wait(handles.store.newest_t_s(&row.id))?;
-            Ok(Self::new(row.id, row.name, newest_t_s, row.progress.last_seq))
+            Ok(Self {
+                newest_t_s: handles.wait(handles.store.newest_t_s(&row.id))?,
+                first_part: row.first_part().to_owned(),
+                id: row.id,
+                name: row.name,
+                last_seq: row.progress.last_seq,
+                is_other_run: false,
+                is_same_run: false,
+            })
         };
         rows.into_iter().map(session).collect()
     }
@@ -70,6 +80,47 @@ impl EndedSession {
             None => self.newest_t_s.is_some_and(|newest| sample.t_s <= newest),
         }
     }
+    /// Returns which of `samples`, each with its index in the batch, this session has already,
+    /// or has with other values; `open` has none of them. Blocks on the store.
+    fn search(
+        &self,
+        samples: &[(usize, Sample)],
+        open: Option<&Engine>,
+        turn: &Turn<'_>,
+    ) -> Result<Found, ServiceError> {
+        let mut found = Found::default();
+        let doubtful: Vec<_> =
+            samples.iter().filter(|(_, sample)| self.may_contain(sample, open)).collect();
+        if doubtful.is_empty() {
+            return Ok(found);
+        }
+        turn.env.handles.fence()?;
+        let recorded =
+            RecordedSamples::find(&self.id, doubtful.iter().map(|(_, sample)| sample), turn)?;
+        for (index, sample) in doubtful {
+            match recorded.recognise(Recognition::Unknown, sample) {
+                Recognition::Same => drop(found.same.insert(*index)),
+                Recognition::Conflict => drop(found.conflicts.insert(*index)),
+                Recognition::New | Recognition::Taken | Recognition::Unknown => {}
+            }
+        }
+        Ok(found)
+    }
+
+    fn acknowledge(&self, found: &Found, ack: &mut AckView) {
+        if !found.same.is_empty() {
+            ack.session.get_or_insert_with(|| self.name.clone());
+            ack.session_id.get_or_insert_with(|| self.id.clone());
+        }
+        ack.duplicate += found.same.len();
+    }
+}
+
+/// The samples that were found in an ended session, by their index in the batch.
+#[derive(Debug, Default)]
+struct Found {
+    same: BTreeSet<usize>,
+    conflicts: BTreeSet<usize>,
 }
 
 impl Asset {
@@ -77,7 +128,7 @@ impl Asset {
     pub(super) fn note_ended(&mut self, session: EndedSession) {
         self.ended.iter_mut().for_each(|earlier| earlier.is_other_run = false);
         self.ended.insert(0, session);
-        self.ended.truncate(MAX_SESSIONS);
+        self.ended.truncate(MAX_SESSIONS as usize);
     }
 
     /// Returns `samples`, each with its index in the batch, without those that an ended
@@ -88,38 +139,53 @@ impl Asset {
         turn: &Turn<'_>,
         ack: &mut AckView,
     ) -> Result<Vec<(usize, Sample)>, ServiceError> {
+        let mut rest = samples.to_vec();
         let engine = self.open.as_ref().map(|open| open.judging.engine());
-        let is_new = |sample: &Sample| {
-            sample.t_s.is_finite()
-                && engine.is_none_or(|engine| engine.recognise(sample) == Recognition::New)
-        };
-        let new: Vec<_> = samples.iter().filter(|(_, sample)| is_new(sample)).collect();
-        let mut found = BTreeSet::new();
         for session in &mut self.ended {
-            let doubtful: Vec<_> =
-                new.iter().filter(|(_, sample)| session.may_contain(sample, engine)).collect();
-            if doubtful.is_empty() {
-                continue;
-            }
-            turn.env.handles.fence()?;
-            let doubtful_samples = doubtful.iter().map(|(_, sample)| sample);
-            let recorded = RecordedSamples::find(&session.id, doubtful_samples, turn)?;
-            let mut n_conflicts = 0;
-            for (index, sample) in doubtful {
-                match recorded.recognise(Recognition::Unknown, sample) {
-                    Recognition::Same => {
-                        ack.session.get_or_insert_with(|| session.name.clone());
-                        ack.session_id.get_or_insert_with(|| session.id.clone());
-                        found.insert(*index);
-                        session.is_same_run = true;
-                    }
-                    Recognition::Conflict => n_conflicts += 1,
-                    Recognition::New | Recognition::Taken | Recognition::Unknown => {}
-                }
-            }
-            session.is_other_run = n_conflicts >= CERTAIN_AFTER && !session.is_same_run;
+            let found = session.search(&new(&rest, engine), engine, turn)?;
+            session.acknowledge(&found, ack);
+            session.is_same_run |= !found.same.is_empty();
+            session.is_other_run |= found.conflicts.len() >= CERTAIN_AFTER as usize;
+            session.is_other_run &= !session.is_same_run;
+            rest.retain(|(index, _)| !found.same.contains(index));
         }
-        ack.duplicate += found.len();
-        Ok(samples.iter().filter(|(index, _)| !found.contains(index)).copied().collect())
+        Ok(rest)
     }
+
+    /// Returns `samples`, each with its index in the batch, without those that an earlier part
+    /// of the open session has: with the same values, they are counted as duplicates; with
+    /// others, they are rejected.
+    pub(super) fn without_earlier_parts(
+        &mut self,
+        samples: &[(usize, Sample)],
+        turn: &Turn<'_>,
+        ack: &mut AckView,
+    ) -> Result<Vec<(usize, Sample)>, ServiceError> {
+        let mut rest = samples.to_vec();
+        let Some(open) = &mut self.open else { return Ok(rest) };
+        for part in self.ended.iter().filter(|ended| ended.first_part == open.part.first) {
+            let engine = open.judging.engine();
+            let found = part.search(&new(&rest, Some(engine)), Some(engine), turn)?;
+            part.acknowledge(&found, ack);
+            rest.retain(|(index, sample)| {
+                if found.conflicts.contains(index) {
+                    let why = Rejection::conflict(sample);
+                    open.judging.note_rejected(why);
+                    count_unjudged(why.as_str(), 1);
+                    ack.rejected.push(RowView { index: *index, reason: why.to_string() });
+                }
+                !found.same.contains(index) && !found.conflicts.contains(index)
+            });
+        }
+        Ok(rest)
+    }
+}
+
+/// Returns those of `samples` that the engine of the open session does not have.
+fn new(samples: &[(usize, Sample)], open: Option<&Engine>) -> Vec<(usize, Sample)> {
+    let is_new = |sample: &Sample| {
+        sample.t_s.is_finite()
+            && open.is_none_or(|engine| engine.recognise(sample) == Recognition::New)
+    };
+    samples.iter().filter(|(_, sample)| is_new(sample)).copied().collect()
 }

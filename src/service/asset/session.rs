@@ -1,10 +1,11 @@
 //! An open session and its engine.
 
+use super::parts::Part;
 use super::recent::RecentTrace;
 use crate::judging::Judging;
 use crate::service::clock::rfc3339;
 use crate::service::{ServiceError, snapshots, views};
-use crate::store::{Micros, SessionProgress, Snapshot, TransitionRow, Write};
+use crate::store::{Micros, SessionProgress, SessionRow, Snapshot, TransitionRow, Write};
 use crate::wire::stored::StoredOccurrence;
 use crate::wire::verdict::{SummaryView, fault_view};
 use offbd_core::diagnosis::FaultMemory;
@@ -15,6 +16,8 @@ use offbd_core::vocabulary::Sample;
 pub(super) struct OpenSession {
     pub(super) id: String,
     pub(super) name: String,
+    pub(super) opened_at: Micros,
+    pub(super) part: Part,
     pub(super) judging: Judging,
     pub(super) progress: SessionProgress,
     pub(super) n_transitions: i64,
@@ -33,24 +36,20 @@ pub(super) struct OpenSession {
 }
 
 impl OpenSession {
-    /// Returns a new session. Motion is counted if the rig is not calibrated, or if
+    /// Returns the session of `row`, with an engine at its start. Motion is counted if the rig is not calibrated, or if
     /// `refines` is set because the session may refine its calibration.
-    pub(super) fn new(
-        id: String,
-        name: String,
-        setup: Setup,
-        baseline: FaultMemory,
-        refines: bool,
-    ) -> Self {
+    pub(super) fn new(row: &SessionRow, setup: Setup, baseline: FaultMemory, refines: bool) -> Self {
         let counts = refines || setup.rig.calibration.is_none();
         Self {
             motion: counts.then(|| UsableMotion::new(&setup.rig)),
-            id,
-            name,
+            id: row.id.clone(),
+            name: row.name.clone(),
+            opened_at: row.opened_at,
+            part: Part::of(row),
             judging: Judging::new(setup, baseline),
             progress: SessionProgress::default(),
             n_transitions: 0,
-            importing: false,
+            importing: row.importing != 0,
             recent: RecentTrace::default(),
             snapshot_at: 0,
             n_restart_signs: 0,
@@ -96,8 +95,13 @@ impl OpenSession {
             return Ok(None);
         }
         let last = std::mem::replace(&mut self.snapshot_at, n_samples);
-        let kept = snapshots::is_kept(n_samples, last, interval);
-        snapshots::take(&self.id, n_samples, kept, &self.judging, self.motion.as_ref()).map(Some)
+        Ok(Some(Snapshot {
+            session: self.id.clone(),
+            n_samples,
+            kept: snapshots::is_kept(n_samples, last, interval),
+            version: snapshots::version(),
+            state: snapshots::state(&self.judging, self.motion.as_ref())?,
+        }))
     }
 
     /// Samples that are not judged because no other confirmed their step of the clock.

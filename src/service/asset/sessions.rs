@@ -3,6 +3,7 @@
 use uuid::Uuid;
 
 use super::actor::Asset;
+use super::parts::Part;
 use super::sent_before::EndedSession;
 use super::session::OpenSession;
 use super::trend;
@@ -38,7 +39,7 @@ impl Asset {
             return Err(ServiceError::Busy { what });
         }
         let name = name.unwrap_or_else(|| rfc3339(turn.at));
-        let open = self.open.as_ref().is_some_and(|open| open.name == name);
+        let open = self.open.as_ref().is_some_and(|open| open.is_named(&name));
         if open || matches!(self.switch_to(&name, importing, turn)?, SessionSwitch::Ended(_)) {
             let asset = self.row.name.clone();
             return Err(ServiceError::SessionExists { asset, name });
@@ -107,7 +108,7 @@ impl Asset {
         importing: bool,
         turn: &mut Turn<'_>,
     ) -> Result<SessionSwitch, ServiceError> {
-        if self.open.as_ref().is_some_and(|open| open.name == name) {
+        if self.open.as_ref().is_some_and(|open| open.is_named(name)) {
             return Ok(SessionSwitch::Open);
         }
         check_session_name(name)?;
@@ -121,24 +122,26 @@ impl Asset {
             return Err(ServiceError::Busy { what });
         }
         self.end(turn)?;
-        self.open(name.to_owned(), importing, turn)?;
+        self.open(name.to_owned(), None, importing, turn)?;
         Ok(SessionSwitch::Open)
     }
 
-    /// Opens a session. No session must be open.
-    fn open(
+    /// Opens a session, which is the part `part` of one that continues. No session must be
+    /// open.
+    pub(super) fn open(
         &mut self,
         name: String,
+        part: Option<&Part>,
         importing: bool,
         turn: &mut Turn<'_>,
     ) -> Result<(), ServiceError> {
         self.session_rate.count(turn.at);
         let id = Uuid::now_v7().to_string();
         let setup = Setup::new(self.rig.clone(), None)?;
-        turn.writes.push(Write::OpenSession(SessionRow {
-            id: id.clone(),
+        let row = SessionRow {
+            id,
             asset: self.row.name.clone(),
-            name: name.clone(),
+            name,
             state: SessionState::Open.to_string(),
             opened_at: turn.at,
             ended_at: None,
@@ -146,13 +149,14 @@ impl Asset {
             baseline: views::to_json(&StoredMemory::of(&self.memory))?,
             progress: SessionProgress::default(),
             importing: importing.into(),
+            part: part.map_or(1, |part| part.number),
+            first_part: part.map(|part| part.first.clone()),
             verdict: None,
             verdict_hash: None,
-        }));
+        };
         let refines = self.learning.refines();
-        let mut open = OpenSession::new(id, name, setup, self.memory.clone(), refines);
-        open.importing = importing;
-        self.open = Some(open);
+        self.open = Some(OpenSession::new(&row, setup, self.memory.clone(), refines));
+        turn.writes.push(Write::OpenSession(row));
         self.write_memory(None, turn)
     }
 
@@ -165,7 +169,7 @@ impl Asset {
         while handles.wait(handles.store.session_named(&self.row.name, &rfc3339(at)))?.is_some() {
             at += 1;
         }
-        self.open(rfc3339(at), false, turn)
+        self.open(rfc3339(at), None, false, turn)
     }
 
     /// Removes the snapshots of the open session, and drops its engine.

@@ -337,7 +337,7 @@ mod tests {
     use crate::service::asset::session_rate::SessionRate;
     use crate::service::writing::Handles;
     use crate::service::{Clock, Limits};
-    use crate::store::{Location, Store};
+    use crate::store::{Location, SessionRow, Store};
     use offbd_core::engine::{Rig, Setup};
     use offbd_core::vocabulary::Sample;
     use tokio::sync::watch;
@@ -396,8 +396,8 @@ mod tests {
         assert!(is_kept(|_, _| Ok(())).await, "nothing has changed");
         let ingest = |asset: &mut Asset, turn: &mut Turn<'_>| {
             let setup = Setup::new(asset.rig.clone(), None)?;
-            let (id, memory) = ("1".to_owned(), asset.memory.clone());
-            asset.open = Some(OpenSession::new(id, "s".to_owned(), setup, memory, false));
+            let row = SessionRow { id: "1".to_owned(), ..SessionRow::default() };
+            asset.open = Some(OpenSession::new(&row, setup, asset.memory.clone(), false));
             let sample = Sample { t_s: 1.0, x_m: Some(0.0), ..Sample::default() };
             asset.record_named(&[(0, sample)], turn, &mut Default::default())?;
             // The error occurs before any write is collected.

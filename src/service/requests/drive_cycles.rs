@@ -14,7 +14,7 @@ impl Service {
         let row = row.ok_or_else(|| ServiceError::UnknownAsset { name: asset.to_owned() })?;
         let rig = views::rig(&row.document)?;
         let busy = |_| ServiceError::Busy { what: "another drive cycle is being computed" };
-        let permit = self.inner.drive_cycles.clone().try_acquire_owned().map_err(busy)?;
+        let permit = self.inner.computing.drive_cycles.clone().try_acquire_owned().map_err(busy)?;
         let task = tokio::task::spawn_blocking(move || {
             let cycle = drive_cycle(&rig);
             drop(permit);

@@ -30,7 +30,7 @@ impl Service {
         let failure =
             last_failure(&self.inner.handles.store, &session.id, code).await?.ok_or_else(gone)?;
         let busy = |_| ServiceError::Busy { what: "the limit of concurrent recordings is reached" };
-        let permit = self.inner.recordings.clone().try_acquire_owned().map_err(busy)?;
+        let permit = self.inner.computing.recordings.clone().try_acquire_owned().map_err(busy)?;
         let handles = self.inner.handles.clone();
         let task = tokio::task::spawn_blocking(move || {
             let recording = fault_recording(&handles, &session, code, &failure, window);

@@ -13,7 +13,7 @@ impl Service {
     pub async fn trace(&self, id: &str, query: TraceQuery) -> Result<TraceView, ServiceError> {
         let session = self.session_row(id).await?;
         let busy = |_| ServiceError::Busy { what: "the limit of concurrent traces is reached" };
-        let permit = self.inner.traces.clone().try_acquire_owned().map_err(busy)?;
+        let permit = self.inner.computing.traces.clone().try_acquire_owned().map_err(busy)?;
         let handles = self.inner.handles.clone();
         let task = tokio::task::spawn_blocking(move || {
             let trace = trace(&handles, &session, &query);

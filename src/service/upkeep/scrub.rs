@@ -180,10 +180,11 @@ impl Comparison {
         if session.state != SessionState::Open.as_str() {
             return Ok(None);
         }
-        let Some((snapshot, restored)) = snapshots::last(handles, session, i64::MAX)? else {
+        let setup = Setup::new(views::rig(&session.setup)?, None)?;
+        let Some((snapshot, restored)) = snapshots::last(handles, session, &setup, i64::MAX)?
+        else {
             return Ok(None);
         };
-        let setup = Setup::new(views::rig(&session.setup)?, None)?;
         let motion = restored.motion.map(|_| UsableMotion::new(&setup.rig));
         let baseline: FaultMemory = views::memory(&session.baseline)?;
         let judging = Judging::new(setup, baseline);

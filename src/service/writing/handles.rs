@@ -11,7 +11,7 @@ use tokio::sync::{mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 
 use super::commit::{EngineGeneration, Outage, WriteSet};
-use crate::service::{Clock, Limits, ServiceError};
+use crate::service::{Clock, Limits, ServiceError, SessionLimits};
 use crate::store::{Store, StoreError, Write};
 
 /// The shared handles of the service. Cheap to clone.
@@ -22,8 +22,8 @@ pub(in crate::service) struct Handles {
     pub(in crate::service) runtime: Handle,
     /// Cancelled when the service shuts down.
     pub(in crate::service) closing: CancellationToken,
-    /// Samples of a session between two snapshots of its engine.
-    pub(in crate::service) snapshot_interval: i64,
+    /// How long sessions may be.
+    pub(in crate::service) sessions: SessionLimits,
     writer: mpsc::Sender<WriteSet>,
     outage: watch::Receiver<Outage>,
     /// Whether a fence has timed out and is not complete yet.
@@ -31,6 +31,9 @@ pub(in crate::service) struct Handles {
     /// Commits what is queued, in a simulation without a writer thread.
     #[cfg(test)]
     pub(in crate::service) commit_queued: Arc<std::sync::OnceLock<CommitQueued>>,
+    /// Number of the next reads that fail, in a simulation.
+    #[cfg(test)]
+    pub(in crate::service) failing_reads: Arc<std::sync::atomic::AtomicU32>,
 }
 
 #[cfg(test)]
@@ -59,12 +62,14 @@ impl Handles {
             clock,
             runtime: Handle::current(),
             closing,
-            snapshot_interval: limits.snapshot_interval,
+            sessions: limits.sessions,
             writer,
             outage,
             is_stuck: Arc::default(),
             #[cfg(test)]
             commit_queued: Arc::default(),
+            #[cfg(test)]
+            failing_reads: Arc::default(),
         }
     }
 
@@ -153,9 +158,18 @@ impl Handles {
         &self,
         answer: impl Future<Output = Result<T, E>>,
     ) -> Result<T, E> {
+        #[cfg(test)]
+        if self.failing_reads.try_update(Ordering::SeqCst, Ordering::SeqCst, one_fewer).is_ok() {
+            return Err(StoreError::too_slow().into());
+        }
         self.runtime.block_on(async {
             let late = |_| StoreError::too_slow();
             tokio::time::timeout(READ_TIMEOUT, answer).await.map_err(late)?
         })
     }
+}
+
+#[cfg(test)]
+const fn one_fewer(n: u32) -> Option<u32> {
+    n.checked_sub(1)
 }

@@ -34,6 +34,7 @@ pub struct ServiceFixture {
     pub server: Option<Server>,
     pub client: Client,
     pub data: tempfile::TempDir,
+    config: Config,
 }
 
 /// Returns whether services under test use PostgreSQL: `TEST_DATABASE=postgres`.
@@ -104,9 +105,9 @@ impl ServiceFixture {
         let data = tempfile::tempdir().unwrap();
         let mut config = config(data.path());
         change(&mut config);
-        let server = server::start(config).await.unwrap();
+        let server = server::start(config.clone()).await.unwrap();
         let client = Client::new(server.address.to_string());
-        Self { server: Some(server), client, data }
+        Self { server: Some(server), client, data, config }
     }
 
     /// Opens a connection to the service's store.
@@ -122,10 +123,10 @@ impl ServiceFixture {
         StoreLock { store }
     }
 
-    /// Shuts the service down and starts it again with the same data.
+    /// Shuts the service down and starts it again with the same data and configuration.
     pub async fn restart(&mut self) {
         self.server.take().unwrap().shutdown().await.unwrap();
-        let server = server::start(config(self.data.path())).await.unwrap();
+        let server = server::start(self.config.clone()).await.unwrap();
         self.client = Client::new(server.address.to_string());
         self.server = Some(server);
     }
