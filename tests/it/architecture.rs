@@ -1,6 +1,7 @@
 //! Rules of `ARCHITECTURE.md` that the compiler does not check: which names each folder must
 //! not use, and that documents name only existing paths.
 
+mod bounds;
 mod documents;
 
 use std::collections::BTreeMap;

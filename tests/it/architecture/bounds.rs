@@ -1,0 +1,81 @@
+//! Compares the list of bounds in the operations manual with the code.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use super::{ROOT, files};
+
+/// The folders whose constants are bounds of the service.
+const FOLDERS: [&str; 4] = ["src/server", "src/http", "src/service", "src/store"];
+
+/// The structs of the configuration whose fields are bounds, with their section.
+const SECTIONS: [(&str, &str); 4] = [
+    ("LimitsConfig", "limits"),
+    ("RatesConfig", "rates"),
+    ("WorkersConfig", "workers"),
+    ("RetentionConfig", "retention"),
+];
+
+fn read(path: &str) -> String {
+    std::fs::read_to_string(Path::new(ROOT).join(path)).unwrap_or_else(|e| panic!("{path}: {e}"))
+}
+
+/// Returns name and value of a constant that is a bound, if `line` defines one.
+fn bound(line: &str) -> Option<String> {
+    let (_, definition) = line.split_once("const ").filter(|(before, _)| is_visibility(before))?;
+    let (name, rest) = definition.split_once(": ")?;
+    let is_bound = ["MAX_", "LONGEST_"].iter().any(|start| name.starts_with(start));
+    let (_, value) = rest.split_once(" = ").filter(|_| is_bound || name.ends_with("TIMEOUT"))?;
+    Some(format!("{name} = {}", value.strip_suffix(';')?))
+}
+
+fn is_visibility(text: &str) -> bool {
+    text.is_empty() || text.starts_with("pub") && !text.contains("fn")
+}
+
+fn bounds_in_code() -> BTreeSet<String> {
+    let of_file = |file: String| {
+        let text = read(&file);
+        let code = text.split("#[cfg(test)]\nmod tests").next().unwrap_or_default();
+        let bounds = code.lines().filter_map(bound);
+        bounds.map(|bound| format!("`{file}`: `{bound}`")).collect::<Vec<_>>()
+    };
+    let is_shipped = |file: &String| !file.contains("/simulation/") && !file.ends_with("tests.rs");
+    let files = FOLDERS.iter().flat_map(|folder| files(folder)).filter(is_shipped);
+    files.flat_map(of_file).collect()
+}
+
+fn bounds_in_manual() -> BTreeSet<String> {
+    let manual = read("docs/operations.md");
+    let rows = manual.lines().filter(|line| line.starts_with("| ") && line.contains("`src/"));
+    let entries = rows.filter_map(|row| row.trim_end_matches(" |").rsplit(" | ").next());
+    entries.flat_map(|cell| cell.split(", `src/").map(with_start)).collect()
+}
+
+fn with_start(entry: &str) -> String {
+    if entry.starts_with('`') { entry.to_owned() } else { format!("`src/{entry}") }
+}
+
+#[test]
+fn the_manual_lists_every_bound_of_the_code_with_its_value() {
+    let (code, manual) = (bounds_in_code(), bounds_in_manual());
+    assert!(code.len() > 50, "{}", code.len());
+    let missing: Vec<_> = code.difference(&manual).collect();
+    let wrong: Vec<_> = manual.difference(&code).collect();
+    assert!(missing.is_empty() && wrong.is_empty(), "missing {missing:#?}, wrong {wrong:#?}");
+}
+
+#[test]
+fn the_manual_lists_every_bound_of_the_configuration() {
+    let (config, manual) = (read("src/config.rs"), read("docs/operations.md"));
+    for (name, section) in SECTIONS {
+        let (_, rest) = config.split_once(&format!("pub struct {name} {{")).unwrap();
+        let (body, _) = rest.split_once("\n}").unwrap();
+        let fields = body.lines().filter_map(|line| line.trim().strip_prefix("pub "));
+        for field in fields.filter_map(|field| field.split(':').next()) {
+            let in_table = manual.contains(&format!("`{section}.{field}`"));
+            let in_example = manual.contains(&format!("\n{field} = "));
+            assert!(in_table || in_example, "{section}.{field} is not in docs/operations.md");
+        }
+    }
+}
