@@ -10,7 +10,7 @@ use crate::service::playback::play;
 use crate::service::{ServiceError, views};
 use crate::store::{SessionFilter, SessionRow};
 use offbd_core::engine::{Input, Setup};
-use offbd_core::vocabulary::FaultCode;
+use offbd_core::vocabulary::{FaultCode, Sample};
 
 /// Checks all sessions, which have ended, and all actions.
 ///
@@ -27,39 +27,57 @@ pub(super) fn check(world: &World) -> Result<(), String> {
     check_actions(world)
 }
 
-fn sessions(world: &World, asset: &str) -> Result<Vec<SessionRow>, String> {
+pub(super) fn sessions(world: &World, asset: &str) -> Result<Vec<SessionRow>, String> {
     let filter = SessionFilter { asset: Some(asset.to_owned()), ..SessionFilter::default() };
     let rows = RUNTIME.block_on(world.inner().handles.store.sessions(&filter, 10_000));
     rows.map_err(|error| error.to_string())
 }
 
-/// All that was acknowledged is there; everything is there once, as it was measured, and in
-/// the session that the device has named.
+/// Returns the recording of `session`.
+pub(super) fn recorded(world: &World, session: &SessionRow) -> Result<Vec<Sample>, String> {
+    let mut recording = world.inner().handles.store.recording(session, 0);
+    let mut all = Vec::new();
+    while let Some(samples) =
+        RUNTIME.block_on(recording.next()).map_err(|error| error.to_string())?
+    {
+        all.extend(samples);
+    }
+    Ok(all)
+}
+
+/// All that was acknowledged is there, unless it was deleted; everything is there once, as it
+/// was measured, and in the session that the device has named.
 fn check_samples(world: &World, device: &Device, sessions: &[SessionRow]) -> Result<(), String> {
     let mut found: BTreeMap<Content, &str> = BTreeMap::new();
     for session in sessions {
-        let mut recording = world.inner().handles.store.recording(session, 0);
-        while let Some(samples) =
-            RUNTIME.block_on(recording.next()).map_err(|error| error.to_string())?
-        {
-            for sample in samples {
-                let key = content(&sample);
-                let at = || format!("{} {key:?} in `{}`", device.asset, session.name);
-                if device.measured.get(&key) != Some(&sample) {
-                    return Err(format!("{}: not as measured: {sample:?}", at()));
-                }
-                if let Some(before) = found.insert(key, &session.name) {
-                    return Err(format!("{}: also in `{before}`", at()));
-                }
-                if device.session(key.0).is_some_and(|name| name != session.name) {
-                    return Err(format!("{}: in the wrong session", at()));
-                }
+        for sample in recorded(world, session)? {
+            let key = content(&sample);
+            let at = || format!("{} {key:?} in `{}`", device.asset, session.name);
+            if device.measured.get(&key) != Some(&sample) {
+                return Err(format!("{}: not as measured: {sample:?}", at()));
+            }
+            if let Some(before) = found.insert(key, &session.name) {
+                return Err(format!("{}: also in `{before}`", at()));
+            }
+            if device.session(key.0).is_some_and(|name| !is_part_of(&session.name, &name)) {
+                return Err(format!("{}: in the wrong session", at()));
             }
         }
     }
-    let lost: Vec<_> =
-        device.acknowledged.iter().filter(|content| !found.contains_key(content)).collect();
-    if lost.is_empty() { Ok(()) } else { Err(format!("{}: lost {lost:?}", device.asset)) }
+    let is_lost = |key: &&Content| !found.contains_key(key) && !device.deleted.contains(key);
+    let lost: Vec<_> = device.acknowledged.iter().filter(is_lost).collect();
+    if lost.is_empty() {
+        return Ok(());
+    }
+    let describe = |row: &SessionRow| format!("`{}` {} {:?}", row.name, row.state, row.progress);
+    let sessions: Vec<_> = sessions.iter().map(describe).collect();
+    Err(format!("{}: lost {lost:?} of {sessions:?}", device.asset))
+}
+
+/// Whether `name` is that of a part of the session `first`.
+fn is_part_of(name: &str, first: &str) -> bool {
+    let rest = name.strip_prefix(first);
+    rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(" ("))
 }
 
 /// The verdict is that of the recording.

@@ -55,6 +55,8 @@ pub(super) struct Device {
     pub(super) measured: BTreeMap<Content, Sample>,
     /// What it was told to be there.
     pub(super) acknowledged: BTreeSet<Content>,
+    /// What was in the sessions that persons have deleted.
+    pub(super) deleted: BTreeSet<Content>,
 }
 
 impl Device {
@@ -71,6 +73,7 @@ impl Device {
             answers: VecDeque::new(),
             measured: BTreeMap::new(),
             acknowledged: BTreeSet::new(),
+            deleted: BTreeSet::new(),
         }
     }
 
@@ -175,7 +178,8 @@ impl Device {
                 ServiceError::Busy { .. }
                 | ServiceError::Unavailable { .. }
                 | ServiceError::Outage { .. }
-                | ServiceError::NotStored { .. },
+                | ServiceError::NotStored { .. }
+                | ServiceError::Store(_),
             ) => return Ok(()),
             Err(error) => return Err(format!("{} got {error:?}", self.asset)),
         };

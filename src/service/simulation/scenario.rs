@@ -49,6 +49,12 @@ pub(super) enum Step {
     Commit { most: usize },
     /// The next transaction fails.
     Fail { at: CommitPoint, fault: CommitFault },
+    /// The next `n` reads for a command fail.
+    FailReads { n: u32 },
+    /// A person deletes the oldest ended session of a rig.
+    Delete { device: usize },
+    /// The service goes on with deletions.
+    Sweep,
     /// The process is killed and started again.
     Kill,
     /// The wall clock is set forward or back, s.
@@ -81,7 +87,8 @@ fn step() -> impl Strategy<Value = Step> {
         14 => measure.prop_map(|(device, n, spoilt)| Step::Measure { device, n, spoilt }),
         4 => device().prop_map(|device| Step::Resend { device }),
         1 => device().prop_map(|device| Step::Reboot { device }),
-        1 => (device(), -2000.0..2000.0).prop_map(|(device, by_s)| Step::DeviceClock { device, by_s }),
+        1 => (device(), -2000.0..2000.0)
+            .prop_map(|(device, by_s)| Step::DeviceClock { device, by_s }),
         5 => device().prop_map(|device| Step::Read { device }),
         1 => device().prop_map(|device| Step::Disconnect { device }),
         12 => (0..8_usize, prop::bool::weighted(0.2))
@@ -91,6 +98,9 @@ fn step() -> impl Strategy<Value = Step> {
         4 => Just(Step::Load),
         8 => (1..6_usize).prop_map(|most| Step::Commit { most }),
         2 => (point, fault).prop_map(|(at, fault)| Step::Fail { at, fault }),
+        1 => (1..4_u32).prop_map(|n| Step::FailReads { n }),
+        1 => device().prop_map(|device| Step::Delete { device }),
+        1 => Just(Step::Sweep),
         1 => Just(Step::Kill),
         1 => (-100_000..100_000_i64).prop_map(|by_s| Step::WallClock { by_s }),
         2 => (device(), any::<bool>()).prop_map(|(device, clears)| Step::Act { device, clears }),

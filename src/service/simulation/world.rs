@@ -4,7 +4,7 @@
 use std::future::Future;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
-use std::pin::Pin;
+use std::pin::{Pin, pin};
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 use std::time::Duration;
@@ -13,12 +13,13 @@ use futures_util::FutureExt;
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
 
-use super::device::{Device, SentBatch};
+use super::check;
+use super::device::{Device, SentBatch, content};
 use super::scenario::{DeviceKind, Scenario, Step};
 use crate::service::asset::{AssetCommand, Loader, Shard};
 use crate::service::start::Inner;
 use crate::service::writing::Committer;
-use crate::service::{Clock, Limits, Service, ServiceError, views};
+use crate::service::{Clock, Limits, Service, ServiceError, SessionLimits, views};
 use crate::store::{FaultPlan, Location, Store};
 use crate::wire::asset;
 use offbd_core::engine::Rig;
@@ -35,7 +36,7 @@ fn limits() -> Limits {
         in_flight_samples: 100,
         batch_samples: 50,
         journal_bytes: 3000,
-        snapshot_interval: 40,
+        sessions: SessionLimits { samples: 150, snapshot_interval: 40, ..Default::default() },
         ..Limits::default()
     }
 }
@@ -198,6 +199,11 @@ impl World {
             Step::Load => drop(self.work(|process| process.loader.step())),
             Step::Commit { most } => drop(self.work(|process| commit(&process.committer, most))),
             Step::Fail { at, fault } => self.process().faults.set(Some((at, fault))),
+            Step::FailReads { n } => {
+                self.inner().handles.failing_reads.store(n, Ordering::SeqCst);
+            }
+            Step::Delete { device } => self.delete(device % n)?,
+            Step::Sweep => self.sweep(),
             Step::Kill => self.kill(),
             Step::WallClock { by_s } => {
                 self.now.fetch_add(by_s * 1_000_000, Ordering::SeqCst);
@@ -382,6 +388,37 @@ impl World {
         Ok(())
     }
 
+    /// Deletes the oldest ended session of a device.
+    fn delete(&mut self, device: usize) -> Result<(), String> {
+        let asset = self.devices[device].asset.clone();
+        let sessions = check::sessions(self, &asset)?;
+        let Some(row) = sessions.into_iter().rev().find(|row| !row.is_open()) else {
+            return Ok(());
+        };
+        let recorded = check::recorded(self, &row)?;
+        self.devices[device].deleted.extend(recorded.iter().map(content));
+        // A kill may interrupt it.
+        let _ = self.call(&asset, |reply| AssetCommand::DeleteSession { session: row.id, reply });
+        Ok(())
+    }
+
+    /// Goes on with all deletions, with the commits that they need.
+    fn sweep(&mut self) {
+        self.work(|process| {
+            let deleter = process.service.inner.deleter.clone();
+            let mut committer = process.committer.lock().unwrap_or_else(PoisonError::into_inner);
+            RUNTIME.block_on(async {
+                let mut deletion = pin!(deleter.all());
+                // A commit is never given up half-way.
+                while futures_util::poll!(&mut deletion).is_pending() {
+                    committer.step(usize::MAX).await;
+                    tokio::task::yield_now().await;
+                }
+            });
+            true
+        });
+    }
+
     /// Executes a command and lets everything go on until it is answered.
     fn call<T: Send + 'static>(
         &mut self,
@@ -406,6 +443,7 @@ impl World {
     /// If that does not come to an end, or the service has done something wrong.
     pub(super) fn finish(&mut self) -> Result<(), String> {
         self.process().faults.set(None);
+        self.inner().handles.failing_reads.store(0, Ordering::SeqCst);
         for round in 0..MAX_ROUNDS {
             if round % 10 == 0 {
                 (0..self.devices.len()).for_each(|device| self.resend(device));
