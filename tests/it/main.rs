@@ -22,6 +22,8 @@ mod liveness;
 mod main_job;
 mod monitoring;
 mod network;
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+mod one_failure;
 mod openapi;
 mod outage;
 mod outcome;
