@@ -37,4 +37,5 @@ mod support;
 #[cfg(feature = "otel")]
 mod traces;
 mod trends;
+mod upgrade;
 mod views;
