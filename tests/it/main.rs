@@ -27,6 +27,8 @@ mod one_failure;
 mod openapi;
 mod outage;
 mod outcome;
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+mod power_cut;
 mod restart;
 mod retention;
 mod same_sample;
