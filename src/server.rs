@@ -32,6 +32,10 @@ use crate::http::{self, AccessPolicy, App, BodyBudget, ExtraRoutes, RateLimit, R
 use crate::service::{Clock, Service, Workers};
 use crate::store::{self, CheckReport, Location, Store};
 
+/// How often a blocking thread is asked for: often enough for a device that waits, and rarely
+/// enough to cost nothing.
+const THREAD_INTERVAL: Duration = Duration::from_secs(1);
+
 /// A running server.
 pub struct Server {
     /// The address that it listens on, with the actual port.
@@ -88,6 +92,7 @@ pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Ser
     tls.map(|tls| tokio::spawn(tls.watch(closing.clone())));
     keys.map(|keys| tokio::spawn(keys.watch(closing.clone())));
     tokio::spawn(http::keep_metrics(closing.clone()));
+    tokio::spawn(keep_threads(closing.clone()));
     tracing::info!(%address, store = %store.location(), "serving");
     let deadline = Duration::from_secs(config.limits.shutdown_s);
     Ok(Server { address, closing, deadline, serving, store, workers, lock })
@@ -98,6 +103,17 @@ async fn rebuild(service: Service, closing: CancellationToken) {
     let rebuilt = closing.run_until_cancelled(service.rebuild()).await;
     if let Some(Err(error)) = rebuilt {
         tracing::error!(%error, "cannot rebuild the engines; each is rebuilt when it is asked for");
+    }
+}
+
+/// Asks for a blocking thread again and again. If the system refuses one, tokio leaves the
+/// task in its queue until the next one comes, and an asset would wait as long to be loaded.
+async fn keep_threads(closing: CancellationToken) {
+    while !closing.is_cancelled() {
+        let idle = tokio::task::spawn_blocking(|| ());
+        let waited = async { (idle.await, tokio::time::sleep(THREAD_INTERVAL).await) };
+        let late = tokio::time::timeout(2 * THREAD_INTERVAL, waited);
+        closing.run_until_cancelled(late).await;
     }
 }
 

@@ -72,6 +72,7 @@ enum CliCommand {
 /// Runs the command line of this process.
 #[must_use]
 pub fn main() -> ExitCode {
+    end_with_main_thread();
     match Cli::try_parse() {
         Ok(cli) => run(cli).map_or_else(|error| report(&error), |()| ExitCode::SUCCESS),
         Err(error) => print_usage(&error),
@@ -105,6 +106,19 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         CliCommand::Migrate(args) => serve::migrate(&args),
         CliCommand::Check(args) => serve::check(&args),
     }
+}
+
+/// Makes a panic of the main thread end the process at once. If the system refuses one of the
+/// runtime's threads, tokio panics and then waits for the others for ever.
+fn end_with_main_thread() {
+    let main = std::thread::current().id();
+    let report = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        report(panic);
+        if std::thread::current().id() == main {
+            std::process::exit(101);
+        }
+    }));
 }
 
 /// The asynchronous runtime for commands that need one.

@@ -15,7 +15,7 @@ use sqlx::postgres::PgConnectOptions;
 use sqlx::{AnyConnection, AnyPool, AssertSqlSafe, ConnectOptions, Executor};
 
 use super::StoreError;
-use super::checkpoint::AUTOCHECKPOINT_PAGES;
+use super::checkpoint::{self, AUTOCHECKPOINT_PAGES};
 use super::write::WriterRole;
 use super::writer_lock::{self, Backend};
 
@@ -97,6 +97,10 @@ impl Location {
     /// and, in PostgreSQL, takes the lock of the database from the connection `lost`, if
     /// that still holds it; returns what the server knows the new one as. An SQLite file
     /// is locked by the caller.
+    ///
+    /// The main writer of an SQLite file first copies the write-ahead log into the file. If a
+    /// sync of the log has failed, SQLite may find commits there that the system has in
+    /// memory but no longer writes to the disk; commits after them would be lost with them.
     pub(super) async fn writer(
         &self,
         role: WriterRole,
@@ -112,6 +116,10 @@ impl Location {
             let backend = match self {
                 Self::Server(_) if role == WriterRole::Main => {
                     Some(writer_lock::take(&mut connection, lost).await?)
+                }
+                Self::File(_) if role == WriterRole::Main => {
+                    checkpoint::copy(&mut connection).await?;
+                    None
                 }
                 _ => None,
             };

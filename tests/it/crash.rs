@@ -2,10 +2,9 @@
 //! the verdict equals that of an uninterrupted run.
 
 use std::path::Path;
-use std::process::Command;
 
 use crate::support::device::{Random, ServiceLink, device};
-use crate::support::process::Process;
+use crate::support::process::{Process, ended};
 use crate::support::{judged, rig};
 use serde_json::json;
 
@@ -102,13 +101,8 @@ async fn sigterm_stops_the_service_without_loss() {
     process.client.asset("a").await;
     let samples = rig(500, 500);
     process.client.telemetry("a", Some("s"), &samples).await;
-    let pid = process.child.id().to_string();
-    assert!(Command::new("kill").args(["-TERM", &pid]).status().unwrap().success());
-    let status = crate::support::eventually(|| {
-        let status = process.child.try_wait().unwrap();
-        async move { status }
-    })
-    .await;
+    process.terminate();
+    let status = ended(&mut process.child).await;
     assert!(status.success(), "{status}");
     process = Process::start(data.path());
     assert_eq!(process.client.recording("a", "s").await, samples);

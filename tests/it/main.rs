@@ -22,10 +22,14 @@ mod liveness;
 mod main_job;
 mod monitoring;
 mod network;
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+mod one_failure;
 mod openapi;
 mod outage;
 mod outcome;
 mod parts;
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+mod power_cut;
 mod restart;
 mod retention;
 mod same_sample;
@@ -36,4 +40,5 @@ mod support;
 #[cfg(feature = "otel")]
 mod traces;
 mod trends;
+mod upgrade;
 mod views;

@@ -2,10 +2,11 @@
 //! meanwhile the service reports the reason.
 
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+#[cfg(target_os = "linux")]
+use crate::support::calls::preloaded;
 use crate::support::device::{ServiceLink, device};
 use crate::support::postgres::Postgres;
 use crate::support::process::Process;
@@ -169,25 +170,11 @@ async fn a_commit_with_a_lost_answer_is_neither_lost_nor_repeated() {
     proxy.abort();
 }
 
-/// Compiles the library that makes system calls fail, see `faulty.c`.
-#[cfg(target_os = "linux")]
-fn faulty(directory: &Path) -> PathBuf {
-    let library = directory.join("faulty.so");
-    let source = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/it/support/faulty.c");
-    let made = Command::new("cc")
-        .args(["-shared", "-fPIC", "-O1", "-Wall", "-Werror", "-o"])
-        .args([&library, Path::new(source)])
-        .args(["-ldl"])
-        .status();
-    assert!(made.expect("a C compiler as `cc`").success());
-    library
-}
-
 #[cfg(target_os = "linux")]
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_full_or_failing_disk_loses_nothing() {
     let data = tempfile::tempdir().unwrap();
-    let (library, faults) = (faulty(data.path()), data.path().join("faults"));
+    let (library, faults) = (preloaded("faulty", data.path()), data.path().join("faults"));
     let environment = [
         ("LD_PRELOAD", library.as_path()),
         ("FAULTS", faults.as_path()),
@@ -220,7 +207,7 @@ async fn a_full_or_failing_disk_loses_nothing() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_step_of_the_wall_clock_loses_nothing() {
     let data = tempfile::tempdir().unwrap();
-    let (library, faults) = (faulty(data.path()), data.path().join("faults"));
+    let (library, faults) = (preloaded("faulty", data.path()), data.path().join("faults"));
     let environment = [("LD_PRELOAD", library.as_path()), ("FAULTS", faults.as_path())];
     let process = Process::start_with(data.path(), &environment);
     let load = DeviceLoad::start(2, &process.client, data.path(), None);

@@ -2,6 +2,8 @@
 
 #![allow(dead_code, reason = "each test uses a part")]
 
+#[cfg(unix)]
+pub mod calls;
 pub mod device;
 pub mod postgres;
 pub mod process;

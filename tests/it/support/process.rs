@@ -2,13 +2,22 @@
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, ChildStderr, Command, ExitStatus, Stdio};
+use std::sync::{Arc, Mutex, mpsc};
 
-use super::Client;
+use super::{Client, DEADLINE};
 
 pub struct Process {
     pub child: Child,
     pub client: Client,
+    log: Arc<Mutex<String>>,
+}
+
+/// A service that ended before it served.
+#[derive(Debug)]
+pub struct Refusal {
+    pub status: ExitStatus,
+    pub log: String,
 }
 
 impl Process {
@@ -18,17 +27,38 @@ impl Process {
 
     /// Starts the service with additional environment variables.
     pub fn start_with(data: &Path, environment: &[(&str, &Path)]) -> Self {
+        let started = Self::try_start(data, environment);
+        started.unwrap_or_else(|Refusal { log, .. }| panic!("the service does not start: {log}"))
+    }
+
+    /// Starts the service, which may end before it serves.
+    pub fn try_start(data: &Path, environment: &[(&str, &Path)]) -> Result<Self, Refusal> {
         let mut child = command(data).envs(environment.iter().copied()).spawn().unwrap();
-        let mut log = BufReader::new(child.stderr.take().unwrap()).lines().map_while(Result::ok);
-        let mut output = String::new();
-        let address = log.find_map(|line| {
-            output.push_str(&line);
-            let line: serde_json::Value = serde_json::from_str(&line).ok()?;
-            (line["message"] == "serving").then(|| line["address"].as_str().unwrap().to_owned())
-        });
-        let address = address.unwrap_or_else(|| panic!("the service does not start: {output}"));
-        std::thread::spawn(move || log.for_each(drop));
-        Self { child, client: Client::new(address) }
+        let log = Arc::<Mutex<String>>::default();
+        let address = read_log(child.stderr.take().unwrap(), log.clone());
+        match address.recv_timeout(DEADLINE) {
+            Ok(address) => Ok(Self { child, client: Client::new(address), log }),
+            Err(mpsc::RecvTimeoutError::Disconnected) => {
+                let status = child.wait().unwrap();
+                Err(Refusal { status, log: log.lock().unwrap().clone() })
+            }
+            Err(mpsc::RecvTimeoutError::Timeout) => {
+                child.kill().unwrap();
+                child.wait().unwrap();
+                panic!("the service neither serves nor ends: {}", log.lock().unwrap())
+            }
+        }
+    }
+
+    /// Returns what the service has logged so far.
+    pub fn log(&self) -> String {
+        self.log.lock().unwrap().clone()
+    }
+
+    /// Sends SIGTERM.
+    pub fn terminate(&self) {
+        let pid = self.child.id().to_string();
+        assert!(Command::new("kill").args(["-TERM", &pid]).status().unwrap().success());
     }
 
     /// Starts a service and kills it during its start, after a time that grows with `n`.
@@ -40,6 +70,32 @@ impl Process {
         child.kill().unwrap();
         child.wait().unwrap();
     }
+}
+
+/// Reads the log on a thread; the address at which the service listens is sent.
+fn read_log(stderr: ChildStderr, log: Arc<Mutex<String>>) -> mpsc::Receiver<String> {
+    let (send, address) = mpsc::channel();
+    std::thread::spawn(move || {
+        let mut send = Some(send);
+        for line in BufReader::new(stderr).lines().map_while(Result::ok) {
+            let fields = serde_json::from_str::<serde_json::Value>(&line).unwrap_or_default();
+            *log.lock().unwrap() += &(line + "\n");
+            if fields["message"] == "serving" {
+                let address = fields["address"].as_str().unwrap().to_owned();
+                send.take().into_iter().for_each(|send| drop(send.send(address.clone())));
+            }
+        }
+    });
+    address
+}
+
+/// Waits until a process has ended.
+pub async fn ended(child: &mut Child) -> ExitStatus {
+    super::eventually(|| {
+        let status = child.try_wait().unwrap();
+        async move { status }
+    })
+    .await
 }
 
 fn command(data: &Path) -> Command {
