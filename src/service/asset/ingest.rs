@@ -2,8 +2,8 @@
 
 use super::actor::Asset;
 use super::recorded::RecordedSamples;
-use super::session::OpenSession;
 use super::sent_before::MAX_SESSIONS;
+use super::session::OpenSession;
 use super::sessions::SessionSwitch;
 use super::turn::Turn;
 use crate::service::{ServiceError, views};

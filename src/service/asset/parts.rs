@@ -81,7 +81,11 @@ impl Asset {
             // Another session of the device has this name.
             part = part.next();
         }
-        tracing::info!(asset = self.row.name, session = open.name, "the session continues in another");
+        tracing::info!(
+            asset = self.row.name,
+            session = open.name,
+            "the session continues in another"
+        );
         self.end(turn)?;
         self.open(part.session_name(), Some(&part), false, turn)
     }

@@ -38,7 +38,12 @@ pub(super) struct OpenSession {
 impl OpenSession {
     /// Returns the session of `row`, with an engine at its start. Motion is counted if the rig is not calibrated, or if
     /// `refines` is set because the session may refine its calibration.
-    pub(super) fn new(row: &SessionRow, setup: Setup, baseline: FaultMemory, refines: bool) -> Self {
+    pub(super) fn new(
+        row: &SessionRow,
+        setup: Setup,
+        baseline: FaultMemory,
+        refines: bool,
+    ) -> Self {
         let counts = refines || setup.rig.calibration.is_none();
         Self {
             motion: counts.then(|| UsableMotion::new(&setup.rig)),
