@@ -13,7 +13,7 @@ use super::asset::{AssetCommand, Environment, Loader, MANY_SAMPLES, Presences, S
 use super::job::{self, Job};
 use super::jobs::{self, JobContext};
 use super::limits::{MAX_DRIVE_CYCLES, MAX_RECORDINGS, MAX_TRACES};
-use super::upkeep::{Deleter, Scrubber, Sweeper, Watchdog};
+use super::upkeep::{Deleter, PageScrubber, Scrubber, Sweeper, Watchdog};
 use super::writing::{Committer, Events, FIRST_RETRY, Handles, Outage};
 use super::{Clock, Limits, ServiceError, snapshots};
 use crate::store::{Store, Write, Writer};
@@ -103,6 +103,7 @@ pub(super) struct Parts {
     pub(super) jobs: mpsc::Receiver<Job>,
     pub(super) sweeper: Sweeper,
     pub(super) scrubber: Scrubber,
+    pub(super) page_scrubber: PageScrubber,
     pub(super) watchdog: Watchdog,
 }
 
@@ -118,6 +119,7 @@ impl Parts {
         jobs.push(tokio::spawn(self.loader.run()));
         jobs.push(tokio::spawn(self.sweeper.run()));
         jobs.push(tokio::spawn(self.scrubber.run()));
+        jobs.push(tokio::spawn(self.page_scrubber.run()));
         jobs.push(tokio::spawn(self.watchdog.run()));
         Ok(Workers { shards, jobs, closing: handles.closing.clone(), committer })
     }
@@ -188,6 +190,7 @@ impl Service {
                 retention: limits.retention.clone(),
             },
             scrubber: Scrubber { handles: handles.clone(), shards: queues.clone() },
+            page_scrubber: PageScrubber { handles: handles.clone() },
             watchdog: Watchdog {
                 in_flight: in_flight.clone(),
                 batch_samples: limits.longest_batch(),
