@@ -104,7 +104,15 @@ pub(super) fn check(args: &CheckArgs) -> anyhow::Result<()> {
         return output::print_line("checked  nothing: there is no store yet");
     };
     report.findings.iter().try_for_each(|finding| output::print_line(finding))?;
-    let CheckReport { n_sessions, n_samples, n_documents, findings } = report;
+    let CheckReport { n_sessions, n_samples, n_documents, page_checksums, findings } = report;
+    match page_checksums {
+        Some(true) => output::print_line("pages    each has a checksum, and all were read")?,
+        Some(false) => output::print_line(
+            "pages    without checksums: an earlier version has made this file; to add them, \
+             stop the service, `offbd backup` the store, and `offbd restore --replace` the copy",
+        )?,
+        None => {}
+    }
     output::print_line(&format!(
         "checked  {n_sessions} sessions, {n_samples} samples, {n_documents} documents"
     ))?;

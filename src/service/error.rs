@@ -111,7 +111,9 @@ impl From<StoreError> for ServiceError {
     fn from(error: StoreError) -> Self {
         match error {
             StoreError::Deleted { session } => Self::UnknownSession { id: session },
-            StoreError::Chunk { .. }
+            StoreError::DamagedPage(_)
+            | StoreError::DamagedHeader
+            | StoreError::Chunk { .. }
             | StoreError::Incomplete { .. }
             | StoreError::Snapshot { .. }
             | StoreError::Journal { .. }

@@ -13,7 +13,7 @@ use super::asset::{AssetCommand, Environment, Loader, MANY_SAMPLES, Presences, S
 use super::job::{self, Job};
 use super::jobs::{self, JobContext};
 use super::limits::{MAX_DRIVE_CYCLES, MAX_RECORDINGS, MAX_TRACES};
-use super::upkeep::{Deleter, Scrubber, Sweeper, Watchdog};
+use super::upkeep::{Deleter, Upkeep, Watchdog};
 use super::writing::{Committer, Events, FIRST_RETRY, Handles, Outage};
 use super::{Clock, Limits, ServiceError, snapshots};
 use crate::store::{Store, Write, Writer};
@@ -114,9 +114,7 @@ pub(super) struct Parts {
     pub(super) shards: Vec<Shard>,
     pub(super) loader: Loader,
     pub(super) jobs: mpsc::Receiver<Job>,
-    pub(super) sweeper: Sweeper,
-    pub(super) scrubber: Scrubber,
-    pub(super) watchdog: Watchdog,
+    pub(super) upkeep: Upkeep,
 }
 
 impl Parts {
@@ -129,9 +127,7 @@ impl Parts {
         let shards = self.shards.into_iter().map(Shard::spawn).collect::<Result<_, _>>()?;
         let mut jobs = jobs::spawn(limits.jobs, job_context, self.jobs);
         jobs.push(tokio::spawn(self.loader.run()));
-        jobs.push(tokio::spawn(self.sweeper.run()));
-        jobs.push(tokio::spawn(self.scrubber.run()));
-        jobs.push(tokio::spawn(self.watchdog.run()));
+        jobs.extend(self.upkeep.spawn());
         Ok(Workers { shards, jobs, closing: handles.closing.clone(), committer })
     }
 }
@@ -190,25 +186,15 @@ impl Service {
         let deleter = Deleter::new(handles.clone());
         let in_flight = Arc::new(Semaphore::new(limits.in_flight_samples));
         let stalled = Arc::new(AtomicBool::new(false));
-        let parts = Parts {
-            committer,
-            shards,
-            loader,
-            jobs: jobs_queue,
-            sweeper: Sweeper {
-                handles: handles.clone(),
-                deleter: deleter.clone(),
-                retention: limits.retention.clone(),
-            },
-            scrubber: Scrubber { handles: handles.clone(), shards: queues.clone() },
-            watchdog: Watchdog {
-                in_flight: in_flight.clone(),
-                batch_samples: limits.longest_batch(),
-                n_commits,
-                stalled: stalled.clone(),
-                closing,
-            },
+        let watchdog = Watchdog {
+            in_flight: in_flight.clone(),
+            batch_samples: limits.longest_batch(),
+            n_commits,
+            stalled: stalled.clone(),
+            closing,
         };
+        let upkeep = Upkeep::new(&handles, &deleter, &limits.retention, &queues, watchdog);
+        let parts = Parts { committer, shards, loader, jobs: jobs_queue, upkeep };
         let inner = Inner {
             job_context: JobContext::new(handles.clone(), queues.clone()),
             handles,

@@ -3,16 +3,17 @@
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use sqlx::any::AnyConnectOptions;
-use sqlx::{AnyConnection, ConnectOptions, Connection};
+use sqlx::{AnyConnection, AssertSqlSafe, Connection, Executor};
 
 use super::check::{check_copy, check_pages};
-use super::location::create_private;
+use super::location::{create_private, file_url};
+use super::page_checksums::{self, open};
 use super::{Location, MIGRATIONS, StoreError};
 
 /// Copies the database file at `location` to the new file `copy`, also while a service
 /// uses it. The copy is a consistent state of the database with all commits before the
-/// call; its contents are checked, and it is on the disk on return.
+/// call; its pages have checksums, its contents are checked, and it is on the disk on
+/// return.
 ///
 /// # Errors
 /// [`StoreError`] if there is no such database, `copy` exists, or it cannot be written.
@@ -21,11 +22,12 @@ pub async fn back_up(location: &Location, copy: &Path) -> Result<(), StoreError>
     check_absent(copy)?;
     let part = with_suffix(copy, ".part");
     remove_if_exists(&part)?;
-    let mut connection = open(file).await?;
-    create_private(&part)?;
-    let target = part.to_string_lossy().into_owned();
-    sqlx::query("VACUUM INTO $1").bind(target).execute(&mut connection).await?;
-    connection.close().await?;
+    // Fails if there is no such database.
+    open(file).await?.close().await?;
+    page_checksums::create(&part).await?;
+    let mut written = open(&part).await?;
+    copy_rows(&mut written, file).await?;
+    written.close().await?;
     let mut written = open(&part).await?;
     check_copy(&mut written, location).await?;
     written.close().await?;
@@ -78,10 +80,33 @@ fn set_aside(file: &Path) -> Result<(), StoreError> {
     remove_if_exists(&with_suffix(file, "-shm"))
 }
 
-async fn open(file: &Path) -> Result<AnyConnection, StoreError> {
-    sqlx::any::install_default_drivers();
-    let url = super::location::file_url(file, "rw")?;
-    Ok(url.parse::<AnyConnectOptions>()?.connect().await?)
+/// Copies the schema and all rows of the database `file` to the empty database `copy`.
+/// `VACUUM INTO` would write pages before the first one, which turns the checksums on.
+async fn copy_rows(copy: &mut AnyConnection, file: &Path) -> Result<(), StoreError> {
+    // An incomplete copy is of no use, and a complete one is synchronised at the end.
+    copy.execute("PRAGMA journal_mode = off; PRAGMA synchronous = off").await?;
+    // With foreign keys SQLite would not copy whole records.
+    copy.execute("PRAGMA foreign_keys = off").await?;
+    let source = file_url(file, "rw")?.replacen("sqlite:", "file:", 1);
+    sqlx::query("ATTACH $1 AS source").bind(source).execute(&mut *copy).await?;
+    copy.execute("BEGIN").await?;
+    let schema: Vec<(String, String, String)> = sqlx::query_as(
+        "SELECT type, name, sql FROM source.sqlite_schema
+         WHERE sql IS NOT NULL AND name NOT LIKE 'sqlite^_%' ESCAPE '^' ORDER BY rowid",
+    )
+    .fetch_all(&mut *copy)
+    .await?;
+    // The indexes first, so that SQLite copies them too instead of sorting the rows again.
+    for (_, _, create) in &schema {
+        copy.execute(AssertSqlSafe(create.clone())).await?;
+    }
+    for (_, table, _) in schema.iter().filter(|(kind, ..)| kind == "table") {
+        let rows = format!("INSERT INTO main.\"{table}\" SELECT * FROM source.\"{table}\"");
+        copy.execute(AssertSqlSafe(rows)).await?;
+    }
+    copy.execute("COMMIT").await?;
+    copy.execute("DETACH source").await?;
+    Ok(())
 }
 
 /// Renames the finished `part` to `file`; contents and name are on the disk on return.
@@ -113,4 +138,38 @@ fn with_suffix(file: &Path, suffix: &str) -> PathBuf {
 
 fn file_error(file: &Path) -> impl Fn(std::io::Error) -> StoreError {
     move |source| StoreError::File { file: file.to_owned(), source }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::{AssetRow, Store, Write};
+
+    /// More rows than the page cache of a connection holds.
+    #[tokio::test]
+    async fn all_pages_of_a_large_copy_have_checksums() {
+        let folder = tempfile::tempdir().unwrap();
+        let location = Location::File(folder.path().join("offbd.db"));
+        let (_store, mut writer) = Store::open(&location).await.unwrap();
+        let asset = |name: usize| {
+            Write::CreateAsset(AssetRow {
+                name: name.to_string(),
+                document: format!("\"{}\"", "x".repeat(20_000)),
+                revision: 1,
+                created_at: 0,
+                updated_at: 0,
+            })
+        };
+        let mut assets: Vec<_> = (0..400).map(asset).collect();
+        writer.commit(&mut [&mut assets]).await.unwrap();
+        let copy = Location::File(folder.path().join("copy"));
+        back_up(&location, copy.file().unwrap()).await.unwrap();
+        writer.close().await.unwrap();
+        let report = crate::store::check(&copy).await.unwrap();
+        assert_eq!(report, crate::store::check(&location).await.unwrap());
+        assert_eq!((report.page_checksums, report.n_documents), (Some(true), 400));
+        assert_eq!(report.findings, [""; 0]);
+        let header = std::fs::read(copy.file().unwrap()).unwrap();
+        assert_eq!(header[20], 8, "the number of reserved bytes");
+    }
 }

@@ -12,7 +12,9 @@ use super::codec::ChunkKey;
 use super::from_row::from_row;
 use super::journal::JournalRun;
 use super::read::VISIBLE;
-use super::{Location, MIGRATIONS, Snapshot, StoreError, decode_chunk, journal};
+use super::{
+    Location, MIGRATIONS, Snapshot, Store, StoreError, decode_chunk, journal, page_checksums,
+};
 
 /// Most findings that are listed; the search ends there.
 const MAX_FINDINGS: usize = 1000;
@@ -42,6 +44,8 @@ pub struct CheckReport {
     pub n_sessions: u64,
     pub n_samples: u64,
     pub n_documents: u64,
+    /// Whether the pages of an SQLite file have checksums; `None` for PostgreSQL.
+    pub page_checksums: Option<bool>,
     /// What is damaged, in words; at most 1000 findings.
     pub findings: Vec<String>,
 }
@@ -101,6 +105,7 @@ async fn check_contents(
 ) -> Result<CheckReport, StoreError> {
     let mut report = CheckReport::default();
     if location.file().is_some() {
+        report.page_checksums = Some(page_checksums::are_verified(db).await?);
         check_structure(db, &mut report).await?;
     }
     check_open(db, location, &mut report).await;
@@ -122,9 +127,75 @@ async fn check_structure(
     db: &mut AnyConnection,
     report: &mut CheckReport,
 ) -> Result<(), StoreError> {
-    let found: Vec<String> = sqlx::query_scalar("PRAGMA integrity_check").fetch_all(db).await?;
-    found.into_iter().filter(|line| line != "ok").for_each(|line| report.add(line));
+    match structure(db, "PRAGMA integrity_check").await {
+        Ok(findings) => findings.into_iter().for_each(|finding| report.add(finding)),
+        Err(error) if error.is_damage() => report.add(error.to_string()),
+        Err(error) => return Err(error),
+    }
     Ok(())
+}
+
+/// The tables of an SQLite file that [`Store::check_table`] takes; none of PostgreSQL. The
+/// chunks are not among them: they are read with their recordings.
+const CHECKED_TABLES: &str = "SELECT name FROM sqlite_schema
+     WHERE type = 'table' AND name <> 'chunk' ORDER BY name";
+
+impl Store {
+    /// The tables whose pages can be checked one table at a time, except the chunks.
+    ///
+    /// # Errors
+    /// [`StoreError`] if the database cannot be read.
+    pub async fn tables_to_check(&self) -> Result<Vec<String>, StoreError> {
+        if self.location.file().is_none() {
+            return Ok(Vec::new());
+        }
+        Ok(sqlx::query_scalar(CHECKED_TABLES).fetch_all(&self.pool).await?)
+    }
+
+    /// Reads all pages of `table` and of its indexes. Returns what is damaged, in words.
+    ///
+    /// # Errors
+    /// [`StoreError`] if the database cannot be read.
+    pub async fn check_table(&self, table: &str) -> Result<Vec<String>, StoreError> {
+        let check = format!("PRAGMA quick_check('{table}')");
+        match structure(&mut *self.pool.acquire().await?, &check).await {
+            Err(error) if error.is_damage() => Ok(vec![error.to_string()]),
+            found => found,
+        }
+    }
+}
+
+/// Executes one of SQLite's checks. Returns what it found, with the names of tables and
+/// indexes.
+async fn structure(db: &mut AnyConnection, check: &str) -> Result<Vec<String>, StoreError> {
+    let mut found: Vec<String> = Vec::new();
+    let mut rows =
+        sqlx::query_scalar::<_, String>(sqlx::AssertSqlSafe(check.to_owned())).fetch(&mut *db);
+    loop {
+        match rows.try_next().await {
+            Ok(Some(row)) if row == "ok" => return Ok(Vec::new()),
+            Ok(Some(row)) => found.push(row),
+            Ok(None) => break,
+            // A check ends at a row that it cannot read, and has named its page before.
+            Err(_) if !found.is_empty() => break,
+            Err(error) => return Err(error.into()),
+        }
+    }
+    drop(rows);
+    let trees = sqlx::query_as("SELECT rootpage, name FROM sqlite_schema").fetch_all(db).await;
+    // The schema itself may be damaged.
+    let trees: Vec<(i64, String)> = trees.unwrap_or_default();
+    let lines = found.iter().flat_map(|row| row.lines()).filter(|line| !line.starts_with("***"));
+    Ok(lines.map(|line| named(line, &trees)).collect())
+}
+
+/// Puts the name of the table or index before a line about a tree of pages.
+fn named(line: &str, trees: &[(i64, String)]) -> String {
+    let root = line.strip_prefix("Tree ").and_then(|rest| rest.split(' ').next()?.parse().ok());
+    match trees.iter().find(|(number, _)| Some(*number) == root) {
+        Some((_, name)) => format!("{name}: {line}"),
+        None => line.to_owned(),
+    }
 }
 
 /// A session as its row describes it.
@@ -220,6 +291,7 @@ async fn check_chunks(
         .fetch_all(&mut *db)
         .await;
         let chunks = chunks.unwrap_or_else(|error| {
+            let error = StoreError::from(error);
             report.add(format!("session {} from chunk {next} on: {error}", session.id));
             Vec::new()
         });
@@ -312,6 +384,7 @@ async fn check_snapshots(db: &mut AnyConnection, report: &mut CheckReport) {
             }
             Ok(None) => break,
             Err(error) => {
+                let error = StoreError::from(error);
                 report.add(format!("the snapshots cannot be read: {error}"));
                 break;
             }
@@ -332,7 +405,7 @@ async fn check_documents(db: &mut AnyConnection, report: &mut CheckReport) {
                 }
                 Ok(None) => break,
                 Err(error) => {
-                    report.add(format!("{what}: {error}"));
+                    report.add(format!("{what}: {}", StoreError::from(error)));
                     break;
                 }
             }

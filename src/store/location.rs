@@ -10,12 +10,13 @@ use std::str::FromStr;
 use std::time::Duration;
 
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, percent_encode};
-use sqlx::any::{AnyConnectOptions, AnyPoolOptions, install_default_drivers};
+use sqlx::any::{AnyConnectOptions, AnyPoolOptions};
 use sqlx::postgres::PgConnectOptions;
 use sqlx::{AnyConnection, AnyPool, AssertSqlSafe, ConnectOptions, Executor};
 
 use super::StoreError;
 use super::checkpoint::{self, AUTOCHECKPOINT_PAGES};
+use super::page_checksums::{self, install_drivers};
 use super::write::WriterRole;
 use super::writer_lock::{self, Backend};
 
@@ -72,9 +73,9 @@ impl Location {
     }
 
     fn options(&self) -> Result<AnyConnectOptions, StoreError> {
-        install_default_drivers();
+        install_drivers()?;
         match self {
-            Self::File(file) => Ok(file_url(file, "rwc")?.parse()?),
+            Self::File(file) => Ok(file_url(file, "rw")?.parse()?),
             Self::Server(url) => Ok(url.parse()?),
         }
     }
@@ -107,11 +108,14 @@ impl Location {
         lost: Option<&Backend>,
     ) -> Result<(AnyConnection, Option<Backend>), StoreError> {
         let options = self.options()?;
-        if let Self::File(file) = self {
-            create_private(file)?;
-        }
         let connect = async {
+            if let Self::File(file) = self {
+                page_checksums::create(file).await?;
+            }
             let mut connection = options.connect().await?;
+            if self.file().is_some() {
+                page_checksums::are_verified(&mut connection).await?;
+            }
             connection.execute(AssertSqlSafe(self.writer_settings(role))).await?;
             let backend = match self {
                 Self::Server(_) if role == WriterRole::Main => {
@@ -130,7 +134,7 @@ impl Location {
 
     /// Opens a connection that may only read; the database must exist.
     pub(super) async fn reader(&self) -> Result<AnyConnection, StoreError> {
-        install_default_drivers();
+        install_drivers()?;
         let (url, read_only) = match self {
             Self::File(file) => (file_url(file, "rw")?, "PRAGMA query_only = on"),
             Self::Server(url) => (url.clone(), "SET default_transaction_read_only = on"),
@@ -138,6 +142,9 @@ impl Location {
         let options: AnyConnectOptions = url.parse()?;
         let connect = async {
             let mut connection = options.connect().await?;
+            if self.file().is_some() {
+                page_checksums::are_verified(&mut connection).await?;
+            }
             connection.execute(read_only).await?;
             Ok(connection)
         };
@@ -216,12 +223,12 @@ pub(super) fn create_private(file: &Path) -> Result<(), StoreError> {
 /// What is not escaped in a path.
 const UNESCAPED: &AsciiSet = &NON_ALPHANUMERIC.remove(b'/').remove(b'-').remove(b'.').remove(b'_');
 
-/// The URL of a file, with the mode `rw`, or `rwc` to create a missing file. Bytes with a
-/// meaning in a URL are escaped.
+/// The URL of a file, with the mode `rw`, or `rwc` to create a missing file. Its pages are
+/// read with their checksums. Bytes with a meaning in a URL are escaped.
 pub(super) fn file_url(file: &Path, mode: &str) -> Result<String, StoreError> {
     let file = std::path::absolute(file).map_err(sqlx::Error::Io)?;
     let path = percent_encode(file.as_os_str().as_encoded_bytes(), UNESCAPED);
-    Ok(format!("sqlite://{path}?mode={mode}"))
+    Ok(format!("sqlite://{path}?mode={mode}&vfs={}", sqlite_checksums::VFS))
 }
 
 async fn within<T>(connect: impl Future<Output = Result<T, StoreError>>) -> Result<T, StoreError> {

@@ -32,6 +32,7 @@ mod journal;
 mod location;
 mod migrations;
 mod multi_row;
+mod page_checksums;
 mod query_builder;
 mod read;
 mod recording;
@@ -47,6 +48,7 @@ use std::time::Duration;
 use migrations::MIGRATIONS;
 use offbd_core::vocabulary::Sample;
 use sqlx::AnyPool;
+use sqlx::migrate::MigrateError;
 use write::WriterRole;
 
 pub use access::{AccessWrite, AuditRow, LAST_ID, MAX_LOGINS, TokenRow};
@@ -54,6 +56,7 @@ pub use backup::{back_up, restore};
 pub use check::{CheckReport, check};
 pub use expiry::SessionSize;
 pub use location::Location;
+pub use page_checksums::install_drivers;
 pub use read::{FaultFilter, FaultOrder, SessionFilter};
 pub use recording::RecordingReader;
 pub use rows::{
@@ -73,9 +76,14 @@ const PING_TIMEOUT: Duration = Duration::from_secs(2);
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
     #[error("database: {0}")]
-    Database(#[from] sqlx::Error),
+    Database(#[source] sqlx::Error),
     #[error("database migration: {0}")]
-    Migration(#[from] sqlx::migrate::MigrateError),
+    Migration(#[source] MigrateError),
+    /// The database has read something that it has not written.
+    #[error("a part of the database is damaged; `offbd check` names it ({0})")]
+    DamagedPage(#[source] sqlx::Error),
+    #[error("the header of the database file is damaged: its pages had checksums")]
+    DamagedHeader,
     #[error("chunk {first_index} of session {session}: {source}")]
     Chunk { session: String, first_index: i64, source: codec::CodecError },
     #[error("session {session} is damaged: sample {found} of {expected} is missing")]
@@ -113,7 +121,36 @@ pub enum StoreError {
     Schema { found: i64, expected: i64 },
 }
 
+impl From<sqlx::Error> for StoreError {
+    fn from(error: sqlx::Error) -> Self {
+        if page_checksums::is_damage(&error) {
+            return Self::DamagedPage(error);
+        }
+        Self::Database(error)
+    }
+}
+
+impl From<MigrateError> for StoreError {
+    fn from(error: MigrateError) -> Self {
+        match error {
+            MigrateError::Execute(error) | MigrateError::ExecuteMigration(error, _)
+                if page_checksums::is_damage(&error) =>
+            {
+                Self::DamagedPage(error)
+            }
+            error => Self::Migration(error),
+        }
+    }
+}
+
 impl StoreError {
+    /// Returns whether a part of the database is damaged. The same statement fails again,
+    /// those that do not need this part succeed.
+    #[must_use]
+    pub const fn is_damage(&self) -> bool {
+        matches!(self, Self::DamagedPage(_) | Self::DamagedHeader)
+    }
+
     /// Returns whether the change violates a unique or foreign key constraint: a row exists
     /// already, or a row that it refers to is missing.
     #[must_use]
@@ -146,6 +183,8 @@ impl StoreError {
             ),
             Self::InUse | Self::UnexpectedCommits { .. } | Self::FileGone { .. } => true,
             Self::Migration(_)
+            | Self::DamagedPage(_)
+            | Self::DamagedHeader
             | Self::Chunk { .. }
             | Self::Incomplete { .. }
             | Self::Snapshot { .. }

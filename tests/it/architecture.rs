@@ -73,8 +73,12 @@ fn a_name_is_found_in_code_but_not_in_comments() {
 
 /// Source folders of the crates, and names that may occur twice in them: `Traces` is one
 /// type with, and another without, the feature `otel`.
-const CRATES: [(&str, &[&str]); 3] =
-    [("src", &["Traces"]), ("crates/offbd-core/src", &[]), ("crates/offbd-lab/src", &[])];
+const CRATES: [(&str, &[&str]); 4] = [
+    ("src", &["Traces"]),
+    ("crates/offbd-core/src", &[]),
+    ("crates/offbd-lab/src", &[]),
+    ("crates/sqlite-checksums/src", &[]),
+];
 
 #[test]
 fn no_type_name_occurs_twice_in_a_crate() {

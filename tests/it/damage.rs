@@ -1,5 +1,8 @@
 //! Damaged and missing data are never served as samples, and an import is there or not.
 
+mod bits;
+mod pages;
+
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;

@@ -99,8 +99,5 @@ async fn a_part_does_not_take_the_name_of_another_session() {
     }
     let parts: Vec<_> =
         sessions(client).await.iter().map(|part| json!([part["name"], part["part"]])).collect();
-    assert_eq!(
-        parts,
-        [json!(["monday (2)", 1]), json!(["monday", 1]), json!(["monday (3)", 3])]
-    );
+    assert_eq!(parts, [json!(["monday (2)", 1]), json!(["monday", 1]), json!(["monday (3)", 3])]);
 }

@@ -83,7 +83,7 @@ impl Service {
         let (asset, sort) = (Some(asset.to_owned()), Some(FaultSort::Asset));
         let query = FaultQuery { status, asset: asset.clone(), sort, ..FaultQuery::default() };
         let mut page = self.faults(query, FaultCode::COUNT as u32).await?;
-        let mut monitors = self.monitors(asset.as_deref().unwrap_or_default()).await;
+        let mut monitors = self.monitors(asset.as_deref().unwrap_or_default()).await?;
         for entry in &mut page.items {
             entry.monitor = take(&mut monitors, entry.record.code);
         }
@@ -91,9 +91,15 @@ impl Service {
     }
 
     /// Returns the monitors of the open session; none without one, or if the shard is busy.
-    async fn monitors(&self, asset: &str) -> Vec<MonitorView> {
+    ///
+    /// # Errors
+    /// [`ServiceError::Corrupt`]: an answer without the monitors would look complete.
+    async fn monitors(&self, asset: &str) -> Result<Vec<MonitorView>, ServiceError> {
         let monitors = self.inner.shards.call(asset, |reply| AssetCommand::Monitors { reply });
-        monitors.await.unwrap_or_default()
+        match monitors.await {
+            Err(error @ ServiceError::Corrupt { .. }) => Err(error),
+            monitors => Ok(monitors.unwrap_or_default()),
+        }
     }
 
     /// Returns the fault memory entry of one code; a code that never failed is `cleared`.
@@ -107,7 +113,7 @@ impl Service {
             Some(row) => views::fault(row)?,
             None => views::never_failed(&self.inner.handles.store, asset, code).await?,
         };
-        entry.monitor = take(&mut self.monitors(asset).await, code.into());
+        entry.monitor = take(&mut self.monitors(asset).await?, code.into());
         Ok(entry)
     }
 

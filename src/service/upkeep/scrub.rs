@@ -19,7 +19,7 @@ use offbd_core::engine::{Admission, Input, Setup, UsableMotion};
 const SAMPLES_AT_ONCE: i64 = 8192;
 
 /// Duration of a pause, as a multiple of the work before it: a twentieth of a core. Chosen.
-const PAUSE_FACTOR: u32 = 19;
+pub(super) const PAUSE_FACTOR: u32 = 19;
 
 /// Longest pause within a session, so that it does not delay a shutdown.
 const LONGEST_PAUSE: Duration = Duration::from_secs(1);
@@ -28,7 +28,7 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(1);
 const PAUSE_AFTER_SESSION: Duration = Duration::from_millis(50);
 
 /// Pause after all sessions. Chosen: damage is rare.
-const PAUSE_AFTER_ALL: Duration = Duration::from_secs(3600);
+pub(super) const PAUSE_AFTER_ALL: Duration = Duration::from_secs(3600);
 
 /// The kinds of findings, as a label of a metric.
 const RECORDING: &str = "recording";
@@ -121,7 +121,7 @@ fn count_sessions(n: u64) {
     metrics::counter!("offbd_scrub_sessions_total").increment(n);
 }
 
-fn count_findings(kind: &'static str, n: u64) {
+pub(super) fn count_findings(kind: &'static str, n: u64) {
     metrics::counter!("offbd_scrub_findings_total", "kind" => kind).increment(n);
 }
 

@@ -84,6 +84,8 @@ pub(in crate::service) struct Committer {
 enum CommitFailure {
     /// The database rejects them, or has failed on them [`MAX_FAILURES`] times.
     Rejected,
+    /// They need a part of the database that is damaged.
+    Damaged(ServiceError),
     /// The database is unavailable and the service is shutting down.
     Closing,
 }
@@ -172,10 +174,13 @@ impl Committer {
                 return false;
             }
             // A single set may be the cause.
-            Err(CommitFailure::Rejected) if group.len() > 1 => {
+            Err(CommitFailure::Rejected | CommitFailure::Damaged(_)) if group.len() > 1 => {
                 return self.commit_each(group).await;
             }
             Err(CommitFailure::Rejected) => group.into_iter().for_each(refuse_rejected),
+            Err(CommitFailure::Damaged(error)) => {
+                group.into_iter().for_each(|set| refuse(set, error.clone()));
+            }
         }
         true
     }
@@ -196,6 +201,7 @@ impl Committer {
             match written {
                 Ok(()) => self.complete(set),
                 Err(CommitFailure::Rejected) => refuse_rejected(set),
+                Err(CommitFailure::Damaged(error)) => refuse(set, error),
                 Err(CommitFailure::Closing) => {
                     refuse(set, closing());
                     available = false;
@@ -226,7 +232,16 @@ impl Committer {
                 }
             }
             tracing::error!(%error, sets = sets.len(), n_failed, "commit failed");
-            return Err(CommitFailure::Rejected);
+            if !error.is_damage() {
+                return Err(CommitFailure::Rejected);
+            }
+            if !self.is_committed_after_damage().await? {
+                return Err(CommitFailure::Damaged(error.into()));
+            }
+            break;
+        }
+        if self.outage.borrow().is_some() {
+            self.set_available();
         }
         metrics::counter!("offbd_commits_total").increment(1);
         self.n_commits.fetch_add(1, Ordering::Relaxed);
@@ -241,6 +256,24 @@ impl Committer {
         let span = tracing::debug_span!("commit", sets = sets.len());
         let commit = timed(self.writer.commit(sets)).instrument(span);
         unless_closing(&self.closing, commit).await.ok_or(CommitFailure::Closing)
+    }
+
+    /// Connects again after a commit that met a damaged part of the database. Returns whether
+    /// it has succeeded after all. Waiting would not help: if each commit needs that part,
+    /// all are refused, and the reason is published.
+    async fn is_committed_after_damage(&mut self) -> Result<bool, CommitFailure> {
+        let closing = self.closing.clone();
+        match unless_closing(&closing, self.writer.reconnect()).await {
+            Some(Ok(committed)) => {
+                self.set_available();
+                Ok(committed)
+            }
+            Some(Err(error)) => {
+                self.set_unavailable(&error);
+                Ok(false)
+            }
+            None => Err(CommitFailure::Closing),
+        }
     }
 
     /// Waits after `error` until the database is available or the service shuts down.

@@ -75,7 +75,7 @@ pub async fn connection(url: &str) -> sqlx::AnyConnection {
 
 /// Like [`connection`], for a database server that may be unavailable.
 pub async fn try_connection(url: &str) -> sqlx::Result<sqlx::AnyConnection> {
-    sqlx::any::install_default_drivers();
+    offbd::store::install_drivers().unwrap();
     url.parse::<sqlx::any::AnyConnectOptions>().unwrap().connect().await
 }
 
