@@ -241,8 +241,6 @@ pub struct LimitsConfig {
     pub journal_bytes: usize,
     /// Samples from which on a session continues in another one.
     pub session_samples: usize,
-    /// Age from which on a session continues in another one, hours.
-    pub session_hours: usize,
     pub assets: usize,
     pub body_timeout_s: u64,
     /// Longest time for the TLS handshake, and for the head of each request to arrive, s;
@@ -352,7 +350,6 @@ impl Default for LimitsConfig {
             in_flight_samples: limits.in_flight_samples,
             journal_bytes: limits.journal_bytes,
             session_samples: usize::try_from(limits.sessions.samples).unwrap_or(usize::MAX),
-            session_hours: (limits.sessions.age.as_secs() / 3600) as usize,
             assets: limits.assets,
             body_timeout_s: limits.body_timeout.as_secs(),
             header_timeout_s: 30,
@@ -368,7 +365,6 @@ impl LimitsConfig {
     fn sessions(&self) -> SessionLimits {
         SessionLimits {
             samples: i64::try_from(self.session_samples).unwrap_or(i64::MAX),
-            age: Duration::from_secs(self.session_hours as u64 * 3600),
             ..SessionLimits::default()
         }
     }
@@ -459,7 +455,6 @@ impl Config {
         within("limits.in_flight_samples", limits.in_flight_samples, samples, 100_000_000)?;
         within("limits.journal_bytes", limits.journal_bytes, 1, 1 << 30)?;
         within("limits.session_samples", limits.session_samples, 1000, 1_000_000_000)?;
-        within("limits.session_hours", limits.session_hours, 1, 24 * 366)?;
         let seconds = usize::try_from(limits.body_timeout_s).unwrap_or(usize::MAX);
         within("limits.body_timeout_s", seconds, 1, 3600)?;
         let seconds = usize::try_from(limits.shutdown_s).unwrap_or(usize::MAX);

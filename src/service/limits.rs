@@ -72,20 +72,17 @@ impl Limits {
 pub struct SessionLimits {
     /// Recorded samples from which on a session continues in another one.
     pub samples: i64,
-    /// Age from which on a session continues in another one.
-    pub age: Duration,
     /// Samples between two snapshots of an engine, which a restart has to evaluate again.
     pub snapshot_interval: i64,
 }
 
 impl Default for SessionLimits {
-    /// Chosen. A day, so that rigs that never stop have a verdict, a trend and something for
-    /// retention to delete every day. To evaluate as many samples as between two snapshots
-    /// takes some 20 ms, and the snapshots, of about 15 kB each, take a tenth of the space of
-    /// the samples.
+    /// Chosen. A session has at least a day at 100 Hz. The limit is not a time, because a clock
+    /// that is set must not divide a session. To evaluate as many samples as between two
+    /// snapshots takes some 20 ms, and the snapshots, of about 15 kB each, take a tenth of the
+    /// space of the samples.
     fn default() -> Self {
-        let age = Duration::from_secs(24 * 3600);
-        Self { samples: 10_000_000, age, snapshot_interval: 16_384 }
+        Self { samples: 10_000_000, snapshot_interval: 16_384 }
     }
 }
 

@@ -1,14 +1,12 @@
 //! The parts of a long session. A session that has become too long ends and continues in
 //! another one, its next part, which has the same name with a number.
 
-use std::time::Duration;
-
 use super::actor::Asset;
 use super::session::OpenSession;
 use super::turn::Turn;
 use crate::service::ServiceError;
 use crate::service::limits::SessionLimits;
-use crate::store::{Micros, SessionRow};
+use crate::store::SessionRow;
 
 /// Which part of which session an open session is.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -53,10 +51,8 @@ impl OpenSession {
     }
 
     /// Whether the session must not get longer.
-    fn is_long(&self, limits: SessionLimits, now: Micros) -> bool {
-        let age = Duration::from_micros(now.saturating_sub(self.opened_at).max(0).unsigned_abs());
-        let n_samples = self.progress.n_samples;
-        !self.importing && n_samples > 0 && (n_samples >= limits.samples || age >= limits.age)
+    const fn is_long(&self, limits: SessionLimits) -> bool {
+        !self.importing && self.progress.n_samples >= limits.samples
     }
 }
 
@@ -65,7 +61,7 @@ impl Asset {
     /// sessions of this asset begin too often.
     pub(super) fn continue_if_long(&mut self, turn: &mut Turn<'_>) -> Result<(), ServiceError> {
         let limits = turn.env.handles.sessions;
-        let Some(open) = self.open.as_ref().filter(|open| open.is_long(limits, turn.at)) else {
+        let Some(open) = self.open.as_ref().filter(|open| open.is_long(limits)) else {
             return Ok(());
         };
         if !self.session_rate.allows(turn.at) {

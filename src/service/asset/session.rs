@@ -16,7 +16,6 @@ use offbd_core::vocabulary::Sample;
 pub(super) struct OpenSession {
     pub(super) id: String,
     pub(super) name: String,
-    pub(super) opened_at: Micros,
     pub(super) part: Part,
     pub(super) judging: Judging,
     pub(super) progress: SessionProgress,
@@ -49,7 +48,6 @@ impl OpenSession {
             motion: counts.then(|| UsableMotion::new(&setup.rig)),
             id: row.id.clone(),
             name: row.name.clone(),
-            opened_at: row.opened_at,
             part: Part::of(row),
             judging: Judging::new(setup, baseline),
             progress: SessionProgress::default(),

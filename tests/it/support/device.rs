@@ -6,13 +6,22 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
+use futures_util::{SinkExt, StreamExt};
 use offbd_core::vocabulary::{FaultCode, Sample};
 use reqwest::Method;
+use reqwest::header::CONTENT_TYPE;
 use serde_json::{Value, json};
 use tokio::sync::watch;
 use tokio::task::JoinHandle;
+use tokio_tungstenite::connect_async;
+use tokio_tungstenite::tungstenite::Message;
 
-use super::{Answer, Client, batch, eventually, judgement, registration, rig, try_connection};
+use super::{
+    Answer, Client, batch, csv, eventually, judgement, packed, registration, rig, try_connection,
+};
+
+/// Ways in which a device can send a batch: JSON, MessagePack, CSV, NDJSON and a WebSocket.
+const N_WAYS: usize = 5;
 
 /// The connection of several devices to the service, whose address may change.
 #[derive(Clone)]
@@ -66,12 +75,16 @@ impl ServiceLink {
 
     /// Sends a request until there is a response other than 429 and 503.
     async fn request(&self, method: Method, path: &str, body: &Value) -> Answer {
+        self.send(|client| client.request(method.clone(), path).json(body)).await
+    }
+
+    /// Sends the request that `make` returns until there is a response other than 429 and 503.
+    async fn send(&self, make: impl Fn(&Client) -> reqwest::RequestBuilder) -> Answer {
         let mut address = self.address.subscribe();
         loop {
             let mut client = self.client.clone();
             client.address = address.borrow_and_update().clone();
-            let request = client.request(method.clone(), path).json(body);
-            let Ok(response) = request.send().await else {
+            let Ok(response) = make(&client).send().await else {
                 wait_for_service(&mut address).await;
                 continue;
             };
@@ -94,20 +107,81 @@ impl ServiceLink {
         self.request(Method::GET, path, &Value::Null).await.expect(200)
     }
 
-    /// Sends `samples` in batches of 1 to 100, sometimes with samples that are already
-    /// acknowledged.
+    /// Sends a batch in one of the ways in which a device can, until it is acknowledged.
+    async fn post(&self, asset: &str, samples: &[Sample], way: usize) -> Value {
+        let path = format!("assets/{asset}/telemetry");
+        let named = format!("{path}?session=s");
+        let document = batch(Some("s"), samples);
+        let text = |kind: &'static str, body: String| {
+            let named = &named;
+            move |client: &Client| {
+                let request = client.request(Method::POST, named);
+                request.header(CONTENT_TYPE, kind).body(body.clone())
+            }
+        };
+        let answer = match way {
+            0 => self.request(Method::POST, &path, &document).await,
+            1 => {
+                let packed = |client: &Client| {
+                    let request = client.request(Method::POST, &path);
+                    request.header(CONTENT_TYPE, "application/msgpack").body(packed(&document))
+                };
+                self.send(packed).await
+            }
+            2 => self.send(text("text/csv", csv(samples))).await,
+            3 => {
+                let rows = document["samples"].as_array().unwrap();
+                let lines: Vec<_> = rows.iter().map(Value::to_string).collect();
+                self.send(text("application/x-ndjson", lines.join("\n"))).await
+            }
+            _ => return self.post_by_stream(asset, &document).await,
+        };
+        answer.expect(200)
+    }
+
+    /// Sends a batch over WebSockets, each for one try, until it is acknowledged.
+    async fn post_by_stream(&self, asset: &str, document: &Value) -> Value {
+        let mut address = self.address.subscribe();
+        loop {
+            let service = address.borrow_and_update().clone();
+            match post_once(&service, asset, document).await {
+                Some(answer) if answer["accepted"].is_u64() => return answer,
+                Some(_) => {
+                    self.refused.fetch_add(1, Ordering::SeqCst);
+                    tokio::task::yield_now().await;
+                }
+                None => wait_for_service(&mut address).await,
+            }
+        }
+    }
+
+    /// Sends `samples` in batches of 1 to 100, in all ways, sometimes with samples that are
+    /// already acknowledged.
     async fn stream(&self, asset: &str, samples: &[Sample], random: &mut Random) {
         let mut at = 0;
         while at < samples.len() {
             let repeated = if random.below(5) == 0 { random.below(100) } else { 0 };
             let end = (at + 1 + random.below(100)).min(samples.len());
             let part = &samples[at.saturating_sub(repeated)..end];
-            let path = format!("assets/{asset}/telemetry");
-            let ack = self.request(Method::POST, &path, &batch(Some("s"), part)).await.expect(200);
+            let ack = self.post(asset, part, random.below(N_WAYS)).await;
             let n = |field: &str| ack[field].as_u64().unwrap();
             assert_eq!(n("accepted") + n("duplicate"), part.len() as u64, "{ack}");
             self.acknowledged.fetch_add((end - at) as u64, Ordering::SeqCst);
             at = end;
+        }
+    }
+}
+
+/// Sends a batch over a WebSocket; returns its answer, `None` if the connection is lost.
+async fn post_once(service: &str, asset: &str, document: &Value) -> Option<Value> {
+    let url = format!("ws://{service}/api/v1/assets/{asset}/stream");
+    let (mut socket, _) = connect_async(url).await.ok()?;
+    socket.send(Message::text(document.to_string())).await.ok()?;
+    loop {
+        match socket.next().await?.ok()? {
+            Message::Text(text) => return serde_json::from_str(&text).ok(),
+            Message::Close(_) => return None,
+            _ => {}
         }
     }
 }
