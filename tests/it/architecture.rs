@@ -140,6 +140,23 @@ fn every_path_named_in_a_document_exists() {
     assert!(missing.is_empty(), "\n{}\n", missing.join("\n"));
 }
 
+#[test]
+fn what_the_image_is_built_from_is_sent_to_the_builder() {
+    let read = |name: &str| std::fs::read_to_string(Path::new(ROOT).join(name)).unwrap();
+    let (image, sent) = (read("Dockerfile"), read(".dockerignore"));
+    let copies = image.lines().filter_map(|line| line.strip_prefix("COPY "));
+    let mut n_copied = 0;
+    for copy in copies.filter(|copy| !copy.starts_with("--from")) {
+        let paths: Vec<&str> = copy.split(' ').collect();
+        for path in &paths[..paths.len() - 1] {
+            assert!(Path::new(ROOT).join(path).exists(), "{path} does not exist");
+            assert!(sent.lines().any(|line| line == format!("!{path}")), "{path} is not sent");
+            n_copied += 1;
+        }
+    }
+    assert!(n_copied > 5);
+}
+
 /// Returns the Rust source files below `folder`, relative to the root.
 fn files(folder: &str) -> Vec<String> {
     let (mut found, mut todo) = (Vec::new(), vec![PathBuf::from(folder)]);

@@ -70,7 +70,7 @@ impl EndedSession {
         rows.into_iter().map(session).collect()
     }
 
-    /// Whether `sample`, which `open` does not have, may be recorded in this session.
+    /// Whether `sample` may be recorded in this session, if `open` does not have it.
     fn may_contain(&self, sample: &Sample, open: Option<&Engine>) -> bool {
         if self.is_other_run && !open.is_none_or(|engine| engine.precedes(sample)) {
             return false;
@@ -81,7 +81,7 @@ impl EndedSession {
         }
     }
     /// Returns which of `samples`, each with its index in the batch, this session has already,
-    /// or has with other values; `open` has none of them. Blocks on the store.
+    /// or has with other values, and `open` has not. Blocks on the store.
     fn search(
         &self,
         samples: &[(usize, Sample)],
@@ -89,8 +89,8 @@ impl EndedSession {
         turn: &Turn<'_>,
     ) -> Result<Found, ServiceError> {
         let mut found = Found::default();
-        let doubtful: Vec<_> =
-            samples.iter().filter(|(_, sample)| self.may_contain(sample, open)).collect();
+        let is_doubtful = |sample: &Sample| self.may_contain(sample, open) && is_new(sample, open);
+        let doubtful: Vec<_> = samples.iter().filter(|(_, sample)| is_doubtful(sample)).collect();
         if doubtful.is_empty() {
             return Ok(found);
         }
@@ -142,7 +142,7 @@ impl Asset {
         let mut rest = samples.to_vec();
         let engine = self.open.as_ref().map(|open| open.judging.engine());
         for session in &mut self.ended {
-            let found = session.search(&new(&rest, engine), engine, turn)?;
+            let found = session.search(&rest, engine, turn)?;
             session.acknowledge(&found, ack);
             session.is_same_run |= !found.same.is_empty();
             session.is_other_run |= found.conflicts.len() >= CERTAIN_AFTER as usize;
@@ -165,7 +165,7 @@ impl Asset {
         let Some(open) = &mut self.open else { return Ok(rest) };
         for part in self.ended.iter().filter(|ended| ended.first_part == open.part.first) {
             let engine = open.judging.engine();
-            let found = part.search(&new(&rest, Some(engine)), Some(engine), turn)?;
+            let found = part.search(&rest, Some(engine), turn)?;
             part.acknowledge(&found, ack);
             rest.retain(|(index, sample)| {
                 if found.conflicts.contains(index) {
@@ -181,11 +181,7 @@ impl Asset {
     }
 }
 
-/// Returns those of `samples` that the engine of the open session does not have.
-fn new(samples: &[(usize, Sample)], open: Option<&Engine>) -> Vec<(usize, Sample)> {
-    let is_new = |sample: &Sample| {
-        sample.t_s.is_finite()
-            && open.is_none_or(|engine| engine.recognise(sample) == Recognition::New)
-    };
-    samples.iter().filter(|(_, sample)| is_new(sample)).copied().collect()
+/// Whether the engine of the open session does not have `sample`.
+fn is_new(sample: &Sample, open: Option<&Engine>) -> bool {
+    sample.t_s.is_finite() && open.is_none_or(|engine| engine.recognise(sample) == Recognition::New)
 }
