@@ -36,7 +36,7 @@ fn limits() -> Limits {
         in_flight_samples: 100,
         batch_samples: 50,
         journal_bytes: 3000,
-        sessions: SessionLimits { samples: 150, snapshot_interval: 40, ..Default::default() },
+        sessions: SessionLimits { samples: 150, snapshot_interval: 40 },
         ..Limits::default()
     }
 }
