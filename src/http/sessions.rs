@@ -209,7 +209,7 @@ pub(super) struct RecordingRangeQuery {
     responses((status = 200, content((String = "text/csv"),
             (crate::wire::telemetry::RowsView = "application/json"))),
         (status = 400, body = Problem), (status = 404, body = Problem),
-        (status = 406, body = Problem), (status = 422, body = Problem)))]
+        (status = 406, body = Problem)))]
 pub(super) async fn telemetry(
     State(service): State<Service>,
     Path(id): Path<String>,

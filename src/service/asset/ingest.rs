@@ -61,11 +61,11 @@ impl Asset {
     ) -> Result<(), ServiceError> {
         self.continue_if_long(turn)?;
         let samples = &self.without_earlier_parts(samples, turn, ack)?[..];
-        self.record_named(samples, turn, ack)
+        self.record_in_open(samples, turn, ack)
     }
 
     /// Records samples of the open session.
-    pub(super) fn record_named(
+    pub(super) fn record_in_open(
         &mut self,
         samples: &[(usize, Sample)],
         turn: &mut Turn<'_>,
@@ -91,7 +91,7 @@ impl Asset {
         }
         let Some(open) = &mut self.open else {
             self.open_nameless(turn)?;
-            return self.record_named(samples, turn, ack);
+            return self.record_in_open(samples, turn, ack);
         };
         let mut recorded = RecordedSamples::unremembered(open, samples, turn)?;
         // At most as often as sessions may begin; otherwise conflicts are rejected.
@@ -107,7 +107,7 @@ impl Asset {
         // Once per batch: a clock that jumps back and forth must not open many sessions.
         self.end(turn)?;
         self.open_nameless(turn)?;
-        self.record_named(rest, turn, ack)
+        self.record_in_open(rest, turn, ack)
     }
 
     /// Evaluates and records `samples`, each with its index in the batch, in the open

@@ -80,6 +80,7 @@ impl EndedSession {
             None => self.newest_t_s.is_some_and(|newest| sample.t_s <= newest),
         }
     }
+
     /// Returns which of `samples`, each with its index in the batch, this session has already,
     /// or has with other values, and `open` has not. Blocks on the store.
     fn search(

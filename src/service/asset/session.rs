@@ -35,8 +35,9 @@ pub(super) struct OpenSession {
 }
 
 impl OpenSession {
-    /// Returns the session of `row`, with an engine at its start. Motion is counted if the rig is not calibrated, or if
-    /// `refines` is set because the session may refine its calibration.
+    /// Returns the session of `row`, with an engine at its start. Motion is counted if the rig
+    /// is not calibrated, or if `refines` is set because the session may refine its
+    /// calibration.
     pub(super) fn new(
         row: &SessionRow,
         setup: Setup,

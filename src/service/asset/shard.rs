@@ -399,7 +399,7 @@ mod tests {
             let row = SessionRow { id: "1".to_owned(), ..SessionRow::default() };
             asset.open = Some(OpenSession::new(&row, setup, asset.memory.clone(), false));
             let sample = Sample { t_s: 1.0, x_m: Some(0.0), ..Sample::default() };
-            asset.record_named(&[(0, sample)], turn, &mut Default::default())?;
+            asset.record_in_open(&[(0, sample)], turn, &mut Default::default())?;
             // The error occurs before any write is collected.
             turn.writes.clear();
             Ok(())

@@ -159,6 +159,8 @@ impl Handles {
         answer: impl Future<Output = Result<T, E>>,
     ) -> Result<T, E> {
         #[cfg(test)]
+        let one_fewer = |n: u32| n.checked_sub(1);
+        #[cfg(test)]
         if self.failing_reads.try_update(Ordering::SeqCst, Ordering::SeqCst, one_fewer).is_ok() {
             return Err(StoreError::too_slow().into());
         }
@@ -167,9 +169,4 @@ impl Handles {
             tokio::time::timeout(READ_TIMEOUT, answer).await.map_err(late)?
         })
     }
-}
-
-#[cfg(test)]
-const fn one_fewer(n: u32) -> Option<u32> {
-    n.checked_sub(1)
 }
