@@ -43,12 +43,12 @@ pub(super) struct RestoreArgs {
 
 pub(super) fn backup(args: &BackupArgs) -> anyhow::Result<()> {
     let config = args.config.load()?;
-    let message = super::runtime()?.block_on(server::back_up(&config, &args.file))?;
+    let message = super::block_on(server::back_up(&config, &args.file))?;
     output::print_line(&message)
 }
 
 pub(super) fn restore(args: &RestoreArgs) -> anyhow::Result<()> {
     let config = args.config.load()?;
     let restore = server::restore(&config, &args.file, args.replace);
-    output::print_line(&super::runtime()?.block_on(restore)?)
+    output::print_line(&super::block_on(restore)?)
 }

@@ -21,6 +21,7 @@ mod token;
 mod trends;
 mod watch;
 
+use std::mem::ManuallyDrop;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -121,9 +122,11 @@ fn end_with_main_thread() {
     }));
 }
 
-/// The asynchronous runtime for commands that need one.
-fn runtime() -> std::io::Result<tokio::runtime::Runtime> {
-    tokio::runtime::Builder::new_multi_thread().enable_all().build()
+/// Runs an asynchronous command to its end, which is that of the process.
+fn block_on<T>(command: impl Future<Output = anyhow::Result<T>>) -> anyhow::Result<T> {
+    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build()?;
+    // Not dropped: after an error tasks may still run, and some would panic without timers.
+    ManuallyDrop::new(runtime).block_on(command)
 }
 
 /// Prints help, the version, or an error of the arguments.

@@ -83,14 +83,14 @@ pub(super) fn serve(args: &ServeArgs, logging: &LoggingArgs) -> anyhow::Result<(
     let config = args.config.load()?;
     let traces = Traces::start(&config.traces)?;
     logging.start(&config.log, traces.as_ref());
-    let result = super::runtime()?.block_on(server::serve(config));
+    let result = super::block_on(server::serve(config));
     traces.iter().for_each(Traces::stop);
     result
 }
 
 pub(super) fn migrate(args: &MigrateArgs) -> anyhow::Result<()> {
     let config = args.config.load()?;
-    let message = super::runtime()?.block_on(server::migrate(&config))?;
+    let message = super::block_on(server::migrate(&config))?;
     output::print_line(&message)
 }
 
@@ -100,7 +100,7 @@ pub(super) fn check(args: &CheckArgs) -> anyhow::Result<()> {
     if args.config.data.is_none() && args.config.database.is_none() {
         return Ok(());
     }
-    let Some(report) = super::runtime()?.block_on(server::check_store(&config))? else {
+    let Some(report) = super::block_on(server::check_store(&config))? else {
         return output::print_line("checked  nothing: there is no store yet");
     };
     report.findings.iter().try_for_each(|finding| output::print_line(finding))?;

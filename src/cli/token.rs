@@ -75,12 +75,11 @@ struct RevokeArgs {
 }
 
 pub(super) fn run(args: &TokenArgs) -> anyhow::Result<()> {
-    let runtime = super::runtime()?;
     match &args.command {
-        TokenCommand::Create(args) => runtime.block_on(create(args)),
-        TokenCommand::List(args) => runtime.block_on(list(args)),
+        TokenCommand::Create(args) => super::block_on(create(args)),
+        TokenCommand::List(args) => super::block_on(list(args)),
         TokenCommand::Revoke(args) => {
-            runtime.block_on(tokens::revoke_token(&args.config.load()?, &args.token))
+            super::block_on(tokens::revoke_token(&args.config.load()?, &args.token))
         }
     }
 }

@@ -50,7 +50,7 @@ fn rate(word: &str) -> Result<f64, String> {
 const BAR: usize = 24;
 
 pub(super) fn run(args: &WatchArgs) -> anyhow::Result<()> {
-    super::runtime()?.block_on(watch(args))
+    super::block_on(watch(args))
 }
 
 async fn watch(args: &WatchArgs) -> anyhow::Result<()> {

@@ -113,6 +113,7 @@ impl From<StoreError> for ServiceError {
             StoreError::Deleted { session } => Self::UnknownSession { id: session },
             StoreError::DamagedPage(_)
             | StoreError::DamagedHeader
+            | StoreError::DamagedLog { .. }
             | StoreError::Chunk { .. }
             | StoreError::Incomplete { .. }
             | StoreError::Snapshot { .. }

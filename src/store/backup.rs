@@ -22,6 +22,7 @@ pub async fn back_up(location: &Location, copy: &Path) -> Result<(), StoreError>
     check_absent(copy)?;
     let part = with_suffix(copy, ".part");
     remove_if_exists(&part)?;
+    location.check_log().await?;
     // Fails if there is no such database.
     open(file).await?.close().await?;
     page_checksums::create(&part).await?;

@@ -16,6 +16,7 @@ use sqlx::{AnyConnection, AnyPool, AssertSqlSafe, ConnectOptions, Executor};
 
 use super::StoreError;
 use super::checkpoint::{self, AUTOCHECKPOINT_PAGES};
+use super::log_damage::check_log;
 use super::page_checksums::{self, install_drivers};
 use super::write::WriterRole;
 use super::writer_lock::{self, Backend};
@@ -132,9 +133,19 @@ impl Location {
         within(connect).await
     }
 
+    /// Checks the write-ahead log of an SQLite file before the first connection opens it:
+    /// SQLite deletes the log with the last one.
+    pub(super) async fn check_log(&self) -> Result<(), StoreError> {
+        match self {
+            Self::File(file) => check_log(file).await,
+            Self::Server(_) => Ok(()),
+        }
+    }
+
     /// Opens a connection that may only read; the database must exist.
     pub(super) async fn reader(&self) -> Result<AnyConnection, StoreError> {
         install_drivers()?;
+        self.check_log().await?;
         let (url, read_only) = match self {
             Self::File(file) => (file_url(file, "rw")?, "PRAGMA query_only = on"),
             Self::Server(url) => (url.clone(), "SET default_transaction_read_only = on"),

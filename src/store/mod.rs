@@ -30,6 +30,7 @@ mod fleet;
 mod from_row;
 mod journal;
 mod location;
+mod log_damage;
 mod migrations;
 mod multi_row;
 mod page_checksums;
@@ -80,10 +81,19 @@ pub enum StoreError {
     #[error("database migration: {0}")]
     Migration(#[source] MigrateError),
     /// The database has read something that it has not written.
-    #[error("a part of the database is damaged; `offbd check` names it ({0})")]
+    #[error("a part of the database is damaged or was not readable; `offbd check` names it ({0})")]
     DamagedPage(#[source] sqlx::Error),
     #[error("the header of the database file is damaged: its pages had checksums")]
     DamagedHeader,
+    /// The write-ahead log of an SQLite file; `n_bytes` of it precede the damage.
+    #[error(
+        "{part} of the write-ahead log {} is damaged, and the commits behind it cannot be read: \
+         restore a backup, or stop the service and continue without them, after \
+         `truncate --size {n_bytes} {}`",
+        log.display(),
+        log.display()
+    )]
+    DamagedLog { part: String, log: PathBuf, n_bytes: u64 },
     #[error("chunk {first_index} of session {session}: {source}")]
     Chunk { session: String, first_index: i64, source: codec::CodecError },
     #[error("session {session} is damaged: sample {found} of {expected} is missing")]
@@ -144,11 +154,11 @@ impl From<MigrateError> for StoreError {
 }
 
 impl StoreError {
-    /// Returns whether a part of the database is damaged. The same statement fails again,
-    /// those that do not need this part succeed.
+    /// Returns whether a part of the database is damaged or was not readable. As long as it
+    /// is, the same statement fails again, and those that do not need this part succeed.
     #[must_use]
     pub const fn is_damage(&self) -> bool {
-        matches!(self, Self::DamagedPage(_) | Self::DamagedHeader)
+        matches!(self, Self::DamagedPage(_) | Self::DamagedHeader | Self::DamagedLog { .. })
     }
 
     /// Returns whether the change violates a unique or foreign key constraint: a row exists
@@ -185,6 +195,7 @@ impl StoreError {
             Self::Migration(_)
             | Self::DamagedPage(_)
             | Self::DamagedHeader
+            | Self::DamagedLog { .. }
             | Self::Chunk { .. }
             | Self::Incomplete { .. }
             | Self::Snapshot { .. }

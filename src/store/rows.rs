@@ -8,7 +8,7 @@ use super::StoreError;
 /// A time: microseconds since 1970-01-01 UTC.
 pub type Micros = i64;
 
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct AssetRow {
     pub name: String,
     /// The asset file (JSON).

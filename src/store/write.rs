@@ -163,6 +163,7 @@ pub struct Writer {
 
 impl Writer {
     pub(super) async fn open(location: &Location, role: WriterRole) -> Result<Self, StoreError> {
+        location.check_log().await?;
         let (mut connection, backend) = location.writer(role, None).await?;
         MIGRATIONS.run_direct(None, &mut connection, false).await?;
         let last_id = counter(&mut connection, "event").await?;

@@ -4,10 +4,10 @@
 use std::fs::File;
 use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, ExitStatus};
 
 use super::check;
-use crate::support::process::Process;
+use crate::support::process::{Process, Refusal};
 use crate::support::{connection, on_postgres, rig, url};
 use sqlx::{AssertSqlSafe, Connection, Executor};
 
@@ -120,4 +120,62 @@ async fn a_damaged_page_stops_no_other_asset() {
     let (status, printed) = check(data.path());
     assert_eq!(status, Some(1), "{printed}");
     assert!(printed.contains("session: Tree"), "{printed}");
+}
+
+/// After a crash SQLite would take the log up to the damage and delete the rest.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_damaged_log_is_named_before_anything_is_lost() {
+    if on_postgres() {
+        return;
+    }
+    let data = tempfile::tempdir().unwrap();
+    let samples = rig(2000, 1000);
+    let process = Process::start(data.path());
+    process.client.asset("a").await;
+    for part in samples.chunks(100) {
+        process.client.telemetry("a", Some("s"), part).await;
+    }
+    drop(process);
+    let log = data.path().join("offbd.sqlite-wal");
+    let whole = std::fs::read(&log).unwrap();
+    let mut damaged = whole.clone();
+    damaged[whole.len() / 8 * 7] ^= 1;
+    std::fs::write(&log, &damaged).unwrap();
+    let copy = data.path().join("copy").display().to_string();
+    let commands: [&[&str]; 3] = [&["check"], &["backup", &copy], &["migrate"]];
+    let run = |command: &[&str]| {
+        let mut offbd = Command::new(env!("CARGO_BIN_EXE_offbd"));
+        let (name, rest) = command.split_first().unwrap();
+        let output = offbd.args([name, "--data"]).arg(data.path()).args(rest).output().unwrap();
+        (output.status, String::from_utf8(output.stderr).unwrap())
+    };
+    let assert_refuses = |what: &str, status: ExitStatus, printed: &str| {
+        assert_eq!(status.code(), Some(1), "{what}: {printed}");
+        assert!(printed.contains("is damaged"), "{what}: {printed}");
+        assert_eq!(std::fs::read(&log).unwrap(), damaged, "{what} leaves it as it is");
+    };
+    for command in commands {
+        let (status, printed) = run(command);
+        assert_refuses(command[0], status, &printed);
+    }
+    let Refusal { status, log: printed } = Process::try_start(data.path(), &[]).err().unwrap();
+    assert_refuses("serve", status, &printed);
+    let truncate = printed.split('`').nth(1).unwrap();
+    // The whole log loses nothing, and the damaged one only what follows the damage.
+    std::fs::write(&log, &whole).unwrap();
+    let undamaged = tempfile::tempdir().unwrap();
+    for end in ["", "-wal"] {
+        let name = format!("offbd.sqlite{end}");
+        std::fs::copy(data.path().join(&name), undamaged.path().join(&name)).unwrap();
+    }
+    let mut process = Process::start(undamaged.path());
+    assert_eq!(process.client.recording("a", "s").await, samples);
+    std::fs::write(&log, &damaged).unwrap();
+    assert!(Command::new("sh").args(["-c", truncate]).status().unwrap().success());
+    process = Process::start(data.path());
+    let kept = process.client.recording("a", "s").await;
+    assert!((100..2000).contains(&kept.len()), "{}", kept.len());
+    assert_eq!(kept, samples[..kept.len()]);
+    process.client.telemetry("a", Some("s"), &samples).await;
+    assert_eq!(process.client.recording("a", "s").await, samples);
 }

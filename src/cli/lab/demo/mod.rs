@@ -82,7 +82,7 @@ fn speed(word: &str) -> Result<f64, String> {
 }
 
 pub(super) fn run(args: &DemoArgs) -> anyhow::Result<()> {
-    crate::cli::runtime()?.block_on(demo(args))
+    crate::cli::block_on(demo(args))
 }
 
 async fn demo(args: &DemoArgs) -> anyhow::Result<()> {
