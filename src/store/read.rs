@@ -147,6 +147,19 @@ impl Store {
         self.session_row(query).await
     }
 
+    /// A later part of the session that a device calls `name`. The first part of it, which has
+    /// that name, may have been deleted.
+    pub async fn later_part_of(
+        &self,
+        asset: &str,
+        name: &str,
+    ) -> Result<Option<SessionRow>, StoreError> {
+        let mut query = QueryBuilder::new(SESSION);
+        query.push("asset = ").bind(asset)?.push(" AND first_part IS NOT NULL AND name = ");
+        query.bind(name)?.push(" || ' (' || CAST(part AS TEXT) || ')' ORDER BY part LIMIT 1");
+        self.session_row(query).await
+    }
+
     /// The last parts of the session whose first part is `first`, the newest first.
     pub async fn parts(&self, first: &str, limit: u32) -> Result<Vec<SessionRow>, StoreError> {
         let mut query = QueryBuilder::new(SESSION);

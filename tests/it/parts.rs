@@ -84,8 +84,14 @@ async fn a_device_names_all_parts_alike_also_after_they_have_ended() {
     let ack = send(client, Some("monday"), &samples[900..1900]).await;
     assert_eq!(ack["duplicate"], 1000);
     let new = Sample { seq: Some(9999), t_s: 99.0, ..samples[0] };
-    let problem = client.post("assets/a/telemetry", &batch(Some("monday"), &[new])).await;
-    problem.problem(409);
+    let post_new = async || client.post("assets/a/telemetry", &batch(Some("monday"), &[new])).await;
+    post_new().await.problem(409);
+    // Without the part that has the name, the device must not begin another session.
+    let first = sessions(client).await[0]["id"].as_str().unwrap().to_owned();
+    client.delete(&format!("sessions/{first}")).await.expect(204);
+    let ack = send(client, Some("monday"), &samples[1000..2000]).await;
+    assert_eq!(ack["duplicate"], 1000);
+    post_new().await.problem(409);
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

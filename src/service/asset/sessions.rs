@@ -3,13 +3,14 @@
 use uuid::Uuid;
 
 use super::actor::Asset;
-use super::parts::Part;
-use super::sent_before::EndedSession;
+use super::ended_session::EndedSession;
+use super::part::Part;
 use super::session::OpenSession;
 use super::trend;
 use super::turn::Turn;
 use crate::service::clock::rfc3339;
 use crate::service::limits::check_session_name;
+use crate::service::writing::Handles;
 use crate::service::{ServiceError, views};
 use crate::store::{SessionProgress, SessionRow, Write};
 use crate::wire::asset;
@@ -114,7 +115,7 @@ impl Asset {
         check_session_name(name)?;
         let handles = &turn.env.handles;
         handles.fence()?;
-        if let Some(row) = handles.wait(handles.store.session_named(&self.row.name, name))? {
+        if let Some(row) = self.ended_session_named(name, handles)? {
             return Ok(SessionSwitch::Ended(Box::new(row)));
         }
         if !self.session_rate.allows(turn.at) {
@@ -124,6 +125,19 @@ impl Asset {
         self.end(turn)?;
         self.open(name.to_owned(), None, importing, turn)?;
         Ok(SessionSwitch::Open)
+    }
+
+    /// Returns a session that a device has called `name`, or a part of it.
+    fn ended_session_named(
+        &self,
+        name: &str,
+        handles: &Handles,
+    ) -> Result<Option<SessionRow>, ServiceError> {
+        let (store, asset) = (&handles.store, &self.row.name);
+        match handles.wait(store.session_named(asset, name))? {
+            None => handles.wait(store.later_part_of(asset, name)).map_err(Into::into),
+            found => Ok(found),
+        }
     }
 
     /// Opens a session, which is the part `part` of one that continues. No session must be
