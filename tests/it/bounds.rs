@@ -1,18 +1,11 @@
 //! What one device or one upload may take of the service has a bound.
 
 use crate::support::process::Process;
-use crate::support::{Client, ServiceFixture, batch, rig};
+use crate::support::{ServiceFixture, batch, rig};
 use offbd::config::Auth;
 use serde_json::json;
 use tokio::io::AsyncWriteExt;
 use tokio::net::TcpStream;
-
-/// The resident memory of the process, bytes.
-async fn resident_bytes(client: &Client) -> f64 {
-    let metrics = client.get("/metrics").await.text;
-    let line = metrics.lines().find(|line| line.starts_with("offbd_process_resident_bytes "));
-    line.unwrap().split(' ').nth(1).unwrap().parse().unwrap()
-}
 
 /// Six files of 10 MiB with one invalid value per row, which took 1.5 GB once.
 #[cfg(target_os = "linux")]
@@ -22,7 +15,7 @@ async fn imports_of_invalid_rows_use_little_more_memory_than_their_files() {
     let data = tempfile::tempdir().unwrap();
     let process = Process::start(data.path());
     let client = &process.client;
-    let before = resident_bytes(client).await;
+    let before = client.resident_bytes().await;
     let mut file = "t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n".to_owned();
     file.push_str(&"x,,,,\n".repeat(FILE / 6));
     let sending: Vec<_> = (0..6)
@@ -37,7 +30,7 @@ async fn imports_of_invalid_rows_use_little_more_memory_than_their_files() {
         .collect();
     let mut most: f64 = 0.0;
     while !sending.iter().all(tokio::task::JoinHandle::is_finished) {
-        most = most.max(resident_bytes(client).await);
+        most = most.max(client.resident_bytes().await);
     }
     for import in sending {
         let view = import.await.unwrap();

@@ -36,6 +36,8 @@ mod same_sample;
 mod same_verdict;
 mod service;
 mod small;
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+mod soak;
 mod support;
 #[cfg(feature = "otel")]
 mod traces;

@@ -6,48 +6,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 #[cfg(target_os = "linux")]
-use crate::support::calls::preloaded;
-use crate::support::device::{ServiceLink, device};
+use crate::support::calls::FaultySystem;
+use crate::support::device::DeviceLoad;
 use crate::support::postgres::Postgres;
 use crate::support::process::Process;
-use crate::support::{Client, ServiceFixture, eventually};
+use crate::support::{ServiceFixture, eventually};
 use sqlx::Executor;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{UnixListener, UnixStream};
-
-/// Waits until `/readyz` has `status`; returns its reason.
-async fn readiness(client: &Client, status: u16) -> String {
-    eventually(|| async {
-        let answer = client.get("/readyz").await;
-        (answer.status == status).then(|| answer.json()["detail"].as_str().unwrap_or("").to_owned())
-    })
-    .await
-}
-
-/// Devices that send until they are stopped.
-struct DeviceLoad {
-    link: ServiceLink,
-    devices: Vec<tokio::task::JoinHandle<usize>>,
-}
-
-impl DeviceLoad {
-    fn start(n: usize, client: &Client, data: &Path, url: Option<&str>) -> Self {
-        let link = ServiceLink::to(client);
-        let devices =
-            (0..n).map(|i| device(&link, &format!("d{i}"), i % 2 == 0, data, url)).collect();
-        Self { link, devices }
-    }
-
-    /// Stops the devices and returns the number of recordings that they have compared.
-    async fn stop(self) -> usize {
-        self.link.stop_devices();
-        let mut laps = 0;
-        for device in self.devices {
-            laps += device.await.unwrap();
-        }
-        laps
-    }
-}
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_restarted_database_server_loses_nothing() {
@@ -66,13 +32,13 @@ async fn a_restarted_database_server_loses_nothing() {
         server.stop(signal);
         // After this, only samples in flight can be acknowledged.
         let (n_full, n_acknowledged) = (load.link.n_too_many(), load.link.acknowledged());
-        let reason = readiness(&fixture.client, 503).await;
+        let reason = fixture.client.readiness(503).await;
         assert!(reason.contains("the database is unavailable"), "{reason}");
         // Samples in flight reach the limit, and further batches get 429.
         eventually(|| async { (load.link.n_too_many() > n_full).then_some(()) }).await;
         assert!(load.link.acknowledged() <= n_acknowledged + 300);
         server.start();
-        readiness(&fixture.client, 200).await;
+        fixture.client.readiness(200).await;
     }
     // Every connection to the database is terminated.
     for _ in 0..20 {
@@ -174,31 +140,28 @@ async fn a_commit_with_a_lost_answer_is_neither_lost_nor_repeated() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_full_or_failing_disk_loses_nothing() {
     let data = tempfile::tempdir().unwrap();
-    let (library, faults) = (preloaded("faulty", data.path()), data.path().join("faults"));
-    let environment = [
-        ("LD_PRELOAD", library.as_path()),
-        ("FAULTS", faults.as_path()),
-        ("OFFBD_LIMITS__JOURNAL_BYTES", Path::new("5000")),
-    ];
+    let system = FaultySystem::new(data.path());
+    let mut environment = system.environment().to_vec();
+    environment.push(("OFFBD_LIMITS__JOURNAL_BYTES", Path::new("5000")));
     let mut process = Process::start_with(data.path(), &environment);
     let load = DeviceLoad::start(2, &process.client, data.path(), None);
     // ENOSPC is 28, EIO is 5.
     let kinds = [("write 28", "full"), ("write 5", "I/O"), ("sync 5", "I/O"), ("torn 5", "I/O")];
     for (i, (fault, word)) in kinds.into_iter().cycle().take(12).enumerate() {
         load.link.wait_for_samples(300).await;
-        std::fs::write(&faults, fault).unwrap();
-        let reason = readiness(&process.client, 503).await;
+        system.set(fault);
+        let reason = process.client.readiness(503).await;
         assert!(reason.contains(word), "{fault}: {reason}");
         if i % 3 == 2 {
             // Killed while the disk fails.
             drop(process);
-            std::fs::remove_file(&faults).unwrap();
+            system.clear();
             process = Process::start_with(data.path(), &environment);
             load.link.set_service(&process.client);
         } else {
-            std::fs::remove_file(&faults).unwrap();
+            system.clear();
         }
-        readiness(&process.client, 200).await;
+        process.client.readiness(200).await;
     }
     load.stop().await;
 }
@@ -207,16 +170,15 @@ async fn a_full_or_failing_disk_loses_nothing() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_step_of_the_wall_clock_loses_nothing() {
     let data = tempfile::tempdir().unwrap();
-    let (library, faults) = (preloaded("faulty", data.path()), data.path().join("faults"));
-    let environment = [("LD_PRELOAD", library.as_path()), ("FAULTS", faults.as_path())];
-    let process = Process::start_with(data.path(), &environment);
+    let system = FaultySystem::new(data.path());
+    let process = Process::start_with(data.path(), &system.environment());
     let load = DeviceLoad::start(2, &process.client, data.path(), None);
     for step in ["clock -86400", "clock 86400", "clock -1", "clock 0"] {
         load.link.wait_for_samples(1000).await;
-        std::fs::write(&faults, step).unwrap();
+        system.set(step);
     }
     load.link.wait_for_samples(1000).await;
-    readiness(&process.client, 200).await;
+    process.client.readiness(200).await;
     load.stop().await;
 }
 
@@ -226,9 +188,9 @@ async fn a_database_locked_by_another_process_loses_nothing() {
     let load = DeviceLoad::start(2, &fixture.client, fixture.data.path(), None);
     load.link.wait_for_samples(500).await;
     let lock = fixture.lock_store().await;
-    let reason = readiness(&fixture.client, 503).await;
+    let reason = fixture.client.readiness(503).await;
     assert!(reason.contains("locked"), "{reason}");
     lock.release().await;
-    readiness(&fixture.client, 200).await;
+    fixture.client.readiness(200).await;
     load.stop().await;
 }

@@ -64,6 +64,34 @@ pub fn preloaded(name: &str, directory: &Path) -> PathBuf {
     library
 }
 
+/// A disk and a clock that fail for one process, see `faulty.c`.
+pub struct FaultySystem {
+    library: PathBuf,
+    fault: PathBuf,
+}
+
+impl FaultySystem {
+    /// Keeps its own files in `folder`.
+    pub fn new(folder: &Path) -> Self {
+        Self { library: preloaded("faulty", folder), fault: folder.join("faults") }
+    }
+
+    /// Returns the environment variables of the process.
+    pub fn environment(&self) -> [(&'static str, &Path); 2] {
+        [("LD_PRELOAD", &self.library), ("FAULTS", &self.fault)]
+    }
+
+    /// Lets `fault` happen from now on.
+    pub fn set(&self, fault: &str) {
+        std::fs::write(&self.fault, fault).unwrap();
+    }
+
+    /// Lets nothing fail any more.
+    pub fn clear(&self) {
+        std::fs::remove_file(&self.fault).unwrap();
+    }
+}
+
 /// The calls of a process on the files in a folder, and its allocations and threads.
 pub struct CallControl {
     library: PathBuf,

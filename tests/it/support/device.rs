@@ -193,6 +193,31 @@ async fn wait_for_service(address: &mut watch::Receiver<String>) {
     let _ = tokio::time::timeout(longest, address.changed()).await;
 }
 
+/// Devices that send until they are stopped.
+pub struct DeviceLoad {
+    pub link: ServiceLink,
+    devices: Vec<JoinHandle<usize>>,
+}
+
+impl DeviceLoad {
+    pub fn start(n: usize, client: &Client, data: &Path, url: Option<&str>) -> Self {
+        let link = ServiceLink::to(client);
+        let devices =
+            (0..n).map(|i| device(&link, &format!("d{i}"), i % 2 == 0, data, url)).collect();
+        Self { link, devices }
+    }
+
+    /// Stops the devices and returns the number of recordings that they have compared.
+    pub async fn stop(self) -> usize {
+        self.link.stop_devices();
+        let mut laps = 0;
+        for device in self.devices {
+            laps += device.await.unwrap();
+        }
+        laps
+    }
+}
+
 /// Starts a device that sends recordings, each for a new asset, and compares what is stored in
 /// the database at `url`, or in the store of `data`. Returns the number of recordings.
 pub fn device(

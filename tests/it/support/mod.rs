@@ -188,6 +188,23 @@ impl Answer {
 }
 
 impl Client {
+    /// Waits until `/readyz` has `status`; returns its reason.
+    pub async fn readiness(&self, status: u16) -> String {
+        let detail = |answer: Answer| answer.json()["detail"].as_str().unwrap_or("").to_owned();
+        eventually(|| async {
+            let answer = self.get("/readyz").await;
+            (answer.status == status).then(|| detail(answer))
+        })
+        .await
+    }
+
+    /// The resident memory of the process, bytes.
+    pub async fn resident_bytes(&self) -> f64 {
+        let metrics = self.get("/metrics").await.text;
+        let line = metrics.lines().find(|line| line.starts_with("offbd_process_resident_bytes "));
+        line.unwrap().split(' ').nth(1).unwrap().parse().unwrap()
+    }
+
     pub fn new(address: String) -> Self {
         Self { address, token: None, http: reqwest::Client::new() }
     }
