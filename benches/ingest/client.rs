@@ -33,11 +33,18 @@ impl Client {
 
     /// Posts `body` and waits for a successful response.
     pub(crate) async fn post(&mut self, path: &str, media_type: &str, body: &[u8]) -> Result<()> {
+        let head = format!("POST {path} HTTP/1.1\r\ncontent-type: {media_type}");
+        self.exchange(&head, body).await
+    }
+
+    /// Waits for a successful response.
+    pub(crate) async fn get(&mut self, path: &str) -> Result<()> {
+        self.exchange(&format!("GET {path} HTTP/1.1"), &[]).await
+    }
+
+    async fn exchange(&mut self, head: &str, body: &[u8]) -> Result<()> {
         let length = body.len();
-        let head = format!(
-            "POST {path} HTTP/1.1\r\nhost: localhost\r\ncontent-type: {media_type}\r\n\
-             content-length: {length}\r\n\r\n"
-        );
+        let head = format!("{head}\r\nhost: localhost\r\ncontent-length: {length}\r\n\r\n");
         self.bytes.clear();
         self.bytes.extend_from_slice(head.as_bytes());
         self.bytes.extend_from_slice(body);

@@ -10,6 +10,8 @@
 //! from CSV. Other arguments:
 //!
 //! - `-- memory`: memory per asset, with 10 000 assets;
+//! - `-- restart ASSETS SAMPLES`: a restart after a kill, with that many assets and samples in
+//!   the open session of each;
 //! - `-- latency`: time from a sample to its fault event, at half the maximum rate;
 //! - `-- only WORD`: only the loads with the word in their name, without *bare*;
 //! - `-- peer URL`: another database that accepts line protocol, see
@@ -25,6 +27,7 @@
 
 mod client;
 mod load;
+mod restart;
 
 use std::net::SocketAddr;
 use std::time::{Duration, Instant, SystemTime};
@@ -59,6 +62,12 @@ fn main() -> Result<()> {
     let samples = recording(SAMPLES, None)?;
     match arguments.first().map(String::as_str) {
         Some("memory") => return runtime.block_on(memory()),
+        Some("restart") => {
+            let number = |n: usize| -> Result<usize> {
+                Ok(arguments.get(n).context("`restart` takes ASSETS SAMPLES")?.parse()?)
+            };
+            return runtime.block_on(restart::measure(number(1)?, number(2)?));
+        }
         Some("latency") => {
             for (load, batch) in [("WebSocket by 100", 100), ("WebSocket by 10", 10)] {
                 runtime.block_on(latency(&samples, load, batch))?;
@@ -315,7 +324,7 @@ async fn memory() -> Result<()> {
     let samples = recording(6000, None)?;
     let server = start(data.path(), ASSETS).await?;
     let mut client = Client::connect(server.address).await?;
-    let before = resident()?;
+    let before = resident(std::process::id())?;
     let mut sent = 0;
     for end in [10, 1000, 6000] {
         for part in samples[sent..end].chunks(1000) {
@@ -326,15 +335,16 @@ async fn memory() -> Result<()> {
             }
         }
         sent = end;
-        let each = (resident()? - before) / ASSETS as f64;
+        let each = (resident(std::process::id())? - before) / ASSETS as f64;
         println!("{ASSETS} assets, {end} samples each: {:.1} KiB per asset", each / 1024.0);
     }
     server.shutdown().await
 }
 
-/// Returns the resident memory of the process, bytes.
-fn resident() -> Result<f64> {
-    let status = std::fs::read_to_string("/proc/self/status").context("only on Linux")?;
+/// Returns the resident memory of a process, bytes.
+fn resident(process: u32) -> Result<f64> {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status"));
+    let status = status.context("only on Linux")?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).context("no VmRSS")?;
     Ok(line.trim().trim_end_matches(" kB").parse::<f64>()? * 1024.0)
 }
