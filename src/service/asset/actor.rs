@@ -1,7 +1,7 @@
 //! A loaded asset.
 
+use super::ended_session::EndedSession;
 use super::learning_record::LearningRecord;
-use super::sent_before::EndedSession;
 use super::session::OpenSession;
 use super::session_rate::SessionRate;
 use crate::service::writing::EngineGeneration;

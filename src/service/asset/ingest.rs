@@ -1,8 +1,9 @@
 //! Evaluating and recording a batch of samples.
 
 use super::actor::Asset;
+use super::ended_session::MAX_SESSIONS;
+use super::outcomes::{count_outcomes, count_unjudged};
 use super::recorded::RecordedSamples;
-use super::sent_before::MAX_SESSIONS;
 use super::session::OpenSession;
 use super::sessions::SessionSwitch;
 use super::turn::Turn;
@@ -47,7 +48,7 @@ impl Asset {
         }
         self.learn_if_due(turn)?;
         ack.rejected.sort_by_key(|row| row.index);
-        count(&ack);
+        count_outcomes(&ack);
         Ok(ack)
     }
 
@@ -218,21 +219,6 @@ fn samples(rows: Vec<Result<Sample, String>>, ack: &mut AckView) -> Vec<(usize, 
         }
     }
     samples
-}
-
-/// Counts `n` samples that are not evaluated. `reason` is a metric label with few values.
-pub(super) fn count_unjudged(reason: &'static str, n: u64) {
-    metrics::counter!("offbd_samples_unjudged_total", "reason" => reason).increment(n);
-}
-
-fn count(ack: &AckView) {
-    let outcome = |outcome: &'static str, n: usize| {
-        metrics::counter!("offbd_samples_total", "outcome" => outcome).increment(n as u64);
-    };
-    outcome("accepted", ack.accepted);
-    outcome("duplicate", ack.duplicate);
-    outcome("rejected", ack.rejected.len());
-    outcome("late", ack.late.len());
 }
 
 /// Acknowledges samples for a session that has ended, if they are recorded already. Rows

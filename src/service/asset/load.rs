@@ -4,8 +4,8 @@
 use std::ops::ControlFlow;
 
 use super::actor::{Asset, Provenance};
+use super::ended_session::EndedSession;
 use super::learning_record::LearningRecord;
-use super::sent_before::EndedSession;
 use super::session::OpenSession;
 use super::session_rate::SessionRate;
 use crate::service::playback::play;
@@ -25,12 +25,12 @@ pub(super) struct StoredAsset {
 }
 
 impl StoredAsset {
-    /// Reads the asset `name`, and the last snapshot of its engine. Blocks on the store.
+    /// Reads the asset `name`, and the last snapshot of its engine; a fence must be complete
+    /// since its last change. Blocks on the store.
     ///
     /// # Errors
     /// [`ServiceError::UnknownAsset`]; [`ServiceError::Store`]; [`ServiceError::Corrupt`].
     pub(super) fn read(handles: &Handles, name: &str) -> Result<Self, ServiceError> {
-        handles.fence()?;
         let row = handles.wait(handles.store.asset(name))?;
         let row = row.ok_or_else(|| ServiceError::UnknownAsset { name: name.to_owned() })?;
         let rig = views::rig(&row.document)?;

@@ -11,12 +11,9 @@ use tokio::sync::{AcquireError, Semaphore};
 
 use super::actor::Asset;
 use super::load::StoredAsset;
-use super::shards::ShardMessage;
+use super::message::{LoadResult, ShardMessage};
 use crate::service::ServiceError;
 use crate::service::writing::Handles;
-
-/// A loaded asset, or why it cannot be loaded.
-pub(super) type LoadResult = Result<Box<Asset>, ServiceError>;
 
 /// Samples to evaluate from which on requests are refused instead of waiting: less take some
 /// 0.1 s. With a snapshot there are much less.
@@ -112,7 +109,8 @@ impl Loader {
     pub(in crate::service) fn step(&mut self) -> bool {
         let Ok(LoadRequest { asset, shard }) = self.requests.try_recv() else { return false };
         self.limits.n_waiting.fetch_sub(1, Ordering::Relaxed);
-        let loaded = begin(&self.handles, &asset).map(|progress| match progress {
+        let begun = self.handles.fence().and_then(|()| begin(&self.handles, &asset));
+        let loaded = begun.map(|progress| match progress {
             Progress::Loaded(asset) => asset,
             Progress::Behind(stored) => Box::new(stored.catch_up(&self.handles).unwrap()),
         });
@@ -141,6 +139,8 @@ async fn load(
     name: &str,
     shard: &Sender<ShardMessage>,
 ) -> LoadResult {
+    // Before there is a permit, so that one commit completes the fences of all that wait.
+    handles.fence_async().await?;
     let permit = limits.few.acquire().await.map_err(closed)?;
     let (for_reading, asset) = (handles.clone(), name.to_owned());
     let stored = match blocking(name, move || begin(&for_reading, &asset)).await? {
@@ -180,4 +180,36 @@ async fn blocking<T: Send + 'static>(
         tracing::error!(asset, "rebuilding the engine panicked");
         Err(ServiceError::Unavailable { what: "the engine of the asset cannot be rebuilt" })
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::service::{Clock, Limits, Service};
+    use crate::store::{Location, Store};
+
+    #[tokio::test]
+    async fn assets_that_load_wait_for_the_same_commit() {
+        const N: usize = 50;
+        let data = tempfile::tempdir().unwrap();
+        let location = Location::File(data.path().join("offbd.sqlite"));
+        let (store, writer) = Store::open(&location).await.unwrap();
+        let (service, mut parts) =
+            Service::assemble(store, writer, Limits::default(), None, Clock::System);
+        let (shard, mut results) = tokio::sync::mpsc::channel(N);
+        let (loader, queue) = Loader::new(service.inner.handles.clone(), 1, &shard);
+        tokio::spawn(loader.run());
+        for i in 0..N {
+            assert!(queue.load(&format!("rig-{i}")).is_none());
+        }
+        for _ in 0..10 * N {
+            tokio::task::yield_now().await;
+        }
+        assert_eq!(parts.committer.queue.len(), N, "all wait, and nothing is committed");
+        assert!(parts.committer.step(N).await);
+        for _ in 0..N {
+            let Some(ShardMessage::Loaded { result, .. }) = results.recv().await else { panic!() };
+            assert!(matches!(*result, Err(ServiceError::UnknownAsset { .. })));
+        }
+    }
 }

@@ -5,11 +5,12 @@
 //! Nothing here writes to the store: the changes that result from a command are collected
 //! in a [`turn::Turn`] and handed to the writer. The reply is sent once they are durable.
 //!
-//! - `command`, `shards`, `shard`, `turn`: commands, their queues, the threads, the execution
-//!   of a command.
+//! - `command`, `message`, `shards`, `shard`, `turn`: commands, their queues, the threads, the
+//!   execution of a command.
 //! - `actor`, `loader`, `load`, `state`: the asset, loading it from the store, queries.
-//! - `ingest`, `sessions`, `session`, `recent`: samples, sessions, the engine of a session.
-//! - `recorded`, `restart`, `sent_before`: which samples are there already, and when a device
+//! - `ingest`, `outcomes`, `sessions`, `session`, `part`, `parts`, `recent`: samples, sessions,
+//!   the engine of a session.
+//! - `recorded`, `restart`, `ended_session`, `sent_before`: which samples are there already, and when a device
 //!   has started anew.
 //! - `memory`, `trend`: the fault memory, servo estimates over the sessions.
 //! - `learning`, `learning_record`: automatic calibration.
@@ -17,12 +18,16 @@
 
 mod actor;
 mod command;
+mod ended_session;
 mod ingest;
 mod learning;
 mod learning_record;
 mod load;
 mod loader;
 mod memory;
+mod message;
+mod outcomes;
+mod part;
 mod parts;
 mod presence;
 mod recent;

@@ -1,6 +1,6 @@
 //! An open session and its engine.
 
-use super::parts::Part;
+use super::part::Part;
 use super::recent::RecentTrace;
 use crate::judging::Judging;
 use crate::service::clock::rfc3339;

@@ -9,8 +9,8 @@ use tokio::sync::mpsc;
 
 use super::actor::Asset;
 use super::command::{AssetCommand, Reply};
-use super::loader::{LoadQueue, LoadResult};
-use super::shards::ShardMessage;
+use super::loader::LoadQueue;
+use super::message::{LoadResult, ShardMessage};
 use super::turn::{Environment, Turn};
 use crate::service::ServiceError;
 use crate::service::writing::{EngineGeneration, WriteSet};

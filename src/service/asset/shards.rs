@@ -6,20 +6,11 @@ use std::sync::Arc;
 use tokio::sync::mpsc;
 
 use super::command::{AssetCommand, Reply};
-use super::loader::{LoadResult, Loader};
+use super::loader::Loader;
+use super::message::ShardMessage;
 use super::shard::Shard;
 use super::turn::Environment;
 use crate::service::{Limits, ServiceError};
-
-/// A message to a shard.
-pub(super) enum ShardMessage {
-    /// A command for an asset.
-    Command { asset: String, command: AssetCommand },
-    /// Loading an asset takes long, because its engine must evaluate a long recording.
-    Rebuilding { asset: String, retry_after_s: u64 },
-    /// An asset is loaded, or cannot be loaded.
-    Loaded { asset: String, result: Box<LoadResult> },
-}
 
 /// The queues of all shards. The hash of its name assigns each asset to one shard. Cheap to
 /// clone.

@@ -131,8 +131,8 @@ fn pause(worked: Duration) {
 }
 
 /// Reads the recording of `session`, and judges it again if there is a snapshot to compare
-/// with. Calls `pause` now and then with the duration of the work since the last call.
-/// Returns `None` also if the service shuts down. Blocks on the store.
+/// with. Calls `pause` now and then, and at the end, with the duration of the work since the
+/// last call. Returns `None` also if the service shuts down. Blocks on the store.
 #[expect(clippy::disallowed_methods, reason = "pauses are a multiple of the work")]
 fn examine(
     handles: &Handles,
@@ -157,6 +157,7 @@ fn examine(
             }
         })
     });
+    pause(since.elapsed());
     match played {
         Err(ServiceError::Corrupt { what }) => return Ok(Some(Finding::Damage(what))),
         played => played?,
@@ -205,5 +206,56 @@ impl Comparison {
             let state = snapshots::state(&self.judging, self.motion.as_ref());
             self.differs = Some(state.is_ok_and(|state| state != self.snapshot.state));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Mutex;
+
+    use super::*;
+    use crate::service::{Clock, Limits, Service};
+    use crate::store::{AssetRow, Location, SessionProgress, Store, Write};
+    use offbd_core::vocabulary::Sample;
+
+    /// The lengths of the work between the pauses in a session of `n_samples`.
+    async fn works(n_samples: usize) -> Vec<Duration> {
+        let folder = tempfile::tempdir().unwrap();
+        let location = Location::File(folder.path().join("offbd.sqlite"));
+        let (store, mut writer) = Store::open(&location).await.unwrap();
+        let asset = AssetRow { name: "a".to_owned(), ..AssetRow::default() };
+        let row = SessionRow { id: "s".to_owned(), asset: "a".to_owned(), ..SessionRow::default() };
+        let samples =
+            (0..n_samples).map(|i| Sample { t_s: i as f64, ..Sample::default() }).collect();
+        let progress = SessionProgress { n_samples: n_samples as i64, ..Default::default() };
+        let append = Write::Append { session: "s".to_owned(), first_index: 0, samples, progress };
+        let end = Write::EndSession {
+            session: "s".to_owned(),
+            ended_at: 0,
+            verdict: "{}".to_owned(),
+            hash: String::new(),
+        };
+        let mut set = vec![Write::CreateAsset(asset), Write::OpenSession(row), append, end];
+        writer.commit(&mut [&mut set]).await.unwrap();
+        let session = store.session("s").await.unwrap().unwrap();
+        let (service, _parts) =
+            Service::assemble(store, writer, Limits::default(), None, Clock::System);
+        let handles = service.inner.handles.clone();
+        tokio::task::spawn_blocking(move || {
+            let works = Mutex::new(Vec::new());
+            let found = examine(&handles, &session, |work| works.lock().unwrap().push(work));
+            assert_eq!(found.unwrap(), None);
+            works.into_inner().unwrap()
+        })
+        .await
+        .unwrap()
+    }
+
+    /// Otherwise many short sessions would take much more than their share of a core.
+    #[tokio::test(flavor = "multi_thread")]
+    async fn all_work_is_followed_by_a_pause() {
+        assert_eq!(works(100).await.len(), 1);
+        assert_eq!(works(20_000).await.len(), 3);
+        assert!(works(100).await.iter().all(|work| !work.is_zero()));
     }
 }

@@ -115,10 +115,36 @@ impl Handles {
     /// [`ServiceError::Outage`] after 5 s, and at once as long as that fence is not complete,
     /// so that assets that must be read do not hold up the others of their shard.
     pub(in crate::service) fn fence(&self) -> Result<(), ServiceError> {
-        if self.is_stuck.load(Ordering::SeqCst) {
-            return Err(self.stuck());
+        self.check_fences()?;
+        let (set, done) = self.new_fence();
+        self.submit(set);
+        #[cfg(test)]
+        if let Some(commit_queued) = self.commit_queued.get() {
+            commit_queued();
         }
-        let (sender, mut receiver) = oneshot::channel();
+        self.runtime.block_on(self.fenced(done))
+    }
+
+    /// Waits like [`fence`](Self::fence), on the runtime. Fences that wait at the same time
+    /// are complete after one commit.
+    ///
+    /// # Errors
+    /// As for [`fence`](Self::fence).
+    pub(in crate::service) async fn fence_async(&self) -> Result<(), ServiceError> {
+        self.check_fences()?;
+        let (set, done) = self.new_fence();
+        if self.writer.send(set).await.is_err() {
+            tracing::error!("the writer has stopped");
+        }
+        self.fenced(done).await
+    }
+
+    fn check_fences(&self) -> Result<(), ServiceError> {
+        if self.is_stuck.load(Ordering::SeqCst) { Err(self.stuck()) } else { Ok(()) }
+    }
+
+    fn new_fence(&self) -> (WriteSet, oneshot::Receiver<()>) {
+        let (sender, done) = oneshot::channel();
         let is_stuck = self.is_stuck.clone();
         let completion = Box::new(move |_| {
             // In this order, so that a fence that times out now sees one of the two.
@@ -126,18 +152,16 @@ impl Handles {
             is_stuck.store(false, Ordering::SeqCst);
         });
         let generation = EngineGeneration::default();
-        self.submit(WriteSet { writes: Vec::new(), generation, completion });
-        #[cfg(test)]
-        if let Some(commit_queued) = self.commit_queued.get() {
-            commit_queued();
-        }
-        let stopped = |_| ServiceError::Unavailable { what: "the writer has stopped" };
-        let done = async { tokio::time::timeout(FENCE_TIMEOUT, &mut receiver).await };
-        if let Ok(done) = self.runtime.block_on(done) {
+        (WriteSet { writes: Vec::new(), generation, completion }, done)
+    }
+
+    async fn fenced(&self, mut done: oneshot::Receiver<()>) -> Result<(), ServiceError> {
+        if let Ok(done) = tokio::time::timeout(FENCE_TIMEOUT, &mut done).await {
+            let stopped = |_| ServiceError::Unavailable { what: "the writer has stopped" };
             return done.map_err(stopped);
         }
         self.is_stuck.store(true, Ordering::SeqCst);
-        if receiver.try_recv().is_ok() {
+        if done.try_recv().is_ok() {
             self.is_stuck.store(false, Ordering::SeqCst);
             return Ok(());
         }

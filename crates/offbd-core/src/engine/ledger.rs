@@ -82,14 +82,14 @@ impl<K> Default for Keys<K> {
 }
 
 impl<K: Key> Keys<K> {
-    fn recognise(&self, key: K, fingerprint: u64) -> Recognition {
+    fn recognise(&self, key: K, fingerprint: impl FnOnce() -> u64) -> Recognition {
         let newest = self.recent.back().map(|&(newest, _)| newest);
         if newest.is_none_or(|newest| key > newest) && self.dropped.is_none_or(|d| key > d) {
             return Recognition::New;
         }
         let at = self.recent.partition_point(|&(k, _)| k < key);
         match self.recent.get(at) {
-            Some(&(k, same)) if k == key && same == fingerprint => Recognition::Same,
+            Some(&(k, of)) if k == key && of == fingerprint() => Recognition::Same,
             Some(&(k, _)) if k == key => Recognition::Conflict,
             _ if self.dropped.is_none_or(|dropped| key > dropped) => Recognition::New,
             _ if !self.cover(key) => Recognition::New,
@@ -169,9 +169,10 @@ pub(super) struct Ledger {
 impl Ledger {
     /// Returns what is known of `sample`, whose numbers must be finite.
     pub(super) fn recognise(&self, sample: &Sample) -> Recognition {
+        let fingerprint = || fingerprint(sample);
         match sample.seq {
-            Some(seq) => self.by_seq.recognise(seq, fingerprint(sample)),
-            None => self.by_time.recognise(sample.t_s, fingerprint(sample)),
+            Some(seq) => self.by_seq.recognise(seq, fingerprint),
+            None => self.by_time.recognise(sample.t_s, fingerprint),
         }
     }
 

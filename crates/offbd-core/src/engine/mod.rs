@@ -39,10 +39,10 @@ pub use rig::{AxisMapping, DiagnosticsSpec, MAX_NAME, Rig, ServoSpec, Setup};
 use serde::{Deserialize, Serialize};
 pub use types::{Admission, Input, MonitorState, Reach, Readiness, Rejection, State, Unjudged};
 
-use admit::Admit;
 use align::Align;
 use clock::{ClockContext, ClockDecision, DeviceClock};
 use coverage::Coverage;
+use ledger::Ledger;
 use pipeline::Pipeline;
 use span::Span;
 
@@ -56,7 +56,7 @@ pub const JUDGEMENT: u32 = 2;
 
 /// Version of the serialised form of an [`Engine`], a [`Plausibility`] and a
 /// [`UsableMotion`]: raised with every change of their fields or of what these mean.
-pub const SNAPSHOT_FORMAT: u32 = 1;
+pub const SNAPSHOT_FORMAT: u32 = 2;
 
 /// Consecutive unjudged samples after which a rig counts as not tested. Chosen: a few late
 /// samples are common.
@@ -72,7 +72,7 @@ const UNTESTED_AFTER: u64 = 10;
 pub struct Engine {
     setup: Setup,
     memory: FaultMemory,
-    admit: Admit,
+    ledger: Ledger,
     clock: DeviceClock,
     align: Align,
     span: Span,
@@ -93,7 +93,7 @@ impl Engine {
     pub fn new(setup: Setup, mut memory: FaultMemory) -> Self {
         memory.start_cycle();
         Self {
-            admit: Admit::new(&setup.rig.mapping),
+            ledger: Ledger::default(),
             clock: DeviceClock::new(1.0 / setup.rig.sample_rate_hz),
             align: Align::default(),
             span: Span::default(),
@@ -154,12 +154,29 @@ impl Engine {
         transitions: &mut Vec<Transition>,
         seen: &mut impl FnMut(&Evidence),
     ) -> Admission {
-        let decided = self.admit.take(sample, is_new);
+        let decided = self.admit(sample, is_new);
         let admission = decided.unwrap_or_else(|| self.take_new(sample, transitions, seen));
         if let Admission::Rejected(why) | Admission::SetAside(why) = admission {
             self.count_unjudged(why);
         }
         admission
+    }
+
+    /// Decides on a sample that is new if `is_new`, and may be a retransmission otherwise.
+    /// Returns `None` if it is new and its clock is to be judged.
+    fn admit(&self, sample: &Sample, is_new: bool) -> Option<Admission> {
+        if let Err(rejection) = admit::check(&self.setup.rig.mapping, sample) {
+            return Some(Admission::Rejected(rejection));
+        }
+        if is_new {
+            return None;
+        }
+        match self.ledger.recognise(sample) {
+            Recognition::New => None,
+            Recognition::Same => Some(Admission::Duplicate),
+            Recognition::Conflict => Some(Admission::Rejected(Rejection::conflict(sample))),
+            Recognition::Taken | Recognition::Unknown => Some(Admission::Unknown),
+        }
     }
 
     /// Takes a sample that is valid and new.
@@ -172,11 +189,11 @@ impl Engine {
         let gap_s = self.gap_s();
         let context = ClockContext {
             released_s: self.align.released_s(),
-            in_stretch: sample.seq.is_none() && self.admit.has_stretch_at(sample.t_s),
+            in_stretch: sample.seq.is_none() && self.ledger.has_stretch_at(sample.t_s),
             reorder_s: self.setup.settings.reorder_s,
             gap_s,
         };
-        self.admit.note(sample, gap_s);
+        self.ledger.note(sample, gap_s);
         match self.clock.take(sample, &context) {
             ClockDecision::Follows => self.arrange(sample, transitions, seen),
             ClockDecision::Doubted { step_s } => {
@@ -318,7 +335,7 @@ impl Engine {
     /// Returns what is known of a sample; its numbers must be finite.
     #[must_use]
     pub fn recognise(&self, sample: &Sample) -> Recognition {
-        self.admit.recognise(sample)
+        self.ledger.recognise(sample)
     }
 
     /// Whether a sample of the past that is new can be one that was lost and is sent late,
@@ -326,13 +343,13 @@ impl Engine {
     /// the first one, and for times in a gap.
     #[must_use]
     pub fn fits_gap(&self, sample: &Sample) -> bool {
-        self.admit.fits_gap(sample)
+        self.ledger.fits_gap(sample)
     }
 
     /// Whether a sample is before the first one taken: its `seq` or, without one, its time.
     #[must_use]
     pub fn precedes(&self, sample: &Sample) -> bool {
-        self.admit.precedes(sample)
+        self.ledger.precedes(sample)
     }
 
     /// Samples that are judged or wait for an earlier one.
