@@ -28,6 +28,9 @@ use clap::{Parser, Subcommand};
 
 use crate::config::{ConfigError, LogConfig};
 
+/// How sqlx names the threads of SQLite connections.
+const SQLITE_THREAD: &str = "sqlx-sqlite-worker-";
+
 /// Off-board diagnostics with a digital twin, for ball-on-plate rigs.
 ///
 /// A device streams commands and measured positions; a physical model of the
@@ -73,7 +76,7 @@ enum CliCommand {
 /// Runs the command line of this process.
 #[must_use]
 pub fn main() -> ExitCode {
-    end_with_main_thread();
+    end_with_essential_threads();
     match Cli::try_parse() {
         Ok(cli) => run(cli).map_or_else(|error| report(&error), |()| ExitCode::SUCCESS),
         Err(error) => print_usage(&error),
@@ -109,14 +112,20 @@ fn run(cli: Cli) -> anyhow::Result<()> {
     }
 }
 
-/// Makes a panic of the main thread end the process at once. If the system refuses one of the
-/// runtime's threads, tokio panics and then waits for the others for ever.
-fn end_with_main_thread() {
+/// Makes a panic end the process at once, where it would be taken for something else:
+///
+/// - on the main thread, which panics in tokio if the system refuses one of the runtime's
+///   threads; tokio then waits for the others for ever;
+/// - on a thread of an SQLite connection, on which sqlx panics without memory for a value.
+///   The rows that it had not sent yet are missing, as if the query had none.
+fn end_with_essential_threads() {
     let main = std::thread::current().id();
     let report = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
         report(panic);
-        if std::thread::current().id() == main {
+        let thread = std::thread::current();
+        let is_sqlite = thread.name().is_some_and(|name| name.starts_with(SQLITE_THREAD));
+        if is_sqlite || thread.id() == main {
             std::process::exit(101);
         }
     }));

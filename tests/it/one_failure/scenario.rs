@@ -108,7 +108,7 @@ impl Scenario {
         self.process = None;
         self.count();
         check(self.data.path(), first.len() + second.len()).await;
-        self.outcome
+        std::mem::take(&mut self.outcome)
     }
 
     /// Prepares to watch the process of `stage` if its calls are to be counted or one of them
@@ -274,6 +274,16 @@ impl Scenario {
         let (status, log) = offbd(&["restore", "--data"], restored.path(), &[&copy], &[]).await;
         assert!(status.success(), "{:?}: {log}", self.failure);
         check(restored.path(), n_samples).await;
+    }
+}
+
+/// Says which call has failed in a scenario that panics, and what the service has printed.
+impl Drop for Scenario {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            let log = self.process.as_ref().map(Process::log);
+            eprintln!("{:?}: {}", self.failure, log.unwrap_or_default());
+        }
     }
 }
 
