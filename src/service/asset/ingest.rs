@@ -28,18 +28,19 @@ impl Asset {
             let what = "a recording is being imported into this asset";
             return Err(ServiceError::Busy { what });
         }
+        let last_t_s = samples.last().map(|(_, last)| last.t_s);
         if !samples.is_empty() {
             match batch.session {
                 Some(name) => match self.switch(&name, turn)? {
-                    SessionSwitch::Open => self.record_in_parts(&samples, turn, &mut ack)?,
+                    SessionSwitch::Open => self.record_in_parts(samples, turn, &mut ack)?,
                     SessionSwitch::Ended(row) => retransmitted(&row, &samples, turn, &mut ack)?,
                 },
-                None => self.record_nameless(&samples, turn, &mut ack)?,
+                None => self.record_nameless(samples, turn, &mut ack)?,
             }
         }
-        if let (Some(open), Some((_, last))) = (&self.open, samples.last()) {
+        if let (Some(open), Some(last_t_s)) = (&self.open, last_t_s) {
             let unjudged = open.judging.engine().unjudged();
-            turn.env.presences.record(&self.row.name, &open.id, turn.at, last.t_s, unjudged);
+            turn.env.presences.record(&self.row.name, &open.id, turn.at, last_t_s, unjudged);
         }
         if ack.session_id.is_none()
             || ack.session_id == self.open.as_ref().map(|open| open.id.clone())
@@ -56,13 +57,13 @@ impl Asset {
     /// part of it has them.
     fn record_in_parts(
         &mut self,
-        samples: &[(usize, Sample)],
+        samples: Vec<(usize, Sample)>,
         turn: &mut Turn<'_>,
         ack: &mut AckView,
     ) -> Result<(), ServiceError> {
         self.continue_if_long(turn)?;
-        let samples = &self.without_earlier_parts(samples, turn, ack)?[..];
-        self.record_in_open(samples, turn, ack)
+        let samples = self.without_earlier_parts(samples, turn, ack)?;
+        self.record_in_open(&samples, turn, ack)
     }
 
     /// Records samples of the open session.
@@ -81,7 +82,7 @@ impl Asset {
     /// none is open or the device has started anew.
     fn record_nameless(
         &mut self,
-        samples: &[(usize, Sample)],
+        samples: Vec<(usize, Sample)>,
         turn: &mut Turn<'_>,
         ack: &mut AckView,
     ) -> Result<(), ServiceError> {

@@ -23,21 +23,20 @@ impl Asset {
     /// session has already, which are counted as duplicates.
     pub(super) fn without_sent_before(
         &mut self,
-        samples: &[(usize, Sample)],
+        mut samples: Vec<(usize, Sample)>,
         turn: &Turn<'_>,
         ack: &mut AckView,
     ) -> Result<Vec<(usize, Sample)>, ServiceError> {
-        let mut rest = samples.to_vec();
         let engine = self.open.as_ref().map(|open| open.judging.engine());
         for session in &mut self.ended {
-            let found = session.search(&rest, engine, turn)?;
+            let found = session.search(&samples, engine, turn)?;
             session.acknowledge(&found, ack);
             session.is_same_run |= !found.same.is_empty();
             session.is_other_run |= found.conflicts.len() >= CERTAIN_AFTER as usize;
             session.is_other_run &= !session.is_same_run;
-            rest.retain(|(index, _)| !found.same.contains(index));
+            samples.retain(|(index, _)| !found.same.contains(index));
         }
-        Ok(rest)
+        Ok(samples)
     }
 
     /// Returns `samples`, each with its index in the batch, without those that an earlier part
@@ -45,17 +44,16 @@ impl Asset {
     /// others, they are rejected.
     pub(super) fn without_earlier_parts(
         &mut self,
-        samples: &[(usize, Sample)],
+        mut samples: Vec<(usize, Sample)>,
         turn: &Turn<'_>,
         ack: &mut AckView,
     ) -> Result<Vec<(usize, Sample)>, ServiceError> {
-        let mut rest = samples.to_vec();
-        let Some(open) = &mut self.open else { return Ok(rest) };
+        let Some(open) = &mut self.open else { return Ok(samples) };
         for part in self.ended.iter().filter(|ended| ended.first_part == open.part.first) {
             let engine = open.judging.engine();
-            let found = part.search(&rest, Some(engine), turn)?;
+            let found = part.search(&samples, Some(engine), turn)?;
             part.acknowledge(&found, ack);
-            rest.retain(|(index, sample)| {
+            samples.retain(|(index, sample)| {
                 if found.conflicts.contains(index) {
                     let why = Rejection::conflict(sample);
                     open.judging.note_rejected(why);
@@ -65,6 +63,6 @@ impl Asset {
                 !found.same.contains(index) && !found.conflicts.contains(index)
             });
         }
-        Ok(rest)
+        Ok(samples)
     }
 }

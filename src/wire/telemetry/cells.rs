@@ -13,7 +13,8 @@ use offbd_core::vocabulary::{Brief, Sample};
 /// Deepest nesting of a MessagePack document, as in `serde_json`.
 const MAX_DEPTH: usize = 128;
 
-/// Largest number of values for which memory is reserved because an array announces them.
+/// Number of values for which memory is reserved; less if an array announces fewer. JSON arrays
+/// announce nothing. Chosen: a usual batch.
 const MAX_RESERVED: usize = 128;
 
 /// A value where a number is expected.
@@ -344,7 +345,7 @@ impl<'de, T: Deserialize<'de>> Visitor<'de> for LimitedArrayVisitor<T> {
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<LimitedArray<T>, A::Error> {
-        let announced = seq.size_hint().unwrap_or_default().min(self.limit).min(MAX_RESERVED);
+        let announced = seq.size_hint().unwrap_or(MAX_RESERVED).min(self.limit).min(MAX_RESERVED);
         let mut array = LimitedArray { values: Vec::with_capacity(announced), n: 0 };
         while array.n < self.limit {
             let Some(value) = seq.next_element()? else { return Ok(array) };

@@ -29,7 +29,10 @@ impl Align {
         self.newest_s = if first { sample.t_s } else { self.newest_s.max(sample.t_s) };
         // Searched from the end: most samples are the latest.
         let after = self.waiting.iter().rev().take_while(|s| s.t_s > sample.t_s).count();
-        self.waiting.insert(self.waiting.len() - after, sample);
+        match after {
+            0 => self.waiting.push_back(sample),
+            _ => self.waiting.insert(self.waiting.len() - after, sample),
+        }
     }
 
     /// Returns the next sample in order if it is due, or if it follows the last one by at

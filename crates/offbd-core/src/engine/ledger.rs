@@ -122,15 +122,22 @@ impl<K: Key> Keys<K> {
             self.dropped = later(self.dropped, oldest);
             self.recent.pop_front();
         }
-        let at = match self.recent.back() {
-            Some(&(newest, _)) if key <= newest => self.recent.partition_point(|&(k, _)| k < key),
-            _ => self.recent.len(),
-        };
-        self.recent.insert(at, (key, fingerprint));
+        if self.recent.back().is_none_or(|&(newest, _)| key > newest) {
+            self.recent.push_back((key, fingerprint));
+        } else {
+            let at = self.recent.partition_point(|&(k, _)| k < key);
+            self.recent.insert(at, (key, fingerprint));
+        }
     }
 
     fn note_range(&mut self, key: K, gap_s: f64) {
         let ranges = &mut self.ranges;
+        if let Some((_, end)) = ranges.back_mut().filter(|(_, end)| key > *end)
+            && end.joins(key, gap_s)
+        {
+            *end = key;
+            return;
+        }
         let after = ranges.partition_point(|&(start, _)| start <= key);
         if after > 0 && ranges[after - 1].1 >= key {
             return;

@@ -158,11 +158,12 @@ impl ResponseCorrelator {
     }
 
     fn correlate(&mut self) {
-        for axis in Axis::ALL {
-            let Some(bend) = self.bend(axis) else { continue };
-            for of in Axis::ALL {
-                for delay in 0..DELAYS {
-                    if let Some(command) = self.command(of, delay) {
+        let bends = PerAxis::from_fn(|axis| self.bend(axis));
+        for of in Axis::ALL {
+            for delay in 0..DELAYS {
+                let Some(command) = self.command(of, delay) else { continue };
+                for axis in Axis::ALL {
+                    if let Some(bend) = bends[axis] {
                         self.tried[axis][of][delay].take(bend, command);
                     }
                 }
@@ -180,11 +181,12 @@ impl ResponseCorrelator {
     /// The command through the same window, `delay` blocks earlier.
     fn command(&self, axis: Axis, delay: usize) -> Option<f64> {
         let middle = HELD - 1 - SPAN - delay;
-        let weighted = |offset: usize| {
+        let mut sum = 0.0;
+        for offset in 0..2 * SPAN - 1 {
             let value = self.held[middle + offset + 1 - SPAN].command[axis].value()?;
-            Some(value * (SPAN - offset.abs_diff(SPAN - 1)) as f64)
-        };
-        (0..2 * SPAN - 1).map(weighted).sum()
+            sum += value * (SPAN - offset.abs_diff(SPAN - 1)) as f64;
+        }
+        Some(sum)
     }
 
     /// Returns the command that the motion along `axis` responds to.
