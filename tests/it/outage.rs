@@ -2,6 +2,7 @@
 //! meanwhile the service reports the reason.
 
 use std::path::{Path, PathBuf};
+use std::pin::pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -10,7 +11,8 @@ use crate::support::calls::FaultySystem;
 use crate::support::device::DeviceLoad;
 use crate::support::postgres::Postgres;
 use crate::support::process::Process;
-use crate::support::{ServiceFixture, eventually};
+use crate::support::{ServiceFixture, batch, eventually, registration, rig};
+use futures_util::future::select;
 use sqlx::Executor;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{UnixListener, UnixStream};
@@ -26,19 +28,27 @@ async fn a_restarted_database_server_loses_nothing() {
         config.limits.batch_samples = 300;
     })
     .await;
-    let load = DeviceLoad::start(8, &fixture.client, fixture.data.path(), Some(&url));
-    for signal in ["INT", "QUIT", "INT", "QUIT"] {
+    let client = &fixture.client;
+    client.post("assets", &registration("full")).await.expect(201);
+    let post = async |session: &str| {
+        let batch = batch(Some(session), &rig(300, 300));
+        client.post("assets/full/telemetry", &batch).await
+    };
+    post("before").await.expect(200);
+    let load = DeviceLoad::start(8, client, fixture.data.path(), Some(&url));
+    for (signal, session) in [("INT", "a"), ("QUIT", "b"), ("INT", "c"), ("QUIT", "d")] {
         load.link.wait_for_samples(500).await;
         server.stop(signal);
         // After this, only samples in flight can be acknowledged.
-        let (n_full, n_acknowledged) = (load.link.n_too_many(), load.link.acknowledged());
-        let reason = fixture.client.readiness(503).await;
+        let n_acknowledged = load.link.acknowledged();
+        let reason = client.readiness(503).await;
         assert!(reason.contains("the database is unavailable"), "{reason}");
-        // Samples in flight reach the limit, and further batches get 429.
-        eventually(|| async { (load.link.n_too_many() > n_full).then_some(()) }).await;
+        // Of two batches as large as the limit, one is above it.
+        let (answer, _) = select(pin!(post(session)), pin!(post(session))).await.factor_first();
+        answer.problem(429);
         assert!(load.link.acknowledged() <= n_acknowledged + 300);
         server.start();
-        fixture.client.readiness(200).await;
+        client.readiness(200).await;
     }
     // Every connection to the database is terminated.
     for _ in 0..20 {

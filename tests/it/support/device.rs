@@ -30,7 +30,6 @@ pub struct ServiceLink {
     address: watch::Sender<String>,
     acknowledged: Arc<AtomicU64>,
     refused: Arc<AtomicU64>,
-    too_many: Arc<AtomicU64>,
     stopped: Arc<AtomicBool>,
 }
 
@@ -39,7 +38,7 @@ impl ServiceLink {
         let (address, _) = watch::channel(client.address.clone());
         let (client, zero) = (client.clone(), || Arc::new(AtomicU64::new(0)));
         let stopped = Arc::default();
-        Self { client, address, acknowledged: zero(), refused: zero(), too_many: zero(), stopped }
+        Self { client, address, acknowledged: zero(), refused: zero(), stopped }
     }
 
     /// Sets the address of the service to that of `client`.
@@ -55,11 +54,6 @@ impl ServiceLink {
     /// Returns the number of responses 429 and 503.
     pub fn n_refused(&self) -> u64 {
         self.refused.load(Ordering::SeqCst)
-    }
-
-    /// Returns the number of responses 429.
-    pub fn n_too_many(&self) -> u64 {
-        self.too_many.load(Ordering::SeqCst)
     }
 
     /// Waits until `n` more samples are acknowledged.
@@ -92,7 +86,6 @@ impl ServiceLink {
             if [429, 503].contains(&status.as_u16()) {
                 assert_eq!(headers["retry-after"], "1");
                 self.refused.fetch_add(1, Ordering::SeqCst);
-                self.too_many.fetch_add(u64::from(status == 429), Ordering::SeqCst);
                 tokio::task::yield_now().await;
                 continue;
             }
