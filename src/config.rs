@@ -5,6 +5,8 @@
 //! It is one typed structure, which is checked completely at the start. An error names
 //! the key. Unknown keys are errors in the file and in the environment.
 
+mod cluster;
+
 use std::net::{IpAddr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -12,6 +14,7 @@ use std::time::Duration;
 use config::{Environment, File, FileFormat};
 use serde::Deserialize;
 
+pub use self::cluster::ClusterConfig;
 use crate::service::access::jwt::ExpectedClaims;
 use crate::service::{Limits, Retention, SessionLimits};
 use crate::store::Location;
@@ -38,6 +41,8 @@ pub struct Config {
     pub tls: Option<TlsConfig>,
     /// The identity provider whose tokens are accepted, if any.
     pub jwt: Option<JwtConfig>,
+    /// The cluster that this process is a node of; `None` for one that works alone.
+    pub cluster: Option<ClusterConfig>,
     pub log: LogConfig,
     pub traces: TracesConfig,
     pub limits: LimitsConfig,
@@ -323,6 +328,7 @@ impl Default for Config {
             origins: Vec::new(),
             tls: None,
             jwt: None,
+            cluster: None,
             log: LogConfig::default(),
             traces: TracesConfig::default(),
             limits: LimitsConfig::default(),
@@ -483,7 +489,8 @@ impl Config {
         }
         self.traces.check()?;
         self.retention.check()?;
-        self.location().map(drop)
+        let location = self.location()?;
+        self.cluster.as_ref().map_or(Ok(()), |cluster| cluster.check(&location))
     }
 
     /// Returns whether requests need a token.

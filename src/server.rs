@@ -20,17 +20,17 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
 use tokio::net::TcpListener;
-use tokio::task::JoinHandle;
+use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
 
 use self::keys::KeyRefresher;
 use self::listen::HttpListener;
 use self::tls::Tls;
 pub use self::traces::Traces;
-use crate::config::Config;
+use crate::config::{ClusterConfig, Config};
 use crate::http::{self, AccessPolicy, App, BodyBudget, ExtraRoutes, RateLimit, RateLimits};
 use crate::service::{Clock, Service, Workers};
-use crate::store::{self, CheckReport, Location, Store};
+use crate::store::{self, CheckReport, Location, NodeIdentity, Partitions, Store};
 
 /// How often a blocking thread is asked for: often enough for a device that waits, and rarely
 /// enough to cost nothing.
@@ -42,7 +42,8 @@ pub struct Server {
     pub address: SocketAddr,
     closing: CancellationToken,
     deadline: Duration,
-    serving: JoinHandle<()>,
+    serving: JoinSet<()>,
+    service: Service,
     store: Store,
     workers: Workers,
     /// The lock file of an SQLite database, locked until the store is closed. `None` for
@@ -73,29 +74,45 @@ pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Ser
     };
     let location = config.location()?;
     let lock = lock(&location)?;
-    let (store, writer) = open(&location).await?;
+    let node = match &config.cluster {
+        Some(cluster) => Some(NodeListener::bind(cluster).await?),
+        None => None,
+    };
+    let (store, writer) = open(&location, node.as_ref()).await?;
     let listener = TcpListener::bind(config.listen)
         .await
         .with_context(|| format!("`listen`: cannot listen on {}", config.listen))?;
     let address = listener.local_addr()?;
     let limits = config.service_limits();
-    let (service, workers) = Service::start(store.clone(), writer, limits, provider).await?;
+    let (service, workers) = match &node {
+        None => Service::start(store.clone(), writer, limits, provider).await?,
+        Some(NodeListener { identity, .. }) => {
+            let me = identity.clone();
+            Service::start_node(store.clone(), writer, limits, provider, me).await?
+        }
+    };
     let closing = CancellationToken::new();
     let budget = BodyBudget::new(config.limits.bodies_bytes);
     let policy = Arc::new(policy(&config)?);
     warn_of_access(&config, &policy, &store).await?;
     tokio::spawn(rebuild(service.clone(), closing.clone()));
-    let app = App { service, budget, policy, closing: closing.clone(), demo: demo.is_some() };
+    let (leaving, demo_routes) = (service.clone(), demo.is_some());
+    let app = App { service, budget, policy, closing: closing.clone(), demo: demo_routes };
     let router = http::router(app, demo.unwrap_or_default());
+    let mut serving = JoinSet::new();
+    if let Some(NodeListener { listener, .. }) = node {
+        let http = HttpListener::new(&config.limits, None, closing.clone());
+        serving.spawn(http.serve(listener, router.clone()));
+    }
     let http = HttpListener::new(&config.limits, tls.clone(), closing.clone());
-    let serving = tokio::spawn(http.serve(listener, router));
+    serving.spawn(http.serve(listener, router));
     tls.map(|tls| tokio::spawn(tls.watch(closing.clone())));
     keys.map(|keys| tokio::spawn(keys.watch(closing.clone())));
     tokio::spawn(http::keep_metrics(closing.clone()));
     tokio::spawn(keep_threads(closing.clone()));
     tracing::info!(%address, store = %store.location(), "serving");
     let deadline = Duration::from_secs(config.limits.shutdown_s);
-    Ok(Server { address, closing, deadline, serving, store, workers, lock })
+    Ok(Server { address, closing, deadline, serving, service: leaving, store, workers, lock })
 }
 
 /// Rebuilds the engines of long recordings while requests are served already.
@@ -169,8 +186,31 @@ fn lock(location: &Location) -> Result<Option<File>> {
     }
 }
 
-async fn open(location: &Location) -> Result<(Store, store::Writer)> {
-    Store::open(location).await.with_context(|| format!("cannot open the store {location}"))
+async fn open(location: &Location, node: Option<&NodeListener>) -> Result<(Store, store::Writer)> {
+    let opened = match node {
+        None => Store::open(location).await,
+        Some(NodeListener { identity, partitions, .. }) => {
+            Store::open_node(location, identity.clone(), *partitions).await
+        }
+    };
+    opened.with_context(|| format!("cannot open the store {location}"))
+}
+
+/// The socket of a node for other nodes.
+struct NodeListener {
+    listener: TcpListener,
+    identity: NodeIdentity,
+    partitions: Partitions,
+}
+
+impl NodeListener {
+    async fn bind(cluster: &ClusterConfig) -> Result<Self> {
+        let listener = TcpListener::bind(cluster.listen)
+            .await
+            .with_context(|| format!("`cluster.listen`: cannot listen on {}", cluster.listen))?;
+        let identity = cluster.identity(listener.local_addr()?);
+        Ok(Self { listener, identity, partitions: cluster.partitions() })
+    }
 }
 
 impl Server {
@@ -181,11 +221,16 @@ impl Server {
     /// If that takes longer than `limits.shutdown_s`. Everything acknowledged is durable
     /// in any case.
     pub async fn shutdown(self) -> Result<()> {
-        let Self { closing, deadline, serving, store, workers, lock, .. } = self;
-        closing.cancel();
-        workers.close();
+        let Self { closing, deadline, mut serving, service, store, workers, lock, .. } = self;
         let finish = async {
-            let served = serving.await;
+            service.leave_cluster().await;
+            drop(service);
+            closing.cancel();
+            workers.close();
+            let mut served = Ok(());
+            while let Some(ended) = serving.join_next().await {
+                served = served.and(ended);
+            }
             workers.finish().await;
             store.close().await;
             drop(lock);

@@ -15,7 +15,7 @@ use crate::wire::service::{FleetEntryView, Page, StateView};
 use crate::wire::trend::TrendsView;
 
 /// Size limit of an asset file, bytes.
-const MAX_ASSET_BYTES: usize = 64 << 10;
+pub(super) const MAX_ASSET_BYTES: usize = 64 << 10;
 
 async fn read_document(app: &App, body: Body) -> Result<Vec<u8>, Problem> {
     let timeout = app.service.limits().body_timeout;

@@ -33,8 +33,15 @@ pub(super) fn set_cookie(secret: &str, seconds: u64, encrypted: bool) -> HeaderM
     value.into_iter().map(|value| (SET_COOKIE, value)).collect()
 }
 
+/// The address of the client of a request that another node has forwarded.
+#[derive(Clone, Copy)]
+pub(super) struct OriginalClient(pub(super) IpAddr);
+
 /// Returns the address of the client.
 pub(super) fn client_address(parts: &Parts) -> Option<IpAddr> {
+    if let Some(OriginalClient(address)) = parts.extensions.get() {
+        return Some(*address);
+    }
     let peer = parts.extensions.get::<ConnectInfo<SocketAddr>>();
     peer.map(|peer| peer.0.ip().to_canonical())
 }

@@ -7,6 +7,7 @@ use std::net::IpAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
+use axum::body::Body;
 use axum::extract::{MatchedPath, RawPathParams, Request, State};
 use axum::http::header::{
     ALLOW, AUTHORIZATION, HOST, HeaderName, HeaderValue, LOCATION, ORIGIN, RETRY_AFTER, UPGRADE,
@@ -21,7 +22,8 @@ use axum::{RequestPartsExt, extract};
 use serde::Deserialize;
 
 use super::body::BodyShare;
-use super::credential::{bearer, client_address, credential};
+use super::credential::{OriginalClient, bearer, client_address, credential};
+use super::forward::{self, Forwarder};
 use super::rates::RateLimits;
 use super::routes::{RouteRule, RouteRules};
 use super::{App, Problem, problem};
@@ -38,10 +40,17 @@ pub struct AccessPolicy {
     pub rates: RateLimits,
 }
 
+/// The route of the events, which every node of a cluster has.
+const EVENTS: &str = "/api/v1/events";
+
+/// The route on which assets are registered.
+const ASSETS: &str = "/api/v1/assets";
+
 /// The access control of all routes.
 pub(super) struct Guard {
     pub(super) app: App,
     pub(super) rules: RouteRules,
+    pub(super) forwarder: Forwarder,
 }
 
 /// The response to a denied request, with an additional header.
@@ -81,11 +90,15 @@ pub(super) async fn guard(
 impl Guard {
     async fn handle(&self, request: Request, next: Next) -> Result<Response, Denial> {
         let (mut parts, body) = request.into_parts();
+        let is_forwarded = forward::is_forwarded(&self.app.service, &parts.headers);
+        if let Some(client) = forward::original_client(&parts.headers).filter(|_| is_forwarded) {
+            parts.extensions.insert(OriginalClient(client));
+        }
         let path = parts.extensions.get::<MatchedPath>().map(MatchedPath::as_str);
         let rule = rule(&self.rules, path, &parts.method, &parts.uri)?;
         self.check_host(&parts)?;
         self.check_origin(&parts)?;
-        let caller = self.caller(&parts, rule.right).await?;
+        let caller = self.caller(&parts, rule.right, is_forwarded).await?;
         if let Some(caller) = &caller {
             self.check_right(caller, rule.right, &mut parts).await?;
             parts.extensions.insert(caller.clone());
@@ -94,7 +107,12 @@ impl Guard {
             parts.extensions.insert(self.body_share(caller.as_ref(), &parts));
         }
         let entry = is_audited(rule.right, &parts.method).then(|| audit_entry(rule.action, &parts));
-        let response = next.run(Request::from_parts(parts, body)).await;
+        let request = match self.forward(parts, body).await? {
+            // The owner has recorded what was done.
+            Ok(response) => return Ok(response),
+            Err(request) => request,
+        };
+        let response = next.run(request).await;
         // The audit entry is durable before the response is sent.
         if let (Some(caller), Some(entry)) =
             (caller, entry.and_then(|entry| completed(entry, &response)))
@@ -102,6 +120,31 @@ impl Guard {
             self.app.service.audit_action(&caller, entry).await.map_err(Problem::from)?;
         }
         Ok(response)
+    }
+
+    /// In a cluster, sends the request to the node that owns its asset, if that is another.
+    async fn forward(
+        &self,
+        mut parts: Parts,
+        body: Body,
+    ) -> Result<Result<Response, Request>, Problem> {
+        let service = &self.app.service;
+        if !service.is_node() {
+            return Ok(Err(Request::from_parts(parts, body)));
+        }
+        let path = parts.extensions.get::<MatchedPath>().map(MatchedPath::as_str);
+        let is_anywhere = matches!(path, None | Some(EVENTS));
+        let is_registration = path == Some(ASSETS) && parts.method == Method::POST;
+        let named = if is_anywhere { None } else { self.asset_of(&mut parts).await? };
+        let mut request = Request::from_parts(parts, body);
+        let mut asset = named;
+        if is_registration {
+            (asset, request) = forward::name_in_body(request).await?;
+        }
+        match asset {
+            Some(asset) => self.forwarder.forward(service, &asset, request).await,
+            None => Ok(Err(request)),
+        }
     }
 
     /// Without authentication, requires an IP address or `localhost` in `Host`, as a
@@ -143,7 +186,13 @@ impl Guard {
     }
 
     /// Authenticates the caller and applies the rate limits; `None` for a public route.
-    async fn caller(&self, parts: &Parts, right: Right) -> Result<Option<Caller>, Denial> {
+    /// The node that has forwarded a request has applied them already.
+    async fn caller(
+        &self,
+        parts: &Parts,
+        right: Right,
+        is_forwarded: bool,
+    ) -> Result<Option<Caller>, Denial> {
         let policy = &self.app.policy;
         if !policy.required {
             return Ok((right != Right::Public).then_some(Caller::Anonymous));
@@ -169,7 +218,9 @@ impl Guard {
             let detail = "the token is unknown, revoked or expired";
             return Err(unauthenticated(detail, Some("invalid_token")));
         };
-        policy.rates.check_token(&principal.id).map_err(rate_limited)?;
+        if !is_forwarded {
+            policy.rates.check_token(&principal.id).map_err(rate_limited)?;
+        }
         Ok(Some(Caller::Authenticated(principal)))
     }
 

@@ -39,9 +39,11 @@ const METRICS: &[(&str, MetricKind, &str)] = &[
     ("offbd_assets_untested", Gauge, "Assets whose samples are not judged"),
     ("offbd_bodies_bytes", Gauge, "Bytes of request bodies in memory"),
     ("offbd_build_info", Gauge, "Always 1; the label has the version"),
+    ("offbd_cluster_nodes", Gauge, "Nodes of the cluster that are alive"),
     ("offbd_commit_failures_total", Counter, "Failed commits, including retried ones"),
     ("offbd_commit_seconds", Seconds, "Duration of a commit"),
     ("offbd_commit_sets", Sizes, "Write sets in a commit"),
+    ("offbd_commits_overtaken_total", Counter, "Write sets refused because their partition moved"),
     ("offbd_commits_total", Counter, "Successful commits"),
     ("offbd_connections", Gauge, "Open connections"),
     ("offbd_connections_refused_total", Counter, "Connections refused at the limit"),
@@ -51,8 +53,13 @@ const METRICS: &[(&str, MetricKind, &str)] = &[
     ("offbd_http_requests_total", Counter, "Requests, by path and status"),
     ("offbd_ingest_stalled", Gauge, "1 if ingest is full and nothing is committed"),
     ("offbd_journal_bytes", Gauge, "Bytes in the journal, not yet folded into the recordings"),
+    ("offbd_partitions_handed_over_total", Counter, "Partitions given to other nodes as planned"),
+    ("offbd_partitions_lost_total", Counter, "Partitions that other nodes have taken"),
+    ("offbd_partitions_owned", Gauge, "Partitions that this node owns"),
+    ("offbd_partitions_taken_total", Counter, "Partitions that this node has taken"),
     ("offbd_process_resident_bytes", Gauge, "Resident memory of the process (Linux)"),
     ("offbd_refused_total", Counter, "Requests denied by the guard, by status"),
+    ("offbd_requests_forwarded_total", Counter, "Requests sent to the node that owns the asset"),
     ("offbd_samples_in_flight", Gauge, "Samples between arrival and commit"),
     ("offbd_samples_in_flight_limit", Gauge, "Limit of these: limits.in_flight_samples"),
     ("offbd_samples_reevaluated_total", Counter, "Recorded samples evaluated again on loading"),
@@ -185,6 +192,8 @@ fn sample_gauges(app: &App) {
     gauge!("offbd_samples_in_flight_limit").set(app.service.limits().in_flight_samples as f64);
     gauge!("offbd_assets_rebuilding").set(app.service.n_rebuilding() as f64);
     gauge!("offbd_assets_untested").set(app.service.n_untested() as f64);
+    gauge!("offbd_cluster_nodes").set(app.service.cluster().nodes.len() as f64);
+    gauge!("offbd_partitions_owned").set(app.service.n_partitions_owned() as f64);
     gauge!("offbd_writer_queue").set(load.writer as f64);
     for (shard, waiting) in load.shards.iter().enumerate() {
         gauge!("offbd_shard_queue", "shard" => shard.to_string()).set(*waiting as f64);

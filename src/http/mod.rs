@@ -11,11 +11,13 @@
 mod assets;
 mod body;
 mod calibrations;
+mod cluster;
 mod credential;
 mod description;
 mod drive_cycles;
 mod events;
 mod faults;
+mod forward;
 mod guard;
 mod headers;
 mod layers;
@@ -58,6 +60,7 @@ pub(crate) use rates::subscriber;
 pub use rates::{RateLimit, RateLimits};
 pub use routes::ExtraRoutes;
 
+use self::forward::Forwarder;
 use self::guard::Guard;
 use self::routes::{GuardedRouter, RouteRules};
 use crate::service::Service;
@@ -205,6 +208,7 @@ fn api() -> GuardedRouter {
         .routes(Read, routes!(assets::trends))
         .routes(ReadAsset, routes!(drive_cycles::get))
         .routes(Read, routes!(assets::fleet))
+        .routes(Read, routes!(cluster::get))
         .routes(SendTelemetry, routes!(telemetry::post))
         .routes(ReadAsset, routes!(stream::stream))
         .routes(ReadAsset, routes!(faults::of_asset))
@@ -270,7 +274,7 @@ pub fn router(app: App, extra: ExtraRoutes) -> Router {
     OPEN_PAGES.iter().for_each(|path| rules.open(path));
     let yaml: Arc<str> = document.to_yaml().unwrap_or_default().into();
     let policy = app.policy.clone();
-    let guard = Arc::new(Guard { app: app.clone(), rules });
+    let guard = Arc::new(Guard { app: app.clone(), rules, forwarder: Forwarder::default() });
     let router = router
         .route("/openapi.yaml", axum::routing::get(move || operations::openapi(yaml)))
         .merge(SwaggerUi::new("/docs").url("/openapi.json", document))

@@ -127,6 +127,7 @@ impl From<ServiceError> for Problem {
                 let status = StatusCode::SERVICE_UNAVAILABLE;
                 Self { retry_after_s, ..new(status, "rebuilding", "Engine is being rebuilt") }
             }
+            E::Moving => new(StatusCode::SERVICE_UNAVAILABLE, "moving", "Asset is moving"),
             E::NotStored { .. } => new(StatusCode::SERVICE_UNAVAILABLE, "store", "Store error"),
             E::Store(_) => {
                 tracing::error!(error = detail, "the store failed");

@@ -9,7 +9,7 @@ use anyhow::{Context, Result, bail};
 use crate::config::Config;
 use crate::service::Clock;
 use crate::service::access::{AuditEntry, NewToken, mint, token_view};
-use crate::store::{AccessWrite, LAST_ID, Store, Write, Writer};
+use crate::store::{AccessWrite, ChangeSet, LAST_ID, Store, Write, Writer};
 use crate::wire::access::TokenView;
 
 /// The actor in the audit log.
@@ -38,7 +38,7 @@ async fn write(mut writer: Writer, change: AccessWrite, act: &str, id: &str) -> 
         AuditEntry { action: act, target, address: None }.row((ACTOR, None), Clock::System.now());
     let changes = [change, AccessWrite::Audit(entry)];
     let mut set = changes.map(Write::Access).to_vec();
-    writer.commit(&mut [&mut set]).await?;
+    writer.commit(&mut [ChangeSet { partition: None, writes: &mut set }]).await?;
     Ok(writer.close().await?)
 }
 

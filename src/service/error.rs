@@ -70,6 +70,9 @@ pub enum ServiceError {
         "the engine of this asset is being rebuilt from its recording; retry in {retry_after_s} s"
     )]
     Rebuilding { retry_after_s: u64 },
+    /// The partition of the asset has no owner at the moment, or another node owns it.
+    #[error("the asset is moving to another node; the request was not processed, retry it")]
+    Moving,
     /// The store or a part of the service failed. Unacknowledged changes may not be
     /// stored; retry.
     #[error("{what}; unacknowledged data were not stored, retry")]

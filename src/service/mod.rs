@@ -55,10 +55,12 @@
 pub mod access;
 mod asset;
 mod clock;
+mod cluster;
 mod error;
 mod job;
 mod jobs;
 mod limits;
+mod ownership;
 mod playback;
 mod reanalysis;
 mod replay_settings;
@@ -73,6 +75,7 @@ mod writing;
 
 pub use crate::store::RecordingReader;
 pub use clock::{Clock, parse_timestamp};
+pub use cluster::Route;
 pub use error::ServiceError;
 pub use limits::{Limits, RETRY_AFTER_S, Retention, SessionLimits};
 pub use reanalysis::fault_recording::RecordingWindow;

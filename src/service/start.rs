@@ -10,13 +10,15 @@ use tokio_util::sync::CancellationToken;
 
 use super::access::{PrincipalCache, Provider};
 use super::asset::{AssetCommand, Environment, Loader, MANY_SAMPLES, Presences, Shard, Shards};
+use super::cluster::{self, Cluster, NodeTask};
 use super::job::{self, Job};
 use super::jobs::{self, JobContext};
 use super::limits::{MAX_DRIVE_CYCLES, MAX_RECORDINGS, MAX_TRACES};
+use super::ownership::Ownership;
 use super::upkeep::{Deleter, Upkeep, Watchdog};
-use super::writing::{Committer, Events, FIRST_RETRY, Handles, Outage};
+use super::writing::{Committer, Events, FIRST_RETRY, Handles, Outage, Transfers};
 use super::{Clock, Limits, ServiceError, snapshots};
-use crate::store::{Store, Write, Writer};
+use crate::store::{MAX_PARTITIONS, NodeIdentity, PartitionId, Store, Write, Writer};
 
 /// A handle to the running service. Cheap to clone; all clones share one service.
 #[derive(Clone)]
@@ -26,6 +28,8 @@ pub struct Service {
 
 pub(super) struct Inner {
     pub(super) handles: Handles,
+    /// `None` for a process that works alone.
+    pub(super) cluster: Option<Cluster>,
     pub(super) limits: Limits,
     pub(super) events: Events,
     pub(super) presences: Presences,
@@ -115,6 +119,7 @@ pub(super) struct Parts {
     pub(super) loader: Loader,
     pub(super) jobs: mpsc::Receiver<Job>,
     pub(super) upkeep: Upkeep,
+    pub(super) node: Option<NodeTask>,
 }
 
 impl Parts {
@@ -123,11 +128,12 @@ impl Parts {
         let Inner { limits, handles, job_context, .. } = &*service.inner;
         let committer = self.committer.spawn()?;
         // Before the sweeper, which deletes them.
-        service.discard_imports().await?;
+        service.discard_imports(handles.ownership.filter().as_deref()).await?;
         let shards = self.shards.into_iter().map(Shard::spawn).collect::<Result<_, _>>()?;
         let mut jobs = jobs::spawn(limits.jobs, job_context, self.jobs);
         jobs.push(tokio::spawn(self.loader.run()));
         jobs.extend(self.upkeep.spawn());
+        jobs.extend(self.node.into_iter().flat_map(|node| cluster::spawn(node, service)));
         Ok(Workers { shards, jobs, closing: handles.closing.clone(), committer })
     }
 }
@@ -145,10 +151,35 @@ impl Service {
         limits: Limits,
         provider: Option<Provider>,
     ) -> Result<(Self, Workers), ServiceError> {
-        let (service, parts) = Self::assemble(store, writer, limits, provider, Clock::System);
+        let (service, parts) = Self::assemble(store, writer, limits, provider, None, Clock::System);
         let workers = parts.start(&service).await?;
-        service.resume_jobs().await?;
+        service.resume_jobs(None).await?;
         Ok((service, workers))
+    }
+
+    /// Starts the service as the node `me` of a cluster. It takes partitions by and by.
+    ///
+    /// # Errors
+    /// As for [`Service::start`].
+    pub async fn start_node(
+        store: Store,
+        writer: Writer,
+        limits: Limits,
+        provider: Option<Provider>,
+        me: NodeIdentity,
+    ) -> Result<(Self, Workers), ServiceError> {
+        let cluster = Some(Cluster::new(me, store.cluster_secret().await?));
+        let (service, parts) =
+            Self::assemble(store, writer, limits, provider, cluster, Clock::System);
+        let workers = parts.start(&service).await?;
+        Ok((service, workers))
+    }
+
+    /// Continues what former owners of these partitions have left unfinished.
+    pub(super) async fn resume(&self, owned: Option<&[PartitionId]>) -> Result<(), ServiceError> {
+        self.discard_imports(owned).await?;
+        self.resume_jobs(owned).await?;
+        self.rebuild_of(owned).await
     }
 
     /// Returns a service and its parts that are to be started, on the current tokio runtime.
@@ -157,17 +188,32 @@ impl Service {
         writer: Writer,
         limits: Limits,
         provider: Option<Provider>,
+        cluster: Option<Cluster>,
         clock: Clock,
     ) -> (Self, Parts) {
-        let events = Events::new(store.clone());
+        let events = Events::new(store.clone(), cluster.is_some());
         let (sets, queue) = mpsc::channel(limits.commit_queue);
         let (outage_sender, outage) = watch::channel(None);
         let closing = CancellationToken::new();
         let n_commits = Arc::new(AtomicU64::new(0));
-        let handles = Handles::new(store, clock, &limits, sets, outage.clone(), closing.clone());
+        let ownership = Ownership::new(writer.partitions(), writer.owned());
+        let (transfers, transfer_requests) = Transfers::new();
+        let (lost_sender, lost) = mpsc::channel(MAX_PARTITIONS as usize);
+        let handles = Handles::new(
+            store,
+            clock,
+            &limits,
+            ownership.clone(),
+            sets,
+            outage.clone(),
+            closing.clone(),
+        );
         let committer = Committer {
             writer,
             queue,
+            transfers: transfer_requests,
+            ownership,
+            lost: lost_sender,
             events: events.clone(),
             outage: outage_sender,
             n_commits: n_commits.clone(),
@@ -194,10 +240,18 @@ impl Service {
             closing,
         };
         let upkeep = Upkeep::new(&handles, &deleter, &limits.retention, &queues, watchdog);
-        let parts = Parts { committer, shards, loader, jobs: jobs_queue, upkeep };
+        let node = cluster.clone().map(|cluster| NodeTask {
+            cluster,
+            handles: handles.clone(),
+            transfers,
+            shards: queues.clone(),
+            lost,
+        });
+        let parts = Parts { committer, shards, loader, jobs: jobs_queue, upkeep, node };
         let inner = Inner {
             job_context: JobContext::new(handles.clone(), queues.clone()),
             handles,
+            cluster,
             limits,
             events,
             presences,
@@ -215,13 +269,14 @@ impl Service {
         (Self { inner: Arc::new(inner) }, parts)
     }
 
-    /// Discards the sessions of imports that a stop has interrupted.
-    async fn discard_imports(&self) -> Result<(), ServiceError> {
+    /// Discards the sessions of imports that a stop has interrupted: of the partitions
+    /// `owned`, or of all.
+    async fn discard_imports(&self, owned: Option<&[PartitionId]>) -> Result<(), ServiceError> {
         let handles = &self.inner.handles;
         let at = handles.clock.now();
-        for session in handles.store.importing_sessions().await? {
+        for (session, asset) in handles.store.importing_sessions(owned).await? {
             tracing::warn!(session, "an import was interrupted; its session is discarded");
-            handles.write(Write::DiscardSession { session, at }).await?;
+            handles.write(&asset, vec![Write::DiscardSession { session, at }]).await?;
         }
         Ok(())
     }
@@ -233,9 +288,14 @@ impl Service {
     /// # Errors
     /// [`ServiceError::Store`] if the store cannot be read.
     pub async fn rebuild(&self) -> Result<(), ServiceError> {
+        self.rebuild_of(self.inner.handles.ownership.filter().as_deref()).await
+    }
+
+    async fn rebuild_of(&self, owned: Option<&[PartitionId]>) -> Result<(), ServiceError> {
         let Inner { handles, shards, limits, n_rebuilding, .. } = &*self.inner;
-        let behind = handles.store.assets_behind(&snapshots::version(), MANY_SAMPLES).await?;
-        n_rebuilding.store(behind.len(), Ordering::Relaxed);
+        let behind =
+            handles.store.assets_behind(&snapshots::version(), MANY_SAMPLES, owned).await?;
+        n_rebuilding.fetch_add(behind.len(), Ordering::Relaxed);
         let load = async |asset: &String| {
             let loaded = shards.call(asset, |reply| AssetCommand::Load { reply }).await;
             n_rebuilding.fetch_sub(1, Ordering::Relaxed);

@@ -144,6 +144,7 @@ fn file_error(file: &Path) -> impl Fn(std::io::Error) -> StoreError {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::store::ChangeSet;
     use crate::store::{AssetRow, Store, Write};
 
     /// More rows than the page cache of a connection holds.
@@ -162,7 +163,7 @@ mod tests {
             })
         };
         let mut assets: Vec<_> = (0..400).map(asset).collect();
-        writer.commit(&mut [&mut assets]).await.unwrap();
+        writer.commit(&mut [ChangeSet::unpartitioned(&mut assets)]).await.unwrap();
         let copy = Location::File(folder.path().join("copy"));
         back_up(&location, copy.file().unwrap()).await.unwrap();
         writer.close().await.unwrap();

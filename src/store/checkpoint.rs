@@ -143,6 +143,7 @@ pub(super) async fn copy(connection: &mut AnyConnection) -> Result<LogPages, sql
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::store::ChangeSet;
     use crate::store::{AssetRow, Store, Write, Writer};
 
     /// Counts the assets in the database file without its log.
@@ -175,7 +176,7 @@ mod tests {
     }
 
     async fn commit(writer: &mut Writer, name: &str) {
-        writer.commit(&mut [&mut vec![asset(name)]]).await.unwrap();
+        writer.commit(&mut [ChangeSet::unpartitioned(&mut vec![asset(name)])]).await.unwrap();
     }
 
     #[tokio::test]

@@ -3,7 +3,7 @@
 //! changed its status is *around a fault*, all others are *plain*.
 
 use super::query_builder::QueryBuilder;
-use super::{Micros, Store, StoreError};
+use super::{Micros, PartitionId, Store, StoreError};
 
 /// The condition that a row of `session` is around a fault.
 const AROUND_FAULT: &str =
@@ -12,7 +12,7 @@ const AROUND_FAULT: &str =
 const CANDIDATE: &str =
     "SELECT id, n_bytes FROM session WHERE state = 'ended' AND expired_at IS NULL AND ";
 
-const SIZE: &str = "SELECT id,
+const SIZE: &str = "SELECT id, asset,
     (SELECT COUNT(*) FROM chunk WHERE chunk.session = session.id),
     (SELECT COUNT(*) FROM transition WHERE transition.session = session.id)
     FROM session WHERE ";
@@ -21,13 +21,15 @@ const SIZE: &str = "SELECT id,
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SessionSize {
     pub id: String,
+    pub asset: String,
     pub n_chunks: u64,
     pub n_transitions: u64,
 }
 
 impl Store {
-    /// The ids of sessions that ended before `moment`, the oldest first: those around a
-    /// fault, or the plain ones.
+    /// Ids and assets of sessions that ended before `moment`, the oldest first: those around
+    /// a fault, or the plain ones. As in all queries here, only assets of the partitions
+    /// `owned` count, or all.
     ///
     /// # Errors
     /// [`StoreError`] if the database fails; so do all queries here.
@@ -35,26 +37,33 @@ impl Store {
         &self,
         moment: Micros,
         around_fault: bool,
+        owned: Option<&[PartitionId]>,
         limit: u32,
-    ) -> Result<Vec<String>, StoreError> {
-        let mut query = QueryBuilder::new(CANDIDATE);
+    ) -> Result<Vec<(String, String)>, StoreError> {
+        let mut query = QueryBuilder::new(
+            "SELECT id, asset FROM session WHERE state = 'ended' AND expired_at IS NULL AND ",
+        );
         query.push(if around_fault { "" } else { "NOT " }).push(AROUND_FAULT);
         query.push(" AND ended_at < ").bind(moment)?;
+        query.push_owned(owned)?;
         query.push(" ORDER BY ended_at LIMIT ").bind(i64::from(limit))?;
-        let rows: Vec<(String, i64)> = query.rows().fetch_all(&self.pool).await?;
-        Ok(rows.into_iter().map(|(id, _)| id).collect())
+        Ok(query.rows().fetch_all(&self.pool).await?)
     }
 
     /// The assets whose ended sessions have more than `bytes` bytes, with these bytes.
-    pub async fn assets_above(&self, bytes: i64) -> Result<Vec<(String, i64)>, StoreError> {
-        Ok(sqlx::query_as(
+    pub async fn assets_above(
+        &self,
+        bytes: i64,
+        owned: Option<&[PartitionId]>,
+    ) -> Result<Vec<(String, i64)>, StoreError> {
+        let mut query = QueryBuilder::new(
             "SELECT asset, CAST(SUM(n_bytes) AS BIGINT) FROM session
-             WHERE state = 'ended' AND expired_at IS NULL
-             GROUP BY asset HAVING SUM(n_bytes) > $1 ORDER BY asset",
-        )
-        .bind(bytes)
-        .fetch_all(&self.pool)
-        .await?)
+             WHERE state = 'ended' AND expired_at IS NULL",
+        );
+        query.push_owned(owned)?;
+        query.push(" GROUP BY asset HAVING SUM(n_bytes) > ").bind(bytes)?;
+        query.push(" ORDER BY asset");
+        Ok(query.rows().fetch_all(&self.pool).await?)
     }
 
     /// Ids and bytes of the plain ended sessions of `asset`, the oldest first.
@@ -70,26 +79,40 @@ impl Store {
     }
 
     /// Hidden sessions that are not deleted yet.
-    pub async fn hidden_sessions(&self) -> Result<Vec<SessionSize>, StoreError> {
+    pub async fn hidden_sessions(
+        &self,
+        owned: Option<&[PartitionId]>,
+    ) -> Result<Vec<SessionSize>, StoreError> {
         let mut query = QueryBuilder::new(SIZE);
-        query.push("expired_at IS NOT NULL ORDER BY expired_at");
+        query.push("expired_at IS NOT NULL").push_owned(owned)?;
+        query.push(" ORDER BY expired_at");
         self.sizes(query).await
     }
 
-    /// The sessions of imports that are not complete.
-    ///
-    /// # Errors
-    /// [`StoreError`] if the database fails.
-    pub async fn importing_sessions(&self) -> Result<Vec<String>, StoreError> {
-        let sql = "SELECT id FROM session WHERE state = 'open' AND importing = 1 ORDER BY id";
-        Ok(sqlx::query_scalar(sql).fetch_all(&self.pool).await?)
+    /// Ids and assets of the sessions of imports that are not complete.
+    pub async fn importing_sessions(
+        &self,
+        owned: Option<&[PartitionId]>,
+    ) -> Result<Vec<(String, String)>, StoreError> {
+        let mut query = QueryBuilder::new(
+            "SELECT id, asset FROM session WHERE state = 'open' AND importing = 1",
+        );
+        query.push_owned(owned)?.push(" ORDER BY id");
+        Ok(query.rows().fetch_all(&self.pool).await?)
     }
 
     /// Hidden assets that are not deleted yet.
-    pub async fn hidden_assets(&self) -> Result<Vec<String>, StoreError> {
-        Ok(sqlx::query_scalar("SELECT name FROM asset WHERE deleted_at IS NOT NULL ORDER BY name")
-            .fetch_all(&self.pool)
-            .await?)
+    pub async fn hidden_assets(
+        &self,
+        owned: Option<&[PartitionId]>,
+    ) -> Result<Vec<String>, StoreError> {
+        let mut query = QueryBuilder::new(
+            "SELECT asset FROM (SELECT name AS asset FROM asset WHERE deleted_at IS NOT NULL)
+             AS hidden WHERE 1 = 1",
+        );
+        query.push_owned(owned)?.push(" ORDER BY asset");
+        let rows: Vec<(String,)> = query.rows().fetch_all(&self.pool).await?;
+        Ok(rows.into_iter().map(|(name,)| name).collect())
     }
 
     /// Returns whether the asset `name` is hidden and not deleted yet.
@@ -121,9 +144,10 @@ impl Store {
     }
 
     async fn sizes(&self, query: QueryBuilder) -> Result<Vec<SessionSize>, StoreError> {
-        let rows: Vec<(String, i64, i64)> = query.rows().fetch_all(&self.pool).await?;
-        let size = |(id, n_chunks, n_transitions): (String, i64, i64)| SessionSize {
+        let rows: Vec<(String, String, i64, i64)> = query.rows().fetch_all(&self.pool).await?;
+        let size = |(id, asset, n_chunks, n_transitions): (String, String, i64, i64)| SessionSize {
             id,
+            asset,
             n_chunks: n_chunks.unsigned_abs(),
             n_transitions: n_transitions.unsigned_abs(),
         };

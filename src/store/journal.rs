@@ -1,27 +1,31 @@
 //! The journal: samples that are committed but not in the chunks of their session yet.
 //!
-//! Each commit appends one row to the table `journal`, with the new samples of all its
-//! sessions. Written to chunks directly, the samples of each session would change several
-//! pages: of its chunks, of its row and of the indexes. The writer also keeps the
+//! Each commit appends one row per partition to the table `journal`, with the new samples of
+//! all its sessions. Written to chunks directly, the samples of each session would change
+//! several pages: of its chunks, of its row and of the indexes. The writer also keeps the
 //! journal's contents in memory, where readers look before they query the tables. To
 //! *fold* a session is to move its samples from the journal to its chunks and to update
 //! its row, in one transaction: after a crash or an error they are in one of the two,
 //! never in both or in neither.
 //!
-//! The memory holds exactly those journal entries that are beyond the progress in the
-//! rows of the open sessions. So [`Journal::load`] restores it on a start, and entries
-//! that are folded already are skipped even if their journal row still exists.
+//! The memory holds exactly those journal entries of owned partitions that are beyond the
+//! progress in the rows of the open sessions. So [`Journal::load`] restores it when a
+//! partition is taken, and entries that are folded already are skipped even if their journal
+//! row still exists.
 
 use super::from_row::from_row;
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use serde::{Deserialize, Serialize, Serializer};
 use sqlx::AnyConnection;
 
 use super::codec::{self, ChunkKey, Packing};
+use super::multi_row::{MultiRowStatement, in_parts};
+use super::query_builder::QueryBuilder;
 use super::tail::{FULL_CHUNK_SAMPLES, Run};
-use super::{SessionProgress, SessionRow, StoreError, decode_chunk};
+use super::{PartitionId, SessionProgress, SessionRow, StoreError, decode_chunk};
 use offbd_core::vocabulary::Sample;
 
 /// Samples from which on a run is folded by its own commit: it fills whole pages anyway.
@@ -31,6 +35,9 @@ const LARGE_RUN_SAMPLES: usize = 1024;
 /// session.
 const MAX_SESSION_SAMPLES: usize = 2 * FULL_CHUNK_SAMPLES;
 
+/// Sessions per query when a partition is loaded.
+const SESSIONS_AT_ONCE: usize = 500;
+
 /// The journal of one database, as kept in memory. Clones share the contents.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Journal {
@@ -39,7 +46,13 @@ pub(super) struct Journal {
 
 #[derive(Debug, Default)]
 struct JournalContents {
-    sessions: HashMap<String, UnfoldedSession>,
+    sessions: HashMap<Arc<str>, UnfoldedSession>,
+    /// All sessions by their first row, so by partition.
+    by_row: BTreeSet<(i64, Arc<str>)>,
+    /// All sessions in the order in which they were added.
+    by_age: BTreeSet<(u64, Arc<str>)>,
+    /// Sessions that were added so far.
+    n_added: u64,
     /// Bytes of each row of the table, by id.
     rows: BTreeMap<i64, usize>,
     /// Bytes of all rows of the table.
@@ -51,6 +64,8 @@ struct JournalContents {
 struct UnfoldedSession {
     /// The first journal row with samples of the session.
     first_row: i64,
+    /// Its place in the order in which sessions were added.
+    age: u64,
     first_index: i64,
     n_samples: usize,
     n_bytes: usize,
@@ -89,17 +104,19 @@ impl JournalEntry<'_> {
 pub(super) struct JournalChanges {
     /// Sessions whose earlier samples are no longer in the journal.
     pub(super) removed_sessions: HashSet<String>,
-    /// Id and bytes of the row that was appended.
-    appended_row: Option<(i64, usize)>,
-    /// The runs in that row, each with its session.
-    runs: Vec<(EncodedRun, String)>,
-    /// The first row that was kept; all earlier ones were removed.
-    first_kept_row: Option<i64>,
+    /// Id and bytes of each row that was appended.
+    appended_rows: Vec<(i64, usize)>,
+    /// The runs in these rows.
+    runs: Vec<EncodedRun>,
+    /// Of a partition each, the rows that were removed.
+    removed_rows: Vec<Range<i64>>,
 }
 
-/// A [`Run`] as a chunk.
+/// A [`Run`] as a chunk in a row of the journal.
 #[derive(Debug)]
 struct EncodedRun {
+    row: i64,
+    session: Arc<str>,
     first_index: i64,
     n_samples: usize,
     progress: SessionProgress,
@@ -107,17 +124,18 @@ struct EncodedRun {
 }
 
 impl EncodedRun {
-    fn of(run: &Run) -> Self {
+    fn of(run: &Run, row: i64) -> Self {
         let Run { first_index, progress, ref samples, .. } = *run;
         let key = ChunkKey { session: &run.session, first_index };
         let chunk = codec::encode(samples, Packing::Plain, key);
-        Self { first_index, n_samples: samples.len(), progress, chunk }
+        let session = run.session.as_str().into();
+        Self { row, session, first_index, n_samples: samples.len(), progress, chunk }
     }
 
-    fn entry<'a>(&'a self, session: &'a str) -> JournalEntry<'a> {
+    fn entry(&self) -> JournalEntry<'_> {
         let SessionProgress { n_samples, n_rejected, first_t_s, last_t_s, last_seq } =
             self.progress;
-        let (first_index, chunk) = (self.first_index, &self.chunk[..]);
+        let (session, first_index, chunk) = (&*self.session, self.first_index, &self.chunk[..]);
         JournalEntry {
             session,
             first_index,
@@ -133,19 +151,57 @@ impl EncodedRun {
 
 /// Methods of the writer.
 impl Journal {
-    /// Reads the entries of the table that are beyond the progress in the sessions' rows.
-    pub(super) async fn load(db: &mut AnyConnection) -> Result<Self, StoreError> {
-        let rows: Vec<(i64, Vec<u8>)> =
-            sqlx::query_as("SELECT id, data FROM journal ORDER BY id").fetch_all(&mut *db).await?;
-        let this = Self::default();
-        if !rows.is_empty() {
-            let folded = folded_progress(db).await?;
-            let mut contents = this.lock();
+    /// Reads the entries of some partitions that are beyond the progress in the sessions'
+    /// rows.
+    pub(super) async fn load(
+        &self,
+        db: &mut AnyConnection,
+        partitions: &[PartitionId],
+    ) -> Result<(), StoreError> {
+        for partition in partitions {
+            let rows: Vec<(i64, Vec<u8>)> = sqlx::query_as(
+                "SELECT id, data FROM journal WHERE id >= $1 AND id < $2 ORDER BY id",
+            )
+            .bind(partition.journal_row(0))
+            .bind(partition.next_journal_row())
+            .fetch_all(&mut *db)
+            .await?;
+            if rows.is_empty() {
+                continue;
+            }
+            let folded = folded_progress(db, &rows).await?;
+            let mut contents = self.lock();
+            contents.forget(*partition);
             for (id, data) in &rows {
                 contents.load_row(*id, data, &folded)?;
             }
         }
-        Ok(this)
+        Ok(())
+    }
+
+    /// Removes the entries of a partition that is no longer owned.
+    pub(super) fn forget(&self, partition: PartitionId) {
+        self.lock().forget(partition);
+    }
+
+    /// The partitions that have rows in the table and no session that needs them.
+    pub(super) fn idle_partitions(&self) -> Vec<PartitionId> {
+        let contents = self.lock();
+        let (mut idle, mut from) = (Vec::new(), i64::MIN);
+        while let Some((&row, _)) = contents.rows.range(from..).next() {
+            let partition = PartitionId::of_journal_row(row);
+            from = partition.next_journal_row();
+            if contents.first_needed_row(partition, &HashSet::new()).is_none() {
+                idle.push(partition);
+            }
+        }
+        idle
+    }
+
+    /// The partition of a session that is in the journal.
+    pub(super) fn partition_of(&self, session: &str) -> Option<PartitionId> {
+        let contents = self.lock();
+        contents.sessions.get(session).map(|s| PartitionId::of_journal_row(s.first_row))
     }
 
     /// Bytes of all rows of the table.
@@ -156,7 +212,7 @@ impl Journal {
     /// Returns whether `run` should be folded by its own commit instead of being appended.
     pub(super) fn is_large(&self, run: &Run) -> bool {
         let n = run.samples.len();
-        let before = || self.lock().sessions.get(&run.session).map_or(0, |known| known.n_samples);
+        let before = || self.lock().sessions.get(&*run.session).map_or(0, |known| known.n_samples);
         n >= LARGE_RUN_SAMPLES || n + before() >= MAX_SESSION_SAMPLES
     }
 
@@ -165,65 +221,79 @@ impl Journal {
         let contents = self.lock();
         let Some(unfolded) = contents.sessions.get(session) else { return Ok(None) };
         let (first_index, progress) = (unfolded.first_index, unfolded.progress);
+        let partition = PartitionId::of_journal_row(unfolded.first_row);
         let samples = unfolded.samples(session)?;
-        Ok(Some(Run { session: session.to_owned(), first_index, samples, progress }))
+        Ok(Some(Run { partition, session: session.to_owned(), first_index, samples, progress }))
     }
 
     /// Returns the sessions that have been in the journal longest, without those in
     /// `except`: as many as are needed for `n_bytes` in total.
     pub(super) fn oldest(&self, n_bytes: usize, except: &HashSet<String>) -> Vec<String> {
         let contents = self.lock();
-        let wanted = contents.sessions.iter().filter(|(id, _)| !except.contains(*id));
-        let mut all: Vec<_> =
-            wanted.map(|(id, session)| (session.first_row, id, session)).collect();
-        all.sort_unstable_by_key(|(row, id, _)| (*row, *id));
         let mut oldest = Vec::new();
         let mut sum = 0;
-        for (_, id, session) in all {
+        for (_, id) in contents.by_age.iter().filter(|(_, id)| !except.contains(&**id)) {
             if sum >= n_bytes {
                 break;
             }
-            sum += session.n_bytes;
-            oldest.push(id.clone());
+            sum += contents.sessions.get(id).map_or(0, |session| session.n_bytes);
+            oldest.push(id.to_string());
         }
         oldest
     }
 
-    /// Appends `runs` to the table as the row `id`.
+    /// Appends `runs` to the table, a row for each of their partitions. `row` returns the id
+    /// of that row.
     pub(super) async fn append(
         db: &mut AnyConnection,
-        id: i64,
         runs: Vec<Run>,
+        row: impl Fn(PartitionId) -> i64,
         changes: &mut JournalChanges,
     ) -> Result<(), StoreError> {
-        if runs.is_empty() {
-            return Ok(());
+        static INSERT: MultiRowStatement =
+            MultiRowStatement::new("INSERT INTO journal (id, data) VALUES ", 2, "");
+        let mut by_row = BTreeMap::<i64, Vec<EncodedRun>>::new();
+        for run in &runs {
+            let row = row(run.partition);
+            by_row.entry(row).or_default().push(EncodedRun::of(run, row));
         }
-        changes.runs = runs.into_iter().map(|run| (EncodedRun::of(&run), run.session)).collect();
-        let entries: Vec<_> =
-            changes.runs.iter().map(|(run, session)| run.entry(session)).collect();
-        let entries = rmp_serde::to_vec(&entries).map_err(|e| StoreError::journal(id, &e))?;
-        let data = seal(id, &entries);
-        changes.appended_row = Some((id, data.len()));
-        sqlx::query("INSERT INTO journal (id, data) VALUES ($1, $2)")
-            .bind(id)
-            .bind(data)
-            .execute(db)
-            .await?;
+        let mut rows = Vec::with_capacity(by_row.len());
+        for (id, runs) in by_row {
+            let entries: Vec<_> = runs.iter().map(EncodedRun::entry).collect();
+            let entries = rmp_serde::to_vec(&entries).map_err(|e| StoreError::journal(id, &e))?;
+            let data = seal(id, &entries);
+            changes.appended_rows.push((id, data.len()));
+            changes.runs.extend(runs);
+            rows.push((id, data));
+        }
+        for part in in_parts(&rows) {
+            let mut query = sqlx::query(INSERT.sql(part.len()));
+            for (id, data) in part {
+                query = query.bind(id).bind(&data[..]);
+            }
+            query.execute(&mut *db).await?;
+        }
         Ok(())
     }
 
-    /// Removes from the table the oldest rows that are no longer needed after `changes`.
-    /// `next` is the id of the row after the last one.
+    /// Removes from the table the oldest rows of `partition` that are no longer needed after
+    /// `changes`. `next` is the id of the row after its last one.
     pub(super) async fn trim(
         &self,
         db: &mut AnyConnection,
+        partition: PartitionId,
         next: i64,
         changes: &mut JournalChanges,
     ) -> Result<(), StoreError> {
-        let first = self.lock().first_needed_row(&changes.removed_sessions).unwrap_or(next);
-        sqlx::query("DELETE FROM journal WHERE id < $1").bind(first).execute(db).await?;
-        changes.first_kept_row = Some(first);
+        let begin = partition.journal_row(0);
+        let needed = self.lock().first_needed_row(partition, &changes.removed_sessions);
+        let first = needed.unwrap_or(next);
+        sqlx::query("DELETE FROM journal WHERE id >= $1 AND id < $2")
+            .bind(begin)
+            .bind(first)
+            .execute(db)
+            .await?;
+        changes.removed_rows.push(begin..first);
         Ok(())
     }
 
@@ -231,17 +301,16 @@ impl Journal {
     pub(super) fn apply(&self, changes: JournalChanges) {
         let mut contents = self.lock();
         for session in &changes.removed_sessions {
-            contents.sessions.remove(session);
+            contents.remove(session);
         }
-        if let Some(first) = changes.first_kept_row {
-            let kept = contents.rows.split_off(&first);
-            let removed = std::mem::replace(&mut contents.rows, kept);
-            contents.n_bytes -= removed.values().sum::<usize>();
+        for removed in changes.removed_rows {
+            contents.remove_rows(removed);
         }
-        let Some((row, n_bytes)) = changes.appended_row else { return };
-        contents.add_row(row, n_bytes);
-        for (run, session) in changes.runs {
-            contents.add_run(row, session, run);
+        for (row, n_bytes) in changes.appended_rows {
+            contents.add_row(row, n_bytes);
+        }
+        for run in changes.runs {
+            contents.add_run(run);
         }
     }
 }
@@ -273,7 +342,7 @@ impl Journal {
     /// The progress of all sessions whose row is not up to date, by session id.
     pub(super) fn all_progress(&self) -> HashMap<String, SessionProgress> {
         let contents = self.lock();
-        contents.sessions.iter().map(|(id, unfolded)| (id.clone(), unfolded.progress)).collect()
+        contents.sessions.iter().map(|(id, s)| (id.to_string(), s.progress)).collect()
     }
 
     fn lock(&self) -> MutexGuard<'_, JournalContents> {
@@ -297,10 +366,23 @@ impl JournalContents {
         self.n_bytes += n_bytes;
     }
 
-    fn add_run(&mut self, row: i64, session: String, run: EncodedRun) {
-        let EncodedRun { first_index, n_samples, progress, chunk } = run;
+    fn remove_rows(&mut self, rows: Range<i64>) {
+        let removed: Vec<_> = self.rows.range(rows).map(|(&id, _)| id).collect();
+        for id in removed {
+            self.n_bytes -= self.rows.remove(&id).unwrap_or_default();
+        }
+    }
+
+    fn add_run(&mut self, run: EncodedRun) {
+        let EncodedRun { row, session, first_index, n_samples, progress, chunk } = run;
+        if !self.sessions.contains_key(&session) {
+            self.n_added += 1;
+            self.by_row.insert((row, session.clone()));
+            self.by_age.insert((self.n_added, session.clone()));
+        }
         let unfolded = self.sessions.entry(session).or_insert_with(|| UnfoldedSession {
             first_row: row,
+            age: self.n_added,
             first_index,
             n_samples: 0,
             n_bytes: 0,
@@ -311,6 +393,28 @@ impl JournalContents {
         unfolded.n_bytes += chunk.len();
         unfolded.progress = progress;
         unfolded.chunks.push(chunk);
+    }
+
+    fn remove(&mut self, session: &str) {
+        if let Some((id, removed)) = self.sessions.remove_entry(session) {
+            self.by_row.remove(&(removed.first_row, id.clone()));
+            self.by_age.remove(&(removed.age, id));
+        }
+    }
+
+    /// Removes all entries of `partition`.
+    fn forget(&mut self, partition: PartitionId) {
+        let rows = partition.journal_row(0)..partition.next_journal_row();
+        let sessions: Vec<_> = self.sessions_in(&rows).cloned().collect();
+        sessions.iter().for_each(|session| self.remove(session));
+        self.remove_rows(rows);
+    }
+
+    /// The sessions whose first row is one of `rows`, by that row.
+    fn sessions_in(&self, rows: &Range<i64>) -> impl Iterator<Item = &Arc<str>> {
+        let begin: (i64, Arc<str>) = (rows.start, "".into());
+        let end: (i64, Arc<str>) = (rows.end, "".into());
+        self.by_row.range(begin..end).map(|(_, id)| id)
     }
 
     /// Adds the entries of a row of the table that are beyond `folded`, the progress in the
@@ -332,16 +436,18 @@ impl JournalContents {
             let n_samples =
                 codec::n_samples(entry.chunk, key).map_err(|e| StoreError::journal(id, &e))?;
             let chunk = entry.chunk.to_vec();
-            let run = EncodedRun { first_index: entry.first_index, n_samples, progress, chunk };
-            self.add_run(id, entry.session.to_owned(), run);
+            let (session, first_index) = (entry.session.into(), entry.first_index);
+            let run = EncodedRun { row: id, session, first_index, n_samples, progress, chunk };
+            self.add_run(run);
         }
         Ok(())
     }
 
-    /// The first row with samples of a session that is not in `removed`.
-    fn first_needed_row(&self, removed: &HashSet<String>) -> Option<i64> {
-        let kept = self.sessions.iter().filter(|(id, _)| !removed.contains(*id));
-        kept.map(|(_, unfolded)| unfolded.first_row).min()
+    /// The first row of `partition` with samples of a session that is not in `removed`.
+    fn first_needed_row(&self, partition: PartitionId, removed: &HashSet<String>) -> Option<i64> {
+        let rows = partition.journal_row(0)..partition.next_journal_row();
+        let needed = self.sessions_in(&rows).find(|id| !removed.contains(&***id))?;
+        self.sessions.get(needed).map(|session| session.first_row)
     }
 }
 
@@ -408,10 +514,11 @@ fn checksum(id: i64, entries: &[u8]) -> [u8; 4] {
     hasher.finalize().to_le_bytes()
 }
 
-/// The progress in the rows of the open sessions, by id. Other sessions are folded
-/// completely.
+/// The progress in the rows of the open sessions that are in the journal's `rows`, by id.
+/// Other sessions are folded completely.
 async fn folded_progress(
     db: &mut AnyConnection,
+    rows: &[(i64, Vec<u8>)],
 ) -> Result<HashMap<String, SessionProgress>, StoreError> {
     struct SessionProgressRow {
         id: String,
@@ -419,11 +526,23 @@ async fn folded_progress(
     }
 
     from_row!(SessionProgressRow { id }[progress]);
-    let rows: Vec<SessionProgressRow> = sqlx::query_as(
-        "SELECT id, n_samples, n_rejected, first_t_s, last_t_s, last_seq FROM session
-         WHERE state = 'open'",
-    )
-    .fetch_all(db)
-    .await?;
-    Ok(rows.into_iter().map(|row| (row.id, row.progress)).collect())
+    let mut sessions = BTreeSet::new();
+    for (id, data) in rows {
+        sessions.extend(entries(*id, data)?.iter().map(|entry| entry.session.to_owned()));
+    }
+    let mut folded = HashMap::new();
+    let sessions: Vec<_> = sessions.into_iter().collect();
+    for part in sessions.chunks(SESSIONS_AT_ONCE) {
+        let mut query = QueryBuilder::new(
+            "SELECT id, n_samples, n_rejected, first_t_s, last_t_s, last_seq FROM session
+             WHERE state = 'open' AND id IN (",
+        );
+        for (i, session) in part.iter().enumerate() {
+            query.push(if i == 0 { "" } else { ", " }).bind(session.clone())?;
+        }
+        query.push(")");
+        let rows: Vec<SessionProgressRow> = query.rows().fetch_all(&mut *db).await?;
+        folded.extend(rows.into_iter().map(|row| (row.id, row.progress)));
+    }
+    Ok(folded)
 }

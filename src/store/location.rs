@@ -19,7 +19,7 @@ use super::checkpoint::{self, AUTOCHECKPOINT_PAGES};
 use super::log_damage::check_log;
 use super::page_checksums::{self, install_drivers};
 use super::write::WriterRole;
-use super::writer_lock::{self, Backend};
+use super::writer_lock::{self, Backend, LockMode};
 
 /// Connections for reading; a reader without one waits.
 const MAX_READERS: u32 = 4;
@@ -119,8 +119,12 @@ impl Location {
             }
             connection.execute(AssertSqlSafe(self.writer_settings(role))).await?;
             let backend = match self {
-                Self::Server(_) if role == WriterRole::Main => {
-                    Some(writer_lock::take(&mut connection, lost).await?)
+                Self::Server(_) if role != WriterRole::Auxiliary => {
+                    let mode = match role {
+                        WriterRole::Node => LockMode::Shared,
+                        _ => LockMode::Exclusive,
+                    };
+                    Some(writer_lock::take(&mut connection, mode, lost).await?)
                 }
                 Self::File(_) if role == WriterRole::Main => {
                     checkpoint::copy(&mut connection).await?;

@@ -188,6 +188,7 @@ mod tests {
     use sqlx::Connection;
 
     use super::*;
+    use crate::store::ChangeSet;
     use crate::store::{AssetRow, Location, Store, Write, Writer, checkpoint, page_checksums};
 
     /// The files of a database whose process was killed.
@@ -211,7 +212,10 @@ mod tests {
                 created_at: 0,
                 updated_at: 0,
             };
-            writer.commit(&mut [&mut vec![Write::CreateAsset(row)]]).await.unwrap();
+            writer
+                .commit(&mut [ChangeSet::unpartitioned(&mut vec![Write::CreateAsset(row)])])
+                .await
+                .unwrap();
         }
     }
 

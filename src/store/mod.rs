@@ -33,7 +33,9 @@ mod location;
 mod log_damage;
 mod migrations;
 mod multi_row;
+mod notifications;
 mod page_checksums;
+mod partition;
 mod query_builder;
 mod read;
 mod recording;
@@ -50,14 +52,17 @@ use migrations::MIGRATIONS;
 use offbd_core::vocabulary::Sample;
 use sqlx::AnyPool;
 use sqlx::migrate::MigrateError;
-use write::WriterRole;
 
 pub use access::{AccessWrite, AuditRow, LAST_ID, MAX_LOGINS, TokenRow};
 pub use backup::{back_up, restore};
 pub use check::{CheckReport, check};
 pub use expiry::SessionSize;
 pub use location::Location;
+pub use notifications::{Notification, Notifications};
 pub use page_checksums::install_drivers;
+pub use partition::{
+    EVENTS, MAX_PARTITIONS, PartitionId, PartitionRow, Partitions, TRANSFERS, subject_token,
+};
 pub use read::{FaultFilter, FaultOrder, SessionFilter};
 pub use recording::RecordingReader;
 pub use rows::{
@@ -66,9 +71,9 @@ pub use rows::{
 };
 pub use snapshot::Snapshot;
 pub use tail::{FULL_CHUNK_SAMPLES, MAX_TAIL_CHUNKS};
+pub use write::{ChangeSet, NodeIdentity, NodeRow, Write, Writer};
 #[cfg(test)]
 pub use write::{CommitFault, CommitPoint, FaultPlan};
-pub use write::{Write, Writer};
 
 /// Longest time for the database to answer a ping.
 const PING_TIMEOUT: Duration = Duration::from_secs(2);
@@ -114,6 +119,14 @@ pub enum StoreError {
          restart the service to continue with the present contents"
     )]
     UnexpectedCommits { expected: i64, found: i64 },
+    /// Other nodes of the cluster have taken these partitions. Nothing was changed.
+    #[error("{} partitions now belong to other nodes", partitions.len())]
+    Overtaken { partitions: Vec<PartitionId> },
+    #[error(
+        "the database is divided into {found} partitions, and `cluster.partitions` is {expected}: \
+         the number is fixed by the first start as a cluster"
+    )]
+    PartitionCount { found: u32, expected: u32 },
     #[error("a PostgreSQL database is backed up with pg_dump and restored with pg_restore")]
     NotSqlite,
     #[error("{} already exists", file.display())]
@@ -196,6 +209,8 @@ impl StoreError {
             | Self::DamagedPage(_)
             | Self::DamagedHeader
             | Self::DamagedLog { .. }
+            | Self::Overtaken { .. }
+            | Self::PartitionCount { .. }
             | Self::Chunk { .. }
             | Self::Incomplete { .. }
             | Self::Snapshot { .. }
@@ -245,7 +260,22 @@ impl Store {
     /// [`StoreError`] if the database cannot be opened, has other migrations than this
     /// version, or (PostgreSQL) another process holds the writer's lock.
     pub async fn open(location: &Location) -> Result<(Self, Writer), StoreError> {
-        Self::open_as(location, WriterRole::Main).await
+        Self::with(location, Writer::open(location).await?)
+    }
+
+    /// Opens the PostgreSQL database at `location` for a node of a cluster, which owns no
+    /// partition yet. The first node brings the schema to this version and divides the assets
+    /// into `partitions`.
+    ///
+    /// # Errors
+    /// As for [`Store::open`]; also if the database has another number of partitions, or a
+    /// process uses it that is not a node.
+    pub async fn open_node(
+        location: &Location,
+        node: NodeIdentity,
+        partitions: Partitions,
+    ) -> Result<(Self, Writer), StoreError> {
+        Self::with(location, Writer::open_node(location, node, partitions).await?)
     }
 
     /// Opens the database at `location` with an auxiliary writer, while a service may be
@@ -255,11 +285,10 @@ impl Store {
     /// # Errors
     /// As for [`Store::open`].
     pub async fn open_auxiliary(location: &Location) -> Result<(Self, Writer), StoreError> {
-        Self::open_as(location, WriterRole::Auxiliary).await
+        Self::with(location, Writer::open_auxiliary(location).await?)
     }
 
-    async fn open_as(location: &Location, role: WriterRole) -> Result<(Self, Writer), StoreError> {
-        let writer = Writer::open(location, role).await?;
+    fn with(location: &Location, writer: Writer) -> Result<(Self, Writer), StoreError> {
         let (pool, location, journal) = (location.readers()?, location.clone(), writer.journal());
         Ok((Self { pool, location, journal }, writer))
     }
@@ -270,7 +299,7 @@ impl Store {
     /// # Errors
     /// As for [`Store::open`]; also if the schema is newer than this version.
     pub async fn migrate(location: &Location) -> Result<usize, StoreError> {
-        Writer::open(location, WriterRole::Main).await?.close().await?;
+        Writer::open(location).await?.close().await?;
         Ok(MIGRATIONS.iter().count())
     }
 

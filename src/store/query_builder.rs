@@ -5,7 +5,7 @@ use sqlx::any::{AnyArguments, AnyRow};
 use sqlx::query::QueryAs;
 use sqlx::{Any, Arguments, AssertSqlSafe, Encode, FromRow, Type};
 
-use super::StoreError;
+use super::{PartitionId, StoreError};
 
 #[derive(Default)]
 pub(super) struct QueryBuilder {
@@ -32,6 +32,20 @@ impl QueryBuilder {
         self.arguments.add(value).map_err(sqlx::Error::Encode)?;
         self.sql.push_str(&format!("${}", self.arguments.len()));
         Ok(self)
+    }
+
+    /// Appends the condition that the column `asset` is in one of the partitions `owned`;
+    /// nothing for all partitions.
+    pub(super) fn push_owned(
+        &mut self,
+        owned: Option<&[PartitionId]>,
+    ) -> Result<&mut Self, StoreError> {
+        let Some(owned) = owned else { return Ok(self) };
+        self.push(" AND asset IN (SELECT name FROM asset WHERE partition IN (-1");
+        for partition in owned {
+            self.push(", ").bind(partition.bound())?;
+        }
+        Ok(self.push("))"))
     }
 
     /// The finished query. Its SQL consists of constants and placeholders only.

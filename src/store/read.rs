@@ -3,8 +3,8 @@
 use super::codec::ChunkKey;
 use super::query_builder::QueryBuilder;
 use super::{
-    ActionRow, AssetRow, CalibrationRow, EventRow, FaultRow, Micros, ReplayRow, SessionRow, Store,
-    StoreError, TransitionRow, TrendEntry, decode_chunk,
+    ActionRow, AssetRow, CalibrationRow, EventRow, FaultRow, Micros, PartitionId, ReplayRow,
+    SessionRow, Store, StoreError, TransitionRow, TrendEntry, decode_chunk,
 };
 use offbd_core::vocabulary::Sample;
 
@@ -104,19 +104,23 @@ impl Store {
     }
 
     /// The names of the assets whose open session has at least `n_samples` samples after the
-    /// last snapshot by this `version` of the engine.
+    /// last snapshot by this `version` of the engine; of the partitions `owned`, or of all.
     pub async fn assets_behind(
         &self,
         version: &str,
         n_samples: i64,
+        owned: Option<&[PartitionId]>,
     ) -> Result<Vec<String>, StoreError> {
-        let rows = sqlx::query_scalar(
-            "SELECT asset FROM session WHERE state = 'open' AND n_samples >= $2 + COALESCE(
-                 (SELECT MAX(snapshot.n_samples) FROM snapshot
-                  WHERE snapshot.session = session.id AND version = $1), 0)
-             ORDER BY asset",
+        let mut query =
+            QueryBuilder::new("SELECT asset FROM session WHERE state = 'open' AND n_samples >= ");
+        query.bind(n_samples)?.push(
+            " + COALESCE((SELECT MAX(snapshot.n_samples) FROM snapshot
+              WHERE snapshot.session = session.id AND version = ",
         );
-        Ok(rows.bind(version).bind(n_samples).fetch_all(&self.pool).await?)
+        query.bind(version.to_owned())?.push("), 0)").push_owned(owned)?;
+        query.push(" ORDER BY asset");
+        let rows: Vec<(String,)> = query.rows().fetch_all(&self.pool).await?;
+        Ok(rows.into_iter().map(|(asset,)| asset).collect())
     }
 
     /// The session `id`.
@@ -468,11 +472,29 @@ impl Store {
             .await?)
     }
 
-    /// Replays that an earlier process did not finish.
-    pub async fn unfinished_replays(&self) -> Result<Vec<ReplayRow>, StoreError> {
-        Ok(sqlx::query_as("SELECT * FROM replay WHERE state IN ('queued', 'running')")
-            .fetch_all(&self.pool)
-            .await?)
+    /// Ids of the replays that an earlier process did not finish; of the partitions `owned`,
+    /// or of all.
+    pub async fn unfinished_replays(
+        &self,
+        owned: Option<&[PartitionId]>,
+    ) -> Result<Vec<String>, StoreError> {
+        self.unfinished(
+            "SELECT replay.id FROM replay JOIN session ON session.id = replay.session
+             WHERE replay.state IN ('queued', 'running')",
+            owned,
+        )
+        .await
+    }
+
+    async fn unfinished(
+        &self,
+        jobs: &'static str,
+        owned: Option<&[PartitionId]>,
+    ) -> Result<Vec<String>, StoreError> {
+        let mut query = QueryBuilder::new(jobs);
+        query.push_owned(owned)?;
+        let rows: Vec<(String,)> = query.rows().fetch_all(&self.pool).await?;
+        Ok(rows.into_iter().map(|(id,)| id).collect())
     }
 
     /// The calibration `id`.
@@ -501,11 +523,14 @@ impl Store {
         Ok(query.rows().fetch_all(&self.pool).await?)
     }
 
-    /// Calibrations that an earlier process did not finish.
-    pub async fn unfinished_calibrations(&self) -> Result<Vec<CalibrationRow>, StoreError> {
-        Ok(sqlx::query_as("SELECT * FROM calibration WHERE state IN ('queued', 'running')")
-            .fetch_all(&self.pool)
-            .await?)
+    /// Ids of the calibrations that an earlier process did not finish; of the partitions
+    /// `owned`, or of all.
+    pub async fn unfinished_calibrations(
+        &self,
+        owned: Option<&[PartitionId]>,
+    ) -> Result<Vec<String>, StoreError> {
+        let jobs = "SELECT id FROM calibration WHERE state IN ('queued', 'running')";
+        self.unfinished(jobs, owned).await
     }
 }
 

@@ -13,7 +13,7 @@ use sqlx::AnyConnection;
 
 use super::codec::{ChunkKey, Packing};
 use super::multi_row::{MultiRowStatement, in_parts};
-use super::{SessionProgress, StoreError, codec, decode_chunk};
+use super::{PartitionId, SessionProgress, StoreError, codec, decode_chunk};
 use offbd_core::vocabulary::Sample;
 
 /// Samples in a full chunk; a longer run is cut into several.
@@ -110,6 +110,7 @@ impl Tails {
 /// Consecutive samples to be appended to one session, and the session's progress with them.
 #[derive(Debug)]
 pub(super) struct Run {
+    pub(super) partition: PartitionId,
     pub(super) session: String,
     pub(super) first_index: i64,
     pub(super) samples: Vec<Sample>,
@@ -118,9 +119,9 @@ pub(super) struct Run {
 
 impl Run {
     /// A run without samples.
-    pub(super) fn empty(session: &str) -> Self {
+    pub(super) fn empty(partition: PartitionId, session: &str) -> Self {
         let (session, progress) = (session.to_owned(), SessionProgress::default());
-        Self { session, first_index: 0, samples: Vec::new(), progress }
+        Self { partition, session, first_index: 0, samples: Vec::new(), progress }
     }
 
     /// Joins this run and the next one of the same session.

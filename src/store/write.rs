@@ -12,27 +12,30 @@ mod deletion;
 #[cfg(test)]
 mod fault;
 mod fold;
+mod ownership;
 mod subject;
 
 #[cfg(test)]
 pub use fault::{CommitFault, CommitPoint, FaultPlan};
 
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 use std::path::Path;
 use std::time::Duration;
 
 use sqlx::{AnyConnection, Connection};
 
 use self::fold::Relocation;
+use self::ownership::OwnedPartitions;
+pub use self::ownership::{NodeIdentity, NodeRow};
 use super::checkpoint::{self, Checkpointer};
 use super::journal::{Journal, JournalChanges};
 use super::multi_row::{MultiRowStatement, in_parts};
 use super::tail::{Run, Tails};
 use super::writer_lock::Backend;
 use super::{
-    AccessWrite, ActionRow, AssetRow, CalibrationRow, FaultRow, Location, MIGRATIONS, Micros,
-    ReplayRow, SessionProgress, SessionRow, Snapshot, StoreError, TransitionRow, TrendRow,
-    snapshot,
+    AccessWrite, ActionRow, AssetRow, CalibrationRow, EVENTS, FaultRow, Location, MIGRATIONS,
+    Micros, PartitionId, Partitions, ReplayRow, SessionProgress, SessionRow, Snapshot, StoreError,
+    TransitionRow, TrendRow, snapshot,
 };
 use offbd_core::vocabulary::Sample;
 
@@ -121,13 +124,38 @@ pub enum Write {
     Access(AccessWrite),
 }
 
+impl Write {
+    /// Whether it gets the number of an event.
+    const fn is_event(&self) -> bool {
+        matches!(self, Self::Transition(_) | Self::Action(_))
+    }
+}
+
+/// Changes that belong together, and the partition of their asset; `None` for changes that
+/// concern no engine, such as tokens.
+#[derive(Debug)]
+pub struct ChangeSet<'a> {
+    pub partition: Option<PartitionId>,
+    pub writes: &'a mut Vec<Write>,
+}
+
+impl<'a> ChangeSet<'a> {
+    /// Changes in a database that has one partition.
+    pub const fn unpartitioned(writes: &'a mut Vec<Write>) -> Self {
+        Self { partition: Some(PartitionId(0)), writes }
+    }
+}
+
 /// What a writer may do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum WriterRole {
-    /// Everything. At most one writer of a database has this role.
+    /// Everything, for all partitions. At most one writer of a database has this role, and
+    /// there is no node beside it.
     Main,
+    /// Everything, for the partitions that it takes: a node of a cluster (PostgreSQL).
+    Node,
     /// Changes that neither cause an event nor concern an engine, such as tokens. It may
-    /// run beside a main writer of another process, and does not count its transactions.
+    /// run beside other writers, and does not count its transactions.
     Auxiliary,
 }
 
@@ -141,14 +169,16 @@ pub struct Writer {
     file_identity: Option<(u64, u64)>,
     /// The last connection as PostgreSQL knows it.
     backend: Option<Backend>,
-    /// The last id given to an event.
-    last_id: i64,
-    /// Transactions that the database has committed and counted.
-    n_commits: i64,
+    /// How many partitions the database has.
+    partitions: Partitions,
+    /// The partitions that this writer may change.
+    owned: OwnedPartitions,
+    /// The node that writes; `None` without a cluster.
+    node: Option<NodeIdentity>,
     role: WriterRole,
     pub(super) checkpointer: Option<Checkpointer>,
-    /// The journal's changes by a transaction whose outcome is not known yet.
-    in_doubt: Option<JournalChanges>,
+    /// The transaction whose outcome is not known yet.
+    in_doubt: Option<InDoubt>,
     tails: Tails,
     journal: Journal,
     /// Sessions that could not be folded because the database refused their chunks. Until
@@ -161,35 +191,66 @@ pub struct Writer {
     pub(crate) faults: FaultPlan,
 }
 
+/// A transaction whose outcome is not known yet.
+#[derive(Debug)]
+struct InDoubt {
+    /// The partitions that count it.
+    partitions: BTreeSet<PartitionId>,
+    journal: JournalChanges,
+}
+
 impl Writer {
-    pub(super) async fn open(location: &Location, role: WriterRole) -> Result<Self, StoreError> {
+    /// Opens the database and takes all its partitions.
+    pub(super) async fn open(location: &Location) -> Result<Self, StoreError> {
         location.check_log().await?;
-        let (mut connection, backend) = location.writer(role, None).await?;
+        let (connection, backend) = location.writer(WriterRole::Main, None).await?;
+        let mut this = Self::connected(location, WriterRole::Main, connection, backend).await?;
+        let all: Vec<_> = this.partitions.all().collect();
+        this.take(&all).await?;
+        this.n_bytes_before = this.journal.n_bytes();
+        this.checkpointer = Checkpointer::start(location);
+        Ok(this)
+    }
+
+    pub(super) async fn open_auxiliary(location: &Location) -> Result<Self, StoreError> {
+        location.check_log().await?;
+        let (connection, _) = location.writer(WriterRole::Auxiliary, None).await?;
+        Self::connected(location, WriterRole::Auxiliary, connection, None).await
+    }
+
+    /// Brings the schema to this version, and returns a writer that owns no partition yet.
+    async fn connected(
+        location: &Location,
+        role: WriterRole,
+        mut connection: AnyConnection,
+        backend: Option<Backend>,
+    ) -> Result<Self, StoreError> {
         MIGRATIONS.run_direct(None, &mut connection, false).await?;
-        let last_id = counter(&mut connection, "event").await?;
-        let n_commits = counter(&mut connection, "commit").await?;
-        let journal = Journal::load(&mut connection).await?;
-        let n_bytes_before = journal.n_bytes();
+        let partitions = ownership::count(&mut connection).await?;
         Ok(Self {
             location: location.clone(),
             file_identity: location.file_identity(),
             connection: Some(connection),
             backend,
-            last_id,
-            n_commits,
+            partitions,
+            owned: OwnedPartitions::default(),
+            node: None,
             role,
-            checkpointer: match role {
-                WriterRole::Main => Checkpointer::start(location),
-                WriterRole::Auxiliary => None,
-            },
+            checkpointer: None,
             in_doubt: None,
             tails: Tails::default(),
-            journal,
+            journal: Journal::default(),
             refused: HashSet::new(),
-            n_bytes_before,
+            n_bytes_before: 0,
             #[cfg(test)]
             faults: FaultPlan::default(),
         })
+    }
+
+    /// How many partitions the database has.
+    #[must_use]
+    pub const fn partitions(&self) -> Partitions {
+        self.partitions
     }
 
     /// Bytes of all rows of the journal.
@@ -203,19 +264,21 @@ impl Writer {
     }
 
     /// Applies `sets` in order, in one transaction that is durable on return, and assigns
-    /// ids to their actions and transitions.
+    /// ids to their actions and transitions: consecutive ones, in the order of the commits of
+    /// all writers of the database.
     ///
     /// # Errors
     /// [`StoreError`]. If [`StoreError::is_outage`], the transaction may nevertheless be
     /// committed; [`Writer::reconnect`] returns whether it is. Otherwise nothing has been
-    /// applied.
-    pub async fn commit(&mut self, sets: &mut [&mut Vec<Write>]) -> Result<(), StoreError> {
+    /// applied; after [`StoreError::Overtaken`] the partitions that it names are no longer
+    /// owned, see [`Writer::lost`].
+    pub async fn commit(&mut self, sets: &mut [ChangeSet<'_>]) -> Result<(), StoreError> {
         self.transact(sets, None).await
     }
 
     async fn transact(
         &mut self,
-        sets: &mut [&mut Vec<Write>],
+        sets: &mut [ChangeSet<'_>],
         relocation: Option<&Relocation>,
     ) -> Result<(), StoreError> {
         self.check_file()?;
@@ -223,7 +286,6 @@ impl Writer {
             // The caller of that commit did not call `reconnect`.
             tracing::warn!("a commit whose outcome was unknown has succeeded");
         }
-        let last_id = self.last_id;
         let late = |_| Err(sqlx::Error::Io(std::io::ErrorKind::TimedOut.into()).into());
         let attempt = tokio::time::timeout(COMMIT_TIMEOUT, self.attempt(sets, relocation));
         let result = attempt.await.unwrap_or_else(late);
@@ -234,11 +296,14 @@ impl Writer {
                     checkpointer.count_commit(n_samples(sets));
                 }
             }
-            Err(_) => {
-                // After a failure the connection may be in any state.
-                self.connection = None;
-                self.last_id = last_id;
+            Err(error) => {
                 self.tails.forget_all();
+                match error {
+                    // The transaction was rolled back, and the connection holds locks.
+                    StoreError::Overtaken { partitions } => self.lose(partitions),
+                    // After another failure the connection may be in any state.
+                    _ => self.connection = None,
+                }
             }
         }
         result
@@ -288,21 +353,8 @@ impl Writer {
         let lost = self.backend.as_ref();
         let (mut connection, backend) = self.location.writer(self.role, lost).await?;
         self.backend = backend.or(self.backend.take());
-        // The update of `probe` checks that the database accepts durable changes. The
-        // update of `commit`, with the same value, waits until the lost connection's
-        // transaction has ended.
-        sqlx::query(
-            "UPDATE counter SET value = CASE name WHEN 'probe' THEN value + 1 ELSE value END
-             WHERE name IN ('commit', 'probe')",
-        )
-        .execute(&mut connection)
-        .await?;
-        let found = counter(&mut connection, "commit").await?;
-        let was_committed = self.in_doubt.is_some() && found == self.n_commits + 1;
-        if found != self.n_commits && !was_committed {
-            return Err(StoreError::UnexpectedCommits { expected: self.n_commits, found });
-        }
-        self.last_id = counter(&mut connection, "event").await?;
+        self.probe(&mut connection).await?;
+        let was_committed = self.own_again(&mut connection).await?;
         if was_committed {
             self.note_committed();
         }
@@ -311,13 +363,28 @@ impl Writer {
         Ok(was_committed)
     }
 
+    /// Checks that the database accepts durable changes, and waits until the transaction of
+    /// the lost connection has ended.
+    async fn probe(&mut self, db: &mut AnyConnection) -> Result<(), StoreError> {
+        sqlx::query("UPDATE counter SET value = value + 1 WHERE name = 'probe'")
+            .execute(&mut *db)
+            .await?;
+        for partition in self.in_doubt.iter().flat_map(|doubt| &doubt.partitions) {
+            sqlx::query("UPDATE partition SET epoch = epoch WHERE id = $1")
+                .bind(partition.bound())
+                .execute(&mut *db)
+                .await?;
+        }
+        Ok(())
+    }
+
     /// Counts the last transaction, which is committed, and applies its changes of the
     /// journal.
     fn note_committed(&mut self) {
-        self.n_commits += i64::from(self.role == WriterRole::Main);
-        if let Some(changes) = self.in_doubt.take() {
-            self.refused.retain(|session| !changes.removed_sessions.contains(session));
-            self.journal.apply(changes);
+        if let Some(InDoubt { partitions, journal }) = self.in_doubt.take() {
+            self.owned.count_commit(&partitions);
+            self.refused.retain(|session| !journal.removed_sessions.contains(session));
+            self.journal.apply(journal);
         }
     }
 
@@ -328,7 +395,7 @@ impl Writer {
     pub async fn close(mut self) -> Result<(), StoreError> {
         let folded = match self.role {
             WriterRole::Main => self.fold_all().await,
-            WriterRole::Auxiliary => Ok(()),
+            WriterRole::Node | WriterRole::Auxiliary => Ok(()),
         };
         if let Some(checkpointer) = self.checkpointer {
             checkpointer.close().await;
@@ -341,35 +408,43 @@ impl Writer {
 
     async fn attempt(
         &mut self,
-        sets: &mut [&mut Vec<Write>],
+        sets: &mut [ChangeSet<'_>],
         relocation: Option<&Relocation>,
     ) -> Result<(), StoreError> {
+        let partitions = self.touched(sets, relocation)?;
         let Some(connection) = &mut self.connection else {
             return Err(sqlx::Error::PoolClosed.into());
         };
         #[cfg(test)]
         self.faults.reach(CommitPoint::Begin)?;
         let mut transaction = connection.begin_with(self.location.begin()).await?;
+        let writes = || sets.iter().flat_map(|set| set.writes.iter());
         let mut group = GroupCommit {
-            number: self.n_commits + 1,
-            last_id: &mut self.last_id,
+            owned: &self.owned,
+            events: EventIds::new(writes().filter(|write| write.is_event()).count()),
             tails: &mut self.tails,
             journal: &self.journal,
             refused: &self.refused,
             changes: JournalChanges::default(),
             pending: Vec::new(),
         };
-        for write in sets.iter_mut().flat_map(|set| set.iter_mut()) {
-            group.apply(&mut transaction, write).await?;
+        for ChangeSet { partition, writes } in sets {
+            let partition = partition.unwrap_or_default();
+            for write in writes.iter_mut() {
+                group.apply(&mut transaction, partition, write).await?;
+            }
         }
         if let Some(relocation) = relocation {
             group.relocate(&mut transaction, relocation).await?;
         }
         group.flush(&mut transaction).await?;
-        let changes = group.changes;
-        if self.role == WriterRole::Main {
-            count(&mut transaction, self.n_commits, self.last_id).await?;
-            self.in_doubt = Some(changes);
+        let (journal, has_events) = (group.changes, group.events.next.is_some());
+        if has_events && self.role == WriterRole::Node {
+            ownership::notify(&mut transaction, EVENTS).await?;
+        }
+        if !partitions.is_empty() {
+            self.owned.fence(&mut transaction, &partitions).await?;
+            self.in_doubt = Some(InDoubt { partitions, journal });
         }
         #[cfg(test)]
         self.faults.reach(CommitPoint::BeforeCommit)?;
@@ -378,44 +453,67 @@ impl Writer {
         self.faults.reach(CommitPoint::AfterCommit)?;
         Ok(())
     }
+
+    /// The partitions that a transaction changes; those count it. One that changes none is
+    /// counted by some owned partition, so that its outcome can be known too.
+    fn touched(
+        &self,
+        sets: &[ChangeSet<'_>],
+        relocation: Option<&Relocation>,
+    ) -> Result<BTreeSet<PartitionId>, StoreError> {
+        if self.role == WriterRole::Auxiliary {
+            return Ok(BTreeSet::new());
+        }
+        let mut touched: BTreeSet<_> = sets.iter().filter_map(|set| set.partition).collect();
+        touched.extend(relocation.into_iter().flat_map(|r| r.partitions(&self.journal)));
+        if touched.is_empty() {
+            touched.extend(self.owned.first());
+        }
+        let lost: Vec<_> = touched.iter().copied().filter(|p| !self.owned.contains(*p)).collect();
+        if lost.is_empty() { Ok(touched) } else { Err(StoreError::Overtaken { partitions: lost }) }
+    }
 }
 
-fn n_samples(sets: &[&mut Vec<Write>]) -> usize {
+fn n_samples(sets: &[ChangeSet<'_>]) -> usize {
     let of =
         |write: &Write| if let Write::Append { samples, .. } = write { samples.len() } else { 0 };
-    sets.iter().flat_map(|set| set.iter()).map(of).sum()
+    sets.iter().flat_map(|set| set.writes.iter()).map(of).sum()
 }
 
-async fn counter(db: &mut AnyConnection, name: &str) -> Result<i64, StoreError> {
-    let query = sqlx::query_scalar("SELECT value FROM counter WHERE name = $1").bind(name);
-    Ok(query.fetch_one(db).await?)
+/// The ids of the events of a transaction. They are taken from the database all at once and
+/// as late as possible, because other writers of the database wait for the next ones until
+/// this transaction has ended. So ids have the order of the commits, and no gaps.
+#[derive(Debug)]
+struct EventIds {
+    n_events: usize,
+    next: Option<i64>,
 }
 
-/// Increments the database's count of commits from `n_commits`, and stores the last id of
-/// an event.
-async fn count(db: &mut AnyConnection, n_commits: i64, last_id: i64) -> Result<(), StoreError> {
-    let counted = sqlx::query(
-        "UPDATE counter SET value = CASE name WHEN 'commit' THEN $1 ELSE $2 END
-         WHERE name IN ('commit', 'event')
-         AND EXISTS (SELECT 1 FROM counter WHERE name = 'commit' AND value = $3)",
-    )
-    .bind(n_commits + 1)
-    .bind(last_id)
-    .bind(n_commits)
-    .execute(&mut *db)
-    .await?;
-    if counted.rows_affected() == 2 {
-        return Ok(());
+impl EventIds {
+    const fn new(n_events: usize) -> Self {
+        Self { n_events, next: None }
     }
-    let found = counter(db, "commit").await?;
-    Err(StoreError::UnexpectedCommits { expected: n_commits, found })
+
+    async fn next(&mut self, db: &mut AnyConnection) -> Result<i64, StoreError> {
+        let n_events = self.n_events as i64;
+        let next = match self.next {
+            Some(next) => next,
+            None => {
+                let take = "UPDATE counter SET value = value + $1 WHERE name = 'event'
+                            RETURNING value";
+                let last: i64 = sqlx::query_scalar(take).bind(n_events).fetch_one(db).await?;
+                last + 1 - n_events
+            }
+        };
+        self.next = Some(next + 1);
+        Ok(next)
+    }
 }
 
 /// A group of changes while its transaction is open.
 struct GroupCommit<'a> {
-    /// The transaction's number, which is also the id of its journal row.
-    number: i64,
-    last_id: &'a mut i64,
+    owned: &'a OwnedPartitions,
+    events: EventIds,
     tails: &'a mut Tails,
     journal: &'a Journal,
     refused: &'a HashSet<String>,
@@ -426,23 +524,28 @@ struct GroupCommit<'a> {
 }
 
 impl GroupCommit<'_> {
-    const fn next_id(&mut self) -> i64 {
-        *self.last_id += 1;
-        *self.last_id
+    /// The id of the journal row of this transaction for `partition`.
+    fn journal_row(&self, partition: PartitionId) -> i64 {
+        partition.journal_row(self.owned.n_commits(partition) + 1)
     }
 
-    async fn apply(&mut self, db: &mut AnyConnection, write: &mut Write) -> Result<(), StoreError> {
+    async fn apply(
+        &mut self,
+        db: &mut AnyConnection,
+        partition: PartitionId,
+        write: &mut Write,
+    ) -> Result<(), StoreError> {
         match write {
             Write::Append { session, first_index, samples, progress } => {
-                self.defer(session, *first_index, samples, *progress);
+                self.defer(partition, session, *first_index, samples, *progress);
                 Ok(())
             }
             Write::Transition(row) => {
-                row.id = self.next_id();
+                row.id = self.events.next(db).await?;
                 insert_transition(db, row).await
             }
             Write::Action(row) => {
-                row.id = self.next_id();
+                row.id = self.events.next(db).await?;
                 insert_action(db, row).await
             }
             Write::Fault(row) => put_fault(db, row).await,
@@ -452,13 +555,13 @@ impl GroupCommit<'_> {
             Write::ActivateCalibration { asset, id } => activate(db, asset, id).await,
             Write::PutLearning { asset, document } => put_learning(db, asset, document).await,
             Write::Access(write) => write.apply(db).await,
-            Write::CreateAsset(row) => create_asset(db, row).await,
+            Write::CreateAsset(row) => create_asset(db, partition, row).await,
             Write::UpdateAsset(row) => update_asset(db, row).await,
             Write::OpenSession(row) => open_session(db, row).await,
             Write::PutSnapshot(row) => snapshot::put(db, row).await,
             Write::RemoveSnapshots { session } => snapshot::remove_all(db, session).await,
             Write::EndSession { session, ended_at, verdict, hash } => {
-                self.fold_ended(db, session).await?;
+                self.fold_ended(db, partition, session).await?;
                 snapshot::remove(db, session).await?;
                 end_session(db, session, *ended_at, verdict, hash).await
             }
@@ -479,6 +582,7 @@ impl GroupCommit<'_> {
     /// Adds samples to the run of their session.
     fn defer(
         &mut self,
+        partition: PartitionId,
         session: &str,
         first_index: i64,
         samples: &[Sample],
@@ -491,7 +595,7 @@ impl GroupCommit<'_> {
             return;
         }
         let (session, samples) = (session.to_owned(), samples.to_vec());
-        self.pending.push(Run { session, first_index, samples, progress });
+        self.pending.push(Run { partition, session, first_index, samples, progress });
     }
 }
 
@@ -523,11 +627,16 @@ async fn put_progress(db: &mut AnyConnection, runs: &[Run]) -> Result<(), StoreE
     Ok(())
 }
 
-async fn create_asset(db: &mut AnyConnection, row: &AssetRow) -> Result<(), StoreError> {
+async fn create_asset(
+    db: &mut AnyConnection,
+    partition: PartitionId,
+    row: &AssetRow,
+) -> Result<(), StoreError> {
     sqlx::query(
-        "INSERT INTO asset (name, document, revision, created_at, updated_at)
-         VALUES ($1, $2, $3, $4, $5)",
+        "INSERT INTO asset (partition, name, document, revision, created_at, updated_at)
+         VALUES ($1, $2, $3, $4, $5, $6)",
     )
+    .bind(partition.bound())
     .bind(&row.name)
     .bind(&row.document)
     .bind(row.revision)

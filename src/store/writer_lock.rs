@@ -1,4 +1,5 @@
-//! The lock of a PostgreSQL database: at most one main writer is connected at a time.
+//! The lock of a PostgreSQL database: either one main writer is connected, or nodes of a
+//! cluster, which share the lock.
 //!
 //! The lock belongs to a connection and ends with it. A connection that is lost without
 //! the server's knowledge, because a host lost power or a firewall forgot it, must not keep
@@ -25,8 +26,17 @@ const KEEPALIVES: &str = "SET tcp_keepalives_idle = 3; SET tcp_keepalives_interv
 /// A connection as the server knows it. Its process number alone is used again.
 #[derive(Clone, Debug)]
 pub(super) struct Backend {
-    pid: i32,
-    started: String,
+    pub(super) pid: i32,
+    pub(super) started: String,
+}
+
+/// How the lock is held.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum LockMode {
+    /// By one writer.
+    Exclusive,
+    /// By the nodes of a cluster.
+    Shared,
 }
 
 /// Takes the lock for `connection`. Ends the connection `lost` before, which this process
@@ -36,12 +46,13 @@ pub(super) struct Backend {
 /// [`StoreError::InUse`] if another writer holds the lock; [`StoreError`].
 pub(super) async fn take(
     connection: &mut AnyConnection,
+    mode: LockMode,
     lost: Option<&Backend>,
 ) -> Result<Backend, StoreError> {
     connection.execute(AssertSqlSafe(KEEPALIVES)).await?;
     if let Some(Backend { pid, started }) = lost {
         sqlx::query(
-            "SELECT pg_terminate_backend(pid) FROM pg_stat_activity
+            "SELECT pg_terminate_backend(pid, 2000) FROM pg_stat_activity
              WHERE pid = $1 AND CAST(backend_start AS TEXT) = $2",
         )
         .bind(pid)
@@ -50,8 +61,9 @@ pub(super) async fn take(
         .await?;
     }
     let lock = format!(
-        "SET lock_timeout = '{LOCK_TIMEOUT}'; SELECT pg_advisory_lock({WRITER_LOCK});
-         SET lock_timeout = DEFAULT"
+        "SET lock_timeout = '{LOCK_TIMEOUT}'; SELECT pg_advisory_lock{}({WRITER_LOCK});
+         SET lock_timeout = DEFAULT",
+        if mode == LockMode::Shared { "_shared" } else { "" }
     );
     connection.execute(AssertSqlSafe(lock)).await.map_err(lock_error)?;
     let (pid, started) = sqlx::query_as(
@@ -61,6 +73,16 @@ pub(super) async fn take(
     .fetch_one(connection)
     .await?;
     Ok(Backend { pid, started })
+}
+
+/// Whether no writer is connected.
+pub(super) async fn is_free(connection: &mut AnyConnection) -> Result<bool, StoreError> {
+    let sql = format!(
+        "SELECT CASE WHEN pg_try_advisory_lock({WRITER_LOCK})
+         THEN CAST(pg_advisory_unlock({WRITER_LOCK}) AS INT) ELSE 0 END"
+    );
+    let is_free: i32 = sqlx::query_scalar(AssertSqlSafe(sql)).fetch_one(connection).await?;
+    Ok(is_free == 1)
 }
 
 /// Converts the error of a failed attempt to take the lock.

@@ -10,6 +10,7 @@ pub mod access;
 pub mod asset;
 pub mod basis;
 pub mod certificate;
+pub mod cluster;
 pub mod difference;
 pub mod drive_cycle;
 pub mod learning;

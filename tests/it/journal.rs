@@ -7,7 +7,7 @@ use crate::support::process::Process;
 use crate::support::{ServiceFixture, connection, rig, url};
 use offbd::store::codec::{self, ChunkKey, Packing};
 use offbd::store::{
-    AssetRow, Location, SessionFilter, SessionProgress, SessionRow, Store, Write, Writer,
+    AssetRow, ChangeSet, Location, SessionFilter, SessionProgress, SessionRow, Store, Write, Writer,
 };
 use offbd_core::vocabulary::Sample;
 use proptest::prelude::*;
@@ -138,7 +138,7 @@ impl StoreTest {
         let location = Location::of_url(&url(data)).unwrap();
         let (store, mut writer) = Store::open(&location).await.unwrap();
         let mut made = (0..ASSETS).map(|i| Write::CreateAsset(asset(&i.to_string()))).collect();
-        writer.commit(&mut [&mut made]).await.unwrap();
+        writer.commit(&mut [ChangeSet::unpartitioned(&mut made)]).await.unwrap();
         let open = vec![ExpectedSession::default(); ASSETS];
         let mut this =
             Self { location, store, writer: Some(writer), open, ended: vec![], n_opened: 0 };
@@ -161,7 +161,7 @@ impl StoreTest {
     }
 
     async fn commit(&mut self, mut set: Vec<Write>) {
-        self.writer().commit(&mut [&mut set]).await.unwrap();
+        self.writer().commit(&mut [ChangeSet::unpartitioned(&mut set)]).await.unwrap();
     }
 
     async fn apply(&mut self, step: Step) -> Result<(), TestCaseError> {
@@ -177,8 +177,11 @@ impl StoreTest {
             }
             Step::Conflict(at, n) => {
                 let mut set = vec![self.open[at].clone().append(n), Write::CreateAsset(asset("0"))];
-                let error =
-                    self.writer().commit(&mut [&mut set]).await.expect_err("the asset exists");
+                let error = self
+                    .writer()
+                    .commit(&mut [ChangeSet::unpartitioned(&mut set)])
+                    .await
+                    .expect_err("the asset exists");
                 assert!(error.is_conflict() && !error.is_outage(), "{error}");
             }
             Step::Fold(above) => self.writer().fold(above).await.unwrap(),

@@ -199,7 +199,7 @@ async fn unblock_deletion(fixture: &ServiceFixture) {
 
 /// Makes the database record the commit that deletes each chunk.
 async fn record_deletions(fixture: &ServiceFixture) {
-    let note = "INSERT INTO gone SELECT value FROM counter WHERE name = 'commit'";
+    let note = "INSERT INTO gone SELECT n_commits FROM partition";
     let words = if crate::support::on_postgres() {
         format!(
             "CREATE TABLE gone (at BIGINT);

@@ -10,6 +10,7 @@ mod backup;
 mod bad_input;
 mod bounds;
 mod cli;
+mod cluster;
 mod crash;
 mod damage;
 mod engine_snapshot;

@@ -138,7 +138,7 @@ async fn a_second_service_cannot_open_the_store() {
 
 #[tokio::test]
 async fn an_auxiliary_writer_can_write_while_the_service_runs() {
-    use offbd::store::{Location, Store, Write};
+    use offbd::store::{ChangeSet, Location, Store, Write};
     let fixture = ServiceFixture::start().await;
     fixture.client.asset("a").await;
     let location = Location::of_url(&crate::support::url(fixture.data.path())).unwrap();
@@ -152,7 +152,7 @@ async fn an_auxiliary_writer_can_write_while_the_service_runs() {
             Write::HideAsset { name: name.clone(), at: 1 },
             Write::DeleteAsset { name },
         ];
-        writer.commit(&mut [&mut set]).await.unwrap();
+        writer.commit(&mut [ChangeSet::unpartitioned(&mut set)]).await.unwrap();
         fixture.client.telemetry("a", None, &rig(10, 10)).await;
     }
     writer.close().await.unwrap();

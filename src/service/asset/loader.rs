@@ -46,13 +46,13 @@ impl LoadQueue {
         Self { shard: shard.downgrade(), ..self.clone() }
     }
 
-    /// Requests to load the asset `name`; the shard gets the result as a message. Returns why
+    /// Requests to load the asset `name`, whose partition has this epoch; the shard gets the result as a message. Returns why
     /// commands must not wait for it, if many assets are to be loaded before.
-    pub(super) fn load(&self, name: &str) -> Option<ServiceError> {
+    pub(super) fn load(&self, name: &str, epoch: i64) -> Option<ServiceError> {
         let closing = ServiceError::Unavailable { what: "the service is shutting down" };
         let Some(shard) = self.shard.upgrade() else { return Some(closing) };
         let n_before = self.n_waiting.fetch_add(1, Ordering::Relaxed);
-        let request = LoadRequest { asset: name.to_owned(), shard };
+        let request = LoadRequest { asset: name.to_owned(), epoch, shard };
         if self.requests.send(request).is_err() {
             return Some(closing);
         }
@@ -64,6 +64,7 @@ impl LoadQueue {
 /// A request to load an asset.
 pub(in crate::service) struct LoadRequest {
     asset: String,
+    epoch: i64,
     shard: Sender<ShardMessage>,
 }
 
@@ -107,27 +108,29 @@ impl Loader {
     /// Executes the next request if there is one, on this thread.
     #[cfg(test)]
     pub(in crate::service) fn step(&mut self) -> bool {
-        let Ok(LoadRequest { asset, shard }) = self.requests.try_recv() else { return false };
+        let Ok(LoadRequest { asset, epoch, shard }) = self.requests.try_recv() else {
+            return false;
+        };
         self.limits.n_waiting.fetch_sub(1, Ordering::Relaxed);
         let begun = self.handles.fence().and_then(|()| begin(&self.handles, &asset));
         let loaded = begun.map(|progress| match progress {
             Progress::Loaded(asset) => asset,
             Progress::Behind(stored) => Box::new(stored.catch_up(&self.handles).unwrap()),
         });
-        let message = ShardMessage::Loaded { asset, result: Box::new(loaded) };
+        let message = ShardMessage::Loaded { asset, epoch, result: Box::new(loaded) };
         assert!(shard.try_send(message).is_ok(), "a simulation leaves room in the queues");
         true
     }
 
     /// Executes the requests, several at a time, until all shards have ended.
     pub(in crate::service) async fn run(mut self) {
-        while let Some(LoadRequest { asset, shard }) = self.requests.recv().await {
+        while let Some(LoadRequest { asset, epoch, shard }) = self.requests.recv().await {
             let (handles, limits) = (self.handles.clone(), self.limits.clone());
             tokio::spawn(async move {
                 let result = Box::new(load(&handles, &limits, &asset, &shard).await);
                 limits.n_waiting.fetch_sub(1, Ordering::Relaxed);
                 // Fails only if the thread of the shard has panicked.
-                let _ = shard.send(ShardMessage::Loaded { asset, result }).await;
+                let _ = shard.send(ShardMessage::Loaded { asset, epoch, result }).await;
             });
         }
     }
@@ -195,12 +198,12 @@ mod tests {
         let location = Location::File(data.path().join("offbd.sqlite"));
         let (store, writer) = Store::open(&location).await.unwrap();
         let (service, mut parts) =
-            Service::assemble(store, writer, Limits::default(), None, Clock::System);
+            Service::assemble(store, writer, Limits::default(), None, None, Clock::System);
         let (shard, mut results) = tokio::sync::mpsc::channel(N);
         let (loader, queue) = Loader::new(service.inner.handles.clone(), 1, &shard);
         tokio::spawn(loader.run());
         for i in 0..N {
-            assert!(queue.load(&format!("rig-{i}")).is_none());
+            assert!(queue.load(&format!("rig-{i}"), 1).is_none());
         }
         for _ in 0..10 * N {
             tokio::task::yield_now().await;

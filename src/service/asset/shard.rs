@@ -14,7 +14,7 @@ use super::message::{LoadResult, ShardMessage};
 use super::turn::{Environment, Turn};
 use crate::service::ServiceError;
 use crate::service::writing::{EngineGeneration, WriteSet};
-use crate::store::{AssetRow, Write};
+use crate::store::{AssetRow, PartitionId, Write};
 
 /// An asset of a shard.
 enum Slot {
@@ -30,6 +30,8 @@ struct Loading {
     waiting: Vec<AssetCommand>,
     /// Why other commands are refused: it will take longer than a client should wait.
     refusal: Option<ServiceError>,
+    /// The epoch of its partition.
+    epoch: i64,
 }
 
 /// The assets of one thread.
@@ -90,12 +92,20 @@ impl Shard {
             ShardMessage::Rebuilding { asset, retry_after_s } => {
                 self.rebuilding(&asset, retry_after_s);
             }
-            ShardMessage::Loaded { asset, result } => self.loaded(&asset, *result),
+            ShardMessage::Loaded { asset, epoch, result } => self.loaded(&asset, epoch, *result),
+            ShardMessage::Release { partitions, lost, done } => {
+                self.release(&partitions, lost);
+                // The receiver is gone if the service shuts down.
+                let _ = done.send(());
+            }
         }
     }
 
     /// Executes `command`, or lets it wait until the asset `name` is loaded.
     fn dispatch(&mut self, name: &str, command: AssetCommand) {
+        let Some(epoch) = self.env.handles.ownership.epoch_of(name) else {
+            return self.apply(name, Err(ServiceError::Moving), command);
+        };
         match self.slots.remove(name) {
             Some(Slot::Loading(loading)) => return self.wait(name, loading, command),
             Some(Slot::Running(asset)) => {
@@ -106,8 +116,33 @@ impl Shard {
             }
             None => {}
         }
-        let refusal = self.loads.load(name);
-        self.wait(name, Loading { refusal, ..Loading::default() }, command);
+        let refusal = self.loads.load(name, epoch);
+        self.wait(name, Loading { refusal, epoch, ..Loading::default() }, command);
+    }
+
+    /// Drops the engines of `partitions`, and refuses the commands that wait for them.
+    fn release(&mut self, partitions: &[PartitionId], lost: bool) {
+        let ownership = self.env.handles.ownership.clone();
+        let is_of = |name: &String| partitions.contains(&ownership.partition_of(name));
+        let names: Vec<_> = self.slots.keys().filter(|name| is_of(name)).cloned().collect();
+        for name in names {
+            self.env.presences.remove(&name);
+            match self.slots.remove(&name) {
+                Some(Slot::Running(asset)) => {
+                    self.n_running.decrement(1);
+                    if lost {
+                        asset.generation.invalidate();
+                    }
+                }
+                Some(Slot::Loading(loading)) => {
+                    self.n_waiting -= loading.waiting.len();
+                    for command in loading.waiting {
+                        self.apply(&name, Err(ServiceError::Moving), command);
+                    }
+                }
+                None => {}
+            }
+        }
     }
 
     /// Lets `command` wait for the asset `name`, unless that is refused.
@@ -137,8 +172,16 @@ impl Shard {
     }
 
     /// Executes the commands that wait for the asset `name`, or refuses them.
-    fn loaded(&mut self, name: &str, result: LoadResult) {
-        let Some(Slot::Loading(loading)) = self.slots.remove(name) else { return };
+    fn loaded(&mut self, name: &str, epoch: i64, result: LoadResult) {
+        let loading = match self.slots.remove(name) {
+            Some(Slot::Loading(loading)) if loading.epoch == epoch => loading,
+            // What was read under an earlier epoch may be out of date.
+            Some(other) => {
+                self.slots.insert(name.to_owned(), other);
+                return;
+            }
+            None => return,
+        };
         self.n_waiting -= loading.waiting.len();
         let refusal = match result {
             Ok(mut asset) => {
@@ -166,7 +209,8 @@ impl Shard {
             std::mem::take(&mut asset.snapshots).into_iter().map(Write::PutSnapshot).collect();
         if !writes.is_empty() {
             let (generation, completion) = (asset.generation.clone(), Box::new(|_| ()));
-            self.env.handles.submit(WriteSet { writes, generation, completion });
+            let partition = Some(self.env.handles.ownership.partition_of(&asset.row.name));
+            self.env.handles.submit(WriteSet { partition, writes, generation, completion });
         }
     }
 
@@ -255,7 +299,7 @@ impl Shard {
         let outcome = catch_unwind(AssertUnwindSafe(|| change(&mut asset, &mut turn)));
         match outcome {
             Ok(Ok(answer)) => {
-                turn.commit(generation, answer, reply);
+                turn.commit(name, generation, answer, reply);
                 if asset.deleted {
                     self.env.presences.remove(name);
                 } else if !asset.dropped {
@@ -316,7 +360,7 @@ impl Shard {
             created_at: turn.at,
             updated_at: turn.at,
         }));
-        turn.commit(EngineGeneration::default(), (), reply);
+        turn.commit(name, EngineGeneration::default(), (), reply);
     }
 
     fn check_not_being_deleted(&self, name: &str) -> Result<(), ServiceError> {
@@ -335,9 +379,10 @@ mod tests {
     use crate::service::asset::presence::Presences;
     use crate::service::asset::session::OpenSession;
     use crate::service::asset::session_rate::SessionRate;
+    use crate::service::ownership::Ownership;
     use crate::service::writing::Handles;
     use crate::service::{Clock, Limits};
-    use crate::store::{Location, SessionRow, Store};
+    use crate::store::{Location, Partitions, SessionRow, Store};
     use offbd_core::engine::{Rig, Setup};
     use offbd_core::vocabulary::Sample;
     use tokio::sync::watch;
@@ -378,7 +423,9 @@ mod tests {
         let (_, outage) = watch::channel(None);
         let (limits, closing) =
             (Limits { shards: 1, ..Limits::default() }, CancellationToken::new());
-        let handles = Handles::new(store, Clock::System, &limits, writer, outage, closing);
+        let ownership = Ownership::new(Partitions::ONE, vec![(PartitionId(0), 1)]);
+        let handles =
+            Handles::new(store, Clock::System, &limits, ownership, writer, outage, closing);
         let env = Environment { handles, presences: Presences::default(), jobs };
         let (_queues, mut shards, _loader) = Shards::new(&limits, &env);
         let mut shard = shards.remove(0);

@@ -3,7 +3,7 @@
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, oneshot};
 
 use super::command::{AssetCommand, Reply};
 use super::loader::Loader;
@@ -11,6 +11,7 @@ use super::message::ShardMessage;
 use super::shard::Shard;
 use super::turn::Environment;
 use crate::service::{Limits, ServiceError};
+use crate::store::PartitionId;
 
 /// The queues of all shards. The hash of its name assigns each asset to one shard. Cheap to
 /// clone.
@@ -78,6 +79,23 @@ impl Shards {
         let message = ShardMessage::Command { asset: asset.to_owned(), command };
         let closing = |_| ServiceError::Unavailable { what: "the service is shutting down" };
         self.of(asset).send(message).await.map_err(closing)
+    }
+
+    /// Drops the engines of `partitions`; see [`ShardMessage::Release`].
+    pub(in crate::service) async fn release(&self, partitions: Vec<PartitionId>, lost: bool) {
+        let partitions: Arc<[PartitionId]> = partitions.into();
+        let mut released = Vec::new();
+        for queue in &*self.0 {
+            let (done, released_here) = oneshot::channel();
+            let message = ShardMessage::Release { partitions: partitions.clone(), lost, done };
+            if queue.send(message).await.is_ok() {
+                released.push(released_here);
+            }
+        }
+        for released in released {
+            // An error means that the service shuts down.
+            let _ = released.await;
+        }
     }
 
     /// Queues the command that `make` returns and waits for its reply.

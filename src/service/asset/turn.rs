@@ -42,6 +42,7 @@ impl<'a> Turn<'a> {
     /// `answer` is sent to `reply`.
     pub(super) fn commit<T: Send + 'static>(
         self,
+        asset: &str,
         generation: EngineGeneration,
         answer: T,
         reply: Reply<T>,
@@ -53,6 +54,7 @@ impl<'a> Turn<'a> {
             }
             reply.send(outcome.map(|()| answer));
         });
-        env.handles.submit(WriteSet { writes, generation, completion });
+        let partition = Some(env.handles.ownership.partition_of(asset));
+        env.handles.submit(WriteSet { partition, writes, generation, completion });
     }
 }

@@ -23,7 +23,7 @@ use offbd_core::vocabulary::Sample;
 pub(super) async fn run(context: &JobContext, id: &str) -> Result<(), ServiceError> {
     let Some(mut row) = context.handles.store.calibration(id).await? else { return Ok(()) };
     row.state = JobState::Running.to_string();
-    context.handles.write(Write::PutCalibration(row.clone())).await?;
+    context.handles.write(&row.asset, vec![Write::PutCalibration(row.clone())]).await?;
     let (store, runtime, job) =
         (context.handles.store.clone(), context.handles.runtime.clone(), row.clone());
     let learning = tokio::task::spawn_blocking(move || learn(&store, &runtime, &job));

@@ -24,8 +24,9 @@ const CHECK_EVERY: u64 = 1024;
 /// Runs a replay to completion; leaves it unfinished if the service shuts down.
 pub(super) async fn run(context: &JobContext, id: &str) -> Result<(), ServiceError> {
     let Some(mut row) = context.handles.store.replay(id).await? else { return Ok(()) };
+    let Some(session) = context.handles.store.session(&row.session).await? else { return Ok(()) };
     row.state = JobState::Running.to_string();
-    context.handles.write(Write::PutReplay(row.clone())).await?;
+    context.handles.write(&session.asset, vec![Write::PutReplay(row.clone())]).await?;
     let (worker, job) = (context.clone(), row.clone());
     let judged = tokio::task::spawn_blocking(move || judge(&worker, &job)).await;
     let failed = ServiceError::Unavailable { what: "evaluating the recording failed" };
@@ -41,7 +42,7 @@ pub(super) async fn run(context: &JobContext, id: &str) -> Result<(), ServiceErr
         }
     }
     row.finished_at = Some(context.handles.clock.now());
-    context.handles.write(Write::PutReplay(row)).await
+    context.handles.write(&session.asset, vec![Write::PutReplay(row)]).await
 }
 
 /// Evaluates the session; returns `None` if the service shuts down before the end.

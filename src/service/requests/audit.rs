@@ -24,7 +24,7 @@ impl Service {
         let actor =
             (caller.name().unwrap_or(ANONYMOUS), principal.map(|principal| principal.id.as_str()));
         let row = entry.row(actor, self.inner.handles.clock.now());
-        self.inner.handles.write(Write::Access(AccessWrite::Audit(row))).await
+        self.inner.handles.write_unpartitioned(Write::Access(AccessWrite::Audit(row))).await
     }
 
     /// Returns a page of the audit log, newest first.

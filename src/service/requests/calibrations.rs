@@ -50,7 +50,9 @@ impl Service {
             document: None,
             error: None,
         };
-        if let Err(error) = self.inner.handles.write(Write::PutCalibration(row.clone())).await {
+        if let Err(error) =
+            self.inner.handles.write(asset, vec![Write::PutCalibration(row.clone())]).await
+        {
             // The asset may have been deleted meanwhile.
             self.asset(&row.asset).await?;
             return Err(error);

@@ -4,14 +4,19 @@ use tokio::sync::mpsc;
 
 use crate::service::job::Job;
 use crate::service::{Service, ServiceError};
+use crate::store::PartitionId;
 
 impl Service {
-    /// Queues the jobs that a previous process left unfinished, as far as there is room.
-    pub(in crate::service) async fn resume_jobs(&self) -> Result<(), ServiceError> {
-        let replays = self.inner.handles.store.unfinished_replays().await?;
-        let calibrations = self.inner.handles.store.unfinished_calibrations().await?;
-        let jobs = replays.into_iter().map(|row| Job::Replay(row.id));
-        for job in jobs.chain(calibrations.into_iter().map(|row| Job::Calibration(row.id))) {
+    /// Queues the jobs that a previous process left unfinished, as far as there is room: of
+    /// the partitions `owned`, or of all.
+    pub(in crate::service) async fn resume_jobs(
+        &self,
+        owned: Option<&[PartitionId]>,
+    ) -> Result<(), ServiceError> {
+        let replays = self.inner.handles.store.unfinished_replays(owned).await?;
+        let calibrations = self.inner.handles.store.unfinished_calibrations(owned).await?;
+        let jobs = replays.into_iter().map(Job::Replay);
+        for job in jobs.chain(calibrations.into_iter().map(Job::Calibration)) {
             if self.inner.jobs.try_send(job).is_err() {
                 tracing::warn!("the queue is too short for all unfinished jobs; restart later");
                 break;

@@ -92,7 +92,8 @@ impl Service {
     fn record_use(&self, id: &str, at: Micros) {
         let (handles, id) = (self.inner.handles.clone(), id.to_owned());
         tokio::spawn(async move {
-            let written = handles.write(Write::Access(AccessWrite::TokenUsed { id, at })).await;
+            let written =
+                handles.write_unpartitioned(Write::Access(AccessWrite::TokenUsed { id, at })).await;
             if let Err(error) = written {
                 tracing::warn!(%error, "cannot record the use of a token");
             }
@@ -126,7 +127,7 @@ impl Service {
             at,
             expires_at: at + micros(LOGIN_DURATION),
         };
-        self.inner.handles.write(Write::Access(write)).await?;
+        self.inner.handles.write_unpartitioned(Write::Access(write)).await?;
         Ok((cookie, LOGIN_DURATION))
     }
 

@@ -27,7 +27,7 @@ impl Service {
         let permit = self.reserve_job()?;
         let row = ReplayRow {
             id: Uuid::now_v7().to_string(),
-            session: session.id,
+            session: session.id.clone(),
             state: JobState::Queued.to_string(),
             settings: views::to_json(&settings)?,
             created_at: self.inner.handles.clock.now(),
@@ -35,7 +35,9 @@ impl Service {
             result: None,
             error: None,
         };
-        if let Err(error) = self.inner.handles.write(Write::PutReplay(row.clone())).await {
+        if let Err(error) =
+            self.inner.handles.write(&session.asset, vec![Write::PutReplay(row.clone())]).await
+        {
             // The session may have been deleted meanwhile.
             self.session_row(&row.session).await?;
             return Err(error);

@@ -25,7 +25,7 @@ impl Service {
             return Err(ServiceError::TokenExists { name: minted.row.name });
         }
         let write = AccessWrite::CreateToken(minted.row.clone());
-        self.inner.handles.write(Write::Access(write)).await?;
+        self.inner.handles.write_unpartitioned(Write::Access(write)).await?;
         Ok(MadeTokenView { token: token_view(minted.row)?, secret: minted.secret })
     }
 
@@ -68,7 +68,7 @@ impl Service {
         &self,
         write: AccessWrite,
     ) -> Result<(), ServiceError> {
-        let written = self.inner.handles.write(Write::Access(write)).await;
+        let written = self.inner.handles.write_unpartitioned(Write::Access(write)).await;
         self.inner.principals.clear();
         written
     }

@@ -80,7 +80,7 @@ impl Process {
         let opened = RUNTIME.block_on(Store::open(&Location::File(file)));
         let (store, writer) = opened.unwrap();
         let faults = writer.faults.clone();
-        let (service, mut parts) = Service::assemble(store, writer, limits(), None, clock);
+        let (service, mut parts) = Service::assemble(store, writer, limits(), None, None, clock);
         parts.committer.first_retry = Duration::ZERO;
         let committer = Arc::new(Mutex::new(parts.committer));
         let for_fence = committer.clone();

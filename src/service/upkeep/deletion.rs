@@ -42,14 +42,15 @@ impl Deleter {
     /// # Errors
     /// [`ServiceError::Store`] if the store cannot be read.
     pub(in crate::service) async fn all(&self) -> Result<(), ServiceError> {
-        for asset in self.handles.store.hidden_assets().await? {
+        let owned = self.handles.ownership.filter();
+        for asset in self.handles.store.hidden_assets(owned.as_deref()).await? {
             if let Err(error) = self.asset(&asset).await {
                 tracing::warn!(asset, %error, "the deletion failed and is retried later");
             }
         }
-        for session in self.handles.store.hidden_sessions().await? {
-            let id = session.id.clone();
-            if let Err(error) = self.delete(vec![session]).await {
+        for session in self.handles.store.hidden_sessions(owned.as_deref()).await? {
+            let (id, asset) = (session.id.clone(), session.asset.clone());
+            if let Err(error) = self.delete(&asset, vec![session]).await {
                 tracing::warn!(session = id, %error, "the deletion failed and is retried later");
             }
         }
@@ -66,9 +67,9 @@ impl Deleter {
             if sessions.is_empty() {
                 break;
             }
-            self.delete(sessions).await?;
+            self.delete(name, sessions).await?;
         }
-        self.commit_part(vec![Write::DeleteAsset { name: name.to_owned() }]).await
+        self.commit_part(name, vec![Write::DeleteAsset { name: name.to_owned() }]).await
     }
 
     /// Deletes the hidden session `id`.
@@ -76,7 +77,10 @@ impl Deleter {
     /// # Errors
     /// As for [`Deleter::asset`].
     pub(in crate::service) async fn session(&self, id: &str) -> Result<(), ServiceError> {
-        self.delete(self.handles.store.session_size(id).await?.into_iter().collect()).await
+        match self.handles.store.session_size(id).await? {
+            Some(session) => self.delete(&session.asset.clone(), vec![session]).await,
+            None => Ok(()),
+        }
     }
 
     /// Runs `deletion` to completion even if the caller is dropped. A deletion that a
@@ -97,16 +101,17 @@ impl Deleter {
         task.await.unwrap_or(Err(ServiceError::Unavailable { what: "the deletion failed" }))
     }
 
-    async fn delete(&self, sessions: Vec<SessionSize>) -> Result<(), ServiceError> {
+    /// Deletes hidden `sessions` of `asset`.
+    async fn delete(&self, asset: &str, sessions: Vec<SessionSize>) -> Result<(), ServiceError> {
         for part in parts(sessions) {
-            self.commit_part(part).await?;
+            self.commit_part(asset, part).await?;
         }
         Ok(())
     }
 
-    async fn commit_part(&self, writes: Vec<Write>) -> Result<(), ServiceError> {
+    async fn commit_part(&self, asset: &str, writes: Vec<Write>) -> Result<(), ServiceError> {
         let _guard = self.lock.lock().await;
-        self.handles.write_all(writes).await
+        self.handles.write(asset, writes).await
     }
 }
 
@@ -115,7 +120,7 @@ impl Deleter {
 fn parts(sessions: Vec<SessionSize>) -> Vec<Vec<Write>> {
     let mut parts = Vec::new();
     let (mut together, mut n_chunks) = (Vec::new(), 0);
-    for SessionSize { id: session, n_chunks: chunks, n_transitions } in sessions {
+    for SessionSize { id: session, n_chunks: chunks, n_transitions, .. } in sessions {
         let n_parts = |n: u64, limit: u32| n.saturating_sub(1) / u64::from(limit);
         let n_chunk_parts = n_parts(chunks, CHUNKS_AT_ONCE);
         for _ in 0..n_chunk_parts {
@@ -150,6 +155,7 @@ mod tests {
     fn shapes(sessions: &[(u64, u64)]) -> Vec<(u64, u64, usize)> {
         let bulk = |(i, &(n_chunks, n_transitions)): (usize, &(u64, u64))| SessionSize {
             id: i.to_string(),
+            asset: "a".to_owned(),
             n_chunks,
             n_transitions,
         };

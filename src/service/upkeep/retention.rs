@@ -8,7 +8,7 @@ use std::time::Duration;
 use super::deletion::Deleter;
 use crate::service::writing::Handles;
 use crate::service::{Retention, ServiceError};
-use crate::store::{Micros, Write};
+use crate::store::{Micros, PartitionId, Write};
 
 /// Limit of sessions that one sweep deletes for each reason; the next sweep continues. It
 /// bounds the loss if the clock is wrong for a while.
@@ -42,14 +42,17 @@ impl Sweeper {
 
     async fn sweep(&self) -> Result<(), ServiceError> {
         let Retention { age, bytes_per_asset, fault_age, .. } = self.retention;
+        let owned = self.handles.ownership.filter();
+        let owned = owned.as_deref();
         for (age, around_fault) in [(age, false), (fault_age, true)] {
             let Some(limit) = age.and_then(|age| self.before(age)) else { continue };
             let old =
-                self.handles.store.sessions_ended_before(limit, around_fault, MAX_EXPIRED).await?;
+                self.handles.store.sessions_ended_before(limit, around_fault, owned, MAX_EXPIRED);
+            let old = old.await?;
             self.expire(old, "age").await?;
         }
         if let Some(bytes) = bytes_per_asset {
-            self.shrink(i64::try_from(bytes).unwrap_or(i64::MAX)).await?;
+            self.shrink(i64::try_from(bytes).unwrap_or(i64::MAX), owned).await?;
         }
         self.deleter.all().await
     }
@@ -60,8 +63,8 @@ impl Sweeper {
 
     /// Hides the oldest sessions without a fault transition of the assets that store more
     /// than `bytes`.
-    async fn shrink(&self, bytes: i64) -> Result<(), ServiceError> {
-        for (asset, held) in self.handles.store.assets_above(bytes).await? {
+    async fn shrink(&self, bytes: i64, owned: Option<&[PartitionId]>) -> Result<(), ServiceError> {
+        for (asset, held) in self.handles.store.assets_above(bytes, owned).await? {
             let mut above = held - bytes;
             let plain = self.handles.store.plain_sessions(&asset, MAX_EXPIRED).await?;
             let needed = |(_, n): &(String, i64)| {
@@ -69,7 +72,8 @@ impl Sweeper {
                 above -= n;
                 is_needed
             };
-            let ids: Vec<_> = plain.into_iter().take_while(needed).map(|(id, _)| id).collect();
+            let chosen = plain.into_iter().take_while(needed);
+            let ids: Vec<_> = chosen.map(|(id, _)| (id, asset.clone())).collect();
             if ids.is_empty() {
                 tracing::warn!(
                     asset,
@@ -82,12 +86,17 @@ impl Sweeper {
         Ok(())
     }
 
-    async fn expire(&self, ids: Vec<String>, reason: &'static str) -> Result<(), ServiceError> {
-        for session in ids {
+    /// Hides sessions, each given with its asset.
+    async fn expire(
+        &self,
+        sessions: Vec<(String, String)>,
+        reason: &'static str,
+    ) -> Result<(), ServiceError> {
+        for (session, asset) in sessions {
             tracing::info!(session, reason, "session deleted by retention");
             metrics::counter!("offbd_sessions_expired_total", "reason" => reason).increment(1);
             let at = self.handles.clock.now();
-            self.handles.write(Write::HideSession { session, at }).await?;
+            self.handles.write(&asset, vec![Write::HideSession { session, at }]).await?;
         }
         Ok(())
     }

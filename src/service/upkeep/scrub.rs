@@ -85,6 +85,9 @@ impl Scrubber {
         };
         last.clone_from(&id);
         let Some(session) = store.session(&id).await? else { return Ok(true) };
+        if !self.handles.ownership.owns(&session.asset) {
+            return Ok(true);
+        }
         let (asset, handles) = (session.asset.clone(), self.handles.clone());
         let found = tokio::task::spawn_blocking(move || examine(&handles, &session, pause)).await;
         match found {
@@ -215,6 +218,7 @@ mod tests {
 
     use super::*;
     use crate::service::{Clock, Limits, Service};
+    use crate::store::ChangeSet;
     use crate::store::{AssetRow, Location, SessionProgress, Store, Write};
     use offbd_core::vocabulary::Sample;
 
@@ -236,10 +240,10 @@ mod tests {
             hash: String::new(),
         };
         let mut set = vec![Write::CreateAsset(asset), Write::OpenSession(row), append, end];
-        writer.commit(&mut [&mut set]).await.unwrap();
+        writer.commit(&mut [ChangeSet::unpartitioned(&mut set)]).await.unwrap();
         let session = store.session("s").await.unwrap().unwrap();
         let (service, _parts) =
-            Service::assemble(store, writer, Limits::default(), None, Clock::System);
+            Service::assemble(store, writer, Limits::default(), None, None, Clock::System);
         let handles = service.inner.handles.clone();
         tokio::task::spawn_blocking(move || {
             let works = Mutex::new(Vec::new());

@@ -6,13 +6,15 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use tokio::runtime::Handle;
-use tokio::sync::{mpsc, watch};
+use tokio::sync::{mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 use tracing::Instrument;
 
 use super::events::{Event, Events};
+use super::transfer::TransferRequest;
 use crate::service::ServiceError;
-use crate::store::{StoreError, TransitionRow, Write, Writer};
+use crate::service::ownership::Ownership;
+use crate::store::{ChangeSet, PartitionId, StoreError, TransitionRow, Write, Writer};
 
 /// Limit of write sets in one transaction; further ones form the next group.
 const MAX_GROUP_SETS: usize = 512;
@@ -58,6 +60,8 @@ pub(in crate::service) type Completion = Box<dyn FnOnce(Result<(), ServiceError>
 
 /// Changes that are committed together.
 pub(in crate::service) struct WriteSet {
+    /// The partition of the asset; `None` for changes that concern none.
+    pub(in crate::service) partition: Option<PartitionId>,
     pub(in crate::service) writes: Vec<Write>,
     pub(in crate::service) generation: EngineGeneration,
     pub(in crate::service) completion: Completion,
@@ -67,6 +71,10 @@ pub(in crate::service) struct WriteSet {
 pub(in crate::service) struct Committer {
     pub(in crate::service) writer: Writer,
     pub(in crate::service) queue: mpsc::Receiver<WriteSet>,
+    pub(in crate::service) transfers: mpsc::Receiver<TransferRequest>,
+    pub(in crate::service) ownership: Ownership,
+    /// Receives the partitions that other nodes have taken. Has room for all.
+    pub(in crate::service) lost: mpsc::Sender<PartitionId>,
     pub(in crate::service) events: Events,
     pub(in crate::service) outage: watch::Sender<Outage>,
     /// Number of successful commits.
@@ -86,6 +94,8 @@ enum CommitFailure {
     Rejected,
     /// They need a part of the database that is damaged.
     Damaged(ServiceError),
+    /// Other nodes have taken these partitions.
+    Overtaken(Vec<PartitionId>),
     /// The database is unavailable and the service is shutting down.
     Closing,
 }
@@ -126,15 +136,77 @@ impl Committer {
     /// service shuts down while the database is unavailable.
     async fn run(mut self) -> Option<Writer> {
         let mut group = Vec::new();
-        while self.queue.recv_many(&mut group, MAX_GROUP_SETS).await > 0 {
-            let available = self.commit(std::mem::take(&mut group)).await && self.fold().await;
+        loop {
+            let available = tokio::select! {
+                biased;
+                Some(request) = self.transfers.recv() => self.transfer(request).await,
+                n_sets = self.queue.recv_many(&mut group, MAX_GROUP_SETS) => {
+                    if n_sets == 0 {
+                        return Some(self.writer);
+                    }
+                    self.commit(std::mem::take(&mut group)).await && self.fold().await
+                }
+            };
             if !available {
                 self.refuse_all().await;
                 return None;
             }
+            self.note_lost();
             self.writer.copy_log().await;
         }
-        Some(self.writer)
+    }
+
+    /// Executes a request about the ownership of partitions. Returns whether the writer can
+    /// continue.
+    async fn transfer(&mut self, request: TransferRequest) -> bool {
+        match request {
+            TransferRequest::Observe(answer) => {
+                let found = self.writer.observe().await;
+                self.answer(found, answer).await
+            }
+            TransferRequest::Take(partitions, answer) => {
+                let taken = self.writer.take(&partitions).await;
+                for (partition, epoch) in self.writer.owned() {
+                    self.ownership.add(partition, epoch);
+                }
+                self.answer(taken, answer).await
+            }
+            TransferRequest::Release(partitions, answer) => {
+                let released = self.writer.release(&partitions).await;
+                self.answer(released, answer).await
+            }
+            TransferRequest::Leave(answer) => {
+                let left = self.writer.leave().await;
+                self.answer(left, answer).await
+            }
+        }
+    }
+
+    /// Answers a request. If the database has failed, waits until it is available.
+    async fn answer<T>(
+        &mut self,
+        result: Result<T, StoreError>,
+        answer: oneshot::Sender<Result<T, ServiceError>>,
+    ) -> bool {
+        let Err(error) = result else {
+            // The receiver is gone if it has timed out.
+            let _ = answer.send(result.map_err(ServiceError::from));
+            return true;
+        };
+        let is_available = !matches!(self.recover(&error).await, Recovery::Closing);
+        let _ = answer.send(Err(error.into()));
+        is_available
+    }
+
+    /// Publishes which partitions other nodes have taken.
+    fn note_lost(&mut self) {
+        for partition in self.writer.lost() {
+            self.ownership.remove(partition);
+            tracing::warn!(%partition, "another node has taken the partition");
+            metrics::counter!("offbd_partitions_lost_total").increment(1);
+            // There is room for all partitions.
+            let _ = self.lost.try_send(partition);
+        }
     }
 
     /// Closes the queue and refuses all write sets in it.
@@ -167,7 +239,21 @@ impl Committer {
         let (invalid, mut group): (Vec<_>, Vec<_>) =
             group.into_iter().partition(|set| set.generation.is_invalid());
         invalid.into_iter().for_each(refuse_invalid);
-        match self.write(&mut group).await {
+        loop {
+            match self.write(&mut group).await {
+                Err(CommitFailure::Overtaken(partitions)) => {
+                    self.note_lost();
+                    group = refuse_lost(group, &partitions);
+                }
+                written => return self.settle(group, written).await,
+            }
+        }
+    }
+
+    /// Completes or refuses the write sets of a group. Returns whether the writer can
+    /// continue.
+    async fn settle(&mut self, group: Vec<WriteSet>, written: Result<(), CommitFailure>) -> bool {
+        match written {
             Ok(()) => group.into_iter().for_each(|set| self.complete(set)),
             Err(CommitFailure::Closing) => {
                 group.into_iter().for_each(|set| refuse(set, closing()));
@@ -176,6 +262,9 @@ impl Committer {
             // A single set may be the cause.
             Err(CommitFailure::Rejected | CommitFailure::Damaged(_)) if group.len() > 1 => {
                 return self.commit_each(group).await;
+            }
+            Err(CommitFailure::Overtaken(partitions)) => {
+                refuse_lost(group, &partitions).into_iter().for_each(refuse_moved);
             }
             Err(CommitFailure::Rejected) => group.into_iter().for_each(refuse_rejected),
             Err(CommitFailure::Damaged(error)) => {
@@ -201,6 +290,7 @@ impl Committer {
             match written {
                 Ok(()) => self.complete(set),
                 Err(CommitFailure::Rejected) => refuse_rejected(set),
+                Err(CommitFailure::Overtaken(_)) => refuse_moved(set),
                 Err(CommitFailure::Damaged(error)) => refuse(set, error),
                 Err(CommitFailure::Closing) => {
                     refuse(set, closing());
@@ -213,15 +303,20 @@ impl Committer {
 
     /// Makes all of `group` durable. Waits while the database is unavailable; meanwhile the
     /// queue fills up and further requests are refused.
-    async fn write(&mut self, group: &mut [WriteSet]) -> Result<(), CommitFailure> {
+    async fn write<'a>(&mut self, group: &'a mut [WriteSet]) -> Result<(), CommitFailure> {
+        let changes =
+            |set: &'a mut WriteSet| ChangeSet { partition: set.partition, writes: &mut set.writes };
         let mut sets: Vec<_> =
-            group.iter_mut().map(|set| &mut set.writes).filter(|w| !w.is_empty()).collect();
+            group.iter_mut().map(changes).filter(|set| !set.writes.is_empty()).collect();
         if sets.is_empty() {
             return Ok(());
         }
         metrics::histogram!("offbd_commit_sets").record(sets.len() as f64);
         for n_failed in 1.. {
             let Err(error) = self.attempt(&mut sets).await? else { break };
+            if let StoreError::Overtaken { partitions } = error {
+                return Err(CommitFailure::Overtaken(partitions));
+            }
             metrics::counter!("offbd_commit_failures_total").increment(1);
             if error.is_outage() {
                 match self.recover(&error).await {
@@ -251,7 +346,7 @@ impl Committer {
     /// Tries to commit `sets` once; during shutdown within [`CLOSING_WAIT`].
     async fn attempt(
         &mut self,
-        sets: &mut [&mut Vec<Write>],
+        sets: &mut [ChangeSet<'_>],
     ) -> Result<Result<(), StoreError>, CommitFailure> {
         let span = tracing::debug_span!("commit", sets = sets.len());
         let commit = timed(self.writer.commit(sets)).instrument(span);
@@ -386,6 +481,19 @@ fn refuse_rejected(set: WriteSet) {
 /// Refuses a write set of an invalid engine: an earlier set of it was refused.
 fn refuse_invalid(set: WriteSet) {
     refuse(set, ServiceError::Unavailable { what: "earlier changes of the asset failed" });
+}
+
+/// Refuses the write sets of `partitions`, which other nodes have taken; returns the others.
+fn refuse_lost(group: Vec<WriteSet>, partitions: &[PartitionId]) -> Vec<WriteSet> {
+    let is_lost = |set: &WriteSet| set.partition.is_some_and(|p| partitions.contains(&p));
+    let (lost, others): (Vec<_>, Vec<_>) = group.into_iter().partition(is_lost);
+    lost.into_iter().for_each(refuse_moved);
+    others
+}
+
+fn refuse_moved(set: WriteSet) {
+    metrics::counter!("offbd_commits_overtaken_total").increment(1);
+    refuse(set, ServiceError::Moving);
 }
 
 fn refuse(set: WriteSet, error: ServiceError) {

@@ -3,15 +3,21 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use tokio::sync::broadcast;
+use std::time::Duration;
+
 use tokio::sync::broadcast::error::RecvError;
+use tokio::sync::{Notify, broadcast};
+use tokio_util::sync::CancellationToken;
 
 use crate::service::ServiceError;
-use crate::store::{ActionRow, EventRow, Store, TransitionRow};
+use crate::store::{ActionRow, EventRow, Store, StoreError, TransitionRow};
 
 /// Events buffered for slow subscribers; one that lags further behind reads the events from
 /// the store.
 const MAX_BUFFERED: usize = 1024;
+
+/// How often a node of a cluster looks for events of others that it was not told of.
+const LOOK_EVERY: Duration = Duration::from_secs(1);
 
 /// Events read from the store per query.
 const PAGE: u32 = 256;
@@ -62,16 +68,68 @@ impl Event {
 pub(in crate::service) struct Events {
     store: Store,
     sender: broadcast::Sender<Arc<Event>>,
+    /// In a cluster, where other nodes have events too: wakes the task that reads them from
+    /// the store, in the order of their ids.
+    reader: Option<Arc<Notify>>,
 }
 
 impl Events {
-    pub(in crate::service) fn new(store: Store) -> Self {
-        Self { store, sender: broadcast::Sender::new(MAX_BUFFERED) }
+    pub(in crate::service) fn new(store: Store, in_cluster: bool) -> Self {
+        let reader = in_cluster.then(Arc::default);
+        Self { store, sender: broadcast::Sender::new(MAX_BUFFERED), reader }
     }
 
+    /// Publishes an event of this process.
     pub(in crate::service) fn publish(&self, event: Event) {
+        match &self.reader {
+            Some(reader) => reader.notify_one(),
+            None => self.send(event),
+        }
+    }
+
+    /// Says that another process may have events.
+    pub(in crate::service) fn wake(&self) {
+        self.reader.iter().for_each(|reader| reader.notify_one());
+    }
+
+    fn send(&self, event: Event) {
         // Fails without subscribers, which is not an error.
         let _ = self.sender.send(Arc::new(event));
+    }
+
+    /// In a cluster, reads the events of all nodes and publishes them here, until `closing`.
+    pub(in crate::service) async fn read_all(self, closing: CancellationToken) {
+        let Some(reader) = self.reader.clone() else { return };
+        let forever = async {
+            let mut last = None;
+            loop {
+                if let Err(error) = self.read_new(&mut last).await {
+                    tracing::debug!(%error, "cannot read the events of the cluster");
+                }
+                let _ = tokio::time::timeout(LOOK_EVERY, reader.notified()).await;
+            }
+        };
+        closing.run_until_cancelled(forever).await;
+    }
+
+    async fn read_new(&self, last: &mut Option<i64>) -> Result<(), StoreError> {
+        let mut after = match *last {
+            Some(last) => last,
+            None => self.store.last_event().await?,
+        };
+        *last = Some(after);
+        loop {
+            let rows = self.store.events(None, after, PAGE).await?;
+            let is_last_page = rows.len() < PAGE as usize;
+            for row in rows {
+                after = row.id;
+                *last = Some(after);
+                self.send(row.into());
+            }
+            if is_last_page {
+                return Ok(());
+            }
+        }
     }
 
     pub(in crate::service) async fn feed(

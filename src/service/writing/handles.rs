@@ -11,8 +11,9 @@ use tokio::sync::{mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 
 use super::commit::{EngineGeneration, Outage, WriteSet};
+use crate::service::ownership::Ownership;
 use crate::service::{Clock, Limits, ServiceError, SessionLimits};
-use crate::store::{Store, StoreError, Write};
+use crate::store::{PartitionId, Store, StoreError, Write};
 
 /// The shared handles of the service. Cheap to clone.
 #[derive(Clone)]
@@ -24,6 +25,7 @@ pub(in crate::service) struct Handles {
     pub(in crate::service) closing: CancellationToken,
     /// How long sessions may be.
     pub(in crate::service) sessions: SessionLimits,
+    pub(in crate::service) ownership: Ownership,
     writer: mpsc::Sender<WriteSet>,
     outage: watch::Receiver<Outage>,
     /// Whether a fence has timed out and is not complete yet.
@@ -53,6 +55,7 @@ impl Handles {
         store: Store,
         clock: Clock,
         limits: &Limits,
+        ownership: Ownership,
         writer: mpsc::Sender<WriteSet>,
         outage: watch::Receiver<Outage>,
         closing: CancellationToken,
@@ -63,6 +66,7 @@ impl Handles {
             runtime: Handle::current(),
             closing,
             sessions: limits.sessions,
+            ownership,
             writer,
             outage,
             is_stuck: Arc::default(),
@@ -78,21 +82,37 @@ impl Handles {
         &self.writer
     }
 
-    /// Makes a change durable that does not belong to an engine.
-    pub(in crate::service) async fn write(&self, write: Write) -> Result<(), ServiceError> {
-        self.write_all(vec![write]).await
+    /// Makes a change durable that concerns no asset.
+    pub(in crate::service) async fn write_unpartitioned(
+        &self,
+        write: Write,
+    ) -> Result<(), ServiceError> {
+        self.commit(None, vec![write]).await
     }
 
-    /// Makes changes durable together that do not belong to an engine.
-    pub(in crate::service) async fn write_all(
+    /// Makes changes of `asset` durable together that do not belong to its engine.
+    ///
+    /// # Errors
+    /// [`ServiceError::Moving`] if this process does not own the asset's partition.
+    pub(in crate::service) async fn write(
         &self,
+        asset: &str,
+        writes: Vec<Write>,
+    ) -> Result<(), ServiceError> {
+        self.commit(Some(self.ownership.partition_of(asset)), writes).await
+    }
+
+    async fn commit(
+        &self,
+        partition: Option<PartitionId>,
         writes: Vec<Write>,
     ) -> Result<(), ServiceError> {
         let (sender, receiver) = oneshot::channel();
         let completion = Box::new(move |outcome| {
             let _ = sender.send(outcome);
         });
-        let set = WriteSet { writes, generation: EngineGeneration::default(), completion };
+        let generation = EngineGeneration::default();
+        let set = WriteSet { partition, writes, generation, completion };
         let closing = ServiceError::Unavailable { what: "the service is shutting down" };
         self.writer.send(set).await.map_err(|_| closing)?;
         let stopped = ServiceError::Unavailable { what: "the writer has stopped" };
@@ -152,7 +172,7 @@ impl Handles {
             is_stuck.store(false, Ordering::SeqCst);
         });
         let generation = EngineGeneration::default();
-        (WriteSet { writes: Vec::new(), generation, completion }, done)
+        (WriteSet { partition: None, writes: Vec::new(), generation, completion }, done)
     }
 
     async fn fenced(&self, mut done: oneshot::Receiver<()>) -> Result<(), ServiceError> {

@@ -4,8 +4,10 @@
 mod commit;
 mod events;
 mod handles;
+mod transfer;
 
 pub(super) use commit::{Committer, EngineGeneration, FIRST_RETRY, Outage, WriteSet};
 pub(super) use events::Events;
 pub use events::{Event, EventFeed};
 pub(super) use handles::Handles;
+pub(super) use transfer::{TransferRequest, Transfers};

@@ -4,14 +4,14 @@
 //! the session that has been in it longest. Sessions that end, and long runs, are folded
 //! by their own commit.
 
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 
 use sqlx::AnyConnection;
 
 use super::{GroupCommit, Writer, put_progress};
-use crate::store::StoreError;
 use crate::store::journal::Journal;
 use crate::store::tail::Run;
+use crate::store::{PartitionId, StoreError};
 
 /// Smallest number of transactions in which a full journal is folded, so that each is
 /// short.
@@ -34,6 +34,15 @@ enum Destination {
 pub(super) struct Relocation {
     sessions: Vec<String>,
     to: Destination,
+}
+
+impl Relocation {
+    /// The partitions whose rows of the journal it changes: those of its sessions, and those
+    /// whose rows are not needed any more.
+    pub(super) fn partitions(&self, journal: &Journal) -> BTreeSet<PartitionId> {
+        let of_sessions = self.sessions.iter().filter_map(|id| journal.partition_of(id));
+        of_sessions.chain(journal.idle_partitions()).collect()
+    }
 }
 
 impl Writer {
@@ -125,11 +134,12 @@ impl GroupCommit<'_> {
     pub(super) async fn fold_ended(
         &mut self,
         db: &mut AnyConnection,
+        partition: PartitionId,
         session: &str,
     ) -> Result<(), StoreError> {
         let run = self.take_run(session)?;
         put_progress(db, run.as_slice()).await?;
-        let run = run.unwrap_or_else(|| Run::empty(session));
+        let run = run.unwrap_or_else(|| Run::empty(partition, session));
         self.tails.finish(db, &run).await?;
         self.changes.removed_sessions.insert(run.session);
         Ok(())
@@ -147,7 +157,10 @@ impl GroupCommit<'_> {
 
     async fn append(&mut self, db: &mut AnyConnection) -> Result<(), StoreError> {
         let runs = std::mem::take(&mut self.pending);
-        Journal::append(db, self.number, runs, &mut self.changes).await
+        let mut changes = std::mem::take(&mut self.changes);
+        let appended = Journal::append(db, runs, |p| self.journal_row(p), &mut changes).await;
+        self.changes = changes;
+        appended
     }
 
     async fn fold(
@@ -172,6 +185,7 @@ impl GroupCommit<'_> {
         db: &mut AnyConnection,
         relocation: &Relocation,
     ) -> Result<(), StoreError> {
+        let partitions = relocation.partitions(self.journal);
         match relocation.to {
             Destination::Chunks => self.fold(db, &relocation.sessions).await?,
             Destination::JournalEnd => {
@@ -183,6 +197,10 @@ impl GroupCommit<'_> {
                 self.append(db).await?;
             }
         }
-        self.journal.trim(db, self.number, &mut self.changes).await
+        for partition in partitions {
+            let next = self.journal_row(partition);
+            self.journal.trim(db, partition, next, &mut self.changes).await?;
+        }
+        Ok(())
     }
 }

@@ -1,0 +1,160 @@
+//! Forwards requests about an asset to the node that owns it, byte by byte, WebSockets
+//! included. A request is forwarded once: a node that gets it and is not the owner answers
+//! 503, and the client tries again.
+
+use axum::body::Body;
+use axum::extract::Request;
+use axum::http::header::{CONNECTION, HOST, TRANSFER_ENCODING, UPGRADE};
+use axum::http::request::Parts;
+use axum::http::uri::{PathAndQuery, Uri};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode};
+use axum::response::Response;
+use hyper_util::client::legacy::Client;
+use hyper_util::client::legacy::connect::HttpConnector;
+use hyper_util::rt::{TokioExecutor, TokioIo};
+use serde::Deserialize;
+use sha2::{Digest, Sha256};
+
+use super::Problem;
+use super::assets::MAX_ASSET_BYTES;
+use super::credential::client_address;
+use crate::service::{Route, Service, ServiceError};
+
+/// The header of a forwarded request, with the secret of the cluster.
+const FORWARDED: HeaderName = HeaderName::from_static("x-offbd-forwarded");
+
+/// The client's address in a forwarded request.
+const CLIENT: HeaderName = HeaderName::from_static("x-offbd-client");
+
+/// Sends requests to other nodes.
+#[derive(Clone)]
+pub(super) struct Forwarder {
+    client: Client<HttpConnector, Body>,
+}
+
+impl Default for Forwarder {
+    fn default() -> Self {
+        let mut connector = HttpConnector::new();
+        connector.set_nodelay(true);
+        Self { client: Client::builder(TokioExecutor::new()).build(connector) }
+    }
+}
+
+/// Whether a request comes from another node of the cluster.
+pub(super) fn is_forwarded(service: &Service, headers: &HeaderMap) -> bool {
+    let Some(secret) = service.cluster_secret() else { return false };
+    // Digests, so that the duration of the comparison tells nothing of the secret.
+    let digest = |text: &[u8]| Sha256::digest(text);
+    headers
+        .get(FORWARDED)
+        .is_some_and(|given| digest(given.as_bytes()) == digest(secret.as_bytes()))
+}
+
+/// The address of the client of a forwarded request.
+pub(super) fn original_client(headers: &HeaderMap) -> Option<std::net::IpAddr> {
+    headers.get(CLIENT)?.to_str().ok()?.parse().ok()
+}
+
+/// The name in the asset file of a request that registers an asset, and the request again.
+///
+/// # Errors
+/// A [`Problem`] if the file is too long or cannot be read.
+pub(super) async fn name_in_body(request: Request) -> Result<(Option<String>, Request), Problem> {
+    #[derive(Deserialize)]
+    struct Named {
+        name: String,
+    }
+    let (parts, body) = request.into_parts();
+    let bytes = axum::body::to_bytes(body, MAX_ASSET_BYTES).await.map_err(|_| {
+        let detail = "the asset file is too long, or the request ended early";
+        Problem::new(StatusCode::PAYLOAD_TOO_LARGE, "too-large", "Content too large", detail)
+    })?;
+    let named: Option<Named> = serde_json::from_slice(&bytes).ok();
+    let request = Request::from_parts(parts, Body::from(bytes));
+    Ok((named.map(|named| named.name), request))
+}
+
+impl Forwarder {
+    /// Sends `request` to the owner of `asset`, if that is another node; otherwise returns it.
+    ///
+    /// # Errors
+    /// A [`Problem`] if no node owns it at the moment, or the owner cannot be reached.
+    pub(super) async fn forward(
+        &self,
+        service: &Service,
+        asset: &str,
+        request: Request,
+    ) -> Result<Result<Response, Request>, Problem> {
+        let address = match service.route(asset) {
+            Route::Here => return Ok(Err(request)),
+            Route::Nowhere => return Err(ServiceError::Moving.into()),
+            Route::Node { address, .. } => address,
+        };
+        if is_forwarded(service, request.headers()) {
+            return Err(ServiceError::Moving.into());
+        }
+        metrics::counter!("offbd_requests_forwarded_total").increment(1);
+        let secret = service.cluster_secret().unwrap_or_default();
+        let (mut parts, body) = request.into_parts();
+        address_to(&mut parts, &address, secret)?;
+        let upgrade = parts.extensions.remove::<hyper::upgrade::OnUpgrade>();
+        let answer = self.client.request(Request::from_parts(parts, body)).await;
+        let answer = answer.map_err(|error| {
+            tracing::debug!(address, %error, "the owner of an asset cannot be reached");
+            Problem::from(ServiceError::Moving)
+        })?;
+        Ok(Ok(response(answer, upgrade)))
+    }
+}
+
+/// Changes the head of a request so that it goes to `address`.
+fn address_to(parts: &mut Parts, address: &str, secret: &str) -> Result<(), Problem> {
+    let moving = |_| Problem::from(ServiceError::Moving);
+    let path = parts.uri.path_and_query().map_or("/", PathAndQuery::as_str);
+    let uri: Uri = format!("http://{address}{path}").parse().map_err(moving)?;
+    if let Some(client) = client_address(parts)
+        && let Ok(client) = HeaderValue::from_str(&client.to_string())
+    {
+        parts.headers.insert(CLIENT, client);
+    }
+    if !parts.headers.contains_key(HOST)
+        && let Some(Ok(host)) = parts.uri.host().map(HeaderValue::from_str)
+    {
+        parts.headers.insert(HOST, host);
+    }
+    if !parts.headers.contains_key(UPGRADE) {
+        parts.headers.remove(CONNECTION);
+    }
+    parts.headers.remove(TRANSFER_ENCODING);
+    let secret = HeaderValue::from_str(secret).map_err(|_| ServiceError::Moving)?;
+    parts.headers.insert(FORWARDED, secret);
+    parts.uri = uri;
+    parts.version = axum::http::Version::HTTP_11;
+    if parts.method == Method::HEAD {
+        parts.headers.remove(axum::http::header::CONTENT_LENGTH);
+    }
+    Ok(())
+}
+
+/// The owner's answer as this node's. After an upgrade, copies bytes in both directions until
+/// one side ends.
+fn response(
+    mut answer: hyper::Response<hyper::body::Incoming>,
+    upgrade: Option<hyper::upgrade::OnUpgrade>,
+) -> Response {
+    if answer.status() == StatusCode::SWITCHING_PROTOCOLS
+        && let Some(client) = upgrade
+    {
+        let owner = hyper::upgrade::on(&mut answer);
+        tokio::spawn(async move {
+            let (Ok(client), Ok(owner)) = tokio::join!(client, owner) else { return };
+            let (mut client, mut owner) = (TokioIo::new(client), TokioIo::new(owner));
+            // Ends when one side is gone, which is no error.
+            let _ = tokio::io::copy_bidirectional(&mut client, &mut owner).await;
+        });
+    } else {
+        answer.headers_mut().remove(CONNECTION);
+    }
+    answer.headers_mut().remove(TRANSFER_ENCODING);
+    answer.map(Body::new)
+}

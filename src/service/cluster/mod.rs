@@ -1,0 +1,260 @@
+//! A node of a cluster: several processes share a PostgreSQL database, and each owns some
+//! partitions of the assets. The database decides who owns what (`store/write/ownership.rs`);
+//! this task looks at it several times a second, takes partitions without an owner, and hands
+//! partitions over.
+
+mod listen;
+mod plan;
+mod routes;
+
+use std::sync::{Arc, Weak};
+use std::time::{Duration, Instant};
+
+use tokio::sync::{Notify, mpsc};
+use tokio::task::JoinHandle;
+use tokio_util::sync::CancellationToken;
+
+use self::plan::OwnershipPlan;
+pub use self::routes::Route;
+pub(super) use self::routes::Routes;
+use super::asset::Shards;
+use super::ownership::Ownership;
+use super::start::Inner;
+use super::writing::{Handles, TransferRequest, Transfers};
+use super::{Service, ServiceError};
+use crate::store::{NodeIdentity, NodeRow, PartitionId};
+use crate::wire::cluster::{ClusterView, NodeView};
+
+/// How often a node looks at the partitions. A quarter of the time after which the server
+/// ends an idle connection.
+const LOOK_EVERY: Duration = Duration::from_millis(500);
+
+/// Longest time for handing all partitions over at a stop. Chosen: less than
+/// `limits.shutdown_s`.
+const LEAVE_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// Take-overs whose work waits to be continued. If there are more, the jobs of a partition
+/// stay queued until its next owner.
+const MAX_RESUMED: usize = 1024;
+
+/// What a process knows of its cluster.
+#[derive(Clone)]
+pub(in crate::service) struct Cluster {
+    pub(in crate::service) me: NodeIdentity,
+    pub(in crate::service) routes: Routes,
+    /// By which nodes know each other.
+    pub(in crate::service) secret: String,
+    /// Tells the task to look at once.
+    pub(in crate::service) poke: Arc<Notify>,
+    /// Cancelled when the node begins to stop.
+    pub(in crate::service) leaving: CancellationToken,
+    /// Cancelled once nothing is owned any more.
+    pub(in crate::service) left: CancellationToken,
+}
+
+impl Cluster {
+    pub(in crate::service) fn new(me: NodeIdentity, secret: String) -> Self {
+        Self {
+            me,
+            routes: Routes::default(),
+            secret,
+            poke: Arc::default(),
+            leaving: CancellationToken::new(),
+            left: CancellationToken::new(),
+        }
+    }
+}
+
+/// The background task of a node.
+pub(in crate::service) struct NodeTask {
+    pub(in crate::service) cluster: Cluster,
+    pub(in crate::service) handles: Handles,
+    pub(in crate::service) transfers: Transfers,
+    pub(in crate::service) shards: Shards,
+    /// Partitions that other nodes have taken.
+    pub(in crate::service) lost: mpsc::Receiver<PartitionId>,
+}
+
+/// Starts the tasks of a node on the current runtime.
+pub(in crate::service) fn spawn(task: NodeTask, service: &Service) -> Vec<JoinHandle<()>> {
+    let Inner { handles, events, .. } = &*service.inner;
+    let (resume, taken) = mpsc::channel(MAX_RESUMED);
+    let closing = handles.closing.clone();
+    vec![
+        tokio::spawn(listen::run(handles.clone(), task.cluster.clone(), events.clone())),
+        tokio::spawn(events.clone().read_all(closing.clone())),
+        tokio::spawn(resume_taken(Arc::downgrade(&service.inner), taken, closing)),
+        tokio::spawn(task.run(resume)),
+    ]
+}
+
+/// Continues the work of the former owners of partitions that were taken: interrupted
+/// imports are discarded, jobs queued again, and engines that are far behind rebuilt.
+async fn resume_taken(
+    service: Weak<Inner>,
+    mut taken: mpsc::Receiver<Vec<PartitionId>>,
+    closing: CancellationToken,
+) {
+    while let Some(Some(partitions)) = closing.run_until_cancelled(taken.recv()).await {
+        let Some(inner) = service.upgrade() else { return };
+        let service = Service { inner };
+        let resume = service.resume(Some(&partitions));
+        if let Some(Err(error)) = closing.run_until_cancelled(resume).await {
+            tracing::error!(%error, "cannot continue the work of partitions that were taken");
+        }
+    }
+}
+
+impl NodeTask {
+    /// Looks at the partitions until the service shuts down.
+    #[expect(clippy::disallowed_methods, reason = "partitions move by the time of this process")]
+    pub(in crate::service) async fn run(mut self, resume: mpsc::Sender<Vec<PartitionId>>) {
+        let started = Instant::now();
+        let mut plan = OwnershipPlan::new(self.cluster.me.id.clone());
+        let (cluster, closing) = (self.cluster.clone(), self.handles.closing.clone());
+        let mut deadline = None;
+        loop {
+            if cluster.leaving.is_cancelled() && deadline.is_none() {
+                deadline = Some(started.elapsed() + LEAVE_TIMEOUT);
+                plan.leave();
+                let left = self.transfers.call(TransferRequest::Leave).await;
+                left.unwrap_or_else(|error| tracing::warn!(%error, "cannot announce the stop"));
+            }
+            let looked = self.look(&mut plan, started.elapsed(), &resume).await;
+            if let Err(error) = looked {
+                tracing::warn!(%error, "cannot look at the partitions");
+            }
+            if let Some(deadline) = deadline
+                && (self.is_alone_or_empty() || started.elapsed() >= deadline)
+            {
+                break;
+            }
+            tokio::select! {
+                () = closing.cancelled() => break,
+                () = cluster.leaving.cancelled(), if deadline.is_none() => {}
+                Some(partition) = self.lost.recv() => self.drop_lost(partition).await,
+                () = cluster.poke.notified() => {}
+                () = tokio::time::sleep(LOOK_EVERY) => {}
+            }
+        }
+        cluster.left.cancel();
+    }
+
+    /// Whether this node owns nothing, or no other node could take what it owns.
+    fn is_alone_or_empty(&self) -> bool {
+        let staying = |(node, _): &(NodeRow, usize)| node.leaving == 0;
+        self.handles.ownership.owned().is_empty()
+            || !self.cluster.routes.nodes().iter().any(staying)
+    }
+
+    async fn drop_lost(&self, partition: PartitionId) {
+        self.shards.release(vec![partition], true).await;
+    }
+
+    async fn look(
+        &mut self,
+        plan: &mut OwnershipPlan,
+        now: Duration,
+        resume: &mpsc::Sender<Vec<PartitionId>>,
+    ) -> Result<(), ServiceError> {
+        let (nodes, partitions) = self.transfers.call(TransferRequest::Observe).await?;
+        self.cluster.routes.set(&nodes, &partitions);
+        // Before anything is taken again, the engines of what was lost must be gone.
+        while let Ok(partition) = self.lost.try_recv() {
+            self.drop_lost(partition).await;
+        }
+        let step = plan.step(now, &nodes, &partitions, &self.handles.ownership.owned());
+        if !step.hand_over.is_empty() {
+            self.hand_over(step.hand_over).await?;
+        }
+        if !step.take.is_empty() {
+            let taken =
+                self.transfers.call(|answer| TransferRequest::Take(step.take, answer)).await?;
+            metrics::counter!("offbd_partitions_taken_total").increment(taken.len() as u64);
+            if !taken.is_empty() {
+                tracing::info!(n = taken.len(), "partitions taken");
+                let (nodes, partitions) = self.transfers.call(TransferRequest::Observe).await?;
+                self.cluster.routes.set(&nodes, &partitions);
+                if resume.try_send(taken).is_err() {
+                    tracing::warn!("too many take-overs at a time; their jobs are not continued");
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Gives partitions up: takes no more requests for them, completes those under way, drops
+    /// the engines, and releases them.
+    async fn hand_over(&self, partitions: Vec<PartitionId>) -> Result<(), ServiceError> {
+        tracing::info!(n = partitions.len(), "handing partitions over");
+        let ownership: &Ownership = &self.handles.ownership;
+        partitions.iter().for_each(|partition| ownership.remove(*partition));
+        self.shards.release(partitions.clone(), false).await;
+        self.handles.fence_async().await?;
+        let n = partitions.len() as u64;
+        self.transfers.call(|answer| TransferRequest::Release(partitions, answer)).await?;
+        metrics::counter!("offbd_partitions_handed_over_total").increment(n);
+        Ok(())
+    }
+}
+
+impl Service {
+    /// Where requests about `asset` are answered.
+    #[must_use]
+    pub fn route(&self, asset: &str) -> Route {
+        let ownership = &self.inner.handles.ownership;
+        let Some(cluster) = &self.inner.cluster else { return Route::Here };
+        if ownership.owns(asset) {
+            return Route::Here;
+        }
+        cluster.routes.of(ownership.partition_of(asset), &cluster.me.id)
+    }
+
+    /// The number of partitions that this process owns.
+    #[must_use]
+    pub fn n_partitions_owned(&self) -> usize {
+        self.inner.handles.ownership.owned().len()
+    }
+
+    /// The nodes of the cluster and their partitions.
+    #[must_use]
+    pub fn cluster(&self) -> ClusterView {
+        let partitions = self.inner.handles.ownership.n_partitions();
+        let Some(cluster) = &self.inner.cluster else {
+            return ClusterView { nodes: Vec::new(), partitions, unowned: 0 };
+        };
+        let nodes = cluster.routes.nodes();
+        let n_owned: usize = nodes.iter().map(|(_, n)| n).sum();
+        let node = |(row, n): (NodeRow, usize)| NodeView {
+            answering: row.id == cluster.me.id,
+            name: row.name,
+            address: row.address,
+            version: row.version,
+            partitions: n,
+            leaving: row.leaving != 0,
+        };
+        let nodes = nodes.into_iter().map(node).collect();
+        ClusterView { nodes, partitions, unowned: partitions.saturating_sub(n_owned) }
+    }
+
+    /// Whether this process is a node of a cluster.
+    #[must_use]
+    pub fn is_node(&self) -> bool {
+        self.inner.cluster.is_some()
+    }
+
+    /// By which the nodes of a cluster know each other; `None` without a cluster.
+    #[must_use]
+    pub fn cluster_secret(&self) -> Option<&str> {
+        self.inner.cluster.as_ref().map(|cluster| cluster.secret.as_str())
+    }
+
+    /// Hands all partitions over to other nodes, if there are any; returns once they are
+    /// released, at the latest after 10 s.
+    pub async fn leave_cluster(&self) {
+        if let Some(cluster) = &self.inner.cluster {
+            cluster.leaving.cancel();
+            cluster.left.cancelled().await;
+        }
+    }
+}

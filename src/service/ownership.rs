@@ -1,0 +1,65 @@
+//! Which partitions this process owns. Without a cluster it owns all of them.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, PoisonError, RwLock};
+
+use crate::store::{PartitionId, Partitions};
+
+/// The owned partitions, each with its epoch. Cheap to clone; all clones share them.
+#[derive(Clone, Debug)]
+pub(in crate::service) struct Ownership {
+    partitions: Partitions,
+    epochs: Arc<RwLock<BTreeMap<PartitionId, i64>>>,
+}
+
+impl Ownership {
+    pub(in crate::service) fn new(partitions: Partitions, owned: Vec<(PartitionId, i64)>) -> Self {
+        Self { partitions, epochs: Arc::new(RwLock::new(owned.into_iter().collect())) }
+    }
+
+    pub(in crate::service) const fn n_partitions(&self) -> usize {
+        self.partitions.count() as usize
+    }
+
+    /// The partition of `asset`.
+    pub(in crate::service) fn partition_of(&self, asset: &str) -> PartitionId {
+        self.partitions.of(asset)
+    }
+
+    /// The epoch of the partition of `asset`; `None` if another process owns it, or none.
+    pub(in crate::service) fn epoch_of(&self, asset: &str) -> Option<i64> {
+        self.epoch(self.partition_of(asset))
+    }
+
+    /// The epoch of `partition`; `None` if another process owns it, or none.
+    pub(in crate::service) fn epoch(&self, partition: PartitionId) -> Option<i64> {
+        self.epochs.read().unwrap_or_else(PoisonError::into_inner).get(&partition).copied()
+    }
+
+    /// The owned partitions as a filter for queries; `None` if all are.
+    pub(in crate::service) fn filter(&self) -> Option<Vec<PartitionId>> {
+        (!self.is_whole()).then(|| self.owned())
+    }
+
+    pub(in crate::service) fn owns(&self, asset: &str) -> bool {
+        self.epoch_of(asset).is_some()
+    }
+
+    pub(in crate::service) fn owned(&self) -> Vec<PartitionId> {
+        self.epochs.read().unwrap_or_else(PoisonError::into_inner).keys().copied().collect()
+    }
+
+    /// Whether this process owns all partitions.
+    pub(in crate::service) fn is_whole(&self) -> bool {
+        let n = self.epochs.read().unwrap_or_else(PoisonError::into_inner).len();
+        n == self.partitions.count() as usize
+    }
+
+    pub(in crate::service) fn add(&self, partition: PartitionId, epoch: i64) {
+        self.epochs.write().unwrap_or_else(PoisonError::into_inner).insert(partition, epoch);
+    }
+
+    pub(in crate::service) fn remove(&self, partition: PartitionId) {
+        self.epochs.write().unwrap_or_else(PoisonError::into_inner).remove(&partition);
+    }
+}

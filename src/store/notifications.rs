@@ -1,0 +1,46 @@
+//! Notifications of PostgreSQL: that a partition has another owner, or that there are events.
+
+use sqlx::postgres::PgListener;
+
+use super::{EVENTS, Location, Store, StoreError, TRANSFERS};
+
+/// What has changed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Notification {
+    Transfer,
+    Event,
+    /// Anything may have changed: the connection was lost for a while.
+    Unknown,
+}
+
+/// A connection that receives notifications.
+#[derive(Debug)]
+pub struct Notifications(PgListener);
+
+impl Notifications {
+    /// Waits for the next notification. Connects again if the connection was lost. Cancel
+    /// safe.
+    ///
+    /// # Errors
+    /// [`StoreError`] if the database is unavailable.
+    pub async fn next(&mut self) -> Result<Notification, StoreError> {
+        Ok(match self.0.try_recv().await? {
+            Some(received) if received.channel() == TRANSFERS => Notification::Transfer,
+            Some(_) => Notification::Event,
+            None => Notification::Unknown,
+        })
+    }
+}
+
+impl Store {
+    /// Subscribes to the notifications of a PostgreSQL database; `None` for SQLite.
+    ///
+    /// # Errors
+    /// [`StoreError`] if the database is unavailable.
+    pub async fn notifications(&self) -> Result<Option<Notifications>, StoreError> {
+        let Location::Server(url) = &self.location else { return Ok(None) };
+        let mut listener = PgListener::connect(url).await?;
+        listener.listen_all([TRANSFERS, EVENTS]).await?;
+        Ok(Some(Notifications(listener)))
+    }
+}

@@ -1,0 +1,498 @@
+//! The partitions of a writer, and the fence that keeps others from changing them.
+//!
+//! PostgreSQL decides who owns a partition: its owner holds an advisory lock on the
+//! connection with which it writes. The server releases the lock when that connection ends:
+//! at once if the process is killed, after [`IDLE_TIMEOUT`] if it is stopped or cut off. So
+//! a process whose lock another one has taken has no connection left on which a transaction
+//! of it could end. The epoch is the proof beside it: each owner increments it before it
+//! reads anything, and every transaction of the former owner finds another epoch.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use data_encoding::HEXLOWER;
+use sqlx::{AnyConnection, AssertSqlSafe, Executor};
+use uuid::Uuid;
+
+use super::{Writer, WriterRole};
+use crate::store::from_row::from_row;
+use crate::store::multi_row::{MultiRowStatement, in_parts};
+use crate::store::partition::PartitionRow;
+use crate::store::writer_lock::{self, Backend};
+use crate::store::{Location, MIGRATIONS, PartitionId, Partitions, Store, StoreError, TRANSFERS};
+
+/// The first key of the advisory locks of partitions; the second is the partition.
+const PARTITION_LOCKS: i32 = i32::from_be_bytes(*b"part");
+
+/// After this long without a statement the server ends the connection of a node's writer.
+/// Chosen: four times the interval at which a node looks at the partitions.
+const IDLE_TIMEOUT: &str = "2s";
+
+/// After this long within a transaction without a statement the server ends the connection.
+/// Chosen: much longer than the work between two statements.
+const IDLE_IN_TRANSACTION_TIMEOUT: &str = "1s";
+
+/// A process of a cluster.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NodeIdentity {
+    /// Unique for each start of a process.
+    pub id: String,
+    pub name: String,
+    /// Where other nodes reach it, `HOST:PORT`.
+    pub address: String,
+    pub version: String,
+}
+
+/// A node whose connection the database server has.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct NodeRow {
+    pub id: String,
+    pub name: String,
+    pub address: String,
+    pub version: String,
+    /// 1 once it hands its partitions over.
+    pub leaving: i64,
+}
+
+from_row!(NodeRow { id, name, address, version, leaving });
+
+/// What a writer knows of a partition that it owns.
+#[derive(Clone, Copy, Debug)]
+struct OwnedPartition {
+    epoch: i64,
+    /// Transactions that the database has committed and counted.
+    n_commits: i64,
+}
+
+/// The partitions that a writer may change.
+#[derive(Debug, Default)]
+pub(super) struct OwnedPartitions {
+    by_id: BTreeMap<PartitionId, OwnedPartition>,
+    /// Those that were lost and not asked for yet.
+    lost: Vec<PartitionId>,
+}
+
+impl OwnedPartitions {
+    pub(super) fn contains(&self, partition: PartitionId) -> bool {
+        self.by_id.contains_key(&partition)
+    }
+
+    pub(super) fn first(&self) -> Option<PartitionId> {
+        self.by_id.keys().next().copied()
+    }
+
+    pub(super) fn n_commits(&self, partition: PartitionId) -> i64 {
+        self.by_id.get(&partition).map_or(0, |owned| owned.n_commits)
+    }
+
+    /// Counts a committed transaction in each of `partitions`.
+    pub(super) fn count_commit(&mut self, partitions: &BTreeSet<PartitionId>) {
+        for partition in partitions {
+            if let Some(owned) = self.by_id.get_mut(partition) {
+                owned.n_commits += 1;
+            }
+        }
+    }
+
+    /// Counts the transaction `db` in each of `partitions`. The last statement before its
+    /// commit.
+    ///
+    /// # Errors
+    /// [`StoreError::Overtaken`] if another node has taken a partition;
+    /// [`StoreError::UnexpectedCommits`] if there are other transactions than this writer's.
+    pub(super) async fn fence(
+        &self,
+        db: &mut AnyConnection,
+        partitions: &BTreeSet<PartitionId>,
+    ) -> Result<(), StoreError> {
+        static COUNT: MultiRowStatement = MultiRowStatement::new(
+            "UPDATE partition SET n_commits = n_commits + 1 FROM (VALUES ",
+            3,
+            ") AS mine WHERE id = mine.column1 AND epoch = mine.column2
+             AND n_commits = mine.column3",
+        );
+        let counted: Vec<_> =
+            partitions.iter().filter_map(|p| self.by_id.get(p).map(|owned| (*p, *owned))).collect();
+        let mut n_counted = 0;
+        for part in in_parts(&counted) {
+            let mut query = sqlx::query(COUNT.sql(part.len()));
+            for (partition, OwnedPartition { epoch, n_commits }) in part {
+                query = query.bind(partition.bound()).bind(epoch).bind(n_commits);
+            }
+            n_counted += query.execute(&mut *db).await?.rows_affected();
+        }
+        if n_counted == partitions.len() as u64 {
+            return Ok(());
+        }
+        let rows = read(db).await?;
+        let (mut overtaken, mut unexpected) = (Vec::new(), None);
+        for (partition, mine) in counted {
+            match rows.get(&partition) {
+                Some(row) if row.epoch == mine.epoch && row.n_commits == mine.n_commits => {}
+                Some(row) if row.epoch == mine.epoch => {
+                    unexpected = Some((mine.n_commits, row.n_commits));
+                }
+                _ => overtaken.push(partition),
+            }
+        }
+        match unexpected {
+            Some((expected, found)) if overtaken.is_empty() => {
+                Err(StoreError::UnexpectedCommits { expected, found })
+            }
+            _ => Err(StoreError::Overtaken { partitions: overtaken }),
+        }
+    }
+}
+
+/// How many partitions the database has.
+pub(super) async fn count(db: &mut AnyConnection) -> Result<Partitions, StoreError> {
+    let n: i64 = sqlx::query_scalar("SELECT COUNT(*) FROM partition").fetch_one(db).await?;
+    Ok(Partitions::new(u32::try_from(n).unwrap_or(u32::MAX)))
+}
+
+/// All partitions as stored.
+async fn read(db: &mut AnyConnection) -> Result<BTreeMap<PartitionId, PartitionRow>, StoreError> {
+    let rows: Vec<PartitionRow> =
+        sqlx::query_as("SELECT * FROM partition ORDER BY id").fetch_all(db).await?;
+    Ok(rows.into_iter().map(|row| (row.partition(), row)).collect())
+}
+
+/// Takes the lock of `partition`; returns whether it was free.
+async fn try_lock(db: &mut AnyConnection, partition: PartitionId) -> Result<bool, StoreError> {
+    let lock = "SELECT CASE WHEN pg_try_advisory_lock($1, $2) THEN 1 ELSE 0 END";
+    let lock = sqlx::query_scalar(lock).bind(PARTITION_LOCKS).bind(partition.0.cast_signed());
+    let is_locked: i32 = lock.fetch_one(db).await?;
+    Ok(is_locked == 1)
+}
+
+async fn unlock(db: &mut AnyConnection, partition: PartitionId) -> Result<(), StoreError> {
+    sqlx::query("SELECT pg_advisory_unlock($1, $2)")
+        .bind(PARTITION_LOCKS)
+        .bind(partition.0.cast_signed())
+        .execute(db)
+        .await?;
+    Ok(())
+}
+
+/// A new secret of a cluster: 256 random bits.
+fn secret() -> Result<String, StoreError> {
+    let mut bytes = [0; 32];
+    getrandom::fill(&mut bytes).map_err(|error| sqlx::Error::Io(std::io::Error::other(error)))?;
+    Ok(HEXLOWER.encode(&bytes))
+}
+
+/// Tells the other nodes that something has changed, once the transaction is committed.
+pub(super) async fn notify(
+    db: &mut AnyConnection,
+    channel: &'static str,
+) -> Result<(), StoreError> {
+    db.execute(AssertSqlSafe(format!("SELECT pg_notify('{channel}', '')"))).await?;
+    Ok(())
+}
+
+impl Writer {
+    /// Opens the database as a node of a cluster, which owns no partition yet. The first node
+    /// brings the schema to this version and divides the assets into `partitions`.
+    pub(in crate::store) async fn open_node(
+        location: &Location,
+        node: NodeIdentity,
+        partitions: Partitions,
+    ) -> Result<Self, StoreError> {
+        let prepared = Self::prepare(location, partitions).await;
+        // Another node is there already.
+        if !matches!(prepared, Ok(()) | Err(StoreError::InUse)) {
+            prepared?;
+        }
+        let (mut connection, backend) = location.writer(WriterRole::Node, None).await?;
+        let found: i64 = sqlx::query_scalar("SELECT MAX(version) FROM _sqlx_migrations")
+            .fetch_one(&mut connection)
+            .await?;
+        let expected = MIGRATIONS.iter().map(|m| m.version).max().unwrap_or_default();
+        if found != expected {
+            return Err(StoreError::Schema { found, expected });
+        }
+        let found = count(&mut connection).await?;
+        if found != partitions {
+            let (found, expected) = (found.count(), partitions.count());
+            return Err(StoreError::PartitionCount { found, expected });
+        }
+        let mut this = Self::connected(location, WriterRole::Node, connection, backend).await?;
+        this.node = Some(node);
+        let Some(mut connection) = this.connection.take() else { return Ok(this) };
+        this.register(&mut connection).await?;
+        this.connection = Some(connection);
+        Ok(this)
+    }
+
+    /// Brings the schema to this version and divides the assets into partitions, unless
+    /// another process uses the database.
+    async fn prepare(location: &Location, partitions: Partitions) -> Result<(), StoreError> {
+        let (connection, backend) = location.writer_if_free().await?;
+        let mut this = Self::connected(location, WriterRole::Main, connection, backend).await?;
+        if this.partitions == Partitions::ONE && partitions != Partitions::ONE {
+            this.take(&[PartitionId(0)]).await?;
+            this.fold_all().await?;
+            this.divide(partitions).await?;
+        }
+        if let Some(connection) = &mut this.connection {
+            sqlx::query(
+                "INSERT INTO cluster (id, secret) SELECT $1, $2
+                 WHERE NOT EXISTS (SELECT 1 FROM cluster)",
+            )
+            .bind(Uuid::now_v7().to_string())
+            .bind(secret()?)
+            .execute(connection)
+            .await?;
+        }
+        this.close().await
+    }
+
+    /// Divides the assets of the only partition, whose journal is empty.
+    async fn divide(&mut self, partitions: Partitions) -> Result<(), StoreError> {
+        static PUT: MultiRowStatement = MultiRowStatement::new(
+            "UPDATE asset SET partition = moved.column2 FROM (VALUES ",
+            2,
+            ") AS moved WHERE name = moved.column1",
+        );
+        let Some(connection) = &mut self.connection else {
+            return Err(sqlx::Error::PoolClosed.into());
+        };
+        let mut transaction = sqlx::Connection::begin(connection).await?;
+        for partition in partitions.all().skip(1) {
+            sqlx::query("INSERT INTO partition (id, epoch, n_commits) VALUES ($1, 0, 0)")
+                .bind(partition.bound())
+                .execute(&mut *transaction)
+                .await?;
+        }
+        let names: Vec<String> =
+            sqlx::query_scalar("SELECT name FROM asset").fetch_all(&mut *transaction).await?;
+        for part in in_parts(&names) {
+            let mut query = sqlx::query(PUT.sql(part.len()));
+            for name in part {
+                query = query.bind(name).bind(partitions.of(name).bound());
+            }
+            query.execute(&mut *transaction).await?;
+        }
+        transaction.commit().await?;
+        self.partitions = partitions;
+        Ok(())
+    }
+
+    /// Stores which connection this node writes with, and forgets nodes that are gone.
+    async fn register(&mut self, db: &mut AnyConnection) -> Result<(), StoreError> {
+        let (Some(node), Some(backend)) = (&self.node, &self.backend) else { return Ok(()) };
+        let settings = format!(
+            "SET idle_session_timeout = '{IDLE_TIMEOUT}';
+             SET idle_in_transaction_session_timeout = '{IDLE_IN_TRANSACTION_TIMEOUT}'"
+        );
+        db.execute(AssertSqlSafe(settings)).await?;
+        sqlx::query(
+            "INSERT INTO node (id, name, address, version, leaving, pid, started)
+             VALUES ($1, $2, $3, $4, 0, $5, $6)
+             ON CONFLICT (id) DO UPDATE SET pid = excluded.pid, started = excluded.started",
+        )
+        .bind(&node.id)
+        .bind(&node.name)
+        .bind(&node.address)
+        .bind(&node.version)
+        .bind(i64::from(backend.pid))
+        .bind(&backend.started)
+        .execute(&mut *db)
+        .await?;
+        let forget = "DELETE FROM node WHERE id NOT IN
+             (SELECT owner FROM partition WHERE owner IS NOT NULL) AND NOT EXISTS
+             (SELECT 1 FROM pg_stat_activity a
+              WHERE a.pid = node.pid AND CAST(a.backend_start AS TEXT) = node.started)";
+        sqlx::query(forget).execute(db).await?;
+        Ok(())
+    }
+
+    /// The partitions that were lost since the last call: others have taken them.
+    pub fn lost(&mut self) -> Vec<PartitionId> {
+        std::mem::take(&mut self.owned.lost)
+    }
+
+    /// The partitions that this writer owns, each with its epoch.
+    #[must_use]
+    pub fn owned(&self) -> Vec<(PartitionId, i64)> {
+        self.owned.by_id.iter().map(|(partition, owned)| (*partition, owned.epoch)).collect()
+    }
+
+    pub(super) fn lose(&mut self, partitions: &[PartitionId]) {
+        for partition in partitions {
+            if self.owned.by_id.remove(partition).is_some() {
+                self.owned.lost.push(*partition);
+            }
+            self.journal.forget(*partition);
+        }
+        self.tails.forget_all();
+    }
+
+    /// Takes those of `partitions` that have no owner, and reads their journal. Returns which.
+    ///
+    /// # Errors
+    /// [`StoreError`]; then none is taken.
+    pub async fn take(
+        &mut self,
+        partitions: &[PartitionId],
+    ) -> Result<Vec<PartitionId>, StoreError> {
+        let Some(mut connection) = self.connection.take() else {
+            return Err(sqlx::Error::PoolClosed.into());
+        };
+        let taken = self.take_on(&mut connection, partitions).await;
+        if taken.is_ok() {
+            self.connection = Some(connection);
+        }
+        taken
+    }
+
+    async fn take_on(
+        &mut self,
+        db: &mut AnyConnection,
+        partitions: &[PartitionId],
+    ) -> Result<Vec<PartitionId>, StoreError> {
+        let owner = self.node.as_ref().map(|node| node.id.clone());
+        let mut taken = Vec::new();
+        for &partition in partitions {
+            if self.role == WriterRole::Node && !try_lock(db, partition).await? {
+                continue;
+            }
+            let take = "UPDATE partition SET epoch = epoch + 1, owner = $2 WHERE id = $1
+                        RETURNING epoch, n_commits";
+            let (epoch, n_commits): (i64, i64) = sqlx::query_as(take)
+                .bind(partition.bound())
+                .bind(&owner)
+                .fetch_one(&mut *db)
+                .await?;
+            taken.push((partition, OwnedPartition { epoch, n_commits }));
+        }
+        let ids: Vec<_> = taken.iter().map(|(partition, _)| *partition).collect();
+        self.journal.load(db, &ids).await?;
+        self.owned.by_id.extend(taken);
+        if self.role == WriterRole::Node && !ids.is_empty() {
+            notify(db, TRANSFERS).await?;
+        }
+        Ok(ids)
+    }
+
+    /// Gives partitions up, of which nothing is to be written any more.
+    ///
+    /// # Errors
+    /// [`StoreError`]; then the server releases them when it ends the connection.
+    pub async fn release(&mut self, partitions: &[PartitionId]) -> Result<(), StoreError> {
+        let Some(mut connection) = self.connection.take() else {
+            return Err(sqlx::Error::PoolClosed.into());
+        };
+        for partition in partitions {
+            let Some(owned) = self.owned.by_id.remove(partition) else { continue };
+            self.journal.forget(*partition);
+            sqlx::query("UPDATE partition SET owner = NULL WHERE id = $1 AND epoch = $2")
+                .bind(partition.bound())
+                .bind(owned.epoch)
+                .execute(&mut connection)
+                .await?;
+            unlock(&mut connection, *partition).await?;
+        }
+        self.tails.forget_all();
+        notify(&mut connection, TRANSFERS).await?;
+        self.connection = Some(connection);
+        Ok(())
+    }
+
+    /// Says that this node hands its partitions over, so that it gets none any more.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub async fn leave(&mut self) -> Result<(), StoreError> {
+        let (Some(node), Some(connection)) = (&self.node, &mut self.connection) else {
+            return Ok(());
+        };
+        sqlx::query("UPDATE node SET leaving = 1 WHERE id = $1")
+            .bind(&node.id)
+            .execute(&mut *connection)
+            .await?;
+        notify(connection, TRANSFERS).await
+    }
+
+    /// Reads which nodes are alive and who owns which partition. Also keeps the connection
+    /// from being idle.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub async fn observe(&mut self) -> Result<(Vec<NodeRow>, Vec<PartitionRow>), StoreError> {
+        let Some(connection) = &mut self.connection else {
+            return Err(sqlx::Error::PoolClosed.into());
+        };
+        let nodes = sqlx::query_as(
+            "SELECT id, name, address, version, leaving FROM node WHERE EXISTS
+             (SELECT 1 FROM pg_stat_activity a
+              WHERE a.pid = node.pid AND CAST(a.backend_start AS TEXT) = node.started)
+             ORDER BY id",
+        );
+        let nodes = nodes.fetch_all(&mut *connection).await?;
+        let partitions = sqlx::query_as("SELECT * FROM partition ORDER BY id");
+        Ok((nodes, partitions.fetch_all(&mut *connection).await?))
+    }
+
+    /// After connecting again: which partitions are still owned. Returns whether the
+    /// transaction in doubt was committed.
+    pub(super) async fn own_again(&mut self, db: &mut AnyConnection) -> Result<bool, StoreError> {
+        if self.role == WriterRole::Auxiliary {
+            return Ok(false);
+        }
+        self.register(db).await?;
+        let mut locked = BTreeSet::new();
+        for &partition in self.owned.by_id.keys() {
+            if self.role == WriterRole::Main || try_lock(db, partition).await? {
+                locked.insert(partition);
+            }
+        }
+        let rows = read(db).await?;
+        let (mut lost, mut was_committed) = (Vec::new(), false);
+        for (&partition, mine) in &self.owned.by_id {
+            let found = rows.get(&partition).cloned().unwrap_or_default();
+            let is_mine = found.epoch == mine.epoch && locked.contains(&partition);
+            if !is_mine && self.role == WriterRole::Node {
+                lost.push(partition);
+            } else if is_mine && found.n_commits == mine.n_commits {
+            } else if is_mine
+                && found.n_commits == mine.n_commits + 1
+                && self.in_doubt.as_ref().is_some_and(|doubt| doubt.partitions.contains(&partition))
+            {
+                was_committed = true;
+            } else {
+                let (expected, found) = (mine.n_commits, found.n_commits);
+                return Err(StoreError::UnexpectedCommits { expected, found });
+            }
+        }
+        for partition in lost.iter().filter(|partition| locked.contains(partition)) {
+            unlock(db, *partition).await?;
+        }
+        self.lose(&lost);
+        Ok(was_committed)
+    }
+}
+
+impl Store {
+    /// By which the nodes of the cluster know each other.
+    ///
+    /// # Errors
+    /// [`StoreError`] if the database fails.
+    pub async fn cluster_secret(&self) -> Result<String, StoreError> {
+        Ok(sqlx::query_scalar("SELECT secret FROM cluster").fetch_one(&self.pool).await?)
+    }
+}
+
+impl Location {
+    /// Opens a connection as the only writer of a PostgreSQL database, if there is no other.
+    async fn writer_if_free(&self) -> Result<(AnyConnection, Option<Backend>), StoreError> {
+        self.check_free().await?;
+        self.writer(WriterRole::Main, None).await
+    }
+
+    async fn check_free(&self) -> Result<(), StoreError> {
+        let mut connection = self.writer(WriterRole::Auxiliary, None).await?.0;
+        let is_free = writer_lock::is_free(&mut connection).await?;
+        sqlx::Connection::close(connection).await?;
+        if is_free { Ok(()) } else { Err(StoreError::InUse) }
+    }
+}

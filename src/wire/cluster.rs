@@ -1,0 +1,31 @@
+//! Views of a cluster.
+
+use serde::Serialize;
+use utoipa::ToSchema;
+
+/// The nodes of a cluster and their partitions.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, ToSchema)]
+pub struct ClusterView {
+    /// The nodes that are alive.
+    pub nodes: Vec<NodeView>,
+    /// Number of partitions.
+    pub partitions: usize,
+    /// Partitions without an owner that is alive. Requests about their assets are answered
+    /// with 503 until a node has taken them.
+    pub unowned: usize,
+}
+
+/// A node of a cluster.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, ToSchema)]
+pub struct NodeView {
+    pub name: String,
+    /// Where other nodes reach it, `HOST:PORT`.
+    pub address: String,
+    pub version: String,
+    /// Number of partitions that it owns.
+    pub partitions: usize,
+    /// Whether it hands its partitions over to stop.
+    pub leaving: bool,
+    /// Whether it is the node that answers.
+    pub answering: bool,
+}

@@ -1,0 +1,284 @@
+//! Several nodes on one PostgreSQL database: any of them answers, those that are killed,
+//! stopped or paused lose nothing, and none writes what it does not own any more.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::Command;
+
+use reqwest::Method;
+use serde_json::{Value, json};
+
+use crate::support::device::{DeviceLoad, Random};
+use crate::support::postgres::Postgres;
+use crate::support::process::{Process, Refusal, ended};
+use crate::support::{Client, Events, batch, eventually, judged, registration, rig};
+
+const N_NODES: usize = 3;
+const N_PARTITIONS: u64 = 16;
+
+/// Faults of the long test, unless the environment variable FAULTS is set.
+const FAULTS: usize = 6;
+
+/// A cluster of processes, and the database server that they share.
+struct Cluster {
+    postgres: Postgres,
+    data: tempfile::TempDir,
+    nodes: Vec<Option<Process>>,
+}
+
+impl Cluster {
+    async fn start() -> Self {
+        let (postgres, data) = (Postgres::new(), tempfile::tempdir().unwrap());
+        let mut this = Self { postgres, data, nodes: Vec::new() };
+        for i in 0..N_NODES {
+            let node = this.try_node(i, &[]).unwrap_or_else(|Refusal { log, .. }| panic!("{log}"));
+            this.nodes.push(Some(node));
+        }
+        this.settled(N_NODES).await;
+        this
+    }
+
+    fn url(&self) -> String {
+        self.postgres.database("cluster")
+    }
+
+    fn try_node(&self, i: usize, settings: &[(&str, &str)]) -> Result<Process, Refusal> {
+        let (name, url, partitions) = (format!("node-{i}"), self.url(), N_PARTITIONS.to_string());
+        let mut environment = BTreeMap::from([
+            ("OFFBD_DATABASE", url.as_str()),
+            ("OFFBD_CLUSTER__NAME", &name),
+            ("OFFBD_CLUSTER__LISTEN", "127.0.0.1:0"),
+            ("OFFBD_CLUSTER__PARTITIONS", &partitions),
+        ]);
+        environment.extend(settings.iter().copied());
+        let environment: Vec<_> =
+            environment.iter().map(|(key, value)| (*key, Path::new(value))).collect();
+        Process::try_start(self.data.path(), &environment)
+    }
+
+    fn restart(&mut self, i: usize) {
+        let node = self.try_node(i, &[]).unwrap_or_else(|Refusal { log, .. }| panic!("{log}"));
+        self.nodes[i] = Some(node);
+    }
+
+    fn client(&self, i: usize) -> Client {
+        self.nodes[i].as_ref().unwrap().client.clone()
+    }
+
+    fn clients(&self) -> Vec<Client> {
+        self.nodes.iter().flatten().map(|node| node.client.clone()).collect()
+    }
+
+    /// Waits until `n` nodes know each other and every partition has an owner.
+    async fn settled(&self, n: usize) {
+        for client in self.clients() {
+            eventually(|| async {
+                let cluster = try_get(&client, "cluster").await?;
+                let n_nodes = cluster["nodes"].as_array()?.len();
+                (n_nodes == n && cluster["unowned"] == 0).then_some(())
+            })
+            .await;
+        }
+    }
+
+    fn signal(&self, i: usize, signal: &str) {
+        let pid = self.nodes[i].as_ref().unwrap().child.id().to_string();
+        assert!(Command::new("kill").args([signal, &pid]).status().unwrap().success());
+    }
+
+    /// Waits until the other nodes own everything.
+    async fn taken_over_from(&self, i: usize) {
+        let name = format!("node-{i}");
+        let other = self.client((i + 1) % N_NODES);
+        eventually(|| async {
+            let cluster = try_get(&other, "cluster").await?;
+            let nodes = cluster["nodes"].as_array()?;
+            let is_gone = nodes.iter().all(|node| node["name"] != name.as_str());
+            (is_gone && cluster["unowned"] == 0).then_some(())
+        })
+        .await;
+    }
+}
+
+async fn try_get(client: &Client, path: &str) -> Option<Value> {
+    let answer = client.request(Method::GET, path).send().await.ok()?;
+    (answer.status() == 200).then_some(answer)?.json().await.ok()
+}
+
+/// Sends a request again until it is not refused because an asset moves.
+async fn call(client: &Client, method: Method, path: &str, body: &Value) -> (u16, Value) {
+    eventually(|| async {
+        let answer = client.request(method.clone(), path).json(body).send().await.ok()?;
+        let status = answer.status().as_u16();
+        if status == 503 {
+            assert_eq!(answer.headers()["retry-after"], "1");
+            return None;
+        }
+        Some((status, answer.json().await.unwrap_or_default()))
+    })
+    .await
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn any_node_answers_for_every_asset() {
+    let cluster = Cluster::start().await;
+    let samples = rig(1500, 500);
+    let (hash, faults) = judged("rig-0", &samples);
+    assert!(!faults.is_empty());
+    let feed = cluster.client(2).request(Method::GET, "events").send().await.unwrap();
+    let mut events = Events::new(feed);
+    for i in 0..6 {
+        // Registered, filled, looked at and ended through different nodes.
+        let asset = format!("rig-{i}");
+        let at = |n: usize| cluster.client((i + n) % N_NODES);
+        let made = call(&at(0), Method::POST, "assets", &registration(&asset)).await;
+        assert_eq!(made.0, 201, "{made:?}");
+        for (n, part) in samples.chunks(500).enumerate() {
+            let path = format!("assets/{asset}/telemetry");
+            let (status, ack) = call(&at(n), Method::POST, &path, &batch(Some("s"), part)).await;
+            assert_eq!((status, &ack["accepted"]), (200, &json!(part.len())), "{ack}");
+        }
+        let state = at(1).get(&format!("assets/{asset}/state")).await.expect(200);
+        assert_eq!(state["samples"], samples.len(), "{state}");
+        let sessions = at(2).get(&format!("sessions?asset={asset}")).await.expect(200);
+        let id = sessions["items"][0]["id"].as_str().unwrap().to_owned();
+        let ended = call(&at(1), Method::POST, &format!("sessions/{id}/end"), &Value::Null).await;
+        assert_eq!(ended.1["verdict"]["faults"], json!(faults), "{ended:?}");
+        if i == 0 {
+            assert_eq!(ended.1["verdict"]["verdict_hash"], hash);
+        }
+        let recording = at(2).recording(&asset, "s").await;
+        assert_eq!(recording, samples);
+        let known = at(0).get(&format!("assets/{asset}/faults?status=all")).await.expect(200);
+        assert!(!known["items"].as_array().unwrap().is_empty());
+    }
+    let fleet = cluster.client(1).get("fleet").await.expect(200);
+    assert_eq!(fleet["items"].as_array().unwrap().len(), 6);
+    // One node tells of the events of all, each once and in order.
+    let stored = cluster.client(0).get("faults?status=all").await.expect(200);
+    let assets: std::collections::BTreeSet<_> =
+        stored["items"].as_array().unwrap().iter().map(|f| f["asset"].to_string()).collect();
+    assert_eq!(assets.len(), 6);
+    let (mut last, mut seen) = (0, std::collections::BTreeSet::new());
+    while seen.len() < 6 {
+        let event = events.next().await;
+        let id = event["id"].as_i64().unwrap();
+        assert_eq!(id, last + 1, "no gap, none twice");
+        last = id;
+        seen.insert(event["asset"].to_string());
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn nodes_that_are_killed_paused_and_stopped_lose_nothing() {
+    let n_faults = std::env::var("FAULTS").map_or(FAULTS, |n| n.parse().unwrap());
+    let mut cluster = Cluster::start().await;
+    let load = DeviceLoad::start(4, &cluster.client(0), cluster.data.path(), Some(&cluster.url()));
+    let mut random = Random(7);
+    let mut n_by_kind = BTreeMap::<&str, usize>::new();
+    for fault in 0..n_faults {
+        load.link.wait_for_samples(random.below(400) as u64 + 50).await;
+        let node = random.below(N_NODES);
+        let other = (node + 1 + random.below(N_NODES - 1)) % N_NODES;
+        let kind = ["kill", "pause", "stop"][fault % 3];
+        *n_by_kind.entry(kind).or_default() += 1;
+        match kind {
+            "kill" => {
+                cluster.nodes[node] = None;
+                load.link.set_service(&cluster.client(other));
+                cluster.restart(node);
+            }
+            "pause" => {
+                cluster.signal(node, "-STOP");
+                load.link.set_service(&cluster.client(other));
+                cluster.taken_over_from(node).await;
+                cluster.signal(node, "-CONT");
+            }
+            _ => {
+                load.link.set_service(&cluster.client(other));
+                let mut stopped = cluster.nodes[node].take().unwrap();
+                stopped.terminate();
+                assert!(ended(&mut stopped.child).await.success(), "{}", stopped.log());
+                cluster.restart(node);
+            }
+        }
+        // After each fault everything goes on, through each node.
+        load.link.set_service(&cluster.client(random.below(N_NODES)));
+        load.link.wait_for_samples(50).await;
+    }
+    let samples = load.link.acknowledged();
+    let laps = load.stop().await;
+    println!("{n_by_kind:?}; {laps} recordings, {samples} samples: each stored once");
+    cluster.settled(N_NODES).await;
+    let taken: f64 = sum_of(&cluster, "offbd_partitions_taken_total").await;
+    assert!(taken > 0.0);
+}
+
+async fn sum_of(cluster: &Cluster, metric: &str) -> f64 {
+    let mut sum = 0.0;
+    for client in cluster.clients() {
+        let text = client.get("/metrics").await.text;
+        let values = text.lines().filter_map(|line| line.strip_prefix(metric));
+        sum += values.filter_map(|value| value.trim().parse::<f64>().ok()).sum::<f64>();
+    }
+    sum
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_paused_node_is_refused_when_it_wakes_up_and_takes_part_again() {
+    let cluster = Cluster::start().await;
+    let samples = rig(900, 300);
+    // Many assets, so that the paused node owns some.
+    let names: Vec<_> = (0..12).map(|i| format!("rig-{i}")).collect();
+    for name in &names {
+        call(&cluster.client(0), Method::POST, "assets", &registration(name)).await;
+        let path = format!("assets/{name}/telemetry");
+        let first = batch(Some("s"), &samples[..300]);
+        assert_eq!(call(&cluster.client(0), Method::POST, &path, &first).await.0, 200);
+    }
+    cluster.signal(1, "-STOP");
+    cluster.taken_over_from(1).await;
+    for name in &names {
+        let path = format!("assets/{name}/telemetry");
+        let second = batch(Some("s"), &samples[300..600]);
+        assert_eq!(call(&cluster.client(0), Method::POST, &path, &second).await.0, 200);
+    }
+    cluster.signal(1, "-CONT");
+    // The node that was paused may believe that it owns what it owned. Its engines have not
+    // seen the second batch: nothing that they say may be stored or answered.
+    for name in &names {
+        let path = format!("assets/{name}/telemetry");
+        let third = batch(Some("s"), &samples[600..]);
+        let (status, ack) = call(&cluster.client(1), Method::POST, &path, &third).await;
+        assert_eq!((status, &ack["accepted"]), (200, &json!(300)), "{ack}");
+    }
+    cluster.settled(N_NODES).await;
+    for name in &names {
+        let recording = cluster.client(2).recording(name, "s").await;
+        assert_eq!(recording, samples, "{name}");
+        let session = cluster.client(1).end(name, "s").await;
+        assert_eq!(session["verdict"]["verdict_hash"], judged(name, &samples).0);
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn what_does_not_belong_to_the_cluster_is_refused() {
+    let cluster = Cluster::start().await;
+    let refusal = |settings: &[(&str, &str)]| match cluster.try_node(9, settings) {
+        Ok(_) => panic!("{settings:?} is accepted"),
+        Err(Refusal { log, .. }) => log,
+    };
+    let log = refusal(&[("OFFBD_CLUSTER__PARTITIONS", "32")]);
+    assert!(log.contains("divided into 16 partitions, and `cluster.partitions` is 32"), "{log}");
+    let log = refusal(&[("OFFBD_DATABASE", "sqlite:/nowhere/x.sqlite")]);
+    assert!(log.contains("`cluster` needs a PostgreSQL database"), "{log}");
+    let log = refusal(&[("OFFBD_CLUSTER__NAME", "a b")]);
+    assert!(log.contains("`cluster.name` must be 1 to 64 letters"), "{log}");
+    let log = refusal(&[("OFFBD_CLUSTER__LISTEN", "0.0.0.0:0")]);
+    assert!(log.contains("`cluster.advertise` is missing"), "{log}");
+    // A process that works alone would not know of the partitions' owners.
+    let url = cluster.url();
+    let alone = Process::try_start(cluster.data.path(), &[("OFFBD_DATABASE", Path::new(&url))]);
+    let Err(Refusal { log, .. }) = alone else { panic!("it starts beside the cluster") };
+    assert!(log.contains("another process uses this database"), "{log}");
+}
