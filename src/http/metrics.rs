@@ -146,8 +146,13 @@ fn initialize_series() {
     };
     for name in [
         "offbd_commit_failures_total",
+        "offbd_commits_overtaken_total",
         "offbd_commits_total",
         "offbd_connections_refused_total",
+        "offbd_partitions_handed_over_total",
+        "offbd_partitions_lost_total",
+        "offbd_partitions_taken_total",
+        "offbd_requests_forwarded_total",
         "offbd_streams_cut_off_total",
     ] {
         counter!(name).absolute(0);

@@ -443,7 +443,7 @@ impl Writer {
             ownership::notify(&mut transaction, EVENTS).await?;
         }
         if !partitions.is_empty() {
-            self.owned.fence(&mut transaction, &partitions).await?;
+            self.owned.fence(&mut transaction, &partitions, self.role).await?;
             self.in_doubt = Some(InDoubt { partitions, journal });
         }
         #[cfg(test)]

@@ -71,10 +71,14 @@ impl OwnershipPlan {
                 Some(owner) if *owner == self.me && !owned.contains(&partition) => {
                     step.take.push(partition);
                 }
-                Some(owner) if *owner == self.me && wanted.is_some() && !is_wanted => {
-                    if self.leaving || is_settled && step.hand_over.len() < HANDED_OVER_AT_ONCE {
-                        step.hand_over.push(partition);
-                    }
+                Some(owner)
+                    if *owner == self.me
+                        && wanted.is_some()
+                        && !is_wanted
+                        && (self.leaving
+                            || is_settled && step.hand_over.len() < HANDED_OVER_AT_ONCE) =>
+                {
+                    step.hand_over.push(partition);
                 }
                 _ => {}
             }
@@ -101,6 +105,7 @@ fn weight(node: &NodeRow, partition: PartitionId) -> ([u8; 32], &str) {
 #[cfg(test)]
 mod tests {
     use std::collections::{BTreeMap, BTreeSet};
+    use std::slice::from_ref;
 
     use proptest::prelude::*;
 
@@ -378,7 +383,7 @@ mod tests {
         let other = NodeRow { id: "b".to_owned(), name: "b".to_owned(), ..NodeRow::default() };
         let now = Duration::ZERO;
         let owned = [PartitionId(0)];
-        assert_eq!(plan.step(now, &[me.clone()], &[row.clone()], &owned), OwnershipStep::default());
+        assert_eq!(plan.step(now, from_ref(&me), from_ref(&row), &owned), OwnershipStep::default());
         let step = plan.step(now, &[me, other], &[row], &owned);
         assert_eq!(step.hand_over, [PartitionId(0)]);
     }

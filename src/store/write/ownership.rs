@@ -97,12 +97,14 @@ impl OwnedPartitions {
     /// commit.
     ///
     /// # Errors
-    /// [`StoreError::Overtaken`] if another node has taken a partition;
+    /// [`StoreError::Overtaken`] if another node has taken a partition, which does not happen to
+    /// a writer that works alone;
     /// [`StoreError::UnexpectedCommits`] if there are other transactions than this writer's.
     pub(super) async fn fence(
         &self,
         db: &mut AnyConnection,
         partitions: &BTreeSet<PartitionId>,
+        role: WriterRole,
     ) -> Result<(), StoreError> {
         static COUNT: MultiRowStatement = MultiRowStatement::new(
             "UPDATE partition SET n_commits = n_commits + 1 FROM (VALUES ",
@@ -128,7 +130,7 @@ impl OwnedPartitions {
         for (partition, mine) in counted {
             match rows.get(&partition) {
                 Some(row) if row.epoch == mine.epoch && row.n_commits == mine.n_commits => {}
-                Some(row) if row.epoch == mine.epoch => {
+                Some(row) if row.epoch == mine.epoch || role == WriterRole::Main => {
                     unexpected = Some((mine.n_commits, row.n_commits));
                 }
                 _ => overtaken.push(partition),
@@ -162,6 +164,22 @@ async fn try_lock(db: &mut AnyConnection, partition: PartitionId) -> Result<bool
     let lock = sqlx::query_scalar(lock).bind(PARTITION_LOCKS).bind(partition.0.cast_signed());
     let is_locked: i32 = lock.fetch_one(db).await?;
     Ok(is_locked == 1)
+}
+
+/// Increments the epoch of `partition`. In a transaction of its own, because the error of an
+/// implicit commit is not reported once there is a row.
+async fn begin_epoch(
+    db: &mut AnyConnection,
+    partition: PartitionId,
+    owner: Option<&str>,
+) -> Result<OwnedPartition, StoreError> {
+    let mut transaction = sqlx::Connection::begin(db).await?;
+    let take = "UPDATE partition SET epoch = epoch + 1, owner = $2 WHERE id = $1
+                RETURNING epoch, n_commits";
+    let taken = sqlx::query_as(take).bind(partition.bound()).bind(owner);
+    let (epoch, n_commits) = taken.fetch_one(&mut *transaction).await?;
+    transaction.commit().await?;
+    Ok(OwnedPartition { epoch, n_commits })
 }
 
 async fn unlock(db: &mut AnyConnection, partition: PartitionId) -> Result<(), StoreError> {
@@ -356,14 +374,7 @@ impl Writer {
             if self.role == WriterRole::Node && !try_lock(db, partition).await? {
                 continue;
             }
-            let take = "UPDATE partition SET epoch = epoch + 1, owner = $2 WHERE id = $1
-                        RETURNING epoch, n_commits";
-            let (epoch, n_commits): (i64, i64) = sqlx::query_as(take)
-                .bind(partition.bound())
-                .bind(&owner)
-                .fetch_one(&mut *db)
-                .await?;
-            taken.push((partition, OwnedPartition { epoch, n_commits }));
+            taken.push((partition, begin_epoch(db, partition, owner.as_deref()).await?));
         }
         let ids: Vec<_> = taken.iter().map(|(partition, _)| *partition).collect();
         self.journal.load(db, &ids).await?;

@@ -120,7 +120,8 @@ impl ServiceFixture {
     /// Locks the store against writes until the lock is released or dropped.
     pub async fn lock_store(&self) -> StoreLock {
         let mut store = self.store().await;
-        let words = if on_postgres() { "BEGIN; LOCK TABLE counter, partition" } else { "BEGIN IMMEDIATE" };
+        let words =
+            if on_postgres() { "BEGIN; LOCK TABLE counter, partition" } else { "BEGIN IMMEDIATE" };
         store.execute(words).await.unwrap();
         StoreLock { store }
     }
