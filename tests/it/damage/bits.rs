@@ -172,7 +172,9 @@ impl Stopped {
         if let Some(bit) = bit {
             bytes[bit / 8] ^= 1 << (bit % 8);
         }
-        for end in ["sqlite-wal", "sqlite-shm"] {
+        // Another file, because SQLite shares what it knows of the log among the connections of
+        // a process to one file, and some may still be closing.
+        for end in ["sqlite", "sqlite-wal", "sqlite-shm"] {
             let _ = std::fs::remove_file(self.file.with_extension(end));
         }
         std::fs::write(&self.file, bytes).unwrap();
