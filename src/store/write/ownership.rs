@@ -215,10 +215,10 @@ impl Writer {
         node: NodeIdentity,
         partitions: Partitions,
     ) -> Result<Self, StoreError> {
-        let prepared = Self::prepare(location, partitions).await;
-        // Another node is there already.
-        if !matches!(prepared, Ok(()) | Err(StoreError::InUse)) {
-            prepared?;
+        match Self::prepare(location, partitions).await {
+            // Another node is there already.
+            Ok(()) | Err(StoreError::InUse) => {}
+            Err(error) => return Err(error),
         }
         let (mut connection, backend) = location.writer(WriterRole::Node, None).await?;
         let found: i64 = sqlx::query_scalar("SELECT MAX(version) FROM _sqlx_migrations")
