@@ -42,8 +42,9 @@ export function MonitorRow({ monitor }: { monitor: Monitor }) {
         {Math.round(share * 100)} %
       </meter>
       <span class="quiet">{resultText(monitor)}</span>
-      <span class="ready" title={readiness} aria-label={readiness}>
-        {complete_this_cycle ? "✓" : ""}
+      <span class="ready" title={readiness}>
+        <span aria-hidden="true">{complete_this_cycle ? "✓" : ""}</span>
+        <span class="hidden">{readiness}</span>
       </span>
     </li>
   );
