@@ -160,6 +160,11 @@ pub struct FleetEntryView {
     /// until a sample arrives, the time at which the latest session was opened or ended;
     /// null without a session.
     pub last_seen: Option<String>,
+    /// Whether a session is open in which no sample has arrived for ten seconds, by the
+    /// service's clock.
+    #[serde(default)]
+    #[schema(required)]
+    pub silent: bool,
     /// Delay of the last batch, relative to the smallest delay of a batch in the session, s;
     /// null until a batch arrives.
     pub lag_s: Option<f64>,
@@ -195,6 +200,15 @@ pub struct FleetFaultView {
     pub kind: Option<KindWord>,
     /// `pending` or `confirmed`.
     pub status: StatusWord,
+    /// Whether the last result of its test is a failure; false for a fault on record whose
+    /// test passes again.
+    #[serde(default)]
+    #[schema(required)]
+    pub failing: bool,
+    /// Time at which the service judged the sample at which the test last began to fail,
+    /// RFC 3339; null if unknown.
+    #[serde(default)]
+    pub failed_at: Option<String>,
     /// Whether the current occurrence has been acknowledged.
     pub acknowledged: bool,
     /// Time at which the record last changed, RFC 3339.

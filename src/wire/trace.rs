@@ -5,16 +5,25 @@ use utoipa::ToSchema;
 
 use offbd_core::diagnosis::AxisEvidence;
 use offbd_core::engine::State;
-use offbd_core::vocabulary::Axis;
+use offbd_core::vocabulary::{Axis, FaultCode};
 
 /// The judged quantities over an interval of a session, for charts: columns of equal length.
 /// All values but the times are rounded to seven digits.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct TraceView {
     /// Times, s on the device's clock.
     pub t_s: Vec<f64>,
     pub x: AxisTraceView,
     pub y: AxisTraceView,
+    /// Every how many judged moments the columns have one; 1 if they have all of them.
+    pub stride: u64,
+}
+
+impl Default for TraceView {
+    fn default() -> Self {
+        let (x, y) = Default::default();
+        Self { t_s: Vec::new(), x, y, stride: 1 }
+    }
 }
 
 /// The quantities along one axis over time. A value that is unknown is null.
@@ -37,6 +46,8 @@ pub struct AxisTraceView {
     pub limit_m_s2: Vec<f32>,
     /// Whether the enable condition holds.
     pub enabled: Vec<bool>,
+    /// Fault detection counter of the servo's monitor, −128 (passed) to 127 (failed).
+    pub counter: Vec<i8>,
 }
 
 /// One moment of a trace.
@@ -52,6 +63,7 @@ struct AxisTracePoint {
     evidence: AxisEvidence,
     plate_angle_rad: f64,
     twin_position_m: f64,
+    counter: i8,
 }
 
 impl TracePoint {
@@ -65,6 +77,7 @@ impl TracePoint {
             evidence: state.evidence.axes[axis],
             plate_angle_rad: state.plate_angle_rad[axis],
             twin_position_m: state.twin_position_m[axis],
+            counter: state.monitors[FaultCode::servo(axis) as usize].counter,
         };
         Some(Self { t_s: at.seconds(), x: of_axis(Axis::X), y: of_axis(Axis::Y) })
     }
@@ -97,6 +110,7 @@ impl AxisTraceView {
         self.twin_m_s2.push(single(evidence.twin_m_s2));
         self.limit_m_s2.push(evidence.limit_m_s2 as f32);
         self.enabled.push(evidence.enabled);
+        self.counter.push(point.counter);
     }
 }
 

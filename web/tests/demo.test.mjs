@@ -1,7 +1,7 @@
 // The demo: a fault is injected by a button, shown live, explained, repaired and cleared.
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
-import { ask, browser, demo, page } from "./support.mjs";
+import { ask, browser, demo, page, SOON } from "./support.mjs";
 
 let show, chromium;
 
@@ -48,6 +48,10 @@ test("a fault is shown within two seconds of its event, on the pages of the flee
     rig.getByRole("list", { name: "Active faults" }).getByText("Y servo").waitFor({ timeout: 2000 }),
   ]);
   assert.equal(line.asset, "demo-rig");
+  // The banner says what is wrong and since when.
+  const banner = rig.getByRole("list", { name: "Active faults" }).getByRole("link", { name: /Y servo/ });
+  await banner.getByText("no power: the plate returns to zero").waitFor();
+  await banner.getByText(/failing now since \d/).waitFor();
   await rig.getByText("failed", { exact: true }).waitFor();
   for (const view of [fleet, rig, buttons]) {
     assert.deepEqual(view.errors, []);
@@ -77,7 +81,16 @@ test("a fault is shown within two seconds of its event, on the pages of the flee
   await rig.getByRole("button", { name: "Acknowledge" }).click();
   await rig.getByText("ada acknowledged it").waitFor();
   await ask(show.url, "DELETE", "/demo/faults");
+  // After the repair the fault is on record, and its sentence stays the headline.
+  const headline = await rig.locator(".sentence").textContent();
+  await rig.getByText("Its test passes again since").waitFor({ timeout: 3 * SOON });
+  assert.equal(await rig.locator(".sentence").textContent(), headline);
+  await rig.getByText("on record, passes again, acknowledged").waitFor();
+  await rig.getByText("passes its test again").first().waitFor();
   await rig.getByRole("button", { name: "Clear" }).click();
+  await rig.getByRole("dialog").getByRole("button", { name: "Cancel" }).click();
+  await rig.getByRole("button", { name: "Clear" }).click();
+  await rig.getByRole("dialog").getByRole("button", { name: "Clear" }).click();
   await rig.getByText("Nothing is on record").waitFor();
   await rig.getByText("ada cleared it").waitFor();
   assert.deepEqual(rig.errors, []);
@@ -94,6 +107,7 @@ test("the script resumes, and the demo continues after a visitor ends the sessio
   await session.getByText("demo-").waitFor();
   const before = await session.textContent();
   await view.getByRole("button", { name: "End session" }).click();
+  await view.getByRole("dialog").getByRole("button", { name: "End session" }).click();
   await view.waitForFunction((was) => {
     const now = [...document.querySelectorAll("dt")].find((dt) => dt.textContent === "Session").nextSibling
       .textContent;

@@ -137,9 +137,9 @@ for (const colorScheme of ["light", "dark"]) {
 test("an unknown rig, fault or session gives a message", async () => {
   const view = await page(chromium);
   for (const [path, words] of [
-    ["/rigs/nobody", "there is no asset `nobody`"],
-    ["/rigs/bench/faults/none", "no such fault code"],
-    ["/sessions/none", "there is no session `none`"],
+    ["/rigs/nobody", "There is no such rig"],
+    ["/rigs/bench/faults/none", "There is no such fault"],
+    ["/sessions/none", "There is no such session"],
   ]) {
     await view.goto(service.url + path);
     await view.getByRole("alert").getByText(words).waitFor();

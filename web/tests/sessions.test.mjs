@@ -45,6 +45,11 @@ test("a foreign file is mapped, its wrong sign detected and corrected, and it is
   await view.goto(`${service.url}/sessions`);
   await view.locator("input[type=file]").setInputFiles(file);
   const dialogue = view.getByRole("dialog");
+  // No rig is proposed: a stranger's file must not go to the first one of the alphabet.
+  assert.equal(await dialogue.getByLabel("Rig").inputValue(), "");
+  await dialogue.getByText("Choose the rig.").waitFor();
+  assert.ok(await dialogue.getByRole("button", { name: /^Import/ }).isDisabled());
+  await dialogue.getByLabel("Rig").fill("bench");
   await dialogue.getByText("the ball goes the other way").waitFor();
   for (const [role, unit] of [
     ["Time", "ms"],
@@ -80,8 +85,16 @@ test("a dropped file opens the dialogue; a file that is not a recording is refus
       },
       [name, text],
     );
-  await drop("numbers.csv", "0,1,2,3\n1,2,3,4\n2,3,4,5\n");
-  await view.getByRole("alert").getByText("it should have the names of the columns").waitFor();
+  await drop("letter.csv", "Dear all,\nno recording.\nYours\n");
+  await view.getByRole("alert").getByText("No line has three or more columns").waitFor();
+  await view.keyboard.press("Escape");
+  await view.getByRole("dialog").waitFor({ state: "detached" });
+
+  // Times that are dates: nothing can be imported, and no rig is registered.
+  await drop("dates.csv", "t_s,x_m,y_m\n2026-03-01T10:00:00.020,0,0\n2026-03-01T10:00:00.040,0,0\n");
+  await view.getByRole("dialog").getByLabel("Rig").fill("stranger");
+  await view.getByText("The column of the time has no numbers").waitFor();
+  assert.ok(await view.getByRole("button", { name: /^Import 0 rows/ }).isDisabled());
   await view.keyboard.press("Escape");
   await view.getByRole("dialog").waitFor({ state: "detached" });
   await drop("dropped.csv", rig.sick);

@@ -42,16 +42,22 @@ test("described, connected, corrected, learnt", async () => {
   const view = await page(chromium);
   await view.goto(`${service.url}/set-up`);
   await view.getByLabel("Name").fill("bench 1");
-  assert.ok(
-    await view.getByRole("button", { name: "Register and continue" }).isDisabled(),
-    "a name with a blank",
-  );
+  await view.getByRole("button", { name: "Register and continue" }).click();
+  const isValid = () => view.getByLabel("Name").evaluate((field) => field.validity.valid);
+  assert.equal(await isValid(), false, "a name with a blank is marked by the browser");
+  await view.getByLabel("Mass").fill("");
+  await view.getByLabel("Mass").press("Enter");
+  assert.equal(await view.getByLabel("Mass").evaluate((field) => field.validity.valid), false);
+  assert.match(view.url(), /set-up$/, "nothing was registered");
+  await view.getByLabel("Mass").fill("51");
   await view.getByLabel("Name").fill("bench-1");
   await view.getByLabel("Ball's position").selectOption({ label: "mm" });
-  await view.getByRole("button", { name: "Register and continue" }).click();
+  assert.equal(await isValid(), true);
+  await view.getByLabel("Mass").press("Enter");
   await view.getByText("Waiting for the first sample").waitFor();
   for (const word of ["curl", "Python", "Arduino / ESP32"]) {
     await view.getByRole("button", { name: word, exact: true }).click();
+    await view.getByLabel(`${word} snippet`).getByText("mm", { exact: false }).first().waitFor();
     await view.getByLabel(`${word} snippet`).getByText("/api/v1/assets/bench-1/telemetry").first().waitFor();
   }
   const send = (from, to) =>
@@ -79,7 +85,7 @@ test("described, connected, corrected, learnt", async () => {
   await device(() => false);
   await view.getByText("recording", { exact: false }).first().waitFor();
   await view.getByRole("checkbox").first().check();
-  await view.getByRole("button", { name: "Learn from it" }).click();
+  await view.getByRole("button", { name: /Learn from it|End the recording and learn/ }).click();
   await view.getByText("The next session is judged by it.").waitFor();
   const learnt = await ask(service.url, "GET", "/assets/bench-1");
   assert.ok(
@@ -107,7 +113,7 @@ test("a recording without motion is refused with a message", async () => {
   const view = await page(chromium);
   await view.goto(`${service.url}/rigs/still/set-up?step=learn`);
   await view.getByRole("checkbox").first().check();
-  await view.getByRole("button", { name: "Learn from it" }).click();
+  await view.getByRole("button", { name: /Learn from it|End the recording and learn/ }).click();
   await view.getByRole("alert").waitFor();
   assert.ok((await view.getByRole("alert").textContent()).length > 20);
   assert.deepEqual(view.errors, []);

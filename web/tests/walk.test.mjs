@@ -65,6 +65,7 @@ test("from the demo to the explanation of a fault", async () => {
   await press("acknowledge", "button", "Acknowledge");
   await view.locator("dt:text-is('Acknowledged') + dd").getByText("ada").waitFor();
   await press("clear", "button", "Clear");
+  await view.getByRole("dialog").getByRole("button", { name: "Clear" }).click();
   await view.locator("dt:text-is('Cleared') + dd").getByText("ada").waitFor();
 
   await press("Set up", "link");

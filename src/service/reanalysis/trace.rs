@@ -114,7 +114,7 @@ impl Decimator {
     }
 
     fn view(&self) -> TraceView {
-        let mut view = TraceView::default();
+        let mut view = TraceView { stride: self.stride, ..TraceView::default() };
         self.points.iter().for_each(|point| view.push(point));
         view
     }
@@ -128,7 +128,7 @@ mod tests {
     use offbd_core::vocabulary::SimTime;
     use proptest::prelude::*;
 
-    fn thinned(most: u32, times_s: impl Iterator<Item = f64>) -> Vec<f64> {
+    fn thinned(most: u32, times_s: impl Iterator<Item = f64>) -> TraceView {
         let mut decimator = Decimator::new(most, 0.0);
         for t_s in times_s {
             let at = SimTime::new(t_s);
@@ -136,24 +136,25 @@ mod tests {
             let state = State { at, evidence, ..State::default() };
             decimator.push(TracePoint::of(&state).unwrap());
         }
-        decimator.view().t_s
+        decimator.view()
     }
 
     #[test]
     fn a_gap_in_time_does_not_increase_the_number_of_points() {
         let dense = (0..10_000).map(|i| f64::from(i) * 0.01);
-        let all = thinned(500, dense.chain([1e9]));
+        let all = thinned(500, dense.chain([1e9])).t_s;
         assert!((250..=500).contains(&all.len()), "{}", all.len());
     }
 
     proptest! {
         #[test]
         fn the_points_are_within_the_limit_and_evenly_spread(most in 1..60_u32, n in 1..2000_u32) {
-            let kept = thinned(most, (0..n).map(f64::from));
+            let TraceView { t_s: kept, stride, .. } = thinned(most, (0..n).map(f64::from));
             prop_assert!(kept.len() <= most as usize);
             prop_assert!(kept.len() >= (n.min(most) as usize).div_ceil(2));
             let steps: Vec<f64> = kept.windows(2).map(|w| w[1] - w[0]).collect();
-            prop_assert!(steps.windows(2).all(|w| w[0] == w[1]), "{:?}", kept);
+            prop_assert!(steps.iter().all(|&step| step == stride as f64), "{:?}", kept);
+            prop_assert_eq!(stride == 1, kept.len() == n as usize);
         }
     }
 }

@@ -8,8 +8,11 @@ use crate::service::{Service, ServiceError, views};
 use crate::store::{AssetRow, FaultRow, Micros, SessionRow, WarningRow};
 use crate::wire::asset::AssetView;
 use crate::wire::service::{FleetEntryView, FleetFaultView, Page, unjudged_view};
-use crate::wire::stored::StoredRecord;
+use crate::wire::stored::{StoredProvenance, StoredRecord};
 use crate::wire::trend::TrendWarningView;
+
+/// Time without a sample after which a rig with an open session counts as silent.
+const SILENT_AFTER: Micros = 10_000_000;
 
 /// The stored data of a page of assets, by asset name.
 struct FleetData {
@@ -88,9 +91,10 @@ impl Service {
             calibrated: file.calibration.is_some(),
             learning: learning.state(file.calibration.is_some()),
             session_id: open.as_ref().map(|open| open.id.clone()),
-            session: open.map(|open| open.name),
+            session: open.as_ref().map(|open| open.name.clone()),
             samples: u64::try_from(progress.n_samples).unwrap_or_default(),
             last_t_s: progress.last_t_s,
+            silent: open.is_some() && is_silent(seen, self.inner.handles.clock.now()),
             last_seen: seen.map(rfc3339),
             lag_s: presence.as_ref().map(|p| p.lag_s),
             unjudged: presence.and_then(|p| p.unjudged).map(unjudged_view),
@@ -99,13 +103,37 @@ impl Service {
     }
 }
 
+/// Whether a rig with an open session, whose last sample arrived at `seen_at`, is silent at `now`.
+fn is_silent(seen_at: Option<Micros>, now: Micros) -> bool {
+    seen_at.is_none_or(|seen_at| now.saturating_sub(seen_at) >= SILENT_AFTER)
+}
+
 fn fault(row: FaultRow) -> Result<FleetFaultView, ServiceError> {
     let stored: StoredRecord = views::from_json(&row.record)?;
+    let provenance: StoredProvenance = views::from_json(&row.provenance)?;
+    let record = stored.record().map_err(ServiceError::corrupt)?;
     Ok(FleetFaultView {
         code: stored.code,
         kind: stored.kind,
         status: views::word(&row.status)?,
+        failing: record.status.test_failed(),
+        failed_at: provenance.last_occurrence.map(|occurrence| occurrence.noted_at),
         acknowledged: row.acknowledged != 0,
         changed_at: rfc3339(row.changed_at),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rig_is_silent_ten_seconds_after_its_last_sample() {
+        let now = 1_000_000_000;
+        assert!(!is_silent(Some(now), now));
+        assert!(!is_silent(Some(now - SILENT_AFTER + 1), now));
+        assert!(is_silent(Some(now - SILENT_AFTER), now));
+        assert!(!is_silent(Some(now + 5), now), "a clock that was set back");
+        assert!(is_silent(None, now), "no sample at all");
+    }
 }

@@ -26,8 +26,11 @@ export async function failure(response: Response): Promise<ProblemError> {
 /** Whether the service requires a valid token. */
 export const isUnauthenticated = (error: unknown) => error instanceof ProblemError && error.status === 401;
 
+/** Whether what was asked for does not exist. */
+export const isNotFound = (error: unknown) => error instanceof ProblemError && error.status === 404;
+
 /** Whether the service could not be reached or did not answer in time. */
-function isUnreachable(error: unknown): boolean {
+export function isUnreachable(error: unknown): boolean {
   return error instanceof TypeError || (error instanceof DOMException && error.name === "TimeoutError");
 }
 

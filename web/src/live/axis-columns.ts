@@ -13,6 +13,8 @@ export interface AxisColumns {
   residual: Column;
   limit: Column;
   limitBelow: Column;
+  /** Fault detection counter of the servo's monitor, −128 to 127. */
+  counter: Column;
   enabled: boolean[];
 }
 
@@ -28,6 +30,7 @@ export const emptyColumns = (): AxisColumns => ({
   residual: [],
   limit: [],
   limitBelow: [],
+  counter: [],
   enabled: [],
 });
 
@@ -48,6 +51,7 @@ export function appendTrace(to: AxisColumns, from: Trace["x"], n: number): void 
     to.residual.push(difference(from.measured_m_s2[i], from.twin_m_s2[i]));
     to.limit.push(limit);
     to.limitBelow.push(limit === null ? null : -limit);
+    to.counter.push(from.counter[i] ?? null);
     to.enabled.push(from.enabled[i] ?? false);
   }
 }

@@ -1,4 +1,4 @@
-/** Dimensions of a rig for drawings; missing ones are those of the book chapter's rig. */
+/** Dimensions of a rig for drawings; missing ones are the service's defaults. */
 import type { Asset } from "../api/types";
 
 export interface PlateSize {

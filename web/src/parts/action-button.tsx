@@ -1,20 +1,22 @@
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
 import { errorText } from "../api/request";
+import { useRefusal, type NeededRole } from "./login/rights";
 
 interface Props {
   action: () => Promise<unknown>;
   children: ComponentChildren;
   class?: string;
   disabled?: boolean;
-  /** The accessible name, if the text alone is not sufficient. */
-  label?: string;
+  /** The role that the action needs: for others the button is disabled and says so. */
+  needs?: NeededRole;
 }
 
 /** A button that is disabled while its action runs and shows the error of the action. */
-export function ActionButton({ action, children, class: className, disabled, label }: Props) {
+export function ActionButton({ action, children, class: className, disabled, needs }: Props) {
   const [isBusy, setBusy] = useState(false);
   const [error, setError] = useState<unknown>();
+  const refused = useRefusal(needs);
   const isMounted = useRef(true);
   useEffect(() => () => void (isMounted.current = false), []);
   const run = async () => {
@@ -32,9 +34,9 @@ export function ActionButton({ action, children, class: className, disabled, lab
       <button
         type="button"
         class={className}
-        disabled={isBusy || disabled}
+        disabled={isBusy || disabled || refused !== undefined}
+        title={refused}
         aria-busy={isBusy}
-        aria-label={label}
         onClick={run}
       >
         {children}

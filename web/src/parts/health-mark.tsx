@@ -3,10 +3,13 @@ import type { RigHealth } from "../words/severity";
 const MARKS: Record<RigHealth, { symbol: string; word: string }> = {
   fault: { symbol: "▲", word: "fault" },
   suspect: { symbol: "◆", word: "suspected" },
+  recorded: { symbol: "△", word: "on record" },
   drift: { symbol: "◇", word: "drifting" },
   untested: { symbol: "◌", word: "not tested" },
+  unlearnt: { symbol: "◌", word: "not learnt" },
   ok: { symbol: "●", word: "no fault" },
   silent: { symbol: "○", word: "silent" },
+  unknown: { symbol: "○", word: "not known" },
   idle: { symbol: "○", word: "no session" },
 };
 

@@ -1,6 +1,7 @@
 /** A list of which only the visible rows are in the document. */
 import type { ComponentChildren } from "preact";
-import { useEffect, useRef, useState } from "preact/hooks";
+import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
+import { rememberedScroll } from "../router/navigation";
 
 /** Number of rows above and below the visible ones that are also in the document. */
 const OVERSCAN = 6;
@@ -33,6 +34,11 @@ export function VirtualList<T>({ items, rowHeight, label, row, id }: Props<T>) {
       removeEventListener("resize", measure);
     };
   }, [rowHeight, items.length]);
+  // Back on the page, the list is as long as before only now, so that the browser could not scroll to its place.
+  useLayoutEffect(() => {
+    const scroll = rememberedScroll();
+    if (scroll !== undefined) scrollTo(0, scroll);
+  }, []);
   const [first, last] = range;
   return (
     <div

@@ -1,5 +1,5 @@
 import type { ComponentChildren } from "preact";
-import { navigate } from "./navigation";
+import { navigate, rememberScroll } from "./navigation";
 
 type Props = { to: string; children: ComponentChildren; class?: string; "aria-current"?: "page" };
 
@@ -9,6 +9,7 @@ export function Link({ to, children, ...rest }: Props) {
     const hasModifier = event.metaKey || event.ctrlKey || event.shiftKey || event.altKey;
     if (event.button !== 0 || hasModifier) return;
     event.preventDefault();
+    rememberScroll();
     navigate(to);
     scrollTo(0, 0);
   };

@@ -9,6 +9,14 @@ export function navigate(path: string, replace = false): void {
   dispatchEvent(new Event(NAVIGATED));
 }
 
+/** Remembers with the present address how far the page is scrolled, for the way back. */
+export function rememberScroll(): void {
+  history.replaceState({ scroll: scrollY }, "");
+}
+
+/** How far the page at this address was scrolled when it was left, px; undefined if it is new. */
+export const rememberedScroll = () => (history.state as { scroll?: number } | null)?.scroll;
+
 /** The current address: the decoded segments of its path, and its query. */
 export function useLocation(): { segments: string[]; query: URLSearchParams } {
   const [address, setAddress] = useState(location.pathname + location.search);

@@ -31,6 +31,18 @@ const isFaultCode = (code: string): code is FaultCode => Object.hasOwn(CODE, cod
 /** Returns the title of a fault code; an unknown code, as in a mistyped address, as plain text. */
 export const codeTitle = (code: string) => (isFaultCode(code) ? CODE[code].title : plain(code));
 
+/** What is wrong if the kind of the fault is not known. */
+const FAULT: Record<FaultCode, string> = {
+  x_servo: "the ball does not move along x as commanded",
+  y_servo: "the ball does not move along y as commanded",
+  stuck_ball: CODE.stuck_ball.meaning,
+  sensor: "the readings are implausible",
+};
+
+/** Returns what is wrong with the rig. */
+export const faultMeaning = (code: FaultCode, kind?: FaultKind | null) =>
+  kind ? kindMeaning(kind) : (FAULT[code] ?? plain(code));
+
 export const codeMeaning = (code: FaultCode) => CODE[code]?.meaning ?? "";
 
 export const kindMeaning = (kind?: FaultKind | null) =>

@@ -1,8 +1,38 @@
-/** The state of a fault on its chip: a class of the style sheet, and text. */
-import { severity, type FaultState } from "./severity";
+/** The state of a fault, and of a line about it: a class of the style sheet, and text. */
+import type { FaultEntry, FaultLine } from "../api/types";
+import { standing, type FaultState } from "./severity";
+import { isFailing } from "./status-byte";
 
-export const chipClass = (fault: FaultState) =>
-  `chip chip-${["none", "pending", "known", "confirmed"][severity(fault)]}`;
+/** The state of a fault by its entry in the fault memory. */
+export const stateOf = ({ status, status_byte, acknowledged }: FaultEntry): FaultState => ({
+  status,
+  acknowledged,
+  failing: isFailing({ status_byte }),
+});
 
-export const stateText = ({ status, acknowledged }: FaultState) =>
-  acknowledged && status !== "cleared" ? `${status}, acknowledged` : status;
+export const chipClass = (fault: FaultState) => {
+  const seen = fault.acknowledged && standing(fault) !== "none" ? " chip-acknowledged" : "";
+  return `chip chip-${standing(fault)}${seen}`;
+};
+
+/** Returns the state of a fault as text; without a session, a test has no result now. */
+export function stateText(fault: FaultState, hasSession = true): string {
+  const failing = hasSession ? "failing now" : "failed when last tested";
+  const text = {
+    failing,
+    pending: hasSession ? "failing, not yet confirmed" : "failed, not yet confirmed",
+    recorded: `on record${fault.status === "pending" ? " as pending" : ""}, passes again`,
+    none: fault.status,
+  }[standing(fault)];
+  return fault.acknowledged && standing(fault) !== "none" ? `${text}, acknowledged` : text;
+}
+
+/** Whether a line reports that the test of a fault on record passes again. */
+export const isRepair = (line: Pick<FaultLine, "status" | "status_byte">) =>
+  !isFailing(line) && (line.status === "pending" || line.status === "confirmed");
+
+/** What a line reports, as text and as a class of the style sheet. */
+export function changeOf(line: Pick<FaultLine, "status" | "status_byte">): { text: string; look: string } {
+  if (isRepair(line)) return { text: "passes again", look: "status-passed" };
+  return { text: line.status, look: `status-${line.status}` };
+}

@@ -1,3 +1,7 @@
+/** The sentences of fault lines. */
+import type { FaultLine } from "../api/types";
+import { isRepair } from "./fault-state";
+
 /** Returns the summary of a fault line as a sentence, without its leading code. */
 export function sentence(summary: string): string {
   const text = summary.replace(/^[^:]*: /, "").replace(/-(?=\d)/g, "−");
@@ -5,3 +9,11 @@ export function sentence(summary: string): string {
 }
 
 export const capitalised = (text: string) => text.charAt(0).toUpperCase() + text.slice(1);
+
+/** Returns what a line reports as a sentence: what was seen, or what became of the fault. */
+export function lineSentence(line: Pick<FaultLine, "status" | "status_byte" | "summary">): string {
+  if (isRepair(line)) return `Its test passes again; the fault stays on record as ${line.status}.`;
+  if (line.status === "healed") return "Enough sessions without the fault followed.";
+  if (line.status === "cleared") return "Nothing of it is on record any more.";
+  return sentence(line.summary);
+}

@@ -1,15 +1,36 @@
 import type { FaultStatus } from "../api/types";
 
-/** The health of a rig: its worst fault, a drift warning, or samples that are missing or not judged. */
-export type RigHealth = "fault" | "suspect" | "drift" | "untested" | "ok" | "silent" | "idle";
+/**
+ * The health of a rig: its worst fault, a drift warning, or samples that are missing or not judged.
+ * `unlearnt`: only sensor faults can be confirmed, so that "no fault" has no ground.
+ * `recorded`: the test of a fault on record passes again. `unknown`: the page has lost the connection.
+ */
+export type RigHealth =
+  "fault" | "suspect" | "recorded" | "drift" | "untested" | "unlearnt" | "ok" | "silent" | "idle" | "unknown";
 
 /** The state of a fault in the rig's fault memory. */
-export type FaultState = { status: FaultStatus; acknowledged?: boolean };
+export interface FaultState {
+  status: FaultStatus;
+  /** Whether the last result of its test is a failure. */
+  failing: boolean;
+  acknowledged?: boolean;
+}
 
-/** The severity of a fault, 0 (not active) to 3 (confirmed, not acknowledged). */
+/** Whether a fault is confirmed and fails, is pending and fails, is on record but passes, or none of these. */
+export type Standing = "failing" | "pending" | "recorded" | "none";
+
+export function standing({ status, failing }: FaultState): Standing {
+  if (status !== "confirmed" && status !== "pending") return "none";
+  if (!failing) return "recorded";
+  return status === "confirmed" ? "failing" : "pending";
+}
+
+const RANK: Record<Standing, number> = { failing: 6, pending: 4, recorded: 2, none: 0 };
+
+/** The severity of a fault: 0 if it is not active, greater if it fails now, is confirmed, and is not acknowledged. */
 export function severity(fault: FaultState): number {
-  if (fault.status === "confirmed") return fault.acknowledged ? 2 : 3;
-  return fault.status === "pending" ? 1 : 0;
+  const rank = RANK[standing(fault)];
+  return rank && fault.acknowledged ? rank - 1 : rank;
 }
 
 /** The greatest severity of `faults`. */
@@ -18,6 +39,7 @@ export const worstSeverity = (faults: FaultState[]) => Math.max(0, ...faults.map
 /** The health of a rig by its faults alone; undefined if none is active. */
 export function healthByFaults(faults: FaultState[]): RigHealth | undefined {
   const worst = worstSeverity(faults);
-  if (worst >= 2) return "fault";
-  return worst === 1 ? "suspect" : undefined;
+  if (worst > RANK.pending) return "fault";
+  if (worst > RANK.recorded) return "suspect";
+  return worst > 0 ? "recorded" : undefined;
 }

@@ -33,3 +33,11 @@ export function timeAgo(moment: string | null | undefined, now = Date.now()): st
 /** Formats a moment as date and time of day in the browser's locale. */
 export const dateTime = (moment: string | null | undefined) =>
   moment ? new Date(moment).toLocaleString(undefined, { dateStyle: "medium", timeStyle: "medium" }) : NONE;
+
+/** Formats a moment: its time of day if it is today, else with its date. */
+export function sinceText(moment: string, now = new Date()): string {
+  const at = new Date(moment);
+  const time = at.toLocaleTimeString(undefined, { timeStyle: "short" });
+  if (at.toDateString() === now.toDateString()) return time;
+  return `${at.toLocaleDateString(undefined, { dateStyle: "medium" })}, ${time}`;
+}

@@ -20,6 +20,7 @@ function trace(from, n, seen = () => true) {
     twin_m_s2: t_s.map((t) => t - 1),
     limit_m_s2: t_s.map(() => 0.5),
     enabled: t_s.map(() => true),
+    counter: t_s.map(() => -128),
   };
   return { t_s, x: axis, y: axis };
 }

@@ -1,8 +1,8 @@
 // Foreign CSV tables, and the session files made from them.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { toColumns, toCsv } from "../../src/pages/import/columns.ts";
-import { guessMapping } from "../../src/pages/import/mapping.ts";
+import { countSeen, toColumns, toCsv } from "../../src/pages/import/columns.ts";
+import { guessFactor, guessMapping } from "../../src/pages/import/mapping.ts";
 import { readTable } from "../../src/pages/import/table.ts";
 import { random } from "./random.mjs";
 
@@ -84,11 +84,46 @@ test("line ends of any system and a byte order mark change nothing", () => {
 });
 
 test("a file that is not a table is refused with a message", () => {
-  assert.throws(() => read("t,x", "0,1", "1,2"), /fewer than three columns/);
-  assert.throws(() => read("0,1,2", "1,2,3", "2,3,4"), /has numbers/);
+  assert.throws(() => read("t,x", "0,1", "1,2"), /No line has three or more columns/);
+  assert.throws(() => read("PK\u0003\u0004\u0014"), /a spreadsheet, not a text file/);
   assert.throws(() => read("t,x,y", "0,1,2"), /no rows/);
-  assert.throws(() => read(""), /fewer than three columns/);
+  assert.throws(() => read(""), /file is empty/);
+  assert.throws(() => read("", "  "), /file is empty/);
   assert.throws(() => read("t,x,y", "0,1,2", '1,"2,3', "2,3,4"), /row 3.*quote/i);
+});
+
+test("lines before the column names are a preamble", () => {
+  const table = read("Recorded by Ada, on the bench", "Rig: 7", "t;x;y", "0,1;1,5;2,5", "0,2;1,6;2,6");
+  assert.deepEqual(table.header, ["t", "x", "y"]);
+  assert.deepEqual(table.rows[1], ["0.2", "1.6", "2.6"]);
+});
+
+test("numbers without names are columns to choose from", () => {
+  const table = read("0,1,2", "1,2,3", "2,3,4");
+  assert.deepEqual(table.header, ["column 1", "column 2", "column 3"]);
+  assert.equal(table.rows.length, 3);
+});
+
+test("runs of blanks separate columns if nothing else does", () => {
+  const table = read("  t   x  y", "0.0  1 2", " 0.1 2   3 ");
+  assert.deepEqual(table.header, ["t", "x", "y"]);
+  assert.deepEqual(table.rows, [
+    ["0.0", "1", "2"],
+    ["0.1", "2", "3"],
+  ]);
+});
+
+test("a column chosen by hand has the unit of its name", () => {
+  const table = read("Zeit [s];Winkel X [°];Kugel X [mm]", "0;1;2", "1;1;2");
+  assert.equal(guessFactor("cmd_qx_rad", table, 1), Math.PI / 180);
+  assert.equal(guessFactor("x_m", table, 2), 1e-3);
+});
+
+test("times that are dates are no times, and such rows are not counted", () => {
+  const table = read("t_s,x_m,y_m", "2026-03-01T10:00:00.020,0,0", "2026-03-01T10:00:00.040,0,0");
+  const columns = toColumns(table, guessMapping(table));
+  assert.deepEqual(columns.t_s, [null, null]);
+  assert.equal(countSeen(columns), 0);
 });
 
 test("columns and units are recognized by name", () => {

@@ -14,27 +14,63 @@ const rig = (asset, more = {}) => ({
   session_id: "1",
   session: "run",
   last_seen: ago(1),
+  silent: false,
+  calibrated: true,
   ...more,
 });
 
-const fault = (status, code = "x_servo") => ({ code, status, acknowledged: false });
+const fault = (status, code = "x_servo", failing = true) => ({ code, status, failing, acknowledged: false });
 const line = (status, more = {}) => ({
   asset: "a",
   code: "x_servo",
   session: "run",
   status,
+  status_byte: "2F",
   onset_s: 1,
   ...more,
 });
 
 test("a rig's health is its worst fault, then drift, then silence", () => {
-  assert.equal(healthOf(rig("a", { faults: [fault("pending"), fault("confirmed")] }), NOW), "fault");
-  assert.equal(healthOf(rig("a", { faults: [fault("pending")], warnings: [{}] }), NOW), "suspect");
-  assert.equal(healthOf(rig("a", { warnings: [{}] }), NOW), "drift");
-  assert.equal(healthOf(rig("a"), NOW), "ok");
-  assert.equal(healthOf(rig("a", { last_seen: ago(11) }), NOW), "silent");
-  assert.equal(healthOf(rig("a", { unjudged: { samples: 10, reason: "late" } }), NOW), "untested");
-  assert.equal(healthOf(rig("a", { session_id: null }), NOW), "idle");
+  assert.equal(healthOf(rig("a", { faults: [fault("pending"), fault("confirmed")] })), "fault");
+  assert.equal(healthOf(rig("a", { faults: [fault("pending")], warnings: [{}] })), "suspect");
+  assert.equal(healthOf(rig("a", { warnings: [{}] })), "drift");
+  assert.equal(healthOf(rig("a")), "ok");
+  assert.equal(healthOf(rig("a", { silent: true })), "silent");
+  assert.equal(healthOf(rig("a", { unjudged: { samples: 10, reason: "late" } })), "untested");
+  assert.equal(healthOf(rig("a", { session_id: null })), "idle");
+  assert.equal(healthOf(rig("a", { calibrated: false })), "unlearnt");
+  assert.equal(healthOf(rig("a", { faults: [fault("confirmed", "sensor", false)] })), "recorded");
+});
+
+test("a rig that the service saw a moment ago stays as it is, however long ago the page looked", () => {
+  const seen = rig("a", { last_seen: ago(3600) });
+  assert.equal(healthOf(seen), "ok");
+});
+
+test("a repair leaves the fault on record, and a new failure begins anew", () => {
+  const failed = { ...fault("confirmed"), failed_at: ago(60), acknowledged: true };
+  const repaired = afterEvent(rig("a", { faults: [failed] }), line("confirmed", { status_byte: "2E" }));
+  assert.equal(healthOf(repaired), "recorded");
+  assert.equal(repaired.faults[0].failed_at, failed.failed_at);
+  const again = afterEvent(repaired, line("confirmed"), new Date(NOW));
+  assert.equal(healthOf(again), "fault");
+  assert.equal(again.faults[0].failed_at, new Date(NOW).toISOString());
+  assert.equal(again.faults[0].acknowledged, false, "another occurrence");
+});
+
+test("newest faults come first if asked for", () => {
+  const at = (seconds) => [{ ...fault("confirmed"), failed_at: ago(seconds) }];
+  const some = [rig("old", { faults: at(60) }), rig("none"), rig("new", { faults: at(1) })];
+  const order = chosenRows(
+    some.map((entry) => rowOf(entry, new Map())),
+    "all",
+    "",
+    "newest",
+  );
+  assert.deepEqual(
+    order.map(({ entry }) => entry.asset),
+    ["new", "old", "none"],
+  );
 });
 
 test("an event changes only its fault, and keeps the acknowledgement", () => {
@@ -60,6 +96,8 @@ test("an event about the same change replaces the previous one, and at most fift
   const first = line("pending", { event: 1 });
   const repeated = line("pending", { event: 2, kind: "gain" });
   assert.deepEqual(withLine([first], repeated), [repeated]);
+  const passed = line("pending", { event: 2, status_byte: "2E" });
+  assert.deepEqual(withLine([repeated], passed), [passed, repeated], "a repair is another change");
   const other = line("confirmed", { event: 3 });
   assert.deepEqual(withLine([repeated], other), [other, repeated]);
   let lines = [];
@@ -75,7 +113,7 @@ const fleet = [
   rig("attic", { session_id: null, last_seen: null }),
 ];
 const ranks = nameRanks(fleet.map(({ asset }) => asset));
-const rows = fleet.map((entry) => rowOf(entry, ranks, NOW));
+const rows = fleet.map((entry) => rowOf(entry, ranks));
 const names = (...choice) => chosenRows(rows, ...choice).map(({ entry }) => entry.asset);
 
 test("rigs are sorted as selected, equal ones by name in natural order", () => {

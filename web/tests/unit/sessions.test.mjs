@@ -6,7 +6,11 @@ import { faultList, faultsByCode } from "../../src/pages/learn/demo-faults.ts";
 import { exampleSession } from "../../src/pages/learn/example-session.ts";
 import { sharesAlongX } from "../../src/pages/learn/shares.ts";
 import { replaySettings } from "../../src/pages/session/replay-settings.ts";
-import { visibleRange } from "../../src/pages/session/visible-range.ts";
+import { healthyStretch } from "../../src/pages/learn/healthy-stretch.ts";
+import { readAddress, withAddress } from "../../src/pages/session/address.ts";
+import { detailWindow, isCovered, longestDetail } from "../../src/pages/session/detail-window.ts";
+import { stretchAt } from "../../src/pages/session/stretches.ts";
+import { panned, visibleRange, zoomRange } from "../../src/pages/session/visible-range.ts";
 
 test("the charts show the span around the moment, within the recording", () => {
   assert.deepEqual(visibleRange(50, 30, 0, 90), [32, 62]);
@@ -32,7 +36,8 @@ test("the demo's faults are grouped by code and named in words", () => {
     groups.get("x_servo").map(({ effect }) => effect),
     ["dead", "slow"],
   );
-  assert.equal(faultList(["x_servo:dead", "sensor:noise"]), "x servo, dead; sensor, noise");
+  assert.equal(faultList(["x_servo:dead", "sensor:noise"]), "X servo, dead; Position sensor, noise");
+  assert.equal(faultList(["sensor:freeze", "y_servo:hold"]), "Position sensor, frozen; Y servo, held");
 });
 
 test("the example is the chosen session, otherwise the preferred one without a fault", () => {
@@ -70,4 +75,65 @@ test("shares count the moments beyond the limit, among all and among the judged 
 test("a drive cycle's CSV has a line for each moment, empty where there is no set point", () => {
   const rows = { t_s: [0, 0.01], cmd_qx_rad: [1, 2], cmd_qy_rad: [3, 4], x_m: [5, null], y_m: [null, 6] };
   assert.equal(cycleCsv({ rows }), "t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n0,1,3,5,\n0.01,2,4,,6\n");
+});
+
+test("the lesson shows what lies before the first fault, and after one that is repaired", () => {
+  const session = { first_t_s: 100, last_t_s: 160 };
+  const fails = (t_s, onset_s) => ({ t_s, onset_s, status_byte: "2F" });
+  const passes = (t_s) => ({ t_s, status_byte: "2E" });
+  assert.deepEqual(healthyStretch(session, []), { from_s: 100, to_s: 120, fault_s: undefined });
+  assert.deepEqual(healthyStretch(session, [fails(111, 110.5)]), {
+    from_s: 100,
+    to_s: 109.5,
+    fault_s: 110.5,
+  });
+  assert.equal(healthyStretch(session, [fails(103, 102)]), undefined, "too short");
+  const after = healthyStretch(session, [passes(102), fails(130, 129)]);
+  assert.deepEqual(after, { from_s: 102, to_s: 122, fault_s: 129 });
+  assert.equal(healthyStretch({ first_t_s: null, last_t_s: null }, []), undefined);
+});
+
+test("the moment, speed and profile are in the address; what is unknown there is left out", () => {
+  assert.deepEqual(readAddress("?t=12.5&speed=2&profile=textbook"), {
+    t: 12.5,
+    speed: 2,
+    profile: "textbook",
+  });
+  assert.deepEqual(readAddress("?t=x&speed=3&profile=none"), { t: undefined, speed: 1, profile: "" });
+  assert.deepEqual(readAddress(""), { t: undefined, speed: 1, profile: "" });
+  assert.equal(withAddress("?t=1.00&speed=2", { t: 3.456, speed: 1 }), "?t=3.46");
+  assert.equal(withAddress("", { profile: "default" }), "?profile=default");
+  assert.equal(withAddress("?profile=default", { profile: "" }), "");
+});
+
+test("a zoom stays within the recording, and is moved by a share of its length", () => {
+  assert.deepEqual(zoomRange([30, 20], 0, 90), [20, 30], "dragged to the left");
+  assert.deepEqual(zoomRange([-5, 5], 0, 90), [0, 10]);
+  assert.deepEqual(panned([20, 30], 0.5, 0, 90), [25, 35]);
+  assert.deepEqual(panned([82, 88], 1, 0, 90), [84, 90], "at the end");
+  const [from, to] = zoomRange([20, 20], 0, 90);
+  assert.ok(to - from >= 0.1 - 1e-9, "not shorter than can be drawn");
+});
+
+test("of a long recording, the part around the shown range is fetched, and the next in time", () => {
+  const all = [0, 4000];
+  assert.equal(longestDetail(20, 12_000), 540);
+  const part = detailWindow([1000, 1030], 540, all);
+  assert.ok(part[0] <= 1000 && part[1] - part[0] === 150, String(part));
+  assert.ok(isCovered([1000, 1030], part, all));
+  assert.ok(!isCovered([part[1] - 31, part[1] - 1], part, all), "the playback is about to leave it");
+  const last = detailWindow([3990, 4000], 540, all);
+  assert.equal(last[1], 4000);
+  assert.ok(isCovered([3990, 4000], last, all), "nothing follows the end");
+  assert.deepEqual(detailWindow([0, 10], 20, all), [0, 20], "not longer than can be shown in full");
+});
+
+test("the stretch of a long recording is that of the moment in the address", () => {
+  const pieces = [
+    { from_s: 0, to_s: 10 },
+    { from_s: 10, to_s: 20 },
+  ];
+  assert.equal(stretchAt(pieces, 15), 1);
+  assert.equal(stretchAt(pieces, 99), undefined);
+  assert.equal(stretchAt(pieces), undefined);
 });

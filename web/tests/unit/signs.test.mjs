@@ -21,6 +21,7 @@ function trace({ x, y }) {
     position_m: [],
     twin_position_m: [],
     limit_m_s2: [],
+    counter: [],
     enabled: [],
   });
   return { t_s, x: columns(x(twin), twin.x), y: columns(y(twin), twin.y) };

@@ -1,9 +1,12 @@
 // The texts of codes, statuses and verdicts.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { codeTitle, faultTitle, kindMeaning } from "../../src/words/fault-names.ts";
-import { chipClass, stateText } from "../../src/words/fault-state.ts";
-import { sentence } from "../../src/words/sentence.ts";
+import { faultMark } from "../../src/parts/charts/fault-marks.ts";
+import { refusal } from "../../src/parts/login/rights.ts";
+import { dimensions, hasDefaultDimensions } from "../../src/words/dimensions.ts";
+import { codeTitle, faultMeaning, faultTitle, kindMeaning } from "../../src/words/fault-names.ts";
+import { changeOf, chipClass, stateText } from "../../src/words/fault-state.ts";
+import { lineSentence, sentence } from "../../src/words/sentence.ts";
 import { healthByFaults, severity } from "../../src/words/severity.ts";
 import { isFailing, STATUS_BITS } from "../../src/words/status-byte.ts";
 import { ambiguousCauses, judgedShare, verdict } from "../../src/words/verdict.ts";
@@ -16,24 +19,76 @@ test("known codes and kinds have titles, unknown ones are shown as plain text", 
   assert.equal(kindMeaning(null), "the kind of fault is not known");
 });
 
-test("severity decreases from confirmed over acknowledged to pending; other faults are not active", () => {
+test("severity decreases from failing over acknowledged and pending to on record", () => {
   const order = [
-    { status: "confirmed" },
-    { status: "confirmed", acknowledged: true },
-    { status: "pending" },
-    { status: "healed" },
+    { status: "confirmed", failing: true },
+    { status: "confirmed", failing: true, acknowledged: true },
+    { status: "pending", failing: true },
+    { status: "confirmed", failing: false },
+    { status: "healed", failing: false },
   ];
-  assert.deepEqual(order.map(severity), [3, 2, 1, 0]);
+  const severities = order.map(severity);
+  assert.deepEqual(
+    [...severities].sort((a, b) => b - a),
+    severities,
+  );
+  assert.equal(new Set(severities).size, order.length);
+  assert.equal(severities.at(-1), 0);
   assert.equal(healthByFaults(order), "fault");
+  assert.equal(healthByFaults(order.slice(1)), "fault", "acknowledged, but it fails");
   assert.equal(healthByFaults(order.slice(2)), "suspect");
+  assert.equal(healthByFaults(order.slice(3)), "recorded", "it passes again");
   assert.equal(healthByFaults([]), undefined);
 });
 
-test("a fault's chip shows its state", () => {
-  const acknowledged = { status: "confirmed", acknowledged: true };
-  assert.equal(stateText(acknowledged), "confirmed, acknowledged");
-  assert.equal(chipClass(acknowledged), "chip chip-known");
-  assert.equal(stateText({ status: "cleared", acknowledged: true }), "cleared");
+test("a fault that fails now, one on record and an acknowledged one look different", () => {
+  const fails = { status: "confirmed", failing: true };
+  const passes = { status: "confirmed", failing: false };
+  assert.equal(stateText(fails), "failing now");
+  assert.equal(stateText(fails, false), "failed when last tested", "no session is open");
+  assert.equal(stateText(passes), "on record, passes again");
+  assert.equal(stateText({ ...fails, acknowledged: true }), "failing now, acknowledged");
+  assert.equal(stateText({ status: "cleared", failing: false, acknowledged: true }), "cleared");
+  const looks = [fails, passes, { ...fails, acknowledged: true }, { status: "pending", failing: true }];
+  assert.equal(new Set(looks.map(chipClass)).size, looks.length);
+});
+
+test("a test that passes again is told as a repair and not as an alarm", () => {
+  const line = { code: "x_servo", status: "confirmed", t_s: 2, summary: "x_servo confirmed: it is dead" };
+  const fails = { ...line, status_byte: "2F" };
+  const passes = { ...line, status_byte: "2E", summary: "x_servo (dead) passes its test again" };
+  assert.deepEqual(changeOf(fails), { text: "confirmed", look: "status-confirmed" });
+  assert.deepEqual(changeOf(passes), { text: "passes again", look: "status-passed" });
+  assert.deepEqual(changeOf({ ...passes, status: "healed" }), { text: "healed", look: "status-healed" });
+  assert.equal(lineSentence(fails), "It is dead.");
+  assert.equal(lineSentence(passes), "Its test passes again; the fault stays on record as confirmed.");
+  assert.equal(faultMark(fails).label, "X servo confirmed");
+  assert.deepEqual(faultMark({ ...passes, axis: "x" }), {
+    t: 2,
+    axis: "x",
+    label: "X servo passes again",
+    colour: "good",
+  });
+});
+
+test("a banner says what is wrong, also if the kind is not known", () => {
+  assert.equal(faultMeaning("x_servo", "dead"), "no power: the plate returns to zero");
+  assert.equal(faultMeaning("sensor"), "the readings are implausible");
+});
+
+test("dimensions are named, and the defaults recognized", () => {
+  const asset = { ball: { radius_m: 0.0127 }, plate: { length_m: 0.38, width_m: 0.24 } };
+  assert.match(dimensions(asset), /ball radius 12\.7.*plate 380.* × 240/);
+  assert.ok(hasDefaultDimensions(asset));
+  assert.ok(!hasDefaultDimensions({ ...asset, ball: { radius_m: 0.02 } }));
+  assert.match(dimensions({ ...asset, plate: { diameter_m: 0.3 } }), /round plate 300/);
+});
+
+test("a button says which role it needs", () => {
+  assert.equal(refusal("operator", "viewer"), "Needs the role operator; yours is viewer.");
+  assert.equal(refusal("admin", "operator"), "Needs the role admin; yours is operator.");
+  assert.equal(refusal("operator", "admin"), undefined);
+  assert.equal(refusal(undefined, "viewer"), undefined);
 });
 
 test("a summary becomes a sentence without its code", () => {

@@ -2,20 +2,39 @@ import type { FaultEntry } from "../../api/types";
 import { FaultChip } from "../../parts/fault-chip";
 import { Link } from "../../router/link";
 import { faultPath } from "../../router/paths";
-import { codeMeaning } from "../../words/fault-names";
+import { faultMeaning } from "../../words/fault-names";
+import { stateOf } from "../../words/fault-state";
+import { standing } from "../../words/severity";
+import { ambiguousCauses } from "../../words/verdict";
 
-export function ActiveFaults({ asset, faults }: { asset: string; faults: FaultEntry[] }) {
+interface Props {
+  asset: string;
+  faults: FaultEntry[];
+  hasSession: boolean;
+}
+
+/** A line for each fault of the rig: what is wrong, whether it fails now, and since when. */
+export function ActiveFaults({ asset, faults, hasSession }: Props) {
   if (!faults.length) return null;
   return (
     <ul class="banner-list" aria-label="Active faults">
-      {faults.map((fault) => (
-        <li>
-          <Link to={faultPath(asset, fault.code)} class={`banner banner-${fault.status}`}>
-            <FaultChip fault={fault} /> <span>{codeMeaning(fault.code)}</span>{" "}
-            <span class="more">Look at it →</span>
-          </Link>
-        </li>
-      ))}
+      {faults.map((fault) => {
+        const { code, kind, candidates, last_occurrence } = fault;
+        const state = stateOf(fault);
+        return (
+          <li>
+            <Link to={faultPath(asset, code)} class={`banner banner-${standing(state)}`}>
+              <FaultChip
+                fault={{ ...state, code, kind }}
+                hasSession={hasSession}
+                since={last_occurrence?.noted_at}
+              />{" "}
+              <span>{ambiguousCauses(candidates) || faultMeaning(code, kind)}</span>{" "}
+              <span class="more">Look at it →</span>
+            </Link>
+          </li>
+        );
+      })}
     </ul>
   );
 }

@@ -1,5 +1,5 @@
 import { api } from "../../api/client";
-import { ActionButton } from "../../parts/action-button";
+import { ConfirmButton } from "../../parts/confirm-button";
 import { HealthMark } from "../../parts/health-mark";
 import { Link } from "../../router/link";
 import { sessionsPath, setUpPath } from "../../router/paths";
@@ -30,7 +30,16 @@ export function AssetHeader({ name, health, session }: Props) {
         <Link class="button" to={setUpPath(name)}>
           Set-up
         </Link>
-        {session && <ActionButton action={() => api.endSession(session)}>End session</ActionButton>}
+        {session && (
+          <ConfirmButton
+            word="End session"
+            question="End the running session?"
+            action={() => api.endSession(session)}
+            needs="operator"
+          >
+            Its verdict becomes final. A rig that goes on sending opens a new session with its next sample.
+          </ConfirmButton>
+        )}
       </div>
     </header>
   );

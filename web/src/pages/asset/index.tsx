@@ -14,6 +14,7 @@ export function AssetPage({ name }: { name: string }) {
   const asset = useQuery(() => api.asset(name), name, ASSET_MS);
   const faults = useQuery(() => api.faultsOf(name), `${name} faults`, FAULTS_MS);
   const refetch = () => Promise.all([faults.refetch(), asset.refetch()]);
-  if (!asset.data) return <UnloadedPage title={name} what={name} error={asset.error} retry={asset.refetch} />;
+  if (!asset.data)
+    return <UnloadedPage title={name} what={name} kind="rig" error={asset.error} retry={asset.refetch} />;
   return <LiveRig key={name} asset={asset.data} faults={faults.data ?? []} refetch={refetch} />;
 }

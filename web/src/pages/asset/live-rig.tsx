@@ -1,13 +1,12 @@
 import type { Asset, FaultEntry } from "../../api/types";
 import { RigView } from "../../parts/rig-view/rig-view";
 import { XyTrace } from "../../parts/xy-trace/xy-trace";
-import { Link } from "../../router/link";
-import { setUpPath } from "../../router/paths";
 import { count } from "../../words/numbers";
 import { ActiveFaults } from "./active-faults";
 import { AssetHeader } from "./asset-header";
 import { DriveCycleCard } from "./drive-cycle/drive-cycle-card";
 import { activeFaults, healthOf } from "./health";
+import { LastSession } from "./last-session";
 import { LearningCard } from "./learning/learning-card";
 import { LiveChartsCard } from "./live-charts-card";
 import { Monitors } from "./monitors";
@@ -29,9 +28,14 @@ export function LiveRig({ asset, faults, refetch }: Props) {
   const { state, connection, isSilent, charts } = useLiveRig(asset.name, () => void refetch());
   const trends = useTrends(asset.name);
   const active = activeFaults(faults);
+  const health = healthOf(active, state, {
+    isConnected: connection === "live",
+    isSilent,
+    isLearnt: asset.calibration != null,
+  });
   return (
     <main class="asset">
-      <AssetHeader name={asset.name} health={healthOf(active, state, isSilent)} session={state?.session_id} />
+      <AssetHeader name={asset.name} health={health} session={state?.session_id} />
       {connection === "lost" && (
         <p class="trouble" role="alert">
           Connection lost; reconnecting. The page shows the last received data.
@@ -43,15 +47,10 @@ export function LiveRig({ asset, faults, refetch }: Props) {
           ).
         </p>
       )}
-      <ActiveFaults asset={asset.name} faults={active} />
+      <ActiveFaults asset={asset.name} faults={active} hasSession={state?.session_id != null} />
       <TrendWarnings trends={trends.data} />
       <LearningCard name={asset.name} state={state} changed={refetch} />
-      {state && !state.session_id && (
-        <p class="note">
-          No session is open. A session is opened by the first sample.{" "}
-          <Link to={setUpPath(asset.name, "connect")}>How to send samples</Link>
-        </p>
-      )}
+      {state && !state.session_id && <LastSession name={asset.name} />}
       <div class="live-top">
         <RigView asset={asset} pose={charts.pose} name={`${asset.name}-live`} />
         <div class="live-side">

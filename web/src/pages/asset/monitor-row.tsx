@@ -6,10 +6,11 @@ import { judgedShare } from "../../words/verdict";
 const PASSED = -128;
 const FAILED = 127;
 
-function resultText({ counter, enabled }: Monitor): string {
+function resultText({ code, counter, enabled }: Monitor): string {
   if (counter === FAILED) return "failed";
   if (counter === PASSED) return "passed";
-  return enabled ? "testing" : "not tested now";
+  if (enabled) return "testing";
+  return code === "sensor" ? "waiting" : "waiting for motion";
 }
 
 function readinessText({ complete_this_cycle, complete_since_clear }: Monitor): string {
@@ -18,7 +19,8 @@ function readinessText({ complete_this_cycle, complete_since_clear }: Monitor): 
 }
 
 function rowClass({ counter, enabled }: Monitor): string {
-  const look = counter === FAILED ? "bad" : counter > 0 ? "warn" : "ok";
+  // Below zero nothing speaks for a fault; only a passed test says that there is none.
+  const look = counter === FAILED ? "bad" : counter > 0 ? "warn" : counter === PASSED ? "ok" : "open";
   return `monitor monitor-${look}${enabled ? "" : " off"}`;
 }
 
@@ -40,8 +42,9 @@ export function MonitorRow({ monitor }: { monitor: Monitor }) {
         {Math.round(share * 100)} %
       </meter>
       <span class="quiet">{resultText(monitor)}</span>
-      <span class="ready" title={readiness} aria-label={readiness}>
-        {complete_this_cycle ? "✓" : "…"}
+      <span class="ready" title={readiness}>
+        <span aria-hidden="true">{complete_this_cycle ? "✓" : ""}</span>
+        <span class="hidden">{readiness}</span>
       </span>
     </li>
   );

@@ -2,6 +2,7 @@ import type { Asset, AxisCalibration, State } from "../../api/types";
 import { Facts, type Fact } from "../../parts/facts";
 import { navigate } from "../../router/navigation";
 import { setUpPath } from "../../router/paths";
+import { dimensions, hasDefaultDimensions } from "../../words/dimensions";
 import { count, NONE, number } from "../../words/numbers";
 import { dateTime } from "../../words/time";
 
@@ -28,6 +29,7 @@ export function TwinCard({ asset, state }: { asset: Asset; state?: State }) {
         facts={[
           ["Plant model", state?.fidelity ?? NONE],
           ["Reason", state?.fidelity_reason ?? NONE],
+          ["Dimensions", dimensions(asset) + (hasDefaultDimensions(asset) ? " (the defaults)" : "")],
           ["Profile", asset.diagnostics?.profile ?? "default"],
           ["Learnt", learnt ?? "not yet"],
           ...servoFacts(asset),

@@ -12,17 +12,25 @@ interface Cell {
 
 const acceleration = (value?: number | null) => number(value, 3, "m/s²");
 
+const RESIDUAL = "Residual";
+const EVIDENCE = "Weight of evidence for a servo fault";
+const PATH = "Deviation from the twin's path over 2 s, RMS";
+
+/** Evidence from which a servo is suspected with the default settings, nats. */
+const SUSPECT_NATS = 10;
+
 const ROWS: [name: string, text: (axis: AxisEvidence) => string][] = [
   ["Command", (axis) => degrees(axis.command_rad, 2)],
   ["Position", (axis) => millimetres(axis.position_m)],
   ["Velocity", (axis) => number(axis.velocity_m_s, 3, "m/s")],
   ["Measured acceleration", (axis) => acceleration(axis.measured_m_s2)],
   ["Twin's acceleration", (axis) => acceleration(axis.twin_m_s2)],
-  ["Residual", (axis) => acceleration(axis.residual_m_s2)],
+  [RESIDUAL, (axis) => acceleration(axis.residual_m_s2)],
   ["Limit", (axis) => acceleration(axis.limit_m_s2)],
   ["Gate", (axis) => (axis.enabled ? "open" : "closed")],
-  ["Evidence of a servo fault", (axis) => number(axis.nats, 1, "nats")],
-  ["RMS deviation from the twin's path, 2 s", (axis) => millimetres(axis.path_error_m)],
+  [EVIDENCE, (axis) => number(axis.nats, 1, "nats")],
+  [PATH, (axis) => millimetres(axis.path_error_m)],
+  ["Largest deviation of a healthy rig", (axis) => millimetres(axis.path_limit_m)],
 ];
 
 /** A value with its standard error. */
@@ -31,16 +39,18 @@ const estimate = (value: number, error: number, digits: number, unit = "") =>
 
 /** Estimates of the servo's response along an axis. */
 const ANSWER_ROWS: [name: string, text: (answer: Answer) => string][] = [
-  ["Gain relative to the twin", (a) => estimate(a.gain, a.gain_error, 2)],
-  [
-    "Acceleration not explained by the command",
-    (a) => estimate(a.offset_m_s2, a.offset_error_m_s2, 2, "m/s²"),
-  ],
-  ["Delay in addition to the twin's", (a) => estimate(a.delay_s * 1e3, a.delay_error_s * 1e3, 0, "ms")],
+  ["Response, % of the command", (a) => estimate(100 * a.gain, 100 * a.gain_error, 0, "%")],
+  ["Unexplained acceleration", (a) => estimate(a.offset_m_s2, a.offset_error_m_s2, 2, "m/s²")],
+  ["Additional delay", (a) => estimate(a.delay_s * 1e3, a.delay_error_s * 1e3, 0, "ms")],
 ];
 
-const isBeyondLimit = (axis: AxisEvidence) =>
-  axis.enabled && Math.abs(axis.residual_m_s2 ?? 0) >= axis.limit_m_s2;
+/** Whether a value speaks for a fault: these are what a verdict on a servo is based on. */
+const SPEAKS_FOR_FAULT: Record<string, (axis: AxisEvidence) => boolean> = {
+  [RESIDUAL]: (axis) => axis.enabled && Math.abs(axis.residual_m_s2 ?? 0) >= axis.limit_m_s2,
+  [EVIDENCE]: (axis) => (axis.nats ?? 0) >= SUSPECT_NATS,
+  [PATH]: (axis) =>
+    axis.path_error_m != null && axis.path_limit_m != null && axis.path_error_m > axis.path_limit_m,
+};
 
 export function evidenceRows({ x, y }: Evidence): { name: string; cells: Cell[] }[] {
   const axes = [x, y];
@@ -48,7 +58,7 @@ export function evidenceRows({ x, y }: Evidence): { name: string; cells: Cell[] 
     name,
     cells: axes.map((axis) => ({
       text: text(axis),
-      isBeyondLimit: name === "Residual" && isBeyondLimit(axis),
+      isBeyondLimit: SPEAKS_FOR_FAULT[name]?.(axis) ?? false,
     })),
   }));
   if (!axes.some((axis) => axis.answer)) return rows;

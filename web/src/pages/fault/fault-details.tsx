@@ -43,7 +43,11 @@ export function FaultDetails({ fault, history, error, refetch }: Props) {
       {freeze_frame && (
         <section class="card">
           <h2>Freeze frame</h2>
-          <p class="quiet small-text">The evidence at the first failure of the current occurrence.</p>
+          <p class="quiet small-text">
+            The evidence at the first failure of the last occurrence. What speaks for a fault is red: a
+            residual beyond its limit, a weight of evidence of 10 nats and more (confirmed from 13, by
+            default), or a path that deviates more than a healthy one.
+          </p>
           <EvidenceTable evidence={freeze_frame} />
         </section>
       )}

@@ -43,8 +43,11 @@ function settingsFacts({ last_occurrence }: FaultEntry): Fact[] {
   if (!last_occurrence) return [];
   const { calibration_id, settings_id } = last_occurrence;
   return [
-    ["Calibration", calibration_id ? <code>{calibration_id}</code> : "none: the rig was not learnt"],
-    ["Settings", <code>{settings_id}</code>],
+    [
+      "Judged with calibration",
+      calibration_id ? <code>{calibration_id}</code> : "none: the rig was not learnt",
+    ],
+    ["Checksum of the settings", <code>{settings_id}</code>],
   ];
 }
 

@@ -3,6 +3,7 @@ import { StatusChip } from "../../parts/status-chip";
 import { Link } from "../../router/link";
 import { rigPath } from "../../router/paths";
 import { faultTitle } from "../../words/fault-names";
+import { stateOf } from "../../words/fault-state";
 import { FaultActions } from "./fault-actions";
 import { isActive } from "./is-active";
 
@@ -15,7 +16,7 @@ export function FaultHeader({ fault, refetch }: { fault: FaultEntry; refetch: ()
           <Link to="/">Fleet</Link> / <Link to={rigPath(asset)}>{asset}</Link>
         </p>
         <h1>
-          {faultTitle(code, kind)} <StatusChip fault={fault} />
+          {faultTitle(code, kind)} <StatusChip fault={stateOf(fault)} hasSession={fault.monitor != null} />
         </h1>
       </div>
       {isActive(fault) && <FaultActions fault={fault} refetch={refetch} />}

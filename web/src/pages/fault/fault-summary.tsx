@@ -1,14 +1,43 @@
 import type { FaultEntry, HistoryEntry } from "../../api/types";
 import { EmptyState } from "../../parts/empty-state";
-import { codeMeaning, codeTitle } from "../../words/fault-names";
-import { sentence } from "../../words/sentence";
+import { codeMeaning, codeTitle, faultMeaning } from "../../words/fault-names";
+import { isRepair } from "../../words/fault-state";
+import { capitalised, sentence } from "../../words/sentence";
+import { isFailing } from "../../words/status-byte";
+import { sinceText } from "../../words/time";
 import { isActive } from "./is-active";
 
-/** The fault in one sentence, or the note that it is not active. */
+/** Returns the latest entry about a failing test; a test that passes again is told by the one after it. */
+const latestFailure = (history: HistoryEntry[]) =>
+  history.find(({ by, fault }) => !by && fault && isFailing(fault))?.fault;
+
+/** Since when the test passes again or fails, and whether that is known for now. */
+function presentText(fault: FaultEntry, history: HistoryEntry[]): string {
+  const began = fault.last_occurrence && sinceText(fault.last_occurrence.noted_at);
+  if (isFailing(fault))
+    return fault.monitor
+      ? `It fails now${began ? `, since ${began}` : ""}.`
+      : `It failed when it was last tested${began ? `; the failure began at ${began}` : ""}. No session is open.`;
+  const repair = history.find((entry) => entry.fault && isRepair(entry.fault));
+  const passes = `Its test passes again${repair ? ` since ${sinceText(repair.at)}` : ""}`;
+  return `${passes}; it stays on record${began ? ` (last failure ${began})` : ""}.`;
+}
+
+/** The fault in one sentence and how it stands now, or the note that it is not active. */
 export function FaultSummary({ fault, history }: { fault: FaultEntry; history: HistoryEntry[] }) {
-  const { code, status } = fault;
-  const latest = history.find(({ fault, what }) => fault && (what === "confirmed" || what === "pending"));
-  if (latest?.fault && isActive(fault)) return <p class="sentence">{sentence(latest.fault.summary)}</p>;
+  const { code, kind, status } = fault;
+  if (isActive(fault)) {
+    const failure = latestFailure(history);
+    const seen = failure ? sentence(failure.summary) : `${capitalised(faultMeaning(code, kind))}.`;
+    return (
+      <div>
+        <p class="sentence">{seen}</p>
+        <p class={`present ${isFailing(fault) ? "status-confirmed" : "status-passed"}`}>
+          {presentText(fault, history)}
+        </p>
+      </div>
+    );
+  }
   return (
     <EmptyState title={status === "cleared" ? "Nothing is on record" : "On record, but not active"}>
       <p>

@@ -26,7 +26,15 @@ export function FaultPage({ name, code }: { name: string; code: FaultCode }) {
     });
   }, [name, code, latestRefetch]);
   if (!fault.data)
-    return <UnloadedPage title={codeTitle(code)} what="the fault" error={fault.error} retry={refetch} />;
+    return (
+      <UnloadedPage
+        title={codeTitle(code)}
+        what="the fault"
+        kind="fault"
+        error={fault.error}
+        retry={refetch}
+      />
+    );
   const error = fault.error ?? history.error;
   return <FaultDetails fault={fault.data} history={history.data ?? []} error={error} refetch={refetch} />;
 }

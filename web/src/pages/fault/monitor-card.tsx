@@ -29,7 +29,7 @@ export function MonitorCard({ fault: { monitor, in_use } }: { fault: FaultEntry 
         facts={[
           ["In this session", sessionText(monitor)],
           ...(counter ? [["Fault detection counter", counter] satisfies [string, string]] : []),
-          ["In-use ratio", ratioText(in_use)],
+          ["Able to judge (in-use ratio)", ratioText(in_use)],
         ]}
       />
       {ratio != null && ratio < LOW_RATIO && (

@@ -3,7 +3,7 @@ import type { Axis, FaultRecording } from "../../api/types";
 import { AXES, TraceBuffer } from "../../live/buffer";
 import { traceOfRecording } from "../../live/recording";
 import { ChartGroup } from "../../parts/charts/chart-group";
-import { ALL_CHARTS } from "../../parts/charts/chart-kinds";
+import { RECORDED_CHARTS } from "../../parts/charts/chart-kinds";
 import type { Mark } from "../../parts/charts/overlays";
 import { RigCharts } from "../../parts/charts/rig-charts";
 
@@ -28,5 +28,5 @@ export function RecordingCharts({ recording, axis }: { recording: FaultRecording
   }, [buffer, group, recording]);
   if (!buffer.t.length) return <p class="quiet">The recording has no data in this range.</p>;
   const axes = axis ? [axis] : [...AXES];
-  return <RigCharts group={group} kinds={ALL_CHARTS} axes={axes} height={150} measuredOnly />;
+  return <RigCharts group={group} kinds={RECORDED_CHARTS} axes={axes} height={150} measuredOnly />;
 }

@@ -2,6 +2,7 @@ import type { FaultCode, HistoryEntry, HistoryEvent } from "../../api/types";
 import { Link } from "../../router/link";
 import { sessionPath } from "../../router/paths";
 import { faultTitle } from "../../words/fault-names";
+import { isRepair } from "../../words/fault-state";
 import { seconds } from "../../words/numbers";
 
 const EVENT: Record<HistoryEvent, string> = {
@@ -31,7 +32,8 @@ export function TimelineText({ entry, code }: { entry: HistoryEntry; code: Fault
   );
   return (
     <span>
-      {faultTitle(code, fault?.kind)} <b>{EVENT[what] ?? what}</b>
+      {faultTitle(code, fault?.kind)}{" "}
+      {fault && isRepair(fault) ? <b class="status-passed">passes its test again</b> : <b>{EVENT[what]}</b>}
       {fault && (
         <>
           {" "}

@@ -1,4 +1,5 @@
 import type { FaultCode, HistoryEntry } from "../../api/types";
+import { isRepair } from "../../words/fault-state";
 import { dateTime } from "../../words/time";
 import { TimelineText } from "./timeline-text";
 
@@ -10,7 +11,7 @@ export function Timeline({ history, code }: { history: HistoryEntry[]; code: Fau
       {history.length === 0 && <p class="quiet">No entries.</p>}
       <ol class="timeline">
         {history.map((entry) => (
-          <li key={entry.id} class={`what-${entry.what}`}>
+          <li key={entry.id} class={entry.fault && isRepair(entry.fault) ? "" : `what-${entry.what}`}>
             <time dateTime={entry.at}>{dateTime(entry.at)}</time>
             <TimelineText entry={entry} code={code} />
           </li>

@@ -5,7 +5,7 @@ import { FleetRow } from "./fleet-row";
 import type { FleetView } from "./use-fleet-view";
 import { useRowHeight } from "./use-row-height";
 
-export function FleetList({ view: { rows, shown }, now }: { view: FleetView; now: number }) {
+export function FleetList({ view: { rows, shown }, seenAt }: { view: FleetView; seenAt: number }) {
   const rowHeight = useRowHeight();
   return (
     <section aria-label="Rigs">
@@ -23,7 +23,7 @@ export function FleetList({ view: { rows, shown }, now }: { view: FleetView; now
           rowHeight={rowHeight}
           label="Rigs"
           id={(row) => row.entry.asset}
-          row={(row) => <FleetRow row={row} now={now} />}
+          row={(row) => <FleetRow row={row} seenAt={seenAt} />}
         />
       ) : (
         <p class="quiet">

@@ -26,7 +26,7 @@ const NOT_LEARNT: Record<LearningState, { word: string; meaning: string }> = {
   learnt: { word: "", meaning: "" },
 };
 
-export function FleetRow({ row: { entry, health }, now }: { row: Row; now: number }) {
+export function FleetRow({ row: { entry, health }, seenAt }: { row: Row; seenAt: number }) {
   const faults = [...entry.faults].sort((a, b) => severity(b) - severity(a));
   const { word, meaning } = NOT_LEARNT[entry.learning];
   return (
@@ -43,7 +43,7 @@ export function FleetRow({ row: { entry, health }, now }: { row: Row; now: numbe
       <HealthMark health={health} />
       <span class="faults">
         {faults.map((fault) => (
-          <FaultChip fault={fault} />
+          <FaultChip fault={fault} hasSession={entry.session_id != null} since={fault.failed_at} />
         ))}
         {entry.warnings.map((warning) => (
           <DriftChip warning={warning} />
@@ -60,7 +60,7 @@ export function FleetRow({ row: { entry, health }, now }: { row: Row; now: numbe
         <span class="only-small">lag </span>
         {number(entry.lag_s, 1, "s")}
       </span>
-      <span class="n quiet">{timeAgo(entry.last_seen, now)}</span>
+      <span class="n quiet">{timeAgo(entry.last_seen, seenAt)}</span>
     </Link>
   );
 }

@@ -2,20 +2,23 @@
 import type { FaultEvent } from "../../api/events";
 import type { FaultLine, FleetEntry } from "../../api/types";
 import { healthByFaults, type RigHealth } from "../../words/severity";
+import { isFailing } from "../../words/status-byte";
 
-/** Time without a sample after which a rig with an open session counts as silent, ms. */
-const SILENT_MS = 10_000;
+/** An event, and when it arrived at the page. */
+export type ReceivedEvent = FaultEvent & { received: Date };
 
 /** Number of event lines that the page keeps. */
 const MAX_LINES = 50;
 
-export function healthOf(entry: FleetEntry, now: number): RigHealth {
+export function healthOf(entry: FleetEntry): RigHealth {
   const byFaults = healthByFaults(entry.faults);
   if (byFaults) return byFaults;
   if (entry.warnings.length) return "drift";
   if (!entry.session_id) return "idle";
-  if (!entry.last_seen || now - Date.parse(entry.last_seen) >= SILENT_MS) return "silent";
-  return entry.unjudged ? "untested" : "ok";
+  // The service judges it: between two looks at a large fleet, every rig would seem silent here.
+  if (entry.silent) return "silent";
+  if (entry.unjudged) return "untested";
+  return entry.calibrated ? "ok" : "unlearnt";
 }
 
 /** Returns the entry after an event. */
@@ -24,11 +27,15 @@ export function afterEvent(entry: FleetEntry, line: FaultLine, now = new Date())
   const isActive = line.status === "pending" || line.status === "confirmed";
   if (!isActive) return { ...entry, faults: others };
   const known = entry.faults.find((fault) => fault.code === line.code);
+  const failing = isFailing(line);
+  const hasBegun = failing && !known?.failing;
   const fault = {
     code: line.code,
     kind: line.kind,
     status: line.status,
-    acknowledged: known?.acknowledged ?? false,
+    failing,
+    failed_at: hasBegun ? now.toISOString() : known?.failed_at,
+    acknowledged: !hasBegun && (known?.acknowledged ?? false),
     changed_at: now.toISOString(),
   };
   return { ...entry, faults: [...others, fault] };
@@ -36,8 +43,10 @@ export function afterEvent(entry: FleetEntry, line: FaultLine, now = new Date())
 
 /** Whether two events report the same change, as when the kind is determined later. */
 const isSameChange = (a: FaultLine, b: FaultLine) =>
-  (["asset", "session", "code", "status", "onset_s"] as const).every((key) => a[key] === b[key]);
+  (["asset", "session", "code", "status", "status_byte", "onset_s"] as const).every(
+    (key) => a[key] === b[key],
+  );
 
 /** Returns the event lines with a new one first; it replaces lines about the same change. */
-export const withLine = (lines: FaultEvent[], line: FaultEvent): FaultEvent[] =>
+export const withLine = (lines: ReceivedEvent[], line: ReceivedEvent): ReceivedEvent[] =>
   [line, ...lines.filter((known) => !isSameChange(known, line))].slice(0, MAX_LINES);

@@ -1,5 +1,4 @@
 /** The page of all rigs: health, faults and lag. */
-import { useNow } from "../../hooks/use-now";
 import { useTitle } from "../../hooks/use-title";
 import { ErrorMessage } from "../../parts/error-message";
 import { UnloadedPage } from "../../parts/unloaded-page";
@@ -12,9 +11,8 @@ import { useFleetView } from "./use-fleet-view";
 
 export function FleetPage() {
   useTitle("Fleet");
-  const { fleet, error, refetch, lines } = useFleet();
-  const now = useNow();
-  const view = useFleetView(fleet, now);
+  const { fleet, seenAt, error, refetch, lines } = useFleet();
+  const view = useFleetView(fleet);
   if (!fleet) return <UnloadedPage title="Fleet" what="the fleet" error={error} retry={refetch} />;
   if (!fleet.length) return <EmptyFleet error={error} />;
   return (
@@ -23,7 +21,7 @@ export function FleetPage() {
       <ErrorMessage error={error} />
       <FleetTools view={view} />
       <div class="fleet-columns">
-        <FleetList view={view} now={now} />
+        <FleetList view={view} seenAt={seenAt} />
         <EventFeed lines={lines} />
       </div>
     </main>

@@ -16,6 +16,7 @@ export type HealthFilter = RigHealth | "all";
 
 export const SORTS = {
   severity: "worst first",
+  newest: "newest fault first",
   name: "by name",
   seen: "last seen first",
   lag: "greatest lag first",
@@ -30,9 +31,9 @@ const NAMES = new Intl.Collator("en", { numeric: true });
 export const nameRanks = (names: string[]) =>
   new Map([...names].sort((a, b) => NAMES.compare(a, b)).map((name, rank) => [name, rank]));
 
-export const rowOf = (entry: FleetEntry, ranks: Map<string, number>, now: number): FleetRow => ({
+export const rowOf = (entry: FleetEntry, ranks: Map<string, number>): FleetRow => ({
   entry,
-  health: healthOf(entry, now),
+  health: healthOf(entry),
   worst: worstSeverity(entry.faults),
   nameRank: ranks.get(entry.asset) ?? 0,
 });
@@ -56,15 +57,23 @@ function matches({ asset, session, faults, warnings }: FleetEntry, text: string)
 const HEALTH_RANK: Record<RigHealth, number> = {
   fault: 0,
   suspect: 1,
-  drift: 2,
-  untested: 3,
-  silent: 4,
-  ok: 5,
-  idle: 6,
+  recorded: 2,
+  drift: 3,
+  untested: 4,
+  silent: 5,
+  unlearnt: 6,
+  ok: 7,
+  unknown: 8,
+  idle: 9,
 };
+
+/** The time at which a test of the rig last began to fail; empty without a fault. */
+const lastFailure = ({ faults }: FleetEntry) =>
+  faults.reduce((last, { failed_at }) => (failed_at && failed_at > last ? failed_at : last), "");
 
 const COMPARE: Record<Sort, (a: FleetRow, b: FleetRow) => number> = {
   severity: (a, b) => b.worst - a.worst || HEALTH_RANK[a.health] - HEALTH_RANK[b.health],
+  newest: (a, b) => lastFailure(b.entry).localeCompare(lastFailure(a.entry)),
   name: () => 0,
   seen: (a, b) => (b.entry.last_seen ?? "").localeCompare(a.entry.last_seen ?? ""),
   lag: (a, b) => (b.entry.lag_s ?? -1) - (a.entry.lag_s ?? -1),

@@ -16,7 +16,7 @@ function useNameRanks(fleet: FleetEntry[]): Map<string, number> {
 const NO_RIGS: FleetEntry[] = [];
 
 /** The fleet with the search, filter and order of the address. */
-export function useFleetView(fleet: FleetEntry[] = NO_RIGS, now: number) {
+export function useFleetView(fleet: FleetEntry[] = NO_RIGS) {
   const { query } = useLocation();
   const search = query.get("search") ?? "";
   const filter = (query.get("health") || "all") as HealthFilter;
@@ -28,7 +28,7 @@ export function useFleetView(fleet: FleetEntry[] = NO_RIGS, now: number) {
     navigate(`/${next.size ? `?${next}` : ""}`, true);
   };
   const ranks = useNameRanks(fleet);
-  const rows = useMemo(() => fleet.map((entry) => rowOf(entry, ranks, now)), [fleet, ranks, now]);
+  const rows = useMemo(() => fleet.map((entry) => rowOf(entry, ranks)), [fleet, ranks]);
   const shown = useMemo(() => chosenRows(rows, filter, search, sort), [rows, filter, search, sort]);
   return { search, filter, sort, rows, shown, change };
 }

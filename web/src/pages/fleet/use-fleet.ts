@@ -1,10 +1,10 @@
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { api } from "../../api/client";
-import { faultEvents, type FaultEvent } from "../../api/events";
+import { faultEvents } from "../../api/events";
 import type { FleetEntry } from "../../api/types";
 import { useLatest } from "../../hooks/use-latest";
 import { useQuery } from "../../hooks/use-query";
-import { afterEvent, withLine } from "./fleet-state";
+import { afterEvent, withLine, type ReceivedEvent } from "./fleet-state";
 
 /** Polling interval for a fleet of `n` rigs, ms. */
 const intervalFor = (n: number) => 2000 + 2 * n;
@@ -20,7 +20,7 @@ export function useFleet() {
   const [interval, setPollInterval] = useState(intervalFor(0));
   const { data: polled, error, refetch } = useQuery(api.fleet, "fleet", interval);
   const [patches, setPatches] = useState<Patches>({ entries: new Map() });
-  const [lines, setLines] = useState<FaultEvent[]>([]);
+  const [lines, setLines] = useState<ReceivedEvent[]>([]);
   const current = useRef(new Map<string, FleetEntry>());
 
   const n = polled?.length;
@@ -45,12 +45,15 @@ export function useFleet() {
       });
     };
     return faultEvents.listen((line) => {
-      setLines((before) => withLine(before, line));
+      setLines((before) => withLine(before, { ...line, received: new Date() }));
       const entry = current.current.get(line.asset ?? "");
       if (entry) patch(afterEvent(entry, line));
       else void refetch();
     });
   }, [refetch, latestPolled]);
+
+  /** The time of the last look at the fleet: "last seen" is told as of then, ms since 1970. */
+  const seenAt = useMemo(() => (polled ? Date.now() : 0), [polled]);
 
   // After a lost connection, the missed changes are fetched.
   useEffect(() => {
@@ -60,5 +63,5 @@ export function useFleet() {
       before = state;
     });
   }, [refetch]);
-  return { fleet, error, refetch, lines };
+  return { fleet, seenAt, error, refetch, lines };
 }

@@ -1,11 +1,11 @@
 import { useEffect, useState } from "preact/hooks";
 
-/** Width below which the layout is that of a phone, as in the style sheet, px. */
-const PHONE_WIDTH = 700;
+/** Width below which a row has several lines, as in the style sheet, px. */
+const NARROW_WIDTH = 960;
 
-const height = () => (innerWidth < PHONE_WIDTH ? 104 : 56);
+const height = () => (innerWidth < NARROW_WIDTH ? 104 : 56);
 
-/** The height of a row, px; on a phone it has two more lines. */
+/** The height of a row, px; on a narrow screen it has two more lines. */
 export function useRowHeight(): number {
   const [rowHeight, setRowHeight] = useState(height);
   useEffect(() => {

@@ -40,3 +40,7 @@ export function extent(values: number[]): [low: number, high: number] {
   }
   return [low, high];
 }
+
+/** Counts the rows that have a time and a position. */
+export const countSeen = ({ t_s, x_m, y_m }: Columns) =>
+  t_s.filter((t, i) => t !== null && x_m[i] !== null && y_m[i] !== null).length;

@@ -8,26 +8,40 @@ const REQUIRED: Quantity[] = ["t_s", "x_m", "y_m"];
 
 interface Props {
   mapping: Mapping;
+  /** Number of rows with a time. */
   nRows: number;
+  /** Number of rows with a time and a position. */
+  nSeen: number;
   hasAsset: boolean;
   send: () => Promise<void>;
   cancel: () => void;
 }
 
-export function ImportButtons({ mapping, nRows, hasAsset, send, cancel }: Props) {
-  const missing = QUANTITIES.filter((quantity) => mapping[quantity].index === null);
-  const isReady = hasAsset && !REQUIRED.some((quantity) => missing.includes(quantity));
+/** Why the recording cannot be imported yet; empty if it can. */
+function obstacle({ mapping, nRows, nSeen, hasAsset }: Omit<Props, "send" | "cancel">): string {
+  const missing = REQUIRED.filter((quantity) => mapping[quantity].index === null);
+  if (missing.length)
+    return `Choose the column of: ${missing.map((quantity) => QUANTITY_TITLES[quantity]).join(", ")}.`;
+  if (nRows < 2) return "The column of the time has no numbers: a time is a number of seconds, ms or µs.";
+  if (nSeen < 2) return "No row has both coordinates of the ball as numbers.";
+  return hasAsset ? "" : "Choose the rig.";
+}
+
+export function ImportButtons({ send, cancel, ...recording }: Props) {
+  const { mapping, nRows } = recording;
+  const problem = obstacle(recording);
+  const absent = QUANTITIES.filter((quantity) => mapping[quantity].index === null);
   return (
     <div class="form-end">
-      {missing.length > 0 && (
-        <span class="quiet">
-          Not assigned: {missing.map((quantity) => QUANTITY_TITLES[quantity]).join(", ")}
-        </span>
-      )}
+      <span class={problem ? "late" : "quiet"} role="status">
+        {problem ||
+          (absent.length > 0 &&
+            `Not assigned: ${absent.map((quantity) => QUANTITY_TITLES[quantity]).join(", ")}`)}
+      </span>
       <button type="button" onClick={cancel}>
         Cancel
       </button>
-      <ActionButton class="primary" action={send} disabled={!isReady}>
+      <ActionButton class="primary" action={send} disabled={problem !== ""} needs="operator">
         Import {count(nRows)} rows
       </ActionButton>
     </div>

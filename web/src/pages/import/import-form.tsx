@@ -4,7 +4,7 @@ import type { ImportResult } from "../../api/types";
 import { navigate } from "../../router/navigation";
 import { sessionPath } from "../../router/paths";
 import { ColumnMapping } from "./column-mapping";
-import { toColumns, toCsv } from "./columns";
+import { countSeen, finite, toColumns, toCsv } from "./columns";
 import { ImportButtons } from "./import-buttons";
 import { ImportTarget } from "./import-target";
 import type { Mapping } from "./mapping";
@@ -36,8 +36,7 @@ export function ImportForm({
 }: Props) {
   const { table, mapping } = recording;
   const columns = useMemo(() => toColumns(table, mapping), [table, mapping]);
-  const [chosenAsset, setAsset] = useState(wantedAsset);
-  const asset = chosenAsset ?? assets[0] ?? "";
+  const [asset, setAsset] = useState(wantedAsset ?? "");
   const [session, setSession] = useState(withoutExtension(fileName));
   const send = async () => {
     if (!assets.includes(asset)) await api.createAsset({ name: asset });
@@ -59,7 +58,8 @@ export function ImportForm({
       <SanityCheck columns={columns} mapping={mapping} change={setMapping} />
       <ImportButtons
         mapping={mapping}
-        nRows={table.rows.length}
+        nRows={finite(columns.t_s).length}
+        nSeen={countSeen(columns)}
         hasAsset={asset !== ""}
         send={send}
         cancel={cancel}

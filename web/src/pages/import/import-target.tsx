@@ -1,3 +1,5 @@
+import { DEFAULT_DIMENSIONS } from "../../words/dimensions";
+
 interface Props {
   assets: string[];
   asset: string;
@@ -17,7 +19,7 @@ export function ImportTarget({ assets, asset, setAsset, session, setSession }: P
             list="import-assets"
             value={asset}
             onInput={(e) => setAsset(e.currentTarget.value)}
-            placeholder="name of the rig"
+            placeholder="choose or name the rig"
           />
         </label>
         <datalist id="import-assets">
@@ -31,8 +33,9 @@ export function ImportTarget({ assets, asset, setAsset, session, setSession }: P
       </div>
       {!assets.includes(asset) && asset && (
         <p class="note">
-          There is no rig <b>{asset}</b> yet. It will be registered with the dimensions of the book chapter's
-          rig; its set-up can be changed later.
+          There is no rig <b>{asset}</b> yet. It will be registered with default dimensions (
+          {DEFAULT_DIMENSIONS}), and servo faults cannot be confirmed until it has been learnt. Set it up
+          first if its dimensions differ.
         </p>
       )}
     </>

@@ -1,4 +1,4 @@
-import type { MappedColumn } from "./mapping";
+import { guessFactor, type MappedColumn } from "./mapping";
 import { QUANTITY_TITLES, UNITS, type Quantity } from "./quantities";
 import { SignChoice } from "./sign-choice";
 import type { Table } from "./table";
@@ -17,7 +17,11 @@ interface Props {
 export function MappingRow({ quantity, column: { index, factor, sign }, table, set }: Props) {
   const word = QUANTITY_TITLES[quantity];
   const firstRows = table.rows.slice(0, SHOWN);
-  const chooseColumn = (value: string) => set({ index: value === "" ? null : Number(value) });
+  const chooseColumn = (value: string) => {
+    if (value === "") return set({ index: null });
+    const chosen = Number(value);
+    set({ index: chosen, factor: guessFactor(quantity, table, chosen) });
+  };
   return (
     <tr>
       <th scope="row">{word}</th>

@@ -48,6 +48,12 @@ function unitBySize(quantity: Quantity, column: (number | null)[]): Unit {
   return units[largest > largestInFirstUnit ? 1 : 0]!;
 }
 
+/** Returns the factor of the unit of a column, by its name or the size of its values. */
+export function guessFactor(quantity: Quantity, table: Table, index: number): number {
+  const unit = unitByName(quantity, table.header[index]!) ?? unitBySize(quantity, numbersOf(table, index));
+  return unit.factor;
+}
+
 export function guessMapping(table: Table): Mapping {
   const taken = new Set<number>();
   const find = (pattern: RegExp) => table.header.findIndex((name, i) => !taken.has(i) && pattern.test(name));
@@ -55,8 +61,7 @@ export function guessMapping(table: Table): Mapping {
     const index = NAMES[quantity].map(find).find((i) => i >= 0) ?? null;
     if (index === null) return { index, factor: UNITS[quantity][0]!.factor, sign: 1 };
     taken.add(index);
-    const unit = unitByName(quantity, table.header[index]!) ?? unitBySize(quantity, numbersOf(table, index));
-    return { index, factor: unit.factor, sign: 1 };
+    return { index, factor: guessFactor(quantity, table, index), sign: 1 };
   };
   return Object.fromEntries(QUANTITIES.map((quantity) => [quantity, guessColumn(quantity)])) as Mapping;
 }

@@ -1,11 +1,13 @@
 import { useEffect, useRef } from "preact/hooks";
 import { count, millimetres, number, seconds } from "../../words/numbers";
-import { extent, finite, type Columns } from "./columns";
+import { countSeen, extent, finite, type Columns } from "./columns";
 import { drawPreview } from "./draw-preview";
 
 /** Formats the range of a column. */
 function rangeText(column: (number | null)[]): string {
-  const [low, high] = extent(finite(column));
+  const known = finite(column);
+  if (!known.length) return "unknown";
+  const [low, high] = extent(known);
   return `from ${millimetres(low, 0)} to ${millimetres(high, 0)}`;
 }
 
@@ -17,7 +19,7 @@ export function Preview({ columns }: { columns: Columns }) {
   const t = finite(t_s);
   const length = t.length > 1 ? t[t.length - 1]! - t[0]! : 0;
   const rate = length > 0 ? (t.length - 1) / length : null;
-  const nSeen = x_m.filter((x, i) => x !== null && y_m[i] !== null).length;
+  const nSeen = countSeen(columns);
   const commands = [...finite(cmd_qx_rad), ...finite(cmd_qy_rad)].map(Math.abs);
   const largestAngle = Math.max(extent(commands)[1], 0);
   return (

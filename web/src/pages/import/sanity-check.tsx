@@ -29,6 +29,7 @@ interface Props {
 /** Checks of the mapped columns, with buttons that correct them. */
 export function SanityCheck({ columns, mapping, change }: Props) {
   const check = useMemo(() => checkSigns(columns), [columns]);
+  const nTimeless = mapping.t_s.index === null ? 0 : columns.t_s.length - finite(columns.t_s).length;
   const nNonIncreasing = countNonIncreasing(columns);
   const isFar = isBeyond(LARGEST_POSITION_M, columns.x_m, columns.y_m);
   const isSteep = isBeyond(LARGEST_ANGLE_RAD, columns.cmd_qx_rad, columns.cmd_qy_rad);
@@ -37,6 +38,11 @@ export function SanityCheck({ columns, mapping, change }: Props) {
     change({ ...mapping, [quantity]: { ...mapping[quantity], sign: mapping[quantity].sign === 1 ? -1 : 1 } });
   return (
     <ul class="sanity" aria-label="Sanity check">
+      {nTimeless > 0 && (
+        <li class="warn">
+          {count(nTimeless)} rows are left out: their time is not a number (a date is not read as one).
+        </li>
+      )}
       {nNonIncreasing > 0 && <li class="warn">Time does not increase in {count(nNonIncreasing)} rows.</li>}
       {isFar && <li class="warn">Positions exceed 2 m: check the unit of the ball's position.</li>}
       {isSteep && <li class="warn">Commands exceed 90°: check the unit of the commands.</li>}

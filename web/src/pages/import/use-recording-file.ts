@@ -10,9 +10,16 @@ export interface RecordingFile {
   mapping: Mapping;
 }
 
+/** Returns the text of a file: UTF-16 if a byte order mark says so, otherwise UTF-8. */
+function textOf(bytes: Uint8Array): string {
+  const mark = `${bytes[0]},${bytes[1]}`;
+  const encoding = { "255,254": "utf-16le", "254,255": "utf-16be" }[mark] ?? "utf-8";
+  return new TextDecoder(encoding).decode(bytes);
+}
+
 async function read(file: File): Promise<RecordingFile> {
   if (file.size > MAX_BYTES) throw new Error("The file is larger than 64 MiB. Split it.");
-  const table = readTable(await file.text());
+  const table = readTable(textOf(new Uint8Array(await file.arrayBuffer())));
   return { table, mapping: guessMapping(table) };
 }
 

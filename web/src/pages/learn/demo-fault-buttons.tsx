@@ -1,7 +1,7 @@
 import type { Demo } from "../../api/types";
 import { ActionButton } from "../../parts/action-button";
 import { codeTitle } from "../../words/fault-names";
-import { effectMeaning, faultsByCode } from "./demo-faults";
+import { effectMeaning, effectWord, faultsByCode } from "./demo-faults";
 
 interface Props {
   demo: Demo;
@@ -16,12 +16,9 @@ export function DemoFaultButtons({ demo: { buttons, broken }, inject }: Props) {
         <fieldset>
           <legend>{codeTitle(code)}</legend>
           {faults.map(({ id, effect }) => (
-            <ActionButton
-              class={broken.includes(id) ? "danger" : ""}
-              action={() => inject(id)}
-              label={`Inject: ${codeTitle(code)}, ${effect}`}
-            >
-              <b>{effect}</b>
+            <ActionButton class={broken.includes(id) ? "danger" : ""} action={() => inject(id)}>
+              <span class="hidden">Inject: {codeTitle(code)}, </span>
+              <b>{effectWord(effect)}</b>
               <br />
               <span class="quiet small-text">{effectMeaning(effect)}</span>
             </ActionButton>

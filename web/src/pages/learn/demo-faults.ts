@@ -1,5 +1,7 @@
 /** The faults that the demo injects: `code:effect`, as on the command line of `offbd simulate`. */
 
+import { codeTitle } from "../../words/fault-names";
+
 export interface DemoFault {
   /** The identifier in the requests to the service. */
   id: string;
@@ -25,6 +27,11 @@ const EFFECT: Partial<Record<string, string>> = {
   jump: "readings shifted by a constant offset",
 };
 
+/** The word of the diagnosis for an effect: one word for one thing on the page. */
+const WORD: Partial<Record<string, string>> = { hold: "held", freeze: "frozen" };
+
+export const effectWord = (effect: string) => WORD[effect] ?? effect;
+
 /** Describes an injected effect; an unknown one is returned as it is. */
 export const effectMeaning = (effect: string) => EFFECT[effect] ?? effect;
 
@@ -40,6 +47,9 @@ export function faultsByCode(ids: string[]): Map<string, DemoFault[]> {
   return groups;
 }
 
-/** Returns the faults as text: x servo, dead; sensor, noise. */
+/** Returns the faults as text: X servo, dead; Position sensor, noise. */
 export const faultList = (ids: string[]) =>
-  ids.map((id) => id.replace(":", ", ").replace("_", " ")).join("; ");
+  ids
+    .map(parse)
+    .map(({ code, effect }) => `${codeTitle(code)}, ${effectWord(effect)}`)
+    .join("; ");

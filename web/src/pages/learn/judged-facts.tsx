@@ -1,11 +1,15 @@
 import { useMemo } from "preact/hooks";
-import type { Profile, Session, Trace } from "../../api/types";
+import type { FaultLine, Profile, Session, Trace } from "../../api/types";
 import { useReplay } from "../../hooks/use-replay";
 import { ActionButton } from "../../parts/action-button";
 import { Facts } from "../../parts/facts";
 import { count, NONE, number } from "../../words/numbers";
+import { isFailing } from "../../words/status-byte";
 import { verdict } from "../../words/verdict";
 import { sharesAlongX } from "./shares";
+
+/** Whether a line reports that a fault is confirmed, and not that its test passes again. */
+const isAlarm = (line: FaultLine) => line.status === "confirmed" && isFailing(line);
 
 const percent = (share?: number | null) => number(share == null ? share : 100 * share, 0, "%");
 
@@ -21,19 +25,23 @@ export function JudgedFacts({ session, profile, trace }: Props) {
   const { replay, judge } = useReplay(session.id);
   const result = replay?.result;
   const isGateClosed = shares && !shares.judged;
-  const judgeAll = <ActionButton action={() => judge({ profile })}>Judge the whole session</ActionButton>;
-  const whole = result ? verdict(result.summary).text : replay ? "judging…" : judgeAll;
+  const judgeAll = (
+    <ActionButton action={() => judge({ profile })} needs="operator">
+      Run on the whole session
+    </ActionButton>
+  );
+  const whole = result ? verdict(result.summary).text : replay ? "running…" : judgeAll;
   return (
     <Facts
       facts={[
         ["Beyond the limit", percent(shares?.beyond)],
-        ["Judged (gate open)", percent(shares?.judged)],
+        ["Time under test", percent(shares?.judged)],
         [
-          "Beyond the limit, of the judged part",
-          isGateClosed ? "none: the gate was never open" : percent(shares?.beyondOfJudged),
+          "Beyond the limit while under test",
+          isGateClosed ? "never under test" : percent(shares?.beyondOfJudged),
         ],
         ["Whole session", whole],
-        ["Status changes", result ? count(result.faults.length) : NONE],
+        ["Alarms in the whole session", result ? count(result.faults.filter(isAlarm).length) : NONE],
       ]}
     />
   );

@@ -1,10 +1,9 @@
 import { useState } from "preact/hooks";
 import { api } from "../../api/client";
-import type { Profile } from "../../api/types";
 import { useQuery } from "../../hooks/use-query";
 import { ErrorMessage } from "../../parts/error-message";
 import { exampleSession } from "./example-session";
-import { JudgedByProfile } from "./judged-by-profile";
+import { Comparison } from "./comparison";
 import { TextbookText } from "./textbook-text";
 
 const INTERVAL_MS = 10_000;
@@ -12,18 +11,20 @@ const INTERVAL_MS = 10_000;
 /** Smallest number of samples of an example. */
 const MIN_SAMPLES = 500;
 
-const PROFILES: Profile[] = ["default", "textbook"];
-
 const fetchSessions = async () => {
   const { items } = await api.sessions({ limit: 50 });
   return items.filter((session) => session.samples > MIN_SAMPLES);
 };
 
-/** One session without a fault, judged with both profiles. */
+/** A stretch without a fault, judged with both profiles. */
 export function Textbook() {
   const { data: sessions, error } = useQuery(fetchSessions, "sessions", INTERVAL_MS);
   const [id, setId] = useState("");
-  const chosen = sessions && exampleSession(sessions, id);
+  /** Sessions without a healthy stretch, which are no examples unless they are chosen. */
+  const [unfit, setUnfit] = useState<ReadonlySet<string>>(new Set());
+  const fit = sessions?.filter((session) => !unfit.has(session.id) || session.id === id);
+  const chosen = sessions && (exampleSession(fit ?? [], id) ?? sessions[0]);
+  const skip = (skipped: string) => setUnfit((before) => new Set(before).add(skipped));
   return (
     <section class="card">
       <h2>Why 0.01 m/s² fails on a real rig</h2>
@@ -46,11 +47,7 @@ export function Textbook() {
               ))}
             </select>
           </label>
-          <div class="pair">
-            {PROFILES.map((profile) => (
-              <JudgedByProfile key={chosen.id + profile} session={chosen} profile={profile} />
-            ))}
-          </div>
+          <Comparison key={chosen.id} session={chosen} unfit={skip} />
         </>
       )}
     </section>

@@ -1,5 +1,6 @@
 import type { FaultLine, Replay } from "../../api/types";
 import { faultTitle } from "../../words/fault-names";
+import { changeOf } from "../../words/fault-state";
 import { NONE, seconds } from "../../words/numbers";
 
 /** Number of displayed rows. */
@@ -32,8 +33,11 @@ export function Differences({ differences }: Pick<NonNullable<Replay["result"]>,
   );
 }
 
-const describe = ({ code, kind, status }: FaultLine) => (
-  <>
-    {faultTitle(code, kind)} <span class={`status-${status}`}>{status}</span>
-  </>
-);
+function describe(line: FaultLine) {
+  const { text, look } = changeOf(line);
+  return (
+    <>
+      {faultTitle(line.code, line.kind)} <span class={look}>{text}</span>
+    </>
+  );
+}

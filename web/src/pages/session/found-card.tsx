@@ -1,37 +1,32 @@
-import type { FaultLine, Session } from "../../api/types";
+import type { Asset, FaultLine, Session } from "../../api/types";
 import { Facts } from "../../parts/facts";
 import { count } from "../../words/numbers";
 import { sessionLength } from "../../words/session";
 import { dateTime, duration } from "../../words/time";
 import { verdict } from "../../words/verdict";
+import { Assumptions } from "./assumptions";
 import { FoundFault } from "./found-fault";
 import { Hash } from "./hash";
 import { JudgedShares } from "./judged-shares";
 
 interface Props {
   session: Session;
+  asset: Asset;
   faults: FaultLine[];
   seek: (t: number) => void;
 }
 
-/** The data of the session and its verdict. */
-export function FoundCard({ session, faults, seek }: Props) {
+/** The verdict on the session, what it rests on, and the data of the session. */
+export function FoundCard({ session, asset, faults, seek }: Props) {
   const { verdict: summary, rejected } = session;
   const result = summary && verdict(summary);
   const hash = summary && <Hash hash={summary.verdict_hash} title={summary.verdict_hash} />;
   return (
-    <section class="card">
+    <section class="card verdict">
       <h2>Verdict</h2>
-      <Facts
-        facts={[
-          ["State", session.state === "open" ? "open" : `ended ${dateTime(session.ended_at)}`],
-          ["Samples", `${count(session.samples)}${rejected ? `, ${count(rejected)} rejected` : ""}`],
-          ["Length", duration(sessionLength(session))],
-          ["Hash", hash ?? "when the session has ended"],
-        ]}
-      />
-      {result && <p class={result.look}>{result.text}</p>}
-      {!result && faults.length === 0 && <p class="quiet">No fault so far</p>}
+      {result && <p class={`result ${result.look}`}>{result.text}</p>}
+      {!result && <p class="quiet">The session is open. {faults.length === 0 && "No fault so far."}</p>}
+      <Assumptions session={session} asset={asset} />
       {faults.length > 0 && (
         <ol class="found">
           {faults.map((line) => (
@@ -40,6 +35,14 @@ export function FoundCard({ session, faults, seek }: Props) {
         </ol>
       )}
       {summary && <JudgedShares monitors={summary.monitors ?? []} />}
+      <Facts
+        facts={[
+          ["State", session.state === "open" ? "open" : `ended ${dateTime(session.ended_at)}`],
+          ["Samples", `${count(session.samples)}${rejected ? `, ${count(rejected)} rejected` : ""}`],
+          ["Length", duration(sessionLength(session))],
+          ["Checksum of the verdict", hash ?? "when the session has ended"],
+        ]}
+      />
     </section>
   );
 }

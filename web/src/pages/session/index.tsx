@@ -17,7 +17,9 @@ export function SessionPage({ id }: { id: string }) {
   useTitle(session.data ? session.data.name : "Session");
   const error = session.error ?? asset.error;
   if (!session.data || !asset.data)
-    return <UnloadedPage title="Session" what="the session" error={error} retry={session.refetch} />;
+    return (
+      <UnloadedPage title="Session" what="the session" kind="session" error={error} retry={session.refetch} />
+    );
   return (
     <SessionDetails
       session={session.data}

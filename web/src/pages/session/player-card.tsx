@@ -1,17 +1,20 @@
 import type { TraceBuffer } from "../../live/buffer";
 import { ALL_CHARTS } from "../../parts/charts/chart-kinds";
 import { RigCharts } from "../../parts/charts/rig-charts";
+import { SPEEDS } from "./address";
 import { NumberChoice } from "./number-choice";
 import { ProfileChoice, type ProfileOrRecorded } from "./profile-choice";
 import type { Playback } from "./use-playback";
 import type { PlaybackCharts } from "./use-playback-charts";
+import { ZoomButtons } from "./zoom-buttons";
 
-const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10];
 /** Selectable time spans of the charts, s; 0 for the whole recording. */
 const SPANS = [10, 30, 60, 0];
 
 interface Props {
   buffer: TraceBuffer;
+  /** Every how many judged moments the trace of the whole has one. */
+  stride: number;
   playback: Playback;
   charts: PlaybackCharts;
   profile: ProfileOrRecorded;
@@ -19,9 +22,9 @@ interface Props {
 }
 
 /** The charts and the controls of the playback. */
-export function PlayerCard({ buffer, playback, charts, profile, setProfile }: Props) {
+export function PlayerCard({ buffer, stride, playback, charts, profile, setProfile }: Props) {
   const { isPlaying, toggle, seek, speed, setSpeed } = playback;
-  const { group, span, setSpan, slider, clock } = charts;
+  const { group, span, setSpan, slider, clock, resolution, zoomTo } = charts;
   const spanText = (seconds: number) => (seconds ? `${seconds} s` : "all");
   return (
     <section class="card">
@@ -43,10 +46,20 @@ export function PlayerCard({ buffer, playback, charts, profile, setProfile }: Pr
         <NumberChoice label="Speed" values={SPEEDS} text={(s) => `${s}×`} chosen={speed} choose={setSpeed} />
         <NumberChoice label="Show" values={SPANS} text={spanText} chosen={span} choose={setSpan} />
         <ProfileChoice label="Judged by" class="inline" chosen={profile} choose={setProfile} />
+        <ZoomButtons charts={charts} />
       </div>
-      <RigCharts group={group} kinds={ALL_CHARTS} height={136} onSeek={seek} />
+      {stride > 1 && (
+        <p ref={resolution} class="resolution small-text" data-resolution="thinned">
+          <span class="if-thinned late">
+            Thinned: one of {stride} judged moments is drawn. Show less time to see all of them.
+          </span>
+          <span class="if-full quiet">Every judged moment is drawn.</span>
+        </p>
+      )}
+      <RigCharts group={group} kinds={ALL_CHARTS} height={136} onSeek={seek} onZoom={zoomTo} />
       <p class="quiet small-text">
-        Click a chart to go to that time. Space plays or pauses, the arrow keys step by one second.
+        Click a chart to go to that time; drag over it to zoom in, double-click to zoom out. Space plays or
+        pauses, the arrow keys step by one second.
       </p>
     </section>
   );

@@ -1,11 +1,12 @@
 import type { Asset, FaultLine, Session } from "../../api/types";
-import type { TraceBuffer } from "../../live/buffer";
+import { AXES, type TraceBuffer } from "../../live/buffer";
 import { poseAt } from "../../live/pose";
 import { RigView } from "../../parts/rig-view/rig-view";
 import { XyTrace } from "../../parts/xy-trace/xy-trace";
 import { FoundCard } from "./found-card";
 import { PlayerCard } from "./player-card";
 import type { ProfileOrRecorded } from "./profile-choice";
+import { useDetail } from "./use-detail";
 import { useHotkeys } from "./use-hotkeys";
 import { usePlayback } from "./use-playback";
 import { usePlaybackCharts } from "./use-playback-charts";
@@ -19,35 +20,54 @@ interface Props {
   faults: FaultLine[];
   /** Undefined while it is fetched; the player keeps its current time. */
   buffer?: TraceBuffer;
+  /** Every how many judged moments the buffer has one. */
+  stride: number;
+  /** Most moments of a trace. */
+  points: number;
   profile: ProfileOrRecorded;
   setProfile: (profile: ProfileOrRecorded) => void;
 }
 
+/** The axes along which the recording has no position at all. */
+const unseenAxes = (buffer: TraceBuffer) =>
+  AXES.filter((axis) => buffer[axis].position.every((value) => value === null));
+
 /** The playback of a recording: drawings and charts of the same moment. */
-export function Player({ session, asset, faults, buffer, profile, setProfile }: Props) {
+export function Player({ session, asset, faults, buffer, stride, points, profile, setProfile }: Props) {
   const playback = usePlayback(buffer);
-  const charts = usePlaybackCharts(buffer, faults, playback);
+  const detail = useDetail(session, profile, buffer, stride, points);
+  const charts = usePlaybackCharts({ buffer, detail, faults, playback });
   useHotkeys(playback);
   if (!buffer?.t.length) return null;
   const { t, seek } = playback;
+  const { drawnBuffer } = charts;
+  const unseen = unseenAxes(buffer);
   return (
     <>
-      <div class="live-top">
+      {unseen.length > 0 && (
+        <p class="note">
+          The recording has no position along {unseen.join(" and ")}, so the ball cannot be drawn on the
+          plate. The charts show what there is.
+        </p>
+      )}
+      <div class="playback-top">
         <RigView
           asset={asset}
-          pose={() => poseAt(buffer, t.current)}
+          pose={() => poseAt(drawnBuffer() ?? buffer, t.current)}
           name={`${session.asset}-${session.name}`}
         />
-        <div class="live-side">
-          <section class="card">
-            <h2>From above</h2>
-            <XyTrace asset={asset} moment={() => ({ buffer, t: t.current, tail: TAIL_S })} />
-          </section>
-          <FoundCard session={session} faults={faults} seek={seek} />
-        </div>
+        <section class="card">
+          <h2>From above</h2>
+          <XyTrace
+            asset={asset}
+            moment={() => ({ buffer: drawnBuffer() ?? buffer, t: t.current, tail: TAIL_S })}
+          />
+        </section>
+        <FoundCard session={session} asset={asset} faults={faults} seek={seek} />
       </div>
       <PlayerCard
         buffer={buffer}
+        stride={stride}
         playback={playback}
         charts={charts}
         profile={profile}

@@ -30,7 +30,7 @@ export function ReplayFields({ judge }: { judge: (form: ReplayForm) => Promise<v
         />{" "}
         without the calibration
       </label>
-      <ActionButton class="primary" action={() => judge(form)}>
+      <ActionButton class="primary" action={() => judge(form)} needs="operator">
         Judge again
       </ActionButton>
     </div>

@@ -10,9 +10,11 @@ import { NumberChoice } from "./number-choice";
 import { Player } from "./player";
 import type { ProfileOrRecorded } from "./profile-choice";
 import { SessionHeader } from "./session-header";
-import { stretches, stretchText } from "./stretches";
+import { stretchAt, stretches, stretchText } from "./stretches";
+import { useAddress } from "./use-address";
 
-/** Largest number of drawn moments; longer sessions are thinned out. */
+/** Largest number of moments of a trace: that of a longer session is thinned out, and the shown part is
+ * fetched again with every sample. */
 const POINTS = 12_000;
 
 interface Props {
@@ -24,11 +26,16 @@ interface Props {
 
 export function SessionDetails({ session, asset, faults, refetch }: Props) {
   /** The profile with which the session is judged for the charts. */
-  const [profile, setProfile] = useState<ProfileOrRecorded>("");
+  const { address, write } = useAddress();
+  const [profile, setProfile] = useState<ProfileOrRecorded>(address.profile);
+  const chooseProfile = (next: ProfileOrRecorded) => {
+    setProfile(next);
+    write({ profile: next });
+  };
   const pieces = useMemo(() => stretches(session), [session]);
   const texts = pieces.map((piece) => stretchText(piece, session.first_t_s ?? 0));
-  /** The shown stretch of a long recording; the last one by default. */
-  const [chosen, setChosen] = useState<number>();
+  /** The shown stretch of a long recording: that of the address, or the last one. */
+  const [chosen, setChosen] = useState(() => stretchAt(pieces, address.t));
   const shown = Math.min(chosen ?? Infinity, pieces.length - 1);
   const fetchTrace = () =>
     api.trace(session.id, { ...pieces[shown], points: POINTS, profile: profile || undefined });
@@ -59,7 +66,9 @@ export function SessionDetails({ session, asset, faults, refetch }: Props) {
         faults={faults}
         buffer={buffer}
         profile={profile}
-        setProfile={setProfile}
+        stride={data?.stride ?? 1}
+        points={POINTS}
+        setProfile={chooseProfile}
       />
       <JudgeAgain session={session} />
     </main>

@@ -2,6 +2,8 @@ import { useState } from "preact/hooks";
 import { api } from "../../api/client";
 import type { Session } from "../../api/types";
 import { ActionButton } from "../../parts/action-button";
+import { ConfirmButton } from "../../parts/confirm-button";
+import { useRefusal } from "../../parts/login/rights";
 import { saveFile } from "../../parts/save-file";
 import { Link } from "../../router/link";
 import { rigPath, sessionsPath } from "../../router/paths";
@@ -10,6 +12,7 @@ import { DeleteDialog } from "./delete-dialog";
 export function SessionHeader({ session, refetch }: { session: Session; refetch: () => Promise<void> }) {
   const { id, name, asset, state } = session;
   const [isDeleting, setDeleting] = useState(false);
+  const cannotDelete = useRefusal("admin");
   const download = async () => saveFile(await api.recording(id), `${asset}-${name}.csv`);
   const end = () => api.endSession(id).then(refetch);
   return (
@@ -24,9 +27,16 @@ export function SessionHeader({ session, refetch }: { session: Session; refetch:
         <div class="page-tools">
           <ActionButton action={download}>Download CSV</ActionButton>
           {state === "open" ? (
-            <ActionButton action={end}>End session</ActionButton>
+            <ConfirmButton word="End session" question="End this session?" action={end} needs="operator">
+              Its verdict becomes final. A rig that goes on sending opens a new session with its next sample.
+            </ConfirmButton>
           ) : (
-            <button type="button" onClick={() => setDeleting(true)}>
+            <button
+              type="button"
+              disabled={cannotDelete !== undefined}
+              title={cannotDelete}
+              onClick={() => setDeleting(true)}
+            >
               Delete
             </button>
           )}

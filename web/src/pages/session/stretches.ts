@@ -22,6 +22,12 @@ export function stretches(session: Pick<Session, "samples" | "first_t_s" | "last
   }));
 }
 
+/** Returns the index of the stretch that contains `t`, if there is one. */
+export function stretchAt(pieces: Stretch[], t?: number): number | undefined {
+  const found = t === undefined ? -1 : pieces.findIndex(({ from_s, to_s }) => from_s <= t && t <= to_s);
+  return found < 0 ? undefined : found;
+}
+
 /** Returns a stretch in words, in hours after the start of the recording. */
 export function stretchText({ from_s, to_s }: Stretch, first_s: number): string {
   const hours = (t_s: number) => ((t_s - first_s) / 3600).toFixed(2);

@@ -5,39 +5,76 @@ import type { TraceBuffer } from "../../live/buffer";
 import { ChartGroup } from "../../parts/charts/chart-group";
 import { faultMark } from "../../parts/charts/fault-marks";
 import { seconds } from "../../words/numbers";
+import type { DetailLoader } from "./use-detail";
 import type { Playback } from "./use-playback";
-import { visibleRange } from "./visible-range";
+import { panned, visibleRange, zoomRange } from "./visible-range";
 
 /** Charts are drawn in every second frame: they move by less than a pixel per frame. */
 const CHART_EVERY = 2;
 
+interface Options {
+  /** The trace of the whole recording; undefined while it is fetched. */
+  buffer?: TraceBuffer;
+  /** The loader of parts with every sample, if `buffer` is thinned. */
+  detail?: DetailLoader;
+  faults: FaultLine[];
+  playback: Playback;
+}
+
 /** The charts, the slider and the clock of the playback, updated without rendering components. */
-export function usePlaybackCharts(buffer: TraceBuffer | undefined, faults: FaultLine[], { t }: Playback) {
+export function usePlaybackCharts({ buffer, detail, faults, playback: { t } }: Options) {
   const group = useMemo(() => new ChartGroup(), []);
   /** Time span of the charts, s; 0 for the whole recording. */
   const [span, setSpan] = useState<number>(30);
+  /** The range that was zoomed to, instead of one around the current time. */
+  const [zoom, setZoom] = useState<[number, number]>();
   const slider = useRef<HTMLInputElement>(null);
   const clock = useRef<HTMLOutputElement>(null);
-  const drawn = useRef("");
+  const resolution = useRef<HTMLParagraphElement>(null);
+  /** The buffer that is drawn: the whole recording, or the shown part with every sample. */
+  const drawn = useRef<{ key: string; buffer?: TraceBuffer }>({ key: "" });
   const frame = useRef(0);
   useEffect(() => group.setMarks(faults.map(faultMark)), [group, faults]);
-  useEffect(() => {
-    // A new buffer is drawn even if the time is the same.
-    drawn.current = "";
-  }, [buffer]);
   useAnimationFrame(() => {
     if (!buffer?.t.length) return;
-    const key = `${t.current.toFixed(3)} ${span}`;
-    if (key === drawn.current || frame.current++ % CHART_EVERY) return;
-    drawn.current = key;
-    group.draw(buffer, visibleRange(t.current, span, buffer.first, buffer.last), t.current);
+    const range = zoom ?? visibleRange(t.current, span, buffer.first, buffer.last);
+    const source = detail?.at(range) ?? buffer;
+    const key = `${t.current.toFixed(3)} ${range.join(" ")}`;
+    if ((key === drawn.current.key && source === drawn.current.buffer) || frame.current++ % CHART_EVERY)
+      return;
+    drawn.current = { key, buffer: source };
+    group.draw(source, range, t.current);
     if (slider.current) {
       slider.current.value = String(t.current);
       slider.current.setAttribute("aria-valuetext", seconds(t.current));
     }
     if (clock.current) clock.current.textContent = `${t.current.toFixed(2)} s`;
+    if (resolution.current)
+      resolution.current.dataset["resolution"] = detail && source === buffer ? "thinned" : "full";
   });
-  return { group, span, setSpan, slider, clock };
+  const chooseSpan = (next: number) => {
+    setZoom(undefined);
+    setSpan(next);
+  };
+  const first = buffer?.first ?? 0;
+  const last = buffer?.last ?? 0;
+  return {
+    group,
+    span,
+    setSpan: chooseSpan,
+    slider,
+    clock,
+    resolution,
+    zoom,
+    zoomTo: (range: [number, number] | undefined) => setZoom(range && zoomRange(range, first, last)),
+    pan: (share: number) => setZoom((range) => range && panned(range, share, first, last)),
+    /** The buffer that is drawn now. */
+    drawnBuffer: () => {
+      const { buffer: shown } = drawn.current;
+      const isInside = shown && t.current >= shown.first && t.current <= shown.last;
+      return isInside ? shown : buffer;
+    },
+  };
 }
 
 export type PlaybackCharts = ReturnType<typeof usePlaybackCharts>;

@@ -1,29 +1,35 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import { useAnimationFrame } from "../../hooks/use-animation-frame";
 import type { TraceBuffer } from "../../live/buffer";
-import { useLocation } from "../../router/navigation";
+import { ballAt } from "../../live/pose";
+import { useAddress } from "./use-address";
 
-/** Longest step of one frame, s: a tab that was hidden does not catch up. */
-const LONGEST_STEP_S = 0.1;
+/** Longest step of one frame, s: slower frames than that are no playback, and a hidden tab has none. */
+const LONGEST_STEP_S = 1;
 
-/** The start time in the address, if there is one, s. */
-function useStart(): number | undefined {
-  const text = useLocation().query.get("t");
-  const start = Number(text ?? NaN);
-  return Number.isFinite(start) ? start : undefined;
+/** Longest search for the first position of the ball, s. */
+const SEARCH_S = 5;
+
+/** Returns the first moment at which the ball's position is known, if it is soon, otherwise the first moment. */
+function firstSeen(buffer: TraceBuffer): number {
+  const seen = buffer.t.find((t) => t > buffer.first + SEARCH_S || ballAt(buffer, "position", t));
+  return seen !== undefined && seen <= buffer.first + SEARCH_S ? seen : buffer.first;
 }
 
 /** The playback of a recording. The current time stays when the buffer changes. */
 export function usePlayback(buffer: TraceBuffer | undefined) {
-  const start = useStart();
+  const { address, write } = useAddress();
   /** Current time, s on the device's clock; a ref, as it changes with every frame. */
   const t = useRef(NaN);
   const [isPlaying, setPlaying] = useState(false);
-  const [speed, setSpeed] = useState<number>(1);
+  const [speed, setSpeed] = useState<number>(address.speed);
   const frameAt = useRef(0);
+  const start = useRef(address.t);
   useEffect(() => {
-    if (buffer?.t.length && Number.isNaN(t.current)) t.current = start ?? buffer.first;
-  }, [buffer, start]);
+    if (!buffer?.t.length || !Number.isNaN(t.current)) return;
+    const wanted = start.current ?? firstSeen(buffer);
+    t.current = Math.min(Math.max(wanted, buffer.first), buffer.last);
+  }, [buffer]);
   useAnimationFrame((now) => {
     const elapsed = Math.min((now - frameAt.current) / 1000, LONGEST_STEP_S);
     frameAt.current = now;
@@ -32,13 +38,20 @@ export function usePlayback(buffer: TraceBuffer | undefined) {
     if (t.current === buffer.last) setPlaying(false);
   });
   const seek = (to: number) => {
-    if (buffer) t.current = Math.min(Math.max(to, buffer.first), buffer.last);
+    if (!buffer) return;
+    t.current = Math.min(Math.max(to, buffer.first), buffer.last);
+    write({ t: t.current });
   };
   const toggle = () => {
     if (!isPlaying && buffer && t.current >= buffer.last) t.current = buffer.first;
+    if (isPlaying) write({ t: t.current });
     setPlaying(!isPlaying);
   };
-  return { t, isPlaying, toggle, seek, speed, setSpeed };
+  const changeSpeed = (next: number) => {
+    setSpeed(next);
+    write({ speed: next });
+  };
+  return { t, isPlaying, toggle, seek, speed, setSpeed: changeSpeed };
 }
 
 export type Playback = ReturnType<typeof usePlayback>;

@@ -23,7 +23,9 @@ export function SessionsPage() {
   useTitle("Sessions");
   const asset = useLocation().query.get("asset") ?? "";
   const { sessions, error, refetch, loadMore } = useSessions(asset);
-  const { data: names = [] } = useQuery(fetchNames, "names");
+  const { data: known } = useQuery(fetchNames, "names");
+  const names = known ?? [];
+  const isUnknown = asset !== "" && known !== undefined && !known.includes(asset);
   const [file, setFile] = useState<File>();
   const close = () => setFile((now) => (now === file ? undefined : now));
   return (
@@ -49,7 +51,7 @@ export function SessionsPage() {
       <ErrorMessage error={error} retry={refetch} />
       {!sessions && !error && <Loading what="the sessions" />}
       {sessions?.length === 0 && (
-        <EmptyState title="No session yet">
+        <EmptyState title={isUnknown ? `There is no rig called ${asset}` : "No session yet"}>
           <p>A session begins when a rig sends its first sample, or when a recording is imported.</p>
         </EmptyState>
       )}

@@ -1,17 +1,23 @@
 import { navigate } from "../../router/navigation";
 import { sessionsPath } from "../../router/paths";
 
-/** Selects the rig whose sessions are listed. */
+/** Selects the rig whose sessions are listed: by typing, since there may be thousands. */
 export function RigChoice({ names, chosen }: { names: string[]; chosen: string }) {
   return (
     <label class="inline">
       Rig{" "}
-      <select value={chosen} onChange={(e) => navigate(sessionsPath(e.currentTarget.value), true)}>
-        <option value="">all</option>
+      <input
+        type="search"
+        list="session-assets"
+        placeholder="all"
+        value={chosen}
+        onChange={(e) => navigate(sessionsPath(e.currentTarget.value.trim()), true)}
+      />
+      <datalist id="session-assets">
         {names.map((name) => (
-          <option value={name}>{name}</option>
+          <option value={name} />
         ))}
-      </select>
+      </datalist>
     </label>
   );
 }

@@ -14,18 +14,18 @@ export function SessionRow({ session }: { session: Session }) {
         <Link to={sessionPath(session.id)}>{session.name}</Link>
       </th>
       <td>
-        <Link to={rigPath(session.asset)}>{session.asset}</Link>
-      </td>
-      <td>{dateTime(session.opened_at)}</td>
-      <td class="n">{duration(sessionLength(session))}</td>
-      <td class="n">{count(session.samples)}</td>
-      <td>
         {session.state === "open" ? (
           <span class="status-open">● open</span>
         ) : (
           result && <span class={result.look}>{result.text}</span>
         )}
       </td>
+      <td>
+        <Link to={rigPath(session.asset)}>{session.asset}</Link>
+      </td>
+      <td>{dateTime(session.opened_at)}</td>
+      <td class="n">{duration(sessionLength(session))}</td>
+      <td class="n">{count(session.samples)}</td>
     </tr>
   );
 }

@@ -8,11 +8,11 @@ export function SessionTable({ sessions }: { sessions: Session[] }) {
         <thead>
           <tr>
             <th>Session</th>
+            <th>Verdict</th>
             <th>Rig</th>
             <th>Started</th>
             <th class="n">Length</th>
             <th class="n">Samples</th>
-            <th>Verdict</th>
           </tr>
         </thead>
         <tbody>

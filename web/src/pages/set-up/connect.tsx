@@ -1,9 +1,10 @@
 import { useState } from "preact/hooks";
+import type { Asset } from "../../api/types";
 import { CodeBlock } from "../../parts/code-block";
 import { useCaller } from "../../parts/login/caller";
 import { DeviceToken } from "./device-token";
 import { SamplesStatus } from "./samples-status";
-import { snippets } from "./snippets";
+import { snippets, unitsOf } from "./snippets";
 import { useWatchedRig } from "./use-watched-rig";
 
 /** Placeholder in the snippets until a token has been created. */
@@ -15,10 +16,11 @@ const LOCAL_NOTE =
   "and the service must listen on it (--listen 0.0.0.0:8087).";
 
 /** Snippets for sending samples, and whether samples arrive. */
-export function Connect({ name, next }: { name: string; next: () => void }) {
+export function Connect({ asset, next }: { asset: Asset; next: () => void }) {
+  const { name } = asset;
   const [token, setToken] = useState(TOKEN_PLACEHOLDER);
   const isTokenNeeded = useCaller()?.authentication === "required";
-  const all = snippets(name, location.origin, isTokenNeeded ? token : undefined);
+  const all = snippets(name, location.origin, isTokenNeeded ? token : undefined, unitsOf(asset));
   const [language, setLanguage] = useState("Python");
   const { state, isSending } = useWatchedRig(name);
   const hasSent = (state?.samples ?? 0) > 0;

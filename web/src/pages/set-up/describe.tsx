@@ -1,11 +1,12 @@
 import { useState } from "preact/hooks";
 import { api } from "../../api/client";
 import type { Asset } from "../../api/types";
-import { ActionButton } from "../../parts/action-button";
+import { useRefusal } from "../../parts/login/rights";
 import { BallFields } from "./ball-fields";
-import { assetOf, describeAsset, isName, type Description } from "./description";
+import { assetOf, describeAsset, type Description } from "./description";
 import { NameFields } from "./name-fields";
 import { PlateFields } from "./plate-fields";
+import { problemText } from "./problem-text";
 import { UnitFields } from "./unit-fields";
 
 interface Props {
@@ -17,23 +18,43 @@ interface Props {
 export function Describe({ asset, done }: Props) {
   const [description, setDescription] = useState(() => describeAsset(asset));
   const set = (part: Partial<Description>) => setDescription((before) => ({ ...before, ...part }));
-  const save = async () => {
-    const wanted = assetOf(description, asset);
-    await (asset ? api.putAsset(wanted) : api.createAsset(wanted));
-    done(description.name);
+  const [error, setError] = useState<unknown>();
+  const [isBusy, setBusy] = useState(false);
+  const refused = useRefusal("operator");
+  // The browser has checked the fields and marked those that are empty or out of range.
+  const submit = async (event: Event) => {
+    event.preventDefault();
+    setBusy(true);
+    setError(undefined);
+    try {
+      const wanted = assetOf(description, asset);
+      await (asset ? api.putAsset(wanted) : api.createAsset(wanted));
+      done(description.name);
+    } catch (thrown) {
+      setError(thrown);
+    }
+    setBusy(false);
   };
   const fields = { description, set };
   return (
-    <form class="card" onSubmit={(e) => e.preventDefault()}>
-      <p>Enter what you know. The defaults are those of the book chapter's rig; the rest is learnt later.</p>
+    <form class="card" onSubmit={submit}>
+      <p>
+        Measure the ball and the plate and enter them here: verdicts depend on them. The service learns the
+        rest.
+      </p>
       <NameFields {...fields} isRegistered={asset !== undefined} />
       <BallFields {...fields} />
       <PlateFields {...fields} />
       <UnitFields {...fields} />
       <div class="form-end">
-        <ActionButton class="primary" action={save} disabled={!isName(description.name)}>
+        {error !== undefined && (
+          <span class="trouble-inline" role="alert">
+            {problemText(error)}
+          </span>
+        )}
+        <button type="submit" class="primary" disabled={isBusy || refused !== undefined} title={refused}>
           {asset ? "Save and continue" : "Register and continue"}
-        </ActionButton>
+        </button>
       </div>
     </form>
   );

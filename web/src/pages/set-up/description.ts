@@ -35,7 +35,7 @@ export const DEGREE = Math.PI / 180;
 /** Rounds off binary noise, which the form would show. */
 const rounded = (n: number) => Number(n.toPrecision(6));
 
-/** The rig of the book chapter, for missing values. */
+/** The default dimensions of the service, for missing values. */
 const DEFAULT = {
   rate: 100,
   ball: { radius_m: 0.0127, mass_kg: 0.051, inertia_factor: SOLID },

@@ -10,12 +10,13 @@ import { Check } from "./check";
 import { Connect } from "./connect";
 import { Describe } from "./describe";
 import { Learn } from "./learn";
-import { Steps } from "./steps";
+import { Steps, STEPS } from "./steps";
 
 /** The step in the address; a new rig is described first. */
 function useStep(name?: string): SetUpStep {
   const { query } = useLocation();
-  return (name ? (query.get("step") ?? "describe") : "describe") as SetUpStep;
+  const wanted = STEPS.find(({ key }) => key === query.get("step"));
+  return (name && wanted?.key) || "describe";
 }
 
 /** The set-up of a rig, or of a new one if `name` is missing. */
@@ -25,7 +26,8 @@ export function SetUpPage({ name }: { name?: string }) {
   const fetchAsset = () => (name ? api.asset(name) : Promise.resolve(undefined));
   const { data: asset, error, refetch } = useQuery(fetchAsset, name ?? "new");
   const step = useStep(name);
-  if (name && !asset) return <UnloadedPage title={title} what={name} error={error} retry={refetch} />;
+  if (name && !asset)
+    return <UnloadedPage title={title} what={name} kind="rig" error={error} retry={refetch} />;
   const goTo = (next: SetUpStep) => navigate(setUpPath(name!, next));
   const connect = (created: string) => navigate(setUpPath(created, "connect"));
   return (
@@ -40,9 +42,9 @@ export function SetUpPage({ name }: { name?: string }) {
           <h1>{title}</h1>
         </div>
       </header>
-      <Steps current={step} goTo={name ? goTo : undefined} />
+      <Steps current={step} asset={asset} goTo={name ? goTo : undefined} />
       {step === "describe" && <Describe asset={asset} done={connect} />}
-      {step === "connect" && name && <Connect name={name} next={() => goTo("check")} />}
+      {step === "connect" && asset && <Connect asset={asset} next={() => goTo("check")} />}
       {step === "check" && asset && <Check asset={asset} changed={refetch} next={() => goTo("learn")} />}
       {step === "learn" && asset && <Learn asset={asset} changed={refetch} />}
     </main>

@@ -22,6 +22,7 @@ export function Learn({ asset, changed }: { asset: Asset; changed: () => Promise
   const [ownChoice, setOwnChoice] = useState<ReadonlySet<string>>();
   const [job, setJob] = useState<CalibrationJob>();
   const chosen = ownChoice ?? proposedSessions(sessions);
+  const hasOpen = sessions?.some(({ id, state }) => state === "open" && chosen.has(id));
   const learn = async () => {
     if (await learnFrom(asset.name, [...chosen], sessions ?? [], setJob)) await changed();
   };
@@ -46,9 +47,15 @@ export function Learn({ asset, changed }: { asset: Asset; changed: () => Promise
           ))}
         </ul>
         {chosen.size > 0 && <LengthStatus seconds={totalLength(sessions ?? [], chosen)} />}
+        {hasOpen && (
+          <p class="note small-text">
+            A chosen session is still being recorded: learning ends it. A rig that goes on sending opens a new
+            one.
+          </p>
+        )}
         <div class="form-end">
-          <ActionButton class="primary" action={learn} disabled={chosen.size === 0}>
-            Learn from {chosen.size === 1 ? "it" : "them"}
+          <ActionButton class="primary" action={learn} disabled={chosen.size === 0} needs="operator">
+            {hasOpen ? "End the recording and learn" : `Learn from ${chosen.size === 1 ? "it" : "them"}`}
           </ActionButton>
         </div>
       </section>

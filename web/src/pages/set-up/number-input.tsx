@@ -5,6 +5,9 @@ export interface FieldsProps {
   set: (part: Partial<Description>) => void;
 }
 
+/** Smallest value of a field: all are greater than zero. */
+const LEAST = 0.001;
+
 interface Props extends FieldsProps {
   field: NumberField;
   label: string;
@@ -19,9 +22,9 @@ export function NumberInput({ description, set, field, label, unit }: Props) {
       <input
         type="number"
         step="any"
-        min="0"
+        min={LEAST}
         required
-        value={description[field]}
+        value={Number.isNaN(description[field]) ? "" : description[field]}
         onInput={(e) => set({ [field]: e.currentTarget.valueAsNumber })}
       />
     </label>

@@ -29,7 +29,7 @@ export function ProspectsTable({ prospects }: { prospects: Prospects }) {
         {ofBothAxes.map(({ name, after_s }) => (
           <tr>
             <th scope="row">{name}</th>
-            <td class="n" colSpan={2}>
+            <td class="both" colSpan={2}>
               {foundAfter(after_s)}
             </td>
           </tr>

@@ -12,19 +12,21 @@ const VERDICTS: Record<SignVerdict, { text: string; look: string }> = {
 /** The result of the sign check for each axis. */
 export function SignList({ signs }: { signs: Signs }) {
   return (
-    <ul class="sanity" role="status">
-      {(["x", "y"] as const).map((axis) => {
-        const { own, other } = signs[axis];
-        const { text, look } = VERDICTS[signs.verdict[axis]];
-        return (
-          <li class={look}>
-            {axis}: {text}{" "}
-            <span class="quiet">
-              (correlation with its own command {number(own, 2)}, with the other {number(other, 2)})
-            </span>
-          </li>
-        );
-      })}
-    </ul>
+    <div role="status">
+      <ul class="sanity">
+        {(["x", "y"] as const).map((axis) => {
+          const { own, other } = signs[axis];
+          const { text, look } = VERDICTS[signs.verdict[axis]];
+          return (
+            <li class={look}>
+              {axis}: {text}{" "}
+              <span class="quiet">
+                (correlation with its own command {number(own, 2)}, with the other {number(other, 2)})
+              </span>
+            </li>
+          );
+        })}
+      </ul>
+    </div>
   );
 }

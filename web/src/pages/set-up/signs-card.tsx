@@ -44,7 +44,7 @@ export function SignsCard({ axes, signs, evidence, change, next }: Props) {
       {known && <SignList signs={known} />}
       {known && isWrong(known) && (
         <p>
-          <ActionButton class="primary" action={() => change(correctedAxes(axes, known))}>
+          <ActionButton class="primary" action={() => change(correctedAxes(axes, known))} needs="operator">
             Correct the axes
           </ActionButton>{" "}
           <span class="quiet">

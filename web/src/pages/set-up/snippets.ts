@@ -1,25 +1,52 @@
 /** Code snippets that send samples to the service. */
+import type { Asset } from "../../api/types";
 
 export interface Snippet {
   language: string;
   text: string;
 }
 
-/** Returns the snippets for `asset`, with `token` if the service requires one. */
-export function snippets(asset: string, origin: string, token?: string): Snippet[] {
+/** The units that a device sends. */
+export interface Units {
+  angle: string;
+  length: string;
+}
+
+const SI: Units = { angle: "rad", length: "m" };
+
+/** Returns the units that the description of a rig says its device sends. */
+export function unitsOf({ axes }: Pick<Asset, "axes">): Units {
+  const metres = axes?.position_unit_m ?? 1;
+  const length = { 1: "m", 0.001: "mm", 0.01: "cm" }[metres] ?? `units of ${metres} m`;
+  const radians = axes?.command_unit_rad ?? 1;
+  const isDegree = Math.abs(radians - Math.PI / 180) < 1e-9;
+  const angle = radians === 1 ? "rad" : isDegree ? "degrees" : `units of ${radians} rad`;
+  return { angle, length };
+}
+
+/**
+ * Returns the snippets for `asset`, with `token` if the service requires one. The keys of a sample end with _rad
+ * and _m in any case; the service converts from the units of the rig's description.
+ */
+export function snippets(asset: string, origin: string, token?: string, units = SI): Snippet[] {
   const urlFrom = (origin: string) => `${origin}/api/v1/assets/${encodeURIComponent(asset)}/telemetry`;
   // A microcontroller is a separate machine and cannot reach the service at localhost.
   const remote = origin.replace(/\/\/(localhost|127\.0\.0\.1)/, "//SERVER");
   return [
-    { language: "curl", text: curl(urlFrom(origin), token) },
-    { language: "Python", text: python(urlFrom(origin), token) },
-    { language: "Arduino / ESP32", text: arduino(urlFrom(remote), token) },
+    { language: "curl", text: curl(urlFrom(origin), units, token) },
+    { language: "Python", text: python(urlFrom(origin), units, token) },
+    { language: "Arduino / ESP32", text: arduino(urlFrom(remote), units, token) },
   ];
 }
 
-function curl(url: string, token?: string): string {
+/** Explains the names of the keys, which are those of SI units. */
+const remark = ({ angle, length }: Units) =>
+  angle === SI.angle && length === SI.length ? "" : " (whatever the keys are called: the service converts)";
+
+function curl(url: string, units: Units, token?: string): string {
   const header = token ? `-H 'authorization: Bearer ${token}' ` : "";
-  return `# One sample: time on the device's clock in s, commanded angles in rad, ball position in m.
+  return `# One sample: time on the device's clock in s, commanded angles in ${units.angle},
+# ball position in ${units.length}${remark(units)}.
 curl ${header}--json '{"samples":[{"seq":1,"t_s":0.00,"cmd_qx_rad":0.0,"cmd_qy_rad":0.02,"x_m":0.010,"y_m":-0.004}]}' \\
   ${url}
 
@@ -28,14 +55,14 @@ curl ${header}-H 'content-type: text/csv' --data-binary @recording.csv ${url}
 `;
 }
 
-function python(url: string, token?: string): string {
+function python(url: string, units: Units, token?: string): string {
   const header = token ? `, "authorization": "Bearer ${token}"` : "";
   return `import json, time, urllib.request
 
 URL = "${url}"
 
 def read_rig():
-    """Replace this: commanded plate angles in rad, ball position in m (None if not seen)."""
+    """Replace this: commanded plate angles in ${units.angle}, ball position in ${units.length} (None if not seen)."""
     return 0.0, 0.0, 0.0, 0.0          # qx, qy, x, y
 
 def send(samples):
@@ -61,7 +88,7 @@ while True:
 `;
 }
 
-function arduino(url: string, token?: string): string {
+function arduino(url: string, units: Units, token?: string): string {
   const header = token ? `\n  http.addHeader("authorization", "Bearer ${token}");` : "";
   return `#include <WiFi.h>
 #include <HTTPClient.h>
@@ -70,7 +97,7 @@ const char* URL = "${url}";
 String batch;
 uint32_t seq = 0, n = 0;
 
-void sample(float qx, float qy, float x, float y) {   // rad and m; every 10 ms
+void sample(float qx, float qy, float x, float y) {   // ${units.angle} and ${units.length}; every 10 ms
   char row[120];
   snprintf(row, sizeof row,
     "%s{\\"seq\\":%u,\\"t_s\\":%.4f,\\"cmd_qx_rad\\":%.5f,\\"cmd_qy_rad\\":%.5f,\\"x_m\\":%.5f,\\"y_m\\":%.5f}",

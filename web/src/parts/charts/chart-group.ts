@@ -11,7 +11,7 @@ export class ChartGroup {
 
   add(key: string, chart: LineChart, kind: ChartKind, axis: Axis): void {
     this.charts.set(key, { chart, kind, axis });
-    chart.setMarks(this.marks);
+    chart.setMarks(this.marksOf(kind, axis));
   }
 
   remove(key: string): void {
@@ -20,7 +20,13 @@ export class ChartGroup {
 
   setMarks(marks: Mark[]): void {
     this.marks = marks;
-    this.charts.forEach(({ chart }) => chart.setMarks(marks));
+    this.charts.forEach(({ chart, kind, axis }) => chart.setMarks(this.marksOf(kind, axis)));
+  }
+
+  /** The marks of an axis; only the charts of the residual, on which the verdict is based, have their labels. */
+  private marksOf(kind: ChartKind, axis: Axis): Mark[] {
+    const own = this.marks.filter((mark) => !mark.axis || mark.axis === axis);
+    return kind.hasMarkLabels ? own : own.map((mark) => ({ ...mark, label: "" }));
   }
 
   /** Draws the moments of `range`; `playhead` is the current time of the playback. */

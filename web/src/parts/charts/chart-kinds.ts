@@ -1,7 +1,7 @@
 /** The kinds of charts of a rig, for each axis. */
 import type { Axis, PlateAngle } from "../../api/types";
 import type { NumberColumn } from "../../live/axis-columns";
-import type { Line } from "./chart-options";
+import type { Line, Threshold } from "./chart-options";
 
 export interface ChartKind {
   title: (axis: Axis) => string;
@@ -11,10 +11,14 @@ export interface ChartKind {
   minExtent: number;
   /** The columns of the buffer that are drawn, each multiplied by its factor. */
   lines: (Line & { column: NumberColumn; factor?: number })[];
+  /** Values that are drawn as horizontal lines. */
+  thresholds?: Threshold[];
   /** Indices of the upper and lower line between which the band is filled. */
   band?: [number, number];
   /** Whether the background is shaded where the residual is judged. */
   showsGates: boolean;
+  /** Whether marks have their labels here; on the other charts they would cover the curves once more. */
+  hasMarkLabels?: boolean;
   /** Description for screen readers. */
   about: string;
 }
@@ -44,6 +48,7 @@ const residual: ChartKind = {
   digits: 1,
   minExtent: 0.3,
   showsGates: true,
+  hasMarkLabels: true,
   band: [1, 2],
   lines: [
     { column: "residual", label: "measured − twin", colour: "residual", width: 2 },
@@ -79,12 +84,30 @@ const command: ChartKind = {
   about: "the commanded plate angle, and the angle of the twin's plate",
 };
 
-export const CHART_KINDS = { acceleration, residual, position, command };
+const counter: ChartKind = {
+  title: (axis) => `Fault detection counter, ${axis} servo`,
+  unit: "",
+  digits: 0,
+  minExtent: 127,
+  showsGates: true,
+  thresholds: [
+    { value: 127, label: "failed" },
+    { value: -128, label: "passed" },
+  ],
+  lines: [{ column: "counter", label: "counter", colour: "command", width: 2 }],
+  about:
+    "it rises with the duration and the weight of the evidence; the test fails at 127 and passes at −128",
+};
+
+export const CHART_KINDS = { acceleration, residual, counter, position, command };
 
 export type ChartKindName = keyof typeof CHART_KINDS;
 
 /** All kinds, in the order on the page of a rig. */
-export const ALL_CHARTS: ChartKindName[] = ["residual", "acceleration", "command", "position"];
+export const ALL_CHARTS: ChartKindName[] = ["residual", "counter", "acceleration", "command", "position"];
+
+/** The kinds that the recording of a fault has. */
+export const RECORDED_CHARTS = ALL_CHARTS.filter((name) => name !== "counter");
 
 const TWIN_POSITIONS: NumberColumn[] = ["twinPosition", "plate"];
 

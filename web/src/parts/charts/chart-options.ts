@@ -10,6 +10,12 @@ export interface Line {
   width?: number;
 }
 
+/** A value that decides, drawn as a horizontal line. */
+export interface Threshold {
+  value: number;
+  label: string;
+}
+
 export interface LineChartOptions {
   lines: Line[];
   unit: string;
@@ -18,11 +24,16 @@ export interface LineChartOptions {
   height: number;
   /** Indices of the upper and lower line between which the band is filled. */
   band?: [number, number];
+  thresholds?: Threshold[];
   /** Smallest extent of the scale on either side of zero. */
   minExtent?: number;
   /** Charts with the same key share their cursor. */
   sync?: string;
   onSeek?: (t: number) => void;
+  /** Called with the range over which the pointer was dragged, and without one after a double click. */
+  onZoom?: (range: [number, number] | undefined) => void;
+  /** Called with the moment under the cursor and the value of each line; with null when the cursor has left. */
+  onCursor?: (t: number | null, values: (number | null | undefined)[]) => void;
 }
 
 /** Scale of the text: the style sheet enlarges it on large screens. */
@@ -67,7 +78,7 @@ function axes(digits: number): uPlot.Axis[] {
 type BuiltOptions = Omit<uPlot.Options, "width" | "height" | "hooks">;
 
 export function chartOptions(options: LineChartOptions, range: () => [number, number]): BuiltOptions {
-  const { lines, digits = 1, band, sync, minExtent = 0 } = options;
+  const { lines, digits = 1, band, sync, minExtent = 0, onZoom } = options;
   return {
     series: [{ label: "t" }, ...lines.map(series)],
     ms: 1e-3,
@@ -79,7 +90,7 @@ export function chartOptions(options: LineChartOptions, range: () => [number, nu
     axes: axes(digits),
     bands: band ? [{ series: [band[0] + 1, band[1] + 1], fill: colour("band") }] : [],
     cursor: {
-      drag: { x: false, y: false },
+      drag: { x: onZoom !== undefined, y: false, setScale: false, dist: 5 },
       points: { size: 6 },
       ...(sync ? { sync: { key: sync, setSeries: false } } : {}),
     },

@@ -3,7 +3,10 @@ import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import { onTheme } from "../../theme";
 import { chartOptions, type LineChartOptions } from "./chart-options";
-import { drawMarks, shadeGates, type Mark } from "./overlays";
+import { drawMarks, drawThresholds, shadeGates, type Mark } from "./overlays";
+
+/** Movement of a pressed pointer from which on it is a drag and not a click, px. */
+const MIN_DRAG_PX = 5;
 
 export type ChartData = [number[], ...(number | null)[][]];
 
@@ -72,16 +75,22 @@ export class LineChart {
       ...this.size(),
       ...chartOptions(this.options, () => this.range),
       hooks: {
-        drawClear: [(plot: uPlot) => shadeGates(plot, this.data[0], this.gates)],
+        drawClear: [
+          (plot: uPlot) => shadeGates(plot, this.data[0], this.gates),
+          (plot: uPlot) => drawThresholds(plot, this.options.thresholds ?? []),
+        ],
         draw: [(plot: uPlot) => this.drawMarks(plot)],
         ready: [(plot: uPlot) => this.listen(plot)],
+        setCursor: [(plot: uPlot) => this.tellCursor(plot)],
+        setSelect: [(plot: uPlot) => this.zoomToSelection(plot)],
       },
     };
     this.plot = new uPlot(options, this.data, this.element);
   }
 
   private drawMarks(plot: uPlot): void {
-    const playhead: Mark[] = this.playhead === null ? [] : [{ t: this.playhead, label: "", colour: "ink" }];
+    const playhead: Mark[] =
+      this.playhead === null ? [] : [{ t: this.playhead, label: "", colour: "ink", isPlayhead: true }];
     const [from, to] = this.range;
     drawMarks(
       plot,
@@ -89,8 +98,34 @@ export class LineChart {
     );
   }
 
+  /** Tells the values at the moment under the cursor. */
+  private tellCursor(plot: uPlot): void {
+    const { idx } = plot.cursor;
+    const [t, ...lines] = this.data;
+    if (idx == null) this.options.onCursor?.(null, []);
+    else
+      this.options.onCursor?.(
+        t[idx] ?? null,
+        lines.map((line) => line[idx]),
+      );
+  }
+
+  /** Zooms to the range over which the pointer was dragged. */
+  private zoomToSelection(plot: uPlot): void {
+    const { left, width } = plot.select;
+    if (width < MIN_DRAG_PX) return;
+    plot.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+    this.options.onZoom?.([plot.posToVal(left, "x"), plot.posToVal(left + width, "x")]);
+  }
+
   private listen(plot: uPlot): void {
-    const { onSeek } = this.options;
-    if (onSeek) plot.over.addEventListener("click", (event) => onSeek(plot.posToVal(event.offsetX, "x")));
+    const { onSeek, onZoom } = this.options;
+    let pressedAt = NaN;
+    plot.over.addEventListener("mousedown", (event) => (pressedAt = event.offsetX));
+    plot.over.addEventListener("click", (event) => {
+      const isDragged = Math.abs(event.offsetX - pressedAt) >= MIN_DRAG_PX;
+      if (!isDragged) onSeek?.(plot.posToVal(event.offsetX, "x"));
+    });
+    if (onZoom) plot.over.addEventListener("dblclick", () => onZoom(undefined));
   }
 }

@@ -4,6 +4,7 @@ import { useLatest } from "../../hooks/use-latest";
 import type { ChartGroup } from "./chart-group";
 import { CHART_KINDS, withoutTwinPositions, type ChartKind, type ChartKindName } from "./chart-kinds";
 import { ChartKey } from "./chart-key";
+import { CursorValues } from "./cursor-values";
 import { LineChart } from "./line-chart";
 
 interface Props {
@@ -12,35 +13,45 @@ interface Props {
   axis: Axis;
   height: number;
   onSeek?: (t: number) => void;
+  onZoom?: (range: [number, number] | undefined) => void;
   measuredOnly?: boolean;
+  minExtent?: number;
 }
 
 /** One chart of a rig; it is drawn by its group. */
-export function RigChart({ group, kind: name, axis, height, onSeek, measuredOnly }: Props) {
+export function RigChart({ group, kind: name, axis, height, measuredOnly, minExtent, ...handlers }: Props) {
   const element = useRef<HTMLDivElement>(null);
-  const seek = useLatest(onSeek);
-  const canSeek = onSeek !== undefined;
+  const key = useRef<HTMLSpanElement>(null);
+  const latest = useLatest(handlers);
+  const canSeek = handlers.onSeek !== undefined;
+  const canZoom = handlers.onZoom !== undefined;
   const kind: ChartKind = useMemo(
     () => (measuredOnly ? withoutTwinPositions(CHART_KINDS[name]) : CHART_KINDS[name]),
     [name, measuredOnly],
   );
   useEffect(() => {
-    const { lines, unit, digits, band, minExtent } = kind;
-    const onSeek = canSeek ? (t: number) => seek.current?.(t) : undefined;
-    const options = { lines, unit, digits, height, band, minExtent, sync: "rig", onSeek };
-    const chart = new LineChart(element.current!, options);
+    const values = new CursorValues(key.current!, kind);
+    const chart = new LineChart(element.current!, {
+      ...kind,
+      height,
+      minExtent: minExtent ?? kind.minExtent,
+      sync: "rig",
+      onSeek: canSeek ? (t) => latest.current.onSeek?.(t) : undefined,
+      onZoom: canZoom ? (range) => latest.current.onZoom?.(range) : undefined,
+      onCursor: (t, column) => values.show(t, column),
+    });
     group.add(name + axis, chart, kind, axis);
     return () => {
       group.remove(name + axis);
       chart.destroy();
     };
-  }, [group, kind, name, axis, height, canSeek, seek]);
+  }, [group, kind, name, axis, height, minExtent, canSeek, canZoom, latest]);
   const style = { height: `${height / 16}rem` };
   return (
     <figure class="chart">
       <figcaption>
         <b>{kind.title(axis)}</b> <span class="quiet">{kind.unit}</span>
-        <ChartKey kind={kind} />
+        <ChartKey kind={kind} element={key} />
       </figcaption>
       <div
         ref={element}

@@ -9,6 +9,10 @@ interface Props {
   height?: number;
   axes?: Axis[];
   onSeek?: (t: number) => void;
+  /** Called with the range over which the pointer was dragged, and without one after a double click. */
+  onZoom?: (range: [number, number] | undefined) => void;
+  /** Smallest extent of the scale on either side of zero, for charts that are compared. */
+  minExtent?: number;
   /** Leaves out the twin's position and plate angle, which the recording of a fault does not have. */
   measuredOnly?: boolean;
 }

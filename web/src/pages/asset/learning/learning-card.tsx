@@ -50,15 +50,19 @@ export function LearningCard({ name, state, changed }: Props) {
       <TeachingSessions sessions={learning.sessions} />
       {learning.state === "offered" && (
         <p class="page-tools">
-          <ActionButton class="primary" action={afterwards(api.acceptLearning)}>
+          <ActionButton class="primary" action={afterwards(api.acceptLearning)} needs="operator">
             Yes, use what was learnt
           </ActionButton>
-          <ActionButton action={discard}>No, start again</ActionButton>
+          <ActionButton action={discard} needs="operator">
+            No, start again
+          </ActionButton>
         </p>
       )}
       {isGathering && learning.refused && (
         <p>
-          <ActionButton action={discard}>Start again</ActionButton>
+          <ActionButton action={discard} needs="operator">
+            Start again
+          </ActionButton>
         </p>
       )}
       {isGathering && <GatheringNote name={name} />}

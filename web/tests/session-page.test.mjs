@@ -1,0 +1,85 @@
+// The page of a session: its address, the charts under the pointer, and what a verdict rests on.
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import { ask, browser, directory, page, recordings, remove, serve } from "./support.mjs";
+
+let work, service, chromium, rig;
+
+before(async () => {
+  work = directory();
+  chromium = await browser();
+  service = await serve(`${work}/store`);
+  rig = recordings(work);
+  await ask(service.url, "POST", "/assets", { ...rig.learnt, name: "bench" });
+});
+
+after(async () => {
+  await chromium?.close();
+  await service?.stop();
+  remove(work);
+});
+
+test("a link leads to the moment, speed and profile, and charts are zoomed and read by the pointer", async () => {
+  const { session } = await ask(
+    service.url,
+    "POST",
+    "/assets/bench/sessions/import?name=linked",
+    rig.sick,
+    "text/csv",
+  );
+  const view = await page(chromium);
+  await view.goto(`${service.url}/sessions/${session.id}?t=99999&speed=2&profile=default`);
+  await view.getByText(/^(39|40)\.\d\d s$/).waitFor();
+  assert.equal(await view.getByLabel("Speed").inputValue(), "2");
+  assert.equal(await view.getByLabel("Judged by").inputValue(), "default");
+  await view.getByRole("slider", { name: "Moment" }).fill("12");
+  await view.waitForURL(/t=12\.00/);
+
+  const chart = view.getByRole("img", { name: /Residual along x/ });
+  await chart.scrollIntoViewIfNeeded();
+  const box = await chart.boundingBox();
+  const at = (share) => [box.x + box.width * share, box.y + box.height / 2];
+  await view.mouse.move(...at(0.4));
+  await view.locator(".cursor-time").first().getByText(/at \d/).waitFor();
+  await view
+    .locator(".cursor-value")
+    .first()
+    .getByText(/\d\.\d{3}/)
+    .waitFor();
+  await view.mouse.down();
+  await view.mouse.move(...at(0.6), { steps: 4 });
+  await view.mouse.up();
+  const zoom = view.getByRole("group", { name: "Zoom" });
+  const shown = async () => (await zoom.textContent()).match(/[\d.]+/g).map(Number);
+  const [from, to] = await shown();
+  assert.ok(to - from > 2 && to - from < 10, `${from} to ${to}`);
+  await zoom.getByRole("button", { name: "Later" }).click();
+  await view.waitForFunction(
+    (was) => !document.querySelector("[aria-label=Zoom]").textContent.includes(was),
+    `${from}`,
+  );
+  assert.ok((await shown())[0] > from);
+  await view.mouse.dblclick(...at(0.5));
+  await zoom.waitFor({ state: "detached" });
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});
+
+test("a session without a calibration says what its verdict rests on", async () => {
+  await ask(service.url, "POST", "/assets", { name: "unlearnt" });
+  const { session } = await ask(
+    service.url,
+    "POST",
+    "/assets/unlearnt/sessions/import?name=first",
+    rig.healthy,
+    "text/csv",
+  );
+  const view = await page(chromium);
+  await view.goto(`${service.url}/sessions/${session.id}`);
+  await view.getByText("Judged without a calibration, with the default dimensions").waitFor();
+  assert.equal(await view.getByText("No fault", { exact: true }).count(), 0);
+  await view.goto(`${service.url}/rigs/unlearnt`);
+  await view.getByText("The last one,").waitFor();
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});
