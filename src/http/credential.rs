@@ -8,8 +8,7 @@ use std::net::{IpAddr, SocketAddr};
 
 use axum::extract::ConnectInfo;
 use axum::http::header::{self, AUTHORIZATION, SET_COOKIE};
-use axum::http::request::Parts;
-use axum::http::{HeaderMap, HeaderValue};
+use axum::http::{Extensions, HeaderMap, HeaderValue};
 
 use crate::service::access::Credential;
 
@@ -34,8 +33,8 @@ pub(super) fn set_cookie(secret: &str, seconds: u64, encrypted: bool) -> HeaderM
 }
 
 /// Returns the address of the client.
-pub(super) fn client_address(parts: &Parts) -> Option<IpAddr> {
-    let peer = parts.extensions.get::<ConnectInfo<SocketAddr>>();
+pub(super) fn client_address(extensions: &Extensions) -> Option<IpAddr> {
+    let peer = extensions.get::<ConnectInfo<SocketAddr>>();
     peer.map(|peer| peer.0.ip().to_canonical())
 }
 

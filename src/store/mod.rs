@@ -58,7 +58,7 @@ pub use check::{CheckReport, check};
 pub use expiry::SessionSize;
 pub use location::Location;
 pub use page_checksums::install_drivers;
-pub use read::{FaultFilter, FaultOrder, SessionFilter};
+pub use read::{AssetFilter, FaultFilter, FaultOrder, SessionFilter};
 pub use recording::RecordingReader;
 pub use rows::{
     ActionKind, ActionRow, AssetRow, CalibrationRow, EventRow, FaultRow, Micros, ReplayRow,

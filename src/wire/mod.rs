@@ -12,6 +12,7 @@ pub mod basis;
 pub mod certificate;
 pub mod difference;
 pub mod drive_cycle;
+pub mod json;
 pub mod learning;
 pub mod memory;
 #[cfg(feature = "lab")]
@@ -20,8 +21,10 @@ pub mod provenance;
 pub mod recording;
 #[cfg(feature = "lab")]
 pub mod scene;
+pub mod series;
 pub mod service;
 pub mod session_csv;
+pub mod sovd;
 pub mod stored;
 pub mod telemetry;
 pub mod trace;

@@ -18,6 +18,7 @@ mod fuzz;
 mod journal;
 mod jwt;
 mod learning;
+mod lists;
 mod liveness;
 mod main_job;
 mod monitoring;
