@@ -4,7 +4,7 @@ that it has with `include-schema=true`.
 
     sovd.py ADDRESS RIG
 
-RIG has an active fault `x_servo` and a recording; $OFFBD_TOKEN is a token of an admin.
+RIG has an active fault `x_servo` and a recording; $CLIENT_TOKEN is a token of an admin.
 """
 
 import json
@@ -17,7 +17,7 @@ import urllib.request
 import jsonschema
 
 ADDRESS, RIG = sys.argv[1:]
-HEADERS = {"Authorization": f"Bearer {os.environ['OFFBD_TOKEN']}"}
+HEADERS = {"Authorization": f"Bearer {os.environ['CLIENT_TOKEN']}"}
 n_checked = 0
 
 
@@ -83,7 +83,9 @@ everything = [item["code"] for item in items]
 for spelling in ("confirmedDTC", "confirmedDtc", "CONFIRMEDDTC"):
     for word in ("1", "true"):
         faults(confirmed, **{f"status[{spelling}]": word})
-faults(everything, **{"status[confirmedDTC]": "1", "status[confirmedDtc]": "0"})
+# Alternatives; with a status, faults that were cleared are listed too.
+codes = ["sensor", "stuck_ball", "x_servo", "y_servo"]
+faults(codes, **{"status[confirmedDTC]": "1", "status[confirmedDtc]": "0"})
 faults(confirmed, **{"status[mask]": "08"})
 faults(everything, scope="rig")
 faults([], scope="other")

@@ -40,7 +40,7 @@ pub struct Problem {
     pub sovd: Option<Box<SovdErrorView>>,
     /// Seconds for the header `Retry-After`.
     #[serde(skip)]
-    pub retry_after_s: u64,
+    pub retry_after_s: u32,
 }
 
 impl Problem {
@@ -60,7 +60,7 @@ impl Problem {
             parameter: None,
             instance: None,
             sovd: None,
-            retry_after_s: RETRY_AFTER_S,
+            retry_after_s: RETRY_AFTER_S as u32,
         }
     }
 
@@ -149,6 +149,7 @@ impl From<ServiceError> for Problem {
             }
             E::Rebuilding { retry_after_s } => {
                 let status = StatusCode::SERVICE_UNAVAILABLE;
+                let retry_after_s = u32::try_from(retry_after_s).unwrap_or(u32::MAX);
                 Self { retry_after_s, ..new(status, "rebuilding", "Engine is being rebuilt") }
             }
             E::NotStored { .. } => new(StatusCode::SERVICE_UNAVAILABLE, "store", "Store error"),
