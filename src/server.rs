@@ -10,6 +10,7 @@ pub mod tokens;
 #[cfg_attr(not(feature = "otel"), path = "server/no_traces.rs")]
 mod traces;
 
+use std::fmt;
 use std::fs::{File, TryLockError};
 use std::net::SocketAddr;
 use std::num::NonZeroU32;
@@ -19,6 +20,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
+use serde::Serialize;
 use tokio::net::TcpListener;
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
@@ -27,7 +29,7 @@ use self::keys::KeyRefresher;
 use self::listen::HttpListener;
 use self::tls::Tls;
 pub use self::traces::Traces;
-use crate::config::{ClusterConfig, Config};
+use crate::config::{ClusterConfig, Config, LogFormat};
 use crate::http::{self, AccessPolicy, App, BodyBudget, ExtraRoutes, RateLimit, RateLimits};
 use crate::service::{Clock, Service, Workers};
 use crate::store::{self, CheckReport, Location, NodeIdentity, Partitions, Store};
@@ -280,59 +282,85 @@ async fn stop_signal() -> Result<()> {
 ///
 /// # Errors
 /// If the store cannot be opened or is newer than this version.
-pub async fn migrate(config: &Config) -> Result<String> {
+pub async fn migrate(config: &Config) -> Result<usize> {
     config.check()?;
     let location = config.location()?;
     let _lock = lock(&location)?;
     let migrated = Store::migrate(&location).await;
-    let n = migrated.with_context(|| format!("cannot migrate the store {location}"))?;
-    Ok(format!("{location}: {n} migrations applied"))
+    migrated.with_context(|| format!("cannot migrate the store {location}"))
 }
 
-/// Copies the embedded store to the new `file`, also while a service uses it. Returns a
-/// message.
+/// Copies the embedded store to the new `file`, also while a service uses it.
 ///
 /// # Errors
 /// If there is no embedded store, `file` exists, or it cannot be written.
-pub async fn back_up(config: &Config, file: &Path) -> Result<String> {
+pub async fn back_up(config: &Config, file: &Path) -> Result<()> {
     let location = config.location()?;
     let result = store::back_up(&location, file).await;
-    result.with_context(|| format!("cannot back up the store {location}"))?;
-    Ok(format!("{}: a copy of {location}", file.display()))
+    result.with_context(|| format!("cannot back up the store {location}"))
 }
 
-/// Restores the embedded store from the copy `file`. Returns a message.
+/// Restores the embedded store from the copy `file`.
 ///
 /// # Errors
 /// If the copy is invalid, the store is in use, or it exists and `replace` is not set.
-pub async fn restore(config: &Config, file: &Path, replace: bool) -> Result<String> {
+pub async fn restore(config: &Config, file: &Path, replace: bool) -> Result<()> {
     let location = config.location()?;
     let _lock = lock(&location)?;
     let result = store::restore(&location, file, replace).await;
-    result.with_context(|| format!("cannot restore the store {location}"))?;
-    Ok(format!("{location}: restored from {}", file.display()))
+    result.with_context(|| format!("cannot restore the store {location}"))
 }
 
-/// Checks the configuration. Returns a summary of a few lines.
+/// What a configuration amounts to.
+#[derive(Clone, Debug, Serialize)]
+pub struct ConfigSummary {
+    pub listen: SocketAddr,
+    pub requires_token: bool,
+    /// The issuer of the JSON Web Tokens that are accepted.
+    pub issuer: Option<String>,
+    pub is_encrypted: bool,
+    pub store: String,
+    pub log_format: LogFormat,
+    pub log_level: String,
+    /// Threads that run engines.
+    pub shards: usize,
+}
+
+impl fmt::Display for ConfigSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let access = match (self.requires_token, &self.issuer) {
+            (true, Some(issuer)) => format!("with a token, or one of {issuer}"),
+            (true, None) => "with a token".to_owned(),
+            (false, _) => "for everyone on this machine".to_owned(),
+        };
+        let encrypted = if self.is_encrypted { "encrypted" } else { "not encrypted" };
+        let format = match self.log_format {
+            LogFormat::Text => "text",
+            LogFormat::Json => "json",
+        };
+        let threads = if self.shards == 1 { "thread" } else { "threads" };
+        writeln!(f, "listen   {}\naccess   {access}, {encrypted}", self.listen)?;
+        writeln!(f, "store    {}\nlog      as {format}, level {}", self.store, self.log_level)?;
+        write!(f, "engines  on {} {threads}", self.shards)
+    }
+}
+
+/// Checks the configuration and summarises it.
 ///
 /// # Errors
 /// Names the first invalid key.
-pub fn check(config: &Config) -> Result<String> {
+pub fn check(config: &Config) -> Result<ConfigSummary> {
     config.check()?;
-    Ok(format!(
-        "listen   {}\naccess   {}, {}\nstore    {}\nlog      {:?}, {}\nworkers  {} shards",
-        config.listen,
-        match (config.requires_token()?, &config.jwt) {
-            (true, Some(jwt)) => format!("with a token, or one of {}", jwt.issuer),
-            (true, None) => "with a token".to_owned(),
-            (false, _) => "for everyone on this machine".to_owned(),
-        },
-        if config.tls.is_some() { "encrypted" } else { "not encrypted" },
-        config.location()?,
-        config.log.format,
-        config.log.level,
-        config.workers.shards,
-    ))
+    Ok(ConfigSummary {
+        listen: config.listen,
+        requires_token: config.requires_token()?,
+        issuer: config.jwt.as_ref().map(|jwt| jwt.issuer.clone()),
+        is_encrypted: config.tls.is_some(),
+        store: config.location()?.to_string(),
+        log_format: config.log.format,
+        log_level: config.log.level.clone(),
+        shards: config.workers.shards,
+    })
 }
 
 /// Checks the contents of the store; nothing is changed. Returns `None` if there is no

@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use serde_json::json;
 
-use super::output;
+use super::output::{self, OutputFormat};
 use super::serve::ConfigArgs;
 use crate::server;
 
@@ -21,6 +22,9 @@ pub(super) struct BackupArgs {
     file: PathBuf,
     #[command(flatten)]
     config: ConfigArgs,
+    /// Text for people, or one JSON object
+    #[arg(long, value_enum, default_value_t = OutputFormat::Table)]
+    format: OutputFormat,
 }
 
 /// Restores the embedded store from a copy; the service must not run.
@@ -39,16 +43,27 @@ pub(super) struct RestoreArgs {
     replace: bool,
     #[command(flatten)]
     config: ConfigArgs,
+    /// Text for people, or one JSON object
+    #[arg(long, value_enum, default_value_t = OutputFormat::Table)]
+    format: OutputFormat,
 }
 
 pub(super) fn backup(args: &BackupArgs) -> anyhow::Result<()> {
     let config = args.config.load()?;
-    let message = super::block_on(server::back_up(&config, &args.file))?;
-    output::print_line(&message)
+    super::block_on(server::back_up(&config, &args.file))?;
+    let (file, store) = (args.file.display().to_string(), config.location()?.to_string());
+    match args.format {
+        OutputFormat::Table => output::print_line(&format!("{file}: a copy of {store}")),
+        OutputFormat::Json => output::print_json(&json!({ "store": store, "file": file })),
+    }
 }
 
 pub(super) fn restore(args: &RestoreArgs) -> anyhow::Result<()> {
     let config = args.config.load()?;
-    let restore = server::restore(&config, &args.file, args.replace);
-    output::print_line(&super::block_on(restore)?)
+    super::block_on(server::restore(&config, &args.file, args.replace))?;
+    let (file, store) = (args.file.display().to_string(), config.location()?.to_string());
+    match args.format {
+        OutputFormat::Table => output::print_line(&format!("{store}: restored from {file}")),
+        OutputFormat::Json => output::print_json(&json!({ "store": store, "file": file })),
+    }
 }

@@ -5,11 +5,13 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-use super::errors::{InputError, read};
+use super::errors::{BadArgument, InputError, read};
 use super::judge::{load_rig, read_samples};
-use super::{output, table};
+use super::output::{self, OutputFormat};
+use super::table;
 use crate::wire::asset;
 use offbd_core::diagnosis::{
     AxisCalibration, Calibration, CalibrationOrigin, MonitorCertificate, Prospects, ServoProspects,
@@ -43,16 +45,41 @@ pub(super) struct CalibrateArgs {
     /// The calibrated asset file to write; - is stdout
     #[arg(short, long, value_name = "OUT.json")]
     output: PathBuf,
+    /// What was learnt: as tables on stderr, or as one JSON object on stdout
+    #[arg(long, value_enum, default_value_t = OutputFormat::Table)]
+    format: OutputFormat,
 }
 
 pub(super) fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
+    if args.format == OutputFormat::Json && args.output == Path::new("-") {
+        let reason = "`--format json` prints to stdout, and so does `-o -`: give a file, or leave \
+                      out `--format`, because the asset file has the calibration";
+        return Err(BadArgument(reason.to_owned()).into());
+    }
     let mut rig = load_rig(Some(&args.asset))?;
     let sessions = load(&args.sessions)?;
     let calibration = learn(&rig, &sessions, &data_hash(&args.sessions)?)
         .map_err(|e| InputError::new("cannot calibrate", e))?;
-    report(&rig, &calibration);
+    if args.format == OutputFormat::Table {
+        report(&rig, &calibration);
+    }
     rig.calibration = Some(calibration);
-    write_asset(&rig, &args.output)
+    write_asset(&rig, &args.output)?;
+    match args.format {
+        OutputFormat::Table => Ok(()),
+        OutputFormat::Json => output::print_json(&learnt(&rig)),
+    }
+}
+
+/// What was learnt of a rig, for programs.
+#[derive(Serialize)]
+struct LearntRig {
+    asset: String,
+    calibration: Option<asset::CalibrationView>,
+}
+
+fn learnt(rig: &Rig) -> LearntRig {
+    LearntRig { asset: rig.name.clone(), calibration: asset::view(rig).calibration }
 }
 
 /// Loads the samples of healthy sessions. Invalid rows are left out and reported on stderr.
@@ -62,7 +89,10 @@ pub(super) fn load(paths: &[PathBuf]) -> Result<Vec<Vec<Sample>>, InputError> {
         let (samples, bad_rows) = read_samples(path)?;
         if let Some(first) = bad_rows.first() {
             let n = bad_rows.len();
-            anstream::eprintln!("{}: {n} rows rejected, the first: {first}", path.display());
+            output::remark(format_args!(
+                "{}: {n} rows rejected, the first: {first}",
+                path.display()
+            ));
         }
         sessions.push(samples);
     }
@@ -104,12 +134,10 @@ pub(super) fn write_asset(rig: &Rig, path: &Path) -> anyhow::Result<()> {
 
 /// Prints the calibration on stderr.
 pub(super) fn report(rig: &Rig, calibration: &Calibration) {
-    anstream::eprintln!(
+    output::remark(format_args!(
         "{}: learnt from {} samples, {:.0} s",
-        rig.name,
-        calibration.n_samples,
-        calibration.duration_s
-    );
+        rig.name, calibration.n_samples, calibration.duration_s
+    ));
     let heading = ["", "x", "y", "meaning"];
     let mut learnt = table::table(&heading, &[1, 2]);
     for (name, number, meaning) in axis_table() {
@@ -117,7 +145,7 @@ pub(super) fn report(rig: &Rig, calibration: &Calibration) {
         learnt.add_row([name.to_owned(), of(Axis::X), of(Axis::Y), meaning.to_owned()]);
     }
     for line in table::lines(&learnt) {
-        anstream::eprintln!("{line}");
+        output::remark(format_args!("{line}"));
     }
     if calibration.sessions.len() > 1 {
         report_sessions(&calibration.sessions);
@@ -128,7 +156,7 @@ pub(super) fn report(rig: &Rig, calibration: &Calibration) {
 
 /// Prints the estimates of each session on stderr.
 fn report_sessions(sessions: &[PerAxis<Option<SessionEstimate>>]) {
-    anstream::eprintln!("\nby session");
+    output::remark(format_args!("\nby session"));
     let heading = ["session", "level x", "gain x", "level y", "gain y"];
     let mut lines = table::table(&heading, &[0, 1, 2, 3, 4]);
     for (i, session) in sessions.iter().enumerate() {
@@ -143,11 +171,11 @@ fn report_sessions(sessions: &[PerAxis<Option<SessionEstimate>>]) {
         lines.add_row(row.map(|cell| cell.unwrap_or_else(|| "-".to_owned())));
     }
     for line in table::lines(&lines) {
-        anstream::eprintln!("{line}");
+        output::remark(format_args!("{line}"));
     }
     for axis in Axis::ALL {
         if let Some(warning) = disagreement(sessions, axis) {
-            anstream::eprintln!("{}", table::wrapped("warning: ", &warning));
+            output::remark(format_args!("{}", table::wrapped("warning: ", &warning)));
         }
     }
 }
@@ -185,7 +213,7 @@ fn range(values: impl Iterator<Item = f64> + Clone) -> Option<f64> {
 
 /// Prints the false alarms to expect of each monitor on stderr.
 fn report_certificate(certificate: &[MonitorCertificate]) {
-    anstream::eprintln!("\non the healthy rig, by tests on recordings not learnt from");
+    output::remark(format_args!("\non the healthy rig, by tests on recordings not learnt from"));
     let heading = ["monitor", "judged", "nearest to an alarm", "false alarms to expect"];
     let mut lines = table::table(&heading, &[1, 2, 3]);
     for (code, monitor) in FaultCode::ALL.iter().zip(certificate) {
@@ -197,7 +225,7 @@ fn report_certificate(certificate: &[MonitorCertificate]) {
         ]);
     }
     for line in table::lines(&lines) {
-        anstream::eprintln!("{line}");
+        output::remark(format_args!("{line}"));
     }
 }
 
@@ -213,7 +241,7 @@ fn alarm_rate(per_hour: f64) -> String {
 
 /// Prints on stderr which faults would be found, and after what time.
 fn report_prospects(prospects: &Prospects) {
-    anstream::eprintln!("\na fault during this recording would have been confirmed after");
+    output::remark(format_args!("\na fault during this recording would have been confirmed after"));
     let heading = ["", "x", "y", "meaning"];
     let mut servos = table::table(&heading, &[1, 2]);
     let numbers: [ServoTableRow; 5] = [
@@ -228,15 +256,15 @@ fn report_prospects(prospects: &Prospects) {
         servos.add_row([name.to_owned(), of(Axis::X), of(Axis::Y), meaning.to_owned()]);
     }
     for line in table::lines(&servos) {
-        anstream::eprintln!("{line}");
+        output::remark(format_args!("{line}"));
     }
     let Prospects { n_trials, stuck_s, frozen_s, unseen_s, .. } = prospects;
-    anstream::eprintln!(
+    output::remark(format_args!(
         "a stuck ball {}, frozen readings {}, no ball seen {}; medians of {n_trials} trials",
         seconds(*stuck_s),
         seconds(*frozen_s),
         seconds(*unseen_s)
-    );
+    ));
 }
 
 fn seconds(delay_s: Option<f64>) -> String {

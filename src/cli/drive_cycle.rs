@@ -51,7 +51,7 @@ pub(super) fn run(args: &DriveCycleArgs) -> anyhow::Result<()> {
     let cycle = drive_cycle(&rig).map_err(|why| InputError::file(&args.asset, why))?;
     let cycle_view = view(&rig.name, &cycle);
     if args.format != DriveCycleFormat::Table {
-        anstream::eprintln!("{}", headline(&cycle_view));
+        output::remark(format_args!("{}", headline(&cycle_view)));
     }
     let mut out = output::create(&args.output)?;
     match args.format {

@@ -1,5 +1,5 @@
-//! Errors with their own exit code: unusable input (3), and arguments that do not fit
-//! together (2).
+//! Errors with their own exit code: unusable input (3), arguments that do not fit together
+//! (2), and a fault where the caller wants none (4).
 
 use std::fmt::Display;
 use std::path::Path;
@@ -27,6 +27,14 @@ impl InputError {
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub(super) struct BadArgument(pub String);
+
+/// Sessions have a fault, and the caller asked to be told by the exit status.
+#[derive(Debug, thiserror::Error)]
+#[error("a fault was found in {n_faulty} of {n} sessions")]
+pub(super) struct FaultFound {
+    pub n_faulty: usize,
+    pub n: usize,
+}
 
 /// Reads the file at `path`.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, InputError> {

@@ -27,6 +27,11 @@ enum LogFormatArg {
 }
 
 impl LoggingArgs {
+    /// Logs errors only, if no level was given.
+    pub(super) fn only_errors(&mut self) {
+        self.log.get_or_insert_with(|| "error".to_owned());
+    }
+
     /// Starts logging for this process, by the arguments or else by `config`, and sends
     /// `traces` if given. A second call has no effect.
     pub(super) fn start(&self, config: &LogConfig, traces: Option<&Traces>) {

@@ -1,12 +1,13 @@
 //! The command line, with one module per subcommand.
 //!
 //! Data goes to stdout, everything else to stderr. Exit codes: 0 for success, whether
-//! faults were found or not, 2 for invalid arguments, 3 for unusable input, 1 for any
-//! other error. If the reader of stdout closes it early, the command ends without an
+//! faults were found or not, 2 for invalid arguments, 3 for unusable input, 4 for a fault
+//! with `--fail-on-fault`, 1 for any other error. If the reader of stdout closes it early, the command ends without an
 //! error.
 
 mod backup;
 mod calibrate;
+mod completions;
 mod drive_cycle;
 mod errors;
 mod judge;
@@ -19,6 +20,7 @@ mod serve;
 mod table;
 mod token;
 mod trends;
+mod usage;
 mod watch;
 
 use std::mem::ManuallyDrop;
@@ -47,12 +49,16 @@ const SQLITE_THREAD: &str = "sqlx-sqlite-worker-";
     offbd replay --asset learnt.json healthy.csv sick.csv\n\n\
     The chapter's exercises:\n  \
     offbd scene --list\n\n\
-    Exit status: 0 success (faults or not), 2 invalid arguments, 3 unusable input.")]
+    Exit status: 0 success (faults or not), 2 invalid arguments, 3 unusable input,\n\
+    4 a fault was found, with --fail-on-fault; 1 any other error.")]
 struct Cli {
     #[command(subcommand)]
     command: CliCommand,
     #[command(flatten)]
     logging: logging::LoggingArgs,
+    /// Print results and errors only: no remarks, no progress, no logs but errors
+    #[arg(short, long, global = true)]
+    quiet: bool,
 }
 
 #[derive(Debug, Subcommand)]
@@ -71,6 +77,8 @@ enum CliCommand {
     Restore(backup::RestoreArgs),
     Migrate(serve::MigrateArgs),
     Check(serve::CheckArgs),
+    Completions(completions::CompletionsArgs),
+    Man(completions::ManArgs),
 }
 
 /// Runs the command line of this process.
@@ -79,12 +87,16 @@ pub fn main() -> ExitCode {
     end_with_essential_threads();
     match Cli::try_parse() {
         Ok(cli) => run(cli).map_or_else(|error| report(&error), |()| ExitCode::SUCCESS),
-        Err(error) => print_usage(&error),
+        Err(error) => usage::print(error),
     }
 }
 
 fn run(cli: Cli) -> anyhow::Result<()> {
-    let logging = cli.logging;
+    let mut logging = cli.logging;
+    if cli.quiet {
+        output::be_quiet();
+        logging.only_errors();
+    }
     match &cli.command {
         // Starts logging itself, as its configuration says.
         CliCommand::Serve(_) => {}
@@ -109,6 +121,8 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         CliCommand::Restore(args) => backup::restore(&args),
         CliCommand::Migrate(args) => serve::migrate(&args),
         CliCommand::Check(args) => serve::check(&args),
+        CliCommand::Completions(args) => completions::completions(&args),
+        CliCommand::Man(args) => completions::man(&args),
     }
 }
 
@@ -138,13 +152,6 @@ fn block_on<T>(command: impl Future<Output = anyhow::Result<T>>) -> anyhow::Resu
     ManuallyDrop::new(runtime).block_on(command)
 }
 
-/// Prints help, the version, or an error of the arguments.
-fn print_usage(error: &clap::Error) -> ExitCode {
-    // A closed stdout is not an error of the help.
-    let _ = error.print();
-    if error.use_stderr() { ExitCode::from(2) } else { ExitCode::SUCCESS }
-}
-
 /// Prints `error` and returns its exit code.
 fn report(error: &anyhow::Error) -> ExitCode {
     if output::is_closed_pipe(error) {
@@ -153,6 +160,9 @@ fn report(error: &anyhow::Error) -> ExitCode {
     anstream::eprintln!("offbd: {error:#}");
     if error.is::<errors::BadArgument>() {
         return ExitCode::from(2);
+    }
+    if error.is::<errors::FaultFound>() {
+        return ExitCode::from(4);
     }
     let unusable = error.is::<errors::InputError>() || error.is::<ConfigError>();
     ExitCode::from(if unusable { 3 } else { 1 })

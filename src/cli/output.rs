@@ -1,12 +1,35 @@
 //! Output to stdout or a file, buffered. An error of a closed pipe can be told from other
 //! errors.
 
+use std::fmt::Display;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Context;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
+
+/// Whether remarks on stderr are left out: `--quiet`.
+static QUIET: AtomicBool = AtomicBool::new(false);
+
+/// Leaves out the remarks of this process.
+pub(super) fn be_quiet() {
+    QUIET.store(true, Ordering::Relaxed);
+}
+
+/// Whether remarks are left out.
+pub(super) fn is_quiet() -> bool {
+    QUIET.load(Ordering::Relaxed)
+}
+
+/// Prints a remark to stderr, something that is neither a result nor an error; nothing with
+/// `--quiet`.
+pub(super) fn remark(text: impl Display) {
+    if !is_quiet() {
+        anstream::eprintln!("{text}");
+    }
+}
 
 /// How a command prints its result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -36,6 +59,11 @@ pub(super) fn print_line(text: &str) -> anyhow::Result<()> {
     let mut out = stdout();
     writeln!(out, "{text}")?;
     Ok(out.flush()?)
+}
+
+/// Writes `value` as one line of JSON to stdout.
+pub(super) fn print_json(value: &impl serde::Serialize) -> anyhow::Result<()> {
+    print_line(&serde_json::to_string(value)?)
 }
 
 /// Returns whether `error` means that the reader of the output has closed it.

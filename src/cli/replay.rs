@@ -10,7 +10,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
-use super::errors::InputError;
+use super::errors::{FaultFound, InputError};
 use super::judge::{self, JudgedSession};
 use super::output::{self, OutputFormat, value_parser};
 use super::table;
@@ -30,9 +30,9 @@ use offbd_core::engine::Setup;
     offbd replay --format json sick.csv | jq 'select(.status == \"confirmed\")'\n  \
     offbd replay --profile textbook sick.csv\n  \
     offbd replay --asset learnt.json --against relearnt.json monday.csv\n\n\
-    Invalid rows are reported on stderr with their line number, and counted. Exit\n\
-    status: 0 all files judged (faults or not), 3 a file is unusable; the others are\n\
-    judged."
+    Invalid rows are reported on stderr with their line number, and counted.\n\n\
+    Exit status: 0 all files judged (faults or not), 3 a file is unusable; the others\n\
+    are judged; 4 a fault was confirmed, with --fail-on-fault."
 )]
 pub(super) struct ReplayArgs {
     /// The rig's asset file, preferably calibrated [default: the chapter's rig]
@@ -54,6 +54,9 @@ pub(super) struct ReplayArgs {
     /// `--asset`), and show where the two verdicts differ
     #[arg(long, value_name = "PROFILE", value_parser = value_parser::<Profile>(Profile::ALL.map(Profile::as_str)))]
     against_profile: Option<Profile>,
+    /// End with exit status 4 if a fault was confirmed in any session
+    #[arg(long)]
+    fail_on_fault: bool,
     /// Files judged at a time [default: one per core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
@@ -82,13 +85,25 @@ pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
         OutputFormat::Json => write_json(&verdicts)?,
         OutputFormat::Table => write_table(&verdicts)?,
     }
-    outcome(results)
+    let (n, n_faulty) = (verdicts.len(), verdicts.iter().filter(|v| v.has_fault()).count());
+    outcome(results)?;
+    if args.fail_on_fault && n_faulty > 0 {
+        return Err(FaultFound { n_faulty, n }.into());
+    }
+    Ok(())
 }
 
 /// A judged session and, for a comparison, the same session judged with other settings.
 struct ComparedSession {
     judged: JudgedSession,
     against: Option<JudgedSession>,
+}
+
+impl ComparedSession {
+    /// Whether a fault was confirmed.
+    fn has_fault(&self) -> bool {
+        !self.judged.summary.faults.is_empty()
+    }
 }
 
 /// The settings of the second judgement for a comparison; `None` without one.
@@ -104,7 +119,7 @@ fn against_setup(args: &ReplayArgs) -> Result<Option<Setup>, InputError> {
 /// A progress bar on stderr for `n` items, hidden if `n` is less than 2 or stderr is not a
 /// terminal.
 pub(super) fn progress(n: usize) -> ProgressBar {
-    if n < 2 {
+    if n < 2 || output::is_quiet() {
         return ProgressBar::hidden();
     }
     let style = ProgressStyle::with_template("{bar:40} {pos} of {len}, {eta} left");
@@ -126,17 +141,17 @@ fn report_rows(path: &Path, result: &Result<ComparedSession, InputError>) {
     let name = path.display();
     let Ok(ComparedSession { judged, .. }) = result else { return };
     for row in &judged.bad_rows {
-        anstream::eprintln!("{name}: {row}; row rejected");
+        output::remark(format_args!("{name}: {row}; row rejected"));
     }
     let n_more = judged.summary.rejected - judged.bad_rows.len() as u64;
     if n_more > 0 {
-        anstream::eprintln!("{name}: {n_more} more rows rejected");
+        output::remark(format_args!("{name}: {n_more} more rows rejected"));
     }
     if judged.n_set_aside > 0 {
-        anstream::eprintln!(
+        output::remark(format_args!(
             "{name}: {} rows kept but not judged: too late, or too far ahead in time",
             judged.n_set_aside
-        );
+        ));
     }
 }
 

@@ -4,11 +4,13 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::Args;
+use serde::Serialize;
+use serde_json::json;
 
 use super::logging::LoggingArgs;
-use super::output;
+use super::output::{self, OutputFormat};
 use crate::config::{Config, ConfigError, Flags};
-use crate::server::{self, Traces};
+use crate::server::{self, ConfigSummary, Traces};
 use crate::store::CheckReport;
 
 /// The arguments of the service's configuration. They override the environment, which
@@ -63,6 +65,9 @@ pub(super) struct ServeArgs {
 pub(super) struct MigrateArgs {
     #[command(flatten)]
     config: ConfigArgs,
+    /// Text for people, or one JSON object
+    #[arg(long, value_enum, default_value_t = OutputFormat::Table)]
+    format: OutputFormat,
 }
 
 /// Checks the configuration, and the contents of the store with --data or --database.
@@ -77,6 +82,9 @@ pub(super) struct MigrateArgs {
 pub(super) struct CheckArgs {
     #[command(flatten)]
     config: ConfigArgs,
+    /// Text for people, or one JSON object
+    #[arg(long, value_enum, default_value_t = OutputFormat::Table)]
+    format: OutputFormat,
 }
 
 pub(super) fn serve(args: &ServeArgs, logging: &LoggingArgs) -> anyhow::Result<()> {
@@ -90,22 +98,75 @@ pub(super) fn serve(args: &ServeArgs, logging: &LoggingArgs) -> anyhow::Result<(
 
 pub(super) fn migrate(args: &MigrateArgs) -> anyhow::Result<()> {
     let config = args.config.load()?;
-    let message = super::block_on(server::migrate(&config))?;
-    output::print_line(&message)
+    let applied = super::block_on(server::migrate(&config))?;
+    let store = config.location()?.to_string();
+    match args.format {
+        OutputFormat::Table => {
+            output::print_line(&format!("{store}: {applied} migrations applied"))
+        }
+        OutputFormat::Json => output::print_json(&json!({ "store": store, "migrations": applied })),
+    }
+}
+
+/// The result of `check`. Without a store that was asked for, and there, no `checked`.
+#[derive(Serialize)]
+struct CheckResult {
+    #[serde(flatten)]
+    configuration: ConfigSummary,
+    checked: Option<CheckedStore>,
+}
+
+#[derive(Serialize)]
+struct CheckedStore {
+    sessions: u64,
+    samples: u64,
+    documents: u64,
+    /// Whether the file's pages have checksums; null for PostgreSQL.
+    page_checksums: Option<bool>,
+    findings: Vec<String>,
+}
+
+impl From<CheckReport> for CheckedStore {
+    fn from(report: CheckReport) -> Self {
+        let CheckReport { n_sessions, n_samples, n_documents, page_checksums, findings } = report;
+        Self {
+            sessions: n_sessions,
+            samples: n_samples,
+            documents: n_documents,
+            page_checksums,
+            findings,
+        }
+    }
 }
 
 pub(super) fn check(args: &CheckArgs) -> anyhow::Result<()> {
     let config = args.config.load()?;
-    output::print_line(&server::check(&config)?)?;
-    if args.config.data.is_none() && args.config.database.is_none() {
-        return Ok(());
-    }
-    let Some(report) = super::block_on(server::check_store(&config))? else {
-        return output::print_line("checked  nothing: there is no store yet");
+    let configuration = server::check(&config)?;
+    let is_asked = args.config.data.is_some() || args.config.database.is_some();
+    let report = match is_asked {
+        true => super::block_on(server::check_store(&config))?,
+        false => None,
     };
-    report.findings.iter().try_for_each(|finding| output::print_line(finding))?;
-    let CheckReport { n_sessions, n_samples, n_documents, page_checksums, findings } = report;
-    match page_checksums {
+    let result = CheckResult { configuration, checked: report.map(CheckedStore::from) };
+    match args.format {
+        OutputFormat::Json => output::print_json(&result)?,
+        OutputFormat::Table => print_check(&result, is_asked)?,
+    }
+    let n_findings = result.checked.map_or(0, |checked| checked.findings.len());
+    anyhow::ensure!(n_findings == 0, "the store is damaged: {n_findings} findings");
+    Ok(())
+}
+
+fn print_check(result: &CheckResult, is_asked: bool) -> anyhow::Result<()> {
+    output::print_line(&result.configuration.to_string())?;
+    let Some(store) = &result.checked else {
+        return match is_asked {
+            true => output::print_line("checked  nothing: there is no store yet"),
+            false => Ok(()),
+        };
+    };
+    store.findings.iter().try_for_each(|finding| output::print_line(finding))?;
+    match store.page_checksums {
         Some(true) => output::print_line("pages    each has a checksum, and all were read")?,
         Some(false) => output::print_line(
             "pages    without checksums: an earlier version has made this file; to add them, \
@@ -113,9 +174,8 @@ pub(super) fn check(args: &CheckArgs) -> anyhow::Result<()> {
         )?,
         None => {}
     }
+    let CheckedStore { sessions, samples, documents, .. } = store;
     output::print_line(&format!(
-        "checked  {n_sessions} sessions, {n_samples} samples, {n_documents} documents"
-    ))?;
-    anyhow::ensure!(findings.is_empty(), "the store is damaged: {} findings", findings.len());
-    Ok(())
+        "checked  {sessions} sessions, {samples} samples, {documents} documents"
+    ))
 }

@@ -95,7 +95,7 @@ async fn create(args: &CreateArgs) -> anyhow::Result<()> {
         Ok(error) => error.into(),
         Err(error) => error,
     })?;
-    anstream::eprintln!("save this token now; it cannot be shown again");
+    output::remark(format_args!("save this token now; it cannot be shown again"));
     output::print_line(&secret)
 }
 

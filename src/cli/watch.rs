@@ -12,7 +12,8 @@ use serde_json::Value;
 use tokio_tungstenite::tungstenite::Message;
 
 use self::connect::{ConnectArgs, connect};
-use super::{output, table};
+use super::output::{self, OutputFormat};
+use super::table;
 use crate::wire::learning::LearningView;
 use crate::wire::service::{MonitorView, StateView};
 use crate::wire::verdict::{AxisEvidenceView, FaultView};
@@ -20,14 +21,16 @@ use crate::wire::verdict::{AxisEvidenceView, FaultView};
 /// Shows an asset live: residuals and their limits, monitors, faults.
 ///
 /// In a terminal the state is updated in place; otherwise each state is printed
-/// as a line. Changes of faults are printed when they happen. Ends with Ctrl-C
+/// as a line, below a heading for each session. Changes of faults are printed
+/// when they happen. With --format json each state and each change is one JSON
+/// object, as the service sends it. Ends with Ctrl-C
 /// or when the service stops.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "Examples:\n  \
     offbd watch demo-rig\n  \
     offbd watch bench-1 --address 192.168.1.5:8087 --hz 1\n  \
     offbd watch bench-1 --address https://rigs.example --token-file token\n  \
-    offbd watch bench-1 --states 1")]
+    offbd watch bench-1 --states 1 --format json | jq .evidence")]
 pub(super) struct WatchArgs {
     /// Name of the asset
     asset: String,
@@ -39,6 +42,9 @@ pub(super) struct WatchArgs {
     /// End after this number of states [default: no limit]
     #[arg(long, value_name = "N")]
     states: Option<u64>,
+    /// Text for people, or one JSON object per line
+    #[arg(long, value_enum, default_value_t = OutputFormat::Table)]
+    format: OutputFormat,
 }
 
 fn rate(word: &str) -> Result<f64, String> {
@@ -55,17 +61,19 @@ pub(super) fn run(args: &WatchArgs) -> anyhow::Result<()> {
 
 async fn watch(args: &WatchArgs) -> anyhow::Result<()> {
     let mut socket = connect(&args.connect, &args.asset, args.hz).await?;
-    let mut screen = Screen { redraws: std::io::stdout().is_terminal(), drawn: 0 };
+    let mut screen = Screen { redraws: std::io::stdout().is_terminal(), ..Screen::default() };
     let mut left = args.states.unwrap_or(u64::MAX);
     while left > 0 {
         let Some(message) = socket.next().await else { bail!("the service closed the stream") };
         let Message::Text(text) = message? else { continue };
         let frame: Value = serde_json::from_str(&text)?;
-        match frame["type"].as_str() {
-            Some("state") => {
-                left -= 1;
-                screen.state(&serde_json::from_value(frame)?)?;
+        let kind = frame["type"].as_str();
+        left -= u64::from(kind == Some("state"));
+        match kind {
+            Some("state" | "fault") if args.format == OutputFormat::Json => {
+                output::print_line(&text)?;
             }
+            Some("state") => screen.state(&serde_json::from_value(frame)?)?,
             Some("fault") => screen.fault(&serde_json::from_value(frame)?)?,
             Some("error") => bail!("{}", frame["problem"]["detail"]),
             _ => {}
@@ -75,21 +83,45 @@ async fn watch(args: &WatchArgs) -> anyhow::Result<()> {
 }
 
 /// The output, in a terminal or as plain lines.
+#[derive(Default)]
 struct Screen {
     /// Whether each state replaces the previous one.
     redraws: bool,
     /// Number of lines of the previous state.
     drawn: usize,
+    /// The session, and the progress of learning, that plain lines are about.
+    session: Option<String>,
+    learning: Option<String>,
 }
 
 impl Screen {
     fn state(&mut self, state: &StateView) -> std::io::Result<()> {
-        let lines = if self.redraws { block(state) } else { vec![line(state)] };
+        let lines = if self.redraws { block(state) } else { self.plain(state) };
         let mut out = output::stdout();
         self.erase(&mut out)?;
         self.drawn = lines.len();
         lines.iter().try_for_each(|line| writeln!(out, "{line}"))?;
         out.flush()
+    }
+
+    /// A state as one line, after a heading if the session is another one, and after the
+    /// progress of learning if it has changed.
+    fn plain(&mut self, state: &StateView) -> Vec<String> {
+        let mut lines = Vec::new();
+        let session = state.session.clone().unwrap_or_else(|| "no session".to_owned());
+        if self.session.as_ref() != Some(&session) {
+            lines.push(format!("{}, {session}", state.asset));
+            lines.push(HEADING.to_owned());
+            self.session = Some(session);
+        }
+        let learning = state.learning.as_ref().map(|learning| learning.summary.clone());
+        if self.learning != learning {
+            let summary = learning.iter().map(|summary| table::wrapped("  learning: ", summary));
+            lines.extend(summary);
+            self.learning = learning;
+        }
+        lines.push(line(state));
+        lines
     }
 
     fn fault(&mut self, fault: &FaultView) -> std::io::Result<()> {
@@ -117,20 +149,21 @@ fn head(state: &StateView) -> String {
     format!("{t_s:>8.2} s  {}  {session}  {} samples", state.asset, state.samples)
 }
 
+/// Heading of the plain lines: the columns of [`line`].
+const HEADING: &str =
+    "       time    samples   x residual/limit   y residual/limit   judged, % of the time";
+
 /// A state as one line, for logs.
 fn line(state: &StateView) -> String {
-    let axis = |name: &str, axis: &AxisEvidenceView| match axis.residual_m_s2 {
-        Some(residual) => format!("{name} {residual:+.2}/{:.2}", axis.limit_m_s2),
-        None => format!("{name} -"),
+    let axis = |axis: &AxisEvidenceView| match axis.residual_m_s2 {
+        Some(residual) => format!("{residual:+.2}/{:.2}", axis.limit_m_s2),
+        None => "-".to_owned(),
     };
-    let evidence = &state.evidence;
-    let share = |m: &MonitorView| format!("{} {:.0} %", m.code, 100.0 * m.judged_share);
-    let judged: Vec<String> = state.monitors.iter().map(share).collect();
-    let (x, y) = (axis("x", &evidence.x), axis("y", &evidence.y));
-    let learning =
-        state.learning.as_ref().map(|l| format!("  {}: {}", l.state.as_str(), l.summary));
-    let learning = learning.unwrap_or_default();
-    format!("{}  {x}  {y}  judged {}{learning}", head(state), judged.join(", "))
+    let percent = |m: &MonitorView| format!("{:.0}", 100.0 * m.judged_share);
+    let judged: Vec<String> = state.monitors.iter().map(percent).collect();
+    let (x, y) = (axis(&state.evidence.x), axis(&state.evidence.y));
+    let (t_s, samples) = (state.t_s.unwrap_or(0.0), state.samples);
+    format!("{t_s:>9.2} s {samples:>10} {x:>18} {y:>18}   {}", judged.join(" "))
 }
 
 /// A state as a block of lines: a bar for each residual, and the monitors.
@@ -216,12 +249,33 @@ mod tests {
     fn the_progress_of_learning_is_shown() {
         let words = "Gathering motion: x 23 of 60 s.";
         let state = gathering(words);
-        assert!(line(&state).ends_with(&format!("gathering: {words}")), "{}", line(&state));
+        let mut screen = Screen::default();
+        let plain = screen.plain(&state);
+        assert!(plain.contains(&format!("  learning: {words}")), "{plain:?}");
+        assert_eq!(screen.plain(&state).len(), 1, "nothing has changed");
         assert_eq!(block(&state).last().unwrap().trim(), format!("learning: {words}"));
         let long = block(&gathering(&"record steps or circles, ".repeat(9)));
         assert!(long.iter().all(|line| !line.contains('\n')), "each line is counted");
         let learnt = StateView { learning: None, ..state };
-        assert!(!line(&learnt).contains("Gathering") && block(&learnt).len() < long.len());
+        assert!(block(&learnt).len() < long.len());
+        assert_eq!(screen.plain(&learnt).len(), 1);
+    }
+
+    #[test]
+    fn plain_lines_fit_and_say_once_what_they_are_about() {
+        let mut screen = Screen::default();
+        let mut state = state_view("rig", None, &State::default());
+        state.session = Some("monday".to_owned());
+        state.t_s = Some(123_456.78);
+        state.samples = 1_234_567_890;
+        state.evidence.x = axis(Some(-12.34));
+        let first = screen.plain(&state);
+        assert_eq!((first.len(), &*first[0]), (3, "rig, monday"));
+        assert!(first.iter().all(|line| line.chars().count() <= 80), "{first:?}");
+        assert!(first[2].contains("-12.34/0.50"), "{first:?}");
+        assert_eq!(screen.plain(&state).len(), 1);
+        state.session = None;
+        assert_eq!(screen.plain(&state)[0], "rig, no session");
     }
 
     #[test]

@@ -3,34 +3,58 @@
 use axum::Json;
 use axum::body::Body;
 use axum::extract::State;
-use axum::http::StatusCode;
 use axum::http::header::LOCATION;
+use axum::http::{HeaderMap, StatusCode};
 use axum::response::IntoResponse;
+use serde::Deserialize;
 
 use super::layers::record_asset;
-use super::{App, AssetPath, PageQuery, Problem, Query, body, page_limit};
-use crate::service::Service;
+use super::{App, AssetPath, Problem, Query, json_body, page_limit};
+use crate::service::{FleetQuery, Service};
 use crate::wire::asset::AssetView;
 use crate::wire::service::{FleetEntryView, Page, StateView};
 use crate::wire::trend::TrendsView;
 
+#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[into_params(parameter_in = Query)]
+pub(super) struct AssetsQuery {
+    /// Only assets whose name begins with this.
+    name: Option<String>,
+    /// `next` of the previous page.
+    cursor: Option<String>,
+    /// Items per page, 1 to 500; 50 by default.
+    #[param(format = Int32, minimum = 1, maximum = 500)]
+    limit: Option<u32>,
+}
+
+#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[into_params(parameter_in = Query)]
+pub(super) struct FleetListQuery {
+    /// Only assets whose name begins with this.
+    name: Option<String>,
+    /// Only assets with, or without, a pending or confirmed fault.
+    has_fault: Option<bool>,
+    /// Only assets with, or without, an open session.
+    has_session: Option<bool>,
+    /// `next` of the previous page.
+    cursor: Option<String>,
+    /// Items per page, 1 to 500; 50 by default.
+    #[param(format = Int32, minimum = 1, maximum = 500)]
+    limit: Option<u32>,
+}
+
 /// Size limit of an asset file, bytes.
 pub(super) const MAX_ASSET_BYTES: usize = 64 << 10;
 
-async fn read_document(app: &App, body: Body) -> Result<Vec<u8>, Problem> {
-    let timeout = app.service.limits().body_timeout;
-    Ok(body::read(body, MAX_ASSET_BYTES, timeout, &app.budget.whole()).await?.bytes)
-}
-
 /// Lists the assets by name.
 #[utoipa::path(get, path = "/assets", tag = "assets", operation_id = "list_assets",
-    params(PageQuery),
+    params(AssetsQuery),
     responses((status = 200, body = Page<AssetView>), (status = 400, body = Problem)))]
 pub(super) async fn list(
     State(service): State<Service>,
-    Query(page): Query<PageQuery>,
+    Query(AssetsQuery { name, cursor, limit }): Query<AssetsQuery>,
 ) -> Result<Json<Page<AssetView>>, Problem> {
-    Ok(Json(service.assets(page.cursor.as_deref(), page_limit(page.limit)).await?))
+    Ok(Json(service.assets(name, cursor.as_deref(), page_limit(limit)).await?))
 }
 
 /// Registers an asset; the body is its asset file.
@@ -44,9 +68,11 @@ pub(super) async fn list(
         (status = 507, body = Problem, description = "The limit of assets is reached")))]
 pub(super) async fn create(
     State(app): State<App>,
+    headers: HeaderMap,
     body: Body,
 ) -> Result<impl IntoResponse, Problem> {
-    let view = app.service.create_asset(&read_document(&app, body).await?).await?;
+    let document = json_body::read(&app, &headers, body, MAX_ASSET_BYTES).await?;
+    let view = app.service.create_asset(&document).await?;
     record_asset(&view.name);
     let location = format!("/api/v1/assets/{}", view.name);
     Ok((StatusCode::CREATED, [(LOCATION, location)], Json(view)))
@@ -72,9 +98,11 @@ pub(super) async fn get(
 pub(super) async fn put(
     State(app): State<App>,
     AssetPath(asset): AssetPath,
+    headers: HeaderMap,
     body: Body,
 ) -> Result<impl IntoResponse, Problem> {
-    let (view, created) = app.service.put_asset(&asset, &read_document(&app, body).await?).await?;
+    let document = json_body::read(&app, &headers, body, MAX_ASSET_BYTES).await?;
+    let (view, created) = app.service.put_asset(&asset, &document).await?;
     Ok((if created { StatusCode::CREATED } else { StatusCode::OK }, Json(view)))
 }
 
@@ -121,11 +149,13 @@ pub(super) async fn trends(
 /// Returns an overview of the fleet: for each asset, sorted by name, its open session,
 /// when its last telemetry arrived, and its active faults.
 #[utoipa::path(get, path = "/fleet", tag = "assets", operation_id = "get_fleet",
-    params(PageQuery),
+    params(FleetListQuery),
     responses((status = 200, body = Page<FleetEntryView>), (status = 400, body = Problem)))]
 pub(super) async fn fleet(
     State(service): State<Service>,
-    Query(page): Query<PageQuery>,
+    Query(query): Query<FleetListQuery>,
 ) -> Result<Json<Page<FleetEntryView>>, Problem> {
-    Ok(Json(service.fleet(page.cursor.as_deref(), page_limit(page.limit)).await?))
+    let FleetListQuery { name, has_fault, has_session, cursor, limit } = query;
+    let query = FleetQuery { name, has_fault, has_session, cursor };
+    Ok(Json(service.fleet(query, page_limit(limit)).await?))
 }

@@ -1,7 +1,6 @@
 //! `/assets/{asset}/calibrations`: calibrating a rig from chosen sessions.
 
 use axum::Json;
-use axum::body::Body;
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::http::header::LOCATION;
@@ -9,7 +8,7 @@ use axum::response::IntoResponse;
 use serde::Deserialize;
 use utoipa::ToSchema;
 
-use super::sessions::small_json;
+use super::json_body::JsonBody;
 use super::{App, AssetItemPath, AssetPath, PageQuery, Problem, Query, page_limit};
 use crate::service::Service;
 use crate::wire::service::{CalibrationJobView, Page, TrainingDataView};
@@ -33,9 +32,8 @@ pub(super) struct NewCalibration {
 pub(super) async fn create(
     State(app): State<App>,
     AssetPath(asset): AssetPath,
-    body: Body,
+    JsonBody(request): JsonBody<NewCalibration>,
 ) -> Result<impl IntoResponse, Problem> {
-    let request: NewCalibration = small_json(&app, body).await?;
     let job = app.service.calibrate(&asset, request.sessions).await?;
     let location = format!("/api/v1/assets/{asset}/calibrations/{}", job.id);
     Ok((StatusCode::ACCEPTED, [(LOCATION, location)], Json(job)))

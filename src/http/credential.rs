@@ -8,8 +8,7 @@ use std::net::{IpAddr, SocketAddr};
 
 use axum::extract::ConnectInfo;
 use axum::http::header::{self, AUTHORIZATION, SET_COOKIE};
-use axum::http::request::Parts;
-use axum::http::{HeaderMap, HeaderValue};
+use axum::http::{Extensions, HeaderMap, HeaderValue};
 
 use crate::service::access::Credential;
 
@@ -38,11 +37,11 @@ pub(super) fn set_cookie(secret: &str, seconds: u64, encrypted: bool) -> HeaderM
 pub(super) struct OriginalClient(pub(super) IpAddr);
 
 /// Returns the address of the client.
-pub(super) fn client_address(parts: &Parts) -> Option<IpAddr> {
-    if let Some(OriginalClient(address)) = parts.extensions.get() {
+pub(super) fn client_address(extensions: &Extensions) -> Option<IpAddr> {
+    if let Some(OriginalClient(address)) = extensions.get() {
         return Some(*address);
     }
-    let peer = parts.extensions.get::<ConnectInfo<SocketAddr>>();
+    let peer = extensions.get::<ConnectInfo<SocketAddr>>();
     peer.map(|peer| peer.0.ip().to_canonical())
 }
 

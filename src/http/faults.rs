@@ -25,7 +25,7 @@ pub(super) struct StatusQuery {
 
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
 #[into_params(parameter_in = Query)]
-pub(super) struct FleetQuery {
+pub(super) struct FleetFaultsQuery {
     /// `active` (pending or confirmed) by default.
     #[param(inline, value_type = Option<StatusFilter>)]
     status: Option<String>,
@@ -38,8 +38,8 @@ pub(super) struct FleetQuery {
     sort: Option<String>,
     /// `next` of the previous page, which must have the same `sort`.
     cursor: Option<String>,
-    /// Items per page, clamped to 1 to 500; 50 by default.
-    #[param(format = Int64, maximum = 4_294_967_295_u32)]
+    /// Items per page, 1 to 500; 50 by default.
+    #[param(format = Int32, minimum = 1, maximum = 500)]
     limit: Option<u32>,
 }
 
@@ -201,14 +201,14 @@ pub(super) async fn history(
 
 /// Lists the faults of the fleet.
 #[utoipa::path(get, path = "/faults", tag = "faults", operation_id = "list_faults",
-    params(FleetQuery),
+    params(FleetFaultsQuery),
     responses((status = 200, body = Page<FaultEntryView>), (status = 400, body = Problem),
         (status = 404, body = Problem, description = "No such asset or code")))]
 pub(super) async fn of_fleet(
     State(service): State<Service>,
-    Query(query): Query<FleetQuery>,
+    Query(query): Query<FleetFaultsQuery>,
 ) -> Result<Json<Page<FaultEntryView>>, Problem> {
-    let FleetQuery { status, asset, code, acknowledged, sort, cursor, limit } = query;
+    let FleetFaultsQuery { status, asset, code, acknowledged, sort, cursor, limit } = query;
     let status = query_word("?status", status.as_deref())?;
     let sort = query_word("?sort", sort.as_deref())?;
     let query = FaultQuery { status, asset, code, acknowledged, sort, cursor };

@@ -112,7 +112,7 @@ fn address_to(parts: &mut Parts, address: &str, secret: &str) -> Result<(), Prob
     let moving = |_| Problem::from(ServiceError::Moving);
     let path = parts.uri.path_and_query().map_or("/", PathAndQuery::as_str);
     let uri: Uri = format!("http://{address}{path}").parse().map_err(moving)?;
-    if let Some(client) = client_address(parts)
+    if let Some(client) = client_address(&parts.extensions)
         && let Ok(client) = HeaderValue::from_str(&client.to_string())
     {
         parts.headers.insert(CLIENT, client);

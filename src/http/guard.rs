@@ -103,6 +103,9 @@ impl Guard {
             self.check_right(caller, rule.right, &mut parts).await?;
             parts.extensions.insert(caller.clone());
         }
+        if let Some(parameters) = &rule.parameters {
+            parameters.check(parts.uri.query()).map_err(Problem::from)?;
+        }
         if !is_safe(&parts.method) {
             parts.extensions.insert(self.body_share(caller.as_ref(), &parts));
         }
@@ -245,14 +248,14 @@ impl Guard {
         if let Some(principal) = caller.and_then(Caller::principal) {
             return budget.share_of(&principal.id);
         }
-        match client_address(parts).filter(|address| !address.is_loopback()) {
+        match client_address(&parts.extensions).filter(|address| !address.is_loopback()) {
             Some(address) => budget.share_of(&address.to_string()),
             None => budget.whole(),
         }
     }
 
     fn check_address_rate(&self, parts: &Parts) -> Result<(), Denial> {
-        let Some(address) = client_address(parts) else { return Ok(()) };
+        let Some(address) = client_address(&parts.extensions) else { return Ok(()) };
         self.app.policy.rates.check_address(address).map_err(rate_limited)
     }
 
@@ -328,7 +331,8 @@ fn rule(
     uri: &Uri,
 ) -> Result<RouteRule, Denial> {
     let Some(path) = path else {
-        return Ok(RouteRule { right: Right::Public, action: String::new() });
+        let (right, action) = (Right::Public, String::new());
+        return Ok(RouteRule { right, action, parameters: None });
     };
     let Some(methods) = rules.of(path) else {
         tracing::error!(path, "the route has no right");
@@ -358,7 +362,7 @@ fn is_audited(right: Right, method: &Method) -> bool {
 }
 
 fn audit_entry(action: String, parts: &Parts) -> AuditEntry {
-    let address = client_address(parts).map(|address| address.to_string());
+    let address = client_address(&parts.extensions).map(|address| address.to_string());
     AuditEntry { action, target: parts.uri.path().to_owned(), address }
 }
 
@@ -405,7 +409,6 @@ fn rate_limited(wait: Duration) -> Denial {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::http::routes::ExtraRoutes;
 
     #[test]
     fn a_route_without_a_right_is_denied() {
@@ -414,7 +417,7 @@ mod tests {
         item.get.as_mut().unwrap().extensions = None;
         let item = document.paths.paths.get_mut("/metrics").unwrap();
         item.get.as_mut().unwrap().extensions = None;
-        let rules = RouteRules::new(&document, &ExtraRoutes::default());
+        let rules = RouteRules::new(&document);
         let uri = Uri::from_static("/");
         let found = |path, method: Method| {
             let rule = rule(&rules, Some(path), &method, &uri);

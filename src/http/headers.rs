@@ -18,6 +18,8 @@ use axum::response::Response;
 use futures_util::{StreamExt, stream};
 use tower_http::cors::CorsLayer;
 
+use super::sovd;
+
 /// The content security policy of responses that are not pages.
 const DENY_ALL: &str = "default-src 'none'; frame-ancestors 'none'";
 
@@ -62,7 +64,7 @@ pub(super) async fn announce_close(request: Request, next: Next) -> Response {
 pub(super) async fn secure(request: Request, next: Next) -> Response {
     let path = request.uri().path();
     let policy = if path.starts_with("/docs") { DOCS } else { DENY_ALL };
-    let is_api = path.starts_with("/api/");
+    let is_api = path.starts_with("/api/") || path.starts_with(sovd::PREFIX);
     let mut response = next.run(request).await;
     let mut set_default = |name: HeaderName, value: &'static str| {
         response.headers_mut().entry(name).or_insert(HeaderValue::from_static(value));

@@ -20,7 +20,7 @@ use tower_http::trace::TraceLayer;
 use tracing::Span;
 use tracing::field::Empty;
 
-use super::{AccessPolicy, Problem, headers};
+use super::{AccessPolicy, Problem, headers, sovd};
 
 /// Longest time until a response starts, except for an import.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(60);
@@ -99,15 +99,18 @@ async fn count(request: Request, next: Next) -> Response {
     response
 }
 
-/// Sets `instance` of a problem to the id of its request.
+/// Sets `instance` of a problem to the id of its request, and the members that clients of SOVD
+/// read if the request is one of its adapter.
 async fn set_instance(request: Request, next: Next) -> Response {
     let id = request_id(&request);
+    let is_sovd = request.uri().path().starts_with(sovd::PREFIX);
     let mut response = next.run(request).await;
     match response.extensions_mut().remove::<Problem>() {
         Some(problem) => {
             let instance = id.map(|id| format!("urn:uuid:{id}").into());
             let mut headers = std::mem::take(response.headers_mut());
-            let mut named = Problem { instance, ..problem }.into_response();
+            let named = Problem { instance, ..problem };
+            let mut named = if is_sovd { named.with_sovd() } else { named }.into_response();
             headers.remove(CONTENT_LENGTH);
             named.headers_mut().extend(headers);
             named

@@ -3,8 +3,7 @@
 //! The cookie is `HttpOnly` and `SameSite=Strict`; in addition the guard checks the
 //! `Origin` of every request that is not safe.
 
-use axum::body::Body;
-use axum::extract::{Request, State};
+use axum::extract::{FromRequest, Request, State};
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
 use axum::{Extension, Json};
@@ -12,7 +11,7 @@ use serde::Deserialize;
 use utoipa::ToSchema;
 
 use super::credential::{client_address, set_cookie};
-use super::sessions::small_json;
+use super::json_body::JsonBody;
 use super::{App, Problem};
 use crate::service::access::{AuditEntry, Caller, Credential, Role};
 use crate::wire::access::CallerView;
@@ -49,12 +48,9 @@ fn view(caller: &Caller) -> CallerView {
     responses((status = 200, body = CallerView), (status = 400, body = Problem),
         (status = 401, body = Problem, description = "Invalid, expired or revoked token"),
         (status = 422, body = Problem)))]
-pub(super) async fn log_in(
-    State(app): State<App>,
-    request: Request<Body>,
-) -> Result<Response, Problem> {
-    let (parts, body) = request.into_parts();
-    let login: NewLogin = small_json(&app, body).await?;
+pub(super) async fn log_in(State(app): State<App>, request: Request) -> Result<Response, Problem> {
+    let address = client_address(request.extensions()).map(|address| address.to_string());
+    let JsonBody(login) = JsonBody::<NewLogin>::from_request(request, &app).await?;
     if !app.policy.required {
         return Ok(Json(view(&Caller::Anonymous)).into_response());
     }
@@ -66,7 +62,6 @@ pub(super) async fn log_in(
     };
     let (secret, duration) = app.service.log_in(&principal).await?;
     let caller = Caller::Authenticated(principal);
-    let address = client_address(&parts).map(|address| address.to_string());
     let entry = AuditEntry { action: "log_in".to_owned(), target: PATH.to_owned(), address };
     app.service.audit_action(&caller, entry).await?;
     let cookie = set_cookie(&secret, duration.as_secs(), app.policy.encrypted);

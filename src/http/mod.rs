@@ -20,6 +20,7 @@ mod faults;
 mod forward;
 mod guard;
 mod headers;
+mod json_body;
 mod layers;
 mod learning;
 mod login;
@@ -27,11 +28,14 @@ mod metrics;
 mod negotiate;
 mod operations;
 mod page;
+mod parameters;
 mod problem;
 mod rates;
 mod replays;
 mod routes;
+mod series;
 mod sessions;
+mod sovd;
 mod stream;
 mod telemetry;
 mod tokens;
@@ -54,6 +58,7 @@ use utoipa_swagger_ui::SwaggerUi;
 
 pub use body::BodyBudget;
 pub use guard::AccessPolicy;
+pub use json_body::parse_json;
 pub use metrics::{gather_metrics, keep_metrics};
 pub use problem::Problem;
 pub(crate) use rates::subscriber;
@@ -63,8 +68,8 @@ pub use routes::ExtraRoutes;
 use self::forward::Forwarder;
 use self::guard::Guard;
 use self::routes::{GuardedRouter, RouteRules};
-use crate::service::Service;
 use crate::service::access::Right;
+use crate::service::{Service, parse_timestamp};
 use offbd_core::vocabulary::{Invalid, TimeRange, UnknownWord};
 
 /// The state shared by all handlers.
@@ -96,19 +101,25 @@ impl FromRef<App> for Service {
             Lengths are in metres, angles in radians, sample times in seconds on the device's \
             clock. Timestamps of the service are RFC 3339.",
     ),
-    components(schemas(crate::wire::service::EventView)),
+    components(schemas(
+        crate::wire::service::EventView,
+        crate::wire::words::SessionSort,
+        crate::wire::words::VerdictFilter,
+        crate::wire::words::SeriesAggregate,
+    )),
     tags(
         (name = "assets", description = "The registry of rigs"),
         (name = "telemetry", description = "Ingest of samples"),
         (name = "faults", description = "Fault memory"),
         (name = "sessions", description = "Recordings"),
+        (name = "sovd", description = "The same in the shape of SOVD (ISO 17978-3)"),
         (name = "access", description = "Tokens, logins, the audit log"),
         (name = "operation", description = "Health and metrics"),
     )
 )]
 struct Api;
 
-/// Most items on a page; `limit` is clamped to 1..=`MAX_PAGE`.
+/// Most items on a page; a `limit` above it is refused.
 const MAX_PAGE: u32 = 500;
 
 /// Items on a page without a `limit`.
@@ -130,16 +141,32 @@ fn query_word<T: FromStr<Err = UnknownWord>>(
     Ok(word.map_err(|error: UnknownWord| Invalid::new(name, error.to_string()))?)
 }
 
-/// Returns the range of the query parameters `from_s` and `to_s`, of which one or both may be
-/// missing. It is empty if they are in the wrong order.
+/// Parses the query parameter `name`, a time (RFC 3339), to microseconds since 1970.
 ///
 /// # Errors
-/// A [`Problem`] if one is not a finite number.
+/// A [`Problem`] with the parameter.
+fn query_time(name: &str, text: Option<&str>) -> Result<Option<i64>, Problem> {
+    let time = text.map(parse_timestamp).transpose();
+    Ok(time.map_err(|reason| Invalid::new(name, reason))?)
+}
+
+/// Returns the range of the query parameters `from_s` and `to_s`, of which one or both may be
+/// missing.
+///
+/// # Errors
+/// A [`Problem`] if one is not a finite number, or if they are in the wrong order.
 fn time_range(from_s: Option<f64>, to_s: Option<f64>) -> Result<TimeRange, Problem> {
     for (name, t_s) in [("?from_s", from_s), ("?to_s", to_s)] {
         if t_s.is_some_and(|t_s| !t_s.is_finite()) {
             return Err(Invalid::new(name, "must be a finite number of seconds").into());
         }
+    }
+    if let (Some(from_s), Some(to_s)) = (from_s, to_s)
+        && to_s < from_s
+    {
+        return Err(
+            Invalid::new("?to_s", format!("{to_s} s is before `from_s`, {from_s} s")).into()
+        );
     }
     let TimeRange { from_s: first, to_s: last } = TimeRange::ALL;
     Ok(TimeRange { from_s: from_s.unwrap_or(first), to_s: to_s.unwrap_or(last) })
@@ -188,8 +215,8 @@ impl<S: Send + Sync> FromRequestParts<S> for AssetItemPath {
 struct PageQuery {
     /// `next` of the previous page.
     cursor: Option<String>,
-    /// Items per page, clamped to 1 to 500; 50 by default.
-    #[param(format = Int64, maximum = 4_294_967_295_u32)]
+    /// Items per page, 1 to 500; 50 by default.
+    #[param(format = Int32, minimum = 1, maximum = 500)]
     limit: Option<u32>,
 }
 
@@ -206,6 +233,8 @@ fn api() -> GuardedRouter {
         .routes(Administer, routes!(assets::delete))
         .routes(ReadAsset, routes!(assets::state))
         .routes(Read, routes!(assets::trends))
+        .routes(Read, routes!(series::series))
+        .routes(Read, routes!(series::annotations))
         .routes(ReadAsset, routes!(drive_cycles::get))
         .routes(Read, routes!(assets::fleet))
         .routes(Read, routes!(cluster::get))
@@ -247,6 +276,7 @@ fn api() -> GuardedRouter {
         .routes(Public, routes!(operations::readyz))
         .routes(Read, routes!(metrics::metrics))
         .nest("/api/v1", v1)
+        .nest("/sovd", sovd::routes())
 }
 
 /// Public paths that are not operations: the API description and its viewer.
@@ -268,9 +298,11 @@ pub fn openapi_yaml() -> String {
 /// Returns the router of everything that is served: the API, its description, the
 /// dashboard, and `extra`.
 pub fn router(app: App, extra: ExtraRoutes) -> Router {
-    let (router, document) = api().split();
+    let (router, mut document) = api().split();
+    let (extra, described) = extra.split();
+    document.merge(described);
     let document = description::complete(document);
-    let mut rules = RouteRules::new(&document, &extra);
+    let mut rules = RouteRules::new(&document);
     OPEN_PAGES.iter().for_each(|path| rules.open(path));
     let yaml: Arc<str> = document.to_yaml().unwrap_or_default().into();
     let policy = app.policy.clone();
@@ -281,7 +313,7 @@ pub fn router(app: App, extra: ExtraRoutes) -> Router {
         .fallback(page::serve)
         .method_not_allowed_fallback(problem::method_not_allowed)
         .with_state(app)
-        .merge(extra.router)
+        .merge(extra)
         .layer(axum::middleware::from_fn_with_state(guard, guard::guard));
     layers::add(router, &policy)
 }

@@ -55,7 +55,10 @@ pub(super) async fn serve(method: Method, uri: Uri, headers: HeaderMap) -> Respo
 /// Whether a browser navigates to a client-side route of the page.
 fn is_client_route(path: &str, headers: &HeaderMap) -> bool {
     let accept = headers.get(ACCEPT).and_then(|a| a.to_str().ok()).unwrap_or_default();
-    accept.contains("text/html") && !path.starts_with("api/") && !path.starts_with(HASHED)
+    accept.contains("text/html")
+        && !path.starts_with("api/")
+        && !path.starts_with("sovd/")
+        && !path.starts_with(HASHED)
 }
 
 fn index(headers: &HeaderMap) -> Response {

@@ -9,6 +9,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::service::{RETRY_AFTER_S, ServiceError};
+use crate::wire::sovd::SovdErrorView;
 use crate::wire::telemetry::BatchError;
 use offbd_core::vocabulary::Invalid;
 
@@ -33,9 +34,13 @@ pub struct Problem {
     /// Id of the request, as in `x-request-id` and in the log.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub instance: Option<Box<str>>,
+    /// The members of an error of SOVD, in answers of its adapter.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    #[schema(ignore)]
+    pub sovd: Option<Box<SovdErrorView>>,
     /// Seconds for the header `Retry-After`.
     #[serde(skip)]
-    pub retry_after_s: u64,
+    pub retry_after_s: u32,
 }
 
 impl Problem {
@@ -54,8 +59,27 @@ impl Problem {
             pointer: None,
             parameter: None,
             instance: None,
-            retry_after_s: RETRY_AFTER_S,
+            sovd: None,
+            retry_after_s: RETRY_AFTER_S as u32,
         }
+    }
+
+    /// Adds the members of an error of SOVD.
+    pub(super) fn with_sovd(self) -> Self {
+        let error_code = match self.status {
+            401 | 403 => "insufficient-access-rights",
+            400 | 408 | 413 | 415 | 422 => "incomplete-request",
+            409 => "precondition-not-fulfilled",
+            500..=599 => "sovd-server-failure",
+            _ => "vendor-specific",
+        };
+        let vendor_code = self.kind.rsplit(':').next().unwrap_or_default().into();
+        let named = [("parameter", &self.parameter), ("pointer", &self.pointer)];
+        let named = named.into_iter().filter_map(|(key, value)| Some((key, value.clone()?)));
+        let parameters = named.collect();
+        let message = self.detail.clone();
+        let sovd = SovdErrorView { error_code, message, vendor_code, parameters };
+        Self { sovd: Some(Box::new(sovd)), ..self }
     }
 
     fn at(self, pointer: &str) -> Self {
@@ -125,6 +149,7 @@ impl From<ServiceError> for Problem {
             }
             E::Rebuilding { retry_after_s } => {
                 let status = StatusCode::SERVICE_UNAVAILABLE;
+                let retry_after_s = u32::try_from(retry_after_s).unwrap_or(u32::MAX);
                 Self { retry_after_s, ..new(status, "rebuilding", "Engine is being rebuilt") }
             }
             E::Moving => new(StatusCode::SERVICE_UNAVAILABLE, "moving", "Asset is moving"),
@@ -180,13 +205,15 @@ impl From<BatchError> for Problem {
 impl From<QueryRejection> for Problem {
     fn from(rejection: QueryRejection) -> Self {
         let title = "Invalid query parameter";
-        Self::new(StatusCode::BAD_REQUEST, "query", title, rejection.body_text())
+        tracing::debug!(%rejection, "the description permits a query that is not understood");
+        Self::new(StatusCode::BAD_REQUEST, "query", title, "the query cannot be understood")
     }
 }
 
 impl From<PathRejection> for Problem {
     fn from(rejection: PathRejection) -> Self {
-        Self::new(StatusCode::BAD_REQUEST, "path", "Invalid path", rejection.body_text())
+        tracing::debug!(%rejection, "invalid path");
+        Self::new(StatusCode::BAD_REQUEST, "path", "Invalid path", "the path is not valid UTF-8")
     }
 }
 

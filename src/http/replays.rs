@@ -1,13 +1,12 @@
 //! `/sessions/{id}/replays` and `/replays`: evaluating a recorded session again.
 
 use axum::Json;
-use axum::body::Body;
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::http::header::LOCATION;
 use axum::response::IntoResponse;
 
-use super::sessions::small_json;
+use super::json_body::JsonBody;
 use super::{App, Path, Problem};
 use crate::service::Service;
 use crate::wire::service::{ReplaySettingsView, ReplayView};
@@ -24,9 +23,8 @@ use crate::wire::service::{ReplaySettingsView, ReplayView};
 pub(super) async fn create(
     State(app): State<App>,
     Path(id): Path<String>,
-    body: Body,
+    JsonBody(settings): JsonBody<ReplaySettingsView>,
 ) -> Result<impl IntoResponse, Problem> {
-    let settings: ReplaySettingsView = small_json(&app, body).await?;
     let replay = app.service.replay(&id, settings).await?;
     let location = format!("/api/v1/replays/{}", replay.id);
     Ok((StatusCode::ACCEPTED, [(LOCATION, location)], Json(replay)))

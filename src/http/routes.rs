@@ -8,7 +8,6 @@ use std::collections::BTreeMap;
 
 use axum::Router;
 use axum::http::Method;
-use axum::routing::MethodRouter;
 use utoipa::openapi::extensions::ExtensionsBuilder;
 use utoipa::openapi::path::{Operation, PathItem};
 use utoipa::openapi::security::{
@@ -19,23 +18,24 @@ use utoipa_axum::router::{OpenApiRouter, UtoipaMethodRouter};
 
 use super::App;
 use super::credential::COOKIE;
+use super::parameters::ParameterRules;
 use crate::service::access::Right;
 
 /// The OpenAPI extension that holds the right of an operation.
 const X_RIGHT: &str = "x-right";
 
 /// The routes of the API; none can be added without a right.
-pub(super) struct GuardedRouter {
-    router: OpenApiRouter<App>,
+pub(super) struct GuardedRouter<S = App> {
+    router: OpenApiRouter<S>,
 }
 
-impl GuardedRouter {
+impl<S: Clone + Send + Sync + 'static> GuardedRouter<S> {
     pub(super) fn new(document: Document) -> Self {
         Self { router: OpenApiRouter::with_openapi(document) }
     }
 
     /// Adds routes, all of which require `right`.
-    pub(super) fn routes(self, right: Right, mut routes: UtoipaMethodRouter<App>) -> Self {
+    pub(super) fn routes(self, right: Right, mut routes: UtoipaMethodRouter<S>) -> Self {
         for operation in routes.1.paths.values_mut().flat_map(operations_mut) {
             set_right(operation, right);
         }
@@ -48,7 +48,7 @@ impl GuardedRouter {
     }
 
     /// Returns the router, and the OpenAPI document with the security schemes.
-    pub(super) fn split(self) -> (Router<App>, Document) {
+    pub(super) fn split(self) -> (Router<S>, Document) {
         let (router, mut document) = self.router.split_for_parts();
         let bearer =
             HttpBuilder::new().scheme(HttpAuthScheme::Bearer).bearer_format("offbd_… or JWT");
@@ -77,34 +77,42 @@ pub(super) fn operations_mut(item: &mut PathItem) -> impl Iterator<Item = &mut O
     [&mut item.get, &mut item.put, &mut item.post, &mut item.delete].into_iter().flatten()
 }
 
-/// The right that an operation requires, and its name in the audit log.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// The right that an operation requires, its name in the audit log, and its query parameters.
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct RouteRule {
     pub(super) right: Right,
     pub(super) action: String,
+    /// `None` if the query is not checked.
+    pub(super) parameters: Option<ParameterRules>,
 }
 
-/// Routes that a caller of [`router`](super::router) adds to the API, each with the
-/// right that it requires.
+/// Routes that a caller of [`router`](super::router) adds to the API, each with its
+/// description and the right that it requires. The description that is served has them too.
 #[derive(Clone, Default)]
 pub struct ExtraRoutes {
-    pub(super) router: Router,
-    rules: Vec<(&'static str, Method, Right)>,
+    router: Router,
+    document: Document,
 }
 
 impl ExtraRoutes {
-    /// Adds a route for `method` that requires `right`.
+    /// Adds described routes, all of which require `right`.
     #[must_use]
-    pub fn route(
+    pub fn routes<S: Clone + Send + Sync + 'static>(
         self,
-        path: &'static str,
-        method: Method,
         right: Right,
-        handler: MethodRouter,
+        routes: UtoipaMethodRouter<S>,
+        state: S,
     ) -> Self {
-        let Self { router, mut rules } = self;
-        rules.push((path, method, right));
-        Self { router: router.route(path, handler), rules }
+        let Self { router, mut document } = self;
+        let added = GuardedRouter::new(Document::default()).routes(right, routes);
+        let (added, described) = added.router.with_state(state).split_for_parts();
+        document.merge(described);
+        Self { router: router.merge(added), document }
+    }
+
+    /// Returns the router and the description.
+    pub(super) fn split(self) -> (Router, Document) {
+        (self.router, self.document)
     }
 }
 
@@ -115,8 +123,8 @@ pub(super) struct RouteRules {
 }
 
 impl RouteRules {
-    /// Collects the rules in `document` and those of `extra`.
-    pub(super) fn new(document: &Document, extra: &ExtraRoutes) -> Self {
+    /// Collects the rules in `document`.
+    pub(super) fn new(document: &Document) -> Self {
         let mut rules = Self::default();
         for (path, item) in &document.paths.paths {
             let methods = [
@@ -131,19 +139,13 @@ impl RouteRules {
                 }
             }
         }
-        for (path, method, right) in &extra.rules {
-            rules.add(
-                path,
-                method.clone(),
-                RouteRule { right: *right, action: (*path).to_owned() },
-            );
-        }
         rules
     }
 
     /// Makes `GET` of `path` public.
     pub(super) fn open(&mut self, path: &str) {
-        self.add(path, Method::GET, RouteRule { right: Right::Public, action: path.to_owned() });
+        let (right, action) = (Right::Public, path.to_owned());
+        self.add(path, Method::GET, RouteRule { right, action, parameters: None });
     }
 
     fn add(&mut self, path: &str, method: Method, rule: RouteRule) {
@@ -160,5 +162,6 @@ impl RouteRules {
 fn rule(operation: &Operation) -> Option<RouteRule> {
     let word = operation.extensions.as_ref()?.get(X_RIGHT)?.as_str()?;
     let right = Right::ALL.into_iter().find(|right| right.as_str() == word)?;
-    Some(RouteRule { right, action: operation.operation_id.clone().unwrap_or_default() })
+    let action = operation.operation_id.clone().unwrap_or_default();
+    Some(RouteRule { right, action, parameters: Some(ParameterRules::of(operation)) })
 }

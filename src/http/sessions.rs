@@ -13,17 +13,18 @@ use futures_util::{Stream, StreamExt};
 use serde::Deserialize;
 
 use super::body::BodyShare;
+use super::json_body::JsonBody;
 use super::negotiate::weight_of_first;
-use super::telemetry::TelemetryFormat;
 use super::{
-    App, AssetPath, PageQuery, Path, Problem, Query, body, page_limit, query_word, time_range,
+    App, AssetPath, PageQuery, Path, Problem, Query, body, page_limit, query_time, query_word,
+    time_range,
 };
-use crate::service::{RecordingReader, Service};
+use crate::service::{RecordingReader, Service, SessionListQuery};
 use crate::wire::service::{ImportView, Page, SessionView};
 use crate::wire::session_csv::{write_header, write_rows};
 use crate::wire::telemetry::{csv_rows, sample_view};
 use crate::wire::verdict::FaultView;
-use crate::wire::words::SessionState;
+use crate::wire::words::{SessionSort, SessionState, VerdictFilter};
 use offbd_core::vocabulary::{Invalid, Sample};
 
 /// Row limit of an imported file.
@@ -31,9 +32,6 @@ const MAX_IMPORT_ROWS: usize = 2_000_000;
 
 /// Time limit to receive an imported file, in multiples of the limit of a batch.
 const IMPORT_TIMEOUT_FACTOR: u32 = 10;
-
-/// Size limit of a small JSON body, bytes.
-const MAX_SMALL_BYTES: usize = 16 << 10;
 
 #[derive(Debug, Default, Deserialize, utoipa::ToSchema)]
 #[serde(deny_unknown_fields)]
@@ -49,18 +47,58 @@ pub(super) struct SessionsQuery {
     asset: Option<String>,
     #[param(value_type = Option<SessionState>)]
     state: Option<String>,
-    /// `next` of the previous page.
+    /// Only sessions whose name begins with this.
+    name: Option<String>,
+    /// Only sessions that were opened at this time or later, RFC 3339.
+    #[param(format = DateTime)]
+    opened_from: Option<String>,
+    /// Only sessions that were opened before this time, RFC 3339.
+    #[param(format = DateTime)]
+    opened_to: Option<String>,
+    /// Only ended sessions in which a fault was, or was not, confirmed.
+    #[param(value_type = Option<VerdictFilter>)]
+    verdict: Option<String>,
+    /// `-opened_at` (the newest first) by default.
+    #[param(value_type = Option<SessionSort>)]
+    sort: Option<String>,
+    /// `next` of the previous page, which must have the same `sort`.
     cursor: Option<String>,
-    /// Items per page, clamped to 1 to 500; 50 by default.
-    #[param(format = Int64, maximum = 4_294_967_295_u32)]
+    /// Items per page, 1 to 500; 50 by default.
+    #[param(format = Int32, minimum = 1, maximum = 500)]
     limit: Option<u32>,
 }
+
+/// The bytes of a file.
+#[derive(utoipa::ToSchema)]
+#[schema(value_type = String, format = Binary)]
+#[allow(dead_code, reason = "describes the body for the interface's document")]
+struct FileBytes(Vec<u8>);
 
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
 #[into_params(parameter_in = Query)]
 pub(super) struct ImportQuery {
     /// Name of the session; the time of the import by default.
     name: Option<String>,
+}
+
+impl SessionsQuery {
+    fn parsed(self) -> Result<SessionListQuery, Problem> {
+        let opened_from = query_time("?opened_from", self.opened_from.as_deref())?;
+        let opened_to = query_time("?opened_to", self.opened_to.as_deref())?;
+        if opened_from.is_some() && opened_to.is_some() && opened_to < opened_from {
+            return Err(Invalid::new("?opened_to", "is before `opened_from`").into());
+        }
+        Ok(SessionListQuery {
+            asset: self.asset,
+            state: query_word("?state", self.state.as_deref())?,
+            name: self.name,
+            opened_from,
+            opened_to,
+            verdict: query_word("?verdict", self.verdict.as_deref())?,
+            sort: query_word("?sort", self.sort.as_deref())?,
+            cursor: self.cursor,
+        })
+    }
 }
 
 fn created<T: serde::Serialize>(id: &str, view: T) -> impl IntoResponse + use<T> {
@@ -77,31 +115,10 @@ fn created<T: serde::Serialize>(id: &str, view: T) -> impl IntoResponse + use<T>
 pub(super) async fn open(
     State(app): State<App>,
     AssetPath(asset): AssetPath,
-    body: Body,
+    JsonBody(request): JsonBody<NewSession>,
 ) -> Result<impl IntoResponse, Problem> {
-    let request: NewSession = small_json(&app, body).await?;
     let session = app.service.open_session(&asset, request.name).await?;
     Ok(created(&session.id.clone(), session))
-}
-
-/// Reads a small JSON body; returns the default value if it is empty or `null`.
-pub(super) async fn small_json<T: Default + serde::de::DeserializeOwned>(
-    app: &App,
-    body: Body,
-) -> Result<T, Problem> {
-    let timeout = app.service.limits().body_timeout;
-    let read = body::read(body, MAX_SMALL_BYTES, timeout, &app.budget.whole()).await?;
-    if read.bytes.trim_ascii().is_empty() {
-        return Ok(T::default());
-    }
-    crate::wire::asset::check_object(&read.bytes)?;
-    let mut json = serde_json::Deserializer::from_slice(&read.bytes);
-    let parsed: Option<T> = serde_path_to_error::deserialize(&mut json).map_err(|error| {
-        let pointer = crate::wire::asset::pointer(error.path());
-        Problem::from(Invalid::new(pointer, error.inner().to_string()))
-    })?;
-    json.end().map_err(|error| Problem::from(Invalid::new("", error.to_string())))?;
-    Ok(parsed.unwrap_or_default())
 }
 
 /// Imports a recorded CSV file as a session. Its samples are processed like live
@@ -110,7 +127,7 @@ pub(super) async fn small_json<T: Default + serde::de::DeserializeOwned>(
 #[utoipa::path(post, path = "/assets/{asset}/sessions/import", tag = "sessions",
     operation_id = "import_session",
     params(("asset" = String, description = "Name of the asset"), ImportQuery),
-    request_body(content = String, content_type = "text/csv"),
+    request_body(content((String = "text/csv"), (FileBytes = "application/octet-stream"))),
     responses((status = 201, body = ImportView), (status = 400, body = Problem),
         (status = 404, body = Problem), (status = 409, body = Problem),
         (status = 413, body = Problem), (status = 415, body = Problem)))]
@@ -122,12 +139,7 @@ pub(super) async fn import(
     headers: HeaderMap,
     body: Body,
 ) -> Result<impl IntoResponse, Problem> {
-    if headers.contains_key(CONTENT_TYPE) && TelemetryFormat::of(&headers)? != TelemetryFormat::Csv
-    {
-        let detail = "the media type of an imported recording must be text/csv";
-        let status = StatusCode::UNSUPPORTED_MEDIA_TYPE;
-        return Err(Problem::new(status, "media-type", "Unsupported media type", detail));
-    }
+    check_recording_type(&headers)?;
     app.service.asset(&asset).await?;
     let limits = app.service.limits();
     let timeout = limits.body_timeout * IMPORT_TIMEOUT_FACTOR;
@@ -138,17 +150,29 @@ pub(super) async fn import(
     Ok(created(&imported.session.id.clone(), imported))
 }
 
-/// Lists sessions, newest first.
+/// Checks that the media type is CSV or, from clients that send files, not stated.
+fn check_recording_type(headers: &HeaderMap) -> Result<(), Problem> {
+    let header = headers.get(CONTENT_TYPE).map(|text| text.to_str().unwrap_or_default());
+    let essence = header.map(|text| text.split(';').next().unwrap_or_default().trim());
+    if essence.is_none_or(|e| ["text/csv", "application/octet-stream"].contains(&e)) {
+        return Ok(());
+    }
+    let detail = "the media type of an imported recording must be text/csv";
+    let status = StatusCode::UNSUPPORTED_MEDIA_TYPE;
+    Err(Problem::new(status, "media-type", "Unsupported media type", detail))
+}
+
+/// Lists sessions by the time at which they were opened.
 #[utoipa::path(get, path = "/sessions", tag = "sessions", operation_id = "list_sessions",
     params(SessionsQuery),
-    responses((status = 200, body = Page<SessionView>), (status = 400, body = Problem)))]
+    responses((status = 200, body = Page<SessionView>), (status = 400, body = Problem),
+        (status = 404, body = Problem, description = "No such asset")))]
 pub(super) async fn list(
     State(service): State<Service>,
     Query(query): Query<SessionsQuery>,
 ) -> Result<Json<Page<SessionView>>, Problem> {
-    let state = query_word("?state", query.state.as_deref())?;
     let limit = page_limit(query.limit);
-    Ok(Json(service.sessions(query.asset, state, query.cursor.as_deref(), limit).await?))
+    Ok(Json(service.sessions(query.parsed()?, limit).await?))
 }
 
 /// Returns a session, with its verdict if it has ended.
@@ -191,7 +215,7 @@ pub(super) async fn end(
 }
 
 /// The range of a recording.
-#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[derive(Debug, Default, Deserialize, utoipa::IntoParams)]
 #[into_params(parameter_in = Query)]
 pub(super) struct RecordingRangeQuery {
     /// First time on the device's clock, s; the start of the session by default.
@@ -203,7 +227,7 @@ pub(super) struct RecordingRangeQuery {
 /// Returns the recording, or a stretch of it, in order of arrival: as CSV, or as JSON rows if
 /// `Accept` prefers `application/json`.
 #[utoipa::path(get, path = "/sessions/{id}/telemetry", tag = "sessions",
-    operation_id = "get_recording",
+    operation_id = "get_session_telemetry",
     params(("id" = String, description = "The service's id of the session"),
         RecordingRangeQuery),
     responses((status = 200, content((String = "text/csv"),

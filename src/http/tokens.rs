@@ -1,13 +1,12 @@
 //! `/tokens` and `/audit`: API tokens and the audit log.
 
-use axum::body::Body;
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::http::header::LOCATION;
 use axum::response::IntoResponse;
 use axum::{Extension, Json};
 
-use super::sessions::small_json;
+use super::json_body::JsonBody;
 use super::{App, PageQuery, Path, Problem, Query, page_limit};
 use crate::service::Service;
 use crate::service::access::{Caller, NewToken};
@@ -36,9 +35,8 @@ fn new_token(view: NewTokenView) -> Result<NewToken, Invalid> {
 pub(super) async fn create(
     State(app): State<App>,
     Extension(caller): Extension<Caller>,
-    body: Body,
+    JsonBody(view): JsonBody<Option<NewTokenView>>,
 ) -> Result<impl IntoResponse, Problem> {
-    let view: Option<NewTokenView> = small_json(&app, body).await?;
     let view = view.ok_or_else(|| Invalid::new("", "the body is empty"))?;
     let by = caller.name().unwrap_or("anyone");
     let created = app.service.create_token(new_token(view)?, by).await?;

@@ -17,9 +17,9 @@ pub(super) struct TraceRangeQuery {
     from_s: Option<f64>,
     /// End on the device's clock, s; the end of the session by default.
     to_s: Option<f64>,
-    /// Most points to return, clamped to 1 to 20000; 5000 by default. A range with more
-    /// points is decimated.
-    #[param(format = Int64, maximum = 4_294_967_295_u32)]
+    /// Most points to return, 1 to 20000; 5000 by default. A range with more points is
+    /// decimated.
+    #[param(format = Int32, minimum = 1, maximum = 20_000)]
     points: Option<u32>,
     /// The profile of the asset file by default.
     #[param(value_type = Option<ProfileWord>)]

@@ -80,6 +80,9 @@ pub use error::ServiceError;
 pub use limits::{Limits, RETRY_AFTER_S, Retention, SessionLimits};
 pub use reanalysis::fault_recording::RecordingWindow;
 pub use reanalysis::trace::{MAX_TRACE_POINTS, TraceQuery};
-pub use requests::{FaultQuery, PendingBatch, QueueLoad};
+pub use requests::{
+    FaultQuery, FleetQuery, MAX_SERIES_SESSIONS, PendingBatch, QueueLoad, SeriesQuery,
+    SessionListQuery,
+};
 pub use start::{Service, Workers};
 pub use writing::{Event, EventFeed};

@@ -63,7 +63,7 @@ pub use page_checksums::install_drivers;
 pub use partition::{
     EVENTS, MAX_PARTITIONS, PartitionId, PartitionRow, Partitions, TRANSFERS, subject_token,
 };
-pub use read::{FaultFilter, FaultOrder, SessionFilter};
+pub use read::{AssetFilter, FaultFilter, FaultOrder, SessionFilter};
 pub use recording::RecordingReader;
 pub use rows::{
     ActionKind, ActionRow, AssetRow, CalibrationRow, EventRow, FaultRow, Micros, ReplayRow,

@@ -4,18 +4,41 @@ use super::codec::ChunkKey;
 use super::query_builder::QueryBuilder;
 use super::{
     ActionRow, AssetRow, CalibrationRow, EventRow, FaultRow, Micros, PartitionId, ReplayRow,
-    SessionRow, Store, StoreError, TransitionRow, TrendEntry, decode_chunk,
+    SessionRow, Store, StoreError, TransitionRow, TrendEntry, TrendRow, decode_chunk,
 };
 use offbd_core::vocabulary::Sample;
 
-/// A filter for a list of sessions, newest first.
+/// A filter for a list of sessions, by their time of opening.
 #[derive(Clone, Debug, Default)]
 pub struct SessionFilter {
     pub asset: Option<String>,
     /// `open` or `ended`.
     pub state: Option<String>,
+    /// How the name begins.
+    pub name: Option<String>,
+    /// Opened at this time or later.
+    pub opened_from: Option<Micros>,
+    /// Opened before this time.
+    pub opened_to: Option<Micros>,
+    /// Ended, with or without a confirmed fault.
+    pub found_fault: Option<bool>,
+    /// Oldest first instead of newest first.
+    pub is_ascending: bool,
     /// Opening time and id of the last session of the previous page.
-    pub before: Option<(Micros, String)>,
+    pub after: Option<(Micros, String)>,
+}
+
+/// A filter for a list of assets, by name.
+#[derive(Clone, Debug, Default)]
+pub struct AssetFilter {
+    /// Only names after this one.
+    pub after: String,
+    /// How the name begins.
+    pub name: Option<String>,
+    /// Whether a fault is pending or confirmed.
+    pub has_fault: Option<bool>,
+    /// Whether a session is open.
+    pub has_session: Option<bool>,
 }
 
 /// The order of a list of faults.
@@ -76,15 +99,34 @@ impl Store {
         Ok(sqlx::query_scalar(query).bind(name).fetch_optional(&self.pool).await?)
     }
 
-    /// Assets with a name after `after`, sorted by name.
-    pub async fn assets(&self, after: &str, limit: u32) -> Result<Vec<AssetRow>, StoreError> {
-        Ok(sqlx::query_as(
-            "SELECT * FROM asset WHERE name > $1 AND deleted_at IS NULL ORDER BY name LIMIT $2",
-        )
-        .bind(after)
-        .bind(i64::from(limit))
-        .fetch_all(&self.pool)
-        .await?)
+    /// Assets that match `filter`, sorted by name.
+    pub async fn assets(
+        &self,
+        filter: &AssetFilter,
+        limit: u32,
+    ) -> Result<Vec<AssetRow>, StoreError> {
+        let mut query = QueryBuilder::new("SELECT * FROM asset WHERE deleted_at IS NULL");
+        query.push(" AND name > ").bind(filter.after.clone())?;
+        push_name(&mut query, filter.name.as_deref())?;
+        for (wanted, related) in [
+            (
+                filter.has_fault,
+                "EXISTS (SELECT 1 FROM fault WHERE fault.asset = asset.name
+                     AND status IN ('pending', 'confirmed'))",
+            ),
+            (
+                filter.has_session,
+                "EXISTS (SELECT 1 FROM session WHERE session.asset = asset.name AND state = 'open')",
+            ),
+        ] {
+            match wanted {
+                Some(true) => drop(query.push(" AND ").push(related)),
+                Some(false) => drop(query.push(" AND NOT ").push(related)),
+                None => {}
+            }
+        }
+        query.push(" ORDER BY name LIMIT ").bind(i64::from(limit))?;
+        Ok(query.rows().fetch_all(&self.pool).await?)
     }
 
     /// The number of assets.
@@ -180,7 +222,7 @@ impl Store {
         Ok(sqlx::query_scalar(newest).bind(session).fetch_one(&self.pool).await?)
     }
 
-    /// Sessions that match `filter`, newest first.
+    /// Sessions that match `filter`, in its order.
     pub async fn sessions(
         &self,
         filter: &SessionFilter,
@@ -200,11 +242,29 @@ impl Store {
             Some(state) => drop(query.push(" AND state = ").bind(state)?),
             None => {}
         }
-        if let Some((opened_at, id)) = &filter.before {
-            query.push(" AND (opened_at, id) < (").bind(opened_at)?;
+        push_name(&mut query, filter.name.as_deref())?;
+        if let Some(from) = filter.opened_from {
+            query.push(" AND opened_at >= ").bind(from)?;
+        }
+        if let Some(to) = filter.opened_to {
+            query.push(" AND opened_at < ").bind(to)?;
+        }
+        // A literal, because there is a partial index of the few with a fault.
+        match filter.found_fault {
+            Some(true) => drop(query.push(" AND found_fault = 1")),
+            Some(false) => drop(query.push(" AND found_fault = 0")),
+            None => {}
+        }
+        if let Some((opened_at, id)) = &filter.after {
+            let beyond = if filter.is_ascending { ") > (" } else { ") < (" };
+            query.push(" AND (opened_at, id").push(beyond).bind(opened_at)?;
             query.push(", ").bind(id)?.push(")");
         }
-        query.push(" ORDER BY opened_at DESC, id DESC LIMIT ").bind(i64::from(limit))?;
+        query.push(match filter.is_ascending {
+            true => " ORDER BY opened_at, id LIMIT ",
+            false => " ORDER BY opened_at DESC, id DESC LIMIT ",
+        });
+        query.bind(i64::from(limit))?;
         self.session_rows(query).await
     }
 
@@ -380,6 +440,45 @@ impl Store {
         .await?)
     }
 
+    /// The servo estimates of the sessions of `asset` that were opened from `from` to before
+    /// `to`, at most `limit`.
+    pub async fn trend_between(
+        &self,
+        asset: &str,
+        from: Micros,
+        to: Micros,
+        limit: u32,
+    ) -> Result<Vec<TrendRow>, StoreError> {
+        Ok(sqlx::query_as(
+            "SELECT trend.* FROM trend JOIN session ON session.id = trend.session
+             WHERE trend.asset = $1 AND session.opened_at >= $2 AND session.opened_at < $3
+             LIMIT $4",
+        )
+        .bind(asset)
+        .bind(from)
+        .bind(to)
+        .bind(i64::from(limit))
+        .fetch_all(&self.pool)
+        .await?)
+    }
+
+    /// The transitions of `asset` or, if `None`, of all assets from a time to before another,
+    /// the latest first, at most `limit`.
+    pub async fn transitions_between(
+        &self,
+        asset: Option<&str>,
+        (from, to): (Micros, Micros),
+        limit: u32,
+    ) -> Result<Vec<TransitionRow>, StoreError> {
+        let mut query = QueryBuilder::new("SELECT * FROM transition WHERE at >= ");
+        query.bind(from)?.push(" AND at < ").bind(to)?;
+        if let Some(asset) = asset {
+            query.push(" AND asset = ").bind(asset.to_owned())?;
+        }
+        query.push(" ORDER BY at DESC, id DESC LIMIT ").bind(i64::from(limit))?;
+        Ok(query.rows().fetch_all(&self.pool).await?)
+    }
+
     /// Transitions of `code` of `asset` with an id below `before`, newest first.
     pub async fn transitions_before(
         &self,
@@ -532,6 +631,16 @@ impl Store {
         let jobs = "SELECT id FROM calibration WHERE state IN ('queued', 'running')";
         self.unfinished(jobs, owned).await
     }
+}
+
+/// Appends the condition that the name begins with `start`. No pattern, whose wildcards may
+/// occur in a name.
+fn push_name(query: &mut QueryBuilder, start: Option<&str>) -> Result<(), StoreError> {
+    if let Some(start) = start {
+        query.push(" AND SUBSTR(name, 1, LENGTH(").bind(start.to_owned())?;
+        query.push(")) = ").bind(start.to_owned())?;
+    }
+    Ok(())
 }
 
 /// Appends the condition for the next page, and the order.

@@ -80,6 +80,8 @@ pub enum Write {
         ended_at: Micros,
         verdict: String,
         hash: String,
+        /// Whether the verdict has a confirmed fault.
+        found_fault: bool,
     },
     /// Deletes a session, with what is left of its chunks and transitions.
     DeleteSession {
@@ -560,10 +562,10 @@ impl GroupCommit<'_> {
             Write::OpenSession(row) => open_session(db, row).await,
             Write::PutSnapshot(row) => snapshot::put(db, row).await,
             Write::RemoveSnapshots { session } => snapshot::remove_all(db, session).await,
-            Write::EndSession { session, ended_at, verdict, hash } => {
+            Write::EndSession { session, ended_at, verdict, hash, found_fault } => {
                 self.fold_ended(db, partition, session).await?;
                 snapshot::remove(db, session).await?;
-                end_session(db, session, *ended_at, verdict, hash).await
+                end_session(db, session, *ended_at, (verdict, hash, *found_fault)).await
             }
             Write::DeleteSession { session } => self.delete_session(db, session).await,
             Write::HideSession { session, at } => deletion::hide_session(db, session, *at).await,
@@ -682,12 +684,11 @@ async fn end_session(
     db: &mut AnyConnection,
     session: &str,
     ended_at: Micros,
-    verdict: &str,
-    hash: &str,
+    (verdict, hash, found_fault): (&str, &str, bool),
 ) -> Result<(), StoreError> {
     sqlx::query(
         "UPDATE session SET state = 'ended', importing = 0, ended_at = $2, verdict = $3,
-         verdict_hash = $4,
+         verdict_hash = $4, found_fault = $5,
          n_bytes = (SELECT CAST(COALESCE(SUM(LENGTH(data)), 0) AS BIGINT) FROM chunk
                     WHERE chunk.session = session.id)
              + LENGTH(setup) + LENGTH(baseline) + LENGTH($3)
@@ -697,6 +698,7 @@ async fn end_session(
     .bind(ended_at)
     .bind(verdict)
     .bind(hash)
+    .bind(i64::from(found_fault))
     .execute(db)
     .await?;
     Ok(())

@@ -6,6 +6,7 @@ use sha2::{Digest, Sha256};
 use utoipa::ToSchema;
 
 use super::certificate::{self, MonitorCertificateView};
+use super::json;
 use super::words::ProfileWord;
 use offbd_core::diagnosis::{
     AxisCalibration, Calibration, CalibrationOrigin, Prospects, SensorCalibration, ServoProspects,
@@ -413,38 +414,8 @@ const fn default_repeat() -> f64 {
 /// [`Invalid`] with the JSON pointer of the offending element; the empty
 /// pointer stands for the document, with line and column in the reason.
 pub fn parse(document: &[u8]) -> Result<Rig, Invalid> {
-    check_object(document)?;
-    let mut json = serde_json::Deserializer::from_slice(document);
-    let view: AssetView = serde_path_to_error::deserialize(&mut json)
-        .map_err(|e| Invalid::new(pointer(e.path()), e.inner().to_string()))?;
-    json.end().map_err(|e| Invalid::new("", e.to_string()))?;
-    rig(&view)
-}
-
-/// Rejects a document that is an array: serde would accept an array of the field values
-/// in place of the object.
-///
-/// # Errors
-/// [`Invalid`] with the empty pointer.
-pub fn check_object(document: &[u8]) -> Result<(), Invalid> {
-    if document.trim_ascii_start().starts_with(b"[") {
-        return Err(Invalid::new("", "is an array, not an object"));
-    }
-    Ok(())
-}
-
-/// Returns the JSON pointer (RFC 6901) of a path inside a document.
-#[must_use]
-pub fn pointer(path: &serde_path_to_error::Path) -> String {
-    use serde_path_to_error::Segment;
-    let token = |segment: &Segment| match segment {
-        Segment::Seq { index } => Some(format!("/{index}")),
-        Segment::Map { key } => Some(format!("/{}", key.replace('~', "~0").replace('/', "~1"))),
-        // The name of an enum variant is a key in the document.
-        Segment::Enum { variant } => Some(format!("/{variant}")),
-        Segment::Unknown => None,
-    };
-    path.iter().filter_map(token).collect()
+    json::check_object(document)?;
+    rig(&json::parse(document)?)
 }
 
 /// Returns the rig that a view describes.
@@ -863,17 +834,17 @@ mod tests {
     fn an_error_names_the_invalid_element_and_the_reason() {
         let cases = [
             (r#"{"name":"a","ball":{"radius_m":-1}}"#, "/ball/radius_m", "not above 0"),
-            (r#"{"name":"a","ball":{"radius_m":"x"}}"#, "/ball/radius_m", "invalid type"),
-            (r#"{"name":"a","bal":{}}"#, "/bal", "unknown field"),
+            (r#"{"name":"a","ball":{"radius_m":"x"}}"#, "/ball/radius_m", "not a number"),
+            (r#"{"name":"a","bal":{}}"#, "/bal", "not known"),
             (r#"{"name":"a b"}"#, "/name", "letters"),
-            (r#"{"ball":{}}"#, "", "missing field `name`"),
+            (r#"{"ball":{}}"#, "/name", "is missing"),
             (r#"{"name":"a","plate":{"diameter_m":1,"width_m":1}}"#, "/plate/diameter_m", "round"),
             (r#"{"name":"a","axes":{"x_sign":2}}"#, "/axes/x_sign", "neither"),
             (r#"{"name":"a","axes":{"y_offset_m":20}}"#, "/axes/y_offset_m", "outside"),
             (r#"{"name":"a","diagnostics":{"profile":"best"}}"#, "/diagnostics/profile", "best"),
             (r#"{"name":"a","servo":{"lag_s":-0.1}}"#, "/servo/lag_s", "outside"),
-            (r#"{"name":"a","sample_rate_hz":1e999}"#, "/sample_rate_hz", "number out of range"),
-            (r#"{"name":"a"} x"#, "", "trailing"),
+            (r#"{"name":"a","sample_rate_hz":1e999}"#, "/sample_rate_hz", "too large"),
+            (r#"{"name":"a"} x"#, "", "column 14"),
         ];
         for (document, element, reason) in cases {
             let error = parse(document.as_bytes()).unwrap_err();

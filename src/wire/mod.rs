@@ -13,6 +13,7 @@ pub mod certificate;
 pub mod cluster;
 pub mod difference;
 pub mod drive_cycle;
+pub mod json;
 pub mod learning;
 pub mod memory;
 #[cfg(feature = "lab")]
@@ -21,8 +22,10 @@ pub mod provenance;
 pub mod recording;
 #[cfg(feature = "lab")]
 pub mod scene;
+pub mod series;
 pub mod service;
 pub mod session_csv;
+pub mod sovd;
 pub mod stored;
 pub mod telemetry;
 pub mod trace;

@@ -3,7 +3,8 @@
 use nalgebra::{Vector2, Vector3};
 use serde::Deserialize;
 
-use super::asset::{BallView, ContactView, check_object, contact, plate_shape, pointer};
+use super::asset::{BallView, ContactView, contact, plate_shape};
+use super::json;
 use super::preset::PresetOr;
 use offbd_core::plant::{Ball, Contact, Motion, Plate};
 use offbd_core::vocabulary::{Invalid, in_range, positive};
@@ -163,12 +164,8 @@ pub struct NamedScene {
 /// [`Invalid`] with the JSON pointer of the offending element; the empty
 /// pointer stands for the document, with line and column in the reason.
 pub fn parse(document: &[u8]) -> Result<NamedScene, Invalid> {
-    check_object(document)?;
-    let mut json = serde_json::Deserializer::from_slice(document);
-    let view: SceneView = serde_path_to_error::deserialize(&mut json)
-        .map_err(|e| Invalid::new(pointer(e.path()), e.inner().to_string()))?;
-    json.end().map_err(|e| Invalid::new("", e.to_string()))?;
-    named_scene(&view)
+    json::check_object(document)?;
+    named_scene(&json::parse(document)?)
 }
 
 fn named_scene(view: &SceneView) -> Result<NamedScene, Invalid> {

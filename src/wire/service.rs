@@ -102,24 +102,33 @@ pub struct ClearedView {
     pub summary: String,
 }
 
-/// The data of an event.
-#[derive(Clone, Debug, Serialize, ToSchema)]
-pub struct EventView {
-    pub asset: String,
-    /// The service's id of the session; null if no session was open.
-    pub session_id: Option<String>,
-    #[serde(flatten)]
-    pub change: ChangeView,
-}
-
-/// The change that an event reports.
+/// The data of an event: a transition in a session, or a code cleared by a person while no
+/// session was open.
 #[derive(Clone, Debug, Serialize, ToSchema)]
 #[serde(untagged)]
-pub enum ChangeView {
-    /// A transition in a session.
-    Fault(Box<FaultView>),
-    /// A code cleared by a person while no session was open.
-    Cleared(Box<ClearedView>),
+pub enum EventView {
+    Fault(FaultEventView),
+    Cleared(ClearedEventView),
+}
+
+/// A transition in a session.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+pub struct FaultEventView {
+    pub asset: String,
+    /// The service's id of the session.
+    pub session_id: String,
+    #[serde(flatten)]
+    pub fault: Box<FaultView>,
+}
+
+/// A code that a person cleared while no session was open.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+pub struct ClearedEventView {
+    pub asset: String,
+    /// Always null.
+    pub session_id: Option<String>,
+    #[serde(flatten)]
+    pub cleared: Box<ClearedView>,
 }
 
 /// Returns the event of `code` cleared by `by` while no session was open.
@@ -466,7 +475,10 @@ pub struct ReplayView {
 
 /// Samples that a calibration learns from: a session by its id, or a stretch of one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(untagged)]
+#[serde(
+    untagged,
+    expecting = "is neither the id of a session nor an object with `session`, `from_s` and `to_s`"
+)]
 pub enum TrainingDataView {
     /// The id of a session.
     Session(String),

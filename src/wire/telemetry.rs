@@ -104,7 +104,7 @@ pub fn ndjson(document: &[u8], limit: usize) -> Result<Batch, BatchError> {
         Ok(row) => row.sample(),
         Err(error) => match lenient::quote_non_finite(line).map(|q| serde_json::from_slice(&q)) {
             Some(Ok(row)) => BatchRow::sample(row),
-            _ => Err(error.to_string()),
+            _ => Err(super::json::words(&error)),
         },
     };
     Ok(Batch { rows: lines.map(row).collect(), ..Batch::default() })

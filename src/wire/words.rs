@@ -233,6 +233,35 @@ words! {
 }
 
 words! {
+    /// How the values of several sessions become one.
+    SeriesAggregate as SeriesAggregate {
+        Mean = "mean", Min = "min", Max = "max",
+        /// That of the latest session.
+        Last = "last",
+    }
+}
+
+words! {
+    /// Order of a list of sessions.
+    SessionSort as SessionSort {
+        /// The session that was opened last first.
+        Newest = "-opened_at",
+        /// The session that was opened first first.
+        Oldest = "opened_at",
+    }
+}
+
+words! {
+    /// Selects sessions by verdict; an open session has none.
+    VerdictFilter as VerdictFilter {
+        /// At least one fault was confirmed.
+        Fault = "fault",
+        /// No fault was confirmed.
+        NoFault = "no_fault",
+    }
+}
+
+words! {
     /// An entry of the history of a fault code: the status it changed to, or the action of a
     /// person.
     HistoryWord as HistoryEvent {

@@ -58,7 +58,8 @@ async fn an_invalid_asset_file_is_rejected_with_its_pointer() {
         (json!({"name":"b","color":"red"}), 422, "/color"),
         (json!({"name":"b","diagnostics":{"profile":"odd"}}), 422, "/diagnostics/profile"),
         (json!([]), 400, ""),
-        (json!({}), 400, ""),
+        (json!({}), 422, "/name"),
+        (json!({"name":"b","ball":{"mass_kg":null}}), 422, "/ball/mass_kg"),
     ] {
         let problem = client.post("assets", &file).await.problem(status);
         assert_eq!(problem["pointer"], pointer, "{file}: {problem}");
@@ -225,12 +226,27 @@ async fn invalid_parameters_and_request_bodies_are_named() {
         ("faults?cursor=é", "cursor"),
         ("sessions?cursor=00", "cursor"),
         ("sessions?state=odd", "state"),
+        ("sessions?verdict=odd", "verdict"),
+        ("sessions?sort=name", "sort"),
+        ("sessions?opened_from=yesterday", "opened_from"),
+        ("sessions?opened_from=2026-01-02T00:00:00Z&opened_to=2026-01-01T00:00:00Z", "opened_to"),
         ("assets?cursor=7", "cursor"),
+        ("assets?limit=many", "limit"),
+        ("assets?limit=0", "limit"),
+        ("assets?limit=-1", "limit"),
+        ("fleet?limit=501", "limit"),
+        ("fleet?has_fault=yes", "has_fault"),
+        ("sessions?asett=a", "asett"),
+        ("sessions?asset=a&asset=a", "asset"),
+        ("faults?acknowledged=1", "acknowledged"),
+        ("assets/a?x=1", "x"),
+        ("assets/a/state?x", "x"),
+        ("/healthz?x=1", "x"),
+        ("events?after=last", "after"),
     ] {
         let problem = client.get(path).await.problem(400);
         assert_eq!(problem["parameter"], parameter, "{path}: {problem}");
     }
-    client.get("assets?limit=many").await.problem(400);
     client.get("assets/a/stream").await.problem(426);
     let request = client.request(Method::GET, "events").header("last-event-id", "x");
     client.send(request).await.problem(400);
@@ -249,7 +265,86 @@ async fn invalid_parameters_and_request_bodies_are_named() {
     assert_eq!(wrong["pointer"], "/sessions/0");
     client.post("assets/a/calibrations", &json!({})).await.problem(422);
     client.post("assets/a/faults/sensor/acknowledge", &Value::Null).await.problem(409);
+    for (rest, parameter) in [
+        ("telemetry?from_s=9&to_s=1", "to_s"),
+        ("telemetry?from_s=nan", "from_s"),
+        ("trace?from_s=9&to_s=1", "to_s"),
+        ("trace?points=0", "points"),
+        ("trace?profile=odd", "profile"),
+    ] {
+        let problem = client.get(&format!("sessions/{id}/{rest}")).await.problem(400);
+        assert_eq!(problem["parameter"], parameter, "{rest}: {problem}");
+    }
     check_alive(client).await;
+}
+
+#[tokio::test]
+async fn a_filter_by_an_unknown_asset_gets_404() {
+    let fixture = service().await;
+    for path in ["sessions?asset=nobody", "faults?asset=nobody", "events?asset=nobody"] {
+        let problem = fixture.client.get(path).await.problem(404);
+        assert_eq!(problem["type"], "urn:offbd:problem:unknown-asset", "{path}");
+    }
+}
+
+/// No answer has a word of the program or its parsers in it.
+#[tokio::test]
+async fn an_error_speaks_of_the_document_and_not_of_the_program() {
+    let fixture = service().await;
+    let client = &fixture.client;
+    let stretch = json!({"sessions":[{"session":"x","from_s":"0","to_s":1}]});
+    let mut problems = Vec::new();
+    for (path, body) in [
+        ("assets", json!({"name":7})),
+        ("assets", json!({"name":"b","ball":7})),
+        ("assets", json!({"name":"b","ball":{"mass_kg":null}})),
+        ("assets", json!({"name":"b","axes":{"x":{"sign":"plus"}}})),
+        ("assets", json!({"name":"b","diagnostics":{"profile":7}})),
+        ("assets/a/sessions", json!({"name":7})),
+        ("assets/a/calibrations", json!({"sessions":{}})),
+        ("assets/a/calibrations", stretch),
+        ("tokens", json!({})),
+        ("tokens", json!({"name":"a","role":"boss"})),
+        ("tokens", json!({"name":"a","role":7})),
+        ("assets/a/telemetry", json!({"samples":{}})),
+        ("assets/a/telemetry", json!({"session":[],"samples":[]})),
+        ("assets/a/telemetry", json!([])),
+    ] {
+        problems.push(client.post(path, &body).await);
+    }
+    for body in ["", "{", "<a/>", "{\"name\":\"a\",\"name\":\"b\"}", "{} {}"] {
+        problems.push(client.post_text("assets", "application/json", body).await);
+        problems.push(client.post_text(TELEMETRY, "application/json", body).await);
+    }
+    problems.push(client.post_text(TELEMETRY, "application/msgpack", "\u{1}").await);
+    for problem in &problems {
+        let text = problem.json()["detail"].as_str().unwrap().to_owned();
+        for word in ["invalid type", "expected", "f64", "u32", "struct", "variant", "View", "EOF"] {
+            assert!(!text.contains(word), "{word}: {text}");
+        }
+        assert!(problem.status.is_client_error(), "{text}");
+    }
+}
+
+#[tokio::test]
+async fn a_json_body_must_say_that_it_is_json() {
+    let fixture = service().await;
+    let client = &fixture.client;
+    let file = "{\"name\":\"b\"}";
+    for kind in ["application/xml", "text/plain", "application/x-www-form-urlencoded"] {
+        for path in ["assets", "assets/a/sessions", "tokens", "login"] {
+            let problem = client.post_text(path, kind, file).await.problem(415);
+            assert_eq!(problem["type"], "urn:offbd:problem:media-type", "{path}");
+        }
+    }
+    let bare = client.request(Method::PUT, "assets/b").body(file);
+    client.send(bare).await.problem(415);
+    client.post_text("assets", "application/json; charset=utf-8", file).await.expect(201);
+    // Nothing is sent, so there is nothing to state.
+    client.send(client.request(Method::POST, "assets/a/sessions")).await.expect(201);
+    let path = "assets/a/sessions/import?name=file";
+    let kind = "application/octet-stream";
+    client.post_text(path, kind, csv(&rig(10, 10))).await.expect(201);
 }
 
 #[tokio::test]

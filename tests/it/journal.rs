@@ -198,6 +198,7 @@ impl StoreTest {
                     ended_at: 1,
                     verdict: "{}".to_owned(),
                     hash: String::new(),
+                    found_fault: false,
                 };
                 let last = self.open[asset].append(3);
                 self.ended.push(self.open[asset].clone());

@@ -19,6 +19,7 @@ mod fuzz;
 mod journal;
 mod jwt;
 mod learning;
+mod lists;
 mod liveness;
 mod main_job;
 mod monitoring;

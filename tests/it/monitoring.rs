@@ -4,9 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::support::process::Process;
 use crate::support::{ServiceFixture, batch, rig};
-use serde_json::json;
+use serde_json::{Value, json};
 
 const DASHBOARD: &str = include_str!("../../deploy/grafana/offbd.json");
+const RIG_DASHBOARD: &str = include_str!("../../deploy/grafana/offbd-rig.json");
 const ALERTS: &str = include_str!("../../deploy/prometheus/offbd.yaml");
 const MANUAL: &str = include_str!("../../docs/operations.md");
 
@@ -137,4 +138,38 @@ async fn metrics_count_samples_by_outcome_and_fault_transitions() {
     assert_eq!(number(&after, "offbd_store_writable"), 1.0);
     #[cfg(target_os = "linux")]
     assert!(number(&after, "offbd_process_resident_bytes") > 1e6);
+}
+
+/// The dashboard of one rig asks for paths, parameters and columns that the interface has.
+#[test]
+fn the_dashboard_of_a_rig_uses_what_the_interface_describes() {
+    let document = serde_json::to_value(offbd::http::openapi()).unwrap();
+    let dashboard: Value = serde_json::from_str(RIG_DASHBOARD).unwrap();
+    let schemas = &document["components"]["schemas"];
+    let properties = |name: &str| schemas[name]["properties"].as_object().unwrap().clone();
+    let mut row = properties("SeriesValues");
+    for part in schemas["SeriesRow"]["allOf"].as_array().unwrap() {
+        row.extend(part["properties"].as_object().cloned().unwrap_or_default());
+    }
+    let panels = dashboard["panels"].as_array().unwrap();
+    let series = panels.iter().map(|panel| (&panel["targets"][0], &row));
+    let mark = properties("Annotation");
+    let marks = [(&dashboard["annotations"]["list"][0]["target"], &mark)];
+    let mut n_columns = 0;
+    for (target, known) in series.chain(marks) {
+        let url = target["url"].as_str().unwrap().replace("${asset}", "{asset}");
+        let (path, query) = url.strip_prefix("${url}").unwrap().split_once('?').unwrap();
+        let operation = &document["paths"][path]["get"];
+        let parameters = operation["parameters"].as_array().unwrap();
+        for pair in query.split('&') {
+            let name = pair.split('=').next().unwrap();
+            assert!(parameters.iter().any(|parameter| parameter["name"] == name), "{name}");
+        }
+        for column in target["columns"].as_array().unwrap() {
+            let name = column["selector"].as_str().unwrap();
+            assert!(known.contains_key(name), "{name}");
+            n_columns += 1;
+        }
+    }
+    assert_eq!(n_columns, 21);
 }

@@ -261,7 +261,14 @@ async fn watch_connects_over_tls_if_the_certificate_is_trusted() {
     let watch = format!("watch a --states 1 --address https://{address}");
     let ca_file = files.certificate.display();
     let done = offbd(words(&format!("{watch} --ca-file {ca_file}"))).await;
-    assert!(String::from_utf8_lossy(&done.stdout).contains(" a "), "{done:?}");
+    assert!(String::from_utf8_lossy(&done.stdout).starts_with("a, no session\n"), "{done:?}");
+    let json = offbd(words(&format!("{watch} --ca-file {ca_file} --format json"))).await;
+    let state: Value = serde_json::from_slice(&json.stdout).unwrap();
+    assert_eq!((&state["type"], &state["asset"]), (&"state".into(), &"a".into()));
+    let other = format!("watch nobody --ca-file {ca_file} --address https://{address}");
+    let done = offbd(words(&other)).await;
+    let stderr = String::from_utf8_lossy(&done.stderr);
+    assert!(stderr.contains("has no asset `nobody`"), "{stderr}");
     let done = offbd(words(&watch)).await;
     let stderr = String::from_utf8_lossy(&done.stderr);
     assert!(!done.status.success() && stderr.contains("certificate"), "{stderr}");

@@ -81,6 +81,16 @@ async fn a_weakening_servo_has_a_warning_before_its_fault_is_confirmed() {
     assert_eq!(fleet_warnings(&client, "weak").await, json!([warning]));
     assert!(warned_at.is_some_and(|at| at < SESSIONS), "{warned_at:?}");
 
+    // The series has the same estimates.
+    let series = client.get("assets/weak/series").await.expect(200);
+    let gains = |rows: &Value, gain: fn(&Value) -> &Value| -> Vec<Value> {
+        rows.as_array().unwrap().iter().map(|row| gain(row).clone()).collect()
+    };
+    let of_series = gains(&series["rows"], |row| &row["gain_x"]);
+    assert!(of_series.iter().filter(|gain| gain.is_number()).count() as u64 >= SESSIONS);
+    let of_points = gains(&view["points"], |point| &point["x"]["gain"]);
+    assert_eq!(of_series[of_series.len() - of_points.len()..], of_points);
+
     // The confidence interval contains the injected slope. At one percent per session, the
     // limit of 0.3 is reached after 30 sessions, of which 12 are over.
     let gain = &view["trends"][0];

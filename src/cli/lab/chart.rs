@@ -79,7 +79,7 @@ pub(super) fn run(args: &ChartArgs) -> anyhow::Result<()> {
     let written = chart::write(&chart, &args.output)?;
     write_table(&chart.table)?;
     for path in written {
-        anstream::eprintln!("{}", path.display());
+        output::remark(format_args!("{}", path.display()));
     }
     Ok(())
 }

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::labels::{Label, class, labelled};
 use super::simulate::{record, write_session};
 use crate::cli::calibrate::write_asset;
+use crate::cli::output;
 use crate::cli::replay::progress;
 use offbd_lab::simulation::{Disturbances, Fault, Preset, Reference, SimulatedRig};
 
@@ -70,12 +71,12 @@ pub(super) fn write(dir: &Path, seconds: f64, seed: u64) -> anyhow::Result<()> {
     let path = dir.join("labels.json");
     std::fs::write(&path, serde_json::to_vec_pretty(&labels)?)
         .with_context(|| path.display().to_string())?;
-    anstream::eprintln!(
+    output::remark(format_args!(
         "{}: {} sessions of {} rigs",
         dir.display(),
         labels.len(),
         Preset::ALL.len()
-    );
+    ));
     Ok(())
 }
 

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use hyper_rustls::ConfigBuilderExt;
 use tokio::io::{AsyncRead, AsyncWrite};
@@ -14,10 +14,11 @@ use tokio_rustls::rustls::pki_types::pem::PemObject;
 use tokio_rustls::rustls::pki_types::{CertificateDer, ServerName};
 use tokio_rustls::rustls::{ClientConfig, RootCertStore};
 use tokio_tungstenite::WebSocketStream;
+use tokio_tungstenite::tungstenite::Error;
 use tokio_tungstenite::tungstenite::client::IntoClientRequest;
 use tokio_tungstenite::tungstenite::handshake::client::Request;
 use tokio_tungstenite::tungstenite::http::header::AUTHORIZATION;
-use tokio_tungstenite::tungstenite::http::{HeaderValue, Uri};
+use tokio_tungstenite::tungstenite::http::{HeaderValue, StatusCode, Uri};
 
 use crate::cli::errors::{self, InputError};
 
@@ -53,7 +54,8 @@ pub(super) async fn connect(args: &ConnectArgs, asset: &str, hz: f64) -> anyhow:
     let request = request(args, &service, asset, hz)?;
     let ServiceAddress { host, port, is_encrypted } = &service;
     let missing = || format!("no stream of {asset} at {}", args.address);
-    let socket = TcpStream::connect((host.as_str(), *port)).await.with_context(missing)?;
+    let socket = TcpStream::connect((host.as_str(), *port)).await;
+    let socket = socket.map_err(|error| no_service(&args.address, &error))?;
     let transport: Box<dyn Transport> = if *is_encrypted {
         let name = ServerName::try_from(host.clone())?;
         let connector = TlsConnector::from(Arc::new(tls(args.ca_file.as_deref())?));
@@ -61,8 +63,37 @@ pub(super) async fn connect(args: &ConnectArgs, asset: &str, hz: f64) -> anyhow:
     } else {
         Box::new(socket)
     };
-    let connected = tokio_tungstenite::client_async(request, transport).await;
-    Ok(connected.with_context(missing)?.0)
+    match tokio_tungstenite::client_async(request, transport).await {
+        Ok((socket, _)) => Ok(socket),
+        Err(Error::Http(answer)) => Err(refusal(answer.status(), asset, &args.address)),
+        Err(error) => Err(error).with_context(missing),
+    }
+}
+
+/// The error if no service answers: what to do.
+fn no_service(address: &str, error: &std::io::Error) -> anyhow::Error {
+    anyhow!(
+        "no service answers at {address} ({error}); start one with `offbd serve` or `offbd demo`, \
+         or give its address with `--address HOST:PORT`"
+    )
+}
+
+/// The error if the service refuses the stream: why, and what to do.
+fn refusal(status: StatusCode, asset: &str, address: &str) -> anyhow::Error {
+    match status {
+        StatusCode::NOT_FOUND => anyhow!(
+            "the service at {address} has no asset `{asset}`; {address}/api/v1/fleet lists those \
+             that it has"
+        ),
+        StatusCode::UNAUTHORIZED => {
+            anyhow!("the service at {address} requires a valid token: `--token-file FILE`")
+        }
+        StatusCode::FORBIDDEN => anyhow!("the token may not read the asset `{asset}`"),
+        StatusCode::TOO_MANY_REQUESTS | StatusCode::SERVICE_UNAVAILABLE => {
+            anyhow!("the service at {address} is busy ({status}); try again")
+        }
+        _ => anyhow!("the service at {address} refuses the stream of `{asset}`: {status}"),
+    }
 }
 
 #[derive(Debug, PartialEq, Eq)]

@@ -210,6 +210,7 @@ impl Asset {
             ended_at: turn.at,
             verdict: views::to_json(&summary)?,
             hash: summary.verdict_hash.clone(),
+            found_fault: !summary.faults.is_empty(),
         });
         let mut trends = trend::ended(&self.row.name, &open, turn)?;
         let warns = |write: &Write| matches!(write, Write::Trend(row) if row.warnings.is_some());

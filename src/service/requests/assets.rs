@@ -2,18 +2,11 @@
 
 use crate::service::asset::AssetCommand;
 use crate::service::{Service, ServiceError, views};
+use crate::store::AssetFilter;
 use crate::wire::asset::{self, AssetView};
 use crate::wire::service::{Page, StateView, WatchView};
 use offbd_core::engine::Rig;
 use offbd_core::vocabulary::Invalid;
-
-/// Parses an asset file. An error of the JSON syntax has an empty pointer, because it
-/// concerns the whole document.
-fn parse(document: &[u8]) -> Result<Rig, Invalid> {
-    let json = serde_json::from_slice::<serde::de::IgnoredAny>(document);
-    json.map_err(|error| Invalid::new("", error.to_string()))?;
-    asset::parse(document)
-}
 
 impl Service {
     /// Returns the asset file of `name`.
@@ -26,17 +19,20 @@ impl Service {
         views::from_json(&row.document)
     }
 
-    /// Returns a page of asset files, sorted by name.
+    /// Returns a page of asset files, sorted by name, of the assets whose name begins with
+    /// `name`.
     ///
     /// # Errors
     /// [`ServiceError::Invalid`] for an invalid cursor.
     pub async fn assets(
         &self,
+        name: Option<String>,
         cursor: Option<&str>,
         limit: u32,
     ) -> Result<Page<AssetView>, ServiceError> {
         let after = cursor.map(views::cursor::<String>).transpose()?.unwrap_or_default();
-        let rows = self.inner.handles.store.assets(&after, limit + 1).await?;
+        let filter = AssetFilter { after, name, ..AssetFilter::default() };
+        let rows = self.inner.handles.store.assets(&filter, limit + 1).await?;
         views::page(rows, limit, |row| row.name.clone(), |row| views::from_json(&row.document))
     }
 
@@ -46,7 +42,7 @@ impl Service {
     /// [`ServiceError::Invalid`] with the invalid element of the asset file;
     /// [`ServiceError::AssetExists`]; [`ServiceError::RegistryFull`].
     pub async fn create_asset(&self, document: &[u8]) -> Result<AssetView, ServiceError> {
-        let rig = parse(document)?;
+        let rig = asset::parse(document)?;
         self.create(&rig).await?;
         Ok(asset::view(&rig))
     }
@@ -73,7 +69,7 @@ impl Service {
         name: &str,
         document: &[u8],
     ) -> Result<(AssetView, bool), ServiceError> {
-        let rig = parse(document)?;
+        let rig = asset::parse(document)?;
         if rig.name != name {
             let reason = format!("`{}` differs from `{name}` in the path", rig.name);
             return Err(Invalid::new("/name", reason).into());

@@ -50,12 +50,13 @@ impl Service {
     /// Returns a page of the faults of the fleet.
     ///
     /// # Errors
-    /// [`ServiceError::Invalid`] for an invalid parameter.
+    /// [`ServiceError::Invalid`] for an invalid parameter; [`ServiceError::UnknownAsset`].
     pub async fn faults(
         &self,
         query: FaultQuery,
         limit: u32,
     ) -> Result<Page<FaultEntryView>, ServiceError> {
+        self.check_asset(query.asset.as_deref()).await?;
         let filter = FaultFilter {
             statuses: statuses(query.status.unwrap_or(StatusFilter::Active)),
             asset: query.asset,
@@ -79,7 +80,6 @@ impl Service {
         asset: &str,
         status: Option<StatusFilter>,
     ) -> Result<Page<FaultEntryView>, ServiceError> {
-        self.asset(asset).await?;
         let (asset, sort) = (Some(asset.to_owned()), Some(FaultSort::Asset));
         let query = FaultQuery { status, asset: asset.clone(), sort, ..FaultQuery::default() };
         let mut page = self.faults(query, FaultCode::COUNT as u32).await?;

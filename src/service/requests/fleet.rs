@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::service::asset::LearningRecord;
 use crate::service::clock::rfc3339;
 use crate::service::{Service, ServiceError, views};
-use crate::store::{AssetRow, FaultRow, Micros, SessionRow, WarningRow};
+use crate::store::{AssetFilter, AssetRow, FaultRow, Micros, SessionRow, WarningRow};
 use crate::wire::asset::AssetView;
 use crate::wire::service::{FleetEntryView, FleetFaultView, Page, unjudged_view};
 use crate::wire::stored::{StoredProvenance, StoredRecord};
@@ -13,6 +13,18 @@ use crate::wire::trend::TrendWarningView;
 
 /// Time without a sample after which a rig with an open session counts as silent.
 const SILENT_AFTER: Micros = 10_000_000;
+
+/// The parameters of a query for the fleet.
+#[derive(Clone, Debug, Default)]
+pub struct FleetQuery {
+    /// How the name begins.
+    pub name: Option<String>,
+    /// Whether a fault is pending or confirmed.
+    pub has_fault: Option<bool>,
+    /// Whether a session is open.
+    pub has_session: Option<bool>,
+    pub cursor: Option<String>,
+}
 
 /// The stored data of a page of assets, by asset name.
 struct FleetData {
@@ -36,11 +48,14 @@ impl Service {
     /// [`ServiceError::Invalid`] for an invalid cursor.
     pub async fn fleet(
         &self,
-        cursor: Option<&str>,
+        query: FleetQuery,
         limit: u32,
     ) -> Result<Page<FleetEntryView>, ServiceError> {
-        let after = cursor.map(views::cursor::<String>).transpose()?.unwrap_or_default();
-        let rows = self.inner.handles.store.assets(&after, limit + 1).await?;
+        let FleetQuery { name, has_fault, has_session, cursor } = query;
+        let after = cursor.as_deref().map(views::cursor::<String>).transpose()?;
+        let after = after.unwrap_or_default();
+        let filter = AssetFilter { after, name, has_fault, has_session };
+        let rows = self.inner.handles.store.assets(&filter, limit + 1).await?;
         let mut known = match (rows.first(), rows.last()) {
             (Some(first), Some(last)) => self.known(&first.name, &last.name).await?,
             _ => return Ok(Page { items: Vec::new(), next: None }),

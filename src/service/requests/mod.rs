@@ -17,6 +17,7 @@ mod principals;
 mod readiness;
 mod recordings;
 mod replays;
+mod series;
 mod sessions;
 mod telemetry;
 mod tokens;
@@ -24,5 +25,8 @@ mod traces;
 mod trends;
 
 pub use faults::FaultQuery;
+pub use fleet::FleetQuery;
 pub use readiness::QueueLoad;
+pub use series::{MAX_SERIES_SESSIONS, SeriesQuery};
+pub use sessions::SessionListQuery;
 pub use telemetry::PendingBatch;

@@ -4,10 +4,38 @@ use crate::service::asset::AssetCommand;
 use crate::service::{Service, ServiceError, views};
 use crate::store::{RecordingReader, SessionFilter, SessionRow};
 use crate::wire::service::{Page, SessionView};
-use crate::wire::words::SessionState;
+use crate::wire::words::{SessionSort, SessionState, VerdictFilter};
 use offbd_core::vocabulary::TimeRange;
 
+/// The parameters of a query for sessions.
+#[derive(Clone, Debug, Default)]
+pub struct SessionListQuery {
+    pub asset: Option<String>,
+    pub state: Option<SessionState>,
+    /// How the name begins.
+    pub name: Option<String>,
+    /// Opened at this time or later, microseconds since 1970.
+    pub opened_from: Option<i64>,
+    /// Opened before this time, microseconds since 1970.
+    pub opened_to: Option<i64>,
+    pub verdict: Option<VerdictFilter>,
+    /// `-opened_at` by default.
+    pub sort: Option<SessionSort>,
+    pub cursor: Option<String>,
+}
+
 impl Service {
+    /// Checks that the asset of a filter exists.
+    pub(in crate::service) async fn check_asset(
+        &self,
+        asset: Option<&str>,
+    ) -> Result<(), ServiceError> {
+        match asset {
+            Some(asset) => self.asset(asset).await.map(drop),
+            None => Ok(()),
+        }
+    }
+
     /// Ends the asset's open session and opens a new one, by default named by the current
     /// time.
     ///
@@ -88,20 +116,26 @@ impl Service {
         row.ok_or_else(|| ServiceError::UnknownSession { id: id.to_owned() })
     }
 
-    /// Sessions, newest first; `state` is `open` or `ended`.
+    /// Returns a page of sessions.
     ///
     /// # Errors
-    /// [`ServiceError::Invalid`] for an invalid cursor.
+    /// [`ServiceError::Invalid`] for an invalid cursor; [`ServiceError::UnknownAsset`].
     pub async fn sessions(
         &self,
-        asset: Option<String>,
-        state: Option<SessionState>,
-        cursor: Option<&str>,
+        query: SessionListQuery,
         limit: u32,
     ) -> Result<Page<SessionView>, ServiceError> {
-        let before = cursor.map(views::cursor::<(i64, String)>).transpose()?;
-        let state = state.map(|state| state.to_string());
-        let filter = SessionFilter { asset, state, before };
+        self.check_asset(query.asset.as_deref()).await?;
+        let filter = SessionFilter {
+            asset: query.asset,
+            state: query.state.map(|state| state.to_string()),
+            name: query.name,
+            opened_from: query.opened_from,
+            opened_to: query.opened_to,
+            found_fault: query.verdict.map(|verdict| verdict == VerdictFilter::Fault),
+            is_ascending: query.sort == Some(SessionSort::Oldest),
+            after: query.cursor.as_deref().map(views::cursor::<(i64, String)>).transpose()?,
+        };
         let rows = self.inner.handles.store.sessions(&filter, limit + 1).await?;
         views::page(rows, limit, |row| (row.opened_at, row.id.clone()), views::session)
     }

@@ -238,6 +238,7 @@ mod tests {
             ended_at: 0,
             verdict: "{}".to_owned(),
             hash: String::new(),
+            found_fault: false,
         };
         let mut set = vec![Write::CreateAsset(asset), Write::OpenSession(row), append, end];
         writer.commit(&mut [ChangeSet::unpartitioned(&mut set)]).await.unwrap();

@@ -7,7 +7,7 @@ use serde::de::{Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 
 use super::{BatchError, MAX_SEQ};
-use crate::wire::asset::pointer;
+use crate::wire::json::{self, pointer};
 use offbd_core::vocabulary::{Brief, Sample};
 
 /// Deepest nesting of a MessagePack document, as in `serde_json`.
@@ -156,7 +156,7 @@ pub(super) fn json(document: &[u8], limit: usize) -> Result<BatchDocument, Batch
     let parsed = json.deserialize_map(BatchDocumentVisitor { limit });
     parsed.and_then(|parsed| json.end().map(|()| parsed)).map_err(|error| {
         let pointer = error_pointer(&mut serde_json::Deserializer::from_slice(document), limit);
-        BatchError::Malformed { pointer, reason: error.to_string() }
+        BatchError::Malformed { pointer, reason: json::words(&error) }
     })
 }
 
@@ -170,13 +170,28 @@ pub(super) fn msgpack(document: &[u8], limit: usize) -> Result<BatchDocument, Ba
     let mut whole = unpack();
     let parsed = whole.deserialize_map(BatchDocumentVisitor { limit });
     let trailing = whole.get_ref().len();
-    let error = match parsed {
+    let reason = match parsed {
         Ok(parsed) if trailing == 0 => return Ok(parsed),
-        Ok(_) => rmp_serde::decode::Error::custom(format!("{trailing} bytes follow the document")),
-        Err(error) => error,
+        Ok(_) => format!("{trailing} bytes follow the document"),
+        Err(error) => msgpack_words(&error),
     };
     let pointer = error_pointer(&mut unpack(), limit);
-    Err(BatchError::Malformed { pointer, reason: error.to_string() })
+    Err(BatchError::Malformed { pointer, reason })
+}
+
+/// Returns an error of the MessagePack parser in plain words.
+fn msgpack_words(error: &rmp_serde::decode::Error) -> String {
+    use rmp_serde::decode::Error as E;
+    match error {
+        E::Syntax(message) | E::Uncategorized(message) => json::mismatch_words(message),
+        E::DepthLimitExceeded => "is nested beyond the permitted depth".to_owned(),
+        E::InvalidMarkerRead(_) | E::InvalidDataRead(_) => {
+            "the MessagePack document ends too early".to_owned()
+        }
+        E::TypeMismatch(_) | E::LengthMismatch(_) | E::OutOfRange | E::Utf8Error(_) => {
+            "is not valid MessagePack, or of the wrong type".to_owned()
+        }
+    }
 }
 
 /// Returns the JSON pointer of the element at which the parser fails. Tracking the path is

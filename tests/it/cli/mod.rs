@@ -9,6 +9,7 @@ mod replay;
 mod scene;
 mod score;
 mod service;
+mod shell;
 mod simulate;
 mod soak;
 mod token;

@@ -34,5 +34,8 @@ fn migrating_twice_changes_nothing() {
 #[test]
 fn watch_reports_a_missing_service() {
     let done = CliFixture::new().run(1, "watch bench-1 --address 127.0.0.1:1");
-    assert!(done.stderr.contains("no stream of bench-1 at 127.0.0.1:1"), "{}", done.stderr);
+    for expected in ["no service answers at 127.0.0.1:1", "offbd serve", "--address"] {
+        assert!(done.stderr.contains(expected), "{}", done.stderr);
+    }
+    assert_eq!(done.stderr.matches("refused").count(), 1, "{}", done.stderr);
 }

@@ -154,7 +154,7 @@ async fn migrate(db: &mut AnyConnection, n: usize) {
         std::fs::copy(file, first.path().join(file.file_name().unwrap())).unwrap();
     }
     let migrator = Migrator::new(first.path()).await.unwrap();
-    assert_eq!(migrator.iter().map(|migration| migration.version).max(), Some(n as i64));
+    assert_eq!(migrator.iter().count(), n);
     migrator.run_direct(None, db, false).await.unwrap();
 }
 

@@ -109,7 +109,7 @@ impl<D: Drive + Clone> Search<'_, D> {
     fn planar(&mut self) -> Option<(Configuration, f64)> {
         let (survey, method) = (self.survey, Method::ZeroOrderHold);
         let why = if self.scene.edges {
-            Some("nobody watches the edge".to_owned())
+            Some("cannot detect the edge".to_owned())
         } else {
             self.not_smooth(survey.planar_error_m)
         };
@@ -250,7 +250,7 @@ impl<D: Drive + Clone> Search<'_, D> {
             Ok(path) => {
                 let error_m = path.apart(&reference.path) + reference.error_m;
                 let meets = error_m <= self.tolerance * MEASURED_SHARE;
-                let verdict = if meets { "meets it" } else { "is off" };
+                let verdict = if meets { "meets it" } else { "is too inaccurate" };
                 let pace = pace_name(configuration);
                 self.note(model, method, Some(error_m), format!("{pace} {verdict}"));
                 CandidateError { error_m, steps: path.steps, meets }

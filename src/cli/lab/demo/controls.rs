@@ -5,13 +5,15 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use axum::Json;
+use axum::body::Bytes;
 use axum::extract::State;
-use axum::http::{Method, StatusCode};
-use axum::routing::{delete, get, post};
+use axum::http::{HeaderMap, StatusCode};
 use serde::{Deserialize, Serialize};
 use tokio::sync::mpsc;
+use utoipa::ToSchema;
+use utoipa_axum::routes;
 
-use crate::http::{ExtraRoutes, Problem};
+use crate::http::{ExtraRoutes, Problem, parse_json};
 use crate::service::access::Right;
 use offbd_lab::simulation::{Fault, FaultEffect};
 
@@ -48,8 +50,9 @@ pub(super) enum VisitorCommand {
 }
 
 /// The state of the demo, for its page.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, ToSchema)]
 pub(super) struct DemoStatus {
+    /// The simulated rig.
     pub asset: String,
     /// Whether the script injects and repairs faults.
     pub script: bool,
@@ -80,14 +83,10 @@ pub(super) fn visitor_controls(asset: &str) -> (VisitorControls, ExtraRoutes) {
     let status = DemoStatus { asset, script: true, broken: Vec::new(), buttons };
     let status = Arc::new(Mutex::new(status));
     let controls = PageControls { commands: sender, status: status.clone() };
-    let (look, break_it) = (get(look).with_state(controls.clone()), post(break_it));
-    let (break_it, repair) = (break_it.with_state(controls.clone()), delete(repair));
-    let (repair, script) = (repair.with_state(controls.clone()), post(script).with_state(controls));
     let routes = ExtraRoutes::default()
-        .route("/api/v1/demo", Method::GET, Right::Read, look)
-        .route("/api/v1/demo/faults", Method::POST, Right::Operate, break_it)
-        .route("/api/v1/demo/faults", Method::DELETE, Right::Operate, repair)
-        .route("/api/v1/demo/script", Method::POST, Right::Operate, script);
+        .routes(Right::Read, routes!(look), controls.clone())
+        .routes(Right::Operate, routes!(break_it, repair), controls.clone())
+        .routes(Right::Operate, routes!(script), controls);
     (VisitorControls { commands, status }, routes)
 }
 
@@ -107,20 +106,31 @@ impl VisitorControls {
     }
 }
 
+/// Returns the state of the demo's rig: whether the script controls it, and its faults.
+#[utoipa::path(get, path = "/api/v1/demo", tag = "demo", operation_id = "get_demo",
+    responses((status = 200, body = DemoStatus)))]
 async fn look(State(controls): State<PageControls>) -> Json<DemoStatus> {
     Json(controls.status.lock().unwrap_or_else(PoisonError::into_inner).clone())
 }
 
-#[derive(Deserialize)]
+/// A fault to inject.
+#[derive(Default, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
 struct FaultRequest {
     /// CODE:KIND[=SIZE], as on the command line.
     fault: String,
 }
 
+/// Injects a fault into the demo's rig, and suspends the script.
+#[utoipa::path(post, path = "/api/v1/demo/faults", tag = "demo",
+    operation_id = "inject_demo_fault", request_body = FaultRequest,
+    responses((status = 202), (status = 422, body = Problem, description = "No such fault")))]
 async fn break_it(
     State(controls): State<PageControls>,
-    Json(request): Json<FaultRequest>,
+    headers: HeaderMap,
+    body: Bytes,
 ) -> Result<StatusCode, Problem> {
+    let request: FaultRequest = parse_json(&headers, &body)?;
     // The syntax requires a time, which is ignored: the fault begins now.
     let fault: Fault = format!("{}@0", request.fault).parse().map_err(|error| {
         let (status, title) = (StatusCode::UNPROCESSABLE_ENTITY, "No such fault");
@@ -130,10 +140,16 @@ async fn break_it(
     controls.send(VisitorCommand::Break(fault.effect))
 }
 
+/// Repairs the demo's rig.
+#[utoipa::path(delete, path = "/api/v1/demo/faults", tag = "demo",
+    operation_id = "repair_demo", responses((status = 202)))]
 async fn repair(State(controls): State<PageControls>) -> Result<StatusCode, Problem> {
     controls.send(VisitorCommand::Repair)
 }
 
+/// Lets the script inject and repair faults again.
+#[utoipa::path(post, path = "/api/v1/demo/script", tag = "demo",
+    operation_id = "resume_demo_script", responses((status = 202)))]
 async fn script(State(controls): State<PageControls>) -> Result<StatusCode, Problem> {
     controls.send(VisitorCommand::Script)
 }

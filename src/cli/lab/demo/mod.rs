@@ -41,8 +41,9 @@ use show::Show;
     offbd demo --seconds 60\n  \
     offbd demo --seconds 90 --fault y_servo:gain=0.3@20 --fault sensor:freeze@60\n  \
     offbd demo --seconds 120 --speed 10 --port 0\n\n\
-    A fault is CODE:KIND[=SIZE]@START[-END]; `offbd simulate --help` lists them. Exit\n\
-    status with --seconds: 0 if what was injected and what was found agree, else 1.")]
+    A fault is CODE:KIND[=SIZE]@START[-END]; `offbd simulate --help` lists them.\n\n\
+    Exit status with --seconds: 0 if what was injected and what was found agree,\n\
+    else 1.")]
 pub(in crate::cli) struct DemoArgs {
     /// Port of the service on 127.0.0.1; 0 takes a free one
     #[arg(long, default_value_t = 8087, value_name = "P")]

@@ -30,7 +30,7 @@ impl OutputFolder {
     /// Returns the path of a file, and prints it.
     fn announced(&self, name: &str) -> PathBuf {
         let path = self.0.join(name);
-        anstream::eprintln!("{}", path.display());
+        output::remark(format_args!("{}", path.display()));
         path
     }
 

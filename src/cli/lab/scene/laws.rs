@@ -80,7 +80,7 @@ fn show(format: OutputFormat, scene_runs: &[SceneRun]) -> anyhow::Result<()> {
 /// Prints the warnings to stderr.
 pub(super) fn warn(scene_run: &SceneRun) {
     for warning in &scene_run.warnings {
-        anstream::eprintln!("warning: {warning}");
+        output::remark(format_args!("warning: {warning}"));
     }
 }
 

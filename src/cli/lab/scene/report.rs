@@ -1,4 +1,4 @@
-//! The output of a run: lines of text, or a JSON object.
+//! The output of a run: lines of text, the result first, or a JSON object.
 
 use serde_json::{Value, json};
 
@@ -15,14 +15,27 @@ const SHOWN_EVENTS: usize = 12;
 pub(super) fn lines(scene_run: &SceneRun) -> Vec<String> {
     let mut lines = vec![
         row("scene", &format!("{}, {} s", scene_run.name, scene_run.scene.duration_s)),
-        row("ran", &words::configuration(&scene_run.decision.configuration)),
-        row("why", &why(scene_run)),
+        end(scene_run),
         row("error", &error(scene_run)),
     ];
+    lines.extend(events(scene_run));
+    lines.push(String::new());
+    lines.push(row("ran", &words::configuration(&scene_run.decision.configuration)));
+    lines.push(row("why", &why(scene_run)));
     lines.extend(effort(scene_run));
     lines.extend(tried(scene_run.decision.choice.as_ref().map_or(&[], |choice| &choice.tried)));
-    lines.extend(events(scene_run));
     lines
+}
+
+/// Returns the line of the result: where the body is at the end, or why the run failed.
+fn end(scene_run: &SceneRun) -> String {
+    match &scene_run.outcome {
+        Ok(outcome) => {
+            let p = outcome.end.position;
+            row("end", &format!("x {:.6}, y {:.6}, z {:.6} m", p.x, p.y, p.z))
+        }
+        Err(failure) => row("failed", &failure.to_string()),
+    }
 }
 
 /// Formats a name and its value, wrapped to 80 columns.
@@ -71,10 +84,7 @@ fn error(scene_run: &SceneRun) -> String {
 }
 
 fn effort(scene_run: &SceneRun) -> Vec<String> {
-    let Ok(outcome) = &scene_run.outcome else {
-        let failure = scene_run.outcome.as_ref().err().map(ToString::to_string).unwrap_or_default();
-        return vec![row("failed", &failure)];
-    };
+    let Ok(outcome) = &scene_run.outcome else { return Vec::new() };
     let rejected = match outcome.statistics.rejected {
         0 => String::new(),
         n => format!(" and {n} tried in vain"),
@@ -83,11 +93,9 @@ fn effort(scene_run: &SceneRun) -> Vec<String> {
         0.0 => String::new(),
         s => format!(", {} to choose", words::work(s)),
     };
-    let p = outcome.end.position;
     vec![
         row("steps", &format!("{}{rejected}", outcome.statistics.steps)),
         row("CPU time", &format!("{} to run{choosing}", words::work(scene_run.running_s))),
-        row("end", &format!("x {:.6}, y {:.6}, z {:.6} m", p.x, p.y, p.z)),
     ]
 }
 

@@ -21,6 +21,9 @@ fn digits(value: f64) -> String {
 
 /// Formats metres in scientific notation, with two digits.
 pub(super) fn metres(value: f64) -> String {
+    if !value.is_finite() {
+        return "no limit".to_owned();
+    }
     format!("{value:.1e} m")
 }
 
