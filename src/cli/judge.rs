@@ -7,7 +7,7 @@ use std::path::Path;
 use super::errors::{InputError, read};
 use crate::judging::Judging;
 use crate::wire::asset;
-use crate::wire::session_csv::{RowError, SessionCsvReader};
+use crate::wire::session_file::{self, RowPlace, SessionRowError, SessionRows};
 use crate::wire::verdict::{FaultView, SummaryView, fault_view};
 use offbd_core::diagnosis::{FaultMemory, Profile, ServoEstimate};
 use offbd_core::engine::{Admission, Input, Misfit, Rig, Setup};
@@ -22,8 +22,8 @@ pub(super) const MAX_NAMED_ROWS: usize = 5;
 pub(super) struct JudgedSession {
     pub faults: Vec<FaultView>,
     pub summary: SummaryView,
-    /// The first [`MAX_NAMED_ROWS`] rejected rows.
-    pub bad_rows: Vec<RowError>,
+    /// The first [`MAX_NAMED_ROWS`] rejected rows: place and reason.
+    pub bad_rows: Vec<String>,
     /// Rows that are not judged: their time was too late, or a step of the clock that no
     /// other row confirmed.
     pub n_set_aside: u64,
@@ -56,28 +56,31 @@ pub(super) fn judge_file(setup: &Setup, path: &Path) -> Result<JudgedSession, In
     let mut session = FileSession::new(setup.clone(), session_name(path));
     while let Some(row) = rows.next() {
         match row {
-            Ok(sample) => session.sample(sample, rows.line()),
-            Err(error) => session.reject(error),
+            Ok(sample) => session.sample(sample, || rows.place()),
+            Err(SessionRowError::Rejected(reason)) => session.reject(reason),
+            Err(error) => return Err(InputError::file(path, error)),
         }
     }
     session.end().map_err(|reason| InputError::file(path, reason))
 }
 
 /// Reads the samples of the session file at `path`, and the errors of its invalid rows.
-pub(super) fn read_samples(path: &Path) -> Result<(Vec<Sample>, Vec<RowError>), InputError> {
+pub(super) fn read_samples(path: &Path) -> Result<(Vec<Sample>, Vec<String>), InputError> {
     let (mut samples, mut bad_rows) = (Vec::new(), Vec::new());
     for row in open(path)? {
         match row {
             Ok(sample) => samples.push(sample),
-            Err(error) => bad_rows.push(error),
+            Err(SessionRowError::Rejected(reason)) => bad_rows.push(reason),
+            Err(error) => return Err(InputError::file(path, error)),
         }
     }
     Ok((samples, bad_rows))
 }
 
-fn open(path: &Path) -> Result<SessionCsvReader<File>, InputError> {
+/// Opens the session file at `path`, whatever its format.
+pub(super) fn open(path: &Path) -> Result<Box<dyn SessionRows>, InputError> {
     let file = File::open(path).map_err(|e| InputError::file(path, e))?;
-    SessionCsvReader::new(file).map_err(|e| InputError::file(path, e))
+    session_file::open(file, None).map_err(|e| InputError::file(path, e))
 }
 
 /// The judgement of a session file.
@@ -85,7 +88,7 @@ struct FileSession {
     name: String,
     judging: Judging,
     faults: Vec<FaultView>,
-    bad_rows: Vec<RowError>,
+    bad_rows: Vec<String>,
     n_rejected: u64,
 }
 
@@ -95,21 +98,21 @@ impl FileSession {
         Self { name, judging, faults: Vec::new(), bad_rows: Vec::new(), n_rejected: 0 }
     }
 
-    fn reject(&mut self, error: RowError) {
+    fn reject(&mut self, reason: String) {
         self.n_rejected += 1;
         if self.bad_rows.len() < MAX_NAMED_ROWS {
-            self.bad_rows.push(error);
+            self.bad_rows.push(reason);
         }
     }
 
-    fn sample(&mut self, sample: Sample, line: u64) {
+    fn sample(&mut self, sample: Sample, place: impl FnOnce() -> RowPlace) {
         let admission = match self.judging.sample(sample) {
             // Rows as old as this are no retransmissions in a recording.
             Admission::Unknown => self.judging.new_sample(sample),
             admission => admission,
         };
         if let Admission::Rejected(reason) = admission {
-            self.reject(RowError { line, reason: reason.to_string() });
+            self.reject(format!("{}: {reason}", place()));
         }
         self.note_faults();
     }

@@ -29,6 +29,7 @@ mod problem;
 mod rates;
 mod replays;
 mod routes;
+mod session_format;
 mod sessions;
 mod stream;
 mod telemetry;

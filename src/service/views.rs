@@ -13,6 +13,7 @@ use crate::wire::asset;
 use crate::wire::memory;
 use crate::wire::provenance::ProvenanceView;
 use crate::wire::service::{FaultEntryView, Page, SessionView};
+use crate::wire::session_file::SessionInfo;
 use crate::wire::stored::{StoredMemory, StoredProvenance, StoredRecord};
 use offbd_core::diagnosis::{FaultMemory, FaultRecord, MemoryRules};
 use offbd_core::engine::Rig;
@@ -52,6 +53,16 @@ pub(super) fn fault(row: FaultRow) -> Result<FaultEntryView, ServiceError> {
         asset: row.asset,
         changed_at: rfc3339(row.changed_at),
         monitor: None,
+    })
+}
+
+/// What a file says about the session, beside its samples.
+pub(super) fn session_info(row: &SessionRow) -> Result<SessionInfo, ServiceError> {
+    Ok(SessionInfo {
+        session: row.name.clone(),
+        asset_file: Some(row.setup.clone()),
+        calibration_id: rig(&row.setup)?.calibration.as_ref().map(asset::calibration_id),
+        verdict_hash: row.verdict_hash.clone(),
     })
 }
 

@@ -22,6 +22,7 @@ pub mod recording;
 pub mod scene;
 pub mod service;
 pub mod session_csv;
+pub mod session_file;
 pub mod stored;
 pub mod telemetry;
 pub mod trace;

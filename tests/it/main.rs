@@ -14,6 +14,7 @@ mod crash;
 mod damage;
 mod engine_snapshot;
 mod fault_memory;
+mod formats;
 mod fuzz;
 mod journal;
 mod jwt;

@@ -5,7 +5,7 @@ use offbd::service::access::Role;
 use offbd::service::access::jwt::{KeySet, MAX_SUBJECT, verify};
 use offbd::store::codec::ChunkKey;
 use offbd::wire::telemetry::{self, Batch, BatchError};
-use offbd::wire::{asset, scene, session_csv};
+use offbd::wire::{asset, scene, session_csv, session_file};
 use offbd_core::diagnosis::FaultMemory;
 use offbd_core::engine::{Engine, Input, Rig, Setup, calibrate};
 use offbd_core::vocabulary::Sample;
@@ -15,11 +15,12 @@ use crate::support::provider::{self, Key};
 pub type Parser = fn(&[u8]) -> String;
 
 /// Every parser, with the directory of its corpus.
-pub const PARSERS: [(&str, Parser); 11] = [
+pub const PARSERS: [(&str, Parser); 12] = [
     ("json", |input| batch(telemetry::json(input, LIMIT))),
     ("msgpack", |input| batch(telemetry::msgpack(input, LIMIT))),
     ("ndjson", |input| batch(telemetry::ndjson(input, LIMIT))),
     ("csv", |input| batch(telemetry::csv(input, LIMIT))),
+    ("session_file", session_file),
     ("calibration", calibration),
     ("asset", asset_file),
     ("scene", scene_file),
@@ -40,6 +41,24 @@ const MAX_REASON_BYTES: usize = 300;
 fn kind(text: &str) -> String {
     let words = text.split(|c: char| !c.is_ascii_alphabetic() && c != '_');
     words.filter(|word| word.len() > 1).take(12).collect::<Vec<_>>().join(" ")
+}
+
+/// Reads a file of any format that the build has, and as many rows of it as of a batch.
+fn session_file(input: &[u8]) -> String {
+    let rows = match session_file::open(std::io::Cursor::new(input.to_vec()), None) {
+        Ok(rows) => rows,
+        Err(error) => return kind(&error.to_string()),
+    };
+    let mut samples = Vec::new();
+    for row in rows.take(LIMIT) {
+        match row {
+            Ok(sample) => samples.push(sample),
+            Err(error) => return kind(&error.to_string()),
+        }
+    }
+    assert!(samples.iter().all(is_finite), "{samples:?}");
+    judge(&samples);
+    "rows".to_owned()
 }
 
 fn batch(read: Result<Batch, BatchError>) -> String {
