@@ -73,10 +73,11 @@ fn a_name_is_found_in_code_but_not_in_comments() {
 
 /// Source folders of the crates, and names that may occur twice in them: `Traces` is one
 /// type with, and another without, the feature `otel`.
-const CRATES: [(&str, &[&str]); 4] = [
+const CRATES: [(&str, &[&str]); 5] = [
     ("src", &["Traces"]),
     ("crates/offbd-core/src", &[]),
     ("crates/offbd-lab/src", &[]),
+    ("crates/offbd-python/src", &[]),
     ("crates/sqlite-checksums/src", &[]),
 ];
 
