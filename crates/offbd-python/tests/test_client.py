@@ -125,7 +125,8 @@ def test_nothing_is_lost_or_doubled_by_a_lossy_line_and_a_kill(
     again = client.replay(second.session_id)
     assert again["result"]["summary"]["verdict_hash"] == wanted.hash
     assert [fault["code"] for fault in client.faults("rig", status="confirmed")] == wanted.confirmed
-    events = client.events("rig", after=0)
+    # The proxy passes only whole answers on, and this one never ends.
+    events = offbd.Client(service.url).events("rig", after=0)
     seen = [next(events).data["t_s"] for _ in wanted.faults]
     assert seen == [fault["t_s"] for fault in wanted.faults]
     assert [session["id"] for session in client.sessions("rig")] == [second.session_id]
