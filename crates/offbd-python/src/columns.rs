@@ -30,7 +30,7 @@ use offbd_core::vocabulary::Sample;
 /// A recording in batches.
 pub(crate) enum Recording {
     Stream(RecordBatchStreamReader),
-    Whole(SampleColumns),
+    Whole(Box<SampleColumns>),
 }
 
 /// Why the columns of a recording cannot be used.
@@ -68,10 +68,10 @@ impl Recording {
             return Ok(Self::Stream(stream(source)?));
         }
         if source.hasattr("__arrow_c_array__")? {
-            return Ok(Self::Whole(SampleColumns::of_batch(&record_batch(source)?)?));
+            return Ok(Self::Whole(Box::new(SampleColumns::of_batch(&record_batch(source)?)?)));
         }
         if let Ok(columns) = source.cast::<PyMapping>() {
-            return Ok(Self::Whole(SampleColumns::of_mapping(columns)?));
+            return Ok(Self::Whole(Box::new(SampleColumns::of_mapping(columns)?)));
         }
         Err(PyTypeError::new_err(format!(
             "a recording is a table with `__arrow_c_stream__` or `__arrow_c_array__`, or a \

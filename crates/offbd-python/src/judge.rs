@@ -35,7 +35,7 @@ struct EvidenceRows(Vec<(f64, PerAxis<AxisEvidence>)>);
 impl EvidenceRows {
     fn take(&mut self, evidence: &Evidence) {
         if let Some(at) = evidence.at {
-            self.0.push((at.seconds(), evidence.axes.clone()));
+            self.0.push((at.seconds(), evidence.axes));
         }
     }
 
