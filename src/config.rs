@@ -5,6 +5,8 @@
 //! It is one typed structure, which is checked completely at the start. An error names
 //! the key. Unknown keys are errors in the file and in the environment.
 
+mod bus;
+
 use std::net::{IpAddr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -12,6 +14,7 @@ use std::time::Duration;
 use config::{Environment, File, FileFormat};
 use serde::Deserialize;
 
+pub use self::bus::{BrokerAddress, MqttConfig, NatsConfig};
 use crate::service::access::jwt::ExpectedClaims;
 use crate::service::{Limits, Retention, SessionLimits};
 use crate::store::Location;
@@ -38,6 +41,10 @@ pub struct Config {
     pub tls: Option<TlsConfig>,
     /// The identity provider whose tokens are accepted, if any.
     pub jwt: Option<JwtConfig>,
+    /// The NATS server whose devices are served, if any.
+    pub nats: Option<NatsConfig>,
+    /// The MQTT broker whose devices are served, if any.
+    pub mqtt: Option<MqttConfig>,
     pub log: LogConfig,
     pub traces: TracesConfig,
     pub limits: LimitsConfig,
@@ -323,6 +330,8 @@ impl Default for Config {
             origins: Vec::new(),
             tls: None,
             jwt: None,
+            nats: None,
+            mqtt: None,
             log: LogConfig::default(),
             traces: TracesConfig::default(),
             limits: LimitsConfig::default(),
@@ -482,6 +491,8 @@ impl Config {
             return Err(ConfigError::Invalid { key: "log.level", reason: error.to_string() });
         }
         self.traces.check()?;
+        self.nats.as_ref().map_or(Ok(()), NatsConfig::check)?;
+        self.mqtt.as_ref().map_or(Ok(()), |mqtt| mqtt.check(self.nats.is_some()))?;
         self.retention.check()?;
         self.location().map(drop)
     }

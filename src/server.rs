@@ -2,6 +2,7 @@
 //! graceful stop. Also the functions behind the commands `migrate`, `check`, `backup`,
 //! `restore` and `token`.
 
+mod buses;
 mod connections;
 mod keys;
 mod listen;
@@ -43,6 +44,8 @@ pub struct Server {
     closing: CancellationToken,
     deadline: Duration,
     serving: JoinHandle<()>,
+    /// What serves devices over NATS and MQTT.
+    buses: Vec<JoinHandle<()>>,
     store: Store,
     workers: Workers,
     /// The lock file of an SQLite database, locked until the store is closed. `None` for
@@ -84,6 +87,7 @@ pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Ser
     let budget = BodyBudget::new(config.limits.bodies_bytes);
     let policy = Arc::new(policy(&config)?);
     warn_of_access(&config, &policy, &store).await?;
+    let buses = buses::start(&config, &service, &closing).await?;
     tokio::spawn(rebuild(service.clone(), closing.clone()));
     let app = App { service, budget, policy, closing: closing.clone(), demo: demo.is_some() };
     let router = http::router(app, demo.unwrap_or_default());
@@ -95,7 +99,7 @@ pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Ser
     tokio::spawn(keep_threads(closing.clone()));
     tracing::info!(%address, store = %store.location(), "serving");
     let deadline = Duration::from_secs(config.limits.shutdown_s);
-    Ok(Server { address, closing, deadline, serving, store, workers, lock })
+    Ok(Server { address, closing, deadline, serving, buses, store, workers, lock })
 }
 
 /// Rebuilds the engines of long recordings while requests are served already.
@@ -181,11 +185,16 @@ impl Server {
     /// If that takes longer than `limits.shutdown_s`. Everything acknowledged is durable
     /// in any case.
     pub async fn shutdown(self) -> Result<()> {
-        let Self { closing, deadline, serving, store, workers, lock, .. } = self;
+        let Self { closing, deadline, serving, buses, store, workers, lock, .. } = self;
         closing.cancel();
         workers.close();
         let finish = async {
             let served = serving.await;
+            for bus in buses {
+                if bus.await.is_err() {
+                    tracing::error!("what serves devices over NATS or MQTT panicked");
+                }
+            }
             workers.finish().await;
             store.close().await;
             drop(lock);
@@ -274,6 +283,7 @@ pub async fn restore(config: &Config, file: &Path, replace: bool) -> Result<Stri
 /// Names the first invalid key.
 pub fn check(config: &Config) -> Result<String> {
     config.check()?;
+    buses::check(config)?;
     Ok(format!(
         "listen   {}\naccess   {}, {}\nstore    {}\nlog      {:?}, {}\nworkers  {} shards",
         config.listen,

@@ -2,6 +2,7 @@
 
 use super::codec::ChunkKey;
 use super::query_builder::QueryBuilder;
+use super::write::published_counter;
 use super::{
     ActionRow, AssetRow, CalibrationRow, EventRow, FaultRow, Micros, ReplayRow, SessionRow, Store,
     StoreError, TransitionRow, TrendEntry, decode_chunk,
@@ -421,6 +422,12 @@ impl Store {
         Ok(sqlx::query_scalar("SELECT value FROM counter WHERE name = 'event'")
             .fetch_one(&self.pool)
             .await?)
+    }
+
+    /// The id of the last event that was published on a bus; `None` before the first one.
+    pub async fn published(&self, bus: &str) -> Result<Option<i64>, StoreError> {
+        let query = sqlx::query_scalar("SELECT value FROM counter WHERE name = $1");
+        Ok(query.bind(published_counter(bus)).fetch_optional(&self.pool).await?)
     }
 
     /// Faults that match `filter`.

@@ -118,6 +118,11 @@ pub enum Write {
         asset: String,
         document: String,
     },
+    /// Stores the last event that was published on a bus.
+    Published {
+        bus: &'static str,
+        event: i64,
+    },
     Access(AccessWrite),
 }
 
@@ -451,6 +456,7 @@ impl GroupCommit<'_> {
             Write::PutCalibration(row) => put_calibration(db, row).await,
             Write::ActivateCalibration { asset, id } => activate(db, asset, id).await,
             Write::PutLearning { asset, document } => put_learning(db, asset, document).await,
+            Write::Published { bus, event } => published(db, bus, *event).await,
             Write::Access(write) => write.apply(db).await,
             Write::CreateAsset(row) => create_asset(db, row).await,
             Write::UpdateAsset(row) => update_asset(db, row).await,
@@ -738,4 +744,16 @@ async fn put_learning(
         .execute(db)
         .await?;
     Ok(())
+}
+
+async fn published(db: &mut AnyConnection, bus: &str, event: i64) -> Result<(), StoreError> {
+    let sql = "INSERT INTO counter (name, value) VALUES ($1, $2)
+        ON CONFLICT (name) DO UPDATE SET value = excluded.value";
+    sqlx::query(sql).bind(published_counter(bus)).bind(event).execute(db).await?;
+    Ok(())
+}
+
+/// Returns the name of the counter of the last event that was published on a bus.
+pub(super) fn published_counter(bus: &str) -> String {
+    format!("published_{bus}")
 }

@@ -9,10 +9,12 @@
 pub mod access;
 pub mod asset;
 pub mod basis;
+pub mod bus;
 pub mod certificate;
 pub mod difference;
 pub mod drive_cycle;
 pub mod learning;
+pub mod mapping;
 pub mod memory;
 #[cfg(feature = "lab")]
 mod preset;

@@ -9,6 +9,8 @@ mod arrival;
 mod backup;
 mod bad_input;
 mod bounds;
+#[cfg(all(feature = "nats", feature = "mqtt"))]
+mod bus;
 mod cli;
 mod crash;
 mod damage;

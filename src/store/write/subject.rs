@@ -35,6 +35,7 @@ impl Write {
                 format!("the active calibration of asset `{asset}`")
             }
             Self::PutLearning { asset, .. } => format!("the learning record of asset `{asset}`"),
+            Self::Published { bus, .. } => format!("the last event published over {bus}"),
             Self::Access(_) => "a change of tokens, logins or the audit log".to_owned(),
         }
     }

@@ -2,6 +2,10 @@
 
 #![allow(dead_code, reason = "each test uses a part")]
 
+#[cfg(all(feature = "nats", feature = "mqtt"))]
+pub mod broker;
+#[cfg(all(feature = "nats", feature = "mqtt"))]
+pub mod bus_device;
 #[cfg(unix)]
 pub mod calls;
 pub mod device;
