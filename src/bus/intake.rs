@@ -142,21 +142,21 @@ impl Intake {
         payload: Bytes,
         receipt: R,
         waits: bool,
-    ) -> Result<(), (String, R, BatchAnswer)> {
+    ) -> Result<(), (String, R, Box<BatchAnswer>)> {
         let limit = self.service.limits().batch_bytes;
         if payload.len() > limit {
             let error = ServiceError::TooMany { what: "bytes in one message", limit };
-            return Err((asset, receipt, self.refused(error)));
+            return Err((asset, receipt, Box::new(self.refused(error))));
         }
         let busy = ServiceError::Busy { what: "too many messages wait to be parsed" };
         let size = u32::try_from(payload.len()).unwrap_or(u32::MAX);
         let Ok(room) = self.bytes.clone().try_acquire_many_owned(size) else {
-            return Err((asset, receipt, self.refused(busy)));
+            return Err((asset, receipt, Box::new(self.refused(busy))));
         };
         let delivery = Delivery { asset, form, payload, receipt, waits, room };
         queue.try_send(delivery).map_err(|error| {
             let delivery = error.into_inner();
-            (delivery.asset, delivery.receipt, self.refused(busy))
+            (delivery.asset, delivery.receipt, Box::new(self.refused(busy)))
         })
     }
 

@@ -229,7 +229,7 @@ impl NatsBus {
             if let Err((asset, receipt, answer)) =
                 intake.queue(&sender, addressed, payload, reply, false)
             {
-                client.answer(&asset, receipt, Some(answer)).await;
+                client.answer(&asset, receipt, Some(*answer)).await;
             }
         }
     }

@@ -261,29 +261,6 @@ pub fn openapi_yaml() -> String {
     openapi().to_yaml().unwrap_or_else(|error| format!("# {error}\n"))
 }
 
-/// What goes over streams: WebSockets, Server-Sent Events, NATS and MQTT.
-#[derive(OpenApi)]
-#[openapi(components(schemas(
-    crate::wire::bus::BatchAckView,
-    crate::wire::bus::BatchRefusalView,
-    crate::wire::bus::FaultMessageView,
-    crate::wire::bus::HelloView,
-    crate::wire::bus::PresenceWord,
-    crate::wire::service::EventView,
-    crate::wire::telemetry::RowsView,
-    events::MessageView,
-    stream::FrameView,
-)))]
-struct StreamSchemas;
-
-/// Returns the section `components` of `asyncapi.yaml`: the schemas of what goes over streams.
-#[must_use]
-pub fn stream_schemas_yaml() -> String {
-    let document = StreamSchemas::openapi().to_yaml();
-    let yaml = document.unwrap_or_else(|error| format!("# {error}\n"));
-    yaml.find("components:").map_or_else(String::new, |start| yaml[start..].to_owned())
-}
-
 /// Returns the router of everything that is served: the API, its description, the
 /// dashboard, and `extra`.
 pub fn router(app: App, extra: ExtraRoutes) -> Router {
