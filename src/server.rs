@@ -3,6 +3,7 @@
 //! `restore` and `token`.
 
 mod connections;
+mod delivery;
 mod keys;
 mod listen;
 mod tls;
@@ -23,6 +24,7 @@ use tokio::net::TcpListener;
 use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
 
+use self::delivery::Senders;
 use self::keys::KeyRefresher;
 use self::listen::HttpListener;
 use self::tls::Tls;
@@ -79,11 +81,13 @@ pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Ser
         .with_context(|| format!("`listen`: cannot listen on {}", config.listen))?;
     let address = listener.local_addr()?;
     let limits = config.service_limits();
+    let senders = Senders::new(&limits.notifications);
     let (service, workers) = Service::start(store.clone(), writer, limits, provider).await?;
     let closing = CancellationToken::new();
     let budget = BodyBudget::new(config.limits.bodies_bytes);
     let policy = Arc::new(policy(&config)?);
     warn_of_access(&config, &policy, &store).await?;
+    tokio::spawn(service.notifier(senders).run());
     tokio::spawn(rebuild(service.clone(), closing.clone()));
     let app = App { service, budget, policy, closing: closing.clone(), demo: demo.is_some() };
     let router = http::router(app, demo.unwrap_or_default());

@@ -55,7 +55,7 @@ pub(super) struct ActorQuery {
 const MAX_ACTOR: usize = 100;
 
 impl ActorQuery {
-    fn actor(self, caller: &Caller) -> String {
+    pub(super) fn actor(self, caller: &Caller) -> String {
         let name = caller.name().map(str::to_owned).or(self.by);
         let mut actor = name.unwrap_or_else(|| "unknown".to_owned());
         while actor.len() > MAX_ACTOR {

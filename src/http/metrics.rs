@@ -43,8 +43,11 @@ const METRICS: &[(&str, MetricKind, &str)] = &[
     ("offbd_commit_seconds", Seconds, "Duration of a commit"),
     ("offbd_commit_sets", Sizes, "Write sets in a commit"),
     ("offbd_commits_total", Counter, "Successful commits"),
+    ("offbd_communication_lost", Gauge, "Rigs with an open session whose data stay away"),
     ("offbd_connections", Gauge, "Open connections"),
     ("offbd_connections_refused_total", Counter, "Connections refused at the limit"),
+    ("offbd_deliveries_given_up_total", Counter, "Notifications given up, by kind of channel"),
+    ("offbd_delivery_attempts_total", Counter, "Attempts to deliver, by channel and result"),
     ("offbd_engines", Gauge, "Engines in memory, by shard"),
     ("offbd_fault_changes_total", Counter, "Durable fault transitions, by code and status"),
     ("offbd_http_request_seconds", Seconds, "Time until a response starts, by path"),
@@ -157,6 +160,14 @@ fn initialize_series() {
             counter!("offbd_fault_changes_total", "code" => code, "status" => status).absolute(0);
         }
     }
+    zero("offbd_deliveries_given_up_total", "channel", &["webhook", "email"]);
+    for channel in ["webhook", "email"] {
+        for result in ["delivered", "failed"] {
+            counter!("offbd_delivery_attempts_total", "channel" => channel, "result" => result)
+                .absolute(0);
+        }
+    }
+    gauge!("offbd_communication_lost").set(0.0);
     gauge!("offbd_ingest_stalled").set(0.0);
     gauge!("offbd_journal_bytes").set(0.0);
     gauge!("offbd_streams").set(0.0);

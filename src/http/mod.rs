@@ -8,6 +8,7 @@
 //! `guard` (authentication, authorization, rate limits, audit log), and the handler.
 //! The routes and the right that each requires are listed in `api`.
 
+mod alarms;
 mod assets;
 mod body;
 mod calibrations;
@@ -23,6 +24,7 @@ mod learning;
 mod login;
 mod metrics;
 mod negotiate;
+mod notifications;
 mod operations;
 mod page;
 mod problem;
@@ -93,11 +95,17 @@ impl FromRef<App> for Service {
             Lengths are in metres, angles in radians, sample times in seconds on the device's \
             clock. Timestamps of the service are RFC 3339.",
     ),
-    components(schemas(crate::wire::service::EventView)),
+    components(schemas(
+        crate::wire::service::EventView,
+        crate::wire::alarm::CommunicationView,
+        crate::wire::notification::NotificationView
+    )),
     tags(
         (name = "assets", description = "The registry of rigs"),
         (name = "telemetry", description = "Ingest of samples"),
         (name = "faults", description = "Fault memory"),
+        (name = "alarms", description = "What fails in the fleet, mutes, and what to do"),
+        (name = "notifications", description = "Who is told of it: channels, rules, deliveries"),
         (name = "sessions", description = "Recordings"),
         (name = "access", description = "Tokens, logins, the audit log"),
         (name = "operation", description = "Health and metrics"),
@@ -214,6 +222,21 @@ fn api() -> GuardedRouter {
         .routes(Read, routes!(faults::recording))
         .routes(Read, routes!(faults::history))
         .routes(Read, routes!(faults::of_fleet))
+        .routes(Read, routes!(alarms::list))
+        .routes(Operate, routes!(alarms::acknowledge))
+        .routes(Read, routes!(alarms::advice))
+        .routes(Operate, routes!(alarms::put_note))
+        .routes(ReadAsset, routes!(alarms::mutes))
+        .routes(Operate, routes!(alarms::mute, alarms::unmute))
+        .routes(Administer, routes!(notifications::channels, notifications::create_channel))
+        .routes(Administer, routes!(notifications::channel, notifications::put_channel))
+        .routes(Administer, routes!(notifications::delete_channel))
+        .routes(Administer, routes!(notifications::test))
+        .routes(Read, routes!(notifications::rules))
+        .routes(Administer, routes!(notifications::create_rule))
+        .routes(Administer, routes!(notifications::put_rule, notifications::delete_rule))
+        .routes(Read, routes!(notifications::deliveries))
+        .routes(Read, routes!(notifications::delivery))
         .routes(ReadAsset, routes!(events::events))
         .routes(ControlSessions, routes!(sessions::open))
         .routes(Operate, routes!(sessions::import))

@@ -45,6 +45,9 @@
 //! - `jobs`: background jobs (replays and calibrations).
 //! - `reanalysis`: evaluates a recording again for plots and for the recording of a
 //!   fault, without storing anything.
+//! - `notifications`: tells people of changes of faults.
+//! - `communication`: finds rigs whose data stay away.
+//! - `mutes`: the monitors that a person has muted.
 //! - `upkeep`: deletion in parts, retention, the watchdog of ingest.
 //! - `simulation`, a test: the whole service without threads, with devices and faults.
 //! - [`access`]: roles and rights, tokens, JSON Web Tokens, audit entries.
@@ -55,10 +58,13 @@
 pub mod access;
 mod asset;
 mod clock;
+mod communication;
 mod error;
 mod job;
 mod jobs;
 mod limits;
+mod mutes;
+mod notifications;
 mod playback;
 mod reanalysis;
 mod replay_settings;
@@ -73,10 +79,15 @@ mod writing;
 
 pub use crate::store::RecordingReader;
 pub use clock::{Clock, parse_timestamp};
+pub use communication::CommunicationSettings;
 pub use error::ServiceError;
 pub use limits::{Limits, RETRY_AFTER_S, Retention, SessionLimits};
+pub use notifications::settings::key as webhook_key;
+pub use notifications::{
+    NotificationSettings, NotificationTransport, Notifier, SendOutcome, TargetPolicy,
+};
 pub use reanalysis::fault_recording::RecordingWindow;
 pub use reanalysis::trace::{MAX_TRACE_POINTS, TraceQuery};
-pub use requests::{FaultQuery, PendingBatch, QueueLoad};
+pub use requests::{AlarmQuery, DeliveryQuery, FaultQuery, PendingBatch, QueueLoad};
 pub use start::{Service, Workers};
-pub use writing::{Event, EventFeed};
+pub use writing::{Event, EventFeed, EventKind};

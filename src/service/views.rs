@@ -102,12 +102,14 @@ pub(super) fn page<R, V, K: Serialize>(
 ) -> Result<Page<V>, ServiceError> {
     let has_next = rows.len() > limit as usize;
     rows.truncate(limit as usize);
-    let next = match rows.last().filter(|_| has_next) {
-        Some(last) => Some(HEXLOWER.encode(to_json(&key(last))?.as_bytes())),
-        None => None,
-    };
+    let next = rows.last().filter(|_| has_next).map(|last| to_cursor(&key(last))).transpose()?;
     let items = rows.into_iter().map(view).collect::<Result<_, _>>()?;
     Ok(Page { items, next })
+}
+
+/// Encodes a key as a cursor.
+pub(super) fn to_cursor<K: Serialize>(key: &K) -> Result<String, ServiceError> {
+    Ok(HEXLOWER.encode(to_json(key)?.as_bytes()))
 }
 
 /// Decodes the key in a cursor that [`page`] returned.

@@ -349,9 +349,11 @@ impl Store {
     ) -> Result<Vec<EventRow>, StoreError> {
         let mut query = QueryBuilder::new("");
         for select in [
-            "SELECT id, asset, session, document FROM transition WHERE id > ",
-            " UNION ALL SELECT id, asset, session, event FROM action
+            "SELECT id, 'fault' AS kind, asset, session, document FROM transition WHERE id > ",
+            " UNION ALL SELECT id, 'fault', asset, session, event FROM action
              WHERE event IS NOT NULL AND id > ",
+            " UNION ALL SELECT id, 'communication', asset, session, document
+             FROM communication_change WHERE id > ",
         ] {
             query.push(select).bind(after)?;
             if let Some(asset) = asset {

@@ -30,9 +30,9 @@ use super::multi_row::{MultiRowStatement, in_parts};
 use super::tail::{Run, Tails};
 use super::writer_lock::Backend;
 use super::{
-    AccessWrite, ActionRow, AssetRow, CalibrationRow, FaultRow, Location, MIGRATIONS, Micros,
-    ReplayRow, SessionProgress, SessionRow, Snapshot, StoreError, TransitionRow, TrendRow,
-    snapshot,
+    AccessWrite, ActionRow, AlarmWrite, AssetRow, CalibrationRow, CommunicationChange, FaultRow,
+    Location, MIGRATIONS, Micros, NotificationWrite, ReplayRow, SessionProgress, SessionRow,
+    Snapshot, StoreError, TransitionRow, TrendRow, alarm, snapshot,
 };
 use offbd_core::vocabulary::Sample;
 
@@ -119,6 +119,10 @@ pub enum Write {
         document: String,
     },
     Access(AccessWrite),
+    Alarm(AlarmWrite),
+    Notification(NotificationWrite),
+    /// Data of a rig stay away or come back; an event.
+    Communication(CommunicationChange),
 }
 
 /// What a writer may do.
@@ -452,6 +456,15 @@ impl GroupCommit<'_> {
             Write::ActivateCalibration { asset, id } => activate(db, asset, id).await,
             Write::PutLearning { asset, document } => put_learning(db, asset, document).await,
             Write::Access(write) => write.apply(db).await,
+            Write::Alarm(write) => write.apply(db).await,
+            Write::Notification(write) => write.apply(db).await,
+            Write::Communication(row) => {
+                row.id = self.next_id();
+                if !alarm::change_communication(db, row).await? {
+                    row.id = 0;
+                }
+                Ok(())
+            }
             Write::CreateAsset(row) => create_asset(db, row).await,
             Write::UpdateAsset(row) => update_asset(db, row).await,
             Write::OpenSession(row) => open_session(db, row).await,

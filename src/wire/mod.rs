@@ -7,6 +7,8 @@
 //! here uses sockets or SQL.
 
 pub mod access;
+pub mod advice;
+pub mod alarm;
 pub mod asset;
 pub mod basis;
 pub mod certificate;
@@ -14,6 +16,7 @@ pub mod difference;
 pub mod drive_cycle;
 pub mod learning;
 pub mod memory;
+pub mod notification;
 #[cfg(feature = "lab")]
 mod preset;
 pub mod provenance;

@@ -4,6 +4,7 @@
 #![allow(unreachable_pub, clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod access;
+mod alarms;
 mod architecture;
 mod arrival;
 mod backup;
@@ -22,6 +23,7 @@ mod liveness;
 mod main_job;
 mod monitoring;
 mod network;
+mod notifications;
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 mod one_failure;
 mod openapi;

@@ -14,7 +14,7 @@ pub const JOURNAL: usize = 6;
 const CHECKSUMS: usize = 10;
 
 /// All tables, those first to which others refer.
-const TABLES: [&str; 15] = [
+const TABLES: [&str; 23] = [
     "asset",
     "session",
     "chunk",
@@ -30,6 +30,14 @@ const TABLES: [&str; 15] = [
     "trend",
     "journal",
     "snapshot",
+    "channel",
+    "rule",
+    "delivery",
+    "reminder",
+    "mute",
+    "communication",
+    "communication_change",
+    "note",
 ];
 
 fn migrations() -> Vec<PathBuf> {
@@ -142,7 +150,8 @@ async fn migrate(db: &mut AnyConnection, n: usize) {
         std::fs::copy(file, first.path().join(file.file_name().unwrap())).unwrap();
     }
     let migrator = Migrator::new(first.path()).await.unwrap();
-    assert_eq!(migrator.iter().map(|migration| migration.version).max(), Some(n as i64));
+    // Numbers may be left out.
+    assert_eq!(migrator.iter().count(), n);
     migrator.run_direct(None, db, false).await.unwrap();
 }
 

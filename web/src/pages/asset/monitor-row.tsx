@@ -1,4 +1,5 @@
 import type { Monitor } from "../../api/types";
+import { MuteButton } from "./mute-button";
 import { codeTitle } from "../../words/fault-names";
 import { judgedShare } from "../../words/verdict";
 
@@ -6,7 +7,8 @@ import { judgedShare } from "../../words/verdict";
 const PASSED = -128;
 const FAILED = 127;
 
-function resultText({ counter, enabled }: Monitor): string {
+function resultText({ counter, enabled, muted }: Monitor): string {
+  if (muted) return `not tested (muted by ${muted.by})`;
   if (counter === FAILED) return "failed";
   if (counter === PASSED) return "passed";
   return enabled ? "testing" : "not tested now";
@@ -17,13 +19,14 @@ function readinessText({ complete_this_cycle, complete_since_clear }: Monitor): 
   return complete_since_clear ? "no result in this session yet" : "no result yet";
 }
 
-function rowClass({ counter, enabled }: Monitor): string {
+function rowClass({ counter, enabled, muted }: Monitor): string {
+  if (muted) return "monitor off";
   const look = counter === FAILED ? "bad" : counter > 0 ? "warn" : "ok";
   return `monitor monitor-${look}${enabled ? "" : " off"}`;
 }
 
-export function MonitorRow({ monitor }: { monitor: Monitor }) {
-  const { code, counter, complete_this_cycle } = monitor;
+export function MonitorRow({ asset, monitor }: { asset: string; monitor: Monitor }) {
+  const { code, counter, complete_this_cycle, muted } = monitor;
   const readiness = readinessText(monitor);
   const share = (counter - PASSED) / (FAILED - PASSED);
   return (
@@ -41,8 +44,9 @@ export function MonitorRow({ monitor }: { monitor: Monitor }) {
       </meter>
       <span class="quiet">{resultText(monitor)}</span>
       <span class="ready" title={readiness} aria-label={readiness}>
-        {complete_this_cycle ? "✓" : "…"}
+        {complete_this_cycle && !muted ? "✓" : "…"}
       </span>
+      <MuteButton asset={asset} code={code} mute={muted} />
     </li>
   );
 }

@@ -10,12 +10,13 @@ const SILENT_MS = 10_000;
 const MAX_LINES = 50;
 
 export function healthOf(entry: FleetEntry, now: number): RigHealth {
-  const byFaults = healthByFaults(entry.faults);
+  const isMuted = (code: string) => entry.muted?.some((mute) => mute.code === code);
+  const byFaults = healthByFaults(entry.faults.filter((fault) => !isMuted(fault.code)));
   if (byFaults) return byFaults;
   if (entry.warnings.length) return "drift";
   if (!entry.session_id) return "idle";
   if (!entry.last_seen || now - Date.parse(entry.last_seen) >= SILENT_MS) return "silent";
-  return entry.unjudged ? "untested" : "ok";
+  return entry.unjudged || entry.muted?.length ? "untested" : "ok";
 }
 
 /** Returns the entry after an event. */
