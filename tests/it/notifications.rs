@@ -77,8 +77,9 @@ async fn validate_a_fault_arrives_as_a_signed_cloud_event() {
     let (channel, secret) = webhook(client, "hook", &receiver.url()).await;
     rule(client, &channel, json!({ "asset": "a", "codes": ["x_servo"] })).await;
     client.telemetry("a", Some("s"), &rig(2000, 300)).await;
-    let received = receiver.wait_for(1).await;
-    let confirmed = received.iter().find(|r| r.body.contains("fault.confirmed")).unwrap();
+    let is_confirmation = |received: &Received| received.body.contains("fault.confirmed");
+    let confirmed =
+        eventually(async || receiver.received().into_iter().find(is_confirmation)).await;
     let message = confirmed.message();
     for (key, value) in [
         ("specversion", "1.0"),
@@ -99,12 +100,12 @@ async fn validate_a_fault_arrives_as_a_signed_cloud_event() {
     assert!(data["summary"].as_str().unwrap().starts_with("a: x_servo"), "{data}");
     assert!((2..=3).contains(&data["advice"].as_array().unwrap().len()), "{data}");
 
-    assert!(is_signed(confirmed, &secret));
+    assert!(is_signed(&confirmed, &secret));
     let forged =
         Received { body: confirmed.body.replace("x_servo", "y_servo"), ..confirmed.clone() };
     assert!(!is_signed(&forged, &secret));
     let other = "whsec_AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA=";
-    assert!(!is_signed(confirmed, other));
+    assert!(!is_signed(&confirmed, other));
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -291,7 +292,7 @@ async fn no_answer_and_no_log_has_a_secret() {
         assert!(!text.contains("whsec") && !text.contains(&secret[6..]), "{path}: {text}");
     }
     let log = process.log();
-    assert!(log.contains("http"), "{log}");
+    assert!(log.contains("notifications/channels"), "{log}");
     assert!(!log.contains(&secret[6..]) && !log.contains("very-own-path"), "{log}");
     // A change without a secret keeps it.
     let renamed = json!({ "name": "other", "webhook": { "url": url } });

@@ -29,7 +29,7 @@ function channelOf(draft: Draft): NewChannel {
 
 export function ChannelForm({ made }: { made: (secret?: string | null) => void }) {
   const [draft, setDraft] = useState(EMPTY);
-  const field = (key: keyof Draft, word: string, type = "text") => (
+  const field = (key: keyof Draft, word: string, type: "text" | "url" | "number" | "password" = "text") => (
     <label>
       {word}
       <input
