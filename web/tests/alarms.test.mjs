@@ -46,7 +46,10 @@ test("alarms from before the page was opened are listed and acknowledged togethe
     assert.equal(fault.acknowledged, true, rig);
   }
   await view.getByRole("checkbox", { name: "Nobody has acknowledged" }).check();
-  await view.getByRole("link", { name: /X servo/ }).first().waitFor({ state: "detached" });
+  await view
+    .getByRole("link", { name: /X servo/ })
+    .first()
+    .waitFor({ state: "detached" });
   await view.done();
 });
 

@@ -33,7 +33,8 @@ export function ChannelForm({ made }: { made: (secret?: string | null) => void }
     <label>
       {word}
       <input
-        type={type}
+        // The types of a form differ in attributes that are not used here.
+        type={type as "text"}
         value={draft[key]}
         autocomplete="off"
         onInput={(e) => setDraft({ ...draft, [key]: e.currentTarget.value })}
