@@ -208,6 +208,3 @@ impl<T: NotificationTransport> Context<T> {
 pub(super) fn stored(row: &ChannelRow) -> Result<StoredChannel, ServiceError> {
     views::from_json(&row.document)
 }
-
-#[cfg(test)]
-mod tests;
