@@ -5,6 +5,7 @@
 //! It is one typed structure, which is checked completely at the start. An error names
 //! the key. Unknown keys are errors in the file and in the environment.
 
+mod bus;
 mod cluster;
 
 use std::net::{IpAddr, SocketAddr};
@@ -14,9 +15,12 @@ use std::time::Duration;
 use config::{Environment, File, FileFormat};
 use serde::{Deserialize, Serialize};
 
+pub use self::bus::{BrokerAddress, MqttConfig, NatsConfig};
 pub use self::cluster::ClusterConfig;
 use crate::service::access::jwt::ExpectedClaims;
-use crate::service::{Limits, Retention, SessionLimits};
+use crate::service::{
+    CommunicationSettings, Limits, NotificationSettings, Retention, SessionLimits, TargetPolicy,
+};
 use crate::store::Location;
 
 /// Name of the database file in the data directory.
@@ -43,12 +47,18 @@ pub struct Config {
     pub jwt: Option<JwtConfig>,
     /// The cluster that this process is a node of; `None` for one that works alone.
     pub cluster: Option<ClusterConfig>,
+    /// The NATS server whose devices are served, if any.
+    pub nats: Option<NatsConfig>,
+    /// The MQTT broker whose devices are served, if any.
+    pub mqtt: Option<MqttConfig>,
     pub log: LogConfig,
     pub traces: TracesConfig,
     pub limits: LimitsConfig,
     pub rates: RatesConfig,
     pub workers: WorkersConfig,
     pub retention: RetentionConfig,
+    pub communication: CommunicationConfig,
+    pub notifications: NotificationsConfig,
 }
 
 /// Whether requests need a token.
@@ -287,6 +297,100 @@ pub struct RetentionConfig {
     pub sweep_s: u64,
 }
 
+/// When the data of a rig count as lost. See [`CommunicationSettings`].
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct CommunicationConfig {
+    /// Silence of a rig with an open session after which its data count as lost, s.
+    pub lost_after_s: u64,
+    /// Time for which data must arrive to count as back, s.
+    pub back_after_s: u64,
+}
+
+impl Default for CommunicationConfig {
+    fn default() -> Self {
+        let CommunicationSettings { lost_after, back_after } = CommunicationSettings::default();
+        Self { lost_after_s: lost_after.as_secs(), back_after_s: back_after.as_secs() }
+    }
+}
+
+impl CommunicationConfig {
+    fn check(&self) -> Result<(), ConfigError> {
+        within_s("communication.lost_after_s", self.lost_after_s, 1, 86_400)?;
+        within_s("communication.back_after_s", self.back_after_s, 0, 86_400)
+    }
+
+    const fn settings(&self) -> CommunicationSettings {
+        CommunicationSettings {
+            lost_after: Duration::from_secs(self.lost_after_s),
+            back_after: Duration::from_secs(self.back_after_s),
+        }
+    }
+}
+
+/// How notifications are sent. See [`NotificationSettings`].
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct NotificationsConfig {
+    /// Address of the dashboard for links in messages: `https://HOST[:PORT]`.
+    pub public_url: Option<String>,
+    /// Patterns of the hosts to which messages may be sent, with `*` and `?`; all if empty.
+    pub targets: Vec<String>,
+    /// Whether messages may be sent to private and loopback addresses.
+    pub private_addresses: bool,
+    /// Time limit of one attempt, s.
+    pub timeout_s: u64,
+    /// Delay after the first failed attempt, s; it doubles with each further one.
+    pub first_retry_s: u64,
+    /// Age at which a message is given up, s.
+    pub give_up_after_s: u64,
+}
+
+impl Default for NotificationsConfig {
+    fn default() -> Self {
+        let settings = NotificationSettings::default();
+        Self {
+            public_url: None,
+            targets: settings.targets.hosts,
+            private_addresses: settings.targets.private_addresses,
+            timeout_s: settings.timeout.as_secs(),
+            first_retry_s: settings.first_retry.as_secs(),
+            give_up_after_s: settings.give_up_after.as_secs(),
+        }
+    }
+}
+
+impl NotificationsConfig {
+    fn check(&self) -> Result<(), ConfigError> {
+        within_s("notifications.timeout_s", self.timeout_s, 1, 60)?;
+        within_s("notifications.first_retry_s", self.first_retry_s, 1, 3600)?;
+        within_s("notifications.give_up_after_s", self.give_up_after_s, 1, 604_800)?;
+        let invalid = |key, reason: &str| Err(ConfigError::Invalid { key, reason: reason.into() });
+        if self.targets.iter().any(|pattern| pattern.is_empty() || pattern.contains(['/', ' '])) {
+            return invalid("notifications.targets", "has an entry that is not a host name");
+        }
+        match &self.public_url {
+            Some(url) if !is_origin(url) => {
+                invalid("notifications.public_url", "is not https://host or https://host:port")
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn settings(&self) -> NotificationSettings {
+        NotificationSettings {
+            public_url: self.public_url.clone(),
+            targets: TargetPolicy {
+                hosts: self.targets.clone(),
+                private_addresses: self.private_addresses,
+            },
+            timeout: Duration::from_secs(self.timeout_s),
+            first_retry: Duration::from_secs(self.first_retry_s),
+            give_up_after: Duration::from_secs(self.give_up_after_s),
+        }
+    }
+}
+
 impl Default for RetentionConfig {
     fn default() -> Self {
         let sweep_s = Retention::default().every.as_secs();
@@ -329,12 +433,16 @@ impl Default for Config {
             tls: None,
             jwt: None,
             cluster: None,
+            nats: None,
+            mqtt: None,
             log: LogConfig::default(),
             traces: TracesConfig::default(),
             limits: LimitsConfig::default(),
             rates: RatesConfig::default(),
             workers: WorkersConfig::default(),
             retention: RetentionConfig::default(),
+            communication: CommunicationConfig::default(),
+            notifications: NotificationsConfig::default(),
         }
     }
 }
@@ -427,7 +535,10 @@ impl Config {
             builder = builder.add_source(File::from(file).format(FileFormat::Toml));
         }
         let environment = environment.prefix_separator("_").separator("__").try_parsing(true);
-        let environment = environment.list_separator(",").with_list_parse_key("origins");
+        let environment = environment
+            .list_separator(",")
+            .with_list_parse_key("origins")
+            .with_list_parse_key("notifications.targets");
         let mut config: Self = builder.add_source(environment).build()?.try_deserialize()?;
         config.override_with(flags);
         config.check()?;
@@ -488,7 +599,11 @@ impl Config {
             return Err(ConfigError::Invalid { key: "log.level", reason: error.to_string() });
         }
         self.traces.check()?;
+        self.nats.as_ref().map_or(Ok(()), NatsConfig::check)?;
+        self.mqtt.as_ref().map_or(Ok(()), |mqtt| mqtt.check(self.nats.is_some()))?;
         self.retention.check()?;
+        self.communication.check()?;
+        self.notifications.check()?;
         let location = self.location()?;
         self.cluster.as_ref().map_or(Ok(()), |cluster| cluster.check(&location))
     }
@@ -538,6 +653,8 @@ impl Config {
             assets: self.limits.assets,
             body_timeout: Duration::from_secs(self.limits.body_timeout_s),
             retention: self.retention.retention(),
+            communication: self.communication.settings(),
+            notifications: self.notifications.settings(),
             ..Limits::default()
         }
     }
@@ -545,13 +662,22 @@ impl Config {
 
 /// Checks that `origin` is written as browsers do (RFC 6454, section 6.1).
 fn check_origin(origin: &str) -> Result<(), ConfigError> {
-    let host = origin.strip_prefix("https://").or_else(|| origin.strip_prefix("http://"));
-    let whole = |host: &str| !host.is_empty() && !host.contains(['/', '?', '#', '@', ' ', '*']);
-    if host.is_some_and(whole) && origin.chars().all(|c| c.is_ascii() && !c.is_ascii_uppercase()) {
+    if is_origin(origin) {
         return Ok(());
     }
     let reason = format!("contains `{origin}`; an origin is https://host or https://host:port");
     Err(ConfigError::Invalid { key: "origins", reason })
+}
+
+fn is_origin(origin: &str) -> bool {
+    let host = origin.strip_prefix("https://").or_else(|| origin.strip_prefix("http://"));
+    let whole = |host: &str| !host.is_empty() && !host.contains(['/', '?', '#', '@', ' ', '*']);
+    host.is_some_and(whole) && origin.chars().all(|c| c.is_ascii() && !c.is_ascii_uppercase())
+}
+
+/// Like [`within`], for seconds.
+fn within_s(key: &'static str, seconds: u64, least: usize, most: usize) -> Result<(), ConfigError> {
+    within(key, usize::try_from(seconds).unwrap_or(usize::MAX), least, most)
 }
 
 fn within(key: &'static str, value: usize, least: usize, most: usize) -> Result<(), ConfigError> {

@@ -3,7 +3,11 @@
 //!
 //! It combines an engine, the check of the data against the rig's description, the
 //! verdict, and counts of the samples. It has no access to the store, and of the formats
-//! only that of the summary.
+//! only those of the summary and the lines of faults.
+
+mod recorded;
+
+pub use recorded::{JudgedSession, MAX_NAMED_ROWS, NoUsableRow, RecordedSession};
 
 use offbd_core::diagnosis::{Evidence, FaultMemory, Transition};
 use offbd_core::engine::{Admission, Engine, Input, Misfit, Plausibility, Rejection, Setup};

@@ -23,12 +23,15 @@
 //!   PostgreSQL);
 //! - [`service`]: the engines of all assets, sessions, jobs, access control and events;
 //! - [`http`]: the HTTP and WebSocket interface;
+//! - `bus`, with the features `nats` and `mqtt`: devices over NATS and MQTT;
 //! - [`config`]: the configuration of the service;
 //! - [`server`]: the assembly of these parts, with TLS and limits on connections;
 //! - [`cli`]: the subcommands of the program `offbd`.
 //!
 //! `ARCHITECTURE.md` describes how they work together, `docs/notation.md` the terms.
 
+#[cfg(any(feature = "nats", feature = "mqtt"))]
+pub mod bus;
 pub mod cli;
 pub mod config;
 pub mod http;

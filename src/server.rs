@@ -2,7 +2,9 @@
 //! graceful stop. Also the functions behind the commands `migrate`, `check`, `backup`,
 //! `restore` and `token`.
 
+mod buses;
 mod connections;
+mod delivery;
 mod keys;
 mod listen;
 mod tls;
@@ -22,9 +24,10 @@ use std::time::Duration;
 use anyhow::{Context, Result, bail};
 use serde::Serialize;
 use tokio::net::TcpListener;
-use tokio::task::JoinSet;
+use tokio::task::{JoinHandle, JoinSet};
 use tokio_util::sync::CancellationToken;
 
+use self::delivery::Senders;
 use self::keys::KeyRefresher;
 use self::listen::HttpListener;
 use self::tls::Tls;
@@ -45,6 +48,8 @@ pub struct Server {
     closing: CancellationToken,
     deadline: Duration,
     serving: JoinSet<()>,
+    /// What serves devices over NATS and MQTT.
+    buses: Vec<JoinHandle<()>>,
     service: Service,
     store: Store,
     workers: Workers,
@@ -86,6 +91,7 @@ pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Ser
         .with_context(|| format!("`listen`: cannot listen on {}", config.listen))?;
     let address = listener.local_addr()?;
     let limits = config.service_limits();
+    let senders = Senders::new(&limits.notifications);
     let (service, workers) = match &node {
         None => Service::start(store.clone(), writer, limits, provider).await?,
         Some(NodeListener { identity, .. }) => {
@@ -97,6 +103,8 @@ pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Ser
     let budget = BodyBudget::new(config.limits.bodies_bytes);
     let policy = Arc::new(policy(&config)?);
     warn_of_access(&config, &policy, &store).await?;
+    tokio::spawn(service.notifier(senders).run());
+    let buses = buses::start(&config, &service, &closing).await?;
     tokio::spawn(rebuild(service.clone(), closing.clone()));
     let (leaving, demo_routes) = (service.clone(), demo.is_some());
     let app = App { service, budget, policy, closing: closing.clone(), demo: demo_routes };
@@ -114,7 +122,8 @@ pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Ser
     tokio::spawn(keep_threads(closing.clone()));
     tracing::info!(%address, store = %store.location(), "serving");
     let deadline = Duration::from_secs(config.limits.shutdown_s);
-    Ok(Server { address, closing, deadline, serving, service: leaving, store, workers, lock })
+    let service = leaving;
+    Ok(Server { address, closing, deadline, serving, buses, service, store, workers, lock })
 }
 
 /// Rebuilds the engines of long recordings while requests are served already.
@@ -223,7 +232,8 @@ impl Server {
     /// If that takes longer than `limits.shutdown_s`. Everything acknowledged is durable
     /// in any case.
     pub async fn shutdown(self) -> Result<()> {
-        let Self { closing, deadline, mut serving, service, store, workers, lock, .. } = self;
+        let Self { closing, deadline, mut serving, buses, service, store, workers, lock, .. } =
+            self;
         let finish = async {
             service.leave_cluster().await;
             drop(service);
@@ -232,6 +242,11 @@ impl Server {
             let mut served = Ok(());
             while let Some(ended) = serving.join_next().await {
                 served = served.and(ended);
+            }
+            for bus in buses {
+                if bus.await.is_err() {
+                    tracing::error!("what serves devices over NATS or MQTT panicked");
+                }
             }
             workers.finish().await;
             store.close().await;
@@ -351,6 +366,7 @@ impl fmt::Display for ConfigSummary {
 /// Names the first invalid key.
 pub fn check(config: &Config) -> Result<ConfigSummary> {
     config.check()?;
+    buses::check(config)?;
     Ok(ConfigSummary {
         listen: config.listen,
         requires_token: config.requires_token()?,

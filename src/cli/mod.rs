@@ -10,6 +10,7 @@ mod calibrate;
 mod completions;
 mod drive_cycle;
 mod errors;
+mod export;
 mod judge;
 #[cfg(feature = "lab")]
 mod lab;
@@ -69,6 +70,7 @@ enum CliCommand {
     Calibrate(calibrate::CalibrateArgs),
     Replay(replay::ReplayArgs),
     Trends(trends::TrendsArgs),
+    Export(export::ExportArgs),
     DriveCycle(drive_cycle::DriveCycleArgs),
     Serve(serve::ServeArgs),
     Watch(watch::WatchArgs),
@@ -113,6 +115,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         CliCommand::Calibrate(args) => calibrate::run(&args),
         CliCommand::Replay(args) => replay::run(&args),
         CliCommand::Trends(args) => trends::run(&args),
+        CliCommand::Export(args) => export::run(&args),
         CliCommand::DriveCycle(args) => drive_cycle::run(&args),
         CliCommand::Serve(args) => serve::serve(&args, &logging),
         CliCommand::Watch(args) => watch::run(&args),

@@ -4,7 +4,7 @@
 use std::fmt::Display;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Context;
@@ -47,6 +47,56 @@ pub(super) fn create(path: &Path) -> anyhow::Result<Box<dyn Write>> {
     }
     let file = File::create(path).with_context(|| path.display().to_string())?;
     Ok(Box::new(BufWriter::new(file)))
+}
+
+/// A file that appears at its path only once it is complete and durable. Until then it has a
+/// temporary name beside it, and it is removed if it is dropped.
+pub(super) struct NewFile {
+    file: BufWriter<File>,
+    path: PathBuf,
+    temporary: PathBuf,
+}
+
+impl NewFile {
+    /// Creates the temporary file for `path`.
+    pub(super) fn create(path: &Path) -> anyhow::Result<Self> {
+        let mut name = path.file_name().unwrap_or_default().to_owned();
+        name.push(format!(".{}.partial", std::process::id()));
+        let temporary = path.with_file_name(name);
+        let file = File::create(&temporary).with_context(|| temporary.display().to_string())?;
+        Ok(Self { file: BufWriter::new(file), path: path.to_owned(), temporary })
+    }
+
+    /// Gives the complete file its name.
+    pub(super) fn keep(mut self) -> anyhow::Result<()> {
+        let named = |path: &Path| path.display().to_string();
+        self.file.flush().with_context(|| named(&self.temporary))?;
+        self.file.get_ref().sync_all().with_context(|| named(&self.temporary))?;
+        std::fs::rename(&self.temporary, &self.path).with_context(|| named(&self.path))?;
+        // The name is durable once the directory is; not every system can open one.
+        let directory = self.path.parent().filter(|p| !p.as_os_str().is_empty());
+        if let Ok(directory) = File::open(directory.unwrap_or(Path::new("."))) {
+            let _ = directory.sync_all();
+        }
+        Ok(())
+    }
+}
+
+impl Write for NewFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+impl Drop for NewFile {
+    fn drop(&mut self) {
+        // Not there any more once it is kept.
+        let _ = std::fs::remove_file(&self.temporary);
+    }
 }
 
 /// Stdout with a buffer that is not flushed at line ends.

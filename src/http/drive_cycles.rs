@@ -6,10 +6,10 @@ use axum::http::HeaderMap;
 use axum::http::header::{CONTENT_DISPOSITION, CONTENT_TYPE};
 use axum::response::{IntoResponse, Response};
 
-use super::sessions::RecordingFormat;
-use super::{AssetPath, Problem};
+use super::{AssetPath, Problem, session_format};
 use crate::service::Service;
 use crate::wire::drive_cycle::{DriveCycleView, view, write_csv};
+use crate::wire::session_file::SessionFormat;
 
 /// Returns the drive cycle of a calibrated rig: the shortest motion, within the plate and
 /// the servo limits, in which every monitor completes and every detectable fault is
@@ -28,15 +28,21 @@ pub(super) async fn get(
     AssetPath(asset): AssetPath,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let format = RecordingFormat::negotiate(&headers, RecordingFormat::Json)?;
+    let format = session_format::negotiate(&headers, &session_format::TABLES, SessionFormat::Json)?;
     let cycle = service.drive_cycle(&asset).await?;
-    if format == RecordingFormat::Json {
+    if format == SessionFormat::Json {
         return Ok(Json(view(&asset, &cycle)).into_response());
     }
     let mut text = Vec::new();
     // Writing to a vector cannot fail.
     let _ = write_csv(&mut text, &cycle);
     let file = format!("attachment; filename=\"{asset}-drive-cycle.csv\"");
-    Ok(([(CONTENT_TYPE, format.kind().to_owned()), (CONTENT_DISPOSITION, file)], text)
+    Ok((
+        [
+            (CONTENT_TYPE, session_format::content_type(format).to_owned()),
+            (CONTENT_DISPOSITION, file),
+        ],
+        text,
+    )
         .into_response())
 }

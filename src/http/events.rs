@@ -36,18 +36,20 @@ pub(super) struct EventsQuery {
 #[derive(Debug, ToSchema)]
 #[allow(dead_code, reason = "describes the events for the interface's document")]
 pub(super) struct MessageView {
-    /// `fault`, or `begin` for the first event.
+    /// `fault`, `communication`, or `begin` for the first event.
     event: String,
     /// Event id, an increasing integer.
     id: String,
-    /// JSON: an `EventView` for `fault`, an empty object for `begin`.
+    /// JSON: an `EventView` for `fault`, a `CommunicationView` with `asset` and `session_id`
+    /// for `communication`, an empty object for `begin`.
     data: String,
 }
 
 /// Streams fault transitions as they become durable (Server-Sent Events). Each is an
 /// event of type `fault` with an id; its data is a fault line with `asset` and
 /// `session_id`. A code that is cleared while no session is open is an event without a
-/// session and without `t_s`. With the header `Last-Event-ID` the missed events are sent
+/// session and without `t_s`. Data of a rig that stay away or come back are an event of type
+/// `communication`. With the header `Last-Event-ID` the missed events are sent
 /// first. The first event of every stream has type `begin`; its id is the one after which
 /// the stream starts.
 #[utoipa::path(get, path = "/events", tag = "faults", operation_id = "stream_events",
@@ -90,7 +92,8 @@ fn messages(feed: EventFeed) -> impl Stream<Item = Result<Message, Infallible>> 
         match feed.next().await {
             Ok(Some(event)) => {
                 let data = event.line();
-                let message = Message::default().id(event.id.to_string()).event("fault");
+                let message =
+                    Message::default().id(event.id.to_string()).event(event.kind.as_str());
                 Some((Ok(message.data(data)), feed))
             }
             Ok(None) => None,

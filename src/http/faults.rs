@@ -7,12 +7,14 @@ use axum::response::{IntoResponse, Response};
 use axum::{Extension, Json};
 use serde::Deserialize;
 
-use super::sessions::RecordingFormat;
-use super::{AssetItemPath, AssetPath, PageQuery, Problem, Query, page_limit, query_word};
+use super::{
+    AssetItemPath, AssetPath, PageQuery, Problem, Query, page_limit, query_word, session_format,
+};
 use crate::service::access::Caller;
 use crate::service::{FaultQuery, RecordingWindow, Service};
 use crate::wire::recording::{ColumnsView, RecordingView, write_csv};
 use crate::wire::service::{FaultEntryView, HistoryView, Page};
+use crate::wire::session_file::SessionFormat;
 use crate::wire::words::{CodeWord, FaultSort, StatusFilter};
 
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
@@ -55,7 +57,7 @@ pub(super) struct ActorQuery {
 const MAX_ACTOR: usize = 100;
 
 impl ActorQuery {
-    fn actor(self, caller: &Caller) -> String {
+    pub(super) fn actor(self, caller: &Caller) -> String {
         let name = caller.name().map(str::to_owned).or(self.by);
         let mut actor = name.unwrap_or_else(|| "unknown".to_owned());
         while actor.len() > MAX_ACTOR {
@@ -165,20 +167,20 @@ pub(super) async fn recording(
     Query(query): Query<WindowQuery>,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let format = RecordingFormat::negotiate(&headers, RecordingFormat::Json)?;
+    let format = session_format::negotiate(&headers, &session_format::TABLES, SessionFormat::Json)?;
     let window = RecordingWindow {
         before_s: query.before_s.unwrap_or(DEFAULT_WINDOW_S),
         after_s: query.after_s.unwrap_or(DEFAULT_WINDOW_S),
     };
     let (mut view, rows) = service.fault_recording(&asset, &code, window).await?;
-    if format == RecordingFormat::Json {
+    if format == SessionFormat::Json {
         view.columns = ColumnsView::of(&rows);
         return Ok(Json(view).into_response());
     }
     let mut text = Vec::new();
     // Writing to a vector cannot fail.
     let _ = write_csv(&mut text, &rows);
-    Ok(([(CONTENT_TYPE, format.kind())], text).into_response())
+    Ok(([(CONTENT_TYPE, session_format::content_type(format))], text).into_response())
 }
 
 /// Lists the history of a code, newest first: its transitions, and who acknowledged or

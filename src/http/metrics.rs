@@ -39,14 +39,22 @@ const METRICS: &[(&str, MetricKind, &str)] = &[
     ("offbd_assets_untested", Gauge, "Assets whose samples are not judged"),
     ("offbd_bodies_bytes", Gauge, "Bytes of request bodies in memory"),
     ("offbd_build_info", Gauge, "Always 1; the label has the version"),
+    ("offbd_bus_connected", Gauge, "1 while connected to the server of NATS or the MQTT broker"),
+    ("offbd_bus_devices_online", Gauge, "Devices that say over NATS or MQTT that they are online"),
+    ("offbd_bus_faults_total", Counter, "Events published over NATS or MQTT"),
+    ("offbd_bus_logins_total", Counter, "Questions of the NATS server for rights, by outcome"),
+    ("offbd_bus_messages_total", Counter, "Messages of devices over NATS and MQTT, by outcome"),
     ("offbd_cluster_nodes", Gauge, "Nodes of the cluster that are alive"),
     ("offbd_commit_failures_total", Counter, "Failed commits, including retried ones"),
     ("offbd_commit_seconds", Seconds, "Duration of a commit"),
     ("offbd_commit_sets", Sizes, "Write sets in a commit"),
     ("offbd_commits_overtaken_total", Counter, "Write sets refused because their partition moved"),
     ("offbd_commits_total", Counter, "Successful commits"),
+    ("offbd_communication_lost", Gauge, "Rigs with an open session whose data stay away"),
     ("offbd_connections", Gauge, "Open connections"),
     ("offbd_connections_refused_total", Counter, "Connections refused at the limit"),
+    ("offbd_deliveries_given_up_total", Counter, "Notifications given up, by kind of channel"),
+    ("offbd_delivery_attempts_total", Counter, "Attempts to deliver, by channel and result"),
     ("offbd_engines", Gauge, "Engines in memory, by shard"),
     ("offbd_fault_changes_total", Counter, "Durable fault transitions, by code and status"),
     ("offbd_http_request_seconds", Seconds, "Time until a response starts, by path"),
@@ -74,6 +82,21 @@ const METRICS: &[(&str, MetricKind, &str)] = &[
     ("offbd_streams_cut_off_total", Counter, "WebSockets closed because the client was too slow"),
     ("offbd_turned_away_total", Counter, "Batches and requests answered with 429, by full queue"),
     ("offbd_writer_queue", Gauge, "Write sets in the queue of the writer"),
+];
+
+/// What may become of a message of a device.
+const BUS_OUTCOMES: [&str; 10] = [
+    "elsewhere",
+    "taken",
+    "malformed",
+    "unknown_asset",
+    "conflict",
+    "too_large",
+    "busy",
+    "unavailable",
+    "topic",
+    "retained",
+    "dropped",
 ];
 
 /// Bucket bounds of durations, s: a commit to a fast disk takes 1 ms, a request times out
@@ -162,6 +185,15 @@ fn initialize_series() {
     let reasons = ["form", "not_finite", "absurd", "conflict", "too_old", "late", "jump"];
     zero("offbd_samples_unjudged_total", "reason", &reasons);
     zero("offbd_sessions_expired_total", "reason", &["age", "size"]);
+    zero("offbd_bus_logins_total", "outcome", &["accepted", "refused"]);
+    for bus in ["nats", "mqtt"] {
+        counter!("offbd_bus_faults_total", "bus" => bus).absolute(0);
+        gauge!("offbd_bus_connected", "bus" => bus).set(0.0);
+        for outcome in BUS_OUTCOMES {
+            counter!("offbd_bus_messages_total", "bus" => bus, "outcome" => outcome).absolute(0);
+        }
+    }
+    gauge!("offbd_bus_devices_online").set(0.0);
     zero("offbd_turned_away_total", "queue", &["samples", "shard"]);
     for code in FaultCode::ALL {
         for status in FaultStatus::ALL {
@@ -169,6 +201,14 @@ fn initialize_series() {
             counter!("offbd_fault_changes_total", "code" => code, "status" => status).absolute(0);
         }
     }
+    zero("offbd_deliveries_given_up_total", "channel", &["webhook", "email"]);
+    for channel in ["webhook", "email"] {
+        for result in ["delivered", "failed"] {
+            counter!("offbd_delivery_attempts_total", "channel" => channel, "result" => result)
+                .absolute(0);
+        }
+    }
+    gauge!("offbd_communication_lost").set(0.0);
     gauge!("offbd_ingest_stalled").set(0.0);
     gauge!("offbd_journal_bytes").set(0.0);
     gauge!("offbd_streams").set(0.0);

@@ -8,6 +8,7 @@
 //! `guard` (authentication, authorization, rate limits, audit log), and the handler.
 //! The routes and the right that each requires are listed in `api`.
 
+mod alarms;
 mod assets;
 mod body;
 mod calibrations;
@@ -26,6 +27,7 @@ mod learning;
 mod login;
 mod metrics;
 mod negotiate;
+mod notifications;
 mod operations;
 mod page;
 mod parameters;
@@ -34,6 +36,7 @@ mod rates;
 mod replays;
 mod routes;
 mod series;
+mod session_format;
 mod sessions;
 mod sovd;
 mod stream;
@@ -106,11 +109,15 @@ impl FromRef<App> for Service {
         crate::wire::words::SessionSort,
         crate::wire::words::VerdictFilter,
         crate::wire::words::SeriesAggregate,
+        crate::wire::alarm::CommunicationView,
+        crate::wire::notification::NotificationView
     )),
     tags(
         (name = "assets", description = "The registry of rigs"),
         (name = "telemetry", description = "Ingest of samples"),
         (name = "faults", description = "Fault memory"),
+        (name = "alarms", description = "What fails in the fleet, mutes, and what to do"),
+        (name = "notifications", description = "Who is told of it: channels, rules, deliveries"),
         (name = "sessions", description = "Recordings"),
         (name = "sovd", description = "The same in the shape of SOVD (ISO 17978-3)"),
         (name = "access", description = "Tokens, logins, the audit log"),
@@ -247,6 +254,21 @@ fn api() -> GuardedRouter {
         .routes(Read, routes!(faults::recording))
         .routes(Read, routes!(faults::history))
         .routes(Read, routes!(faults::of_fleet))
+        .routes(Read, routes!(alarms::list))
+        .routes(Operate, routes!(alarms::acknowledge))
+        .routes(Read, routes!(alarms::advice))
+        .routes(Operate, routes!(alarms::put_note))
+        .routes(ReadAsset, routes!(alarms::mutes))
+        .routes(Operate, routes!(alarms::mute, alarms::unmute))
+        .routes(Administer, routes!(notifications::channels, notifications::create_channel))
+        .routes(Administer, routes!(notifications::channel, notifications::put_channel))
+        .routes(Administer, routes!(notifications::delete_channel))
+        .routes(Administer, routes!(notifications::test))
+        .routes(Read, routes!(notifications::rules))
+        .routes(Administer, routes!(notifications::create_rule))
+        .routes(Administer, routes!(notifications::put_rule, notifications::delete_rule))
+        .routes(Read, routes!(notifications::deliveries))
+        .routes(Read, routes!(notifications::delivery))
         .routes(ReadAsset, routes!(events::events))
         .routes(ControlSessions, routes!(sessions::open))
         .routes(Operate, routes!(sessions::import))

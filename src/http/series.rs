@@ -7,10 +7,11 @@ use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
 
-use super::sessions::RecordingFormat;
+use super::session_format;
 use super::{AssetPath, Problem, Query, query_time, query_word};
 use crate::service::{SeriesQuery, Service};
 use crate::wire::series::{AnnotationView, SeriesView, write_csv};
+use crate::wire::session_file::SessionFormat;
 use crate::wire::words::SeriesAggregate;
 use offbd_core::vocabulary::Invalid;
 
@@ -58,19 +59,19 @@ pub(super) async fn series(
     Query(query): Query<SeriesRangeQuery>,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let format = RecordingFormat::negotiate(&headers, RecordingFormat::Json)?;
+    let format = session_format::negotiate(&headers, &session_format::TABLES, SessionFormat::Json)?;
     let (from, to) = time_span(query.from.as_deref(), query.to.as_deref())?;
     let aggregate = query_word("?aggregate", query.aggregate.as_deref())?;
     let aggregate = aggregate.unwrap_or(SeriesAggregate::Mean);
     let wanted = SeriesQuery { from, to, step_s: query.step_s, aggregate };
     let view = service.series(&asset, wanted).await?;
-    if format == RecordingFormat::Json {
+    if format == SessionFormat::Json {
         return Ok(Json(view).into_response());
     }
     let mut text = Vec::new();
     // Writing to a vector cannot fail.
     let _ = write_csv(&mut text, &view);
-    Ok(([(CONTENT_TYPE, format.kind())], text).into_response())
+    Ok(([(CONTENT_TYPE, session_format::content_type(format))], text).into_response())
 }
 
 #[derive(Debug, Deserialize, utoipa::IntoParams)]

@@ -1,11 +1,10 @@
 //! `/sessions`: opening, ending, importing, listing and exporting sessions.
 
-use std::cmp::Ordering;
 use std::io::Cursor;
 
 use axum::body::{Body, Bytes};
 use axum::extract::State;
-use axum::http::header::{ACCEPT, CONTENT_DISPOSITION, CONTENT_TYPE, LOCATION};
+use axum::http::header::{CONTENT_DISPOSITION, CONTENT_TYPE, LOCATION};
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
 use axum::{Extension, Json};
@@ -14,18 +13,17 @@ use serde::Deserialize;
 
 use super::body::BodyShare;
 use super::json_body::JsonBody;
-use super::negotiate::weight_of_first;
+use super::session_format::BinaryFile;
 use super::{
     App, AssetPath, PageQuery, Path, Problem, Query, body, page_limit, query_time, query_word,
-    time_range,
+    session_format, time_range,
 };
 use crate::service::{RecordingReader, Service, SessionListQuery};
 use crate::wire::service::{ImportView, Page, SessionView};
-use crate::wire::session_csv::{write_header, write_rows};
-use crate::wire::telemetry::{csv_rows, sample_view};
+use crate::wire::session_file::{self, SessionFormat, SessionWriter};
 use crate::wire::verdict::FaultView;
 use crate::wire::words::{SessionSort, SessionState, VerdictFilter};
-use offbd_core::vocabulary::{Invalid, Sample};
+use offbd_core::vocabulary::Invalid;
 
 /// Row limit of an imported file.
 const MAX_IMPORT_ROWS: usize = 2_000_000;
@@ -67,12 +65,6 @@ pub(super) struct SessionsQuery {
     #[param(format = Int32, minimum = 1, maximum = 500)]
     limit: Option<u32>,
 }
-
-/// The bytes of a file.
-#[derive(utoipa::ToSchema)]
-#[schema(value_type = String, format = Binary)]
-#[allow(dead_code, reason = "describes the body for the interface's document")]
-struct FileBytes(Vec<u8>);
 
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
 #[into_params(parameter_in = Query)]
@@ -121,13 +113,17 @@ pub(super) async fn open(
     Ok(created(&session.id.clone(), session))
 }
 
-/// Imports a recorded CSV file as a session. Its samples are processed like live
-/// telemetry. The asset's open session is ended first, and the new session is ended after
-/// the last row; live telemetry of the asset gets 429 until then.
+/// Imports a recorded file as a session: CSV or, in a build with these formats, Parquet and
+/// Arrow (streams and files without compression), with the columns of the CSV file in any
+/// numeric type. Its samples are processed like live telemetry. The asset's open session is
+/// ended first, and the new session is ended after the last row; live telemetry of the asset
+/// gets 429 until then. Of a file that is damaged or ends too early, nothing is kept.
 #[utoipa::path(post, path = "/assets/{asset}/sessions/import", tag = "sessions",
     operation_id = "import_session",
     params(("asset" = String, description = "Name of the asset"), ImportQuery),
-    request_body(content((String = "text/csv"), (FileBytes = "application/octet-stream"))),
+    request_body(content((String = "text/csv"), (BinaryFile = "application/octet-stream"),
+        (BinaryFile = "application/vnd.apache.parquet"),
+        (BinaryFile = "application/vnd.apache.arrow.stream"))),
     responses((status = 201, body = ImportView), (status = 400, body = Problem),
         (status = 404, body = Problem), (status = 409, body = Problem),
         (status = 413, body = Problem), (status = 415, body = Problem)))]
@@ -139,27 +135,15 @@ pub(super) async fn import(
     headers: HeaderMap,
     body: Body,
 ) -> Result<impl IntoResponse, Problem> {
-    check_recording_type(&headers)?;
+    let format = session_format::of_file(&headers)?;
     app.service.asset(&asset).await?;
     let limits = app.service.limits();
     let timeout = limits.body_timeout * IMPORT_TIMEOUT_FACTOR;
     let read = body::read(body, limits.import_bytes, timeout, &share).await?;
     // The rows are parsed while they are imported, so that only the file is in memory.
-    let rows = csv_rows(Cursor::new(read))?;
+    let rows = session_file::open(Cursor::new(read), format)?;
     let imported = app.service.import(&asset, query.name, rows, MAX_IMPORT_ROWS).await?;
     Ok(created(&imported.session.id.clone(), imported))
-}
-
-/// Checks that the media type is CSV or, from clients that send files, not stated.
-fn check_recording_type(headers: &HeaderMap) -> Result<(), Problem> {
-    let header = headers.get(CONTENT_TYPE).map(|text| text.to_str().unwrap_or_default());
-    let essence = header.map(|text| text.split(';').next().unwrap_or_default().trim());
-    if essence.is_none_or(|e| ["text/csv", "application/octet-stream"].contains(&e)) {
-        return Ok(());
-    }
-    let detail = "the media type of an imported recording must be text/csv";
-    let status = StatusCode::UNSUPPORTED_MEDIA_TYPE;
-    Err(Problem::new(status, "media-type", "Unsupported media type", detail))
 }
 
 /// Lists sessions by the time at which they were opened.
@@ -224,14 +208,17 @@ pub(super) struct RecordingRangeQuery {
     to_s: Option<f64>,
 }
 
-/// Returns the recording, or a stretch of it, in order of arrival: as CSV, or as JSON rows if
-/// `Accept` prefers `application/json`.
+/// Returns the recording, or a stretch of it, in order of arrival: as CSV, or as `Accept`
+/// prefers as JSON rows, a Parquet file or an Arrow stream. The last two need a build with
+/// these formats.
 #[utoipa::path(get, path = "/sessions/{id}/telemetry", tag = "sessions",
     operation_id = "get_session_telemetry",
     params(("id" = String, description = "The service's id of the session"),
         RecordingRangeQuery),
     responses((status = 200, content((String = "text/csv"),
-            (crate::wire::telemetry::RowsView = "application/json"))),
+            (crate::wire::telemetry::RowsView = "application/json"),
+            (BinaryFile = "application/vnd.apache.parquet"),
+            (BinaryFile = "application/vnd.apache.arrow.stream"))),
         (status = 400, body = Problem), (status = 404, body = Problem),
         (status = 406, body = Problem)))]
 pub(super) async fn telemetry(
@@ -240,15 +227,14 @@ pub(super) async fn telemetry(
     Query(query): Query<RecordingRangeQuery>,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let format = RecordingFormat::negotiate(&headers, RecordingFormat::Csv)?;
+    let format = session_format::negotiate(&headers, &SessionFormat::ALL, SessionFormat::Csv)?;
     let range = time_range(query.from_s, query.to_s)?;
-    let (session, recording) = service.recording(&id, range).await?;
+    let (session, info, recording) = service.recording(&id, range).await?;
     let file = format!("attachment; filename=\"{id}.{}\"", format.suffix());
-    let with_seq = session.last_seq.is_some();
-    let start = format.start(&session.name, with_seq);
-    let body = Body::from_stream(parts(recording, format, start, with_seq));
-    Ok(([(CONTENT_TYPE, format.kind().to_owned()), (CONTENT_DISPOSITION, file)], body)
-        .into_response())
+    let writer = SessionWriter::new(format, &info, session.last_seq.is_some())?;
+    let body = Body::from_stream(parts(recording, writer));
+    let kind = session_format::content_type(format).to_owned();
+    Ok(([(CONTENT_TYPE, kind), (CONTENT_DISPOSITION, file)], body).into_response())
 }
 
 /// Lists the fault transitions of a session, in order.
@@ -266,90 +252,9 @@ pub(super) async fn faults(
     Ok(Json(service.session_faults(&id, page.cursor.as_deref(), limit).await?))
 }
 
-/// The format of an exported recording.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum RecordingFormat {
-    Csv,
-    Json,
-}
-
-impl RecordingFormat {
-    /// Returns the format that `Accept` prefers; `default` if it prefers neither.
-    ///
-    /// # Errors
-    /// 406 if it accepts neither.
-    pub(super) fn negotiate(headers: &HeaderMap, default: Self) -> Result<Self, Problem> {
-        let Some(accept) = headers.get(ACCEPT) else { return Ok(default) };
-        let accept = accept.to_str().unwrap_or_default();
-        let json = weight_of_first(accept, &["application/json", "application/*", "*/*"]);
-        let csv = weight_of_first(accept, &["text/csv", "text/*", "*/*"]);
-        if json.max(csv) > 0.0 {
-            return Ok(match json.total_cmp(&csv) {
-                Ordering::Greater => Self::Json,
-                Ordering::Less => Self::Csv,
-                Ordering::Equal => default,
-            });
-        }
-        let detail = format!("`{accept}` is not available; use text/csv or application/json");
-        Err(Problem::new(StatusCode::NOT_ACCEPTABLE, "not-acceptable", "Not acceptable", detail))
-    }
-
-    pub(super) const fn kind(self) -> &'static str {
-        match self {
-            Self::Csv => "text/csv; charset=utf-8",
-            Self::Json => "application/json",
-        }
-    }
-
-    const fn suffix(self) -> &'static str {
-        match self {
-            Self::Csv => "csv",
-            Self::Json => "json",
-        }
-    }
-
-    fn start(self, session: &str, with_seq: bool) -> Vec<u8> {
-        let mut bytes = Vec::new();
-        match self {
-            // Writing to a vector cannot fail.
-            Self::Csv => drop(write_header(&mut bytes, with_seq)),
-            Self::Json => {
-                let name = serde_json::to_string(session).unwrap_or_default();
-                bytes.extend(format!(r#"{{"session":{name},"samples":["#).into_bytes());
-            }
-        }
-        bytes
-    }
-
-    /// Serializes rows; in JSON with a comma before each, except the `first` row of all.
-    fn rows(self, samples: &[Sample], with_seq: bool, first: bool) -> Vec<u8> {
-        let mut bytes = Vec::new();
-        match self {
-            Self::Csv => drop(write_rows(&mut bytes, samples, with_seq)),
-            Self::Json => {
-                for (i, sample) in samples.iter().enumerate() {
-                    if i > 0 || !first {
-                        bytes.push(b',');
-                    }
-                    let _ = serde_json::to_writer(&mut bytes, &sample_view(sample));
-                }
-            }
-        }
-        bytes
-    }
-
-    const fn end(self) -> &'static [u8] {
-        match self {
-            Self::Csv => b"",
-            Self::Json => b"]}",
-        }
-    }
-}
-
 /// The part of an export to send next.
 enum ExportPart {
     Start(Vec<u8>),
-    FirstRows,
     Rows,
     Done,
 }
@@ -358,29 +263,34 @@ enum ExportPart {
 /// that the client does not take it for complete.
 fn parts(
     recording: RecordingReader,
-    format: RecordingFormat,
-    start: Vec<u8>,
-    with_seq: bool,
+    (writer, start): (SessionWriter, Vec<u8>),
 ) -> impl Stream<Item = Result<Bytes, std::io::Error>> + Send {
-    let begin = (recording, ExportPart::Start(start));
-    let parts = futures_util::stream::unfold(begin, move |(mut recording, part)| async move {
-        let first = match part {
-            ExportPart::Start(start) => {
-                return Some((Ok(start.into()), (recording, ExportPart::FirstRows)));
-            }
-            ExportPart::FirstRows => true,
-            ExportPart::Rows => false,
-            ExportPart::Done => return None,
-        };
-        match recording.next().await {
-            Ok(Some(samples)) => {
-                let rows = format.rows(&samples, with_seq, first);
-                Some((Ok(rows.into()), (recording, ExportPart::Rows)))
-            }
-            Ok(None) => Some((Ok(Bytes::from_static(format.end())), (recording, ExportPart::Done))),
-            Err(error) => Some((Err(std::io::Error::other(error)), (recording, ExportPart::Done))),
-        }
-    });
+    let begin = (recording, Some(writer), ExportPart::Start(start));
+    let parts =
+        futures_util::stream::unfold(begin, |(mut recording, mut writer, part)| async move {
+            let sent = match part {
+                ExportPart::Start(start) => Ok(start),
+                ExportPart::Rows => next_rows(&mut recording, &mut writer).await,
+                ExportPart::Done => return None,
+            };
+            let next =
+                if sent.is_ok() && writer.is_some() { ExportPart::Rows } else { ExportPart::Done };
+            Some((sent.map(Bytes::from), (recording, writer, next)))
+        });
     // The compression layer polls once more after the end.
     parts.fuse()
+}
+
+/// Returns the next rows of an export; at the end of the recording, takes the writer and
+/// returns the end of the file.
+async fn next_rows(
+    recording: &mut RecordingReader,
+    writer: &mut Option<SessionWriter>,
+) -> Result<Vec<u8>, std::io::Error> {
+    let samples = recording.next().await.map_err(std::io::Error::other)?;
+    let written = match (samples, writer.as_mut()) {
+        (Some(samples), Some(writer)) => writer.rows(&samples),
+        _ => writer.take().map_or_else(|| Ok(Vec::new()), SessionWriter::end),
+    };
+    written.map_err(std::io::Error::other)
 }

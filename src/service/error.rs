@@ -23,6 +23,18 @@ pub enum ServiceError {
     UnknownCalibration { asset: String, id: String },
     #[error("there is no token `{id}`")]
     UnknownToken { id: String },
+    #[error("there is no channel `{id}`")]
+    UnknownChannel { id: String },
+    #[error("there is no rule `{id}`")]
+    UnknownRule { id: String },
+    #[error("there is no delivery `{id}`; of each channel the last 1000 are kept")]
+    UnknownDelivery { id: String },
+    #[error("there is a channel `{name}` already")]
+    ChannelExists { name: String },
+    #[error("the rule `{rule}` uses the channel `{name}`; delete the rule first")]
+    ChannelInUse { name: String, rule: String },
+    #[error("the limit of {limit} {what} is reached; delete one first")]
+    TooManySettings { what: &'static str, limit: usize },
     #[error("no such fault code: {0}")]
     UnknownCode(UnknownWord),
     #[error("asset `{name}` already exists; replace it with PUT /api/v1/assets/{name}")]

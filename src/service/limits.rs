@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::ServiceError;
+use super::{CommunicationSettings, NotificationSettings, ServiceError};
 use offbd_core::vocabulary::Invalid;
 
 /// The configurable limits.
@@ -38,6 +38,10 @@ pub struct Limits {
     pub body_timeout: Duration,
     /// How long recordings are kept.
     pub retention: Retention,
+    /// When the data of a rig count as lost.
+    pub communication: CommunicationSettings,
+    /// How notifications are sent.
+    pub notifications: NotificationSettings,
 }
 
 impl Default for Limits {
@@ -56,6 +60,8 @@ impl Default for Limits {
             assets: 10_000,
             body_timeout: Duration::from_secs(30),
             retention: Retention::default(),
+            communication: CommunicationSettings::default(),
+            notifications: NotificationSettings::default(),
         }
     }
 }

@@ -45,6 +45,9 @@
 //! - `jobs`: background jobs (replays and calibrations).
 //! - `reanalysis`: evaluates a recording again for plots and for the recording of a
 //!   fault, without storing anything.
+//! - `notifications`: tells people of changes of faults.
+//! - `communication`: finds rigs whose data stay away.
+//! - `mutes`: the monitors that a person has muted.
 //! - `upkeep`: deletion in parts, retention, the watchdog of ingest.
 //! - `simulation`, a test: the whole service without threads, with devices and faults.
 //! - [`access`]: roles and rights, tokens, JSON Web Tokens, audit entries.
@@ -56,10 +59,13 @@ pub mod access;
 mod asset;
 mod clock;
 mod cluster;
+mod communication;
 mod error;
 mod job;
 mod jobs;
 mod limits;
+mod mutes;
+mod notifications;
 mod ownership;
 mod playback;
 mod reanalysis;
@@ -76,13 +82,18 @@ mod writing;
 pub use crate::store::RecordingReader;
 pub use clock::{Clock, parse_timestamp};
 pub use cluster::Route;
+pub use communication::CommunicationSettings;
 pub use error::ServiceError;
 pub use limits::{Limits, RETRY_AFTER_S, Retention, SessionLimits};
+pub use notifications::settings::key as webhook_key;
+pub use notifications::{
+    NotificationSettings, NotificationTransport, Notifier, SendOutcome, TargetPolicy,
+};
 pub use reanalysis::fault_recording::RecordingWindow;
 pub use reanalysis::trace::{MAX_TRACE_POINTS, TraceQuery};
 pub use requests::{
-    FaultQuery, FleetQuery, MAX_SERIES_SESSIONS, PendingBatch, QueueLoad, SeriesQuery,
-    SessionListQuery,
+    AlarmQuery, DeliveryQuery, FaultQuery, FleetQuery, MAX_SERIES_SESSIONS, PendingBatch,
+    QueueLoad, SeriesQuery, SessionListQuery,
 };
 pub use start::{Service, Workers};
-pub use writing::{Event, EventFeed};
+pub use writing::{Event, EventFeed, EventKind};

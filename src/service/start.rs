@@ -4,16 +4,19 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 
 use futures_util::{StreamExt, stream};
-use tokio::sync::{Semaphore, mpsc, watch};
+use tokio::sync::{Notify, Semaphore, mpsc, watch};
 use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
 
 use super::access::{PrincipalCache, Provider};
 use super::asset::{AssetCommand, Environment, Loader, MANY_SAMPLES, Presences, Shard, Shards};
 use super::cluster::{self, Cluster, NodeTask};
+use super::communication::CommunicationWatch;
 use super::job::{self, Job};
 use super::jobs::{self, JobContext};
 use super::limits::{MAX_DRIVE_CYCLES, MAX_RECORDINGS, MAX_TRACES};
+use super::mutes::Mutes;
+use super::notifications::{NotificationTransport, Notifier};
 use super::ownership::Ownership;
 use super::upkeep::{Deleter, Upkeep, Watchdog};
 use super::writing::{Committer, Events, FIRST_RETRY, Handles, Outage, Transfers};
@@ -33,6 +36,9 @@ pub(super) struct Inner {
     pub(super) limits: Limits,
     pub(super) events: Events,
     pub(super) presences: Presences,
+    pub(super) mutes: Mutes,
+    /// Wakes the notifier.
+    pub(super) wake_notifier: Arc<Notify>,
     pub(super) principals: PrincipalCache,
     pub(super) provider: Option<Provider>,
     pub(super) shards: Shards,
@@ -120,6 +126,7 @@ pub(super) struct Parts {
     pub(super) jobs: mpsc::Receiver<Job>,
     pub(super) upkeep: Upkeep,
     pub(super) node: Option<NodeTask>,
+    pub(super) communication: CommunicationWatch,
 }
 
 impl Parts {
@@ -129,11 +136,13 @@ impl Parts {
         let committer = self.committer.spawn()?;
         // Before the sweeper, which deletes them.
         service.discard_imports(handles.ownership.filter().as_deref()).await?;
+        service.inner.mutes.load(handles.store.mutes(handles.clock.now()).await?);
         let shards = self.shards.into_iter().map(Shard::spawn).collect::<Result<_, _>>()?;
         let mut jobs = jobs::spawn(limits.jobs, job_context, self.jobs);
         jobs.push(tokio::spawn(self.loader.run()));
         jobs.extend(self.upkeep.spawn());
         jobs.extend(self.node.into_iter().flat_map(|node| cluster::spawn(node, service)));
+        jobs.push(tokio::spawn(self.communication.run()));
         Ok(Workers { shards, jobs, closing: handles.closing.clone(), committer })
     }
 }
@@ -177,6 +186,8 @@ impl Service {
 
     /// Continues what former owners of these partitions have left unfinished.
     pub(super) async fn resume(&self, owned: Option<&[PartitionId]>) -> Result<(), ServiceError> {
+        let Inner { handles, mutes, .. } = &*self.inner;
+        mutes.load(handles.store.mutes(handles.clock.now()).await?);
         self.discard_imports(owned).await?;
         self.resume_jobs(owned).await?;
         self.rebuild_of(owned).await
@@ -247,7 +258,10 @@ impl Service {
             shards: queues.clone(),
             lost,
         });
-        let parts = Parts { committer, shards, loader, jobs: jobs_queue, upkeep, node };
+        let communication =
+            CommunicationWatch::new(handles.clone(), presences.clone(), limits.communication);
+        let parts =
+            Parts { committer, shards, loader, jobs: jobs_queue, upkeep, node, communication };
         let inner = Inner {
             job_context: JobContext::new(handles.clone(), queues.clone()),
             handles,
@@ -255,6 +269,8 @@ impl Service {
             limits,
             events,
             presences,
+            mutes: Mutes::default(),
+            wake_notifier: Arc::default(),
             principals: PrincipalCache::default(),
             provider,
             shards: queues,
@@ -267,6 +283,14 @@ impl Service {
             computing: Computing::new(),
         };
         (Self { inner: Arc::new(inner) }, parts)
+    }
+
+    /// Returns the background task of notifications, which sends by `transport`.
+    pub fn notifier<T: NotificationTransport>(&self, transport: T) -> Notifier<T> {
+        let Inner { handles, mutes, limits, events, wake_notifier, .. } = &*self.inner;
+        let settings = limits.notifications.clone();
+        let wake = wake_notifier.clone();
+        Notifier::new(handles.clone(), mutes.clone(), settings, events.clone(), wake, transport)
     }
 
     /// Discards the sessions of imports that a stop has interrupted: of the partitions

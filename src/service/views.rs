@@ -13,6 +13,7 @@ use crate::wire::asset;
 use crate::wire::memory;
 use crate::wire::provenance::ProvenanceView;
 use crate::wire::service::{FaultEntryView, Page, SessionView};
+use crate::wire::session_file::SessionInfo;
 use crate::wire::stored::{StoredMemory, StoredProvenance, StoredRecord};
 use offbd_core::diagnosis::{FaultMemory, FaultRecord, MemoryRules};
 use offbd_core::engine::Rig;
@@ -52,6 +53,16 @@ pub(super) fn fault(row: FaultRow) -> Result<FaultEntryView, ServiceError> {
         asset: row.asset,
         changed_at: rfc3339(row.changed_at),
         monitor: None,
+    })
+}
+
+/// What a file says about the session, beside its samples.
+pub(super) fn session_info(row: &SessionRow) -> Result<SessionInfo, ServiceError> {
+    Ok(SessionInfo {
+        session: row.name.clone(),
+        asset_file: Some(row.setup.clone()),
+        calibration_id: rig(&row.setup)?.calibration.as_ref().map(asset::calibration_id),
+        verdict_hash: row.verdict_hash.clone(),
     })
 }
 
@@ -102,12 +113,14 @@ pub(super) fn page<R, V, K: Serialize>(
 ) -> Result<Page<V>, ServiceError> {
     let has_next = rows.len() > limit as usize;
     rows.truncate(limit as usize);
-    let next = match rows.last().filter(|_| has_next) {
-        Some(last) => Some(HEXLOWER.encode(to_json(&key(last))?.as_bytes())),
-        None => None,
-    };
+    let next = rows.last().filter(|_| has_next).map(|last| to_cursor(&key(last))).transpose()?;
     let items = rows.into_iter().map(view).collect::<Result<_, _>>()?;
     Ok(Page { items, next })
+}
+
+/// Encodes a key as a cursor.
+pub(super) fn to_cursor<K: Serialize>(key: &K) -> Result<String, ServiceError> {
+    Ok(HEXLOWER.encode(to_json(key)?.as_bytes()))
 }
 
 /// Decodes the key in a cursor that [`page`] returned.

@@ -62,6 +62,20 @@ impl Store {
         .await?)
     }
 
+    /// The assets from `first` to `last` whose data stay away, each with the time at which the
+    /// last data arrived.
+    pub async fn lost_communications_of(
+        &self,
+        first: &str,
+        last: &str,
+    ) -> Result<Vec<(String, Micros)>, StoreError> {
+        let rows = sqlx::query_as(
+            "SELECT asset, since FROM communication
+             WHERE asset >= $1 AND asset <= $2 AND lost = 1",
+        );
+        Ok(rows.bind(first).bind(last).fetch_all(&self.pool).await?)
+    }
+
     /// The learning records of the assets from `first` to `last`, with the asset's name,
     /// for those that have one.
     pub async fn learning_of(

@@ -21,6 +21,7 @@
 //! into the database file while commits go on (`checkpoint.rs`).
 
 mod access;
+mod alarm;
 mod backup;
 mod check;
 mod checkpoint;
@@ -33,6 +34,7 @@ mod location;
 mod log_damage;
 mod migrations;
 mod multi_row;
+mod notification;
 mod notifications;
 mod page_checksums;
 mod partition;
@@ -54,10 +56,14 @@ use sqlx::AnyPool;
 use sqlx::migrate::MigrateError;
 
 pub use access::{AccessWrite, AuditRow, LAST_ID, MAX_LOGINS, TokenRow};
+pub use alarm::{AlarmWrite, CommunicationChange, CommunicationRow, MuteRow, NoteRow, OpenLink};
 pub use backup::{back_up, restore};
 pub use check::{CheckReport, check};
 pub use expiry::SessionSize;
 pub use location::Location;
+pub use notification::{
+    ChannelRow, DeliveryRow, NotificationWrite, PlannedEventRow, ReminderRow, RuleRow,
+};
 pub use notifications::{Notification, Notifications};
 pub use page_checksums::install_drivers;
 pub use partition::{

@@ -2,6 +2,7 @@
 
 use super::codec::ChunkKey;
 use super::query_builder::QueryBuilder;
+use super::write::published_counter;
 use super::{
     ActionRow, AssetRow, CalibrationRow, EventRow, FaultRow, Micros, PartitionId, ReplayRow,
     SessionRow, Store, StoreError, TransitionRow, TrendEntry, TrendRow, decode_chunk,
@@ -413,9 +414,11 @@ impl Store {
     ) -> Result<Vec<EventRow>, StoreError> {
         let mut query = QueryBuilder::new("");
         for select in [
-            "SELECT id, asset, session, document FROM transition WHERE id > ",
-            " UNION ALL SELECT id, asset, session, event FROM action
+            "SELECT id, 'fault' AS kind, asset, session, document FROM transition WHERE id > ",
+            " UNION ALL SELECT id, 'fault', asset, session, event FROM action
              WHERE event IS NOT NULL AND id > ",
+            " UNION ALL SELECT id, 'communication', asset, session, document
+             FROM communication_change WHERE id > ",
         ] {
             query.push(select).bind(after)?;
             if let Some(asset) = asset {
@@ -524,6 +527,12 @@ impl Store {
         Ok(sqlx::query_scalar("SELECT value FROM counter WHERE name = 'event'")
             .fetch_one(&self.pool)
             .await?)
+    }
+
+    /// The id of the last event that was published on a bus; `None` before the first one.
+    pub async fn published(&self, bus: &str) -> Result<Option<i64>, StoreError> {
+        let query = sqlx::query_scalar("SELECT value FROM counter WHERE name = $1");
+        Ok(query.bind(published_counter(bus)).fetch_optional(&self.pool).await?)
     }
 
     /// Faults that match `filter`.

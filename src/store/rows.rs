@@ -171,12 +171,14 @@ from_row!(TransitionRow { id, asset, session, ordinal, t_s, code, status, at, do
 pub struct EventRow {
     /// Increases with every event, and is never used twice.
     pub id: i64,
+    /// `fault` or `communication`.
+    pub kind: String,
     pub asset: String,
     pub session: Option<String>,
     pub document: String,
 }
 
-from_row!(EventRow { id, asset, session, document });
+from_row!(EventRow { id, kind, asset, session, document });
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct FaultRow {

@@ -33,9 +33,9 @@ use super::multi_row::{MultiRowStatement, in_parts};
 use super::tail::{Run, Tails};
 use super::writer_lock::Backend;
 use super::{
-    AccessWrite, ActionRow, AssetRow, CalibrationRow, EVENTS, FaultRow, Location, MIGRATIONS,
-    Micros, PartitionId, Partitions, ReplayRow, SessionProgress, SessionRow, Snapshot, StoreError,
-    TransitionRow, TrendRow, snapshot,
+    AccessWrite, ActionRow, AlarmWrite, AssetRow, CalibrationRow, CommunicationChange, EVENTS,
+    FaultRow, Location, MIGRATIONS, Micros, NotificationWrite, PartitionId, Partitions, ReplayRow,
+    SessionProgress, SessionRow, Snapshot, StoreError, TransitionRow, TrendRow, alarm, snapshot,
 };
 use offbd_core::vocabulary::Sample;
 
@@ -123,13 +123,22 @@ pub enum Write {
         asset: String,
         document: String,
     },
+    /// Stores the last event that was published on a bus.
+    Published {
+        bus: &'static str,
+        event: i64,
+    },
     Access(AccessWrite),
+    Alarm(AlarmWrite),
+    Notification(NotificationWrite),
+    /// Data of a rig stay away or come back; an event.
+    Communication(CommunicationChange),
 }
 
 impl Write {
     /// Whether it gets the number of an event.
     const fn is_event(&self) -> bool {
-        matches!(self, Self::Transition(_) | Self::Action(_))
+        matches!(self, Self::Transition(_) | Self::Action(_) | Self::Communication(_))
     }
 }
 
@@ -484,7 +493,8 @@ fn n_samples(sets: &[ChangeSet<'_>]) -> usize {
 
 /// The ids of the events of a transaction. They are taken from the database all at once and
 /// as late as possible, because other writers of the database wait for the next ones until
-/// this transaction has ended. So ids have the order of the commits, and no gaps.
+/// this transaction has ended. So ids have the order of the commits, and
+/// no gaps but where an event turns out to be none.
 #[derive(Debug)]
 struct EventIds {
     n_events: usize,
@@ -556,7 +566,17 @@ impl GroupCommit<'_> {
             Write::PutCalibration(row) => put_calibration(db, row).await,
             Write::ActivateCalibration { asset, id } => activate(db, asset, id).await,
             Write::PutLearning { asset, document } => put_learning(db, asset, document).await,
+            Write::Published { bus, event } => published(db, bus, *event).await,
             Write::Access(write) => write.apply(db).await,
+            Write::Alarm(write) => write.apply(db).await,
+            Write::Notification(write) => write.apply(db).await,
+            Write::Communication(row) => {
+                row.id = self.events.next(db).await?;
+                if !alarm::change_communication(db, row).await? {
+                    row.id = 0;
+                }
+                Ok(())
+            }
             Write::CreateAsset(row) => create_asset(db, partition, row).await,
             Write::UpdateAsset(row) => update_asset(db, row).await,
             Write::OpenSession(row) => open_session(db, row).await,
@@ -849,4 +869,16 @@ async fn put_learning(
         .execute(db)
         .await?;
     Ok(())
+}
+
+async fn published(db: &mut AnyConnection, bus: &str, event: i64) -> Result<(), StoreError> {
+    let sql = "INSERT INTO counter (name, value) VALUES ($1, $2)
+        ON CONFLICT (name) DO UPDATE SET value = excluded.value";
+    sqlx::query(sql).bind(published_counter(bus)).bind(event).execute(db).await?;
+    Ok(())
+}
+
+/// Returns the name of the counter of the last event that was published on a bus.
+pub(super) fn published_counter(bus: &str) -> String {
+    format!("published_{bus}")
 }

@@ -7,15 +7,20 @@
 //! here uses sockets or SQL.
 
 pub mod access;
+pub mod advice;
+pub mod alarm;
 pub mod asset;
 pub mod basis;
+pub mod bus;
 pub mod certificate;
 pub mod cluster;
 pub mod difference;
 pub mod drive_cycle;
 pub mod json;
 pub mod learning;
+pub mod mapping;
 pub mod memory;
+pub mod notification;
 #[cfg(feature = "lab")]
 mod preset;
 pub mod provenance;
@@ -25,6 +30,7 @@ pub mod scene;
 pub mod series;
 pub mod service;
 pub mod session_csv;
+pub mod session_file;
 pub mod sovd;
 pub mod stored;
 pub mod telemetry;

@@ -4,6 +4,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::alarm::MuteView;
 use super::difference::{ComparedView, TallyView};
 use super::learning::{LearningState, LearningView};
 use super::memory::FaultRecordView;
@@ -181,8 +182,15 @@ pub struct FleetEntryView {
     /// they are.
     #[serde(default)]
     pub unjudged: Option<UnjudgedView>,
-    /// Pending and confirmed faults.
+    /// Pending and confirmed faults, also those of muted monitors.
     pub faults: Vec<FleetFaultView>,
+    /// Mutes in force: these monitors count as not tested.
+    #[serde(default)]
+    pub muted: Vec<MuteView>,
+    /// Time at which the last data arrived, RFC 3339, if the data of the rig stay away although
+    /// its session is open; null otherwise.
+    #[serde(default)]
+    pub communication_lost_since: Option<String>,
     /// Warnings of expected faults: drifts of a servo from session to session.
     pub warnings: Vec<TrendWarningView>,
 }
@@ -270,6 +278,9 @@ pub struct MonitorView {
     pub judged_share: f64,
     /// Former name of `judged_s`, with the same value.
     pub enabled_s: f64,
+    /// The mute in force: the monitor counts as not tested; null without one.
+    #[serde(default)]
+    pub muted: Option<Box<MuteView>>,
 }
 
 /// One value for each direction of ball motion.
@@ -363,6 +374,7 @@ fn monitor_view((code, monitor): (&FaultCode, &MonitorState)) -> MonitorView {
         judged_s: monitor.judged_s,
         judged_share: monitor.judged_share,
         enabled_s: monitor.judged_s,
+        muted: None,
     }
 }
 

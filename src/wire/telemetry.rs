@@ -124,15 +124,21 @@ pub fn csv(document: &[u8], limit: usize) -> Result<Batch, BatchError> {
 }
 
 /// Parses CSV with the header of a session file, row by row.
-///
-/// # Errors
-/// [`BatchError::Malformed`] if the header is not that of a session file.
-pub fn csv_rows<R: Read>(
+fn csv_rows<R: Read>(
     document: R,
 ) -> Result<impl Iterator<Item = Result<Sample, String>>, BatchError> {
     let malformed = |reason| BatchError::Malformed { pointer: String::new(), reason };
     let reader = SessionCsvReader::new(document).map_err(|e| malformed(e.to_string()))?;
-    Ok(reader.map(|row| row.map_err(|e| shorten(&e.to_string())).and_then(check_seq)))
+    Ok(reader.map(|row| file_row(row.map_err(|e| e.to_string()))))
+}
+
+/// Returns a row of a session file as one of a batch: its `seq` is checked, and a reason is
+/// shortened.
+///
+/// # Errors
+/// The reason why the row is invalid.
+pub fn file_row(row: Result<Sample, String>) -> Result<Sample, String> {
+    row.map_err(|reason| shorten(&reason)).and_then(check_seq)
 }
 
 fn check_seq(sample: Sample) -> Result<Sample, String> {

@@ -289,6 +289,110 @@ words! {
     AuthenticationWord as Authentication { Required = "required", Off = "off" }
 }
 
+words! {
+    /// What an alarm is about: a fault code, or that no data of the rig arrive.
+    AlarmCodeWord as AlarmCode {
+        XServo = "x_servo", YServo = "y_servo", StuckBall = "stuck_ball", Sensor = "sensor",
+        /// No data arrive although a session is open. Found by the service, not by a monitor.
+        CommunicationLost = "communication_lost",
+    }
+}
+
+impl From<CodeWord> for AlarmCodeWord {
+    fn from(code: CodeWord) -> Self {
+        match code {
+            CodeWord::XServo => Self::XServo,
+            CodeWord::YServo => Self::YServo,
+            CodeWord::StuckBall => Self::StuckBall,
+            CodeWord::Sensor => Self::Sensor,
+        }
+    }
+}
+
+impl AlarmCodeWord {
+    /// The fault code, if a monitor finds this.
+    #[must_use]
+    pub const fn fault_code(self) -> Option<CodeWord> {
+        match self {
+            Self::XServo => Some(CodeWord::XServo),
+            Self::YServo => Some(CodeWord::YServo),
+            Self::StuckBall => Some(CodeWord::StuckBall),
+            Self::Sensor => Some(CodeWord::Sensor),
+            Self::CommunicationLost => None,
+        }
+    }
+}
+
+words! {
+    /// A change that a notification tells of.
+    AlarmChangeWord as AlarmChange {
+        /// The test fails; the fault is not confirmed yet.
+        Pending = "pending",
+        /// The test fails, and the fault is confirmed.
+        Confirmed = "confirmed",
+        /// The test passes again; the fault stays on record.
+        Passed = "passed",
+        /// Enough good sessions followed.
+        Healed = "healed",
+        /// A person has erased the record.
+        Cleared = "cleared",
+    }
+}
+
+words! {
+    /// Selects alarms.
+    AlarmStateFilter as AlarmStateFilter {
+        /// The test fails now.
+        Failing = "failing",
+        /// On record as pending or confirmed; the test does not fail now.
+        OnRecord = "on_record",
+        /// Failing or on record.
+        Active = "active",
+        /// Healed ones and those of lost communication that is back, too.
+        All = "all",
+    }
+}
+
+words! {
+    /// How much of the evidence of an occurrence is kept.
+    EvidenceWord as EvidenceState {
+        /// The recording of the session, and the values at the first failure.
+        Complete = "complete",
+        /// The values at the first failure.
+        Partial = "partial",
+        /// Nothing.
+        None = "none",
+    }
+}
+
+words! {
+    /// State of a delivery.
+    DeliveryState as DeliveryState {
+        /// Waits for its turn or its next attempt.
+        Pending = "pending",
+        Delivered = "delivered",
+        /// All attempts have failed for too long.
+        GivenUp = "given_up",
+    }
+}
+
+words! {
+    /// How a channel sends.
+    ChannelKind as ChannelKind { Webhook = "webhook", Email = "email" }
+}
+
+words! {
+    /// Encryption of the connection to a mail server.
+    MailSecurity as MailSecurity {
+        /// From the start (port 465).
+        Tls = "tls",
+        /// After the greeting (port 587); without it, nothing is sent.
+        StartTls = "starttls",
+        /// None.
+        None = "none",
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -4,17 +4,21 @@
 #![allow(unreachable_pub, clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod access;
+mod alarms;
 mod architecture;
 mod arrival;
 mod backup;
 mod bad_input;
 mod bounds;
+#[cfg(all(feature = "nats", feature = "mqtt"))]
+mod bus;
 mod cli;
 mod cluster;
 mod crash;
 mod damage;
 mod engine_snapshot;
 mod fault_memory;
+mod formats;
 mod fuzz;
 mod journal;
 mod jwt;
@@ -24,6 +28,7 @@ mod liveness;
 mod main_job;
 mod monitoring;
 mod network;
+mod notifications;
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 mod one_failure;
 mod openapi;

@@ -99,6 +99,8 @@ const VIEWS = () => [
   ["/rigs/bench/faults/sensor", "Nothing is on record"],
   ["/sessions", "monday"],
   [`/sessions/${session.id}`, "Judge it again"],
+  ["/alarms", "What to do"],
+  ["/notifications", "nobody is told of anything"],
   ["/set-up", "Units that the device sends"],
   ["/rigs/bench/set-up?step=connect", "Waiting for the first sample"],
   ["/rigs/bench/set-up?step=check", "Signs and units"],

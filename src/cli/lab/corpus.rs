@@ -7,7 +7,7 @@ use anyhow::Context;
 use rayon::prelude::*;
 
 use super::labels::{Label, class, labelled};
-use super::simulate::{record, write_session};
+use super::simulate::write_session;
 use crate::cli::calibrate::write_asset;
 use crate::cli::output;
 use crate::cli::replay::progress;
@@ -114,7 +114,7 @@ impl CorpusSession {
         let mut rig = SimulatedRig::new(model, self.reference, self.disturbances, self.seed)?;
         let fault = self.fault.as_deref().map(str::parse::<Fault>).transpose()?;
         fault.into_iter().for_each(|fault| rig.inject(fault));
-        let samples = record(&mut rig, self.seconds);
+        let samples = rig.record(self.seconds);
         let folder = self.preset.as_str();
         write_session(&dir.join(folder).join(&self.file), &samples, false)?;
         let truth = rig.faults().next();

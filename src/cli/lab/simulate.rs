@@ -112,19 +112,13 @@ pub(super) fn run(args: &SimulateArgs) -> anyhow::Result<()> {
     let mut rig =
         SimulatedRig::new(model, args.reference, disturbances, args.seed).map_err(bad_argument)?;
     args.fault.iter().for_each(|fault| rig.inject(*fault));
-    let samples = record(&mut rig, args.seconds);
+    let samples = rig.record(args.seconds);
     let rows = args.transported(&samples)?;
     write_session(&args.output, &rows, args.seq)?;
     if let Some(path) = &args.truth {
         write_truth(path, &args.label(&rig, &name, rows.len()))?;
     }
     Ok(())
-}
-
-/// Returns the rows that `rig` logs in the next `seconds`.
-pub(super) fn record(rig: &mut SimulatedRig, seconds: f64) -> Vec<Sample> {
-    let end_s = rig.truth().t_s + seconds;
-    std::iter::from_fn(|| Some(rig.next_sample())).take_while(|s| s.t_s <= end_s).collect()
 }
 
 /// Writes a session, with the column `seq` if `seq` is true.

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use rayon::prelude::*;
 
-use super::simulate::{record, write_session};
+use super::simulate::write_session;
 use crate::cli::calibrate::write_asset;
 use crate::cli::errors::InputError;
 use crate::cli::output::{OutputFormat, value_parser};
@@ -131,7 +131,7 @@ fn session(
 ) -> Result<Vec<Sample>, InputError> {
     let mut rig =
         SimulatedRig::new(model.of_session(seed), reference, disturbances, seed).map_err(cannot)?;
-    Ok(record(&mut rig, seconds))
+    Ok(rig.record(seconds))
 }
 
 /// Simulates the calibration sessions, without disturbances. Their seeds count down in the

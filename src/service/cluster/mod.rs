@@ -216,6 +216,12 @@ impl Service {
         self.inner.handles.ownership.owned().len()
     }
 
+    /// Whether this process does what one of a cluster does for all.
+    #[must_use]
+    pub fn is_leader(&self) -> bool {
+        self.inner.handles.is_leader()
+    }
+
     /// The nodes of the cluster and their partitions.
     #[must_use]
     pub fn cluster(&self) -> ClusterView {

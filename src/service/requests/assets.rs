@@ -100,6 +100,7 @@ impl Service {
         let deletion = async move {
             this.inner.shards.call(&name, |reply| AssetCommand::Delete { reply }).await?;
             this.inner.principals.clear();
+            this.inner.mutes.remove_asset(&name);
             this.inner.deleter.asset(&name).await
         };
         self.inner.deleter.run_to_completion(deletion).await
@@ -110,7 +111,8 @@ impl Service {
     /// # Errors
     /// [`ServiceError::UnknownAsset`].
     pub async fn state(&self, name: &str) -> Result<StateView, ServiceError> {
-        self.inner.shards.call(name, |reply| AssetCommand::State { reply }).await
+        let state = self.inner.shards.call(name, |reply| AssetCommand::State { reply }).await?;
+        Ok(self.with_mutes(state))
     }
 
     /// Returns the state of the twin, and the trace after the first `seen` points of the
@@ -124,6 +126,8 @@ impl Service {
         session: Option<String>,
         seen: u64,
     ) -> Result<WatchView, ServiceError> {
-        self.inner.shards.call(name, |reply| AssetCommand::Watch { session, seen, reply }).await
+        let watch = |reply| AssetCommand::Watch { session, seen, reply };
+        let view = self.inner.shards.call(name, watch).await?;
+        Ok(WatchView { state: self.with_mutes(view.state), ..view })
     }
 }

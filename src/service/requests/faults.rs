@@ -98,7 +98,11 @@ impl Service {
         let monitors = self.inner.shards.call(asset, |reply| AssetCommand::Monitors { reply });
         match monitors.await {
             Err(error @ ServiceError::Corrupt { .. }) => Err(error),
-            monitors => Ok(monitors.unwrap_or_default()),
+            monitors => {
+                let mut monitors = monitors.unwrap_or_default();
+                self.show_mutes(asset, &mut monitors);
+                Ok(monitors)
+            }
         }
     }
 

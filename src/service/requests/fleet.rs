@@ -33,6 +33,7 @@ struct FleetData {
     faults: BTreeMap<String, Vec<FleetFaultView>>,
     warnings: BTreeMap<String, Vec<SessionWarnings>>,
     learning: BTreeMap<String, LearningRecord>,
+    lost: BTreeMap<String, Micros>,
 }
 
 /// The drift warnings of an axis in a session, and the calibration that they refer to.
@@ -87,6 +88,7 @@ impl Service {
             faults,
             warnings,
             learning,
+            lost: store.lost_communications_of(first, last).await?.into_iter().collect(),
         })
     }
 
@@ -103,6 +105,8 @@ impl Service {
         Ok(FleetEntryView {
             warnings: warned.into_iter().flat_map(|warned| warned.warnings).collect(),
             faults: known.faults.remove(&row.name).unwrap_or_default(),
+            muted: self.mutes_of(&row.name),
+            communication_lost_since: known.lost.remove(&row.name).map(rfc3339),
             calibrated: file.calibration.is_some(),
             learning: learning.state(file.calibration.is_some()),
             session_id: open.as_ref().map(|open| open.id.clone()),

@@ -6,7 +6,8 @@ use crate::service::PendingBatch;
 use crate::service::asset::AssetCommand;
 use crate::service::{Service, ServiceError};
 use crate::wire::service::{ImportView, SessionView};
-use crate::wire::telemetry::{AckView, Batch, RowView};
+use crate::wire::session_file::SessionRowError;
+use crate::wire::telemetry::{AckView, Batch, BatchError, RowView, file_row};
 use offbd_core::vocabulary::Sample;
 
 /// Batches of an import that wait for their acknowledgement at a time.
@@ -27,12 +28,13 @@ impl Service {
     ///
     /// # Errors
     /// [`ServiceError::SessionExists`]; [`ServiceError::Invalid`] for an invalid name;
-    /// [`ServiceError::TooMany`] if there are more rows; those of the samples' batches.
+    /// [`ServiceError::TooMany`] if there are more rows; [`ServiceError::Batch`] if the file
+    /// cannot be read to its end; those of the samples' batches.
     pub async fn import(
         &self,
         asset: &str,
         name: Option<String>,
-        rows: impl Iterator<Item = Result<Sample, String>> + Send + 'static,
+        rows: impl Iterator<Item = Result<Sample, SessionRowError>> + Send + 'static,
         limit: usize,
     ) -> Result<ImportView, ServiceError> {
         let (this, asset) = (self.clone(), asset.to_owned());
@@ -63,7 +65,7 @@ impl Service {
         &self,
         asset: &str,
         session: SessionView,
-        rows: impl Iterator<Item = Result<Sample, String>> + Send,
+        rows: impl Iterator<Item = Result<Sample, SessionRowError>> + Send,
         limit: usize,
     ) -> Result<ImportView, ServiceError> {
         let name = session.name.clone();
@@ -71,7 +73,7 @@ impl Service {
         let mut rows = rows.peekable();
         let mut first = 0;
         while rows.peek().is_some() {
-            let rows: Vec<_> = rows.by_ref().take(BATCH).collect();
+            let rows = rows.by_ref().take(BATCH).map(batch_row).collect::<Result<Vec<_>, _>>()?;
             let n = rows.len();
             if first + n > limit {
                 return Err(ServiceError::TooMany { what: "rows in an imported file", limit });
@@ -87,6 +89,18 @@ impl Service {
             counts.settle().await?;
         }
         Ok(counts.view)
+    }
+}
+
+/// Returns a row of a file as one of a batch; an error if the file cannot be read on.
+fn batch_row(row: Result<Sample, SessionRowError>) -> Result<Result<Sample, String>, ServiceError> {
+    match row {
+        Err(SessionRowError::Unreadable(error)) => {
+            let (pointer, reason) = (String::new(), error.to_string());
+            Err(BatchError::Malformed { pointer, reason }.into())
+        }
+        Err(SessionRowError::Rejected(row)) => Ok(file_row(Err(row.to_string()))),
+        Ok(sample) => Ok(file_row(Ok(sample))),
     }
 }
 

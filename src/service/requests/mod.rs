@@ -2,6 +2,7 @@
 //! `impl Service` block. Queries read the store; changes of an asset are sent as commands
 //! to its shard, others directly to the writer.
 
+mod alarms;
 mod assets;
 mod audit;
 mod calibrations;
@@ -13,6 +14,8 @@ mod history;
 mod import;
 mod jobs;
 mod learning;
+mod mutes;
+mod notifications;
 mod principals;
 mod readiness;
 mod recordings;
@@ -24,8 +27,10 @@ mod tokens;
 mod traces;
 mod trends;
 
+pub use alarms::AlarmQuery;
 pub use faults::FaultQuery;
 pub use fleet::FleetQuery;
+pub use notifications::DeliveryQuery;
 pub use readiness::QueueLoad;
 pub use series::{MAX_SERIES_SESSIONS, SeriesQuery};
 pub use sessions::SessionListQuery;

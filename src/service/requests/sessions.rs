@@ -4,6 +4,7 @@ use crate::service::asset::AssetCommand;
 use crate::service::{Service, ServiceError, views};
 use crate::store::{RecordingReader, SessionFilter, SessionRow};
 use crate::wire::service::{Page, SessionView};
+use crate::wire::session_file::SessionInfo;
 use crate::wire::words::{SessionSort, SessionState, VerdictFilter};
 use offbd_core::vocabulary::TimeRange;
 
@@ -140,7 +141,8 @@ impl Service {
         views::page(rows, limit, |row| (row.opened_at, row.id.clone()), views::session)
     }
 
-    /// Returns a session and a reader of the part of its recording in `range`.
+    /// Returns a session, what a file says about it, and a reader of the part of its recording
+    /// in `range`.
     ///
     /// # Errors
     /// [`ServiceError::UnknownSession`].
@@ -148,9 +150,12 @@ impl Service {
         &self,
         id: &str,
         range: TimeRange,
-    ) -> Result<(SessionView, RecordingReader), ServiceError> {
+    ) -> Result<(SessionView, SessionInfo, RecordingReader), ServiceError> {
         let row = self.session_row(id).await?;
         let recording = self.inner.handles.store.stretch(&row, range).await?;
-        Ok((views::session(row)?, recording))
+        let mut info = views::session_info(&row)?;
+        // The hash is that of the whole session.
+        info.verdict_hash = info.verdict_hash.filter(|_| range == TimeRange::ALL);
+        Ok((views::session(row)?, info, recording))
     }
 }

@@ -429,6 +429,7 @@ impl Committer {
                     Some(Event::of_transition(row))
                 }
                 Write::Action(row) => Event::of_act(row),
+                Write::Communication(row) => Event::of_communication(row),
                 _ => None,
             };
             event.into_iter().for_each(|event| self.events.publish(event));

@@ -10,7 +10,7 @@ use tokio::sync::{Notify, broadcast};
 use tokio_util::sync::CancellationToken;
 
 use crate::service::ServiceError;
-use crate::store::{ActionRow, EventRow, Store, StoreError, TransitionRow};
+use crate::store::{ActionRow, CommunicationChange, EventRow, Store, StoreError, TransitionRow};
 
 /// Events buffered for slow subscribers; one that lags further behind reads the events from
 /// the store.
@@ -22,45 +22,83 @@ const LOOK_EVERY: Duration = Duration::from_secs(1);
 /// Events read from the store per query.
 const PAGE: u32 = 256;
 
-/// A fault transition.
+/// What an event is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EventKind {
+    /// A change of the status of a fault.
+    Fault,
+    /// Data of a rig stay away or come back.
+    Communication,
+}
+
+impl EventKind {
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Fault => "fault",
+            Self::Communication => "communication",
+        }
+    }
+}
+
+/// A fault transition, or a change of communication.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Event {
     /// Unique and increasing.
     pub id: i64,
+    pub kind: EventKind,
     pub asset: String,
     /// The id of the session; `None` if none was open.
     pub session: Option<String>,
-    /// The fault line, JSON.
+    /// The fault line or the change of communication, JSON.
     pub document: String,
 }
 
 impl From<EventRow> for Event {
     fn from(row: EventRow) -> Self {
-        Self { id: row.id, asset: row.asset, session: row.session, document: row.document }
+        let EventRow { id, kind, asset, session, document } = row;
+        let kind = match kind.as_str() {
+            "communication" => EventKind::Communication,
+            _ => EventKind::Fault,
+        };
+        Self { id, kind, asset, session, document }
     }
 }
 
 impl Event {
     pub(in crate::service) fn of_transition(row: TransitionRow) -> Self {
-        let session = Some(row.session);
-        Self { id: row.id, asset: row.asset, session, document: row.document }
+        let TransitionRow { id, asset, session, document, .. } = row;
+        Self { id, kind: EventKind::Fault, asset, session: Some(session), document }
     }
 
     /// None for an act that changed nothing, or that a transition tells of.
     pub(in crate::service) fn of_act(row: ActionRow) -> Option<Self> {
         let document = row.event?;
-        Some(Self { id: row.id, asset: row.asset, session: row.session, document })
+        let ActionRow { id, asset, session, .. } = row;
+        Some(Self { id, kind: EventKind::Fault, asset, session, document })
+    }
+
+    /// None if the asset has been deleted.
+    pub(in crate::service) fn of_communication(row: CommunicationChange) -> Option<Self> {
+        let CommunicationChange { id, asset, session, document, .. } = row;
+        let kind = EventKind::Communication;
+        (id != 0).then_some(Self { id, kind, asset, session, document })
     }
 
     /// Returns the fault line with `asset` and `session_id`, a JSON object.
     #[must_use]
     pub fn line(&self) -> String {
-        let rest = self.document.strip_prefix('{').unwrap_or(&self.document);
-        // Names and ids need no escaping: letters, digits, `-`, `_`, `.`.
-        let session = self.session.as_ref().map(|id| format!("\"{id}\""));
-        let session = session.as_deref().unwrap_or("null");
-        format!(r#"{{"asset":"{}","session_id":{session},{rest}"#, self.asset)
+        line(&self.asset, self.session.as_deref(), &self.document)
     }
+}
+
+/// Returns the `document` of an event with `asset` and `session_id`, a JSON object.
+pub(in crate::service) fn line(asset: &str, session: Option<&str>, document: &str) -> String {
+    let rest = document.strip_prefix('{').unwrap_or(document);
+    // Names and ids need no escaping: letters, digits, `-`, `_`, `.`.
+    let session = session.map(|id| format!("\"{id}\""));
+    let session = session.as_deref().unwrap_or("null");
+    format!(r#"{{"asset":"{asset}","session_id":{session},{rest}"#)
 }
 
 /// The publisher of events. Cheap to clone.
@@ -95,6 +133,11 @@ impl Events {
     fn send(&self, event: Event) {
         // Fails without subscribers, which is not an error.
         let _ = self.sender.send(Arc::new(event));
+    }
+
+    /// Subscribes to be woken by events.
+    pub(in crate::service) fn subscribe(&self) -> broadcast::Receiver<Arc<Event>> {
+        self.sender.subscribe()
     }
 
     /// In a cluster, reads the events of all nodes and publishes them here, until `closing`.

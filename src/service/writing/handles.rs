@@ -102,6 +102,23 @@ impl Handles {
         self.commit(Some(self.ownership.partition_of(asset)), writes).await
     }
 
+    /// Makes changes durable together that one process of a cluster makes for all: the owner of
+    /// the first partition.
+    ///
+    /// # Errors
+    /// [`ServiceError::Moving`] if this process does not own it.
+    pub(in crate::service) async fn write_as_leader(
+        &self,
+        writes: Vec<Write>,
+    ) -> Result<(), ServiceError> {
+        self.commit(Some(PartitionId(0)), writes).await
+    }
+
+    /// Whether this process does what one of a cluster does for all.
+    pub(in crate::service) fn is_leader(&self) -> bool {
+        self.ownership.epoch(PartitionId(0)).is_some()
+    }
+
     async fn commit(
         &self,
         partition: Option<PartitionId>,

@@ -7,7 +7,7 @@ mod handles;
 mod transfer;
 
 pub(super) use commit::{Committer, EngineGeneration, FIRST_RETRY, Outage, WriteSet};
-pub(super) use events::Events;
-pub use events::{Event, EventFeed};
+pub use events::{Event, EventFeed, EventKind};
+pub(super) use events::{Events, line};
 pub(super) use handles::Handles;
 pub(super) use transfer::{TransferRequest, Transfers};

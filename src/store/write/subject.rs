@@ -35,6 +35,10 @@ impl Write {
                 format!("the active calibration of asset `{asset}`")
             }
             Self::PutLearning { asset, .. } => format!("the learning record of asset `{asset}`"),
+            Self::Alarm(_) => "a change of mutes or notes".to_owned(),
+            Self::Notification(_) => "a change of notifications".to_owned(),
+            Self::Communication(row) => format!("the communication of asset `{}`", row.asset),
+            Self::Published { bus, .. } => format!("the last event published over {bus}"),
             Self::Access(_) => "a change of tokens, logins or the audit log".to_owned(),
         }
     }

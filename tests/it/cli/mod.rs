@@ -4,7 +4,7 @@ mod calibrate;
 mod chart;
 mod demo;
 mod drive_cycle;
-mod fixture;
+pub mod fixture;
 mod replay;
 mod scene;
 mod score;

@@ -4,8 +4,10 @@
 use offbd::service::access::Role;
 use offbd::service::access::jwt::{KeySet, MAX_SUBJECT, verify};
 use offbd::store::codec::ChunkKey;
+use offbd::wire::bus::{TopicError, TopicStyle, encoded};
+use offbd::wire::mapping::Mapping;
 use offbd::wire::telemetry::{self, Batch, BatchError};
-use offbd::wire::{asset, scene, session_csv};
+use offbd::wire::{asset, scene, session_csv, session_file};
 use offbd_core::diagnosis::FaultMemory;
 use offbd_core::engine::{Engine, Input, Rig, Setup, calibrate};
 use offbd_core::vocabulary::Sample;
@@ -15,11 +17,12 @@ use crate::support::provider::{self, Key};
 pub type Parser = fn(&[u8]) -> String;
 
 /// Every parser, with the directory of its corpus.
-pub const PARSERS: [(&str, Parser); 11] = [
+pub const PARSERS: [(&str, Parser); 14] = [
     ("json", |input| batch(telemetry::json(input, LIMIT))),
     ("msgpack", |input| batch(telemetry::msgpack(input, LIMIT))),
     ("ndjson", |input| batch(telemetry::ndjson(input, LIMIT))),
     ("csv", |input| batch(telemetry::csv(input, LIMIT))),
+    ("session_file", session_file),
     ("calibration", calibration),
     ("asset", asset_file),
     ("scene", scene_file),
@@ -27,6 +30,8 @@ pub const PARSERS: [(&str, Parser); 11] = [
     ("moment", timestamp),
     ("jwt", jwt),
     ("jwks", jwks),
+    ("mapped", mapped),
+    ("topic", topic),
 ];
 
 /// Largest number of samples of a batch.
@@ -40,6 +45,24 @@ const MAX_REASON_BYTES: usize = 300;
 fn kind(text: &str) -> String {
     let words = text.split(|c: char| !c.is_ascii_alphabetic() && c != '_');
     words.filter(|word| word.len() > 1).take(12).collect::<Vec<_>>().join(" ")
+}
+
+/// Reads a file of any format that the build has, and as many rows of it as of a batch.
+fn session_file(input: &[u8]) -> String {
+    let rows = match session_file::open(std::io::Cursor::new(input.to_vec()), None) {
+        Ok(rows) => rows,
+        Err(error) => return kind(&error.to_string()),
+    };
+    let mut samples = Vec::new();
+    for row in rows.take(LIMIT) {
+        match row {
+            Ok(sample) => samples.push(sample),
+            Err(error) => return kind(&error.to_string()),
+        }
+    }
+    assert!(samples.iter().all(is_finite), "{samples:?}");
+    judge(&samples);
+    "rows".to_owned()
 }
 
 fn batch(read: Result<Batch, BatchError>) -> String {
@@ -59,6 +82,33 @@ fn batch(read: Result<Batch, BatchError>) -> String {
     let first = refused.first().map_or(String::new(), |reason| kind(reason));
     let named = (batch.session.is_some(), batch.id.is_some());
     format!("taken {named:?} {} {first}", samples.len().min(3))
+}
+
+/// A payload of a device with a format of its own.
+fn mapped(input: &[u8]) -> String {
+    let topic = serde_json::json!({
+        "pattern": "a", "asset": "a", "samples": "/s", "session": "/n", "seq": "/q",
+        "t": { "pointer": "/t", "unit": "ms" },
+        "x": { "pointer": "/p/0", "unit": "mm", "negate": true },
+        "qy": { "pointer": "/p/1", "unit": "deg" },
+    });
+    let view = serde_json::from_value(serde_json::json!({ "topics": [topic] })).unwrap();
+    let mapping = Mapping::new(view).unwrap();
+    let (entry, _) = mapping.find("a").unwrap();
+    batch(entry.batch(input, LIMIT))
+}
+
+/// A topic of a device, which must be that of the asset in it.
+fn topic(input: &[u8]) -> String {
+    let text = String::from_utf8_lossy(input);
+    match TopicStyle::Mqtt.parse(&text) {
+        Ok((asset, kind)) => {
+            assert_eq!(TopicStyle::Mqtt.topic(&[&encoded(&asset), kind.as_str()]), text);
+            kind.as_str().to_owned()
+        }
+        Err(TopicError::Foreign { .. }) => "foreign".to_owned(),
+        Err(TopicError::Name { .. }) => "name".to_owned(),
+    }
 }
 
 fn is_finite(sample: &Sample) -> bool {

@@ -2,12 +2,17 @@
 
 #![allow(dead_code, reason = "each test uses a part")]
 
+#[cfg(all(feature = "nats", feature = "mqtt"))]
+pub mod broker;
+#[cfg(all(feature = "nats", feature = "mqtt"))]
+pub mod bus_device;
 #[cfg(unix)]
 pub mod calls;
 pub mod device;
 pub mod postgres;
 pub mod process;
 pub mod provider;
+pub mod receiver;
 
 use std::future::Future;
 use std::path::Path;
@@ -472,4 +477,10 @@ pub async fn eventually<T, F: Future<Output = Option<T>>>(mut done: impl FnMut()
         assert!(start.elapsed() < DEADLINE, "not fulfilled within the deadline");
         tokio::task::yield_now().await;
     }
+}
+
+/// A time this many hours from now, RFC 3339.
+#[expect(clippy::disallowed_methods, reason = "mutes end at a time of the wall clock")]
+pub fn hours_from_now(hours: i64) -> String {
+    (jiff::Timestamp::now() + jiff::SignedDuration::from_hours(hours)).to_string()
 }

@@ -14,7 +14,7 @@ pub const JOURNAL: usize = 6;
 const CHECKSUMS: usize = 10;
 
 /// All tables, those first to which others refer.
-const TABLES: [&str; 16] = [
+const TABLES: [&str; 24] = [
     "asset",
     "session",
     "chunk",
@@ -31,6 +31,14 @@ const TABLES: [&str; 16] = [
     "journal",
     "snapshot",
     "partition",
+    "channel",
+    "rule",
+    "delivery",
+    "reminder",
+    "mute",
+    "communication",
+    "communication_change",
+    "note",
 ];
 
 /// The counter that became a column of `partition`.

@@ -16,6 +16,7 @@ function tabs([first, , third]: string[], isDemo: boolean) {
   const isSetUp = first === "set-up" || third === "set-up";
   return [
     { to: "/", word: "Fleet", isHere: !first || (first === "rigs" && !isSetUp) },
+    { to: "/alarms", word: "Alarms", isHere: first === "alarms" || first === "notifications" },
     { to: sessionsPath(), word: "Sessions", isHere: first === "sessions" },
     { to: "/set-up", word: "Set up", isHere: isSetUp },
     { to: "/learn", word: isDemo ? "Demo" : "Learn", isHere: first === "learn" },

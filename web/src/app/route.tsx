@@ -10,6 +10,10 @@ const FaultPage = lazy(() => import("../pages/fault").then((module) => module.Fa
 const SessionsPage = lazy(() => import("../pages/sessions").then((module) => module.SessionsPage));
 const SessionPage = lazy(() => import("../pages/session").then((module) => module.SessionPage));
 const SetUpPage = lazy(() => import("../pages/set-up").then((module) => module.SetUpPage));
+const AlarmsPage = lazy(() => import("../pages/alarms").then((module) => module.AlarmsPage));
+const NotificationsPage = lazy(() =>
+  import("../pages/notifications").then((module) => module.NotificationsPage),
+);
 const LearnPage = lazy(() => import("../pages/learn").then((module) => module.LearnPage));
 
 /** The view at the path of `segments`; `isDemo` selects the controls of the demo. */
@@ -25,6 +29,8 @@ export function Route({ segments, isDemo }: { segments: string[]; isDemo: boolea
   if (first === "set-up") return <SetUpPage />;
   if (first === "sessions" && name) return <SessionPage key={name} id={name} />;
   if (first === "sessions") return <SessionsPage />;
+  if (first === "alarms") return <AlarmsPage />;
+  if (first === "notifications") return <NotificationsPage />;
   if (first === "learn") return <LearnPage isDemo={isDemo} />;
   return (
     <main>

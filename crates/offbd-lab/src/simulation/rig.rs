@@ -159,6 +159,12 @@ impl SimulatedRig {
         }
     }
 
+    /// Returns the samples of the next `seconds`.
+    pub fn record(&mut self, seconds: f64) -> Vec<Sample> {
+        let end_s = self.truth().t_s + seconds;
+        core::iter::from_fn(|| Some(self.next_sample())).take_while(|s| s.t_s <= end_s).collect()
+    }
+
     /// Returns the next row of the device's log. Rows are numbered from 1; their times
     /// increase strictly.
     pub fn next_sample(&mut self) -> Sample {

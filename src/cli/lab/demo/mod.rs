@@ -144,7 +144,7 @@ fn calibrated_rig(seed: u64) -> anyhow::Result<Rig> {
     let model = Preset::Chapter.model()?;
     let mut rig = Rig { name: ASSET.to_owned(), ..model.rig };
     let mut healthy = simulated_rig(Reference::Lissajous, seed.wrapping_add(1))?;
-    let samples = simulate::record(&mut healthy, HEALTHY_S);
+    let samples = healthy.record(HEALTHY_S);
     let mut file = Vec::new();
     session_csv::write(&mut file, &samples)?;
     let sha256 = HEXLOWER.encode(&Sha256::digest(&file));

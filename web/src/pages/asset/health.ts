@@ -21,11 +21,12 @@ export function healthOf(
   state: State | undefined,
   { isConnected, isSilent, isLearnt }: Known,
 ): RigHealth {
-  const byFaults = healthByFaults(faults.map(stateOf));
+  const muted = (state?.monitors ?? []).filter((monitor) => monitor.muted).map(({ code }) => code);
+  const byFaults = healthByFaults(faults.filter(({ code }) => !muted.includes(code)).map(stateOf));
   if (byFaults) return byFaults;
   if (!isConnected || !state) return "unknown";
   if (!state.session_id) return "idle";
   if (isSilent) return "silent";
-  if (state.unjudged) return "untested";
+  if (state.unjudged || muted.length) return "untested";
   return isLearnt ? "ok" : "unlearnt";
 }

@@ -58,7 +58,7 @@ export function LiveRig({ asset, faults, refetch }: Props) {
             <h2>From above</h2>
             <XyTrace asset={asset} moment={charts.moment} />
           </section>
-          <Monitors monitors={state?.monitors ?? []} />
+          <Monitors asset={asset.name} monitors={state?.monitors ?? []} />
         </div>
       </div>
       {(!state || state.session_id) && <LiveChartsCard charts={charts} />}

@@ -1,4 +1,5 @@
 import type { Monitor } from "../../api/types";
+import { MuteButton } from "./mute-button";
 import { codeTitle } from "../../words/fault-names";
 import { judgedShare } from "../../words/verdict";
 
@@ -6,7 +7,8 @@ import { judgedShare } from "../../words/verdict";
 const PASSED = -128;
 const FAILED = 127;
 
-function resultText({ code, counter, enabled }: Monitor): string {
+function resultText({ code, counter, enabled, muted }: Monitor): string {
+  if (muted) return `not tested (muted by ${muted.by})`;
   if (counter === FAILED) return "failed";
   if (counter === PASSED) return "passed";
   if (enabled) return "testing";
@@ -18,14 +20,15 @@ function readinessText({ complete_this_cycle, complete_since_clear }: Monitor): 
   return complete_since_clear ? "no result in this session yet" : "no result yet";
 }
 
-function rowClass({ counter, enabled }: Monitor): string {
+function rowClass({ counter, enabled, muted }: Monitor): string {
+  if (muted) return "monitor off";
   // Below zero nothing speaks for a fault; only a passed test says that there is none.
   const look = counter === FAILED ? "bad" : counter > 0 ? "warn" : counter === PASSED ? "ok" : "open";
   return `monitor monitor-${look}${enabled ? "" : " off"}`;
 }
 
-export function MonitorRow({ monitor }: { monitor: Monitor }) {
-  const { code, counter, complete_this_cycle } = monitor;
+export function MonitorRow({ asset, monitor }: { asset: string; monitor: Monitor }) {
+  const { code, counter, complete_this_cycle, muted } = monitor;
   const readiness = readinessText(monitor);
   const share = (counter - PASSED) / (FAILED - PASSED);
   return (
@@ -43,9 +46,10 @@ export function MonitorRow({ monitor }: { monitor: Monitor }) {
       </meter>
       <span class="quiet">{resultText(monitor)}</span>
       <span class="ready" title={readiness}>
-        <span aria-hidden="true">{complete_this_cycle ? "✓" : ""}</span>
+        <span aria-hidden="true">{complete_this_cycle && !muted ? "✓" : ""}</span>
         <span class="hidden">{readiness}</span>
       </span>
+      <MuteButton asset={asset} code={code} mute={muted} />
     </li>
   );
 }

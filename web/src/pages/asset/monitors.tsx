@@ -1,14 +1,14 @@
 import type { Monitor } from "../../api/types";
 import { MonitorRow } from "./monitor-row";
 
-export function Monitors({ monitors }: { monitors: Monitor[] }) {
+export function Monitors({ asset, monitors }: { asset: string; monitors: Monitor[] }) {
   return (
     <section class="card">
       <h2>Monitors</h2>
       {monitors.length === 0 && <p class="quiet">Waiting for data.</p>}
       <ul class="monitors">
         {monitors.map((monitor) => (
-          <MonitorRow monitor={monitor} />
+          <MonitorRow asset={asset} monitor={monitor} />
         ))}
       </ul>
       <p class="quiet small-text">

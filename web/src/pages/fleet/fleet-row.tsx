@@ -4,6 +4,7 @@ import { FaultChip } from "../../parts/fault-chip";
 import { HealthMark } from "../../parts/health-mark";
 import { Link } from "../../router/link";
 import { rigPath } from "../../router/paths";
+import { alarmCodeTitle } from "../../words/alarm";
 import { number } from "../../words/numbers";
 import { severity } from "../../words/severity";
 import { timeAgo } from "../../words/time";
@@ -53,7 +54,17 @@ export function FleetRow({ row: { entry, health }, seenAt }: { row: Row; seenAt:
             {entry.unjudged.reason}
           </span>
         )}
-        {!faults.length && !entry.warnings.length && !entry.unjudged && <span class="quiet">none</span>}
+        {entry.communication_lost_since && <span class="chip chip-confirmed">No data arrive</span>}
+        {entry.muted?.map((mute) => (
+          <span class="quiet clip" title={`${mute.reason}, until ${mute.until}`}>
+            {alarmCodeTitle(mute.code)} not tested (muted by {mute.by})
+          </span>
+        ))}
+        {!faults.length &&
+          !entry.warnings.length &&
+          !entry.unjudged &&
+          !entry.muted?.length &&
+          !entry.communication_lost_since && <span class="quiet">none</span>}
       </span>
       <span class="quiet clip">{entry.session ?? "–"}</span>
       <span class={`n${(entry.lag_s ?? 0) > LATE_S ? " late" : ""}`}>

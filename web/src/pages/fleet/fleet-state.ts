@@ -11,13 +11,14 @@ export type ReceivedEvent = FaultEvent & { received: Date };
 const MAX_LINES = 50;
 
 export function healthOf(entry: FleetEntry): RigHealth {
-  const byFaults = healthByFaults(entry.faults);
+  const isMuted = (code: string) => entry.muted?.some((mute) => mute.code === code);
+  const byFaults = healthByFaults(entry.faults.filter((fault) => !isMuted(fault.code)));
   if (byFaults) return byFaults;
   if (entry.warnings.length) return "drift";
   if (!entry.session_id) return "idle";
   // The service judges it: between two looks at a large fleet, every rig would seem silent here.
   if (entry.silent) return "silent";
-  if (entry.unjudged) return "untested";
+  if (entry.unjudged || entry.muted?.length) return "untested";
   return entry.calibrated ? "ok" : "unlearnt";
 }
 

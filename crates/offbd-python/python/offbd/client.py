@@ -1,0 +1,284 @@
+"""A client of the service, with the standard library only."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import random
+import ssl
+import time
+import urllib.error
+import urllib.parse
+import urllib.request
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+ATTEMPT_TIMEOUT_S = 30.0
+"""Longest time without an answer, s; then the request counts as failed."""
+MAX_DELAY_S = 30.0
+"""Longest delay between two attempts, s."""
+FIRST_DELAY_S = 0.2
+"""Delay after the first failed attempt, s; it doubles with each further one."""
+MAX_BATCH_ROWS = 500
+"""Most samples of one request; more are sent in several."""
+RETRIED = (408, 425, 429)
+"""Statuses below 500 after which a request may succeed unchanged."""
+
+
+class ClientError(Exception):
+    """The service has refused a request, or could not be reached in time."""
+
+    def __init__(self, message: str, status: int | None = None, problem: Any = None) -> None:
+        super().__init__(message)
+        self.status = status
+        """The status of the answer; None without an answer."""
+        self.problem = problem
+        """The problem document (RFC 9457) of the answer, if it has one."""
+
+
+@dataclass
+class Acknowledgement:
+    """What the service has done with samples; they are stored durably."""
+
+    accepted: int = 0
+    """Number of recorded samples."""
+    duplicate: int = 0
+    """Number of samples that were recorded before."""
+    rejected: list[tuple[int, str]] = field(default_factory=list)
+    """Index in the sent samples and reason of each invalid sample."""
+    session: str | None = None
+    """Name of the session."""
+    session_id: str | None = None
+    """The service's id of the session."""
+
+
+@dataclass(frozen=True)
+class Event:
+    """A change of a fault's status."""
+
+    id: int
+    data: dict[str, Any]
+
+
+class Client:
+    """Talks to the service at `url`, with a bearer token if one is given.
+
+    A request that fails for a reason that may pass (no connection, 408, 425, 429, 5xx) is
+    sent again with growing delays, for `patience_s` seconds at most; None means for ever.
+    Sent telemetry is idempotent: a sample that arrives twice is stored once.
+    """
+
+    def __init__(
+        self,
+        url: str = "http://127.0.0.1:8087",
+        *,
+        token: str | None = None,
+        patience_s: float | None = None,
+        context: ssl.SSLContext | None = None,
+    ) -> None:
+        scheme = urllib.parse.urlsplit(url).scheme
+        if scheme not in ("http", "https"):
+            raise ValueError(f"the address of a service starts with http:// or https://: {url}")
+        self._base = url.rstrip("/") + "/api/v1"
+        self._token = token
+        self._patience_s = patience_s
+        self._context = context
+
+    def assets(self) -> list[dict[str, Any]]:
+        """Returns all assets."""
+        return list(self._items("/assets", {}))
+
+    def asset(self, name: str) -> dict[str, Any]:
+        """Returns an asset with its description and calibration."""
+        return self._object("GET", f"/assets/{_part(name)}")
+
+    def put_asset(self, name: str, description: Mapping[str, Any]) -> dict[str, Any]:
+        """Registers the asset `name`, or replaces its description."""
+        return self._object("PUT", f"/assets/{_part(name)}", {**description, "name": name})
+
+    def send(
+        self, asset: str, samples: Iterable[Mapping[str, Any]], *, session: str | None = None
+    ) -> Acknowledgement:
+        """Sends samples and returns when all are stored durably. They are taken from the
+        iterable batch by batch, so that it may be long.
+        """
+        total = Acknowledgement()
+        n_sent = 0
+        for batch in _batches(samples):
+            body: dict[str, Any] = {"samples": batch}
+            if session is not None:
+                body["session"] = session
+            answer = self._object("POST", f"/assets/{_part(asset)}/telemetry", body)
+            total.accepted += answer["accepted"]
+            total.duplicate += answer["duplicate"]
+            total.rejected += [(n_sent + row["index"], row["reason"]) for row in answer["rejected"]]
+            total.session = answer["session"] or total.session
+            total.session_id = answer["session_id"] or total.session_id
+            n_sent += len(batch)
+        return total
+
+    def sessions(self, asset: str | None = None) -> Iterator[dict[str, Any]]:
+        """Yields the sessions of an asset, or of all."""
+        return self._items("/sessions", {"asset": asset})
+
+    def session(self, session_id: str) -> dict[str, Any]:
+        """Returns a session by the service's id."""
+        return self._object("GET", f"/sessions/{_part(session_id)}")
+
+    def end_session(self, session_id: str) -> dict[str, Any]:
+        """Ends a session; returns it with its verdict."""
+        return self._object("POST", f"/sessions/{_part(session_id)}/end")
+
+    def recording(self, session_id: str) -> list[dict[str, Any]]:
+        """Returns the samples of a session."""
+        answer = self._object("GET", f"/sessions/{_part(session_id)}/telemetry")
+        samples: list[dict[str, Any]] = answer["samples"]
+        return samples
+
+    def faults(
+        self, asset: str | None = None, *, status: str = "active"
+    ) -> Iterator[dict[str, Any]]:
+        """Yields the faults of an asset, or of all."""
+        path = "/faults" if asset is None else f"/assets/{_part(asset)}/faults"
+        return self._items(path, {"status": status})
+
+    def acknowledge_fault(self, asset: str, code: str, by: str) -> dict[str, Any]:
+        """Acknowledges the present occurrence of a fault in the name of `by`."""
+        path = f"/assets/{_part(asset)}/faults/{_part(code)}/acknowledge"
+        return self._object("POST", path, {"by": by})
+
+    def replay(
+        self, session_id: str, settings: Mapping[str, Any] | None = None, *, poll_s: float = 0.2
+    ) -> dict[str, Any]:
+        """Judges a recorded session again, with other settings if given; returns the finished
+        replay with its result.
+        """
+        job = self._object("POST", f"/sessions/{_part(session_id)}/replays", dict(settings or {}))
+        while job["state"] not in ("done", "failed"):
+            time.sleep(poll_s)
+            job = self._object("GET", f"/replays/{_part(job['id'])}")
+        if job["state"] == "failed":
+            raise ClientError(f"the replay failed: {job['error']}")
+        return job
+
+    def events(self, asset: str | None = None, *, after: int | None = None) -> Iterator[Event]:
+        """Yields the changes of faults as they become durable, for ever; after a lost
+        connection it asks for those that it missed. `after` is the id of the last known event,
+        0 for all that are stored.
+        """
+        delay_s = FIRST_DELAY_S
+        while True:
+            query = _query({"asset": asset, "after": after})
+            try:
+                with self._open("GET", "/events" + query, None) as answer:
+                    for event_id, kind, data in _messages(answer):
+                        after, delay_s = event_id, FIRST_DELAY_S
+                        if kind == "fault":
+                            yield Event(event_id, json.loads(data))
+            except urllib.error.HTTPError as error:
+                if not _may_pass(error.code):
+                    raise _refusal(error) from None
+            except (OSError, http.client.HTTPException):
+                pass
+            time.sleep(delay_s * random.uniform(0.8, 1.2))
+            delay_s = min(2 * delay_s, MAX_DELAY_S)
+
+    def _items(self, path: str, query: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+        """Yields the items of all pages of a list."""
+        cursor = None
+        while True:
+            page = self._object("GET", path + _query({**query, "cursor": cursor}))
+            yield from page["items"]
+            cursor = page.get("next")
+            if cursor is None:
+                return
+
+    def _object(self, method: str, path: str, body: Any = None) -> dict[str, Any]:
+        """Sends a request until it succeeds; returns the JSON of the answer."""
+        content = None if body is None else json.dumps(body).encode()
+        end = None if self._patience_s is None else time.monotonic() + self._patience_s
+        delay_s = FIRST_DELAY_S
+        while True:
+            try:
+                with self._open(method, path, content) as answer:
+                    value: dict[str, Any] = json.load(answer)
+                    return value
+            except urllib.error.HTTPError as error:
+                failure = _refusal(error)
+                if not _may_pass(error.code):
+                    raise failure from None
+                delay_s = max(delay_s, _retry_after_s(error))
+            except (OSError, http.client.HTTPException, ValueError) as error:
+                failure = ClientError(f"{method} {self._base}{path}: {error}")
+            pause_s = delay_s * random.uniform(0.8, 1.2)
+            if end is not None and time.monotonic() + pause_s > end:
+                raise failure
+            time.sleep(pause_s)
+            delay_s = min(2 * delay_s, MAX_DELAY_S)
+
+    def _open(self, method: str, path: str, content: bytes | None) -> Any:
+        headers = {"Accept": "application/json, text/event-stream"}
+        if content is not None:
+            headers["Content-Type"] = "application/json"
+        if self._token is not None:
+            headers["Authorization"] = f"Bearer {self._token}"
+        request = urllib.request.Request(self._base + path, content, headers, method=method)
+        return urllib.request.urlopen(request, timeout=ATTEMPT_TIMEOUT_S, context=self._context)
+
+
+def _batches(samples: Iterable[Mapping[str, Any]]) -> Iterator[list[dict[str, Any]]]:
+    batch: list[dict[str, Any]] = []
+    for sample in samples:
+        batch.append(dict(sample))
+        if len(batch) == MAX_BATCH_ROWS:
+            yield batch
+            batch = []
+    if batch:
+        yield batch
+
+
+def _messages(lines: Iterable[bytes]) -> Iterator[tuple[int, str, str]]:
+    """Yields id, type and data of each message of a stream of Server-Sent Events."""
+    fields: dict[str, str] = {}
+    for line in lines:
+        text = line.decode().rstrip("\r\n")
+        if text:
+            name, _, value = text.partition(":")
+            fields[name] = value.removeprefix(" ")
+        elif "id" in fields:
+            yield int(fields["id"]), fields.get("event", "message"), fields.get("data", "")
+            fields = {}
+        else:
+            fields = {}
+
+
+def _may_pass(status: int) -> bool:
+    return status in RETRIED or status >= 500
+
+
+def _refusal(error: urllib.error.HTTPError) -> ClientError:
+    text = error.read().decode(errors="replace")
+    try:
+        problem = json.loads(text)
+        detail = problem.get("detail") or problem.get("title")
+    except (ValueError, AttributeError):
+        problem, detail = None, text
+    return ClientError(f"{error.code} {error.reason}: {detail}", error.code, problem)
+
+
+def _retry_after_s(error: urllib.error.HTTPError) -> float:
+    """Returns the delay that the service asks for, s, up to a minute."""
+    try:
+        return min(max(float(error.headers.get("Retry-After", 0)), 0.0), 60.0)
+    except ValueError:
+        return 0.0
+
+
+def _part(text: str) -> str:
+    return urllib.parse.quote(text, safe="")
+
+
+def _query(values: Mapping[str, Any]) -> str:
+    given = {name: value for name, value in values.items() if value is not None}
+    return "?" + urllib.parse.urlencode(given) if given else ""

@@ -1,0 +1,160 @@
+"""The client, with a real service and a proxy that loses connections."""
+
+from __future__ import annotations
+
+import json
+import random
+import socket
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pyarrow as pa
+import pytest
+from conftest import Service
+
+import offbd
+
+
+class LossyProxy:
+    """Passes connections on. Of every ten, one is closed before the request, one after it:
+    then the service has stored the batch, but the client does not know."""
+
+    def __init__(self, service: Service) -> None:
+        self.service = service
+        self.random = random.Random(1)
+        self.n_lost = 0
+        self.listener = socket.create_server(("127.0.0.1", 0))
+        threading.Thread(target=self.accept, daemon=True).start()
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.listener.getsockname()[1]}"
+
+    def accept(self) -> None:
+        while True:
+            try:
+                connection, _ = self.listener.accept()
+            except OSError:
+                return
+            threading.Thread(target=self.serve, args=(connection,), daemon=True).start()
+
+    def serve(self, connection: socket.socket) -> None:
+        fate = self.random.randrange(10)
+        host, port = self.service.listen.rsplit(":", 1)
+        with connection:
+            if fate == 0:
+                self.n_lost += 1
+                return
+            # A client that has given up, or a service that is just being killed.
+            try:
+                with socket.create_connection((host, int(port))) as upstream:
+                    upstream.sendall(read_request(connection))
+                    answer = read_all(upstream)
+            except OSError:
+                return
+            if fate == 1:
+                self.n_lost += 1
+                return
+            try:
+                connection.sendall(answer)
+            except OSError:
+                pass
+
+
+def read_request(connection: socket.socket) -> bytes:
+    data = b""
+    while b"\r\n\r\n" not in data:
+        data += received(connection)
+    head, _, body = data.partition(b"\r\n\r\n")
+    length = 0
+    for line in head.split(b"\r\n"):
+        name, _, value = line.partition(b":")
+        if name.lower() == b"content-length":
+            length = int(value)
+    while len(body) < length:
+        body += received(connection)
+    return head + b"\r\n\r\n" + body
+
+
+def received(connection: socket.socket) -> bytes:
+    part = connection.recv(65536)
+    if not part:
+        raise ConnectionError("the client has gone")
+    return part
+
+
+def read_all(connection: socket.socket) -> bytes:
+    data = b""
+    while part := connection.recv(65536):
+        data += part
+    return data
+
+
+@pytest.fixture
+def proxy(service: Service) -> Iterator[LossyProxy]:
+    made = LossyProxy(service)
+    yield made
+    made.listener.close()
+
+
+def test_nothing_is_lost_or_doubled_by_a_lossy_line_and_a_kill(
+    service: Service, proxy: LossyProxy, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("offbd.client.MAX_BATCH_ROWS", 40)
+    monkeypatch.setattr("offbd.client.FIRST_DELAY_S", 0.01)
+    simulation = offbd.simulate(seed=2, faults=["x_servo:dead@20"], seconds=40, seq=True)
+    samples = list(offbd.rows(simulation.table))
+    client = offbd.Client(proxy.url)
+    asset = {**json.loads((folder / "learnt.json").read_text()), "name": "rig"}
+    client.put_asset("rig", asset)
+    half = len(samples) // 2
+    first = client.send("rig", samples[:half], session="s")
+    service.kill()
+    service.start()
+    second = client.send("rig", samples[half:], session="s")
+    assert proxy.n_lost > 5
+    total = first.accepted + first.duplicate + second.accepted + second.duplicate
+    assert total == len(samples) and first.rejected == second.rejected == []
+    assert second.session_id is not None
+    ended = client.end_session(second.session_id)
+    assert client.recording(second.session_id) == samples
+    wanted = offbd.replay(simulation.table, asset)
+    assert wanted.confirmed == ["x_servo"]
+    assert ended["verdict"]["verdict_hash"] == wanted.hash
+    again = client.replay(second.session_id)
+    assert again["result"]["summary"]["verdict_hash"] == wanted.hash
+    assert [fault["code"] for fault in client.faults("rig", status="confirmed")] == wanted.confirmed
+    # The proxy passes only whole answers on, and this one never ends.
+    events = offbd.Client(service.url).events("rig", after=0)
+    seen = [next(events).data["t_s"] for _ in wanted.faults]
+    assert seen == [fault["t_s"] for fault in wanted.faults]
+    assert [session["id"] for session in client.sessions("rig")] == [second.session_id]
+    assert [asset["name"] for asset in client.assets()] == ["rig"]
+
+
+def test_a_refusal_is_an_error_with_its_problem(service: Service) -> None:
+    client = offbd.Client(service.url)
+    with pytest.raises(offbd.ClientError, match="404") as refusal:
+        client.asset("none")
+    assert refusal.value.status == 404
+    assert refusal.value.problem["status"] == 404
+    client.put_asset("rig", {})
+    acknowledged = client.send("rig", [{"seq": 1, "t_s": 0.0}, {"seq": 2, "t_s": "x"}])
+    assert acknowledged.accepted == 1
+    assert [index for index, _ in acknowledged.rejected] == [1]
+
+
+def test_a_service_that_cannot_be_reached_is_an_error_after_the_patience() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as unused:
+        port = unused.getsockname()[1]
+    with pytest.raises(offbd.ClientError) as failure:
+        offbd.Client(f"http://127.0.0.1:{port}", patience_s=0).assets()
+    assert failure.value.status is None
+    with pytest.raises(ValueError, match="http://"):
+        offbd.Client("127.0.0.1:8087")
+
+
+def test_rows_of_a_table_are_what_is_sent(folder: Path) -> None:
+    table = offbd.simulate(seconds=1, seq=True).table
+    assert list(offbd.rows(table)) == pa.table(table).to_pylist()

@@ -1,0 +1,320 @@
+//! A NATS server: batches of devices in, acknowledgements and faults out. Devices that speak
+//! MQTT reach the same subjects through the server.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+
+use async_nats::{Client, ConnectOptions, Event as ClientEvent, Message, Subject};
+use futures_util::StreamExt;
+use futures_util::stream::{SelectAll, select_all};
+use tokio::sync::{Semaphore, mpsc};
+use tokio::task::JoinHandle;
+use tokio::time::timeout;
+use tokio_util::sync::CancellationToken;
+
+use super::callout::{self, Issuer};
+use super::faults::{FaultMessage, Publishing, publish_faults};
+use super::intake::{Answering, BatchAnswer, Delivery, Form, Intake, queue};
+use super::settings::{UnsafeServer, check_streams, check_version};
+use super::{RETRY_INTERVAL, SEND_TIMEOUT};
+use crate::service::Service;
+use crate::wire::bus::{DeviceTopic, TopicStyle};
+
+const BUS: &str = "nats";
+
+/// Longest time of one attempt to connect.
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
+
+/// Messages of one subject that the client holds; when there are more, they are dropped, and
+/// devices send them again.
+const MAX_UNREAD: usize = 1024;
+
+/// Questions for the rights of devices that are answered at a time; further ones wait.
+const MAX_QUESTIONS: usize = 64;
+
+/// How to connect to a NATS server, and what to do there.
+#[derive(Clone, Debug, Default)]
+pub struct NatsSettings {
+    /// `nats://HOST:PORT` or `tls://HOST:PORT`, several of one cluster.
+    pub servers: Vec<String>,
+    pub user: Option<(String, String)>,
+    /// A file with credentials (a JSON Web Token and a seed).
+    pub credentials: Option<PathBuf>,
+    /// Certificates that the server's must come from, a PEM file; without it those of the
+    /// machine.
+    pub ca: Option<PathBuf>,
+    /// The server's monitoring port, `http://HOST:PORT`, to check its settings.
+    pub monitor: Option<String>,
+    /// Whether faults are published.
+    pub faults: bool,
+    /// The seed of the key that signs the rights of devices; without it the server does not
+    /// ask for them.
+    pub issuer_seed: Option<String>,
+    /// The account that devices are in.
+    pub account: String,
+}
+
+/// Why the settings, or the server, cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum NatsError {
+    #[error("`nats.url`: {0}")]
+    Url(String),
+    #[error("`nats.credentials`: {0}")]
+    Credentials(std::io::Error),
+    #[error("{0}")]
+    Key(String),
+    #[error(transparent)]
+    Unsafe(#[from] UnsafeServer),
+}
+
+/// Connects, and takes batches until the service stops.
+///
+/// # Errors
+/// [`NatsError`] if the settings are invalid, or the server's are unsafe. A server that cannot
+/// be reached is no error: the connection is tried again.
+pub async fn start(
+    service: Service,
+    settings: NatsSettings,
+    closing: CancellationToken,
+) -> Result<JoinHandle<()>, NatsError> {
+    let issuer = settings.issuer_seed.as_ref().map(|seed| {
+        let issuer = Issuer::new(seed, settings.account.clone());
+        issuer.map(Arc::new).map_err(|error| NatsError::Key(error.to_string()))
+    });
+    let bus = NatsBus { service, issuer: issuer.transpose()?, settings, closing };
+    let client = match bus.connect().await? {
+        Some(client) => {
+            bus.check(&client).await?;
+            Some(client)
+        }
+        None => None,
+    };
+    Ok(tokio::spawn(bus.run(client)))
+}
+
+struct NatsBus {
+    service: Service,
+    settings: NatsSettings,
+    issuer: Option<Arc<Issuer>>,
+    closing: CancellationToken,
+}
+
+impl NatsBus {
+    /// Returns a client; `None` if no server can be reached.
+    async fn connect(&self) -> Result<Option<Client>, NatsError> {
+        let NatsSettings { servers, user, credentials, ca, .. } = &self.settings;
+        let mut options = ConnectOptions::new()
+            .name("offbd")
+            .connection_timeout(CONNECT_TIMEOUT)
+            .subscription_capacity(MAX_UNREAD)
+            .custom_inbox_prefix("_INBOX.offbd.service")
+            .event_callback(noted);
+        if let Some((user, password)) = user {
+            options = options.user_and_password(user.clone(), password.clone());
+        }
+        if let Some(path) = credentials {
+            options = options.credentials_file(path).await.map_err(NatsError::Credentials)?;
+        }
+        if let Some(path) = ca {
+            options = options.add_root_certificates(path.clone());
+        }
+        let addresses: Result<Vec<async_nats::ServerAddr>, _> =
+            servers.iter().map(|server| server.parse()).collect();
+        let addresses =
+            addresses.map_err(|error: std::io::Error| NatsError::Url(error.to_string()))?;
+        match options.connect(addresses).await {
+            Ok(client) => Ok(Some(client)),
+            Err(error) => {
+                tracing::warn!(%error, "cannot connect to the NATS server; trying again");
+                Ok(None)
+            }
+        }
+    }
+
+    async fn check(&self, client: &Client) -> Result<(), UnsafeServer> {
+        let info = client.server_info();
+        check_version(&info.version)?;
+        let batch_bytes = self.service.limits().batch_bytes;
+        if info.max_payload < batch_bytes {
+            tracing::warn!(
+                "the NATS server takes messages of {} bytes (`max_payload`), `limits.batch_bytes` is \
+                 {batch_bytes}; a longer batch disconnects its device",
+                info.max_payload
+            );
+        }
+        match &self.settings.monitor {
+            Some(monitor) => check_streams(monitor).await,
+            None => Ok(()),
+        }
+    }
+
+    /// Connects if there is no client yet, then takes messages.
+    async fn run(self, client: Option<Client>) {
+        let closing = self.closing.clone();
+        let client = match client {
+            Some(client) => client,
+            None => match closing.run_until_cancelled(self.connect_later()).await {
+                Some(client) => client,
+                None => return,
+            },
+        };
+        if let Err(error) = self.serve(client).await {
+            tracing::error!(%error, "cannot subscribe at the NATS server");
+        }
+    }
+
+    async fn connect_later(&self) -> Client {
+        loop {
+            tokio::time::sleep(RETRY_INTERVAL).await;
+            let Ok(Some(client)) = self.connect().await else { continue };
+            match self.check(&client).await {
+                Ok(()) => return client,
+                Err(error) => tracing::error!(%error, "the NATS server is not used"),
+            }
+        }
+    }
+
+    async fn serve(&self, client: Client) -> Result<(), async_nats::SubscribeError> {
+        let intake = Intake::new(BUS, self.service.clone());
+        let mut subscriptions = Vec::new();
+        for topic in DeviceTopic::ALL {
+            let subject = TopicStyle::Nats.topic(&["*", topic.as_str()]);
+            subscriptions.push(client.subscribe(subject).await?);
+        }
+        let questions = match &self.issuer {
+            Some(issuer) => {
+                let asked = client.queue_subscribe(callout::SUBJECT, "offbd".to_owned()).await?;
+                Some((issuer.clone(), asked))
+            }
+            None => None,
+        };
+        let publishing = async {
+            if self.settings.faults {
+                let (service, closing) = (self.service.clone(), self.closing.clone());
+                publish_faults(BUS, service, client.clone(), closing).await;
+            }
+        };
+        let answering_questions = async {
+            if let Some((issuer, asked)) = questions {
+                self.closing.run_until_cancelled(self.answer(&client, issuer, asked)).await;
+            }
+        };
+        let (sender, receiver) = queue();
+        let reading = self.read(&intake, &client, select_all(subscriptions), sender);
+        let answering = intake.clone().run(&client, receiver);
+        tokio::join!(publishing, answering_questions, reading, answering);
+        Ok(())
+    }
+
+    /// Queues the messages of devices until the service stops.
+    async fn read(
+        &self,
+        intake: &Intake,
+        client: &Client,
+        mut messages: SelectAll<async_nats::Subscriber>,
+        sender: mpsc::Sender<Delivery<Option<Subject>>>,
+    ) {
+        while let Some(Some(message)) = self.closing.run_until_cancelled(messages.next()).await {
+            let Message { subject, reply, payload, .. } = message;
+            let (asset, kind) = match TopicStyle::Nats.parse(&subject) {
+                Ok(topic) => topic,
+                Err(error) => {
+                    tracing::warn!(%error, "a message is refused");
+                    intake.count("topic");
+                    continue;
+                }
+            };
+            let addressed = (asset, Form::Device(kind));
+            if let Err((asset, receipt, answer)) =
+                intake.queue(&sender, addressed, payload, reply, false)
+            {
+                client.answer(&asset, receipt, Some(*answer)).await;
+            }
+        }
+    }
+
+    /// Answers the questions of the server for the rights of devices.
+    async fn answer(
+        &self,
+        client: &Client,
+        issuer: Arc<Issuer>,
+        mut asked: async_nats::Subscriber,
+    ) {
+        let permits = Arc::new(Semaphore::new(MAX_QUESTIONS));
+        while let Some(message) = asked.next().await {
+            let Ok(permit) = permits.clone().acquire_owned().await else { return };
+            let (service, client, issuer) = (self.service.clone(), client.clone(), issuer.clone());
+            let answering = async move {
+                let Some(reply) = message.reply else { return };
+                match issuer.answer(&service, &message.payload).await {
+                    Ok(answer) => send(&client, reply, answer.into_bytes()).await,
+                    Err(error) => {
+                        tracing::warn!(%error, "the question of a NATS server is ignored")
+                    }
+                }
+                drop(permit);
+            };
+            let closing = self.closing.clone();
+            tokio::spawn(async move { closing.run_until_cancelled_owned(answering).await });
+        }
+    }
+}
+
+async fn noted(event: ClientEvent) {
+    match event {
+        ClientEvent::Connected => {
+            tracing::info!("connected to the NATS server");
+            metrics::gauge!("offbd_bus_connected", "bus" => BUS).set(1.0);
+        }
+        ClientEvent::Disconnected | ClientEvent::Closed => {
+            tracing::warn!("the connection to the NATS server is lost");
+            metrics::gauge!("offbd_bus_connected", "bus" => BUS).set(0.0);
+        }
+        ClientEvent::SlowConsumer(_) => {
+            metrics::counter!("offbd_bus_messages_total", "bus" => BUS, "outcome" => "dropped")
+                .increment(1);
+        }
+        event => tracing::warn!(%event, "the NATS server reports"),
+    }
+}
+
+/// Sends a message; one that cannot be sent in time is dropped.
+async fn send(client: &Client, subject: impl async_nats::subject::ToSubject, document: Vec<u8>) {
+    if !matches!(timeout(SEND_TIMEOUT, client.publish(subject, document.into())).await, Ok(Ok(())))
+    {
+        tracing::warn!("a message to the NATS server is dropped");
+    }
+}
+
+impl Answering for Client {
+    type Receipt = Option<Subject>;
+
+    async fn answer(&self, asset: &str, reply: Option<Subject>, answer: Option<BatchAnswer>) {
+        let Some(answer) = answer else { return };
+        let document = answer.document();
+        if let Some(reply) = reply {
+            send(self, reply, document.clone()).await;
+        }
+        send(self, TopicStyle::Nats.ack(asset), document).await;
+    }
+
+    async fn finish(&self) {
+        let _ = timeout(SEND_TIMEOUT, self.flush()).await;
+    }
+}
+
+impl Publishing for Client {
+    async fn publish(&self, message: FaultMessage<'_>) {
+        let FaultMessage { asset, code, document, .. } = message;
+        let subject = TopicStyle::Nats.fault(asset, code);
+        loop {
+            let sent = Self::publish(self, subject.clone(), document.clone().into()).await;
+            // While the server is away, the flush fails or waits for it.
+            if sent.is_ok() && self.flush().await.is_ok() {
+                return;
+            }
+            tokio::time::sleep(RETRY_INTERVAL).await;
+        }
+    }
+}

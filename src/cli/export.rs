@@ -1,0 +1,141 @@
+//! `offbd export`: a recorded session in another format.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::errors::{BadArgument, InputError};
+use super::judge;
+use super::output::{self, NewFile};
+use crate::judging::MAX_NAMED_ROWS;
+use crate::wire::asset;
+use crate::wire::session_file::{SessionFormat, SessionInfo, SessionRowError, SessionWriter};
+use offbd_core::vocabulary::Sample;
+
+/// Samples that are written at a time.
+const BATCH: usize = 8192;
+
+/// Writes a recorded session in another format.
+///
+/// Reads CSV, and in builds with these formats Parquet and Arrow. What a file is,
+/// its first bytes say. Of a session in the service,
+/// GET /api/v1/sessions/ID/telemetry is the same in each format.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    offbd export monday.csv -o monday.parquet\n  \
+    offbd export monday.parquet --asset learnt.json --format arrow -o - | other-program\n\n\
+    With an asset file the session is judged: asset file, calibration and verdict\n\
+    hash are in the metadata of the new file (Parquet, Arrow).\n\n\
+    Invalid rows are reported on stderr, and left out. Exit status: 0 written, 3 the\n\
+    session is unusable; then there is no new file.")]
+pub(super) struct ExportArgs {
+    /// The recorded session
+    #[arg(value_name = "SESSION.csv")]
+    session: PathBuf,
+    /// The file to write, replaced once it is complete; - is stdout
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// The format [default: by the suffix of FILE]
+    #[arg(long, value_parser = parse_format, value_name = "FORMAT")]
+    format: Option<SessionFormat>,
+    /// The rig's asset file, with which the session is judged
+    #[arg(long, value_name = "ASSET.json")]
+    asset: Option<PathBuf>,
+}
+
+/// The formats that are written.
+const FORMATS: [SessionFormat; 4] =
+    [SessionFormat::Csv, SessionFormat::Json, SessionFormat::Parquet, SessionFormat::Arrow];
+
+fn parse_format(word: &str) -> Result<SessionFormat, String> {
+    let found = FORMATS.into_iter().find(|format| format.suffix() == word);
+    found.ok_or_else(|| format!("expected {}", FORMATS.map(SessionFormat::suffix).join(", ")))
+}
+
+pub(super) fn run(args: &ExportArgs) -> anyhow::Result<()> {
+    let format = format(args)?;
+    format.check().map_err(|e| BadArgument(e.to_string()))?;
+    if !args.session.is_file() {
+        let reason = "is not a regular file, which can be read twice";
+        return Err(InputError::file(&args.session, reason).into());
+    }
+    let info = info(args)?;
+    // Only CSV has the column `seq` where it is needed.
+    let with_seq = format == SessionFormat::Csv && has_seq(&args.session)?;
+    let begun = SessionWriter::new(format, &info, with_seq)?;
+    if args.output == Path::new("-") {
+        let mut out = output::stdout();
+        write(&args.session, begun, &mut out)?;
+        return Ok(out.flush()?);
+    }
+    let mut file = NewFile::create(&args.output)?;
+    write(&args.session, begun, &mut file)?;
+    file.keep()
+}
+
+fn format(args: &ExportArgs) -> Result<SessionFormat, BadArgument> {
+    let suffix = args.output.extension().and_then(|suffix| suffix.to_str());
+    let by_suffix = || suffix.and_then(|suffix| parse_format(suffix).ok());
+    args.format.or_else(by_suffix).ok_or_else(|| {
+        let formats = FORMATS.map(SessionFormat::suffix).join(", ");
+        BadArgument(format!("the suffix of FILE is no format; add --format, one of {formats}"))
+    })
+}
+
+/// Judges the session if there is an asset file.
+fn info(args: &ExportArgs) -> anyhow::Result<SessionInfo> {
+    let session = judge::session_name(&args.session);
+    let Some(path) = args.asset.as_deref() else {
+        return Ok(SessionInfo { session, ..SessionInfo::default() });
+    };
+    let setup = judge::set_up(judge::load_rig(Some(path))?, None)?;
+    let judged = judge::judge_file(&setup, &args.session)?;
+    Ok(SessionInfo {
+        session,
+        asset_file: Some(serde_json::to_string(&asset::view(&setup.rig))?),
+        calibration_id: setup.rig.calibration.as_ref().map(asset::calibration_id),
+        verdict_hash: Some(judged.summary.verdict_hash),
+    })
+}
+
+fn has_seq(path: &Path) -> Result<bool, InputError> {
+    Ok(judge::open(path)?.any(|row| row.is_ok_and(|sample| sample.seq.is_some())))
+}
+
+/// Writes the valid rows of the session at `path`, and reports the others.
+fn write(
+    path: &Path,
+    (mut writer, start): (SessionWriter, Vec<u8>),
+    out: &mut impl Write,
+) -> anyhow::Result<()> {
+    out.write_all(&start)?;
+    let (mut samples, mut n_rejected) = (Vec::<Sample>::with_capacity(BATCH), 0_usize);
+    for row in judge::open(path)? {
+        match row {
+            Ok(sample) => samples.push(sample),
+            Err(SessionRowError::Rejected(reason)) => {
+                n_rejected += 1;
+                if n_rejected <= MAX_NAMED_ROWS {
+                    anstream::eprintln!("{}: {reason}; row left out", path.display());
+                }
+            }
+            Err(error) => return Err(InputError::file(path, error).into()),
+        }
+        if samples.len() == BATCH {
+            out.write_all(&writer.rows(&samples)?)?;
+            samples.clear();
+        }
+    }
+    if n_rejected > MAX_NAMED_ROWS {
+        anstream::eprintln!(
+            "{}: {} more rows left out",
+            path.display(),
+            n_rejected - MAX_NAMED_ROWS
+        );
+    }
+    if !samples.is_empty() {
+        out.write_all(&writer.rows(&samples)?)?;
+    }
+    Ok(out.write_all(&writer.end()?)?)
+}

@@ -1,0 +1,364 @@
+//! Files of one session in the formats of other tools: reading them as samples and writing
+//! them, piece by piece.
+//!
+//! All formats have the columns of the CSV file (`session_csv.rs`). A format beside CSV and
+//! JSON needs a cargo feature of its own name; without it the file is refused with a message
+//! that says so. Readers and writers hold a bounded part of a session in memory. A file that
+//! ends too early or is damaged is an error at the row where that is found: callers discard
+//! what they have read.
+
+#[cfg(feature = "parquet")]
+mod arrow;
+#[cfg(feature = "parquet")]
+mod columns;
+#[cfg(feature = "parquet")]
+mod parquet;
+#[cfg(feature = "parquet")]
+mod parquet_pages;
+
+use std::fmt;
+use std::io::{self, Read, Seek, SeekFrom};
+
+use offbd_core::vocabulary::Sample;
+
+use super::session_csv::{self, CsvError, RowError, SessionCsvReader};
+use super::telemetry::sample_view;
+
+/// A format of session files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SessionFormat {
+    Csv,
+    /// JSON rows, as `GET /sessions/{id}/telemetry` sends them; only written.
+    Json,
+    Parquet,
+    /// An Arrow stream; an Arrow file is read, too.
+    Arrow,
+}
+
+impl SessionFormat {
+    /// All formats; the first is the one by default.
+    pub const ALL: [Self; 4] = [Self::Csv, Self::Json, Self::Parquet, Self::Arrow];
+
+    /// The word on the command line, and the usual suffix of a file's name.
+    #[must_use]
+    pub const fn suffix(self) -> &'static str {
+        match self {
+            Self::Csv => "csv",
+            Self::Json => "json",
+            Self::Parquet => "parquet",
+            Self::Arrow => "arrow",
+        }
+    }
+
+    /// The media type.
+    #[must_use]
+    pub const fn media_type(self) -> &'static str {
+        match self {
+            Self::Csv => "text/csv",
+            Self::Json => "application/json",
+            Self::Parquet => "application/vnd.apache.parquet",
+            Self::Arrow => "application/vnd.apache.arrow.stream",
+        }
+    }
+
+    /// Checks that this build of offbd has the format.
+    ///
+    /// # Errors
+    /// [`SessionFileError::NotBuilt`].
+    pub const fn check(self) -> Result<(), SessionFileError> {
+        match self {
+            Self::Parquet | Self::Arrow if !cfg!(feature = "parquet") => Err(self.not_built()),
+            _ => Ok(()),
+        }
+    }
+
+    const fn not_built(self) -> SessionFileError {
+        SessionFileError::NotBuilt { format: self, feature: "parquet" }
+    }
+
+    /// Returns the format of a file that begins with `head`; CSV unless a signature says
+    /// otherwise.
+    #[must_use]
+    pub fn of(head: &[u8]) -> Self {
+        const SIGNATURES: [(&[u8], SessionFormat); 3] = [
+            (b"PAR1", SessionFormat::Parquet),
+            (ARROW_FILE, SessionFormat::Arrow),
+            (&[0xff; 4], SessionFormat::Arrow),
+        ];
+        let found = SIGNATURES.iter().find(|(signature, _)| head.starts_with(signature));
+        found.map_or(Self::Csv, |(_, format)| *format)
+    }
+}
+
+impl fmt::Display for SessionFormat {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Csv => "CSV",
+            Self::Json => "JSON",
+            Self::Parquet => "Parquet",
+            Self::Arrow => "Arrow",
+        })
+    }
+}
+
+/// The first bytes of an Arrow file, which is a stream between signatures.
+const ARROW_FILE: &[u8] = b"ARROW1\0\0";
+
+/// Bytes that show the format of a file.
+const HEAD_BYTES: u64 = 8;
+
+/// Why a file cannot be read or written as a session.
+#[derive(Debug, thiserror::Error)]
+pub enum SessionFileError {
+    #[error(transparent)]
+    Csv(#[from] CsvError),
+    #[error(
+        "this build of offbd has no {format}; build it with `cargo build --features {feature}`"
+    )]
+    NotBuilt { format: SessionFormat, feature: &'static str },
+    #[error("{0} files are only written, not read")]
+    NotRead(SessionFormat),
+    #[error("there is no column `{0}`; required: t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m")]
+    NoColumn(&'static str),
+    #[error("there are two columns `{0}`")]
+    TwoColumns(&'static str),
+    /// The column is not numeric; `found` is its type.
+    #[error("the column `{column}` has the type {found}, not a number")]
+    NotANumber { column: &'static str, found: String },
+    #[error("the file cannot be read: {0}")]
+    Io(#[from] io::Error),
+    #[error("the {format} file is damaged, or was not written to its end: {reason}")]
+    Damaged { format: SessionFormat, reason: String },
+    /// A part of the file that must be in memory as a whole is too large.
+    #[error("{what} of the file has {found} bytes; at most {limit} are read")]
+    TooLarge { what: &'static str, found: u64, limit: u64 },
+    #[error("the recording cannot be written as {format}: {reason}")]
+    Write { format: SessionFormat, reason: String },
+}
+
+/// Runs a part of a library's reader, whose panic means that the file contradicts itself.
+#[cfg(feature = "parquet")]
+fn guarded<T>(format: SessionFormat, read: impl FnOnce() -> T) -> Result<T, SessionFileError> {
+    std::panic::catch_unwind(std::panic::AssertUnwindSafe(read)).map_err(|_| {
+        let reason = "its contents contradict each other".to_owned();
+        SessionFileError::Damaged { format, reason }
+    })
+}
+
+/// Where in a file a row is, counted from 1; lines count the header.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RowPlace {
+    Line(u64),
+    Row(u64),
+}
+
+impl fmt::Display for RowPlace {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Line(n) => write!(f, "line {n}"),
+            Self::Row(n) => write!(f, "row {n}"),
+        }
+    }
+}
+
+/// A row of a recording that is rejected.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RejectedRow {
+    pub place: RowPlace,
+    pub reason: String,
+}
+
+impl fmt::Display for RejectedRow {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.place, self.reason)
+    }
+}
+
+/// Why the next row is no sample.
+#[derive(Debug, thiserror::Error)]
+pub enum SessionRowError {
+    /// The row is rejected, and the next one can be read.
+    #[error("{0}")]
+    Rejected(RejectedRow),
+    /// The rest of the file cannot be read, so that nothing of it may be kept.
+    #[error(transparent)]
+    Unreadable(SessionFileError),
+}
+
+/// The rows of a session file, in its order. After an [`SessionRowError::Unreadable`] the
+/// rows end.
+pub trait SessionRows: Iterator<Item = Result<Sample, SessionRowError>> + Send {
+    /// The place of the row read last.
+    fn place(&self) -> RowPlace;
+}
+
+/// Opens the session file `source`. Without `format` its first bytes say what it is.
+///
+/// # Errors
+/// [`SessionFileError`] if this build does not read the format, a column is missing or has
+/// another type, or the file is damaged.
+pub fn open<S: Read + Seek + Send + 'static>(
+    mut source: S,
+    format: Option<SessionFormat>,
+) -> Result<Box<dyn SessionRows>, SessionFileError> {
+    let mut head = Vec::new();
+    if format.is_none() {
+        source.by_ref().take(HEAD_BYTES).read_to_end(&mut head)?;
+    }
+    let format = format.unwrap_or_else(|| SessionFormat::of(&head));
+    if format == SessionFormat::Csv {
+        // A pipe cannot go back to its start.
+        let source = io::Cursor::new(head).chain(source);
+        return Ok(Box::new(CsvRows(SessionCsvReader::new(source)?)));
+    }
+    source.seek(SeekFrom::Start(0))?;
+    match format {
+        #[cfg(feature = "parquet")]
+        SessionFormat::Parquet => Ok(Box::new(parquet::rows(source)?)),
+        #[cfg(feature = "parquet")]
+        SessionFormat::Arrow => Ok(Box::new(arrow::ArrowRows::new(source)?)),
+        #[cfg(not(feature = "parquet"))]
+        SessionFormat::Parquet | SessionFormat::Arrow => Err(format.not_built()),
+        SessionFormat::Json | SessionFormat::Csv => Err(SessionFileError::NotRead(format)),
+    }
+}
+
+struct CsvRows<R>(SessionCsvReader<R>);
+
+impl<R: Read> Iterator for CsvRows<R> {
+    type Item = Result<Sample, SessionRowError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let rejected = |RowError { line, reason }| {
+            SessionRowError::Rejected(RejectedRow { place: RowPlace::Line(line), reason })
+        };
+        self.0.next().map(|row| row.map_err(rejected))
+    }
+}
+
+impl<R: Read + Send> SessionRows for CsvRows<R> {
+    fn place(&self) -> RowPlace {
+        RowPlace::Line(self.0.line())
+    }
+}
+
+/// What a file says about its session, beside the samples.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct SessionInfo {
+    /// The session's name.
+    pub session: String,
+    /// The asset file that the session is judged with.
+    pub asset_file: Option<String>,
+    pub calibration_id: Option<String>,
+    /// The verdict hash of the session, if it has ended.
+    pub verdict_hash: Option<String>,
+}
+
+impl SessionInfo {
+    /// Keys and values, for the metadata of a file.
+    #[cfg(feature = "parquet")]
+    fn entries(&self) -> impl Iterator<Item = (&'static str, &str)> {
+        let entries = [
+            ("offbd.session", Some(self.session.as_str())),
+            ("offbd.version", Some(env!("CARGO_PKG_VERSION"))),
+            ("offbd.asset_file", self.asset_file.as_deref()),
+            ("offbd.calibration_id", self.calibration_id.as_deref()),
+            ("offbd.verdict_hash", self.verdict_hash.as_deref()),
+        ];
+        entries.into_iter().filter_map(|(key, value)| Some((key, value?)))
+    }
+}
+
+/// Writes the samples of one session. Each call returns the next bytes of the file.
+pub struct SessionWriter(Encoding);
+
+enum Encoding {
+    Csv {
+        with_seq: bool,
+    },
+    Json {
+        is_first: bool,
+    },
+    #[cfg(feature = "parquet")]
+    Parquet(Box<parquet::ParquetEncoder>),
+    #[cfg(feature = "parquet")]
+    Arrow(Box<arrow::ArrowEncoder>),
+}
+
+impl SessionWriter {
+    /// Begins a file; in CSV with the column `seq` if `with_seq`. Returns the first bytes.
+    ///
+    /// # Errors
+    /// [`SessionFileError::NotBuilt`]; [`SessionFileError::Write`].
+    pub fn new(
+        format: SessionFormat,
+        info: &SessionInfo,
+        with_seq: bool,
+    ) -> Result<(Self, Vec<u8>), SessionFileError> {
+        let (encoding, start) = match format {
+            SessionFormat::Csv => {
+                let mut start = Vec::new();
+                session_csv::write_header(&mut start, with_seq)?;
+                (Encoding::Csv { with_seq }, start)
+            }
+            SessionFormat::Json => {
+                let name = serde_json::to_string(&info.session).map_err(io::Error::from)?;
+                let start = format!(r#"{{"session":{name},"samples":["#).into_bytes();
+                (Encoding::Json { is_first: true }, start)
+            }
+            #[cfg(feature = "parquet")]
+            SessionFormat::Parquet => {
+                (Encoding::Parquet(Box::new(parquet::ParquetEncoder::new(info)?)), Vec::new())
+            }
+            #[cfg(feature = "parquet")]
+            SessionFormat::Arrow => {
+                (Encoding::Arrow(Box::new(arrow::ArrowEncoder::new(info)?)), Vec::new())
+            }
+            #[cfg(not(feature = "parquet"))]
+            SessionFormat::Parquet | SessionFormat::Arrow => return Err(format.not_built()),
+        };
+        Ok((Self(encoding), start))
+    }
+
+    /// Appends samples.
+    ///
+    /// # Errors
+    /// [`SessionFileError::Write`].
+    pub fn rows(&mut self, samples: &[Sample]) -> Result<Vec<u8>, SessionFileError> {
+        let mut bytes = Vec::new();
+        match &mut self.0 {
+            Encoding::Csv { with_seq } => {
+                session_csv::write_rows(&mut bytes, samples, *with_seq)?;
+            }
+            Encoding::Json { is_first } => {
+                for sample in samples {
+                    if !std::mem::take(is_first) {
+                        bytes.push(b',');
+                    }
+                    serde_json::to_writer(&mut bytes, &sample_view(sample))
+                        .map_err(io::Error::from)?;
+                }
+            }
+            #[cfg(feature = "parquet")]
+            Encoding::Parquet(encoder) => bytes = encoder.rows(samples)?,
+            #[cfg(feature = "parquet")]
+            Encoding::Arrow(encoder) => bytes = encoder.rows(samples)?,
+        }
+        Ok(bytes)
+    }
+
+    /// Ends the file.
+    ///
+    /// # Errors
+    /// [`SessionFileError::Write`].
+    pub fn end(self) -> Result<Vec<u8>, SessionFileError> {
+        match self.0 {
+            Encoding::Csv { .. } => Ok(Vec::new()),
+            Encoding::Json { .. } => Ok(b"]}".to_vec()),
+            #[cfg(feature = "parquet")]
+            Encoding::Parquet(encoder) => encoder.end(),
+            #[cfg(feature = "parquet")]
+            Encoding::Arrow(encoder) => encoder.end(),
+        }
+    }
+}

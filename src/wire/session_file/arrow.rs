@@ -1,0 +1,219 @@
+//! Sessions as Arrow streams, and read also as Arrow files: a file is a stream between
+//! signatures, followed by an index that is not needed.
+//!
+//! Compressed streams are not read: their buffers state the size to reserve, without a limit.
+
+use std::io::{Read, Seek, SeekFrom};
+
+use arrow_array::RecordBatch;
+use arrow_buffer::Buffer;
+use arrow_ipc::reader::StreamDecoder;
+use arrow_ipc::writer::StreamWriter;
+use arrow_schema::SchemaRef;
+
+use super::columns::{self, BatchRows, SchemaIndices};
+use super::{
+    ARROW_FILE, RowPlace, SessionFileError, SessionFormat, SessionInfo, SessionRowError,
+    SessionRows, guarded,
+};
+use offbd_core::vocabulary::Sample;
+
+/// Bytes that are read at a time.
+const READ_BYTES: usize = 64 << 10;
+
+/// Longest record batch that is read, bytes; it is in memory as a whole. Chosen: 5 million
+/// rows of a session. A longer one is refused.
+const MAX_BATCH_BYTES: u64 = 256 << 20;
+
+fn damaged(reason: impl ToString) -> SessionFileError {
+    SessionFileError::Damaged { format: SessionFormat::Arrow, reason: reason.to_string() }
+}
+
+fn unwritten(error: impl ToString) -> SessionFileError {
+    SessionFileError::Write { format: SessionFormat::Arrow, reason: error.to_string() }
+}
+
+/// Writes an Arrow stream into memory, from where each call takes what is complete.
+pub(super) struct ArrowEncoder {
+    schema: SchemaRef,
+    writer: StreamWriter<Vec<u8>>,
+}
+
+impl ArrowEncoder {
+    pub(super) fn new(info: &SessionInfo) -> Result<Self, SessionFileError> {
+        let schema = columns::schema(info);
+        let writer = StreamWriter::try_new(Vec::new(), &schema).map_err(unwritten)?;
+        Ok(Self { schema, writer })
+    }
+
+    pub(super) fn rows(&mut self, samples: &[Sample]) -> Result<Vec<u8>, SessionFileError> {
+        let batch = columns::batch(&self.schema, samples).map_err(unwritten)?;
+        self.writer.write(&batch).map_err(unwritten)?;
+        Ok(std::mem::take(self.writer.get_mut()))
+    }
+
+    pub(super) fn end(mut self) -> Result<Vec<u8>, SessionFileError> {
+        self.writer.finish().map_err(unwritten)?;
+        Ok(std::mem::take(self.writer.get_mut()))
+    }
+}
+
+/// The last bytes of an Arrow file, after the length of its index.
+const SIGNATURE: &[u8] = b"ARROW1";
+
+/// The first bytes of each message of a stream.
+const MESSAGE: &[u8] = &[0xff; 4];
+
+/// Bytes at the end of an Arrow file: the length of its index and the signature.
+const TAIL_BYTES: u64 = 10;
+
+/// Returns the end of the stream in an Arrow file; `None` if `source` is a stream itself.
+fn stream_end<S: Read + Seek>(source: &mut S) -> Result<Option<u64>, SessionFileError> {
+    let mut head = Vec::with_capacity(ARROW_FILE.len());
+    source.by_ref().take(ARROW_FILE.len() as u64).read_to_end(&mut head)?;
+    if head != ARROW_FILE {
+        return Ok(None);
+    }
+    let mut mark = Vec::new();
+    source.by_ref().take(MESSAGE.len() as u64).read_to_end(&mut mark)?;
+    if mark != MESSAGE {
+        return Err(damaged("it has no stream, only an index; write it as an Arrow stream"));
+    }
+    let n_bytes = source.seek(SeekFrom::End(0))?;
+    source.seek(SeekFrom::Start(n_bytes.saturating_sub(TAIL_BYTES)))?;
+    let mut tail = Vec::new();
+    source.by_ref().take(TAIL_BYTES).read_to_end(&mut tail)?;
+    match tail.split_first_chunk::<4>() {
+        Some((length, SIGNATURE)) => {
+            let index = u64::from(u32::from_le_bytes(*length));
+            Ok(Some(n_bytes.saturating_sub(TAIL_BYTES + index)))
+        }
+        _ => Err(damaged("it does not end with its signature")),
+    }
+}
+
+/// The rows of an Arrow stream or file.
+pub(super) struct ArrowRows<S> {
+    source: S,
+    /// Bytes of the stream that are not read yet, at most.
+    left: u64,
+    is_file: bool,
+    decoder: StreamDecoder,
+    unread: Buffer,
+    /// Bytes since the last record batch.
+    n_bytes: u64,
+    rows: BatchRows,
+    has_ended: bool,
+}
+
+impl<S: Read + Seek> ArrowRows<S> {
+    /// Reads the schema and the first record batch.
+    pub(super) fn new(mut source: S) -> Result<Self, SessionFileError> {
+        let stream_end = stream_end(&mut source)?;
+        let start = stream_end.map_or(0, |_| ARROW_FILE.len() as u64);
+        source.seek(SeekFrom::Start(start))?;
+        let mut this = Self {
+            source,
+            left: stream_end.map_or(u64::MAX, |end| end.saturating_sub(start)),
+            is_file: stream_end.is_some(),
+            decoder: StreamDecoder::new(),
+            unread: Buffer::from_vec(Vec::<u8>::new()),
+            n_bytes: 0,
+            rows: BatchRows::new(),
+            has_ended: false,
+        };
+        this.advance()?;
+        let schema = this.decoder.schema().ok_or_else(|| damaged("it has no schema"))?;
+        SchemaIndices::of(&schema)?;
+        Ok(this)
+    }
+}
+
+impl<S: Read> ArrowRows<S> {
+    /// Goes on to the next record batch, or to the end.
+    fn advance(&mut self) -> Result<(), SessionFileError> {
+        match self.batch()? {
+            Some(batch) => self.rows.set(batch),
+            None => {
+                self.has_ended = true;
+                Ok(())
+            }
+        }
+    }
+
+    fn batch(&mut self) -> Result<Option<RecordBatch>, SessionFileError> {
+        loop {
+            if self.unread.is_empty() {
+                let mut bytes = Vec::with_capacity(READ_BYTES);
+                let most = self.left.min(READ_BYTES as u64);
+                self.source.by_ref().take(most).read_to_end(&mut bytes)?;
+                self.left -= bytes.len() as u64;
+                if bytes.is_empty() {
+                    return self.check_end().map(|()| None);
+                }
+                self.n_bytes += bytes.len() as u64;
+                self.unread = Buffer::from_vec(bytes);
+            }
+            let (decoder, unread) = (&mut self.decoder, &mut self.unread);
+            match guarded(SessionFormat::Arrow, || decoder.decode(unread))? {
+                Ok(Some(batch)) => {
+                    self.n_bytes = self.unread.len() as u64;
+                    return Ok(Some(batch));
+                }
+                // Something follows the end of the stream.
+                Err(_) if self.decoder.finish().is_ok() => return Ok(None),
+                Err(error) => return Err(damaged(error)),
+                Ok(None) if self.n_bytes > MAX_BATCH_BYTES => {
+                    let (found, limit) = (self.n_bytes, MAX_BATCH_BYTES);
+                    return Err(SessionFileError::TooLarge {
+                        what: "a record batch",
+                        found,
+                        limit,
+                    });
+                }
+                Ok(None) => {}
+            }
+        }
+    }
+}
+
+impl<S: Read> ArrowRows<S> {
+    /// Checks that the source, of which nothing is left, has the mark at the end of a stream.
+    fn check_end(&mut self) -> Result<(), SessionFileError> {
+        self.decoder.finish().map_err(damaged)?;
+        if self.is_file {
+            // Its end is known from its last bytes, and not each program writes the mark.
+            return Ok(());
+        }
+        // Only after the mark does the decoder refuse any further byte.
+        match self.decoder.decode(&mut Buffer::from_vec(vec![0_u8])) {
+            Err(_) => Ok(()),
+            Ok(_) => Err(damaged("it has no mark of its end")),
+        }
+    }
+}
+
+impl<S: Read> Iterator for ArrowRows<S> {
+    type Item = Result<Sample, SessionRowError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            if let Some(row) = self.rows.next() {
+                return Some(row);
+            }
+            if self.has_ended {
+                return None;
+            }
+            if let Err(error) = self.advance() {
+                self.has_ended = true;
+                return Some(Err(SessionRowError::Unreadable(error)));
+            }
+        }
+    }
+}
+
+impl<S: Read + Send> SessionRows for ArrowRows<S> {
+    fn place(&self) -> RowPlace {
+        self.rows.place()
+    }
+}

@@ -1,0 +1,134 @@
+"""Compares what offbd and other programs read and write. See scripts/formats."""
+
+import json
+import resource
+import subprocess
+import sys
+from csv import DictReader
+from pathlib import Path
+
+import duckdb
+import numpy
+import pandas
+import polars
+import pyarrow.ipc
+import pyarrow.parquet
+
+PROGRAM, DATA, ROWS = sys.argv[1], Path(sys.argv[2]), int(sys.argv[3])
+COLUMNS = ["t_s", "cmd_qx_rad", "cmd_qy_rad", "x_m", "y_m"]
+
+# The most memory that offbd may take to convert a file of any length.
+LIMIT_BYTES = 400 << 20
+
+
+def offbd(*arguments, status=0):
+    run = subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, cwd=DATA)
+    assert run.returncode == status, f"offbd {arguments}: {run.returncode}\n{run.stderr}"
+    return run
+
+
+def verdict_hash(file):
+    lines = offbd("replay", "--asset", "learnt.json", "--format", "json", file).stdout.splitlines()
+    return json.loads(lines[-1])["verdict_hash"]
+
+
+def bits(frame):
+    """The columns as integers of the same bits, and a fixed number for a missing value."""
+    found = {}
+    for name in COLUMNS:
+        values = frame[name]
+        doubles = numpy.array([numpy.nan if v is None else v for v in values], dtype="float64")
+        found[name] = numpy.where(numpy.isnan(doubles), -1, doubles.view("int64")).tolist()
+    return found
+
+
+def check(what, found, expected):
+    assert found == expected, f"{what} differs"
+    print(f"{what}: the same")
+
+
+offbd("simulate", "--rig", "rig.json", "--reference", "lissajous", "--seconds", 90, "--seed", 7, "-o", "healthy.csv")
+offbd("calibrate", "--asset", "rig.json", "healthy.csv", "-o", "learnt.json")
+offbd("simulate", "--seed", 2, "--seconds", 40, "--fault", "x_servo:dead@20", "-o", "sick.csv")
+with open(DATA / "sick.csv", newline="") as file:
+    rows = [{name: float(row[name]) if row[name] else None for name in COLUMNS} for row in DictReader(file)]
+csv = pandas.DataFrame(rows, columns=COLUMNS, dtype="float64")
+expected = bits({name: [row[name] for row in rows] for name in COLUMNS})
+expected_hash = verdict_hash("sick.csv")
+assert -1 in expected["x_m"], "no missing value"
+
+# What offbd writes is read by others.
+for suffix in ["parquet", "arrow"]:
+    offbd("export", "sick.csv", "--asset", "learnt.json", "-o", f"sick.{suffix}")
+parquet, arrow = DATA / "sick.parquet", DATA / "sick.arrow"
+table = pyarrow.parquet.read_table(parquet)
+check("Parquet in pyarrow", bits(table.to_pydict()), expected)
+types = {name: str(table.schema.field(name).type) for name in [*COLUMNS, "seq"]}
+assert types == dict.fromkeys(COLUMNS, "double") | {"seq": "int64"}, types
+check("Parquet in polars", bits(polars.read_parquet(parquet).to_dict(as_series=False)), expected)
+relation = duckdb.read_parquet(str(parquet))
+check("Parquet in DuckDB", bits(relation.to_arrow_table().to_pydict()), expected)
+check("Parquet in pandas", bits(pandas.read_parquet(parquet).astype(object)), expected)
+with pyarrow.ipc.open_stream(arrow) as reader:
+    stream = reader.read_all()
+check("Arrow in pyarrow", bits(stream.to_pydict()), expected)
+check("Arrow in polars", bits(polars.read_ipc_stream(arrow).to_dict(as_series=False)), expected)
+for metadata in [pyarrow.parquet.read_metadata(parquet).metadata, stream.schema.metadata]:
+    assert metadata[b"offbd.verdict_hash"].decode() == expected_hash, metadata
+    asset = json.loads(metadata[b"offbd.asset_file"])
+    assert asset["calibration"]["id"] == metadata[b"offbd.calibration_id"].decode(), metadata
+print("metadata: asset file, calibration and verdict hash")
+
+# What others write is judged the same.
+frame = polars.from_pandas(csv)
+files = {
+    "pandas.parquet": lambda f: csv.to_parquet(f, index=False),
+    "pandas-zstd.parquet": lambda f: csv.to_parquet(f, index=False, compression="zstd"),
+    "polars.parquet": frame.write_parquet,
+    "polars-stream.arrow": frame.write_ipc_stream,
+    "duckdb.parquet": lambda f: duckdb.sql(f"COPY frame TO '{f}' (FORMAT parquet)"),
+    "rows-of-ten.parquet": lambda f: csv.to_parquet(f, index=False, row_group_size=10),
+    "feather.arrow": lambda f: csv.to_feather(f, compression="uncompressed"),
+    "more-columns.parquet": lambda f: csv.assign(note="x", n=1)[
+        ["note", *reversed(COLUMNS), "n"]
+    ].to_parquet(f, index=False),
+}
+for name, write in files.items():
+    write(DATA / name)
+    check(name, verdict_hash(name), expected_hash)
+
+# Errors name what is wrong.
+refused = {
+    "text.parquet": (csv.assign(x_m="0"), "`x_m`"),
+    "missing.parquet": (csv.drop(columns="y_m"), "`y_m`"),
+    "times.parquet": (csv.assign(t_s=pandas.to_datetime(csv.t_s, unit="s")), "`t_s`"),
+    "truth.parquet": (csv.assign(cmd_qx_rad=True), "`cmd_qx_rad`"),
+}
+for name, (wrong, word) in refused.items():
+    wrong.to_parquet(DATA / name, index=False)
+    error = offbd("replay", name, status=3).stderr
+    assert word in error, f"{name}: {error}"
+csv.to_feather(DATA / "compressed.arrow", compression="lz4")
+error = offbd("replay", "compressed.arrow", status=3).stderr
+assert "compress" in error, error
+print("wrong columns and compressed Arrow files: refused by name")
+
+frame.write_ipc(DATA / "polars-file.arrow", compression="uncompressed")
+error = offbd("replay", "polars-file.arrow", status=3).stderr
+assert "as an Arrow stream" in error, error
+
+# A long session, in bounded memory, in both directions.
+n = numpy.arange(ROWS)
+long = pandas.DataFrame({"seq": n, "t_s": n * 0.01})
+for i, name in enumerate(COLUMNS[1:]):
+    long[name] = numpy.sin(n * 0.001 * (i + 1)) * 0.1
+long.to_parquet(DATA / "long.parquet", index=False)
+# Each is judged by its own process, so that the largest of all is that of one.
+for source, target in [("long.parquet", "long.arrow"), ("long.arrow", "back.parquet")]:
+    offbd("export", source, "-o", target)
+assert polars.read_parquet(DATA / "back.parquet").equals(
+    polars.from_pandas(long).select(["t_s", "seq", *COLUMNS[1:]])
+), "the long session differs"
+most = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss << 10
+assert most < LIMIT_BYTES, f"{most >> 20} MiB"
+print(f"{ROWS} rows to Arrow and back: the same, with {most >> 20} MiB at most")

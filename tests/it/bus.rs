@@ -1,0 +1,96 @@
+//! Devices over NATS and MQTT, with a real nats-server and a real mosquitto.
+
+mod access;
+mod bad_input;
+mod faults;
+mod loss;
+mod mapping;
+mod puback;
+mod verdict;
+
+use crate::support::broker::{Mosquitto, Nats};
+use crate::support::{Client, ServiceFixture, config};
+use offbd::server;
+use serde_json::json;
+
+/// Starts a service with a NATS server.
+async fn with_nats(nats: &Nats) -> ServiceFixture {
+    ServiceFixture::start_with(|config| config.nats = Some(nats.config())).await
+}
+
+/// Starts a service with an MQTT broker.
+async fn with_mosquitto(mosquitto: &Mosquitto) -> ServiceFixture {
+    let fixture = ServiceFixture::start_with(|config| config.mqtt = Some(mosquitto.config())).await;
+    connected(&fixture.client, "mqtt").await;
+    fixture
+}
+
+/// Waits until the service is connected.
+async fn connected(client: &Client, bus: &str) {
+    metric(client, &format!("offbd_bus_connected{{bus=\"{bus}\"}}"), |value| value == 1.0).await;
+}
+
+/// Waits until a metric has a value, and returns it.
+async fn metric(client: &Client, series: &str, wanted: impl Fn(f64) -> bool) -> f64 {
+    crate::support::eventually(async || {
+        let text = client.get("/metrics").await.text;
+        let line = text.lines().find_map(|line| line.strip_prefix(&format!("{series} ")));
+        let value: f64 = line.unwrap_or_else(|| panic!("no {series}")).parse().unwrap();
+        wanted(value).then_some(value)
+    })
+    .await
+}
+
+/// Returns the value of a metric.
+async fn count(client: &Client, series: &str) -> f64 {
+    metric(client, series, |_| true).await
+}
+
+/// Creates an asset and a token for its device.
+async fn device(client: &Client, asset: &str) -> String {
+    client.asset(asset).await;
+    token(client, &json!({ "name": asset, "role": "device", "asset": asset })).await
+}
+
+async fn token(client: &Client, body: &serde_json::Value) -> String {
+    let made = client.post("tokens", body).await.expect(201);
+    made["secret"].as_str().unwrap_or_else(|| panic!("{made}")).to_owned()
+}
+
+/// A NATS server that acknowledges before it has written to the disk is not used, nor one that
+/// another key speaks for.
+#[tokio::test(flavor = "multi_thread")]
+async fn an_unsafe_server_is_refused_at_the_start() {
+    let nats = Nats::start_with(|shipped| shipped.replace("sync_interval: always", ""));
+    let data = tempfile::tempdir().unwrap();
+    let mut config = config(data.path());
+    config.nats = Some(nats.config());
+    let error = server::start(config.clone()).await.err().unwrap().to_string();
+    assert!(error.contains("sync_interval: always") && error.contains("120 s"), "{error}");
+    let data = tempfile::tempdir().unwrap();
+    let mut config = crate::support::config(data.path());
+    let user = nkeys::KeyPair::new_user().seed().unwrap();
+    let seed = data.path().join("seed");
+    std::fs::write(&seed, user).unwrap();
+    config.nats = Some(offbd::config::NatsConfig { issuer_seed: Some(seed), ..nats.config() });
+    let error = server::start(config).await.err().unwrap().to_string();
+    assert!(error.contains("nats.issuer_seed"), "{error}");
+}
+
+/// Without a broker the service starts, and connects when there is one.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_broker_that_is_away_is_waited_for() {
+    let (mut nats, mut mosquitto) = (Nats::start(), Mosquitto::start());
+    nats.kill();
+    mosquitto.kill();
+    let fixture = ServiceFixture::start_with(|config| {
+        config.nats = Some(nats.config());
+        config.mqtt = Some(mosquitto.config());
+    })
+    .await;
+    fixture.client.get("/readyz").await.expect(200);
+    nats.restart();
+    mosquitto.restart();
+    connected(&fixture.client, "nats").await;
+    connected(&fixture.client, "mqtt").await;
+}

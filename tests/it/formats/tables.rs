@@ -1,0 +1,233 @@
+//! Session files as tables: what is written is read back, what others write is read, and what
+//! is damaged is refused.
+
+use std::io::Cursor;
+
+use offbd::wire::session_file::{SessionFileError, SessionFormat, SessionRowError, open};
+use offbd_core::vocabulary::Sample;
+
+const CSV_FILE: &[u8] =
+    b"seq,t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n0,0,0.1,,0.25,-0.5\n1,0.01,-0.1,0.2,,\n";
+
+fn rows(file: &[u8]) -> Result<Vec<Result<Sample, String>>, SessionFileError> {
+    let mut samples = Vec::new();
+    for row in open(Cursor::new(file.to_vec()), None)? {
+        match row {
+            Ok(sample) => samples.push(Ok(sample)),
+            Err(SessionRowError::Rejected(row)) => samples.push(Err(row.to_string())),
+            Err(SessionRowError::Unreadable(error)) => return Err(error),
+        }
+    }
+    Ok(samples)
+}
+
+fn samples(file: &[u8]) -> Vec<Sample> {
+    rows(file).unwrap().into_iter().map(Result::unwrap).collect()
+}
+
+#[test]
+fn a_file_is_csv_unless_its_first_bytes_say_otherwise() {
+    assert_eq!(SessionFormat::of(b"PAR1"), SessionFormat::Parquet);
+    assert_eq!(SessionFormat::of(b"ARROW1\0\0"), SessionFormat::Arrow);
+    assert_eq!(SessionFormat::of(b"\xff\xff\xff\xff\x10"), SessionFormat::Arrow);
+    for csv in [&b"t_s,x_m"[..], b"", b"PA"] {
+        assert_eq!(SessionFormat::of(csv), SessionFormat::Csv);
+    }
+    assert_eq!(samples(CSV_FILE).len(), 2);
+}
+
+#[cfg(not(feature = "parquet"))]
+#[test]
+fn a_format_that_is_not_built_is_refused_with_the_feature_that_it_needs() {
+    let Err(error) = rows(b"PAR1") else { panic!("read") };
+    assert!(error.to_string().contains("--features parquet"), "{error}");
+}
+
+#[cfg(feature = "parquet")]
+mod columns {
+    use super::*;
+    use arrow_array::types::{Float32Type, Int32Type, UInt8Type};
+    use arrow_array::{
+        ArrayRef, BooleanArray, Float64Array, NullArray, PrimitiveArray, RecordBatch,
+    };
+    use offbd::wire::session_file::{SessionInfo, SessionWriter};
+    use proptest::prelude::*;
+    use std::sync::Arc;
+
+    const FORMATS: [SessionFormat; 2] = [SessionFormat::Parquet, SessionFormat::Arrow];
+
+    fn write(format: SessionFormat, samples: &[Sample], at_a_time: usize) -> Vec<u8> {
+        let (mut writer, mut file) =
+            SessionWriter::new(format, &SessionInfo::default(), true).unwrap();
+        for samples in samples.chunks(at_a_time) {
+            file.extend(writer.rows(samples).unwrap());
+        }
+        file.extend(writer.end().unwrap());
+        file
+    }
+
+    /// An Arrow stream of other columns than those of offbd.
+    fn stream(columns: Vec<(&str, ArrayRef)>) -> Vec<u8> {
+        let batch = RecordBatch::try_from_iter(columns).unwrap();
+        let mut writer =
+            arrow_ipc::writer::StreamWriter::try_new(Vec::new(), &batch.schema()).unwrap();
+        writer.write(&batch).unwrap();
+        writer.finish().unwrap();
+        writer.into_inner().unwrap()
+    }
+
+    fn doubles(values: [f64; 3]) -> ArrayRef {
+        Arc::new(Float64Array::from(values.to_vec()))
+    }
+
+    fn with(column: &'static str, values: ArrayRef) -> Vec<u8> {
+        let mut columns = vec![
+            ("t_s", doubles([0.0, 1.0, 2.0])),
+            ("cmd_qx_rad", doubles([0.1; 3])),
+            ("cmd_qy_rad", doubles([0.2; 3])),
+            ("x_m", doubles([0.3; 3])),
+            ("y_m", doubles([0.4; 3])),
+        ];
+        columns.retain(|(name, _)| *name != column);
+        columns.push((column, values));
+        stream(columns)
+    }
+
+    #[test]
+    fn a_session_without_samples_is_a_file_without_rows() {
+        for format in FORMATS {
+            assert_eq!(samples(&write(format, &[], 1)), [], "{format}");
+        }
+    }
+
+    #[test]
+    fn what_was_written_by_earlier_versions_and_other_programs_is_read() {
+        let expected = samples(CSV_FILE);
+        for file in [
+            &include_bytes!("../../formats/offbd.parquet")[..],
+            include_bytes!("../../formats/offbd.arrow"),
+            include_bytes!("../../formats/pandas.parquet"),
+            include_bytes!("../../formats/polars.parquet"),
+            include_bytes!("../../formats/polars.arrow"),
+            include_bytes!("../../formats/pyarrow-file.arrow"),
+            include_bytes!("../../formats/duckdb.parquet"),
+        ] {
+            assert_eq!(samples(file), expected);
+        }
+    }
+
+    #[test]
+    fn other_numeric_types_are_converted() {
+        let single: ArrayRef = Arc::new(PrimitiveArray::<Float32Type>::from(vec![0.5, 0.25, -1.0]));
+        let x: Vec<_> = samples(&with("x_m", single)).iter().map(|s| s.x_m).collect();
+        assert_eq!(x, [Some(0.5), Some(0.25), Some(-1.0)]);
+        let whole: ArrayRef = Arc::new(PrimitiveArray::<Int32Type>::from(vec![3, 4, 5]));
+        let t_s: Vec<_> = samples(&with("t_s", whole)).iter().map(|s| s.t_s).collect();
+        assert_eq!(t_s, [3.0, 4.0, 5.0]);
+        let small: ArrayRef = Arc::new(PrimitiveArray::<UInt8Type>::from(vec![7, 8, 9]));
+        let seq: Vec<_> = samples(&with("seq", small)).iter().map(|s| s.seq).collect();
+        assert_eq!(seq, [Some(7), Some(8), Some(9)]);
+        let seq: Vec<_> =
+            samples(&with("seq", doubles([1.0, f64::NAN, 3.0]))).iter().map(|s| s.seq).collect();
+        assert_eq!(seq, [Some(1), None, Some(3)]);
+        let none: ArrayRef = Arc::new(NullArray::new(3));
+        assert!(samples(&with("y_m", none)).iter().all(|s| s.y_m.is_none()));
+    }
+
+    #[test]
+    fn nan_is_a_missing_value_and_an_infinite_one_is_rejected_with_its_row() {
+        let found = rows(&with("x_m", doubles([f64::NAN, f64::INFINITY, 1.0]))).unwrap();
+        assert_eq!(found[0].as_ref().unwrap().x_m, None);
+        assert_eq!(found[1].as_ref().unwrap_err(), "row 2: `x_m`: `inf` is not finite");
+        assert_eq!(found[2].as_ref().unwrap().x_m, Some(1.0));
+        let found = rows(&with("t_s", doubles([0.0, f64::NAN, 2.0]))).unwrap();
+        assert_eq!(found[1].as_ref().unwrap_err(), "row 2: `t_s` is missing");
+        let found = rows(&with("seq", doubles([0.5, -1.0, 1e300]))).unwrap();
+        assert!(found.iter().all(|row| row.as_ref().unwrap_err().contains("`seq`")), "{found:?}");
+    }
+
+    #[test]
+    fn a_column_of_another_type_a_missing_and_a_double_one_are_named() {
+        let truth: ArrayRef = Arc::new(BooleanArray::from(vec![true, false, true]));
+        let error = rows(&with("cmd_qy_rad", truth)).unwrap_err().to_string();
+        assert_eq!(error, "the column `cmd_qy_rad` has the type Boolean, not a number");
+        let error = rows(&stream(vec![("t_s", doubles([0.0; 3]))])).unwrap_err().to_string();
+        assert!(error.contains("no column `cmd_qx_rad`"), "{error}");
+        let columns = ["t_s", "cmd_qx_rad", "cmd_qy_rad", "x_m", "y_m", "x_m"];
+        let twice = columns.map(|name| (name, doubles([0.0; 3]))).to_vec();
+        let error = rows(&stream(twice)).unwrap_err().to_string();
+        assert!(error.contains("two columns `x_m`"), "{error}");
+    }
+
+    /// Samples of which a file has several pages and batches.
+    fn many() -> Vec<Sample> {
+        let sample = |i: u32| Sample {
+            seq: Some(u64::from(i)),
+            t_s: f64::from(i) * 0.01,
+            cmd_qx_rad: Some(f64::from(i % 7) * 0.01),
+            cmd_qy_rad: (!i.is_multiple_of(3)).then(|| f64::from(i % 11)),
+            x_m: (!i.is_multiple_of(5)).then(|| f64::from(i).sin()),
+            y_m: None,
+        };
+        (0..20_000).map(sample).collect()
+    }
+
+    #[test]
+    fn of_a_file_that_ends_too_early_the_reason_is_known_and_no_end_is_reached() {
+        for format in FORMATS {
+            let file = write(format, &many(), 8192);
+            for n in (9..file.len()).step_by(file.len() / 97).chain([file.len() - 1]) {
+                let error = rows(&file[..n]).unwrap_err();
+                assert!(
+                    matches!(error, SessionFileError::Damaged { .. }),
+                    "{format}, {n} of {} bytes: {error}",
+                    file.len()
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn no_wrong_byte_stops_the_program() {
+        for format in FORMATS {
+            let file = write(format, &many()[..3000], 1000);
+            // More of the end, where the structure of a Parquet file is.
+            let (start, end) = (file.len() / 2, file.len() - 1200);
+            let places = (0..start).step_by(293).chain((start..end).step_by(997));
+            for at in places.chain((end..file.len()).step_by(23)) {
+                for flip in [0x01, 0xff] {
+                    let mut damaged = file.clone();
+                    damaged[at] ^= flip;
+                    let _ = rows(&damaged);
+                }
+            }
+        }
+    }
+
+    fn finite() -> impl Strategy<Value = f64> {
+        proptest::num::f64::NORMAL | proptest::num::f64::SUBNORMAL | proptest::num::f64::ZERO
+    }
+
+    proptest! {
+        #[test]
+        fn written_samples_are_read_back_bit_for_bit(
+            rows in proptest::collection::vec(
+                (
+                    proptest::option::of(0..u64::MAX / 2),
+                    finite(),
+                    proptest::array::uniform4(proptest::option::of(finite())),
+                ),
+                0..50,
+            ),
+            at_a_time in 1..20_usize,
+        ) {
+            let expected: Vec<Sample> = rows.into_iter().map(|(seq, t_s, [a, b, c, d])| Sample {
+                seq, t_s, cmd_qx_rad: a, cmd_qy_rad: b, x_m: c, y_m: d,
+            }).collect();
+            for format in FORMATS {
+                let back = samples(&write(format, &expected, at_a_time));
+                prop_assert_eq!(format!("{:?}", back), format!("{:?}", expected));
+            }
+        }
+    }
+}

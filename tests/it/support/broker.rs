@@ -1,0 +1,232 @@
+//! Private brokers: nats-server and mosquitto. They end with the process that started them,
+//! even if that is killed.
+
+use std::io::Write;
+use std::net::{TcpListener, TcpStream};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, Command, Stdio};
+
+/// Version of nats-server that `scripts/nats-server` installs.
+const NATS_VERSION: &str = "2.15.1";
+
+/// Runs a program until a line is read or the input ends, then kills it.
+const WATCH: &str = r#""$@" & server=$!; read -r line; kill -KILL $server; wait $server"#;
+
+/// A running program.
+struct Watched {
+    child: Child,
+    input: Option<ChildStdin>,
+}
+
+impl Watched {
+    fn start(program: &Path, arguments: &[String], environment: &[(&str, String)]) -> Self {
+        let mut command = Command::new("sh");
+        command.args(["-c", WATCH, "watch"]).arg(program).args(arguments);
+        command.envs(environment.iter().map(|(name, value)| (*name, value)));
+        let mut child = command
+            .stdin(Stdio::piped())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let input = child.stdin.take();
+        Self { child, input }
+    }
+}
+
+impl Drop for Watched {
+    fn drop(&mut self) {
+        drop(self.input.take());
+        self.child.wait().unwrap();
+    }
+}
+
+/// Returns a port that nobody listens on.
+pub fn free_port() -> u16 {
+    TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
+}
+
+fn wait_for_port(port: u16) {
+    let start = std::time::Instant::now();
+    while TcpStream::connect(("127.0.0.1", port)).is_err() {
+        assert!(start.elapsed() < super::DEADLINE, "nobody listens on port {port}");
+        std::thread::yield_now();
+    }
+}
+
+/// Returns the first of these programs that exists.
+fn find(name: &str, places: &[PathBuf], missing: &str) -> PathBuf {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let in_path = std::env::split_paths(&path).map(|directory| directory.join(name));
+    let known = places.iter().cloned().chain(in_path).find(|program| program.exists());
+    known.unwrap_or_else(|| panic!("{missing}"))
+}
+
+/// A nats-server with the configuration that is shipped, on ports of its own.
+pub struct Nats {
+    directory: tempfile::TempDir,
+    pub port: u16,
+    pub mqtt_port: u16,
+    pub monitor_port: u16,
+    /// The key that signs the rights of devices.
+    pub issuer: nkeys::KeyPair,
+    running: Option<Watched>,
+}
+
+pub const NATS_PASSWORD: &str = "the-password-of-the-service";
+
+impl Nats {
+    pub fn start() -> Self {
+        Self::start_with(|configuration| configuration)
+    }
+
+    /// Starts a server whose configuration is the shipped one after `change`.
+    pub fn start_with(change: impl FnOnce(String) -> String) -> Self {
+        let directory = tempfile::tempdir().unwrap();
+        let (port, mqtt_port, monitor_port) = (free_port(), free_port(), free_port());
+        let shipped = include_str!("../../../deploy/nats/offbd.conf");
+        let mut configuration = change(shipped.to_owned());
+        for (standard, own) in [
+            ("0.0.0.0:4222", format!("127.0.0.1:{port}")),
+            ("0.0.0.0:1883", format!("127.0.0.1:{mqtt_port}")),
+            ("127.0.0.1:8222", format!("127.0.0.1:{monitor_port}")),
+            ("/var/lib/nats", directory.path().join("store").display().to_string()),
+        ] {
+            assert!(configuration.contains(standard), "{standard}");
+            configuration = configuration.replace(standard, &own);
+        }
+        std::fs::write(directory.path().join("conf"), configuration).unwrap();
+        let issuer = nkeys::KeyPair::new_account();
+        let mut nats = Self { directory, port, mqtt_port, monitor_port, issuer, running: None };
+        nats.restart();
+        nats
+    }
+
+    /// Kills the server, if it runs.
+    pub fn kill(&mut self) {
+        self.running = None;
+    }
+
+    /// Kills the server if it runs, and starts it with the same ports and data.
+    pub fn restart(&mut self) {
+        self.kill();
+        let arguments = ["-c".to_owned(), self.directory.path().join("conf").display().to_string()];
+        let environment = [
+            ("OFFBD_NATS_PASSWORD", NATS_PASSWORD.to_owned()),
+            ("OFFBD_ISSUER", self.issuer.public_key()),
+        ];
+        self.running = Some(Watched::start(&nats_server(), &arguments, &environment));
+        wait_for_port(self.port);
+        wait_for_port(self.mqtt_port);
+    }
+
+    /// Returns the section of the service's configuration.
+    pub fn config(&self) -> offbd::config::NatsConfig {
+        let seed = self.directory.path().join("seed");
+        std::fs::write(&seed, self.issuer.seed().unwrap()).unwrap();
+        offbd::config::NatsConfig {
+            url: format!("nats://127.0.0.1:{}", self.port),
+            user: Some("offbd".to_owned()),
+            password: Some(NATS_PASSWORD.to_owned()),
+            credentials: None,
+            ca: None,
+            monitor: Some(format!("http://127.0.0.1:{}", self.monitor_port)),
+            faults: true,
+            issuer_seed: Some(seed),
+            account: "OFFBD".to_owned(),
+        }
+    }
+}
+
+fn nats_server() -> PathBuf {
+    let target = std::env::var_os("CARGO_TARGET_DIR")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("target"), PathBuf::from);
+    let installed = target.join(format!("nats-server-{NATS_VERSION}/bin/nats-server"));
+    let given = std::env::var_os("NATS_SERVER").map(PathBuf::from);
+    let places: Vec<PathBuf> = given.into_iter().chain([installed]).collect();
+    find("nats-server", &places, "no nats-server: run scripts/nats-server, or set NATS_SERVER")
+}
+
+/// A mosquitto that everybody may use.
+pub struct Mosquitto {
+    directory: tempfile::TempDir,
+    pub port: u16,
+    running: Option<Watched>,
+}
+
+impl Mosquitto {
+    pub fn start() -> Self {
+        let directory = tempfile::tempdir().unwrap();
+        let port = free_port();
+        let lines = [
+            format!("listener {port} 127.0.0.1"),
+            "allow_anonymous true".to_owned(),
+            // So that a kill loses nothing that it has acknowledged, and devices in tests are not
+            // held up.
+            "persistence true".to_owned(),
+            format!("persistence_location {}/", directory.path().display()),
+            "autosave_on_changes true".to_owned(),
+            "autosave_interval 1".to_owned(),
+            "max_queued_messages 0".to_owned(),
+        ];
+        std::fs::write(directory.path().join("conf"), lines.join("\n") + "\n").unwrap();
+        #[cfg(unix)]
+        {
+            // Started as root, it continues as another user.
+            use std::os::unix::fs::PermissionsExt;
+            let all = std::fs::Permissions::from_mode(0o777);
+            std::fs::set_permissions(directory.path(), all).unwrap();
+        }
+        let mut mosquitto = Self { directory, port, running: None };
+        mosquitto.restart();
+        mosquitto
+    }
+
+    pub fn kill(&mut self) {
+        self.running = None;
+    }
+
+    pub fn restart(&mut self) {
+        self.kill();
+        let places = [PathBuf::from("/usr/sbin/mosquitto")];
+        let program = find("mosquitto", &places, "no mosquitto: install `mosquitto`");
+        let conf = self.directory.path().join("conf").display().to_string();
+        self.running = Some(Watched::start(&program, &["-c".to_owned(), conf], &[]));
+        wait_for_port(self.port);
+    }
+
+    /// Returns the section of the service's configuration.
+    pub fn config(&self) -> offbd::config::MqttConfig {
+        mqtt_config(self.port)
+    }
+
+    /// Publishes each line of `input` with the program mosquitto_pub.
+    pub fn publish_lines(&self, arguments: &[&str], input: &str) {
+        let mut command = Command::new("mosquitto_pub");
+        command.args(["-h", "127.0.0.1", "-p", &self.port.to_string(), "-l"]).args(arguments);
+        let mut child = command.stdin(Stdio::piped()).spawn().unwrap();
+        child.stdin.take().unwrap().write_all(input.as_bytes()).unwrap();
+        assert!(child.wait().unwrap().success());
+    }
+
+    /// Returns what the program mosquitto_sub prints.
+    pub fn subscribe(&self, arguments: &[&str]) -> String {
+        let mut command = Command::new("mosquitto_sub");
+        command.args(["-h", "127.0.0.1", "-p", &self.port.to_string()]).args(arguments);
+        String::from_utf8(command.output().unwrap().stdout).unwrap()
+    }
+}
+
+/// Returns the section of the service's configuration for a broker that everybody may use.
+pub fn mqtt_config(port: u16) -> offbd::config::MqttConfig {
+    offbd::config::MqttConfig {
+        url: format!("mqtt://127.0.0.1:{port}"),
+        client_id: "offbd".to_owned(),
+        user: None,
+        password: None,
+        ca: None,
+        telemetry: true,
+        faults: true,
+        mapping: None,
+    }
+}

@@ -1,0 +1,199 @@
+//! Devices that send over MQTT and NATS, and keep a batch until it is acknowledged.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use futures_util::StreamExt;
+use rumqttc::{AsyncClient, Event, EventLoop, MqttOptions, Packet, Publish, QoS};
+use serde_json::{Value, json};
+use tokio::time::timeout;
+
+use super::{DEADLINE, batch};
+use offbd_core::vocabulary::Sample;
+
+/// A client of a broker.
+pub struct MqttDevice {
+    pub client: AsyncClient,
+    events: EventLoop,
+}
+
+impl MqttDevice {
+    /// Connects to the broker on `port`.
+    pub async fn connect(port: u16, id: &str, login: Option<(&str, &str)>) -> Self {
+        let mut options = MqttOptions::new(id, "127.0.0.1", port);
+        options.set_keep_alive(Duration::from_secs(60));
+        options.set_max_packet_size(32 << 20, 32 << 20);
+        if let Some((user, password)) = login {
+            options.set_credentials(user, password);
+        }
+        let (client, events) = AsyncClient::new(options, 1000);
+        let mut device = Self { client, events };
+        device.until(|packet| matches!(packet, Packet::ConnAck(_)).then_some(())).await;
+        device
+    }
+
+    /// Subscribes, and waits until the broker has confirmed it.
+    pub async fn subscribe(&mut self, filter: &str) {
+        self.client.subscribe(filter, QoS::AtLeastOnce).await.unwrap();
+        self.until(|packet| matches!(packet, Packet::SubAck(_)).then_some(())).await;
+    }
+
+    pub async fn publish(&self, topic: &str, payload: impl Into<Vec<u8>>) {
+        self.client.publish(topic, QoS::AtMostOnce, false, payload).await.unwrap();
+    }
+
+    /// Returns the next message.
+    pub async fn next(&mut self) -> Publish {
+        self.until(|packet| match packet {
+            Packet::Publish(publish) => Some(publish),
+            _ => None,
+        })
+        .await
+    }
+
+    /// Handles packets until one is the wanted one; connects again if the broker is away.
+    pub async fn until<T>(&mut self, wanted: impl Fn(Packet) -> Option<T>) -> T {
+        let found = async {
+            loop {
+                match self.events.poll().await {
+                    Ok(Event::Incoming(packet)) => {
+                        if let Some(found) = wanted(packet) {
+                            return found;
+                        }
+                    }
+                    Ok(Event::Outgoing(_)) => {}
+                    Err(_) => tokio::task::yield_now().await,
+                }
+            }
+        };
+        timeout(DEADLINE, found).await.expect("a packet in time")
+    }
+
+    /// Returns the error with which the broker ends or refuses the connection.
+    pub async fn refusal(port: u16, id: &str, login: Option<(&str, &str)>) -> String {
+        let mut options = MqttOptions::new(id, "127.0.0.1", port);
+        if let Some((user, password)) = login {
+            options.set_credentials(user, password);
+        }
+        let (_client, mut events) = AsyncClient::new(options, 10);
+        match timeout(DEADLINE, events.poll()).await.expect("an answer in time") {
+            Ok(event) => panic!("accepted: {event:?}"),
+            Err(error) => error.to_string(),
+        }
+    }
+}
+
+/// What a device sends over and gets acknowledgements from.
+pub enum Way {
+    Mqtt(MqttDevice),
+    Nats(async_nats::Client, async_nats::Subscriber),
+}
+
+/// A device of one asset.
+pub struct BusDevice {
+    asset: String,
+    way: Way,
+}
+
+impl BusDevice {
+    pub async fn mqtt(port: u16, asset: &str, login: Option<(&str, &str)>) -> Self {
+        let id = asset.replace(['.', '-'], "");
+        let mut device = MqttDevice::connect(port, &id, login).await;
+        device.subscribe(&format!("offbd/v1/{}/ack", asset.replace('.', "=2E"))).await;
+        Self { asset: asset.to_owned(), way: Way::Mqtt(device) }
+    }
+
+    pub async fn nats(port: u16, asset: &str, login: (&str, &str)) -> Self {
+        let client = nats(port, asset, login).await.unwrap();
+        let subject = format!("offbd.v1.{}.ack", asset.replace('.', "=2E"));
+        let acks = client.subscribe(subject).await.unwrap();
+        client.flush().await.unwrap();
+        Self { asset: asset.to_owned(), way: Way::Nats(client, acks) }
+    }
+
+    pub async fn send(&self, document: Vec<u8>) {
+        let token = self.asset.replace('.', "=2E");
+        match &self.way {
+            Way::Mqtt(device) => {
+                device.publish(&format!("offbd/v1/{token}/telemetry"), document).await;
+            }
+            Way::Nats(client, _) => {
+                let subject = format!("offbd.v1.{token}.telemetry");
+                client.publish(subject, document.into()).await.unwrap();
+            }
+        }
+    }
+
+    /// Returns the next acknowledgement or refusal.
+    pub async fn answer(&mut self) -> Value {
+        let payload = match &mut self.way {
+            Way::Mqtt(device) => device.next().await.payload,
+            Way::Nats(_, acks) => {
+                timeout(DEADLINE, acks.next()).await.expect("an answer in time").unwrap().payload
+            }
+        };
+        serde_json::from_slice(&payload).unwrap()
+    }
+
+    /// Sends one batch and returns its answer.
+    pub async fn ask(&mut self, document: Vec<u8>) -> Value {
+        self.send(document).await;
+        self.answer().await
+    }
+
+    /// Sends all batches at first, of which some are lost on the way, and some acknowledgements
+    /// on the way back; then again what was not acknowledged, until all is. Returns how many
+    /// messages were lost.
+    pub async fn send_until_acknowledged(
+        &mut self,
+        samples: &[Sample],
+        size: usize,
+        mut is_lost: impl FnMut() -> bool,
+    ) -> usize {
+        let mut kept: BTreeMap<String, &[Sample]> =
+            samples.chunks(size).enumerate().map(|(i, part)| (format!("{i:06}"), part)).collect();
+        let mut n_lost = 0;
+        while !kept.is_empty() {
+            let mut arriving = 0;
+            for (id, part) in &kept {
+                if is_lost() {
+                    n_lost += 1;
+                    continue;
+                }
+                self.send(numbered(id, part)).await;
+                arriving += 1;
+            }
+            for _ in 0..arriving {
+                let answer = self.answer().await;
+                if is_lost() {
+                    n_lost += 1;
+                } else if answer["accepted"].is_number() {
+                    kept.remove(answer["id"].as_str().unwrap());
+                } else {
+                    assert!(answer["retry_after_s"].is_number(), "{answer}");
+                }
+            }
+        }
+        n_lost
+    }
+}
+
+/// Connects to a NATS server, with an inbox of the device's own.
+pub async fn nats(
+    port: u16,
+    asset: &str,
+    (user, password): (&str, &str),
+) -> Result<async_nats::Client, async_nats::ConnectError> {
+    async_nats::ConnectOptions::new()
+        .user_and_password(user.to_owned(), password.to_owned())
+        .custom_inbox_prefix(format!("_INBOX.offbd.{}", asset.replace('.', "=2E")))
+        .connect(format!("nats://127.0.0.1:{port}"))
+        .await
+}
+
+/// Returns a batch of session `s` with an id, JSON.
+pub fn numbered(id: &str, samples: &[Sample]) -> Vec<u8> {
+    let mut document = batch(Some("s"), samples);
+    document["id"] = json!(id);
+    document.to_string().into_bytes()
+}

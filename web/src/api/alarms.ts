@@ -1,0 +1,53 @@
+/** The requests about alarms, mutes and notifications. */
+import type { components } from "../../generated/schema";
+import { actor } from "./access";
+import { get, getAll, query, segment, send } from "./request";
+import type { Page } from "./types";
+
+type Schemas = components["schemas"];
+export type Advice = Schemas["AdviceListView"];
+export type Alarm = Schemas["AlarmView"];
+export type AlarmChange = Schemas["AlarmChange"];
+export type AlarmCode = Schemas["AlarmCode"];
+export type Channel = Schemas["ChannelView"];
+export type Delivery = Schemas["DeliveryView"];
+export type DeliveryState = Schemas["DeliveryState"];
+export type Mute = Schemas["MuteView"];
+export type NewChannel = Schemas["NewChannelView"];
+export type NewRule = Schemas["NewRuleView"];
+export type Rule = Schemas["RuleView"];
+
+export interface AlarmFilter {
+  state?: string;
+  asset?: string;
+  code?: string;
+  acknowledged?: boolean;
+  from?: string;
+}
+
+const CHANNELS = "/notifications/channels";
+const RULES = "/notifications/rules";
+const by = () => query({ by: actor() });
+
+export const alarmApi = {
+  alarms: (filter: AlarmFilter, cursor?: string | null) =>
+    get<Page<Alarm>>(`/alarms${query({ ...filter, cursor, limit: 100 })}`),
+  acknowledge: (alarms: { asset: string; code: AlarmCode }[]) =>
+    send<Schemas["AcknowledgedView"]>("POST", `/alarms/acknowledge${by()}`, { alarms }),
+  advice: () => get<Advice>("/advice"),
+  putNote: (code: AlarmCode, text: string) => send("PUT", `/advice/${segment(code)}/note${by()}`, { text }),
+  mute: (asset: string, code: AlarmCode, reason: string, until: string) =>
+    send<Mute>("PUT", `/assets/${segment(asset)}/mutes/${segment(code)}${by()}`, { reason, until }),
+  unmute: (asset: string, code: AlarmCode) =>
+    send("DELETE", `/assets/${segment(asset)}/mutes/${segment(code)}`),
+  channels: () => getAll<Channel>(CHANNELS, {}),
+  createChannel: (channel: NewChannel) => send<Schemas["MadeChannelView"]>("POST", CHANNELS, channel),
+  deleteChannel: (id: string) => send("DELETE", `${CHANNELS}/${segment(id)}`),
+  testChannel: (id: string) => send<Delivery>("POST", `${CHANNELS}/${segment(id)}/test`),
+  rules: () => getAll<Rule>(RULES, {}),
+  createRule: (rule: NewRule) => send<Rule>("POST", RULES, rule),
+  putRule: (id: string, rule: NewRule) => send<Rule>("PUT", `${RULES}/${segment(id)}`, rule),
+  deleteRule: (id: string) => send("DELETE", `${RULES}/${segment(id)}`),
+  deliveries: (state?: DeliveryState) =>
+    get<Page<Delivery>>(`/notifications/deliveries${query({ state, limit: 100 })}`),
+};

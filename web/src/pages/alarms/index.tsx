@@ -1,0 +1,73 @@
+/** The alarms of the fleet: what fails now, what is on record, and what to do. */
+import { useState } from "preact/hooks";
+import { alarmApi, type AlarmFilter } from "../../api/alarms";
+import { useNow } from "../../hooks/use-now";
+import { useQuery } from "../../hooks/use-query";
+import { useTitle } from "../../hooks/use-title";
+import { ActionButton } from "../../parts/action-button";
+import { EmptyState } from "../../parts/empty-state";
+import { ErrorMessage } from "../../parts/error-message";
+import { Loading } from "../../parts/loading";
+import { Link } from "../../router/link";
+import { AlarmTable } from "./alarm-table";
+import { AlarmTools } from "./alarm-tools";
+import { alarmKey, useAlarms } from "./use-alarms";
+
+export function AlarmsPage() {
+  useTitle("Alarms");
+  const [filter, setFilter] = useState<AlarmFilter>({ state: "active" });
+  const [chosen, setChosen] = useState(new Set<string>());
+  const { alarms, error, refetch, loadMore } = useAlarms(filter);
+  const advice = useQuery(alarmApi.advice, "advice");
+  const now = useNow();
+  const taken = (alarms ?? []).filter((alarm) => chosen.has(alarmKey(alarm)) && !alarm.acknowledgement);
+  const [refused, setRefused] = useState<string[]>([]);
+  const acknowledge = async () => {
+    const keys = taken.map(({ asset, code }) => ({ asset, code }));
+    const { items } = await alarmApi.acknowledge(keys);
+    setRefused(items.filter((item) => !item.acknowledged).map((item) => item.reason ?? ""));
+    setChosen(new Set());
+    await refetch();
+  };
+  return (
+    <main>
+      <header class="page-head">
+        <h1>Alarms</h1>
+        <div class="page-tools">
+          <Link to="/notifications">Who is told</Link>
+          <ActionButton class="primary" disabled={!taken.length} action={acknowledge}>
+            Acknowledge {taken.length || ""}
+          </ActionButton>
+        </div>
+      </header>
+      <AlarmTools filter={filter} change={setFilter} />
+      <ErrorMessage error={error} retry={refetch} />
+      {refused.length > 0 && (
+        <p class="trouble" role="alert">
+          Not acknowledged: {refused.join("; ")}
+        </p>
+      )}
+      {!alarms && !error && <Loading what="the alarms" />}
+      {alarms?.length === 0 && (
+        <EmptyState title="No alarm">
+          <p>Nothing that the filter selects fails or is on record.</p>
+        </EmptyState>
+      )}
+      {alarms && alarms.length > 0 && (
+        <AlarmTable
+          alarms={alarms}
+          now={now}
+          advice={advice.data}
+          refetchAdvice={advice.refetch}
+          chosen={chosen}
+          choose={setChosen}
+        />
+      )}
+      {loadMore && (
+        <p>
+          <ActionButton action={loadMore}>Show more</ActionButton>
+        </p>
+      )}
+    </main>
+  );
+}

@@ -1,0 +1,81 @@
+import { useState } from "preact/hooks";
+import { alarmApi, type AlarmCode, type Mute } from "../../api/alarms";
+import { ActionButton } from "../../parts/action-button";
+import { Dialog } from "../../parts/dialog";
+import { alarmCodeTitle } from "../../words/alarm";
+import { dateTime } from "../../words/time";
+
+/** Durations of a mute, hours. */
+const DURATIONS = [
+  [1, "one hour"],
+  [8, "8 hours"],
+  [24, "a day"],
+  [168, "a week"],
+  [720, "30 days"],
+] as const;
+
+const hoursFromNow = (hours: number) => new Date(Date.now() + hours * 3_600_000).toISOString();
+
+/** Mutes a monitor of a rig, or ends its mute. */
+export function MuteButton({ asset, code, mute }: { asset: string; code: AlarmCode; mute?: Mute | null }) {
+  const [isOpen, setOpen] = useState(false);
+  if (mute)
+    return (
+      <ActionButton
+        class="small"
+        label={`End the mute of ${alarmCodeTitle(code)}: ${mute.reason}, until ${dateTime(mute.until)}`}
+        action={() => alarmApi.unmute(asset, code)}
+      >
+        Unmute
+      </ActionButton>
+    );
+  return (
+    <>
+      <button
+        type="button"
+        class="small"
+        aria-label={`Mute ${alarmCodeTitle(code)}`}
+        onClick={() => setOpen(true)}
+      >
+        Mute
+      </button>
+      {isOpen && <MuteDialog asset={asset} code={code} close={() => setOpen(false)} />}
+    </>
+  );
+}
+
+function MuteDialog({ asset, code, close }: { asset: string; code: AlarmCode; close: () => void }) {
+  const [reason, setReason] = useState("");
+  const [hours, setHours] = useState(8);
+  const save = async () => {
+    await alarmApi.mute(asset, code, reason.trim(), hoursFromNow(hours));
+    close();
+  };
+  return (
+    <Dialog title={`Mute ${alarmCodeTitle(code)} of ${asset}`} close={close}>
+      <p class="quiet">
+        The monitor is shown as not tested, and nobody is told of what it finds. The fault memory records it
+        all the same. The mute ends by itself.
+      </p>
+      <div class="form-row">
+        <label>
+          Why
+          <input value={reason} maxLength={200} onInput={(e) => setReason(e.currentTarget.value)} />
+        </label>
+        <label>
+          For
+          <select value={hours} onChange={(e) => setHours(Number(e.currentTarget.value))}>
+            {DURATIONS.map(([value, word]) => (
+              <option value={value}>{word}</option>
+            ))}
+          </select>
+        </label>
+      </div>
+      <div class="form-end">
+        <ActionButton class="primary" disabled={!reason.trim()} action={save}>
+          Mute
+        </ActionButton>
+      </div>
+    </Dialog>
+  );
+}

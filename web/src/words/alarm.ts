@@ -1,0 +1,32 @@
+/** Words about alarms. */
+import type { Alarm, AlarmChange, AlarmCode } from "../api/alarms";
+import { faultPath, rigPath } from "../router/paths";
+import { codeTitle } from "./fault-names";
+
+export const ALARM_CODES: AlarmCode[] = ["x_servo", "y_servo", "stuck_ball", "sensor", "communication_lost"];
+
+export const CHANGES: Record<AlarmChange, string> = {
+  pending: "fails, not confirmed yet",
+  confirmed: "fails, confirmed",
+  passed: "passes again",
+  healed: "healed",
+  cleared: "cleared by a person",
+};
+
+export const alarmCodeTitle = (code: AlarmCode) =>
+  code === "communication_lost" ? "No data arrive" : codeTitle(code);
+
+export const alarmTitle = ({ code, kind }: Pick<Alarm, "code" | "kind">) =>
+  alarmCodeTitle(code) + (kind ? `, ${kind}` : "");
+
+/** The view that shows more of an alarm. */
+export const alarmPath = ({ asset, code }: Pick<Alarm, "asset" | "code">) =>
+  code === "communication_lost" ? rigPath(asset) : faultPath(asset, code);
+
+/** What an alarm is now, and the class of its look. */
+export function alarmState({ failing, status, muted }: Pick<Alarm, "failing" | "status" | "muted">) {
+  if (muted) return { text: `not tested (muted by ${muted.by})`, look: "status-cleared" };
+  if (failing) return { text: "▲ fails now", look: "status-confirmed" };
+  if (status === "healed") return { text: "healed", look: "status-healed" };
+  return { text: `passes, on record as ${status}`, look: "status-pending" };
+}

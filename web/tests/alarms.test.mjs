@@ -1,0 +1,109 @@
+// Alarms, mutes and notifications in the page.
+import assert from "node:assert/strict";
+import { createServer } from "node:http";
+import { after, before, test } from "node:test";
+import { ask, browser, directory, page, recordings, remove, serve } from "./support.mjs";
+
+let work, service, chromium, receiver;
+const received = [];
+
+before(async () => {
+  work = directory();
+  chromium = await browser();
+  service = await serve(work);
+  const { learnt, sick } = recordings(work);
+  for (const name of ["bench", "shelf"]) {
+    await ask(service.url, "POST", "/assets", { ...learnt, name });
+    await ask(service.url, "POST", `/assets/${name}/sessions/import?name=monday`, sick, "text/csv");
+  }
+  receiver = createServer((request, answer) => {
+    let body = "";
+    request.on("data", (part) => (body += part));
+    request.on("end", () => {
+      received.push(JSON.parse(body));
+      answer.end();
+    });
+  });
+  await new Promise((done) => receiver.listen(0, "127.0.0.1", done));
+});
+
+after(async () => {
+  await chromium?.close();
+  await service?.stop();
+  receiver?.close();
+  remove(work);
+});
+
+test("alarms from before the page was opened are listed and acknowledged together", async () => {
+  const view = await page(chromium);
+  await view.goto(`${service.url}/alarms`);
+  for (const rig of ["bench", "shelf"])
+    await view.getByRole("checkbox", { name: new RegExp(`X servo.* of ${rig}`) }).check();
+  await view.getByRole("button", { name: "Acknowledge 2" }).click();
+  await view.getByText("dashboard,").nth(1).waitFor();
+  for (const rig of ["bench", "shelf"]) {
+    const fault = await ask(service.url, "GET", `/assets/${rig}/faults/x_servo`);
+    assert.equal(fault.acknowledged, true, rig);
+  }
+  await view.getByRole("checkbox", { name: "Nobody has acknowledged" }).check();
+  await view
+    .getByRole("link", { name: /X servo/ })
+    .first()
+    .waitFor({ state: "detached" });
+  await view.done();
+});
+
+test("what to do is told, and the owner's note is kept", async () => {
+  const view = await page(chromium);
+  await view.goto(`${service.url}/alarms`);
+  const row = view.getByRole("row", { name: /bench X servo/ });
+  await row.getByText("What to do").click();
+  await row.getByText("power").first().waitFor();
+  await row.getByRole("button", { name: "Add a note" }).click();
+  await row.getByRole("textbox").fill("Spare horns are in the drawer.");
+  await row.getByRole("button", { name: "Keep" }).click();
+  await row.getByText("Spare horns are in the drawer.").waitFor();
+  const { notes } = await ask(service.url, "GET", "/advice");
+  assert.deepEqual(
+    notes.map(({ code, text }) => [code, text]),
+    [["x_servo", "Spare horns are in the drawer."]],
+  );
+  await view.done();
+});
+
+test("a channel and a rule are made in the page, and a test message arrives", async () => {
+  const view = await page(chromium);
+  await view.goto(`${service.url}/notifications`);
+  await view.getByText("nobody is told of anything").waitFor();
+  await view.getByRole("button", { name: "Add a channel" }).click();
+  await view.getByLabel("Name").fill("workshop");
+  await view.getByLabel("URL").fill(`http://127.0.0.1:${receiver.address().port}/hook`);
+  await view.getByRole("button", { name: "Add", exact: true }).click();
+  await view.getByText(/^whsec_/).waitFor();
+  await view.getByRole("button", { name: "Test workshop" }).click();
+  await view.getByText("delivered").waitFor();
+  assert.equal(received[0].type, "org.offbd.test.v1");
+  await view.getByRole("button", { name: "Add a rule" }).click();
+  await view.getByLabel("Name").fill("everything");
+  await view.getByRole("button", { name: "Add", exact: true }).click();
+  await view.getByRole("button", { name: "Silence 8 h" }).click();
+  await view.getByText("silent until").waitFor();
+  const [rule] = (await ask(service.url, "GET", "/notifications/rules")).items;
+  assert.deepEqual([rule.name, rule.asset, rule.channel_name], ["everything", "*", "workshop"]);
+  assert.ok(Date.parse(rule.silent_until) > Date.now());
+  await view.done();
+});
+
+test("a muted monitor is shown as not tested by whom, never as passed", async () => {
+  await ask(service.url, "POST", "/assets/bench/sessions", { name: "tuesday" });
+  const view = await page(chromium);
+  await view.goto(`${service.url}/rigs/bench`);
+  await view.getByRole("button", { name: "Mute Y servo" }).click();
+  await view.getByLabel("Why").fill("new horn");
+  await view.getByRole("dialog").getByRole("button", { name: "Mute", exact: true }).click();
+  await view.getByText("not tested (muted by dashboard)").waitFor();
+  await view.getByRole("button", { name: /End the mute of Y servo/ }).waitFor();
+  await view.goto(service.url);
+  await view.getByText("Y servo not tested (muted by dashboard)").waitFor();
+  await view.done();
+});
