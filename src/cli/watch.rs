@@ -150,8 +150,7 @@ fn head(state: &StateView) -> String {
 }
 
 /// Heading of the plain lines: the columns of [`line`].
-const HEADING: &str =
-    "       time    samples   x residual/limit   y residual/limit   judged, % of the time";
+const HEADING: &str = "       time    samples   x residual/limit   y residual/limit   judged %";
 
 /// A state as one line, for logs.
 fn line(state: &StateView) -> String {

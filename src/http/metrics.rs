@@ -85,7 +85,7 @@ const METRICS: &[(&str, MetricKind, &str)] = &[
 ];
 
 /// What may become of a message of a device.
-const BUS_OUTCOMES: [&str; 10] = [
+const BUS_OUTCOMES: [&str; 11] = [
     "elsewhere",
     "taken",
     "malformed",

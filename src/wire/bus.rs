@@ -218,7 +218,7 @@ mod tests {
 
     #[test]
     fn a_topic_is_that_of_a_device_or_the_reason_names_it() {
-        let parse = |topic| TopicStyle::Mqtt.parse(topic);
+        let parse = |topic: &str| TopicStyle::Mqtt.parse(topic);
         assert_eq!(parse("offbd/v1/a=2Eb/hello"), Ok(("a.b".to_owned(), DeviceTopic::Hello)));
         for topic in [
             "offbd/v1/a/ack",

@@ -70,7 +70,7 @@ async fn a_repeated_key_is_an_error_and_loses_nothing() {
         let path = "assets/a/telemetry";
         let answer = fixture.client.post_text(path, "application/json", document).await;
         let detail = answer.problem(400)["detail"].clone();
-        let wanted = format!("duplicate field `{key}`");
+        let wanted = format!("`{key}` is given twice");
         assert!(detail.as_str().unwrap().contains(&wanted), "{detail}");
     }
 }

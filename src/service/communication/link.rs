@@ -130,7 +130,7 @@ mod tests {
     #[test]
     fn flapping_is_one_loss() {
         let found = changes(1000, |s| s < 10 || s % 40 == 0 || s > 800);
-        assert_eq!(found, [(39, LinkChange::Lost), (811, LinkChange::Back)]);
+        assert_eq!(found, [(39, LinkChange::Lost), (810, LinkChange::Back)]);
     }
 
     #[test]

@@ -7,15 +7,17 @@ use crate::support::broker::{Mosquitto, NATS_PASSWORD, Nats};
 use crate::support::bus_device::{MqttDevice, nats};
 use crate::support::{DEADLINE, rig};
 use futures_util::StreamExt;
+use rumqttc::QoS;
 use serde_json::Value;
 
 /// Returns what a new subscriber gets at once, by topic.
 async fn retained(port: u16, login: Option<(&str, &str)>) -> BTreeMap<String, Value> {
     let mut late = MqttDevice::connect(port, "late", login).await;
+    // Of each subscription the retained messages come at once, so that this one is the last.
+    late.client.publish("marker", QoS::AtLeastOnce, true, "x").await.unwrap();
+    late.until(|packet| matches!(packet, rumqttc::Packet::PubAck(_)).then_some(())).await;
     late.subscribe("offbd/v1/+/fault/+").await;
-    late.subscribe("marker").await;
-    // Messages are delivered in order, so that this one is the last.
-    late.publish("marker", "").await;
+    late.client.subscribe("marker", QoS::AtLeastOnce).await.unwrap();
     let mut found = BTreeMap::new();
     loop {
         let message = late.next().await;

@@ -1,6 +1,6 @@
 //! Devices with topics and formats of their own, by a mapping file.
 
-use crate::bus::{connected, metric};
+use crate::bus::{connected, count, metric};
 use crate::support::broker::Mosquitto;
 use crate::support::{ServiceFixture, rig};
 use serde_json::json;
@@ -40,10 +40,14 @@ async fn foreign_topics_become_the_same_samples() {
         json!({ "boot": "s", "n": s.seq, "ms": s.t_s * 1000.0, "ball": ball, "servo": servo })
     };
     let lines: String = samples.iter().map(|sample| format!("{}\n", line(sample))).collect();
+    let taken = "offbd_bus_messages_total{bus=\"mqtt\",outcome=\"taken\"}";
+    let malformed = "offbd_bus_messages_total{bus=\"mqtt\",outcome=\"malformed\"}";
+    // The metrics are those of the process, which has other tests.
+    let (taken_before, malformed_before) =
+        (count(client, taken).await, count(client, malformed).await);
     // With the program of somebody else, at QoS 1, so that none is lost.
     mosquitto.publish_lines(&["-q", "1", "-t", "lab/rig/status"], &lines);
-    let taken = "offbd_bus_messages_total{bus=\"mqtt\",outcome=\"taken\"}";
-    metric(client, taken, |n| n == 500.0).await;
+    metric(client, taken, |n| n == taken_before + 500.0).await;
     let recording = client.recording("rig", "s").await;
     assert_eq!(recording.len(), samples.len());
     for (found, sent) in recording.iter().zip(&samples) {
@@ -58,9 +62,8 @@ async fn foreign_topics_become_the_same_samples() {
         assert!(near(found.cmd_qy_rad, sent.cmd_qy_rad), "{found:?} {sent:?}");
     }
     mosquitto.publish_lines(&["-t", "lab/rig/status"], "{\"boot\":\"s\"}\nno JSON\n");
-    let malformed = "offbd_bus_messages_total{bus=\"mqtt\",outcome=\"malformed\"}";
-    metric(client, malformed, |n| n == 1.0).await;
-    metric(client, taken, |n| n == 501.0).await;
+    metric(client, malformed, |n| n == malformed_before + 1.0).await;
+    metric(client, taken, |n| n == taken_before + 501.0).await;
     assert_eq!(client.session("rig", "s").await["rejected"], 1);
 }
 

@@ -46,6 +46,7 @@ pub fn free_port() -> u16 {
     TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
 }
 
+#[expect(clippy::disallowed_methods, reason = "a test must not wait forever")]
 fn wait_for_port(port: u16) {
     let start = std::time::Instant::now();
     while TcpStream::connect(("127.0.0.1", port)).is_err() {

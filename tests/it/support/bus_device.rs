@@ -85,7 +85,7 @@ impl MqttDevice {
 
 /// What a device sends over and gets acknowledgements from.
 pub enum Way {
-    Mqtt(MqttDevice),
+    Mqtt(Box<MqttDevice>),
     Nats(async_nats::Client, async_nats::Subscriber),
 }
 
@@ -100,7 +100,7 @@ impl BusDevice {
         let id = asset.replace(['.', '-'], "");
         let mut device = MqttDevice::connect(port, &id, login).await;
         device.subscribe(&format!("offbd/v1/{}/ack", asset.replace('.', "=2E"))).await;
-        Self { asset: asset.to_owned(), way: Way::Mqtt(device) }
+        Self { asset: asset.to_owned(), way: Way::Mqtt(Box::new(device)) }
     }
 
     pub async fn nats(port: u16, asset: &str, login: (&str, &str)) -> Self {

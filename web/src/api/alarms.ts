@@ -5,17 +5,17 @@ import { get, getAll, query, segment, send } from "./request";
 import type { Page } from "./types";
 
 type Schemas = components["schemas"];
-export type Advice = Schemas["AdviceListView"];
-export type Alarm = Schemas["AlarmView"];
+export type Advice = Schemas["AdviceList"];
+export type Alarm = Schemas["Alarm"];
 export type AlarmChange = Schemas["AlarmChange"];
 export type AlarmCode = Schemas["AlarmCode"];
-export type Channel = Schemas["ChannelView"];
-export type Delivery = Schemas["DeliveryView"];
+export type Channel = Schemas["Channel"];
+export type Delivery = Schemas["Delivery"];
 export type DeliveryState = Schemas["DeliveryState"];
-export type Mute = Schemas["MuteView"];
-export type NewChannel = Schemas["NewChannelView"];
-export type NewRule = Schemas["NewRuleView"];
-export type Rule = Schemas["RuleView"];
+export type Mute = Schemas["Mute"];
+export type NewChannel = Schemas["NewChannel"];
+export type NewRule = Schemas["NewRule"];
+export type Rule = Schemas["Rule"];
 
 export interface AlarmFilter {
   state?: string;
@@ -33,7 +33,7 @@ export const alarmApi = {
   alarms: (filter: AlarmFilter, cursor?: string | null) =>
     get<Page<Alarm>>(`/alarms${query({ ...filter, cursor, limit: 100 })}`),
   acknowledge: (alarms: { asset: string; code: AlarmCode }[]) =>
-    send<Schemas["AcknowledgedView"]>("POST", `/alarms/acknowledge${by()}`, { alarms }),
+    send<Schemas["Acknowledged"]>("POST", `/alarms/acknowledge${by()}`, { alarms }),
   advice: () => get<Advice>("/advice"),
   putNote: (code: AlarmCode, text: string) => send("PUT", `/advice/${segment(code)}/note${by()}`, { text }),
   mute: (asset: string, code: AlarmCode, reason: string, until: string) =>
@@ -41,7 +41,7 @@ export const alarmApi = {
   unmute: (asset: string, code: AlarmCode) =>
     send("DELETE", `/assets/${segment(asset)}/mutes/${segment(code)}`),
   channels: () => getAll<Channel>(CHANNELS, {}),
-  createChannel: (channel: NewChannel) => send<Schemas["MadeChannelView"]>("POST", CHANNELS, channel),
+  createChannel: (channel: NewChannel) => send<Schemas["MadeChannel"]>("POST", CHANNELS, channel),
   deleteChannel: (id: string) => send("DELETE", `${CHANNELS}/${segment(id)}`),
   testChannel: (id: string) => send<Delivery>("POST", `${CHANNELS}/${segment(id)}/test`),
   rules: () => getAll<Rule>(RULES, {}),

@@ -8,12 +8,14 @@ interface Props {
   children: ComponentChildren;
   class?: string;
   disabled?: boolean;
+  /** What a screen reader says instead of the text. */
+  label?: string;
   /** The role that the action needs: for others the button is disabled and says so. */
   needs?: NeededRole;
 }
 
 /** A button that is disabled while its action runs and shows the error of the action. */
-export function ActionButton({ action, children, class: className, disabled, needs }: Props) {
+export function ActionButton({ action, children, class: className, disabled, label, needs }: Props) {
   const [isBusy, setBusy] = useState(false);
   const [error, setError] = useState<unknown>();
   const refused = useRefusal(needs);
@@ -36,6 +38,7 @@ export function ActionButton({ action, children, class: className, disabled, nee
         class={className}
         disabled={isBusy || disabled || refused !== undefined}
         title={refused}
+        aria-label={label}
         aria-busy={isBusy}
         onClick={run}
       >

@@ -1,5 +1,6 @@
 import type { AlarmFilter } from "../../api/alarms";
-import { ALARM_CODES, alarmCodeTitle } from "../../words/alarm";
+import { FaultChoice } from "./fault-choice";
+import { LastChangeChoice } from "./last-change-choice";
 
 const STATES = [
   ["active", "Failing or on record"],
@@ -7,21 +8,6 @@ const STATES = [
   ["on_record", "Passing, on record"],
   ["all", "All, healed ones too"],
 ] as const;
-
-/** Ranges of the last change, hours back. */
-const RANGES = [
-  [0, "At any time"],
-  [1, "In the last hour"],
-  [24, "In the last day"],
-  [168, "In the last week"],
-] as const;
-
-/** The range is rounded to minutes, so that the filter stays the same for a while. */
-function since(hours: number): string | undefined {
-  if (!hours) return undefined;
-  const minute = 60_000;
-  return new Date(Math.floor(Date.now() / minute) * minute - hours * 3_600_000).toISOString();
-}
 
 /** The filter of the list. */
 export function AlarmTools({
@@ -41,26 +27,8 @@ export function AlarmTools({
           ))}
         </select>
       </label>
-      <label>
-        Fault
-        <select
-          value={filter.code ?? ""}
-          onChange={(e) => change({ ...filter, code: e.currentTarget.value || undefined })}
-        >
-          <option value="">Any</option>
-          {ALARM_CODES.map((code) => (
-            <option value={code}>{alarmCodeTitle(code)}</option>
-          ))}
-        </select>
-      </label>
-      <label>
-        Last change
-        <select onChange={(e) => change({ ...filter, from: since(Number(e.currentTarget.value)) })}>
-          {RANGES.map(([hours, word]) => (
-            <option value={hours}>{word}</option>
-          ))}
-        </select>
-      </label>
+      <FaultChoice code={filter.code} change={(code) => change({ ...filter, code })} />
+      <LastChangeChoice change={(from) => change({ ...filter, from })} />
       <label>
         Rig
         <input

@@ -11,32 +11,24 @@ import { Loading } from "../../parts/loading";
 import { Link } from "../../router/link";
 import { AlarmTable } from "./alarm-table";
 import { AlarmTools } from "./alarm-tools";
-import { alarmKey, useAlarms } from "./use-alarms";
+import { useAcknowledge } from "./use-acknowledge";
+import { useAlarms } from "./use-alarms";
 
 export function AlarmsPage() {
   useTitle("Alarms");
   const [filter, setFilter] = useState<AlarmFilter>({ state: "active" });
-  const [chosen, setChosen] = useState(new Set<string>());
   const { alarms, error, refetch, loadMore } = useAlarms(filter);
+  const { chosen, choose, open, refused, acknowledge } = useAcknowledge(alarms ?? [], refetch);
   const advice = useQuery(alarmApi.advice, "advice");
   const now = useNow();
-  const taken = (alarms ?? []).filter((alarm) => chosen.has(alarmKey(alarm)) && !alarm.acknowledgement);
-  const [refused, setRefused] = useState<string[]>([]);
-  const acknowledge = async () => {
-    const keys = taken.map(({ asset, code }) => ({ asset, code }));
-    const { items } = await alarmApi.acknowledge(keys);
-    setRefused(items.filter((item) => !item.acknowledged).map((item) => item.reason ?? ""));
-    setChosen(new Set());
-    await refetch();
-  };
   return (
     <main>
       <header class="page-head">
         <h1>Alarms</h1>
         <div class="page-tools">
           <Link to="/notifications">Who is told</Link>
-          <ActionButton class="primary" disabled={!taken.length} action={acknowledge}>
-            Acknowledge {taken.length || ""}
+          <ActionButton class="primary" disabled={!open} action={acknowledge}>
+            Acknowledge {open || ""}
           </ActionButton>
         </div>
       </header>
@@ -60,7 +52,7 @@ export function AlarmsPage() {
           advice={advice.data}
           refetchAdvice={advice.refetch}
           chosen={chosen}
-          choose={setChosen}
+          choose={choose}
         />
       )}
       {loadMore && (

@@ -1,7 +1,5 @@
-import { useState } from "preact/hooks";
-import { alarmApi, type Advice, type Alarm } from "../../api/alarms";
-import { ActionButton } from "../../parts/action-button";
-import { alarmCodeTitle } from "../../words/alarm";
+import type { Advice, Alarm } from "../../api/alarms";
+import { OwnNote } from "./own-note";
 
 /** The checks for a kind of fault; those of the code if the kind has none of its own. */
 function checksFor(advice: Advice, { code, kind }: Alarm): string[] {
@@ -20,13 +18,6 @@ export function WhatToDo({
   advice: Advice;
   refetch: () => Promise<unknown>;
 }) {
-  const note = advice.notes.find(({ code }) => code === alarm.code);
-  const [draft, setDraft] = useState<string>();
-  const save = async () => {
-    await alarmApi.putNote(alarm.code, draft ?? "");
-    await refetch();
-    setDraft(undefined);
-  };
   return (
     <details class="what-to-do">
       <summary>What to do</summary>
@@ -35,36 +26,7 @@ export function WhatToDo({
           <li>{check}</li>
         ))}
       </ol>
-      {draft === undefined ? (
-        <p>
-          {note && (
-            <span class="own-note">
-              {note.text} <span class="quiet">({note.by})</span>{" "}
-            </span>
-          )}
-          <button type="button" class="link" onClick={() => setDraft(note?.text ?? "")}>
-            {note ? "Edit the note" : "Add a note"}
-          </button>
-        </p>
-      ) : (
-        <div class="note-form">
-          <label>
-            Note on every fault “{alarmCodeTitle(alarm.code)}”
-            <textarea
-              rows={3}
-              maxLength={2000}
-              value={draft}
-              onInput={(e) => setDraft(e.currentTarget.value)}
-            />
-          </label>
-          <ActionButton class="small" action={save}>
-            Keep
-          </ActionButton>{" "}
-          <button type="button" class="small" onClick={() => setDraft(undefined)}>
-            Cancel
-          </button>
-        </div>
-      )}
+      <OwnNote code={alarm.code} advice={advice} refetch={refetch} />
     </details>
   );
 }

@@ -1,10 +1,8 @@
 import { useState } from "preact/hooks";
-import { alarmApi, type Channel, type NewRule, type Rule } from "../../api/alarms";
-import { ActionButton } from "../../parts/action-button";
+import type { Channel, Rule } from "../../api/alarms";
 import { Dialog } from "../../parts/dialog";
-import { alarmCodeTitle, CHANGES } from "../../words/alarm";
-import { dateTime, duration } from "../../words/time";
 import { RuleForm } from "./rule-form";
+import { RuleRow } from "./rule-row";
 
 interface Props {
   rules: Rule[];
@@ -58,59 +56,5 @@ export function RulesCard({ rules, channels, refetch }: Props) {
         </Dialog>
       )}
     </section>
-  );
-}
-
-/** Hours for which a rule is silenced by its button. */
-const SILENCE_H = 8;
-
-function RuleRow({
-  rule,
-  mayChange,
-  refetch,
-}: {
-  rule: Rule;
-  mayChange: boolean;
-  refetch: () => Promise<unknown>;
-}) {
-  const { id, channel_name, created_at: _, ...settings } = rule;
-  const isSilent = !!rule.silent_until && Date.parse(rule.silent_until) > Date.now();
-  const change = (more: Partial<NewRule>) => async () => {
-    await alarmApi.putRule(id, { ...settings, ...more });
-    await refetch();
-  };
-  const silenceEnd = () => new Date(Date.now() + SILENCE_H * 3_600_000).toISOString();
-  const remove = async () => {
-    await alarmApi.deleteRule(id);
-    await refetch();
-  };
-  const codes = rule.codes?.length ? rule.codes.map(alarmCodeTitle).join(", ") : "any fault";
-  return (
-    <tr>
-      <th scope="row">
-        {rule.name}
-        {!rule.enabled && <span class="quiet"> (off)</span>}
-        {isSilent && <p class="quiet small-text">silent until {dateTime(rule.silent_until)}</p>}
-      </th>
-      <td data-word="rigs">{rule.asset}</td>
-      <td>
-        {codes}: {(rule.changes ?? []).map((word) => CHANGES[word]).join("; ")}
-      </td>
-      <td data-word="by">{channel_name}</td>
-      <td data-word="repeated">{rule.repeat_s ? `every ${duration(rule.repeat_s)}` : "–"}</td>
-      {mayChange && (
-        <td>
-          <ActionButton class="small" action={change({ enabled: !rule.enabled })}>
-            {rule.enabled ? "Turn off" : "Turn on"}
-          </ActionButton>{" "}
-          <ActionButton class="small" action={change({ silent_until: isSilent ? null : silenceEnd() })}>
-            {isSilent ? "End the silence" : `Silence ${SILENCE_H} h`}
-          </ActionButton>{" "}
-          <ActionButton class="small" label={`Delete ${rule.name}`} action={remove}>
-            Delete
-          </ActionButton>
-        </td>
-      )}
-    </tr>
   );
 }

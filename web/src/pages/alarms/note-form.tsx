@@ -1,0 +1,36 @@
+import { useState } from "preact/hooks";
+import { alarmApi, type AlarmCode } from "../../api/alarms";
+import { ActionButton } from "../../parts/action-button";
+import { alarmCodeTitle } from "../../words/alarm";
+
+interface Props {
+  code: AlarmCode;
+  /** The note before. */
+  text: string;
+  refetch: () => Promise<unknown>;
+  close: () => void;
+}
+
+/** Edits the owner's note on a fault. */
+export function NoteForm({ code, text, refetch, close }: Props) {
+  const [draft, setDraft] = useState(text);
+  const save = async () => {
+    await alarmApi.putNote(code, draft);
+    await refetch();
+    close();
+  };
+  return (
+    <div class="note-form">
+      <label>
+        Note on every fault “{alarmCodeTitle(code)}”
+        <textarea rows={3} maxLength={2000} value={draft} onInput={(e) => setDraft(e.currentTarget.value)} />
+      </label>
+      <ActionButton class="small" action={save}>
+        Keep
+      </ActionButton>{" "}
+      <button type="button" class="small" onClick={close}>
+        Cancel
+      </button>
+    </div>
+  );
+}

@@ -1,0 +1,30 @@
+import { useState } from "preact/hooks";
+import type { Advice, AlarmCode } from "../../api/alarms";
+import { NoteForm } from "./note-form";
+
+interface Props {
+  code: AlarmCode;
+  advice: Advice;
+  refetch: () => Promise<unknown>;
+}
+
+/** The owner's own note on a fault, which can be edited. */
+export function OwnNote({ code, advice, refetch }: Props) {
+  const [isEdited, setEdited] = useState(false);
+  const note = advice.notes.find((note) => note.code === code);
+  if (isEdited) {
+    return <NoteForm code={code} text={note?.text ?? ""} refetch={refetch} close={() => setEdited(false)} />;
+  }
+  return (
+    <p>
+      {note && (
+        <span class="own-note">
+          {note.text} <span class="quiet">({note.by})</span>{" "}
+        </span>
+      )}
+      <button type="button" class="link" onClick={() => setEdited(true)}>
+        {note ? "Edit the note" : "Add a note"}
+      </button>
+    </p>
+  );
+}

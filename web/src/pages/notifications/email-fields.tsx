@@ -1,0 +1,46 @@
+import type { ChannelDraft } from "./channel-draft";
+import { ChannelField } from "./channel-field";
+import { Choice } from "./choice";
+
+const ENCRYPTIONS = [
+  ["starttls", "STARTTLS"],
+  ["tls", "TLS"],
+  ["none", "none"],
+] as const;
+
+interface Props {
+  draft: ChannelDraft;
+  change: (part: Partial<ChannelDraft>) => void;
+}
+
+/** The fields of a channel that sends e-mail. */
+export function EmailFields({ draft, change }: Props) {
+  const { host, port, security, user, password, from, to } = draft;
+  return (
+    <>
+      <div class="form-row">
+        <ChannelField word="Mail server" value={host} change={(host) => change({ host })} />
+        <ChannelField word="Port" type="number" value={port} change={(port) => change({ port })} />
+        <Choice
+          word="Encryption"
+          value={security}
+          options={ENCRYPTIONS}
+          change={(security) => change({ security })}
+        />
+      </div>
+      <div class="form-row">
+        <ChannelField word="User (if needed)" value={user} change={(user) => change({ user })} />
+        <ChannelField
+          word="Password"
+          type="password"
+          value={password}
+          change={(password) => change({ password })}
+        />
+      </div>
+      <div class="form-row">
+        <ChannelField word="From" value={from} change={(from) => change({ from })} />
+        <ChannelField word="To (several with commas)" value={to} change={(to) => change({ to })} />
+      </div>
+    </>
+  );
+}

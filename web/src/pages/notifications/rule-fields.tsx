@@ -1,0 +1,49 @@
+import type { Channel } from "../../api/alarms";
+import { Choice } from "./choice";
+import type { RuleDraft } from "./rule-draft";
+
+/** Intervals of reminders, s. */
+const REPEATS = [
+  [0, "Never"],
+  [900, "Every 15 minutes"],
+  [3600, "Every hour"],
+  [86_400, "Every day"],
+] as const;
+
+interface Props {
+  draft: RuleDraft;
+  channels: Channel[];
+  change: (part: Partial<RuleDraft>) => void;
+}
+
+/** Name, rigs, channel and reminders of a rule. */
+export function RuleFields({ draft, channels, change }: Props) {
+  return (
+    <div class="form-row">
+      <label>
+        Name
+        <input value={draft.name} maxLength={100} onInput={(e) => change({ name: e.currentTarget.value })} />
+      </label>
+      <label>
+        Rigs (* stands for any characters)
+        <input
+          value={draft.asset}
+          maxLength={200}
+          onInput={(e) => change({ asset: e.currentTarget.value })}
+        />
+      </label>
+      <Choice
+        word="Channel"
+        value={draft.channel}
+        options={channels.map(({ id, name }) => [id, name] as const)}
+        change={(channel) => change({ channel })}
+      />
+      <Choice<number>
+        word="Repeated while it fails"
+        value={draft.repeat}
+        options={REPEATS}
+        change={(repeat) => change({ repeat: Number(repeat) })}
+      />
+    </div>
+  );
+}
