@@ -18,6 +18,8 @@ READ = "import json, sys; from ruamel.yaml import YAML; print(json.dumps(YAML(ty
 # are in the client nevertheless.
 FOREIGN_BODIES = {
     "Unsupported content type application/msgpack",
+    "Unsupported content type application/vnd.apache.arrow.stream",
+    "Unsupported content type application/vnd.apache.parquet",
     "Unsupported content type application/x-ndjson",
     "Unsupported content type text/csv",
 }

@@ -70,6 +70,10 @@ pub(super) async fn list(
     Ok(Json(service.alarms(query, page_limit(limit)).await?))
 }
 
+/// Size limit of a request to acknowledge alarms, bytes: 500 names of the greatest length in
+/// escapes need half of it.
+const MAX_ACKNOWLEDGE_BYTES: usize = 512 << 10;
+
 /// Acknowledges the current occurrences of several alarms. Each succeeds or fails by itself.
 #[utoipa::path(post, path = "/alarms/acknowledge", tag = "alarms",
     operation_id = "acknowledge_alarms", params(ActorQuery), request_body = AcknowledgeView,
@@ -79,7 +83,7 @@ pub(super) async fn acknowledge(
     State(app): State<App>,
     Query(query): Query<ActorQuery>,
     Extension(caller): Extension<Caller>,
-    JsonBody(request): JsonBody<AcknowledgeView>,
+    JsonBody(request): JsonBody<AcknowledgeView, MAX_ACKNOWLEDGE_BYTES>,
 ) -> Result<Json<AcknowledgedView>, Problem> {
     Ok(Json(app.service.acknowledge_all(request, query.actor(&caller)).await?))
 }

@@ -12,15 +12,16 @@ use crate::wire::json;
 /// Size limit of a small JSON body, bytes; a longer one is answered with 413.
 const MAX_SMALL_BYTES: usize = 16 << 10;
 
-/// The value in a small JSON body; the default value if the body is empty or `null`.
-pub(super) struct JsonBody<T>(pub(super) T);
+/// The value in a small JSON body of at most `LIMIT` bytes. An empty body and `null` count as
+/// `{}`.
+pub(super) struct JsonBody<T, const LIMIT: usize = MAX_SMALL_BYTES>(pub(super) T);
 
-impl<T: Default + DeserializeOwned> FromRequest<App> for JsonBody<T> {
+impl<T: DeserializeOwned, const LIMIT: usize> FromRequest<App> for JsonBody<T, LIMIT> {
     type Rejection = Problem;
 
     async fn from_request(request: Request, app: &App) -> Result<Self, Problem> {
         let (parts, body) = request.into_parts();
-        let bytes = read(app, &parts.headers, body, MAX_SMALL_BYTES).await?;
+        let bytes = read(app, &parts.headers, body, LIMIT).await?;
         Ok(Self(parse(&bytes)?))
     }
 }
@@ -46,20 +47,18 @@ pub(super) async fn read(
 /// # Errors
 /// 415 if its media type is not JSON, 400 if it is not valid JSON, 422 with the pointer of an
 /// invalid element.
-pub fn parse_json<T: Default + DeserializeOwned>(
-    headers: &HeaderMap,
-    bytes: &[u8],
-) -> Result<T, Problem> {
+pub fn parse_json<T: DeserializeOwned>(headers: &HeaderMap, bytes: &[u8]) -> Result<T, Problem> {
     check_media_type(headers, bytes)?;
     parse(bytes)
 }
 
-fn parse<T: Default + DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
-    if bytes.trim_ascii().is_empty() {
-        return Ok(T::default());
-    }
+fn parse<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
+    let bytes = match bytes.trim_ascii() {
+        b"" | b"null" => b"{}",
+        bytes => bytes,
+    };
     json::check_object(bytes)?;
-    Ok(json::parse::<Option<T>>(bytes)?.unwrap_or_default())
+    Ok(json::parse(bytes)?)
 }
 
 fn check_media_type(headers: &HeaderMap, body: &[u8]) -> Result<(), Problem> {

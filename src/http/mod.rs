@@ -9,6 +9,7 @@
 //! The routes and the right that each requires are listed in `api`.
 
 mod alarms;
+mod api;
 mod assets;
 mod body;
 mod calibrations;
@@ -56,7 +57,6 @@ use serde::Deserialize;
 use tokio_util::sync::CancellationToken;
 use utoipa::OpenApi;
 use utoipa::openapi::OpenApi as Document;
-use utoipa_axum::routes;
 use utoipa_swagger_ui::SwaggerUi;
 
 pub use body::BodyBudget;
@@ -68,10 +68,10 @@ pub(crate) use rates::subscriber;
 pub use rates::{RateLimit, RateLimits};
 pub use routes::ExtraRoutes;
 
+use self::api::api;
 use self::forward::Forwarder;
 use self::guard::Guard;
-use self::routes::{GuardedRouter, RouteRules};
-use crate::service::access::Right;
+use self::routes::RouteRules;
 use crate::service::{Service, parse_timestamp};
 use offbd_core::vocabulary::{Invalid, TimeRange, UnknownWord};
 
@@ -225,80 +225,6 @@ struct PageQuery {
     /// Items per page, 1 to 500; 50 by default.
     #[param(format = Int32, minimum = 1, maximum = 500)]
     limit: Option<u32>,
-}
-
-/// Returns every operation with the right that it requires.
-fn api() -> GuardedRouter {
-    use Right::{
-        Administer, Authenticated, ControlSessions, Operate, Public, Read, ReadAsset, SendTelemetry,
-    };
-    let v1 = GuardedRouter::new(Document::default())
-        .routes(Read, routes!(assets::list))
-        .routes(Operate, routes!(assets::create))
-        .routes(ReadAsset, routes!(assets::get))
-        .routes(Operate, routes!(assets::put))
-        .routes(Administer, routes!(assets::delete))
-        .routes(ReadAsset, routes!(assets::state))
-        .routes(Read, routes!(assets::trends))
-        .routes(Read, routes!(series::series))
-        .routes(Read, routes!(series::annotations))
-        .routes(ReadAsset, routes!(drive_cycles::get))
-        .routes(Read, routes!(assets::fleet))
-        .routes(Read, routes!(cluster::get))
-        .routes(SendTelemetry, routes!(telemetry::post))
-        .routes(ReadAsset, routes!(stream::stream))
-        .routes(ReadAsset, routes!(faults::of_asset))
-        .routes(ReadAsset, routes!(faults::get))
-        .routes(Operate, routes!(faults::clear))
-        .routes(Operate, routes!(faults::acknowledge))
-        .routes(Read, routes!(faults::recording))
-        .routes(Read, routes!(faults::history))
-        .routes(Read, routes!(faults::of_fleet))
-        .routes(Read, routes!(alarms::list))
-        .routes(Operate, routes!(alarms::acknowledge))
-        .routes(Read, routes!(alarms::advice))
-        .routes(Operate, routes!(alarms::put_note))
-        .routes(ReadAsset, routes!(alarms::mutes))
-        .routes(Operate, routes!(alarms::mute, alarms::unmute))
-        .routes(Administer, routes!(notifications::channels, notifications::create_channel))
-        .routes(Administer, routes!(notifications::channel, notifications::put_channel))
-        .routes(Administer, routes!(notifications::delete_channel))
-        .routes(Administer, routes!(notifications::test))
-        .routes(Read, routes!(notifications::rules))
-        .routes(Administer, routes!(notifications::create_rule))
-        .routes(Administer, routes!(notifications::put_rule, notifications::delete_rule))
-        .routes(Read, routes!(notifications::deliveries))
-        .routes(Read, routes!(notifications::delivery))
-        .routes(ReadAsset, routes!(events::events))
-        .routes(ControlSessions, routes!(sessions::open))
-        .routes(Operate, routes!(sessions::import))
-        .routes(ReadAsset, routes!(sessions::list))
-        .routes(ReadAsset, routes!(sessions::get))
-        .routes(Administer, routes!(sessions::delete))
-        .routes(ControlSessions, routes!(sessions::end))
-        .routes(Read, routes!(sessions::telemetry))
-        .routes(ReadAsset, routes!(sessions::faults))
-        .routes(Read, routes!(traces::trace))
-        .routes(Operate, routes!(replays::create))
-        .routes(Read, routes!(replays::get))
-        .routes(Read, routes!(calibrations::list))
-        .routes(Operate, routes!(calibrations::create))
-        .routes(Read, routes!(calibrations::get))
-        .routes(Operate, routes!(calibrations::activate))
-        .routes(ReadAsset, routes!(learning::get))
-        .routes(Operate, routes!(learning::accept))
-        .routes(Operate, routes!(learning::discard))
-        .routes(Administer, routes!(tokens::list, tokens::create))
-        .routes(Administer, routes!(tokens::get, tokens::revoke))
-        .routes(Administer, routes!(tokens::audit))
-        .routes(Public, routes!(login::log_in))
-        .routes(Authenticated, routes!(login::get, login::log_out));
-    GuardedRouter::new(Api::openapi())
-        .routes(Public, routes!(operations::healthz))
-        .routes(Public, routes!(operations::readyz))
-        .routes(Read, routes!(metrics::metrics))
-        .nest("/api/v1", v1)
-        .nest("/sovd", sovd::routes())
 }
 
 /// Public paths that are not operations: the API description and its viewer.

@@ -19,7 +19,7 @@ use super::mutes::Mutes;
 use super::notifications::{NotificationTransport, Notifier};
 use super::ownership::Ownership;
 use super::upkeep::{Deleter, Upkeep, Watchdog};
-use super::writing::{Committer, Events, FIRST_RETRY, Handles, Outage, Transfers};
+use super::writing::{Committer, Events, FIRST_RETRY, Handles, Transfers};
 use super::{Clock, Limits, ServiceError, snapshots};
 use crate::store::{MAX_PARTITIONS, NodeIdentity, PartitionId, Store, Write, Writer};
 
@@ -42,7 +42,6 @@ pub(super) struct Inner {
     pub(super) principals: PrincipalCache,
     pub(super) provider: Option<Provider>,
     pub(super) shards: Shards,
-    pub(super) outage: watch::Receiver<Outage>,
     pub(super) deleter: Deleter,
     pub(super) jobs: mpsc::Sender<Job>,
     pub(super) job_context: JobContext,
@@ -147,6 +146,51 @@ impl Parts {
     }
 }
 
+/// The handles that lead to the writer, and what it reports.
+struct WayToWriter {
+    handles: Handles,
+    committer: Committer,
+    events: Events,
+    n_commits: Arc<AtomicU64>,
+    transfers: Transfers,
+    /// Partitions that another node has taken.
+    lost: mpsc::Receiver<PartitionId>,
+}
+
+impl WayToWriter {
+    fn new(
+        store: Store,
+        writer: Writer,
+        limits: &Limits,
+        clock: Clock,
+        is_clustered: bool,
+    ) -> Self {
+        let events = Events::new(store.clone(), is_clustered);
+        let (sets, queue) = mpsc::channel(limits.commit_queue);
+        let (outage_sender, outage) = watch::channel(None);
+        let closing = CancellationToken::new();
+        let n_commits = Arc::new(AtomicU64::new(0));
+        let ownership = Ownership::new(writer.partitions(), writer.owned());
+        let (transfers, transfer_requests) = Transfers::new();
+        let (lost_sender, lost) = mpsc::channel(MAX_PARTITIONS as usize);
+        let committer = Committer {
+            writer,
+            queue,
+            transfers: transfer_requests,
+            ownership: ownership.clone(),
+            lost: lost_sender,
+            events: events.clone(),
+            outage: outage_sender,
+            n_commits: n_commits.clone(),
+            closing: closing.clone(),
+            journal_bytes: limits.journal_bytes,
+            first_retry: FIRST_RETRY,
+        };
+        let handles = Handles::new(store, clock, limits, ownership, sets, outage, closing);
+        Self { handles, committer, events, n_commits, transfers, lost }
+    }
+}
+
 impl Service {
     /// Starts the shards and the writer on the current tokio runtime, and queues unfinished
     /// jobs again. Tokens of the identity `provider` are accepted in addition to the
@@ -202,36 +246,8 @@ impl Service {
         cluster: Option<Cluster>,
         clock: Clock,
     ) -> (Self, Parts) {
-        let events = Events::new(store.clone(), cluster.is_some());
-        let (sets, queue) = mpsc::channel(limits.commit_queue);
-        let (outage_sender, outage) = watch::channel(None);
-        let closing = CancellationToken::new();
-        let n_commits = Arc::new(AtomicU64::new(0));
-        let ownership = Ownership::new(writer.partitions(), writer.owned());
-        let (transfers, transfer_requests) = Transfers::new();
-        let (lost_sender, lost) = mpsc::channel(MAX_PARTITIONS as usize);
-        let handles = Handles::new(
-            store,
-            clock,
-            &limits,
-            ownership.clone(),
-            sets,
-            outage.clone(),
-            closing.clone(),
-        );
-        let committer = Committer {
-            writer,
-            queue,
-            transfers: transfer_requests,
-            ownership,
-            lost: lost_sender,
-            events: events.clone(),
-            outage: outage_sender,
-            n_commits: n_commits.clone(),
-            closing: closing.clone(),
-            journal_bytes: limits.journal_bytes,
-            first_retry: FIRST_RETRY,
-        };
+        let way = WayToWriter::new(store, writer, &limits, clock, cluster.is_some());
+        let WayToWriter { handles, committer, events, n_commits, transfers, lost } = way;
         let presences = Presences::default();
         let (jobs, jobs_queue) = mpsc::channel(job::MAX_QUEUED);
         let env = Environment {
@@ -248,7 +264,7 @@ impl Service {
             batch_samples: limits.longest_batch(),
             n_commits,
             stalled: stalled.clone(),
-            closing,
+            closing: handles.closing.clone(),
         };
         let upkeep = Upkeep::new(&handles, &deleter, &limits.retention, &queues, watchdog);
         let node = cluster.clone().map(|cluster| NodeTask {
@@ -274,7 +290,6 @@ impl Service {
             principals: PrincipalCache::default(),
             provider,
             shards: queues,
-            outage,
             deleter,
             jobs,
             in_flight,

@@ -108,12 +108,12 @@ pub struct AlarmKeyView {
 /// The outcome for each alarm of a request, in its order.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct AcknowledgedView {
-    pub items: Vec<AcknowledgedItemView>,
+    pub items: Vec<AcknowledgeOutcomeView>,
 }
 
 /// The outcome for one alarm.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
-pub struct AcknowledgedItemView {
+pub struct AcknowledgeOutcomeView {
     pub asset: String,
     pub code: AlarmCodeWord,
     pub acknowledged: bool,

@@ -10,7 +10,7 @@ use crate::store::{
 };
 use crate::wire::advice;
 use crate::wire::alarm::{
-    AcknowledgeView, AcknowledgedItemView, AcknowledgedView, AdviceListView, AlarmEvidenceView,
+    AcknowledgeOutcomeView, AcknowledgeView, AcknowledgedView, AdviceListView, AlarmEvidenceView,
     AlarmKeyView, AlarmView, NewNoteView, NoteView,
 };
 use crate::wire::provenance::ActView;
@@ -238,7 +238,7 @@ impl Service {
         for AlarmKeyView { asset, code } in alarms {
             let outcome = self.acknowledge_alarm(&asset, code, actor.clone()).await;
             let reason = outcome.err().map(|error| error.to_string());
-            items.push(AcknowledgedItemView {
+            items.push(AcknowledgeOutcomeView {
                 asset,
                 code,
                 acknowledged: reason.is_none(),

@@ -38,7 +38,7 @@ impl Service {
         if self.inner.shards.is_any_closed() {
             return Err(ServiceError::Unavailable { what: "a shard has stopped" });
         }
-        if let Some(reason) = self.inner.outage.borrow().clone() {
+        if let Some(reason) = self.inner.handles.outage.borrow().clone() {
             return Err(ServiceError::Outage { reason });
         }
         if self.inner.stalled.load(Ordering::Relaxed) {

@@ -27,7 +27,7 @@ pub(in crate::service) struct Handles {
     pub(in crate::service) sessions: SessionLimits,
     pub(in crate::service) ownership: Ownership,
     writer: mpsc::Sender<WriteSet>,
-    outage: watch::Receiver<Outage>,
+    pub(in crate::service) outage: watch::Receiver<Outage>,
     /// Whether a fence has timed out and is not complete yet.
     is_stuck: Arc<AtomicBool>,
     /// Commits what is queued, in a simulation without a writer thread.

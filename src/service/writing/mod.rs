@@ -6,7 +6,7 @@ mod events;
 mod handles;
 mod transfer;
 
-pub(super) use commit::{Committer, EngineGeneration, FIRST_RETRY, Outage, WriteSet};
+pub(super) use commit::{Committer, EngineGeneration, FIRST_RETRY, WriteSet};
 pub use events::{Event, EventFeed, EventKind};
 pub(super) use events::{Events, line};
 pub(super) use handles::Handles;

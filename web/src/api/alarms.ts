@@ -1,7 +1,7 @@
 /** The requests about alarms, mutes and notifications. */
 import type { components } from "../../generated/schema";
 import { actor } from "./access";
-import { get, getAll, query, segment, send } from "./request";
+import { get, query, segment, send } from "./request";
 import type { Page } from "./types";
 
 type Schemas = components["schemas"];
@@ -40,11 +40,11 @@ export const alarmApi = {
     send<Mute>("PUT", `/assets/${segment(asset)}/mutes/${segment(code)}${by()}`, { reason, until }),
   unmute: (asset: string, code: AlarmCode) =>
     send("DELETE", `/assets/${segment(asset)}/mutes/${segment(code)}`),
-  channels: () => getAll<Channel>(CHANNELS, {}),
+  channels: async () => (await get<Page<Channel>>(CHANNELS)).items,
   createChannel: (channel: NewChannel) => send<Schemas["MadeChannel"]>("POST", CHANNELS, channel),
   deleteChannel: (id: string) => send("DELETE", `${CHANNELS}/${segment(id)}`),
   testChannel: (id: string) => send<Delivery>("POST", `${CHANNELS}/${segment(id)}/test`),
-  rules: () => getAll<Rule>(RULES, {}),
+  rules: async () => (await get<Page<Rule>>(RULES)).items,
   createRule: (rule: NewRule) => send<Rule>("POST", RULES, rule),
   putRule: (id: string, rule: NewRule) => send<Rule>("PUT", `${RULES}/${segment(id)}`, rule),
   deleteRule: (id: string) => send("DELETE", `${RULES}/${segment(id)}`),

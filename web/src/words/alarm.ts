@@ -14,7 +14,7 @@ export const CHANGES: Record<AlarmChange, string> = {
 };
 
 export const alarmCodeTitle = (code: AlarmCode) =>
-  code === "communication_lost" ? "No data arrive" : codeTitle(code);
+  code === "communication_lost" ? "Communication lost" : codeTitle(code);
 
 export const alarmTitle = ({ code, kind }: Pick<Alarm, "code" | "kind">) =>
   alarmCodeTitle(code) + (kind ? `, ${kind}` : "");

@@ -7,7 +7,7 @@ import { rigPath } from "../../router/paths";
 import { alarmCodeTitle } from "../../words/alarm";
 import { number } from "../../words/numbers";
 import { severity } from "../../words/severity";
-import { timeAgo } from "../../words/time";
+import { dateTime, timeAgo } from "../../words/time";
 import type { FleetRow as Row } from "./rows";
 
 /** Lag from which on it is highlighted, s. */
@@ -54,10 +54,13 @@ export function FleetRow({ row: { entry, health }, seenAt }: { row: Row; seenAt:
             {entry.unjudged.reason}
           </span>
         )}
-        {entry.communication_lost_since && <span class="chip chip-confirmed">No data arrive</span>}
+        {entry.communication_lost_since && <span class="chip chip-failing">Communication lost</span>}
         {entry.muted?.map((mute) => (
-          <span class="quiet clip" title={`${mute.reason}, until ${mute.until}`}>
-            {alarmCodeTitle(mute.code)} not tested (muted by {mute.by})
+          <span
+            class="chip chip-muted"
+            title={`Muted by ${mute.by} until ${dateTime(mute.until)}: ${mute.reason}`}
+          >
+            {alarmCodeTitle(mute.code)} not tested
           </span>
         ))}
         {!faults.length &&
