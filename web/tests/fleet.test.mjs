@@ -92,7 +92,7 @@ test("after a restart of the service, the page catches up", async () => {
   await view.getByText("The service does not answer").waitFor({ state: "detached" });
   // The missed events arrive, each once.
   const feed = view.getByRole("region", { name: "Events" });
-  await feed.getByText("X servo confirmed").waitFor();
+  await feed.getByText(/X servo.* confirmed/).waitFor();
   assert.equal(await feed.getByRole("listitem").count(), 2);
   assert.deepEqual(view.errors, []);
   await view.done();

@@ -140,6 +140,15 @@ export async function ask(base, method, path, body, type = "application/json") {
   return text && answer.headers.get("content-type")?.includes("json") ? JSON.parse(text) : text;
 }
 
+/** Waits until `condition` resolves with true. */
+export async function until(condition) {
+  const deadline = Date.now() + SOON;
+  while (!(await condition())) {
+    assert.ok(Date.now() < deadline, "not fulfilled within the deadline");
+    await new Promise((done) => setTimeout(done, 200));
+  }
+}
+
 export async function browser() {
   const executablePath = BROWSERS.find((path) => path && existsSync(path));
   assert.ok(executablePath, "no Chromium found; name one in CHROMIUM");

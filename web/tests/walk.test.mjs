@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { after, before, test } from "node:test";
-import { browser, demo, offbd, page } from "./support.mjs";
+import { ask, browser, demo, offbd, page, until } from "./support.mjs";
 
 const README = readFileSync(new URL("../../README.md", import.meta.url), "utf8");
 const WALK = README.slice(
@@ -33,6 +33,11 @@ async function press(words, role = "button", name = words) {
 test("from the demo to the explanation of a fault", async () => {
   await view.goto(show.url);
   await view.getByRole("link", { name: /demo-rig/ }).waitFor();
+  // A reader watches the healthy rig for a moment; the lesson shows what lies before the fault.
+  await until(async () => {
+    const { items } = await ask(show.url, "GET", "/sessions");
+    return items.some(({ first_t_s: first, last_t_s: last }) => last - first > 8);
+  });
 
   await press("Demo", "link");
   await press("dead", "button", "Inject: X servo, dead");
@@ -57,9 +62,9 @@ test("from the demo to the explanation of a fault", async () => {
   await view.getByText("Another verdict").waitFor();
 
   await press("Demo", "link");
-  await view.getByRole("heading", { name: "textbook" }).waitFor();
   await press("Repair all");
   await view.getByText("The simulated rig is healthy.").waitFor();
+  await view.getByRole("heading", { name: "textbook" }).waitFor();
   await view.goto(`${show.url}/rigs/demo-rig/faults/x_servo`);
   await view.getByLabel("Your name, recorded with the action").fill("ada");
   await press("acknowledge", "button", "Acknowledge");

@@ -79,8 +79,8 @@ test("a drive cycle's CSV has a line for each moment, empty where there is no se
 
 test("the lesson shows what lies before the first fault, and after one that is repaired", () => {
   const session = { first_t_s: 100, last_t_s: 160 };
-  const fails = (t_s, onset_s) => ({ t_s, onset_s, status_byte: "2F" });
-  const passes = (t_s) => ({ t_s, status_byte: "2E" });
+  const fails = (t_s, onset_s) => ({ t_s, onset_s, code: "x_servo", status_byte: "2F" });
+  const passes = (t_s) => ({ t_s, code: "x_servo", status_byte: "2E" });
   assert.deepEqual(healthyStretch(session, []), { from_s: 100, to_s: 120, fault_s: undefined });
   assert.deepEqual(healthyStretch(session, [fails(111, 110.5)]), {
     from_s: 100,
@@ -90,6 +90,14 @@ test("the lesson shows what lies before the first fault, and after one that is r
   assert.equal(healthyStretch(session, [fails(103, 102)]), undefined, "too short");
   const after = healthyStretch(session, [passes(102), fails(130, 129)]);
   assert.deepEqual(after, { from_s: 102, to_s: 122, fault_s: 129 });
+  const between = healthyStretch(session, [fails(103, 102), passes(110), fails(150, 149)]);
+  assert.deepEqual(between, { from_s: 110, to_s: 130, fault_s: 149 });
+  const other = { ...fails(104), code: "y_servo" };
+  assert.equal(
+    healthyStretch(session, [fails(103, 102), other, passes(110)]),
+    undefined,
+    "another one fails on",
+  );
   assert.equal(healthyStretch({ first_t_s: null, last_t_s: null }, []), undefined);
 });
 

@@ -27,8 +27,41 @@ const NOT_LEARNT: Record<LearningState, { word: string; meaning: string }> = {
   learnt: { word: "", meaning: "" },
 };
 
-export function FleetRow({ row: { entry, health }, seenAt }: { row: Row; seenAt: number }) {
+/** Faults, warnings, and what is not tested. */
+function Findings({ entry }: { entry: Row["entry"] }) {
   const faults = [...entry.faults].sort((a, b) => severity(b) - severity(a));
+  return (
+    <span class="faults">
+      {faults.map((fault) => (
+        <FaultChip fault={fault} hasSession={entry.session_id != null} since={fault.failed_at} />
+      ))}
+      {entry.warnings.map((warning) => (
+        <DriftChip warning={warning} />
+      ))}
+      {entry.unjudged && (
+        <span class="quiet clip" title={entry.unjudged.reason}>
+          {entry.unjudged.reason}
+        </span>
+      )}
+      {entry.communication_lost_since && <span class="chip chip-failing">Communication lost</span>}
+      {entry.muted?.map((mute) => (
+        <span
+          class="chip chip-muted"
+          title={`Muted by ${mute.by} until ${dateTime(mute.until)}: ${mute.reason}`}
+        >
+          {alarmCodeTitle(mute.code)} not tested
+        </span>
+      ))}
+      {!faults.length &&
+        !entry.warnings.length &&
+        !entry.unjudged &&
+        !entry.muted?.length &&
+        !entry.communication_lost_since && <span class="quiet">none</span>}
+    </span>
+  );
+}
+
+export function FleetRow({ row: { entry, health }, seenAt }: { row: Row; seenAt: number }) {
   const { word, meaning } = NOT_LEARNT[entry.learning];
   return (
     <Link to={rigPath(entry.asset)} class={`fleet-row row-${health}`}>
@@ -42,33 +75,7 @@ export function FleetRow({ row: { entry, health }, seenAt }: { row: Row; seenAt:
         )}
       </span>
       <HealthMark health={health} />
-      <span class="faults">
-        {faults.map((fault) => (
-          <FaultChip fault={fault} hasSession={entry.session_id != null} since={fault.failed_at} />
-        ))}
-        {entry.warnings.map((warning) => (
-          <DriftChip warning={warning} />
-        ))}
-        {entry.unjudged && (
-          <span class="quiet clip" title={entry.unjudged.reason}>
-            {entry.unjudged.reason}
-          </span>
-        )}
-        {entry.communication_lost_since && <span class="chip chip-failing">Communication lost</span>}
-        {entry.muted?.map((mute) => (
-          <span
-            class="chip chip-muted"
-            title={`Muted by ${mute.by} until ${dateTime(mute.until)}: ${mute.reason}`}
-          >
-            {alarmCodeTitle(mute.code)} not tested
-          </span>
-        ))}
-        {!faults.length &&
-          !entry.warnings.length &&
-          !entry.unjudged &&
-          !entry.muted?.length &&
-          !entry.communication_lost_since && <span class="quiet">none</span>}
-      </span>
+      <Findings entry={entry} />
       <span class="quiet clip">{entry.session ?? "–"}</span>
       <span class={`n${(entry.lag_s ?? 0) > LATE_S ? " late" : ""}`}>
         <span class="only-small">lag </span>

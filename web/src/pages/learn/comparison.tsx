@@ -9,6 +9,8 @@ import { duration } from "../../words/time";
 import { healthyStretch, type HealthyStretch } from "./healthy-stretch";
 import { JudgedByProfile } from "./judged-by-profile";
 
+const INTERVAL_MS = 5000;
+
 /** The largest residual or limit along x of all traces, m/s². */
 function commonExtent(traces: Trace[]): number {
   const values = traces.flatMap(({ x }) =>
@@ -37,8 +39,8 @@ function Stretch({ session, stretch }: { session: Session; stretch: HealthyStret
       <p class="quiet small-text">
         {duration(to_s - from_s)} along x without a fault, from {seconds(from_s, 1)} to {seconds(to_s, 1)}
         {fault_s === undefined
-          ? "; the whole session has none."
-          : `; the first fault of this session begins at ${seconds(fault_s, 1)}, after it.`}
+          ? "; none follows."
+          : `; the next fault of this session begins at ${seconds(fault_s, 1)}, after it.`}
       </p>
       <ErrorMessage error={error} retry={refetch} />
       <div class="pair">
@@ -51,7 +53,11 @@ function Stretch({ session, stretch }: { session: Session; stretch: HealthyStret
 
 /** A session judged with both profiles, as far as it is without a fault; `unfit` is called if it has no such part. */
 export function Comparison({ session, unfit }: { session: Session; unfit: (id: string) => void }) {
-  const { data: lines, error, refetch } = useQuery(() => api.sessionFaults(session.id), session.id);
+  const {
+    data: lines,
+    error,
+    refetch,
+  } = useQuery(() => api.sessionFaults(session.id), session.id, INTERVAL_MS);
   const latestUnfit = useLatest(unfit);
   const isUnfit = lines !== undefined && !healthyStretch(session, lines);
   useEffect(() => {
@@ -60,6 +66,6 @@ export function Comparison({ session, unfit }: { session: Session; unfit: (id: s
   if (!lines) return <ErrorMessage error={error} retry={refetch} />;
   const stretch = healthyStretch(session, lines);
   if (!stretch)
-    return <p class="note">This session has a fault nearly from its start on. Choose another one.</p>;
+    return <p class="note">This session has no few seconds without a fault yet. Choose another one.</p>;
   return <Stretch session={session} stretch={stretch} />;
 }

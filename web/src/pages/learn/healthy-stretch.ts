@@ -14,22 +14,38 @@ const MARGIN_S = 1;
 export interface HealthyStretch {
   from_s: number;
   to_s: number;
-  /** Onset of the first fault after it, s; undefined if the session has none. */
+  /** Onset of the first fault after it, s; undefined if there is none. */
   fault_s?: number;
 }
 
-/** Returns the first seconds of a session before its first fault; undefined if they are too few. */
+type Line = Pick<FaultLine, "t_s" | "onset_s" | "code" | "status_byte">;
+
+/** Returns the intervals in which no fault fails, in order; the last one goes on. */
+function healthyIntervals(first: number, lines: Line[]): HealthyStretch[] {
+  const intervals: HealthyStretch[] = [];
+  const failing = new Set<string>();
+  let from_s = first;
+  for (const line of [...lines].sort((a, b) => a.t_s - b.t_s)) {
+    if (isFailing(line)) {
+      const fault_s = Math.min(line.onset_s ?? line.t_s, line.t_s);
+      if (!failing.size) intervals.push({ from_s, to_s: fault_s - MARGIN_S, fault_s });
+      failing.add(line.code);
+    } else {
+      failing.delete(line.code);
+      // Also a fault of the session before, which still failed at the first sample.
+      from_s = line.t_s;
+    }
+  }
+  return failing.size ? intervals : [...intervals, { from_s, to_s: Infinity }];
+}
+
+/** Returns the first seconds of a session in which nothing fails; undefined if they are too few. */
 export function healthyStretch(
   { first_t_s: first, last_t_s: last }: Pick<Session, "first_t_s" | "last_t_s">,
-  lines: Pick<FaultLine, "t_s" | "onset_s" | "status_byte">[],
+  lines: Line[],
 ): HealthyStretch | undefined {
   if (first == null || last == null) return undefined;
-  const onsets = lines.filter(isFailing).map(({ t_s, onset_s }) => Math.min(onset_s ?? t_s, t_s));
-  // A fault of the session before may still fail at the first sample.
-  const repaired = lines.filter((line) => !isFailing(line)).map(({ t_s }) => t_s);
-  const fault_s = onsets.length ? Math.min(...onsets) : undefined;
-  const end = fault_s === undefined ? last : fault_s - MARGIN_S;
-  const from_s = Math.max(first, ...repaired.filter((t) => t < end - SHORTEST_S));
-  const to_s = Math.min(from_s + LONGEST_S, end);
-  return to_s - from_s < SHORTEST_S ? undefined : { from_s, to_s, fault_s };
+  return healthyIntervals(first, lines)
+    .map(({ from_s, to_s, fault_s }) => ({ from_s, to_s: Math.min(from_s + LONGEST_S, to_s, last), fault_s }))
+    .find(({ from_s, to_s }) => to_s - from_s >= SHORTEST_S);
 }

@@ -1,24 +1,26 @@
 import { useState } from "preact/hooks";
 import { api } from "../../api/client";
+import type { Session } from "../../api/types";
 import { useQuery } from "../../hooks/use-query";
 import { ErrorMessage } from "../../parts/error-message";
 import { exampleSession } from "./example-session";
 import { Comparison } from "./comparison";
 import { TextbookText } from "./textbook-text";
 
-const INTERVAL_MS = 10_000;
+const INTERVAL_MS = 2000;
 
-/** Smallest number of samples of an example. */
-const MIN_SAMPLES = 500;
+/** Shortest duration of an example, s. */
+const SHORTEST_S = 5;
 
-const fetchSessions = async () => {
-  const { items } = await api.sessions({ limit: 50 });
-  return items.filter((session) => session.samples > MIN_SAMPLES);
-};
+const isLong = ({ first_t_s: first, last_t_s: last }: Session) =>
+  first != null && last != null && last - first >= SHORTEST_S;
+
+const fetchSessions = async () => (await api.sessions({ limit: 50 })).items;
 
 /** A stretch without a fault, judged with both profiles. */
 export function Textbook() {
-  const { data: sessions, error } = useQuery(fetchSessions, "sessions", INTERVAL_MS);
+  const { data: all, error } = useQuery(fetchSessions, "sessions", INTERVAL_MS);
+  const sessions = all?.filter(isLong);
   const [id, setId] = useState("");
   /** Sessions without a healthy stretch, which are no examples unless they are chosen. */
   const [unfit, setUnfit] = useState<ReadonlySet<string>>(new Set());
@@ -32,7 +34,13 @@ export function Textbook() {
       <ErrorMessage error={error} />
       {sessions?.length === 0 && (
         <p class="note">
-          There is no session to compare yet. Run <code>offbd demo</code>, or import a recording.
+          {all?.length ? (
+            "The sessions are too short to compare yet: it takes a few seconds."
+          ) : (
+            <>
+              There is no session to compare yet. Run <code>offbd demo</code>, or import a recording.
+            </>
+          )}
         </p>
       )}
       {chosen && (
