@@ -24,6 +24,7 @@
 //! - [`service`]: the engines of all assets, sessions, jobs, access control and events;
 //! - [`http`]: the HTTP and WebSocket interface;
 //! - `bus`, with the features `nats` and `mqtt`: devices over NATS and MQTT;
+//! - [`edge_agent`]: `offbd forward`, which keeps telemetry until the service has stored it;
 //! - [`config`]: the configuration of the service;
 //! - [`server`]: the assembly of these parts, with TLS and limits on connections;
 //! - [`cli`]: the subcommands of the program `offbd`.
@@ -34,6 +35,7 @@
 pub mod bus;
 pub mod cli;
 pub mod config;
+pub mod edge_agent;
 pub mod http;
 pub mod judging;
 pub mod server;

@@ -29,6 +29,7 @@ use tokio_util::sync::CancellationToken;
 
 use self::delivery::Senders;
 use self::keys::KeyRefresher;
+pub(crate) use self::keys::{HttpsClient, https_client};
 use self::listen::HttpListener;
 use self::tls::Tls;
 pub use self::traces::Traces;

@@ -11,6 +11,7 @@ mod completions;
 mod drive_cycle;
 mod errors;
 mod export;
+mod forward;
 mod judge;
 #[cfg(feature = "lab")]
 mod lab;
@@ -73,6 +74,7 @@ enum CliCommand {
     Export(export::ExportArgs),
     DriveCycle(drive_cycle::DriveCycleArgs),
     Serve(serve::ServeArgs),
+    Forward(forward::ForwardArgs),
     Watch(watch::WatchArgs),
     Token(token::TokenArgs),
     Backup(backup::BackupArgs),
@@ -118,6 +120,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         CliCommand::Export(args) => export::run(&args),
         CliCommand::DriveCycle(args) => drive_cycle::run(&args),
         CliCommand::Serve(args) => serve::serve(&args, &logging),
+        CliCommand::Forward(args) => forward::run(&args),
         CliCommand::Watch(args) => watch::run(&args),
         CliCommand::Token(args) => token::run(&args),
         CliCommand::Backup(args) => backup::backup(&args),

@@ -52,6 +52,16 @@ pub(super) fn add(router: Router, policy: &AccessPolicy) -> Router {
     ))
 }
 
+/// Adds what gives each request an id, in the answer and as the `instance` of its problem, to a
+/// router that is not the service's.
+pub(crate) fn add_ids(router: Router) -> Router {
+    router.layer((
+        SetRequestIdLayer::new(REQUEST_ID, MakeRequestUuid),
+        PropagateRequestIdLayer::new(REQUEST_ID),
+        from_fn(set_instance),
+    ))
+}
+
 /// Creates the request's span, as a child of the caller's trace if there is one.
 fn span(request: &Request<Body>) -> Span {
     let id = request_id(request).unwrap_or_default();

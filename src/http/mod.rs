@@ -19,6 +19,7 @@ mod description;
 mod drive_cycles;
 mod events;
 mod faults;
+mod fleet;
 mod forward;
 mod guard;
 mod headers;
@@ -50,9 +51,9 @@ mod traces;
 use std::str::FromStr;
 use std::sync::Arc;
 
-use axum::Router;
 use axum::extract::{FromRef, FromRequestParts};
 use axum::http::request::Parts;
+use axum::{Extension, Router};
 use serde::Deserialize;
 use tokio_util::sync::CancellationToken;
 use utoipa::OpenApi;
@@ -62,11 +63,13 @@ use utoipa_swagger_ui::SwaggerUi;
 pub use body::BodyBudget;
 pub use guard::AccessPolicy;
 pub use json_body::parse_json;
+pub(crate) use layers::add_ids;
 pub use metrics::{gather_metrics, keep_metrics};
 pub use problem::Problem;
 pub(crate) use rates::subscriber;
 pub use rates::{RateLimit, RateLimits};
 pub use routes::ExtraRoutes;
+pub(crate) use telemetry::TelemetryFormat;
 
 use self::api::api;
 use self::forward::Forwarder;
@@ -254,7 +257,8 @@ pub fn router(app: App, extra: ExtraRoutes) -> Router {
     OPEN_PAGES.iter().for_each(|path| rules.open(path));
     let yaml: Arc<str> = document.to_yaml().unwrap_or_default().into();
     let policy = app.policy.clone();
-    let guard = Arc::new(Guard { app: app.clone(), rules, forwarder: Forwarder::default() });
+    let forwarder = Forwarder::default();
+    let guard = Arc::new(Guard { app: app.clone(), rules, forwarder: forwarder.clone() });
     let router = router
         .route("/openapi.yaml", axum::routing::get(move || operations::openapi(yaml)))
         .merge(SwaggerUi::new("/docs").url("/openapi.json", document))
@@ -262,6 +266,7 @@ pub fn router(app: App, extra: ExtraRoutes) -> Router {
         .method_not_allowed_fallback(problem::method_not_allowed)
         .with_state(app)
         .merge(extra)
+        .layer(Extension(forwarder))
         .layer(axum::middleware::from_fn_with_state(guard, guard::guard));
     layers::add(router, &policy)
 }

@@ -14,7 +14,7 @@ use offbd_core::vocabulary::Invalid;
 
 /// The format of a batch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum TelemetryFormat {
+pub(crate) enum TelemetryFormat {
     Json,
     Msgpack,
     Ndjson,
@@ -23,7 +23,7 @@ pub(super) enum TelemetryFormat {
 
 impl TelemetryFormat {
     /// Returns the format in `Content-Type`; JSON without the header.
-    pub(super) fn of(headers: &HeaderMap) -> Result<Self, Problem> {
+    pub(crate) fn of(headers: &HeaderMap) -> Result<Self, Problem> {
         let Some(header) = headers.get(CONTENT_TYPE) else { return Ok(Self::Json) };
         let text = header.to_str().unwrap_or_default();
         let essence = text.split(';').next().unwrap_or_default().trim().to_ascii_lowercase();
@@ -47,7 +47,7 @@ impl TelemetryFormat {
         }
     }
 
-    pub(super) fn parse(self, document: &[u8], limit: usize) -> Result<Batch, BatchError> {
+    pub(crate) fn parse(self, document: &[u8], limit: usize) -> Result<Batch, BatchError> {
         match self {
             Self::Json => telemetry::json(document, limit),
             Self::Msgpack => telemetry::msgpack(document, limit),

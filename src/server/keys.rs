@@ -39,7 +39,7 @@ const MAX_DOCUMENT: usize = 256 * 1024;
 /// Where the keys are read from.
 enum KeySource {
     File(PathBuf),
-    Url(Uri, Box<Client<HttpsConnector<HttpConnector>, Body>>),
+    Url(Uri, Box<HttpsClient>),
 }
 
 /// Keeps the keys of the provider up to date.
@@ -57,7 +57,7 @@ impl KeyRefresher {
         let source = match config.location()? {
             KeyLocation::File(path) => KeySource::File(path),
             KeyLocation::Url(url) => {
-                let client = client(&url)
+                let client = https_client(&url)
                     .context("`jwt.jwks`: no root certificates to verify the server")?;
                 KeySource::Url(url, Box::new(client))
             }
@@ -130,7 +130,7 @@ async fn read(path: &Path) -> Result<Bytes> {
 }
 
 /// Fetches a document. Redirects are not followed.
-async fn fetch(client: &Client<HttpsConnector<HttpConnector>, Body>, url: &Uri) -> Result<Bytes> {
+async fn fetch(client: &HttpsClient, url: &Uri) -> Result<Bytes> {
     let response = client.get(url.clone()).await?;
     if response.status() != StatusCode::OK {
         bail!("the status of the response is {}", response.status());
@@ -139,8 +139,11 @@ async fn fetch(client: &Client<HttpsConnector<HttpConnector>, Body>, url: &Uri) 
     body.with_context(|| format!("the response is incomplete or exceeds {MAX_DOCUMENT} bytes"))
 }
 
-/// An HTTP client that trusts the root certificates of the machine, or of `SSL_CERT_FILE`.
-fn client(url: &Uri) -> Result<Client<HttpsConnector<HttpConnector>, Body>> {
+/// An HTTP client, with TLS on request.
+pub(crate) type HttpsClient = Client<HttpsConnector<HttpConnector>, Body>;
+
+/// Returns a client that trusts the root certificates of the machine, or of `SSL_CERT_FILE`.
+pub(crate) fn https_client(url: &Uri) -> Result<HttpsClient> {
     let builder = HttpsConnectorBuilder::new();
     let builder = if url.scheme_str() == Some("https") {
         builder.with_provider_and_native_roots(ring::default_provider())?

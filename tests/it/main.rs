@@ -19,6 +19,7 @@ mod damage;
 mod engine_snapshot;
 mod fault_memory;
 mod formats;
+mod forward;
 mod fuzz;
 mod journal;
 mod jwt;

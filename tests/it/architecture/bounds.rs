@@ -6,8 +6,15 @@ use std::path::Path;
 use super::{ROOT, files};
 
 /// The folders whose constants are bounds of the service.
-const FOLDERS: [&str; 6] =
-    ["src/bus", "src/server", "src/http", "src/service", "src/store", "src/wire/session_file"];
+const FOLDERS: [&str; 7] = [
+    "src/bus",
+    "src/edge_agent",
+    "src/server",
+    "src/http",
+    "src/service",
+    "src/store",
+    "src/wire/session_file",
+];
 
 /// The structs of the configuration whose fields are bounds, with their section.
 const SECTIONS: [(&str, &str); 4] = [

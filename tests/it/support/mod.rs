@@ -12,6 +12,7 @@ pub mod device;
 pub mod postgres;
 pub mod process;
 pub mod provider;
+pub mod proxy;
 pub mod receiver;
 
 use std::future::Future;

@@ -1,0 +1,126 @@
+//! `offbd forward`: the edge agent.
+
+use std::io::BufReader;
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use anyhow::Context;
+use clap::{Args, ValueEnum};
+use percent_encoding::{NON_ALPHANUMERIC, utf8_percent_encode};
+
+use super::errors::{BadArgument, InputError, read};
+use crate::edge_agent::{
+    LineFormat, MAX_SPOOL_BYTES, ServiceUrl, Spool, SpoolSender, router, spool_lines,
+};
+use offbd_core::engine::Rig;
+
+/// Keeps telemetry on this machine until the service has stored it.
+///
+/// Takes batches like the service (POST /api/v1/assets/ASSET/telemetry), or with
+/// --asset the lines of stdin, and forwards them in order, across lost
+/// connections and restarts. When the spool is full it takes no more: devices get
+/// 429, a pipe waits.
+#[derive(Clone, Debug, Args)]
+#[command(
+    after_help = "GET /api/v1/spool says how much waits, and which batches the service has refused\n\
+    for good. The agent has no access control: let it listen where only devices are.\n\n\
+    Examples:\n  \
+    offbd forward --to https://offbd.example:8087 --token-file token --spool spool.sqlite\n  \
+    my_logger | offbd forward --to http://10.0.0.2:8087 --asset my-rig --session monday"
+)]
+pub(super) struct ForwardArgs {
+    /// Address of the service
+    #[arg(long, value_name = "URL")]
+    to: String,
+    /// File with the token for the service
+    #[arg(long, value_name = "FILE")]
+    token_file: Option<PathBuf>,
+    /// File of the spool; created if missing
+    #[arg(long, value_name = "FILE", default_value = "offbd-spool.sqlite")]
+    spool: PathBuf,
+    /// Most bytes in the spool
+    #[arg(long, value_name = "N", default_value_t = MAX_SPOOL_BYTES)]
+    max_bytes: u64,
+    /// Address to listen on
+    #[arg(
+        long,
+        value_name = "ADDR:PORT",
+        default_value = "127.0.0.1:8088",
+        conflicts_with = "asset"
+    )]
+    listen: SocketAddr,
+    /// Take the lines of stdin as samples of this asset, instead of listening
+    #[arg(long, value_name = "ASSET")]
+    asset: Option<String>,
+    /// Name of the session of these lines
+    #[arg(long, value_name = "NAME", requires = "asset")]
+    session: Option<String>,
+    /// Format of these lines; the first line of CSV is the header
+    #[arg(long, value_enum, default_value = "csv", requires = "asset")]
+    format: LineFormatArg,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum LineFormatArg {
+    Csv,
+    Ndjson,
+}
+
+pub(super) fn run(args: &ForwardArgs) -> anyhow::Result<()> {
+    let token = args.token_file.as_deref().map(read).transpose()?;
+    let token = token.map(|token| String::from_utf8_lossy(&token).trim().to_owned());
+    let to = ServiceUrl::new(&args.to, token.as_deref())
+        .map_err(|e| BadArgument(format!("--to: {e}")))?;
+    super::block_on(async {
+        let spool = Spool::open(&args.spool, args.max_bytes).await;
+        let spool = Arc::new(spool.map_err(|e| InputError::file(&args.spool, e))?);
+        let waiting = spool.status().await?.waiting_batches;
+        let delivery = SpoolSender::new(spool.clone(), to);
+        match &args.asset {
+            Some(asset) => forward_lines(args, asset, &spool, delivery).await,
+            None => serve(args, spool, delivery, waiting).await,
+        }
+    })
+}
+
+async fn serve(
+    args: &ForwardArgs,
+    spool: Arc<Spool>,
+    mut delivery: SpoolSender,
+    waiting: u64,
+) -> anyhow::Result<()> {
+    let listener = tokio::net::TcpListener::bind(args.listen).await;
+    let listener = listener.with_context(|| format!("cannot listen on {}", args.listen))?;
+    let address = listener.local_addr()?;
+    tracing::info!(%address, to = args.to, waiting, "forwarding");
+    tokio::select! {
+        served = async { axum::serve(listener, router(spool)).await } => Ok(served?),
+        ended = delivery.run() => Ok(ended?),
+    }
+}
+
+async fn forward_lines(
+    args: &ForwardArgs,
+    asset: &str,
+    spool: &Spool,
+    mut delivery: SpoolSender,
+) -> anyhow::Result<()> {
+    Rig::chapter(asset).check().map_err(|e| BadArgument(format!("--asset: {}", e.reason)))?;
+    let name = |name: &String| format!("session={}", utf8_percent_encode(name, NON_ALPHANUMERIC));
+    let query = args.session.as_ref().map(name).unwrap_or_default();
+    let format = match args.format {
+        LineFormatArg::Csv => LineFormat::Csv,
+        LineFormatArg::Ndjson => LineFormat::Ndjson,
+    };
+    let source = BufReader::new(std::io::stdin());
+    tokio::select! {
+        spooled = spool_lines(spool, source, format, asset, &query) => spooled?,
+        ended = delivery.run() => ended?,
+    }
+    // What was under way when the source ended is sent again.
+    delivery.drain().await?;
+    let refused = spool.status().await?.refused.len();
+    anyhow::ensure!(refused == 0, "the service has refused {refused} batches for good");
+    Ok(())
+}

@@ -1,0 +1,88 @@
+//! Takes batches over HTTP, at the path and in the formats of the service.
+
+use std::sync::Arc;
+
+use axum::body::Bytes;
+use axum::extract::{DefaultBodyLimit, Path, RawQuery, State};
+use axum::http::{HeaderMap, StatusCode};
+use axum::routing::{get, post};
+use axum::{Json, Router};
+use offbd_core::engine::Rig;
+
+use super::media_type;
+use super::spool::{NewBatch, Spool, SpoolError, SpoolStatus};
+use crate::http::{Problem, TelemetryFormat, add_ids};
+use crate::wire::telemetry::{AckView, Batch, RowView};
+
+/// Longest body, bytes; a longer one is refused with 413.
+const MAX_BODY_BYTES: usize = 4 << 20;
+/// Most samples of a batch; more are refused with 413. The default limit of the service.
+const MAX_BATCH_SAMPLES: usize = 10_000;
+/// When a device may try again while the spool is full, s.
+const RETRY_AFTER_S: u32 = 5;
+
+/// The routes of the agent.
+pub fn router(spool: Arc<Spool>) -> Router {
+    let router = Router::new()
+        .route("/api/v1/assets/{asset}/telemetry", post(take))
+        .route("/api/v1/spool", get(status))
+        .route("/healthz", get(|| async { Json(serde_json::json!({ "status": "ok" })) }))
+        .layer(DefaultBodyLimit::max(MAX_BODY_BYTES))
+        .with_state(spool);
+    add_ids(router)
+}
+
+/// Takes a batch; the answer is sent once it is on the disk. It is checked as the service
+/// checks it, so that a device learns of invalid rows at once.
+async fn take(
+    State(spool): State<Arc<Spool>>,
+    Path(asset): Path<String>,
+    RawQuery(query): RawQuery,
+    headers: HeaderMap,
+    body: Bytes,
+) -> Result<Json<AckView>, Problem> {
+    let format = TelemetryFormat::of(&headers)?;
+    let parsed = format.parse(&body, MAX_BATCH_SAMPLES)?;
+    Rig::chapter(&asset).check()?;
+    let header = headers.get("content-type").and_then(|value| value.to_str().ok());
+    let media_type = media_type(header).to_owned();
+    let query = query.unwrap_or_default();
+    spool.put(&NewBatch { asset, query, media_type, body: body.into() }).await?;
+    Ok(Json(acknowledgement(parsed)))
+}
+
+/// The acknowledgement of a batch in the spool. What the service alone knows is missing: its
+/// session, duplicates, late samples.
+fn acknowledgement(batch: Batch) -> AckView {
+    let rows = batch.rows.iter().enumerate();
+    let rejected = rows.filter_map(|(index, row)| {
+        row.as_ref().err().map(|reason| RowView { index, reason: reason.clone() })
+    });
+    let samples = || batch.rows.iter().flatten();
+    AckView {
+        rejected: rejected.collect(),
+        accepted: samples().count(),
+        last_seq: samples().filter_map(|sample| sample.seq).max(),
+        session: batch.session.clone(),
+        ..AckView::default()
+    }
+}
+
+async fn status(State(spool): State<Arc<Spool>>) -> Result<Json<SpoolStatus>, Problem> {
+    Ok(Json(spool.status().await?))
+}
+
+impl From<SpoolError> for Problem {
+    fn from(error: SpoolError) -> Self {
+        let detail = error.to_string();
+        let problem = match error {
+            SpoolError::Full { .. } => {
+                Self::new(StatusCode::TOO_MANY_REQUESTS, "spool-full", "Spool full", detail)
+            }
+            SpoolError::Sql(_) => {
+                Self::new(StatusCode::SERVICE_UNAVAILABLE, "spool", "Not stored", detail)
+            }
+        };
+        Self { retry_after_s: RETRY_AFTER_S, ..problem }
+    }
+}
