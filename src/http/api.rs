@@ -6,9 +6,9 @@ use utoipa_axum::routes;
 
 use super::routes::GuardedRouter;
 use super::{
-    Api, alarms, assets, calibrations, cluster, drive_cycles, events, faults, learning, login,
-    metrics, notifications, operations, replays, series, sessions, sovd, stream, telemetry, tokens,
-    traces,
+    Api, alarms, assets, calibrations, cluster, drive_cycles, events, faults, fleet, learning,
+    login, metrics, notifications, operations, replays, series, sessions, sovd, stream, telemetry,
+    tokens, traces,
 };
 use crate::service::access::Right::{
     Administer, Authenticated, ControlSessions, Operate, Public, Read, ReadAsset, SendTelemetry,
@@ -39,7 +39,7 @@ fn with_assets(router: GuardedRouter) -> GuardedRouter {
         .routes(Read, routes!(series::series))
         .routes(Read, routes!(series::annotations))
         .routes(ReadAsset, routes!(drive_cycles::get))
-        .routes(Read, routes!(assets::fleet))
+        .routes(Read, routes!(fleet::get))
         .routes(Read, routes!(cluster::get))
         .routes(Read, routes!(calibrations::list))
         .routes(Operate, routes!(calibrations::create))

@@ -1,4 +1,4 @@
-//! `/assets` and `/fleet`: the asset registry, twin states, trends.
+//! `/assets`: the asset registry, twin states, trends.
 
 use axum::Json;
 use axum::body::Body;
@@ -10,9 +10,9 @@ use serde::Deserialize;
 
 use super::layers::record_asset;
 use super::{App, AssetPath, Problem, Query, json_body, page_limit};
-use crate::service::{FleetQuery, Service};
+use crate::service::Service;
 use crate::wire::asset::AssetView;
-use crate::wire::service::{FleetEntryView, Page, StateView};
+use crate::wire::service::{Page, StateView};
 use crate::wire::trend::TrendsView;
 
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
@@ -20,22 +20,6 @@ use crate::wire::trend::TrendsView;
 pub(super) struct AssetsQuery {
     /// Only assets whose name begins with this.
     name: Option<String>,
-    /// `next` of the previous page.
-    cursor: Option<String>,
-    /// Items per page, 1 to 500; 50 by default.
-    #[param(format = Int32, minimum = 1, maximum = 500)]
-    limit: Option<u32>,
-}
-
-#[derive(Debug, Deserialize, utoipa::IntoParams)]
-#[into_params(parameter_in = Query)]
-pub(super) struct FleetListQuery {
-    /// Only assets whose name begins with this.
-    name: Option<String>,
-    /// Only assets with, or without, a pending or confirmed fault.
-    has_fault: Option<bool>,
-    /// Only assets with, or without, an open session.
-    has_session: Option<bool>,
     /// `next` of the previous page.
     cursor: Option<String>,
     /// Items per page, 1 to 500; 50 by default.
@@ -144,18 +128,4 @@ pub(super) async fn trends(
     AssetPath(asset): AssetPath,
 ) -> Result<Json<TrendsView>, Problem> {
     Ok(Json(service.trends(&asset).await?))
-}
-
-/// Returns an overview of the fleet: for each asset, sorted by name, its open session,
-/// when its last telemetry arrived, and its active faults.
-#[utoipa::path(get, path = "/fleet", tag = "assets", operation_id = "get_fleet",
-    params(FleetListQuery),
-    responses((status = 200, body = Page<FleetEntryView>), (status = 400, body = Problem)))]
-pub(super) async fn fleet(
-    State(service): State<Service>,
-    Query(query): Query<FleetListQuery>,
-) -> Result<Json<Page<FleetEntryView>>, Problem> {
-    let FleetListQuery { name, has_fault, has_session, cursor, limit } = query;
-    let query = FleetQuery { name, has_fault, has_session, cursor };
-    Ok(Json(service.fleet(query, page_limit(limit)).await?))
 }

@@ -85,6 +85,9 @@ impl Forwarder {
         asset: &str,
         request: Request,
     ) -> Result<Result<Response, Request>, Problem> {
+        if request.method().is_safe() {
+            service.confirm_ownership().await?;
+        }
         let address = match service.route(asset) {
             Route::Here => return Ok(Err(request)),
             Route::Nowhere => return Err(ServiceError::Moving.into()),
@@ -94,16 +97,29 @@ impl Forwarder {
             return Err(ServiceError::Moving.into());
         }
         metrics::counter!("offbd_requests_forwarded_total").increment(1);
+        self.send(service, &address, request).await.map(Ok)
+    }
+
+    /// Sends `request` to the node at `address`.
+    ///
+    /// # Errors
+    /// A [`Problem`] if it cannot be reached.
+    pub(super) async fn send(
+        &self,
+        service: &Service,
+        address: &str,
+        request: Request,
+    ) -> Result<Response, Problem> {
         let secret = service.cluster_secret().unwrap_or_default();
         let (mut parts, body) = request.into_parts();
-        address_to(&mut parts, &address, secret)?;
+        address_to(&mut parts, address, secret)?;
         let upgrade = parts.extensions.remove::<hyper::upgrade::OnUpgrade>();
         let answer = self.client.request(Request::from_parts(parts, body)).await;
         let answer = answer.map_err(|error| {
-            tracing::debug!(address, %error, "the owner of an asset cannot be reached");
+            tracing::debug!(address, %error, "another node cannot be reached");
             Problem::from(ServiceError::Moving)
         })?;
-        Ok(Ok(response(answer, upgrade)))
+        Ok(response(answer, upgrade))
     }
 }
 

@@ -237,7 +237,7 @@ fn sample_gauges(app: &App) {
     gauge!("offbd_samples_in_flight_limit").set(app.service.limits().in_flight_samples as f64);
     gauge!("offbd_assets_rebuilding").set(app.service.n_rebuilding() as f64);
     gauge!("offbd_assets_untested").set(app.service.n_untested() as f64);
-    gauge!("offbd_cluster_nodes").set(app.service.cluster().nodes.len() as f64);
+    gauge!("offbd_cluster_nodes").set(app.service.cluster(None).nodes.len() as f64);
     gauge!("offbd_partitions_owned").set(app.service.n_partitions_owned() as f64);
     gauge!("offbd_writer_queue").set(load.writer as f64);
     for (shard, waiting) in load.shards.iter().enumerate() {

@@ -13,6 +13,18 @@ pub struct ClusterView {
     /// Partitions without an owner that is alive. Requests about their assets are answered
     /// with 503 until a node has taken them.
     pub unowned: usize,
+    /// Where the asset of the query belongs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub asset: Option<PlaceView>,
+}
+
+/// Where an asset belongs.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, ToSchema)]
+pub struct PlaceView {
+    pub partition: u32,
+    /// Name of the node that owns it; null if none that is alive does.
+    pub owner: Option<String>,
 }
 
 /// A node of a cluster.

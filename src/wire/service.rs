@@ -193,6 +193,23 @@ pub struct FleetEntryView {
     pub communication_lost_since: Option<String>,
     /// Warnings of expected faults: drifts of a servo from session to session.
     pub warnings: Vec<TrendWarningView>,
+    /// Whether the node that owns the asset did not answer, so that `last_seen`, `silent`,
+    /// `lag_s` and `unjudged` are not those of now.
+    #[serde(default)]
+    #[schema(required)]
+    pub stale: bool,
+}
+
+/// A page of the fleet.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct FleetView {
+    pub items: Vec<FleetEntryView>,
+    /// Cursor for the next page; null on the last one.
+    pub next: Option<String>,
+    /// Nodes of the cluster that did not answer in time.
+    #[serde(default)]
+    #[schema(required)]
+    pub missing_nodes: Vec<String>,
 }
 
 /// The latest samples of a rig, if they are not judged.

@@ -262,6 +262,87 @@ async fn a_paused_node_is_refused_when_it_wakes_up_and_takes_part_again() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_paused_node_that_wakes_up_answers_no_read_from_its_own_past() {
+    let cluster = Cluster::start().await;
+    let samples = rig(900, 300);
+    let names: Vec<_> = (0..12).map(|i| format!("rig-{i}")).collect();
+    for name in &names {
+        call(&cluster.client(0), Method::POST, "assets", &registration(name)).await;
+        let path = format!("assets/{name}/telemetry");
+        let first = batch(Some("s"), &samples[..300]);
+        assert_eq!(call(&cluster.client(0), Method::POST, &path, &first).await.0, 200);
+    }
+    cluster.signal(1, "-STOP");
+    cluster.taken_over_from(1).await;
+    for name in &names {
+        let path = format!("assets/{name}/telemetry");
+        let second = batch(Some("s"), &samples[300..600]);
+        assert_eq!(call(&cluster.client(0), Method::POST, &path, &second).await.0, 200);
+    }
+    cluster.signal(1, "-CONT");
+    // The requests arrive before the node has looked at the database again, or while it does.
+    let zombie = cluster.client(1);
+    let reads = names.iter().map(async |name| {
+        let path = format!("assets/{name}/state");
+        let answer = zombie.request(Method::GET, &path).send().await.unwrap();
+        (answer.status().as_u16(), answer.json::<Value>().await.unwrap_or_default())
+    });
+    let mut n_answers = 0;
+    for (status, state) in futures_util::future::join_all(reads).await {
+        match status {
+            200 => assert_eq!(state["samples"], 600, "{state}"),
+            status => assert_eq!(status, 503, "{state}"),
+        }
+        n_answers += 1;
+    }
+    assert_eq!(n_answers, names.len());
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn the_fleet_is_gathered_from_all_nodes_and_says_which_is_missing() {
+    let cluster = Cluster::start().await;
+    let samples = rig(300, 100);
+    let names: Vec<_> = (0..12).map(|i| format!("rig-{i:02}")).collect();
+    for name in &names {
+        call(&cluster.client(0), Method::POST, "assets", &registration(name)).await;
+        let path = format!("assets/{name}/telemetry");
+        let sent = batch(Some("s"), &samples);
+        assert_eq!(call(&cluster.client(0), Method::POST, &path, &sent).await.0, 200);
+    }
+    // Only the owner of a rig knows how far the last batch was behind.
+    let fleets: Vec<Value> = futures_util::future::join_all(
+        cluster.clients().iter().map(async |client| client.get("fleet").await.expect(200)),
+    )
+    .await;
+    for fleet in &fleets {
+        assert_eq!(fleet["missing_nodes"], json!([]), "{fleet}");
+        assert_eq!(fleet["items"], fleets[0]["items"]);
+        for entry in fleet["items"].as_array().unwrap() {
+            assert_eq!((&entry["lag_s"], &entry["stale"]), (&json!(0.0), &json!(false)), "{entry}");
+        }
+    }
+    let owner_of = async |name: &str| {
+        let place = cluster.client(0).get(&format!("cluster?asset={name}")).await.expect(200);
+        place["asset"]["owner"].as_str().map(str::to_owned)
+    };
+    let mut owned = Vec::new();
+    for name in &names {
+        if owner_of(name).await.as_deref() == Some("node-1") {
+            owned.push(name.clone());
+        }
+    }
+    cluster.signal(1, "-STOP");
+    let fleet = cluster.client(0).get("fleet").await.expect(200);
+    assert_eq!(fleet["missing_nodes"], json!(["node-1"]), "{fleet}");
+    let items = fleet["items"].as_array().unwrap();
+    assert_eq!(items.len(), names.len());
+    let stale: Vec<_> = items.iter().filter(|entry| entry["stale"] == true).collect();
+    let stale: Vec<_> = stale.iter().map(|entry| entry["asset"].as_str().unwrap()).collect();
+    assert_eq!(stale, owned);
+    cluster.signal(1, "-CONT");
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn what_does_not_belong_to_the_cluster_is_refused() {
     let cluster = Cluster::start().await;
     let refusal = |settings: &[(&str, &str)]| match cluster.try_node(9, settings) {

@@ -12,6 +12,7 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::{Notify, mpsc};
 use tokio::task::JoinHandle;
+use tokio::time::timeout;
 use tokio_util::sync::CancellationToken;
 
 use self::plan::OwnershipPlan;
@@ -22,12 +23,19 @@ use super::ownership::Ownership;
 use super::start::Inner;
 use super::writing::{Handles, TransferRequest, Transfers};
 use super::{Service, ServiceError};
-use crate::store::{NodeIdentity, NodeRow, PartitionId};
-use crate::wire::cluster::{ClusterView, NodeView};
+use crate::store::{NodeIdentity, NodeRow, PartitionId, PartitionRow};
+use crate::wire::cluster::{ClusterView, NodeView, PlaceView};
 
 /// How often a node looks at the partitions. A quarter of the time after which the server
 /// ends an idle connection.
 const LOOK_EVERY: Duration = Duration::from_millis(500);
+
+/// How long after the start of a look nothing can have been taken from this node: the server
+/// holds its locks for at least a second after a statement.
+const LOOK_VALID_FOR: Duration = Duration::from_secs(1);
+
+/// Longest wait for a look before a read is answered.
+const CONFIRM_TIMEOUT: Duration = Duration::from_secs(3);
 
 /// Longest time for handing all partitions over at a stop. Chosen: less than
 /// `limits.shutdown_s`.
@@ -151,14 +159,22 @@ impl NodeTask {
         self.shards.release(vec![partition], true).await;
     }
 
+    /// Reads who owns what.
+    #[expect(clippy::disallowed_methods, reason = "partitions move by the time of this process")]
+    async fn observe(&self) -> Result<(Vec<NodeRow>, Vec<PartitionRow>), ServiceError> {
+        let looked_at = Instant::now();
+        let (nodes, partitions) = self.transfers.call(TransferRequest::Observe).await?;
+        self.cluster.routes.set(looked_at, &nodes, &partitions);
+        Ok((nodes, partitions))
+    }
+
     async fn look(
         &mut self,
         plan: &mut OwnershipPlan,
         now: Duration,
         resume: &mpsc::Sender<Vec<PartitionId>>,
     ) -> Result<(), ServiceError> {
-        let (nodes, partitions) = self.transfers.call(TransferRequest::Observe).await?;
-        self.cluster.routes.set(&nodes, &partitions);
+        let (nodes, partitions) = self.observe().await?;
         // Before anything is taken again, the engines of what was lost must be gone.
         while let Ok(partition) = self.lost.try_recv() {
             self.drop_lost(partition).await;
@@ -173,8 +189,7 @@ impl NodeTask {
             metrics::counter!("offbd_partitions_taken_total").increment(taken.len() as u64);
             if !taken.is_empty() {
                 tracing::info!(n = taken.len(), "partitions taken");
-                let (nodes, partitions) = self.transfers.call(TransferRequest::Observe).await?;
-                self.cluster.routes.set(&nodes, &partitions);
+                self.observe().await?;
                 if resume.try_send(taken).is_err() {
                     tracing::warn!("too many take-overs at a time; their jobs are not continued");
                 }
@@ -210,6 +225,35 @@ impl Service {
         cluster.routes.of(ownership.partition_of(asset), &cluster.me.id)
     }
 
+    /// Waits for another look at the database if the last one is so old that another node may
+    /// own, by now, what this one does. Call it before a read is answered; writes need no such
+    /// check, because the database makes it.
+    ///
+    /// # Errors
+    /// [`ServiceError::Moving`] if the database does not answer in time.
+    pub async fn confirm_ownership(&self) -> Result<(), ServiceError> {
+        let Some(cluster) = &self.inner.cluster else { return Ok(()) };
+        let is_recent = |at: &Option<Instant>| at.is_some_and(|at| at.elapsed() < LOOK_VALID_FOR);
+        let mut looked = cluster.routes.looked();
+        if is_recent(&looked.borrow_and_update()) {
+            return Ok(());
+        }
+        cluster.poke.notify_one();
+        match timeout(CONFIRM_TIMEOUT, looked.wait_for(is_recent)).await {
+            Ok(Ok(_)) => Ok(()),
+            _ => Err(ServiceError::Moving),
+        }
+    }
+
+    /// Name and address of each other node of the cluster that is alive.
+    #[must_use]
+    pub fn other_nodes(&self) -> Vec<(String, String)> {
+        let Some(cluster) = &self.inner.cluster else { return Vec::new() };
+        let others = cluster.routes.nodes().into_iter().map(|(node, _)| node);
+        let others = others.filter(|node| node.id != cluster.me.id);
+        others.map(|node| (node.name, node.address)).collect()
+    }
+
     /// The number of partitions that this process owns.
     #[must_use]
     pub fn n_partitions_owned(&self) -> usize {
@@ -222,13 +266,22 @@ impl Service {
         self.inner.handles.is_leader()
     }
 
-    /// The nodes of the cluster and their partitions.
+    /// The nodes of the cluster and their partitions, and where `asset` belongs. A process that
+    /// works alone has no nodes.
     #[must_use]
-    pub fn cluster(&self) -> ClusterView {
+    pub fn cluster(&self, asset: Option<&str>) -> ClusterView {
         let partitions = self.inner.handles.ownership.n_partitions();
         let Some(cluster) = &self.inner.cluster else {
-            return ClusterView { nodes: Vec::new(), partitions, unowned: 0 };
+            return ClusterView { nodes: Vec::new(), partitions, unowned: 0, asset: None };
         };
+        let asset = asset.map(|asset| PlaceView {
+            partition: self.inner.handles.ownership.partition_of(asset).0,
+            owner: match self.route(asset) {
+                Route::Here => Some(cluster.me.name.clone()),
+                Route::Node { name, .. } => Some(name),
+                Route::Nowhere => None,
+            },
+        });
         let nodes = cluster.routes.nodes();
         let n_owned: usize = nodes.iter().map(|(_, n)| n).sum();
         let node = |(row, n): (NodeRow, usize)| NodeView {
@@ -240,7 +293,7 @@ impl Service {
             leaving: row.leaving != 0,
         };
         let nodes = nodes.into_iter().map(node).collect();
-        ClusterView { nodes, partitions, unowned: partitions.saturating_sub(n_owned) }
+        ClusterView { nodes, partitions, unowned: partitions.saturating_sub(n_owned), asset }
     }
 
     /// Whether this process is a node of a cluster.

@@ -2,6 +2,9 @@
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, PoisonError, RwLock};
+use std::time::Instant;
+
+use tokio::sync::watch;
 
 use crate::store::{NodeRow, PartitionId, PartitionRow};
 
@@ -20,7 +23,11 @@ pub enum Route {
 
 /// The owner of each partition. Cheap to clone; all clones share it.
 #[derive(Clone, Debug, Default)]
-pub(in crate::service) struct Routes(Arc<RwLock<Table>>);
+pub(in crate::service) struct Routes {
+    table: Arc<RwLock<Table>>,
+    /// The start of the last look at the database, on the monotonic clock of this process.
+    looked: watch::Sender<Option<Instant>>,
+}
 
 #[derive(Debug, Default)]
 struct Table {
@@ -29,19 +36,26 @@ struct Table {
 }
 
 impl Routes {
-    pub(super) fn set(&self, nodes: &[NodeRow], partitions: &[PartitionRow]) {
+    /// Sets what a look that began at `looked_at` has found.
+    pub(super) fn set(&self, looked_at: Instant, nodes: &[NodeRow], partitions: &[PartitionRow]) {
         let owner = |row: &PartitionRow| {
             let owner = nodes.iter().find(|node| Some(&node.id) == row.owner.as_ref())?;
             Some((row.partition(), owner.clone()))
         };
         let table =
             Table { owners: partitions.iter().filter_map(owner).collect(), nodes: nodes.to_vec() };
-        *self.0.write().unwrap_or_else(PoisonError::into_inner) = table;
+        *self.table.write().unwrap_or_else(PoisonError::into_inner) = table;
+        self.looked.send_replace(Some(looked_at));
+    }
+
+    /// The start of the last look.
+    pub(super) fn looked(&self) -> watch::Receiver<Option<Instant>> {
+        self.looked.subscribe()
     }
 
     /// The owner of `partition`, if it has one that is not the node `me`.
     pub(super) fn of(&self, partition: PartitionId, me: &str) -> Route {
-        let table = self.0.read().unwrap_or_else(PoisonError::into_inner);
+        let table = self.table.read().unwrap_or_else(PoisonError::into_inner);
         match table.owners.get(&partition).filter(|node| node.id != me) {
             Some(NodeRow { name, address, .. }) => {
                 Route::Node { name: name.clone(), address: address.clone() }
@@ -52,7 +66,7 @@ impl Routes {
 
     /// The nodes that are alive, each with the number of its partitions.
     pub(in crate::service) fn nodes(&self) -> Vec<(NodeRow, usize)> {
-        let table = self.0.read().unwrap_or_else(PoisonError::into_inner);
+        let table = self.table.read().unwrap_or_else(PoisonError::into_inner);
         let n_owned = |node: &NodeRow| table.owners.values().filter(|o| o.id == node.id).count();
         table.nodes.iter().map(|node| (node.clone(), n_owned(node))).collect()
     }

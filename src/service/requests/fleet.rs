@@ -103,6 +103,7 @@ impl Service {
         warned.retain(|warned| warned.calibration_id.as_ref() == calibration_id);
         let learning = known.learning.remove(&row.name).unwrap_or_default();
         Ok(FleetEntryView {
+            stale: false,
             warnings: warned.into_iter().flat_map(|warned| warned.warnings).collect(),
             faults: known.faults.remove(&row.name).unwrap_or_default(),
             muted: self.mutes_of(&row.name),

@@ -52,9 +52,15 @@ function Findings({ entry }: { entry: Row["entry"] }) {
           {alarmCodeTitle(mute.code)} not tested
         </span>
       ))}
+      {entry.stale && (
+        <span class="chip chip-muted" title="The node of the cluster that has the rig does not answer">
+          not up to date
+        </span>
+      )}
       {!faults.length &&
         !entry.warnings.length &&
         !entry.unjudged &&
+        !entry.stale &&
         !entry.muted?.length &&
         !entry.communication_lost_since && <span class="quiet">none</span>}
     </span>
