@@ -84,6 +84,8 @@ test("a channel and a rule are made in the page, and a test message arrives", as
   await view.getByText("delivered").waitFor();
   assert.equal(received[0].type, "org.offbd.test.v1");
   await view.getByRole("button", { name: "Add a rule" }).click();
+  const { y, height } = await view.getByRole("dialog").boundingBox();
+  assert.ok(Math.abs(y + height / 2 - 400) < 100, `the dialog is in the middle: ${y}, ${height}`);
   await view.getByLabel("Name").fill("everything");
   await view.getByRole("button", { name: "Add", exact: true }).click();
   await view.getByRole("button", { name: "Silence 8 h" }).click();
