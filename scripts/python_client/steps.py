@@ -44,7 +44,7 @@ from offbd_client.models import (
     FaultEntryPage,
     FaultPage,
     FaultStatus,
-    FleetEntryPage,
+    Fleet,
     Import,
     Problem,
     Profile,
@@ -99,7 +99,7 @@ def main() -> None:
     again_ack = is_a(Ack, post_telemetry.sync(asset.name, client=client, body=batch))
     assert first.accepted == again_ack.duplicate > 1000 and again_ack.accepted == 0, again_ack
     assert is_a(State, get_state.sync(asset.name, client=client)).session == "monday"
-    fleet = is_a(FleetEntryPage, get_fleet.sync(client=client, has_fault=True))
+    fleet = is_a(Fleet, get_fleet.sync(client=client, has_fault=True))
     assert [entry.asset for entry in fleet.items] == [asset.name]
 
     faults = is_a(FaultEntryPage, list_asset_faults.sync(asset.name, client=client)).items

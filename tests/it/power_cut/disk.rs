@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::support::calls::{CallRecord, Deed};
+use crate::support::calls::{CallRecord, Operation};
 use crate::support::device::Random;
 
 /// Bytes that a disk writes as a whole.
@@ -53,31 +53,33 @@ impl Disk {
 
     pub fn apply(&mut self, record: &CallRecord) {
         let path = &record.path;
-        match &record.deed {
-            Deed::Create => {
+        match &record.operation {
+            Operation::Create => {
                 self.files.push(DiskFile::default());
                 self.rename(vec![(path.clone(), Some(self.files.len() - 1))]);
             }
-            Deed::Unlink => self.rename(vec![(path.clone(), None)]),
-            Deed::Rename(to) => {
+            Operation::Unlink => self.rename(vec![(path.clone(), None)]),
+            Operation::Rename(to) => {
                 let file = self.names.get(path).copied();
                 self.rename(vec![(path.clone(), None), (to.clone(), file)]);
             }
-            Deed::Write(at, data) => self.change(path, Change::Write(*at, data.clone())),
-            Deed::Resize(length) => self.change(path, Change::Resize(*length)),
-            Deed::Sync if *path == self.folder => {
+            Operation::Write(at, data) => self.change(path, Change::Write(*at, data.clone())),
+            Operation::Resize(length) => self.change(path, Change::Resize(*length)),
+            Operation::Sync if *path == self.folder => {
                 let renamed = std::mem::take(&mut self.unsynced_names);
                 renamed.into_iter().for_each(|names| set(&mut self.synced_names, names));
             }
-            Deed::Sync => {
+            Operation::Sync => {
                 let Some(file) = self.file(path) else { return };
                 let changes = std::mem::take(&mut file.unsynced);
                 changes.iter().for_each(|change| change.apply(&mut file.synced));
             }
-            Deed::FailedSync if *path == self.folder => {}
+            Operation::FailedSync if *path == self.folder => {}
             // What was to be written is lost, and no later sync knows of it.
-            Deed::FailedSync => self.file(path).into_iter().for_each(|file| file.unsynced.clear()),
-            Deed::Send(_) => {}
+            Operation::FailedSync => {
+                self.file(path).into_iter().for_each(|file| file.unsynced.clear())
+            }
+            Operation::Send(_) => {}
         }
     }
 
@@ -167,15 +169,15 @@ fn write(content: &mut Vec<u8>, at: usize, data: &[u8]) {
 
 #[test]
 fn a_cut_leaves_what_is_synced_and_any_part_of_the_rest() {
-    let record = |deed| CallRecord { path: "/d/f".to_owned(), deed };
+    let record = |operation| CallRecord { path: "/d/f".to_owned(), operation };
     let mut disk = Disk::new(Path::new("/d"));
-    disk.apply(&record(Deed::Create));
-    disk.apply(&CallRecord { path: "/d".to_owned(), deed: Deed::Sync });
-    disk.apply(&record(Deed::Write(0, vec![1; 1000])));
-    disk.apply(&record(Deed::Sync));
-    disk.apply(&record(Deed::Write(500, vec![2; 1000])));
-    disk.apply(&record(Deed::FailedSync));
-    disk.apply(&record(Deed::Write(1000, vec![3; 1000])));
+    disk.apply(&record(Operation::Create));
+    disk.apply(&CallRecord { path: "/d".to_owned(), operation: Operation::Sync });
+    disk.apply(&record(Operation::Write(0, vec![1; 1000])));
+    disk.apply(&record(Operation::Sync));
+    disk.apply(&record(Operation::Write(500, vec![2; 1000])));
+    disk.apply(&record(Operation::FailedSync));
+    disk.apply(&record(Operation::Write(1000, vec![3; 1000])));
     let images = |disk: &Disk| {
         let mut random = Random(1);
         let images = (0..200).map(|_| disk.cut(&mut random)["/d/f"].clone());
@@ -188,6 +190,6 @@ fn a_cut_leaves_what_is_synced_and_any_part_of_the_rest() {
     assert!(found.contains(&whole));
     // Bytes 1000 to 1024, two whole sectors, and 1536 to 2000 are there or not.
     assert_eq!(found.iter().filter(|image| image.len() > 1000).count(), 7);
-    disk.apply(&record(Deed::Sync));
+    disk.apply(&record(Operation::Sync));
     assert_eq!(images(&disk).into_iter().collect::<Vec<_>>(), [whole]);
 }

@@ -10,7 +10,7 @@ use reqwest::Method;
 use serde_json::Value;
 
 use crate::support::calls::{
-    CallControl, CallError, CallFault, CallKind, CallRecord, Deed, read_records,
+    CallControl, CallError, CallFault, CallKind, CallRecord, Operation, read_records,
 };
 use crate::support::device::Random;
 use crate::support::process::{Process, ended};
@@ -51,17 +51,29 @@ pub struct History {
 impl History {
     /// Lets a service live three times; in each life a sync fails on request.
     pub async fn record(library: &Path, fails_syncs: bool, random: &mut Random) -> Self {
+        loop {
+            if let Some(history) = Self::try_record(library, fails_syncs, random).await {
+                return history;
+            }
+        }
+    }
+
+    /// Returns `None` if a life ended while a record was written: what it did last is unknown
+    /// then.
+    async fn try_record(library: &Path, fails_syncs: bool, random: &mut Random) -> Option<Self> {
         let (folder, scratch) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-        let file = scratch.path().join("record");
-        let control = CallControl::new(library, folder.path(), &scratch.path().join("control"));
-        let control = control.record_to(&file);
+        let mut control = CallControl::new(library, folder.path(), &scratch.path().join("control"));
+        let mut records = Vec::new();
         for life in 0..JOURNAL_BYTES.len() {
+            let file = scratch.path().join(format!("record-{life}"));
+            control = control.record_to(&file);
             let number = 1 + random.below(SYNCS) as u64;
             let fault = CallFault { kind: CallKind::Sync, number, error: CallError::Io };
             control.begin(fails_syncs.then_some(fault), 0);
             live(&control, folder.path(), life, random).await;
+            records.extend(read_records(&file)?);
         }
-        Self { folder, records: read_records(&file) }
+        Some(Self { folder, records })
     }
 
     pub fn folder(&self) -> &Path {
@@ -71,7 +83,7 @@ impl History {
     /// The syncs that failed among the first `n` records, with their files.
     pub fn failed_syncs(&self, n: usize) -> Vec<(usize, &str)> {
         let records = self.records[..n].iter().enumerate();
-        let failed = records.filter(|(_, record)| record.deed == Deed::FailedSync);
+        let failed = records.filter(|(_, record)| record.operation == Operation::FailedSync);
         failed.map(|(i, record)| (i, record.path.as_str())).collect()
     }
 
@@ -102,7 +114,7 @@ impl History {
 
 /// Returns the id of the request that a record acknowledges. It says what is acknowledged.
 fn acknowledgement(record: &CallRecord) -> Option<String> {
-    let Deed::Send(data) = &record.deed else { return None };
+    let Operation::Send(data) = &record.operation else { return None };
     let head = String::from_utf8_lossy(data);
     let mut lines = head.split("\r\n");
     lines.next().filter(|status| status.starts_with("HTTP/1.1 2"))?;

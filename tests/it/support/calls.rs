@@ -164,7 +164,7 @@ impl CallControl {
 
 /// Something that was done to a file, or sent to a client.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Deed {
+pub enum Operation {
     Create,
     Write(usize, Vec<u8>),
     Resize(usize),
@@ -175,37 +175,38 @@ pub enum Deed {
     Send(Vec<u8>),
 }
 
-/// A deed and the path of its file.
+/// An operation and the path of its file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CallRecord {
     pub path: String,
-    pub deed: Deed,
+    pub operation: Operation,
 }
 
-/// Reads what `calls.c` has recorded.
-pub fn read_records(file: &Path) -> Vec<CallRecord> {
+/// Reads what `calls.c` has recorded; returns `None` if the last record is incomplete, because the
+/// process was killed while it was written.
+pub fn read_records(file: &Path) -> Option<Vec<CallRecord>> {
     let recorded = std::fs::read(file).unwrap();
     let (mut rest, mut records) = (recorded.as_slice(), Vec::new());
     while !rest.is_empty() {
         let mut number = || {
-            let bytes = rest.split_off(..8).unwrap();
-            usize::try_from(u64::from_ne_bytes(bytes.try_into().unwrap())).unwrap()
+            let bytes = rest.split_off(..8)?;
+            usize::try_from(u64::from_ne_bytes(bytes.try_into().unwrap())).ok()
         };
-        let [kind, path, data, number] = [number(), number(), number(), number()];
-        let path = String::from_utf8(rest.split_off(..path).unwrap().to_vec()).unwrap();
-        let data = rest.split_off(..data).unwrap().to_vec();
-        let deed = match u8::try_from(kind).unwrap() {
-            b'c' => Deed::Create,
-            b'w' => Deed::Write(number, data),
-            b't' => Deed::Resize(number),
-            b's' => Deed::Sync,
-            b'x' => Deed::FailedSync,
-            b'u' => Deed::Unlink,
-            b'r' => Deed::Rename(String::from_utf8(data).unwrap()),
-            b'a' => Deed::Send(data),
+        let [kind, path, data, number] = [number()?, number()?, number()?, number()?];
+        let path = String::from_utf8(rest.split_off(..path)?.to_vec()).unwrap();
+        let data = rest.split_off(..data)?.to_vec();
+        let operation = match u8::try_from(kind).unwrap() {
+            b'c' => Operation::Create,
+            b'w' => Operation::Write(number, data),
+            b't' => Operation::Resize(number),
+            b's' => Operation::Sync,
+            b'x' => Operation::FailedSync,
+            b'u' => Operation::Unlink,
+            b'r' => Operation::Rename(String::from_utf8(data).unwrap()),
+            b'a' => Operation::Send(data),
             kind => panic!("unknown kind {kind}"),
         };
-        records.push(CallRecord { path, deed });
+        records.push(CallRecord { path, operation });
     }
-    records
+    Some(records)
 }
