@@ -11,7 +11,7 @@ use offbd_core::engine::Rig;
 
 use super::media_type;
 use super::spool::{NewBatch, Spool, SpoolError, SpoolStatus};
-use crate::http::{Problem, TelemetryFormat, add_ids};
+use crate::http::{Problem, TelemetryFormat, add_basics};
 use crate::wire::telemetry::{AckView, Batch, RowView};
 
 /// Longest body, bytes; a longer one is refused with 413.
@@ -29,7 +29,7 @@ pub fn router(spool: Arc<Spool>) -> Router {
         .route("/healthz", get(|| async { Json(serde_json::json!({ "status": "ok" })) }))
         .layer(DefaultBodyLimit::max(MAX_BODY_BYTES))
         .with_state(spool);
-    add_ids(router)
+    add_basics(router)
 }
 
 /// Takes a batch; the answer is sent once it is on the disk. It is checked as the service

@@ -1,21 +1,17 @@
 //! Response headers for browsers: cross-origin access (CORS) and the content security
 //! policy.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use axum::body::{Body, Bytes, HttpBody};
 use axum::extract::Request;
+use axum::http::Method;
 use axum::http::header::{
-    ACCEPT, AUTHORIZATION, CACHE_CONTROL, CONNECTION, CONTENT_SECURITY_POLICY, CONTENT_TYPE,
-    HeaderName, HeaderValue, LOCATION, REFERRER_POLICY, RETRY_AFTER, STRICT_TRANSPORT_SECURITY,
+    ACCEPT, AUTHORIZATION, CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HeaderName,
+    HeaderValue, LOCATION, REFERRER_POLICY, RETRY_AFTER, STRICT_TRANSPORT_SECURITY,
     WWW_AUTHENTICATE, X_CONTENT_TYPE_OPTIONS,
 };
-use axum::http::{Method, Version};
 use axum::middleware::Next;
 use axum::response::Response;
-use futures_util::{StreamExt, stream};
 use tower_http::cors::CorsLayer;
 
 use super::sovd;
@@ -37,26 +33,6 @@ const TLS_ONLY: HeaderValue = HeaderValue::from_static("max-age=15768000");
 pub(super) async fn require_tls(request: Request, next: Next) -> Response {
     let mut response = next.run(request).await;
     response.headers_mut().insert(STRICT_TRANSPORT_SECURITY, TLS_ONLY);
-    response
-}
-
-/// Announces that the connection is closed after a response that does not wait for the
-/// whole request body, as the server cannot find the next request then.
-pub(super) async fn announce_close(request: Request, next: Next) -> Response {
-    if request.body().is_end_stream() || request.version() > Version::HTTP_11 {
-        return next.run(request).await;
-    }
-    let is_read = Arc::new(AtomicBool::new(false));
-    let at_end = is_read.clone();
-    let end = stream::once(async move {
-        at_end.store(true, Ordering::Relaxed);
-        Ok(Bytes::new())
-    });
-    let request = request.map(|body| Body::from_stream(body.into_data_stream().chain(end)));
-    let mut response = next.run(request).await;
-    if !is_read.load(Ordering::Relaxed) {
-        response.headers_mut().insert(CONNECTION, HeaderValue::from_static("close"));
-    }
     response
 }
 

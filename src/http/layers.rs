@@ -20,7 +20,7 @@ use tower_http::trace::TraceLayer;
 use tracing::Span;
 use tracing::field::Empty;
 
-use super::{AccessPolicy, Problem, headers, sovd};
+use super::{AccessPolicy, Problem, headers, sovd, unread_body};
 
 /// Longest time until a response starts, except for an import.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(60);
@@ -44,7 +44,7 @@ pub(super) fn add(router: Router, policy: &AccessPolicy) -> Router {
         CompressionLayer::new(),
         headers::cors(&policy.origins),
         from_fn(headers::secure),
-        from_fn(headers::announce_close),
+        from_fn(unread_body::discard),
         from_fn(set_instance),
         CatchPanicLayer::custom(panicked),
         from_fn(count),
@@ -52,12 +52,14 @@ pub(super) fn add(router: Router, policy: &AccessPolicy) -> Router {
     ))
 }
 
-/// Adds what gives each request an id, in the answer and as the `instance` of its problem, to a
-/// router that is not the service's.
-pub(crate) fn add_ids(router: Router) -> Router {
+/// Adds to a router that is not the service's what makes its answers like the service's: each
+/// request has an id, also as the `instance` of its problem, and a refused body does not reset
+/// the connection.
+pub(crate) fn add_basics(router: Router) -> Router {
     router.layer((
         SetRequestIdLayer::new(REQUEST_ID, MakeRequestUuid),
         PropagateRequestIdLayer::new(REQUEST_ID),
+        from_fn(unread_body::discard),
         from_fn(set_instance),
     ))
 }

@@ -47,6 +47,7 @@ mod tokens;
 #[cfg(feature = "otel")]
 mod trace_parent;
 mod traces;
+mod unread_body;
 
 use std::str::FromStr;
 use std::sync::Arc;
@@ -63,7 +64,7 @@ use utoipa_swagger_ui::SwaggerUi;
 pub use body::BodyBudget;
 pub use guard::AccessPolicy;
 pub use json_body::parse_json;
-pub(crate) use layers::add_ids;
+pub(crate) use layers::add_basics;
 pub use metrics::{gather_metrics, keep_metrics};
 pub use problem::Problem;
 pub(crate) use rates::subscriber;
