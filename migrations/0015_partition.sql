@@ -29,6 +29,5 @@ CREATE TABLE node (
 
 -- What all nodes of a cluster share.
 CREATE TABLE cluster (
-    id     TEXT PRIMARY KEY,             -- names the database
     secret TEXT NOT NULL                 -- by which nodes know each other
 );

@@ -34,15 +34,15 @@ impl Client {
     /// Posts `body` and waits for a successful response.
     pub(crate) async fn post(&mut self, path: &str, media_type: &str, body: &[u8]) -> Result<()> {
         let head = format!("POST {path} HTTP/1.1\r\ncontent-type: {media_type}");
-        self.exchange(&head, body).await
+        self.exchange(&head, body).await.map(drop)
     }
 
-    /// Waits for a successful response.
-    pub(crate) async fn get(&mut self, path: &str) -> Result<()> {
+    /// Waits for a successful response and returns its body.
+    pub(crate) async fn get(&mut self, path: &str) -> Result<String> {
         self.exchange(&format!("GET {path} HTTP/1.1"), &[]).await
     }
 
-    async fn exchange(&mut self, head: &str, body: &[u8]) -> Result<()> {
+    async fn exchange(&mut self, head: &str, body: &[u8]) -> Result<String> {
         let length = body.len();
         let head = format!("{head}\r\nhost: localhost\r\ncontent-length: {length}\r\n\r\n");
         self.bytes.clear();
@@ -59,12 +59,12 @@ impl Client {
             let Some((head, rest)) = text.split_once("\r\n\r\n") else { continue };
             ensure!(head.starts_with("HTTP/1.1 2"), "{text}");
             if head.starts_with("HTTP/1.1 204") {
-                return Ok(());
+                return Ok(String::new());
             }
             let (_, length) = head.split_once("content-length: ").context("no length")?;
             let length: usize = length.lines().next().unwrap_or_default().parse()?;
             if rest.len() >= length {
-                return Ok(());
+                return Ok(rest.to_owned());
             }
         }
     }

@@ -97,7 +97,7 @@ pub(crate) fn loads_of_peer(samples: &[Sample], begin_s: f64) -> Vec<Load> {
     ]
 }
 
-fn columns(batch: &[Sample]) -> serde_json::Value {
+pub(crate) fn columns(batch: &[Sample]) -> serde_json::Value {
     let column = |of: fn(&Sample) -> Option<f64>| batch.iter().map(of).collect::<Vec<_>>();
     serde_json::json!({
         "seq": batch.iter().map(|s| s.seq).collect::<Vec<_>>(),

@@ -12,6 +12,10 @@
 //! - `-- memory`: memory per asset, with 10 000 assets;
 //! - `-- restart ASSETS SAMPLES`: a restart after a kill, with that many assets and samples in
 //!   the open session of each;
+//! - `-- cluster ALONE ONE TWO [ROUNDS]`: nodes of a cluster; the URLs of three empty PostgreSQL
+//!   databases;
+//! - `-- mqtt PORT [ROUNDS]`: devices over an MQTT broker on that port of this machine, with
+//!   messages lost on the way (feature `mqtt`);
 //! - `-- latency`: time from a sample to its fault event, at half the maximum rate;
 //! - `-- only WORD`: only the loads with the word in their name, without *bare*;
 //! - `-- peer URL`: another database that accepts line protocol, see
@@ -26,7 +30,10 @@
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
 
 mod client;
+mod cluster;
 mod load;
+#[cfg(feature = "mqtt")]
+mod mqtt;
 mod restart;
 
 use std::net::SocketAddr;
@@ -67,6 +74,18 @@ fn main() -> Result<()> {
                 Ok(arguments.get(n).context("`restart` takes ASSETS SAMPLES")?.parse()?)
             };
             return runtime.block_on(restart::measure(number(1)?, number(2)?));
+        }
+        Some("cluster") => {
+            let url =
+                |n: usize| arguments.get(n).context("`cluster` takes the URLs of three databases");
+            let databases = [url(1)?.as_str(), url(2)?, url(3)?];
+            return runtime.block_on(cluster::measure(databases, &samples, rounds));
+        }
+        #[cfg(feature = "mqtt")]
+        Some("mqtt") => {
+            let port = arguments.get(1).context("`mqtt` takes the port of a broker")?.parse()?;
+            let rounds = arguments.get(2).map_or(Ok(3), |n| n.parse())?;
+            return runtime.block_on(mqtt::measure(port, &samples, rounds));
         }
         Some("latency") => {
             for (load, batch) in [("WebSocket by 100", 100), ("WebSocket by 10", 10)] {
@@ -160,7 +179,7 @@ async fn bare_handler(load: &Load) -> Result<Rate> {
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await?;
     let address = listener.local_addr()?;
     let server = tokio::spawn(async move { axum::serve(listener, app).await });
-    let rate = stream(address, load, &telemetry).await;
+    let rate = stream(load, &|device| (address, device)).await;
     server.abort();
     rate
 }
@@ -185,19 +204,31 @@ fn telemetry(device: usize) -> String {
 async fn service(load: &Load) -> Result<Rate> {
     let data = tempfile::tempdir()?;
     let server = start(data.path(), DEVICES).await?;
-    let rate = stream(server.address, load, &telemetry).await;
+    let rate = stream(load, &|device| (server.address, device)).await;
     server.shutdown().await?;
     rate
 }
 
 /// Every device sends every body, one after the other. The first body opens the session and
-/// is not counted.
+/// is not counted. `target` returns the address to which the nth device sends, and the number
+/// of its asset.
 async fn stream(
-    address: SocketAddr,
     load: &Load,
-    path: &(dyn Fn(usize) -> String + Sync),
+    target: &(dyn Fn(usize) -> (SocketAddr, usize) + Sync),
 ) -> Result<Rate> {
-    let devices = (0..DEVICES).map(|device| Device::connect(address, load, device, path(device)));
+    stream_to(load, &|device| {
+        let (address, asset) = target(device);
+        (address, asset, telemetry(asset))
+    })
+    .await
+}
+
+/// Like [`stream`], with the path of each device as well.
+async fn stream_to(
+    load: &Load,
+    target: &(dyn Fn(usize) -> (SocketAddr, usize, String) + Sync),
+) -> Result<Rate> {
+    let devices = (0..DEVICES).map(|device| Device::connect(load, device, target(device)));
     let mut devices = try_join_all(devices).await?;
     devices = send_all(devices, |bodies| &bodies[..1]).await?;
     let clocks = Clocks::start();
@@ -229,17 +260,16 @@ enum Connection {
 
 impl Device {
     async fn connect(
-        address: SocketAddr,
         load: &Load,
         device: usize,
-        path: String,
+        (address, asset, path): (SocketAddr, usize, String),
     ) -> Result<Self> {
         let connection = match load.transport {
             Transport::Http(media_type) => {
                 Connection::Http { client: Client::connect(address).await?, path, media_type }
             }
             Transport::Socket => {
-                Connection::Socket(Box::new(Socket::connect(address, device).await?))
+                Connection::Socket(Box::new(Socket::connect(address, asset).await?))
             }
         };
         Ok(Self { connection, bodies: load.bodies(device).to_vec() })
@@ -273,7 +303,8 @@ fn peer(
         // Each round uses other times, so that no sample exists already.
         let begin_s = now - 7200.0 * (round + 1) as f64;
         for (load, rates) in loads_of_peer(samples, begin_s).iter().zip(&mut rates) {
-            rates.push(runtime.block_on(stream(address, load, &|_| path.clone()))?);
+            let target = |device| (address, device, path.clone());
+            rates.push(runtime.block_on(stream_to(load, &target))?);
         }
     }
     for (load, rates) in loads_of_peer(&samples[..SAMPLES], now).iter().zip(&mut rates) {

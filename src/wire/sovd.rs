@@ -90,7 +90,7 @@ pub struct SovdFaultView {
 }
 
 /// The ISO 14229 status byte by its bits, each `0` or `1`.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "camelCase")]
 pub struct SovdStatusView {
     /// `active` while pending or confirmed, `passive` once healed, else `cleared`.
@@ -253,7 +253,7 @@ impl SovdStatusView {
     pub fn matches(&self, key: &str, value: &str) -> Option<bool> {
         if key.eq_ignore_ascii_case("mask") {
             let wanted = u8::from_str_radix(value.trim_start_matches("0x"), 16).ok()?;
-            let present = u8::from_str_radix(&self.mask, 16).ok()?;
+            let present = u8::from_str_radix(&self.mask, 16).unwrap_or_default();
             return Some(wanted & present != 0);
         }
         if key.eq_ignore_ascii_case("aggregatedStatus") {

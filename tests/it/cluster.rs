@@ -11,7 +11,8 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 
 use crate::support::device::{DeviceLoad, Random};
-use crate::support::postgres::Postgres;
+use crate::support::held_socket::HeldSocket;
+use crate::support::postgres::{self, Postgres};
 use crate::support::process::{Process, Refusal, ended};
 use crate::support::{Client, Events, batch, eventually, judged, registration, rig};
 use offbd_core::vocabulary::Sample;
@@ -31,11 +32,18 @@ struct Cluster {
 
 impl Cluster {
     async fn start() -> Self {
+        Self::start_with(|_| None).await
+    }
+
+    /// Starts the nodes, the second one with its own way to the database, if there is one.
+    async fn start_with(way: impl FnOnce(&Postgres) -> Option<String>) -> Self {
         let (postgres, data) = (Postgres::new(), tempfile::tempdir().unwrap());
+        let way = way(&postgres);
         let mut this = Self { postgres, data, nodes: Vec::new() };
         for i in 0..N_NODES {
-            let node = this.try_node(i, &[]).unwrap_or_else(|Refusal { log, .. }| panic!("{log}"));
-            this.nodes.push(Some(node));
+            let way = way.as_deref().filter(|_| i == 1).map(|url| ("OFFBD_DATABASE", url));
+            let node = this.try_node(i, way.as_slice());
+            this.nodes.push(Some(node.unwrap_or_else(|Refusal { log, .. }| panic!("{log}"))));
         }
         this.settled(N_NODES).await;
         this
@@ -296,6 +304,36 @@ async fn a_paused_node_that_wakes_up_answers_no_read_from_its_own_past() {
         } else {
             assert!(answer.starts_with("HTTP/1.1 503"), "{answer}");
         }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_node_that_is_cut_off_from_the_database_answers_no_read_from_its_own_past() {
+    let mut way = None;
+    let cluster = Cluster::start_with(|postgres| {
+        let held = way.insert(HeldSocket::new(postgres.directory()));
+        // The database has to exist before the first node connects.
+        postgres.database("cluster");
+        Some(postgres::url(held.directory.path(), "cluster"))
+    })
+    .await;
+    let (way, samples) = (way.unwrap(), rig(900, 300));
+    let names = register_rigs(&cluster).await;
+    send_all(&cluster.client(0), &names, &samples[..300]).await;
+    way.hold(true);
+    cluster.taken_over_from(1).await;
+    send_all(&cluster.client(0), &names, &samples[300..600]).await;
+    // The node cannot learn that it has lost its rigs: it has to admit that it does not know.
+    let client = cluster.client(1);
+    let states = names.iter().map(async |name| client.get(&format!("assets/{name}/state")).await);
+    for answer in futures_util::future::join_all(states).await {
+        answer.problem(503);
+    }
+    way.hold(false);
+    cluster.settled(N_NODES).await;
+    send_all(&client, &names, &samples[600..]).await;
+    for name in &names {
+        assert_eq!(client.recording(name, "s").await, samples, "{name}");
     }
 }
 

@@ -10,7 +10,8 @@ use super::{AssetItemPath, AssetPath, Problem, Query, SchemaQuery, answer};
 use crate::service::Service;
 use crate::service::access::Caller;
 use crate::wire::sovd::{
-    SCOPE, SovdFaultDetailView, SovdFaultView, SovdFaultsView, fault_detail, fault_item,
+    SCOPE, SovdFaultDetailView, SovdFaultView, SovdFaultsView, SovdStatusView, fault_detail,
+    fault_item,
 };
 use crate::wire::words::{CodeWord, StatusFilter, StatusWord};
 use offbd_core::vocabulary::Invalid;
@@ -33,28 +34,28 @@ fn actor(caller: &Caller) -> String {
 }
 
 /// Returns the pairs of `status[key]=value` in a query.
+///
+/// # Errors
+/// [`Invalid`] if there is no such key or value.
 fn status_pairs(query: Option<&str>) -> Result<Vec<(String, String)>, Invalid> {
     let mut pairs = Vec::new();
     for (name, value) in form_urlencoded::parse(query.unwrap_or_default().as_bytes()) {
         let Some(rest) = name.strip_prefix("status") else { continue };
         let key = rest.strip_prefix('[').and_then(|rest| rest.strip_suffix(']'));
         let key = key.ok_or_else(|| Invalid::new("?status", "is not of the form status[KEY]"))?;
+        if SovdStatusView::default().matches(key, &value).is_none() {
+            let reason = "is no key of the status, or its value is not 0, 1, true or false";
+            return Err(Invalid::new(format!("?status[{key}]"), reason));
+        }
         pairs.push((key.to_owned(), value.into_owned()));
     }
     Ok(pairs)
 }
 
 /// Whether a fault has one of the wanted statuses, or none is wanted.
-fn has_status(fault: &SovdFaultView, pairs: &[(String, String)]) -> Result<bool, Invalid> {
-    let mut is_any = pairs.is_empty();
-    for (key, value) in pairs {
-        let matches = fault.status.matches(key, value).ok_or_else(|| {
-            let reason = "is no key of the status, or its value is not 0, 1, true or false";
-            Invalid::new(format!("?status[{key}]"), reason)
-        })?;
-        is_any |= matches;
-    }
-    Ok(is_any)
+fn has_status(fault: &SovdFaultView, pairs: &[(String, String)]) -> bool {
+    let matches = |(key, value): &(String, String)| fault.status.matches(key, value) == Some(true);
+    pairs.is_empty() || pairs.iter().any(matches)
 }
 
 /// Lists the faults of a rig that are on record; with `status`, also those that were cleared.
@@ -82,7 +83,7 @@ pub(super) async fn list(
         let is_there = !pairs.is_empty() || entry.record.status != StatusWord::Cleared;
         let is_wanted = filter.severity.is_none_or(|severity| severity == fault.severity)
             && filter.scope.as_ref().is_none_or(|scope| scope == SCOPE);
-        if has_status(&fault, &pairs)? && is_wanted && is_there {
+        if has_status(&fault, &pairs) && is_wanted && is_there {
             items.push(fault);
         }
     }
@@ -149,4 +150,18 @@ pub(super) async fn clear_all(
         service.clear(&asset, entry.record.code.as_str(), actor(&caller)).await?;
     }
     Ok(StatusCode::NO_CONTENT)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::status_pairs;
+
+    #[test]
+    fn a_status_that_does_not_exist_is_refused_whatever_is_on_record() {
+        for query in ["status[colour]=1", "status[testFailed]=2", "status[mask]=x", "status=1"] {
+            assert!(status_pairs(Some(query)).is_err(), "{query}");
+        }
+        let pairs = status_pairs(Some("status%5BtestFailed%5D=1&severity=2")).unwrap();
+        assert_eq!(pairs, [("testFailed".to_owned(), "1".to_owned())]);
+    }
 }

@@ -22,6 +22,8 @@ mod retry;
 mod rules;
 pub(super) mod settings;
 mod targets;
+#[cfg(test)]
+mod tests;
 
 use std::collections::HashSet;
 use std::future::Future;

@@ -11,7 +11,6 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use data_encoding::HEXLOWER;
 use sqlx::{AnyConnection, AssertSqlSafe, Executor};
-use uuid::Uuid;
 
 use super::{Writer, WriterRole};
 use crate::store::from_row::from_row;
@@ -30,6 +29,14 @@ const IDLE_TIMEOUT: &str = "2s";
 /// After this long within a transaction without a statement the server ends the connection.
 /// Chosen: much longer than the work between two statements.
 const IDLE_IN_TRANSACTION_TIMEOUT: &str = "1s";
+
+/// Whether the server still has the connection with which a row of `node` writes.
+macro_rules! is_alive {
+    () => {
+        "EXISTS (SELECT 1 FROM pg_stat_activity a
+         WHERE a.pid = node.pid AND CAST(a.backend_start AS TEXT) = node.started)"
+    };
+}
 
 /// A process of a cluster.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -253,10 +260,8 @@ impl Writer {
         }
         if let Some(connection) = &mut this.connection {
             sqlx::query(
-                "INSERT INTO cluster (id, secret) SELECT $1, $2
-                 WHERE NOT EXISTS (SELECT 1 FROM cluster)",
+                "INSERT INTO cluster (secret) SELECT $1 WHERE NOT EXISTS (SELECT 1 FROM cluster)",
             )
-            .bind(Uuid::now_v7().to_string())
             .bind(secret()?)
             .execute(connection)
             .await?;
@@ -316,10 +321,11 @@ impl Writer {
         .bind(&backend.started)
         .execute(&mut *db)
         .await?;
-        let forget = "DELETE FROM node WHERE id NOT IN
-             (SELECT owner FROM partition WHERE owner IS NOT NULL) AND NOT EXISTS
-             (SELECT 1 FROM pg_stat_activity a
-              WHERE a.pid = node.pid AND CAST(a.backend_start AS TEXT) = node.started)";
+        let forget = concat!(
+            "DELETE FROM node WHERE id NOT IN
+             (SELECT owner FROM partition WHERE owner IS NOT NULL) AND NOT ",
+            is_alive!()
+        );
         sqlx::query(forget).execute(db).await?;
         Ok(())
     }
@@ -433,12 +439,11 @@ impl Writer {
         let Some(connection) = &mut self.connection else {
             return Err(sqlx::Error::PoolClosed.into());
         };
-        let nodes = sqlx::query_as(
-            "SELECT id, name, address, version, leaving FROM node WHERE EXISTS
-             (SELECT 1 FROM pg_stat_activity a
-              WHERE a.pid = node.pid AND CAST(a.backend_start AS TEXT) = node.started)
-             ORDER BY id",
-        );
+        let nodes = sqlx::query_as(concat!(
+            "SELECT id, name, address, version, leaving FROM node WHERE ",
+            is_alive!(),
+            " ORDER BY id"
+        ));
         let nodes = nodes.fetch_all(&mut *connection).await?;
         let partitions = sqlx::query_as("SELECT * FROM partition ORDER BY id");
         Ok((nodes, partitions.fetch_all(&mut *connection).await?))
@@ -464,15 +469,17 @@ impl Writer {
             let is_mine = found.epoch == mine.epoch && locked.contains(&partition);
             if !is_mine && self.role == WriterRole::Node {
                 lost.push(partition);
-            } else if is_mine && found.n_commits == mine.n_commits {
-            } else if is_mine
-                && found.n_commits == mine.n_commits + 1
-                && self.in_doubt.as_ref().is_some_and(|doubt| doubt.partitions.contains(&partition))
-            {
-                was_committed = true;
-            } else {
-                let (expected, found) = (mine.n_commits, found.n_commits);
-                return Err(StoreError::UnexpectedCommits { expected, found });
+                continue;
+            }
+            let is_in_doubt =
+                self.in_doubt.as_ref().is_some_and(|doubt| doubt.partitions.contains(&partition));
+            match found.n_commits - mine.n_commits {
+                0 if is_mine => {}
+                1 if is_mine && is_in_doubt => was_committed = true,
+                _ => {
+                    let (expected, found) = (mine.n_commits, found.n_commits);
+                    return Err(StoreError::UnexpectedCommits { expected, found });
+                }
             }
         }
         for partition in lost.iter().filter(|partition| locked.contains(partition)) {

@@ -9,6 +9,7 @@ pub mod bus_device;
 #[cfg(unix)]
 pub mod calls;
 pub mod device;
+pub mod held_socket;
 pub mod postgres;
 pub mod process;
 pub mod provider;
