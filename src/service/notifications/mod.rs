@@ -22,8 +22,6 @@ mod retry;
 mod rules;
 pub(super) mod settings;
 mod targets;
-#[cfg(test)]
-mod tests;
 
 use std::collections::HashSet;
 use std::future::Future;
@@ -214,3 +212,6 @@ impl<T: NotificationTransport> Context<T> {
 pub(super) fn stored(row: &ChannelRow) -> Result<StoredChannel, ServiceError> {
     views::from_json(&row.document)
 }
+
+#[cfg(test)]
+mod tests;
