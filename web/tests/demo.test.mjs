@@ -1,7 +1,7 @@
 // The demo: a fault is injected by a button, shown live, explained, repaired and cleared.
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
-import { ask, browser, demo, page, SOON } from "./support.mjs";
+import { ask, browser, demo, page, SOON, until } from "./support.mjs";
 
 let show, chromium;
 
@@ -39,6 +39,12 @@ test("a fault is shown within two seconds of its event, on the pages of the flee
   await rig.goto(`${show.url}/rigs/demo-rig`);
   await rig.getByRole("heading", { name: "Monitors" }).waitFor();
   await buttons.goto(`${show.url}/learn`);
+  // The lesson below needs some seconds without a fault: between two faults of the script there
+  // may be none.
+  await until(async () => {
+    const { items } = await ask(show.url, "GET", "/sessions");
+    return items.some(({ first_t_s: first, last_t_s: last }) => last - first > 7);
+  });
   const confirmed = await event(show.url, (line) => line.code === "y_servo" && line.status === "confirmed");
   await buttons.getByRole("button", { name: "Inject: Y servo, dead" }).click();
   await buttons.getByText("Injected faults").waitFor();
