@@ -10,13 +10,10 @@ use offbd::server::{self, Server};
 
 use crate::client::Client;
 use crate::load::{DEVICES, Load, loads};
-use crate::{Rate, median, stream};
+use crate::{Rate, Target, median, register, stream};
 
 /// Most questions for the owner of an asset, while nodes divide the partitions.
 const MAX_QUESTIONS: usize = 10_000;
-
-/// The ways to send, in the order of a round.
-const WAYS: [&str; 4] = ["alone", "one node", "to owners", "to others"];
 
 /// Measures all ways in each of `rounds` rounds. `databases` are empty: one for the service that
 /// works alone, one for the cluster of one node, one for that of two.
@@ -34,7 +31,7 @@ pub(crate) async fn measure(
         [start(&data("a"), two, Some("a")).await?, start(&data("b"), two, Some("b")).await?];
     let addresses = [nodes[0].address, nodes[1].address];
     println!("{DEVICES} devices; medians of {rounds} rounds, samples per second");
-    println!("{:24}{:>12}{:>12}{:>12}{:>12}", "", WAYS[0], WAYS[1], WAYS[2], WAYS[3]);
+    println!("{:24}{:>12}{:>12}{:>12}{:>12}", "", "alone", "one node", "to owners", "to others");
     for (n_load, load) in
         loads(samples).iter().filter(|load| load.name.starts_with("MessagePack")).enumerate()
     {
@@ -43,11 +40,13 @@ pub(crate) async fn measure(
             let first = (n_load * rounds + round) * 2 * DEVICES;
             rates[0].push(send(load, first, alone.address).await?);
             rates[1].push(send(load, first, one.address).await?);
-            register(addresses[0], first, 2 * DEVICES).await?;
+            register(addresses[0], first..first + 2 * DEVICES).await?;
             for (way, rates) in rates.iter_mut().skip(2).enumerate() {
                 let first = first + way * DEVICES;
                 let owners = owners(addresses, first).await?;
-                rates.push(stream(load, &|n| (addresses[owners[n] ^ way], first + n)).await?);
+                // The first way is to the owner, the second one to the other node.
+                let to = |n: usize| Target::telemetry(addresses[owners[n] ^ way], first + n);
+                rates.push(stream(load, &to).await?);
             }
         }
         show(load.name, rates);
@@ -90,18 +89,8 @@ async fn start(data: &Path, database: &str, node: Option<&str>) -> Result<Server
 
 /// Sends the load for [`DEVICES`] new assets, from the one with number `first` on.
 async fn send(load: &Load, first: usize, to: SocketAddr) -> Result<Rate> {
-    register(to, first, DEVICES).await?;
-    stream(load, &|n| (to, first + n)).await
-}
-
-/// Registers `n` assets, from the one with number `first` on.
-async fn register(address: SocketAddr, first: usize, n: usize) -> Result<()> {
-    let mut client = Client::connect(address).await?;
-    for device in first..first + n {
-        let asset = serde_json::json!({ "name": format!("device-{device}") }).to_string();
-        client.post("/api/v1/assets", "application/json", asset.as_bytes()).await?;
-    }
-    Ok(())
+    register(to, first..first + DEVICES).await?;
+    stream(load, &|n| Target::telemetry(to, first + n)).await
 }
 
 /// Which of two nodes owns each of [`DEVICES`] assets. Both own some.

@@ -179,7 +179,7 @@ async fn bare_handler(load: &Load) -> Result<Rate> {
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await?;
     let address = listener.local_addr()?;
     let server = tokio::spawn(async move { axum::serve(listener, app).await });
-    let rate = stream(load, &|device| (address, device)).await;
+    let rate = stream(load, &|device| Target::telemetry(address, device)).await;
     server.abort();
     rate
 }
@@ -189,12 +189,18 @@ async fn start(data: &std::path::Path, assets: usize) -> Result<Server> {
     let mut config = Config { data: data.to_owned(), ..Config::default() };
     config.listen.set_port(0);
     let server = server::start(config).await?;
-    let mut client = Client::connect(server.address).await?;
-    for device in 0..assets {
-        let asset = serde_json::json!({ "name": format!("device-{device}") }).to_string();
+    register(server.address, 0..assets).await?;
+    Ok(server)
+}
+
+/// Registers the assets with these numbers.
+async fn register(address: SocketAddr, assets: std::ops::Range<usize>) -> Result<()> {
+    let mut client = Client::connect(address).await?;
+    for n in assets {
+        let asset = serde_json::json!({ "name": format!("device-{n}") }).to_string();
         client.post("/api/v1/assets", "application/json", asset.as_bytes()).await?;
     }
-    Ok(server)
+    Ok(())
 }
 
 fn telemetry(device: usize) -> String {
@@ -204,30 +210,29 @@ fn telemetry(device: usize) -> String {
 async fn service(load: &Load) -> Result<Rate> {
     let data = tempfile::tempdir()?;
     let server = start(data.path(), DEVICES).await?;
-    let rate = stream(load, &|device| (server.address, device)).await;
+    let rate = stream(load, &|device| Target::telemetry(server.address, device)).await;
     server.shutdown().await?;
     rate
 }
 
-/// Every device sends every body, one after the other. The first body opens the session and
-/// is not counted. `target` returns the address to which the nth device sends, and the number
-/// of its asset.
-async fn stream(
-    load: &Load,
-    target: &(dyn Fn(usize) -> (SocketAddr, usize) + Sync),
-) -> Result<Rate> {
-    stream_to(load, &|device| {
-        let (address, asset) = target(device);
-        (address, asset, telemetry(asset))
-    })
-    .await
+/// Where a device sends.
+struct Target {
+    address: SocketAddr,
+    /// Number of its asset.
+    asset: usize,
+    /// Path of its requests over HTTP.
+    path: String,
 }
 
-/// Like [`stream`], with the path of each device as well.
-async fn stream_to(
-    load: &Load,
-    target: &(dyn Fn(usize) -> (SocketAddr, usize, String) + Sync),
-) -> Result<Rate> {
+impl Target {
+    fn telemetry(address: SocketAddr, asset: usize) -> Self {
+        Self { address, asset, path: telemetry(asset) }
+    }
+}
+
+/// Every device sends every body, one after the other. The first body opens the session and
+/// is not counted.
+async fn stream(load: &Load, target: &(dyn Fn(usize) -> Target + Sync)) -> Result<Rate> {
     let devices = (0..DEVICES).map(|device| Device::connect(load, device, target(device)));
     let mut devices = try_join_all(devices).await?;
     devices = send_all(devices, |bodies| &bodies[..1]).await?;
@@ -262,7 +267,7 @@ impl Device {
     async fn connect(
         load: &Load,
         device: usize,
-        (address, asset, path): (SocketAddr, usize, String),
+        Target { address, asset, path }: Target,
     ) -> Result<Self> {
         let connection = match load.transport {
             Transport::Http(media_type) => {
@@ -303,8 +308,8 @@ fn peer(
         // Each round uses other times, so that no sample exists already.
         let begin_s = now - 7200.0 * (round + 1) as f64;
         for (load, rates) in loads_of_peer(samples, begin_s).iter().zip(&mut rates) {
-            let target = |device| (address, device, path.clone());
-            rates.push(runtime.block_on(stream_to(load, &target))?);
+            let target = |asset| Target { address, asset, path: path.clone() };
+            rates.push(runtime.block_on(stream(load, &target))?);
         }
     }
     for (load, rates) in loads_of_peer(&samples[..SAMPLES], now).iter().zip(&mut rates) {

@@ -14,7 +14,7 @@ use tokio::time::timeout;
 
 use crate::client::Client;
 use crate::load::{DEVICES, columns};
-use crate::{Clocks, Rate, median, show};
+use crate::{Clocks, Rate, register, show};
 
 /// Samples of a batch.
 const BATCH: usize = 100;
@@ -33,7 +33,6 @@ pub(crate) async fn measure(port: u16, samples: &[Sample], rounds: usize) -> Res
     for round in 0..rounds {
         rates.push(round_of(port, round, &bodies, samples.len()).await?);
     }
-    median(&mut rates).context("no rounds")?;
     show(&format!("MQTT by {BATCH}, 1 of {DROPPED} lost"), &mut rates, &mut []);
     Ok(())
 }
@@ -51,7 +50,7 @@ async fn round_of(port: u16, round: usize, bodies: &[Bytes], n_samples: usize) -
     config.listen.set_port(0);
     config.mqtt = Some(MqttConfig {
         url: format!("mqtt://127.0.0.1:{port}"),
-        client_id: format!("offbd-{round}"),
+        client_id: format!("offbd{round}"),
         user: None,
         password: None,
         ca: None,
@@ -60,11 +59,9 @@ async fn round_of(port: u16, round: usize, bodies: &[Bytes], n_samples: usize) -
         mapping: None,
     });
     let server = server::start(config).await?;
-    let mut client = Client::connect(server.address).await?;
+    register(server.address, 0..DEVICES).await?;
     let mut devices = Vec::new();
     for n in 0..DEVICES {
-        let asset = serde_json::json!({ "name": format!("device-{n}") }).to_string();
-        client.post("/api/v1/assets", "application/json", asset.as_bytes()).await?;
         devices.push(MqttDevice::connect(port, round, n).await?);
     }
     let clocks = Clocks::start();
@@ -74,6 +71,7 @@ async fn round_of(port: u16, round: usize, bodies: &[Bytes], n_samples: usize) -
         device.await??;
     }
     let rate = clocks.rate(n_samples * DEVICES);
+    let mut client = Client::connect(server.address).await?;
     for n in 0..DEVICES {
         let page = client.get(&format!("/api/v1/sessions?asset=device-{n}")).await?;
         let page: serde_json::Value = serde_json::from_str(&page)?;

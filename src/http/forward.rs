@@ -2,6 +2,8 @@
 //! included. A request is forwarded once: a node that gets it and is not the owner answers
 //! 503, and the client tries again.
 
+use std::sync::Arc;
+
 use axum::body::Body;
 use axum::extract::Request;
 use axum::http::header::{CONNECTION, HOST, TRANSFER_ENCODING, UPGRADE};
@@ -29,14 +31,15 @@ const CLIENT: HeaderName = HeaderName::from_static("x-offbd-client");
 /// Sends requests to other nodes.
 #[derive(Clone)]
 pub(super) struct Forwarder {
-    client: Client<HttpConnector, Body>,
+    // Shared, as every request has a copy of the forwarder.
+    client: Arc<Client<HttpConnector, Body>>,
 }
 
 impl Default for Forwarder {
     fn default() -> Self {
         let mut connector = HttpConnector::new();
         connector.set_nodelay(true);
-        Self { client: Client::builder(TokioExecutor::new()).build(connector) }
+        Self { client: Arc::new(Client::builder(TokioExecutor::new()).build(connector)) }
     }
 }
 

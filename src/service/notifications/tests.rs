@@ -36,14 +36,14 @@ impl NotificationTransport for Arc<Inbox> {
 }
 
 /// A service without its threads but the writer, with the asset `a`, a channel and a rule.
-struct Scene {
+struct NotifierFixture {
     service: Service,
     notifier: Notifier<Arc<Inbox>>,
     inbox: Arc<Inbox>,
     _data: tempfile::TempDir,
 }
 
-impl Scene {
+impl NotifierFixture {
     async fn new(rule: serde_json::Value) -> Self {
         let data = tempfile::tempdir().unwrap();
         let location = Location::File(data.path().join("store.sqlite"));
@@ -115,9 +115,9 @@ fn attempts(expected: &[(i64, &str, &str)]) -> Vec<(i64, String, String)> {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn reminders_come_until_somebody_acknowledges() {
-    let scene = Scene::new(json!({ "repeat_s": 3600 })).await;
-    scene.change(true).await;
-    let sent = scene.pass(2 * HOUR, 600 * SECOND).await;
+    let fixture = NotifierFixture::new(json!({ "repeat_s": 3600 })).await;
+    fixture.change(true).await;
+    let sent = fixture.pass(2 * HOUR, 600 * SECOND).await;
     let expected = [
         (0, "confirmed.v1", "evt_1"),
         (3600, "reminder.v1", "evt_1.1"),
@@ -126,13 +126,13 @@ async fn reminders_come_until_somebody_acknowledges() {
     assert_eq!(sent, attempts(&expected));
     let (asset, actor) = ("a".to_owned(), "ann".to_owned());
     let acknowledge = AlarmWrite::AcknowledgeCommunication { asset, actor, at: 2 * HOUR };
-    scene.write(Write::Alarm(acknowledge)).await;
-    assert_eq!(scene.pass(5 * HOUR, 600 * SECOND).await, []);
+    fixture.write(Write::Alarm(acknowledge)).await;
+    assert_eq!(fixture.pass(5 * HOUR, 600 * SECOND).await, []);
     // The next occurrence is told again, and nothing after its end.
-    scene.change(false).await;
-    scene.change(true).await;
-    scene.change(false).await;
-    let sent = scene.pass(8 * HOUR, 600 * SECOND).await;
+    fixture.change(false).await;
+    fixture.change(true).await;
+    fixture.change(false).await;
+    let sent = fixture.pass(8 * HOUR, 600 * SECOND).await;
     let at = 5 * 3600;
     let expected =
         [(at, "passed.v1", "evt_2"), (at, "confirmed.v1", "evt_3"), (at, "passed.v1", "evt_4")];
@@ -142,9 +142,9 @@ async fn reminders_come_until_somebody_acknowledges() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_fault_in_a_silence_is_told_at_its_end_if_the_rule_repeats() {
     let silent = |rule: serde_json::Value| async move {
-        let scene = Scene::new(rule).await;
-        scene.change(true).await;
-        scene.pass(3 * HOUR, 1200 * SECOND).await
+        let fixture = NotifierFixture::new(rule).await;
+        fixture.change(true).await;
+        fixture.pass(3 * HOUR, 1200 * SECOND).await
     };
     let until = "1970-01-01T02:00:00Z";
     let once = silent(json!({ "silent_until": until })).await;
@@ -156,10 +156,10 @@ async fn a_fault_in_a_silence_is_told_at_its_end_if_the_rule_repeats() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_muted_fault_is_neither_told_nor_reminded_of() {
-    let scene = Scene::new(json!({ "repeat_s": 3600 })).await;
-    scene.change(true).await;
-    assert_eq!(scene.pass(0, SECOND).await.len(), 1);
-    scene.service.inner.mutes.set(
+    let fixture = NotifierFixture::new(json!({ "repeat_s": 3600 })).await;
+    fixture.change(true).await;
+    assert_eq!(fixture.pass(0, SECOND).await.len(), 1);
+    fixture.service.inner.mutes.set(
         AlarmCodeWord::CommunicationLost,
         MuteRow {
             asset: "a".into(),
@@ -170,31 +170,31 @@ async fn a_muted_fault_is_neither_told_nor_reminded_of() {
             until: 5 * HOUR,
         },
     );
-    scene.change(false).await;
-    scene.change(true).await;
-    assert_eq!(scene.pass(5 * HOUR - SECOND, 1800 * SECOND).await, []);
+    fixture.change(false).await;
+    fixture.change(true).await;
+    assert_eq!(fixture.pass(5 * HOUR - SECOND, 1800 * SECOND).await, []);
 }
 
 /// Nothing is lost and nothing overtakes while the target is away; after a day it is given up.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_target_that_is_away_gets_all_in_order_or_they_are_given_up() {
-    let scene = Scene::new(json!({})).await;
-    scene.inbox.away_until.store(20 * HOUR, Ordering::SeqCst);
-    scene.change(true).await;
-    scene.change(false).await;
-    let sent = scene.pass(21 * HOUR, 5 * SECOND * 60).await;
+    let fixture = NotifierFixture::new(json!({})).await;
+    fixture.inbox.away_until.store(20 * HOUR, Ordering::SeqCst);
+    fixture.change(true).await;
+    fixture.change(false).await;
+    let sent = fixture.pass(21 * HOUR, 5 * SECOND * 60).await;
     let ids: Vec<_> = sent.iter().map(|(.., id)| id.as_str()).collect();
     let n = ids.iter().filter(|id| **id == "evt_1").count();
     assert!((20..40).contains(&n), "{n} attempts in 21 hours");
     assert_eq!(ids[n..], ["evt_2"], "the second waits for the first");
 
-    scene.inbox.away_until.store(Micros::MAX, Ordering::SeqCst);
-    scene.change(true).await;
-    let sent = scene.pass(46 * HOUR, 300 * SECOND).await;
+    fixture.inbox.away_until.store(Micros::MAX, Ordering::SeqCst);
+    fixture.change(true).await;
+    let sent = fixture.pass(46 * HOUR, 300 * SECOND).await;
     assert!(sent.iter().all(|(.., id)| id == "evt_3"), "{sent:?}");
-    let page = scene.service.deliveries(Default::default(), 10).await.unwrap();
+    let page = fixture.service.deliveries(Default::default(), 10).await.unwrap();
     let newest = &page.items[0];
     assert_eq!((newest.message_id.as_str(), newest.state.as_str()), ("evt_3", "given_up"));
     assert_eq!(newest.error.as_deref(), Some("away"));
-    assert_eq!(scene.pass(50 * HOUR, 300 * SECOND).await, [], "given up for good");
+    assert_eq!(fixture.pass(50 * HOUR, 300 * SECOND).await, [], "given up for good");
 }

@@ -4,7 +4,9 @@ use std::collections::BTreeSet;
 
 use futures_util::StreamExt;
 use offbd::store::{Partitions, subject_token};
+use tokio::time::timeout;
 
+use crate::support::DEADLINE;
 use crate::support::broker::{NATS_PASSWORD, Nats};
 use crate::support::bus_device::nats;
 use crate::support::device::Random;
@@ -42,7 +44,8 @@ async fn validate_partitions_against_those_of_a_nats_server() {
     for name in &names {
         let subject = format!("asset.{}", subject_token(name));
         client.publish(subject, "".into()).await.unwrap();
-        let found = mapped.next().await.unwrap().subject.to_string();
+        let found = timeout(DEADLINE, mapped.next()).await.expect("a message in time");
+        let found = found.unwrap().subject.to_string();
         let expected = format!("partition.{}.{}", partitions.of(name), subject_token(name));
         assert_eq!(found, expected, "{name}");
     }
