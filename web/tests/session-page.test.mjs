@@ -35,6 +35,12 @@ test("a link leads to the moment, speed and profile, and charts are zoomed and r
   await view.getByRole("slider", { name: "Moment" }).fill("12");
   await view.waitForURL(/t=12\.00/);
 
+  // The evidence of the chosen monitor is drawn with the values at which it decides.
+  await view.getByRole("img", { name: /Evidence against the x servo/ }).waitFor();
+  await view.getByLabel("Monitor").selectOption({ label: "Position sensor" });
+  await view.getByRole("img", { name: /Fault detection counter, sensor/ }).waitFor();
+  assert.equal(await view.getByRole("img", { name: /Evidence against/ }).count(), 0);
+
   const chart = view.getByRole("img", { name: /Residual along x/ });
   await chart.scrollIntoViewIfNeeded();
   const box = await chart.boundingBox();

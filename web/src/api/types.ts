@@ -51,6 +51,7 @@ export type ReplaySettings = Schemas["ReplaySettings"];
 export type Session = Schemas["Session"];
 export type Summary = Schemas["Summary"];
 export type State = Schemas["State"];
+export type Thresholds = Schemas["Thresholds"];
 export type Trace = Schemas["Trace"];
 export type Trend = Schemas["Trend"];
 export type TrendPoint = Schemas["TrendPoint"];

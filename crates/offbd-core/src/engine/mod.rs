@@ -37,7 +37,9 @@ pub use motion::{UsableMotion, WANTED_MOTION_S};
 pub use plausibility::{Misfit, Plausibility};
 pub use rig::{AxisMapping, DiagnosticsSpec, MAX_NAME, Rig, ServoSpec, Setup};
 use serde::{Deserialize, Serialize};
-pub use types::{Admission, Input, MonitorState, Reach, Readiness, Rejection, State, Unjudged};
+pub use types::{
+    Admission, Input, MonitorState, Reach, Readiness, Rejection, State, Thresholds, Unjudged,
+};
 
 use align::Align;
 use clock::{ClockContext, ClockDecision, DeviceClock};
@@ -297,6 +299,12 @@ impl Engine {
     #[must_use]
     pub const fn evidence(&self) -> &Evidence {
         self.pipeline.evidence()
+    }
+
+    /// The values at which the monitor of `code` decides.
+    #[must_use]
+    pub fn thresholds(&self, code: FaultCode) -> Thresholds {
+        self.pipeline.thresholds(code)
     }
 
     /// Largest deviation of the path of each axis from the twin's so far, m.

@@ -15,7 +15,7 @@ use super::coverage::Coverage;
 use super::edge::Edge;
 use super::frame::{self, Moment, Repeats};
 use super::monitor::Monitor;
-use super::{MonitorState, Reach, Readiness, Rig, Setup, State};
+use super::{MonitorState, Reach, Readiness, Rig, Setup, State, Thresholds};
 use crate::diagnosis::{
     AxisEvidence, AxisPrior, DebounceTimes, Evaluator, Evidence, FaultMemory, Finding, GateOutcome,
     InUse, LONGEST_GAP_S, LearntPrior, Limits, OutlierGate, PositionJump, Profile, Qualified,
@@ -583,6 +583,15 @@ impl Pipeline {
         self.now
     }
 
+    /// The values at which the monitor of `code` decides.
+    pub(super) fn thresholds(&self, code: FaultCode) -> Thresholds {
+        let (confirm, suspect) = (self.settings.confirm_nats, self.settings.suspect_nats);
+        let confirm_nats = code.axis().map(|a| self.confirm_nats[a]).filter(|n| n.is_finite());
+        let suspect_nats = confirm_nats.map(|nats| nats / confirm * suspect);
+        let times = DebounceTimes::of(code, None, false, &self.settings);
+        Thresholds { times, suspect_nats, confirm_nats }
+    }
+
     /// The result that the monitor of `code` can give so far.
     fn reach(&self, code: FaultCode) -> Reach {
         let judged_s = self.monitors[code as usize].judged_s();
@@ -609,8 +618,10 @@ impl Pipeline {
     ) -> State {
         let monitors = core::array::from_fn(|i| {
             let (watch, status) = (&self.monitors[i], memory.record(FaultCode::ALL[i]).status);
+            let suspect_nats = self.thresholds(FaultCode::ALL[i]).suspect_nats;
             MonitorState {
                 counter: watch.counter(),
+                nats: suspect_nats.map_or(0.0, |nats| watch.weight() * nats),
                 readiness: Readiness {
                     enabled: watch.test() != Test::NotTested,
                     complete_this_cycle: status.completed_this_cycle(),

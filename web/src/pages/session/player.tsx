@@ -1,4 +1,4 @@
-import type { Asset, FaultLine, Session } from "../../api/types";
+import type { Asset, FaultLine, Session, Thresholds } from "../../api/types";
 import { AXES, type TraceBuffer } from "../../live/buffer";
 import { poseAt } from "../../live/pose";
 import { RigView } from "../../parts/rig-view/rig-view";
@@ -20,6 +20,8 @@ interface Props {
   faults: FaultLine[];
   /** Undefined while it is fetched; the player keeps its current time. */
   buffer?: TraceBuffer;
+  /** The values at which the monitors decide. */
+  thresholds: Thresholds[];
   /** Every how many judged moments the buffer has one. */
   stride: number;
   /** Most moments of a trace. */
@@ -33,7 +35,8 @@ const unseenAxes = (buffer: TraceBuffer) =>
   AXES.filter((axis) => buffer[axis].position.every((value) => value === null));
 
 /** The playback of a recording: drawings and charts of the same moment. */
-export function Player({ session, asset, faults, buffer, stride, points, profile, setProfile }: Props) {
+export function Player(props: Props) {
+  const { session, asset, faults, buffer, thresholds, stride, points, profile, setProfile } = props;
   const playback = usePlayback(buffer);
   const detail = useDetail(session, profile, buffer, stride, points);
   const charts = usePlaybackCharts({ buffer, detail, faults, playback });
@@ -67,6 +70,7 @@ export function Player({ session, asset, faults, buffer, stride, points, profile
       </div>
       <PlayerCard
         buffer={buffer}
+        thresholds={thresholds}
         stride={stride}
         playback={playback}
         charts={charts}
