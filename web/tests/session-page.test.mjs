@@ -41,7 +41,10 @@ test("a link leads to the moment, speed and profile, and charts are zoomed and r
   await view.getByRole("img", { name: /Fault detection counter, sensor/ }).waitFor();
   assert.equal(await view.getByRole("img", { name: /Evidence against/ }).count(), 0);
 
-  const chart = view.getByRole("img", { name: /Residual along x/ });
+  await view.getByText("Histogram of the residual").click();
+  await view.getByRole("img", { name: /Histogram of the residual along x: \d+ of \d+ judged/ }).waitFor();
+
+  const chart = view.getByRole("img", { name: /^Residual along x/ });
   await chart.scrollIntoViewIfNeeded();
   const box = await chart.boundingBox();
   const at = (share) => [box.x + box.width * share, box.y + box.height / 2];

@@ -6,6 +6,7 @@ import { SPEEDS } from "./address";
 import { MonitorCharts } from "./monitor-charts";
 import { NumberChoice } from "./number-choice";
 import { ProfileChoice, type ProfileOrRecorded } from "./profile-choice";
+import { ResidualHistograms } from "./residual-histograms";
 import type { Playback } from "./use-playback";
 import type { PlaybackCharts } from "./use-playback-charts";
 import { ZoomButtons } from "./zoom-buttons";
@@ -68,6 +69,7 @@ export function PlayerCard(props: Props) {
       <RigCharts {...chart} kinds={["residual"]} />
       <MonitorCharts {...chart} thresholds={thresholds} />
       <RigCharts {...chart} kinds={SESSION_CHARTS} />
+      <ResidualHistograms shown={charts.shown} />
       <p class="quiet small-text">
         Click a chart to go to that time; drag over it to zoom in, double-click to zoom out. Space plays or
         pauses, the arrow keys step by one second.
