@@ -47,6 +47,7 @@ mod tokens;
 #[cfg(feature = "otel")]
 mod trace_parent;
 mod traces;
+mod trials;
 mod unread_body;
 
 use std::str::FromStr;

@@ -36,5 +36,6 @@ pub mod stored;
 pub mod telemetry;
 pub mod trace;
 pub mod trend;
+pub mod trial;
 pub mod verdict;
 pub mod words;

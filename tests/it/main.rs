@@ -50,5 +50,6 @@ mod support;
 #[cfg(feature = "otel")]
 mod traces;
 mod trends;
+mod trials;
 mod upgrade;
 mod views;

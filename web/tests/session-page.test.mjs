@@ -92,3 +92,27 @@ test("a session without a calibration says what its verdict rests on", async () 
   assert.deepEqual(view.errors, []);
   await view.done();
 });
+
+test("sliders show the alarms that other limits and debounce times would raise", async () => {
+  const { session } = await ask(
+    service.url,
+    "POST",
+    "/assets/bench/sessions/import?name=tried",
+    rig.sick,
+    "text/csv",
+  );
+  const view = await page(chromium);
+  await view.goto(`${service.url}/sessions/${session.id}`);
+  const row = view.locator(".trial tbody tr").first();
+  await view.getByRole("slider", { name: "Debounce of X servo" }).fill("0");
+  await row
+    .getByText(/[1-9]\d* alarm/)
+    .first()
+    .waitFor();
+  await view.getByRole("slider", { name: "Limit of X servo" }).fill("3");
+  await row.getByText("0 alarms").first().waitFor();
+  await view.getByRole("button", { name: "As set" }).click();
+  await row.getByText("0 alarms").waitFor({ state: "detached" });
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});

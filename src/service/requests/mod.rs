@@ -26,6 +26,7 @@ mod telemetry;
 mod tokens;
 mod traces;
 mod trends;
+mod trials;
 
 pub use alarms::AlarmQuery;
 pub use faults::FaultQuery;

@@ -27,6 +27,7 @@ import type {
   State,
   Trace,
   Trends,
+  Trial,
 } from "./types";
 
 export const api = {
@@ -76,6 +77,8 @@ export const api = {
     session: string,
     range: { from_s?: number; to_s?: number; points?: number; profile?: Profile } = {},
   ) => get<Trace>(`/sessions/${segment(session)}/trace${query(range)}`),
+  trial: (session: string, settings: Record<string, number | string | undefined>) =>
+    get<Trial>(`/sessions/${segment(session)}/trial${query(settings)}`),
   importCsv: (asset: string, name: string, csv: string) =>
     request<ImportResult>(`${BASE}/assets/${segment(asset)}/sessions/import${query({ name })}`, {
       method: "POST",

@@ -1,15 +1,20 @@
-import type { Asset, FaultLine, Session, Thresholds } from "../../api/types";
+import { useMemo, useState } from "preact/hooks";
+import type { Asset, Axis, FaultLine, Session, Thresholds } from "../../api/types";
 import { AXES, type TraceBuffer } from "../../live/buffer";
 import { poseAt } from "../../live/pose";
+import { faultMark } from "../../parts/charts/fault-marks";
 import { RigView } from "../../parts/rig-view/rig-view";
 import { XyTrace } from "../../parts/xy-trace/xy-trace";
 import { FoundCard } from "./found-card";
 import { PlayerCard } from "./player-card";
 import type { ProfileOrRecorded } from "./profile-choice";
+import { alarmMarks, type TriedSettings } from "./trial";
+import { TrialCard } from "./trial-card";
 import { useDetail } from "./use-detail";
 import { useHotkeys } from "./use-hotkeys";
 import { usePlayback } from "./use-playback";
 import { usePlaybackCharts } from "./use-playback-charts";
+import { useTrial } from "./use-trial";
 
 /** Duration of the path in the plan view, s. */
 const TAIL_S = 4;
@@ -34,25 +39,35 @@ interface Props {
 const unseenAxes = (buffer: TraceBuffer) =>
   AXES.filter((axis) => buffer[axis].position.every((value) => value === null));
 
+function UnseenNote({ axes }: { axes: Axis[] }) {
+  if (!axes.length) return null;
+  return (
+    <p class="note">
+      The recording has no position along {axes.join(" and ")}, so the ball cannot be drawn on the plate. The
+      charts show what there is.
+    </p>
+  );
+}
+
 /** The playback of a recording: drawings and charts of the same moment. */
 export function Player(props: Props) {
   const { session, asset, faults, buffer, thresholds, stride, points, profile, setProfile } = props;
   const playback = usePlayback(buffer);
   const detail = useDetail(session, profile, buffer, stride, points);
-  const charts = usePlaybackCharts({ buffer, detail, faults, playback });
+  const [tried, setTried] = useState<TriedSettings>({});
+  const trial = useTrial(session.id, profile, tried);
+  const marks = useMemo(
+    () => [...faults.map(faultMark), ...alarmMarks(trial.trial?.monitors ?? [])],
+    [faults, trial],
+  );
+  const charts = usePlaybackCharts({ buffer, detail, marks, playback });
   useHotkeys(playback);
   if (!buffer?.t.length) return null;
   const { t, seek } = playback;
   const { drawnBuffer } = charts;
-  const unseen = unseenAxes(buffer);
   return (
     <>
-      {unseen.length > 0 && (
-        <p class="note">
-          The recording has no position along {unseen.join(" and ")}, so the ball cannot be drawn on the
-          plate. The charts show what there is.
-        </p>
-      )}
+      <UnseenNote axes={unseenAxes(buffer)} />
       <div class="playback-top">
         <RigView
           asset={asset}
@@ -77,6 +92,7 @@ export function Player(props: Props) {
         profile={profile}
         setProfile={setProfile}
       />
+      <TrialCard thresholds={thresholds} settings={tried} choose={setTried} state={trial} />
     </>
   );
 }

@@ -1,9 +1,8 @@
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
-import type { FaultLine } from "../../api/types";
 import { useAnimationFrame } from "../../hooks/use-animation-frame";
 import type { TraceBuffer } from "../../live/buffer";
 import { ChartGroup } from "../../parts/charts/chart-group";
-import { faultMark } from "../../parts/charts/fault-marks";
+import type { Mark } from "../../parts/charts/overlays";
 import { seconds } from "../../words/numbers";
 import type { Shown } from "./use-shown";
 import type { DetailLoader } from "./use-detail";
@@ -18,7 +17,8 @@ interface Options {
   buffer?: TraceBuffer;
   /** The loader of parts with every sample, if `buffer` is thinned. */
   detail?: DetailLoader;
-  faults: FaultLine[];
+  /** Moments that are marked in all charts. */
+  marks: Mark[];
   playback: Playback;
 }
 
@@ -31,7 +31,7 @@ function showTime(t: number, slider: HTMLInputElement | null, clock: HTMLOutputE
 }
 
 /** The charts, the slider and the clock of the playback, updated without rendering components. */
-export function usePlaybackCharts({ buffer, detail, faults, playback: { t } }: Options) {
+export function usePlaybackCharts({ buffer, detail, marks, playback: { t } }: Options) {
   const group = useMemo(() => new ChartGroup(), []);
   /** Time span of the charts, s; 0 for the whole recording. */
   const [span, setSpan] = useState<number>(30);
@@ -43,7 +43,7 @@ export function usePlaybackCharts({ buffer, detail, faults, playback: { t } }: O
   /** The buffer that is drawn: the whole recording, or the shown part with every sample. */
   const drawn = useRef<{ key: string } & Partial<Shown>>({ key: "" });
   const frame = useRef(0);
-  useEffect(() => group.setMarks(faults.map(faultMark)), [group, faults]);
+  useEffect(() => group.setMarks(marks), [group, marks]);
   useAnimationFrame(() => {
     if (!buffer?.t.length) return;
     const range = zoom ?? visibleRange(t.current, span, buffer.first, buffer.last);
