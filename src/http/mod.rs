@@ -35,6 +35,7 @@ mod page;
 mod parameters;
 mod problem;
 mod rates;
+mod remarks;
 mod replays;
 mod routes;
 mod series;

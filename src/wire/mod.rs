@@ -25,6 +25,7 @@ pub mod notification;
 mod preset;
 pub mod provenance;
 pub mod recording;
+pub mod remark;
 #[cfg(feature = "lab")]
 pub mod scene;
 pub mod series;

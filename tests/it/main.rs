@@ -38,6 +38,7 @@ mod outcome;
 mod parts;
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 mod power_cut;
+mod remarks;
 mod restart;
 mod retention;
 mod same_sample;

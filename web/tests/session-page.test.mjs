@@ -116,3 +116,32 @@ test("sliders show the alarms that other limits and debounce times would raise",
   assert.deepEqual(view.errors, []);
   await view.done();
 });
+
+test("a remark on a moment is kept, listed and removed", async () => {
+  const { session } = await ask(
+    service.url,
+    "POST",
+    "/assets/bench/sessions/import?name=remarked",
+    rig.sick,
+    "text/csv",
+  );
+  const view = await page(chromium);
+  await view.goto(`${service.url}/sessions/${session.id}?t=12`);
+  await view.getByText("12.00 s", { exact: true }).waitFor();
+  await view.getByLabel("Remark", { exact: true }).fill("new horn");
+  await view.getByLabel("Your name, kept with the remark").fill("ada");
+  await view.getByRole("button", { name: "Keep for this moment" }).click();
+  const list = view.getByRole("list", { name: "Remarks" });
+  await list.getByText("new horn").waitFor();
+  await list.getByText(/^ada, /).waitFor();
+  await list
+    .getByRole("button", { name: /^12\.00/ })
+    .first()
+    .waitFor();
+  await view.reload();
+  await list.getByText("new horn").waitFor();
+  await list.getByRole("button", { name: /^Remove the remark/ }).click();
+  await list.waitFor({ state: "detached" });
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});

@@ -19,6 +19,7 @@ mod notifications;
 mod principals;
 mod readiness;
 mod recordings;
+mod remarks;
 mod replays;
 mod series;
 mod sessions;

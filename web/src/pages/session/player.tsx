@@ -1,13 +1,14 @@
 import { useMemo, useState } from "preact/hooks";
+import { api } from "../../api/client";
 import type { Asset, Axis, FaultLine, Session, Thresholds } from "../../api/types";
+import { useQuery } from "../../hooks/use-query";
 import { AXES, type TraceBuffer } from "../../live/buffer";
-import { poseAt } from "../../live/pose";
 import { faultMark } from "../../parts/charts/fault-marks";
-import { RigView } from "../../parts/rig-view/rig-view";
-import { XyTrace } from "../../parts/xy-trace/xy-trace";
-import { FoundCard } from "./found-card";
+import { PlaybackTop } from "./playback-top";
 import { PlayerCard } from "./player-card";
 import type { ProfileOrRecorded } from "./profile-choice";
+import { remarkMarks } from "./remarks";
+import { RemarksCard } from "./remarks-card";
 import { alarmMarks, type TriedSettings } from "./trial";
 import { TrialCard } from "./trial-card";
 import { useDetail } from "./use-detail";
@@ -15,9 +16,6 @@ import { useHotkeys } from "./use-hotkeys";
 import { usePlayback } from "./use-playback";
 import { usePlaybackCharts } from "./use-playback-charts";
 import { useTrial } from "./use-trial";
-
-/** Duration of the path in the plan view, s. */
-const TAIL_S = 4;
 
 interface Props {
   session: Session;
@@ -56,33 +54,25 @@ export function Player(props: Props) {
   const detail = useDetail(session, profile, buffer, stride, points);
   const [tried, setTried] = useState<TriedSettings>({});
   const trial = useTrial(session.id, profile, tried);
-  const marks = useMemo(
-    () => [...faults.map(faultMark), ...alarmMarks(trial.trial?.monitors ?? [])],
-    [faults, trial],
-  );
+  const remarks = useQuery(() => api.remarks(session.id), `${session.id} remarks`);
+  const marks = useMemo(() => {
+    const tried = alarmMarks(trial.trial?.monitors ?? []);
+    return [...faults.map(faultMark), ...tried, ...remarkMarks(remarks.data ?? [])];
+  }, [faults, trial, remarks.data]);
   const charts = usePlaybackCharts({ buffer, detail, marks, playback });
   useHotkeys(playback);
   if (!buffer?.t.length) return null;
-  const { t, seek } = playback;
-  const { drawnBuffer } = charts;
   return (
     <>
       <UnseenNote axes={unseenAxes(buffer)} />
-      <div class="playback-top">
-        <RigView
-          asset={asset}
-          pose={() => poseAt(drawnBuffer() ?? buffer, t.current)}
-          name={`${session.asset}-${session.name}`}
-        />
-        <section class="card">
-          <h2>From above</h2>
-          <XyTrace
-            asset={asset}
-            moment={() => ({ buffer: drawnBuffer() ?? buffer, t: t.current, tail: TAIL_S })}
-          />
-        </section>
-        <FoundCard session={session} asset={asset} faults={faults} seek={seek} />
-      </div>
+      <PlaybackTop
+        session={session}
+        asset={asset}
+        faults={faults}
+        buffer={buffer}
+        playback={playback}
+        charts={charts}
+      />
       <PlayerCard
         buffer={buffer}
         thresholds={thresholds}
@@ -92,6 +82,7 @@ export function Player(props: Props) {
         profile={profile}
         setProfile={setProfile}
       />
+      <RemarksCard session={session.id} remarks={remarks} playback={playback} zoom={charts.zoom} />
       <TrialCard thresholds={thresholds} settings={tried} choose={setTried} state={trial} />
     </>
   );
