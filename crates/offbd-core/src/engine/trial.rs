@@ -1,8 +1,6 @@
 //! Other limits and debounce times than those of the rig, tried on a recording.
 
 use crate::diagnosis::Settings;
-#[cfg(not(feature = "std"))]
-use crate::no_std::*;
 use crate::vocabulary::{Axis, FaultCode, Invalid, PerAxis, in_range};
 
 /// Smallest factor on the limits of a servo. Chosen: below it everything is a failure.
