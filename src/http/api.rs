@@ -7,8 +7,8 @@ use utoipa_axum::routes;
 use super::routes::GuardedRouter;
 use super::{
     Api, alarms, assets, calibrations, cluster, drive_cycles, events, faults, fleet, learning,
-    login, metrics, notifications, operations, replays, series, sessions, sovd, stream, telemetry,
-    tokens, traces,
+    login, metrics, notifications, operations, remarks, replays, series, sessions, sovd, stream,
+    telemetry, tokens, traces, trials,
 };
 use crate::service::access::Right::{
     Administer, Authenticated, ControlSessions, Operate, Public, Read, ReadAsset, SendTelemetry,
@@ -92,7 +92,11 @@ fn with_sessions(router: GuardedRouter) -> GuardedRouter {
         .routes(Read, routes!(sessions::telemetry))
         .routes(ReadAsset, routes!(sessions::faults))
         .routes(Read, routes!(traces::trace))
+        .routes(Read, routes!(trials::try_out))
         .routes(Operate, routes!(replays::create))
+        .routes(Read, routes!(remarks::list))
+        .routes(Operate, routes!(remarks::add))
+        .routes(Operate, routes!(remarks::remove))
         .routes(Read, routes!(replays::get))
 }
 

@@ -302,7 +302,7 @@ impl Guard {
         }
         let path = parts.extensions.get::<MatchedPath>().map(MatchedPath::as_str);
         match (path, params.as_slice()) {
-            (Some(path), [(_, id)]) if path.starts_with("/api/v1/sessions/{id}") => {
+            (Some(path), [(_, id), ..]) if path.starts_with("/api/v1/sessions/{id}") => {
                 Ok(self.app.service.asset_of_session(id).await?)
             }
             (_, []) => {

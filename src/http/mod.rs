@@ -35,6 +35,7 @@ mod page;
 mod parameters;
 mod problem;
 mod rates;
+mod remarks;
 mod replays;
 mod routes;
 mod series;
@@ -47,6 +48,7 @@ mod tokens;
 #[cfg(feature = "otel")]
 mod trace_parent;
 mod traces;
+mod trials;
 mod unread_body;
 
 use std::str::FromStr;

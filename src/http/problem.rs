@@ -120,6 +120,7 @@ impl From<ServiceError> for Problem {
             E::UnknownAsset { .. } => missing("unknown-asset", "No such asset"),
             E::UnknownSession { .. } => missing("unknown-session", "No such session"),
             E::UnknownReplay { .. } => missing("unknown-replay", "No such replay"),
+            E::UnknownRemark { .. } => missing("unknown-remark", "No such remark"),
             E::UnknownCalibration { .. } => missing("unknown-calibration", "No such calibration"),
             E::UnknownToken { .. } => missing("unknown-token", "No such token"),
             E::UnknownChannel { .. } => missing("unknown-channel", "No such channel"),

@@ -19,6 +19,8 @@ pub enum ServiceError {
     UnknownSession { id: String },
     #[error("there is no replay `{id}`")]
     UnknownReplay { id: String },
+    #[error("the session has no remark `{id}`")]
+    UnknownRemark { id: String },
     #[error("asset `{asset}` has no calibration `{id}`")]
     UnknownCalibration { asset: String, id: String },
     #[error("there is no token `{id}`")]

@@ -41,6 +41,7 @@ mod partition;
 mod query_builder;
 mod read;
 mod recording;
+mod remark;
 mod rows;
 mod snapshot;
 mod tail;
@@ -71,6 +72,7 @@ pub use partition::{
 };
 pub use read::{AssetFilter, FaultFilter, FaultOrder, SessionFilter};
 pub use recording::RecordingReader;
+pub use remark::{RemarkRow, RemarkWrite};
 pub use rows::{
     ActionKind, ActionRow, AssetRow, CalibrationRow, EventRow, FaultRow, Micros, ReplayRow,
     SessionProgress, SessionRow, TransitionRow, TrendEntry, TrendRow, WarningRow,

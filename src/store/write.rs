@@ -34,8 +34,9 @@ use super::tail::{Run, Tails};
 use super::writer_lock::Backend;
 use super::{
     AccessWrite, ActionRow, AlarmWrite, AssetRow, CalibrationRow, CommunicationChange, EVENTS,
-    FaultRow, Location, MIGRATIONS, Micros, NotificationWrite, PartitionId, Partitions, ReplayRow,
-    SessionProgress, SessionRow, Snapshot, StoreError, TransitionRow, TrendRow, alarm, snapshot,
+    FaultRow, Location, MIGRATIONS, Micros, NotificationWrite, PartitionId, Partitions,
+    RemarkWrite, ReplayRow, SessionProgress, SessionRow, Snapshot, StoreError, TransitionRow,
+    TrendRow, alarm, snapshot,
 };
 use offbd_core::vocabulary::Sample;
 
@@ -131,6 +132,7 @@ pub enum Write {
     Access(AccessWrite),
     Alarm(AlarmWrite),
     Notification(NotificationWrite),
+    Remark(RemarkWrite),
     /// Data of a rig stay away or come back; an event.
     Communication(CommunicationChange),
 }
@@ -570,6 +572,7 @@ impl GroupCommit<'_> {
             Write::Access(write) => write.apply(db).await,
             Write::Alarm(write) => write.apply(db).await,
             Write::Notification(write) => write.apply(db).await,
+            Write::Remark(write) => write.apply(db).await,
             Write::Communication(row) => {
                 row.id = self.events.next(db).await?;
                 if !alarm::change_communication(db, row).await? {

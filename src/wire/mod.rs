@@ -25,6 +25,7 @@ pub mod notification;
 mod preset;
 pub mod provenance;
 pub mod recording;
+pub mod remark;
 #[cfg(feature = "lab")]
 pub mod scene;
 pub mod series;
@@ -36,5 +37,6 @@ pub mod stored;
 pub mod telemetry;
 pub mod trace;
 pub mod trend;
+pub mod trial;
 pub mod verdict;
 pub mod words;

@@ -3,8 +3,9 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::words::CodeWord;
 use offbd_core::diagnosis::AxisEvidence;
-use offbd_core::engine::State;
+use offbd_core::engine::{Engine, State};
 use offbd_core::vocabulary::{Axis, FaultCode};
 
 /// The judged quantities over an interval of a session, for charts: columns of equal length.
@@ -15,6 +16,14 @@ pub struct TraceView {
     pub t_s: Vec<f64>,
     pub x: AxisTraceView,
     pub y: AxisTraceView,
+    /// Fault detection counter of the monitor of the ball, −128 (passed) to 127 (failed).
+    pub stuck_ball_counter: Vec<i8>,
+    /// Fault detection counter of the monitor of the sensor, −128 (passed) to 127 (failed).
+    pub sensor_counter: Vec<i8>,
+    /// The values at which the monitors decide, which are constant during a session. Live
+    /// data have none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub thresholds: Vec<ThresholdsView>,
     /// Every how many judged moments the columns have one; 1 if they have all of them.
     pub stride: u64,
 }
@@ -22,7 +31,41 @@ pub struct TraceView {
 impl Default for TraceView {
     fn default() -> Self {
         let (x, y) = Default::default();
-        Self { t_s: Vec::new(), x, y, stride: 1 }
+        let (t_s, stuck_ball_counter, sensor_counter, thresholds) = Default::default();
+        Self { t_s, x, y, stuck_ball_counter, sensor_counter, thresholds, stride: 1 }
+    }
+}
+
+/// The values at which a monitor decides.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ThresholdsView {
+    pub code: CodeWord,
+    /// Time of failure after which the counter is at 127 and the test fails, s: for a failure
+    /// of no particular kind without a rival cause.
+    pub fail_s: f64,
+    /// Further time of failure until the fault is confirmed, s.
+    pub confirm_s: f64,
+    /// Evidence at which the test of a servo fails, nats; null if evidence does not decide.
+    pub suspect_nats: Option<f64>,
+    /// Evidence that confirms a fault of a servo, nats; null if evidence does not decide.
+    pub confirm_nats: Option<f64>,
+}
+
+impl ThresholdsView {
+    /// Returns the values of all monitors of `engine`, in the order of the codes.
+    #[must_use]
+    pub fn of(engine: &Engine) -> Vec<Self> {
+        let of_code = |&code: &FaultCode| {
+            let found = engine.thresholds(code);
+            Self {
+                code: code.into(),
+                fail_s: found.times.fail_s,
+                confirm_s: found.times.confirm_s,
+                suspect_nats: found.suspect_nats,
+                confirm_nats: found.confirm_nats,
+            }
+        };
+        FaultCode::ALL.iter().map(of_code).collect()
     }
 }
 
@@ -46,6 +89,8 @@ pub struct AxisTraceView {
     pub limit_m_s2: Vec<f32>,
     /// Whether the enable condition holds.
     pub enabled: Vec<bool>,
+    /// Evidence against the servo as its monitor weighs it, nats.
+    pub nats: Vec<f32>,
     /// Fault detection counter of the servo's monitor, −128 (passed) to 127 (failed).
     pub counter: Vec<i8>,
 }
@@ -56,6 +101,8 @@ pub struct TracePoint {
     t_s: f64,
     x: AxisTracePoint,
     y: AxisTracePoint,
+    stuck_ball_counter: i8,
+    sensor_counter: i8,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,6 +110,7 @@ struct AxisTracePoint {
     evidence: AxisEvidence,
     plate_angle_rad: f64,
     twin_position_m: f64,
+    nats: f64,
     counter: i8,
 }
 
@@ -73,13 +121,21 @@ impl TracePoint {
     #[must_use]
     pub fn of(state: &State) -> Option<Self> {
         let at = state.at.filter(|_| state.at == state.evidence.at)?;
+        let monitor = |code: FaultCode| &state.monitors[code as usize];
         let of_axis = |axis: Axis| AxisTracePoint {
             evidence: state.evidence.axes[axis],
             plate_angle_rad: state.plate_angle_rad[axis],
             twin_position_m: state.twin_position_m[axis],
-            counter: state.monitors[FaultCode::servo(axis) as usize].counter,
+            nats: monitor(FaultCode::servo(axis)).nats,
+            counter: monitor(FaultCode::servo(axis)).counter,
         };
-        Some(Self { t_s: at.seconds(), x: of_axis(Axis::X), y: of_axis(Axis::Y) })
+        Some(Self {
+            t_s: at.seconds(),
+            x: of_axis(Axis::X),
+            y: of_axis(Axis::Y),
+            stuck_ball_counter: monitor(FaultCode::StuckBall).counter,
+            sensor_counter: monitor(FaultCode::Sensor).counter,
+        })
     }
 
     /// Returns the time, s on the device's clock.
@@ -95,6 +151,8 @@ impl TraceView {
         self.t_s.push(point.t_s);
         self.x.push(&point.x);
         self.y.push(&point.y);
+        self.stuck_ball_counter.push(point.stuck_ball_counter);
+        self.sensor_counter.push(point.sensor_counter);
     }
 }
 
@@ -110,6 +168,7 @@ impl AxisTraceView {
         self.twin_m_s2.push(single(evidence.twin_m_s2));
         self.limit_m_s2.push(evidence.limit_m_s2 as f32);
         self.enabled.push(evidence.enabled);
+        self.nats.push(point.nats as f32);
         self.counter.push(point.counter);
     }
 }

@@ -38,6 +38,7 @@ mod outcome;
 mod parts;
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 mod power_cut;
+mod remarks;
 mod restart;
 mod retention;
 mod same_sample;
@@ -50,5 +51,6 @@ mod support;
 #[cfg(feature = "otel")]
 mod traces;
 mod trends;
+mod trials;
 mod upgrade;
 mod views;

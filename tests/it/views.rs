@@ -123,6 +123,19 @@ async fn a_trace_equals_what_was_judged() {
         assert!((drawn - reported.unwrap()).abs() < 1e-6, "{name}: {drawn}, {reported:?}");
     }
 
+    // Where the line was written, its monitor had reached what its thresholds demand.
+    let thresholds = &all["thresholds"];
+    assert_eq!(thresholds.as_array().unwrap().len(), 4);
+    let servo = &thresholds[0];
+    assert_eq!((&servo["code"], &line["code"]), (&json!("x_servo"), &json!("x_servo")));
+    let nats = column(&all, "nats")[i].unwrap();
+    let counter = column(&all, "counter")[i].unwrap();
+    let suspect_nats = servo["suspect_nats"].as_f64().unwrap();
+    assert!(counter == 127.0 || nats >= suspect_nats - 1e-5, "{counter}, {nats}, {servo}");
+    assert!(servo["confirm_nats"].as_f64().unwrap() > suspect_nats);
+    assert_eq!(thresholds[3]["suspect_nats"], Value::Null, "no evidence decides on the sensor");
+    assert_eq!(numbers(&all["sensor_counter"]).len(), n);
+
     let part = client.get(&format!("sessions/{id}/trace?from_s=5&to_s=6")).await.expect(200);
     let times = numbers(&part["t_s"]);
     assert!(times.iter().all(|t| (5.0..=6.0).contains(&t.unwrap())) && times.len() >= 19);
@@ -131,6 +144,7 @@ async fn a_trace_equals_what_was_judged() {
     let textbook = client.get(&format!("sessions/{id}/trace?profile=textbook")).await.expect(200);
     let limits = column(&textbook, "limit_m_s2");
     assert_eq!(limits[limits.len() / 2], Some(0.01));
+    assert_eq!(textbook["thresholds"][0]["suspect_nats"], Value::Null);
     client.get(&format!("sessions/{id}/trace?profile=none")).await.problem(400);
     client.get("sessions/none/trace").await.problem(404);
 }

@@ -134,6 +134,8 @@ test("a rig that is healthy by the default profile exceeds the textbook's limit"
         (dt) => dt.textContent === "Beyond the limit" && /\d/.test(dt.nextSibling.textContent),
       ).length === 2,
   );
+  await view.getByText("3. Diagnosis: which limit").click();
+  await view.getByText("offbd scene bad-x-servo").waitFor();
   const [usual, textbook] = (await share.allTextContents()).map((text) => parseInt(text, 10));
   assert.ok(textbook > 10 && usual < textbook / 2, `default ${usual} %, textbook ${textbook} %`);
   await view

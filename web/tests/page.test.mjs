@@ -99,6 +99,7 @@ const VIEWS = () => [
   ["/rigs/bench/faults/sensor", "Nothing is on record"],
   ["/sessions", "monday"],
   [`/sessions/${session.id}`, "Judge it again"],
+  [`/compare?a=${session.id}&b=${session.id}`, "Compare sessions"],
   ["/alarms", "What to do"],
   ["/notifications", "nobody is told of anything"],
   ["/set-up", "Units that the device sends"],

@@ -35,7 +35,16 @@ test("a link leads to the moment, speed and profile, and charts are zoomed and r
   await view.getByRole("slider", { name: "Moment" }).fill("12");
   await view.waitForURL(/t=12\.00/);
 
-  const chart = view.getByRole("img", { name: /Residual along x/ });
+  // The evidence of the chosen monitor is drawn with the values at which it decides.
+  await view.getByRole("img", { name: /Evidence against the x servo/ }).waitFor();
+  await view.getByLabel("Monitor").selectOption({ label: "Position sensor" });
+  await view.getByRole("img", { name: /Fault detection counter, sensor/ }).waitFor();
+  assert.equal(await view.getByRole("img", { name: /Evidence against/ }).count(), 0);
+
+  await view.getByText("Histogram of the residual").click();
+  await view.getByRole("img", { name: /Histogram of the residual along x: \d+ of \d+ judged/ }).waitFor();
+
+  const chart = view.getByRole("img", { name: /^Residual along x/ });
   await chart.scrollIntoViewIfNeeded();
   const box = await chart.boundingBox();
   const at = (share) => [box.x + box.width * share, box.y + box.height / 2];
@@ -80,6 +89,59 @@ test("a session without a calibration says what its verdict rests on", async () 
   assert.equal(await view.getByText("No fault", { exact: true }).count(), 0);
   await view.goto(`${service.url}/rigs/unlearnt`);
   await view.getByText("The last one,").waitFor();
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});
+
+test("sliders show the alarms that other limits and debounce times would raise", async () => {
+  const { session } = await ask(
+    service.url,
+    "POST",
+    "/assets/bench/sessions/import?name=tried",
+    rig.sick,
+    "text/csv",
+  );
+  const view = await page(chromium);
+  await view.goto(`${service.url}/sessions/${session.id}`);
+  const row = view.locator(".trial tbody tr").first();
+  await view.getByRole("slider", { name: "Debounce of X servo" }).fill("0");
+  await row
+    .getByText(/[1-9]\d* alarm/)
+    .first()
+    .waitFor();
+  await view.getByRole("slider", { name: "Limit of X servo" }).fill("3");
+  await row.getByText("0 alarms").first().waitFor();
+  await view.getByRole("button", { name: "As set" }).click();
+  await row.getByText("0 alarms").waitFor({ state: "detached" });
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});
+
+test("a remark on a moment is kept, listed and removed", async () => {
+  const { session } = await ask(
+    service.url,
+    "POST",
+    "/assets/bench/sessions/import?name=remarked",
+    rig.sick,
+    "text/csv",
+  );
+  const view = await page(chromium);
+  await view.goto(`${service.url}/sessions/${session.id}?t=12`);
+  await view.getByText("12.00 s", { exact: true }).waitFor();
+  await view.getByLabel("Remark", { exact: true }).fill("new horn");
+  await view.getByLabel("Your name, kept with the remark").fill("ada");
+  await view.getByRole("button", { name: "Keep for this moment" }).click();
+  const list = view.getByRole("list", { name: "Remarks" });
+  await list.getByText("new horn").waitFor();
+  await list.getByText(/^ada, /).waitFor();
+  await list
+    .getByRole("button", { name: /^12\.00/ })
+    .first()
+    .waitFor();
+  await view.reload();
+  await list.getByText("new horn").waitFor();
+  await list.getByRole("button", { name: /^Remove the remark/ }).click();
+  await list.waitFor({ state: "detached" });
   assert.deepEqual(view.errors, []);
   await view.done();
 });

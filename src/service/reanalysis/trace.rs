@@ -9,7 +9,7 @@ use crate::service::writing::Handles;
 use crate::service::{ServiceError, snapshots};
 use crate::store::SessionRow;
 use crate::wire::service::ReplaySettingsView;
-use crate::wire::trace::{TracePoint, TraceView};
+use crate::wire::trace::{ThresholdsView, TracePoint, TraceView};
 use offbd_core::engine::Input;
 use offbd_core::vocabulary::TimeRange;
 
@@ -65,7 +65,8 @@ pub(in crate::service) fn trace(
         decimator.push(point);
         ControlFlow::Continue(())
     })?;
-    Ok(decimator.view())
+    let thresholds = ThresholdsView::of(judging.engine());
+    Ok(TraceView { thresholds, ..decimator.view() })
 }
 
 /// Returns the expected number of points in the range, assuming evenly spaced samples and

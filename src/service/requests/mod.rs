@@ -19,6 +19,7 @@ mod notifications;
 mod principals;
 mod readiness;
 mod recordings;
+mod remarks;
 mod replays;
 mod series;
 mod sessions;
@@ -26,6 +27,7 @@ mod telemetry;
 mod tokens;
 mod traces;
 mod trends;
+mod trials;
 
 pub use alarms::AlarmQuery;
 pub use faults::FaultQuery;

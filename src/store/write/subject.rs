@@ -37,6 +37,7 @@ impl Write {
             Self::PutLearning { asset, .. } => format!("the learning record of asset `{asset}`"),
             Self::Alarm(_) => "a change of mutes or notes".to_owned(),
             Self::Notification(_) => "a change of notifications".to_owned(),
+            Self::Remark(write) => format!("a remark on session {}", write.session()),
             Self::Communication(row) => format!("the communication of asset `{}`", row.asset),
             Self::Published { bus, .. } => format!("the last event published over {bus}"),
             Self::Access(_) => "a change of tokens, logins or the audit log".to_owned(),

@@ -14,7 +14,7 @@ pub const JOURNAL: usize = 6;
 const CHECKSUMS: usize = 10;
 
 /// All tables, those first to which others refer.
-const TABLES: [&str; 24] = [
+const TABLES: [&str; 25] = [
     "asset",
     "session",
     "chunk",
@@ -39,6 +39,7 @@ const TABLES: [&str; 24] = [
     "communication",
     "communication_change",
     "note",
+    "remark",
 ];
 
 /// The counter that became a column of `partition`.

@@ -16,9 +16,11 @@ import type {
   HistoryEntry,
   ImportResult,
   Learning,
+  NewRemark,
   NewToken,
   Page,
   Profile,
+  Remark,
   Replay,
   ReplaySettings,
   ServiceHealth,
@@ -27,6 +29,7 @@ import type {
   State,
   Trace,
   Trends,
+  Trial,
 } from "./types";
 
 export const api = {
@@ -76,6 +79,14 @@ export const api = {
     session: string,
     range: { from_s?: number; to_s?: number; points?: number; profile?: Profile } = {},
   ) => get<Trace>(`/sessions/${segment(session)}/trace${query(range)}`),
+  trial: (session: string, settings: Record<string, number | string | undefined>) =>
+    get<Trial>(`/sessions/${segment(session)}/trial${query(settings)}`),
+  remarks: (session: string) =>
+    get<Page<Remark>>(`/sessions/${segment(session)}/remarks`).then((page) => page.items),
+  addRemark: (session: string, remark: NewRemark) =>
+    send<Remark>("POST", `/sessions/${segment(session)}/remarks${query({ by: actor() })}`, remark),
+  removeRemark: (session: string, id: string) =>
+    send<void>("DELETE", `/sessions/${segment(session)}/remarks/${segment(id)}`),
   importCsv: (asset: string, name: string, csv: string) =>
     request<ImportResult>(`${BASE}/assets/${segment(asset)}/sessions/import${query({ name })}`, {
       method: "POST",

@@ -9,6 +9,7 @@ const AssetPage = lazy(() => import("../pages/asset").then((module) => module.As
 const FaultPage = lazy(() => import("../pages/fault").then((module) => module.FaultPage));
 const SessionsPage = lazy(() => import("../pages/sessions").then((module) => module.SessionsPage));
 const SessionPage = lazy(() => import("../pages/session").then((module) => module.SessionPage));
+const ComparePage = lazy(() => import("../pages/compare").then((module) => module.ComparePage));
 const SetUpPage = lazy(() => import("../pages/set-up").then((module) => module.SetUpPage));
 const AlarmsPage = lazy(() => import("../pages/alarms").then((module) => module.AlarmsPage));
 const NotificationsPage = lazy(() =>
@@ -29,6 +30,7 @@ export function Route({ segments, isDemo }: { segments: string[]; isDemo: boolea
   if (first === "set-up") return <SetUpPage />;
   if (first === "sessions" && name) return <SessionPage key={name} id={name} />;
   if (first === "sessions") return <SessionsPage />;
+  if (first === "compare") return <ComparePage />;
   if (first === "alarms") return <AlarmsPage />;
   if (first === "notifications") return <NotificationsPage />;
   if (first === "learn") return <LearnPage isDemo={isDemo} />;

@@ -15,6 +15,8 @@ export interface AxisColumns {
   limitBelow: Column;
   /** Fault detection counter of the servo's monitor, −128 to 127. */
   counter: Column;
+  /** Evidence against the servo, nats. */
+  nats: Column;
   enabled: boolean[];
 }
 
@@ -31,6 +33,7 @@ export const emptyColumns = (): AxisColumns => ({
   limit: [],
   limitBelow: [],
   counter: [],
+  nats: [],
   enabled: [],
 });
 
@@ -52,11 +55,30 @@ export function appendTrace(to: AxisColumns, from: Trace["x"], n: number): void 
     to.limit.push(limit);
     to.limitBelow.push(limit === null ? null : -limit);
     to.counter.push(from.counter[i] ?? null);
+    to.nats.push(from.nats[i] ?? null);
     to.enabled.push(from.enabled[i] ?? false);
   }
 }
 
+/** The counters of the monitors that do not belong to an axis. */
+export interface SharedColumns {
+  stuckBall: Column;
+  sensor: Column;
+}
+
+export type SharedColumn = keyof SharedColumns;
+
+export const emptyShared = (): SharedColumns => ({ stuckBall: [], sensor: [] });
+
+/** Appends the first `n` moments of what a trace has besides the axes. */
+export function appendShared(to: SharedColumns, from: Trace, n: number): void {
+  for (let i = 0; i < n; i++) {
+    to.stuckBall.push(from.stuck_ball_counter[i] ?? null);
+    to.sensor.push(from.sensor_counter[i] ?? null);
+  }
+}
+
 /** Removes the oldest `n` moments. */
-export function dropOldest(columns: AxisColumns, n: number): void {
+export function dropOldest(columns: AxisColumns | SharedColumns, n: number): void {
   for (const column of Object.values(columns) as unknown[][]) column.splice(0, n);
 }

@@ -1,6 +1,13 @@
 /** A growing trace as columns, for charts and drawings; the oldest moments are dropped. */
 import type { Axis, Trace } from "../api/types";
-import { appendTrace, dropOldest, emptyColumns, type NumberColumn } from "./axis-columns";
+import {
+  appendShared,
+  appendTrace,
+  dropOldest,
+  emptyColumns,
+  emptyShared,
+  type NumberColumn,
+} from "./axis-columns";
 
 export const AXES: readonly Axis[] = ["x", "y"];
 
@@ -11,6 +18,7 @@ export class TraceBuffer {
   t: number[] = [];
   x = emptyColumns();
   y = emptyColumns();
+  shared = emptyShared();
 
   /** Returns a buffer with a whole trace, of which nothing is dropped. */
   static of(trace: Trace): TraceBuffer {
@@ -33,12 +41,14 @@ export class TraceBuffer {
     this.t = [];
     this.x = emptyColumns();
     this.y = emptyColumns();
+    this.shared = emptyShared();
   }
 
   append(trace: Trace): void {
     const n = trace.t_s.length;
     for (let i = 0; i < n; i++) this.t.push(trace.t_s[i]!);
     for (const axis of AXES) appendTrace(this[axis], trace[axis], n);
+    appendShared(this.shared, trace, n);
     // Dropping moves all columns, so it is done only for a tenth of the capacity at once.
     const over = this.t.length - this.capacity;
     if (over > this.capacity / 10) this.drop(over);
@@ -47,6 +57,7 @@ export class TraceBuffer {
   private drop(n: number): void {
     this.t.splice(0, n);
     for (const axis of AXES) dropOldest(this[axis], n);
+    dropOldest(this.shared, n);
   }
 
   /** Returns the index of the last moment not after `t`, or 0 if all moments are after `t`. */

@@ -24,7 +24,7 @@ function drawable(columns: Columns): Columns {
 export function traceOfRecording({ columns }: FaultRecording): Trace {
   const c = drawable(columns);
   const none: Column = c.t_s.map(() => null);
-  const unknown = { plate_angle_rad: none, twin_position_m: none, counter: none };
+  const unknown = { plate_angle_rad: none, twin_position_m: none, counter: none, nats: none };
   const x = {
     ...unknown,
     command_rad: c.cmd_qy_rad,
@@ -43,5 +43,5 @@ export function traceOfRecording({ columns }: FaultRecording): Trace {
     limit_m_s2: c.y_limit_m_s2,
     enabled: c.y_enabled.map(Boolean),
   };
-  return { t_s: c.t_s, x, y, stride: 1 } as unknown as Trace;
+  return { t_s: c.t_s, x, y, stuck_ball_counter: none, sensor_counter: none, stride: 1 } as unknown as Trace;
 }

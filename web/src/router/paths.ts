@@ -19,3 +19,7 @@ export const sessionsPath = (asset?: string) =>
 /** The address of a session, at the time `t_s` of the device's clock if given. */
 export const sessionPath = (id: string, t_s?: number | null) =>
   path("sessions", id) + (t_s == null ? "" : `?t=${t_s.toFixed(2)}`);
+
+/** The address of the comparison of two sessions, the second `shift` seconds later than the first. */
+export const comparePath = (a: string, b: string, shift = 0) =>
+  `/compare?a=${encodeURIComponent(a)}&b=${encodeURIComponent(b)}${shift ? `&shift=${shift}` : ""}`;

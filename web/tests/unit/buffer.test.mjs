@@ -21,8 +21,10 @@ function trace(from, n, seen = () => true) {
     limit_m_s2: t_s.map(() => 0.5),
     enabled: t_s.map(() => true),
     counter: t_s.map(() => -128),
+    nats: t_s.map(() => 0),
   };
-  return { t_s, x: axis, y: axis };
+  const counters = t_s.map(() => -128);
+  return { t_s, x: axis, y: axis, stuck_ball_counter: counters, sensor_counter: counters };
 }
 
 test("moments are appended, with residual and limits on both sides", () => {

@@ -22,9 +22,11 @@ function trace({ x, y }) {
     twin_position_m: [],
     limit_m_s2: [],
     counter: [],
+    nats: [],
     enabled: [],
   });
-  return { t_s, x: columns(x(twin), twin.x), y: columns(y(twin), twin.y) };
+  const counters = { stuck_ball_counter: [], sensor_counter: [] };
+  return { t_s, x: columns(x(twin), twin.x), y: columns(y(twin), twin.y), ...counters };
 }
 
 const times = (factor, column) => column.map((value) => factor * value);

@@ -159,6 +159,14 @@ impl Evaluator {
         Self { suspect_nats, fits_badly, ..self }
     }
 
+    /// Multiplies the limits and the evidence of each servo by a factor.
+    #[must_use]
+    pub fn with_factor(self, factor: PerAxis<f64>) -> Self {
+        let limits = PerAxis::from_fn(|axis| self.limits[axis].times(factor[axis]));
+        let suspect_nats = PerAxis::from_fn(|axis| factor[axis] * self.suspect_nats[axis]);
+        Self { limits, suspect_nats, ..self }
+    }
+
     /// The limits in force.
     #[must_use]
     pub const fn limits(&self) -> &PerAxis<Limits> {

@@ -190,6 +190,18 @@ impl Limits {
         }
     }
 
+    /// Returns the limits with those of the residual and of the path multiplied by `factor`.
+    #[must_use]
+    pub fn times(&self, factor: f64) -> Self {
+        Self {
+            floor_m_s2: factor * self.floor_m_s2,
+            share: factor * self.share,
+            errors: factor * self.errors,
+            path_m: self.path_m.map(|m| factor * m),
+            ..*self
+        }
+    }
+
     /// Acceleration from which on a ball at rest counts as asked to move, m/s².
     #[must_use]
     pub const fn pressing_m_s2(&self) -> f64 {

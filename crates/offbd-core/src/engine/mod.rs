@@ -22,6 +22,7 @@ mod pipeline;
 mod plausibility;
 mod rig;
 mod span;
+mod trial;
 mod types;
 
 #[cfg(not(feature = "std"))]
@@ -37,7 +38,10 @@ pub use motion::{UsableMotion, WANTED_MOTION_S};
 pub use plausibility::{Misfit, Plausibility};
 pub use rig::{AxisMapping, DiagnosticsSpec, MAX_NAME, Rig, ServoSpec, Setup};
 use serde::{Deserialize, Serialize};
-pub use types::{Admission, Input, MonitorState, Reach, Readiness, Rejection, State, Unjudged};
+pub use trial::Trial;
+pub use types::{
+    Admission, Input, MonitorState, Reach, Readiness, Rejection, State, Thresholds, Unjudged,
+};
 
 use align::Align;
 use clock::{ClockContext, ClockDecision, DeviceClock};
@@ -105,6 +109,13 @@ impl Engine {
             memory,
             setup,
         }
+    }
+
+    /// Tries other limits and debounce times; only for an engine that has taken no input and
+    /// is not serialised.
+    #[must_use]
+    pub fn with_trial(self, trial: &Trial) -> Self {
+        Self { pipeline: self.pipeline.with_trial(trial), ..self }
     }
 
     /// The rig, settings and twin of this engine.
@@ -297,6 +308,12 @@ impl Engine {
     #[must_use]
     pub const fn evidence(&self) -> &Evidence {
         self.pipeline.evidence()
+    }
+
+    /// The values at which the monitor of `code` decides.
+    #[must_use]
+    pub fn thresholds(&self, code: FaultCode) -> Thresholds {
+        self.pipeline.thresholds(code)
     }
 
     /// Largest deviation of the path of each axis from the twin's so far, m.

@@ -43,6 +43,11 @@ impl Monitor {
         }
     }
 
+    /// Evidence as a fraction of what makes the test fail.
+    pub(super) const fn weight(&self) -> f64 {
+        self.weight
+    }
+
     pub(super) const fn most_nats(&self) -> f64 {
         self.most_nats
     }

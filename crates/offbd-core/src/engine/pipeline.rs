@@ -15,7 +15,7 @@ use super::coverage::Coverage;
 use super::edge::Edge;
 use super::frame::{self, Moment, Repeats};
 use super::monitor::Monitor;
-use super::{MonitorState, Reach, Readiness, Rig, Setup, State};
+use super::{MonitorState, Reach, Readiness, Rig, Setup, State, Thresholds, Trial};
 use crate::diagnosis::{
     AxisEvidence, AxisPrior, DebounceTimes, Evaluator, Evidence, FaultMemory, Finding, GateOutcome,
     InUse, LONGEST_GAP_S, LearntPrior, Limits, OutlierGate, PositionJump, Profile, Qualified,
@@ -71,6 +71,9 @@ pub(super) struct Pipeline {
     n_judged: u64,
     /// Whether the next sample is on a clock that was set back.
     clock_set_back: bool,
+    /// Other debounce times than those of the settings. What has some is not serialised.
+    #[serde(skip)]
+    trial: Trial,
 }
 
 impl Pipeline {
@@ -133,7 +136,21 @@ impl Pipeline {
             monitors: Default::default(),
             n_judged: 0,
             clock_set_back: false,
+            trial: Trial::default(),
         }
+    }
+
+    /// Tries other limits and debounce times.
+    pub(super) fn with_trial(self, trial: &Trial) -> Self {
+        let factor = *trial.limit_factor();
+        let confirm_nats = PerAxis::from_fn(|axis| factor[axis] * self.confirm_nats[axis]);
+        let evaluator = self.evaluator.with_factor(factor);
+        Self { confirm_nats, evaluator, trial: *trial, ..self }
+    }
+
+    /// The settings in use for the monitor of `code`.
+    fn settings_of(&self, code: FaultCode) -> Settings {
+        self.trial.settings(code, &self.settings)
     }
 
     /// Passes one sample, in order, through all stages.
@@ -484,7 +501,7 @@ impl Pipeline {
 
     /// Whether the readings have recently jumped farther than a ball can move.
     fn jumped(&self) -> bool {
-        self.since_jump_s < self.settings.jump_lasts_s()
+        self.since_jump_s < self.settings_of(FaultCode::Sensor).jump_lasts_s()
     }
 
     fn surroundings(&self) -> Surroundings {
@@ -510,17 +527,18 @@ impl Pipeline {
     ) {
         let mut blamed = false;
         for (&code, finding) in FaultCode::ALL.iter().zip(findings) {
+            let settings = &self.settings_of(code);
             let watch = &mut self.monitors[code as usize];
             let rising = code.axis().and_then(|axis| self.servos[axis].rising_since());
             let share =
                 code.axis().map_or(1.0, |a| self.settings.confirm_nats / self.confirm_nats[a]);
             let finding = &Finding { nats: finding.nats.map(|n| share * n), ..*finding };
-            let qualified = watch.update(code, finding, moment.at, dt, &self.settings, rising);
-            let qualified = match self.settings.confirms(code, finding.kind) {
+            let qualified = watch.update(code, finding, moment.at, dt, settings, rising);
+            let qualified = match settings.confirms(code, finding.kind) {
                 true => qualified,
                 false => qualified.min(Qualified::Failed),
             };
-            watch.apply(code, qualified, &self.settings, &self.evidence, memory, transitions);
+            watch.apply(code, qualified, settings, &self.evidence, memory, transitions);
             let failed = match qualified {
                 Qualified::Tripped => true,
                 // Evidence continues to accumulate until it confirms.
@@ -583,10 +601,19 @@ impl Pipeline {
         self.now
     }
 
+    /// The values at which the monitor of `code` decides.
+    pub(super) fn thresholds(&self, code: FaultCode) -> Thresholds {
+        let (confirm, suspect) = (self.settings.confirm_nats, self.settings.suspect_nats);
+        let confirm_nats = code.axis().map(|a| self.confirm_nats[a]).filter(|n| n.is_finite());
+        let suspect_nats = confirm_nats.map(|nats| nats / confirm * suspect);
+        let times = DebounceTimes::of(code, None, false, &self.settings_of(code));
+        Thresholds { times, suspect_nats, confirm_nats }
+    }
+
     /// The result that the monitor of `code` can give so far.
     fn reach(&self, code: FaultCode) -> Reach {
         let judged_s = self.monitors[code as usize].judged_s();
-        match InUse::judges(judged_s, DebounceTimes::needed_s(code, &self.settings)) {
+        match InUse::judges(judged_s, DebounceTimes::needed_s(code, &self.settings_of(code))) {
             false => Reach::NotJudged,
             true if !self.settings.confirms(code, None) => Reach::NotLearnt,
             true => Reach::Judged,
@@ -596,7 +623,7 @@ impl Pipeline {
     /// Counts how much of this session each monitor could judge.
     pub(super) fn count_use(&self, coverage: &Coverage, memory: &mut FaultMemory) {
         for (&code, watch) in FaultCode::ALL.iter().zip(&self.monitors) {
-            let needed_s = DebounceTimes::needed_s(code, &self.settings);
+            let needed_s = DebounceTimes::needed_s(code, &self.settings_of(code));
             memory.count_use(code, coverage.data_s(code), watch.judged_s(), needed_s);
         }
     }
@@ -609,8 +636,10 @@ impl Pipeline {
     ) -> State {
         let monitors = core::array::from_fn(|i| {
             let (watch, status) = (&self.monitors[i], memory.record(FaultCode::ALL[i]).status);
+            let suspect_nats = self.thresholds(FaultCode::ALL[i]).suspect_nats;
             MonitorState {
                 counter: watch.counter(),
+                nats: suspect_nats.map_or(0.0, |nats| watch.weight() * nats),
                 readiness: Readiness {
                     enabled: watch.test() != Test::NotTested,
                     complete_this_cycle: status.completed_this_cycle(),

@@ -1,6 +1,6 @@
 //! The inputs of the engine, its decisions on them and its state.
 
-use crate::diagnosis::Evidence;
+use crate::diagnosis::{DebounceTimes, Evidence};
 use crate::plant::Fidelity;
 use crate::vocabulary::{Brief, FaultCode, PerAxis, Sample, SimTime};
 
@@ -116,12 +116,26 @@ pub enum Reach {
 pub struct MonitorState {
     /// Fault detection counter, −128 (passed) to 127 (failed).
     pub counter: i8,
+    /// Evidence against a servo as its monitor weighs it, nats: after the isolation from other
+    /// causes. Zero for the other monitors and where evidence does not decide.
+    pub nats: f64,
     pub readiness: Readiness,
     /// Time of this session for which it could judge, s.
     pub judged_s: f64,
     /// That time as a fraction of the session from its first sample to its last, 0 to 1.
     pub judged_share: f64,
     pub reach: Reach,
+}
+
+/// The values at which a monitor decides; constant during a session.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Thresholds {
+    /// The debounce times for a failure of no particular kind without a rival cause.
+    pub times: DebounceTimes,
+    /// Evidence at which the test fails, nats; `None` if evidence does not decide.
+    pub suspect_nats: Option<f64>,
+    /// Evidence that confirms a fault, nats; `None` if evidence does not decide.
+    pub confirm_nats: Option<f64>,
 }
 
 /// The state of an engine; see [`super::Engine::state`].

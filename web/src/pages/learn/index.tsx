@@ -2,6 +2,7 @@
 import { useTitle } from "../../hooks/use-title";
 import { Benchmarks } from "./benchmarks";
 import { DemoControls } from "./demo-controls";
+import { ExercisesCard } from "./exercises-card";
 import { Textbook } from "./textbook";
 
 export function LearnPage({ isDemo }: { isDemo: boolean }) {
@@ -17,6 +18,7 @@ export function LearnPage({ isDemo }: { isDemo: boolean }) {
         </p>
       )}
       <Textbook />
+      <ExercisesCard />
       <Benchmarks />
     </main>
   );

@@ -13,7 +13,8 @@ interface Props {
   session: Session;
   asset: Asset;
   faults: FaultLine[];
-  seek: (t: number) => void;
+  /** Goes to a moment of the playback, if there is one. */
+  seek?: (t: number) => void;
 }
 
 /** The verdict on the session, what it rests on, and the data of the session. */

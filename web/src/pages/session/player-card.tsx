@@ -1,9 +1,12 @@
+import type { Thresholds } from "../../api/types";
 import type { TraceBuffer } from "../../live/buffer";
-import { ALL_CHARTS } from "../../parts/charts/chart-kinds";
+import { SESSION_CHARTS } from "../../parts/charts/chart-kinds";
 import { RigCharts } from "../../parts/charts/rig-charts";
 import { SPEEDS } from "./address";
+import { MonitorCharts } from "./monitor-charts";
 import { NumberChoice } from "./number-choice";
 import { ProfileChoice, type ProfileOrRecorded } from "./profile-choice";
+import { ResidualHistograms } from "./residual-histograms";
 import type { Playback } from "./use-playback";
 import type { PlaybackCharts } from "./use-playback-charts";
 import { ZoomButtons } from "./zoom-buttons";
@@ -11,8 +14,13 @@ import { ZoomButtons } from "./zoom-buttons";
 /** Selectable time spans of the charts, s; 0 for the whole recording. */
 const SPANS = [10, 30, 60, 0];
 
+/** Height of a chart, px. */
+const HEIGHT = 136;
+
 interface Props {
   buffer: TraceBuffer;
+  /** The values at which the monitors decide. */
+  thresholds: Thresholds[];
   /** Every how many judged moments the trace of the whole has one. */
   stride: number;
   playback: Playback;
@@ -22,9 +30,11 @@ interface Props {
 }
 
 /** The charts and the controls of the playback. */
-export function PlayerCard({ buffer, stride, playback, charts, profile, setProfile }: Props) {
+export function PlayerCard(props: Props) {
+  const { buffer, thresholds, stride, playback, charts, profile, setProfile } = props;
   const { isPlaying, toggle, seek, speed, setSpeed } = playback;
   const { group, span, setSpan, slider, clock, resolution, zoomTo } = charts;
+  const chart = { group, height: HEIGHT, onSeek: seek, onZoom: zoomTo };
   const spanText = (seconds: number) => (seconds ? `${seconds} s` : "all");
   return (
     <section class="card">
@@ -56,7 +66,10 @@ export function PlayerCard({ buffer, stride, playback, charts, profile, setProfi
           <span class="if-full quiet">Every judged moment is drawn.</span>
         </p>
       )}
-      <RigCharts group={group} kinds={ALL_CHARTS} height={136} onSeek={seek} onZoom={zoomTo} />
+      <RigCharts {...chart} kinds={["residual"]} />
+      <MonitorCharts {...chart} thresholds={thresholds} />
+      <RigCharts {...chart} kinds={SESSION_CHARTS} />
+      <ResidualHistograms shown={charts.shown} />
       <p class="quiet small-text">
         Click a chart to go to that time; drag over it to zoom in, double-click to zoom out. Space plays or
         pauses, the arrow keys step by one second.

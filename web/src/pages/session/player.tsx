@@ -1,18 +1,21 @@
-import type { Asset, FaultLine, Session } from "../../api/types";
+import { useMemo, useState } from "preact/hooks";
+import { api } from "../../api/client";
+import type { Asset, Axis, FaultLine, Session, Thresholds } from "../../api/types";
+import { useQuery } from "../../hooks/use-query";
 import { AXES, type TraceBuffer } from "../../live/buffer";
-import { poseAt } from "../../live/pose";
-import { RigView } from "../../parts/rig-view/rig-view";
-import { XyTrace } from "../../parts/xy-trace/xy-trace";
-import { FoundCard } from "./found-card";
+import { faultMark } from "../../parts/charts/fault-marks";
+import { PlaybackTop } from "./playback-top";
 import { PlayerCard } from "./player-card";
 import type { ProfileOrRecorded } from "./profile-choice";
+import { remarkMarks } from "./remarks";
+import { RemarksCard } from "./remarks-card";
+import { alarmMarks, type TriedSettings } from "./trial";
+import { TrialCard } from "./trial-card";
 import { useDetail } from "./use-detail";
 import { useHotkeys } from "./use-hotkeys";
 import { usePlayback } from "./use-playback";
 import { usePlaybackCharts } from "./use-playback-charts";
-
-/** Duration of the path in the plan view, s. */
-const TAIL_S = 4;
+import { useTrial } from "./use-trial";
 
 interface Props {
   session: Session;
@@ -20,6 +23,8 @@ interface Props {
   faults: FaultLine[];
   /** Undefined while it is fetched; the player keeps its current time. */
   buffer?: TraceBuffer;
+  /** The values at which the monitors decide. */
+  thresholds: Thresholds[];
   /** Every how many judged moments the buffer has one. */
   stride: number;
   /** Most moments of a trace. */
@@ -32,47 +37,53 @@ interface Props {
 const unseenAxes = (buffer: TraceBuffer) =>
   AXES.filter((axis) => buffer[axis].position.every((value) => value === null));
 
+function UnseenNote({ axes }: { axes: Axis[] }) {
+  if (!axes.length) return null;
+  return (
+    <p class="note">
+      The recording has no position along {axes.join(" and ")}, so the ball cannot be drawn on the plate. The
+      charts show what there is.
+    </p>
+  );
+}
+
 /** The playback of a recording: drawings and charts of the same moment. */
-export function Player({ session, asset, faults, buffer, stride, points, profile, setProfile }: Props) {
+export function Player(props: Props) {
+  const { session, asset, faults, buffer, thresholds, stride, points, profile, setProfile } = props;
   const playback = usePlayback(buffer);
   const detail = useDetail(session, profile, buffer, stride, points);
-  const charts = usePlaybackCharts({ buffer, detail, faults, playback });
+  const [tried, setTried] = useState<TriedSettings>({});
+  const trial = useTrial(session.id, profile, tried);
+  const remarks = useQuery(() => api.remarks(session.id), `${session.id} remarks`);
+  const marks = useMemo(() => {
+    const tried = alarmMarks(trial.trial?.monitors ?? []);
+    return [...faults.map(faultMark), ...tried, ...remarkMarks(remarks.data ?? [])];
+  }, [faults, trial, remarks.data]);
+  const charts = usePlaybackCharts({ buffer, detail, marks, playback });
   useHotkeys(playback);
   if (!buffer?.t.length) return null;
-  const { t, seek } = playback;
-  const { drawnBuffer } = charts;
-  const unseen = unseenAxes(buffer);
   return (
     <>
-      {unseen.length > 0 && (
-        <p class="note">
-          The recording has no position along {unseen.join(" and ")}, so the ball cannot be drawn on the
-          plate. The charts show what there is.
-        </p>
-      )}
-      <div class="playback-top">
-        <RigView
-          asset={asset}
-          pose={() => poseAt(drawnBuffer() ?? buffer, t.current)}
-          name={`${session.asset}-${session.name}`}
-        />
-        <section class="card">
-          <h2>From above</h2>
-          <XyTrace
-            asset={asset}
-            moment={() => ({ buffer: drawnBuffer() ?? buffer, t: t.current, tail: TAIL_S })}
-          />
-        </section>
-        <FoundCard session={session} asset={asset} faults={faults} seek={seek} />
-      </div>
+      <UnseenNote axes={unseenAxes(buffer)} />
+      <PlaybackTop
+        session={session}
+        asset={asset}
+        faults={faults}
+        buffer={buffer}
+        playback={playback}
+        charts={charts}
+      />
       <PlayerCard
         buffer={buffer}
+        thresholds={thresholds}
         stride={stride}
         playback={playback}
         charts={charts}
         profile={profile}
         setProfile={setProfile}
       />
+      <RemarksCard session={session.id} remarks={remarks} playback={playback} zoom={charts.zoom} />
+      <TrialCard thresholds={thresholds} settings={tried} choose={setTried} state={trial} />
     </>
   );
 }

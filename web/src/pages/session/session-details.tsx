@@ -65,6 +65,7 @@ export function SessionDetails({ session, asset, faults, refetch }: Props) {
         asset={asset}
         faults={faults}
         buffer={buffer}
+        thresholds={data?.thresholds ?? []}
         profile={profile}
         stride={data?.stride ?? 1}
         points={POINTS}

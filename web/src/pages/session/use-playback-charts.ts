@@ -1,10 +1,10 @@
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
-import type { FaultLine } from "../../api/types";
 import { useAnimationFrame } from "../../hooks/use-animation-frame";
 import type { TraceBuffer } from "../../live/buffer";
 import { ChartGroup } from "../../parts/charts/chart-group";
-import { faultMark } from "../../parts/charts/fault-marks";
+import type { Mark } from "../../parts/charts/overlays";
 import { seconds } from "../../words/numbers";
+import type { Shown } from "./use-shown";
 import type { DetailLoader } from "./use-detail";
 import type { Playback } from "./use-playback";
 import { panned, visibleRange, zoomRange } from "./visible-range";
@@ -17,12 +17,21 @@ interface Options {
   buffer?: TraceBuffer;
   /** The loader of parts with every sample, if `buffer` is thinned. */
   detail?: DetailLoader;
-  faults: FaultLine[];
+  /** Moments that are marked in all charts. */
+  marks: Mark[];
   playback: Playback;
 }
 
+function showTime(t: number, slider: HTMLInputElement | null, clock: HTMLOutputElement | null): void {
+  if (slider) {
+    slider.value = String(t);
+    slider.setAttribute("aria-valuetext", seconds(t));
+  }
+  if (clock) clock.textContent = `${t.toFixed(2)} s`;
+}
+
 /** The charts, the slider and the clock of the playback, updated without rendering components. */
-export function usePlaybackCharts({ buffer, detail, faults, playback: { t } }: Options) {
+export function usePlaybackCharts({ buffer, detail, marks, playback: { t } }: Options) {
   const group = useMemo(() => new ChartGroup(), []);
   /** Time span of the charts, s; 0 for the whole recording. */
   const [span, setSpan] = useState<number>(30);
@@ -32,9 +41,9 @@ export function usePlaybackCharts({ buffer, detail, faults, playback: { t } }: O
   const clock = useRef<HTMLOutputElement>(null);
   const resolution = useRef<HTMLParagraphElement>(null);
   /** The buffer that is drawn: the whole recording, or the shown part with every sample. */
-  const drawn = useRef<{ key: string; buffer?: TraceBuffer }>({ key: "" });
+  const drawn = useRef<{ key: string } & Partial<Shown>>({ key: "" });
   const frame = useRef(0);
-  useEffect(() => group.setMarks(faults.map(faultMark)), [group, faults]);
+  useEffect(() => group.setMarks(marks), [group, marks]);
   useAnimationFrame(() => {
     if (!buffer?.t.length) return;
     const range = zoom ?? visibleRange(t.current, span, buffer.first, buffer.last);
@@ -42,13 +51,9 @@ export function usePlaybackCharts({ buffer, detail, faults, playback: { t } }: O
     const key = `${t.current.toFixed(3)} ${range.join(" ")}`;
     if ((key === drawn.current.key && source === drawn.current.buffer) || frame.current++ % CHART_EVERY)
       return;
-    drawn.current = { key, buffer: source };
+    drawn.current = { key, buffer: source, range };
     group.draw(source, range, t.current);
-    if (slider.current) {
-      slider.current.value = String(t.current);
-      slider.current.setAttribute("aria-valuetext", seconds(t.current));
-    }
-    if (clock.current) clock.current.textContent = `${t.current.toFixed(2)} s`;
+    showTime(t.current, slider.current, clock.current);
     if (resolution.current)
       resolution.current.dataset["resolution"] = detail && source === buffer ? "thinned" : "full";
   });
@@ -68,6 +73,11 @@ export function usePlaybackCharts({ buffer, detail, faults, playback: { t } }: O
     zoom,
     zoomTo: (range: [number, number] | undefined) => setZoom(range && zoomRange(range, first, last)),
     pan: (share: number) => setZoom((range) => range && panned(range, share, first, last)),
+    /** What is drawn now. */
+    shown: (): Shown | undefined => {
+      const { buffer: source, range } = drawn.current;
+      return source && range && { buffer: source, range };
+    },
     /** The buffer that is drawn now. */
     drawnBuffer: () => {
       const { buffer: shown } = drawn.current;

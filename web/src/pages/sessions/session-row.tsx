@@ -6,10 +6,20 @@ import { sessionLength } from "../../words/session";
 import { dateTime, duration } from "../../words/time";
 import { verdict } from "../../words/verdict";
 
-export function SessionRow({ session }: { session: Session }) {
+interface Props {
+  session: Session;
+  isChosen: boolean;
+  /** Chooses the session for a comparison, or no longer. */
+  toggle: () => void;
+}
+
+export function SessionRow({ session, isChosen, toggle }: Props) {
   const result = session.verdict && verdict(session.verdict);
   return (
     <tr>
+      <td>
+        <input type="checkbox" aria-label={`Compare ${session.name}`} checked={isChosen} onChange={toggle} />
+      </td>
       <th scope="row">
         <Link to={sessionPath(session.id)}>{session.name}</Link>
       </th>

@@ -4,14 +4,29 @@ import type { ChartKind } from "./chart-kinds";
 import type { LineChart } from "./line-chart";
 import type { Mark } from "./overlays";
 
+interface GroupedChart {
+  chart: LineChart;
+  kind: ChartKind;
+  axis: Axis;
+}
+
+interface Drawn {
+  buffer: TraceBuffer;
+  range: [number, number];
+  playhead: number | null;
+}
+
 /** Charts that are drawn together from one buffer, without rendering components. */
 export class ChartGroup {
-  private charts = new Map<string, { chart: LineChart; kind: ChartKind; axis: Axis }>();
+  private charts = new Map<string, GroupedChart>();
+  /** What was drawn last; a chart that is added later shows it, too. */
+  private drawn?: Drawn;
   private marks: Mark[] = [];
 
   add(key: string, chart: LineChart, kind: ChartKind, axis: Axis): void {
     this.charts.set(key, { chart, kind, axis });
     chart.setMarks(this.marksOf(kind, axis));
+    if (this.drawn) this.drawOne({ chart, kind, axis }, this.drawn);
   }
 
   remove(key: string): void {
@@ -31,17 +46,20 @@ export class ChartGroup {
 
   /** Draws the moments of `range`; `playhead` is the current time of the playback. */
   draw(buffer: TraceBuffer, range: [number, number], playhead: number | null = null): void {
+    this.drawn = { buffer, range, playhead };
+    this.charts.forEach((one) => this.drawOne(one, this.drawn!));
+  }
+
+  private drawOne({ chart, kind, axis }: GroupedChart, { buffer, range, playhead }: Drawn): void {
     const from = Math.max(buffer.index(range[0]) - 1, 0);
     const to = buffer.index(range[1]) + 2;
     const cut = <T>(column: T[]) => column.slice(from, to);
-    const t = cut(buffer.t);
-    this.charts.forEach(({ chart, kind, axis }) => {
-      const columns = buffer[axis];
-      const lines = kind.lines.map(({ column, factor }) => {
-        const values = cut(columns[column]);
-        return factor ? values.map((value) => (value === null ? null : value * factor)) : values;
-      });
-      chart.show([t, ...lines], range, kind.showsGates ? cut(columns.enabled) : [], playhead);
+    const columns = { ...buffer.shared, ...buffer[axis] };
+    const lines = kind.lines.map(({ column, factor }) => {
+      const values = cut(columns[column]);
+      return factor ? values.map((value) => (value === null ? null : value * factor)) : values;
     });
+    const gates = kind.showsGates ? cut(columns.enabled) : [];
+    chart.show([cut(buffer.t), ...lines], range, gates, playhead);
   }
 }

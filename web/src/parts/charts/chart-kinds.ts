@@ -1,7 +1,8 @@
 /** The kinds of charts of a rig, for each axis. */
 import type { Axis, PlateAngle } from "../../api/types";
-import type { NumberColumn } from "../../live/axis-columns";
+import type { NumberColumn, SharedColumn } from "../../live/axis-columns";
 import type { Line, Threshold } from "./chart-options";
+import { MONITOR_KINDS } from "./monitor-kinds";
 
 export interface ChartKind {
   title: (axis: Axis) => string;
@@ -10,7 +11,9 @@ export interface ChartKind {
   /** Smallest extent of the scale on either side of zero. */
   minExtent: number;
   /** The columns of the buffer that are drawn, each multiplied by its factor. */
-  lines: (Line & { column: NumberColumn; factor?: number })[];
+  lines: (Line & { column: NumberColumn | SharedColumn; factor?: number })[];
+  /** Whether no value is negative, so that the scale begins at zero. */
+  isPositive?: boolean;
   /** Values that are drawn as horizontal lines. */
   thresholds?: Threshold[];
   /** Indices of the upper and lower line between which the band is filled. */
@@ -84,22 +87,7 @@ const command: ChartKind = {
   about: "the commanded plate angle, and the angle of the twin's plate",
 };
 
-const counter: ChartKind = {
-  title: (axis) => `Fault detection counter, ${axis} servo`,
-  unit: "",
-  digits: 0,
-  minExtent: 127,
-  showsGates: true,
-  thresholds: [
-    { value: 127, label: "failed" },
-    { value: -128, label: "passed" },
-  ],
-  lines: [{ column: "counter", label: "counter", colour: "command", width: 2 }],
-  about:
-    "it rises with the duration and the weight of the evidence; the test fails at 127 and passes at −128",
-};
-
-export const CHART_KINDS = { acceleration, residual, counter, position, command };
+export const CHART_KINDS = { acceleration, residual, position, command, ...MONITOR_KINDS };
 
 export type ChartKindName = keyof typeof CHART_KINDS;
 
@@ -109,7 +97,10 @@ export const ALL_CHARTS: ChartKindName[] = ["residual", "counter", "acceleration
 /** The kinds that the recording of a fault has. */
 export const RECORDED_CHARTS = ALL_CHARTS.filter((name) => name !== "counter");
 
-const TWIN_POSITIONS: NumberColumn[] = ["twinPosition", "plate"];
+/** The kinds on the page of a session besides those of the chosen monitor. */
+export const SESSION_CHARTS = RECORDED_CHARTS.filter((name) => name !== "residual");
+
+const TWIN_POSITIONS: (NumberColumn | SharedColumn)[] = ["twinPosition", "plate"];
 
 /** Returns a kind without the lines of the twin's position and plate angle. */
 export const withoutTwinPositions = (kind: ChartKind): ChartKind => ({

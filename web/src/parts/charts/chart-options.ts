@@ -27,6 +27,8 @@ export interface LineChartOptions {
   thresholds?: Threshold[];
   /** Smallest extent of the scale on either side of zero. */
   minExtent?: number;
+  /** Whether no value is negative, so that the scale begins at zero. */
+  isPositive?: boolean;
   /** Charts with the same key share their cursor. */
   sync?: string;
   onSeek?: (t: number) => void;
@@ -42,8 +44,13 @@ export const textScale = () => parseFloat(getComputedStyle(document.documentElem
 const withTrueMinus = (text: string) => text.replace("-", "−");
 
 /** Returns the range of the value axis, with a margin above and below. */
-function valueRange(low: number | null, high: number | null, minExtent: number): [number, number] {
-  const bottom = Math.min(Number.isFinite(low) ? low! : 0, -minExtent);
+function valueRange(
+  low: number | null,
+  high: number | null,
+  minExtent: number,
+  isPositive: boolean,
+): [number, number] {
+  const bottom = isPositive ? 0 : Math.min(Number.isFinite(low) ? low! : 0, -minExtent);
   const top = Math.max(Number.isFinite(high) ? high! : 0, minExtent);
   const margin = Math.max((top - bottom) * 0.08, 1e-6);
   return [bottom - margin, top + margin];
@@ -78,14 +85,14 @@ function axes(digits: number): uPlot.Axis[] {
 type BuiltOptions = Omit<uPlot.Options, "width" | "height" | "hooks">;
 
 export function chartOptions(options: LineChartOptions, range: () => [number, number]): BuiltOptions {
-  const { lines, digits = 1, band, sync, minExtent = 0, onZoom } = options;
+  const { lines, digits = 1, band, sync, minExtent = 0, isPositive = false, onZoom } = options;
   return {
     series: [{ label: "t" }, ...lines.map(series)],
     ms: 1e-3,
     legend: { show: false },
     scales: {
       x: { time: false, range },
-      y: { range: (_, low, high) => valueRange(low, high, minExtent) },
+      y: { range: (_, low, high) => valueRange(low, high, minExtent, isPositive) },
     },
     axes: axes(digits),
     bands: band ? [{ series: [band[0] + 1, band[1] + 1], fill: colour("band") }] : [],

@@ -3,6 +3,7 @@ import type { Axis } from "../../api/types";
 import { useLatest } from "../../hooks/use-latest";
 import type { ChartGroup } from "./chart-group";
 import { CHART_KINDS, withoutTwinPositions, type ChartKind, type ChartKindName } from "./chart-kinds";
+import type { Threshold } from "./chart-options";
 import { ChartKey } from "./chart-key";
 import { CursorValues } from "./cursor-values";
 import { LineChart } from "./line-chart";
@@ -16,10 +17,13 @@ interface Props {
   onZoom?: (range: [number, number] | undefined) => void;
   measuredOnly?: boolean;
   minExtent?: number;
+  /** The values that decide, if they are those of the rig. */
+  thresholds?: Threshold[];
 }
 
 /** One chart of a rig; it is drawn by its group. */
-export function RigChart({ group, kind: name, axis, height, measuredOnly, minExtent, ...handlers }: Props) {
+export function RigChart(props: Props) {
+  const { group, kind: name, axis, height, measuredOnly, minExtent, thresholds, ...handlers } = props;
   const element = useRef<HTMLDivElement>(null);
   const key = useRef<HTMLSpanElement>(null);
   const latest = useLatest(handlers);
@@ -35,6 +39,7 @@ export function RigChart({ group, kind: name, axis, height, measuredOnly, minExt
       ...kind,
       height,
       minExtent: minExtent ?? kind.minExtent,
+      thresholds: thresholds ?? kind.thresholds,
       sync: "rig",
       onSeek: canSeek ? (t) => latest.current.onSeek?.(t) : undefined,
       onZoom: canZoom ? (range) => latest.current.onZoom?.(range) : undefined,
@@ -45,7 +50,7 @@ export function RigChart({ group, kind: name, axis, height, measuredOnly, minExt
       group.remove(name + axis);
       chart.destroy();
     };
-  }, [group, kind, name, axis, height, minExtent, canSeek, canZoom, latest]);
+  }, [group, kind, name, axis, height, minExtent, thresholds, canSeek, canZoom, latest]);
   const style = { height: `${height / 16}rem` };
   return (
     <figure class="chart">

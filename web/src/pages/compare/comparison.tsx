@@ -1,0 +1,58 @@
+import { useMemo, useState } from "preact/hooks";
+import type { Axis } from "../../api/types";
+import { AXES } from "../../live/buffer";
+import { SESSION_CHARTS } from "../../parts/charts/chart-kinds";
+import { FoundCard } from "../session/found-card";
+import { alignedTrace, commonRange } from "./align";
+import { ComparedCharts } from "./compared-charts";
+import { ShiftField } from "./shift-field";
+import type { Recording } from "./use-recording";
+
+const KINDS = ["residual" as const, "counter" as const, ...SESSION_CHARTS];
+
+interface Props {
+  a: Recording;
+  b: Recording;
+  shift: number;
+  setShift: (shift: number) => void;
+}
+
+/** Two recordings on one time axis, and their verdicts. */
+export function Comparison({ a, b, shift, setShift }: Props) {
+  const [axis, setAxis] = useState<Axis>("x");
+  const [zoom, setZoom] = useState<[number, number]>();
+  const whole = useMemo<[number, number]>(
+    () => commonRange(alignedTrace(a.trace, 0), alignedTrace(b.trace, shift)) ?? [0, 1],
+    [a, b, shift],
+  );
+  const chart = { range: zoom ?? whole, axis, kinds: KINDS, onZoom: setZoom };
+  return (
+    <>
+      <section class="card player">
+        <ShiftField shift={shift} set={setShift} />
+        <label class="inline">
+          Axis{" "}
+          <select value={axis} onChange={(e) => setAxis(e.currentTarget.value as Axis)}>
+            {AXES.map((name) => (
+              <option value={name}>{name}</option>
+            ))}
+          </select>
+        </label>
+        <button type="button" disabled={!zoom} onClick={() => setZoom(undefined)}>
+          Zoom out
+        </button>
+      </section>
+      <div class="compared">
+        <ComparedCharts recording={a} start={0} {...chart} />
+        <ComparedCharts recording={b} start={shift} {...chart} />
+        {[a, b].map((one) => (
+          <FoundCard session={one.session} asset={one.asset} faults={one.faults} />
+        ))}
+      </div>
+      <p class="quiet small-text">
+        Times are seconds after the start of the first session. Drag over a chart to zoom into both,
+        double-click to zoom out.
+      </p>
+    </>
+  );
+}

@@ -1,0 +1,58 @@
+import { useMemo, useState } from "preact/hooks";
+import type { Axis, FaultCode, Thresholds } from "../../api/types";
+import type { ChartGroup } from "../../parts/charts/chart-group";
+import type { ChartKindName } from "../../parts/charts/chart-kinds";
+import { RigChart } from "../../parts/charts/rig-chart";
+import { codeTitle } from "../../words/fault-names";
+import { counterLines, evidenceLines } from "./decision-lines";
+
+interface Props {
+  group: ChartGroup;
+  /** The values at which the monitors decide. */
+  thresholds: Thresholds[];
+  height: number;
+  onSeek: (t: number) => void;
+  onZoom: (range: [number, number] | undefined) => void;
+}
+
+/** Where a monitor is drawn: its counter, and the axis of its servo. */
+const DRAWN: Record<FaultCode, { counter: ChartKindName; axis?: Axis }> = {
+  x_servo: { counter: "counter", axis: "x" },
+  y_servo: { counter: "counter", axis: "y" },
+  stuck_ball: { counter: "stuckBall" },
+  sensor: { counter: "sensor" },
+};
+
+/** The evidence and the debounce counter of one monitor, against the values at which they decide. */
+export function MonitorCharts({ thresholds, ...chart }: Props) {
+  const [code, setCode] = useState<FaultCode>("x_servo");
+  const found = thresholds.find((one) => one.code === code);
+  const evidence = useMemo(() => found && evidenceLines(found), [found]);
+  const ends = useMemo(() => found && counterLines(found), [found]);
+  const { counter, axis } = DRAWN[code];
+  return (
+    <>
+      <label class="inline">
+        Monitor{" "}
+        <select value={code} onChange={(e) => setCode(e.currentTarget.value as FaultCode)}>
+          {thresholds.map((one) => (
+            <option value={one.code}>{codeTitle(one.code)}</option>
+          ))}
+        </select>
+      </label>
+      <div class="charts charts-2">
+        {axis && evidence && evidence.length > 0 && (
+          <RigChart
+            key={`evidence ${axis}`}
+            kind="evidence"
+            axis={axis}
+            thresholds={evidence}
+            minExtent={found?.confirm_nats ?? undefined}
+            {...chart}
+          />
+        )}
+        <RigChart key={code} kind={counter} axis={axis ?? "x"} thresholds={ends} {...chart} />
+      </div>
+    </>
+  );
+}

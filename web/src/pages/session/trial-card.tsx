@@ -1,0 +1,55 @@
+import type { FaultCode, Thresholds } from "../../api/types";
+import { ErrorMessage } from "../../parts/error-message";
+import { isTried, type TriedSettings, type TriedValues } from "./trial";
+import { TrialRow } from "./trial-row";
+import type { TrialState } from "./use-trial";
+
+interface Props {
+  thresholds: Thresholds[];
+  settings: TriedSettings;
+  choose: (settings: TriedSettings) => void;
+  state: TrialState;
+}
+
+/** Sliders for limits and debounce times, with the alarms that they would raise on this session. */
+export function TrialCard({ thresholds, settings, choose, state: { trial, error } }: Props) {
+  const set = (code: FaultCode, values: TriedValues) => choose({ ...settings, [code]: values });
+  const found = (code: FaultCode) => trial?.monitors.find((monitor) => monitor.thresholds.code === code);
+  return (
+    <section class="card">
+      <h2>Try other limits</h2>
+      <p class="quiet">
+        Counts the alarms that other limits and debounce times would raise on this session, judged by itself,
+        and marks them in the charts. Nothing is stored.
+      </p>
+      <div class="scroll" tabIndex={0} role="region" aria-label="Limits and debounce times">
+        <table class="trial">
+          <thead>
+            <tr>
+              <th scope="col">Monitor</th>
+              <th scope="col">Limits</th>
+              <th scope="col">Debounce</th>
+              <th scope="col">Confirmed</th>
+              <th scope="col">Test failed</th>
+            </tr>
+          </thead>
+          <tbody aria-live="polite">
+            {thresholds.map((one) => (
+              <TrialRow
+                key={one.code}
+                thresholds={one}
+                values={settings[one.code] ?? {}}
+                set={(values) => set(one.code, values)}
+                found={found(one.code)}
+              />
+            ))}
+          </tbody>
+        </table>
+      </div>
+      <ErrorMessage error={error} />
+      <button type="button" disabled={!isTried(settings)} onClick={() => choose({})}>
+        As set
+      </button>
+    </section>
+  );
+}

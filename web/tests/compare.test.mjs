@@ -1,0 +1,51 @@
+// The page that compares two sessions.
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import { ask, browser, directory, page, recordings, remove, serve } from "./support.mjs";
+
+let work, service, chromium;
+
+before(async () => {
+  work = directory();
+  chromium = await browser();
+  service = await serve(`${work}/store`);
+  const rig = recordings(work);
+  await ask(service.url, "POST", "/assets", { ...rig.learnt, name: "bench" });
+  for (const name of ["healthy", "sick"])
+    await ask(service.url, "POST", `/assets/bench/sessions/import?name=${name}`, rig[name], "text/csv");
+});
+
+after(async () => {
+  await chromium?.close();
+  await service?.stop();
+  remove(work);
+});
+
+test("two sessions of the list are compared on one time axis", async () => {
+  const view = await page(chromium);
+  await view.goto(`${service.url}/sessions`);
+  await view.getByText("Choose two sessions").waitFor();
+  await view.getByLabel("Compare healthy").check();
+  await view.getByLabel("Compare sick").check();
+  await view.getByRole("link", { name: "Compare the two chosen sessions" }).click();
+  await view.getByRole("heading", { name: "Compare sessions" }).waitFor();
+  await view.getByRole("heading", { name: "healthy" }).waitFor();
+  await view.getByRole("heading", { name: "sick" }).waitFor();
+  assert.equal(await view.getByRole("heading", { name: "Verdict" }).count(), 2);
+  assert.equal(await view.getByRole("img", { name: /^Residual along x/ }).count(), 2);
+  await view.getByLabel("The second begins later by").fill("2.5");
+  await view.waitForURL(/shift=2\.5/);
+  await view.getByLabel("Axis").selectOption("y");
+  assert.equal(await view.getByRole("img", { name: /^Residual along y/ }).count(), 2);
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});
+
+test("without two sessions the page leads to the list", async () => {
+  const view = await page(chromium);
+  await view.goto(`${service.url}/compare`);
+  await view.getByRole("link", { name: "list of sessions" }).click();
+  await view.getByRole("heading", { name: "Sessions" }).waitFor();
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});

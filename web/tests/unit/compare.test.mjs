@@ -1,0 +1,33 @@
+// Two sessions on one time axis.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { alignedMarks, alignedTrace, commonRange, readCompare } from "../../src/pages/compare/align.ts";
+import { withToggled } from "../../src/pages/sessions/with-toggled.ts";
+import { comparePath } from "../../src/router/paths.ts";
+
+test("recordings of any clock begin at the same moment, and the second may be moved", () => {
+  const [a, b] = [{ t_s: [100, 101, 103] }, { t_s: [7, 9] }];
+  assert.deepEqual(alignedTrace(a, 0).t_s, [0, 1, 3]);
+  assert.deepEqual(alignedTrace(b, -2).t_s, [-2, 0]);
+  assert.deepEqual(commonRange(alignedTrace(a, 0), alignedTrace(b, -2)), [-2, 3]);
+  assert.equal(commonRange({ t_s: [] }, { t_s: [] }), undefined);
+  assert.deepEqual(a.t_s, [100, 101, 103], "the trace itself is not changed");
+});
+
+test("a fault is marked where it is on the common axis", () => {
+  const line = { t_s: 8, code: "x_servo", axis: "x", status: "confirmed", status_byte: "2F" };
+  assert.equal(alignedMarks([line], 7, 0.5)[0].t, 1.5);
+});
+
+test("the address has both sessions and the shift", () => {
+  const read = (address) => readCompare(new URL(address, "http://host").searchParams);
+  assert.deepEqual(read(comparePath("1", "x&y", 1.5)), { a: "1", b: "x&y", shift: 1.5 });
+  assert.deepEqual(read(comparePath("1", "2")), { a: "1", b: "2", shift: 0 });
+  assert.deepEqual(read("/compare?shift=odd"), { a: undefined, b: undefined, shift: 0 });
+});
+
+test("at most two sessions are chosen", () => {
+  const chosen = ["1", "2", "3"].reduce(withToggled, []);
+  assert.deepEqual(chosen, ["2", "3"]);
+  assert.deepEqual(withToggled(chosen, "2"), ["3"]);
+});
