@@ -22,6 +22,7 @@ mod recordings;
 mod replays;
 mod series;
 mod sessions;
+mod tags;
 mod telemetry;
 mod tokens;
 mod traces;

@@ -39,6 +39,7 @@ const TABLES: [&str; 24] = [
     "communication",
     "communication_change",
     "note",
+    "tag",
 ];
 
 /// The counter that became a column of `partition`.
