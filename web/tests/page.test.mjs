@@ -94,6 +94,7 @@ test("the first load is small and requests nothing from other hosts", async () =
 /** The views, each with a text that it shows. */
 const VIEWS = () => [
   ["/", "bench"],
+  ["/?layout=wall", "bench"],
   ["/rigs/bench", "Monitors"],
   ["/rigs/bench/faults/x_servo", "Freeze frame"],
   ["/rigs/bench/faults/sensor", "Nothing is on record"],

@@ -1,4 +1,5 @@
 import type { AlarmFilter } from "../../api/alarms";
+import { TagChoice } from "../../parts/tag-choice";
 import { FaultChoice } from "./fault-choice";
 import { LastChangeChoice } from "./last-change-choice";
 
@@ -12,9 +13,12 @@ const STATES = [
 /** The filter of the list. */
 export function AlarmTools({
   filter,
+  tags,
   change,
 }: {
   filter: AlarmFilter;
+  /** The tags in use. */
+  tags: string[];
   change: (filter: AlarmFilter) => void;
 }) {
   return (
@@ -38,6 +42,11 @@ export function AlarmTools({
           onChange={(e) => change({ ...filter, asset: e.currentTarget.value.trim() || undefined })}
         />
       </label>
+      <TagChoice
+        tags={tags}
+        chosen={filter.tag ?? ""}
+        change={(tag) => change({ ...filter, tag: tag || undefined })}
+      />
       <label class="check">
         <input
           type="checkbox"

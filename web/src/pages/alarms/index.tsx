@@ -1,6 +1,7 @@
 /** The alarms of the fleet: what fails now, what is on record, and what to do. */
 import { useState } from "preact/hooks";
 import { alarmApi, type AlarmFilter } from "../../api/alarms";
+import { tagApi } from "../../api/tags";
 import { useNow } from "../../hooks/use-now";
 import { useQuery } from "../../hooks/use-query";
 import { useTitle } from "../../hooks/use-title";
@@ -20,6 +21,7 @@ export function AlarmsPage() {
   const { alarms, error, refetch, loadMore } = useAlarms(filter);
   const { chosen, choose, open, refused, acknowledge } = useAcknowledge(alarms ?? [], refetch);
   const advice = useQuery(alarmApi.advice, "advice");
+  const tags = useQuery(tagApi.inUse, "tags");
   const now = useNow();
   return (
     <main>
@@ -32,7 +34,7 @@ export function AlarmsPage() {
           </ActionButton>
         </div>
       </header>
-      <AlarmTools filter={filter} change={setFilter} />
+      <AlarmTools filter={filter} tags={tags.data ?? []} change={setFilter} />
       <ErrorMessage error={error} retry={refetch} />
       {refused.length > 0 && (
         <p class="trouble" role="alert">

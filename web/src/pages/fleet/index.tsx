@@ -6,6 +6,7 @@ import { EmptyFleet } from "./empty-fleet";
 import { EventFeed } from "./event-feed";
 import { FleetList } from "./fleet-list";
 import { FleetTools } from "./fleet-tools";
+import { FleetWall } from "./wall";
 import { useFleet } from "./use-fleet";
 import { useFleetView } from "./use-fleet-view";
 
@@ -20,10 +21,14 @@ export function FleetPage() {
       <h1>Fleet</h1>
       <ErrorMessage error={error} />
       <FleetTools view={view} />
-      <div class="fleet-columns">
-        <FleetList view={view} seenAt={seenAt} />
-        <EventFeed lines={lines} />
-      </div>
+      {view.layout === "wall" ? (
+        <FleetWall rows={view.shown} />
+      ) : (
+        <div class="fleet-columns">
+          <FleetList view={view} seenAt={seenAt} />
+          <EventFeed lines={lines} />
+        </div>
+      )}
     </main>
   );
 }
