@@ -52,6 +52,29 @@ test("tags are set on the rig's page and select rigs, alarms and sessions", asyn
   await view.done();
 });
 
+test("a view is saved, opened, renamed and deleted, and is there after a reload", async () => {
+  const view = await page(chromium);
+  await view.goto(`${service.url}/alarms?tag=hall-1&state=all`);
+  assert.equal(await view.getByLabel("State").inputValue(), "all");
+  await view.getByRole("button", { name: "Views" }).click();
+  await view.getByLabel("Name of the present view").fill("first hall");
+  await view.getByRole("button", { name: "Save" }).click();
+  await view.getByRole("button", { name: "first hall", exact: true }).waitFor();
+  await view.goto(`${service.url}/alarms`);
+  await view.getByRole("button", { name: "Views" }).click();
+  await view.getByRole("button", { name: "Rename first hall" }).click();
+  await view.getByLabel("New name of first hall").fill("hall one");
+  await view.getByRole("button", { name: "Rename" }).click();
+  await view.getByRole("button", { name: "hall one", exact: true }).click();
+  await view.getByText("No alarm").waitFor();
+  assert.match(view.url(), /alarms\?.*tag=hall-1/);
+  await view.getByRole("button", { name: "Views" }).click();
+  await view.getByRole("button", { name: "Delete hall one" }).click();
+  await view.getByText("None yet").waitFor();
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});
+
 test("a wall screen shows a tile for each rig, the worst group first", async () => {
   const view = await page(chromium);
   await view.goto(`${service.url}/?layout=wall`);

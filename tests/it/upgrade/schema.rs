@@ -14,7 +14,7 @@ pub const JOURNAL: usize = 6;
 const CHECKSUMS: usize = 10;
 
 /// All tables, those first to which others refer.
-const TABLES: [&str; 24] = [
+const TABLES: [&str; 25] = [
     "asset",
     "session",
     "chunk",

@@ -1,6 +1,7 @@
 /** The page of all rigs: health, faults and lag. */
 import { useTitle } from "../../hooks/use-title";
 import { ErrorMessage } from "../../parts/error-message";
+import { SavedViews } from "../../parts/saved-views/saved-views";
 import { UnloadedPage } from "../../parts/unloaded-page";
 import { EmptyFleet } from "./empty-fleet";
 import { EventFeed } from "./event-feed";
@@ -18,7 +19,12 @@ export function FleetPage() {
   if (!fleet.length) return <EmptyFleet error={error} />;
   return (
     <main class="fleet">
-      <h1>Fleet</h1>
+      <header class="page-head">
+        <h1>Fleet</h1>
+        <div class="page-tools">
+          <SavedViews page="/" />
+        </div>
+      </header>
       <ErrorMessage error={error} />
       <FleetTools view={view} />
       {view.layout === "wall" ? (
