@@ -100,6 +100,8 @@ const VIEWS = () => [
   ["/rigs/bench/faults/sensor", "Nothing is on record"],
   ["/sessions", "monday"],
   [`/sessions/${session.id}`, "Judge it again"],
+  [`/sessions/${session.id}/report`, "Calibration and certificate"],
+  ["/rigs/bench/faults/x_servo/report", "Calibration and certificate"],
   ["/alarms", "What to do"],
   ["/notifications", "nobody is told of anything"],
   ["/set-up", "Units that the device sends"],

@@ -22,6 +22,11 @@ function withQuery(path: string, values: Record<string, string | undefined>): st
 /** The address of the fleet, or of its rigs with a tag. */
 export const fleetPath = (values: { tag?: string } = {}) => withQuery("/", values);
 
+/** The addresses of the reports to print. */
+export const sessionReportPath = (id: string) => path("sessions", id, "report");
+export const faultReportPath = (name: string, code: FaultCode) =>
+  path("rigs", name, "faults", code, "report");
+
 /** The address of all sessions, or of those of one rig or of the rigs with a tag. */
 export const sessionsPath = (asset?: string, tag?: string) => withQuery("/sessions", { asset, tag });
 
