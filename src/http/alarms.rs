@@ -28,6 +28,8 @@ pub(super) struct AlarmsQuery {
     #[param(value_type = Option<AlarmCodeWord>)]
     code: Option<String>,
     acknowledged: Option<bool>,
+    /// Only alarms of assets with this tag.
+    tag: Option<String>,
     /// Only alarms whose last change was at this time or later, RFC 3339.
     #[param(format = DateTime)]
     from: Option<String>,
@@ -57,12 +59,13 @@ pub(super) async fn list(
     State(service): State<Service>,
     Query(query): Query<AlarmsQuery>,
 ) -> Result<Json<Page<AlarmView>>, Problem> {
-    let AlarmsQuery { state, asset, code, acknowledged, from, to, cursor, limit } = query;
+    let AlarmsQuery { state, asset, code, acknowledged, tag, from, to, cursor, limit } = query;
     let query = AlarmQuery {
         state: query_word("?state", state.as_deref())?,
         asset,
         code: query_word("?code", code.as_deref())?,
         acknowledged,
+        tag,
         from: moment("?from", from.as_deref())?,
         to: moment("?to", to.as_deref())?,
         cursor,

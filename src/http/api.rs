@@ -8,7 +8,7 @@ use super::routes::GuardedRouter;
 use super::{
     Api, alarms, assets, calibrations, cluster, drive_cycles, events, faults, fleet, learning,
     login, metrics, notifications, operations, remarks, replays, series, sessions, sovd, stream,
-    telemetry, tokens, traces, trials,
+    tags, telemetry, tokens, traces, trials,
 };
 use crate::service::access::Right::{
     Administer, Authenticated, ControlSessions, Operate, Public, Read, ReadAsset, SendTelemetry,
@@ -38,6 +38,9 @@ fn with_assets(router: GuardedRouter) -> GuardedRouter {
         .routes(Read, routes!(assets::trends))
         .routes(Read, routes!(series::series))
         .routes(Read, routes!(series::annotations))
+        .routes(Read, routes!(tags::list))
+        .routes(ReadAsset, routes!(tags::get))
+        .routes(Operate, routes!(tags::put))
         .routes(ReadAsset, routes!(drive_cycles::get))
         .routes(Read, routes!(fleet::get))
         .routes(Read, routes!(cluster::get))

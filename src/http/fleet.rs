@@ -33,6 +33,8 @@ pub(super) struct FleetListQuery {
     has_fault: Option<bool>,
     /// Only assets with, or without, an open session.
     has_session: Option<bool>,
+    /// Only assets with this tag.
+    tag: Option<String>,
     /// `next` of the previous page.
     cursor: Option<String>,
     /// Items per page, 1 to 500; 50 by default.
@@ -53,8 +55,8 @@ pub(super) async fn get(
     Extension(forwarder): Extension<Forwarder>,
     headers: HeaderMap,
 ) -> Result<Json<FleetView>, Problem> {
-    let FleetListQuery { name, has_fault, has_session, cursor, limit } = query;
-    let query = FleetQuery { name, has_fault, has_session, cursor };
+    let FleetListQuery { name, has_fault, has_session, tag, cursor, limit } = query;
+    let query = FleetQuery { name, has_fault, has_session, tag, cursor };
     let page = service.fleet(query, page_limit(limit)).await?;
     let mut fleet = FleetView { items: page.items, next: page.next, missing_nodes: Vec::new() };
     if service.is_node() && !is_forwarded(&service, &headers) {

@@ -43,6 +43,7 @@ mod session_format;
 mod sessions;
 mod sovd;
 mod stream;
+mod tags;
 mod telemetry;
 mod tokens;
 #[cfg(feature = "otel")]

@@ -56,6 +56,8 @@ pub(super) struct SessionsQuery {
     /// Only ended sessions in which a fault was, or was not, confirmed.
     #[param(value_type = Option<VerdictFilter>)]
     verdict: Option<String>,
+    /// Only sessions of assets with this tag.
+    tag: Option<String>,
     /// `-opened_at` (the newest first) by default.
     #[param(value_type = Option<SessionSort>)]
     sort: Option<String>,
@@ -87,6 +89,7 @@ impl SessionsQuery {
             opened_from,
             opened_to,
             verdict: query_word("?verdict", self.verdict.as_deref())?,
+            tag: self.tag,
             sort: query_word("?sort", self.sort.as_deref())?,
             cursor: self.cursor,
         })

@@ -48,6 +48,7 @@
 //! - `notifications`: tells people of changes of faults.
 //! - `communication`: finds rigs whose data stay away.
 //! - `mutes`: the monitors that a person has muted.
+//! - `tags`: what is permitted as a tag of a rig.
 //! - `upkeep`: deletion in parts, retention, the watchdog of ingest.
 //! - `simulation`, a test: the whole service without threads, with devices and faults.
 //! - [`access`]: roles and rights, tokens, JSON Web Tokens, audit entries.
@@ -75,6 +76,7 @@ mod requests;
 mod simulation;
 mod snapshots;
 mod start;
+mod tags;
 mod upkeep;
 mod views;
 mod writing;

@@ -223,6 +223,7 @@ impl Store {
     pub async fn communications(
         &self,
         asset: Option<&str>,
+        tag: Option<&str>,
         lost_only: bool,
     ) -> Result<Vec<CommunicationRow>, StoreError> {
         let mut query = QueryBuilder::new(
@@ -232,6 +233,7 @@ impl Store {
         if let Some(asset) = asset {
             query.push(" AND asset = ").bind(asset)?;
         }
+        query.push_tagged("asset", tag)?;
         if lost_only {
             query.push(" AND lost = 1");
         }

@@ -44,6 +44,7 @@ mod recording;
 mod remark;
 mod rows;
 mod snapshot;
+mod tag;
 mod tail;
 mod write;
 mod writer_lock;
@@ -78,6 +79,7 @@ pub use rows::{
     SessionProgress, SessionRow, TransitionRow, TrendEntry, TrendRow, WarningRow,
 };
 pub use snapshot::Snapshot;
+pub use tag::TagsByAsset;
 pub use tail::{FULL_CHUNK_SAMPLES, MAX_TAIL_CHUNKS};
 pub use write::{ChangeSet, NodeIdentity, NodeRow, Write, Writer};
 #[cfg(test)]

@@ -23,6 +23,8 @@ pub struct SessionFilter {
     pub opened_to: Option<Micros>,
     /// Ended, with or without a confirmed fault.
     pub found_fault: Option<bool>,
+    /// A tag of the asset.
+    pub tag: Option<String>,
     /// Oldest first instead of newest first.
     pub is_ascending: bool,
     /// Opening time and id of the last session of the previous page.
@@ -40,6 +42,8 @@ pub struct AssetFilter {
     pub has_fault: Option<bool>,
     /// Whether a session is open.
     pub has_session: Option<bool>,
+    /// A tag of the asset.
+    pub tag: Option<String>,
 }
 
 /// The order of a list of faults.
@@ -61,6 +65,8 @@ pub struct FaultFilter {
     pub asset: Option<String>,
     pub code: Option<&'static str>,
     pub acknowledged: Option<bool>,
+    /// A tag of the asset.
+    pub tag: Option<String>,
     pub order: FaultOrder,
     /// Time of the last change, asset and code of the last fault of the previous page.
     pub after: Option<(Micros, String, String)>,
@@ -109,6 +115,7 @@ impl Store {
         let mut query = QueryBuilder::new("SELECT * FROM asset WHERE deleted_at IS NULL");
         query.push(" AND name > ").bind(filter.after.clone())?;
         push_name(&mut query, filter.name.as_deref())?;
+        query.push_tagged("name", filter.tag.as_deref())?;
         for (wanted, related) in [
             (
                 filter.has_fault,
@@ -244,6 +251,7 @@ impl Store {
             None => {}
         }
         push_name(&mut query, filter.name.as_deref())?;
+        query.push_tagged("asset", filter.tag.as_deref())?;
         if let Some(from) = filter.opened_from {
             query.push(" AND opened_at >= ").bind(from)?;
         }
@@ -558,6 +566,7 @@ impl Store {
         if let Some(acknowledged) = filter.acknowledged {
             query.push(" AND acknowledged = ").bind(i64::from(acknowledged))?;
         }
+        query.push_tagged("asset", filter.tag.as_deref())?;
         push_page(&mut query, filter)?;
         query.push(" LIMIT ").bind(i64::from(limit))?;
         Ok(query.rows().fetch_all(&self.pool).await?)

@@ -36,7 +36,7 @@ use super::{
     AccessWrite, ActionRow, AlarmWrite, AssetRow, CalibrationRow, CommunicationChange, EVENTS,
     FaultRow, Location, MIGRATIONS, Micros, NotificationWrite, PartitionId, Partitions,
     RemarkWrite, ReplayRow, SessionProgress, SessionRow, Snapshot, StoreError, TransitionRow,
-    TrendRow, alarm, snapshot,
+    TrendRow, alarm, snapshot, tag,
 };
 use offbd_core::vocabulary::Sample;
 
@@ -128,6 +128,11 @@ pub enum Write {
     Published {
         bus: &'static str,
         event: i64,
+    },
+    /// Replaces the tags of an asset.
+    PutTags {
+        asset: String,
+        tags: Vec<String>,
     },
     Access(AccessWrite),
     Alarm(AlarmWrite),
@@ -568,6 +573,7 @@ impl GroupCommit<'_> {
             Write::PutCalibration(row) => put_calibration(db, row).await,
             Write::ActivateCalibration { asset, id } => activate(db, asset, id).await,
             Write::PutLearning { asset, document } => put_learning(db, asset, document).await,
+            Write::PutTags { asset, tags } => tag::put(db, asset, tags).await,
             Write::Published { bus, event } => published(db, bus, *event).await,
             Write::Access(write) => write.apply(db).await,
             Write::Alarm(write) => write.apply(db).await,

@@ -34,6 +34,7 @@ pub mod session_csv;
 pub mod session_file;
 pub mod sovd;
 pub mod stored;
+pub mod tag;
 pub mod telemetry;
 pub mod trace;
 pub mod trend;

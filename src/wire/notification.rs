@@ -162,6 +162,10 @@ pub struct NewRuleView {
     #[serde(default = "any")]
     #[schema(min_length = 1, max_length = 200)]
     pub asset: String,
+    /// Only assets with this tag; null or absent for all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(min_length = 1, max_length = 50)]
+    pub tag: Option<String>,
     /// The codes; all if empty.
     #[serde(default)]
     pub codes: Vec<AlarmCodeWord>,

@@ -187,6 +187,10 @@ pub struct FleetEntryView {
     /// Mutes in force: these monitors count as not tested.
     #[serde(default)]
     pub muted: Vec<MuteView>,
+    /// Its tags, in alphabetical order.
+    #[serde(default)]
+    #[schema(required)]
+    pub tags: Vec<String>,
     /// Time at which the last data arrived, RFC 3339, if the data of the rig stay away although
     /// its session is open; null otherwise.
     #[serde(default)]

@@ -48,6 +48,7 @@ mod small;
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 mod soak;
 mod support;
+mod tags;
 #[cfg(feature = "otel")]
 mod traces;
 mod trends;

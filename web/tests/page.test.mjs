@@ -94,12 +94,15 @@ test("the first load is small and requests nothing from other hosts", async () =
 /** The views, each with a text that it shows. */
 const VIEWS = () => [
   ["/", "bench"],
+  ["/?layout=wall", "bench"],
   ["/rigs/bench", "Monitors"],
   ["/rigs/bench/faults/x_servo", "Freeze frame"],
   ["/rigs/bench/faults/sensor", "Nothing is on record"],
   ["/sessions", "monday"],
   [`/sessions/${session.id}`, "Judge it again"],
   [`/compare?a=${session.id}&b=${session.id}`, "Compare sessions"],
+  [`/sessions/${session.id}/report`, "Calibration and certificate"],
+  ["/rigs/bench/faults/x_servo/report", "Calibration and certificate"],
   ["/alarms", "What to do"],
   ["/notifications", "nobody is told of anything"],
   ["/set-up", "Units that the device sends"],

@@ -1,5 +1,7 @@
 //! Turns events into deliveries.
 
+use std::collections::BTreeSet;
+
 use serde_json::Value;
 use uuid::Uuid;
 
@@ -9,7 +11,8 @@ use crate::service::clock::rfc3339;
 use crate::service::writing;
 use crate::service::{NotificationSettings, ServiceError, views};
 use crate::store::{
-    ChannelRow, DeliveryRow, Micros, NotificationWrite, PlannedEventRow, ReminderRow, Write,
+    ChannelRow, DeliveryRow, Micros, NotificationWrite, PlannedEventRow, ReminderRow, TagsByAsset,
+    Write,
 };
 use crate::wire::advice;
 use crate::wire::notification::{NotificationDataView, NotificationView};
@@ -56,11 +59,25 @@ impl<T: NotificationTransport> Context<T> {
                 // Other nodes mute monitors too.
                 self.mutes.load(store.mutes(self.handles.clock.now()).await?);
             }
-            self.handles.write_as_leader(self.planned(channel, &rules, events)).await?;
+            let tags = self.tags(&rules, &events).await?;
+            self.handles.write_as_leader(self.planned(channel, &rules, &tags, events)).await?;
             if is_last {
                 return Ok(());
             }
         }
+    }
+
+    /// Returns the tags of the assets of `events`; none if no rule asks for a tag.
+    async fn tags(
+        &self,
+        rules: &[&ActiveRule],
+        events: &[PlannedEventRow],
+    ) -> Result<TagsByAsset, ServiceError> {
+        if rules.iter().all(|rule| rule.rule.tag.is_none()) {
+            return Ok(TagsByAsset::new());
+        }
+        let assets: BTreeSet<&str> = events.iter().map(|event| event.asset.as_str()).collect();
+        Ok(self.handles.store.tags_of(assets).await?)
     }
 
     /// Returns the deliveries and reminders of events, with the new position of the channel.
@@ -68,6 +85,7 @@ impl<T: NotificationTransport> Context<T> {
         &self,
         channel: &ChannelRow,
         rules: &[&ActiveRule],
+        tags: &TagsByAsset,
         events: Vec<PlannedEventRow>,
     ) -> Vec<Write> {
         let now = self.handles.clock.now();
@@ -76,8 +94,8 @@ impl<T: NotificationTransport> Context<T> {
         for row in events {
             let Ok(document) = serde_json::from_str::<Value>(&row.document) else { continue };
             let Some(event) = AlarmEvent::of(&document) else { continue };
-            let concerned = rules.iter().filter(|rule| rule.concerns(&row.asset, event.code));
-            let concerned: Vec<_> = concerned.collect();
+            let is_concerned = |rule: &&&ActiveRule| rule.concerns(&row.asset, event.code, tags);
+            let concerned: Vec<_> = rules.iter().filter(is_concerned).collect();
             let is_muted = self.mutes.of(&row.asset, event.code, now).is_some();
             let told: Vec<_> = concerned.iter().filter(|rule| rule.tells(event.change)).collect();
             let message = || message(&self.settings, &row, event);

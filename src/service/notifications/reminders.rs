@@ -40,7 +40,8 @@ impl<T: NotificationTransport> Context<T> {
         let code: Option<AlarmCodeWord> = row.code.parse().ok();
         let wanted = found.and_then(|(rule, channel)| Some((rule, channel, rule.repeat()?, code?)));
         let Some((rule, channel, repeat, code)) = wanted else { return Ok(vec![end(row)]) };
-        if !rule.concerns(&row.asset, code) || !self.is_open(&row.asset, code).await? {
+        let tags = self.handles.store.tags_of([row.asset.as_str()]).await?;
+        if !rule.concerns(&row.asset, code, &tags) || !self.is_open(&row.asset, code).await? {
             return Ok(vec![end(row)]);
         }
         let later = |due_at| ReminderRow { due_at, ..row.clone() };
@@ -65,7 +66,7 @@ impl<T: NotificationTransport> Context<T> {
     async fn is_open(&self, asset: &str, code: AlarmCodeWord) -> Result<bool, ServiceError> {
         let store = &self.handles.store;
         let Some(fault) = code.fault_code() else {
-            let lost = store.communications(Some(asset), true).await?;
+            let lost = store.communications(Some(asset), None, true).await?;
             return Ok(lost.first().is_some_and(|row| row.acknowledged_at.is_none()));
         };
         let Some(row) = store.fault(asset, fault.as_str()).await? else { return Ok(false) };

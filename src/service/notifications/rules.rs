@@ -4,7 +4,7 @@ use serde_json::Value;
 use wildmatch::WildMatch;
 
 use crate::service::clock::parse_timestamp;
-use crate::store::Micros;
+use crate::store::{Micros, TagsByAsset};
 use crate::wire::notification::NewRuleView;
 use crate::wire::words::{AlarmChangeWord, AlarmCodeWord, KindWord, StatusWord};
 use offbd_core::diagnosis::StatusByte;
@@ -33,12 +33,17 @@ impl ActiveRule {
         Self { id, rule, silent_until, pattern }
     }
 
-    /// Returns whether the rule is for `code` of `asset`.
-    pub(super) fn concerns(&self, asset: &str, code: AlarmCodeWord) -> bool {
+    /// Returns whether the rule is for `code` of `asset`, whose tags are among `tags`.
+    pub(super) fn concerns(&self, asset: &str, code: AlarmCodeWord, tags: &TagsByAsset) -> bool {
         let codes = &self.rule.codes;
         self.rule.enabled
             && self.pattern.matches(asset)
+            && self.takes_tags(tags.get(asset).map_or(&[], Vec::as_slice))
             && (codes.is_empty() || codes.contains(&code))
+    }
+
+    fn takes_tags(&self, tags: &[String]) -> bool {
+        self.rule.tag.as_ref().is_none_or(|wanted| tags.contains(wanted))
     }
 
     /// Returns whether the rule tells of such a change.
@@ -86,6 +91,8 @@ impl AlarmEvent {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
     use super::*;
     use serde_json::json;
 
@@ -97,12 +104,28 @@ mod tests {
 
     #[test]
     fn a_rule_is_for_the_assets_and_codes_that_it_names() {
+        let none = TagsByAsset::new();
         let rule = rule(json!({ "asset": "lab?-*", "codes": ["sensor"] }));
-        assert!(rule.concerns("lab1-03", AlarmCodeWord::Sensor));
-        assert!(!rule.concerns("lab1-03", AlarmCodeWord::XServo));
-        assert!(!rule.concerns("lab-03", AlarmCodeWord::Sensor));
-        assert!(!self::rule(json!({ "enabled": false })).concerns("a", AlarmCodeWord::Sensor));
-        assert!(self::rule(json!({})).concerns("a", AlarmCodeWord::CommunicationLost));
+        assert!(rule.concerns("lab1-03", AlarmCodeWord::Sensor, &none));
+        assert!(!rule.concerns("lab1-03", AlarmCodeWord::XServo, &none));
+        assert!(!rule.concerns("lab-03", AlarmCodeWord::Sensor, &none));
+        assert!(!self::rule(json!({ "enabled": false })).concerns(
+            "a",
+            AlarmCodeWord::Sensor,
+            &none
+        ));
+        assert!(self::rule(json!({})).concerns("a", AlarmCodeWord::CommunicationLost, &none));
+    }
+
+    #[test]
+    fn a_rule_with_a_tag_is_for_the_assets_that_have_it() {
+        let rule = rule(json!({ "tag": "hall-2" }));
+        let tags = BTreeMap::from([
+            ("a".to_owned(), vec!["hall-1".to_owned(), "hall-2".to_owned()]),
+            ("b".to_owned(), vec!["hall-20".to_owned()]),
+        ]);
+        let concerns = |asset| rule.concerns(asset, AlarmCodeWord::Sensor, &tags);
+        assert_eq!([concerns("a"), concerns("b"), concerns("c")], [true, false, false]);
     }
 
     #[test]

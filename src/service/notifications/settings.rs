@@ -4,8 +4,8 @@
 use data_encoding::BASE64;
 
 use super::TargetPolicy;
-use crate::service::ServiceError;
 use crate::service::clock::parse_timestamp;
+use crate::service::{ServiceError, tags};
 use crate::wire::notification::{
     EmailView, NewChannelView, NewEmailView, NewRuleView, NewWebhookView, StoredChannel,
     StoredEmail,
@@ -182,6 +182,9 @@ pub(in crate::service) fn email_view(stored: StoredEmail) -> EmailView {
 pub(in crate::service) fn check_rule(rule: &NewRuleView) -> Result<(), Invalid> {
     text("/name", &rule.name, MAX_NAME)?;
     text("/asset", &rule.asset, MAX_PATTERN)?;
+    if let Some(tag) = &rule.tag {
+        tags::check("/tag", tag)?;
+    }
     if rule.changes.is_empty() {
         return Err(Invalid::new("/changes", "must have at least one change"));
     }

@@ -38,6 +38,8 @@ pub struct AlarmQuery {
     pub asset: Option<String>,
     pub code: Option<AlarmCodeWord>,
     pub acknowledged: Option<bool>,
+    /// A tag of the asset.
+    pub tag: Option<String>,
     /// Range of the last change.
     pub from: Option<Micros>,
     pub to: Option<Micros>,
@@ -107,6 +109,7 @@ impl Service {
         let order = FaultOrder::Newest;
         let mut filter = FaultFilter {
             asset: query.asset.clone(),
+            tag: query.tag.clone(),
             code,
             order,
             after,
@@ -144,7 +147,8 @@ impl Service {
         query: &AlarmQuery,
         after: Option<&AlarmKey>,
     ) -> Result<Vec<(AlarmKey, AlarmView)>, ServiceError> {
-        let rows = self.inner.handles.store.communications(query.asset.as_deref(), false).await?;
+        let (asset, tag) = (query.asset.as_deref(), query.tag.as_deref());
+        let rows = self.inner.handles.store.communications(asset, tag, false).await?;
         let code = AlarmCodeWord::CommunicationLost;
         let alarms = rows.into_iter().map(|row| {
             let key = (row.changed_at, row.asset.clone(), code.to_string());
@@ -258,7 +262,7 @@ impl Service {
             return self.acknowledge(asset, fault.as_str(), actor).await.map(drop);
         }
         self.asset(asset).await?;
-        let lost = self.inner.handles.store.communications(Some(asset), true).await?;
+        let lost = self.inner.handles.store.communications(Some(asset), None, true).await?;
         if lost.is_empty() {
             let (asset, code) = (asset.to_owned(), code.to_string());
             return Err(ServiceError::NothingToAcknowledge { asset, code });

@@ -64,6 +64,7 @@ impl Service {
             acknowledged: query.acknowledged,
             order: query.sort.map(order).unwrap_or_default(),
             after: query.cursor.as_deref().map(views::cursor).transpose()?,
+            ..FaultFilter::default()
         };
         let rows = self.inner.handles.store.faults(&filter, limit + 1).await?;
         let key =

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::service::asset::LearningRecord;
 use crate::service::clock::rfc3339;
 use crate::service::{Service, ServiceError, views};
-use crate::store::{AssetFilter, AssetRow, FaultRow, Micros, SessionRow, WarningRow};
+use crate::store::{AssetFilter, AssetRow, FaultRow, Micros, SessionRow, TagsByAsset, WarningRow};
 use crate::wire::asset::AssetView;
 use crate::wire::service::{FleetEntryView, FleetFaultView, Page, unjudged_view};
 use crate::wire::stored::{StoredProvenance, StoredRecord};
@@ -23,6 +23,8 @@ pub struct FleetQuery {
     pub has_fault: Option<bool>,
     /// Whether a session is open.
     pub has_session: Option<bool>,
+    /// A tag of the asset.
+    pub tag: Option<String>,
     pub cursor: Option<String>,
 }
 
@@ -34,6 +36,7 @@ struct FleetData {
     warnings: BTreeMap<String, Vec<SessionWarnings>>,
     learning: BTreeMap<String, LearningRecord>,
     lost: BTreeMap<String, Micros>,
+    tags: TagsByAsset,
 }
 
 /// The drift warnings of an axis in a session, and the calibration that they refer to.
@@ -52,10 +55,10 @@ impl Service {
         query: FleetQuery,
         limit: u32,
     ) -> Result<Page<FleetEntryView>, ServiceError> {
-        let FleetQuery { name, has_fault, has_session, cursor } = query;
+        let FleetQuery { name, has_fault, has_session, tag, cursor } = query;
         let after = cursor.as_deref().map(views::cursor::<String>).transpose()?;
         let after = after.unwrap_or_default();
-        let filter = AssetFilter { after, name, has_fault, has_session };
+        let filter = AssetFilter { after, name, has_fault, has_session, tag };
         let rows = self.inner.handles.store.assets(&filter, limit + 1).await?;
         let mut known = match (rows.first(), rows.last()) {
             (Some(first), Some(last)) => self.known(&first.name, &last.name).await?,
@@ -88,6 +91,7 @@ impl Service {
             faults,
             warnings,
             learning,
+            tags: store.tags_between(first, last).await?,
             lost: store.lost_communications_of(first, last).await?.into_iter().collect(),
         })
     }
@@ -107,6 +111,7 @@ impl Service {
             warnings: warned.into_iter().flat_map(|warned| warned.warnings).collect(),
             faults: known.faults.remove(&row.name).unwrap_or_default(),
             muted: self.mutes_of(&row.name),
+            tags: known.tags.remove(&row.name).unwrap_or_default(),
             communication_lost_since: known.lost.remove(&row.name).map(rfc3339),
             calibrated: file.calibration.is_some(),
             learning: learning.state(file.calibration.is_some()),

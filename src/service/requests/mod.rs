@@ -23,6 +23,7 @@ mod remarks;
 mod replays;
 mod series;
 mod sessions;
+mod tags;
 mod telemetry;
 mod tokens;
 mod traces;

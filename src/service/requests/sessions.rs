@@ -20,6 +20,8 @@ pub struct SessionListQuery {
     /// Opened before this time, microseconds since 1970.
     pub opened_to: Option<i64>,
     pub verdict: Option<VerdictFilter>,
+    /// A tag of the asset.
+    pub tag: Option<String>,
     /// `-opened_at` by default.
     pub sort: Option<SessionSort>,
     pub cursor: Option<String>,
@@ -134,6 +136,7 @@ impl Service {
             opened_from: query.opened_from,
             opened_to: query.opened_to,
             found_fault: query.verdict.map(|verdict| verdict == VerdictFilter::Fault),
+            tag: query.tag,
             is_ascending: query.sort == Some(SessionSort::Oldest),
             after: query.cursor.as_deref().map(views::cursor::<(i64, String)>).transpose()?,
         };

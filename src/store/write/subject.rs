@@ -35,6 +35,7 @@ impl Write {
                 format!("the active calibration of asset `{asset}`")
             }
             Self::PutLearning { asset, .. } => format!("the learning record of asset `{asset}`"),
+            Self::PutTags { asset, .. } => format!("the tags of asset `{asset}`"),
             Self::Alarm(_) => "a change of mutes or notes".to_owned(),
             Self::Notification(_) => "a change of notifications".to_owned(),
             Self::Remark(write) => format!("a remark on session {}", write.session()),

@@ -14,7 +14,7 @@ pub const JOURNAL: usize = 6;
 const CHECKSUMS: usize = 10;
 
 /// All tables, those first to which others refer.
-const TABLES: [&str; 25] = [
+const TABLES: [&str; 26] = [
     "asset",
     "session",
     "chunk",
@@ -40,6 +40,7 @@ const TABLES: [&str; 25] = [
     "communication_change",
     "note",
     "remark",
+    "tag",
 ];
 
 /// The counter that became a column of `partition`.

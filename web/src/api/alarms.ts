@@ -20,6 +20,7 @@ export type Rule = Schemas["Rule"];
 export interface AlarmFilter {
   state?: string;
   asset?: string;
+  tag?: string;
   code?: string;
   acknowledged?: boolean;
   from?: string;

@@ -69,8 +69,13 @@ export const api = {
     ),
   clear: (name: string, code: FaultCode) =>
     send<void>("DELETE", `/assets/${segment(name)}/faults/${segment(code)}${query({ by: actor() })}`),
-  sessions: (values: { asset?: string; state?: SessionState; cursor?: string | null; limit?: number }) =>
-    get<Page<Session>>(`/sessions${query(values)}`),
+  sessions: (values: {
+    asset?: string;
+    tag?: string;
+    state?: SessionState;
+    cursor?: string | null;
+    limit?: number;
+  }) => get<Page<Session>>(`/sessions${query(values)}`),
   session: (session: string) => get<Session>(`/sessions/${segment(session)}`),
   sessionFaults: (session: string) => getAll<FaultLine>(`/sessions/${segment(session)}/faults`, {}, 2000),
   endSession: (session: string) => send<Session>("POST", `/sessions/${segment(session)}/end`),

@@ -23,6 +23,7 @@ export type FaultFilter = NonNullable<
   NonNullable<operations["list_asset_faults"]["parameters"]["query"]>["status"]
 >;
 
+export type TagUse = Schemas["TagUse"];
 export type Asset = Schemas["Asset"];
 export type AssetAxes = Schemas["Axes"];
 export type AxisCalibration = Schemas["AxisCalibration"];

@@ -15,19 +15,26 @@ const AlarmsPage = lazy(() => import("../pages/alarms").then((module) => module.
 const NotificationsPage = lazy(() =>
   import("../pages/notifications").then((module) => module.NotificationsPage),
 );
+const SessionReport = lazy(() =>
+  import("../pages/report/session-report").then((module) => module.SessionReport),
+);
+const FaultReport = lazy(() => import("../pages/report/fault-report").then((module) => module.FaultReport));
 const LearnPage = lazy(() => import("../pages/learn").then((module) => module.LearnPage));
 
 /** The view at the path of `segments`; `isDemo` selects the controls of the demo. */
 export function Route({ segments, isDemo }: { segments: string[]; isDemo: boolean }) {
-  const [first, name, second, code] = segments;
+  const [first, name, second, code, fifth] = segments;
   if (!first) return <FleetPage />;
   if (first === "rigs" && name) {
     if (!second) return <AssetPage name={name} />;
     // The service answers 404 for an unknown code.
+    if (second === "faults" && code && fifth === "report")
+      return <FaultReport key={name + code} name={name} code={code as FaultCode} />;
     if (second === "faults" && code) return <FaultPage name={name} code={code as FaultCode} />;
     if (second === "set-up") return <SetUpPage key={name} name={name} />;
   }
   if (first === "set-up") return <SetUpPage />;
+  if (first === "sessions" && name && second === "report") return <SessionReport key={name} id={name} />;
   if (first === "sessions" && name) return <SessionPage key={name} id={name} />;
   if (first === "sessions") return <SessionsPage />;
   if (first === "compare") return <ComparePage />;

@@ -12,9 +12,23 @@ export const faultPath = (name: string, code: FaultCode) => path("rigs", name, "
 export const setUpPath = (name: string, step?: SetUpStep) =>
   path("rigs", name, "set-up") + (step ? `?step=${step}` : "");
 
-/** The address of all sessions, or of those of one rig. */
-export const sessionsPath = (asset?: string) =>
-  asset ? `/sessions?asset=${encodeURIComponent(asset)}` : "/sessions";
+/** `path` with those of the values that are not empty as its query. */
+function withQuery(path: string, values: Record<string, string | undefined>): string {
+  const given = Object.entries(values).filter(([, value]) => value);
+  const parts = given.map(([key, value]) => `${key}=${encodeURIComponent(value!)}`);
+  return parts.length ? `${path}?${parts.join("&")}` : path;
+}
+
+/** The address of the fleet, or of its rigs with a tag. */
+export const fleetPath = (values: { tag?: string } = {}) => withQuery("/", values);
+
+/** The addresses of the reports to print. */
+export const sessionReportPath = (id: string) => path("sessions", id, "report");
+export const faultReportPath = (name: string, code: FaultCode) =>
+  path("rigs", name, "faults", code, "report");
+
+/** The address of all sessions, or of those of one rig or of the rigs with a tag. */
+export const sessionsPath = (asset?: string, tag?: string) => withQuery("/sessions", { asset, tag });
 
 /** The address of a session, at the time `t_s` of the device's clock if given. */
 export const sessionPath = (id: string, t_s?: number | null) =>

@@ -2,6 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { afterEvent, healthOf, withLine } from "../../src/pages/fleet/fleet-state.ts";
+import { groupsByTag, tagged, tagsOf } from "../../src/pages/fleet/tags.ts";
 import { chosenRows, countRows, nameRanks, rowOf } from "../../src/pages/fleet/rows.ts";
 
 const NOW = Date.parse("2026-01-01T12:00:00Z");
@@ -10,6 +11,7 @@ const ago = (seconds) => new Date(NOW - seconds * 1000).toISOString();
 const rig = (asset, more = {}) => ({
   asset,
   faults: [],
+  tags: [],
   warnings: [],
   session_id: "1",
   session: "run",
@@ -133,4 +135,31 @@ test("every word of a search must occur in the name, session or faults", () => {
 test("a filter selects and counts the rigs of one health", () => {
   assert.deepEqual(names("fault", "", "name"), ["lab"]);
   assert.deepEqual([countRows(rows, "all"), countRows(rows, "ok"), countRows(rows, "drift")], [4, 2, 0]);
+});
+
+test("a tag selects its rigs, and the group with the worst rig is the first", () => {
+  const rigs = [
+    rig("well", { tags: ["hall-1", "spare"] }),
+    rig("plain"),
+    rig("sick", { tags: ["hall-2"], faults: [fault("confirmed")] }),
+  ];
+  assert.deepEqual(tagsOf(rigs), ["hall-1", "hall-2", "spare"]);
+  assert.deepEqual(
+    tagged(rigs, "spare").map(({ asset }) => asset),
+    ["well"],
+  );
+  assert.equal(tagged(rigs, "").length, 3);
+  assert.equal(tagged(rigs, "hall").length, 0, "only whole tags");
+  const rows = rigs.map((entry) => rowOf(entry, nameRanks(rigs.map(({ asset }) => asset))));
+  const groups = groupsByTag(chosenRows(rows, "all", "", "severity"));
+  assert.deepEqual(
+    groups.map((group) => [group.tag, ...group.rows.map(({ entry }) => entry.asset)]),
+    [
+      ["hall-2", "sick"],
+      [undefined, "plain"],
+      ["hall-1", "well"],
+      ["spare", "well"],
+    ],
+  );
+  assert.equal(chosenRows(rows, "all", "hall-2", "severity").length, 1, "the search finds tags");
 });

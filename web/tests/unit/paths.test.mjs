@@ -2,7 +2,15 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { query } from "../../src/api/request.ts";
-import { faultPath, path, rigPath, sessionPath, sessionsPath, setUpPath } from "../../src/router/paths.ts";
+import {
+  faultPath,
+  fleetPath,
+  path,
+  rigPath,
+  sessionPath,
+  sessionsPath,
+  setUpPath,
+} from "../../src/router/paths.ts";
 
 test("paths lead to the views", () => {
   assert.equal(rigPath("bench-1"), "/rigs/bench-1");
@@ -12,6 +20,10 @@ test("paths lead to the views", () => {
   assert.equal(sessionsPath(), "/sessions");
   assert.equal(sessionsPath(""), "/sessions");
   assert.equal(sessionsPath("a b"), "/sessions?asset=a%20b");
+  assert.equal(sessionsPath("", "ü"), "/sessions?tag=%C3%BC");
+  assert.equal(sessionsPath("a", "b"), "/sessions?asset=a&tag=b");
+  assert.equal(fleetPath(), "/");
+  assert.equal(fleetPath({ tag: "hall-2" }), "/?tag=hall-2");
 });
 
 test("a session is opened at a time, including 0", () => {

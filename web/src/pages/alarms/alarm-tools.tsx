@@ -1,4 +1,8 @@
 import type { AlarmFilter } from "../../api/alarms";
+import { tagApi } from "../../api/tags";
+import { useQuery } from "../../hooks/use-query";
+import { TagChoice } from "../../parts/tag-choice";
+import type { AlarmKey } from "./alarm-filter";
 import { FaultChoice } from "./fault-choice";
 import { LastChangeChoice } from "./last-change-choice";
 
@@ -9,40 +13,43 @@ const STATES = [
   ["all", "All, healed ones too"],
 ] as const;
 
-/** The filter of the list. */
-export function AlarmTools({
-  filter,
-  change,
-}: {
+interface Props {
   filter: AlarmFilter;
-  change: (filter: AlarmFilter) => void;
-}) {
+  /** The range of the last change, hours back; empty for any time. */
+  hours: string;
+  change: (key: AlarmKey, value: string) => void;
+}
+
+/** The filter of the list. */
+export function AlarmTools({ filter, hours, change }: Props) {
+  const { data: tags } = useQuery(tagApi.inUse, "tags");
   return (
     <div class="form-row">
       <label>
         State
-        <select value={filter.state} onChange={(e) => change({ ...filter, state: e.currentTarget.value })}>
+        <select value={filter.state} onChange={(e) => change("state", e.currentTarget.value)}>
           {STATES.map(([value, word]) => (
             <option value={value}>{word}</option>
           ))}
         </select>
       </label>
-      <FaultChoice code={filter.code} change={(code) => change({ ...filter, code })} />
-      <LastChangeChoice change={(from) => change({ ...filter, from })} />
+      <FaultChoice code={filter.code} change={(code) => change("code", code ?? "")} />
+      <LastChangeChoice hours={hours} change={(hours) => change("hours", hours)} />
       <label>
         Rig
         <input
           type="search"
           placeholder="whole name"
           value={filter.asset ?? ""}
-          onChange={(e) => change({ ...filter, asset: e.currentTarget.value.trim() || undefined })}
+          onChange={(e) => change("asset", e.currentTarget.value.trim())}
         />
       </label>
+      <TagChoice tags={tags ?? []} chosen={filter.tag ?? ""} change={(tag) => change("tag", tag)} />
       <label class="check">
         <input
           type="checkbox"
           checked={filter.acknowledged === false}
-          onChange={(e) => change({ ...filter, acknowledged: e.currentTarget.checked ? false : undefined })}
+          onChange={(e) => change("acknowledged", e.currentTarget.checked ? "false" : "")}
         />
         Nobody has acknowledged
       </label>

@@ -1,6 +1,5 @@
 /** The alarms of the fleet: what fails now, what is on record, and what to do. */
-import { useState } from "preact/hooks";
-import { alarmApi, type AlarmFilter } from "../../api/alarms";
+import { alarmApi } from "../../api/alarms";
 import { useNow } from "../../hooks/use-now";
 import { useQuery } from "../../hooks/use-query";
 import { useTitle } from "../../hooks/use-title";
@@ -8,15 +7,17 @@ import { ActionButton } from "../../parts/action-button";
 import { EmptyState } from "../../parts/empty-state";
 import { ErrorMessage } from "../../parts/error-message";
 import { Loading } from "../../parts/loading";
+import { SavedViews } from "../../parts/saved-views/saved-views";
 import { Link } from "../../router/link";
 import { AlarmTable } from "./alarm-table";
 import { AlarmTools } from "./alarm-tools";
 import { useAcknowledge } from "./use-acknowledge";
+import { useAlarmFilter } from "./use-alarm-filter";
 import { useAlarms } from "./use-alarms";
 
 export function AlarmsPage() {
   useTitle("Alarms");
-  const [filter, setFilter] = useState<AlarmFilter>({ state: "active" });
+  const { filter, hours, change } = useAlarmFilter();
   const { alarms, error, refetch, loadMore } = useAlarms(filter);
   const { chosen, choose, open, refused, acknowledge } = useAcknowledge(alarms ?? [], refetch);
   const advice = useQuery(alarmApi.advice, "advice");
@@ -26,13 +27,14 @@ export function AlarmsPage() {
       <header class="page-head">
         <h1>Alarms</h1>
         <div class="page-tools">
+          <SavedViews page="/alarms" />
           <Link to="/notifications">Who is told</Link>
           <ActionButton class="primary" disabled={!open} action={acknowledge}>
             Acknowledge {open || ""}
           </ActionButton>
         </div>
       </header>
-      <AlarmTools filter={filter} change={setFilter} />
+      <AlarmTools filter={filter} hours={hours} change={change} />
       <ErrorMessage error={error} retry={refetch} />
       {refused.length > 0 && (
         <p class="trouble" role="alert">

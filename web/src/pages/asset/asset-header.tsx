@@ -4,6 +4,7 @@ import { HealthMark } from "../../parts/health-mark";
 import { Link } from "../../router/link";
 import { sessionsPath, setUpPath } from "../../router/paths";
 import type { RigHealth } from "../../words/severity";
+import { RigTags } from "./rig-tags";
 
 interface Props {
   name: string;
@@ -22,6 +23,7 @@ export function AssetHeader({ name, health, session }: Props) {
         <h1>
           {name} <HealthMark health={health} />
         </h1>
+        <RigTags asset={name} />
       </div>
       <div class="page-tools">
         <Link class="button" to={sessionsPath(name)}>

@@ -1,7 +1,7 @@
 import type { FaultEntry } from "../../api/types";
 import { StatusChip } from "../../parts/status-chip";
 import { Link } from "../../router/link";
-import { rigPath } from "../../router/paths";
+import { faultReportPath, rigPath } from "../../router/paths";
 import { faultTitle } from "../../words/fault-names";
 import { stateOf } from "../../words/fault-state";
 import { FaultActions } from "./fault-actions";
@@ -18,6 +18,7 @@ export function FaultHeader({ fault, refetch }: { fault: FaultEntry; refetch: ()
         <h1>
           {faultTitle(code, kind)} <StatusChip fault={stateOf(fault)} hasSession={fault.monitor != null} />
         </h1>
+        <Link to={faultReportPath(asset, code)}>Report to print</Link>
       </div>
       {isActive(fault) && <FaultActions fault={fault} refetch={refetch} />}
     </header>

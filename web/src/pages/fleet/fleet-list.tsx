@@ -5,7 +5,7 @@ import { FleetRow } from "./fleet-row";
 import type { FleetView } from "./use-fleet-view";
 import { useRowHeight } from "./use-row-height";
 
-export function FleetList({ view: { rows, shown }, seenAt }: { view: FleetView; seenAt: number }) {
+export function FleetList({ view: { total, shown }, seenAt }: { view: FleetView; seenAt: number }) {
   const rowHeight = useRowHeight();
   return (
     <section aria-label="Rigs">
@@ -29,7 +29,7 @@ export function FleetList({ view: { rows, shown }, seenAt }: { view: FleetView; 
         <p class="quiet">
           No rig matches.{" "}
           <button type="button" class="link" onClick={() => navigate("/", true)}>
-            Show all {count(rows.length)}
+            Show all {count(total)}
           </button>
         </p>
       )}

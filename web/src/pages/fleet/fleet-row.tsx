@@ -79,6 +79,7 @@ export function FleetRow({ row: { entry, health }, seenAt }: { row: Row; seenAt:
             {word}
           </span>
         )}
+        {entry.tags.length > 0 && <span class="quiet small-text"> {entry.tags.join(", ")}</span>}
       </span>
       <HealthMark health={health} />
       <Findings entry={entry} />

@@ -1,3 +1,4 @@
+import { TagChoice } from "../../parts/tag-choice";
 import { count } from "../../words/numbers";
 import { countRows, SORTS, type HealthFilter } from "./rows";
 import type { FleetView } from "./use-fleet-view";
@@ -17,8 +18,9 @@ const FILTERS: { key: HealthFilter; word: string }[] = [
 
 const SEARCH = "Search rigs, faults, sessions";
 
-/** Filters, search and order of the list of rigs. */
-export function FleetTools({ view: { rows, filter, search, sort, change } }: { view: FleetView }) {
+/** Filters, search, order and layout of the rigs. */
+export function FleetTools({ view }: { view: FleetView }) {
+  const { rows, filter, search, sort, tag, tags, layout, change } = view;
   return (
     <div class="tools">
       <div class="chips" role="group" aria-label="Show">
@@ -40,6 +42,7 @@ export function FleetTools({ view: { rows, filter, search, sort, change } }: { v
         value={search}
         onInput={(e) => change("search", e.currentTarget.value)}
       />
+      <TagChoice tags={tags} chosen={tag} change={(chosen) => change("tag", chosen)} />
       <label class="inline">
         Sort{" "}
         <select value={sort} onChange={(e) => change("sort", e.currentTarget.value)}>
@@ -48,6 +51,9 @@ export function FleetTools({ view: { rows, filter, search, sort, change } }: { v
           ))}
         </select>
       </label>
+      <button type="button" onClick={() => change("layout", layout === "wall" ? "" : "wall")}>
+        {layout === "wall" ? "Show as a list" : "Show for a wall screen"}
+      </button>
     </div>
   );
 }

@@ -1,11 +1,13 @@
 /** The page of all rigs: health, faults and lag. */
 import { useTitle } from "../../hooks/use-title";
 import { ErrorMessage } from "../../parts/error-message";
+import { SavedViews } from "../../parts/saved-views/saved-views";
 import { UnloadedPage } from "../../parts/unloaded-page";
 import { EmptyFleet } from "./empty-fleet";
 import { EventFeed } from "./event-feed";
 import { FleetList } from "./fleet-list";
 import { FleetTools } from "./fleet-tools";
+import { FleetWall } from "./wall";
 import { useFleet } from "./use-fleet";
 import { useFleetView } from "./use-fleet-view";
 
@@ -17,13 +19,22 @@ export function FleetPage() {
   if (!fleet.length) return <EmptyFleet error={error} />;
   return (
     <main class="fleet">
-      <h1>Fleet</h1>
+      <header class="page-head">
+        <h1>Fleet</h1>
+        <div class="page-tools">
+          <SavedViews page="/" />
+        </div>
+      </header>
       <ErrorMessage error={error} />
       <FleetTools view={view} />
-      <div class="fleet-columns">
-        <FleetList view={view} seenAt={seenAt} />
-        <EventFeed lines={lines} />
-      </div>
+      {view.layout === "wall" ? (
+        <FleetWall rows={view.shown} />
+      ) : (
+        <div class="fleet-columns">
+          <FleetList view={view} seenAt={seenAt} />
+          <EventFeed lines={lines} />
+        </div>
+      )}
     </main>
   );
 }

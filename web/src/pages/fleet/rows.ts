@@ -39,9 +39,10 @@ export const rowOf = (entry: FleetEntry, ranks: Map<string, number>): FleetRow =
 });
 
 /** Whether the entry contains every word of `text`. */
-function matches({ asset, session, faults, warnings }: FleetEntry, text: string): boolean {
+function matches({ asset, tags, session, faults, warnings }: FleetEntry, text: string): boolean {
   const words = [
     asset,
+    ...tags,
     session ?? "",
     ...faults.flatMap(({ code, kind }) => [code, codeTitle(code), kind ?? ""]),
     ...warnings.flatMap(({ code, parameter }) => [code, codeTitle(code), parameter]),

@@ -4,6 +4,8 @@ import type { AlarmChange, AlarmCode, NewRule } from "../../api/alarms";
 export interface RuleDraft {
   name: string;
   asset: string;
+  /** Only rigs with this tag; empty for all. */
+  tag: string;
   channel: string;
   codes: AlarmCode[];
   changes: AlarmChange[];
@@ -15,6 +17,7 @@ export interface RuleDraft {
 export const firstDraft = (channel: string): RuleDraft => ({
   name: "",
   asset: "*",
+  tag: "",
   channel,
   codes: [],
   changes: ["confirmed", "passed"],
@@ -22,6 +25,6 @@ export const firstDraft = (channel: string): RuleDraft => ({
 });
 
 /** The rule that the form describes. */
-export function ruleOf({ repeat, ...settings }: RuleDraft): NewRule {
-  return { ...settings, repeat_s: repeat || null, enabled: true };
+export function ruleOf({ repeat, tag, ...settings }: RuleDraft): NewRule {
+  return { ...settings, tag: tag.trim() || null, repeat_s: repeat || null, enabled: true };
 }

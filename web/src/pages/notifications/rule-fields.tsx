@@ -16,7 +16,7 @@ interface Props {
   change: (part: Partial<RuleDraft>) => void;
 }
 
-/** Name, rigs, channel and reminders of a rule. */
+/** Name, rigs, tag, channel and reminders of a rule. */
 export function RuleFields({ draft, channels, change }: Props) {
   return (
     <div class="form-row">
@@ -30,6 +30,15 @@ export function RuleFields({ draft, channels, change }: Props) {
           value={draft.asset}
           maxLength={200}
           onInput={(e) => change({ asset: e.currentTarget.value })}
+        />
+      </label>
+      <label>
+        With the tag
+        <input
+          value={draft.tag}
+          maxLength={50}
+          placeholder="any"
+          onInput={(e) => change({ tag: e.currentTarget.value })}
         />
       </label>
       <Choice

@@ -8,8 +8,8 @@ const SILENCE_H = 8;
 
 /** The settings of a rule: every one, so that a change of one keeps the others. */
 function settingsOf(rule: Rule): { [Key in keyof Required<NewRule>]: NewRule[Key] } {
-  const { name, asset, channel, codes, changes, enabled, repeat_s, silent_until } = rule;
-  return { name, asset, channel, codes, changes, enabled, repeat_s, silent_until };
+  const { name, asset, tag, channel, codes, changes, enabled, repeat_s, silent_until } = rule;
+  return { name, asset, tag, channel, codes, changes, enabled, repeat_s, silent_until };
 }
 
 interface Props {
@@ -37,7 +37,10 @@ export function RuleRow({ rule, mayChange, refetch }: Props) {
         {!rule.enabled && <span class="quiet"> (off)</span>}
         {isSilent && <p class="quiet small-text">silent until {dateTime(rule.silent_until)}</p>}
       </th>
-      <td data-word="rigs">{rule.asset}</td>
+      <td data-word="rigs">
+        {rule.asset}
+        {rule.tag && <span class="quiet"> with {rule.tag}</span>}
+      </td>
       <td>
         {codes}: {(rule.changes ?? []).map((word) => CHANGES[word]).join("; ")}
       </td>

@@ -6,7 +6,7 @@ import { ConfirmButton } from "../../parts/confirm-button";
 import { useRefusal } from "../../parts/login/rights";
 import { saveFile } from "../../parts/save-file";
 import { Link } from "../../router/link";
-import { rigPath, sessionsPath } from "../../router/paths";
+import { rigPath, sessionReportPath, sessionsPath } from "../../router/paths";
 import { DeleteDialog } from "./delete-dialog";
 
 export function SessionHeader({ session, refetch }: { session: Session; refetch: () => Promise<void> }) {
@@ -25,6 +25,9 @@ export function SessionHeader({ session, refetch }: { session: Session; refetch:
           <h1>{name}</h1>
         </div>
         <div class="page-tools">
+          <Link class="button" to={sessionReportPath(id)}>
+            Report
+          </Link>
           <ActionButton action={download}>Download CSV</ActionButton>
           {state === "open" ? (
             <ConfirmButton word="End session" question="End this session?" action={end} needs="operator">

@@ -10,8 +10,8 @@ import { lazy, Suspense } from "../../parts/lazy";
 import { Loading } from "../../parts/loading";
 import { useLocation } from "../../router/navigation";
 import { DropZone } from "./drop-zone";
-import { RigChoice } from "./rig-choice";
 import { SessionTable } from "./session-table";
+import { SessionTools } from "./session-tools";
 import { useSessions } from "./use-sessions";
 
 /** Loaded when a file is chosen, as it contains the CSV parser. */
@@ -21,8 +21,9 @@ const fetchNames = () => api.fleet().then((fleet) => fleet.map((entry) => entry.
 
 export function SessionsPage() {
   useTitle("Sessions");
-  const asset = useLocation().query.get("asset") ?? "";
-  const { sessions, error, refetch, loadMore } = useSessions(asset);
+  const { query } = useLocation();
+  const [asset, tag] = [query.get("asset") ?? "", query.get("tag") ?? ""];
+  const { sessions, error, refetch, loadMore } = useSessions(asset, tag);
   const { data: known } = useQuery(fetchNames, "names");
   const names = known ?? [];
   const isUnknown = asset !== "" && known !== undefined && !known.includes(asset);
@@ -33,7 +34,7 @@ export function SessionsPage() {
       <header class="page-head">
         <h1>Sessions</h1>
         <div class="page-tools">
-          <RigChoice names={names} chosen={asset} />
+          <SessionTools names={names} asset={asset} tag={tag} />
         </div>
       </header>
       <DropZone take={setFile} />

@@ -7,26 +7,30 @@ import { useQuery } from "../../hooks/use-query";
 const PAGE = 100;
 const INTERVAL_MS = 5000;
 
-/** Sessions after the first page, of one rig or of all. */
+/** Sessions after the first page, of one selection. */
 interface FurtherPages {
-  asset: string;
+  key: string;
   items: Session[];
   next?: string | null;
 }
 
-/** The sessions of one rig or of all: the first page is polled, `loadMore` fetches the next one. */
-export function useSessions(asset: string) {
-  const fetchFirst = () => api.sessions({ asset, limit: PAGE });
-  const { data: first, error, refetch } = useQuery(fetchFirst, `sessions ${asset}`, INTERVAL_MS);
+/**
+ * The sessions of one rig, of the rigs with a tag, or of all: the first page is polled, `loadMore` fetches the
+ * next one.
+ */
+export function useSessions(asset: string, tag: string) {
+  const key = `sessions ${asset} ${tag}`;
+  const fetchFirst = () => api.sessions({ asset, tag, limit: PAGE });
+  const { data: first, error, refetch } = useQuery(fetchFirst, key, INTERVAL_MS);
   const [loaded, setLoaded] = useState<FurtherPages>();
-  const rest = loaded?.asset === asset ? loaded : undefined;
+  const rest = loaded?.key === key ? loaded : undefined;
   // New sessions push sessions of the first page to the further pages.
   const known = new Set(first?.items.map((session) => session.id));
   const others = (rest?.items ?? []).filter((session) => !known.has(session.id));
   const next = rest ? rest.next : first?.next;
   const loadMore = async () => {
-    const page = await api.sessions({ asset, limit: PAGE, cursor: next });
-    setLoaded({ asset, items: [...(rest?.items ?? []), ...page.items], next: page.next });
+    const page = await api.sessions({ asset, tag, limit: PAGE, cursor: next });
+    setLoaded({ key, items: [...(rest?.items ?? []), ...page.items], next: page.next });
   };
   return {
     sessions: first && [...first.items, ...others],

@@ -1,0 +1,18 @@
+import { useMemo } from "preact/hooks";
+import { navigate, useLocation } from "../../router/navigation";
+import { alarmFilter, type AlarmKey } from "./alarm-filter";
+
+/** The filter in the address, and its change. */
+export function useAlarmFilter() {
+  const { query } = useLocation();
+  const text = query.toString();
+  // The same filter as long as the address is the same, so that further pages belong to it.
+  const filter = useMemo(() => alarmFilter(new URLSearchParams(text), Date.now()), [text]);
+  const change = (key: AlarmKey, value: string) => {
+    const next = new URLSearchParams(text);
+    if (value) next.set(key, value);
+    else next.delete(key);
+    navigate(`/alarms${next.size ? `?${next}` : ""}`, true);
+  };
+  return { filter, hours: query.get("hours") ?? "", change };
+}

@@ -1,0 +1,58 @@
+import { useState } from "preact/hooks";
+import { tagApi } from "../../api/tags";
+import { useQuery } from "../../hooks/use-query";
+import { ActionButton } from "../../parts/action-button";
+import { Dialog } from "../../parts/dialog";
+import { Link } from "../../router/link";
+import { fleetPath } from "../../router/paths";
+import { tagsIn } from "../../words/tags";
+
+/** The tags of a rig, each with the way to the rigs that have it. */
+export function RigTags({ asset }: { asset: string }) {
+  const { data: tags, refetch } = useQuery(() => tagApi.of(asset), `${asset} tags`);
+  const [isOpen, setOpen] = useState(false);
+  if (!tags) return null;
+  return (
+    <div class="chips">
+      {tags.map((tag) => (
+        <Link class="chip" to={fleetPath({ tag })}>
+          {tag}
+        </Link>
+      ))}
+      <button type="button" class="small" onClick={() => setOpen(true)}>
+        {tags.length ? "Change tags" : "Add tags"}
+      </button>
+      {isOpen && <TagsDialog asset={asset} tags={tags} changed={refetch} close={() => setOpen(false)} />}
+    </div>
+  );
+}
+
+interface DialogProps {
+  asset: string;
+  tags: string[];
+  changed: () => Promise<unknown>;
+  close: () => void;
+}
+
+function TagsDialog({ asset, tags, changed, close }: DialogProps) {
+  const [text, setText] = useState(tags.join(" "));
+  const save = async () => {
+    await tagApi.put(asset, tagsIn(text));
+    await changed();
+    close();
+  };
+  return (
+    <Dialog title={`Tags of ${asset}`} close={close}>
+      <label>
+        Words with blanks between them
+        <input value={text} onInput={(e) => setText(e.currentTarget.value)} />
+      </label>
+      <p class="quiet">At most 20 words of letters, digits, “-”, “_” and “.”, such as a room or a line.</p>
+      <div class="form-end">
+        <ActionButton class="primary" action={save} needs="operator">
+          Keep
+        </ActionButton>
+      </div>
+    </Dialog>
+  );
+}

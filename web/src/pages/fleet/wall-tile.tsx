@@ -1,0 +1,26 @@
+import { HealthMark } from "../../parts/health-mark";
+import { Link } from "../../router/link";
+import { rigPath } from "../../router/paths";
+import { faultTitle } from "../../words/fault-names";
+import { severity } from "../../words/severity";
+import { sinceText } from "../../words/time";
+import type { FleetRow } from "./rows";
+
+/** The worst finding of a rig in a few words. */
+function worstFinding({ entry }: FleetRow): string {
+  if (entry.communication_lost_since) return `no data since ${sinceText(entry.communication_lost_since)}`;
+  const [worst] = [...entry.faults].sort((a, b) => severity(b) - severity(a));
+  if (!worst) return entry.unjudged?.reason ?? entry.session ?? "";
+  const since = worst.failing && worst.failed_at ? ` since ${sinceText(worst.failed_at)}` : "";
+  return faultTitle(worst.code, worst.kind) + since;
+}
+
+export function WallTile({ row }: { row: FleetRow }) {
+  return (
+    <Link to={rigPath(row.entry.asset)} class={`tile tile-${row.health}`}>
+      <b class="clip">{row.entry.asset}</b>
+      <HealthMark health={row.health} />
+      <span class="clip">{worstFinding(row)}</span>
+    </Link>
+  );
+}

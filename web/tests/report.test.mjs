@@ -1,0 +1,55 @@
+// The reports of a session and of a fault, to print.
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import { ask, browser, directory, page, recordings, remove, serve } from "./support.mjs";
+
+let work, service, chromium, session;
+
+before(async () => {
+  work = directory();
+  chromium = await browser();
+  service = await serve(work);
+  const { learnt, sick } = recordings(work);
+  await ask(service.url, "POST", "/assets", { ...learnt, name: "bench" });
+  const made = await ask(service.url, "POST", "/assets/bench/sessions/import?name=monday", sick, "text/csv");
+  session = made.session.id;
+});
+
+after(async () => {
+  await chromium?.close();
+  await service?.stop();
+  remove(work);
+});
+
+/** The number of pages on paper. */
+async function pages(view) {
+  const paper = (await view.pdf({ preferCSSPageSize: true })).toString("latin1");
+  return paper.match(/\/Type\s*\/Page\b/g).length;
+}
+
+for (const [what, address, link] of [
+  ["session", () => `/sessions/${session}`, "Report"],
+  ["fault", () => "/rigs/bench/faults/x_servo", "Report to print"],
+])
+  test(`the report of a ${what} is one or two pages with verdict, picture and certificate`, async () => {
+    const view = await page(chromium);
+    await view.goto(service.url + address());
+    await view.getByRole("link", { name: link, exact: true }).click();
+    await view.waitForURL(/report$/);
+    await view
+      .getByText(/X servo/)
+      .first()
+      .waitFor();
+    await view.getByRole("heading", { name: "Calibration and certificate" }).waitFor();
+    await view.locator(".report canvas").first().waitFor();
+    await view
+      .locator(".report-foot")
+      .getByText(/offbd \d+\.\d+/)
+      .waitFor();
+    const n = await pages(view);
+    assert.ok(n >= 1 && n <= 2, `${n} pages`);
+    await view.emulateMedia({ media: "print" });
+    assert.equal(await view.getByRole("button", { name: "Print" }).isVisible(), false);
+    assert.deepEqual(view.errors, []);
+    await view.done();
+  });
