@@ -189,7 +189,7 @@ impl<'a> Trials<'a> {
     /// Returns the time from the onset to the confirmation, s; `None` if the ball leaves
     /// the plate or the time is over.
     fn delay_s(&self, start: &TrialStart<'_>, fault: Fault) -> Option<f64> {
-        let mut trial = Trial::new(self.rig, start, fault);
+        let mut trial = FaultTrial::new(self.rig, start, fault);
         let onset = start.session.moments[start.from].at;
         let mut transitions = Vec::new();
         for i in start.from..start.session.moments.len() {
@@ -207,7 +207,7 @@ impl<'a> Trials<'a> {
 }
 
 /// A session from the onset of a fault on.
-struct Trial<'a> {
+struct FaultTrial<'a> {
     rig: &'a Rig,
     start: &'a TrialStart<'a>,
     fault: Fault,
@@ -218,7 +218,7 @@ struct Trial<'a> {
     beside: PerAxis<(f64, f64)>,
 }
 
-impl<'a> Trial<'a> {
+impl<'a> FaultTrial<'a> {
     fn new(rig: &'a Rig, start: &'a TrialStart<'a>, fault: Fault) -> Self {
         let (engine, healthy) = (start.engine.clone(), start.twin.clone());
         let (faulty, beside) = (healthy.clone(), PerAxis::default());
