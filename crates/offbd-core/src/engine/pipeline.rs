@@ -5,6 +5,7 @@
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
+use alloc::borrow::Cow;
 use core::mem;
 use serde::{Deserialize, Serialize};
 
@@ -149,7 +150,7 @@ impl Pipeline {
     }
 
     /// The settings in use for the monitor of `code`.
-    fn settings_of(&self, code: FaultCode) -> Settings {
+    fn settings_of(&self, code: FaultCode) -> Cow<'_, Settings> {
         self.trial.settings(code, &self.settings)
     }
 
@@ -527,7 +528,7 @@ impl Pipeline {
     ) {
         let mut blamed = false;
         for (&code, finding) in FaultCode::ALL.iter().zip(findings) {
-            let settings = &self.settings_of(code);
+            let settings = &*self.trial.settings(code, &self.settings);
             let watch = &mut self.monitors[code as usize];
             let rising = code.axis().and_then(|axis| self.servos[axis].rising_since());
             let share =

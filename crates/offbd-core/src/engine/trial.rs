@@ -1,5 +1,7 @@
 //! Other limits and debounce times than those of the rig, tried on a recording.
 
+use alloc::borrow::Cow;
+
 use crate::diagnosis::Settings;
 use crate::vocabulary::{Axis, FaultCode, Invalid, PerAxis, in_range};
 
@@ -58,16 +60,20 @@ impl Trial {
 
     /// Returns `settings` with the debounce of `code`. They have the rig's window, which
     /// extends the debounce as in [`Settings::with_window`].
-    pub(super) fn settings(&self, code: FaultCode, settings: &Settings) -> Settings {
-        let Some(fail_s) = self.debounce_s[code as usize] else { return *settings };
+    pub(super) fn settings<'a>(
+        &self,
+        code: FaultCode,
+        settings: &'a Settings,
+    ) -> Cow<'a, Settings> {
+        let Some(fail_s) = self.debounce_s[code as usize] else { return Cow::Borrowed(settings) };
         let extension_s = settings.window_s - Settings::of(settings.profile).window_s;
-        Settings {
+        Cow::Owned(Settings {
             fail_s: (fail_s + extension_s).max(0.0),
             readings_fail_s: fail_s,
             noise_fail_s: fail_s,
             gather_s: fail_s,
             ..*settings
-        }
+        })
     }
 }
 
@@ -82,8 +88,8 @@ mod tests {
         let tried = trial.settings(FaultCode::XServo, &learnt);
         let owners = Settings::default().with_debounce(1.0).unwrap().with_window(|_| 0.7);
         assert!((tried.fail_s - owners.fail_s).abs() < 1e-12);
-        assert_eq!(Settings { fail_s: owners.fail_s, ..tried }, owners);
-        assert_eq!(trial.settings(FaultCode::YServo, &learnt), learnt);
+        assert_eq!(Settings { fail_s: owners.fail_s, ..*tried }, owners);
+        assert_eq!(*trial.settings(FaultCode::YServo, &learnt), learnt);
     }
 
     #[test]
