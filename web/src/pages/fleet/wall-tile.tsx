@@ -20,7 +20,7 @@ export function WallTile({ row }: { row: FleetRow }) {
     <Link to={rigPath(row.entry.asset)} class={`tile tile-${row.health}`}>
       <b class="clip">{row.entry.asset}</b>
       <HealthMark health={row.health} />
-      <span class="clip">{worstFinding(row)}</span>
+      <span>{worstFinding(row)}</span>
     </Link>
   );
 }

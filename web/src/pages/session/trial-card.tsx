@@ -29,8 +29,12 @@ export function TrialCard({ thresholds, settings, choose, state: { trial, error 
               <th scope="col">Monitor</th>
               <th scope="col">Limits</th>
               <th scope="col">Debounce</th>
-              <th scope="col">Confirmed</th>
-              <th scope="col">Test failed</th>
+              <th scope="col" class="n">
+                Confirmed
+              </th>
+              <th scope="col" class="n">
+                Test failed
+              </th>
             </tr>
           </thead>
           <tbody aria-live="polite">
