@@ -50,6 +50,8 @@ fn grouped(rows: Vec<(String, String)>) -> TagsByAsset {
     for (asset, tag) in rows {
         tags.entry(asset).or_default().push(tag);
     }
+    // Not by the database, whose order depends on its collation.
+    tags.values_mut().for_each(|tags| tags.sort());
     tags
 }
 
@@ -59,9 +61,7 @@ impl Store {
     /// # Errors
     /// [`StoreError`] if the database fails; so do all queries here.
     pub async fn tags_between(&self, first: &str, last: &str) -> Result<TagsByAsset, StoreError> {
-        let rows = sqlx::query_as(
-            "SELECT asset, name FROM tag WHERE asset >= $1 AND asset <= $2 ORDER BY asset, name",
-        );
+        let rows = sqlx::query_as("SELECT asset, name FROM tag WHERE asset >= $1 AND asset <= $2");
         Ok(grouped(rows.bind(first).bind(last).fetch_all(&self.pool).await?))
     }
 
@@ -74,7 +74,7 @@ impl Store {
         for asset in assets {
             query.push(", ").bind(asset.to_owned())?;
         }
-        query.push(") ORDER BY asset, name");
+        query.push(")");
         Ok(grouped(query.rows().fetch_all(&self.pool).await?))
     }
 
