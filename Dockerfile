@@ -19,12 +19,12 @@ COPY docs/charts docs/charts
 COPY web web
 # Benchmarks, examples and tests are copied because Cargo.toml names them. The build
 # leaves out the laboratory (scenes, charts, simulated rigs) and includes OpenTelemetry, NATS,
-# MQTT, e-mail and Parquet.
+# MQTT, e-mail, MCAP, Parquet and Excel.
 # Cache mounts keep packages and compiled dependencies from build to build; the
 # program is copied out of them, because a mount is not part of the image.
 RUN --mount=type=cache,target=/usr/local/cargo/registry \
     --mount=type=cache,target=/src/target \
-    cargo build --profile dist --no-default-features --features email,mqtt,nats,otel,parquet --locked --package offbd --bin offbd \
+    cargo build --profile dist --no-default-features --features email,mcap,mqtt,nats,otel,parquet,xlsx --locked --package offbd --bin offbd \
     && cp target/dist/offbd /usr/local/bin/offbd
 
 FROM debian:bookworm-slim

@@ -36,7 +36,7 @@ pub use self::traces::Traces;
 use crate::config::{ClusterConfig, Config, LogFormat};
 use crate::http::{self, AccessPolicy, App, BodyBudget, ExtraRoutes, RateLimit, RateLimits};
 use crate::service::{Clock, Service, Workers};
-use crate::store::{self, CheckReport, Location, NodeIdentity, Partitions, Store};
+use crate::store::{self, CheckReport, ColdDirectory, Location, NodeIdentity, Partitions, Store};
 
 /// How often a blocking thread is asked for: often enough for a device that waits, and rarely
 /// enough to cost nothing.
@@ -74,6 +74,7 @@ pub async fn start(config: Config) -> Result<Server> {
 /// As for [`start`].
 pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Server> {
     config.check()?;
+    config.cold_directory().map_or(Ok(()), |cold| check_cold(&cold))?;
     http::gather_metrics();
     let tls = config.tls.as_ref().map(Tls::read).transpose()?;
     let (provider, keys) = match &config.jwt {
@@ -87,6 +88,7 @@ pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Ser
         None => None,
     };
     let (store, writer) = open(&location, node.as_ref()).await?;
+    let store = store.with_cold(config.cold_directory());
     let listener = TcpListener::bind(config.listen)
         .await
         .with_context(|| format!("`listen`: cannot listen on {}", config.listen))?;
@@ -125,6 +127,13 @@ pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Ser
     let deadline = Duration::from_secs(config.limits.shutdown_s);
     let service = leaving;
     Ok(Server { address, closing, deadline, serving, buses, service, store, workers, lock })
+}
+
+/// Checks that the directory of cold data is there. It is not created, because it may be a
+/// file system that is not mounted.
+fn check_cold(directory: &ColdDirectory) -> Result<()> {
+    let root = directory.root().display();
+    directory.check().with_context(|| format!("`cold.directory`: cannot read {root}"))
 }
 
 /// Rebuilds the engines of long recordings while requests are served already.
@@ -312,7 +321,7 @@ pub async fn migrate(config: &Config) -> Result<usize> {
 /// If there is no embedded store, `file` exists, or it cannot be written.
 pub async fn back_up(config: &Config, file: &Path) -> Result<()> {
     let location = config.location()?;
-    let result = store::back_up(&location, file).await;
+    let result = store::back_up(&location, file, config.cold_directory().as_ref()).await;
     result.with_context(|| format!("cannot back up the store {location}"))
 }
 
@@ -323,7 +332,8 @@ pub async fn back_up(config: &Config, file: &Path) -> Result<()> {
 pub async fn restore(config: &Config, file: &Path, replace: bool) -> Result<()> {
     let location = config.location()?;
     let _lock = lock(&location)?;
-    let result = store::restore(&location, file, replace).await;
+    let cold = config.cold_directory();
+    let result = store::restore(&location, file, replace, cold.as_ref()).await;
     result.with_context(|| format!("cannot restore the store {location}"))
 }
 
@@ -390,6 +400,6 @@ pub async fn check_store(config: &Config) -> Result<Option<CheckReport>> {
     if location.file().is_some_and(|file| !file.exists()) {
         return Ok(None);
     }
-    let report = store::check(&location).await;
+    let report = store::check(&location, config.cold_directory().as_ref()).await;
     report.map(Some).with_context(|| format!("cannot check the store {location}"))
 }

@@ -20,6 +20,8 @@ FOREIGN_BODIES = {
     "Unsupported content type application/msgpack",
     "Unsupported content type application/vnd.apache.arrow.stream",
     "Unsupported content type application/vnd.apache.parquet",
+    "Unsupported content type application/vnd.mcap",
+    "Unsupported content type application/vnd.openxmlformats-officedocument.spreadsheetml.sheet",
     "Unsupported content type application/x-ndjson",
     "Unsupported content type text/csv",
 }

@@ -1,9 +1,11 @@
-//! `offbd export`: a recorded session in another format.
+//! `offbd export`: a recorded session in another format, or the twin of a rig.
+
+mod fmu;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, Subcommand};
 
 use super::errors::{BadArgument, InputError};
 use super::judge;
@@ -18,18 +20,39 @@ const BATCH: usize = 8192;
 
 /// Writes a recorded session in another format.
 ///
-/// Reads CSV, and in builds with these formats Parquet and Arrow. What a file is,
+/// Reads CSV, and in builds with these formats Parquet, Arrow, MCAP and
+/// Excel. What a file is,
 /// its first bytes say. Of a session in the service,
 /// GET /api/v1/sessions/ID/telemetry is the same in each format.
+///
+/// `offbd export fmu` writes the digital twin of a rig instead.
 #[derive(Clone, Debug, Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 #[command(after_help = "Examples:\n  \
     offbd export monday.csv -o monday.parquet\n  \
-    offbd export monday.parquet --asset learnt.json --format arrow -o - | other-program\n\n\
+    offbd export monday.csv --asset learnt.json -o monday.mcap\n  \
+    offbd export monday.parquet --asset learnt.json --format arrow -o - | other-program\n  \
+    offbd export fmu --asset learnt.json -o ball_on_plate.fmu\n\n\
     With an asset file the session is judged: asset file, calibration and verdict\n\
-    hash are in the metadata of the new file (Parquet, Arrow).\n\n\
+    hash are in the metadata of the new file (Parquet, Arrow, MCAP). An MCAP file then\n\
+    also shows the rig, the twin and the faults in Foxglove.\n\n\
     Invalid rows are reported on stderr, and left out. Exit status: 0 written, 3 the\n\
     session is unusable; then there is no new file.")]
 pub(super) struct ExportArgs {
+    #[command(subcommand)]
+    other: Option<OtherExport>,
+    #[command(flatten)]
+    session: Option<SessionExport>,
+}
+
+/// What is exported besides sessions.
+#[derive(Clone, Debug, Subcommand)]
+enum OtherExport {
+    Fmu(fmu::FmuArgs),
+}
+
+#[derive(Clone, Debug, Args)]
+struct SessionExport {
     /// The recorded session
     #[arg(value_name = "SESSION.csv")]
     session: PathBuf,
@@ -45,8 +68,7 @@ pub(super) struct ExportArgs {
 }
 
 /// The formats that are written.
-const FORMATS: [SessionFormat; 4] =
-    [SessionFormat::Csv, SessionFormat::Json, SessionFormat::Parquet, SessionFormat::Arrow];
+const FORMATS: [SessionFormat; 5] = SessionFormat::WRITTEN;
 
 fn parse_format(word: &str) -> Result<SessionFormat, String> {
     let found = FORMATS.into_iter().find(|format| format.suffix() == word);
@@ -54,6 +76,14 @@ fn parse_format(word: &str) -> Result<SessionFormat, String> {
 }
 
 pub(super) fn run(args: &ExportArgs) -> anyhow::Result<()> {
+    match (&args.other, &args.session) {
+        (Some(OtherExport::Fmu(args)), _) => fmu::run(args),
+        (None, Some(args)) => export_session(args),
+        (None, None) => Err(BadArgument("name a session".to_owned()).into()),
+    }
+}
+
+fn export_session(args: &SessionExport) -> anyhow::Result<()> {
     let format = format(args)?;
     format.check().map_err(|e| BadArgument(e.to_string()))?;
     if !args.session.is_file() {
@@ -74,7 +104,7 @@ pub(super) fn run(args: &ExportArgs) -> anyhow::Result<()> {
     file.keep()
 }
 
-fn format(args: &ExportArgs) -> Result<SessionFormat, BadArgument> {
+fn format(args: &SessionExport) -> Result<SessionFormat, BadArgument> {
     let suffix = args.output.extension().and_then(|suffix| suffix.to_str());
     let by_suffix = || suffix.and_then(|suffix| parse_format(suffix).ok());
     args.format.or_else(by_suffix).ok_or_else(|| {
@@ -84,7 +114,7 @@ fn format(args: &ExportArgs) -> Result<SessionFormat, BadArgument> {
 }
 
 /// Judges the session if there is an asset file.
-fn info(args: &ExportArgs) -> anyhow::Result<SessionInfo> {
+fn info(args: &SessionExport) -> anyhow::Result<SessionInfo> {
     let session = judge::session_name(&args.session);
     let Some(path) = args.asset.as_deref() else {
         return Ok(SessionInfo { session, ..SessionInfo::default() });

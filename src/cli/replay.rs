@@ -25,7 +25,8 @@ use offbd_core::engine::Setup;
 #[command(
     after_help = "A session is CSV with the header t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m: seconds, \
     radians, metres. An empty position means that no ball was seen. In a build with the \
-    feature `parquet`, Parquet and Arrow files with these columns are read too.\n\n\
+    feature `parquet`, Parquet and Arrow files with these columns are read too; with `mcap`, \
+    MCAP files with messages of these keys; with `xlsx`, Excel workbooks.\n\n\
     Examples:\n  \
     offbd replay --asset learnt.json monday.csv tuesday.csv\n  \
     offbd replay --format json sick.csv | jq 'select(.status == \"confirmed\")'\n  \

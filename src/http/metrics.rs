@@ -45,6 +45,9 @@ const METRICS: &[(&str, MetricKind, &str)] = &[
     ("offbd_bus_logins_total", Counter, "Questions of the NATS server for rights, by outcome"),
     ("offbd_bus_messages_total", Counter, "Messages of devices over NATS and MQTT, by outcome"),
     ("offbd_cluster_nodes", Gauge, "Nodes of the cluster that are alive"),
+    ("offbd_cold_bytes_total", Counter, "Bytes of the files that hold moved sessions"),
+    ("offbd_cold_failures_total", Counter, "Files of sessions not written, verified or removed"),
+    ("offbd_cold_files_total", Counter, "Sessions whose samples were moved to a file"),
     ("offbd_commit_failures_total", Counter, "Failed commits, including retried ones"),
     ("offbd_commit_seconds", Seconds, "Duration of a commit"),
     ("offbd_commit_sets", Sizes, "Write sets in a commit"),
@@ -168,6 +171,9 @@ fn initialize_series() {
         values.iter().for_each(|value| counter!(name, label => *value).absolute(0));
     };
     for name in [
+        "offbd_cold_bytes_total",
+        "offbd_cold_failures_total",
+        "offbd_cold_files_total",
         "offbd_commit_failures_total",
         "offbd_commits_overtaken_total",
         "offbd_commits_total",

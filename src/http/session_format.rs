@@ -86,8 +86,11 @@ pub(super) fn of_file(headers: &HeaderMap) -> Result<Option<SessionFormat>, Prob
         "application/vnd.apache.arrow.stream" | "application/vnd.apache.arrow.file" => {
             SessionFormat::Arrow
         }
+        "application/vnd.mcap" => SessionFormat::Mcap,
+        "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet" => SessionFormat::Xlsx,
         _ => {
-            let formats = list(&[SessionFormat::Csv, SessionFormat::Parquet, SessionFormat::Arrow]);
+            let formats = SessionFormat::ALL.iter().filter(|format| format.is_read());
+            let formats = list(&formats.copied().collect::<Vec<_>>());
             return Err(unsupported(format!(
                 "`{text}` is no media type of an imported recording; use {formats}"
             )));
@@ -118,7 +121,7 @@ mod tests {
     fn accepted(accept: &'static str) -> Result<SessionFormat, u16> {
         let mut headers = HeaderMap::new();
         headers.insert(ACCEPT, HeaderValue::from_static(accept));
-        let format = negotiate(&headers, &SessionFormat::ALL, SessionFormat::Csv);
+        let format = negotiate(&headers, &SessionFormat::WRITTEN, SessionFormat::Csv);
         format.map_err(|problem| problem.status)
     }
 

@@ -118,7 +118,8 @@ pub(super) async fn open(
 
 /// Imports a recorded file as a session: CSV or, in a build with these formats, Parquet and
 /// Arrow (streams and files without compression), with the columns of the CSV file in any
-/// numeric type. Its samples are processed like live telemetry. The asset's open session is
+/// numeric type, MCAP with JSON messages of the schema `offbd.Sample`, or the
+/// first sheet of an Excel workbook, in which a time may be a date. Its samples are processed like live telemetry. The asset's open session is
 /// ended first, and the new session is ended after the last row; live telemetry of the asset
 /// gets 429 until then. Of a file that is damaged or ends too early, nothing is kept.
 #[utoipa::path(post, path = "/assets/{asset}/sessions/import", tag = "sessions",
@@ -126,7 +127,9 @@ pub(super) async fn open(
     params(("asset" = String, description = "Name of the asset"), ImportQuery),
     request_body(content((String = "text/csv"), (BinaryFile = "application/octet-stream"),
         (BinaryFile = "application/vnd.apache.parquet"),
-        (BinaryFile = "application/vnd.apache.arrow.stream"))),
+        (BinaryFile = "application/vnd.apache.arrow.stream"),
+        (BinaryFile = "application/vnd.mcap"),
+        (BinaryFile = "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet"))),
     responses((status = 201, body = ImportView), (status = 400, body = Problem),
         (status = 404, body = Problem), (status = 409, body = Problem),
         (status = 413, body = Problem), (status = 415, body = Problem)))]
@@ -212,8 +215,8 @@ pub(super) struct RecordingRangeQuery {
 }
 
 /// Returns the recording, or a stretch of it, in order of arrival: as CSV, or as `Accept`
-/// prefers as JSON rows, a Parquet file or an Arrow stream. The last two need a build with
-/// these formats.
+/// prefers as JSON rows, a Parquet file, an Arrow stream or an MCAP file. The last three need
+/// a build with these formats. An MCAP file also has what is judged of these samples.
 #[utoipa::path(get, path = "/sessions/{id}/telemetry", tag = "sessions",
     operation_id = "get_session_telemetry",
     params(("id" = String, description = "The service's id of the session"),
@@ -221,7 +224,8 @@ pub(super) struct RecordingRangeQuery {
     responses((status = 200, content((String = "text/csv"),
             (crate::wire::telemetry::RowsView = "application/json"),
             (BinaryFile = "application/vnd.apache.parquet"),
-            (BinaryFile = "application/vnd.apache.arrow.stream"))),
+            (BinaryFile = "application/vnd.apache.arrow.stream"),
+            (BinaryFile = "application/vnd.mcap"))),
         (status = 400, body = Problem), (status = 404, body = Problem),
         (status = 406, body = Problem)))]
 pub(super) async fn telemetry(
@@ -230,7 +234,7 @@ pub(super) async fn telemetry(
     Query(query): Query<RecordingRangeQuery>,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let format = session_format::negotiate(&headers, &SessionFormat::ALL, SessionFormat::Csv)?;
+    let format = session_format::negotiate(&headers, &SessionFormat::WRITTEN, SessionFormat::Csv)?;
     let range = time_range(query.from_s, query.to_s)?;
     let (session, info, recording) = service.recording(&id, range).await?;
     let file = format!("attachment; filename=\"{id}.{}\"", format.suffix());

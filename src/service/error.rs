@@ -133,6 +133,7 @@ impl From<StoreError> for ServiceError {
             | StoreError::DamagedLog { .. }
             | StoreError::Chunk { .. }
             | StoreError::Incomplete { .. }
+            | StoreError::Cold { .. }
             | StoreError::Snapshot { .. }
             | StoreError::Journal { .. }
             | StoreError::UnknownValue { .. } => Self::corrupt(error),

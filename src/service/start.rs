@@ -266,7 +266,7 @@ impl Service {
             stalled: stalled.clone(),
             closing: handles.closing.clone(),
         };
-        let upkeep = Upkeep::new(&handles, &deleter, &limits.retention, &queues, watchdog);
+        let upkeep = Upkeep::new(&handles, &deleter, &limits, &queues, watchdog);
         let node = cluster.clone().map(|cluster| NodeTask {
             cluster,
             handles: handles.clone(),

@@ -9,6 +9,7 @@ use serde::de::IgnoredAny;
 use sqlx::{AnyConnection, Connection, Executor};
 
 use super::codec::ChunkKey;
+use super::cold::{self, ColdDirectory, ColdFileRow};
 use super::from_row::from_row;
 use super::journal::JournalRun;
 use super::read::VISIBLE;
@@ -58,28 +59,32 @@ impl CheckReport {
     }
 }
 
-/// Checks the contents of the database at `location`, also while a service uses it.
-/// Nothing is changed.
+/// Checks the contents of the database at `location`, and the files in the directory of its
+/// `cold` data, also while a service uses them. Nothing is changed.
 ///
 /// # Errors
 /// [`StoreError`] if the database cannot be opened or has the schema of another version.
-pub async fn check(location: &Location) -> Result<CheckReport, StoreError> {
+pub async fn check(
+    location: &Location,
+    cold: Option<&ColdDirectory>,
+) -> Result<CheckReport, StoreError> {
     let mut db = location.reader().await?;
     check_version(&mut db).await?;
-    let report = check_contents(&mut db, location).await?;
+    let report = check_contents(&mut db, location, cold).await?;
     db.close().await?;
     Ok(report)
 }
 
-/// Checks the contents of a copy of the database at `location`.
+/// Checks the contents of a copy of the database at `location`, with its `cold` data.
 ///
 /// # Errors
 /// [`StoreError::Damaged`] with the first finding.
 pub(super) async fn check_copy(
     copy: &mut AnyConnection,
     location: &Location,
+    cold: Option<&ColdDirectory>,
 ) -> Result<(), StoreError> {
-    whole(check_contents(copy, location).await?)
+    whole(check_contents(copy, location, cold).await?)
 }
 
 /// Checks the structure of an SQLite database, whatever its schema.
@@ -102,6 +107,7 @@ fn whole(report: CheckReport) -> Result<(), StoreError> {
 async fn check_contents(
     db: &mut AnyConnection,
     location: &Location,
+    cold: Option<&ColdDirectory>,
 ) -> Result<CheckReport, StoreError> {
     let mut report = CheckReport::default();
     if location.file().is_some() {
@@ -109,7 +115,7 @@ async fn check_contents(
         check_structure(db, &mut report).await?;
     }
     check_open(db, location, &mut report).await;
-    check_ended(db, &mut report).await;
+    check_ended(db, cold, &mut report).await;
     check_snapshots(db, &mut report).await;
     check_documents(db, &mut report).await;
     Ok(report)
@@ -229,19 +235,60 @@ async fn check_open(db: &mut AnyConnection, location: &Location, report: &mut Ch
     }
 }
 
-async fn check_ended(db: &mut AnyConnection, report: &mut CheckReport) {
+async fn check_ended(
+    db: &mut AnyConnection,
+    cold: Option<&ColdDirectory>,
+    report: &mut CheckReport,
+) {
     let found = sessions(db, "ended").await;
     let found = found.unwrap_or_else(|error| {
         report.add(format!("the sessions cannot be read: {error}"));
         Vec::new()
     });
     for session in found {
-        let n = check_chunks(db, &session, report).await;
+        let mut n = check_chunks(db, &session, report).await;
+        if n != session.n_samples
+            && let Some(n_cold) = check_cold(db, cold, &session, report).await
+        {
+            n = n_cold;
+        }
         if n != session.n_samples && is_visible(db, &session.id).await {
             let CheckedSession { id, n_samples } = &session;
             report.add(format!("session {id}: {n} of {n_samples} samples are there"));
         }
         report.n_sessions += 1;
+    }
+}
+
+/// Checks the file of `session`. Returns the number of its samples, or of those that are
+/// expected if a finding says why they are not there; `None` if it has no file.
+async fn check_cold(
+    db: &mut AnyConnection,
+    cold: Option<&ColdDirectory>,
+    session: &CheckedSession,
+    report: &mut CheckReport,
+) -> Option<i64> {
+    let sql = "SELECT * FROM cold_file WHERE session = $1 AND moved_at IS NOT NULL";
+    let row = sqlx::query_as(sql).bind(&session.id).fetch_optional(&mut *db).await;
+    let row: Option<ColdFileRow> = match row {
+        Ok(row) => Some(row?),
+        Err(error) => {
+            report.add(format!("the file of session {}: {}", session.id, StoreError::from(error)));
+            None
+        }
+    };
+    match cold::verify(cold, row?).await {
+        Ok(n) => {
+            report.n_samples += n.unsigned_abs();
+            Some(n)
+        }
+        Err(error) => {
+            // It may have been deleted meanwhile.
+            if is_visible(db, &session.id).await {
+                report.add(error.to_string());
+            }
+            Some(session.n_samples)
+        }
     }
 }
 

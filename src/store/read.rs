@@ -225,8 +225,12 @@ impl Store {
 
     /// The latest time in the last two chunks of `session`, s.
     pub async fn newest_t_s(&self, session: &str) -> Result<Option<f64>, StoreError> {
-        let newest = "SELECT MAX(max_t_s) FROM (SELECT max_t_s FROM chunk WHERE session = $1
-                      ORDER BY first_index DESC LIMIT 2) AS newest";
+        let newest = "SELECT MAX(max_t_s) FROM (
+             SELECT max_t_s FROM (SELECT max_t_s FROM chunk WHERE session = $1
+                                  ORDER BY first_index DESC LIMIT 2) AS hot
+             UNION ALL
+             SELECT max_t_s FROM (SELECT max_t_s FROM cold_chunk WHERE session = $1
+                                  ORDER BY first_index DESC LIMIT 2) AS cold) AS newest";
         Ok(sqlx::query_scalar(newest).bind(session).fetch_one(&self.pool).await?)
     }
 
@@ -342,21 +346,32 @@ impl Store {
         let journal = self.journal.run(session)?.map(|run| run.samples).unwrap_or_default();
         let mut found: Vec<Sample> = journal.into_iter().filter(is_asked).collect();
         let mut query = QueryBuilder::new("SELECT first_index, data FROM chunk WHERE session = ");
-        query.bind(session.to_owned())?.push(" AND (");
-        for (i, (first, last)) in time_ranges(times).into_iter().enumerate() {
-            query.push(if i > 0 { " OR (min_t_s <= " } else { "(min_t_s <= " }).bind(last)?;
-            query.push(" AND max_t_s >= ").bind(first)?.push(")");
-        }
-        query.push(") ORDER BY first_index DESC LIMIT ").bind(i64::from(limit) + 1)?;
+        query.bind(session.to_owned())?;
+        push_times(&mut query, times)?;
+        query.push(" ORDER BY first_index DESC LIMIT ").bind(i64::from(limit) + 1)?;
         let rows: Vec<(i64, Vec<u8>)> = query.rows().fetch_all(&self.pool).await?;
-        if rows.len() > limit as usize {
+        let n_cold = self.n_cold_chunks(session, times).await?;
+        if rows.len() + n_cold > limit as usize {
             return Ok(None);
         }
         for (first_index, data) in rows {
             let samples = decode_chunk(&data, ChunkKey { session, first_index })?;
             found.extend(samples.into_iter().filter(is_asked));
         }
+        if n_cold > 0 {
+            found.extend(self.cold_samples(session, is_asked).await?);
+        }
         Ok(Some(found))
+    }
+
+    /// How many former chunks of `session` may have samples at one of the `times`, which
+    /// ascend.
+    async fn n_cold_chunks(&self, session: &str, times: &[f64]) -> Result<usize, StoreError> {
+        let mut query = QueryBuilder::new("SELECT COUNT(*) FROM cold_chunk WHERE session = ");
+        query.bind(session.to_owned())?;
+        push_times(&mut query, times)?;
+        let (n,): (i64,) = query.rows().fetch_one(&self.pool).await?;
+        Ok(usize::try_from(n).unwrap_or_default())
     }
 
     /// The actions of people in `session`, in order.
@@ -658,6 +673,17 @@ fn push_name(query: &mut QueryBuilder, start: Option<&str>) -> Result<(), StoreE
         query.push(" AND SUBSTR(name, 1, LENGTH(").bind(start.to_owned())?;
         query.push(")) = ").bind(start.to_owned())?;
     }
+    Ok(())
+}
+
+/// Appends the condition that a chunk may have samples at one of the `times`, which ascend.
+fn push_times(query: &mut QueryBuilder, times: &[f64]) -> Result<(), StoreError> {
+    query.push(" AND (");
+    for (i, (first, last)) in time_ranges(times).into_iter().enumerate() {
+        query.push(if i > 0 { " OR (min_t_s <= " } else { "(min_t_s <= " }).bind(last)?;
+        query.push(" AND max_t_s >= ").bind(first)?.push(")");
+    }
+    query.push(")");
     Ok(())
 }
 

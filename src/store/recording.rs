@@ -1,5 +1,6 @@
 //! Reading the recording of a session, or a stretch of it.
 
+use super::cold::ColdReader;
 use super::{SessionRow, Store, StoreError};
 use offbd_core::vocabulary::{Sample, TimeRange};
 
@@ -12,6 +13,8 @@ pub struct RecordingReader {
     next: i64,
     end: i64,
     range: TimeRange,
+    /// The file of the samples, once the database has them no longer.
+    cold: Option<ColdReader>,
 }
 
 impl Store {
@@ -20,7 +23,7 @@ impl Store {
     pub fn recording(&self, session: &SessionRow, first: i64) -> RecordingReader {
         let (next, end) = (first.max(0), session.progress.n_samples);
         let (store, session, range) = (self.clone(), session.id.clone(), TimeRange::ALL);
-        RecordingReader { store, session, next, end, range }
+        RecordingReader { store, session, next, end, range, cold: None }
     }
 
     /// Returns a reader of the samples of `session` whose times are in `range`.
@@ -34,7 +37,7 @@ impl Store {
     ) -> Result<RecordingReader, StoreError> {
         let (next, end) = self.indexes(session, range).await?;
         let (store, session) = (self.clone(), session.id.clone());
-        Ok(RecordingReader { store, session, next, end, range })
+        Ok(RecordingReader { store, session, next, end, range, cold: None })
     }
 
     /// Returns indexes of `session` between which all samples with times in `range` are: the
@@ -56,7 +59,10 @@ impl Store {
             "SELECT MIN(CASE WHEN max_t_s >= $2 THEN first_index END),
                  MAX(CASE WHEN min_t_s <= $3 THEN first_index + n END),
                  COALESCE(MAX(first_index + n), 0)
-             FROM chunk WHERE session = $1",
+             FROM (SELECT first_index, n, min_t_s, max_t_s FROM chunk WHERE session = $1
+                   UNION ALL
+                   SELECT first_index, n, min_t_s, max_t_s FROM cold_chunk WHERE session = $1)
+                 AS stored",
         )
         .bind(&session.id)
         .bind(range.from_s)
@@ -68,17 +74,35 @@ impl Store {
     }
 }
 
+impl Store {
+    /// Why the sample `found` of `session`, of `expected` ones, is not there.
+    async fn missing(
+        &self,
+        session: &str,
+        found: i64,
+        expected: i64,
+    ) -> Result<StoreError, StoreError> {
+        let (row, session) = (self.session(session).await?, session.to_owned());
+        Ok(match row {
+            None => StoreError::Deleted { session },
+            Some(_) => StoreError::Incomplete { session, found, expected },
+        })
+    }
+}
+
 impl RecordingReader {
     /// Reads the next samples, as many as are stored together; returns `None` at the end.
     ///
     /// # Errors
     /// [`StoreError::Deleted`] if the session is deleted meanwhile;
-    /// [`StoreError::Incomplete`] and [`StoreError::Chunk`] if the recording is damaged;
+    /// [`StoreError::Incomplete`], [`StoreError::Chunk`] and [`StoreError::Cold`] if the
+    /// recording is damaged;
     /// [`StoreError::Database`].
     pub async fn next(&mut self) -> Result<Option<Vec<Sample>>, StoreError> {
         while self.next < self.end {
-            let samples = self.store.samples_from(&self.session, self.next).await;
-            let Some(mut samples) = samples? else { return Err(self.missing().await?) };
+            let Some(mut samples) = self.stored().await? else {
+                return Err(self.store.missing(&self.session, self.next, self.end).await?);
+            };
             samples.truncate(usize::try_from(self.end - self.next).unwrap_or(usize::MAX));
             self.next += i64::try_from(samples.len()).unwrap_or(i64::MAX);
             samples.retain(|sample| self.range.contains(sample.t_s));
@@ -89,12 +113,17 @@ impl RecordingReader {
         Ok(None)
     }
 
-    /// Why the next sample is not there.
-    async fn missing(&self) -> Result<StoreError, StoreError> {
-        let session = self.session.clone();
-        Ok(match self.store.session(&session).await? {
-            None => StoreError::Deleted { session },
-            Some(_) => StoreError::Incomplete { session, found: self.next, expected: self.end },
-        })
+    /// Reads samples from the next one on: from the database or, if they have left it, from
+    /// their file.
+    async fn stored(&mut self) -> Result<Option<Vec<Sample>>, StoreError> {
+        if self.cold.is_none() {
+            if let Some(samples) = self.store.samples_from(&self.session, self.next).await? {
+                return Ok(Some(samples));
+            }
+            self.cold = self.store.cold_reader(&self.session, self.next).await?;
+        }
+        let Some(cold) = &mut self.cold else { return Ok(None) };
+        let samples = cold.next_part().await?;
+        Ok((!samples.is_empty()).then_some(samples))
     }
 }

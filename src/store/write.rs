@@ -33,8 +33,8 @@ use super::multi_row::{MultiRowStatement, in_parts};
 use super::tail::{Run, Tails};
 use super::writer_lock::Backend;
 use super::{
-    AccessWrite, ActionRow, AlarmWrite, AssetRow, CalibrationRow, CommunicationChange, EVENTS,
-    FaultRow, Location, MIGRATIONS, Micros, NotificationWrite, PartitionId, Partitions,
+    AccessWrite, ActionRow, AlarmWrite, AssetRow, CalibrationRow, ColdWrite, CommunicationChange,
+    EVENTS, FaultRow, Location, MIGRATIONS, Micros, NotificationWrite, PartitionId, Partitions,
     RemarkWrite, ReplayRow, SessionProgress, SessionRow, Snapshot, StoreError, TransitionRow,
     TrendRow, alarm, snapshot, tag,
 };
@@ -140,6 +140,8 @@ pub enum Write {
     Remark(RemarkWrite),
     /// Data of a rig stay away or come back; an event.
     Communication(CommunicationChange),
+    /// The samples of an ended session leave the database.
+    Cold(ColdWrite),
 }
 
 impl Write {
@@ -579,6 +581,7 @@ impl GroupCommit<'_> {
             Write::Alarm(write) => write.apply(db).await,
             Write::Notification(write) => write.apply(db).await,
             Write::Remark(write) => write.apply(db).await,
+            Write::Cold(write) => write.apply(db).await,
             Write::Communication(row) => {
                 row.id = self.events.next(db).await?;
                 if !alarm::change_communication(db, row).await? {

@@ -16,6 +16,7 @@ pub mod certificate;
 pub mod cluster;
 pub mod difference;
 pub mod drive_cycle;
+pub mod fmu;
 pub mod json;
 pub mod learning;
 pub mod mapping;

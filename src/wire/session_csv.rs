@@ -141,7 +141,7 @@ impl<R: Read> SessionCsvReader<R> {
 }
 
 /// Parses the number in a field; `None` if the field is empty.
-fn parse_number(field: &[u8]) -> Result<Option<f64>, String> {
+pub(super) fn parse_number(field: &[u8]) -> Result<Option<f64>, String> {
     let field = field.trim_ascii();
     if field.is_empty() {
         return Ok(None);

@@ -1,7 +1,8 @@
 //! Files of one session in the formats of other tools: reading them as samples and writing
 //! them, piece by piece.
 //!
-//! All formats have the columns of the CSV file (`session_csv.rs`). A format beside CSV and
+//! All formats have the columns of the CSV file (`session_csv.rs`), as columns or as the keys
+//! of messages. A format beside CSV and
 //! JSON needs a cargo feature of its own name; without it the file is refused with a message
 //! that says so. Readers and writers hold a bounded part of a session in memory. A file that
 //! ends too early or is damaged is an error at the row where that is found: callers discard
@@ -11,10 +12,20 @@
 mod arrow;
 #[cfg(feature = "parquet")]
 mod columns;
+#[cfg(feature = "mcap")]
+mod mcap;
+#[cfg(feature = "mcap")]
+mod mcap_rows;
+#[cfg(feature = "mcap")]
+mod mcap_scene;
 #[cfg(feature = "parquet")]
 mod parquet;
 #[cfg(feature = "parquet")]
 mod parquet_pages;
+#[cfg(feature = "xlsx")]
+mod sheet_rows;
+#[cfg(feature = "xlsx")]
+mod xlsx;
 
 use std::fmt;
 use std::io::{self, Read, Seek, SeekFrom};
@@ -33,11 +44,18 @@ pub enum SessionFormat {
     Parquet,
     /// An Arrow stream; an Arrow file is read, too.
     Arrow,
+    Mcap,
+    /// An Excel workbook; only read.
+    Xlsx,
 }
 
 impl SessionFormat {
     /// All formats; the first is the one by default.
-    pub const ALL: [Self; 4] = [Self::Csv, Self::Json, Self::Parquet, Self::Arrow];
+    pub const ALL: [Self; 6] =
+        [Self::Csv, Self::Json, Self::Parquet, Self::Arrow, Self::Mcap, Self::Xlsx];
+
+    /// The formats that are written; the first is the one by default.
+    pub const WRITTEN: [Self; 5] = [Self::Csv, Self::Json, Self::Parquet, Self::Arrow, Self::Mcap];
 
     /// The word on the command line, and the usual suffix of a file's name.
     #[must_use]
@@ -47,6 +65,8 @@ impl SessionFormat {
             Self::Json => "json",
             Self::Parquet => "parquet",
             Self::Arrow => "arrow",
+            Self::Mcap => "mcap",
+            Self::Xlsx => "xlsx",
         }
     }
 
@@ -58,7 +78,15 @@ impl SessionFormat {
             Self::Json => "application/json",
             Self::Parquet => "application/vnd.apache.parquet",
             Self::Arrow => "application/vnd.apache.arrow.stream",
+            Self::Mcap => "application/vnd.mcap",
+            Self::Xlsx => "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet",
         }
+    }
+
+    /// Whether files of the format are read.
+    #[must_use]
+    pub const fn is_read(self) -> bool {
+        !matches!(self, Self::Json)
     }
 
     /// Checks that this build of offbd has the format.
@@ -68,22 +96,31 @@ impl SessionFormat {
     pub const fn check(self) -> Result<(), SessionFileError> {
         match self {
             Self::Parquet | Self::Arrow if !cfg!(feature = "parquet") => Err(self.not_built()),
+            Self::Mcap if !cfg!(feature = "mcap") => Err(self.not_built()),
+            Self::Xlsx if !cfg!(feature = "xlsx") => Err(self.not_built()),
             _ => Ok(()),
         }
     }
 
     const fn not_built(self) -> SessionFileError {
-        SessionFileError::NotBuilt { format: self, feature: "parquet" }
+        let feature = match self {
+            Self::Mcap => "mcap",
+            Self::Xlsx => "xlsx",
+            _ => "parquet",
+        };
+        SessionFileError::NotBuilt { format: self, feature }
     }
 
     /// Returns the format of a file that begins with `head`; CSV unless a signature says
     /// otherwise.
     #[must_use]
     pub fn of(head: &[u8]) -> Self {
-        const SIGNATURES: [(&[u8], SessionFormat); 3] = [
+        const SIGNATURES: [(&[u8], SessionFormat); 5] = [
             (b"PAR1", SessionFormat::Parquet),
             (ARROW_FILE, SessionFormat::Arrow),
             (&[0xff; 4], SessionFormat::Arrow),
+            (b"\x89MCAP0\r\n", SessionFormat::Mcap),
+            (b"PK\x03\x04", SessionFormat::Xlsx),
         ];
         let found = SIGNATURES.iter().find(|(signature, _)| head.starts_with(signature));
         found.map_or(Self::Csv, |(_, format)| *format)
@@ -97,6 +134,8 @@ impl fmt::Display for SessionFormat {
             Self::Json => "JSON",
             Self::Parquet => "Parquet",
             Self::Arrow => "Arrow",
+            Self::Mcap => "MCAP",
+            Self::Xlsx => "Excel",
         })
     }
 }
@@ -118,6 +157,8 @@ pub enum SessionFileError {
     NotBuilt { format: SessionFormat, feature: &'static str },
     #[error("{0} files are only written, not read")]
     NotRead(SessionFormat),
+    #[error("{0} files are only read, not written")]
+    NotWritten(SessionFormat),
     #[error("there is no column `{0}`; required: t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m")]
     NoColumn(&'static str),
     #[error("there are two columns `{0}`")]
@@ -125,6 +166,12 @@ pub enum SessionFileError {
     /// The column is not numeric; `found` is its type.
     #[error("the column `{column}` has the type {found}, not a number")]
     NotANumber { column: &'static str, found: String },
+    /// The first sheet of a workbook is no session.
+    #[error("sheet `{sheet}`: {reason}")]
+    Sheet { sheet: String, reason: String },
+    /// An MCAP file without a topic of the schema.
+    #[error("there is no topic with JSON messages of the schema `{0}`")]
+    NoTopic(&'static str),
     #[error("the file cannot be read: {0}")]
     Io(#[from] io::Error),
     #[error("the {format} file is damaged, or was not written to its end: {reason}")]
@@ -137,7 +184,7 @@ pub enum SessionFileError {
 }
 
 /// Runs a part of a library's reader, whose panic means that the file contradicts itself.
-#[cfg(feature = "parquet")]
+#[cfg(any(feature = "parquet", feature = "mcap", feature = "xlsx"))]
 fn guarded<T>(format: SessionFormat, read: impl FnOnce() -> T) -> Result<T, SessionFileError> {
     std::panic::catch_unwind(std::panic::AssertUnwindSafe(read)).map_err(|_| {
         let reason = "its contents contradict each other".to_owned();
@@ -217,9 +264,14 @@ pub fn open<S: Read + Seek + Send + 'static>(
         SessionFormat::Parquet => Ok(Box::new(parquet::rows(source)?)),
         #[cfg(feature = "parquet")]
         SessionFormat::Arrow => Ok(Box::new(arrow::ArrowRows::new(source)?)),
-        #[cfg(not(feature = "parquet"))]
-        SessionFormat::Parquet | SessionFormat::Arrow => Err(format.not_built()),
-        SessionFormat::Json | SessionFormat::Csv => Err(SessionFileError::NotRead(format)),
+        #[cfg(feature = "mcap")]
+        SessionFormat::Mcap => Ok(Box::new(mcap_rows::McapRows::new(source))),
+        #[cfg(feature = "xlsx")]
+        SessionFormat::Xlsx => Ok(Box::new(xlsx::rows(source)?)),
+        _ => {
+            format.check()?;
+            Err(SessionFileError::NotRead(format))
+        }
     }
 }
 
@@ -256,7 +308,7 @@ pub struct SessionInfo {
 
 impl SessionInfo {
     /// Keys and values, for the metadata of a file.
-    #[cfg(feature = "parquet")]
+    #[cfg(any(feature = "parquet", feature = "mcap"))]
     fn entries(&self) -> impl Iterator<Item = (&'static str, &str)> {
         let entries = [
             ("offbd.session", Some(self.session.as_str())),
@@ -283,6 +335,8 @@ enum Encoding {
     Parquet(Box<parquet::ParquetEncoder>),
     #[cfg(feature = "parquet")]
     Arrow(Box<arrow::ArrowEncoder>),
+    #[cfg(feature = "mcap")]
+    Mcap(Box<mcap::McapEncoder>),
 }
 
 impl SessionWriter {
@@ -314,8 +368,14 @@ impl SessionWriter {
             SessionFormat::Arrow => {
                 (Encoding::Arrow(Box::new(arrow::ArrowEncoder::new(info)?)), Vec::new())
             }
-            #[cfg(not(feature = "parquet"))]
-            SessionFormat::Parquet | SessionFormat::Arrow => return Err(format.not_built()),
+            #[cfg(feature = "mcap")]
+            SessionFormat::Mcap => {
+                (Encoding::Mcap(Box::new(mcap::McapEncoder::new(info)?)), Vec::new())
+            }
+            _ => {
+                format.check()?;
+                return Err(SessionFileError::NotWritten(format));
+            }
         };
         Ok((Self(encoding), start))
     }
@@ -343,6 +403,8 @@ impl SessionWriter {
             Encoding::Parquet(encoder) => bytes = encoder.rows(samples)?,
             #[cfg(feature = "parquet")]
             Encoding::Arrow(encoder) => bytes = encoder.rows(samples)?,
+            #[cfg(feature = "mcap")]
+            Encoding::Mcap(encoder) => bytes = encoder.rows(samples)?,
         }
         Ok(bytes)
     }
@@ -359,6 +421,8 @@ impl SessionWriter {
             Encoding::Parquet(encoder) => encoder.end(),
             #[cfg(feature = "parquet")]
             Encoding::Arrow(encoder) => encoder.end(),
+            #[cfg(feature = "mcap")]
+            Encoding::Mcap(encoder) => encoder.end(),
         }
     }
 }

@@ -100,14 +100,24 @@ fn check_length(found: usize, limit: usize) -> Result<(), BatchError> {
 pub fn ndjson(document: &[u8], limit: usize) -> Result<Batch, BatchError> {
     let lines = document.split(|b| *b == b'\n').map(<[u8]>::trim_ascii).filter(|l| !l.is_empty());
     check_length(lines.clone().count(), limit)?;
-    let row = |line: &[u8]| match serde_json::from_slice::<BatchRow>(line) {
+    Ok(Batch { rows: lines.map(json_row).collect(), ..Batch::default() })
+}
+
+/// Parses one sample object.
+///
+/// # Errors
+/// The reason why the row is invalid.
+pub fn json_row(document: &[u8]) -> Result<Sample, String> {
+    match serde_json::from_slice::<BatchRow>(document) {
         Ok(row) => row.sample(),
-        Err(error) => match lenient::quote_non_finite(line).map(|q| serde_json::from_slice(&q)) {
-            Some(Ok(row)) => BatchRow::sample(row),
-            _ => Err(super::json::words(&error)),
-        },
-    };
-    Ok(Batch { rows: lines.map(row).collect(), ..Batch::default() })
+        Err(error) => {
+            let quoted = lenient::quote_non_finite(document);
+            match quoted.map(|quoted| serde_json::from_slice(&quoted)) {
+                Some(Ok(row)) => BatchRow::sample(row),
+                _ => Err(super::json::words(&error)),
+            }
+        }
+    }
 }
 
 /// Parses CSV with the header of a session file, with at most `limit` rows.

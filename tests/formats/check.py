@@ -8,7 +8,11 @@ from csv import DictReader
 from pathlib import Path
 
 import duckdb
+import jsonschema
+import mcap.reader
+import mcap.writer
 import numpy
+import openpyxl
 import pandas
 import polars
 import pyarrow.ipc
@@ -79,6 +83,59 @@ for metadata in [pyarrow.parquet.read_metadata(parquet).metadata, stream.schema.
     assert asset["calibration"]["id"] == metadata[b"offbd.calibration_id"].decode(), metadata
 print("metadata: asset file, calibration and verdict hash")
 
+# An MCAP file has the samples, and each message is as its schema says.
+offbd("export", "sick.csv", "--asset", "learnt.json", "-o", "sick.mcap")
+messages = {}
+with open(DATA / "sick.mcap", "rb") as file:
+    reader = mcap.reader.make_reader(file, validate_crcs=True)
+    metadata = {record.name: record.metadata for record in reader.iter_metadata()}["offbd"]
+    (attachment,) = reader.iter_attachments()
+    validators = {}
+    for schema, channel, message in reader.iter_messages():
+        assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json"), channel
+        content = json.loads(message.data)
+        if schema.id not in validators:
+            document = json.loads(schema.data)
+            jsonschema.Draft202012Validator.check_schema(document)
+            validators[schema.id] = jsonschema.Draft202012Validator(document)
+        # One in fifty of each topic, for the time that it takes.
+        of_topic = messages.setdefault((channel.topic, schema.name), [])
+        if len(of_topic) % 50 == 0:
+            validators[schema.id].validate(content)
+        of_topic.append(content)
+    counts = reader.get_summary().statistics.channel_message_counts
+    assert sum(counts.values()) == sum(map(len, messages.values())), counts
+samples = messages["/offbd/samples", "offbd.Sample"]
+check("MCAP in mcap", bits({name: [sample[name] for sample in samples] for name in COLUMNS}), expected)
+topics = {("/rig", "foxglove.SceneUpdate"), ("/twin", "foxglove.SceneUpdate"), ("/tf", "foxglove.FrameTransforms")}
+assert topics <= messages.keys(), messages.keys()
+lines = map(json.loads, offbd("replay", "--asset", "learnt.json", "--format", "json", "sick.csv").stdout.splitlines())
+replayed = [line["summary"] for line in lines if "verdict_hash" not in line]
+check("the faults in the log", [log["message"] for log in messages["/faults", "foxglove.Log"]], replayed)
+assert replayed, "no fault"
+assert metadata["offbd.verdict_hash"] == expected_hash, metadata
+assert json.loads(attachment.data)["calibration"]["id"] == metadata["offbd.calibration_id"], metadata
+check("MCAP in offbd", verdict_hash("sick.mcap"), expected_hash)
+
+
+def write_mcap(file, compression):
+    """The samples as messages of a topic of another program, between other messages."""
+    writer = mcap.writer.Writer(file, compression=compression)
+    writer.start()
+    schema = writer.register_schema(name="offbd.Sample", encoding="jsonschema", data=b"{}")
+    channel = writer.register_channel(topic="/lab/rig", message_encoding="json", schema_id=schema)
+    other = writer.register_channel(topic="/lab/note", message_encoding="text", schema_id=0)
+    for row in rows:
+        times = {"log_time": int(row["t_s"] * 1e9), "publish_time": 0}
+        writer.add_message(channel_id=channel, data=json.dumps(row).encode(), **times)
+        writer.add_message(channel_id=other, data=b"kept by nobody", **times)
+    writer.finish()
+
+
+for compression in [mcap.writer.CompressionType.NONE, mcap.writer.CompressionType.ZSTD]:
+    write_mcap(str(DATA / "other.mcap"), compression)
+    check(f"MCAP of mcap, {compression.name}", verdict_hash("other.mcap"), expected_hash)
+
 # What others write is judged the same.
 frame = polars.from_pandas(csv)
 files = {
@@ -96,6 +153,13 @@ files = {
 for name, write in files.items():
     write(DATA / name)
     check(name, verdict_hash(name), expected_hash)
+
+book = openpyxl.Workbook()
+book.active.append(COLUMNS)
+for row in rows:
+    book.active.append([row[name] for name in COLUMNS])
+book.save(DATA / "openpyxl.xlsx")
+check("Excel of openpyxl", verdict_hash("openpyxl.xlsx"), expected_hash)
 
 # Errors name what is wrong.
 refused = {

@@ -3,7 +3,10 @@
 Needs the packages that scripts/formats installs.
 """
 
+import datetime
+
 import duckdb
+import openpyxl
 import pandas
 import polars
 import pyarrow
@@ -38,3 +41,41 @@ with pyarrow.OSFile("pyarrow-file.arrow", "wb") as sink:
         writer.write_table(rows)
 
 duckdb.sql("COPY (SELECT * FROM frame) TO 'duckdb.parquet' (FORMAT parquet)")
+
+
+def workbook(name, rows, sheet="Data"):
+    """Writes a sheet, and a second one that is not read."""
+    book = openpyxl.Workbook()
+    book.active.title = sheet
+    for row in rows:
+        book.active.append(row)
+    book.create_sheet("Notes").append(["kept by nobody"])
+    book.save(name)
+
+
+HEADER = ["note", "seq", *COLUMNS]
+workbook(
+    "openpyxl.xlsx",
+    [
+        [],
+        HEADER,
+        ["kept by", 0, 0, 0.1, None, 0.25, -0.5],
+        [],
+        ["nobody", 1, 0.01, -0.1, "0.2", None, None],
+    ],
+)
+second = datetime.datetime(2026, 3, 1, 12, 0, 0, 250_000)
+workbook(
+    "dates.xlsx",
+    [
+        HEADER,
+        [None, None, second, 0, 0, 0, 0],
+        [None, None, datetime.time(0, 1, 30), 0, 0, 0, 0],
+        [None, None, 2, "left", 0, 0, 0],
+        [None, None, 3, 0, 0, second, 0],
+        [None, None, 4, 0, 0, True, 0],
+        [None, 1.5, 5, 0, 0, 0, 0],
+        [None, 6, None, 0, 0, 0, 0],
+    ],
+)
+workbook("columns.xlsx", [["t_s", "x_m"], [0, 0]], sheet="Run 1")

@@ -14,6 +14,8 @@ mod bounds;
 mod bus;
 mod cli;
 mod cluster;
+#[cfg(feature = "parquet")]
+mod cold;
 mod crash;
 mod damage;
 mod engine_snapshot;

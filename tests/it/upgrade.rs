@@ -115,7 +115,7 @@ async fn upgrade_each(schemas: impl Iterator<Item = usize>, is_stopped: bool) {
         assert_eq!(views(&process.client, n).await, shown[n - 1], "schema {n}");
         go_on(&process.client, n).await;
         drop(process);
-        let report = offbd::store::check(&location).await.unwrap();
+        let report = offbd::store::check(&location, None).await.unwrap();
         assert_eq!(report.findings, Vec::<String>::new(), "schema {n}");
     }
 }

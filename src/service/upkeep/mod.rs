@@ -1,6 +1,7 @@
-//! Background upkeep: deletion in parts, retention, the scrub of stored data, and the
-//! watchdog of ingest.
+//! Background upkeep: deletion in parts, retention, cold data, the scrub of stored data, and
+//! the watchdog of ingest.
 
+mod cold;
 mod deletion;
 mod page_scrub;
 mod retention;
@@ -12,16 +13,18 @@ use tokio::task::JoinHandle;
 pub(super) use deletion::Deleter;
 pub(super) use watchdog::{STALLED_AFTER, Watchdog};
 
+use self::cold::ColdMover;
 use self::page_scrub::PageScrubber;
 use self::retention::Sweeper;
 use self::scrub::Scrubber;
 use super::asset::Shards;
-use super::limits::Retention;
+use super::limits::Limits;
 use super::writing::Handles;
 
 /// The background tasks, before they are started.
 pub(super) struct Upkeep {
     sweeper: Sweeper,
+    mover: ColdMover,
     scrubber: Scrubber,
     page_scrubber: PageScrubber,
     watchdog: Watchdog,
@@ -31,13 +34,20 @@ impl Upkeep {
     pub(super) fn new(
         handles: &Handles,
         deleter: &Deleter,
-        retention: &Retention,
+        limits: &Limits,
         shards: &Shards,
         watchdog: Watchdog,
     ) -> Self {
         let (handles, shards) = (handles.clone(), shards.clone());
-        let (deleter, retention) = (deleter.clone(), retention.clone());
+        let (deleter, retention) = (deleter.clone(), limits.retention.clone());
+        let mover = ColdMover {
+            handles: handles.clone(),
+            after: limits.cold_after,
+            every: retention.every,
+            deleted: deleter.deleted(),
+        };
         Self {
+            mover,
             sweeper: Sweeper { handles: handles.clone(), deleter, retention },
             scrubber: Scrubber { handles: handles.clone(), shards },
             page_scrubber: PageScrubber { handles },
@@ -46,9 +56,10 @@ impl Upkeep {
     }
 
     /// Starts the tasks on the current runtime.
-    pub(super) fn spawn(self) -> [JoinHandle<()>; 4] {
+    pub(super) fn spawn(self) -> [JoinHandle<()>; 5] {
         [
             tokio::spawn(self.sweeper.run()),
+            tokio::spawn(self.mover.run()),
             tokio::spawn(self.scrubber.run()),
             tokio::spawn(self.page_scrubber.run()),
             tokio::spawn(self.watchdog.run()),

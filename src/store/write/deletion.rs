@@ -5,7 +5,7 @@
 use sqlx::AnyConnection;
 
 use super::GroupCommit;
-use crate::store::{Micros, StoreError};
+use crate::store::{Micros, StoreError, cold};
 
 impl GroupCommit<'_> {
     /// Hides the asset `name` and its sessions, deletes its faults and calibrations, and
@@ -62,6 +62,7 @@ impl GroupCommit<'_> {
         session: &str,
     ) -> Result<(), StoreError> {
         self.discard(session);
+        cold::release(db, session).await?;
         sqlx::query("DELETE FROM session WHERE id = $1").bind(session).execute(db).await?;
         Ok(())
     }

@@ -5,6 +5,7 @@ mod chart;
 mod demo;
 mod drive_cycle;
 pub mod fixture;
+mod fmu;
 mod replay;
 mod scene;
 mod score;

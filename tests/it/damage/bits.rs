@@ -185,7 +185,7 @@ impl Stopped {
 
     /// Returns whether a check names the damage.
     async fn is_found(&self) -> bool {
-        match store::check(&Location::File(self.file.clone())).await {
+        match store::check(&Location::File(self.file.clone()), None).await {
             Ok(report) => !report.findings.is_empty(),
             Err(error) => is_named(&error.to_string()),
         }

@@ -30,6 +30,7 @@ fn a_file_is_csv_unless_its_first_bytes_say_otherwise() {
     assert_eq!(SessionFormat::of(b"PAR1"), SessionFormat::Parquet);
     assert_eq!(SessionFormat::of(b"ARROW1\0\0"), SessionFormat::Arrow);
     assert_eq!(SessionFormat::of(b"\xff\xff\xff\xff\x10"), SessionFormat::Arrow);
+    assert_eq!(SessionFormat::of(b"\x89MCAP0\r\n"), SessionFormat::Mcap);
     for csv in [&b"t_s,x_m"[..], b"", b"PA"] {
         assert_eq!(SessionFormat::of(csv), SessionFormat::Csv);
     }
@@ -54,7 +55,11 @@ mod columns {
     use proptest::prelude::*;
     use std::sync::Arc;
 
-    const FORMATS: [SessionFormat; 2] = [SessionFormat::Parquet, SessionFormat::Arrow];
+    const FORMATS: &[SessionFormat] = if cfg!(feature = "mcap") {
+        &[SessionFormat::Parquet, SessionFormat::Arrow, SessionFormat::Mcap]
+    } else {
+        &[SessionFormat::Parquet, SessionFormat::Arrow]
+    };
 
     fn write(format: SessionFormat, samples: &[Sample], at_a_time: usize) -> Vec<u8> {
         let (mut writer, mut file) =
@@ -95,7 +100,7 @@ mod columns {
 
     #[test]
     fn a_session_without_samples_is_a_file_without_rows() {
-        for format in FORMATS {
+        for &format in FORMATS {
             assert_eq!(samples(&write(format, &[], 1)), [], "{format}");
         }
     }
@@ -174,7 +179,7 @@ mod columns {
 
     #[test]
     fn of_a_file_that_ends_too_early_the_reason_is_known_and_no_end_is_reached() {
-        for format in FORMATS {
+        for &format in FORMATS {
             let file = write(format, &many(), 8192);
             for n in (9..file.len()).step_by(file.len() / 97).chain([file.len() - 1]) {
                 let error = rows(&file[..n]).unwrap_err();
@@ -189,7 +194,7 @@ mod columns {
 
     #[test]
     fn no_wrong_byte_stops_the_program() {
-        for format in FORMATS {
+        for &format in FORMATS {
             let file = write(format, &many()[..3000], 1000);
             // More of the end, where the structure of a Parquet file is.
             let (start, end) = (file.len() / 2, file.len() - 1200);
@@ -224,10 +229,175 @@ mod columns {
             let expected: Vec<Sample> = rows.into_iter().map(|(seq, t_s, [a, b, c, d])| Sample {
                 seq, t_s, cmd_qx_rad: a, cmd_qy_rad: b, x_m: c, y_m: d,
             }).collect();
-            for format in FORMATS {
+            for &format in FORMATS {
                 let back = samples(&write(format, &expected, at_a_time));
                 prop_assert_eq!(format!("{:?}", back), format!("{:?}", expected));
             }
+        }
+    }
+}
+
+#[cfg(feature = "mcap")]
+mod mcap_files {
+    use super::*;
+    use std::collections::BTreeMap;
+
+    use mcap::records::MessageHeader;
+    use mcap::{MessageStream, WriteOptions};
+    use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+    use offbd::wire::asset;
+    use offbd::wire::session_file::{SessionInfo, SessionWriter};
+    use offbd_core::engine::Rig;
+    use serde_json::Value;
+
+    /// A file of one topic with the given messages.
+    fn file(schema: &str, encoding: &str, messages: &[&str]) -> Vec<u8> {
+        let mut writer = WriteOptions::new().create(Cursor::new(Vec::new())).unwrap();
+        let schema = writer.add_schema(schema, "jsonschema", b"{}").unwrap();
+        let channel_id = writer.add_channel(schema, "/mine", encoding, &BTreeMap::new()).unwrap();
+        for message in messages {
+            let header = MessageHeader { channel_id, sequence: 0, log_time: 0, publish_time: 0 };
+            writer.write_to_known_channel(&header, message.as_bytes()).unwrap();
+        }
+        writer.finish().unwrap();
+        writer.into_inner().into_inner()
+    }
+
+    #[test]
+    fn messages_of_the_schema_are_read_from_any_topic_and_wrong_ones_are_named() {
+        let found = rows(&file(
+            "offbd.Sample",
+            "json",
+            &[
+                r#"{"t_s": 1, "cmd_qx_rad": 0.1, "cmd_qy_rad": null, "x_m": 0.25, "y_m": -0.5}"#,
+                r#"{"cmd_qx_rad": 0.1}"#,
+                "not JSON",
+            ],
+        ))
+        .unwrap();
+        let (t_s, cmd_qx_rad) = (1.0, Some(0.1));
+        let (x_m, y_m) = (Some(0.25), Some(-0.5));
+        let first = Sample { t_s, cmd_qx_rad, x_m, y_m, ..Sample::default() };
+        assert_eq!(found[0], Ok(first));
+        assert!(found[1].as_ref().unwrap_err().starts_with("row 2: "), "{found:?}");
+        assert!(found[2].as_ref().unwrap_err().starts_with("row 3: "), "{found:?}");
+    }
+
+    #[test]
+    fn a_file_without_samples_says_which_schema_it_lacks() {
+        for other in [file("other", "json", &["{}"]), file("offbd.Sample", "cdr", &["{}"])] {
+            let error = rows(&other).unwrap_err().to_string();
+            assert!(error.contains("`offbd.Sample`"), "{error}");
+        }
+    }
+
+    /// The messages of a session that is written with an asset file, by topic.
+    fn shown(samples: &[Sample]) -> BTreeMap<String, Vec<Value>> {
+        let rig = Rig::chapter("shown");
+        let info = SessionInfo {
+            asset_file: Some(serde_json::to_string(&asset::view(&rig)).unwrap()),
+            ..SessionInfo::default()
+        };
+        let (mut writer, mut file) = SessionWriter::new(SessionFormat::Mcap, &info, true).unwrap();
+        file.extend(writer.rows(samples).unwrap());
+        file.extend(writer.end().unwrap());
+        let mut topics = BTreeMap::<String, Vec<Value>>::new();
+        for message in MessageStream::new(&file).unwrap() {
+            let message = message.unwrap();
+            let content = serde_json::from_slice(&message.data).unwrap();
+            topics.entry(message.channel.topic.clone()).or_default().push(content);
+        }
+        topics
+    }
+
+    #[test]
+    fn a_positive_qy_lowers_the_side_of_the_plate_at_positive_x_and_a_positive_qx_raises_y() {
+        for (cmd_qx_rad, cmd_qy_rad) in [(0.0, 0.1), (0.1, 0.0)] {
+            let still = |i: u32| Sample {
+                t_s: f64::from(i) * 0.02,
+                cmd_qx_rad: Some(cmd_qx_rad),
+                cmd_qy_rad: Some(cmd_qy_rad),
+                x_m: Some(0.05),
+                y_m: Some(-0.02),
+                ..Sample::default()
+            };
+            let topics = shown(&(0..100).map(still).collect::<Vec<_>>());
+            let last = topics["/tf"].last().unwrap();
+            let turned = &last["transforms"][0]["rotation"];
+            let part = |name: &str| turned[name].as_f64().unwrap();
+            let turned = Quaternion::new(part("w"), part("x"), part("y"), part("z"));
+            let turned = UnitQuaternion::from_quaternion(turned);
+            let heights = [turned * Vector3::x(), turned * Vector3::y()].map(|side| side.z);
+            let expected = [-cmd_qy_rad.sin(), cmd_qx_rad.sin()];
+            for (height, expected) in heights.iter().zip(expected) {
+                assert!((height - expected).abs() < 1e-9, "{heights:?}");
+            }
+            let ball = &last["transforms"][1]["translation"];
+            assert!((ball["x"].as_f64().unwrap() - 0.05).abs() < 1e-9, "{ball}");
+            assert!((ball["y"].as_f64().unwrap() + 0.02).abs() < 1e-9, "{ball}");
+        }
+    }
+
+    #[test]
+    fn a_session_with_an_asset_file_shows_the_rig_once_and_each_fault() {
+        let topics = shown(&crate::support::rig(6000, 3000));
+        assert_eq!(topics["/offbd/samples"].len(), 6000);
+        assert_eq!(topics["/rig"].len(), 1);
+        let ids: Vec<_> = topics["/rig"][0]["entities"].as_array().unwrap().iter().collect();
+        assert_eq!((&ids[0]["id"], &ids[1]["id"]), (&"plate".into(), &"ball".into()));
+        assert_eq!(topics["/tf"].len(), topics["/offbd/evidence"].len());
+        let is_error = |log: &&Value| log["level"] == 4;
+        assert!(topics["/faults"].iter().any(|log| is_error(&log)), "{:?}", topics["/faults"]);
+    }
+}
+
+#[cfg(feature = "xlsx")]
+mod workbooks {
+    use super::*;
+
+    #[test]
+    fn the_first_sheet_is_read_with_numbers_as_numbers_or_text() {
+        let file = include_bytes!("../../formats/openpyxl.xlsx");
+        assert_eq!(SessionFormat::of(file), SessionFormat::Xlsx);
+        assert_eq!(samples(file), samples(CSV_FILE));
+    }
+
+    #[test]
+    fn a_time_may_be_a_date_and_a_wrong_cell_is_named() {
+        let found = rows(include_bytes!("../../formats/dates.xlsx")).unwrap();
+        // Seconds of 2026-03-01 12:00:00.25 since 1970, by `date --utc +%s`.
+        assert_eq!(found[0].as_ref().unwrap().t_s, 1_772_366_400.25);
+        assert_eq!(found[1].as_ref().unwrap().t_s, 90.0);
+        let wrong: Vec<&str> =
+            found[2..].iter().map(|row| row.as_ref().unwrap_err().as_str()).collect();
+        assert_eq!(
+            wrong,
+            [
+                "row 4: sheet `Data`, cell D4 (`cmd_qx_rad`): `left` is not a number",
+                "row 5: sheet `Data`, cell F5 (`x_m`): a date is not a number",
+                "row 6: sheet `Data`, cell F6 (`x_m`): a truth value is not a number",
+                "row 7: sheet `Data`, `seq`: `1.5` is not a whole number of a sample",
+                "row 8: sheet `Data`, `t_s` is empty",
+            ]
+        );
+    }
+
+    #[test]
+    fn a_missing_column_is_named_with_its_sheet() {
+        let error = rows(include_bytes!("../../formats/columns.xlsx")).unwrap_err().to_string();
+        assert!(error.starts_with("sheet `Run 1`: there is no column `cmd_qx_rad`"), "{error}");
+    }
+
+    #[test]
+    fn no_end_that_comes_too_early_and_no_wrong_byte_stops_the_program() {
+        let file = include_bytes!("../../formats/openpyxl.xlsx");
+        for n in 4..file.len() {
+            assert!(rows(&file[..n]).is_err(), "{n} of {} bytes", file.len());
+        }
+        for at in (4..file.len()).step_by(7) {
+            let mut damaged = file.to_vec();
+            damaged[at] ^= 0xff;
+            let _ = rows(&damaged);
         }
     }
 }

@@ -43,7 +43,7 @@ pub struct ServiceFixture {
     pub server: Option<Server>,
     pub client: Client,
     pub data: tempfile::TempDir,
-    config: Config,
+    pub config: Config,
 }
 
 /// Returns whether services under test use PostgreSQL: `TEST_DATABASE=postgres`.

@@ -14,7 +14,7 @@ pub const JOURNAL: usize = 6;
 const CHECKSUMS: usize = 10;
 
 /// All tables, those first to which others refer.
-const TABLES: [&str; 26] = [
+const TABLES: [&str; 28] = [
     "asset",
     "session",
     "chunk",
@@ -41,6 +41,8 @@ const TABLES: [&str; 26] = [
     "note",
     "remark",
     "tag",
+    "cold_file",
+    "cold_chunk",
 ];
 
 /// The counter that became a column of `partition`.

@@ -181,9 +181,16 @@ impl Twin {
             None => self.settle(commands),
         }
         self.now = Some(to);
+        self.command(commands);
+    }
+
+    /// Stores `commands`, which hold from the present time on. Before the first
+    /// [`advance`](Self::advance) there is no such time, and nothing is stored.
+    pub fn command(&mut self, commands: PerAxis<Option<f64>>) {
+        let Some(now) = self.now else { return };
         for axis in Axis::ALL {
             if let Some(command) = commands[axis] {
-                self.commands[axis].push(to.seconds(), command);
+                self.commands[axis].push(now.seconds(), command);
             }
         }
     }

@@ -1,0 +1,106 @@
+use super::*;
+use crate::variables::{BALL_RADIUS, INERTIA_FACTOR, LONGEST_STEP, PLATE_THICKNESS, X_SERVO};
+use offbd_core::engine::{Rig, Setup};
+
+const LAG: usize = X_SERVO + 3;
+const DEAD_TIME: usize = X_SERVO + 2;
+
+fn instance(values: &[(usize, f64)]) -> Instance {
+    let setup = Setup::new(Rig::chapter("chapter"), None).unwrap();
+    let mut instance = Instance::new(&StartValues::of(&setup).unwrap());
+    values.iter().for_each(|&(index, value)| instance.set(index as u32, value).unwrap());
+    instance.enter_initialization(0.0).unwrap();
+    instance.exit_initialization().unwrap();
+    instance
+}
+
+fn run(instance: &mut Instance, steps: u32, h: f64, command: impl Fn(f64) -> f64) {
+    for i in 0..steps {
+        let t = f64::from(i) * h;
+        instance.set(COMMAND_QY as u32, command(t)).unwrap();
+        instance.step(t, h).unwrap();
+    }
+}
+
+/// On a plate that stands still the path is a parabola: v̇x = g/(1 + κ)·cos qx·sin qy.
+#[test]
+fn validate_a_held_plate_against_the_parabola() {
+    let held = [(COMMAND_QX, 0.1), (COMMAND_QY, 0.15), (INERTIA_FACTOR, 2.0 / 3.0), (VX, 0.2)];
+    let mut instance = instance(&held);
+    run(&mut instance, 40, 0.05, |_| 0.15);
+    let a = 9.81 / (1.0 + 2.0 / 3.0) * 0.1_f64.cos() * 0.15_f64.sin();
+    let x = instance.get(X as u32).unwrap();
+    assert!((x - (0.2 * 2.0 + a * 2.0)).abs() < 1e-12, "{x}");
+    let vy = instance.get(VY as u32).unwrap();
+    let b = -9.81 / (1.0 + 2.0 / 3.0) * 0.1_f64.sin();
+    assert!((vy - b * 2.0).abs() < 1e-12, "{vy}");
+}
+
+/// The plate follows a step of the command by the lag's exponential, after the dead time.
+#[test]
+fn validate_the_plate_against_the_exponential() {
+    let mut instance = instance(&[(LAG, 0.05), (DEAD_TIME, 0.02)]);
+    run(&mut instance, 10, 0.01, |_| 0.1);
+    let angle = instance.get(QY as u32).unwrap();
+    let wanted = 0.1 * (1.0 - (-(0.1 - 0.02) / 0.05_f64).exp());
+    assert!((angle - wanted).abs() < 1e-12, "{angle}");
+}
+
+/// With a shorter step of the integration the path changes by less: it converges.
+#[test]
+fn the_path_converges_with_the_step() {
+    let at = |longest| {
+        let mut instance = instance(&[(LONGEST_STEP, longest), (LAG, 0.05)]);
+        run(&mut instance, 200, 0.01, |t| 0.15 * (4.0 * t).sin());
+        instance.get(X as u32).unwrap()
+    };
+    let path = [0.01, 0.005, 0.0025].map(at);
+    let ratio = (path[0] - path[1]) / (path[1] - path[2]);
+    assert!((1.5..5.0).contains(&ratio), "{path:?}: {ratio}");
+}
+
+#[test]
+fn a_saved_state_goes_on_alike_to_the_bit() {
+    let mut instance = instance(&[(DEAD_TIME, 0.035), (PLATE_THICKNESS, 0.01)]);
+    run(&mut instance, 20, 0.01, |t| t);
+    let mut copy = Instance::from_bytes(&instance.to_bytes().unwrap()).unwrap();
+    for one in [&mut instance, &mut copy] {
+        one.step(0.2, 0.01).unwrap();
+        one.step(0.21, 0.02).unwrap();
+    }
+    assert_eq!(instance.values, copy.values);
+    assert!(Instance::from_bytes(b"no instance").is_err());
+}
+
+#[test]
+fn what_does_not_fit_is_refused_in_words() {
+    let mut instance = instance(&[]);
+    let radius = instance.set(BALL_RADIUS as u32, 0.02).unwrap_err().to_string();
+    assert_eq!(radius, "ball_radius cannot be set after the initialization");
+    let late = instance.step(0.5, 0.01).unwrap_err().to_string();
+    assert_eq!(late, "the step begins at 0.5 s, but the last one ended at 0 s");
+    assert!(matches!(instance.step(0.0, 0.0), Err(Refusal::Value(_))));
+    assert!(matches!(instance.step(0.0, f64::NAN), Err(Refusal::Value(_))));
+    assert!(matches!(instance.step(f64::NAN, 0.1), Err(Refusal::OtherTime { .. })));
+    assert_eq!(instance.get(999), Err(Refusal::NoVariable(999)));
+    let command = instance.set(COMMAND_QX as u32, f64::INFINITY).unwrap_err().to_string();
+    assert_eq!(command, "cmd_qx: inf is outside -1000 to 1000");
+    instance.terminate().unwrap();
+    let after = instance.step(0.0, 0.1).unwrap_err().to_string();
+    assert_eq!(after, "a step is not allowed after the end");
+    instance.reset();
+    instance.set(BALL_RADIUS as u32, 0.02).unwrap();
+}
+
+#[test]
+fn start_values_are_outputs_during_the_initialization() {
+    let setup = Setup::new(Rig::chapter("chapter"), None).unwrap();
+    let mut instance = Instance::new(&StartValues::of(&setup).unwrap());
+    instance.enter_initialization(3.0).unwrap();
+    instance.set(COMMAND_QY as u32, 0.5).unwrap();
+    instance.set(Y as u32, 0.04).unwrap();
+    // The servo's limit is 0.2 rad.
+    assert_eq!(instance.get(QY as u32), Ok(0.2));
+    assert_eq!(instance.get(Y as u32), Ok(0.04));
+    assert_eq!(instance.get(TIME as u32), Ok(3.0));
+}

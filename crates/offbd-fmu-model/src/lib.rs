@@ -1,0 +1,22 @@
+//! The digital twin as a model of FMI 3.0, for co-simulation.
+//!
+//! [`VARIABLES`] is the one list of what the model has; the model description, the
+//! documentation and the checks of values follow it. [`Instance`] is a twin between its
+//! instantiation and its end. The C functions of FMI are in another crate, which makes a
+//! shared library of this one.
+//!
+//! Knows no files, no clock and no pointers.
+
+mod description;
+mod instance;
+mod start_values;
+mod twin;
+mod variables;
+
+pub use description::{documentation, instantiation_token, model_description};
+pub use instance::{Instance, Refusal};
+pub use start_values::StartValues;
+pub use variables::{Role, VARIABLES, Variable};
+
+/// The name of the shared library within an FMU, without its suffix.
+pub const MODEL_IDENTIFIER: &str = "ball_on_plate";

@@ -1,0 +1,58 @@
+//! What a pointer to an instance points to.
+
+#![expect(unsafe_code, reason = "the interface of FMI is C")]
+
+use std::ffi::{CString, c_char, c_int, c_void};
+
+use offbd_fmu_model::{Instance, Refusal};
+
+/// `fmi3Status`: the call succeeded.
+pub(crate) const OK: c_int = 0;
+/// `fmi3Status`: the call was refused.
+pub(crate) const ERROR: c_int = 3;
+/// `fmi3Status`: the instance is of no use any more.
+pub(crate) const FATAL: c_int = 4;
+
+/// `fmi3LogMessageCallback`.
+pub(crate) type LogMessage = unsafe extern "C" fn(*mut c_void, c_int, *const c_char, *const c_char);
+
+/// The importer's logger, with the pointer that it wants back.
+#[derive(Clone, Copy)]
+pub(crate) struct ImporterLog {
+    pub environment: *mut c_void,
+    pub message: Option<LogMessage>,
+}
+
+impl ImporterLog {
+    /// Tells the importer why a call is refused.
+    pub(crate) fn error(&self, reason: &str) {
+        let (Some(message), Ok(text)) = (self.message, CString::new(reason)) else { return };
+        // SAFETY: the importer has passed the function and its environment at the
+        // instantiation, to be called until the instance is freed; both strings live until
+        // the call ends.
+        unsafe {
+            message(self.environment, ERROR, c"logStatusError".as_ptr(), text.as_ptr());
+        }
+    }
+}
+
+/// An instance and the logger of its importer.
+pub(crate) struct Component {
+    pub instance: Instance,
+    pub log: ImporterLog,
+}
+
+/// A call that was refused, and why.
+#[derive(Debug)]
+pub(crate) struct RefusedCall(pub String);
+
+impl From<Refusal> for RefusedCall {
+    fn from(refusal: Refusal) -> Self {
+        Self(refusal.to_string())
+    }
+}
+
+/// A call with a null pointer where there must be none.
+pub(crate) fn null(name: &str) -> RefusedCall {
+    RefusedCall(format!("{name} is a null pointer"))
+}

@@ -1,0 +1,292 @@
+"""Compares the FMU of the twin, run by two importers, with scenes. See scripts/fmu."""
+
+import json
+import shutil
+import subprocess
+import sys
+from contextlib import contextmanager
+from csv import DictReader
+from math import pi, sin
+from pathlib import Path
+
+import ecospy
+import fmpy
+from fmpy.fmi3 import FMU3Slave
+from fmpy.validation import validate_fmu
+
+PROGRAM, LIBRARY, DATA = sys.argv[1], sys.argv[2], Path(sys.argv[3])
+BALL = ["x", "y", "vx", "vy"]
+# Servos that are at once where they should be.
+IDEAL = {
+    f"{axis}_servo.{name}": value
+    for axis in "xy"
+    for name, value in {"lag": 0, "dead_time": 0, "rate_limit": 1000, "angle_limit": 1}.items()
+}
+
+
+def offbd(*arguments, status=0):
+    run = subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, cwd=DATA)
+    assert run.returncode == status, f"offbd {arguments}: {run.returncode}\n{run.stderr}"
+    return run
+
+
+def export(name, *arguments):
+    offbd("export", "fmu", "--library", LIBRARY, "-o", name, *arguments)
+    return DATA / name
+
+
+def scene(name, step, *arguments, **content):
+    """Returns the rows of the scene, one for each step."""
+    (DATA / f"{name}.json").write_text(json.dumps({"name": name, "edges": False, **content}))
+    offbd("scene", f"{name}.json", "--model", "rolling", "--sample", step, "-o", name, *arguments)
+    with open(DATA / name / "trajectory.csv") as file:
+        rows = [{key: float(value) for key, value in row.items()} for row in DictReader(file)]
+    return [[row[key] for key in ["x_m", "y_m", "vx_m_s", "vy_m_s"]] for row in rows]
+
+
+class Twin:
+    """The FMU in FMPy, with its variables by name."""
+
+    def __init__(self, fmu, directory, log):
+        self.model = fmpy.read_model_description(fmu)
+        self.references = {v.name: v.valueReference for v in self.model.modelVariables}
+        self.slave = FMU3Slave(
+            guid=self.model.instantiationToken,
+            unzipDirectory=directory,
+            modelIdentifier=self.model.coSimulation.modelIdentifier,
+            instanceName="twin",
+        )
+        self.slave.instantiate(logMessage=log)
+        self.time = 0.0
+
+    def set(self, values):
+        for name, value in values.items():
+            self.slave.setFloat64([self.references[name]], [float(value)])
+
+    def get(self, *names):
+        return self.slave.getFloat64([self.references[name] for name in names])
+
+    def start(self, values):
+        self.set(values)
+        self.slave.enterInitializationMode()
+        self.slave.exitInitializationMode()
+
+    def step(self, h):
+        self.slave.doStep(self.time, h)
+        self.time += h
+
+
+@contextmanager
+def twin(fmu, log=None):
+    directory = fmpy.extract(fmu)
+    one = Twin(fmu, directory, log)
+    try:
+        yield one
+        one.slave.terminate()
+    finally:
+        one.slave.freeInstance()
+        shutil.rmtree(directory)
+
+
+def largest_difference(rows, others):
+    assert len(rows) == len(others) > 10, (len(rows), len(others))
+    return max(abs(a - b) for row, other in zip(rows, others) for a, b in zip(row, other))
+
+
+def validate():
+    fmu = export("chapter.fmu")
+    problems = validate_fmu(fmu)
+    assert not problems, problems
+    model = fmpy.read_model_description(fmu)
+    variables = {v.name: v for v in model.modelVariables}
+    assert variables["cmd_qx"].unit == "rad" and variables["x"].unit == "m"
+    assert float(variables["x_servo.lag"].start) == 0.06
+    result = fmpy.simulate_fmu(fmu, stop_time=1, start_values={"cmd_qy": 0.1})
+    assert len(result) == 101 and result["x"][-1] > 0.3
+    return fmu
+
+
+def held_plates(fmu):
+    """The same commands and the same step as a scene whose plate stands still."""
+    (DATA / "rig.json").write_text(
+        json.dumps(
+            {
+                "name": "hollow",
+                "ball": {"radius_m": 0.02, "mass_kg": 0.0027, "inertia_factor": 0.6666},
+                "plate": {"length_m": 0.3, "width_m": 0.3, "thickness_m": 0.004},
+            }
+        )
+    )
+    hollow = json.loads((DATA / "rig.json").read_text())
+    of_rig = export("rig.fmu", "--asset", "rig.json")
+    cases = [
+        ("slope", fmu, pi / 20, pi / 20, [0, 0, 0, 0], {}),
+        ("thrown", fmu, -0.11, 0.07, [0.05, -0.03, -0.4, 0.2], {}),
+        ("hollow", of_rig, 0.2, -0.15, [0, 0.01, 0.1, 0], {key: hollow[key] for key in ["ball", "plate"]}),
+    ]
+    for name, model, qx, qy, ball, content in cases:
+        height = 0.0227 if not content else 0.022
+        wanted = scene(
+            name,
+            0.01,
+            *["--method", "rk4", "--step", 0.01],
+            duration_s=2,
+            qx=[{"constant_rad": qx}],
+            qy=[{"constant_rad": qy}],
+            initial={"position_m": [*ball[:2], height], "velocity_m_s": [*ball[2:], 0]},
+            **content,
+        )
+        with twin(model) as one:
+            start = dict(zip(BALL, ball)) | {"cmd_qx": qx, "cmd_qy": qy, "longest_step": 0.01}
+            one.start({**IDEAL, **start})
+            rows = [one.get(*BALL)]
+            for _ in range(200):
+                one.step(0.01)
+                rows.append(one.get(*BALL))
+            assert one.get("qx", "qy") == [qx, qy]
+        difference = largest_difference(rows, wanted)
+        print(f"{name}: the FMU and the scene differ by at most {difference:.1e} m, m/s")
+        assert difference < 1e-12, difference
+
+
+def moving_plate(fmu):
+    """A plate that turns to an angle and back, qx after qy. The servos have a lag; the commands
+    are those by which it turns as in the scene, held for a step each, so that the FMU approaches
+    the scene with the step.
+    """
+    lag = 0.06
+    laws = {"cmd_qx": [(0.08, 0.3, 0.6), (-0.16, 1.1, 0.5)], "cmd_qy": [(0.1, 0, 0.5), (-0.2, 0.6, 0.7)]}
+
+    def command(law, t):
+        """The angle of the law, and the lag times its rate."""
+        total = 0
+        for to, start, duration in law:
+            s = min(max((t - start) / duration, 0), 1)
+            total += to * (3 * s**2 - 2 * s**3) + lag * to / duration * 6 * (s - s**2)
+        return total
+
+    def of_scene(law):
+        names = ["to_rad", "start_s", "duration_s"]
+        return [{"smoothstep": dict(zip(names, term))} for term in law]
+
+    wanted = scene(
+        "swing",
+        0.04,
+        *["--method", "dopri5", "--tolerance", 1e-11],
+        duration_s=2,
+        qx=of_scene(laws["cmd_qx"]),
+        qy=of_scene(laws["cmd_qy"]),
+    )
+
+    def run(h):
+        per_row = round(0.04 / h)
+        lags = {"x_servo.lag": lag, "y_servo.lag": lag, "longest_step": h}
+        with twin(fmu) as one:
+            one.start({**IDEAL, **lags})
+            rows = [one.get(*BALL)]
+            for i in range(50 * per_row):
+                one.set({name: command(law, (i + 0.5) * h) for name, law in laws.items()})
+                one.step(h)
+                if (i + 1) % per_row == 0:
+                    rows.append(one.get(*BALL))
+        return largest_difference(rows, wanted)
+
+    differences = [run(h) for h in [8e-3, 4e-3, 2e-3]]
+    print("swing: the FMU and the scene differ by", *[f"{d:.1e}" for d in differences], "m, m/s")
+    for longer, shorter in zip(differences, differences[1:]):
+        assert shorter < 0.6 * longer, differences
+
+
+def saved_states(fmu):
+    with twin(fmu) as one:
+        one.start({"cmd_qy": 0.1})
+
+        def ten_steps():
+            for i in range(10):
+                one.set({"cmd_qx": 0.1 * sin(i)})
+                one.step(0.01)
+            return one.get(*BALL, "qx", "qy", "time")
+
+        ten_steps()
+        time, state = one.time, one.slave.getFMUState()
+        saved = one.slave.serializeFMUState(state)
+        first = ten_steps()
+        one.time = time
+        one.slave.setFMUState(state)
+        assert ten_steps() == first
+        one.slave.freeFMUState(state)
+        again = one.slave.deserializeFMUState(saved)
+        one.time = time
+        one.slave.setFMUState(again)
+        assert ten_steps() == first
+        one.slave.freeFMUState(again)
+        one.slave.reset()
+        one.time = 0.0
+        one.start({"ball_radius": 0.02})
+        assert one.get("x", "ball_radius") == [0.0, 0.02]
+
+
+def refusals(fmu):
+    messages = []
+    with twin(fmu, lambda *words: messages.append(words[-1].decode())) as one:
+        one.start({})
+        for call, expected in [
+            (lambda: one.set({"ball_radius": 0.02}), "ball_radius cannot be set after"),
+            (lambda: one.set({"cmd_qx": 1e9}), "cmd_qx: 1000000000 is outside -1000 to 1000"),
+            (lambda: one.slave.doStep(5.0, 0.01), "the step begins at 5 s"),
+            (lambda: one.slave.getInt32([0]), "fmi3GetInt32 is not offered"),
+        ]:
+            try:
+                call()
+            except Exception as error:
+                assert "fmi3Error" in str(error) or "status 3" in str(error), error
+            else:
+                raise AssertionError(f"not refused: {expected}")
+            assert expected in messages[-1], messages
+    (DATA / "no.so").write_text("#!/bin/sh\n")
+    reason = offbd("export", "fmu", "--library", "no.so", "-o", "no.fmu", status=3).stderr
+    assert "no.so: is no shared library" in reason, reason
+    assert not (DATA / "no.fmu").exists()
+    twice = ["--library", LIBRARY] * 2
+    reason = offbd("export", "fmu", *twice, "-o", "no.fmu", status=3).stderr
+    assert "two libraries for x86_64-linux" in reason, reason
+    program = DATA / "alone"
+    shutil.copy(PROGRAM, program)
+    run = subprocess.run([program, "export", "fmu", "-o", "no.fmu"], capture_output=True, text=True, cwd=DATA)
+    assert run.returncode == 3 and "--package offbd-fmu" in run.stderr, run.stderr
+
+
+def other_importer(fmu):
+    """ecos must see what FMPy sees, to the bit."""
+    commands = [0.1 * sin(0.05 * i) for i in range(200)]
+    with twin(fmu) as one:
+        one.start({"x_servo.lag": 0.03})
+        rows = []
+        for command in commands:
+            one.set({"cmd_qx": command, "cmd_qy": 2 * command})
+            one.step(0.01)
+            rows.append(one.get(*BALL, "qx", "qy"))
+    others = []
+    with ecospy.EcosSimulationStructure() as structure:
+        structure.add_model("twin", str(fmu))
+        structure.add_parameter_set("start", {"twin::x_servo.lag": 0.03})
+        with ecospy.EcosSimulation(structure=structure, step_size=0.01) as simulation:
+            simulation.init(parameter_set="start")
+            for command in commands:
+                simulation.set_real("twin::cmd_qx", command)
+                simulation.set_real("twin::cmd_qy", 2 * command)
+                simulation.step()
+                names = [*BALL, "qx", "qy"]
+                others.append([simulation.get_real(f"twin::{name}") for name in names])
+            simulation.terminate()
+    assert rows == others, largest_difference(rows, others)
+    print(f"ecos: {len(rows)} steps as in FMPy")
+
+
+if __name__ == "__main__":
+    FMU = validate()
+    held_plates(FMU)
+    moving_plate(FMU)
+    saved_states(FMU)
+    refusals(FMU)
+    other_importer(FMU)
