@@ -86,6 +86,10 @@ async fn a_weakening_servo_has_a_warning_before_its_fault_is_confirmed() {
     let gains = |rows: &Value, gain: fn(&Value) -> &Value| -> Vec<Value> {
         rows.as_array().unwrap().iter().map(|row| gain(row).clone()).collect()
     };
+    let residual = |row: &Value| row["residual_x_m_s2"].as_f64().unwrap();
+    let rows = series["rows"].as_array().unwrap();
+    let (first, last) = (residual(&rows[1]), residual(rows.last().unwrap()));
+    assert!(0.0 < first && first < last, "a weaker servo leaves more unexplained: {first}, {last}");
     let of_series = gains(&series["rows"], |row| &row["gain_x"]);
     assert!(of_series.iter().filter(|gain| gain.is_number()).count() as u64 >= SESSIONS);
     let of_points = gains(&view["points"], |point| &point["x"]["gain"]);
