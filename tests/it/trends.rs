@@ -170,3 +170,41 @@ async fn without_a_calibration_there_are_estimates_but_no_trends() {
     assert_eq!(view["trends"], json!([]));
     client.get("assets/nobody/trends").await.problem(404);
 }
+
+/// The root mean square of measured minus predicted acceleration along x while it is judged.
+fn residual_of(trace: &Value) -> f64 {
+    let column = |name: &str| trace["x"][name].as_array().unwrap().iter();
+    let pairs = column("measured_m_s2").zip(column("twin_m_s2")).zip(column("enabled"));
+    let squares: Vec<f64> = pairs
+        .filter(|(_, enabled)| **enabled == json!(true))
+        .filter_map(|((measured, twin), _)| Some(measured.as_f64()? - twin.as_f64()?))
+        .map(|residual| residual * residual)
+        .collect();
+    (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_trace_with_another_calibration_shows_its_fit_and_stores_nothing() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
+    register_and_learn(client, "bench").await;
+    let recorded = import(client, "bench", "s", &session(5, 60, None)).await;
+    let path = format!("sessions/{}", recorded["id"].as_str().unwrap());
+    let trace = async |query: &str| client.get(&format!("{path}/trace?points=20000{query}")).await;
+    let as_recorded = trace("").await.expect(200);
+    let jobs = client.get("assets/bench/calibrations").await.expect(200);
+    let job = &jobs["items"][0];
+    for id in [&job["id"], &job["calibration"]["id"]] {
+        let again = trace(&format!("&calibration={}", id.as_str().unwrap())).await.expect(200);
+        assert_eq!(again, as_recorded, "the calibration in use");
+    }
+    let without = trace("&calibration=none").await.expect(200);
+    assert!(residual_of(&without) > residual_of(&as_recorded), "learning improves the fit");
+    // The trace has every moment, and the residual that the session keeps is theirs.
+    assert_eq!(as_recorded["stride"], 1);
+    let kept = recorded["verdict"]["residual_x_m_s2"].as_f64().unwrap();
+    assert!((kept / residual_of(&as_recorded) - 1.0).abs() < 0.01, "{kept}");
+    let problem = trace("&calibration=other").await.problem(404);
+    assert!(problem["detail"].as_str().unwrap().contains("other"), "{problem}");
+    assert_eq!(client.get(&path).await.expect(200), recorded);
+}
