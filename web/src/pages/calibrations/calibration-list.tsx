@@ -4,7 +4,7 @@ import { EmptyState } from "../../parts/empty-state";
 import { Link } from "../../router/link";
 import { setUpPath } from "../../router/paths";
 import { CalibrationCard } from "./calibration-card";
-import { CalibrationRow } from "./calibration-row";
+import { CalibrationTable } from "./calibration-table";
 import { FitCard } from "./fit-card";
 import { numbered, previous } from "./history";
 
@@ -31,32 +31,14 @@ export function CalibrationList({ name, jobs, sessions, refetch }: Props) {
     );
   return (
     <>
-      <section class="card">
-        <h2>History</h2>
-        <table class="numbers">
-          <thead>
-            <tr>
-              {["number", "made", "learnt from", "state", ""].map((word) => (
-                <th scope="col">{word}</th>
-              ))}
-            </tr>
-          </thead>
-          <tbody>
-            {done.map(({ job, n }) => (
-              <CalibrationRow
-                key={job.id}
-                name={name}
-                job={job}
-                n={n}
-                sessions={sessions}
-                isChosen={job === chosen.job}
-                choose={() => choose(job.id)}
-                refetch={refetch}
-              />
-            ))}
-          </tbody>
-        </table>
-      </section>
+      <CalibrationTable
+        name={name}
+        done={done}
+        chosen={chosen.job.id}
+        choose={choose}
+        sessions={sessions}
+        refetch={refetch}
+      />
       <CalibrationCard n={chosen.n} calibration={chosen.job.calibration} />
       <FitCard
         key={chosen.job.id}

@@ -45,6 +45,12 @@ export function FitCard({ n, calibration, before, sessions }: Props) {
           ))}
         </select>
       </label>
+      {before === NO_CALIBRATION && (
+        <p class="quiet small-text">
+          A learnt rig is judged over a window as long as its noise requires, which alone makes the residual
+          smaller.
+        </p>
+      )}
       {fit.data && <Fit traces={fit.data} before={other} after={`with calibration ${n}`} />}
       {!fit.data &&
         (fit.error ? <ErrorMessage error={fit.error} retry={fit.refetch} /> : <Loading what="the fit" />)}

@@ -3,7 +3,8 @@ import type { Axis, Trace } from "../../api/types";
 import { number } from "../../words/numbers";
 
 /** The root mean square of the residual while it could be judged, m/s²; null if it never could. */
-export function residualRms({ [axis]: columns }: Pick<Trace, Axis>, axis: Axis): number | null {
+export function residualRms(trace: Pick<Trace, Axis>, axis: Axis): number | null {
+  const columns = trace[axis];
   const residuals = columns.measured_m_s2.flatMap((measured, i) => {
     const twin = columns.twin_m_s2[i];
     return columns.enabled[i] && measured != null && twin != null ? [measured - twin] : [];
