@@ -6,6 +6,7 @@
 //! only those of the summary and the lines of faults.
 
 mod recorded;
+mod residual;
 
 pub use recorded::{JudgedSession, MAX_NAMED_ROWS, NoUsableRow, RecordedSession};
 
@@ -16,6 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::wire::basis::Basis;
 use crate::wire::verdict::{SummaryView, Verdict};
+use residual::ResidualSize;
 
 /// Counts of the samples of a session.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -39,6 +41,7 @@ pub struct Judging {
     basis: Basis,
     plausibility: Plausibility,
     verdict: Verdict,
+    residual: ResidualSize,
     /// Samples that were neither duplicates nor rejected.
     n_samples: u64,
     /// The latest time of these, also of those that are not judged, s.
@@ -57,6 +60,7 @@ impl Judging {
             plausibility: Plausibility::new(&setup.rig),
             engine: Engine::new(setup, memory),
             verdict: Verdict::default(),
+            residual: ResidualSize::default(),
             n_samples: 0,
             newest_t_s: None,
             transitions: Vec::new(),
@@ -85,9 +89,17 @@ impl Judging {
 
     /// Takes one input like [`Judging::input`], and calls `observer` with the evidence of
     /// each sample that is judged thereby, in order of time.
-    pub fn observe(&mut self, input: Input, observer: impl FnMut(&Evidence)) -> Option<Admission> {
+    pub fn observe(
+        &mut self,
+        input: Input,
+        mut observer: impl FnMut(&Evidence),
+    ) -> Option<Admission> {
         self.transitions.clear();
-        let admission = self.engine.observe(input, &mut self.transitions, observer);
+        let residual = &mut self.residual;
+        let admission = self.engine.observe(input, &mut self.transitions, |evidence| {
+            residual.take(evidence);
+            observer(evidence);
+        });
         self.verdict.take(self.engine.n_accepted(), &self.transitions);
         let is_recorded = matches!(admission, Some(Admission::Accepted | Admission::SetAside(_)));
         if let (true, Input::Sample(sample) | Input::NewSample(sample)) = (is_recorded, &input) {
@@ -152,5 +164,6 @@ impl Judging {
             .summary(session, self.n_samples, n_rejected, self.engine.duration_s())
             .with_monitors(self.verdict.monitors(&self.engine.state()))
             .with_misfits(&self.misfits())
+            .with_residual(self.residual.rms_m_s2())
     }
 }

@@ -20,19 +20,31 @@ pub(super) async fn calibration(
     settings: &ReplaySettingsView,
 ) -> Result<Option<CalibrationView>, ServiceError> {
     let Some(id) = &settings.calibration else { return Ok(None) };
+    let found = find_calibration(store, asset, id).await?;
+    let unknown = || {
+        let reason = format!("asset `{asset}` has no completed calibration `{id}`");
+        Invalid::new("/calibration", reason)
+    };
+    Ok(Some(found.ok_or_else(unknown)?))
+}
+
+/// Returns the completed calibration of `asset` with `id`, its own or that of its job; `None`
+/// if there is none.
+pub(super) async fn find_calibration(
+    store: &Store,
+    asset: &str,
+    id: &str,
+) -> Result<Option<CalibrationView>, ServiceError> {
     let mut before = None::<(Micros, String)>;
     loop {
         let from = before.as_ref().map(|(made_at, id)| (*made_at, id.as_str()));
         let rows = store.calibrations(asset, from, PAGE).await?;
-        let Some(last) = rows.last() else {
-            let reason = format!("asset `{asset}` has no completed calibration `{id}`");
-            return Err(Invalid::new("/calibration", reason).into());
-        };
+        let Some(last) = rows.last() else { return Ok(None) };
         before = Some((last.made_at, last.id.clone()));
         for row in &rows {
             let Some(document) = &row.document else { continue };
             let view: CalibrationView = views::from_json(document)?;
-            if row.id == *id || view.id == *id {
+            if row.id == id || view.id == id {
                 return Ok(Some(view));
             }
         }

@@ -74,6 +74,10 @@ series_values! {
     delay_x_s,
     /// Delay of the y servo in addition to the twin's, s.
     delay_y_s,
+    /// Root mean square along x of the acceleration that the twin does not predict, m/s².
+    residual_x_m_s2,
+    /// Root mean square along y of the acceleration that the twin does not predict, m/s².
+    residual_y_m_s2,
     /// Share of the session in which the x servo could be judged, 0 to 1.
     judged_x_servo,
     /// Share of the session in which the y servo could be judged, 0 to 1.

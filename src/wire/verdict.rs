@@ -189,6 +189,13 @@ pub struct SummaryView {
     /// without them.
     #[serde(default)]
     pub monitors: Vec<JudgedView>,
+    /// Root mean square of the residual along x while it could be judged, m/s²; null if it
+    /// never could, or if an earlier version stored the summary without it.
+    #[serde(default)]
+    pub residual_x_m_s2: Option<f64>,
+    /// The same along y.
+    #[serde(default)]
+    pub residual_y_m_s2: Option<f64>,
     /// SHA-256 of the number of judged samples and of all transitions, hexadecimal; equal
     /// judgements have equal hashes.
     pub verdict_hash: String,
@@ -376,7 +383,8 @@ impl Verdict {
         HEXLOWER.encode(&hash.finalize())
     }
 
-    /// Returns the summary line of a session, without the monitors' results and warnings.
+    /// Returns the summary line of a session, without the monitors' results, the residual and
+    /// warnings.
     #[must_use]
     pub fn summary(
         &self,
@@ -394,6 +402,8 @@ impl Verdict {
             faults: self.confirmed.iter().map(|&code| code.into()).collect(),
             outcome: None,
             monitors: Vec::new(),
+            residual_x_m_s2: None,
+            residual_y_m_s2: None,
             verdict_hash: self.hash(),
             warnings: Vec::new(),
         }

@@ -107,6 +107,9 @@ async fn a_series_has_the_results_of_the_sessions() {
             let name = format!("judged_{}", monitor["code"].as_str().unwrap());
             assert_eq!(row[&name], monitor["judged_share"], "{row}");
         }
+        for residual in ["residual_x_m_s2", "residual_y_m_s2"] {
+            assert_eq!(row[residual], verdict[residual], "{row}");
+        }
         let point = points.as_array().unwrap().iter().find(|p| p["session"] == session["name"]);
         let estimate = point.map_or(&Value::Null, |point| &point["y"]);
         assert_eq!(row["gain_y"], estimate["gain"], "{row}");

@@ -37,8 +37,13 @@ async fn register_and_learn(client: &Client, asset: &str) {
 async fn learn(client: &Client, asset: &str, seed: u64) {
     let name = format!("healthy-{seed}");
     let healthy = import(client, asset, &name, &session(seed, 120, None)).await;
+    learn_from(client, asset, &healthy).await;
+}
+
+/// Calibrates `asset` with `session` and uses the result.
+async fn learn_from(client: &Client, asset: &str, session: &Value) {
     let calibrations = format!("assets/{asset}/calibrations");
-    let job = client.post(&calibrations, &json!({ "sessions": [healthy["id"]] })).await.expect(202);
+    let job = client.post(&calibrations, &json!({ "sessions": [session["id"]] })).await.expect(202);
     let path = format!("{calibrations}/{}", job["id"].as_str().unwrap());
     eventually(|| async { (client.get(&path).await.expect(200)["state"] == "done").then_some(()) })
         .await;
@@ -86,6 +91,10 @@ async fn a_weakening_servo_has_a_warning_before_its_fault_is_confirmed() {
     let gains = |rows: &Value, gain: fn(&Value) -> &Value| -> Vec<Value> {
         rows.as_array().unwrap().iter().map(|row| gain(row).clone()).collect()
     };
+    let residual = |row: &Value| row["residual_x_m_s2"].as_f64().unwrap();
+    let rows = series["rows"].as_array().unwrap();
+    let (first, last) = (residual(&rows[1]), residual(rows.last().unwrap()));
+    assert!(0.0 < first && first < last, "a weaker servo leaves more unexplained: {first}, {last}");
     let of_series = gains(&series["rows"], |row| &row["gain_x"]);
     assert!(of_series.iter().filter(|gain| gain.is_number()).count() as u64 >= SESSIONS);
     let of_points = gains(&view["points"], |point| &point["x"]["gain"]);
@@ -165,4 +174,46 @@ async fn without_a_calibration_there_are_estimates_but_no_trends() {
     assert!(points[0]["x"]["gain_error"].as_f64().unwrap() > 0.0);
     assert_eq!(view["trends"], json!([]));
     client.get("assets/nobody/trends").await.problem(404);
+}
+
+/// The root mean square of measured minus predicted acceleration along x while it is judged.
+fn residual_of(trace: &Value) -> f64 {
+    let column = |name: &str| trace["x"][name].as_array().unwrap().iter();
+    let pairs = column("measured_m_s2").zip(column("twin_m_s2")).zip(column("enabled"));
+    let squares: Vec<f64> = pairs
+        .filter(|(_, enabled)| **enabled == json!(true))
+        .filter_map(|((measured, twin), _)| Some(measured.as_f64()? - twin.as_f64()?))
+        .map(|residual| residual * residual)
+        .collect();
+    (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_trace_with_another_calibration_shows_its_fit_and_stores_nothing() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
+    client.post("assets", &json!({ "name": "bench" })).await.expect(201);
+    // A servo that answers four fifths of its command: the twin of its description does not.
+    let weak = Some("x_servo:gain=0.8@0");
+    let taught = import(client, "bench", "taught", &session(5, 120, weak)).await;
+    learn_from(client, "bench", &taught).await;
+    let recorded = import(client, "bench", "s", &session(6, 60, weak)).await;
+    let path = format!("sessions/{}", recorded["id"].as_str().unwrap());
+    let trace = async |query: &str| client.get(&format!("{path}/trace?points=20000{query}")).await;
+    let as_recorded = trace("").await.expect(200);
+    let jobs = client.get("assets/bench/calibrations").await.expect(200);
+    let job = &jobs["items"][0];
+    for id in [&job["id"], &job["calibration"]["id"]] {
+        let again = trace(&format!("&calibration={}", id.as_str().unwrap())).await.expect(200);
+        assert_eq!(again, as_recorded, "the calibration in use");
+    }
+    let without = trace("&calibration=none").await.expect(200);
+    assert!(residual_of(&without) > residual_of(&as_recorded), "learning improves the fit");
+    // The trace has every moment, and the residual that the session keeps is theirs.
+    assert_eq!(as_recorded["stride"], 1);
+    let kept = recorded["verdict"]["residual_x_m_s2"].as_f64().unwrap();
+    assert!((kept / residual_of(&as_recorded) - 1.0).abs() < 0.01, "{kept}");
+    let problem = trace("&calibration=other").await.problem(404);
+    assert!(problem["detail"].as_str().unwrap().contains("other"), "{problem}");
+    assert_eq!(client.get(&path).await.expect(200), recorded);
 }

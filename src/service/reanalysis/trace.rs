@@ -8,6 +8,7 @@ use crate::service::replay_settings;
 use crate::service::writing::Handles;
 use crate::service::{ServiceError, snapshots};
 use crate::store::SessionRow;
+use crate::wire::asset::CalibrationView;
 use crate::wire::service::ReplaySettingsView;
 use crate::wire::trace::{ThresholdsView, TracePoint, TraceView};
 use offbd_core::engine::Input;
@@ -29,7 +30,8 @@ pub struct TraceQuery {
     pub settings: ReplaySettingsView,
 }
 
-/// Computes the trace of `session`; ends early if the service shuts down.
+/// Computes the trace of `session`, with the calibration `learnt` if it is not the recorded
+/// one; ends early if the service shuts down.
 ///
 /// # Errors
 /// [`ServiceError::TooMany`] if too many samples must be evaluated: those of the range, and
@@ -38,8 +40,9 @@ pub(in crate::service) fn trace(
     handles: &Handles,
     session: &SessionRow,
     query: &TraceQuery,
+    learnt: Option<&CalibrationView>,
 ) -> Result<TraceView, ServiceError> {
-    let setup = replay_settings::setup(session, &query.settings, None)?;
+    let setup = replay_settings::setup(session, &query.settings, learnt)?;
     let expected = expected_points(session, query, setup.settings.period_s);
     let (first, end) = handles.wait(handles.store.indexes(session, query.range))?;
     let (first, mut judging) = snapshots::engine_before(handles, session, setup, first)?;

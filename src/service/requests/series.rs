@@ -115,6 +115,10 @@ fn session_result(row: &SessionRow, estimates: &[TrendRow]) -> Result<SessionRes
             (Some(estimate.gain), Some(estimate.offset_m_s2), Some(estimate.delay_s));
     }
     let verdict: Option<SummaryView> = row.verdict.as_deref().map(views::from_json).transpose()?;
+    if let Some(verdict) = &verdict {
+        values.residual_x_m_s2 = verdict.residual_x_m_s2;
+        values.residual_y_m_s2 = verdict.residual_y_m_s2;
+    }
     for monitor in verdict.iter().flat_map(|verdict| &verdict.monitors) {
         let share = match monitor.code {
             CodeWord::XServo => &mut values.judged_x_servo,

@@ -10,7 +10,7 @@ use super::{CandidateView, SummaryView, Verdict, candidate_view, warnings};
 use crate::wire::words::CodeWord;
 use offbd_core::diagnosis::Suspicion;
 use offbd_core::engine::{Misfit, MonitorState, Reach, State};
-use offbd_core::vocabulary::FaultCode;
+use offbd_core::vocabulary::{FaultCode, PerAxis};
 
 /// The result of a session, or of one monitor in a session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -131,6 +131,12 @@ impl SummaryView {
     pub fn with_monitors(self, monitors: Vec<JudgedView>) -> Self {
         let each: Vec<Outcome> = monitors.iter().map(|m| m.outcome).collect();
         Self { outcome: Some(Outcome::of_session(&each)), monitors, ..self }
+    }
+
+    /// Adds the root mean square of the residual along each axis, m/s².
+    #[must_use]
+    pub fn with_residual(self, rms_m_s2: PerAxis<Option<f64>>) -> Self {
+        Self { residual_x_m_s2: rms_m_s2.x, residual_y_m_s2: rms_m_s2.y, ..self }
     }
 
     /// Adds the warnings of `misfits`. If one of them prevents judging and nothing was found,

@@ -82,7 +82,7 @@ export const api = {
   deleteSession: (session: string) => send<void>("DELETE", `/sessions/${segment(session)}`),
   trace: (
     session: string,
-    range: { from_s?: number; to_s?: number; points?: number; profile?: Profile } = {},
+    range: { from_s?: number; to_s?: number; points?: number; profile?: Profile; calibration?: string } = {},
   ) => get<Trace>(`/sessions/${segment(session)}/trace${query(range)}`),
   trial: (session: string, settings: Record<string, number | string | undefined>) =>
     get<Trial>(`/sessions/${segment(session)}/trial${query(settings)}`),
@@ -104,6 +104,7 @@ export const api = {
   replayState: (replay: string) => get<Replay>(`/replays/${segment(replay)}`),
   calibrate: (asset: string, sessions: string[]) =>
     send<CalibrationJob>("POST", `/assets/${segment(asset)}/calibrations`, { sessions }),
+  calibrations: (asset: string) => getAll<CalibrationJob>(`/assets/${segment(asset)}/calibrations`, {}),
   calibration: (asset: string, job: string) =>
     get<CalibrationJob>(`/assets/${segment(asset)}/calibrations/${segment(job)}`),
   learning: (asset: string) => get<Learning>(`/assets/${segment(asset)}/learning`),

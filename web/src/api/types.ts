@@ -33,6 +33,7 @@ export type ServoProspects = Schemas["ServoProspects"];
 export type Candidate = Schemas["Candidate"];
 export type Calibration = Schemas["Calibration"];
 export type CalibrationJob = Schemas["CalibrationJob"];
+export type TrainingData = Schemas["TrainingData"];
 export type Caller = Schemas["Caller"];
 export type DriveCycle = Schemas["DriveCycle"];
 export type Evidence = Schemas["Evidence"];

@@ -11,6 +11,9 @@ const SessionsPage = lazy(() => import("../pages/sessions").then((module) => mod
 const SessionPage = lazy(() => import("../pages/session").then((module) => module.SessionPage));
 const ComparePage = lazy(() => import("../pages/compare").then((module) => module.ComparePage));
 const SetUpPage = lazy(() => import("../pages/set-up").then((module) => module.SetUpPage));
+const CalibrationsPage = lazy(() =>
+  import("../pages/calibrations").then((module) => module.CalibrationsPage),
+);
 const AlarmsPage = lazy(() => import("../pages/alarms").then((module) => module.AlarmsPage));
 const NotificationsPage = lazy(() =>
   import("../pages/notifications").then((module) => module.NotificationsPage),
@@ -31,6 +34,7 @@ export function Route({ segments, isDemo }: { segments: string[]; isDemo: boolea
     if (second === "faults" && code && fifth === "report")
       return <FaultReport key={name + code} name={name} code={code as FaultCode} />;
     if (second === "faults" && code) return <FaultPage name={name} code={code as FaultCode} />;
+    if (second === "calibrations") return <CalibrationsPage key={name} name={name} />;
     if (second === "set-up") return <SetUpPage key={name} name={name} />;
   }
   if (first === "set-up") return <SetUpPage />;

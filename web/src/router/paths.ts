@@ -7,6 +7,7 @@ export const path = (...segments: string[]) => `/${segments.map(encodeURICompone
 export type SetUpStep = "describe" | "connect" | "check" | "learn";
 
 export const rigPath = (name: string) => path("rigs", name);
+export const calibrationsPath = (name: string) => path("rigs", name, "calibrations");
 export const faultPath = (name: string, code: FaultCode) => path("rigs", name, "faults", code);
 
 export const setUpPath = (name: string, step?: SetUpStep) =>

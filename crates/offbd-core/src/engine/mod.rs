@@ -59,8 +59,9 @@ use crate::vocabulary::{FaultCode, PerAxis, Sample};
 pub const JUDGEMENT: u32 = 2;
 
 /// Version of the serialised form of an [`Engine`], a [`Plausibility`] and a
-/// [`UsableMotion`]: raised with every change of their fields or of what these mean.
-pub const SNAPSHOT_FORMAT: u32 = 2;
+/// [`UsableMotion`], and of what a caller stores with them: raised with every change of the
+/// fields or of what these mean.
+pub const SNAPSHOT_FORMAT: u32 = 3;
 
 /// Consecutive unjudged samples after which a rig counts as not tested. Chosen: a few late
 /// samples are common.

@@ -2,7 +2,7 @@ import { api } from "../../api/client";
 import { ConfirmButton } from "../../parts/confirm-button";
 import { HealthMark } from "../../parts/health-mark";
 import { Link } from "../../router/link";
-import { sessionsPath, setUpPath } from "../../router/paths";
+import { calibrationsPath, sessionsPath, setUpPath } from "../../router/paths";
 import type { RigHealth } from "../../words/severity";
 import { RigTags } from "./rig-tags";
 
@@ -28,6 +28,9 @@ export function AssetHeader({ name, health, session }: Props) {
       <div class="page-tools">
         <Link class="button" to={sessionsPath(name)}>
           Sessions
+        </Link>
+        <Link class="button" to={calibrationsPath(name)}>
+          Calibrations
         </Link>
         <Link class="button" to={setUpPath(name)}>
           Set-up

@@ -1,5 +1,7 @@
 import { isFinished } from "../../api/poll";
 import type { Asset, CalibrationJob } from "../../api/types";
+import { Link } from "../../router/link";
+import { rigPath } from "../../router/paths";
 import { CalibrationDetails } from "./calibration-details";
 
 /** The progress of the calibration, and its result. */
@@ -26,7 +28,16 @@ export function Learnt({ asset, job }: { asset: Asset; job?: CalibrationJob }) {
       {!calibration && !job && (
         <p class="quiet">Nothing yet. Until then, only sensor faults are confirmed.</p>
       )}
-      {calibration && <CalibrationDetails name={asset.name} calibration={calibration} />}
+      {calibration && (
+        <>
+          <CalibrationDetails calibration={calibration} />
+          <p>
+            <Link class="button primary" to={rigPath(asset.name)}>
+              Done: open the live view
+            </Link>
+          </p>
+        </>
+      )}
     </section>
   );
 }

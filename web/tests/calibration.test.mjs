@@ -1,0 +1,61 @@
+// The page with the calibrations of a rig.
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import { ask, browser, directory, page, recordings, remove, serve, SOON } from "./support.mjs";
+
+let work, service, chromium;
+
+/** Calibrates the rig from `session` and uses the result. */
+async function learn(session) {
+  const calibrations = "/assets/bench/calibrations";
+  let job = await ask(service.url, "POST", calibrations, { sessions: [session] });
+  for (const until = Date.now() + 3 * SOON; job.state !== "done" && Date.now() < until;)
+    job = await ask(service.url, "GET", `${calibrations}/${job.id}`);
+  assert.equal(job.state, "done", job.error);
+  await ask(service.url, "POST", `${calibrations}/${job.id}/activate`);
+}
+
+before(async () => {
+  work = directory();
+  chromium = await browser();
+  service = await serve(`${work}/store`);
+  const { healthy } = recordings(work);
+  await ask(service.url, "POST", "/assets", { name: "bench" });
+  const path = "/assets/bench/sessions/import?name=healthy";
+  const { session } = await ask(service.url, "POST", path, healthy, "text/csv");
+  await learn(session.id);
+  await learn(session.id);
+});
+
+after(async () => {
+  await chromium?.close();
+  await service?.stop();
+  remove(work);
+});
+
+test("the calibrations are listed with their fit, and an earlier one is used again", async () => {
+  const view = await page(chromium);
+  await view.goto(`${service.url}/rigs/bench`);
+  await view.getByRole("link", { name: "Calibrations" }).click();
+  await view.getByRole("heading", { name: "What calibration 2 learnt" }).waitFor();
+  await view.getByRole("heading", { name: "Before: with calibration 1" }).waitFor();
+
+  await view.getByRole("radio", { name: "1" }).check();
+  await view.getByRole("heading", { name: "What calibration 1 learnt" }).waitFor();
+  await view.getByRole("heading", { name: "Before: without a calibration" }).waitFor();
+  await view.getByText(/^Along x the residual is [\d.]+ m\/s²/).waitFor();
+  assert.equal(await view.getByRole("img", { name: /^Residual along/ }).count(), 4);
+  assert.equal(await view.getByRole("img", { name: /^Acceleration along/ }).count(), 4);
+
+  await view.getByRole("button", { name: "Use this one again" }).click();
+  const dialog = view.getByRole("dialog", { name: "Use calibration 1 again?" });
+  await dialog.getByRole("button", { name: "Use this one again" }).click();
+  await view.getByRole("row", { name: /^1 .* in use/ }).waitFor();
+  const { items } = await ask(service.url, "GET", "/assets/bench/calibrations");
+  assert.deepEqual(
+    items.map(({ active }) => active),
+    [false, true],
+  );
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});
