@@ -194,14 +194,12 @@ fn device_operation(topic: DeviceTopic, ack: &str) -> (&'static str, Operation) 
              seconds of silence and after connecting",
             receive(&["batch"]).answered(ack, ANSWERS),
         ),
-        DeviceTopic::Hello => ("Birth: what a device tells after connecting", {
-            receive(&["hello"]).retained()
-        }),
-        DeviceTopic::State => {
-            ("Presence: `online`; the last will of a device is `offline`", {
-                receive(&["presence"]).retained()
-            })
+        DeviceTopic::Hello => {
+            ("Birth: what a device tells after connecting", { receive(&["hello"]).retained() })
         }
+        DeviceTopic::State => ("Presence: `online`; the last will of a device is `offline`", {
+            receive(&["presence"]).retained()
+        }),
     }
 }
 
@@ -246,10 +244,8 @@ fn channel_object(channel: &Channel) -> Value {
 }
 
 /// Parameters of addresses.
-const PARAMETERS: [(&str, &str); 2] = [
-    ("asset", "Name of the asset; in topics, `.` is written `=2E`"),
-    ("code", "Fault code"),
-];
+const PARAMETERS: [(&str, &str); 2] =
+    [("asset", "Name of the asset; in topics, `.` is written `=2E`"), ("code", "Fault code")];
 
 fn reference(target: &str) -> Value {
     json!({ "$ref": target })
@@ -261,11 +257,7 @@ fn message_references(channel: &str, names: &[&str]) -> Value {
 }
 
 /// Returns the name and the object of an operation.
-fn operation_object(
-    channel: &Channel,
-    operation: &Operation,
-    openapi: &Value,
-) -> (String, Value) {
+fn operation_object(channel: &Channel, operation: &Operation, openapi: &Value) -> (String, Value) {
     let action = operation.action.as_str();
     let mut object = json!({
         "action": action,
@@ -391,7 +383,7 @@ fn asyncapi() -> Value {
 /// Returns the AsyncAPI document as YAML, as committed in `asyncapi.yaml`.
 #[must_use]
 pub fn asyncapi_yaml() -> String {
-    serde_norway::to_string(&asyncapi()).unwrap_or_else(|error| format!("# {error}\n"))
+    yaml_serde::to_string(&asyncapi()).unwrap_or_else(|error| format!("# {error}\n"))
 }
 
 #[cfg(test)]
