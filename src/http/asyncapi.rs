@@ -118,8 +118,9 @@ impl Operation {
         Self { action, messages, retained: false, reply: None }
     }
 
-    const fn retained(self) -> Self {
-        Self { retained: true, ..self }
+    const fn retained(mut self) -> Self {
+        self.retained = true;
+        self
     }
 
     fn answered(self, channel: &str, messages: &'static [&'static str]) -> Self {
