@@ -1,5 +1,5 @@
-//! Publishes the events of the service: the present state of each fault code as a retained
-//! message, which is removed when the code is cleared.
+//! Publishes the events of the service: the present state of each fault code, and that data
+//! stay away, as a retained message, which is removed when the code is cleared or data are back.
 //!
 //! The events of all assets are published in the order of their commits, each once. After a
 //! restart it goes on from the last one that was published; one that was published just before
@@ -13,7 +13,7 @@ use tokio_util::sync::CancellationToken;
 
 use super::RETRY_INTERVAL;
 use crate::service::{Event, EventFeed, Service, ServiceError};
-use crate::wire::words::{CodeWord, StatusWord};
+use crate::wire::words::{AlarmChangeWord, AlarmCodeWord};
 
 /// Events published without storing the last one, while further ones wait.
 const UNSTORED_EVENTS: u32 = 64;
@@ -35,8 +35,8 @@ pub(super) trait Publishing: Send + Sync {
 
 #[derive(Deserialize)]
 struct CodeAndStatus {
-    code: CodeWord,
-    status: StatusWord,
+    code: AlarmCodeWord,
+    status: AlarmChangeWord,
 }
 
 /// Publishes events until the service stops.
@@ -96,9 +96,11 @@ async fn publish(link: &impl Publishing, event: &Event) -> Result<(), ServiceErr
         .map_err(|error| ServiceError::Corrupt { what: format!("event {}: {error}", event.id) })?;
     let line = event.line();
     let document = format!(r#"{{"event":{},{}"#, event.id, &line[1..]).into_bytes();
-    let (asset, code, is_cleared) = (&event.asset, code.as_str(), status == StatusWord::Cleared);
-    link.publish(FaultMessage { asset, code, document, retained: !is_cleared }).await;
-    if is_cleared {
+    // A fault that is cleared, or data that are back: nothing is left to tell of.
+    let is_over = matches!(status, AlarmChangeWord::Cleared | AlarmChangeWord::Passed);
+    let (asset, code) = (&event.asset, code.as_str());
+    link.publish(FaultMessage { asset, code, document, retained: !is_over }).await;
+    if is_over {
         link.publish(FaultMessage { asset, code, document: Vec::new(), retained: true }).await;
     }
     Ok(())

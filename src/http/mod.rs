@@ -11,6 +11,7 @@
 mod alarms;
 mod api;
 mod assets;
+mod asyncapi;
 mod body;
 mod calibrations;
 mod cluster;
@@ -64,6 +65,7 @@ use utoipa::OpenApi;
 use utoipa::openapi::OpenApi as Document;
 use utoipa_swagger_ui::SwaggerUi;
 
+pub use asyncapi::asyncapi_yaml;
 pub use body::BodyBudget;
 pub use guard::AccessPolicy;
 pub use json_body::parse_json;
@@ -235,8 +237,8 @@ struct PageQuery {
 }
 
 /// Public paths that are not operations: the API description and its viewer.
-const OPEN_PAGES: [&str; 5] =
-    ["/openapi.yaml", "/openapi.json", "/docs", "/docs/", "/docs/{*rest}"];
+const OPEN_PAGES: [&str; 6] =
+    ["/openapi.yaml", "/openapi.json", "/asyncapi.yaml", "/docs", "/docs/", "/docs/{*rest}"];
 
 /// Returns the OpenAPI document.
 #[must_use]
@@ -260,11 +262,13 @@ pub fn router(app: App, extra: ExtraRoutes) -> Router {
     let mut rules = RouteRules::new(&document);
     OPEN_PAGES.iter().for_each(|path| rules.open(path));
     let yaml: Arc<str> = document.to_yaml().unwrap_or_default().into();
+    let messages: Arc<str> = asyncapi_yaml().into();
     let policy = app.policy.clone();
     let forwarder = Forwarder::default();
     let guard = Arc::new(Guard { app: app.clone(), rules, forwarder: forwarder.clone() });
     let router = router
-        .route("/openapi.yaml", axum::routing::get(move || operations::openapi(yaml)))
+        .route("/openapi.yaml", axum::routing::get(move || operations::yaml(yaml)))
+        .route("/asyncapi.yaml", axum::routing::get(move || operations::yaml(messages)))
         .merge(SwaggerUi::new("/docs").url("/openapi.json", document))
         .fallback(page::serve)
         .method_not_allowed_fallback(problem::method_not_allowed)

@@ -1,4 +1,4 @@
-//! Health, readiness and the OpenAPI document.
+//! Health, readiness and the descriptions of the interface.
 
 use std::sync::Arc;
 
@@ -56,6 +56,6 @@ pub(super) async fn readyz(State(app): State<App>) -> Result<Json<HealthView>, P
     Ok(healthy(&app))
 }
 
-pub(super) async fn openapi(yaml: Arc<str>) -> impl IntoResponse {
+pub(super) async fn yaml(yaml: Arc<str>) -> impl IntoResponse {
     ([(CONTENT_TYPE, "application/yaml")], yaml.to_string())
 }

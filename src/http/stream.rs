@@ -17,7 +17,6 @@ use axum::http::StatusCode;
 use axum::response::Response;
 use futures_util::{FutureExt, SinkExt};
 use serde::{Deserialize, Serialize};
-use serde_json::json;
 use tokio::time::{Instant, Interval, MissedTickBehavior, interval_at, timeout};
 use utoipa::ToSchema;
 
@@ -25,6 +24,8 @@ use super::telemetry::TelemetryFormat;
 use super::{App, AssetPath, Problem, Query};
 use crate::service::access::{Caller, Right};
 use crate::service::{Event, EventFeed, PendingBatch, Service, ServiceError};
+use crate::wire::bus::BatchAckView;
+use crate::wire::service::StateView;
 use crate::wire::telemetry::AckView;
 use crate::wire::trace::TraceView;
 use offbd_core::vocabulary::Invalid;
@@ -328,7 +329,7 @@ impl StreamConnection {
         self.waiting = None;
         while let Some(pending) = self.pending.pop_front() {
             let ack = pending.ack.await;
-            self.send(ack_frame(pending.id.as_deref(), ack)).await?;
+            self.send_messages(vec![text(&answer(pending.id, ack))]).await?;
         }
         Err(CloseReason::Close(close_code::AWAY, "the service is shutting down"))
     }
@@ -353,7 +354,8 @@ impl StreamConnection {
         if !self.may_send {
             let detail = "the token does not permit sending telemetry of this asset";
             let problem = Problem::new(StatusCode::FORBIDDEN, "forbidden", "Forbidden", detail);
-            return self.send(json!({ "type": "error", "problem": problem }).to_string()).await;
+            let refused = StreamErrorView { id: None, problem };
+            return self.send_messages(vec![text(&StreamFrameView::Error(refused))]).await;
         }
         let parsed = format.parse(document, self.app.service.limits().batch_samples);
         match parsed {
@@ -376,7 +378,7 @@ impl StreamConnection {
         let mut next = Some(first);
         while let Some(ack) = next {
             let id = self.pending.pop_front().and_then(|pending| pending.id);
-            frames.push(Message::Text(ack_frame(id.as_deref(), ack).into()));
+            frames.push(text(&answer(id, ack)));
             next = self.pending.front_mut().and_then(|pending| pending.ack.as_mut().now_or_never());
         }
         self.send_messages(frames).await
@@ -390,29 +392,25 @@ impl StreamConnection {
     }
 
     async fn send_state(&mut self) -> Result<(), CloseReason> {
-        match self.state().await {
-            Ok(mut frame) => {
-                frame["type"] = "state".into();
-                self.send(frame.to_string()).await
-            }
+        let frame = match self.state().await {
+            Ok(state) => StreamFrameView::State(Box::new(state)),
             // Telemetry has priority, or the engine is not ready: this state is skipped.
-            Err(ServiceError::Busy { .. } | ServiceError::Rebuilding { .. }) => Ok(()),
-            Err(error) => self.send(ack_frame(None, Err(error))).await,
-        }
+            Err(ServiceError::Busy { .. } | ServiceError::Rebuilding { .. }) => return Ok(()),
+            Err(error) => answer(None, Err(error)),
+        };
+        self.send_messages(vec![text(&frame)]).await
     }
 
     /// Returns the state and, if requested, the trace since the previous state.
-    async fn state(&mut self) -> Result<serde_json::Value, ServiceError> {
+    async fn state(&mut self) -> Result<WatchedStateView, ServiceError> {
         let service: &Service = &self.app.service;
         let Some(cursor) = &mut self.cursor else {
             let state = service.state(&self.asset).await?;
-            return Ok(serde_json::to_value(&state).unwrap_or_default());
+            return Ok(WatchedStateView { state, trace: None });
         };
         let view = service.watch(&self.asset, cursor.session_id.clone(), cursor.seen).await?;
         *cursor = TraceCursor { session_id: view.state.session_id.clone(), seen: view.seen };
-        let mut frame = serde_json::to_value(&view.state).unwrap_or_default();
-        frame["trace"] = serde_json::to_value(&view.trace).unwrap_or_default();
-        Ok(frame)
+        Ok(WatchedStateView { state: view.state, trace: Some(view.trace) })
     }
 
     async fn send_ping(&mut self) -> Result<(), CloseReason> {
@@ -447,32 +445,47 @@ impl StreamConnection {
     }
 }
 
-/// The frame that acknowledges a batch.
-#[derive(Serialize)]
-struct AckFrame<'a> {
-    #[serde(rename = "type")]
-    kind: &'static str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    id: Option<&'a str>,
-    #[serde(flatten)]
-    ack: &'a AckView,
+/// A frame from the service that is no event.
+#[derive(Debug, Serialize, ToSchema)]
+#[serde(tag = "type", rename_all = "lowercase")]
+pub(super) enum StreamFrameView {
+    /// A batch is durable.
+    Ack(BatchAckView),
+    /// A batch was refused, or there is no state.
+    Error(StreamErrorView),
+    /// The state of rig and twin.
+    State(Box<WatchedStateView>),
 }
 
-/// Returns an `ack` or an `error` frame.
-fn ack_frame(id: Option<&str>, ack: Result<AckView, ServiceError>) -> String {
+/// Why a batch was refused.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct StreamErrorView {
+    /// The id of the batch, if it has one and could be read.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    id: Option<String>,
+    problem: Problem,
+}
+
+/// The state of rig and twin.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct WatchedStateView {
+    #[serde(flatten)]
+    state: StateView,
+    /// The samples evaluated since the previous state, if requested.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    trace: Option<TraceView>,
+}
+
+/// Returns the frame of the answer to a batch.
+fn answer(id: Option<String>, ack: Result<AckView, ServiceError>) -> StreamFrameView {
     match ack {
-        Ok(ack) => {
-            let frame = AckFrame { kind: "ack", id, ack: &ack };
-            serde_json::to_string(&frame).unwrap_or_default()
-        }
-        Err(error) => {
-            let mut frame = json!({ "type": "error", "problem": Problem::from(error) });
-            if let Some(id) = id {
-                frame["id"] = id.into();
-            }
-            frame.to_string()
-        }
+        Ok(ack) => StreamFrameView::Ack(BatchAckView { id, ack }),
+        Err(error) => StreamFrameView::Error(StreamErrorView { id, problem: error.into() }),
     }
+}
+
+fn text(frame: &StreamFrameView) -> Message {
+    Message::Text(serde_json::to_string(frame).unwrap_or_default().into())
 }
 
 /// Returns the close code and the reason for a frame that could not be read (RFC 6455,

@@ -88,6 +88,16 @@ pub struct CommunicationView {
     pub summary: String,
 }
 
+/// The data of an event `communication`.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct CommunicationEventView {
+    pub asset: String,
+    /// The service's id of the session; null if none was open.
+    pub session_id: Option<String>,
+    #[serde(flatten)]
+    pub change: CommunicationView,
+}
+
 /// Alarms to acknowledge.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]

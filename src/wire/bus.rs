@@ -8,8 +8,9 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::alarm::CommunicationEventView;
 use super::service::EventView;
-use super::telemetry::AckView;
+use super::telemetry::{AckView, ColumnsView, RowsView};
 
 /// The first levels of every topic.
 const ROOT: [&str; 2] = ["offbd", "v1"];
@@ -169,6 +170,24 @@ impl PresenceWord {
     }
 }
 
+/// A batch as a device sends it in one message.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+pub struct BatchMessageView {
+    /// Comes back with the acknowledgement.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub id: Option<String>,
+    #[serde(flatten)]
+    pub batch: BatchView,
+}
+
+/// The samples of a batch.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+#[serde(untagged)]
+pub enum BatchView {
+    Rows(RowsView),
+    Columns(ColumnsView),
+}
+
 /// The acknowledgement of a batch that is durable: that of HTTP, with the `id` of the batch.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct BatchAckView {
@@ -209,6 +228,16 @@ pub struct FaultMessageView {
     pub event: i64,
     #[serde(flatten)]
     pub change: EventView,
+}
+
+/// A change of whether data of a rig arrive as it is published: an event of the service with
+/// its number.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+pub struct CommunicationMessageView {
+    /// Number of the event, which rises; a message with a number seen before is a repetition.
+    pub event: i64,
+    #[serde(flatten)]
+    pub change: CommunicationEventView,
 }
 
 #[cfg(test)]

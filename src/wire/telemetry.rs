@@ -224,6 +224,28 @@ pub struct RowsView {
     pub samples: Vec<SampleView>,
 }
 
+/// A batch as JSON columns, all of the same length. A column that the device does not have is
+/// absent.
+#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+pub struct ColumnsView {
+    /// The device's name for the session; if absent, the open session.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub session: Option<String>,
+    /// `seq` of each sample, as in rows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seq: Option<Vec<Option<u64>>>,
+    /// Times, s on the device's clock.
+    pub t_s: Vec<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cmd_qx_rad: Option<Vec<Option<f64>>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cmd_qy_rad: Option<Vec<Option<f64>>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub x_m: Option<Vec<Option<f64>>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub y_m: Option<Vec<Option<f64>>>,
+}
+
 /// Returns the view of a sample.
 #[must_use]
 pub const fn sample_view(sample: &Sample) -> SampleView {

@@ -1,16 +1,26 @@
-//! The committed OpenAPI description equals the one generated from the code.
+//! The committed descriptions of the interface, OpenAPI and AsyncAPI, equal those generated
+//! from the code.
 
-const COMMITTED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/openapi.yaml");
+use std::path::Path;
 
 #[test]
 fn openapi_yaml_equals_the_generated_description() {
-    let generated = offbd::http::openapi_yaml();
+    compare("openapi.yaml", &offbd::http::openapi_yaml());
+}
+
+#[test]
+fn asyncapi_yaml_equals_the_generated_description() {
+    compare("asyncapi.yaml", &offbd::http::asyncapi_yaml());
+}
+
+fn compare(file: &str, generated: &str) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
     if std::env::var_os("UPDATE_OPENAPI").is_some() {
-        std::fs::write(COMMITTED, &generated).unwrap();
+        std::fs::write(&path, generated).unwrap();
     }
-    let committed = std::fs::read_to_string(COMMITTED).unwrap_or_default();
+    let committed = std::fs::read_to_string(&path).unwrap_or_default();
     assert!(
         committed == generated,
-        "openapi.yaml is out of date; refresh it with\n    UPDATE_OPENAPI=1 cargo test --test it openapi\n"
+        "{file} is out of date; refresh it with\n    UPDATE_OPENAPI=1 cargo test --test it openapi\n"
     );
 }
