@@ -34,11 +34,13 @@ after(async () => {
 });
 
 test("the calibrations are listed with their fit, and an earlier one is used again", async () => {
+  // The rig may have learnt from its first session by itself as well.
+  const n = (await ask(service.url, "GET", "/assets/bench/calibrations")).items.length;
   const view = await page(chromium);
   await view.goto(`${service.url}/rigs/bench`);
   await view.getByRole("link", { name: "Calibrations" }).click();
-  await view.getByRole("heading", { name: "What calibration 2 learnt" }).waitFor();
-  await view.getByRole("heading", { name: "Before: with calibration 1" }).waitFor();
+  await view.getByRole("heading", { name: `What calibration ${n} learnt` }).waitFor();
+  await view.getByRole("heading", { name: `Before: with calibration ${n - 1}` }).waitFor();
 
   await view.getByRole("radio", { name: "1" }).check();
   await view.getByRole("heading", { name: "What calibration 1 learnt" }).waitFor();
@@ -54,7 +56,7 @@ test("the calibrations are listed with their fit, and an earlier one is used aga
   const { items } = await ask(service.url, "GET", "/assets/bench/calibrations");
   assert.deepEqual(
     items.map(({ active }) => active),
-    [false, true],
+    items.map((_, i) => i === n - 1),
   );
   assert.deepEqual(view.errors, []);
   await view.done();

@@ -32,7 +32,7 @@ async fn foreign_topics_become_the_same_samples() {
     let client = &fixture.client;
     connected(client, "mqtt").await;
     client.asset("rig").await;
-    let samples = rig(500, 500);
+    let samples = rig(200, 200);
     let line = |s: &offbd_core::vocabulary::Sample| {
         let (roll, pitch) = (s.cmd_qx_rad.map(f64::to_degrees), s.cmd_qy_rad.map(|q| -q));
         let ball = json!([s.y_m.map(|y| y * 100.0), s.x_m.map(|x| -x * 1000.0)]);
@@ -47,7 +47,7 @@ async fn foreign_topics_become_the_same_samples() {
         (count(client, taken).await, count(client, malformed).await);
     // With the program of somebody else, at QoS 1, so that none is lost.
     mosquitto.publish_lines(&["-q", "1", "-t", "lab/rig/status"], &lines);
-    metric(client, taken, |n| n == taken_before + 500.0).await;
+    metric(client, taken, |n| n == taken_before + 200.0).await;
     let recording = client.recording("rig", "s").await;
     assert_eq!(recording.len(), samples.len());
     for (found, sent) in recording.iter().zip(&samples) {
@@ -63,7 +63,7 @@ async fn foreign_topics_become_the_same_samples() {
     }
     mosquitto.publish_lines(&["-t", "lab/rig/status"], "{\"boot\":\"s\"}\nno JSON\n");
     metric(client, malformed, |n| n == malformed_before + 1.0).await;
-    metric(client, taken, |n| n == taken_before + 501.0).await;
+    metric(client, taken, |n| n == taken_before + 201.0).await;
     assert_eq!(client.session("rig", "s").await["rejected"], 1);
 }
 
