@@ -45,11 +45,12 @@ test("the calibrations are listed with their fit, and an earlier one is used aga
   await view.getByRole("radio", { name: "1" }).check();
   await view.getByRole("heading", { name: "What calibration 1 learnt" }).waitFor();
   await view.getByRole("heading", { name: "Before: without a calibration" }).waitFor();
-  await view.getByText(/^Along x the residual is [\d.]+ m\/s²/).waitFor();
+  await view.getByText(/^Along x the residual is [\d.]+\sm\/s²/).waitFor();
   assert.equal(await view.getByRole("img", { name: /^Residual along/ }).count(), 4);
   assert.equal(await view.getByRole("img", { name: /^Acceleration along/ }).count(), 4);
 
-  await view.getByRole("button", { name: "Use this one again" }).click();
+  const first = view.getByRole("row", { name: /^1 / });
+  await first.getByRole("button", { name: "Use this one again" }).click();
   const dialog = view.getByRole("dialog", { name: "Use calibration 1 again?" });
   await dialog.getByRole("button", { name: "Use this one again" }).click();
   await view.getByRole("row", { name: /^1 .* in use/ }).waitFor();
