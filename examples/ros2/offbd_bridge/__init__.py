@@ -1,0 +1,1 @@
+"""Connects a ball-on-plate rig in ROS 2 to offbd."""

@@ -1,0 +1,16 @@
+from setuptools import setup
+
+NAME = "offbd_bridge"
+
+setup(
+    name=NAME,
+    version="0.1.0",
+    packages=[NAME],
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (f"share/{NAME}", ["package.xml"]),
+        (f"share/{NAME}/launch", ["launch/offbd.launch.py"]),
+    ],
+    install_requires=["setuptools"],
+    entry_points={"console_scripts": [f"{NAME} = {NAME}.node:main"]},
+)
