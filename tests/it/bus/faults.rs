@@ -79,6 +79,36 @@ async fn a_late_subscriber_gets_the_present_faults_and_none_that_was_cleared() {
     assert_eq!(after.keys().collect::<Vec<_>>(), expected.keys().collect::<Vec<_>>());
 }
 
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_silent_rig_is_retained_until_its_data_are_back_and_later_faults_follow() {
+    let mosquitto = Mosquitto::start();
+    let fixture = crate::support::ServiceFixture::start_with(|config| {
+        config.mqtt = Some(mosquitto.config());
+        config.communication.lost_after_s = 1;
+        config.communication.back_after_s = 0;
+    })
+    .await;
+    let mut early = MqttDevice::connect(mosquitto.port, "early", None).await;
+    early.subscribe("offbd/v1/a/fault/+").await;
+    fixture.client.asset("a").await;
+    let samples = rig(3000, 1500);
+    fixture.client.telemetry("a", Some("s"), &samples[..100]).await;
+    let (silence, servo) = ("offbd/v1/a/fault/communication_lost", "offbd/v1/a/fault/x_servo");
+    let lost = early.next().await;
+    assert_eq!(lost.topic, silence);
+    let lost: Value = serde_json::from_slice(&lost.payload).unwrap();
+    assert_eq!((&lost["asset"], &lost["status"]), (&"a".into(), &"confirmed".into()));
+    assert_eq!(retained(mosquitto.port, None).await[silence], lost);
+
+    fixture.client.telemetry("a", Some("s"), &samples[100..]).await;
+    let (mut is_removed, mut is_faulty) = (false, false);
+    while !(is_removed && is_faulty) {
+        let message = early.next().await;
+        is_removed |= message.topic == silence && message.payload.is_empty();
+        is_faulty |= message.topic == servo;
+    }
+}
+
 /// Through the gateway of a NATS server, by which it can retain messages too, and which hands
 /// them on to subscribers by NATS.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
