@@ -31,6 +31,8 @@
 //!
 //! `ARCHITECTURE.md` describes how they work together, `docs/notation.md` the terms.
 
+#[cfg(test)]
+mod any_sample;
 #[cfg(any(feature = "nats", feature = "mqtt"))]
 pub mod bus;
 pub mod cli;

@@ -20,10 +20,9 @@ const BATCH: usize = 8192;
 
 /// Writes a recorded session in another format.
 ///
-/// Reads CSV, and in builds with these formats Parquet, Arrow, MCAP and
-/// Excel. What a file is,
-/// its first bytes say. Of a session in the service,
-/// GET /api/v1/sessions/ID/telemetry is the same in each format.
+/// Reads CSV, and in builds with these formats Parquet, Arrow, MCAP and Excel. What
+/// a file is, its first bytes say. Of a session in the service, GET
+/// /api/v1/sessions/ID/telemetry is the same in each format.
 ///
 /// `offbd export fmu` writes the digital twin of a rig instead.
 #[derive(Clone, Debug, Args)]

@@ -42,11 +42,11 @@ fn time_span(from: Option<&str>, to: Option<&str>) -> Result<(Option<i64>, Optio
     Ok((from, to))
 }
 
-/// Returns the results of the ended sessions of an asset over time: gain, offset and delay of
-/// both servos, the size of the residual, the share of time for which each monitor could
-/// judge, and the number of sessions with a fault. The rows are flat, as charts need them: JSON, or CSV if `Accept`
-/// prefers `text/csv`. Nothing is judged again; the time series within a session is its
-/// `trace`.
+/// Returns the results of the ended sessions of an asset over time: gain, offset and delay
+/// of both servos, the size of the residual, the share of time for which each monitor could
+/// judge, and the number of sessions with a fault. The rows are flat, as charts need them:
+/// JSON, or CSV if `Accept` prefers `text/csv`. Nothing is judged again; the time series
+/// within a session is its `trace`.
 #[utoipa::path(get, path = "/assets/{asset}/series", tag = "assets", operation_id = "get_series",
     params(("asset" = String, description = "Name of the asset"), SeriesRangeQuery),
     responses((status = 200, content((SeriesView = "application/json"), (String = "text/csv"))),

@@ -118,10 +118,11 @@ pub(super) async fn open(
 
 /// Imports a recorded file as a session: CSV or, in a build with these formats, Parquet and
 /// Arrow (streams and files without compression), with the columns of the CSV file in any
-/// numeric type, MCAP with JSON messages of the schema `offbd.Sample`, or the
-/// first sheet of an Excel workbook, in which a time may be a date. Its samples are processed like live telemetry. The asset's open session is
-/// ended first, and the new session is ended after the last row; live telemetry of the asset
-/// gets 429 until then. Of a file that is damaged or ends too early, nothing is kept.
+/// numeric type, MCAP with JSON messages of the schema `offbd.Sample`, or the first sheet
+/// of an Excel workbook, in which a time may be a date. Its samples are processed like live
+/// telemetry. The asset's open session is ended first, and the new session is ended after
+/// the last row; live telemetry of the asset gets 429 until then. Of a file that is damaged
+/// or ends too early, nothing is kept.
 #[utoipa::path(post, path = "/assets/{asset}/sessions/import", tag = "sessions",
     operation_id = "import_session",
     params(("asset" = String, description = "Name of the asset"), ImportQuery),

@@ -94,6 +94,8 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::any_sample::any_sample;
+    use crate::wire::telemetry::MAX_SEQ;
 
     const PATH: &str = "2026-01-31/partition-00/s.parquet";
 
@@ -112,23 +114,8 @@ mod tests {
         any::<u64>().prop_map(f64::from_bits).prop_filter("finite", |value| value.is_finite())
     }
 
-    fn sample() -> impl Strategy<Value = Sample> {
-        let seq = proptest::option::of(0..1_u64 << 53);
-        let optional = || proptest::option::of(quantity());
-        (seq, quantity(), optional(), optional(), optional(), optional()).prop_map(
-            |(seq, t_s, cmd_qx_rad, cmd_qy_rad, x_m, y_m)| Sample {
-                seq,
-                t_s,
-                cmd_qx_rad,
-                cmd_qy_rad,
-                x_m,
-                y_m,
-            },
-        )
-    }
-
     fn samples() -> impl Strategy<Value = Vec<Sample>> {
-        proptest::collection::vec(sample(), 1..300)
+        proptest::collection::vec(any_sample(0..=MAX_SEQ, quantity), 1..300)
     }
 
     fn written(samples: &[Sample]) -> (tempfile::TempDir, ColdDirectory) {

@@ -11,10 +11,10 @@ use super::location::{create_private, file_url};
 use super::page_checksums::{self, open};
 use super::{Location, MIGRATIONS, StoreError};
 
-/// Copies the database file at `location` to the new file `copy`, also while a service
-/// uses it. The copy is a consistent state of the database with all commits before the
-/// call, with the samples in the files of its `cold` data; its pages have checksums, its contents are checked, and it is on the disk on
-/// return.
+/// Copies the database file at `location` to the new file `copy`, also while a service uses
+/// it. The copy is a consistent state of the database with all commits before the call,
+/// with the samples in the files of its `cold` data; its pages have checksums, its contents
+/// are checked, and it is on the disk on return.
 ///
 /// # Errors
 /// [`StoreError`] if there is no such database, `copy` exists, it cannot be written, or a file
@@ -43,8 +43,8 @@ pub async fn back_up(
 }
 
 /// Replaces the database file at `location` by `copy`, with the schema brought to this
-/// version, and its `cold` data checked. An existing file is an error or, with `replace`, renamed to `*.replaced`. No
-/// service may use the database meanwhile.
+/// version, and its `cold` data checked. An existing file is an error or, with `replace`,
+/// renamed to `*.replaced`. No service may use the database meanwhile.
 ///
 /// # Errors
 /// [`StoreError`] if the copy is damaged, is not a database of offbd, or is newer than

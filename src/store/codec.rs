@@ -331,6 +331,7 @@ impl<'a> ByteReader<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::any_sample::any_sample;
     use proptest::prelude::*;
 
     const KEY: ChunkKey<'_> = ChunkKey { session: "s", first_index: 8192 };
@@ -354,23 +355,7 @@ mod tests {
     }
 
     fn sample() -> impl Strategy<Value = Sample> {
-        let reading = || proptest::option::of(edge_case());
-        (
-            proptest::option::of(any::<u64>()),
-            edge_case(),
-            reading(),
-            reading(),
-            reading(),
-            reading(),
-        )
-            .prop_map(|(seq, t_s, cmd_qx_rad, cmd_qy_rad, x_m, y_m)| Sample {
-                seq,
-                t_s,
-                cmd_qx_rad,
-                cmd_qy_rad,
-                x_m,
-                y_m,
-            })
+        any_sample(any::<u64>(), edge_case)
     }
 
     type Bits = (Option<u64>, u64, [Option<u64>; 4]);

@@ -5,6 +5,7 @@
 //! `checkpoint.rs` and `backup.rs` (SQLite only), and in the error codes of `mod.rs`.
 
 use std::fmt;
+use std::fs::OpenOptions;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
@@ -220,14 +221,19 @@ impl Location {
     }
 }
 
+/// Options to write a file that only its owner can read once it is created.
+pub(super) fn private_file() -> OpenOptions {
+    let mut options = OpenOptions::new();
+    options.write(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    options
+}
+
 /// Creates `file` if it is missing, readable by its owner only; SQLite gives its other
 /// files the same permissions.
 pub(super) fn create_private(file: &Path) -> Result<(), StoreError> {
-    let mut options = std::fs::OpenOptions::new();
-    options.write(true).create_new(true);
-    #[cfg(unix)]
-    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
-    match options.open(file) {
+    match private_file().create_new(true).open(file) {
         Err(error) if error.kind() != std::io::ErrorKind::AlreadyExists => {
             Err(StoreError::File { file: file.to_owned(), source: error })
         }

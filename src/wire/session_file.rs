@@ -1,12 +1,11 @@
 //! Files of one session in the formats of other tools: reading them as samples and writing
 //! them, piece by piece.
 //!
-//! All formats have the columns of the CSV file (`session_csv.rs`), as columns or as the keys
-//! of messages. A format beside CSV and
-//! JSON needs a cargo feature of its own name; without it the file is refused with a message
-//! that says so. Readers and writers hold a bounded part of a session in memory. A file that
-//! ends too early or is damaged is an error at the row where that is found: callers discard
-//! what they have read.
+//! All formats have the columns of the CSV file (`session_csv.rs`), as columns or as the
+//! keys of messages. A format beside CSV and JSON needs a cargo feature of its own name;
+//! without it the file is refused with a message that says so. Readers and writers hold a
+//! bounded part of a session in memory. A file that ends too early or is damaged is an
+//! error at the row where that is found: callers discard what they have read.
 
 #[cfg(feature = "parquet")]
 mod arrow;

@@ -9,6 +9,7 @@ use data_encoding::HEXLOWER;
 use sha2::{Digest, Sha256};
 
 use super::ColdFileRow;
+use crate::store::location::private_file;
 use offbd_core::vocabulary::Sample;
 
 /// Bytes of a file that are read at a time for its checksum.
@@ -22,15 +23,6 @@ pub type SampleStream = Box<dyn Iterator<Item = Result<Sample, String>> + Send>;
 
 /// Reads a file as samples.
 pub type ReadSamples = fn(File) -> Result<SampleStream, String>;
-
-/// Creates the file `path` for its owner only, as the database is.
-fn create_private(path: &Path) -> io::Result<File> {
-    let mut options = File::options();
-    options.write(true).create(true).truncate(true);
-    #[cfg(unix)]
-    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
-    options.open(path)
-}
 
 /// The directory of cold data, and how its files are read. Paths are relative to it.
 #[derive(Clone, Debug)]
@@ -106,7 +98,7 @@ impl ColdDirectory {
         self.check()?;
         let (file, part) = (self.root.join(path), self.part(path));
         std::fs::create_dir_all(part.parent().unwrap_or(&self.root))?;
-        let mut written = create_private(&part)?;
+        let mut written = private_file().create(true).truncate(true).open(&part)?;
         fill(&mut written)?;
         written.sync_all()?;
         drop(written);

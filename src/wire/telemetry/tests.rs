@@ -2,6 +2,7 @@ use proptest::prelude::*;
 use serde_json::{Value, json};
 
 use super::*;
+use crate::any_sample::any_sample;
 
 const LIMIT: usize = 100;
 
@@ -108,16 +109,7 @@ fn finite() -> impl Strategy<Value = f64> {
 }
 
 fn sample() -> impl Strategy<Value = Sample> {
-    let reading = || proptest::option::of(finite());
-    (proptest::option::of(0..=MAX_SEQ), finite(), reading(), reading(), reading(), reading())
-        .prop_map(|(seq, t_s, cmd_qx_rad, cmd_qy_rad, x_m, y_m)| Sample {
-            seq,
-            t_s,
-            cmd_qx_rad,
-            cmd_qy_rad,
-            x_m,
-            y_m,
-        })
+    any_sample(0..=MAX_SEQ, finite)
 }
 
 proptest! {
