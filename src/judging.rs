@@ -94,7 +94,8 @@ impl Judging {
         input: Input,
         mut observer: impl FnMut(&Evidence),
     ) -> Option<Admission> {
-        self.transitions.clear();
+        // Keeps no memory: there are many sessions, and their faults change rarely.
+        self.transitions = Vec::new();
         let residual = &mut self.residual;
         let admission = self.engine.observe(input, &mut self.transitions, |evidence| {
             residual.take(evidence);

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::vocabulary::Sample;
 
 /// Samples of each kind (with and without `seq`) whose values are remembered; bounds the
-/// memory to 4 KiB each. Chosen: the rows of a batch.
+/// memory to 3 KiB each. Chosen: the rows of a batch.
 const MAX_RECENT: usize = 256;
 
 /// Most separate ranges of keys that are remembered; bounds the memory. Beyond it the
@@ -62,8 +62,10 @@ impl Key for f64 {
 /// The keys of one kind.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Keys<K> {
-    /// The latest keys, ascending, each with the fingerprint of its sample.
-    recent: VecDeque<(K, u64)>,
+    /// The latest keys, ascending.
+    recent: VecDeque<K>,
+    /// The fingerprint of the sample of each.
+    fingerprints: VecDeque<u32>,
     /// The largest key that `recent` has dropped.
     dropped: Option<K>,
     /// Inclusive ranges of keys, ascending, with a gap between any two.
@@ -76,21 +78,27 @@ struct Keys<K> {
 
 impl<K> Default for Keys<K> {
     fn default() -> Self {
-        let (recent, ranges) = (VecDeque::new(), VecDeque::new());
-        Self { recent, dropped: None, ranges, closed: None, first: None }
+        Self {
+            recent: VecDeque::new(),
+            fingerprints: VecDeque::new(),
+            dropped: None,
+            ranges: VecDeque::new(),
+            closed: None,
+            first: None,
+        }
     }
 }
 
 impl<K: Key> Keys<K> {
-    fn recognise(&self, key: K, fingerprint: impl FnOnce() -> u64) -> Recognition {
-        let newest = self.recent.back().map(|&(newest, _)| newest);
-        if newest.is_none_or(|newest| key > newest) && self.dropped.is_none_or(|d| key > d) {
+    fn recognise(&self, key: K, fingerprint: impl FnOnce() -> u32) -> Recognition {
+        let newest = self.recent.back();
+        if newest.is_none_or(|&newest| key > newest) && self.dropped.is_none_or(|d| key > d) {
             return Recognition::New;
         }
-        let at = self.recent.partition_point(|&(k, _)| k < key);
+        let at = self.recent.partition_point(|&k| k < key);
         match self.recent.get(at) {
-            Some(&(k, of)) if k == key && of == fingerprint() => Recognition::Same,
-            Some(&(k, _)) if k == key => Recognition::Conflict,
+            Some(&k) if k == key && self.fingerprints[at] == fingerprint() => Recognition::Same,
+            Some(&k) if k == key => Recognition::Conflict,
             _ if self.dropped.is_none_or(|dropped| key > dropped) => Recognition::New,
             _ if !self.cover(key) => Recognition::New,
             _ if K::IS_DENSE && self.closed.is_none_or(|closed| key >= closed) => {
@@ -106,27 +114,30 @@ impl<K: Key> Keys<K> {
         after > 0 && self.ranges[after - 1].1 >= key
     }
 
-    fn note(&mut self, key: K, fingerprint: u64, gap_s: f64) {
+    fn note(&mut self, key: K, fingerprint: u32, gap_s: f64) {
         self.first.get_or_insert(key);
         self.note_recent(key, fingerprint);
         self.note_range(key, gap_s);
     }
 
-    fn note_recent(&mut self, key: K, fingerprint: u64) {
+    fn note_recent(&mut self, key: K, fingerprint: u32) {
         if self.recent.len() >= MAX_RECENT {
-            let oldest = self.recent.front().map(|&(oldest, _)| oldest);
+            let oldest = self.recent.front().copied();
             if oldest.is_some_and(|oldest| key < oldest) {
                 self.dropped = later(self.dropped, Some(key));
                 return;
             }
             self.dropped = later(self.dropped, oldest);
             self.recent.pop_front();
+            self.fingerprints.pop_front();
         }
-        if self.recent.back().is_none_or(|&(newest, _)| key > newest) {
-            self.recent.push_back((key, fingerprint));
+        if self.recent.back().is_none_or(|&newest| key > newest) {
+            self.recent.push_back(key);
+            self.fingerprints.push_back(fingerprint);
         } else {
-            let at = self.recent.partition_point(|&(k, _)| k < key);
-            self.recent.insert(at, (key, fingerprint));
+            let at = self.recent.partition_point(|&k| k < key);
+            self.recent.insert(at, key);
+            self.fingerprints.insert(at, fingerprint);
         }
     }
 
@@ -219,8 +230,9 @@ impl Ledger {
 }
 
 /// Returns a hash of all values of a sample (FNV-1a over 64-bit words, with a final mix).
-/// Equal samples have equal fingerprints; −0 equals 0.
-fn fingerprint(sample: &Sample) -> u64 {
+/// Equal samples have equal fingerprints; −0 equals 0. Of 4 · 10⁹ conflicts, one is taken for
+/// a retransmission.
+fn fingerprint(sample: &Sample) -> u32 {
     let Sample { seq, t_s, cmd_qx_rad, cmd_qy_rad, x_m, y_m } = *sample;
     let bits = |value: Option<f64>| value.map_or(u64::MAX, |v| (v + 0.0).to_bits());
     let words = [
@@ -235,7 +247,7 @@ fn fingerprint(sample: &Sample) -> u64 {
         let mixed = (hash ^ word).wrapping_mul(0x0000_0100_0000_01b3);
         mixed ^ (mixed >> 32)
     });
-    hash.wrapping_mul(0x9e37_79b9_7f4a_7c15)
+    (hash.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32) as u32
 }
 
 #[cfg(test)]

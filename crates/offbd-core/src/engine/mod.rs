@@ -61,7 +61,7 @@ pub const JUDGEMENT: u32 = 2;
 /// Version of the serialised form of an [`Engine`], a [`Plausibility`] and a
 /// [`UsableMotion`], and of what a caller stores with them: raised with every change of the
 /// fields or of what these mean.
-pub const SNAPSHOT_FORMAT: u32 = 3;
+pub const SNAPSHOT_FORMAT: u32 = 4;
 
 /// Consecutive unjudged samples after which a rig counts as not tested. Chosen: a few late
 /// samples are common.
