@@ -1,4 +1,4 @@
-"""Compares the FMU of the twin, run by two importers, with scenes. See scripts/fmu."""
+"""Compares the FMU of the twin, run by two importers, with `offbd scene`. See scripts/fmu."""
 
 import json
 import shutil
@@ -16,6 +16,7 @@ from fmpy.validation import validate_fmu
 
 PROGRAM, LIBRARY, DATA = sys.argv[1], sys.argv[2], Path(sys.argv[3])
 BALL = ["x", "y", "vx", "vy"]
+BALL_AND_PLATE = [*BALL, "qx", "qy"]
 # Servos that are at once where they should be.
 IDEAL = {
     f"{axis}_servo.{name}": value
@@ -39,9 +40,22 @@ def scene(name, step, *arguments, **content):
     """Returns the rows of the scene, one for each step."""
     (DATA / f"{name}.json").write_text(json.dumps({"name": name, "edges": False, **content}))
     offbd("scene", f"{name}.json", "--model", "rolling", "--sample", step, "-o", name, *arguments)
-    with open(DATA / name / "trajectory.csv") as file:
-        rows = [{key: float(value) for key, value in row.items()} for row in DictReader(file)]
-    return [[row[key] for key in ["x_m", "y_m", "vx_m_s", "vy_m_s"]] for row in rows]
+    return columns(DATA / name / "trajectory.csv", "x_m", "y_m", "vx_m_s", "vy_m_s")
+
+
+def columns(path, *names):
+    """Returns the rows of a CSV file, with these columns."""
+    with open(path) as file:
+        return [[float(row[name]) for name in names] for row in DictReader(file)]
+
+
+def free_run(name, longest_step, asset):
+    """Returns ball and plate of the twin under the commands of the session, for each sample."""
+    step = ["--step", longest_step]
+    offbd("scene", "--commands", f"{name}.csv", "--asset", asset, *step, "-o", f"{name}-run")
+    angles = ["qx_rad", "qy_rad"]
+    path = DATA / f"{name}-run" / "trajectory.csv"
+    return columns(path, "x_m", "y_m", "vx_m_s", "vy_m_s", *angles)
 
 
 class Twin:
@@ -149,10 +163,93 @@ def held_plates(fmu):
         assert difference < 1e-12, difference
 
 
+def write_session(name, rows):
+    header = "t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n"
+    text = "".join(",".join(map(repr, row)) + "\n" for row in rows)
+    (DATA / f"{name}.csv").write_text(header + text)
+
+
+def with_fmpy(fmu, session, longest_step):
+    """Returns ball and plate of the FMU under the commands of the session, for each sample."""
+    (_, qx, qy, x, y), *_ = session
+    with twin(fmu) as one:
+        one.start({"cmd_qx": qx, "cmd_qy": qy, "x": x, "y": y, "longest_step": longest_step})
+        rows = [one.get(*BALL_AND_PLATE)]
+        for (t, qx, qy, *_), (end, *_) in zip(session, session[1:]):
+            one.set({"cmd_qx": qx, "cmd_qy": qy})
+            one.step(end - t)
+            rows.append(one.get(*BALL_AND_PLATE))
+    return rows
+
+
+def with_ecos(fmu, session, longest_step):
+    """The same for samples at equal intervals."""
+    (_, qx, qy, x, y), (h, *_), *_ = session
+    start = {"cmd_qx": qx, "cmd_qy": qy, "x": x, "y": y, "longest_step": longest_step}
+    rows = []
+    with ecospy.EcosSimulationStructure() as structure:
+        structure.add_model("twin", str(fmu))
+        named = {f"twin::{name}": value for name, value in start.items()}
+        structure.add_parameter_set("start", named)
+        with ecospy.EcosSimulation(structure=structure, step_size=h) as simulation:
+
+            def read():
+                rows.append([simulation.get_real(f"twin::{name}") for name in BALL_AND_PLATE])
+
+            simulation.init(parameter_set="start")
+            read()
+            for _, qx, qy, *_ in session[:-1]:
+                simulation.set_real("twin::cmd_qx", qx)
+                simulation.set_real("twin::cmd_qy", qy)
+                simulation.step()
+                read()
+            simulation.terminate()
+    return rows
+
+
 def moving_plate(fmu):
-    """A plate that turns to an angle and back, qx after qy. The servos have a lag; the commands
-    are those by which it turns as in the scene, held for a step each, so that the FMU approaches
-    the scene with the step.
+    """The same commands as in a free run of the same rig: its servos have dead time, lag and
+    limits, of which the commands reach that of the angle.
+    """
+    (DATA / "chapter.json").write_text('{"name": "chapter"}')
+    for h, longest_step in [(0.02, 0.005), (0.01, 0.01), (0.008, 0.008), (0.004, 0.004), (0.002, 0.002)]:
+
+        def sample(i):
+            t = i * h
+            return t, 0.12 * sin(3 * t), 0.25 * sin(4.4 * t + 1), 0.03, -0.02
+
+        session = [sample(i) for i in range(round(4 / h))]
+        write_session("swing", session)
+        wanted = free_run("swing", longest_step, "chapter.json")
+        assert max(row[5] for row in wanted) > 0.19, "the plate has not moved"
+        for name, run in [("FMPy", with_fmpy), ("ecos", with_ecos)]:
+            difference = largest_difference(run(fmu, session, longest_step), wanted)
+            print(f"swing, steps of {h} s: {name} and the scene differ by at most {difference:.1e}")
+            assert difference < 1e-12, difference
+
+
+def recorded_session():
+    """A calibrated rig, whose axes differ, and commands that were recorded at uneven intervals."""
+    long = ["--reference", "lissajous", "--seconds", 90, "--seed", 7]
+    offbd("simulate", "--rig", "of-owner.json", *long, "-o", "healthy.csv")
+    offbd("calibrate", "--asset", "of-owner.json", "healthy.csv", "-o", "learnt.json")
+    offbd("simulate", "--seconds", 10, "--seed", 3, "-o", "recorded.csv")
+    # A row without a position would start the twin elsewhere, or end the reading here.
+    names = ["t_s", "cmd_qx_rad", "cmd_qy_rad"]
+    session = [[*row, 0.01, 0.02] for row in columns(DATA / "recorded.csv", *names)]
+    assert len({round(b[0] - a[0], 6) for a, b in zip(session, session[1:])}) > 1
+    write_session("recorded", session)
+    fmu = export("learnt.fmu", "--asset", "learnt.json")
+    wanted = free_run("recorded", 0.002, "learnt.json")
+    difference = largest_difference(with_fmpy(fmu, session, 0.002), wanted)
+    print(f"recorded: the FMU and the scene differ by at most {difference:.1e}")
+    assert difference < 1e-12, difference
+
+
+def smooth_plate(fmu):
+    """A plate that turns to an angle and back, qx after qy, smoothly in the scene. The servos have
+    a lag; the commands are those by which it turns as in the scene, held for a step each, so that
+    the FMU approaches the scene with the step.
     """
     lag = 0.06
     laws = {"cmd_qx": [(0.08, 0.3, 0.6), (-0.16, 1.1, 0.5)], "cmd_qy": [(0.1, 0, 0.5), (-0.2, 0.6, 0.7)]}
@@ -170,7 +267,7 @@ def moving_plate(fmu):
         return [{"smoothstep": dict(zip(names, term))} for term in law]
 
     wanted = scene(
-        "swing",
+        "smooth",
         0.04,
         *["--method", "dopri5", "--tolerance", 1e-11],
         duration_s=2,
@@ -192,7 +289,7 @@ def moving_plate(fmu):
         return largest_difference(rows, wanted)
 
     differences = [run(h) for h in [8e-3, 4e-3, 2e-3]]
-    print("swing: the FMU and the scene differ by", *[f"{d:.1e}" for d in differences], "m, m/s")
+    print("smooth: the FMU and the scene differ by", *[f"{d:.1e}" for d in differences], "m, m/s")
     for longer, shorter in zip(differences, differences[1:]):
         assert shorter < 0.6 * longer, differences
 
@@ -205,7 +302,7 @@ def saved_states(fmu):
             for i in range(10):
                 one.set({"cmd_qx": 0.1 * sin(i)})
                 one.step(0.01)
-            return one.get(*BALL, "qx", "qy", "time")
+            return one.get(*BALL_AND_PLATE, "time")
 
         ten_steps()
         time, state = one.time, one.slave.getFMUState()
@@ -265,7 +362,7 @@ def other_importer(fmu):
         for command in commands:
             one.set({"cmd_qx": command, "cmd_qy": 2 * command})
             one.step(0.01)
-            rows.append(one.get(*BALL, "qx", "qy"))
+            rows.append(one.get(*BALL_AND_PLATE))
     others = []
     with ecospy.EcosSimulationStructure() as structure:
         structure.add_model("twin", str(fmu))
@@ -276,8 +373,7 @@ def other_importer(fmu):
                 simulation.set_real("twin::cmd_qx", command)
                 simulation.set_real("twin::cmd_qy", 2 * command)
                 simulation.step()
-                names = [*BALL, "qx", "qy"]
-                others.append([simulation.get_real(f"twin::{name}") for name in names])
+                others.append([simulation.get_real(f"twin::{name}") for name in BALL_AND_PLATE])
             simulation.terminate()
     assert rows == others, largest_difference(rows, others)
     print(f"ecos: {len(rows)} steps as in FMPy")
@@ -287,6 +383,8 @@ if __name__ == "__main__":
     FMU = validate()
     held_plates(FMU)
     moving_plate(FMU)
+    recorded_session()
+    smooth_plate(FMU)
     saved_states(FMU)
     refusals(FMU)
     other_importer(FMU)

@@ -1,10 +1,11 @@
 //! An instance of the model: its values, its twin, and what may be done with it when.
 
+use offbd_core::plant::SimulatedTwin;
 use offbd_core::vocabulary::{Axis, Invalid, PerAxis, SimTime, in_range};
 use serde::{Deserialize, Serialize};
 
 use crate::start_values::StartValues;
-use crate::twin::SimulatedTwin;
+use crate::twin;
 use crate::variables::{
     COMMAND_QX, COMMAND_QY, COUNT, LONGEST_STEP, QX, QY, Role, TIME, VARIABLES, VX, VY, X, Y,
 };
@@ -161,16 +162,11 @@ impl Instance {
             return Err(Refusal::OtherTime { from_s, at_s });
         }
         in_range("step", step_s, f64::MIN_POSITIVE..=LONGEST_COMMUNICATION_STEP_S)?;
-        let commands = self.commands();
+        let (commands, to) = (self.commands(), time(from_s + step_s)?);
         let Some(twin) = &mut self.twin else { return Ok(()) };
-        twin.command(commands);
-        let n = (step_s / self.values[LONGEST_STEP] - 1e-9).ceil().max(1.0);
-        let h = step_s / n;
-        for i in 1..=n as u64 {
-            let to = if i == n as u64 { from_s + step_s } else { from_s + i as f64 * h };
-            twin.advance(time(to)?, h);
-        }
-        self.values[TIME] = from_s + step_s;
+        twin.command(commands.map(Some));
+        twin.advance(to, self.values[LONGEST_STEP]);
+        self.values[TIME] = to.seconds();
         self.read_twin();
         Ok(())
     }
@@ -206,7 +202,7 @@ impl Instance {
     /// Builds the twin at the present time with its servos on their commands.
     fn settle(&mut self) -> Result<(), Refusal> {
         let at = time(self.values[TIME])?;
-        let twin = SimulatedTwin::start(&self.values, at, self.commands())?;
+        let twin = twin::start(&self.values, at, self.commands())?;
         self.twin = Some(twin);
         self.read_twin();
         Ok(())

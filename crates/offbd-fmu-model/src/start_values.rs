@@ -3,12 +3,12 @@
 use std::fmt::Write;
 
 use offbd_core::engine::Setup;
-use offbd_core::plant::{GRAVITY_M_S2, TwinAxis};
+use offbd_core::plant::{GRAVITY_M_S2, SimulatedTwin, TwinAxis};
 use offbd_core::vocabulary::{Invalid, in_range};
 
 use crate::variables::{
-    BALL_RADIUS, COUNT, FRICTION, GRAVITY, INERTIA_FACTOR, LEAST_LONGEST_STEP_S, LONGEST_STEP,
-    PLATE_THICKNESS, VARIABLES, X_SERVO, Y_SERVO,
+    BALL_RADIUS, COUNT, FRICTION, GRAVITY, INERTIA_FACTOR, LONGEST_STEP, PLATE_THICKNESS,
+    VARIABLES, X_SERVO, Y_SERVO,
 };
 
 /// A value of each variable, within its range.
@@ -32,7 +32,7 @@ impl StartValues {
         values[INERTIA_FACTOR] = rig.ball.inertia_factor();
         values[PLATE_THICKNESS] = rig.plate.thickness_m();
         values[FRICTION] = rig.contact.friction();
-        values[LONGEST_STEP] = LEAST_LONGEST_STEP_S;
+        values[LONGEST_STEP] = *SimulatedTwin::STEPS_S.start();
         values[X_SERVO..Y_SERVO].copy_from_slice(&servo(&axes.x));
         values[Y_SERVO..].copy_from_slice(&servo(&axes.y));
         Self::checked(values)

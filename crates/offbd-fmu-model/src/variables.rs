@@ -3,7 +3,7 @@
 use std::f64::consts::FRAC_PI_2;
 use std::ops::RangeInclusive;
 
-use offbd_core::plant::LONGEST_DEAD_TIME_S;
+use offbd_core::plant::{LONGEST_DEAD_TIME_S, SimulatedTwin};
 
 /// What a variable is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,11 +60,6 @@ const ANY_COMMAND: f64 = 1e3;
 /// The least value of a parameter that must be positive. Chosen.
 const LEAST: f64 = 1e-6;
 
-/// The shortest longest step, s. The twin is made for steps of 1 ms or longer: in a shorter one
-/// it underestimates the effect of the plate's rates. A step that is divided has parts of at least
-/// half of the longest.
-pub(crate) const LEAST_LONGEST_STEP_S: f64 = 2e-3;
-
 /// All variables.
 pub const VARIABLES: [Variable; COUNT] = [
     readable("time", Role::Time, "s", "Time of the simulation"),
@@ -95,7 +90,7 @@ pub const VARIABLES: [Variable; COUNT] = [
         "longest_step",
         "s",
         "Longest step of the integration; a longer communication step is divided",
-        LEAST_LONGEST_STEP_S..=0.01,
+        SimulatedTwin::STEPS_S,
     ),
     parameter("x_servo.angle_limit", "rad", "Largest angle of the x servo", LEAST..=FRAC_PI_2),
     parameter("x_servo.rate_limit", "rad/s", "Largest rate of the x servo", LEAST..=1000.0),

@@ -267,3 +267,47 @@ fn missing_options_are_filled_in() {
         assert!((x - 0.086_61).abs() < 2e-3, "{options}: {x}");
     }
 }
+
+/// The plate follows the recorded command by the exponential of the servo, after its dead time;
+/// the ball starts where it was measured.
+#[test]
+fn validate_a_twin_under_recorded_commands() {
+    let cli = CliFixture::new();
+    cli.write(
+        "rig.json",
+        r#"{"name":"slow","servo":{"dead_time_s":0.1,"lag_s":0.2,"angle_limit_rad":0.2}}"#,
+    );
+    let mut session = "t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n0,0,0,0.03,-0.02\n".to_owned();
+    (1..=100).for_each(|i| session += &format!("{},0,0.1,,\n", f64::from(i) / 100.0));
+    cli.write("my.csv", &session);
+    let line = "scene --commands my.csv --asset rig.json -o out --format json";
+    let result = object(&cli.ok(line));
+    assert_eq!((&result["asset"], &result["samples"]), (&"slow".into(), &101.into()));
+    assert_eq!(result["farthest_from_measured_m"], 0.0);
+    let text = cli.read("out/trajectory.csv");
+    let mut lines = text.lines();
+    assert_eq!(lines.next(), Some("t_s,x_m,y_m,vx_m_s,vy_m_s,qx_rad,qy_rad"));
+    assert_eq!(lines.next(), Some("0,0.03,-0.02,0,0,0,0"));
+    let last: Vec<f64> = lines.last().unwrap().split(',').map(|w| w.parse().unwrap()).collect();
+    let wanted = 0.1 * (1.0 - (-(1.0 - 0.01 - 0.1) / 0.2_f64).exp());
+    assert!((last[6] - wanted).abs() < 1e-12, "{last:?}");
+    assert_eq!((last[2], last[5]), (-0.02, 0.0));
+    exists(&cli, &["out/position.svg", "out/position.png"]);
+    assert!(cli.ok("scene --commands my.csv").stdout.contains("the twin of chapter"));
+}
+
+#[test]
+fn what_does_not_fit_recorded_commands_is_refused() {
+    let cli = CliFixture::new();
+    cli.write("empty.csv", "t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n");
+    for (code, line, expected) in [
+        (2, "scene tilt --commands empty.csv", "cannot be used with"),
+        (2, "scene --commands empty.csv --model rolling", "cannot be used with"),
+        (2, "scene tilt --asset rig.json", "--commands"),
+        (2, "scene --commands empty.csv --step 0.5", "--step: 0.5 is outside 0.002 to 0.01"),
+        (3, "scene --commands empty.csv", "empty.csv: has no usable sample"),
+    ] {
+        let reason = cli.run(code, line).stderr;
+        assert!(reason.contains(expected), "{line}: {reason}");
+    }
+}

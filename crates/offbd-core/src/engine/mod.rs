@@ -15,6 +15,7 @@ mod coverage;
 mod drive_cycle;
 mod edge;
 mod frame;
+mod free_run;
 mod ledger;
 mod monitor;
 mod motion;
@@ -33,6 +34,7 @@ pub use drive_cycle::{
     DriveCycle, DriveLaw, FaultVerdict, Feedback, MonitorVerdict, NoDriveCycle, NotReached, Order,
     TriedFault, drive_cycle,
 };
+pub use free_run::{FreeRunPoint, LONGEST_FREE_RUN_S, free_run};
 pub use ledger::Recognition;
 pub use motion::{UsableMotion, WANTED_MOTION_S};
 pub use plausibility::{Misfit, Plausibility};

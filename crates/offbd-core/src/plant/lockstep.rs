@@ -141,6 +141,12 @@ impl Ladder {
         &self.planar
     }
 
+    /// The rolling model.
+    #[must_use]
+    pub const fn rolling(&self) -> &Rolling {
+        &self.rolling
+    }
+
     /// Returns the acceleration of the ball along x and y, m/s², for the `observed`
     /// motion over a step of `h` seconds with the plate moving as `tilt`.
     pub fn acceleration(

@@ -11,6 +11,7 @@ mod lockstep;
 mod planar;
 mod rolling;
 mod servo;
+mod simulated_twin;
 mod sliding;
 mod tilt;
 mod twin;
@@ -21,6 +22,7 @@ pub use lockstep::{Fidelity, Ladder, Rung};
 pub use planar::Planar;
 pub use rolling::{Grip, Rolling, RollingState};
 pub use servo::{ServoModel, ServoState};
+pub use simulated_twin::SimulatedTwin;
 pub use sliding::{Hold, Phase, Sliding};
 pub use tilt::{PlateMotion, Tilt};
 #[cfg(test)]

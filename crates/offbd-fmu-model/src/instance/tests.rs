@@ -1,6 +1,7 @@
 use super::*;
-use crate::variables::{BALL_RADIUS, INERTIA_FACTOR, LONGEST_STEP, PLATE_THICKNESS, X_SERVO};
-use offbd_core::engine::{Rig, Setup};
+use crate::variables::{BALL_RADIUS, INERTIA_FACTOR, PLATE_THICKNESS, X_SERVO};
+use offbd_core::engine::{Rig, Setup, free_run};
+use offbd_core::vocabulary::Sample;
 
 const LAG: usize = X_SERVO + 3;
 const DEAD_TIME: usize = X_SERVO + 2;
@@ -44,6 +45,33 @@ fn validate_the_plate_against_the_exponential() {
     let angle = instance.get(QY as u32).unwrap();
     let wanted = 0.1 * (1.0 - (-(0.1 - 0.02) / 0.05_f64).exp());
     assert!((angle - wanted).abs() < 1e-12, "{angle}");
+}
+
+/// The model moves as the twin under the same commands, recorded, whose samples are between the
+/// steps of the integration.
+#[test]
+fn the_path_is_that_of_a_free_run() {
+    let setup = Setup::new(Rig::chapter("chapter"), None).unwrap();
+    let (h, command) = (0.013, |t: f64| 0.15 * (4.0 * t).sin());
+    let sample = |i: u32| {
+        let (t_s, held) = (f64::from(i) * h, Some(0.0));
+        let cmd_qy_rad = Some(command(t_s));
+        Sample { t_s, cmd_qx_rad: held, cmd_qy_rad, x_m: Some(0.02), y_m: held, seq: None }
+    };
+    let samples: Vec<Sample> = (0..=200).map(sample).collect();
+    let points = free_run(&setup, &samples, 0.005).unwrap();
+    let mut instance = instance(&[(LONGEST_STEP, 0.005), (X, 0.02)]);
+    run(&mut instance, 200, h, command);
+    let end = points[200];
+    for (index, wanted) in [
+        (X, end.ball.position.x),
+        (VX, end.ball.velocity.x),
+        (Y, end.ball.position.y),
+        (QY, end.plate.x),
+    ] {
+        let got = instance.get(index as u32).unwrap();
+        assert!((got - wanted).abs() < 1e-12, "{}: {got} is not {wanted}", VARIABLES[index].name);
+    }
 }
 
 /// With a shorter step of the integration the path changes by less: it converges.

@@ -9,12 +9,15 @@ use super::scene_run::Sampled;
 use crate::cli::calibrate::write_asset;
 use crate::cli::output;
 use crate::wire::session_csv;
-use offbd_core::engine::Rig;
+use offbd_core::engine::{FreeRunPoint, Rig};
 use offbd_core::vocabulary::Sample;
 use offbd_lab::chart::{Figure, png, svg};
 
 /// The header of a trajectory, plate frame.
 const HEADER: &str = "t_s,x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s,wx_rad_s,wy_rad_s,wz_rad_s";
+
+/// The header of the twin's trajectory under recorded commands, plate frame.
+const FREE_RUN_HEADER: &str = "t_s,x_m,y_m,vx_m_s,vy_m_s,qx_rad,qy_rad";
 
 /// The directory of the files; the name of each file is printed to stderr.
 pub(super) struct OutputFolder(PathBuf);
@@ -36,11 +39,32 @@ impl OutputFolder {
 
     /// Writes a trajectory, with all digits that are needed to read the same numbers back.
     pub(super) fn trajectory(&self, name: &str, samples: &[Sampled]) -> anyhow::Result<()> {
+        self.rows(name, HEADER, samples.iter().map(|(t, at)| (*t, at.to_row())))
+    }
+
+    /// Writes the motion of ball and plate of a twin to `trajectory.csv`, likewise.
+    pub(super) fn free_run(&self, points: &[FreeRunPoint]) -> anyhow::Result<()> {
+        let row = |point: &FreeRunPoint| {
+            let FreeRunPoint { at, ball, plate, .. } = point;
+            let (p, v) = (ball.position, ball.velocity);
+            // The x servo turns qy, the y servo qx.
+            (at.seconds(), [p.x, p.y, v.x, v.y, plate.y, plate.x])
+        };
+        self.rows("trajectory.csv", FREE_RUN_HEADER, points.iter().map(row))
+    }
+
+    /// Writes a table of numbers over time, s.
+    fn rows<const N: usize>(
+        &self,
+        name: &str,
+        header: &str,
+        rows: impl Iterator<Item = (f64, [f64; N])>,
+    ) -> anyhow::Result<()> {
         let mut out = output::create(&self.announced(name))?;
-        writeln!(out, "{HEADER}")?;
-        for (t, at) in samples {
+        writeln!(out, "{header}")?;
+        for (t, row) in rows {
             write!(out, "{t}")?;
-            for value in at.to_row() {
+            for value in row {
                 // Adding zero turns −0 into 0.
                 write!(out, ",{}", value + 0.0)?;
             }
