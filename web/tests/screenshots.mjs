@@ -2,7 +2,18 @@
 // scripts/screenshots; the first argument is the directory, the second the views, the third the sizes.
 import { mkdirSync } from "node:fs";
 import { join } from "node:path";
-import { ask, browser, demo, directory, drifting, page, recordings, remove, serve, until } from "./support.mjs";
+import {
+  ask,
+  browser,
+  demo,
+  directory,
+  drifting,
+  page,
+  recordings,
+  remove,
+  serve,
+  until,
+} from "./support.mjs";
 
 const out = process.argv[2] ?? "screenshots";
 const only = process.argv[3] ? process.argv[3].split(",") : undefined;
@@ -119,14 +130,21 @@ try {
     view.getByText("workshop").first().waitFor(),
   );
   await shoot(of, "calibrations", `${base}/rigs/taught/calibrations`, heading("What calibration"), (view) =>
-    view.getByRole("img", { name: /^Residual along/ }).first().waitFor(),
+    view
+      .getByRole("img", { name: /^Residual along/ })
+      .first()
+      .waitFor(),
   );
   await shoot(
     of,
     "compare",
     `${base}/compare?a=${before.session.id}&b=${imported.session.id}`,
     heading("Compare sessions"),
-    (view) => view.getByRole("img", { name: /^Residual along/ }).first().waitFor(),
+    (view) =>
+      view
+        .getByRole("img", { name: /^Residual along/ })
+        .first()
+        .waitFor(),
   );
   await shoot(of, "report", `${base}/sessions/${imported.session.id}/report`, heading("Calibration and"));
   await shoot(of, "fault-report", `${base}/rigs/bench-1/faults/x_servo/report`, heading("Calibration and"));
