@@ -1,16 +1,29 @@
-// Takes screenshots of every view in three sizes and two themes. Run by
-// scripts/screenshots; the first argument is the directory.
+// Takes screenshots of every view in four sizes and two themes. Run by
+// scripts/screenshots; the first argument is the directory, the second the views, the third the sizes.
 import { mkdirSync } from "node:fs";
 import { join } from "node:path";
-import { ask, browser, demo, directory, drifting, page, recordings, remove, serve } from "./support.mjs";
+import {
+  ask,
+  browser,
+  demo,
+  directory,
+  drifting,
+  page,
+  recordings,
+  remove,
+  serve,
+  until,
+} from "./support.mjs";
 
 const out = process.argv[2] ?? "screenshots";
-const only = process.argv[3]?.split(",");
+const only = process.argv[3] ? process.argv[3].split(",") : undefined;
 const SIZES = {
   phone: { width: 390, height: 844 },
+  tablet: { width: 1024, height: 768 },
   laptop: { width: 1366, height: 850 },
-  wall: { width: 2560, height: 1440 },
+  wall: { width: 1920, height: 1080 },
 };
+const sizes = process.argv[4] ? process.argv[4].split(",") : Object.keys(SIZES);
 const THEMES = ["light", "dark"];
 mkdirSync(out, { recursive: true });
 
@@ -19,20 +32,42 @@ const settle = (view, ms = 1500) => view.waitForTimeout(ms);
 
 async function shoot(of, name, url, ready, act) {
   if (only && !only.includes(name)) return;
-  for (const [size, viewport] of Object.entries(SIZES)) {
+  for (const size of sizes) {
+    const viewport = SIZES[size];
     for (const colorScheme of THEMES) {
       const view = await page(of, { viewport, colorScheme });
       await view.goto(url);
       await ready(view);
       if (act) await act(view);
       await settle(view);
-      const fullPage = size === "phone" && name !== "fleet";
+      const fullPage = name !== "fleet" && (size === "phone" || name === "report");
       if (fullPage) await view.evaluate(() => scrollTo(0, 0));
       await view.screenshot({ path: join(out, `${name}-${size}-${colorScheme}.png`), fullPage });
       if (view.errors.length) console.error(`${name} ${size} ${colorScheme}:`, view.errors);
       await view.done();
     }
   }
+}
+
+/** Registers a rig that learns from a session, and so has calibrations. */
+async function taught(base, healthy) {
+  await ask(base, "POST", "/assets", { name: "taught" });
+  const path = "/assets/taught/sessions/import?name=healthy";
+  const { session } = await ask(base, "POST", path, healthy, "text/csv");
+  const { id } = await ask(base, "POST", "/assets/taught/calibrations", { sessions: [session.id] });
+  const job = `/assets/taught/calibrations/${id}`;
+  await until(async () => (await ask(base, "GET", job)).state === "done");
+  await ask(base, "POST", `${job}/activate`);
+}
+
+/** Adds tags, and a channel with a rule. */
+async function told(base) {
+  await ask(base, "PUT", "/assets/bench-1/tags", { tags: ["hall-1"] });
+  await ask(base, "PUT", "/assets/demo-rig/tags", { tags: ["hall-2"] });
+  const url = "http://127.0.0.1:9/hook";
+  const channel = await ask(base, "POST", "/notifications/channels", { name: "workshop", webhook: { url } });
+  const rule = { name: "all faults", asset: "*", channel: channel.id, codes: [], changes: ["confirmed"] };
+  await ask(base, "POST", "/notifications/rules", { ...rule, enabled: true });
 }
 
 const work = directory();
@@ -42,7 +77,9 @@ const base = show.url;
 try {
   const { learnt, sick, healthy, path } = recordings(work);
   await ask(base, "POST", "/assets", { ...learnt, name: "bench-1" });
-  await ask(base, "POST", "/assets/bench-1/sessions/import?name=healthy", healthy, "text/csv");
+  const before = await ask(base, "POST", "/assets/bench-1/sessions/import?name=healthy", healthy, "text/csv");
+  await taught(base, healthy);
+  await told(base);
   const imported = await ask(base, "POST", "/assets/bench-1/sessions/import?name=monday", sick, "text/csv");
   await drifting(base, work, learnt);
   for (let i = 2; i < 40; i++) {
@@ -78,6 +115,39 @@ try {
     await view.getByRole("heading", { name: "Drift over sessions" }).scrollIntoViewIfNeeded();
     await view.evaluate(() => scrollTo(0, document.body.scrollHeight));
   });
+  await shoot(of, "wall", `${base}/?layout=wall`, heading("Fleet"), (view) =>
+    view.getByText("weak").first().waitFor(),
+  );
+  await shoot(of, "alarms", `${base}/alarms?state=all`, heading("Alarms"), (view) =>
+    view.getByText("What to do").first().waitFor(),
+  );
+  await shoot(of, "views", `${base}/alarms?tag=hall-1`, heading("Alarms"), async (view) => {
+    await view.getByRole("button", { name: "Views" }).click();
+    await view.getByLabel("Name of the present view").fill("first hall");
+    await view.getByRole("button", { name: "Save" }).click();
+  });
+  await shoot(of, "notifications", `${base}/notifications`, heading("Notifications"), (view) =>
+    view.getByText("workshop").first().waitFor(),
+  );
+  await shoot(of, "calibrations", `${base}/rigs/taught/calibrations`, heading("What calibration"), (view) =>
+    view
+      .getByRole("img", { name: /^Residual along/ })
+      .first()
+      .waitFor(),
+  );
+  await shoot(
+    of,
+    "compare",
+    `${base}/compare?a=${before.session.id}&b=${imported.session.id}`,
+    heading("Compare sessions"),
+    (view) =>
+      view
+        .getByRole("img", { name: /^Residual along/ })
+        .first()
+        .waitFor(),
+  );
+  await shoot(of, "report", `${base}/sessions/${imported.session.id}/report`, heading("Calibration and"));
+  await shoot(of, "fault-report", `${base}/rigs/bench-1/faults/x_servo/report`, heading("Calibration and"));
   await shoot(of, "sessions", `${base}/sessions`, heading("Sessions"), (view) =>
     view.getByText("monday").first().waitFor(),
   );

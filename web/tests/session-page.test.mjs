@@ -129,7 +129,7 @@ test("a remark on a moment is kept, listed and removed", async () => {
   await view.goto(`${service.url}/sessions/${session.id}?t=12`);
   await view.getByText("12.00 s", { exact: true }).waitFor();
   await view.getByLabel("Remark", { exact: true }).fill("new horn");
-  await view.getByLabel("Your name, kept with the remark").fill("ada");
+  await view.getByLabel("Your name, recorded with the action").fill("ada");
   await view.getByRole("button", { name: "Keep for this moment" }).click();
   const list = view.getByRole("list", { name: "Remarks" });
   await list.getByText("new horn").waitFor();

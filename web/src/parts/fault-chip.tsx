@@ -12,16 +12,19 @@ interface Props {
   since?: string | null;
 }
 
+/** When a fault began to fail, to follow the text of its state. */
+function whenText({ failing }: FaultState, hasSession: boolean, since: string): string {
+  if (!failing) return `, failed ${sinceText(since)}`;
+  return hasSession ? ` since ${sinceText(since)}` : `, began ${sinceText(since)}`;
+}
+
 /** A fault, its state, and since when. */
 export function FaultChip({ fault, hasSession, since }: Props) {
-  const when = since && (fault.failing ? ` since ${sinceText(since)}` : `, failed ${sinceText(since)}`);
+  const title = faultTitle(fault.code, fault.kind);
+  const text = stateText(fault, hasSession) + (since ? whenText(fault, hasSession, since) : "");
   return (
-    <span class={chipClass(fault)}>
-      <b>{faultTitle(fault.code, fault.kind)}</b>{" "}
-      <span>
-        {stateText(fault, hasSession)}
-        {when}
-      </span>
+    <span class={chipClass(fault)} title={`${title}: ${text}`}>
+      <b>{title}</b> <span>{text}</span>
     </span>
   );
 }

@@ -1,3 +1,5 @@
+import { Choice } from "./choice";
+
 interface Props {
   /** The tags in use. */
   tags: string[];
@@ -9,15 +11,6 @@ interface Props {
 export function TagChoice({ tags, chosen, change }: Props) {
   const known = chosen && !tags.includes(chosen) ? [chosen, ...tags] : tags;
   if (!known.length) return null;
-  return (
-    <label class="inline">
-      Tag{" "}
-      <select value={chosen} onChange={(e) => change(e.currentTarget.value)}>
-        <option value="">any</option>
-        {known.map((tag) => (
-          <option value={tag}>{tag}</option>
-        ))}
-      </select>
-    </label>
-  );
+  const options = [["", "any"] as const, ...known.map((tag) => [tag, tag] as const)];
+  return <Choice isInline label="Tag" options={options} value={chosen} change={change} />;
 }

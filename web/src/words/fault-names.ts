@@ -8,6 +8,9 @@ const CODE: Record<FaultCode, { title: string; meaning: string }> = {
   sensor: { title: "Position sensor", meaning: "measures the position of the ball" },
 };
 
+/** All fault codes. */
+export const CODES = Object.keys(CODE) as FaultCode[];
+
 const KIND: Record<FaultKind, string> = {
   dead: "no power: the plate returns to zero",
   held: "holds its angle whatever the command",

@@ -1,6 +1,8 @@
 /** The sentences of fault lines. */
 import type { FaultLine } from "../api/types";
+import { CODES, codeTitle } from "./fault-names";
 import { isRepair } from "./fault-state";
+import { dateTime } from "./time";
 
 /** Returns the summary of a fault line as a sentence, without its leading code. */
 export function sentence(summary: string): string {
@@ -16,4 +18,14 @@ export function lineSentence(line: Pick<FaultLine, "status" | "status_byte" | "s
   if (line.status === "healed") return "Enough sessions without the fault followed.";
   if (line.status === "cleared") return "Nothing of it is on record any more.";
   return sentence(line.summary);
+}
+
+/** A time of the service, as in ISO 8601. */
+const MOMENT = /\d{4}-\d\d-\d\dT[\d:.]+Z/g;
+
+/** Returns the summary of a message, which names rig, fault code and times, as text for people. */
+export function deliverySummary(summary: string): string {
+  const [, rig = "", rest = summary] = /^([^:]*: )(.*)$/s.exec(summary) ?? [];
+  const titled = CODES.reduce((text, code) => text.replaceAll(code, codeTitle(code)), rest);
+  return rig + titled.replace(MOMENT, dateTime).replace(/(?<=\s)-(?=\d)/g, "−");
 }

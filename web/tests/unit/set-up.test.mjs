@@ -4,6 +4,7 @@ import { test } from "node:test";
 import { assetOf, DEGREE, describeAsset, isName } from "../../src/pages/set-up/description.ts";
 import { proposedSessions, totalLength, withChoice } from "../../src/pages/set-up/chosen-sessions.ts";
 import { falseAlarmRate } from "../../src/pages/set-up/false-alarm-rate.ts";
+import { isDone } from "../../src/pages/set-up/is-done.ts";
 import { learnFrom } from "../../src/pages/set-up/learn-from.ts";
 import { snippets } from "../../src/pages/set-up/snippets.ts";
 import { random } from "./random.mjs";
@@ -148,4 +149,13 @@ test("snippets contain a token only if the service requires one", () => {
   for (const { language, text } of snippets("bench-1", "http://host")) {
     assert.doesNotMatch(text, /authorization|undefined/, language);
   }
+});
+
+test("steps are ticked off as they are done", () => {
+  const steps = ["describe", "connect", "check", "learn"];
+  const done = (...of) => steps.filter((step) => isDone(step, ...of));
+  assert.deepEqual(done(undefined, false), []);
+  assert.deepEqual(done({ calibration: null }, false), ["describe"]);
+  assert.deepEqual(done({ calibration: null }, true), ["describe", "connect"]);
+  assert.deepEqual(done({ calibration: {} }, false), steps);
 });

@@ -6,7 +6,7 @@ import { refusal } from "../../src/parts/login/rights.ts";
 import { dimensions, hasDefaultDimensions } from "../../src/words/dimensions.ts";
 import { codeTitle, faultMeaning, faultTitle, kindMeaning } from "../../src/words/fault-names.ts";
 import { changeOf, chipClass, stateText } from "../../src/words/fault-state.ts";
-import { lineSentence, sentence } from "../../src/words/sentence.ts";
+import { deliverySummary, lineSentence, sentence } from "../../src/words/sentence.ts";
 import { healthByFaults, severity } from "../../src/words/severity.ts";
 import { isFailing, STATUS_BITS } from "../../src/words/status-byte.ts";
 import { ambiguousCauses, judgedShare, verdict } from "../../src/words/verdict.ts";
@@ -158,4 +158,10 @@ test("an ambiguous fault is shown with its candidates", () => {
 test("a judged share has its duration", () => {
   assert.equal(judgedShare({ judged_share: 0.456, judged_s: 119.6 }), "46 %, 2\u202fmin 0\u202fs");
   assert.equal(judgedShare({}), "0 %, 0.0\u202fs");
+});
+
+test("a message is told without codes and times of the interface", () => {
+  const text = deliverySummary("my_x_servo-1: x_servo (dead) confirmed since 4.50 s: qy asks for -0.2 m/s²");
+  assert.equal(text, "my_x_servo-1: X servo (dead) confirmed since 4.50 s: qy asks for −0.2 m/s²");
+  assert.doesNotMatch(deliverySummary("a: last heard 2026-11-25T20:02:59.031397Z"), /T20/);
 });

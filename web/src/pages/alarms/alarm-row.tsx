@@ -40,7 +40,7 @@ export function AlarmRow({ alarm, now, advice, refetchAdvice, isChosen, toggle }
         <span class={look}>{text}</span>
         {alarm.muted && <p class="quiet small-text">{alarm.muted.reason}</p>}
       </td>
-      <td data-word="since" title={dateTime(since)}>
+      <td data-word="began" title={dateTime(since)}>
         {since ? timeAgo(since, now) : "–"}
       </td>
       <td data-word="acknowledged">

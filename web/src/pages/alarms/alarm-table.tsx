@@ -36,7 +36,7 @@ export function AlarmTable({ alarms, now, advice, refetchAdvice, chosen, choose 
             <th>Rig</th>
             <th>Fault</th>
             <th>State</th>
-            <th>Since</th>
+            <th>Began</th>
             <th>Acknowledged</th>
           </tr>
         </thead>

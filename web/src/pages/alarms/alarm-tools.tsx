@@ -1,6 +1,7 @@
 import type { AlarmFilter } from "../../api/alarms";
 import { tagApi } from "../../api/tags";
 import { useQuery } from "../../hooks/use-query";
+import { Choice } from "../../parts/choice";
 import { TagChoice } from "../../parts/tag-choice";
 import type { AlarmKey } from "./alarm-filter";
 import { FaultChoice } from "./fault-choice";
@@ -25,14 +26,12 @@ export function AlarmTools({ filter, hours, change }: Props) {
   const { data: tags } = useQuery(tagApi.inUse, "tags");
   return (
     <div class="form-row">
-      <label>
-        State
-        <select value={filter.state} onChange={(e) => change("state", e.currentTarget.value)}>
-          {STATES.map(([value, word]) => (
-            <option value={value}>{word}</option>
-          ))}
-        </select>
-      </label>
+      <Choice<string>
+        label="State"
+        options={STATES}
+        value={filter.state ?? ""}
+        change={(state) => change("state", state)}
+      />
       <FaultChoice code={filter.code} change={(code) => change("code", code ?? "")} />
       <LastChangeChoice hours={hours} change={(hours) => change("hours", hours)} />
       <label>

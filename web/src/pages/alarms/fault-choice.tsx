@@ -1,16 +1,12 @@
+import { Choice } from "../../parts/choice";
 import { ALARM_CODES, alarmCodeTitle } from "../../words/alarm";
 
+const CODES: (readonly [string, string])[] = [
+  ["", "Any"],
+  ...ALARM_CODES.map((code) => [code, alarmCodeTitle(code)] as const),
+];
+
 /** Selects alarms by their code. */
-export function FaultChoice({ code, change }: { code?: string; change: (code?: string) => void }) {
-  return (
-    <label>
-      Fault
-      <select value={code ?? ""} onChange={(e) => change(e.currentTarget.value || undefined)}>
-        <option value="">Any</option>
-        {ALARM_CODES.map((code) => (
-          <option value={code}>{alarmCodeTitle(code)}</option>
-        ))}
-      </select>
-    </label>
-  );
-}
+export const FaultChoice = ({ code, change }: { code?: string; change: (code?: string) => void }) => (
+  <Choice label="Fault" options={CODES} value={code ?? ""} change={(chosen) => change(chosen || undefined)} />
+);

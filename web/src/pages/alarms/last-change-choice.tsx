@@ -1,3 +1,5 @@
+import { Choice } from "../../parts/choice";
+
 /** Ranges of the last change, hours back. */
 const RANGES = [
   ["", "At any time"],
@@ -7,15 +9,6 @@ const RANGES = [
 ] as const;
 
 /** Selects alarms by their last change. */
-export function LastChangeChoice({ hours, change }: { hours: string; change: (hours: string) => void }) {
-  return (
-    <label>
-      Last change
-      <select value={hours} onChange={(e) => change(e.currentTarget.value)}>
-        {RANGES.map(([hours, word]) => (
-          <option value={hours}>{word}</option>
-        ))}
-      </select>
-    </label>
-  );
-}
+export const LastChangeChoice = ({ hours, change }: { hours: string; change: (hours: string) => void }) => (
+  <Choice<string> label="Last change" options={RANGES} value={hours} change={change} />
+);

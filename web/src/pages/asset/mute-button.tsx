@@ -1,6 +1,7 @@
 import { useState } from "preact/hooks";
 import { alarmApi, type AlarmCode, type Mute } from "../../api/alarms";
 import { ActionButton } from "../../parts/action-button";
+import { Choice } from "../../parts/choice";
 import { Dialog } from "../../parts/dialog";
 import { alarmCodeTitle } from "../../words/alarm";
 import { dateTime } from "../../words/time";
@@ -62,14 +63,7 @@ function MuteDialog({ asset, code, close }: { asset: string; code: AlarmCode; cl
           Why
           <input value={reason} maxLength={200} onInput={(e) => setReason(e.currentTarget.value)} />
         </label>
-        <label>
-          For
-          <select value={hours} onChange={(e) => setHours(Number(e.currentTarget.value))}>
-            {DURATIONS.map(([value, word]) => (
-              <option value={value}>{word}</option>
-            ))}
-          </select>
-        </label>
+        <Choice<number> label="For" options={DURATIONS} value={hours} change={setHours} />
       </div>
       <div class="form-end">
         <ActionButton class="primary" disabled={!reason.trim()} action={save}>

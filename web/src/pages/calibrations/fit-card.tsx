@@ -2,6 +2,7 @@ import { useState } from "preact/hooks";
 import { api } from "../../api/client";
 import type { Session } from "../../api/types";
 import { useQuery } from "../../hooks/use-query";
+import { Choice } from "../../parts/choice";
 import { ErrorMessage } from "../../parts/error-message";
 import { Loading } from "../../parts/loading";
 import { Fit } from "./fit";
@@ -33,18 +34,12 @@ export function FitCard({ n, calibration, before, sessions }: Props) {
     `${session} ${before} ${calibration}`,
   );
   if (!session) return null;
+  const choices = sessions.map(({ id, name }) => [id, name] as const);
   const other = before === NO_CALIBRATION ? "without a calibration" : `with calibration ${n - 1}`;
   return (
     <section class="card">
       <h2>Its fit over the data</h2>
-      <label class="inline">
-        Session{" "}
-        <select value={session} onChange={(e) => choose(e.currentTarget.value)}>
-          {sessions.map(({ id, name }) => (
-            <option value={id}>{name}</option>
-          ))}
-        </select>
-      </label>
+      <Choice isInline label="Session" options={choices} value={session} change={choose} />
       {before === NO_CALIBRATION && (
         <p class="quiet small-text">
           A learnt rig is judged over a window as long as its noise requires, which alone makes the residual

@@ -2,6 +2,7 @@ import { useMemo, useState } from "preact/hooks";
 import type { Axis } from "../../api/types";
 import { AXES } from "../../live/buffer";
 import { SESSION_CHARTS } from "../../parts/charts/chart-kinds";
+import { Choice } from "../../parts/choice";
 import { FoundCard } from "../session/found-card";
 import { alignedTrace, commonRange } from "./align";
 import { ComparedCharts } from "./compared-charts";
@@ -9,6 +10,8 @@ import { ShiftField } from "./shift-field";
 import type { Recording } from "./use-recording";
 
 const KINDS = ["residual" as const, "counter" as const, ...SESSION_CHARTS];
+
+const AXIS_OPTIONS = AXES.map((axis) => [axis, axis] as const);
 
 interface Props {
   a: Recording;
@@ -30,14 +33,7 @@ export function Comparison({ a, b, shift, setShift }: Props) {
     <>
       <section class="card player">
         <ShiftField shift={shift} set={setShift} />
-        <label class="inline">
-          Axis{" "}
-          <select value={axis} onChange={(e) => setAxis(e.currentTarget.value as Axis)}>
-            {AXES.map((name) => (
-              <option value={name}>{name}</option>
-            ))}
-          </select>
-        </label>
+        <Choice isInline label="Axis" options={AXIS_OPTIONS} value={axis} change={setAxis} />
         <button type="button" disabled={!zoom} onClick={() => setZoom(undefined)}>
           Zoom out
         </button>

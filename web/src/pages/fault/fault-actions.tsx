@@ -1,36 +1,22 @@
-import { useState } from "preact/hooks";
-import { actor, rememberActor } from "../../api/access";
 import { api } from "../../api/client";
 import type { FaultCode, FaultEntry } from "../../api/types";
 import { ActionButton } from "../../parts/action-button";
+import { ActorField, useActor } from "../../parts/actor-field";
 import { ConfirmButton } from "../../parts/confirm-button";
-import { useCaller } from "../../parts/login/caller";
 import { codeTitle } from "../../words/fault-names";
 
 /** The actions on the fault, and the name that is recorded with them. */
 export function FaultActions({ fault, refetch }: { fault: FaultEntry; refetch: () => Promise<unknown> }) {
   const { asset, code, acknowledged } = fault;
-  const caller = useCaller();
-  const [name, setName] = useState(actor());
+  const actor = useActor();
   const asActor = (action: (asset: string, code: FaultCode) => Promise<unknown>) => async () => {
-    rememberActor(name);
+    actor.remember();
     await action(asset, code);
     await refetch();
   };
   return (
     <div class="page-tools">
-      {!caller?.name && (
-        <label class="inline">
-          as{" "}
-          <input
-            value={name}
-            size={12}
-            maxLength={60}
-            onInput={(e) => setName(e.currentTarget.value)}
-            aria-label="Your name, recorded with the action"
-          />
-        </label>
-      )}
+      <ActorField actor={actor} />
       <ActionButton
         class="primary"
         disabled={acknowledged}

@@ -1,3 +1,4 @@
+import { Choice } from "../../parts/choice";
 import { TagChoice } from "../../parts/tag-choice";
 import { count } from "../../words/numbers";
 import { countRows, SORTS, type HealthFilter } from "./rows";
@@ -43,14 +44,13 @@ export function FleetTools({ view }: { view: FleetView }) {
         onInput={(e) => change("search", e.currentTarget.value)}
       />
       <TagChoice tags={tags} chosen={tag} change={(chosen) => change("tag", chosen)} />
-      <label class="inline">
-        Sort{" "}
-        <select value={sort} onChange={(e) => change("sort", e.currentTarget.value)}>
-          {Object.entries(SORTS).map(([key, word]) => (
-            <option value={key}>{word}</option>
-          ))}
-        </select>
-      </label>
+      <Choice<string>
+        isInline
+        label="Sort"
+        options={Object.entries(SORTS)}
+        value={sort}
+        change={(key) => change("sort", key)}
+      />
       <button type="button" onClick={() => change("layout", layout === "wall" ? "" : "wall")}>
         {layout === "wall" ? "Show as a list" : "Show for a wall screen"}
       </button>

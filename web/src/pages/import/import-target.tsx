@@ -17,6 +17,7 @@ export function ImportTarget({ assets, asset, setAsset, session, setSession }: P
           Rig{" "}
           <input
             list="import-assets"
+            size={24}
             value={asset}
             onInput={(e) => setAsset(e.currentTarget.value)}
             placeholder="choose or name the rig"

@@ -2,6 +2,7 @@ import { useState } from "preact/hooks";
 import { api } from "../../api/client";
 import type { Session } from "../../api/types";
 import { useQuery } from "../../hooks/use-query";
+import { Choice } from "../../parts/choice";
 import { ErrorMessage } from "../../parts/error-message";
 import { exampleSession } from "./example-session";
 import { Comparison } from "./comparison";
@@ -27,6 +28,7 @@ export function Textbook() {
   const fit = sessions?.filter((session) => !unfit.has(session.id) || session.id === id);
   const chosen = sessions && (exampleSession(fit ?? [], id) ?? sessions[0]);
   const skip = (skipped: string) => setUnfit((before) => new Set(before).add(skipped));
+  const choices = sessions?.map(({ id, asset, name }) => [id, `${asset}: ${name}`] as const) ?? [];
   return (
     <section class="card">
       <h2>Why 0.01 m/s² fails on a real rig</h2>
@@ -45,16 +47,7 @@ export function Textbook() {
       )}
       {chosen && (
         <>
-          <label class="inline">
-            Session{" "}
-            <select value={chosen.id} onChange={(e) => setId(e.currentTarget.value)}>
-              {sessions.map(({ id, asset, name }) => (
-                <option value={id}>
-                  {asset}: {name}
-                </option>
-              ))}
-            </select>
-          </label>
+          <Choice isInline label="Session" options={choices} value={chosen.id} change={setId} />
           <Comparison key={chosen.id} session={chosen} unfit={skip} />
         </>
       )}

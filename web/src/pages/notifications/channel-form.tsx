@@ -1,9 +1,9 @@
 import { useState } from "preact/hooks";
 import { alarmApi } from "../../api/alarms";
 import { ActionButton } from "../../parts/action-button";
+import { Choice } from "../../parts/choice";
 import { channelOf, EMPTY_DRAFT, isComplete, type ChannelDraft } from "./channel-draft";
 import { ChannelField } from "./channel-field";
-import { Choice } from "./choice";
 import { EmailFields } from "./email-fields";
 
 const KINDS = [
@@ -19,7 +19,7 @@ export function ChannelForm({ made }: { made: (secret?: string | null) => void }
   return (
     <>
       <div class="form-row">
-        <Choice word="Kind" value={kind} options={KINDS} change={(kind) => change({ kind })} />
+        <Choice label="Kind" value={kind} options={KINDS} change={(kind) => change({ kind })} />
         <ChannelField word="Name" value={name} change={(name) => change({ name })} />
         {kind === "webhook" && (
           <ChannelField word="URL" type="url" value={url} change={(url) => change({ url })} />

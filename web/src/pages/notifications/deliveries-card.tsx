@@ -1,5 +1,6 @@
 import type { Delivery } from "../../api/alarms";
 import { useNow } from "../../hooks/use-now";
+import { deliverySummary } from "../../words/sentence";
 import { timeAgo, dateTime } from "../../words/time";
 
 /** The state of a delivery, and the class of its look. */
@@ -24,7 +25,7 @@ export function DeliveriesCard({ deliveries }: { deliveries: Delivery[] }) {
                 <th>Channel</th>
                 <th>State</th>
                 <th class="n">Attempts</th>
-                <th>Since</th>
+                <th>Created</th>
               </tr>
             </thead>
             <tbody>
@@ -44,7 +45,7 @@ function DeliveryRow({ delivery, now }: { delivery: Delivery; now: number }) {
   const next = delivery.attempts && delivery.next_attempt_at ? dateTime(delivery.next_attempt_at) : "";
   return (
     <tr>
-      <td>{delivery.summary}</td>
+      <td>{deliverySummary(delivery.summary)}</td>
       <td data-word="by">{delivery.channel_name ?? "–"}</td>
       <td>
         <span class={look}>{text}</span>
@@ -54,7 +55,7 @@ function DeliveryRow({ delivery, now }: { delivery: Delivery; now: number }) {
       <td class="n" data-word="attempts">
         {delivery.attempts}
       </td>
-      <td data-word="since" title={dateTime(delivery.created_at)}>
+      <td data-word="created" title={dateTime(delivery.created_at)}>
         {timeAgo(delivery.created_at, now)}
       </td>
     </tr>

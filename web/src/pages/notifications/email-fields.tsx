@@ -1,6 +1,6 @@
+import { Choice } from "../../parts/choice";
 import type { ChannelDraft } from "./channel-draft";
 import { ChannelField } from "./channel-field";
-import { Choice } from "./choice";
 
 const ENCRYPTIONS = [
   ["starttls", "STARTTLS"],
@@ -22,7 +22,7 @@ export function EmailFields({ draft, change }: Props) {
         <ChannelField word="Mail server" value={host} change={(host) => change({ host })} />
         <ChannelField word="Port" type="number" value={port} change={(port) => change({ port })} />
         <Choice
-          word="Encryption"
+          label="Encryption"
           value={security}
           options={ENCRYPTIONS}
           change={(security) => change({ security })}

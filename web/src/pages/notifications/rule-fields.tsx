@@ -1,5 +1,5 @@
 import type { Channel } from "../../api/alarms";
-import { Choice } from "./choice";
+import { Choice } from "../../parts/choice";
 import type { RuleDraft } from "./rule-draft";
 
 /** Intervals of reminders, s. */
@@ -42,16 +42,16 @@ export function RuleFields({ draft, channels, change }: Props) {
         />
       </label>
       <Choice
-        word="Channel"
+        label="Channel"
         value={draft.channel}
         options={channels.map(({ id, name }) => [id, name] as const)}
         change={(channel) => change({ channel })}
       />
-      <Choice<number>
-        word="Repeated while it fails"
+      <Choice
+        label="Repeated while it fails"
         value={draft.repeat}
         options={REPEATS}
-        change={(repeat) => change({ repeat: Number(repeat) })}
+        change={(repeat) => change({ repeat })}
       />
     </div>
   );

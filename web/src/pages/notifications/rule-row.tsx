@@ -38,7 +38,7 @@ export function RuleRow({ rule, mayChange, refetch }: Props) {
         {isSilent && <p class="quiet small-text">silent until {dateTime(rule.silent_until)}</p>}
       </th>
       <td data-word="rigs">
-        {rule.asset}
+        {rule.asset === "*" ? "all" : rule.asset}
         {rule.tag && <span class="quiet"> with {rule.tag}</span>}
       </td>
       <td>

@@ -3,6 +3,7 @@ import type { Axis, FaultCode, Thresholds } from "../../api/types";
 import type { ChartGroup } from "../../parts/charts/chart-group";
 import type { ChartKindName } from "../../parts/charts/chart-kinds";
 import { RigChart } from "../../parts/charts/rig-chart";
+import { Choice } from "../../parts/choice";
 import { codeTitle } from "../../words/fault-names";
 import { counterLines, evidenceLines } from "./decision-lines";
 
@@ -30,16 +31,10 @@ export function MonitorCharts({ thresholds, ...chart }: Props) {
   const evidence = useMemo(() => found && evidenceLines(found), [found]);
   const ends = useMemo(() => found && counterLines(found), [found]);
   const { counter, axis } = DRAWN[code];
+  const monitors = thresholds.map((one) => [one.code, codeTitle(one.code)] as const);
   return (
     <>
-      <label class="inline">
-        Monitor{" "}
-        <select value={code} onChange={(e) => setCode(e.currentTarget.value as FaultCode)}>
-          {thresholds.map((one) => (
-            <option value={one.code}>{codeTitle(one.code)}</option>
-          ))}
-        </select>
-      </label>
+      <Choice isInline label="Monitor" options={monitors} value={code} change={setCode} />
       <div class="charts charts-2">
         {axis && evidence && evidence.length > 0 && (
           <RigChart

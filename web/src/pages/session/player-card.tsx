@@ -2,9 +2,9 @@ import type { Thresholds } from "../../api/types";
 import type { TraceBuffer } from "../../live/buffer";
 import { SESSION_CHARTS } from "../../parts/charts/chart-kinds";
 import { RigCharts } from "../../parts/charts/rig-charts";
+import { Choice } from "../../parts/choice";
 import { SPEEDS } from "./address";
 import { MonitorCharts } from "./monitor-charts";
-import { NumberChoice } from "./number-choice";
 import { ProfileChoice, type ProfileOrRecorded } from "./profile-choice";
 import { ResidualHistograms } from "./residual-histograms";
 import type { Playback } from "./use-playback";
@@ -12,7 +12,14 @@ import type { PlaybackCharts } from "./use-playback-charts";
 import { ZoomButtons } from "./zoom-buttons";
 
 /** Selectable time spans of the charts, s; 0 for the whole recording. */
-const SPANS = [10, 30, 60, 0];
+const SPANS = [
+  [10, "10 s"],
+  [30, "30 s"],
+  [60, "60 s"],
+  [0, "all"],
+] as const;
+
+const SPEED_OPTIONS = SPEEDS.map((speed) => [speed, `${speed}×`] as const);
 
 /** Height of a chart, px. */
 const HEIGHT = 136;
@@ -35,7 +42,6 @@ export function PlayerCard(props: Props) {
   const { isPlaying, toggle, seek, speed, setSpeed } = playback;
   const { group, span, setSpan, slider, clock, resolution, zoomTo } = charts;
   const chart = { group, height: HEIGHT, onSeek: seek, onZoom: zoomTo };
-  const spanText = (seconds: number) => (seconds ? `${seconds} s` : "all");
   return (
     <section class="card">
       <div class="player">
@@ -53,9 +59,9 @@ export function PlayerCard(props: Props) {
           onInput={(e) => seek(Number(e.currentTarget.value))}
         />
         <output ref={clock} class="n clock" />
-        <NumberChoice label="Speed" values={SPEEDS} text={(s) => `${s}×`} chosen={speed} choose={setSpeed} />
-        <NumberChoice label="Show" values={SPANS} text={spanText} chosen={span} choose={setSpan} />
-        <ProfileChoice label="Judged by" class="inline" chosen={profile} choose={setProfile} />
+        <Choice isInline label="Speed" options={SPEED_OPTIONS} value={speed} change={setSpeed} />
+        <Choice<number> isInline label="Show" options={SPANS} value={span} change={setSpan} />
+        <ProfileChoice label="Judged by" isInline chosen={profile} choose={setProfile} />
         <ZoomButtons charts={charts} />
       </div>
       {stride > 1 && (

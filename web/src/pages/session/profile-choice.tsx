@@ -1,25 +1,23 @@
 import type { Profile } from "../../api/types";
+import { Choice } from "../../parts/choice";
 
 /** A profile; empty for the one of the recording. */
 export type ProfileOrRecorded = Profile | "";
 
+const PROFILES: [ProfileOrRecorded, string][] = [
+  ["", "as recorded"],
+  ["default", "default"],
+  ["textbook", "textbook"],
+];
+
 interface Props {
   label: string;
-  class?: string;
+  isInline?: boolean;
   chosen: ProfileOrRecorded;
   choose: (profile: ProfileOrRecorded) => void;
 }
 
 /** Selects the profile with which a session is judged. */
-export function ProfileChoice({ label, class: className, chosen, choose }: Props) {
-  return (
-    <label class={className}>
-      {label}{" "}
-      <select value={chosen} onChange={(e) => choose(e.currentTarget.value as ProfileOrRecorded)}>
-        <option value="">as recorded</option>
-        <option value="default">default</option>
-        <option value="textbook">textbook</option>
-      </select>
-    </label>
-  );
-}
+export const ProfileChoice = ({ label, isInline, chosen, choose }: Props) => (
+  <Choice label={label} isInline={isInline} options={PROFILES} value={chosen} change={choose} />
+);

@@ -1,8 +1,7 @@
 import { useState } from "preact/hooks";
-import { actor, rememberActor } from "../../api/access";
 import { api } from "../../api/client";
 import { ActionButton } from "../../parts/action-button";
-import { useCaller } from "../../parts/login/caller";
+import { ActorField, useActor } from "../../parts/actor-field";
 
 interface Props {
   session: string;
@@ -14,11 +13,10 @@ interface Props {
 
 /** Keeps a remark on the current moment, or on the range that was zoomed to. */
 export function RemarkForm({ session, place, isZoomed, refetch }: Props) {
-  const caller = useCaller();
-  const [name, setName] = useState(actor());
+  const actor = useActor();
   const [text, setText] = useState("");
   const keep = async () => {
-    rememberActor(name);
+    actor.remember();
     await api.addRemark(session, { text, ...place() });
     setText("");
     await refetch();
@@ -29,18 +27,7 @@ export function RemarkForm({ session, place, isZoomed, refetch }: Props) {
         Remark
         <textarea rows={2} maxLength={2000} value={text} onInput={(e) => setText(e.currentTarget.value)} />
       </label>
-      {!caller?.name && (
-        <label class="inline">
-          as{" "}
-          <input
-            value={name}
-            size={12}
-            maxLength={60}
-            onInput={(e) => setName(e.currentTarget.value)}
-            aria-label="Your name, kept with the remark"
-          />
-        </label>
-      )}{" "}
+      <ActorField actor={actor} />{" "}
       <ActionButton class="small" action={keep} disabled={!text.trim()} needs="operator">
         {isZoomed ? "Keep for the shown range" : "Keep for this moment"}
       </ActionButton>

@@ -3,10 +3,10 @@ import { api } from "../../api/client";
 import type { Asset, FaultLine, Session } from "../../api/types";
 import { useQuery } from "../../hooks/use-query";
 import { TraceBuffer } from "../../live/buffer";
+import { Choice } from "../../parts/choice";
 import { ErrorMessage } from "../../parts/error-message";
 import { Loading } from "../../parts/loading";
 import { JudgeAgain } from "./judge-again";
-import { NumberChoice } from "./number-choice";
 import { Player } from "./player";
 import type { ProfileOrRecorded } from "./profile-choice";
 import { SessionHeader } from "./session-header";
@@ -33,7 +33,7 @@ export function SessionDetails({ session, asset, faults, refetch }: Props) {
     write({ profile: next });
   };
   const pieces = useMemo(() => stretches(session), [session]);
-  const texts = pieces.map((piece) => stretchText(piece, session.first_t_s ?? 0));
+  const texts = pieces.map((piece, i) => [i, stretchText(piece, session.first_t_s ?? 0)] as const);
   /** The shown stretch of a long recording: that of the address, or the last one. */
   const [chosen, setChosen] = useState(() => stretchAt(pieces, address.t));
   const shown = Math.min(chosen ?? Infinity, pieces.length - 1);
@@ -49,13 +49,7 @@ export function SessionDetails({ session, asset, faults, refetch }: Props) {
       {pieces.length > 1 && (
         <p class="note">
           This recording is long and shown in stretches.{" "}
-          <NumberChoice
-            label="Stretch"
-            values={pieces.map((_, i) => i)}
-            text={(i) => texts[i] ?? ""}
-            chosen={shown}
-            choose={setChosen}
-          />
+          <Choice isInline label="Stretch" options={texts} value={shown} change={setChosen} />
         </p>
       )}
       {!buffer && !trace.error && <Loading what="the recording" />}

@@ -19,6 +19,13 @@ function useStep(name?: string): SetUpStep {
   return (name && wanted?.key) || "describe";
 }
 
+/** Whether a session of the rig has samples. */
+async function hasSamples(name?: string): Promise<boolean> {
+  if (!name) return false;
+  const { items } = await api.sessions({ asset: name, limit: 20 });
+  return items.some((session) => session.samples > 0);
+}
+
 /** The set-up of a rig, or of a new one if `name` is missing. */
 export function SetUpPage({ name }: { name?: string }) {
   const title = name ? `Set up ${name}` : "Set up a rig";
@@ -26,6 +33,7 @@ export function SetUpPage({ name }: { name?: string }) {
   const fetchAsset = () => (name ? api.asset(name) : Promise.resolve(undefined));
   const { data: asset, error, refetch } = useQuery(fetchAsset, name ?? "new");
   const step = useStep(name);
+  const samples = useQuery(() => hasSamples(name), `${name} ${step} samples`);
   if (name && !asset)
     return <UnloadedPage title={title} what={name} kind="rig" error={error} retry={refetch} />;
   const goTo = (next: SetUpStep) => navigate(setUpPath(name!, next));
@@ -42,7 +50,7 @@ export function SetUpPage({ name }: { name?: string }) {
           <h1>{title}</h1>
         </div>
       </header>
-      <Steps current={step} asset={asset} goTo={name ? goTo : undefined} />
+      <Steps current={step} asset={asset} hasSamples={samples.data ?? false} goTo={name ? goTo : undefined} />
       {step === "describe" && <Describe asset={asset} done={connect} />}
       {step === "connect" && asset && <Connect asset={asset} next={() => goTo("check")} />}
       {step === "check" && asset && <Check asset={asset} changed={refetch} next={() => goTo("learn")} />}

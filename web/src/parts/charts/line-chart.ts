@@ -3,7 +3,7 @@ import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import { onTheme } from "../../theme";
 import { chartOptions, type LineChartOptions } from "./chart-options";
-import { drawMarks, drawThresholds, shadeGates, type Mark } from "./overlays";
+import { drawMarks, drawThresholdLabels, drawThresholds, shadeGates, type Mark } from "./overlays";
 
 /** Movement of a pressed pointer from which on it is a drag and not a click, px. */
 const MIN_DRAG_PX = 5;
@@ -79,7 +79,10 @@ export class LineChart {
           (plot: uPlot) => shadeGates(plot, this.data[0], this.gates),
           (plot: uPlot) => drawThresholds(plot, this.options.thresholds ?? []),
         ],
-        draw: [(plot: uPlot) => this.drawMarks(plot)],
+        draw: [
+          (plot: uPlot) => drawThresholdLabels(plot, this.options.thresholds ?? []),
+          (plot: uPlot) => this.drawMarks(plot),
+        ],
         ready: [(plot: uPlot) => this.listen(plot)],
         setCursor: [(plot: uPlot) => this.tellCursor(plot)],
         setSelect: [(plot: uPlot) => this.zoomToSelection(plot)],

@@ -1,8 +1,9 @@
-/** Overlays of a chart: the shading where the gate is open, and marks. */
+/** Overlays of a chart: the shading where the gate is open, lines that decide, and marks. */
 import type uPlot from "uplot";
 import type { Axis } from "../../api/types";
 import { colour } from "../../theme";
 import { textScale, type Threshold } from "./chart-options";
+import { placeLineLabels, placeMarkLabels } from "./label-places";
 
 export interface Mark {
   t: number;
@@ -37,42 +38,73 @@ export function shadeGates(plot: uPlot, times: number[], gates: boolean[]): void
   ctx.restore();
 }
 
-/** Draws the values that decide as horizontal lines with their labels. */
+/** Draws the values that decide as horizontal lines. */
 export function drawThresholds(plot: uPlot, thresholds: Threshold[]): void {
   const { ctx, bbox } = plot;
-  const textHeight = 11 * textScale() * devicePixelRatio;
   ctx.save();
-  ctx.font = `${textHeight}px system-ui, sans-serif`;
-  ctx.textAlign = "right";
-  ctx.fillStyle = colour("quiet");
   ctx.strokeStyle = colour("limit");
   ctx.lineWidth = devicePixelRatio;
-  for (const { value, label } of thresholds) {
+  for (const { value } of thresholds) {
     const y = Math.round(plot.valToPos(value, "y", true));
     ctx.beginPath();
     ctx.moveTo(bbox.left, y);
     ctx.lineTo(bbox.left + bbox.width, y);
     ctx.stroke();
-    // The label is inside of the line, above one below zero and below one above it.
-    ctx.fillText(label, bbox.left + bbox.width - 4 * devicePixelRatio, value > 0 ? y + textHeight : y - 3);
   }
+  ctx.restore();
+}
+
+/** Draws the labels of the horizontal lines. */
+export function drawThresholdLabels(plot: uPlot, thresholds: Threshold[]): void {
+  const { ctx, bbox } = plot;
+  const height = 13 * textScale() * devicePixelRatio;
+  ctx.save();
+  ctx.font = `${height * 0.85}px system-ui, sans-serif`;
+  const labels = thresholds.map(({ value, label }) => ({
+    y: Math.round(plot.valToPos(value, "y", true)),
+    width: ctx.measureText(label).width,
+  }));
+  const right = bbox.left + bbox.width - 4 * devicePixelRatio;
+  const places = placeLineLabels(labels, { top: bbox.top, bottom: bbox.top + bbox.height, right }, height);
+  places.forEach(({ right, top }, i) => {
+    const { width } = labels[i]!;
+    drawText(ctx, { text: thresholds[i]!.label, colour: "quiet", left: right - width, top, width, height });
+  });
   ctx.restore();
 }
 
 /** Draws vertical lines at `marks` with their labels. */
 export function drawMarks(plot: uPlot, marks: Mark[]): void {
-  const { ctx } = plot;
-  const lineHeight = 12 * textScale() * devicePixelRatio;
+  const { ctx, bbox } = plot;
+  const height = 13 * textScale() * devicePixelRatio;
   ctx.save();
-  ctx.font = `${lineHeight * 0.92}px system-ui, sans-serif`;
-  // The end of each row of labels: labels that would overlap are put into separate rows.
-  const rowEnds: number[] = [];
+  ctx.font = `${height * 0.85}px system-ui, sans-serif`;
   const position = ({ t }: Mark) => Math.round(plot.valToPos(t, "x", true));
   for (const mark of marks) {
     ctx.strokeStyle = colour(mark.colour);
     drawLine(plot, position(mark), !mark.isPlayhead);
   }
-  for (const mark of marks) if (mark.label) drawLabel(plot, position(mark), mark, lineHeight, rowEnds);
+  const labelled = marks.filter(({ label }) => label);
+  const margin = 4 * devicePixelRatio;
+  const labels = labelled.map((mark) => ({
+    x: position(mark),
+    width: ctx.measureText(mark.label).width + 2 * margin,
+    text: mark.label,
+  }));
+  const rows = Math.floor(bbox.height / height);
+  placeMarkLabels(labels, bbox.left + bbox.width, rows).forEach((place, i) => {
+    const { label: text, colour } = labelled[i]!;
+    const width = labels[i]!.width - 2 * margin;
+    if (!place) return;
+    drawText(ctx, {
+      text,
+      colour,
+      left: place.left + margin,
+      top: bbox.top + place.row * height,
+      width,
+      height,
+    });
+  });
   ctx.restore();
 }
 
@@ -85,25 +117,25 @@ function drawLine({ ctx, bbox }: uPlot, x: number, isDashed: boolean): void {
   ctx.stroke();
 }
 
-function drawLabel(
-  { ctx, bbox }: uPlot,
-  x: number,
-  { label, colour: name }: Mark,
-  lineHeight: number,
-  rowEnds: number[],
-): void {
-  const width = ctx.measureText(label).width + 6 * devicePixelRatio;
-  const fitsRight = x + width < bbox.left + bbox.width;
-  const left = fitsRight ? x : x - width;
-  const freeRow = rowEnds.findIndex((end) => end <= left);
-  const row = freeRow < 0 ? rowEnds.length : freeRow;
-  rowEnds[row] = left + width;
-  // A ground behind the text, so that it can be read above the curves.
-  ctx.globalAlpha = 0.85;
+interface PlacedText {
+  text: string;
+  /** The name of a colour of the style sheet. */
+  colour: string;
+  left: number;
+  top: number;
+  width: number;
+  height: number;
+}
+
+/** Draws a text on a ground of its own, so that it can be read above the curves. */
+function drawText(ctx: CanvasRenderingContext2D, placed: PlacedText): void {
+  const { text, left, top, width, height } = placed;
+  ctx.globalAlpha = 0.9;
   ctx.fillStyle = colour("panel");
-  ctx.fillRect(left + devicePixelRatio, bbox.top + (row + 0.1) * lineHeight, width, lineHeight);
+  ctx.fillRect(left - 2, top, width + 4, height);
   ctx.globalAlpha = 1;
-  ctx.fillStyle = colour(name);
-  ctx.textAlign = fitsRight ? "left" : "right";
-  ctx.fillText(label, x + (fitsRight ? 4 : -4) * devicePixelRatio, bbox.top + (row + 0.9) * lineHeight);
+  ctx.fillStyle = colour(placed.colour);
+  ctx.textAlign = "left";
+  ctx.textBaseline = "middle";
+  ctx.fillText(text, left, top + height / 2);
 }
