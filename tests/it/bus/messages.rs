@@ -60,7 +60,6 @@ async fn live(device: &mut BusDevice, observer: &mut Observer) {
     device.publish("state", b"online".to_vec()).await;
     let hello = r#"{"firmware":"1.2","axes":["x","y"],"units":["m","rad"],"rate_hz":100}"#;
     device.publish("hello", hello.into()).await;
-    observer.until("hello").await;
     let mut batches = batches(&rig(3000, 1500));
     let last = batches.pop().unwrap();
     for (i, batch) in batches.iter().enumerate() {
