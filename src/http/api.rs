@@ -90,6 +90,7 @@ fn with_sessions(router: GuardedRouter) -> GuardedRouter {
         .routes(Operate, routes!(sessions::import))
         .routes(ReadAsset, routes!(sessions::list))
         .routes(ReadAsset, routes!(sessions::get))
+        .routes(Read, routes!(sessions::calibration))
         .routes(Administer, routes!(sessions::delete))
         .routes(ControlSessions, routes!(sessions::end))
         .routes(Read, routes!(sessions::telemetry))

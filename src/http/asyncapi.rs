@@ -1,5 +1,5 @@
 //! `/asyncapi.yaml`: the messages of the interface, as AsyncAPI 3.0: over the WebSocket, as
-//! Server-Sent Events, and over MQTT and NATS.
+//! Server-Sent Events and webhooks, and over MQTT and NATS.
 //!
 //! The schemas of messages are those of the OpenAPI description and named alike. Topics are
 //! made by the functions that the buses use; the parameters of a query are those of the
@@ -15,12 +15,12 @@ use utoipa::OpenApi;
 
 use self::channels::{
     Channel, JSON, MESSAGES, Message, NOTHING, Operation, PARAMETERS, bus_channels, http_channels,
-    query, servers,
+    query, servers, webhook_channel,
 };
 use super::api::api;
 use super::{description, stream};
 use crate::wire::bus::TopicStyle;
-use crate::wire::{alarm, bus, service};
+use crate::wire::{alarm, bus, notification, service};
 
 /// How a reference to a schema begins.
 const SCHEMA: &str = "#/components/schemas/";
@@ -36,6 +36,7 @@ const SCHEMA: &str = "#/components/schemas/";
     bus::FaultMessageView,
     bus::HelloView,
     bus::PresenceWord,
+    notification::NotificationView,
     service::EventView,
     stream::StreamFrameView
 )))]
@@ -53,7 +54,7 @@ fn channel_object(channel: &Channel) -> Value {
         .map(|&name| (name.to_owned(), reference(&format!("#/components/messages/{name}"))))
         .collect();
     let mut object = json!({
-        "address": channel.address,
+        "address": (!channel.address.is_empty()).then_some(&channel.address),
         "summary": channel.summary,
         "servers": [reference(&format!("#/servers/{}", channel.server))],
         "messages": messages,
@@ -93,6 +94,9 @@ fn operation_object(channel: &Channel, operation: &Operation, openapi: &Value) -
     if channel.server == "mqtt" {
         let mqtt = json!({ "retain": operation.retained, "bindingVersion": "0.2.0" });
         object["bindings"] = json!({ "mqtt": mqtt });
+    }
+    if channel.server == "receiver" {
+        object["bindings"] = json!({ "http": { "method": "POST", "bindingVersion": "0.3.0" } });
     }
     if channel.server == "http" {
         let query = query(openapi, &channel.address);
@@ -154,6 +158,7 @@ fn asyncapi() -> Value {
     let openapi = serde_json::to_value(description::complete(openapi)).unwrap_or_default();
     let channels: Vec<Channel> = http_channels(&openapi)
         .into_iter()
+        .chain([webhook_channel()])
         .chain(bus_channels(TopicStyle::Mqtt))
         .chain(bus_channels(TopicStyle::Nats))
         .collect();

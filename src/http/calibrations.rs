@@ -1,16 +1,18 @@
 //! `/assets/{asset}/calibrations`: calibrating a rig from chosen sessions.
 
-use axum::Json;
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::http::header::LOCATION;
 use axum::response::IntoResponse;
+use axum::{Extension, Json};
 use serde::Deserialize;
 use utoipa::ToSchema;
 
+use super::faults::ActorQuery;
 use super::json_body::JsonBody;
 use super::{App, AssetItemPath, AssetPath, PageQuery, Problem, Query, page_limit};
 use crate::service::Service;
+use crate::service::access::Caller;
 use crate::wire::service::{CalibrationJobView, Page, TrainingDataView};
 
 /// The sessions to calibrate from.
@@ -23,7 +25,8 @@ pub(super) struct NewCalibration {
 
 /// Starts a background job that calibrates the rig from healthy sessions.
 #[utoipa::path(post, path = "/assets/{asset}/calibrations", tag = "assets",
-    operation_id = "calibrate", params(("asset" = String, description = "Name of the asset")),
+    operation_id = "calibrate",
+    params(("asset" = String, description = "Name of the asset"), ActorQuery),
     request_body = NewCalibration,
     responses(
         (status = 202, body = CalibrationJobView, description = "`Location` has the job's URL"),
@@ -32,9 +35,12 @@ pub(super) struct NewCalibration {
 pub(super) async fn create(
     State(app): State<App>,
     AssetPath(asset): AssetPath,
+    Query(query): Query<ActorQuery>,
+    Extension(caller): Extension<Caller>,
     JsonBody(request): JsonBody<NewCalibration>,
 ) -> Result<impl IntoResponse, Problem> {
-    let job = app.service.calibrate(&asset, request.sessions).await?;
+    let by = query.known_actor(&caller);
+    let job = app.service.calibrate(&asset, request.sessions, by).await?;
     let location = format!("/api/v1/assets/{asset}/calibrations/{}", job.id);
     Ok((StatusCode::ACCEPTED, [(LOCATION, location)], Json(job)))
 }
@@ -71,12 +77,15 @@ pub(super) async fn get(
 #[utoipa::path(post, path = "/assets/{asset}/calibrations/{id}/activate", tag = "assets",
     operation_id = "activate_calibration",
     params(("asset" = String, description = "Name of the asset"),
-        ("id" = String, description = "Id of the calibration")),
+        ("id" = String, description = "Id of the calibration"), ActorQuery),
     responses((status = 200, body = CalibrationJobView), (status = 404, body = Problem),
         (status = 409, body = Problem, description = "The calibration is not done")))]
 pub(super) async fn activate(
     State(service): State<Service>,
     AssetItemPath(asset, id): AssetItemPath,
+    Query(query): Query<ActorQuery>,
+    Extension(caller): Extension<Caller>,
 ) -> Result<Json<CalibrationJobView>, Problem> {
-    Ok(Json(service.activate_calibration(&asset, &id).await?))
+    let by = query.known_actor(&caller);
+    Ok(Json(service.activate_calibration(&asset, &id, by).await?))
 }

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::service::access::Caller;
 use crate::service::{FaultQuery, RecordingWindow, Service};
-use crate::wire::recording::{ColumnsView, RecordingView, write_csv};
+use crate::wire::recording::{RecordingColumnsView, RecordingView, write_csv};
 use crate::wire::service::{FaultEntryView, HistoryView, Page};
 use crate::wire::session_file::SessionFormat;
 use crate::wire::words::{CodeWord, FaultSort, StatusFilter};
@@ -58,12 +58,16 @@ const MAX_ACTOR: usize = 100;
 
 impl ActorQuery {
     pub(super) fn actor(self, caller: &Caller) -> String {
-        let name = caller.name().map(str::to_owned).or(self.by);
-        let mut actor = name.unwrap_or_else(|| "unknown".to_owned());
+        self.known_actor(caller).unwrap_or_else(|| "unknown".to_owned())
+    }
+
+    /// Like [`Self::actor`]; `None` if the request names nobody.
+    pub(super) fn known_actor(self, caller: &Caller) -> Option<String> {
+        let mut actor = caller.name().map(str::to_owned).or(self.by)?;
         while actor.len() > MAX_ACTOR {
             actor.pop();
         }
-        actor
+        Some(actor)
     }
 }
 
@@ -174,7 +178,7 @@ pub(super) async fn recording(
     };
     let (mut view, rows) = service.fault_recording(&asset, &code, window).await?;
     if format == SessionFormat::Json {
-        view.columns = ColumnsView::of(&rows);
+        view.columns = RecordingColumnsView::of(&rows);
         return Ok(Json(view).into_response());
     }
     let mut text = Vec::new();

@@ -1,10 +1,12 @@
 //! `/assets/{asset}/learning`: automatic calibration from the telemetry of a rig.
 
-use axum::Json;
 use axum::extract::State;
+use axum::{Extension, Json};
 
-use super::{AssetPath, Problem};
+use super::faults::ActorQuery;
+use super::{AssetPath, Problem, Query};
 use crate::service::Service;
+use crate::service::access::Caller;
 use crate::wire::learning::LearningView;
 
 /// Returns the progress of the automatic calibration: the motion gathered so far, what is
@@ -25,14 +27,16 @@ pub(super) async fn get(
 /// new one. Later sessions without any finding refine it until it is based on five.
 #[utoipa::path(post, path = "/assets/{asset}/learning/accept", tag = "assets",
     operation_id = "accept_learning",
-    params(("asset" = String, description = "Name of the asset")),
+    params(("asset" = String, description = "Name of the asset"), ActorQuery),
     responses((status = 200, body = LearningView), (status = 404, body = Problem),
         (status = 409, body = Problem, description = "No calibration is offered")))]
 pub(super) async fn accept(
     State(service): State<Service>,
     AssetPath(asset): AssetPath,
+    Query(query): Query<ActorQuery>,
+    Extension(caller): Extension<Caller>,
 ) -> Result<Json<LearningView>, Problem> {
-    Ok(Json(service.accept_learning(&asset).await?))
+    Ok(Json(service.accept_learning(&asset, query.known_actor(&caller)).await?))
 }
 
 /// States that the rig was not healthy: discards the gathered motion, including that of

@@ -19,7 +19,7 @@ use super::{
     session_format, time_range,
 };
 use crate::service::{RecordingReader, Service, SessionListQuery};
-use crate::wire::service::{ImportView, Page, SessionView};
+use crate::wire::service::{ImportView, Page, SessionCalibrationView, SessionView};
 use crate::wire::session_file::{self, SessionFormat, SessionWriter};
 use crate::wire::verdict::FaultView;
 use crate::wire::words::{SessionSort, SessionState, VerdictFilter};
@@ -175,6 +175,19 @@ pub(super) async fn get(
     Path(id): Path<String>,
 ) -> Result<Json<SessionView>, Problem> {
     Ok(Json(service.session(&id).await?))
+}
+
+/// Returns the calibration that a session is judged with: that of the rig when the session was
+/// opened, whatever has been activated since.
+#[utoipa::path(get, path = "/sessions/{id}/calibration", tag = "sessions",
+    operation_id = "get_session_calibration",
+    params(("id" = String, description = "The service's id of the session")),
+    responses((status = 200, body = SessionCalibrationView), (status = 404, body = Problem)))]
+pub(super) async fn calibration(
+    State(service): State<Service>,
+    Path(id): Path<String>,
+) -> Result<Json<SessionCalibrationView>, Problem> {
+    Ok(Json(service.session_calibration(&id).await?))
 }
 
 /// Deletes a session with its recording and transitions. The asset's fault memory is

@@ -223,9 +223,26 @@ pub struct CalibrationRow {
     pub active: i64,
     pub document: Option<String>,
     pub error: Option<String>,
+    /// Who made it; `None` if nobody is known.
+    pub made_by: Option<String>,
+    /// Who activated it last, and when; `None` if nobody is known, or it never was.
+    pub activated_by: Option<String>,
+    pub activated_at: Option<Micros>,
 }
 
-from_row!(CalibrationRow { id, asset, state, sessions, made_at, active, document, error });
+from_row!(CalibrationRow {
+    id,
+    asset,
+    state,
+    sessions,
+    made_at,
+    active,
+    document,
+    error,
+    made_by,
+    activated_by,
+    activated_at,
+});
 
 /// The estimate of the servo of an axis from one session.
 #[derive(Clone, Debug, PartialEq)]

@@ -115,9 +115,12 @@ pub enum Write {
     Trend(TrendRow),
     PutReplay(ReplayRow),
     PutCalibration(CalibrationRow),
+    /// Makes a calibration the active one of its asset; an empty `id` is none of them.
     ActivateCalibration {
         asset: String,
         id: String,
+        by: Option<String>,
+        at: Micros,
     },
     /// Stores the learning record of an asset (its automatic calibration).
     PutLearning {
@@ -573,7 +576,9 @@ impl GroupCommit<'_> {
             Write::Trend(row) => insert_trend(db, row).await,
             Write::PutReplay(row) => put_replay(db, row).await,
             Write::PutCalibration(row) => put_calibration(db, row).await,
-            Write::ActivateCalibration { asset, id } => activate(db, asset, id).await,
+            Write::ActivateCalibration { asset, id, by, at } => {
+                activate(db, asset, id, (by.as_deref(), *at)).await
+            }
             Write::PutLearning { asset, document } => put_learning(db, asset, document).await,
             Write::PutTags { asset, tags } => tag::put(db, asset, tags).await,
             Write::Published { bus, event } => published(db, bus, *event).await,
@@ -841,8 +846,8 @@ async fn put_replay(db: &mut AnyConnection, row: &ReplayRow) -> Result<(), Store
 
 async fn put_calibration(db: &mut AnyConnection, row: &CalibrationRow) -> Result<(), StoreError> {
     sqlx::query(
-        "INSERT INTO calibration (id, asset, state, sessions, made_at, active, document, error)
-         VALUES ($1, $2, $3, $4, $5, $6, $7, $8)
+        "INSERT INTO calibration (id, asset, state, sessions, made_at, active, document, error,
+         made_by) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9)
          ON CONFLICT (id) DO UPDATE SET state = excluded.state, document = excluded.document,
          error = excluded.error",
     )
@@ -854,17 +859,30 @@ async fn put_calibration(db: &mut AnyConnection, row: &CalibrationRow) -> Result
     .bind(row.active)
     .bind(&row.document)
     .bind(&row.error)
+    .bind(&row.made_by)
     .execute(db)
     .await?;
     Ok(())
 }
 
-async fn activate(db: &mut AnyConnection, asset: &str, id: &str) -> Result<(), StoreError> {
+async fn activate(
+    db: &mut AnyConnection,
+    asset: &str,
+    id: &str,
+    (by, at): (Option<&str>, Micros),
+) -> Result<(), StoreError> {
+    sqlx::query("UPDATE calibration SET active = 0 WHERE asset = $1 AND active = 1")
+        .bind(asset)
+        .execute(&mut *db)
+        .await?;
     sqlx::query(
-        "UPDATE calibration SET active = CASE WHEN id = $2 THEN 1 ELSE 0 END WHERE asset = $1",
+        "UPDATE calibration SET active = 1, activated_by = $3, activated_at = $4
+         WHERE asset = $1 AND id = $2",
     )
     .bind(asset)
     .bind(id)
+    .bind(by)
+    .bind(at)
     .execute(db)
     .await?;
     Ok(())

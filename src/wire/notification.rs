@@ -6,6 +6,8 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::alarm::CommunicationEventView;
+use super::service::EventView;
 use super::words::{AlarmChangeWord, AlarmCodeWord, ChannelKind, DeliveryState, MailSecurity};
 
 /// Settings of a channel: exactly one of `webhook` and `email`.
@@ -269,8 +271,17 @@ pub struct NotificationDataView {
     pub link: Option<String>,
     /// Checks to make.
     pub advice: Vec<String>,
-    /// The event: a fault line or a change of communication; null for a test.
+    /// The event; null for a test.
+    #[schema(value_type = Option<NotifiedEventView>)]
     pub event: serde_json::Value,
+}
+
+/// The event of which a message tells.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+#[serde(untagged)]
+pub enum NotifiedEventView {
+    Fault(EventView),
+    Communication(CommunicationEventView),
 }
 
 impl NotificationView {

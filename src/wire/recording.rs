@@ -36,7 +36,7 @@ pub struct RecordingView {
     /// Id of the profile, settings and rig description that were used.
     pub settings_id: String,
     /// One entry for each sample, in order of time.
-    pub columns: ColumnsView,
+    pub columns: RecordingColumnsView,
 }
 
 macro_rules! columns {
@@ -49,9 +49,9 @@ macro_rules! columns {
         /// The columns of a recording, all of the same length. Judged quantities are null if
         /// the sample was not judged.
         #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
-        pub struct ColumnsView { $($(#[$doc])* pub $name: Vec<$kind>),+ }
+        pub struct RecordingColumnsView { $($(#[$doc])* pub $name: Vec<$kind>),+ }
 
-        impl ColumnsView {
+        impl RecordingColumnsView {
             /// Returns the columns of `rows`.
             #[must_use]
             pub fn of(rows: &[RecordingRow]) -> Self {

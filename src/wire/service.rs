@@ -60,6 +60,13 @@ pub struct SessionView {
     pub verdict: Option<SummaryView>,
 }
 
+/// The calibration that a session is judged with: that of the rig when it was opened.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct SessionCalibrationView {
+    /// Null if the rig was not learnt.
+    pub calibration: Option<super::asset::CalibrationView>,
+}
+
 /// The record of one fault code of one asset.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct FaultEntryView {
@@ -560,8 +567,15 @@ pub struct CalibrationJobView {
     pub sessions: Vec<TrainingDataView>,
     /// Time of creation, RFC 3339.
     pub made_at: String,
+    /// Who created it: name of the token, or the request's `by` if the service requires none;
+    /// `offbd` if the rig learnt by itself. Null if unknown.
+    pub made_by: Option<String>,
     /// Whether this calibration is in use: in the asset file.
     pub active: bool,
+    /// Who put it into use last, as `made_by`; null if unknown, or if it never was.
+    pub activated_by: Option<String>,
+    /// Time at which it was put into use last, RFC 3339; null if unknown, or if it never was.
+    pub activated_at: Option<String>,
     /// The calibration; null unless the state is `done`.
     pub calibration: Option<super::asset::CalibrationView>,
     /// Why it failed, for example what the data lack; null unless the state is `failed`.

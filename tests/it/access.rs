@@ -459,6 +459,8 @@ async fn the_audit_log_records_actor_action_target_and_address() {
     device.telemetry("a", Some("s"), &rig(20, usize::MAX)).await;
     operator.delete("assets/a/faults/x_servo").await.expect(204);
     operator.put("assets/a", &json!({ "name": "a", "sample_rate_hz": 50 })).await.expect(200);
+    operator.put("assets/a/tags", &json!({ "tags": ["hall-2"] })).await.expect(200);
+    operator.put("assets/a/tags", &json!({ "tags": ["two words"] })).await.problem(422);
     operator.delete("assets/a").await.problem(403);
     operator.delete("assets/a/faults/nonsense").await.problem(404);
     service.fixture.client.post("login", &json!({ "token": operator.token })).await.expect(200);
@@ -492,6 +494,7 @@ async fn the_audit_log_records_actor_action_target_and_address() {
         at("root", "create_asset", "/api/v1/assets/b"),
         at("olga", "clear_fault", "/api/v1/assets/a/faults/x_servo"),
         at("olga", "put_asset", "/api/v1/assets/a"),
+        at("olga", "put_tags", "/api/v1/assets/a/tags"),
         at("olga", "log_in", "/api/v1/login"),
         at("root", "create_token", &token),
         at("root", "revoke_token", &token),

@@ -5,6 +5,7 @@ mod bad_input;
 mod faults;
 mod loss;
 mod mapping;
+mod messages;
 mod partition;
 mod puback;
 mod verdict;

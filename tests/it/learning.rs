@@ -46,6 +46,13 @@ async fn calibration_id(client: &Client, asset: &str) -> Value {
     client.get(&format!("assets/{asset}")).await.expect(200)["calibration"]["id"].clone()
 }
 
+/// Who made and who activated each calibration of `new`, the newest first.
+async fn makers(client: &Client) -> Vec<[Value; 2]> {
+    let page = client.get("assets/new/calibrations").await.expect(200);
+    let of = |job: &Value| [job["made_by"].clone(), job["activated_by"].clone()];
+    page["items"].as_array().unwrap().iter().map(of).collect()
+}
+
 fn names(view: &Value) -> Vec<&str> {
     let sessions = view["sessions"].as_array().unwrap();
     sessions.iter().map(|session| session["name"].as_str().unwrap()).collect()
@@ -88,12 +95,13 @@ async fn a_rig_is_learnt_automatically_and_refined_by_later_sessions() {
     assert_eq!(fleet["items"][0]["learning"], "offered");
 
     // A person accepts it; the open session continues without it.
-    let learnt = post(&client, "new", "accept").await.expect(200);
+    let learnt = post(&client, "new", "accept?by=ann").await.expect(200);
     assert_eq!((&learnt["state"], &learnt["n_sessions"]), (&json!("learnt"), &json!(1)));
     assert_eq!((&learnt["by_itself"], &learnt["refines"]), (&json!(true), &json!(true)));
     assert!(learnt["summary"].as_str().unwrap().contains("does not use it"), "{learnt}");
     let first_learnt = calibration_id(&client, "new").await;
     assert_ne!(first_learnt, Value::Null);
+    assert_eq!(makers(&client).await, [[json!("offbd"), json!("ann")]]);
     post(&client, "new", "accept").await.problem(409);
     post(&client, "new", "discard").await.problem(409);
     client.end("new", "first").await;
@@ -113,6 +121,7 @@ async fn a_rig_is_learnt_automatically_and_refined_by_later_sessions() {
     eventually(|| async { changed().await.then_some(()) }).await;
     fixture.restart().await;
     assert_eq!(learning(&fixture.client, "new").await, refined);
+    assert_eq!(makers(&fixture.client).await[0], [json!("offbd"), json!("offbd")]);
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

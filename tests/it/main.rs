@@ -29,6 +29,7 @@ mod learning;
 mod lists;
 mod liveness;
 mod main_job;
+mod messages;
 mod monitoring;
 mod network;
 mod notifications;

@@ -521,7 +521,7 @@ async fn a_rig_can_be_calibrated_from_its_sessions() {
     for name in ["good", "short"] {
         let session = fixture.client.session("a", name).await;
         let wanted = json!({ "sessions": [session["id"]] });
-        let answer = fixture.client.post("assets/a/calibrations", &wanted).await;
+        let answer = fixture.client.post("assets/a/calibrations?by=ann", &wanted).await;
         let id = answer.expect(202)["id"].as_str().unwrap().to_owned();
         assert_eq!(answer.headers["location"], format!("/api/v1/assets/a/calibrations/{id}"));
         ids.push(format!("assets/a/calibrations/{id}"));
@@ -543,15 +543,42 @@ async fn a_rig_can_be_calibrated_from_its_sessions() {
     assert_eq!(jobs[1]["state"], "failed");
     assert!(jobs[1]["error"].as_str().unwrap().contains("are needed"), "{}", jobs[1]);
     client.post(&format!("{}/activate", ids[1]), &Value::Null).await.problem(409);
-    let active = client.post(&format!("{}/activate", ids[0]), &Value::Null).await.expect(200);
+    let activate = format!("{}/activate?by=bob", ids[0]);
+    let active = client.post(&activate, &Value::Null).await.expect(200);
     assert_eq!(active["active"], true);
+    assert_eq!((&active["made_by"], &active["activated_by"]), (&json!("ann"), &json!("bob")));
+    assert!(active["activated_at"].as_str() >= active["made_at"].as_str(), "{active}");
     let asset = client.get("assets/a").await.expect(200);
     let learnt = &asset["calibration"];
     assert_eq!(learnt["data_sha256"], active["calibration"]["data_sha256"]);
     let page = client.get("assets/a/calibrations").await.expect(200);
     assert_eq!(page["items"].as_array().unwrap().len(), 2);
+    assert_eq!(page["items"][1], active);
+    assert_eq!(page["items"][0]["activated_by"], Value::Null);
     client.put("assets/a", &json!({"name":"a"})).await.expect(200);
-    assert_eq!(client.get(&ids[0]).await.expect(200)["active"], false);
+    let replaced = client.get(&ids[0]).await.expect(200);
+    assert_eq!((&replaced["active"], &replaced["activated_by"]), (&json!(false), &json!("bob")));
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_session_keeps_the_calibration_of_its_start() {
+    let mut fixture = ServiceFixture::start().await;
+    fixture.client.asset("a").await;
+    fixture.client.telemetry("a", Some("learnt"), &rig(100, 100)).await;
+    let learnt = registration("a")["calibration"].clone();
+    // From now on the rig is not learnt; the open session is judged as before.
+    fixture.client.put("assets/a", &json!({ "name": "a" })).await.expect(200);
+    fixture.restart().await;
+    let client = &fixture.client;
+    let of = async |name: &str| {
+        let id = client.session("a", name).await["id"].as_str().unwrap().to_owned();
+        client.get(&format!("sessions/{id}/calibration")).await.expect(200)["calibration"].clone()
+    };
+    let kept = of("learnt").await;
+    assert_eq!((&kept["id"], &kept["certificate"]), (&learnt["id"], &learnt["certificate"]));
+    client.telemetry("a", Some("later"), &rig(100, 100)).await;
+    assert_eq!((of("later").await, of("learnt").await), (Value::Null, kept));
+    client.get("sessions/nonsense/calibration").await.problem(404);
 }
 
 #[tokio::test]

@@ -18,9 +18,10 @@ pub(super) struct Message {
 }
 
 pub(super) const JSON: &str = "application/json";
+const CLOUD_EVENT: &str = "application/cloudevents+json";
 
 /// Every message.
-pub(super) const MESSAGES: [Message; 11] = [
+pub(super) const MESSAGES: [Message; 12] = [
     message("batch", "BatchMessage", JSON, "Samples; either document also as MessagePack"),
     message("batchAck", "BatchAck", JSON, "The batch is durable"),
     message("batchRefusal", "BatchRefusal", JSON, "Nothing of the batch was taken"),
@@ -32,6 +33,7 @@ pub(super) const MESSAGES: [Message; 11] = [
     message("frame", "StreamFrame", JSON, "An answer to a batch, or a state"),
     message("faultEvent", "Event", JSON, "Data of an event `fault`"),
     message("communicationEvent", "CommunicationEvent", JSON, "Data of an event `communication`"),
+    message("notification", "Notification", CLOUD_EVENT, "A change, a reminder or a test"),
 ];
 
 /// Stands for the schema of a message without a payload.
@@ -65,6 +67,7 @@ impl Action {
 /// A channel with its operations.
 pub(super) struct Channel {
     pub(super) name: String,
+    /// Empty if each receiver has its own.
     pub(super) address: String,
     pub(super) server: &'static str,
     pub(super) summary: &'static str,
@@ -125,6 +128,18 @@ pub(super) fn http_channels(openapi: &Value) -> [Channel; 2] {
             operations: vec![Operation::new(Action::Send, &["faultEvent", "communicationEvent"])],
         },
     ]
+}
+
+/// Returns the channel of notifications, whose receivers are set in the service.
+pub(super) fn webhook_channel() -> Channel {
+    Channel {
+        name: "webhook".to_owned(),
+        address: String::new(),
+        server: "receiver",
+        summary: "Notifications of a channel, signed as Standard Webhooks say, posted to its URL",
+        bindings: Value::Null,
+        operations: vec![Operation::new(Action::Send, &["notification"])],
+    }
 }
 
 /// Returns the channels of a bus.
@@ -200,6 +215,7 @@ pub(super) fn servers() -> Value {
         "websocket": { "host": "127.0.0.1:8087", "protocol": "ws", "security": token },
         "http": { "host": "127.0.0.1:8087", "protocol": "http", "security": token },
         "mqtt": { "host": "127.0.0.1:1883", "protocol": "mqtt", "security": login },
+        "receiver": { "host": "hooks.example", "protocol": "https" },
         "nats": { "host": "127.0.0.1:4222", "protocol": "nats", "security": login },
     })
 }

@@ -1,9 +1,9 @@
 //! `/sovd`: the fleet in the shape of SOVD (ISO 17978-3), for clients that speak it.
 //!
 //! An adapter: it makes the same requests to the service, under the same rights, as the
-//! interface below `/api/v1`, and names the results differently. A component is a rig. Locks,
-//! operations, modes and updates are not offered: sessions and jobs exclude each other in the
-//! service, without a lock that a client must hold.
+//! interface below `/api/v1`, and names the results differently. A component is a rig. Locks
+//! are not offered, because they would not exclude: see `docs/operations.md`. Nor are operations,
+//! modes and updates.
 
 mod data;
 mod entities;

@@ -45,13 +45,18 @@ pub(in crate::service) enum AssetCommand {
     Acknowledge { code: FaultCode, actor: String, reply: Reply<()> },
 
     /// Writes a calibration that a person chose to the asset file.
-    Activate { id: String, calibration: Box<CalibrationView>, reply: Reply<()> },
+    Activate { id: String, calibration: Box<CalibrationView>, by: Option<String>, reply: Reply<()> },
     /// Records the outcome of a calibration job.
     FinishCalibration { row: Box<CalibrationRow>, reply: Reply<()> },
     /// Returns the id of the calibration that waits to be accepted, if there is one.
     OfferedCalibration { reply: Reply<Option<String>> },
     /// Writes the offered calibration to the asset file if it is still this one.
-    AcceptLearning { id: String, calibration: Box<CalibrationView>, reply: Reply<()> },
+    AcceptLearning {
+        id: String,
+        calibration: Box<CalibrationView>,
+        by: Option<String>,
+        reply: Reply<()>,
+    },
     /// Discards the motion gathered for the automatic calibration.
     DiscardLearning { reply: Reply<()> },
 

@@ -22,7 +22,7 @@ use crate::wire::verdict::{Outcome, SummaryView};
 use crate::wire::words::JobState;
 use offbd_core::vocabulary::Axis;
 
-/// The actor of a refinement in the audit log.
+/// The actor of what a rig learns by itself.
 const ACTOR: &str = "offbd";
 
 /// Motion below which an axis counts as not having moved, s.
@@ -49,6 +49,9 @@ impl Asset {
             active: 0,
             document: None,
             error: None,
+            made_by: Some(ACTOR.to_owned()),
+            activated_by: None,
+            activated_at: None,
         };
         let id = row.id.clone();
         turn.writes.push(Write::PutCalibration(row));
@@ -101,7 +104,7 @@ impl Asset {
         match (outcome, document) {
             (CalibrationEnd::NotRequested, _) => return Ok(()),
             (CalibrationEnd::Refines, Some(calibration)) => {
-                self.activate_calibration(calibration, &id, turn)?;
+                self.activate_calibration(calibration, &id, Some(ACTOR.to_owned()), turn)?;
                 let target = format!("/api/v1/assets/{}/calibrations/{id}", self.row.name);
                 let action = "refine_calibration".to_owned();
                 let entry = AuditEntry { action, target, address: None };
@@ -114,14 +117,15 @@ impl Asset {
         self.learn_if_due(turn)
     }
 
-    /// Activates the calibration `id` on request of a person.
+    /// Activates the calibration `id` on request of the person `by`.
     pub(super) fn activate(
         &mut self,
         calibration: CalibrationView,
         id: &str,
+        by: Option<String>,
         turn: &mut Turn<'_>,
     ) -> Result<(), ServiceError> {
-        self.activate_calibration(calibration, id, turn)?;
+        self.activate_calibration(calibration, id, by, turn)?;
         self.learning.activated(id);
         self.write_learning(turn)
     }
@@ -131,18 +135,19 @@ impl Asset {
         self.learning.offered().map(str::to_owned)
     }
 
-    /// A person confirms that the rig was healthy: activates the calibration `id` if it is
+    /// The person `by` confirms that the rig was healthy: activates the calibration `id` if it is
     /// still offered.
     pub(super) fn accept_learning(
         &mut self,
         calibration: CalibrationView,
         id: &str,
+        by: Option<String>,
         turn: &mut Turn<'_>,
     ) -> Result<(), ServiceError> {
         if self.learning.offered() != Some(id) {
             return Err(ServiceError::NothingOffered { asset: self.row.name.clone() });
         }
-        self.activate(calibration, id, turn)
+        self.activate(calibration, id, by, turn)
     }
 
     /// A person states that the rig was not healthy: discards the gathered motion,
@@ -161,6 +166,7 @@ impl Asset {
         &mut self,
         calibration: CalibrationView,
         id: &str,
+        by: Option<String>,
         turn: &mut Turn<'_>,
     ) -> Result<(), ServiceError> {
         let mut file = asset::view(&self.rig);
@@ -168,7 +174,7 @@ impl Asset {
         self.rig = asset::rig(&file)?;
         self.write_file(views::to_json(&file)?, turn);
         let (asset, id) = (self.row.name.clone(), id.to_owned());
-        turn.writes.push(Write::ActivateCalibration { asset, id });
+        turn.writes.push(Write::ActivateCalibration { asset, id, by, at: turn.at });
         Ok(())
     }
 

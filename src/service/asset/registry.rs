@@ -14,7 +14,7 @@ impl Asset {
         if self.rig.calibration != rig.calibration {
             // The calibration in the file is not one of the stored calibration jobs.
             let (asset, id) = (self.row.name.clone(), String::new());
-            turn.writes.push(Write::ActivateCalibration { asset, id });
+            turn.writes.push(Write::ActivateCalibration { asset, id, by: None, at: turn.at });
             self.learning.calibration_replaced();
         } else if self.rig.calibration.is_none() && self.rig != rig {
             self.learning.description_changed();

@@ -252,8 +252,8 @@ impl Shard {
             C::Acknowledge { code, actor, reply } => {
                 self.change(name, asset, reply, |a, turn| a.acknowledge(code, actor, turn));
             }
-            C::Activate { id, calibration, reply } => {
-                self.change(name, asset, reply, |a, turn| a.activate(*calibration, &id, turn));
+            C::Activate { id, calibration, by, reply } => {
+                self.change(name, asset, reply, |a, turn| a.activate(*calibration, &id, by, turn));
             }
             C::FinishCalibration { row, reply } => {
                 self.change(name, asset, reply, |a, turn| a.finish_calibration(*row, turn));
@@ -261,9 +261,10 @@ impl Shard {
             C::OfferedCalibration { reply } => {
                 self.change(name, asset, reply, |a, _| Ok(a.offered_calibration()));
             }
-            C::AcceptLearning { id, calibration, reply } => {
-                let accept =
-                    |a: &mut Asset, turn: &mut Turn<'_>| a.accept_learning(*calibration, &id, turn);
+            C::AcceptLearning { id, calibration, by, reply } => {
+                let accept = |a: &mut Asset, turn: &mut Turn<'_>| {
+                    a.accept_learning(*calibration, &id, by, turn)
+                };
                 self.change(name, asset, reply, accept);
             }
             C::DiscardLearning { reply } => {

@@ -9,7 +9,7 @@ use crate::service::writing::Handles;
 use crate::service::{ServiceError, snapshots, views};
 use crate::store::{SessionRow, Store};
 use crate::wire::basis::Basis;
-use crate::wire::recording::{ColumnsView, RecordingRow, RecordingView};
+use crate::wire::recording::{RecordingColumnsView, RecordingRow, RecordingView};
 use crate::wire::verdict::FaultView;
 use crate::wire::words::StatusWord;
 use offbd_core::diagnosis::{Evidence, StatusByte};
@@ -140,7 +140,7 @@ pub(in crate::service) fn fault_recording(
         complete: !session.is_open() || session.progress.last_t_s.is_some_and(|t_s| t_s > to_s),
         calibration_id: basis.calibration_id,
         settings_id: basis.settings_id,
-        columns: ColumnsView::default(),
+        columns: RecordingColumnsView::default(),
     };
     Ok((view, rows))
 }

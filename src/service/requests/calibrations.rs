@@ -13,7 +13,8 @@ use crate::wire::words::JobState;
 use offbd_core::vocabulary::Invalid;
 
 impl Service {
-    /// Queues a job that calibrates `asset` from its `sessions`, or stretches of them.
+    /// Queues a job that calibrates `asset` from its `sessions`, or stretches of them, on
+    /// request of the person `by`.
     ///
     /// # Errors
     /// [`ServiceError::Invalid`] for a session of another asset or an empty stretch; [`ServiceError::Busy`].
@@ -21,6 +22,7 @@ impl Service {
         &self,
         asset: &str,
         sessions: Vec<TrainingDataView>,
+        by: Option<String>,
     ) -> Result<CalibrationJobView, ServiceError> {
         self.asset(asset).await?;
         if !(1..=MAX_CALIBRATION_SESSIONS).contains(&sessions.len()) {
@@ -49,6 +51,9 @@ impl Service {
             active: 0,
             document: None,
             error: None,
+            made_by: by,
+            activated_by: None,
+            activated_at: None,
         };
         if let Err(error) =
             self.inner.handles.write(asset, vec![Write::PutCalibration(row.clone())]).await
@@ -100,7 +105,7 @@ impl Service {
         views::page(rows, limit, |row| (row.made_at, row.id.clone()), view)
     }
 
-    /// Writes a calibration to the asset file. An open session keeps the calibration that
+    /// Writes a calibration to the asset file, on request of the person `by`. An open session keeps the calibration that
     /// it started with; the next one uses the new one.
     ///
     /// # Errors
@@ -109,13 +114,14 @@ impl Service {
         &self,
         asset: &str,
         id: &str,
+        by: Option<String>,
     ) -> Result<CalibrationJobView, ServiceError> {
         let row = self.calibration_row(asset, id).await?;
         let Some(document) = row.document else {
             return Err(ServiceError::NotDone { id: row.id, state: row.state });
         };
         let (id, calibration) = (row.id.clone(), Box::new(views::from_json(&document)?));
-        let activate = |reply| AssetCommand::Activate { id, calibration, reply };
+        let activate = |reply| AssetCommand::Activate { id, calibration, by, reply };
         self.inner.shards.call(asset, activate).await?;
         self.calibration(asset, &row.id).await
     }
@@ -128,7 +134,10 @@ fn view(row: CalibrationRow) -> Result<CalibrationJobView, ServiceError> {
         state: views::word(&row.state)?,
         sessions: views::from_json(&row.sessions)?,
         made_at: rfc3339(row.made_at),
+        made_by: row.made_by,
         active: row.active != 0,
+        activated_by: row.activated_by,
+        activated_at: row.activated_at.map(rfc3339),
         calibration: row.document.as_deref().map(views::from_json).transpose()?,
         error: row.error,
     })

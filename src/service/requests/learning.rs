@@ -14,12 +14,17 @@ impl Service {
         self.inner.shards.call(asset, |reply| AssetCommand::Learning { reply }).await
     }
 
-    /// Accepts the offered calibration, because the rig was healthy. An open session does
+    /// Accepts the offered calibration on request of the person `by`, because the rig was
+    /// healthy. An open session does
     /// not use it; the next one does.
     ///
     /// # Errors
     /// [`ServiceError::UnknownAsset`]; [`ServiceError::NothingOffered`].
-    pub async fn accept_learning(&self, asset: &str) -> Result<LearningView, ServiceError> {
+    pub async fn accept_learning(
+        &self,
+        asset: &str,
+        by: Option<String>,
+    ) -> Result<LearningView, ServiceError> {
         let nothing = || ServiceError::NothingOffered { asset: asset.to_owned() };
         let shards = &self.inner.shards;
         // The reply implies that the offered calibration is durable.
@@ -27,7 +32,7 @@ impl Service {
         let id = offered.await?.ok_or_else(nothing)?;
         let document = self.calibration_row(asset, &id).await?.document.ok_or_else(nothing)?;
         let calibration = Box::new(views::from_json(&document)?);
-        let accept = |reply| AssetCommand::AcceptLearning { id, calibration, reply };
+        let accept = |reply| AssetCommand::AcceptLearning { id, calibration, by, reply };
         shards.call(asset, accept).await?;
         self.learning(asset).await
     }

@@ -3,7 +3,8 @@
 use crate::service::asset::AssetCommand;
 use crate::service::{Service, ServiceError, views};
 use crate::store::{RecordingReader, SessionFilter, SessionRow};
-use crate::wire::service::{Page, SessionView};
+use crate::wire::asset;
+use crate::wire::service::{Page, SessionCalibrationView, SessionView};
 use crate::wire::session_file::SessionInfo;
 use crate::wire::words::{SessionSort, SessionState, VerdictFilter};
 use offbd_core::vocabulary::TimeRange;
@@ -109,6 +110,18 @@ impl Service {
     /// [`ServiceError::UnknownSession`].
     pub async fn session(&self, id: &str) -> Result<SessionView, ServiceError> {
         views::session(self.session_row(id).await?)
+    }
+
+    /// Returns the calibration that a session is judged with.
+    ///
+    /// # Errors
+    /// [`ServiceError::UnknownSession`].
+    pub async fn session_calibration(
+        &self,
+        id: &str,
+    ) -> Result<SessionCalibrationView, ServiceError> {
+        let rig = views::rig(&self.session_row(id).await?.setup)?;
+        Ok(SessionCalibrationView { calibration: asset::view(&rig).calibration })
     }
 
     pub(in crate::service) async fn session_row(

@@ -112,14 +112,19 @@ impl BusDevice {
     }
 
     pub async fn send(&self, document: Vec<u8>) {
+        self.publish("telemetry", document).await;
+    }
+
+    /// Publishes on the device's topic that ends with `level`.
+    pub async fn publish(&self, level: &str, payload: Vec<u8>) {
         let token = self.asset.replace('.', "=2E");
         match &self.way {
             Way::Mqtt(device) => {
-                device.publish(&format!("offbd/v1/{token}/telemetry"), document).await;
+                device.publish(&format!("offbd/v1/{token}/{level}"), payload).await;
             }
             Way::Nats(client, _) => {
-                let subject = format!("offbd.v1.{token}.telemetry");
-                client.publish(subject, document.into()).await.unwrap();
+                let subject = format!("offbd.v1.{token}.{level}");
+                client.publish(subject, payload.into()).await.unwrap();
             }
         }
     }

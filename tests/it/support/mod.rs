@@ -8,6 +8,7 @@ pub mod broker;
 pub mod bus_device;
 #[cfg(unix)]
 pub mod calls;
+pub mod described;
 pub mod device;
 pub mod held_socket;
 pub mod postgres;

@@ -25,6 +25,7 @@ import type {
   ReplaySettings,
   ServiceHealth,
   Session,
+  SessionCalibration,
   SessionState,
   State,
   Trace,
@@ -77,6 +78,9 @@ export const api = {
     limit?: number;
   }) => get<Page<Session>>(`/sessions${query(values)}`),
   session: (session: string) => get<Session>(`/sessions/${segment(session)}`),
+  /** The calibration that a session is judged with. */
+  sessionCalibration: (session: string) =>
+    get<SessionCalibration>(`/sessions/${segment(session)}/calibration`),
   sessionFaults: (session: string) => getAll<FaultLine>(`/sessions/${segment(session)}/faults`, {}, 2000),
   endSession: (session: string) => send<Session>("POST", `/sessions/${segment(session)}/end`),
   deleteSession: (session: string) => send<void>("DELETE", `/sessions/${segment(session)}`),
@@ -103,15 +107,21 @@ export const api = {
     send<Replay>("POST", `/sessions/${segment(session)}/replays`, settings),
   replayState: (replay: string) => get<Replay>(`/replays/${segment(replay)}`),
   calibrate: (asset: string, sessions: string[]) =>
-    send<CalibrationJob>("POST", `/assets/${segment(asset)}/calibrations`, { sessions }),
+    send<CalibrationJob>("POST", `/assets/${segment(asset)}/calibrations${query({ by: actor() })}`, {
+      sessions,
+    }),
   calibrations: (asset: string) => getAll<CalibrationJob>(`/assets/${segment(asset)}/calibrations`, {}),
   calibration: (asset: string, job: string) =>
     get<CalibrationJob>(`/assets/${segment(asset)}/calibrations/${segment(job)}`),
   learning: (asset: string) => get<Learning>(`/assets/${segment(asset)}/learning`),
-  acceptLearning: (asset: string) => send<Learning>("POST", `/assets/${segment(asset)}/learning/accept`),
+  acceptLearning: (asset: string) =>
+    send<Learning>("POST", `/assets/${segment(asset)}/learning/accept${query({ by: actor() })}`),
   discardLearning: (asset: string) => send<Learning>("POST", `/assets/${segment(asset)}/learning/discard`),
   activate: (asset: string, job: string) =>
-    send<CalibrationJob>("POST", `/assets/${segment(asset)}/calibrations/${segment(job)}/activate`),
+    send<CalibrationJob>(
+      "POST",
+      `/assets/${segment(asset)}/calibrations/${segment(job)}/activate${query({ by: actor() })}`,
+    ),
   /** Fetches the recording as CSV, with the same credentials as all requests. */
   recording: async (session: string) => {
     const init = withCredentials({ headers: { accept: "text/csv" } });

@@ -1,7 +1,7 @@
 // The calibrations of a rig: their order, their fit and what they leave open.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { numbered, previous, undetermined } from "../../src/pages/calibrations/history";
+import { actWords, numbered, previous, undetermined, useWords } from "../../src/pages/calibrations/history";
 import { fitSentence, residualRms } from "../../src/pages/calibrations/residual";
 
 const jobs = [
@@ -20,6 +20,15 @@ test("calibrations are numbered from the oldest, and failed ones are not counted
   );
   assert.equal(previous(jobs, "c"), "a");
   assert.equal(previous(jobs, "a"), "none");
+});
+
+test("a calibration says who made and who activated it, as far as it is known", () => {
+  const activated = { active: true, activated_at: "2026-01-02T00:00:00Z", activated_by: "ann" };
+  assert.match(useWords(activated), /^in use since .*2026.* by ann$/);
+  assert.match(useWords({ ...activated, active: false }), /^not in use; last activated .* by ann$/);
+  assert.equal(useWords({ active: true }), "in use");
+  assert.equal(useWords({ active: false }), "not in use");
+  assert.doesNotMatch(actWords("2026-01-02T00:00:00Z", null), / by /);
 });
 
 test("only judged moments count for the size of the residual", () => {

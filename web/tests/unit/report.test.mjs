@@ -3,15 +3,20 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { certificateNote } from "../../src/pages/report/certificate-note.ts";
 
-const PRESENT = { id: "c2", made_at: "2026-01-02T00:00:00Z" };
+const JUDGED = { id: "c1", made_at: "2026-01-02T00:00:00Z" };
 
-test("the certificate is shown only with what it belongs to", () => {
-  const note = (judged, present = PRESENT) => certificateNote(present, judged);
-  assert.equal(note({ calibration: "c2" }).applies, true);
-  assert.deepEqual(note({ calibration: null }), { text: "Judged without a calibration.", applies: false });
-  assert.equal(note({ calibration: "c1" }).applies, false);
-  assert.match(note({ calibration: "c1" }).text, /c1, which is not the present one/);
-  assert.equal(note({ opened: "2026-01-03T00:00:00Z" }).applies, true);
-  assert.equal(note({ opened: "2026-01-01T00:00:00Z" }).applies, false);
-  assert.equal(note({ opened: "2026-01-01T00:00:00Z" }, null).text, "The rig has no calibration.");
+test("the calibration is that in force when the session began, whatever is present", () => {
+  assert.doesNotMatch(certificateNote(JUDGED, undefined, JUDGED), /which/);
+  assert.match(certificateNote(JUDGED, undefined, JUDGED), /^Judged with calibration c1, of .*2026.*\.$/);
+  assert.match(
+    certificateNote(JUDGED, "c1", { ...JUDGED, id: "c2" }),
+    /c1, of .*, which is not the present one/,
+  );
+  assert.match(certificateNote(JUDGED, "c1", null), /which is not the present one/);
+  assert.equal(certificateNote(null, null, JUDGED), "Judged without a calibration.");
+});
+
+test("a session that was deleted leaves the id of its calibration", () => {
+  assert.match(certificateNote(undefined, "c1", JUDGED), /c1, whose session is not stored any more/);
+  assert.equal(certificateNote(undefined, null, JUDGED), "Judged without a calibration.");
 });

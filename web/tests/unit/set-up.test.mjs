@@ -84,9 +84,10 @@ test("a choice changes by one session, and its duration is that of its sessions"
   assert.equal(totalLength([session("a", 30), session("b", null), session("c", 40)], chosen), 30);
 });
 
-/** Replaces `fetch` by one that returns `answers`; returns the requests. */
+/** Replaces `fetch` by one that returns `answers`, for the user ann; returns the requests. */
 function fakeService(answers) {
   const requests = [];
+  globalThis.localStorage = { getItem: () => "ann" };
   globalThis.fetch = (path, { method = "GET", body } = {}) => {
     requests.push([method, path.replace("/api/v1", ""), ...(body ? [JSON.parse(body)] : [])]);
     return Promise.resolve(Response.json(answers.shift()));
@@ -106,10 +107,10 @@ test("learning ends the open sessions, waits for the job, and activates the cali
   assert.equal(await learnFrom("bench", ["a", "b"], sessions, ({ state }) => shown.push(state)), true);
   assert.deepEqual(requests, [
     ["POST", "/sessions/a/end"],
-    ["POST", "/assets/bench/calibrations", { sessions: ["a", "b"] }],
+    ["POST", "/assets/bench/calibrations?by=ann", { sessions: ["a", "b"] }],
     ["GET", "/assets/bench/calibrations/7"],
     ["GET", "/assets/bench/calibrations/7"],
-    ["POST", "/assets/bench/calibrations/7/activate"],
+    ["POST", "/assets/bench/calibrations/7/activate?by=ann"],
   ]);
   assert.deepEqual(shown, ["queued", "running", "done", "done"]);
 });

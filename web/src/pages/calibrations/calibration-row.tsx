@@ -4,8 +4,7 @@ import { ConfirmButton } from "../../parts/confirm-button";
 import { useRefusal } from "../../parts/login/rights";
 import { Link } from "../../router/link";
 import { sessionPath } from "../../router/paths";
-import { dateTime } from "../../words/time";
-import { sessionOf, type DoneJob } from "./history";
+import { actWords, sessionOf, useWords, type DoneJob } from "./history";
 
 interface Props {
   name: string;
@@ -28,7 +27,7 @@ export function CalibrationRow({ name, job, n, sessions, isChosen, choose, refet
           <input type="radio" name="calibration" checked={isChosen} onChange={choose} /> {n}
         </label>
       </th>
-      <td>{dateTime(job.made_at)}</td>
+      <td>{actWords(job.made_at, job.made_by)}</td>
       <td>
         {job.sessions.map(sessionOf).map((id, i) => (
           <>
@@ -37,7 +36,7 @@ export function CalibrationRow({ name, job, n, sessions, isChosen, choose, refet
           </>
         ))}
       </td>
-      <td>{job.active ? "in use" : "not in use"}</td>
+      <td>{useWords(job)}</td>
       <td>
         {!job.active && mayActivate && (
           <ConfirmButton

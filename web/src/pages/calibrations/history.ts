@@ -1,5 +1,6 @@
 /** The calibrations of a rig in words, and which of them is compared with which. */
 import type { Calibration, CalibrationJob, TrainingData } from "../../api/types";
+import { dateTime } from "../../words/time";
 
 /** What judges without any calibration, as the service calls it. */
 export const NO_CALIBRATION = "none";
@@ -22,6 +23,16 @@ export function previous(jobs: CalibrationJob[], id: string): string {
 }
 
 export const sessionOf = (data: TrainingData) => (typeof data === "string" ? data : data.session);
+
+/** When and by whom something was done, as far as it is known. */
+export const actWords = (at: string, by?: string | null) => dateTime(at) + (by ? ` by ${by}` : "");
+
+/** Whether a calibration is in use, and who put it into use last. */
+export function useWords({ active, activated_at, activated_by }: CalibrationJob): string {
+  if (!activated_at) return active ? "in use" : "not in use";
+  const act = actWords(activated_at, activated_by);
+  return active ? `in use since ${act}` : `not in use; last activated ${act}`;
+}
 
 /** What a calibration leaves open, in words. */
 export function undetermined({ x, y, certificate, prospects }: Calibration): string[] {

@@ -39,7 +39,11 @@ export function FaultReport({ name, code }: { name: string; code: FaultCode }) {
         </section>
       )}
       {last_occurrence && (
-        <Certificate asset={asset.data} judged={{ calibration: last_occurrence.calibration_id ?? null }} />
+        <Certificate
+          asset={asset.data}
+          session={last_occurrence.session_id}
+          id={last_occurrence.calibration_id}
+        />
       )}
     </ReportFrame>
   );

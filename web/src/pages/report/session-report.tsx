@@ -70,7 +70,7 @@ function Report({ session, asset, faults }: { session: Session; asset: Asset; fa
         </ol>
         <JudgedShares monitors={session.verdict?.monitors ?? []} />
       </section>
-      <Certificate asset={asset} judged={{ opened: session.opened_at }} />
+      <Certificate asset={asset} session={session.id} />
     </ReportFrame>
   );
 }
