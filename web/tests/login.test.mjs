@@ -76,6 +76,15 @@ test("a device's snippet shows a token of its own", async () => {
   assert.equal((await asks("POST", "/assets", token, { name: "other" })).status, 403);
 });
 
+test("a token names the user, who is not asked for a name", async () => {
+  const { url } = service;
+  const before = view.url();
+  await view.goto(`${url}/rigs/bench-1/faults/sensor`);
+  await view.getByRole("button", { name: "Clear" }).waitFor();
+  assert.equal(await view.getByLabel("Your name, recorded with the action").count(), 0);
+  await view.goto(before);
+});
+
 test("after the logout, the login is shown again", async () => {
   await view.getByRole("button", { name: "Log out" }).click();
   await view.getByLabel("Token").waitFor();
