@@ -83,7 +83,7 @@ test("after a restart of the service, the page catches up", async () => {
   await view.getByText("live", { exact: true }).waitFor();
   const { port } = service;
   const rigView = await page(chromium);
-  await rigView.goto(`${service.url}/rigs/rig-7`);
+  await rigView.goto(`${service.url}/rigs/rig-9`);
   await rigView.getByRole("heading", { name: "Monitors" }).waitFor();
   await service.stop();
   await view.getByText("connection lost").waitFor();

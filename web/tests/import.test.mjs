@@ -32,7 +32,7 @@ test("a long recording is shown in the dialogue and can be imported", async () =
   const dialogue = view.getByRole("dialog");
   await dialogue.getByText("70\u202f000 rows over 700.0\u202fs").waitFor();
   await dialogue.getByLabel("Rig").fill("bench");
-  assert.ok(await dialogue.getByRole("button", { name: /^Import 70\u202f000 rows/ }).isEnabled());
+  assert.ok(await dialogue.getByRole("button", { name: /^Import 70\s000 rows/ }).isEnabled());
   assert.deepEqual(view.errors, []);
   await view.done();
 });

@@ -77,10 +77,16 @@ test("a device's snippet shows a token of its own", async () => {
 });
 
 test("a token names the user, who is not asked for a name", async () => {
-  const { url } = service;
   const before = view.url();
-  await view.goto(`${url}/rigs/bench-1/faults/sensor`);
-  await view.getByRole("button", { name: "Clear" }).waitFor();
+  const file = join(work, "short.csv");
+  offbd("simulate", "--seconds", "10", "-o", file);
+  const imported = await fetch(`${service.url}/api/v1/assets/bench-1/sessions/import?name=short`, {
+    method: "POST",
+    headers: { authorization: `Bearer ${admin}`, "content-type": "text/csv" },
+    body: readFileSync(file),
+  });
+  await view.goto(`${service.url}/sessions/${(await imported.json()).session.id}`);
+  await view.getByLabel("Remark", { exact: true }).waitFor();
   assert.equal(await view.getByLabel("Your name, recorded with the action").count(), 0);
   await view.goto(before);
 });

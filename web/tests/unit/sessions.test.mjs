@@ -161,8 +161,8 @@ test("a playback begins where the ball is first seen, unless that is late", () =
   const recording = (unseen) => {
     const t = Array.from({ length: 100 }, (_, i) => i / 10);
     const position = t.map((at) => (at < unseen ? null : 0.01));
-    const at = (column, t) => column[Math.round(10 * t)];
-    return { t, first: 0, last: 9.9, at, x: { position }, y: { position } };
+    const at = (axis, column, t) => position[Math.round(10 * t)];
+    return { t, first: 0, last: 9.9, at };
   };
   assert.equal(firstSeen(recording(1.5)), 1.5);
   assert.equal(firstSeen(recording(8)), 0);
