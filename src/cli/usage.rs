@@ -21,7 +21,7 @@ fn correct_suggestions(error: &mut clap::Error) {
     if error.kind() == ErrorKind::UnknownArgument && invalid.as_deref() == Some("--json") {
         let meant = ContextValue::String("--format json".to_owned());
         error.insert(ContextKind::SuggestedArg, meant);
-        error.insert(ContextKind::Suggested, ContextValue::None);
+        error.remove(ContextKind::Suggested);
     }
 }
 
@@ -39,8 +39,8 @@ fn keep_near_commands(error: &mut clap::Error) {
     let is_near = |word: &String| strsim::osa_distance(&typed, word) <= word.len().div_ceil(3);
     let near: Vec<String> = suggested.into_iter().filter(is_near).collect();
     if near.is_empty() {
-        error.insert(ContextKind::SuggestedSubcommand, ContextValue::None);
-        error.insert(ContextKind::Suggested, ContextValue::None);
+        error.remove(ContextKind::SuggestedSubcommand);
+        error.remove(ContextKind::Suggested);
     } else {
         error.insert(ContextKind::SuggestedSubcommand, ContextValue::Strings(near));
     }

@@ -96,6 +96,19 @@ test("a channel and a rule are made in the page, and a test message arrives", as
   await view.done();
 });
 
+test("on a phone, nothing of a channel, rule or message is off the screen", async () => {
+  const view = await page(chromium, { viewport: { width: 390, height: 800 } });
+  await view.goto(`${service.url}/notifications`);
+  await view.getByText("workshop").first().waitFor();
+  await view.getByText("everything").first().waitFor();
+  const cut = () =>
+    [...document.querySelectorAll(".scroll")]
+      .map((box) => box.scrollWidth - box.clientWidth)
+      .filter((px) => px > 0);
+  assert.deepEqual(await view.evaluate(cut), []);
+  await view.done();
+});
+
 test("a muted monitor is shown as not tested by whom, never as passed", async () => {
   await ask(service.url, "POST", "/assets/bench/sessions", { name: "tuesday" });
   const view = await page(chromium);

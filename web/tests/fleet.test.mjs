@@ -48,6 +48,11 @@ test("thousands of rigs can be searched and filtered, and only visible rows are 
   await view.evaluate(() => scrollTo(0, document.body.scrollHeight / 2));
   await view.getByRole("link", { name: /rig-1500/ }).waitFor();
   assert.ok((await rows.count()) < 60);
+  // Back from a rig, the list is where it was.
+  await view.getByRole("link", { name: /rig-1500/ }).click();
+  await view.getByRole("heading", { name: "Monitors" }).waitFor();
+  await view.goBack();
+  await view.getByRole("link", { name: /rig-1500/ }).waitFor();
   await view.getByRole("searchbox").fill("rig-29 no-such");
   await view.getByText("No rig matches").waitFor();
   await view.getByRole("searchbox").fill("rig-2999");
@@ -77,8 +82,15 @@ test("after a restart of the service, the page catches up", async () => {
     .waitFor();
   await view.getByText("live", { exact: true }).waitFor();
   const { port } = service;
+  const rigView = await page(chromium);
+  await rigView.goto(`${service.url}/rigs/rig-9`);
+  await rigView.getByRole("heading", { name: "Monitors" }).waitFor();
   await service.stop();
   await view.getByText("connection lost").waitFor();
+  // Without a connection, nothing is known of the rig; a page that was not loaded yet waits for the service.
+  await rigView.getByText("not known").first().waitFor();
+  await rigView.getByRole("link", { name: "Alarms" }).click();
+  await rigView.getByText("This page is loaded as soon as it does").waitFor();
   await view.getByText("The service does not answer").waitFor();
   service = await serve(`${work}/many`, port);
   await ask(service.url, "PUT", "/assets/rig-8", { ...rig.learnt, name: "rig-8" });
@@ -90,6 +102,8 @@ test("after a restart of the service, the page catches up", async () => {
     .first()
     .waitFor();
   await view.getByText("The service does not answer").waitFor({ state: "detached" });
+  await rigView.getByRole("heading", { name: "Alarms" }).waitFor();
+  await rigView.done();
   // The missed events arrive, each once.
   const feed = view.getByRole("region", { name: "Events" });
   await feed.getByText(/X servo.* confirmed/).waitFor();

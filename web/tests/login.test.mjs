@@ -76,6 +76,21 @@ test("a device's snippet shows a token of its own", async () => {
   assert.equal((await asks("POST", "/assets", token, { name: "other" })).status, 403);
 });
 
+test("a token names the user, who is not asked for a name", async () => {
+  const before = view.url();
+  const file = join(work, "short.csv");
+  offbd("simulate", "--seconds", "10", "-o", file);
+  const imported = await fetch(`${service.url}/api/v1/assets/bench-1/sessions/import?name=short`, {
+    method: "POST",
+    headers: { authorization: `Bearer ${admin}`, "content-type": "text/csv" },
+    body: readFileSync(file),
+  });
+  await view.goto(`${service.url}/sessions/${(await imported.json()).session.id}`);
+  await view.getByLabel("Remark", { exact: true }).waitFor();
+  assert.equal(await view.getByLabel("Your name, recorded with the action").count(), 0);
+  await view.goto(before);
+});
+
 test("after the logout, the login is shown again", async () => {
   await view.getByRole("button", { name: "Log out" }).click();
   await view.getByLabel("Token").waitFor();

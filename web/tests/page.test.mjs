@@ -140,6 +140,18 @@ for (const colorScheme of ["light", "dark"]) {
   }
 }
 
+for (const width of [320, 720, 768])
+  test(`every view is as wide as the screen, ${width} px`, async () => {
+    const view = await page(chromium, { viewport: { width, height: 800 } });
+    for (const [path, sign] of VIEWS()) {
+      await view.goto(service.url + path);
+      await view.getByText(sign).first().waitFor();
+      const over = await view.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+      assert.ok(over <= 0, `${path} is ${over} px too wide`);
+    }
+    await view.done();
+  });
+
 test("an unknown rig, fault or session gives a message", async () => {
   const view = await page(chromium);
   for (const [path, words] of [
@@ -150,6 +162,10 @@ test("an unknown rig, fault or session gives a message", async () => {
     await view.goto(service.url + path);
     await view.getByRole("alert").getByText(words).waitFor();
   }
+  await view.goto(`${service.url}/sessions?asset=nobody`);
+  await view.getByText("There is no rig called nobody").waitFor();
+  await view.goto(`${service.url}/rigs/bench/set-up?step=zzz`);
+  await view.getByText("Units that the device sends").waitFor();
   assert.ok(
     view.errors.every((error) => error.includes("404")),
     view.errors.join("\n"),

@@ -111,6 +111,10 @@ test("sliders show the alarms that other limits and debounce times would raise",
     .waitFor();
   await view.getByRole("slider", { name: "Limit of X servo" }).fill("3");
   await row.getByText("0 alarms").first().waitFor();
+  await view.setViewportSize({ width: 390, height: 800 });
+  const table = view.getByRole("region", { name: "Limits and debounce times" });
+  const cut = await table.evaluate((box) => box.scrollWidth - box.clientWidth);
+  assert.ok(cut <= 0, `${cut} px of the alarms are off the screen of a phone`);
   await view.getByRole("button", { name: "As set" }).click();
   await row.getByText("0 alarms").waitFor({ state: "detached" });
   assert.deepEqual(view.errors, []);
@@ -142,6 +146,42 @@ test("a remark on a moment is kept, listed and removed", async () => {
   await list.getByText("new horn").waitFor();
   await list.getByRole("button", { name: /^Remove the remark/ }).click();
   await list.waitFor({ state: "detached" });
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});
+
+test("an open session has no recorded verdict, whatever it was judged to be since", async () => {
+  await ask(service.url, "PUT", "/assets/open", { ...rig.learnt, name: "open" });
+  await ask(service.url, "POST", "/assets/open/telemetry?session=now", rig.sick, "text/csv");
+  const { items } = await ask(service.url, "GET", "/sessions?asset=open");
+  const view = await page(chromium);
+  await view.goto(`${service.url}/sessions/${items[0].id}`);
+  await view.getByRole("button", { name: "Judge again" }).click();
+  const recorded = view.locator("dt:text-is('Recorded') + dd");
+  await recorded.getByText("when the session has ended").waitFor();
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});
+
+test("a recording with one axis says that the ball cannot be drawn; touching the 3D view scrolls", async () => {
+  const [head, ...lines] = rig.healthy.trim().split("\n");
+  const y = head.split(",").indexOf("y_m");
+  const oneAxis = lines.map((line) => line.split(",").map((cell, i) => (i === y ? "" : cell)));
+  const text = [head, ...oneAxis.map((cells) => cells.join(","))].join("\n");
+  const path = "/assets/bench/sessions/import?name=one-axis";
+  const { session } = await ask(service.url, "POST", path, text, "text/csv");
+  const view = await page(chromium);
+  await view.goto(`${service.url}/sessions/${session.id}`);
+  await view.getByText("The recording has no position along y").waitFor();
+  const canvas = view.locator(".stage canvas").first();
+  await canvas.waitFor();
+  assert.equal(await canvas.evaluate((element) => getComputedStyle(element).touchAction), "pan-y");
+  // The play button leaves the arrow keys to the playback.
+  const clock = view.locator("output.clock");
+  const before = await clock.textContent();
+  await view.getByRole("button", { name: "Play", exact: true }).focus();
+  await view.keyboard.press("ArrowRight");
+  await view.waitForFunction((was) => document.querySelector("output.clock").textContent !== was, before);
   assert.deepEqual(view.errors, []);
   await view.done();
 });

@@ -72,41 +72,6 @@ test("a foreign file is mapped, its wrong sign detected and corrected, and it is
   await view.done();
 });
 
-test("a dropped file opens the dialogue; a file that is not a recording is refused", async () => {
-  const view = await page(chromium);
-  await view.goto(`${service.url}/sessions`);
-  await view.getByText("Drop a recording").waitFor();
-  const drop = (name, text) =>
-    view.evaluate(
-      ([name, text]) => {
-        const files = new DataTransfer();
-        files.items.add(new File([text], name, { type: "text/csv" }));
-        dispatchEvent(new DragEvent("drop", { dataTransfer: files, bubbles: true, cancelable: true }));
-      },
-      [name, text],
-    );
-  await drop("letter.csv", "Dear all,\nno recording.\nYours\n");
-  await view.getByRole("alert").getByText("No line has three or more columns").waitFor();
-  await view.keyboard.press("Escape");
-  await view.getByRole("dialog").waitFor({ state: "detached" });
-
-  // Times that are dates: nothing can be imported, and no rig is registered.
-  await drop("dates.csv", "t_s,x_m,y_m\n2026-03-01T10:00:00.020,0,0\n2026-03-01T10:00:00.040,0,0\n");
-  await view.getByRole("dialog").getByLabel("Rig").fill("stranger");
-  await view.getByText("The column of the time has no numbers").waitFor();
-  assert.ok(await view.getByRole("button", { name: /^Import 0 rows/ }).isDisabled());
-  await view.keyboard.press("Escape");
-  await view.getByRole("dialog").waitFor({ state: "detached" });
-  await drop("dropped.csv", rig.sick);
-  const dialogue = view.getByRole("dialog");
-  await dialogue.getByLabel("Rig").fill("new-rig");
-  await dialogue.getByText("There is no rig new-rig yet").waitFor();
-  await dialogue.getByRole("button", { name: /^Import/ }).click();
-  await view.getByRole("heading", { name: "dropped" }).waitFor();
-  assert.deepEqual(view.errors, []);
-  await view.done();
-});
-
 test("played back, scrubbed, judged again, recorded, downloaded, deleted", async () => {
   const { session } = await ask(
     service.url,

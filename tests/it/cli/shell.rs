@@ -114,6 +114,7 @@ fn a_mistyped_command_gets_a_suggestion_if_one_is_near() {
     assert!(near.contains("'replay'"), "{near}");
     let far = cli.run(2, "frobnicate").stderr;
     assert!(far.contains("frobnicate") && !far.contains("calibrate"), "{far}");
+    assert!(!far.contains("tip:"), "a tip without a text: {far}");
     let json = cli.run(2, "replay --json a.csv").stderr;
     assert!(json.contains("--format json") && !json.contains("-- --json"), "{json}");
 }

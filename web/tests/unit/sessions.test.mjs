@@ -1,4 +1,6 @@
 // The logic of the pages of sessions, the demo and drive cycles.
+import { evidenceRows } from "../../src/pages/fault/evidence-rows.ts";
+import { firstSeen, playedOn } from "../../src/pages/session/playback-time.ts";
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { cycleCsv } from "../../src/pages/asset/drive-cycle/cycle-csv.ts";
@@ -144,4 +146,35 @@ test("the stretch of a long recording is that of the moment in the address", () 
   assert.equal(stretchAt(pieces, 15), 1);
   assert.equal(stretchAt(pieces, 99), undefined);
   assert.equal(stretchAt(pieces), undefined);
+});
+
+test("slow frames do not slow the playback down, and a hidden tab does not skip ahead", () => {
+  let t = 0;
+  for (let frame = 0; frame < 12; frame++) t = playedOn(t, 250, 1, 40);
+  assert.equal(t, 3);
+  assert.equal(playedOn(0, 250, 2, 40), 0.5);
+  assert.equal(playedOn(0, 60_000, 1, 40), 1);
+  assert.equal(playedOn(39.9, 1000, 10, 40), 40);
+});
+
+test("a playback begins where the ball is first seen, unless that is late", () => {
+  const recording = (unseen) => {
+    const t = Array.from({ length: 100 }, (_, i) => i / 10);
+    const position = t.map((at) => (at < unseen ? null : 0.01));
+    const at = (axis, column, t) => position[Math.round(10 * t)];
+    return { t, first: 0, last: 9.9, at };
+  };
+  assert.equal(firstSeen(recording(1.5)), 1.5);
+  assert.equal(firstSeen(recording(8)), 0);
+});
+
+test("in a freeze frame, what speaks for a fault is marked: the evidence, too", () => {
+  const axis = { enabled: true, residual_m_s2: 0.204, limit_m_s2: 0.212, nats: 12.8 };
+  const marked = (x) =>
+    evidenceRows({ x, y: { limit_m_s2: 0.2 } })
+      .filter(({ cells }) => cells[0].isBeyondLimit)
+      .map(({ name }) => name);
+  assert.deepEqual(marked(axis), ["Weight of evidence for a servo fault"]);
+  assert.deepEqual(marked({ ...axis, nats: 3, residual_m_s2: -0.3 }), ["Residual"]);
+  assert.deepEqual(marked({ ...axis, nats: 3, residual_m_s2: -0.3, enabled: false }), []);
 });

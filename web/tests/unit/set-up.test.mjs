@@ -6,7 +6,9 @@ import { proposedSessions, totalLength, withChoice } from "../../src/pages/set-u
 import { falseAlarmRate } from "../../src/pages/set-up/false-alarm-rate.ts";
 import { isDone } from "../../src/pages/set-up/is-done.ts";
 import { learnFrom } from "../../src/pages/set-up/learn-from.ts";
-import { snippets } from "../../src/pages/set-up/snippets.ts";
+import { problemText } from "../../src/pages/set-up/problem-text.ts";
+import { snippets, unitsOf } from "../../src/pages/set-up/snippets.ts";
+import { ProblemError } from "../../src/api/request.ts";
 import { random } from "./random.mjs";
 
 test("a new rig is described as that of the book chapter", () => {
@@ -159,4 +161,22 @@ test("steps are ticked off as they are done", () => {
   assert.deepEqual(done({ calibration: null }, false), ["describe"]);
   assert.deepEqual(done({ calibration: null }, true), ["describe", "connect"]);
   assert.deepEqual(done({ calibration: {} }, false), steps);
+});
+
+test("snippets name the units of the rig's description", () => {
+  assert.deepEqual(unitsOf({}), { angle: "rad", length: "m" });
+  const units = unitsOf({ axes: { position_unit_m: 0.001, command_unit_rad: DEGREE } });
+  assert.deepEqual(units, { angle: "degrees", length: "mm" });
+  for (const { language, text } of snippets("bench-1", "http://host", undefined, units)) {
+    assert.match(text, /degrees/, language);
+    assert.match(text, /\bmm\b/, language);
+  }
+});
+
+test("a refused description names the field of the form, and values in its unit", () => {
+  const refused = (pointer, detail) => problemText(new ProblemError(422, { detail, pointer }));
+  const text = refused("/ball/radius_m", "/ball/radius_m: -0.003 is not above 0 and at most 1");
+  assert.equal(text, "Radius: −3\u202fmm is not above 0\u202fmm and at most 1000\u202fmm");
+  assert.equal(refused("/name", "/name: is taken"), "Name: is taken");
+  assert.equal(refused(undefined, "no element"), "no element");
 });

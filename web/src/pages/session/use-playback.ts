@@ -1,20 +1,8 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import { useAnimationFrame } from "../../hooks/use-animation-frame";
 import type { TraceBuffer } from "../../live/buffer";
-import { ballAt } from "../../live/pose";
+import { firstSeen, playedOn } from "./playback-time";
 import { useAddress } from "./use-address";
-
-/** Longest step of one frame, s: slower frames than that are no playback, and a hidden tab has none. */
-const LONGEST_STEP_S = 1;
-
-/** Longest search for the first position of the ball, s. */
-const SEARCH_S = 5;
-
-/** Returns the first moment at which the ball's position is known, if it is soon, otherwise the first moment. */
-function firstSeen(buffer: TraceBuffer): number {
-  const seen = buffer.t.find((t) => t > buffer.first + SEARCH_S || ballAt(buffer, "position", t));
-  return seen !== undefined && seen <= buffer.first + SEARCH_S ? seen : buffer.first;
-}
 
 /** The playback of a recording. The current time stays when the buffer changes. */
 export function usePlayback(buffer: TraceBuffer | undefined) {
@@ -31,10 +19,10 @@ export function usePlayback(buffer: TraceBuffer | undefined) {
     t.current = Math.min(Math.max(wanted, buffer.first), buffer.last);
   }, [buffer]);
   useAnimationFrame((now) => {
-    const elapsed = Math.min((now - frameAt.current) / 1000, LONGEST_STEP_S);
+    const elapsed = now - frameAt.current;
     frameAt.current = now;
     if (!buffer?.t.length || !isPlaying) return;
-    t.current = Math.min(t.current + elapsed * speed, buffer.last);
+    t.current = playedOn(t.current, elapsed, speed, buffer.last);
     if (t.current === buffer.last) setPlaying(false);
   });
   const seek = (to: number) => {

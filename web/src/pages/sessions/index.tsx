@@ -1,6 +1,7 @@
 /** The page of all sessions, with the import of recordings. */
 import { useState } from "preact/hooks";
 import { api } from "../../api/client";
+import { isNotFound } from "../../api/request";
 import { useQuery } from "../../hooks/use-query";
 import { useTitle } from "../../hooks/use-title";
 import { ActionButton } from "../../parts/action-button";
@@ -9,6 +10,8 @@ import { ErrorMessage } from "../../parts/error-message";
 import { lazy, Suspense } from "../../parts/lazy";
 import { Loading } from "../../parts/loading";
 import { useLocation } from "../../router/navigation";
+import { Link } from "../../router/link";
+import { sessionsPath } from "../../router/paths";
 import { DropZone } from "./drop-zone";
 import { SessionTable } from "./session-table";
 import { SessionTools } from "./session-tools";
@@ -19,6 +22,16 @@ const ImportDialog = lazy(() => import("../import").then((module) => module.Impo
 
 const fetchNames = () => api.fleet().then((fleet) => fleet.map((entry) => entry.asset));
 
+function UnknownRig({ name }: { name: string }) {
+  return (
+    <EmptyState title={`There is no rig called ${name}`}>
+      <p>
+        Its name may be mistyped, or it has been deleted. <Link to={sessionsPath()}>Show all sessions</Link>
+      </p>
+    </EmptyState>
+  );
+}
+
 export function SessionsPage() {
   useTitle("Sessions");
   const { query } = useLocation();
@@ -26,7 +39,7 @@ export function SessionsPage() {
   const { sessions, error, refetch, loadMore } = useSessions(asset, tag);
   const { data: known } = useQuery(fetchNames, "names");
   const names = known ?? [];
-  const isUnknown = asset !== "" && known !== undefined && !known.includes(asset);
+  const isUnknown = asset !== "" && isNotFound(error);
   const [file, setFile] = useState<File>();
   const close = () => setFile((now) => (now === file ? undefined : now));
   return (
@@ -49,10 +62,10 @@ export function SessionsPage() {
           />
         </Suspense>
       )}
-      <ErrorMessage error={error} retry={refetch} />
+      {isUnknown ? <UnknownRig name={asset} /> : <ErrorMessage error={error} retry={refetch} />}
       {!sessions && !error && <Loading what="the sessions" />}
       {sessions?.length === 0 && (
-        <EmptyState title={isUnknown ? `There is no rig called ${asset}` : "No session yet"}>
+        <EmptyState title="No session yet">
           <p>A session begins when a rig sends its first sample, or when a recording is imported.</p>
         </EmptyState>
       )}
