@@ -1,131 +1,26 @@
 //! Several nodes on one PostgreSQL database: any of them answers, those that are killed,
 //! stopped or paused lose nothing, and none writes what it does not own any more.
 
+mod versions;
+
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::process::Command;
 
 use reqwest::Method;
 use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 
+use crate::support::cluster::{Cluster, N_NODES, call};
 use crate::support::device::{DeviceLoad, Random};
 use crate::support::held_socket::HeldSocket;
-use crate::support::postgres::{self, Postgres};
-use crate::support::process::{Process, Refusal, ended};
+use crate::support::postgres;
+use crate::support::process::{Process, Refusal};
 use crate::support::{Client, Events, batch, eventually, judged, registration, rig};
 use offbd_core::vocabulary::Sample;
 
-const N_NODES: usize = 3;
-const N_PARTITIONS: u64 = 16;
-
 /// Faults of the long test, unless the environment variable FAULTS is set.
 const FAULTS: usize = 6;
-
-/// A cluster of processes, and the database server that they share.
-struct Cluster {
-    postgres: Postgres,
-    data: tempfile::TempDir,
-    nodes: Vec<Option<Process>>,
-}
-
-impl Cluster {
-    async fn start() -> Self {
-        Self::start_with(|_| None).await
-    }
-
-    /// Starts the nodes, the second one with its own way to the database, if there is one.
-    async fn start_with(way: impl FnOnce(&Postgres) -> Option<String>) -> Self {
-        let (postgres, data) = (Postgres::new(), tempfile::tempdir().unwrap());
-        let way = way(&postgres);
-        let mut this = Self { postgres, data, nodes: Vec::new() };
-        for i in 0..N_NODES {
-            let way = way.as_deref().filter(|_| i == 1).map(|url| ("OFFBD_DATABASE", url));
-            let node = this.try_node(i, way.as_slice());
-            this.nodes.push(Some(node.unwrap_or_else(|Refusal { log, .. }| panic!("{log}"))));
-        }
-        this.settled(N_NODES).await;
-        this
-    }
-
-    fn url(&self) -> String {
-        self.postgres.database("cluster")
-    }
-
-    fn try_node(&self, i: usize, settings: &[(&str, &str)]) -> Result<Process, Refusal> {
-        let (name, url, partitions) = (format!("node-{i}"), self.url(), N_PARTITIONS.to_string());
-        let mut environment = BTreeMap::from([
-            ("OFFBD_DATABASE", url.as_str()),
-            ("OFFBD_CLUSTER__NAME", &name),
-            ("OFFBD_CLUSTER__LISTEN", "127.0.0.1:0"),
-            ("OFFBD_CLUSTER__PARTITIONS", &partitions),
-        ]);
-        environment.extend(settings.iter().copied());
-        let environment: Vec<_> =
-            environment.iter().map(|(key, value)| (*key, Path::new(value))).collect();
-        Process::try_start(self.data.path(), &environment)
-    }
-
-    fn restart(&mut self, i: usize) {
-        let node = self.try_node(i, &[]).unwrap_or_else(|Refusal { log, .. }| panic!("{log}"));
-        self.nodes[i] = Some(node);
-    }
-
-    fn client(&self, i: usize) -> Client {
-        self.nodes[i].as_ref().unwrap().client.clone()
-    }
-
-    fn clients(&self) -> Vec<Client> {
-        self.nodes.iter().flatten().map(|node| node.client.clone()).collect()
-    }
-
-    /// Waits until `n` nodes know each other and share all partitions.
-    async fn settled(&self, n: usize) {
-        for client in self.clients() {
-            eventually(|| async {
-                let cluster = try_get(&client, "cluster").await?;
-                let nodes = cluster["nodes"].as_array()?;
-                let share = N_PARTITIONS / n as u64;
-                let is_shared = nodes.iter().all(|node| node["partitions"].as_u64() >= Some(share));
-                (nodes.len() == n && is_shared && cluster["unowned"] == 0).then_some(())
-            })
-            .await;
-        }
-    }
-
-    /// Returns those of the rigs that a node owns; there are some.
-    async fn owned_by(&self, i: usize, names: &[String]) -> Vec<String> {
-        let (client, node) = (self.client(0), format!("node-{i}"));
-        let mut owned = Vec::new();
-        for name in names {
-            let place = client.get(&format!("cluster?asset={name}")).await.expect(200);
-            if place["asset"]["owner"] == node.as_str() {
-                owned.push(name.clone());
-            }
-        }
-        assert!(!owned.is_empty(), "{node} owns none of the rigs");
-        owned
-    }
-
-    fn signal(&self, i: usize, signal: &str) {
-        let pid = self.nodes[i].as_ref().unwrap().child.id().to_string();
-        assert!(Command::new("kill").args([signal, &pid]).status().unwrap().success());
-    }
-
-    /// Waits until the other nodes own everything.
-    async fn taken_over_from(&self, i: usize) {
-        let name = format!("node-{i}");
-        let other = self.client((i + 1) % N_NODES);
-        eventually(|| async {
-            let cluster = try_get(&other, "cluster").await?;
-            let nodes = cluster["nodes"].as_array()?;
-            let is_gone = nodes.iter().all(|node| node["name"] != name.as_str());
-            (is_gone && cluster["unowned"] == 0).then_some(())
-        })
-        .await;
-    }
-}
 
 /// Registers rigs through the first node: many, so that each node owns some.
 async fn register_rigs(cluster: &Cluster) -> Vec<String> {
@@ -156,25 +51,6 @@ async fn pause_second_node(cluster: &Cluster, samples: &[Sample]) -> Vec<String>
     cluster.taken_over_from(1).await;
     send_all(&cluster.client(0), &names, &samples[300..600]).await;
     names
-}
-
-async fn try_get(client: &Client, path: &str) -> Option<Value> {
-    let answer = client.request(Method::GET, path).send().await.ok()?;
-    (answer.status() == 200).then_some(answer)?.json().await.ok()
-}
-
-/// Sends a request again until it is not refused because an asset moves.
-async fn call(client: &Client, method: Method, path: &str, body: &Value) -> (u16, Value) {
-    eventually(|| async {
-        let answer = client.request(method.clone(), path).json(body).send().await.ok()?;
-        let status = answer.status().as_u16();
-        if status == 503 {
-            assert_eq!(answer.headers()["retry-after"], "1");
-            return None;
-        }
-        Some((status, answer.json().await.unwrap_or_default()))
-    })
-    .await
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -242,7 +118,7 @@ async fn nodes_that_are_killed_paused_and_stopped_lose_nothing() {
         *n_by_kind.entry(kind).or_default() += 1;
         match kind {
             "kill" => {
-                cluster.nodes[node] = None;
+                cluster.kill(node);
                 load.link.set_service(&cluster.client(other));
                 cluster.restart(node);
             }
@@ -254,9 +130,7 @@ async fn nodes_that_are_killed_paused_and_stopped_lose_nothing() {
             }
             _ => {
                 load.link.set_service(&cluster.client(other));
-                let mut stopped = cluster.nodes[node].take().unwrap();
-                stopped.terminate();
-                assert!(ended(&mut stopped.child).await.success(), "{}", stopped.log());
+                cluster.stop(node).await;
                 cluster.restart(node);
             }
         }

@@ -29,13 +29,6 @@ async fn send(client: &Client, asset: &str, samples: &[Sample]) {
     }
 }
 
-/// Returns the number of samples that the service has evaluated again to load its assets.
-async fn n_evaluated_again(client: &Client) -> f64 {
-    let text = client.get("/metrics").await.text;
-    let line = text.lines().find(|line| line.starts_with("offbd_samples_reevaluated_total"));
-    line.map_or(0.0, |line| line.rsplit(' ').next().unwrap().parse().unwrap())
-}
-
 /// Ends session `s` of `asset`; returns its verdict hash and its transitions.
 async fn outcome(client: &Client, asset: &str) -> (Value, Value) {
     let session = client.end(asset, "s").await;
@@ -71,9 +64,9 @@ async fn an_engine_goes_on_from_its_snapshot() {
         if to < 45_000 {
             drop(service);
             service = Process::start(data.path());
-            assert_eq!(n_evaluated_again(&service.client).await, 0.0, "nobody has asked yet");
+            assert_eq!(service.client.n_evaluated_again().await, 0.0, "nobody has asked yet");
             service.client.get("assets/a/state").await.expect(200);
-            let n = n_evaluated_again(&service.client).await;
+            let n = service.client.n_evaluated_again().await;
             assert!(n < 16_384.0 + BATCH as f64, "{n}");
         }
     }
@@ -116,7 +109,7 @@ async fn a_snapshot_that_is_damaged_or_of_another_version_is_not_used() {
     for sql in spoil {
         service = restart_after(service, &data, sql).await;
         service.client.get("assets/a/state").await.expect(200);
-        let n = n_evaluated_again(&service.client).await;
+        let n = service.client.n_evaluated_again().await;
         assert_eq!(n, 20_000.0, "{sql}");
     }
     send(&service.client, "a", rest).await;
@@ -208,7 +201,7 @@ async fn a_long_recording_holds_up_only_its_own_asset() {
     drop(service);
     let service = Process::start(data.path());
     service.client.get("assets/long/state").await.expect(200);
-    let n = n_evaluated_again(&service.client).await;
+    let n = service.client.n_evaluated_again().await;
     assert!(n < 20_000.0, "{n}");
 }
 

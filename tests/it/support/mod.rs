@@ -8,6 +8,7 @@ pub mod broker;
 pub mod bus_device;
 #[cfg(unix)]
 pub mod calls;
+pub mod cluster;
 pub mod described;
 pub mod device;
 pub mod held_socket;
@@ -212,6 +213,13 @@ impl Client {
         let metrics = self.get("/metrics").await.text;
         let line = metrics.lines().find(|line| line.starts_with("offbd_process_resident_bytes "));
         line.unwrap().split(' ').nth(1).unwrap().parse().unwrap()
+    }
+
+    /// The number of samples that the service has evaluated again to load its assets.
+    pub async fn n_evaluated_again(&self) -> f64 {
+        let text = self.get("/metrics").await.text;
+        let line = text.lines().find(|line| line.starts_with("offbd_samples_reevaluated_total"));
+        line.map_or(0.0, |line| line.rsplit(' ').next().unwrap().parse().unwrap())
     }
 
     pub fn new(address: String) -> Self {

@@ -1,7 +1,7 @@
 //! The service as a separate process, which can be killed.
 
 use std::io::{BufRead, BufReader};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStderr, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, mpsc};
 
@@ -33,7 +33,16 @@ impl Process {
 
     /// Starts the service, which may end before it serves.
     pub fn try_start(data: &Path, environment: &[(&str, &Path)]) -> Result<Self, Refusal> {
-        let mut child = command(data).envs(environment.iter().copied()).spawn().unwrap();
+        Self::try_start_program(&program(), data, environment)
+    }
+
+    /// As [`Self::try_start`], with a program of one's own.
+    pub fn try_start_program(
+        program: &Path,
+        data: &Path,
+        environment: &[(&str, &Path)],
+    ) -> Result<Self, Refusal> {
+        let mut child = command(program, data).envs(environment.iter().copied()).spawn().unwrap();
         let log = Arc::<Mutex<String>>::default();
         let address = read_log(child.stderr.take().unwrap(), log.clone());
         match address.recv_timeout(DEADLINE) {
@@ -63,7 +72,7 @@ impl Process {
 
     /// Starts a service and kills it during its start, after a time that grows with `n`.
     pub fn start_and_kill(data: &Path, n: u64) {
-        let mut child = command(data).spawn().unwrap();
+        let mut child = command(&program(), data).spawn().unwrap();
         for _ in 0..n {
             assert!(child.try_wait().unwrap().is_none_or(|status| status.success()));
         }
@@ -98,8 +107,13 @@ pub async fn ended(child: &mut Child) -> ExitStatus {
     .await
 }
 
-fn command(data: &Path) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_offbd"));
+/// The program under test.
+pub fn program() -> PathBuf {
+    PathBuf::from(env!("CARGO_BIN_EXE_offbd"))
+}
+
+fn command(program: &Path, data: &Path) -> Command {
+    let mut command = Command::new(program);
     command
         .args(["serve", "--listen", "127.0.0.1:0", "--log-format", "json", "--data"])
         .arg(data)
