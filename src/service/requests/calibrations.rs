@@ -105,8 +105,8 @@ impl Service {
         views::page(rows, limit, |row| (row.made_at, row.id.clone()), view)
     }
 
-    /// Writes a calibration to the asset file, on request of the person `by`. An open session keeps the calibration that
-    /// it started with; the next one uses the new one.
+    /// Writes a calibration to the asset file, on request of the person `by`. An open session
+    /// keeps the calibration that it started with; the next one uses the new one.
     ///
     /// # Errors
     /// [`ServiceError::UnknownCalibration`]; [`ServiceError::NotDone`].

@@ -15,8 +15,7 @@ impl Service {
     }
 
     /// Accepts the offered calibration on request of the person `by`, because the rig was
-    /// healthy. An open session does
-    /// not use it; the next one does.
+    /// healthy. An open session does not use it; the next one does.
     ///
     /// # Errors
     /// [`ServiceError::UnknownAsset`]; [`ServiceError::NothingOffered`].
