@@ -114,7 +114,9 @@ pub fn documentation(setup: &Setup) -> Result<String, Invalid> {
          A positive qy moves the ball toward +x, a positive qx toward &minus;y. All values are \
          in SI units. There is no clock and no random number: equal inputs give equal \
          outputs. Communication steps should be 1 ms or longer: in shorter ones the effect of the \
-         plate&rsquo;s rates on the ball is underestimated.</p>\n<table>\n<tr><th>variable<th>unit<th>start<th>what it is\n",
+         plate&rsquo;s rates on the ball is underestimated. If a dead time is a multiple of the \
+         step, rounding of the importer&rsquo;s times decides whether a servo begins to turn at the \
+         end of a step or at the start of the next, and the path differs by that step.</p>\n<table>\n<tr><th>variable<th>unit<th>start<th>what it is\n",
         name = setup.rig.name,
     );
     for (variable, start) in VARIABLES.iter().zip(values.values()) {
