@@ -303,7 +303,8 @@ fn what_does_not_fit_recorded_commands_is_refused() {
     for (code, line, expected) in [
         (2, "scene tilt --commands empty.csv", "cannot be used with"),
         (2, "scene --commands empty.csv --model rolling", "cannot be used with"),
-        (2, "scene tilt --asset rig.json", "--commands"),
+        (2, "scene tilt --asset rig.json", "cannot be used with"),
+        (2, "scene --asset rig.json", "--commands"),
         (2, "scene --commands empty.csv --step 0.5", "--step: 0.5 is outside 0.002 to 0.01"),
         (3, "scene --commands empty.csv", "empty.csv: has no usable sample"),
     ] {

@@ -10,7 +10,7 @@ use sqlx::Executor;
 use super::{register_rigs, send_all};
 use crate::support::cluster::{Cluster, NodeKind, call};
 use crate::support::postgres::Postgres;
-use crate::support::process::{Process, Refusal};
+use crate::support::process::Refusal;
 use crate::support::{Client, connection, judged, rig};
 
 /// Samples of each rig before the first hand-over, so that each has a snapshot.

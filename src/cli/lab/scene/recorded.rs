@@ -25,7 +25,7 @@ pub(super) struct RecordedArgs {
           conflicts_with_all = ["scene", "list", "model", "method", "tolerance", "sample"])]
     pub commands: Option<PathBuf>,
     /// The rig's asset file, for --commands [default: the chapter's rig]
-    #[arg(long, value_name = "ASSET.json", requires = "commands")]
+    #[arg(long, value_name = "ASSET.json", requires = "commands", conflicts_with_all = ["scene", "list"])]
     asset: Option<PathBuf>,
 }
 
