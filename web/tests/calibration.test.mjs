@@ -53,7 +53,7 @@ test("the calibrations are listed with their fit, and an earlier one is used aga
   await first.getByRole("button", { name: "Use this one again" }).click();
   const dialog = view.getByRole("dialog", { name: "Use calibration 1 again?" });
   await dialog.getByRole("button", { name: "Use this one again" }).click();
-  await view.getByRole("row", { name: /^1 .* in use/ }).waitFor();
+  await view.getByRole("row", { name: /^1 .* in use since/ }).waitFor();
   const { items } = await ask(service.url, "GET", "/assets/bench/calibrations");
   assert.deepEqual(
     items.map(({ active }) => active),
