@@ -1,6 +1,6 @@
 //! Nodes of two versions on one database: each takes over what the other one has judged.
 //!
-//! The environment variable OLDER is the program of the other version, which runs as the first
+//! The environment variable OLDER is the program of the other version, with the same schema, as the first
 //! node. Without it both nodes are of this version, and another one is told by its snapshots.
 
 use offbd_core::vocabulary::Sample;
