@@ -1,7 +1,8 @@
 //! Nodes of two versions on one database: each takes over what the other one has judged.
 //!
-//! The environment variable OLDER is the program of the other version, with the same schema, as the first
-//! node. Without it both nodes are of this version, and another one is told by its snapshots.
+//! The environment variable OLDER is the program of the other version, which must have the same
+//! schema; it runs as the first node. Without it both nodes are of this version, and another one
+//! is told by its snapshots.
 
 use offbd_core::vocabulary::Sample;
 use reqwest::Method;
