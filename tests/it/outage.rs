@@ -139,8 +139,8 @@ async fn a_commit_with_a_lost_answer_is_neither_lost_nor_repeated() {
         next_commit.store(1 + i % 3, Ordering::SeqCst);
         eventually(|| async { (next_commit.load(Ordering::SeqCst) == PASS).then_some(()) }).await;
     }
-    // The service finds out whether a commit was done and retries it if not; no device
-    // gets an error.
+    // The service finds out whether a commit was done and retries it if not; no batch is
+    // refused.
     assert_eq!(load.link.n_refused(), 0);
     load.stop().await;
     proxy.abort();

@@ -51,7 +51,7 @@ impl ServiceLink {
         self.acknowledged.load(Ordering::SeqCst)
     }
 
-    /// Returns the number of responses 429 and 503.
+    /// Returns how often a batch was refused with 429 or 503.
     pub fn n_refused(&self) -> u64 {
         self.refused.load(Ordering::SeqCst)
     }
@@ -69,12 +69,14 @@ impl ServiceLink {
 
     /// Sends a request until there is a response other than 429 and 503.
     async fn request(&self, method: Method, path: &str, body: &Value) -> Answer {
-        self.send(|client| client.request(method.clone(), path).json(body)).await
+        self.send(|client| client.request(method.clone(), path).json(body)).await.0
     }
 
     /// Sends the request that `make` returns until there is a response other than 429 and 503.
-    async fn send(&self, make: impl Fn(&Client) -> reqwest::RequestBuilder) -> Answer {
+    /// Returns the response and how many were refused before.
+    async fn send(&self, make: impl Fn(&Client) -> reqwest::RequestBuilder) -> (Answer, u64) {
         let mut address = self.address.subscribe();
+        let mut refused = 0;
         loop {
             let mut client = self.client.clone();
             client.address = address.borrow_and_update().clone();
@@ -85,12 +87,12 @@ impl ServiceLink {
             let (status, headers) = (response.status(), response.headers().clone());
             if [429, 503].contains(&status.as_u16()) {
                 assert_eq!(headers["retry-after"], "1");
-                self.refused.fetch_add(1, Ordering::SeqCst);
+                refused += 1;
                 tokio::task::yield_now().await;
                 continue;
             }
             match response.text().await {
-                Ok(text) => return Answer { status, headers, text },
+                Ok(text) => return (Answer { status, headers, text }, refused),
                 Err(_) => wait_for_service(&mut address).await,
             }
         }
@@ -112,8 +114,9 @@ impl ServiceLink {
                 request.header(CONTENT_TYPE, kind).body(body.clone())
             }
         };
-        let answer = match way {
-            0 => self.request(Method::POST, &path, &document).await,
+        let json = |client: &Client| client.request(Method::POST, &path).json(&document);
+        let (answer, refused) = match way {
+            0 => self.send(json).await,
             1 => {
                 let packed = |client: &Client| {
                     let request = client.request(Method::POST, &path);
@@ -129,6 +132,7 @@ impl ServiceLink {
             }
             _ => return self.post_by_stream(asset, &document).await,
         };
+        self.refused.fetch_add(refused, Ordering::SeqCst);
         answer.expect(200)
     }
 
