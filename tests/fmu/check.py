@@ -182,10 +182,8 @@ def with_fmpy(fmu, session, longest_step):
     return rows
 
 
-def with_ecos(fmu, session, longest_step):
-    """The same for samples at equal intervals."""
-    (_, qx, qy, x, y), (h, *_), *_ = session
-    start = {"cmd_qx": qx, "cmd_qy": qy, "x": x, "y": y, "longest_step": longest_step}
+def ecos_rows(fmu, start, commands, h):
+    """Runs the FMU in ecos; returns ball and plate at the start and after each of the commands."""
     rows = []
     with ecospy.EcosSimulationStructure() as structure:
         structure.add_model("twin", str(fmu))
@@ -198,13 +196,20 @@ def with_ecos(fmu, session, longest_step):
 
             simulation.init(parameter_set="start")
             read()
-            for _, qx, qy, *_ in session[:-1]:
+            for qx, qy in commands:
                 simulation.set_real("twin::cmd_qx", qx)
                 simulation.set_real("twin::cmd_qy", qy)
                 simulation.step()
                 read()
             simulation.terminate()
     return rows
+
+
+def with_ecos(fmu, session, longest_step):
+    """The same as `with_fmpy`, for samples at equal intervals."""
+    (_, qx, qy, x, y), (h, *_), *_ = session
+    start = {"cmd_qx": qx, "cmd_qy": qy, "x": x, "y": y, "longest_step": longest_step}
+    return ecos_rows(fmu, start, [(qx, qy) for _, qx, qy, *_ in session[:-1]], h)
 
 
 def moving_plate():
@@ -360,28 +365,18 @@ def refusals(fmu):
 
 def other_importer(fmu):
     """ecos must see what FMPy sees, to the bit."""
-    commands = [0.1 * sin(0.05 * i) for i in range(200)]
+    start = {"x_servo.lag": 0.03}
+    commands = [(0.1 * sin(0.05 * i), 0.2 * sin(0.05 * i)) for i in range(200)]
     with twin(fmu) as one:
-        one.start({"x_servo.lag": 0.03})
-        rows = []
-        for command in commands:
-            one.set({"cmd_qx": command, "cmd_qy": 2 * command})
+        one.start(start)
+        rows = [one.get(*BALL_AND_PLATE)]
+        for qx, qy in commands:
+            one.set({"cmd_qx": qx, "cmd_qy": qy})
             one.step(0.01)
             rows.append(one.get(*BALL_AND_PLATE))
-    others = []
-    with ecospy.EcosSimulationStructure() as structure:
-        structure.add_model("twin", str(fmu))
-        structure.add_parameter_set("start", {"twin::x_servo.lag": 0.03})
-        with ecospy.EcosSimulation(structure=structure, step_size=0.01) as simulation:
-            simulation.init(parameter_set="start")
-            for command in commands:
-                simulation.set_real("twin::cmd_qx", command)
-                simulation.set_real("twin::cmd_qy", 2 * command)
-                simulation.step()
-                others.append([simulation.get_real(f"twin::{name}") for name in BALL_AND_PLATE])
-            simulation.terminate()
+    others = ecos_rows(fmu, start, commands, 0.01)
     assert rows == others, largest_difference(rows, others)
-    print(f"ecos: {len(rows)} steps as in FMPy")
+    print(f"ecos: {len(commands)} steps as in FMPy")
 
 
 if __name__ == "__main__":

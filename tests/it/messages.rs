@@ -3,7 +3,9 @@
 
 use crate::support::described::Described;
 use crate::support::receiver::{Received, WebhookReceiver};
-use crate::support::{Client, DEADLINE, Events, ServiceFixture, batch, eventually, packed, rig};
+use crate::support::{
+    Client, DEADLINE, Events, ServiceFixture, batch, columns, eventually, packed, rig,
+};
 use futures_util::{SinkExt, StreamExt};
 use offbd_core::vocabulary::Sample;
 use reqwest::Method;
@@ -12,20 +14,6 @@ use tokio::net::TcpStream;
 use tokio::time::timeout;
 use tokio_tungstenite::tungstenite::Message;
 use tokio_tungstenite::{MaybeTlsStream, WebSocketStream, connect_async};
-
-/// Returns a batch as JSON columns.
-pub fn columns(session: &str, samples: &[Sample]) -> Value {
-    let column = |value: fn(&Sample) -> Value| samples.iter().map(value).collect::<Value>();
-    json!({
-        "session": session,
-        "seq": column(|s| json!(s.seq)),
-        "t_s": column(|s| json!(s.t_s)),
-        "cmd_qx_rad": column(|s| json!(s.cmd_qx_rad)),
-        "cmd_qy_rad": column(|s| json!(s.cmd_qy_rad)),
-        "x_m": column(|s| json!(s.x_m)),
-        "y_m": column(|s| json!(s.y_m)),
-    })
-}
 
 /// Returns a recording in batches of every accepted shape: rows, rows without numbers and
 /// positions, columns, and columns that a device lacks.

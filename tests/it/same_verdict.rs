@@ -1,7 +1,7 @@
 //! One session sent over every transport and in every format gives the same recording and the
 //! same verdict.
 
-use crate::support::{Client, ServiceFixture, batch, csv, judged, learnt, packed, rig};
+use crate::support::{Client, ServiceFixture, batch, columns, csv, judged, learnt, packed, rig};
 use futures_util::{SinkExt, StreamExt};
 use offbd::wire::asset::view;
 use offbd_core::vocabulary::Sample;
@@ -44,8 +44,8 @@ async fn every_transport_and_format_gives_the_same_recording_and_verdict() {
         client.telemetry("hundreds", Some("s"), part).await;
     }
     for part in samples.chunks(777) {
-        let text = client.post("assets/columns/telemetry", &columns(part)).await.expect(200);
-        let packed = client.post_packed("assets/packed/telemetry", &columns(part)).await;
+        let text = client.post("assets/columns/telemetry", &columns("s", part)).await.expect(200);
+        let packed = client.post_packed("assets/packed/telemetry", &columns("s", part)).await;
         assert_eq!(without_session_id(packed.expect(200)), without_session_id(text));
         let path = "assets/csv/telemetry?session=s";
         client.post_text(path, "text/csv", csv(part)).await.expect(200);
@@ -121,19 +121,6 @@ fn hash_by_command_line(samples: &[Sample]) -> String {
     let printed = String::from_utf8(run.get_output().stdout.clone()).unwrap();
     let summary: Value = serde_json::from_str(printed.lines().last().unwrap()).unwrap();
     summary["verdict_hash"].as_str().unwrap().to_owned()
-}
-
-fn columns(samples: &[Sample]) -> Value {
-    let column = |get: fn(&Sample) -> Value| samples.iter().map(get).collect::<Value>();
-    json!({
-        "session": "s",
-        "seq": column(|s| json!(s.seq)),
-        "t_s": column(|s| json!(s.t_s)),
-        "cmd_qx_rad": column(|s| json!(s.cmd_qx_rad)),
-        "cmd_qy_rad": column(|s| json!(s.cmd_qy_rad)),
-        "x_m": column(|s| json!(s.x_m)),
-        "y_m": column(|s| json!(s.y_m)),
-    })
 }
 
 fn lines(samples: &[Sample]) -> String {

@@ -1,16 +1,15 @@
 // Alarms, mutes and notifications in the page.
 import assert from "node:assert/strict";
 import { createServer } from "node:http";
-import { after, before, test } from "node:test";
-import { ask, browser, directory, page, recordings, remove, serve } from "./support.mjs";
+import { after, test } from "node:test";
+import { recordings } from "./rigs.mjs";
+import { ask, page, started } from "./support.mjs";
 
 let work, service, chromium, receiver;
 const received = [];
 
-before(async () => {
-  work = directory();
-  chromium = await browser();
-  service = await serve(work);
+started(async (made) => {
+  ({ work, service, chromium } = made);
   const { learnt, sick } = recordings(work);
   for (const name of ["bench", "shelf"]) {
     await ask(service.url, "POST", "/assets", { ...learnt, name });
@@ -27,12 +26,7 @@ before(async () => {
   await new Promise((done) => receiver.listen(0, "127.0.0.1", done));
 });
 
-after(async () => {
-  await chromium?.close();
-  await service?.stop();
-  receiver?.close();
-  remove(work);
-});
+after(() => receiver?.close());
 
 test("alarms from before the page was opened are listed and acknowledged together", async () => {
   const view = await page(chromium);

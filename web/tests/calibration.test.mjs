@@ -1,7 +1,8 @@
 // The page with the calibrations of a rig.
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import { ask, browser, directory, page, recordings, remove, serve, SOON } from "./support.mjs";
+import { test } from "node:test";
+import { recordings } from "./rigs.mjs";
+import { ask, page, SOON, started } from "./support.mjs";
 
 let work, service, chromium;
 
@@ -15,22 +16,14 @@ async function learn(session) {
   await ask(service.url, "POST", `${calibrations}/${job.id}/activate`);
 }
 
-before(async () => {
-  work = directory();
-  chromium = await browser();
-  service = await serve(`${work}/store`);
+started(async (made) => {
+  ({ work, service, chromium } = made);
   const { healthy } = recordings(work);
   await ask(service.url, "POST", "/assets", { name: "bench" });
   const path = "/assets/bench/sessions/import?name=healthy";
   const { session } = await ask(service.url, "POST", path, healthy, "text/csv");
   await learn(session.id);
   await learn(session.id);
-});
-
-after(async () => {
-  await chromium?.close();
-  await service?.stop();
-  remove(work);
 });
 
 test("the calibrations are listed with their fit, and an earlier one is used again", async () => {

@@ -1,24 +1,17 @@
 // The page that compares two sessions.
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import { ask, browser, directory, page, recordings, remove, serve } from "./support.mjs";
+import { test } from "node:test";
+import { recordings } from "./rigs.mjs";
+import { ask, page, started } from "./support.mjs";
 
 let work, service, chromium;
 
-before(async () => {
-  work = directory();
-  chromium = await browser();
-  service = await serve(`${work}/store`);
+started(async (made) => {
+  ({ work, service, chromium } = made);
   const rig = recordings(work);
   await ask(service.url, "POST", "/assets", { ...rig.learnt, name: "bench" });
   for (const name of ["healthy", "sick"])
     await ask(service.url, "POST", `/assets/bench/sessions/import?name=${name}`, rig[name], "text/csv");
-});
-
-after(async () => {
-  await chromium?.close();
-  await service?.stop();
-  remove(work);
 });
 
 test("two sessions of the list are compared on one time axis", async () => {

@@ -3,23 +3,16 @@ import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
-import { after, before, test } from "node:test";
-import { ask, browser, directory, page, recordings, remove, serve } from "./support.mjs";
+import { test } from "node:test";
+import { recordings } from "./rigs.mjs";
+import { ask, page, started } from "./support.mjs";
 
 let work, service, chromium;
 
-before(async () => {
-  work = directory();
-  chromium = await browser();
-  service = await serve(join(work, "data"));
+started(async (made) => {
+  ({ work, service, chromium } = made);
   await ask(service.url, "POST", "/assets", { ...recordings(work).learnt, name: "learnt" });
   await ask(service.url, "POST", "/assets", { name: "new" });
-});
-
-after(async () => {
-  await chromium?.close();
-  await service?.stop();
-  remove(work);
 });
 
 /** Presses a button and returns the downloaded text. */

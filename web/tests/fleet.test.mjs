@@ -1,7 +1,8 @@
 // The fleet: empty, large, with a fault, and with a service that restarts.
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
-import { ask, browser, directory, page, recordings, remove, serve } from "./support.mjs";
+import { recordings } from "./rigs.mjs";
+import { ask, browser, directory, page, remove, serve } from "./support.mjs";
 
 let work, service, chromium, rig;
 

@@ -1,11 +1,12 @@
 // The served page: size, caching, no third-party requests, accessibility.
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
+import { test } from "node:test";
 import { get } from "node:http";
 import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { brotliDecompressSync } from "node:zlib";
-import { ask, browser, directory, page, recordings, remove, serve } from "./support.mjs";
+import { recordings } from "./rigs.mjs";
+import { ask, page, started } from "./support.mjs";
 
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 
@@ -14,20 +15,12 @@ const FIRST_LOAD = 500_000;
 
 let work, service, chromium, session;
 
-before(async () => {
-  work = directory();
-  chromium = await browser();
-  service = await serve(work);
+started(async (made) => {
+  ({ work, service, chromium } = made);
   const { learnt, sick } = recordings(work);
   await ask(service.url, "POST", "/assets", { ...learnt, name: "bench" });
   session = (await ask(service.url, "POST", "/assets/bench/sessions/import?name=monday", sick, "text/csv"))
     .session;
-});
-
-after(async () => {
-  await chromium?.close();
-  await service?.stop();
-  remove(work);
 });
 
 const fetched = (path, headers = {}) =>

@@ -1,24 +1,23 @@
 // The reports of a session and of a fault, to print.
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import { ask, browser, directory, page, recordings, remove, serve } from "./support.mjs";
+import { test } from "node:test";
+import { recordings } from "./rigs.mjs";
+import { ask, page, started } from "./support.mjs";
 
 let work, service, chromium, session;
 
-before(async () => {
-  work = directory();
-  chromium = await browser();
-  service = await serve(work);
+started(async (made) => {
+  ({ work, service, chromium } = made);
   const { learnt, sick } = recordings(work);
   await ask(service.url, "POST", "/assets", { ...learnt, name: "bench" });
-  const made = await ask(service.url, "POST", "/assets/bench/sessions/import?name=monday", sick, "text/csv");
-  session = made.session.id;
-});
-
-after(async () => {
-  await chromium?.close();
-  await service?.stop();
-  remove(work);
+  const imported = await ask(
+    service.url,
+    "POST",
+    "/assets/bench/sessions/import?name=monday",
+    sick,
+    "text/csv",
+  );
+  session = imported.session.id;
 });
 
 /** The number of pages on paper. */

@@ -2,18 +2,8 @@
 // scripts/screenshots; the first argument is the directory, the second the views, the third the sizes.
 import { mkdirSync } from "node:fs";
 import { join } from "node:path";
-import {
-  ask,
-  browser,
-  demo,
-  directory,
-  drifting,
-  page,
-  recordings,
-  remove,
-  serve,
-  until,
-} from "./support.mjs";
+import { drifting, recordings } from "./rigs.mjs";
+import { ask, browser, demo, directory, page, remove, serve, until } from "./support.mjs";
 
 const out = process.argv[2] ?? "screenshots";
 const only = process.argv[3] ? process.argv[3].split(",") : undefined;

@@ -1,22 +1,15 @@
 // The page of a session: its address, the charts under the pointer, and what a verdict rests on.
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import { ask, browser, directory, page, recordings, remove, serve } from "./support.mjs";
+import { test } from "node:test";
+import { recordings } from "./rigs.mjs";
+import { ask, page, started } from "./support.mjs";
 
 let work, service, chromium, rig;
 
-before(async () => {
-  work = directory();
-  chromium = await browser();
-  service = await serve(`${work}/store`);
+started(async (made) => {
+  ({ work, service, chromium } = made);
   rig = recordings(work);
   await ask(service.url, "POST", "/assets", { ...rig.learnt, name: "bench" });
-});
-
-after(async () => {
-  await chromium?.close();
-  await service?.stop();
-  remove(work);
 });
 
 test("a link leads to the moment, speed and profile, and charts are zoomed and read by the pointer", async () => {

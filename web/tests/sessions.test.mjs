@@ -1,23 +1,16 @@
 // Recordings: imported from CSV, played back, judged again, downloaded, deleted.
 import assert from "node:assert/strict";
 import { readFileSync, writeFileSync } from "node:fs";
-import { after, before, test } from "node:test";
-import { ask, browser, directory, page, recordings, remove, serve } from "./support.mjs";
+import { test } from "node:test";
+import { recordings } from "./rigs.mjs";
+import { ask, page, started } from "./support.mjs";
 
 let work, service, chromium, rig;
 
-before(async () => {
-  work = directory();
-  chromium = await browser();
-  service = await serve(`${work}/store`);
+started(async (made) => {
+  ({ work, service, chromium } = made);
   rig = recordings(work);
   await ask(service.url, "POST", "/assets", { ...rig.learnt, name: "bench" });
-});
-
-after(async () => {
-  await chromium?.close();
-  await service?.stop();
-  remove(work);
 });
 
 /**

@@ -1,21 +1,14 @@
 // The set-up of a rig whose device sends millimetres with swapped axes and a wrong sign.
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import { ask, browser, directory, page, recordings, remove, serve } from "./support.mjs";
+import { test } from "node:test";
+import { recordings } from "./rigs.mjs";
+import { ask, page, started } from "./support.mjs";
 
 let work, service, chromium, rig;
 
-before(async () => {
-  work = directory();
-  chromium = await browser();
-  service = await serve(`${work}/store`);
+started(async (made) => {
+  ({ work, service, chromium } = made);
   rig = recordings(work);
-});
-
-after(async () => {
-  await chromium?.close();
-  await service?.stop();
-  remove(work);
 });
 
 /** The healthy recording as rows of a device with swapped axes, mm, and the sign of y inverted. */

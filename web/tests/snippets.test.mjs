@@ -3,24 +3,16 @@ import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
 import { writeFileSync } from "node:fs";
 import { join } from "node:path";
-import { after, before, test } from "node:test";
-import { ask, browser, directory, page, remove, serve, SOON } from "./support.mjs";
+import { test } from "node:test";
+import { ask, page, SOON, started } from "./support.mjs";
 
 let work, service, chromium, view;
 
-before(async () => {
-  work = directory();
-  chromium = await browser();
-  service = await serve(join(work, "data"));
+started(async (made) => {
+  ({ work, service, chromium } = made);
   await ask(service.url, "POST", "/assets", { name: "bench-1" });
   view = await page(chromium);
   await view.goto(`${service.url}/rigs/bench-1/set-up?step=connect`);
-});
-
-after(async () => {
-  await chromium?.close();
-  await service?.stop();
-  remove(work);
 });
 
 /** The text under `word`, as the page shows it. */

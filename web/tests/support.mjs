@@ -1,8 +1,8 @@
-// Starts the real program and a browser, and provides recordings of rigs.
+// Starts the real program and a browser.
 import assert from "node:assert/strict";
 import { execFileSync, spawn } from "node:child_process";
-import { existsSync, mkdtempSync, readFileSync, rmSync } from "node:fs";
-import { after } from "node:test";
+import { existsSync, mkdtempSync, rmSync } from "node:fs";
+import { after, before } from "node:test";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { fileURLToPath } from "node:url";
@@ -71,62 +71,24 @@ export const serve = (data, port = 0, ...more) =>
   run(["serve", "--data", data, "--listen", `127.0.0.1:${port}`, ...more], "stderr");
 export const demo = (...args) => run(["demo", "--port", "0", ...args], "stdout");
 
+/** Starts the program with an empty store, and a browser, for the tests of a file; `prepare` gets both. */
+export function started(prepare) {
+  const made = { work: directory() };
+  before(async () => {
+    made.chromium = await browser();
+    made.service = await serve(join(made.work, "store"));
+    await prepare(made);
+  });
+  after(async () => {
+    await made.chromium?.close();
+    await made.service?.stop();
+    remove(made.work);
+  });
+}
+
 /** Runs a command of the program and returns its output. */
 export const offbd = (...args) =>
   execFileSync(BINARY, args, { encoding: "utf8", stdio: ["ignore", "pipe", "pipe"] });
-
-/** A learnt rig, and a session in which its x servo dies at 20 s. */
-export function recordings(where) {
-  const path = (name) => join(where, name);
-  offbd(
-    "simulate",
-    "--reference",
-    "lissajous",
-    "--seconds",
-    "90",
-    "--rig",
-    path("rig.json"),
-    "-o",
-    path("healthy.csv"),
-  );
-  offbd("calibrate", "--asset", path("rig.json"), path("healthy.csv"), "-o", path("learnt.json"));
-  offbd("simulate", "--seed", "2", "--seconds", "40", "--fault", "x_servo:dead@20", "-o", path("sick.csv"));
-  const read = (name) => readFileSync(path(name), "utf8");
-  return {
-    path,
-    rig: JSON.parse(read("rig.json")),
-    learnt: JSON.parse(read("learnt.json")),
-    healthy: read("healthy.csv"),
-    sick: read("sick.csv"),
-  };
-}
-
-/** Registers a learnt rig whose x servo loses 2 % of its gain with each of `n` sessions. */
-export async function drifting(base, where, learnt, name = "weak", n = 12) {
-  await ask(base, "POST", "/assets", { ...learnt, name });
-  for (let i = 0; i < n; i++) {
-    const path = join(where, "drifting.csv");
-    const args = [
-      "simulate",
-      "--reference",
-      "lissajous",
-      "--seed",
-      `${100 + i}`,
-      "--fault",
-      `x_servo:gain=${1 - 0.02 * i}@0`,
-      "-o",
-      path,
-    ];
-    offbd(...args);
-    await ask(
-      base,
-      "POST",
-      `/assets/${name}/sessions/import?name=day-${i + 1}`,
-      readFileSync(path, "utf8"),
-      "text/csv",
-    );
-  }
-}
 
 /** Sends a request to the API; throws on an unsuccessful response. */
 export async function ask(base, method, path, body, type = "application/json") {

@@ -1,24 +1,17 @@
 // Tags of rigs in the page, and the layout for a wall screen.
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import { ask, browser, directory, page, recordings, remove, serve } from "./support.mjs";
+import { test } from "node:test";
+import { recordings } from "./rigs.mjs";
+import { ask, page, started } from "./support.mjs";
 
 let work, service, chromium;
 
-before(async () => {
-  work = directory();
-  chromium = await browser();
-  service = await serve(work);
+started(async (made) => {
+  ({ work, service, chromium } = made);
   const { learnt, sick } = recordings(work);
   for (const name of ["bench", "shelf"]) await ask(service.url, "POST", "/assets", { ...learnt, name });
   await ask(service.url, "POST", "/assets/bench/sessions/import?name=monday", sick, "text/csv");
   await ask(service.url, "PUT", "/assets/shelf/tags", { tags: ["hall-1"] });
-});
-
-after(async () => {
-  await chromium?.close();
-  await service?.stop();
-  remove(work);
 });
 
 test("tags are set on the rig's page and select rigs, alarms and sessions", async () => {

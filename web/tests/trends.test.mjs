@@ -1,21 +1,14 @@
 // Drift warnings: a servo that weakens from session to session.
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import { browser, directory, drifting, page, recordings, remove, serve } from "./support.mjs";
+import { test } from "node:test";
+import { drifting, recordings } from "./rigs.mjs";
+import { page, started } from "./support.mjs";
 
 let work, service, chromium;
 
-before(async () => {
-  work = directory();
-  chromium = await browser();
-  service = await serve(`${work}/data`);
+started(async (made) => {
+  ({ work, service, chromium } = made);
   await drifting(service.url, work, recordings(work).learnt);
-});
-
-after(async () => {
-  await chromium?.close();
-  await service?.stop();
-  remove(work);
 });
 
 test("the fleet warns of a drifting servo, and the rig's page shows its trend", async () => {

@@ -323,6 +323,20 @@ pub fn batch(session: Option<&str>, samples: &[Sample]) -> Value {
     json!({ "session": session, "samples": rows })
 }
 
+/// Returns a batch as JSON columns.
+pub fn columns(session: &str, samples: &[Sample]) -> Value {
+    let column = |value: fn(&Sample) -> Value| samples.iter().map(value).collect::<Value>();
+    json!({
+        "session": session,
+        "seq": column(|s| json!(s.seq)),
+        "t_s": column(|s| json!(s.t_s)),
+        "cmd_qx_rad": column(|s| json!(s.cmd_qx_rad)),
+        "cmd_qy_rad": column(|s| json!(s.cmd_qy_rad)),
+        "x_m": column(|s| json!(s.x_m)),
+        "y_m": column(|s| json!(s.y_m)),
+    })
+}
+
 /// Returns a document as MessagePack.
 pub fn packed(document: &Value) -> Vec<u8> {
     rmp_serde::to_vec_named(document).unwrap()

@@ -43,7 +43,10 @@ class RigStream {
     this.closed = true;
     clearInterval(this.watchdog);
     clearTimeout(this.retry);
-    this.socket?.close();
+    const { socket } = this;
+    // The browser reports an error of the page if a socket is closed before it is open.
+    if (socket?.readyState === WebSocket.CONNECTING) socket.onopen = () => socket.close();
+    else socket?.close();
   }
 
   private address(): string {
