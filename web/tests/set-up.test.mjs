@@ -77,7 +77,8 @@ test("described, connected, corrected, learnt", async () => {
 
   await device(() => false);
   await view.getByText("recording", { exact: false }).first().waitFor();
-  await view.getByRole("checkbox").first().check();
+  // The session is proposed as soon as it is long enough.
+  await view.getByRole("checkbox", { checked: true }).first().waitFor();
   await view.getByRole("button", { name: /Learn from it|End the recording and learn/ }).click();
   await view.getByText("The next session is judged by it.").waitFor();
   const learnt = await ask(service.url, "GET", "/assets/bench-1");
