@@ -91,6 +91,25 @@ test("a token names the user, who is not asked for a name", async () => {
   await view.goto(before);
 });
 
+test("an action that a viewer may not do is disabled and says which role it needs", async () => {
+  const made = await asks("POST", "/tokens", admin, { name: "vi", role: "viewer" });
+  const { secret } = await made.json();
+  await asks("POST", "/assets/bench-1/telemetry", admin, { samples: [{ t_s: 0, x_m: 0, y_m: 0 }] });
+  const viewers = await page(chromium);
+  await viewers.goto(`${service.url}/rigs/bench-1`);
+  await viewers.getByLabel("Token").fill(secret);
+  await viewers.getByRole("button", { name: "Log in" }).click();
+  const end = viewers.getByRole("button", { name: "End session" });
+  await end.waitFor();
+  assert.equal(await end.getAttribute("title"), "Needs the role operator; yours is viewer.");
+  assert.ok(await end.isDisabled());
+  assert.deepEqual(
+    viewers.errors.filter((error) => !error.includes("401")),
+    [],
+  );
+  await viewers.done();
+});
+
 test("after the logout, the login is shown again", async () => {
   await view.getByRole("button", { name: "Log out" }).click();
   await view.getByLabel("Token").waitFor();

@@ -45,7 +45,7 @@ export function usePlaybackCharts({ buffer, detail, marks, playback: { t } }: Op
   const frame = useRef(0);
   useEffect(() => group.setMarks(marks), [group, marks]);
   useAnimationFrame(() => {
-    if (!buffer?.t.length) return;
+    if (!buffer?.t.length || Number.isNaN(t.current)) return;
     const range = zoom ?? visibleRange(t.current, span, buffer.first, buffer.last);
     const source = detail?.at(range) ?? buffer;
     const key = `${t.current.toFixed(3)} ${range.join(" ")}`;
