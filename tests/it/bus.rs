@@ -12,17 +12,48 @@ mod verdict;
 
 use crate::support::broker::{Mosquitto, Nats};
 use crate::support::{Client, ServiceFixture, config};
+use offbd::config::Config;
 use offbd::server;
 use serde_json::json;
+use std::ops::{Deref, DerefMut};
+use tokio::sync::{Mutex, MutexGuard};
+
+/// A service with a bus. The metrics of a process are those of all services in it: one of
+/// these runs at a time.
+struct BusService {
+    fixture: ServiceFixture,
+    _alone: MutexGuard<'static, ()>,
+}
+
+impl Deref for BusService {
+    type Target = ServiceFixture;
+
+    fn deref(&self) -> &ServiceFixture {
+        &self.fixture
+    }
+}
+
+impl DerefMut for BusService {
+    fn deref_mut(&mut self) -> &mut ServiceFixture {
+        &mut self.fixture
+    }
+}
+
+/// Waits until no other service with a bus runs, and starts one.
+async fn start_with(configure: impl FnOnce(&mut Config)) -> BusService {
+    static ALONE: Mutex<()> = Mutex::const_new(());
+    let _alone = ALONE.lock().await;
+    BusService { fixture: ServiceFixture::start_with(configure).await, _alone }
+}
 
 /// Starts a service with a NATS server.
-async fn with_nats(nats: &Nats) -> ServiceFixture {
-    ServiceFixture::start_with(|config| config.nats = Some(nats.config())).await
+async fn with_nats(nats: &Nats) -> BusService {
+    start_with(|config| config.nats = Some(nats.config())).await
 }
 
 /// Starts a service with an MQTT broker.
-async fn with_mosquitto(mosquitto: &Mosquitto) -> ServiceFixture {
-    let fixture = ServiceFixture::start_with(|config| config.mqtt = Some(mosquitto.config())).await;
+async fn with_mosquitto(mosquitto: &Mosquitto) -> BusService {
+    let fixture = start_with(|config| config.mqtt = Some(mosquitto.config())).await;
     connected(&fixture.client, "mqtt").await;
     fixture
 }
@@ -86,7 +117,7 @@ async fn a_broker_that_is_away_is_waited_for() {
     let (mut nats, mut mosquitto) = (Nats::start(), Mosquitto::start());
     nats.kill();
     mosquitto.kill();
-    let fixture = ServiceFixture::start_with(|config| {
+    let fixture = start_with(|config| {
         config.nats = Some(nats.config());
         config.mqtt = Some(mosquitto.config());
     })

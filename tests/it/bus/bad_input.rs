@@ -14,7 +14,7 @@ fn outcome(bus: &str, outcome: &str) -> String {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_bad_batch_is_refused_in_words() {
     let (nats, mosquitto) = (Nats::start(), Mosquitto::start());
-    let fixture = crate::support::ServiceFixture::start_with(|config| {
+    let fixture = crate::bus::start_with(|config| {
         config.nats = Some(nats.config());
         config.mqtt = Some(mosquitto.config());
         config.limits.batch_bytes = 100_000;

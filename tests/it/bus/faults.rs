@@ -82,7 +82,7 @@ async fn a_late_subscriber_gets_the_present_faults_and_none_that_was_cleared() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_silent_rig_is_retained_until_its_data_are_back_and_later_faults_follow() {
     let mosquitto = Mosquitto::start();
-    let fixture = crate::support::ServiceFixture::start_with(|config| {
+    let fixture = crate::bus::start_with(|config| {
         config.mqtt = Some(mosquitto.config());
         config.communication.lost_after_s = 1;
         config.communication.back_after_s = 0;
@@ -114,7 +114,7 @@ async fn a_silent_rig_is_retained_until_its_data_are_back_and_later_faults_follo
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_nats_server_hands_faults_to_subscribers_by_nats_and_mqtt() {
     let server = Nats::start();
-    let fixture = crate::support::ServiceFixture::start_with(|config| {
+    let fixture = crate::bus::start_with(|config| {
         config.nats = Some(offbd::config::NatsConfig { faults: false, ..server.config() });
         config.mqtt = Some(offbd::config::MqttConfig {
             telemetry: false,

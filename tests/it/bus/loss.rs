@@ -26,7 +26,7 @@ async fn is_stored_once(client: &Client, asset: &str, samples: &[Sample]) {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn lost_messages_are_sent_again_and_nothing_is_lost_or_doubled() {
     let (nats, mosquitto) = (Nats::start(), Mosquitto::start());
-    let fixture = crate::support::ServiceFixture::start_with(|config| {
+    let fixture = crate::bus::start_with(|config| {
         config.nats = Some(nats.config());
         config.mqtt = Some(mosquitto.config());
     })

@@ -2,7 +2,7 @@
 
 use crate::bus::{connected, count, metric};
 use crate::support::broker::Mosquitto;
-use crate::support::{ServiceFixture, eventually, rig};
+use crate::support::{eventually, rig};
 use serde_json::json;
 
 const MAPPING: &str = r#"
@@ -22,7 +22,7 @@ async fn foreign_topics_become_the_same_samples() {
     let mosquitto = Mosquitto::start();
     let file = tempfile::NamedTempFile::new().unwrap();
     std::fs::write(file.path(), MAPPING).unwrap();
-    let fixture = ServiceFixture::start_with(|config| {
+    let fixture = crate::bus::start_with(|config| {
         config.mqtt = Some(offbd::config::MqttConfig {
             mapping: Some(file.path().to_owned()),
             ..mosquitto.config()

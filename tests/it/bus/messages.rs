@@ -7,7 +7,7 @@ use crate::messages::batches;
 use crate::support::broker::{Mosquitto, NATS_PASSWORD, Nats};
 use crate::support::bus_device::{BusDevice, MqttDevice, nats};
 use crate::support::described::Described;
-use crate::support::{DEADLINE, ServiceFixture, packed, rig};
+use crate::support::{DEADLINE, packed, rig};
 use futures_util::{Stream, StreamExt};
 use serde_json::Value;
 use tokio::time::timeout;
@@ -87,7 +87,7 @@ fn quick(config: &mut offbd::config::Config) {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn messages_over_mqtt_are_as_described() {
     let mosquitto = Mosquitto::start();
-    let fixture = ServiceFixture::start_with(|config| {
+    let fixture = crate::bus::start_with(|config| {
         config.mqtt = Some(mosquitto.config());
         quick(config);
     })
@@ -112,7 +112,7 @@ async fn messages_over_mqtt_are_as_described() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn messages_over_nats_are_as_described() {
     let server = Nats::start();
-    let fixture = ServiceFixture::start_with(|config| {
+    let fixture = crate::bus::start_with(|config| {
         config.nats = Some(server.config());
         quick(config);
     })

@@ -5,10 +5,10 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::time::timeout;
 
-use crate::bus::{count, metric};
+use crate::bus::{BusService, count, metric};
 use crate::support::broker::mqtt_config;
 use crate::support::bus_device::numbered;
-use crate::support::{DEADLINE, ServiceFixture, rig};
+use crate::support::{DEADLINE, rig};
 use offbd_core::vocabulary::Sample;
 
 const CONNECT: u8 = 1;
@@ -91,9 +91,9 @@ impl Connection {
     }
 }
 
-async fn service(listener: &TcpListener) -> ServiceFixture {
+async fn service(listener: &TcpListener) -> BusService {
     let port = listener.local_addr().unwrap().port();
-    let fixture = ServiceFixture::start_with(|config| {
+    let fixture = crate::bus::start_with(|config| {
         let mqtt = offbd::config::MqttConfig { faults: false, ..mqtt_config(port) };
         config.mqtt = Some(mqtt);
     })

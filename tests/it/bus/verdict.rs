@@ -3,13 +3,13 @@
 use crate::bus::{connected, device};
 use crate::support::broker::{Mosquitto, Nats};
 use crate::support::bus_device::{BusDevice, numbered};
-use crate::support::{ServiceFixture, batch, csv, judged, packed, rig};
+use crate::support::{batch, csv, judged, packed, rig};
 use serde_json::json;
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn every_bus_gives_the_same_recording_and_verdict_as_http() {
     let (nats, mosquitto) = (Nats::start(), Mosquitto::start());
-    let fixture = ServiceFixture::start_with(|config| {
+    let fixture = crate::bus::start_with(|config| {
         config.nats = Some(nats.config());
         config.mqtt = Some(mosquitto.config());
     })

@@ -500,7 +500,8 @@ pub async fn eventually<T, F: Future<Output = Option<T>>>(mut done: impl FnMut()
             return found;
         }
         assert!(start.elapsed() < DEADLINE, "not fulfilled within the deadline");
-        tokio::task::yield_now().await;
+        // What is waited for may need the processor.
+        tokio::time::sleep(Duration::from_millis(2)).await;
     }
 }
 
