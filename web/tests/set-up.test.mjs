@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { recordings } from "./rigs.mjs";
-import { ask, page, started } from "./support.mjs";
+import { ask, page, started, until } from "./support.mjs";
 
 let work, service, chromium, rig;
 
@@ -77,8 +77,12 @@ test("described, connected, corrected, learnt", async () => {
 
   await device(() => false);
   await view.getByText("recording", { exact: false }).first().waitFor();
-  // The session is proposed as soon as it is long enough.
-  await view.getByRole("checkbox", { checked: true }).first().waitFor();
+  // The page may propose the session, and so tick the box, just before the click.
+  const box = view.getByRole("checkbox").first();
+  await until(async () => {
+    if (!(await box.isChecked())) await box.click();
+    return box.isChecked();
+  });
   await view.getByRole("button", { name: /Learn from it|End the recording and learn/ }).click();
   await view.getByText("The next session is judged by it.").waitFor();
   const learnt = await ask(service.url, "GET", "/assets/bench-1");
