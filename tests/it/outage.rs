@@ -139,10 +139,11 @@ async fn a_commit_with_a_lost_answer_is_neither_lost_nor_repeated() {
         next_commit.store(1 + i % 3, Ordering::SeqCst);
         eventually(|| async { (next_commit.load(Ordering::SeqCst) == PASS).then_some(()) }).await;
     }
+    let link = load.link.clone();
+    load.stop().await;
     // The service finds out whether a commit was done and retries it if not; no batch is
     // refused.
-    assert_eq!(load.link.n_refused(), 0);
-    load.stop().await;
+    assert_eq!(link.n_refused(), 0);
     proxy.abort();
 }
 

@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { createServer } from "node:http";
 import { after, test } from "node:test";
-import { recordings } from "./rigs.mjs";
+import { imported, recordings } from "./rigs.mjs";
 import { ask, page, started } from "./support.mjs";
 
 let work, service, chromium, receiver;
@@ -13,7 +13,7 @@ started(async (made) => {
   const { learnt, sick } = recordings(work);
   for (const name of ["bench", "shelf"]) {
     await ask(service.url, "POST", "/assets", { ...learnt, name });
-    await ask(service.url, "POST", `/assets/${name}/sessions/import?name=monday`, sick, "text/csv");
+    await imported(service.url, name, "monday", sick);
   }
   receiver = createServer((request, answer) => {
     let body = "";

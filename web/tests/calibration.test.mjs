@@ -1,7 +1,7 @@
 // The page with the calibrations of a rig.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { recordings } from "./rigs.mjs";
+import { imported, recordings } from "./rigs.mjs";
 import { ask, page, SOON, started } from "./support.mjs";
 
 let work, service, chromium;
@@ -20,8 +20,7 @@ started(async (made) => {
   ({ work, service, chromium } = made);
   const { healthy } = recordings(work);
   await ask(service.url, "POST", "/assets", { name: "bench" });
-  const path = "/assets/bench/sessions/import?name=healthy";
-  const { session } = await ask(service.url, "POST", path, healthy, "text/csv");
+  const session = await imported(service.url, "bench", "healthy", healthy);
   await learn(session.id);
   await learn(session.id);
 });

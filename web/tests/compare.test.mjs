@@ -1,7 +1,7 @@
 // The page that compares two sessions.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { recordings } from "./rigs.mjs";
+import { imported, recordings } from "./rigs.mjs";
 import { ask, page, started } from "./support.mjs";
 
 let work, service, chromium;
@@ -10,8 +10,7 @@ started(async (made) => {
   ({ work, service, chromium } = made);
   const rig = recordings(work);
   await ask(service.url, "POST", "/assets", { ...rig.learnt, name: "bench" });
-  for (const name of ["healthy", "sick"])
-    await ask(service.url, "POST", `/assets/bench/sessions/import?name=${name}`, rig[name], "text/csv");
+  for (const name of ["healthy", "sick"]) await imported(service.url, "bench", name, rig[name]);
 });
 
 test("two sessions of the list are compared on one time axis", async () => {

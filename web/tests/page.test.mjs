@@ -5,7 +5,7 @@ import { get } from "node:http";
 import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { brotliDecompressSync } from "node:zlib";
-import { recordings } from "./rigs.mjs";
+import { imported, recordings } from "./rigs.mjs";
 import { ask, page, started } from "./support.mjs";
 
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
@@ -19,8 +19,7 @@ started(async (made) => {
   ({ work, service, chromium } = made);
   const { learnt, sick } = recordings(work);
   await ask(service.url, "POST", "/assets", { ...learnt, name: "bench" });
-  session = (await ask(service.url, "POST", "/assets/bench/sessions/import?name=monday", sick, "text/csv"))
-    .session;
+  session = await imported(service.url, "bench", "monday", sick);
 });
 
 const fetched = (path, headers = {}) =>

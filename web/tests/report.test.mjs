@@ -1,7 +1,7 @@
 // The reports of a session and of a fault, to print.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { recordings } from "./rigs.mjs";
+import { imported, recordings } from "./rigs.mjs";
 import { ask, page, started } from "./support.mjs";
 
 let work, service, chromium, session;
@@ -10,14 +10,7 @@ started(async (made) => {
   ({ work, service, chromium } = made);
   const { learnt, sick } = recordings(work);
   await ask(service.url, "POST", "/assets", { ...learnt, name: "bench" });
-  const imported = await ask(
-    service.url,
-    "POST",
-    "/assets/bench/sessions/import?name=monday",
-    sick,
-    "text/csv",
-  );
-  session = imported.session.id;
+  session = (await imported(service.url, "bench", "monday", sick)).id;
 });
 
 /** The number of pages on paper. */

@@ -29,6 +29,12 @@ export function recordings(where) {
   };
 }
 
+/** Imports a recording and returns its session. */
+export async function imported(base, asset, name, text) {
+  const path = `/assets/${asset}/sessions/import?name=${name}`;
+  return (await ask(base, "POST", path, text, "text/csv")).session;
+}
+
 /** Registers a learnt rig whose x servo loses 2 % of its gain with each of `n` sessions. */
 export async function drifting(base, where, learnt, name = "weak", n = 12) {
   await ask(base, "POST", "/assets", { ...learnt, name });
@@ -46,12 +52,6 @@ export async function drifting(base, where, learnt, name = "weak", n = 12) {
       path,
     ];
     offbd(...args);
-    await ask(
-      base,
-      "POST",
-      `/assets/${name}/sessions/import?name=day-${i + 1}`,
-      readFileSync(path, "utf8"),
-      "text/csv",
-    );
+    await imported(base, name, `day-${i + 1}`, readFileSync(path, "utf8"));
   }
 }

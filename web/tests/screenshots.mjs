@@ -2,7 +2,7 @@
 // scripts/screenshots; the first argument is the directory, the second the views, the third the sizes.
 import { mkdirSync } from "node:fs";
 import { join } from "node:path";
-import { drifting, recordings } from "./rigs.mjs";
+import { drifting, imported, recordings } from "./rigs.mjs";
 import { ask, browser, demo, directory, page, remove, serve, until } from "./support.mjs";
 
 const out = process.argv[2] ?? "screenshots";
@@ -42,8 +42,7 @@ async function shoot(of, name, url, ready, act) {
 /** Registers a rig that learns from a session, and so has calibrations. */
 async function taught(base, healthy) {
   await ask(base, "POST", "/assets", { name: "taught" });
-  const path = "/assets/taught/sessions/import?name=healthy";
-  const { session } = await ask(base, "POST", path, healthy, "text/csv");
+  const session = await imported(base, "taught", "healthy", healthy);
   const { id } = await ask(base, "POST", "/assets/taught/calibrations", { sessions: [session.id] });
   const job = `/assets/taught/calibrations/${id}`;
   await until(async () => (await ask(base, "GET", job)).state === "done");
@@ -67,10 +66,10 @@ const base = show.url;
 try {
   const { learnt, sick, healthy, path } = recordings(work);
   await ask(base, "POST", "/assets", { ...learnt, name: "bench-1" });
-  const before = await ask(base, "POST", "/assets/bench-1/sessions/import?name=healthy", healthy, "text/csv");
+  const healthyDay = await imported(base, "bench-1", "healthy", healthy);
   await taught(base, healthy);
   await told(base);
-  const imported = await ask(base, "POST", "/assets/bench-1/sessions/import?name=monday", sick, "text/csv");
+  const monday = await imported(base, "bench-1", "monday", sick);
   await drifting(base, work, learnt);
   for (let i = 2; i < 40; i++) {
     await ask(base, "POST", "/assets", { name: `bench-${i}` });
@@ -128,7 +127,7 @@ try {
   await shoot(
     of,
     "compare",
-    `${base}/compare?a=${before.session.id}&b=${imported.session.id}`,
+    `${base}/compare?a=${healthyDay.id}&b=${monday.id}`,
     heading("Compare sessions"),
     (view) =>
       view
@@ -136,7 +135,7 @@ try {
         .first()
         .waitFor(),
   );
-  await shoot(of, "report", `${base}/sessions/${imported.session.id}/report`, heading("Calibration and"));
+  await shoot(of, "report", `${base}/sessions/${monday.id}/report`, heading("Calibration and"));
   await shoot(of, "fault-report", `${base}/rigs/bench-1/faults/x_servo/report`, heading("Calibration and"));
   await shoot(of, "sessions", `${base}/sessions`, heading("Sessions"), (view) =>
     view.getByText("monday").first().waitFor(),
@@ -144,7 +143,7 @@ try {
   await shoot(
     of,
     "session",
-    `${base}/sessions/${imported.session.id}?t=19`,
+    `${base}/sessions/${monday.id}?t=19`,
     heading("Judge it again"),
     async (view) => {
       await view.getByRole("button", { name: "Play" }).waitFor();

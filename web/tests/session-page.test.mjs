@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
-import { recordings } from "./rigs.mjs";
+import { imported, recordings } from "./rigs.mjs";
 import { ask, offbd, page, started } from "./support.mjs";
 
 let work, service, chromium, rig;
@@ -13,12 +13,8 @@ started(async (made) => {
   await ask(service.url, "POST", "/assets", { ...rig.learnt, name: "bench" });
 });
 
-/** Imports a recording and returns its session. */
-const imported = async (asset, name, text) =>
-  (await ask(service.url, "POST", `/assets/${asset}/sessions/import?name=${name}`, text, "text/csv")).session;
-
 test("a link leads to the moment, speed and profile, and charts are zoomed and read by the pointer", async () => {
-  const session = await imported("bench", "linked", rig.sick);
+  const session = await imported(service.url, "bench", "linked", rig.sick);
   const view = await page(chromium);
   await view.goto(`${service.url}/sessions/${session.id}?t=99999&speed=2&profile=default`);
   await view.getByText(/^(39|40)\.\d\d s$/).waitFor();
@@ -68,23 +64,21 @@ test("a link leads to the moment, speed and profile, and charts are zoomed and r
 
 test("of a long session, the shown part is fetched with every judged moment", async () => {
   offbd("simulate", "--seconds", "900", "--reference", "lissajous", "-o", rig.path("long.csv"));
-  const session = await imported("bench", "long", readFileSync(rig.path("long.csv"), "utf8"));
+  const session = await imported(service.url, "bench", "long", readFileSync(rig.path("long.csv"), "utf8"));
   const view = await page(chromium);
-  await view.goto(`${service.url}/sessions/${session.id}?t=200`);
-  const choice = view.getByRole("combobox", { name: "Show" });
-  await choice.selectOption({ label: "all" });
-  await view.getByText(/Thinned: one of \d+ judged moments is drawn/).waitFor();
   const part = view.waitForResponse((response) => /\/trace\?.*from_s=1\d\d/.test(response.url()));
-  await choice.selectOption({ label: "10 s" });
+  await view.goto(`${service.url}/sessions/${session.id}?t=200`);
   assert.equal((await (await part).json()).stride, 1);
   await view.getByText("Every judged moment is drawn").waitFor();
+  await view.getByRole("combobox", { name: "Show" }).selectOption({ label: "all" });
+  await view.getByText(/Thinned: one of \d+ judged moments is drawn/).waitFor();
   assert.deepEqual(view.errors, []);
   await view.done();
 });
 
 test("a session without a calibration says what its verdict rests on", async () => {
   await ask(service.url, "POST", "/assets", { name: "unlearnt" });
-  const session = await imported("unlearnt", "first", rig.healthy);
+  const session = await imported(service.url, "unlearnt", "first", rig.healthy);
   const view = await page(chromium);
   await view.goto(`${service.url}/sessions/${session.id}`);
   await view.getByText("Judged without a calibration, with the default dimensions").waitFor();
@@ -96,7 +90,7 @@ test("a session without a calibration says what its verdict rests on", async () 
 });
 
 test("sliders show the alarms that other limits and debounce times would raise", async () => {
-  const session = await imported("bench", "tried", rig.sick);
+  const session = await imported(service.url, "bench", "tried", rig.sick);
   const view = await page(chromium);
   await view.goto(`${service.url}/sessions/${session.id}`);
   const row = view.locator(".trial tbody tr").first();
@@ -118,7 +112,7 @@ test("sliders show the alarms that other limits and debounce times would raise",
 });
 
 test("a remark on a moment is kept, listed and removed", async () => {
-  const session = await imported("bench", "remarked", rig.sick);
+  const session = await imported(service.url, "bench", "remarked", rig.sick);
   const view = await page(chromium);
   await view.goto(`${service.url}/sessions/${session.id}?t=12`);
   await view.getByText("12.00 s", { exact: true }).waitFor();
@@ -158,7 +152,7 @@ test("a recording with one axis says that the ball cannot be drawn; touching the
   const y = head.split(",").indexOf("y_m");
   const oneAxis = lines.map((line) => line.split(",").map((cell, i) => (i === y ? "" : cell)));
   const text = [head, ...oneAxis.map((cells) => cells.join(","))].join("\n");
-  const session = await imported("bench", "one-axis", text);
+  const session = await imported(service.url, "bench", "one-axis", text);
   const view = await page(chromium);
   await view.goto(`${service.url}/sessions/${session.id}`);
   await view.getByText("The recording has no position along y").waitFor();

@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { readFileSync, writeFileSync } from "node:fs";
 import { test } from "node:test";
-import { recordings } from "./rigs.mjs";
+import { imported, recordings } from "./rigs.mjs";
 import { ask, page, started } from "./support.mjs";
 
 let work, service, chromium, rig;
@@ -66,13 +66,7 @@ test("a foreign file is mapped, its wrong sign detected and corrected, and it is
 });
 
 test("played back, scrubbed, judged again, recorded, downloaded, deleted", async () => {
-  const { session } = await ask(
-    service.url,
-    "POST",
-    "/assets/bench/sessions/import?name=sick",
-    rig.sick,
-    "text/csv",
-  );
+  const session = await imported(service.url, "bench", "sick", rig.sick);
   const view = await page(chromium);
   await view.goto(`${service.url}/sessions/${session.id}`);
   const moment = view.getByRole("slider", { name: "Moment" });
@@ -136,13 +130,7 @@ test("played back, scrubbed, judged again, recorded, downloaded, deleted", async
 test("a session that is too short is shown as not judged", async () => {
   // 0.3 s: shorter than the confirmation of any fault.
   const moment = rig.healthy.split("\n").slice(0, 31).join("\n");
-  const { session } = await ask(
-    service.url,
-    "POST",
-    "/assets/bench/sessions/import?name=moment",
-    moment,
-    "text/csv",
-  );
+  const session = await imported(service.url, "bench", "moment", moment);
   const view = await page(chromium);
   await view.goto(`${service.url}/sessions/${session.id}`);
   await view.getByText("Not judged", { exact: true }).waitFor();

@@ -1,7 +1,7 @@
 // The set-up of a rig whose device sends millimetres with swapped axes and a wrong sign.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { recordings } from "./rigs.mjs";
+import { imported, recordings } from "./rigs.mjs";
 import { ask, page, started, until } from "./support.mjs";
 
 let work, service, chromium, rig;
@@ -101,13 +101,8 @@ test("described, connected, corrected, learnt", async () => {
 test("a recording without motion is refused with a message", async () => {
   await ask(service.url, "POST", "/assets", { name: "still" });
   const lines = Array.from({ length: 3000 }, (_, i) => `${(i / 100).toFixed(2)},0,0,0.01,0.01`);
-  await ask(
-    service.url,
-    "POST",
-    "/assets/still/sessions/import?name=rest",
-    `t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n${lines.join("\n")}\n`,
-    "text/csv",
-  );
+  const text = `t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n${lines.join("\n")}\n`;
+  await imported(service.url, "still", "rest", text);
   const view = await page(chromium);
   await view.goto(`${service.url}/rigs/still/set-up?step=learn`);
   await view.getByRole("checkbox").first().check();

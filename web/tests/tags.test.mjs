@@ -1,7 +1,7 @@
 // Tags of rigs in the page, and the layout for a wall screen.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { recordings } from "./rigs.mjs";
+import { imported, recordings } from "./rigs.mjs";
 import { ask, page, started } from "./support.mjs";
 
 let work, service, chromium;
@@ -10,7 +10,7 @@ started(async (made) => {
   ({ work, service, chromium } = made);
   const { learnt, sick } = recordings(work);
   for (const name of ["bench", "shelf"]) await ask(service.url, "POST", "/assets", { ...learnt, name });
-  await ask(service.url, "POST", "/assets/bench/sessions/import?name=monday", sick, "text/csv");
+  await imported(service.url, "bench", "monday", sick);
   await ask(service.url, "PUT", "/assets/shelf/tags", { tags: ["hall-1"] });
 });
 
