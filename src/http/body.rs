@@ -11,6 +11,7 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::timeout;
 
 use super::Problem;
+use crate::service::ServiceError;
 
 /// The limit of request body bytes in memory at a time, over all requests. A request
 /// that would exceed it is answered with 429.
@@ -121,18 +122,28 @@ impl AsRef<[u8]> for BudgetedBody {
 
 impl BudgetedBody {
     fn reserve(&mut self, n: usize, share: &BodyShare) -> Result<(), Problem> {
-        let n = u32::try_from(n).unwrap_or(u32::MAX);
-        for (i, bytes) in share.own.iter().chain([&share.all]).enumerate() {
-            let permit = bytes.clone().try_acquire_many_owned(n).map_err(|_| {
-                let detail = "the limit of request bodies in memory is reached; \
-                    the request was not processed, retry it";
-                Problem::new(StatusCode::TOO_MANY_REQUESTS, "busy", "Too many requests", detail)
-            })?;
+        for (i, permit) in share.reserve(n)?.into_iter().enumerate() {
             match self.permits.get_mut(i) {
                 Some(held) => held.merge(permit),
                 None => self.permits.push(permit),
             }
         }
         Ok(())
+    }
+}
+
+impl BodyShare {
+    /// Reserves `n` bytes, until the permits are dropped: of the caller's share, if there is
+    /// one, and of the whole budget.
+    ///
+    /// # Errors
+    /// [`ServiceError::Busy`] if one of them is exhausted.
+    pub(super) fn reserve(&self, n: usize) -> Result<Vec<OwnedSemaphorePermit>, ServiceError> {
+        let n = u32::try_from(n).unwrap_or(u32::MAX);
+        let reserve = |bytes: &Arc<Semaphore>| bytes.clone().try_acquire_many_owned(n);
+        let permits: Result<_, _> = self.own.iter().chain([&self.all]).map(reserve).collect();
+        permits.map_err(|_| ServiceError::Busy {
+            what: "the limit of request bodies in memory is reached",
+        })
     }
 }

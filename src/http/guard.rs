@@ -106,7 +106,7 @@ impl Guard {
         if let Some(parameters) = &rule.parameters {
             parameters.check(parts.uri.query()).map_err(Problem::from)?;
         }
-        if !is_safe(&parts.method) {
+        if !is_safe(&parts.method) || parts.headers.contains_key(UPGRADE) {
             parts.extensions.insert(self.body_share(caller.as_ref(), &parts));
         }
         let entry = is_audited(rule.right, &parts.method).then(|| audit_entry(rule.action, &parts));

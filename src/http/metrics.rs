@@ -62,7 +62,7 @@ const METRICS: &[(&str, MetricKind, &str)] = &[
     ("offbd_fault_changes_total", Counter, "Durable fault transitions, by code and status"),
     ("offbd_http_request_seconds", Seconds, "Time until a response starts, by path"),
     ("offbd_http_requests_total", Counter, "Requests, by path and status"),
-    ("offbd_ingest_stalled", Gauge, "1 if ingest is full and nothing is committed"),
+    ("offbd_ingest_stalled", Gauge, "1 if batches wait and nothing is committed"),
     ("offbd_journal_bytes", Gauge, "Bytes in the journal, not yet folded into the recordings"),
     ("offbd_partitions_handed_over_total", Counter, "Partitions given to other nodes as planned"),
     ("offbd_partitions_lost_total", Counter, "Partitions that other nodes have taken"),
@@ -188,7 +188,8 @@ fn initialize_series() {
     }
     zero("offbd_refused_total", "status", &["401", "403", "405", "421", "429", "503"]);
     zero("offbd_samples_total", "outcome", &["accepted", "duplicate", "rejected", "late"]);
-    let reasons = ["form", "not_finite", "absurd", "conflict", "too_old", "late", "jump"];
+    let reasons =
+        ["form", "not_finite", "absurd", "conflict", "too_old", "session_ended", "late", "jump"];
     zero("offbd_samples_unjudged_total", "reason", &reasons);
     zero("offbd_sessions_expired_total", "reason", &["age", "size"]);
     zero("offbd_bus_logins_total", "outcome", &["accepted", "refused"]);

@@ -17,9 +17,11 @@ use axum::http::StatusCode;
 use axum::response::Response;
 use futures_util::{FutureExt, SinkExt};
 use serde::{Deserialize, Serialize};
+use tokio::sync::OwnedSemaphorePermit;
 use tokio::time::{Instant, Interval, MissedTickBehavior, interval_at, timeout};
 use utoipa::ToSchema;
 
+use super::body::BodyShare;
 use super::telemetry::TelemetryFormat;
 use super::{App, AssetPath, Problem, Query};
 use crate::service::access::{Caller, Right};
@@ -97,6 +99,7 @@ pub(super) async fn stream(
     AssetPath(asset): AssetPath,
     Query(query): Query<StreamQuery>,
     Extension(caller): Extension<Caller>,
+    Extension(share): Extension<BodyShare>,
     upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
 ) -> Result<Response, Problem> {
     let upgrade = upgrade.map_err(|rejection| {
@@ -104,7 +107,7 @@ pub(super) async fn stream(
         Problem::new(StatusCode::UPGRADE_REQUIRED, "websocket", "Upgrade required", detail)
     })?;
     let period = query.state.map(period).transpose()?;
-    let cursor = query.trace.then(TraceCursor::default);
+    let states = RequestedStates { period, cursor: query.trace.then(TraceCursor::default) };
     let events = app.service.events(Some(asset.clone()), query.after).await?;
     let frame = app.service.limits().batch_bytes;
     let upgrade = upgrade
@@ -113,7 +116,7 @@ pub(super) async fn stream(
         .max_write_buffer_size(MAX_WRITE_BUFFER);
     Ok(upgrade.on_upgrade(move |socket| async move {
         metrics::gauge!("offbd_streams").increment(1.0);
-        let stream = StreamConnection::new(socket, app, caller, asset, events, period, cursor);
+        let stream = StreamConnection::new(socket, app, caller, share, asset, events, states);
         stream.run().await;
         metrics::gauge!("offbd_streams").decrement(1.0);
     }))
@@ -146,6 +149,8 @@ struct QueuedBatch {
     id: Option<String>,
     n_rows: usize,
     submitted: ServiceFuture<PendingBatch>,
+    /// The memory of its message.
+    _bytes: Vec<OwnedSemaphorePermit>,
 }
 
 type ServiceFuture<T> = Pin<Box<dyn Future<Output = Result<T, ServiceError>> + Send>>;
@@ -172,11 +177,20 @@ struct TraceCursor {
     seen: u64,
 }
 
+/// The states that a client has requested.
+struct RequestedStates {
+    period: Option<Duration>,
+    /// `None` if no trace is requested.
+    cursor: Option<TraceCursor>,
+}
+
 struct StreamConnection {
     socket: WebSocket,
     app: App,
     /// Whether the caller may send batches.
     may_send: bool,
+    /// The memory that messages may take.
+    share: BodyShare,
     /// Completes when the caller's token expires or is revoked.
     revoked: Pin<Box<dyn Future<Output = ()> + Send>>,
     asset: String,
@@ -211,16 +225,17 @@ impl StreamConnection {
         socket: WebSocket,
         app: App,
         caller: Caller,
+        share: BodyShare,
         asset: String,
         events: EventFeed,
-        period: Option<Duration>,
-        cursor: Option<TraceCursor>,
+        states: RequestedStates,
     ) -> Self {
         let ticks = |period| {
             let mut ticks = interval_at(Instant::now() + period, period);
             ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
             ticks
         };
+        let RequestedStates { period, cursor } = states;
         let (states, pings) = (period.map(ticks), ticks(PING_INTERVAL));
         let (pending, waiting, received_at) = (VecDeque::new(), None, Instant::now());
         let may_send = caller.may(Right::SendTelemetry, &asset);
@@ -230,6 +245,7 @@ impl StreamConnection {
             socket,
             app,
             may_send,
+            share,
             revoked,
             asset,
             events,
@@ -357,15 +373,19 @@ impl StreamConnection {
             let refused = StreamErrorView { id: None, problem };
             return self.send_messages(vec![text(&StreamFrameView::Error(refused))]).await;
         }
-        let parsed = format.parse(document, self.app.service.limits().batch_samples);
+        let parsed = self.share.reserve(document.len()).and_then(|bytes| {
+            let batch = format.parse(document, self.app.service.limits().batch_samples)?;
+            Ok((batch, bytes))
+        });
         match parsed {
-            Ok(mut batch) => {
+            Ok((mut batch, bytes)) => {
                 let (id, n_rows) = (batch.id.take(), batch.rows.len());
                 let submitted = self.app.service.submit_when_ready(&self.asset, batch, false);
-                self.waiting = Some(QueuedBatch { id, n_rows, submitted: Box::pin(submitted) });
+                let submitted = Box::pin(submitted);
+                self.waiting = Some(QueuedBatch { id, n_rows, submitted, _bytes: bytes });
             }
             Err(error) => {
-                let ack = acknowledgement(Err(error.into()));
+                let ack = acknowledgement(Err(error));
                 self.pending.push_back(PendingAck { id: None, n_rows: 0, ack });
             }
         }

@@ -261,7 +261,7 @@ impl Service {
         let stalled = Arc::new(AtomicBool::new(false));
         let watchdog = Watchdog {
             in_flight: in_flight.clone(),
-            batch_samples: limits.longest_batch(),
+            max_in_flight: limits.in_flight_samples,
             n_commits,
             stalled: stalled.clone(),
             closing: handles.closing.clone(),

@@ -382,3 +382,39 @@ async fn a_batch_with_an_invalid_row_is_acknowledged_again_after_its_session_has
     assert_eq!(client.session("a", "one").await["rejected"], 1);
     assert_eq!(client.session("a", "two").await["rejected"], 0, "another session's row");
 }
+
+#[tokio::test]
+async fn rows_that_were_rejected_are_rejected_again_after_their_session_has_ended() {
+    for numbered in [false, true] {
+        let fixture = service().await;
+        let client = &fixture.client;
+        let mut samples = rig(100, 100);
+        if !numbered {
+            samples.iter_mut().for_each(|sample| sample.seq = None);
+        }
+        client.telemetry("a", Some("one"), &samples).await;
+        let mut others = samples.clone();
+        others[7].x_m = Some(0.123);
+        others[8].t_s += 1e-3; // with a number, another sample of this number
+        if !numbered {
+            others.remove(8);
+        }
+        let live = client.telemetry("a", Some("one"), &others).await;
+        client.end("a", "one").await;
+        let again = client.telemetry("a", Some("one"), &others).await;
+        assert_eq!(again["duplicate"], live["duplicate"], "{again}");
+        let of = |ack: &Value| {
+            let rejected = ack["rejected"].as_array().unwrap();
+            rejected.iter().map(|row| row["index"].clone()).collect::<Vec<_>>()
+        };
+        assert_eq!(of(&again), of(&live));
+        assert_eq!(of(&again).len(), if numbered { 2 } else { 1 });
+        // What is later than the session is for another one.
+        let mut later = samples[99];
+        later.t_s += 0.01;
+        later.seq = later.seq.map(|seq| seq + 1);
+        let batch = crate::support::batch(Some("one"), &[samples[99], later]);
+        let problem = client.post(TELEMETRY, &batch).await.problem(409);
+        assert_eq!(problem["type"], "urn:offbd:problem:session-ended");
+    }
+}

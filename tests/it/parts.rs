@@ -64,6 +64,30 @@ async fn a_long_session_continues_in_parts_and_every_sample_is_there_once() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn what_may_be_in_a_part_that_is_not_searched_is_not_recorded_again() {
+    for numbered in [false, true] {
+        let fixture = service().await;
+        let mut samples = rig(6400, usize::MAX);
+        if !numbered {
+            samples.iter_mut().for_each(|sample| sample.seq = None);
+        }
+        for part in samples.chunks(200) {
+            send(&fixture.client, Some("monday"), part).await;
+        }
+        for _ in ["while the last part is open", "after it has ended"] {
+            let ack = send(&fixture.client, Some("monday"), &samples[100..200]).await;
+            assert_eq!((&ack["accepted"], &ack["duplicate"]), (&json!(0), &json!(0)), "{ack}");
+            let rejected = ack["rejected"].as_array().unwrap();
+            assert_eq!(rejected.len(), 100);
+            assert!(rejected[0]["reason"].as_str().unwrap().starts_with("too old"), "{ack}");
+            let ack = send(&fixture.client, Some("monday"), &samples[4000..4100]).await;
+            assert_eq!(ack["duplicate"], 100, "{ack}");
+            fixture.client.end("a", "monday (7)").await;
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_device_names_all_parts_alike_also_after_they_have_ended() {
     let fixture = service().await;
     let client = &fixture.client;

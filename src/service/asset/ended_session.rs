@@ -77,6 +77,12 @@ impl EndedSession {
         }
     }
 
+    /// Whether `sample` may be recorded in this session, or in one before it, and `open` does not
+    /// have it.
+    pub(super) fn is_doubtful(&self, sample: &Sample, open: Option<&Engine>) -> bool {
+        self.may_contain(sample, open) && is_new(sample, open)
+    }
+
     /// Returns which of `samples`, each with its index in the batch, this session has already,
     /// or has with other values, and `open` has not. Blocks on the store.
     pub(super) fn search(
@@ -86,8 +92,8 @@ impl EndedSession {
         turn: &Turn<'_>,
     ) -> Result<Found, ServiceError> {
         let mut found = Found::default();
-        let is_doubtful = |sample: &Sample| self.may_contain(sample, open) && is_new(sample, open);
-        let doubtful: Vec<_> = samples.iter().filter(|(_, sample)| is_doubtful(sample)).collect();
+        let doubtful: Vec<_> =
+            samples.iter().filter(|(_, sample)| self.is_doubtful(sample, open)).collect();
         if doubtful.is_empty() {
             return Ok(found);
         }

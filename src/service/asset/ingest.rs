@@ -1,16 +1,16 @@
 //! Evaluating and recording a batch of samples.
 
 use super::actor::Asset;
-use super::ended_session::MAX_SESSIONS;
 use super::outcomes::{count_outcomes, count_unjudged};
 use super::recorded::RecordedSamples;
+use super::retransmission::retransmitted;
 use super::session::OpenSession;
 use super::sessions::SessionSwitch;
 use super::turn::Turn;
-use crate::service::{ServiceError, views};
-use crate::store::{SessionRow, Write};
+use crate::service::ServiceError;
+use crate::store::Write;
 use crate::wire::telemetry::{AckView, Batch, RowView};
-use offbd_core::engine::{Admission, Recognition, Rejection, rejection};
+use offbd_core::engine::{Admission, Recognition, Rejection};
 use offbd_core::vocabulary::Sample;
 
 impl Asset {
@@ -220,42 +220,4 @@ fn samples(rows: Vec<Result<Sample, String>>, ack: &mut AckView) -> Vec<(usize, 
         }
     }
     samples
-}
-
-/// Acknowledges samples for a session that has ended, if they are recorded already. Rows
-/// that the engine rejects were never recorded, and are rejected again.
-///
-/// # Errors
-/// [`ServiceError::SessionEnded`] if another one is not recorded.
-fn retransmitted(
-    row: &SessionRow,
-    samples: &[(usize, Sample)],
-    turn: &Turn<'_>,
-    ack: &mut AckView,
-) -> Result<(), ServiceError> {
-    let rig = views::rig(&row.setup)?;
-    let mut recorded = Vec::with_capacity(samples.len());
-    for (index, sample) in samples {
-        match rejection(&rig, sample) {
-            None => recorded.push(sample),
-            Some(why) => {
-                count_unjudged(why.as_str(), 1);
-                ack.rejected.push(RowView { index: *index, reason: why.to_string() });
-            }
-        }
-    }
-    let handles = &turn.env.handles;
-    let mut found = RecordedSamples::default();
-    for part in handles.wait(handles.store.parts(row.first_part(), MAX_SESSIONS))? {
-        found.merge(RecordedSamples::find(&part.id, recorded.iter().copied(), turn)?);
-    }
-    if !found.contain_all(&recorded) {
-        let (asset, name) = (row.asset.clone(), row.name.clone());
-        return Err(ServiceError::SessionEnded { asset, name });
-    }
-    ack.duplicate += recorded.len();
-    ack.session = Some(row.name.clone());
-    ack.session_id = Some(row.id.clone());
-    ack.last_seq = row.progress.last_seq.and_then(|seq| u64::try_from(seq).ok());
-    Ok(())
 }

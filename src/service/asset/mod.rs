@@ -34,6 +34,7 @@ mod recent;
 mod recorded;
 mod registry;
 mod restart;
+mod retransmission;
 mod sent_before;
 mod session;
 mod session_rate;

@@ -88,10 +88,4 @@ impl RecordedSamples {
             None => Recognition::New,
         }
     }
-
-    /// Whether each of `samples` is recorded with the same values.
-    pub(super) fn contain_all(&self, samples: &[&Sample]) -> bool {
-        let is_same = |s: &Sample| self.recognise(Recognition::Unknown, s) == Recognition::Same;
-        samples.iter().all(|sample| is_same(sample))
-    }
 }

@@ -5,6 +5,7 @@ use super::actor::Asset;
 use super::ended_session::{EndedSession, MAX_SESSIONS};
 use super::outcomes::count_unjudged;
 use super::restart::CERTAIN_AFTER;
+use super::session::OpenSession;
 use super::turn::Turn;
 use crate::service::ServiceError;
 use crate::wire::telemetry::{AckView, RowView};
@@ -41,7 +42,7 @@ impl Asset {
 
     /// Returns `samples`, each with its index in the batch, without those that an earlier part
     /// of the open session has: with the same values, they are counted as duplicates; with
-    /// others, they are rejected.
+    /// others, they are rejected, as are those that parts may have that are not searched.
     pub(super) fn without_earlier_parts(
         &mut self,
         mut samples: Vec<(usize, Sample)>,
@@ -49,20 +50,37 @@ impl Asset {
         ack: &mut AckView,
     ) -> Result<Vec<(usize, Sample)>, ServiceError> {
         let Some(open) = &mut self.open else { return Ok(samples) };
-        for part in self.ended.iter().filter(|ended| ended.first_part == open.part.first) {
+        let parts: Vec<_> =
+            self.ended.iter().filter(|ended| ended.first_part == open.part.first).collect();
+        for part in &parts {
             let engine = open.judging.engine();
             let found = part.search(&samples, Some(engine), turn)?;
             part.acknowledge(&found, ack);
             samples.retain(|(index, sample)| {
                 if found.conflicts.contains(index) {
-                    let why = Rejection::conflict(sample);
-                    open.judging.note_rejected(why);
-                    count_unjudged(why.as_str(), 1);
-                    ack.rejected.push(RowView { index: *index, reason: why.to_string() });
+                    reject(open, *index, Rejection::conflict(sample), ack);
                 }
                 !found.same.contains(index) && !found.conflicts.contains(index)
             });
         }
+        let n_earlier = usize::try_from(open.part.number - 1).unwrap_or_default();
+        if let Some(oldest) = parts.last().filter(|_| parts.len() < n_earlier) {
+            samples.retain(|(index, sample)| {
+                let engine = open.judging.engine();
+                let is_doubtful = oldest.is_doubtful(sample, Some(engine));
+                if is_doubtful {
+                    reject(open, *index, Rejection::TooOld, ack);
+                }
+                !is_doubtful
+            });
+        }
         Ok(samples)
     }
+}
+
+/// Rejects the row `index` of a batch for the open session.
+fn reject(open: &mut OpenSession, index: usize, why: Rejection, ack: &mut AckView) {
+    open.judging.note_rejected(why);
+    count_unjudged(why.as_str(), 1);
+    ack.rejected.push(RowView { index, reason: why.to_string() });
 }

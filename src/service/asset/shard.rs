@@ -203,14 +203,17 @@ impl Shard {
         }
     }
 
-    /// Stores the snapshots that were taken while the engine was rebuilt.
+    /// Stores the snapshots that were taken while the engine was rebuilt, if there is room for
+    /// them in the writer's queue; a later rebuild takes them again.
     fn store_snapshots(&self, asset: &mut Asset) {
         let writes: Vec<_> =
             std::mem::take(&mut asset.snapshots).into_iter().map(Write::PutSnapshot).collect();
-        if !writes.is_empty() {
+        if !writes.is_empty()
+            && let Ok(room) = self.env.handles.reserve()
+        {
             let (generation, completion) = (asset.generation.clone(), Box::new(|_| ()));
             let partition = Some(self.env.handles.ownership.partition_of(&asset.row.name));
-            self.env.handles.submit(WriteSet { partition, writes, generation, completion });
+            room.send(WriteSet { partition, writes, generation, completion });
         }
     }
 
@@ -296,7 +299,13 @@ impl Shard {
             Err(error) => return reply.send(Err(error)),
         };
         let generation = asset.generation.clone();
-        let mut turn = Turn::begin(&self.env);
+        let mut turn = match Turn::begin(&self.env) {
+            Ok(turn) => turn,
+            Err(error) => {
+                self.keep(name, asset);
+                return reply.send(Err(error));
+            }
+        };
         let outcome = catch_unwind(AssertUnwindSafe(|| change(&mut asset, &mut turn)));
         match outcome {
             Ok(Ok(answer)) => {
@@ -353,7 +362,10 @@ impl Shard {
         if let Err(error) = absent {
             return reply.send(Err(error));
         }
-        let mut turn = Turn::begin(&self.env);
+        let mut turn = match Turn::begin(&self.env) {
+            Ok(turn) => turn,
+            Err(error) => return reply.send(Err(error)),
+        };
         turn.writes.push(Write::CreateAsset(AssetRow {
             name: name.to_owned(),
             document,

@@ -30,12 +30,19 @@ pub(super) struct Turn<'a> {
     pub(super) engine_changed: bool,
     /// Jobs to queue once the writes are durable, each with its permit of the queue.
     pub(super) jobs: Vec<(OwnedPermit<Job>, Job)>,
+    /// The room for the changes in the writer's queue.
+    room: OwnedPermit<WriteSet>,
 }
 
 impl<'a> Turn<'a> {
-    pub(super) fn begin(env: &'a Environment) -> Self {
+    /// Begins a turn; blocks while the writer's queue is full.
+    ///
+    /// # Errors
+    /// Those of [`Handles::reserve`].
+    pub(super) fn begin(env: &'a Environment) -> Result<Self, ServiceError> {
+        let room = env.handles.reserve()?;
         let at = env.handles.clock.now();
-        Self { env, at, writes: Vec::new(), engine_changed: false, jobs: Vec::new() }
+        Ok(Self { env, at, writes: Vec::new(), engine_changed: false, jobs: Vec::new(), room })
     }
 
     /// Submits the changes to the writer. Once they are durable, the jobs are queued and
@@ -47,7 +54,7 @@ impl<'a> Turn<'a> {
         answer: T,
         reply: Reply<T>,
     ) {
-        let Self { env, writes, jobs, .. } = self;
+        let Self { env, writes, jobs, room, .. } = self;
         let completion = Box::new(move |outcome: Result<(), ServiceError>| {
             if outcome.is_ok() {
                 jobs.into_iter().for_each(|(permit, job)| drop(permit.send(job)));
@@ -55,6 +62,6 @@ impl<'a> Turn<'a> {
             reply.send(outcome.map(|()| answer));
         });
         let partition = Some(env.handles.ownership.partition_of(asset));
-        env.handles.submit(WriteSet { partition, writes, generation, completion });
+        room.send(WriteSet { partition, writes, generation, completion });
     }
 }

@@ -193,6 +193,10 @@ impl Device {
                 // it sends then.
                 (Some(_), Some(row)) if !self.kind.named && row.reason.contains("other values") => {
                 }
+                // A person ended the session before this was recorded.
+                (Some(content), Some(row))
+                    if row.reason.contains("session has ended")
+                        && !self.acknowledged.contains(content) => {}
                 (content, rejected) => {
                     return Err(format!("{}: {content:?} got {rejected:?}", self.asset));
                 }

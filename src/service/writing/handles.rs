@@ -7,6 +7,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use tokio::runtime::Handle;
+use tokio::sync::mpsc::OwnedPermit;
+use tokio::sync::mpsc::error::{SendTimeoutError, TrySendError};
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 
@@ -30,6 +32,8 @@ pub(in crate::service) struct Handles {
     pub(in crate::service) outage: watch::Receiver<Outage>,
     /// Whether a fence has timed out and is not complete yet.
     is_stuck: Arc<AtomicBool>,
+    /// Whether the writer's queue had no room for too long, and has not had any since.
+    is_full: Arc<AtomicBool>,
     /// Commits what is queued, in a simulation without a writer thread.
     #[cfg(test)]
     pub(in crate::service) commit_queued: Arc<std::sync::OnceLock<CommitQueued>>,
@@ -41,13 +45,17 @@ pub(in crate::service) struct Handles {
 #[cfg(test)]
 type CommitQueued = Box<dyn Fn() + Send + Sync>;
 
-/// Longest time for a fence. Chosen: much longer than a commit, and short enough for the
-/// other assets of a shard to wait.
-const FENCE_TIMEOUT: Duration = Duration::from_secs(5);
+/// Longest time for a fence, and longest wait for room in the writer's queue. Chosen: much
+/// longer than a commit, and short enough for the other assets of a shard to wait.
+const WRITER_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Longest time for one read of the store. Chosen: twice the time that a reader waits for
 /// a connection; a database that takes longer is unavailable.
 const READ_TIMEOUT: Duration = Duration::from_secs(20);
+
+fn stopped() -> ServiceError {
+    ServiceError::Unavailable { what: "the writer has stopped" }
+}
 
 impl Handles {
     /// Returns handles on the current runtime.
@@ -70,6 +78,7 @@ impl Handles {
             writer,
             outage,
             is_stuck: Arc::default(),
+            is_full: Arc::default(),
             #[cfg(test)]
             commit_queued: Arc::default(),
             #[cfg(test)]
@@ -132,16 +141,31 @@ impl Handles {
         let set = WriteSet { partition, writes, generation, completion };
         let closing = ServiceError::Unavailable { what: "the service is shutting down" };
         self.writer.send(set).await.map_err(|_| closing)?;
-        let stopped = ServiceError::Unavailable { what: "the writer has stopped" };
-        receiver.await.unwrap_or(Err(stopped))
+        receiver.await.unwrap_or_else(|_| Err(stopped()))
     }
 
-    /// Submits `set` to the writer; blocks while its queue is full. If the writer has
-    /// stopped, the set is dropped, which reports an error to its receiver. Must not run on
-    /// a thread of the runtime.
-    pub(in crate::service) fn submit(&self, set: WriteSet) {
-        if self.writer.blocking_send(set).is_err() {
-            tracing::error!("the writer has stopped");
+    /// Blocks until there is room for a write set in the writer's queue, and reserves it.
+    /// Must not run on a thread of the runtime.
+    ///
+    /// # Errors
+    /// [`ServiceError::Outage`] after 5 s without room, and at once from then on until there is
+    /// some, so that a shard still answers what changes nothing;
+    /// [`ServiceError::Unavailable`] if the writer has stopped.
+    pub(in crate::service) fn reserve(&self) -> Result<OwnedPermit<WriteSet>, ServiceError> {
+        let room = match self.writer.clone().try_reserve_owned() {
+            Err(TrySendError::Full(_)) if self.is_full.load(Ordering::Relaxed) => None,
+            Err(TrySendError::Full(writer)) => {
+                let room =
+                    async { tokio::time::timeout(WRITER_TIMEOUT, writer.reserve_owned()).await };
+                self.runtime.block_on(room).ok()
+            }
+            Err(TrySendError::Closed(_)) => return Err(stopped()),
+            Ok(permit) => Some(Ok(permit)),
+        };
+        self.is_full.store(room.is_none(), Ordering::Relaxed);
+        match room {
+            Some(permit) => permit.map_err(|_| stopped()),
+            None => Err(self.stuck()),
         }
     }
 
@@ -150,11 +174,12 @@ impl Handles {
     ///
     /// # Errors
     /// [`ServiceError::Outage`] after 5 s, and at once as long as that fence is not complete,
-    /// so that assets that must be read do not hold up the others of their shard.
+    /// so that assets that must be read do not hold up the others of their shard; those of
+    /// [`reserve`](Self::reserve).
     pub(in crate::service) fn fence(&self) -> Result<(), ServiceError> {
         self.check_fences()?;
         let (set, done) = self.new_fence();
-        self.submit(set);
+        self.reserve()?.send(set);
         #[cfg(test)]
         if let Some(commit_queued) = self.commit_queued.get() {
             commit_queued();
@@ -170,10 +195,11 @@ impl Handles {
     pub(in crate::service) async fn fence_async(&self) -> Result<(), ServiceError> {
         self.check_fences()?;
         let (set, done) = self.new_fence();
-        if self.writer.send(set).await.is_err() {
-            tracing::error!("the writer has stopped");
+        match self.writer.send_timeout(set, WRITER_TIMEOUT).await {
+            Ok(()) => self.fenced(done).await,
+            Err(SendTimeoutError::Timeout(_)) => Err(self.stuck()),
+            Err(SendTimeoutError::Closed(_)) => Err(stopped()),
         }
-        self.fenced(done).await
     }
 
     fn check_fences(&self) -> Result<(), ServiceError> {
@@ -193,9 +219,8 @@ impl Handles {
     }
 
     async fn fenced(&self, mut done: oneshot::Receiver<()>) -> Result<(), ServiceError> {
-        if let Ok(done) = tokio::time::timeout(FENCE_TIMEOUT, &mut done).await {
-            let stopped = |_| ServiceError::Unavailable { what: "the writer has stopped" };
-            return done.map_err(stopped);
+        if let Ok(done) = tokio::time::timeout(WRITER_TIMEOUT, &mut done).await {
+            return done.map_err(|_| stopped());
         }
         self.is_stuck.store(true, Ordering::SeqCst);
         if done.try_recv().is_ok() {

@@ -23,6 +23,11 @@ const DOUBTED_WINDOWS: f64 = 10.0;
 /// are common.
 const DOUBTED_INTERVALS: f64 = 10.0;
 
+/// Time that samples without `seq` from before the first one must last to show that the clock
+/// was set back, s. Chosen: longer than most batches, because a batch that was lost may be sent
+/// late.
+const SET_BACK_AFTER_S: f64 = 10.0;
+
 /// Gain of the filter of the sample interval, per sample. Chosen.
 const INTERVAL_GAIN: f64 = 0.1;
 
@@ -36,6 +41,8 @@ pub(super) struct ClockContext {
     pub(super) released_s: Option<f64>,
     /// Whether samples without `seq` have been taken around this time.
     pub(super) in_stretch: bool,
+    /// Whether the sample has no `seq` and is before the first one taken.
+    pub(super) precedes: bool,
     pub(super) reorder_s: f64,
     /// The interval without a sample that makes a gap, s.
     pub(super) gap_s: f64,
@@ -110,13 +117,15 @@ impl DeviceClock {
     }
 
     /// Whether a sample of the past can mean that the clock was set back: its `seq`
-    /// continues, or without `seq` samples around this time have been taken already. If
-    /// not, it is one that was lost and is sent late.
+    /// continues, or without `seq` samples around this time have been taken already, or none
+    /// from before. If not, it is one that was lost and is sent late.
     fn may_be_set_back(&self, sample: &Sample, context: &ClockContext) -> bool {
         match (sample.seq, self.newest_seq) {
             (Some(seq), newest) => newest.is_none_or(|newest| seq > newest),
             (None, Some(_)) => false,
-            (None, None) => context.in_stretch || self.n_followed < BELIEVED_AFTER,
+            (None, None) => {
+                context.in_stretch || context.precedes || self.n_followed < BELIEVED_AFTER
+            }
         }
     }
 
@@ -137,13 +146,14 @@ impl DeviceClock {
     }
 
     /// Whether enough samples agree. Without `seq`, samples of the past must also last
-    /// longer than a gap, because shorter gaps are not known: they may fill one.
+    /// longer than a gap, because shorter gaps are not known: they may fill one. Those from
+    /// before the first sample must last longer.
     fn is_confirmed(&self, step_s: f64, context: &ClockContext) -> bool {
-        let span_s = self.held_span_s();
+        let needed_s = if context.precedes { SET_BACK_AFTER_S } else { context.gap_s };
         let may_fill_gap = step_s < 0.0
             && self.newest_seq.is_none()
             && self.n_followed >= BELIEVED_AFTER
-            && span_s <= context.gap_s;
+            && self.held_span_s() <= needed_s;
         self.held.len() >= MAX_HELD || (self.held.len() >= BELIEVED_AFTER && !may_fill_gap)
     }
 
@@ -245,7 +255,12 @@ mod tests {
             let t_s = |i: u64| 2000.0 + i as f64 / HZ + if i >= 2000 { step_s } else { 0.0 };
             assert_eq!(judged(HZ, numbered(6001, t_s)), (6001, 0), "{step_s} s");
         }
-        // Without numbers, a time of the past is followed where samples were taken before.
+        // Without numbers, a time from before the first sample is followed after 10 s.
+        for step_s in [-1e6, -3000.0] {
+            let t_s = |i: u64| 2000.0 + i as f64 / HZ + if i >= 2000 { step_s } else { 0.0 };
+            assert_eq!(judged(HZ, unnumbered(6001, t_s)), (6001, 0), "{step_s} s");
+        }
+        // A time of the past is followed where samples were taken before.
         let t_s = |i: u64| i as f64 / HZ - if i >= 5000 { 30.005 } else { 0.0 };
         assert_eq!(judged(HZ, unnumbered(8000, t_s)), (8000, 0));
     }
@@ -280,6 +295,13 @@ mod tests {
         let live = (0..4000).filter(|i| !short.contains(i)).map(late);
         let rows = live.chain(short.clone().map(late)).chain((4000..5000).map(late));
         assert_eq!(judged(HZ, rows), (4990, 10), "a gap that is not known as one");
+    }
+
+    #[test]
+    fn a_first_batch_that_arrives_late_is_set_aside() {
+        let rows = |range: std::ops::Range<u64>| range.map(|i| row(None, i as f64 / HZ));
+        let (n, aside) = judged(HZ, rows(900..2000).chain(rows(0..900)).chain(rows(2000..4000)));
+        assert_eq!((n, aside), (3100, 900));
     }
 
     #[test]

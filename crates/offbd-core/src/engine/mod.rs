@@ -58,7 +58,7 @@ use crate::vocabulary::{FaultCode, PerAxis, Sample};
 /// Version of the judgement: raised with every change that gives another verdict on some
 /// recording by the same settings, so that verdicts of different versions can be told
 /// apart.
-pub const JUDGEMENT: u32 = 2;
+pub const JUDGEMENT: u32 = 3;
 
 /// Version of the serialised form of an [`Engine`], a [`Plausibility`] and a
 /// [`UsableMotion`], and of what a caller stores with them: raised with every change of the
@@ -204,6 +204,7 @@ impl Engine {
         let context = ClockContext {
             released_s: self.align.released_s(),
             in_stretch: sample.seq.is_none() && self.ledger.has_stretch_at(sample.t_s),
+            precedes: sample.seq.is_none() && self.ledger.precedes(sample),
             reorder_s: self.setup.settings.reorder_s,
             gap_s,
         };
