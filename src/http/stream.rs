@@ -99,13 +99,14 @@ pub(super) async fn stream(
     AssetPath(asset): AssetPath,
     Query(query): Query<StreamQuery>,
     Extension(caller): Extension<Caller>,
-    Extension(share): Extension<BodyShare>,
+    share: Option<Extension<BodyShare>>,
     upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
 ) -> Result<Response, Problem> {
     let upgrade = upgrade.map_err(|rejection| {
         let detail = format!("a WebSocket upgrade is required: {}", rejection.body_text());
         Problem::new(StatusCode::UPGRADE_REQUIRED, "websocket", "Upgrade required", detail)
     })?;
+    let share = share.map_or_else(|| app.budget.whole(), |Extension(share)| share);
     let period = query.state.map(period).transpose()?;
     let states = RequestedStates { period, cursor: query.trace.then(TraceCursor::default) };
     let events = app.service.events(Some(asset.clone()), query.after).await?;

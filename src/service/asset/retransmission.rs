@@ -83,9 +83,11 @@ impl EndedRecording {
             found.merge(RecordedSamples::find(&part.id, samples.iter().copied(), turn)?);
         }
         let last = parts.first().unwrap_or(row);
+        let is_first = parts.last().is_some_and(|oldest| oldest.part == 1);
         Ok(Self {
             samples: found,
-            is_whole: parts.last().is_none_or(|oldest| oldest.part == 1),
+            // A deleted part leaves none out.
+            is_whole: parts.len() < MAX_SESSIONS as usize || is_first,
             last_seq: last.progress.last_seq,
             newest_t_s: handles.wait(handles.store.newest_t_s(&last.id))?,
         })

@@ -12,6 +12,9 @@ use crate::wire::telemetry::{AckView, RowView};
 use offbd_core::engine::Rejection;
 use offbd_core::vocabulary::Sample;
 
+/// Number of the first part of a session before which there are parts that are not searched.
+const FIRST_LEFT_OUT: i64 = MAX_SESSIONS as i64 + 1;
+
 impl Asset {
     /// Notes that `session` has ended.
     pub(super) fn note_ended(&mut self, session: EndedSession) {
@@ -63,8 +66,10 @@ impl Asset {
                 !found.same.contains(index) && !found.conflicts.contains(index)
             });
         }
-        let n_earlier = usize::try_from(open.part.number - 1).unwrap_or_default();
-        if let Some(oldest) = parts.last().filter(|_| parts.len() < n_earlier) {
+        // A deleted part leaves none out.
+        let are_left_out =
+            parts.len() >= MAX_SESSIONS as usize && open.part.number > FIRST_LEFT_OUT;
+        if let Some(oldest) = parts.last().filter(|_| are_left_out) {
             samples.retain(|(index, sample)| {
                 let engine = open.judging.engine();
                 let is_doubtful = oldest.is_doubtful(sample, Some(engine));

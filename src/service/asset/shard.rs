@@ -432,7 +432,7 @@ mod tests {
         let data = tempfile::tempdir().unwrap();
         let location = Location::File(data.path().join("test.sqlite"));
         let (store, _writer) = Store::open(&location).await.unwrap();
-        let ((jobs, _), (writer, _)) = (mpsc::channel(1), mpsc::channel(1));
+        let ((jobs, _), (writer, _sets)) = (mpsc::channel(1), mpsc::channel(1));
         let (_, outage) = watch::channel(None);
         let (limits, closing) =
             (Limits { shards: 1, ..Limits::default() }, CancellationToken::new());

@@ -19,6 +19,11 @@ pub(super) type Content = (usize, usize);
 const CONTENT_UNIT_M: f64 = 1e-8;
 const SAMPLES_PER_RUN: usize = 100_000;
 
+/// Samples from which on a session continues in another one.
+pub(super) const SAMPLES_PER_PART: usize = 150;
+/// Ended parts of a session that are searched for what is sent again.
+const N_SEARCHED_PARTS: usize = 4;
+
 /// Returns the content of a recorded sample.
 pub(super) fn content(sample: &Sample) -> Content {
     let number = (sample.y_m.unwrap_or(f64::NAN) / CONTENT_UNIT_M).round() as usize;
@@ -193,6 +198,12 @@ impl Device {
                 // it sends then.
                 (Some(_), Some(row)) if !self.kind.named && row.reason.contains("other values") => {
                 }
+                // It is so late that the part of the session that may have it is not searched.
+                (Some(content), Some(row))
+                    if row.reason.contains("too old")
+                        && self.kind.named
+                        && self.n_measured > content.1 + N_SEARCHED_PARTS * SAMPLES_PER_PART
+                        && !self.acknowledged.contains(content) => {}
                 // A person ended the session before this was recorded.
                 (Some(content), Some(row))
                     if row.reason.contains("session has ended")

@@ -14,7 +14,7 @@ use tempfile::TempDir;
 use tokio::runtime::Runtime;
 
 use super::check;
-use super::device::{Device, SentBatch, content};
+use super::device::{Device, SAMPLES_PER_PART, SentBatch, content};
 use super::scenario::{DeviceKind, Scenario, Step};
 use crate::service::asset::{AssetCommand, Loader, Shard};
 use crate::service::start::Inner;
@@ -36,7 +36,7 @@ fn limits() -> Limits {
         in_flight_samples: 100,
         batch_samples: 50,
         journal_bytes: 3000,
-        sessions: SessionLimits { samples: 150, snapshot_interval: 40 },
+        sessions: SessionLimits { samples: SAMPLES_PER_PART as i64, snapshot_interval: 40 },
         ..Limits::default()
     }
 }
