@@ -67,6 +67,15 @@ test("what to do is told, and the owner's note is kept", async () => {
     notes.map(({ code, text, by }) => [code, text, by]),
     [["x_servo", "Spare horns are in the drawer.", "ada"]],
   );
+  // The pages of the fault, to which every link leads, tell the same.
+  for (const path of ["/rigs/bench/faults/x_servo", "/rigs/bench/faults/x_servo/report"]) {
+    await view.goto(service.url + path);
+    await view.getByRole("heading", { name: "What to do" }).waitFor();
+    await view.getByRole("listitem").getByText("power").first().waitFor();
+    await view.getByText("Spare horns are in the drawer.").waitFor();
+  }
+  await view.emulateMedia({ media: "print" });
+  assert.equal(await view.getByRole("button", { name: "Edit the note" }).isVisible(), false);
   await view.done();
 });
 

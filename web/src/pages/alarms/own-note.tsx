@@ -26,7 +26,7 @@ export function OwnNote({ code, advice, refetch }: Props) {
       )}
       <button
         type="button"
-        class="link"
+        class="link no-print"
         disabled={refused !== undefined}
         title={refused}
         onClick={() => setEdited(true)}

@@ -1,5 +1,6 @@
 import type { FaultEntry, HistoryEntry } from "../../api/types";
 import { ErrorMessage } from "../../parts/error-message";
+import { AdviceCard } from "./advice-card";
 import { AroundOccurrence } from "./around-occurrence";
 import { Causes } from "./causes";
 import { EvidenceTable } from "./evidence-table";
@@ -25,6 +26,7 @@ export function FaultDetails({ fault, history, error, refetch }: Props) {
       <FaultSummary fault={fault} history={history} />
       <div class="pair">
         <div class="column">
+          <AdviceCard fault={fault} />
           <Causes fault={fault} />
           <Timeline history={history} code={fault.code} />
         </div>

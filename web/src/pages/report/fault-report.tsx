@@ -7,6 +7,7 @@ import { Facts } from "../../parts/facts";
 import { UnloadedPage } from "../../parts/unloaded-page";
 import { faultPath } from "../../router/paths";
 import { codeTitle, faultTitle } from "../../words/fault-names";
+import { AdviceCard } from "../fault/advice-card";
 import { EvidenceTable } from "../fault/evidence-table";
 import { faultFacts } from "../fault/fault-facts";
 import { FaultSummary } from "../fault/fault-summary";
@@ -30,6 +31,7 @@ export function FaultReport({ name, code }: { name: string; code: FaultCode }) {
   return (
     <ReportFrame title={`${faultTitle(code, kind)} of ${name}`} back={faultPath(name, code)}>
       <FaultSummary fault={fault.data} history={history.data?.items ?? []} />
+      <AdviceCard fault={fault.data} />
       <Facts facts={faultFacts(fault.data)} />
       {last_occurrence && <ReportCharts name={name} code={code} axis={axis} />}
       {freeze_frame && (
