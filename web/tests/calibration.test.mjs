@@ -38,6 +38,7 @@ test("the calibrations are listed with their fit, and an earlier one is used aga
   await view.getByRole("heading", { name: "What calibration 1 learnt" }).waitFor();
   await view.getByRole("heading", { name: "Before: without a calibration" }).waitFor();
   await view.getByText(/^Along x the residual is [\d.]+\sm\/s²/).waitFor();
+  await view.getByText("one of 2 judged moments is drawn and counted").waitFor();
   assert.equal(await view.getByRole("img", { name: /^Residual along/ }).count(), 4);
   assert.equal(await view.getByRole("img", { name: /^Acceleration along/ }).count(), 4);
 

@@ -25,6 +25,10 @@ test("two sessions of the list are compared on one time axis", async () => {
   await view.getByRole("heading", { name: "sick" }).waitFor();
   assert.equal(await view.getByRole("heading", { name: "Verdict" }).count(), 2);
   assert.equal(await view.getByRole("img", { name: /^Residual along x/ }).count(), 2);
+  // The longer recording is thinned, and says so.
+  const cards = view.locator(".compared > section").filter({ has: view.getByRole("img") });
+  await cards.filter({ hasText: "healthy" }).getByText("one of 2 judged moments is drawn").waitFor();
+  assert.equal(await view.getByText(/^Thinned/).count(), 1);
   await view.getByLabel("The second begins later by").fill("2.5");
   await view.waitForURL(/shift=2\.5/);
   await view.getByLabel("Axis").selectOption("y");

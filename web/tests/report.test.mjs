@@ -42,6 +42,11 @@ for (const [what, address, link] of [
     assert.ok(n >= 1 && n <= 2, `${n} pages`);
     await view.emulateMedia({ media: "print" });
     assert.equal(await view.getByRole("button", { name: "Print" }).isVisible(), false);
+    // The whole session has more judged moments than can be seen on paper; a fault has all of its own.
+    assert.equal(
+      await view.getByText(/one of 2 judged moments is drawn/).count(),
+      what === "session" ? 1 : 0,
+    );
     assert.deepEqual(view.errors, []);
     await view.done();
   });

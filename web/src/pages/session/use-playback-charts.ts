@@ -15,6 +15,8 @@ const CHART_EVERY = 2;
 interface Options {
   /** The trace of the whole recording; undefined while it is fetched. */
   buffer?: TraceBuffer;
+  /** Every how many judged moments it has one. */
+  stride: number;
   /** The loader of parts with every sample, if `buffer` is thinned. */
   detail?: DetailLoader;
   /** Moments that are marked in all charts. */
@@ -31,7 +33,7 @@ function showTime(t: number, slider: HTMLInputElement | null, clock: HTMLOutputE
 }
 
 /** The charts, the slider and the clock of the playback, updated without rendering components. */
-export function usePlaybackCharts({ buffer, detail, marks, playback: { t } }: Options) {
+export function usePlaybackCharts({ buffer, stride, detail, marks, playback: { t } }: Options) {
   const group = useMemo(() => new ChartGroup(), []);
   /** Time span of the charts, s; 0 for the whole recording. */
   const [span, setSpan] = useState<number>(30);
@@ -76,7 +78,7 @@ export function usePlaybackCharts({ buffer, detail, marks, playback: { t } }: Op
     /** What is drawn now. */
     shown: (): Shown | undefined => {
       const { buffer: source, range } = drawn.current;
-      return source && range && { buffer: source, range };
+      return source && range && { buffer: source, range, stride: source === buffer ? stride : 1 };
     },
     /** The buffer that is drawn now. */
     drawnBuffer: () => {
