@@ -1,10 +1,11 @@
 // The page with the calibrations of a rig.
 import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import { imported, recordings } from "./rigs.mjs";
-import { ask, page, SOON, started } from "./support.mjs";
+import { ask, offbd, page, SOON, started } from "./support.mjs";
 
-let work, service, chromium;
+let work, service, chromium, rig;
 
 /** Calibrates the rig from `session` and uses the result. */
 async function learn(session) {
@@ -18,9 +19,9 @@ async function learn(session) {
 
 started(async (made) => {
   ({ work, service, chromium } = made);
-  const { healthy } = recordings(work);
+  rig = recordings(work);
   await ask(service.url, "POST", "/assets", { name: "bench" });
-  const session = await imported(service.url, "bench", "healthy", healthy);
+  const session = await imported(service.url, "bench", "healthy", rig.healthy);
   await learn(session.id);
   await learn(session.id);
 });
@@ -38,7 +39,6 @@ test("the calibrations are listed with their fit, and an earlier one is used aga
   await view.getByRole("heading", { name: "What calibration 1 learnt" }).waitFor();
   await view.getByRole("heading", { name: "Before: without a calibration" }).waitFor();
   await view.getByText(/^Along x the residual is [\d.]+\sm\/s²/).waitFor();
-  await view.getByText("one of 2 judged moments is drawn and counted").waitFor();
   assert.equal(await view.getByRole("img", { name: /^Residual along/ }).count(), 4);
   assert.equal(await view.getByRole("img", { name: /^Acceleration along/ }).count(), 4);
 
@@ -52,6 +52,21 @@ test("the calibrations are listed with their fit, and an earlier one is used aga
     items.map(({ active }) => active),
     items.map((_, i) => i === n - 1),
   );
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});
+
+test("the fit over a long session says that moments are left out", async () => {
+  const long = rig.path("long.csv");
+  offbd("simulate", "--seconds", "400", "-o", long);
+  await imported(service.url, "bench", "long", readFileSync(long, "utf8"));
+  const view = await page(chromium);
+  await view.goto(`${service.url}/rigs/bench/calibrations`);
+  await view.getByLabel("Session").selectOption({ label: "long" });
+  await view.getByText("one of 2 judged moments is drawn and counted").waitFor();
+  await view.getByLabel("Session").selectOption({ label: "healthy" });
+  await view.getByText(/^Thinned/).waitFor({ state: "detached" });
+  await view.getByText(/^Along x the residual is/).waitFor();
   assert.deepEqual(view.errors, []);
   await view.done();
 });

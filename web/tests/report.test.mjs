@@ -1,8 +1,10 @@
 // The reports of a session and of a fault, to print.
 import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import { join } from "node:path";
 import { test } from "node:test";
 import { imported, recordings } from "./rigs.mjs";
-import { ask, page, started } from "./support.mjs";
+import { ask, offbd, page, started } from "./support.mjs";
 
 let work, service, chromium, session;
 
@@ -42,11 +44,19 @@ for (const [what, address, link] of [
     assert.ok(n >= 1 && n <= 2, `${n} pages`);
     await view.emulateMedia({ media: "print" });
     assert.equal(await view.getByRole("button", { name: "Print" }).isVisible(), false);
-    // The whole session has more judged moments than can be seen on paper; a fault has all of its own.
-    assert.equal(
-      await view.getByText(/one of 2 judged moments is drawn/).count(),
-      what === "session" ? 1 : 0,
-    );
     assert.deepEqual(view.errors, []);
     await view.done();
   });
+
+test("the report of a long session says that moments are left out", async () => {
+  const long = join(work, "long.csv");
+  offbd("simulate", "--seconds", "120", "-o", long);
+  const { id } = await imported(service.url, "bench", "long", readFileSync(long, "utf8"));
+  const view = await page(chromium);
+  await view.goto(`${service.url}/sessions/${id}/report`);
+  await view.getByText("one of 2 judged moments is drawn").waitFor();
+  await view.goto(`${service.url}/sessions/${session}/report`);
+  await view.locator(".report canvas").first().waitFor();
+  assert.equal(await view.getByText(/^Thinned/).count(), 0);
+  await view.done();
+});
