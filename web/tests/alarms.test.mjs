@@ -117,6 +117,28 @@ test("on a phone, nothing of a channel, rule or message is off the screen", asyn
   await view.done();
 });
 
+test("a rule and a channel are deleted after a question", async () => {
+  const view = await page(chromium);
+  await view.goto(`${service.url}/notifications`);
+  for (const [kind, name] of [
+    ["rule", "everything"],
+    ["channel", "workshop"],
+  ]) {
+    const listed = async () => (await ask(service.url, "GET", `/notifications/${kind}s`)).items.length;
+    const dialog = view.getByRole("dialog", { name: `Delete the ${kind} ${name}?` });
+    await view.getByRole("button", { name: `Delete ${name}` }).click();
+    await dialog.getByRole("button", { name: "Cancel" }).click();
+    await dialog.waitFor({ state: "detached" });
+    assert.equal(await listed(), 1);
+    await view.getByRole("button", { name: `Delete ${name}` }).click();
+    await dialog.getByRole("button", { name: "Delete" }).click();
+    await view.getByRole("button", { name: `Delete ${name}` }).waitFor({ state: "detached" });
+    assert.equal(await listed(), 0);
+  }
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});
+
 test("a muted monitor is shown as not tested by whom, never as passed", async () => {
   await ask(service.url, "POST", "/assets/bench/sessions", { name: "tuesday" });
   const view = await page(chromium);
