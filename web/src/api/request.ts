@@ -29,6 +29,9 @@ export const isUnauthenticated = (error: unknown) => error instanceof ProblemErr
 /** Whether what was asked for does not exist. */
 export const isNotFound = (error: unknown) => error instanceof ProblemError && error.status === 404;
 
+/** Whether the service has too much to do now; the same request may succeed soon. */
+export const isBusy = (error: unknown) => error instanceof ProblemError && error.status === 429;
+
 /** Whether the service could not be reached or did not answer in time. */
 export function isUnreachable(error: unknown): boolean {
   return error instanceof TypeError || (error instanceof DOMException && error.name === "TimeoutError");

@@ -1,4 +1,4 @@
-import type { Evidence } from "../../api/types";
+import type { Evidence, Thresholds } from "../../api/types";
 import { millimetres, plural, seconds } from "../../words/numbers";
 import { evidenceRows } from "./evidence-rows";
 
@@ -16,7 +16,7 @@ function remarks(evidence: Evidence): string {
 }
 
 /** The evidence at one moment as a table: the innovation record or a freeze frame. */
-export function EvidenceTable({ evidence }: { evidence: Evidence }) {
+export function EvidenceTable({ evidence, thresholds }: { evidence: Evidence; thresholds?: Thresholds[] }) {
   return (
     <>
       <div class="scroll" tabIndex={0} role="region" aria-label="Evidence at that time">
@@ -33,7 +33,7 @@ export function EvidenceTable({ evidence }: { evidence: Evidence }) {
             </tr>
           </thead>
           <tbody>
-            {evidenceRows(evidence).map(({ name, cells }) => (
+            {evidenceRows(evidence, thresholds).map(({ name, cells }) => (
               <tr>
                 <th scope="row">{name}</th>
                 {cells.map(({ text, isBeyondLimit }) => (

@@ -7,7 +7,8 @@ import { seconds } from "../../words/numbers";
 import type { Shown } from "./use-shown";
 import type { DetailLoader } from "./use-detail";
 import type { Playback } from "./use-playback";
-import { panned, visibleRange, zoomRange } from "./visible-range";
+import { useZoom } from "./use-zoom";
+import { visibleRange } from "./visible-range";
 
 /** Charts are drawn in every second frame: they move by less than a pixel per frame. */
 const CHART_EVERY = 2;
@@ -37,8 +38,10 @@ export function usePlaybackCharts({ buffer, stride, detail, marks, playback: { t
   const group = useMemo(() => new ChartGroup(), []);
   /** Time span of the charts, s; 0 for the whole recording. */
   const [span, setSpan] = useState<number>(30);
+  const first = buffer?.first ?? 0;
+  const last = buffer?.last ?? 0;
   /** The range that was zoomed to, instead of one around the current time. */
-  const [zoom, setZoom] = useState<[number, number]>();
+  const { zoom, zoomTo, pan } = useZoom(first, last);
   const slider = useRef<HTMLInputElement>(null);
   const clock = useRef<HTMLOutputElement>(null);
   const resolution = useRef<HTMLParagraphElement>(null);
@@ -60,11 +63,9 @@ export function usePlaybackCharts({ buffer, stride, detail, marks, playback: { t
       resolution.current.dataset["resolution"] = detail && source === buffer ? "thinned" : "full";
   });
   const chooseSpan = (next: number) => {
-    setZoom(undefined);
+    zoomTo(undefined);
     setSpan(next);
   };
-  const first = buffer?.first ?? 0;
-  const last = buffer?.last ?? 0;
   return {
     group,
     span,
@@ -73,8 +74,8 @@ export function usePlaybackCharts({ buffer, stride, detail, marks, playback: { t
     clock,
     resolution,
     zoom,
-    zoomTo: (range: [number, number] | undefined) => setZoom(range && zoomRange(range, first, last)),
-    pan: (share: number) => setZoom((range) => range && panned(range, share, first, last)),
+    zoomTo,
+    pan,
     /** What is drawn now. */
     shown: (): Shown | undefined => {
       const { buffer: source, range } = drawn.current;
