@@ -1,4 +1,5 @@
 /** HTTP requests to the service. An error response is thrown as a `ProblemError` with its detail. */
+import { problemWords } from "../words/problem";
 import { announceUnauthenticated, withCredentials } from "./access";
 import type { Page, Problem } from "./types";
 
@@ -41,7 +42,8 @@ export function isUnreachable(error: unknown): boolean {
 export function errorText(error: unknown): string {
   if (isUnreachable(error))
     return "The service does not answer. The page updates when it is available again.";
-  return error instanceof Error ? error.message : String(error);
+  const words = error instanceof ProblemError && problemWords(error.problem);
+  return words || (error instanceof Error ? error.message : String(error));
 }
 
 export async function request<T>(path: string, init: RequestInit = {}): Promise<T> {
