@@ -2,28 +2,17 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
-import { imported, recordings } from "./rigs.mjs";
-import { ask, offbd, page, SOON, started } from "./support.mjs";
+import { calibrated, imported, recordings } from "./rigs.mjs";
+import { ask, offbd, page, started } from "./support.mjs";
 
 let work, service, chromium, rig;
-
-/** Calibrates the rig from `session` and uses the result. */
-async function learn(session) {
-  const calibrations = "/assets/bench/calibrations";
-  let job = await ask(service.url, "POST", calibrations, { sessions: [session] });
-  for (const until = Date.now() + 3 * SOON; job.state !== "done" && Date.now() < until;)
-    job = await ask(service.url, "GET", `${calibrations}/${job.id}`);
-  assert.equal(job.state, "done", job.error);
-  await ask(service.url, "POST", `${calibrations}/${job.id}/activate`);
-}
 
 started(async (made) => {
   ({ work, service, chromium } = made);
   rig = recordings(work);
   await ask(service.url, "POST", "/assets", { name: "bench" });
   const session = await imported(service.url, "bench", "healthy", rig.healthy);
-  await learn(session.id);
-  await learn(session.id);
+  for (let i = 0; i < 2; i++) await calibrated(service.url, "bench", session.id);
 });
 
 test("the calibrations are listed with their fit, and an earlier one is used again", async () => {
