@@ -109,7 +109,7 @@ test("sliders show the alarms that other limits and debounce times would raise",
   const table = view.getByRole("region", { name: "Limits and debounce times" });
   const cut = await table.evaluate((box) => box.scrollWidth - box.clientWidth);
   assert.ok(cut <= 0, `${cut} px of the alarms are off the screen of a phone`);
-  await view.getByRole("button", { name: "As set" }).click();
+  await view.getByRole("button", { name: "Reset" }).click();
   await row.getByText("0 alarms").waitFor({ state: "detached" });
   assert.deepEqual(view.errors, []);
   await view.done();

@@ -8,7 +8,7 @@ function remarks(evidence: Evidence): string {
   const healthy = healthy_scatter_m ? ` (healthy: ${millimetres(healthy_scatter_m, 2)})` : "";
   const jumped = jump ? `; readings jumped by ${millimetres(jump.size_m, 0)} at ${seconds(jump.t_s)}` : "";
   return (
-    `Estimation window ${seconds(evidence.window_s)}; ball not seen for ${seconds(evidence.unseen_s)}; ` +
+    `Averaged over ${seconds(evidence.window_s)}; ball not seen for ${seconds(evidence.unseen_s)}; ` +
     `readings identical for ${seconds(evidence.identical_s)}; ball at rest for ${seconds(evidence.still_s)}; ` +
     `${plural(evidence.outliers, "outlier")} in 10 s; ` +
     `scatter ${millimetres(evidence.scatter_m, 2)}${healthy}${jumped}.`

@@ -32,7 +32,7 @@ export function FaultReport({ name, code }: { name: string; code: FaultCode }) {
     <ReportFrame title={`${faultTitle(code, kind)} of ${name}`} back={faultPath(name, code)}>
       <FaultSummary fault={fault.data} history={history.data?.items ?? []} />
       <AdviceCard fault={fault.data} />
-      <Facts facts={faultFacts(fault.data)} />
+      <Facts facts={faultFacts(fault.data, true)} />
       {last_occurrence && <ReportCharts fault={fault.data} moment={moment} />}
       {freeze_frame && (
         <section>
