@@ -103,10 +103,10 @@ const REFUSED = (session) => [
   ["/alarms", ["Acknowledge", "Add a note"]],
   ["/rigs/bench-1/set-up?step=check", ["Positions are in mm", "Commands are in degrees"]],
   [`/sessions/${session}`, ["Keep for this moment", "Judge again"]],
-  ["/learn", ["Repair all", "Resume the script", "Inject: Y servo, dead"]],
+  ["/learn", ["Repair all", "Resume the script", /^Inject: Y servo, dead/]],
 ];
 
-/** A session with a fault of the sensor, a muted monitor, and readings of a device with other units. */
+/** A session with a fault of the sensor, a muted monitor, and readings of a device with other units: 4 m, 172°. */
 async function prepareForViewer() {
   const session = await imported("sick", "--fault", "sensor:frozen@4");
   const until = new Date(Date.now() + 3_600_000).toISOString();
@@ -116,8 +116,8 @@ async function prepareForViewer() {
     t_s: 1 + i / 100,
     cmd_qx_rad: 3,
     cmd_qy_rad: 3,
-    x_m: 30,
-    y_m: 30,
+    x_m: i / 50,
+    y_m: i / 50,
   }));
   const sent = await asks("POST", "/assets/bench-1/telemetry", admin, { samples });
   assert.equal((await sent.json()).accepted, samples.length);

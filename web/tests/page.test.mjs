@@ -153,7 +153,7 @@ test("the description of the API opens beside the page", async () => {
   await view.goto(service.url);
   const opened = view.context().waitForEvent("page");
   await view.getByRole("link", { name: "API", exact: true }).click();
-  assert.match((await opened).url(), /\/docs\/$/);
+  await (await opened).waitForURL(/\/docs\/$/);
   await view.getByText("bench").first().waitFor();
   await view.done();
 });
