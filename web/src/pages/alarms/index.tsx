@@ -28,8 +28,8 @@ export function AlarmsPage() {
       <header class="page-head">
         <h1>Alarms</h1>
         <div class="page-tools">
-          <SavedViews page="/alarms" />
           <Link to="/notifications">Who is told</Link>
+          <SavedViews page="/alarms" />
           <AcknowledgeTools open={open} acknowledge={acknowledge} />
         </div>
       </header>
