@@ -5,6 +5,9 @@ import { after, test } from "node:test";
 import { imported, recordings } from "./rigs.mjs";
 import { ask, page, started } from "./support.mjs";
 
+/** The label of the field for the name that is recorded with an action. */
+const ACTOR = "Your name, recorded with the action";
+
 let work, service, chromium, receiver;
 const received = [];
 
@@ -33,8 +36,9 @@ test("alarms from before the page was opened are listed and acknowledged togethe
   await view.goto(`${service.url}/alarms`);
   for (const rig of ["bench", "shelf"])
     await view.getByRole("checkbox", { name: new RegExp(`X servo.* of ${rig}`) }).check();
+  await view.getByLabel(ACTOR).fill("ada");
   await view.getByRole("button", { name: "Acknowledge 2" }).click();
-  await view.getByText("dashboard,").nth(1).waitFor();
+  await view.getByText("ada,").nth(1).waitFor();
   for (const rig of ["bench", "shelf"]) {
     const fault = await ask(service.url, "GET", `/assets/${rig}/faults/x_servo`);
     assert.equal(fault.acknowledged, true, rig);
@@ -54,14 +58,24 @@ test("what to do is told, and the owner's note is kept", async () => {
   await row.getByText("What to do").click();
   await row.getByText("power").first().waitFor();
   await row.getByRole("button", { name: "Add a note" }).click();
-  await row.getByRole("textbox").fill("Spare horns are in the drawer.");
+  await row.getByRole("textbox", { name: "Note on every fault" }).fill("Spare horns are in the drawer.");
+  await row.getByLabel(ACTOR).fill("ada");
   await row.getByRole("button", { name: "Keep" }).click();
   await row.getByText("Spare horns are in the drawer.").waitFor();
   const { notes } = await ask(service.url, "GET", "/advice");
   assert.deepEqual(
-    notes.map(({ code, text }) => [code, text]),
-    [["x_servo", "Spare horns are in the drawer."]],
+    notes.map(({ code, text, by }) => [code, text, by]),
+    [["x_servo", "Spare horns are in the drawer.", "ada"]],
   );
+  // The pages of the fault, to which every link leads, tell the same.
+  for (const path of ["/rigs/bench/faults/x_servo", "/rigs/bench/faults/x_servo/report"]) {
+    await view.goto(service.url + path);
+    await view.getByRole("heading", { name: "What to do" }).waitFor();
+    await view.getByRole("listitem").getByText("power").first().waitFor();
+    await view.getByText("Spare horns are in the drawer.").waitFor();
+  }
+  await view.emulateMedia({ media: "print" });
+  assert.equal(await view.getByRole("button", { name: "Edit the note" }).isVisible(), false);
   await view.done();
 });
 
@@ -103,14 +117,37 @@ test("on a phone, nothing of a channel, rule or message is off the screen", asyn
   await view.done();
 });
 
+test("a rule and a channel are deleted after a question", async () => {
+  const view = await page(chromium);
+  await view.goto(`${service.url}/notifications`);
+  for (const [kind, name] of [
+    ["rule", "everything"],
+    ["channel", "workshop"],
+  ]) {
+    const listed = async () => (await ask(service.url, "GET", `/notifications/${kind}s`)).items.length;
+    const dialog = view.getByRole("dialog", { name: `Delete the ${kind} ${name}?` });
+    await view.getByRole("button", { name: `Delete ${name}` }).click();
+    await dialog.getByRole("button", { name: "Cancel" }).click();
+    await dialog.waitFor({ state: "detached" });
+    assert.equal(await listed(), 1);
+    await view.getByRole("button", { name: `Delete ${name}` }).click();
+    await dialog.getByRole("button", { name: "Delete" }).click();
+    await view.getByRole("button", { name: `Delete ${name}` }).waitFor({ state: "detached" });
+    assert.equal(await listed(), 0);
+  }
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});
+
 test("a muted monitor is shown as not tested by whom, never as passed", async () => {
   await ask(service.url, "POST", "/assets/bench/sessions", { name: "tuesday" });
   const view = await page(chromium);
   await view.goto(`${service.url}/rigs/bench`);
   await view.getByRole("button", { name: "Mute Y servo" }).click();
   await view.getByLabel("Why").fill("new horn");
+  await view.getByRole("dialog").getByLabel(ACTOR).fill("ada");
   await view.getByRole("dialog").getByRole("button", { name: "Mute", exact: true }).click();
-  await view.getByText("not tested (muted by dashboard)").waitFor();
+  await view.getByText("not tested (muted by ada)").waitFor();
   await view.getByRole("button", { name: /End the mute of Y servo/ }).waitFor();
   await view.goto(service.url);
   await view.getByText("Y servo not tested", { exact: true }).waitFor();

@@ -1,28 +1,18 @@
 // The page with the calibrations of a rig.
 import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
 import { test } from "node:test";
-import { imported, recordings } from "./rigs.mjs";
-import { ask, page, SOON, started } from "./support.mjs";
+import { calibrated, imported, recordings } from "./rigs.mjs";
+import { ask, offbd, page, started } from "./support.mjs";
 
-let work, service, chromium;
-
-/** Calibrates the rig from `session` and uses the result. */
-async function learn(session) {
-  const calibrations = "/assets/bench/calibrations";
-  let job = await ask(service.url, "POST", calibrations, { sessions: [session] });
-  for (const until = Date.now() + 3 * SOON; job.state !== "done" && Date.now() < until;)
-    job = await ask(service.url, "GET", `${calibrations}/${job.id}`);
-  assert.equal(job.state, "done", job.error);
-  await ask(service.url, "POST", `${calibrations}/${job.id}/activate`);
-}
+let work, service, chromium, rig;
 
 started(async (made) => {
   ({ work, service, chromium } = made);
-  const { healthy } = recordings(work);
+  rig = recordings(work);
   await ask(service.url, "POST", "/assets", { name: "bench" });
-  const session = await imported(service.url, "bench", "healthy", healthy);
-  await learn(session.id);
-  await learn(session.id);
+  const session = await imported(service.url, "bench", "healthy", rig.healthy);
+  for (let i = 0; i < 2; i++) await calibrated(service.url, "bench", session.id);
 });
 
 test("the calibrations are listed with their fit, and an earlier one is used again", async () => {
@@ -51,6 +41,21 @@ test("the calibrations are listed with their fit, and an earlier one is used aga
     items.map(({ active }) => active),
     items.map((_, i) => i === n - 1),
   );
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});
+
+test("the fit over a long session says that moments are left out", async () => {
+  const long = rig.path("long.csv");
+  offbd("simulate", "--seconds", "400", "-o", long);
+  await imported(service.url, "bench", "long", readFileSync(long, "utf8"));
+  const view = await page(chromium);
+  await view.goto(`${service.url}/rigs/bench/calibrations`);
+  await view.getByLabel("Session").selectOption({ label: "long" });
+  await view.getByText("one of 2 judged moments is drawn and counted").waitFor();
+  await view.getByLabel("Session").selectOption({ label: "healthy" });
+  await view.getByText(/^Thinned/).waitFor({ state: "detached" });
+  await view.getByText(/^Along x the residual is/).waitFor();
   assert.deepEqual(view.errors, []);
   await view.done();
 });

@@ -1,14 +1,15 @@
 // The page that compares two sessions.
 import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import { imported, recordings } from "./rigs.mjs";
-import { ask, page, started } from "./support.mjs";
+import { ask, offbd, page, started } from "./support.mjs";
 
-let work, service, chromium;
+let work, service, chromium, rig;
 
 started(async (made) => {
   ({ work, service, chromium } = made);
-  const rig = recordings(work);
+  rig = recordings(work);
   await ask(service.url, "POST", "/assets", { ...rig.learnt, name: "bench" });
   for (const name of ["healthy", "sick"]) await imported(service.url, "bench", name, rig[name]);
 });
@@ -29,6 +30,21 @@ test("two sessions of the list are compared on one time axis", async () => {
   await view.waitForURL(/shift=2\.5/);
   await view.getByLabel("Axis").selectOption("y");
   assert.equal(await view.getByRole("img", { name: /^Residual along y/ }).count(), 2);
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});
+
+test("a recording of which moments are left out says so", async () => {
+  const long = rig.path("long.csv");
+  offbd("simulate", "--seconds", "400", "-o", long);
+  const { id } = await imported(service.url, "bench", "long", readFileSync(long, "utf8"));
+  const { items } = await ask(service.url, "GET", "/sessions");
+  const other = items.find(({ name }) => name === "sick").id;
+  const view = await page(chromium);
+  await view.goto(`${service.url}/compare?a=${id}&b=${other}`);
+  const cards = view.locator(".compared > section").filter({ has: view.getByRole("img") });
+  await cards.filter({ hasText: "long" }).getByText("one of 2 judged moments is drawn").waitFor();
+  assert.equal(await view.getByText(/^Thinned/).count(), 1);
   assert.deepEqual(view.errors, []);
   await view.done();
 });

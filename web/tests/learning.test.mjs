@@ -41,7 +41,7 @@ test("motion is gathered, a calibration offered and confirmed", async () => {
   assert.ok(Number(await bar.getAttribute("value")) > early, "the bar follows");
 
   await send("new", 5000, 7000);
-  await view.getByRole("heading", { name: "Ready: was the rig healthy?" }).waitFor();
+  await view.getByRole("heading", { name: "Was the rig healthy while it was recorded?" }).waitFor();
   await panel(view).getByRole("link", { name: "first" }).waitFor();
   await panel(view).getByRole("button", { name: "Yes, use what was learnt" }).click();
   await view.getByRole("heading", { name: "Learnt automatically" }).waitFor();

@@ -36,6 +36,18 @@ const asks = (method, path, token, body) =>
     body: JSON.stringify(body),
   });
 
+/** Simulates a session, imports it, and returns its id. */
+async function imported(name, ...options) {
+  const file = join(work, `${name}.csv`);
+  offbd("simulate", "--seconds", "10", ...options, "-o", file);
+  const answer = await fetch(`${service.url}/api/v1/assets/bench-1/sessions/import?name=${name}`, {
+    method: "POST",
+    headers: { authorization: `Bearer ${admin}`, "content-type": "text/csv" },
+    body: readFileSync(file),
+  });
+  return (await answer.json()).session.id;
+}
+
 test("without authentication, only the login is shown", async () => {
   await view.getByLabel("Token").waitFor();
   assert.doesNotMatch(await view.textContent("body"), /bench-1/);
@@ -78,31 +90,68 @@ test("a device's snippet shows a token of its own", async () => {
 
 test("a token names the user, who is not asked for a name", async () => {
   const before = view.url();
-  const file = join(work, "short.csv");
-  offbd("simulate", "--seconds", "10", "-o", file);
-  const imported = await fetch(`${service.url}/api/v1/assets/bench-1/sessions/import?name=short`, {
-    method: "POST",
-    headers: { authorization: `Bearer ${admin}`, "content-type": "text/csv" },
-    body: readFileSync(file),
-  });
-  await view.goto(`${service.url}/sessions/${(await imported.json()).session.id}`);
+  await view.goto(`${service.url}/sessions/${await imported("short")}`);
   await view.getByLabel("Remark", { exact: true }).waitFor();
   assert.equal(await view.getByLabel("Your name, recorded with the action").count(), 0);
   await view.goto(before);
 });
 
+/** The views with actions, each with the names of the buttons that a viewer may not press. */
+const REFUSED = (session) => [
+  ["/rigs/bench-1", ["End session", "Mute Y servo", /^End the mute of X servo/]],
+  ["/rigs/bench-1/faults/sensor", ["Acknowledge", "Clear"]],
+  ["/alarms", ["Acknowledge", "Add a note"]],
+  ["/rigs/bench-1/set-up?step=check", ["Positions are in mm", "Commands are in degrees"]],
+  [`/sessions/${session}`, ["Keep for this moment", "Judge again"]],
+  ["/learn", ["Repair all", "Resume the script", /^Inject: Y servo, dead/]],
+];
+
+/** A session with a fault of the sensor, a muted monitor, and readings of a device with other units: 4 m, 172°. */
+async function prepareForViewer() {
+  const session = await imported("sick", "--fault", "sensor:frozen@4");
+  const until = new Date(Date.now() + 3_600_000).toISOString();
+  await asks("PUT", "/assets/bench-1/mutes/x_servo", admin, { reason: "new horn", until });
+  const samples = Array.from({ length: 200 }, (_, i) => ({
+    seq: i + 10,
+    t_s: 1 + i / 100,
+    cmd_qx_rad: 3,
+    cmd_qy_rad: 3,
+    x_m: i / 50,
+    y_m: i / 50,
+  }));
+  const sent = await asks("POST", "/assets/bench-1/telemetry", admin, { samples });
+  assert.equal((await sent.json()).accepted, samples.length);
+  return session;
+}
+
+/** Lets the page see a service that is a demo. */
+async function asDemo(view) {
+  const health = await (await fetch(`${service.url}/healthz`)).json();
+  await view.route("**/healthz", (route) => route.fulfill({ json: { ...health, demo: true } }));
+  const demo = { asset: "bench-1", script: false, broken: [], buttons: ["y_servo:dead"] };
+  await view.route("**/api/v1/demo", (route) => route.fulfill({ json: demo }));
+}
+
 test("an action that a viewer may not do is disabled and says which role it needs", async () => {
   const made = await asks("POST", "/tokens", admin, { name: "vi", role: "viewer" });
   const { secret } = await made.json();
-  await asks("POST", "/assets/bench-1/telemetry", admin, { samples: [{ t_s: 0, x_m: 0, y_m: 0 }] });
+  const session = await prepareForViewer();
   const viewers = await page(chromium);
+  await asDemo(viewers);
   await viewers.goto(`${service.url}/rigs/bench-1`);
   await viewers.getByLabel("Token").fill(secret);
   await viewers.getByRole("button", { name: "Log in" }).click();
-  const end = viewers.getByRole("button", { name: "End session" });
-  await end.waitFor();
-  assert.equal(await end.getAttribute("title"), "Needs the role operator; yours is viewer.");
-  assert.ok(await end.isDisabled());
+  await viewers.getByText("vi", { exact: true }).waitFor();
+  for (const [path, names] of REFUSED(session)) {
+    await viewers.goto(service.url + path);
+    for (const name of names) {
+      const button = viewers.getByRole("button", { name, exact: true, includeHidden: true }).first();
+      await button.waitFor({ state: "attached" });
+      const title = await button.getAttribute("title");
+      assert.equal(title, "Needs the role operator; yours is viewer.", `${path}: ${name}`);
+      assert.ok(await button.isDisabled(), `${path}: ${name}`);
+    }
+  }
   assert.deepEqual(
     viewers.errors.filter((error) => !error.includes("401")),
     [],

@@ -5,7 +5,7 @@ import { get } from "node:http";
 import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { brotliDecompressSync } from "node:zlib";
-import { imported, recordings } from "./rigs.mjs";
+import { calibrated, imported, recordings } from "./rigs.mjs";
 import { ask, page, started } from "./support.mjs";
 
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
@@ -17,9 +17,12 @@ let work, service, chromium, session;
 
 started(async (made) => {
   ({ work, service, chromium } = made);
-  const { learnt, sick } = recordings(work);
+  const { learnt, sick, healthy } = recordings(work);
   await ask(service.url, "POST", "/assets", { ...learnt, name: "bench" });
   session = await imported(service.url, "bench", "monday", sick);
+  await ask(service.url, "POST", "/assets", { name: "taught" });
+  const { id } = await imported(service.url, "taught", "healthy", healthy);
+  await calibrated(service.url, "taught", id);
 });
 
 const fetched = (path, headers = {}) =>
@@ -90,8 +93,9 @@ const VIEWS = () => [
   ["/rigs/bench", "Monitors"],
   ["/rigs/bench/faults/x_servo", "Freeze frame"],
   ["/rigs/bench/faults/sensor", "Nothing is on record"],
+  ["/rigs/taught/calibrations", "Along x the residual is"],
   ["/sessions", "monday"],
-  [`/sessions/${session.id}`, "Judge it again"],
+  [`/sessions/${session.id}`, "Judge again"],
   [`/compare?a=${session.id}&b=${session.id}`, "Compare sessions"],
   [`/sessions/${session.id}/report`, "Calibration and certificate"],
   ["/rigs/bench/faults/x_servo/report", "Calibration and certificate"],
@@ -143,6 +147,16 @@ for (const width of [320, 720, 768])
     }
     await view.done();
   });
+
+test("the description of the API opens beside the page", async () => {
+  const view = await page(chromium);
+  await view.goto(service.url);
+  const opened = view.context().waitForEvent("page");
+  await view.getByRole("link", { name: "API", exact: true }).click();
+  await (await opened).waitForURL(/\/docs\/$/);
+  await view.getByText("bench").first().waitFor();
+  await view.done();
+});
 
 test("an unknown rig, fault or session gives a message", async () => {
   const view = await page(chromium);

@@ -1,7 +1,8 @@
 // Rigs and their recordings, simulated by the program.
+import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
-import { ask, offbd } from "./support.mjs";
+import { ask, offbd, SOON } from "./support.mjs";
 
 /** A learnt rig, and a session in which its x servo dies at 20 s. */
 export function recordings(where) {
@@ -33,6 +34,16 @@ export function recordings(where) {
 export async function imported(base, asset, name, text) {
   const path = `/assets/${asset}/sessions/import?name=${name}`;
   return (await ask(base, "POST", path, text, "text/csv")).session;
+}
+
+/** Calibrates a rig from a session and uses the result. */
+export async function calibrated(base, asset, session) {
+  const calibrations = `/assets/${asset}/calibrations`;
+  let job = await ask(base, "POST", calibrations, { sessions: [session] });
+  for (const until = Date.now() + 3 * SOON; job.state !== "done" && Date.now() < until;)
+    job = await ask(base, "GET", `${calibrations}/${job.id}`);
+  assert.equal(job.state, "done", job.error);
+  await ask(base, "POST", `${calibrations}/${job.id}/activate`);
 }
 
 /** Registers a learnt rig whose x servo loses 2 % of its gain with each of `n` sessions. */

@@ -140,17 +140,11 @@ try {
   await shoot(of, "sessions", `${base}/sessions`, heading("Sessions"), (view) =>
     view.getByText("monday").first().waitFor(),
   );
-  await shoot(
-    of,
-    "session",
-    `${base}/sessions/${monday.id}?t=19`,
-    heading("Judge it again"),
-    async (view) => {
-      await view.getByRole("button", { name: "Play" }).waitFor();
-      await view.getByRole("button", { name: "Judge again" }).click();
-      await view.getByText("Another verdict").waitFor();
-    },
-  );
+  await shoot(of, "session", `${base}/sessions/${monday.id}?t=19`, heading("Judge again"), async (view) => {
+    await view.getByRole("button", { name: "Play" }).waitFor();
+    await view.getByRole("button", { name: "Judge again" }).click();
+    await view.getByText("Another verdict").waitFor();
+  });
   await shoot(of, "import", `${base}/sessions`, heading("Sessions"), async (view) => {
     await view.getByText("monday").first().waitFor();
     await view.locator("input[type=file]").setInputFiles(path("sick.csv"));

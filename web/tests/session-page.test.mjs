@@ -70,8 +70,12 @@ test("of a long session, the shown part is fetched with every judged moment", as
   await view.goto(`${service.url}/sessions/${session.id}?t=200`);
   assert.equal((await (await part).json()).stride, 1);
   await view.getByText("Every judged moment is drawn").waitFor();
+  await view.getByText("Histogram of the residual").click();
+  await view.getByRole("img", { name: /Histogram of the residual along x: .* judged moments/ }).waitFor();
   await view.getByRole("combobox", { name: "Show" }).selectOption({ label: "all" });
   await view.getByText(/Thinned: one of \d+ judged moments is drawn/).waitFor();
+  await view.getByText(/Thinned: one of \d+ judged moments is counted/).waitFor();
+  await view.getByRole("img", { name: /Histogram of the residual along x: .* counted moments/ }).waitFor();
   assert.deepEqual(view.errors, []);
   await view.done();
 });
@@ -105,7 +109,7 @@ test("sliders show the alarms that other limits and debounce times would raise",
   const table = view.getByRole("region", { name: "Limits and debounce times" });
   const cut = await table.evaluate((box) => box.scrollWidth - box.clientWidth);
   assert.ok(cut <= 0, `${cut} px of the alarms are off the screen of a phone`);
-  await view.getByRole("button", { name: "As set" }).click();
+  await view.getByRole("button", { name: "Reset" }).click();
   await row.getByText("0 alarms").waitFor({ state: "detached" });
   assert.deepEqual(view.errors, []);
   await view.done();

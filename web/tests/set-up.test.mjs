@@ -98,6 +98,17 @@ test("described, connected, corrected, learnt", async () => {
   await view.done();
 });
 
+test("a name that is taken is refused in words for people", async () => {
+  await ask(service.url, "POST", "/assets", { name: "taken" });
+  const view = await page(chromium);
+  await view.goto(`${service.url}/set-up`);
+  await view.getByLabel("Name").fill("taken");
+  await view.getByRole("button", { name: "Register and continue" }).click();
+  await view.getByText("There is a rig of this name already").waitFor();
+  assert.doesNotMatch(await view.textContent("main"), /\/api\/|asset/);
+  await view.done();
+});
+
 test("a recording without motion is refused with a message", async () => {
   await ask(service.url, "POST", "/assets", { name: "still" });
   const lines = Array.from({ length: 3000 }, (_, i) => `${(i / 100).toFixed(2)},0,0,0.01,0.01`);

@@ -1,4 +1,5 @@
 /** HTTP requests to the service. An error response is thrown as a `ProblemError` with its detail. */
+import { problemWords } from "../words/problem";
 import { announceUnauthenticated, withCredentials } from "./access";
 import type { Page, Problem } from "./types";
 
@@ -29,6 +30,9 @@ export const isUnauthenticated = (error: unknown) => error instanceof ProblemErr
 /** Whether what was asked for does not exist. */
 export const isNotFound = (error: unknown) => error instanceof ProblemError && error.status === 404;
 
+/** Whether the service has too much to do now; the same request may succeed soon. */
+export const isBusy = (error: unknown) => error instanceof ProblemError && error.status === 429;
+
 /** Whether the service could not be reached or did not answer in time. */
 export function isUnreachable(error: unknown): boolean {
   return error instanceof TypeError || (error instanceof DOMException && error.name === "TimeoutError");
@@ -38,7 +42,8 @@ export function isUnreachable(error: unknown): boolean {
 export function errorText(error: unknown): string {
   if (isUnreachable(error))
     return "The service does not answer. The page updates when it is available again.";
-  return error instanceof Error ? error.message : String(error);
+  const words = error instanceof ProblemError && problemWords(error.problem);
+  return words || (error instanceof Error ? error.message : String(error));
 }
 
 export async function request<T>(path: string, init: RequestInit = {}): Promise<T> {

@@ -28,7 +28,9 @@ export function App() {
         </Suspense>
       </div>
       <footer>
-        <a href="/docs/">API</a>
+        <a href="/docs/" target="_blank" rel="noopener">
+          API
+        </a>
         <a href="/openapi.yaml">openapi.yaml</a>
         <a href="/metrics">Metrics</a>
         <span class="quiet">offbd {health.data?.version}</span>

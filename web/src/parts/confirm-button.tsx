@@ -11,18 +11,28 @@ interface Props {
   question: string;
   action: () => Promise<unknown>;
   needs?: NeededRole;
+  class?: string;
+  /** What a screen reader says instead of the word of the button. */
+  label?: string;
   /** What will happen. */
   children: ComponentChildren;
 }
 
 /** A button whose action is carried out after a question. */
-export function ConfirmButton({ word, question, action, needs, children }: Props) {
+export function ConfirmButton({ word, question, action, needs, class: className, label, children }: Props) {
   const [isAsking, setAsking] = useState(false);
   const refused = useRefusal(needs);
   const confirmed = () => action().then(() => setAsking(false));
   return (
     <>
-      <button type="button" disabled={refused !== undefined} title={refused} onClick={() => setAsking(true)}>
+      <button
+        type="button"
+        class={className}
+        disabled={refused !== undefined}
+        title={refused}
+        aria-label={label}
+        onClick={() => setAsking(true)}
+      >
         {word}
       </button>
       {isAsking && (

@@ -1,5 +1,5 @@
 // The logic of the pages of sessions, the demo and drive cycles.
-import { evidenceRows } from "../../src/pages/fault/evidence-rows.ts";
+import { decisiveNats, evidenceRows } from "../../src/pages/fault/evidence-rows.ts";
 import { firstSeen, playedOn } from "../../src/pages/session/playback-time.ts";
 import assert from "node:assert/strict";
 import { test } from "node:test";
@@ -170,11 +170,21 @@ test("a playback begins where the ball is first seen, unless that is late", () =
 
 test("in a freeze frame, what speaks for a fault is marked: the evidence, too", () => {
   const axis = { enabled: true, residual_m_s2: 0.204, limit_m_s2: 0.212, nats: 12.8 };
-  const marked = (x) =>
-    evidenceRows({ x, y: { limit_m_s2: 0.2 } })
+  const thresholds = [{ code: "x_servo", suspect_nats: 12, confirm_nats: 15.04 }];
+  const marked = (x, decided = thresholds) =>
+    evidenceRows({ x, y: { limit_m_s2: 0.2 } }, decided)
       .filter(({ cells }) => cells[0].isBeyondLimit)
       .map(({ name }) => name);
   assert.deepEqual(marked(axis), ["Weight of evidence for a servo fault"]);
   assert.deepEqual(marked({ ...axis, nats: 3, residual_m_s2: -0.3 }), ["Residual"]);
   assert.deepEqual(marked({ ...axis, nats: 3, residual_m_s2: -0.3, enabled: false }), []);
+  // Whatever the evidence is, only the values that applied decide.
+  assert.deepEqual(marked({ ...axis, nats: 11.9 }), []);
+  assert.deepEqual(marked(axis, [{ code: "x_servo", suspect_nats: null, confirm_nats: null }]), []);
+  assert.deepEqual(marked(axis, []), []);
+  assert.match(decisiveNats(thresholds), /of 12\snats and more \(confirmed from 15\) is red/);
+  const y = { code: "y_servo", suspect_nats: 10, confirm_nats: 13 };
+  assert.match(decisiveNats([...thresholds, y]), /along x and 10\snats.* along y/);
+  assert.match(decisiveNats([{ ...y, suspect_nats: null }]), /did not decide/);
+  assert.match(decisiveNats(undefined), /not known/);
 });

@@ -179,4 +179,7 @@ test("a refused description names the field of the form, and values in its unit"
   assert.equal(text, "Radius: −3\u202fmm is not above 0\u202fmm and at most 1000\u202fmm");
   assert.equal(refused("/name", "/name: is taken"), "Name: is taken");
   assert.equal(refused(undefined, "no element"), "no element");
+  const type = "urn:offbd:problem:asset-exists";
+  const detail = "asset `bench` already exists; replace it with PUT /api/v1/assets/bench";
+  assert.match(problemText(new ProblemError(409, { type, detail })), /^There is a rig of this name already/);
 });

@@ -4,6 +4,7 @@ import { test } from "node:test";
 import { TraceBuffer } from "../../src/live/buffer.ts";
 import { correlation, judgeSign } from "../../src/live/correlation.ts";
 import { compareSigns, correctedAxes, DEFAULT_AXES } from "../../src/live/signs.ts";
+import { servoArrows } from "../../src/parts/xy-trace/servo-arrows.ts";
 import { random } from "./random.mjs";
 
 const N = 1000;
@@ -94,4 +95,16 @@ test("the corrected axes make any wrong wiring agree", () => {
       JSON.stringify({ swap, x_sign, y_sign, corrected }),
     );
   }
+});
+
+test("the arrows of the servos point where gravity pulls the ball with a positive command", () => {
+  const toCanvas = (x, y) => [200 + 1000 * x, 100 - 1000 * y];
+  const [x, y] = servoArrows({ length: 0.38, width: 0.24, isRound: false }, toCanvas);
+  // Gravity in the plate frame: g·(cos qx sin qy, −sin qx); the y of the canvas points down.
+  const pulled = (qx, qy) => [Math.sign(Math.cos(qx) * Math.sin(qy)), Math.sign(Math.sin(qx))];
+  const direction = ({ from, to }) => [Math.sign(to[0] - from[0]), Math.sign(to[1] - from[1])];
+  assert.match(x.label, /^X servo.*qy/);
+  assert.deepEqual(direction(x), pulled(0, 0.1));
+  assert.match(y.label, /^Y servo.*qx/);
+  assert.deepEqual(direction(y), pulled(0.1, 0));
 });

@@ -33,7 +33,12 @@ export function AlarmRow({ alarm, now, advice, refetchAdvice, isChosen, toggle }
       </th>
       <td>
         <Link to={alarmPath(alarm)}>{alarmTitle(alarm)}</Link>
-        {advice && <WhatToDo alarm={alarm} advice={advice} refetch={refetchAdvice} />}
+        {advice && (
+          <details>
+            <summary>What to do</summary>
+            <WhatToDo fault={alarm} advice={advice} refetch={refetchAdvice} />
+          </details>
+        )}
         {evidence.reason && <p class="quiet small-text">Evidence: {evidence.reason}.</p>}
       </td>
       <td>

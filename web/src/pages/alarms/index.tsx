@@ -9,6 +9,7 @@ import { ErrorMessage } from "../../parts/error-message";
 import { Loading } from "../../parts/loading";
 import { SavedViews } from "../../parts/saved-views/saved-views";
 import { Link } from "../../router/link";
+import { AcknowledgeTools } from "./acknowledge-tools";
 import { AlarmTable } from "./alarm-table";
 import { AlarmTools } from "./alarm-tools";
 import { useAcknowledge } from "./use-acknowledge";
@@ -27,11 +28,9 @@ export function AlarmsPage() {
       <header class="page-head">
         <h1>Alarms</h1>
         <div class="page-tools">
-          <SavedViews page="/alarms" />
           <Link to="/notifications">Who is told</Link>
-          <ActionButton class="primary" disabled={!open} action={acknowledge}>
-            Acknowledge {open || ""}
-          </ActionButton>
+          <SavedViews page="/alarms" />
+          <AcknowledgeTools open={open} acknowledge={acknowledge} />
         </div>
       </header>
       <AlarmTools filter={filter} hours={hours} change={change} />

@@ -1,6 +1,7 @@
 import { useState } from "preact/hooks";
 import { alarmApi, type AlarmCode } from "../../api/alarms";
 import { ActionButton } from "../../parts/action-button";
+import { ActorField, useActor } from "../../parts/actor-field";
 import { alarmCodeTitle } from "../../words/alarm";
 
 interface Props {
@@ -14,7 +15,9 @@ interface Props {
 /** Edits the owner's note on a fault. */
 export function NoteForm({ code, text, refetch, close }: Props) {
   const [draft, setDraft] = useState(text);
+  const actor = useActor();
   const save = async () => {
+    actor.remember();
     await alarmApi.putNote(code, draft);
     await refetch();
     close();
@@ -25,7 +28,8 @@ export function NoteForm({ code, text, refetch, close }: Props) {
         Note on every fault “{alarmCodeTitle(code)}”
         <textarea rows={3} maxLength={2000} value={draft} onInput={(e) => setDraft(e.currentTarget.value)} />
       </label>
-      <ActionButton class="small" action={save}>
+      <ActorField actor={actor} />{" "}
+      <ActionButton class="small" action={save} needs="operator">
         Keep
       </ActionButton>{" "}
       <button type="button" class="small" onClick={close}>

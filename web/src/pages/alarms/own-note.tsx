@@ -1,5 +1,6 @@
 import { useState } from "preact/hooks";
 import type { Advice, AlarmCode } from "../../api/alarms";
+import { useRefusal } from "../../parts/login/rights";
 import { NoteForm } from "./note-form";
 
 interface Props {
@@ -11,6 +12,7 @@ interface Props {
 /** The owner's own note on a fault, which can be edited. */
 export function OwnNote({ code, advice, refetch }: Props) {
   const [isEdited, setEdited] = useState(false);
+  const refused = useRefusal("operator");
   const note = advice.notes.find((note) => note.code === code);
   if (isEdited) {
     return <NoteForm code={code} text={note?.text ?? ""} refetch={refetch} close={() => setEdited(false)} />;
@@ -22,7 +24,13 @@ export function OwnNote({ code, advice, refetch }: Props) {
           {note.text} <span class="quiet">({note.by})</span>{" "}
         </span>
       )}
-      <button type="button" class="link" onClick={() => setEdited(true)}>
+      <button
+        type="button"
+        class="link no-print"
+        disabled={refused !== undefined}
+        title={refused}
+        onClick={() => setEdited(true)}
+      >
         {note ? "Edit the note" : "Add a note"}
       </button>
     </p>

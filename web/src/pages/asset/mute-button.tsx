@@ -1,8 +1,10 @@
 import { useState } from "preact/hooks";
 import { alarmApi, type AlarmCode, type Mute } from "../../api/alarms";
 import { ActionButton } from "../../parts/action-button";
+import { ActorField, useActor } from "../../parts/actor-field";
 import { Choice } from "../../parts/choice";
 import { Dialog } from "../../parts/dialog";
+import { useRefusal } from "../../parts/login/rights";
 import { alarmCodeTitle } from "../../words/alarm";
 import { dateTime } from "../../words/time";
 
@@ -20,12 +22,14 @@ const hoursFromNow = (hours: number) => new Date(Date.now() + hours * 3_600_000)
 /** Mutes a monitor of a rig, or ends its mute. */
 export function MuteButton({ asset, code, mute }: { asset: string; code: AlarmCode; mute?: Mute | null }) {
   const [isOpen, setOpen] = useState(false);
+  const refused = useRefusal("operator");
   if (mute)
     return (
       <ActionButton
         class="small"
         label={`End the mute of ${alarmCodeTitle(code)}: ${mute.reason}, until ${dateTime(mute.until)}`}
         action={() => alarmApi.unmute(asset, code)}
+        needs="operator"
       >
         Unmute
       </ActionButton>
@@ -36,6 +40,8 @@ export function MuteButton({ asset, code, mute }: { asset: string; code: AlarmCo
         type="button"
         class="small"
         aria-label={`Mute ${alarmCodeTitle(code)}`}
+        disabled={refused !== undefined}
+        title={refused}
         onClick={() => setOpen(true)}
       >
         Mute
@@ -48,7 +54,9 @@ export function MuteButton({ asset, code, mute }: { asset: string; code: AlarmCo
 function MuteDialog({ asset, code, close }: { asset: string; code: AlarmCode; close: () => void }) {
   const [reason, setReason] = useState("");
   const [hours, setHours] = useState(8);
+  const actor = useActor();
   const save = async () => {
+    actor.remember();
     await alarmApi.mute(asset, code, reason.trim(), hoursFromNow(hours));
     close();
   };
@@ -66,7 +74,8 @@ function MuteDialog({ asset, code, close }: { asset: string; code: AlarmCode; cl
         <Choice<number> label="For" options={DURATIONS} value={hours} change={setHours} />
       </div>
       <div class="form-end">
-        <ActionButton class="primary" disabled={!reason.trim()} action={save}>
+        <ActorField actor={actor} />
+        <ActionButton class="primary" disabled={!reason.trim()} action={save} needs="operator">
           Mute
         </ActionButton>
       </div>

@@ -22,7 +22,7 @@ export function NowCard({ state }: { state?: State }) {
           ["Samples", count(state?.samples ?? 0)],
           ["Ball", `${millimetres(evidence?.x.position_m)}, ${millimetres(evidence?.y.position_m)}`],
           ["Command", `qx ${degrees(evidence?.y.command_rad)}, qy ${degrees(evidence?.x.command_rad)}`],
-          ["Estimation window", seconds(evidence?.window_s)],
+          ["Averaged over", seconds(evidence?.window_s)],
           ["Scatter of readings", millimetres(evidence?.scatter_m, 2)],
         ]}
       />

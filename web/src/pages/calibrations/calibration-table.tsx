@@ -20,29 +20,31 @@ export function CalibrationTable({ name, done, chosen, choose, sessions, refetch
   return (
     <section class="card">
       <h2>History</h2>
-      <table class="numbers">
-        <thead>
-          <tr>
-            {COLUMNS.map((word) => (
-              <th scope="col">{word}</th>
+      <div class="scroll" tabIndex={0} role="region" aria-label="History of the calibrations">
+        <table class="numbers">
+          <thead>
+            <tr>
+              {COLUMNS.map((word) => (
+                <th scope="col">{word}</th>
+              ))}
+            </tr>
+          </thead>
+          <tbody>
+            {done.map(({ job, n }) => (
+              <CalibrationRow
+                key={job.id}
+                name={name}
+                job={job}
+                n={n}
+                sessions={sessions}
+                isChosen={job.id === chosen}
+                choose={() => choose(job.id)}
+                refetch={refetch}
+              />
             ))}
-          </tr>
-        </thead>
-        <tbody>
-          {done.map(({ job, n }) => (
-            <CalibrationRow
-              key={job.id}
-              name={name}
-              job={job}
-              n={n}
-              sessions={sessions}
-              isChosen={job.id === chosen}
-              choose={() => choose(job.id)}
-              refetch={refetch}
-            />
-          ))}
-        </tbody>
-      </table>
+          </tbody>
+        </table>
+      </div>
     </section>
   );
 }

@@ -1,5 +1,6 @@
 import type { Trace } from "../../api/types";
 import { AXES } from "../../live/buffer";
+import { ThinnedNote } from "../../parts/charts/thinned-note";
 import { FitCharts } from "./fit-charts";
 import { fitSentence, residualRms } from "./residual";
 
@@ -18,8 +19,10 @@ export function Fit({ traces, before, after }: Props) {
     after: residualRms(traces.after, axis),
   }));
   const largest = Math.max(...rms.flatMap((of) => [of.before ?? 0, of.after ?? 0]));
+  const stride = Math.max(traces.before.stride, traces.after.stride);
   return (
     <>
+      <ThinnedNote stride={stride} use="drawn and counted" />
       {rms.map((of) => (
         <p>{fitSentence(of.axis, of.before, of.after)}</p>
       ))}

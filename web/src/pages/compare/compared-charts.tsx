@@ -4,6 +4,7 @@ import { TraceBuffer } from "../../live/buffer";
 import { ChartGroup } from "../../parts/charts/chart-group";
 import type { ChartKindName } from "../../parts/charts/chart-kinds";
 import { RigCharts } from "../../parts/charts/rig-charts";
+import { ThinnedNote } from "../../parts/charts/thinned-note";
 import { Link } from "../../router/link";
 import { sessionPath } from "../../router/paths";
 import { alignedMarks, alignedTrace } from "./align";
@@ -35,6 +36,7 @@ export function ComparedCharts({ recording, start, range, axis, kinds, onZoom }:
         <Link to={sessionPath(session.id)}>{session.name}</Link>
       </h2>
       <p class="quiet">{session.asset}</p>
+      <ThinnedNote stride={trace.stride} hint="The page of the session shows all of them." />
       <RigCharts group={group} kinds={kinds} axes={[axis]} height={130} onZoom={onZoom} />
     </section>
   );

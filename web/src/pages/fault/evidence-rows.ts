@@ -1,5 +1,6 @@
 /** The evidence at one moment as rows of a table with a column for each axis. */
-import type { Evidence } from "../../api/types";
+import type { Axis, Evidence, Thresholds } from "../../api/types";
+import { AXES } from "../../live/buffer";
 import { degrees, millimetres, NONE, number } from "../../words/numbers";
 
 type AxisEvidence = Evidence["x"];
@@ -16,9 +17,6 @@ const RESIDUAL = "Residual";
 const EVIDENCE = "Weight of evidence for a servo fault";
 const PATH = "Deviation from the twin's path over 2 s, RMS";
 
-/** Evidence from which a servo is suspected with the default settings, nats. */
-const SUSPECT_NATS = 10;
-
 const ROWS: [name: string, text: (axis: AxisEvidence) => string][] = [
   ["Command", (axis) => degrees(axis.command_rad, 2)],
   ["Position", (axis) => millimetres(axis.position_m)],
@@ -27,7 +25,7 @@ const ROWS: [name: string, text: (axis: AxisEvidence) => string][] = [
   ["Twin's acceleration", (axis) => acceleration(axis.twin_m_s2)],
   [RESIDUAL, (axis) => acceleration(axis.residual_m_s2)],
   ["Limit", (axis) => acceleration(axis.limit_m_s2)],
-  ["Gate", (axis) => (axis.enabled ? "open" : "closed")],
+  ["Under test", (axis) => (axis.enabled ? "yes" : "no")],
   [EVIDENCE, (axis) => number(axis.nats, 1, "nats")],
   [PATH, (axis) => millimetres(axis.path_error_m)],
   ["Largest deviation of a healthy rig", (axis) => millimetres(axis.path_limit_m)],
@@ -44,21 +42,33 @@ const ANSWER_ROWS: [name: string, text: (answer: Answer) => string][] = [
   ["Additional delay", (a) => estimate(a.delay_s * 1e3, a.delay_error_s * 1e3, 0, "ms")],
 ];
 
-/** Whether a value speaks for a fault: these are what a verdict on a servo is based on. */
-const SPEAKS_FOR_FAULT: Record<string, (axis: AxisEvidence) => boolean> = {
+/**
+ * Whether a value speaks for a fault: these are what a verdict on a servo is based on. `suspect` is the evidence
+ * from which the servo of the axis was suspected, nats, if evidence decided.
+ */
+const SPEAKS_FOR_FAULT: Record<string, (axis: AxisEvidence, suspect?: number | null) => boolean> = {
   [RESIDUAL]: (axis) => axis.enabled && Math.abs(axis.residual_m_s2 ?? 0) >= axis.limit_m_s2,
-  [EVIDENCE]: (axis) => (axis.nats ?? 0) >= SUSPECT_NATS,
+  [EVIDENCE]: (axis, suspect) => suspect != null && (axis.nats ?? 0) >= suspect,
   [PATH]: (axis) =>
     axis.path_error_m != null && axis.path_limit_m != null && axis.path_error_m > axis.path_limit_m,
 };
 
-export function evidenceRows({ x, y }: Evidence): { name: string; cells: Cell[] }[] {
+/** The values at which the monitor of the servo along an axis decided. */
+const ofServo = (thresholds: Thresholds[], axis: Axis) =>
+  thresholds.find(({ code }) => code === `${axis}_servo`);
+
+/** Returns the rows; `thresholds` are the values at which the monitors decided, as far as they are known. */
+export function evidenceRows(
+  { x, y }: Evidence,
+  thresholds: Thresholds[] = [],
+): { name: string; cells: Cell[] }[] {
   const axes = [x, y];
+  const suspect = AXES.map((axis) => ofServo(thresholds, axis)?.suspect_nats);
   const rows = ROWS.map(([name, text]) => ({
     name,
-    cells: axes.map((axis) => ({
+    cells: axes.map((axis, i) => ({
       text: text(axis),
-      isBeyondLimit: SPEAKS_FOR_FAULT[name]?.(axis) ?? false,
+      isBeyondLimit: SPEAKS_FOR_FAULT[name]?.(axis, suspect[i]) ?? false,
     })),
   }));
   if (!axes.some((axis) => axis.answer)) return rows;
@@ -67,4 +77,21 @@ export function evidenceRows({ x, y }: Evidence): { name: string; cells: Cell[] 
     cells: axes.map(({ answer }) => ({ text: answer ? text(answer) : NONE, isBeyondLimit: false })),
   }));
   return [...rows, ...answers];
+}
+
+const nats = (value: number) => `${Number(value.toFixed(1))}`;
+
+/** From which weight of evidence on servos were suspected and confirmed, as a sentence. */
+export function decisiveNats(thresholds?: Thresholds[]): string {
+  if (!thresholds) return "From which weight of evidence on a servo was suspected is not known any more.";
+  const texts = AXES.flatMap((axis) => {
+    const { suspect_nats: suspect, confirm_nats: confirm } = ofServo(thresholds, axis) ?? {};
+    return suspect == null || confirm == null
+      ? []
+      : [`${nats(suspect)}\u202fnats and more (confirmed from ${nats(confirm)})`];
+  });
+  const [x, y] = texts;
+  if (!x) return "The weight of evidence did not decide.";
+  const both = y && x !== y ? `${x} along x and ${y} along y` : x;
+  return `A weight of evidence of ${both} is red, too.`;
 }

@@ -1,4 +1,4 @@
-import type { Evidence } from "../../api/types";
+import type { Evidence, Thresholds } from "../../api/types";
 import { millimetres, plural, seconds } from "../../words/numbers";
 import { evidenceRows } from "./evidence-rows";
 
@@ -8,7 +8,7 @@ function remarks(evidence: Evidence): string {
   const healthy = healthy_scatter_m ? ` (healthy: ${millimetres(healthy_scatter_m, 2)})` : "";
   const jumped = jump ? `; readings jumped by ${millimetres(jump.size_m, 0)} at ${seconds(jump.t_s)}` : "";
   return (
-    `Estimation window ${seconds(evidence.window_s)}; ball not seen for ${seconds(evidence.unseen_s)}; ` +
+    `Averaged over ${seconds(evidence.window_s)}; ball not seen for ${seconds(evidence.unseen_s)}; ` +
     `readings identical for ${seconds(evidence.identical_s)}; ball at rest for ${seconds(evidence.still_s)}; ` +
     `${plural(evidence.outliers, "outlier")} in 10 s; ` +
     `scatter ${millimetres(evidence.scatter_m, 2)}${healthy}${jumped}.`
@@ -16,7 +16,7 @@ function remarks(evidence: Evidence): string {
 }
 
 /** The evidence at one moment as a table: the innovation record or a freeze frame. */
-export function EvidenceTable({ evidence }: { evidence: Evidence }) {
+export function EvidenceTable({ evidence, thresholds }: { evidence: Evidence; thresholds?: Thresholds[] }) {
   return (
     <>
       <div class="scroll" tabIndex={0} role="region" aria-label="Evidence at that time">
@@ -33,7 +33,7 @@ export function EvidenceTable({ evidence }: { evidence: Evidence }) {
             </tr>
           </thead>
           <tbody>
-            {evidenceRows(evidence).map(({ name, cells }) => (
+            {evidenceRows(evidence, thresholds).map(({ name, cells }) => (
               <tr>
                 <th scope="row">{name}</th>
                 {cells.map(({ text, isBeyondLimit }) => (

@@ -1,13 +1,15 @@
 import type { FaultEntry, HistoryEntry } from "../../api/types";
 import { ErrorMessage } from "../../parts/error-message";
+import { AdviceCard } from "./advice-card";
 import { AroundOccurrence } from "./around-occurrence";
 import { Causes } from "./causes";
-import { EvidenceTable } from "./evidence-table";
 import { FaultHeader } from "./fault-header";
 import { FaultSummary } from "./fault-summary";
+import { FreezeFrame } from "./freeze-frame";
 import { MonitorCard } from "./monitor-card";
 import { StatusByte } from "./status-byte";
 import { Timeline } from "./timeline";
+import { useFaultMoment } from "./use-fault-moment";
 
 interface Props {
   fault: FaultEntry;
@@ -18,6 +20,7 @@ interface Props {
 
 export function FaultDetails({ fault, history, error, refetch }: Props) {
   const { last_occurrence, freeze_frame } = fault;
+  const moment = useFaultMoment(fault);
   return (
     <main class="fault">
       <FaultHeader fault={fault} refetch={refetch} />
@@ -25,6 +28,7 @@ export function FaultDetails({ fault, history, error, refetch }: Props) {
       <FaultSummary fault={fault} history={history} />
       <div class="pair">
         <div class="column">
+          <AdviceCard fault={fault} />
           <Causes fault={fault} />
           <Timeline history={history} code={fault.code} />
         </div>
@@ -38,19 +42,10 @@ export function FaultDetails({ fault, history, error, refetch }: Props) {
           key={`${last_occurrence.session_id} ${fault.onset_s}`}
           fault={fault}
           session={last_occurrence.session_id}
+          moment={moment}
         />
       )}
-      {freeze_frame && (
-        <section class="card">
-          <h2>Freeze frame</h2>
-          <p class="quiet small-text">
-            The evidence at the first failure of the last occurrence. What speaks for a fault is red: a
-            residual beyond its limit, a weight of evidence of 10 nats and more (confirmed from 13, by
-            default), or a path that deviates more than a healthy one.
-          </p>
-          <EvidenceTable evidence={freeze_frame} />
-        </section>
-      )}
+      {freeze_frame && <FreezeFrame evidence={freeze_frame} moment={moment} />}
     </main>
   );
 }

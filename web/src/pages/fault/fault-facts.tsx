@@ -2,11 +2,11 @@
 import type { FaultEntry } from "../../api/types";
 import type { Fact } from "../../parts/facts";
 import { Link } from "../../router/link";
-import { sessionPath } from "../../router/paths";
+import { calibrationsPath, sessionPath } from "../../router/paths";
 import { plural, seconds } from "../../words/numbers";
 import { dateTime } from "../../words/time";
 
-export function faultFacts(fault: FaultEntry): Fact[] {
+export function faultFacts(fault: FaultEntry, isPrinted = false): Fact[] {
   const { axis, command, occurrences, failed_cycles, acknowledgement } = fault;
   const sessions = plural(failed_cycles ?? 0, "session");
   return [
@@ -14,7 +14,7 @@ export function faultFacts(fault: FaultEntry): Fact[] {
     ["Occurrences", `${occurrences} since the last clear, in ${sessions}`],
     ...occurrenceFacts("First", fault.first_occurrence, fault.first_onset_s),
     ...(occurrences > 1 ? occurrenceFacts("Last", fault.last_occurrence, fault.last_onset_s) : []),
-    ...settingsFacts(fault),
+    ...settingsFacts(fault, isPrinted),
     ["Acknowledged", doneBy(acknowledgement) ?? (occurrences ? "not yet" : "nothing to acknowledge")],
     ["Cleared", doneBy(fault.cleared) ?? "never"],
     ...recoveryFacts(fault),
@@ -39,15 +39,40 @@ function occurrenceFacts(
   return [[`${which} occurrence`, value]];
 }
 
-function settingsFacts({ last_occurrence }: FaultEntry): Fact[] {
+/** What the last occurrence was judged with; on paper, nothing is folded away. */
+function settingsFacts({ asset, last_occurrence }: FaultEntry, isPrinted: boolean): Fact[] {
   if (!last_occurrence) return [];
   const { calibration_id, settings_id } = last_occurrence;
+  const checksums = (
+    <>
+      settings <code>{settings_id}</code>
+      {calibration_id && (
+        <>
+          , calibration <code>{calibration_id}</code>
+        </>
+      )}
+    </>
+  );
   return [
     [
-      "Judged with calibration",
-      calibration_id ? <code>{calibration_id}</code> : "none: the rig was not learnt",
+      "Judged with",
+      calibration_id ? (
+        <Link to={calibrationsPath(asset)}>a calibration of this rig</Link>
+      ) : (
+        "no calibration: the rig was not learnt"
+      ),
     ],
-    ["Checksum of the settings", <code>{settings_id}</code>],
+    [
+      "Checksums",
+      isPrinted ? (
+        checksums
+      ) : (
+        <details>
+          <summary>of the settings{calibration_id && " and the calibration"}</summary>
+          {checksums}
+        </details>
+      ),
+    ],
   ];
 }
 

@@ -29,12 +29,22 @@ export function MonitorCard({ fault: { monitor, in_use } }: { fault: FaultEntry 
         facts={[
           ["In this session", sessionText(monitor)],
           ...(counter ? [["Fault detection counter", counter] satisfies [string, string]] : []),
-          ["Able to judge (in-use ratio)", ratioText(in_use)],
+          ["Able to judge", ratioText(in_use)],
         ]}
       />
       {ratio != null && ratio < LOW_RATIO && (
-        <p class="note">A low ratio means that the enable condition (the gate) is too strict for this rig.</p>
+        <p class="note">
+          It was rarely able to judge: the rig moves too little, or the conditions for a test are too strict
+          for it.
+        </p>
       )}
+      <details class="quiet small-text">
+        <summary>In the words of the standards</summary>
+        <p>
+          The share of the sessions with enough data is the in-use ratio of SAE J1979. The fault detection
+          counter is that of ISO 14229-1.
+        </p>
+      </details>
     </section>
   );
 }

@@ -1,11 +1,18 @@
 import { useEffect, useMemo } from "preact/hooks";
-import type { Axis, FaultRecording } from "../../api/types";
+import type { FaultEntry, FaultRecording, Trace } from "../../api/types";
 import { AXES, TraceBuffer } from "../../live/buffer";
 import { traceOfRecording } from "../../live/recording";
 import { ChartGroup } from "../../parts/charts/chart-group";
-import { RECORDED_CHARTS } from "../../parts/charts/chart-kinds";
+import { RECORDED_CHARTS, SESSION_CHARTS } from "../../parts/charts/chart-kinds";
 import type { Mark } from "../../parts/charts/overlays";
 import { RigCharts } from "../../parts/charts/rig-charts";
+import { ThinnedNote } from "../../parts/charts/thinned-note";
+import { ChartsOfMonitor, MonitorCharts } from "../session/monitor-charts";
+import { useZoom } from "../session/use-zoom";
+import { ZoomButtons } from "../session/zoom-buttons";
+import type { FaultMoment } from "./use-fault-moment";
+
+const HEIGHT = 150;
 
 function marksOf({ onset_s, failed_s, confirmed_s }: FaultRecording): Mark[] {
   const marks: Mark[] = [];
@@ -15,18 +22,65 @@ function marksOf({ onset_s, failed_s, confirmed_s }: FaultRecording): Mark[] {
   return marks;
 }
 
-/** The charts of a recording for the axis of its fault, or for both axes. */
-export function RecordingCharts({ recording, axis }: { recording: FaultRecording; axis?: Axis | null }) {
+/** The charts of a moment as a group, what they draw, and the range that was zoomed to. */
+function useMomentCharts({ recording, trace }: FaultMoment) {
   const group = useMemo(() => new ChartGroup(), []);
-  const buffer = useMemo(() => TraceBuffer.of(traceOfRecording(recording)), [recording]);
+  const buffer = useMemo(() => TraceBuffer.of(trace ?? traceOfRecording(recording)), [trace, recording]);
+  const { from_s, to_s, failed_s } = recording;
+  const first = Math.max(from_s, buffer.first);
+  const last = Math.min(to_s, Math.max(buffer.last, failed_s + 1));
+  const zoom = useZoom(first, last);
+  const [from, to] = zoom.zoom ?? [first, last];
+  useEffect(() => group.setMarks(marksOf(recording)), [group, recording]);
   useEffect(() => {
-    if (!buffer.t.length) return;
-    const { from_s, to_s, failed_s } = recording;
-    group.setMarks(marksOf(recording));
-    const end = Math.min(to_s, Math.max(buffer.last, failed_s + 1));
-    group.draw(buffer, [Math.max(from_s, buffer.first), end]);
-  }, [buffer, group, recording]);
-  if (!buffer.t.length) return <p class="quiet">The recording has no data in this range.</p>;
+    if (buffer.t.length) group.draw(buffer, [from, to]);
+  }, [group, buffer, from, to]);
+  return { group, zoom, isEmpty: !buffer.t.length };
+}
+
+interface Props {
+  moment: FaultMoment;
+  fault: FaultEntry;
+  /** Whether they are for paper, where nothing can be chosen. */
+  isPrinted?: boolean;
+}
+
+/** The charts of the moment of a fault, for its axis or for both, with the curves on which its monitor decided. */
+export function RecordingCharts({ moment, fault: { code, axis }, isPrinted }: Props) {
+  const { group, zoom, isEmpty } = useMomentCharts(moment);
+  if (isEmpty) return <p class="quiet">The recording has no data in this range.</p>;
   const axes = axis ? [axis] : [...AXES];
-  return <RigCharts group={group} kinds={RECORDED_CHARTS} axes={axes} height={150} measuredOnly />;
+  const chart = { group, height: HEIGHT, onZoom: isPrinted ? undefined : zoom.zoomTo };
+  const { trace } = moment;
+  return (
+    <>
+      {!isPrinted && <ZoomButtons zoom={zoom} />}
+      {trace ? (
+        <>
+          <ThinnedNote stride={trace.stride} hint="The page of the session shows all of them." />
+          <RigCharts {...chart} kinds={["residual"]} axes={axes} />
+          <DecisionCharts {...chart} code={code} trace={trace} isPrinted={isPrinted} />
+          <RigCharts {...chart} kinds={SESSION_CHARTS} axes={axes} />
+        </>
+      ) : (
+        <RigCharts {...chart} kinds={RECORDED_CHARTS} axes={axes} measuredOnly />
+      )}
+      {!isPrinted && <p class="quiet small-text">Drag over a chart to zoom in, double-click to zoom out.</p>}
+    </>
+  );
+}
+
+interface DecisionProps {
+  group: ChartGroup;
+  height: number;
+  onZoom?: (range: [number, number] | undefined) => void;
+  code: FaultEntry["code"];
+  trace: Trace;
+  isPrinted?: boolean;
+}
+
+/** Evidence and counter of the fault's monitor; on the screen, those of another one can be chosen. */
+function DecisionCharts({ code, trace: { thresholds = [] }, isPrinted, ...chart }: DecisionProps) {
+  if (isPrinted) return <ChartsOfMonitor {...chart} code={code} thresholds={thresholds} />;
+  return <MonitorCharts {...chart} first={code} thresholds={thresholds} />;
 }

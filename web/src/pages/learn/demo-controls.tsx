@@ -25,8 +25,10 @@ export function DemoControls() {
           <Link class="button primary" to={rigPath(asset)}>
             Watch {asset}
           </Link>
-          <ActionButton action={thenRefetch(api.repairDemo)}>Repair all</ActionButton>
-          <ActionButton action={thenRefetch(api.resumeDemoScript)} disabled={script}>
+          <ActionButton action={thenRefetch(api.repairDemo)} needs="operator">
+            Repair all
+          </ActionButton>
+          <ActionButton action={thenRefetch(api.resumeDemoScript)} disabled={script} needs="operator">
             Resume the script
           </ActionButton>
         </div>

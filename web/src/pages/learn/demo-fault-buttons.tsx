@@ -16,7 +16,11 @@ export function DemoFaultButtons({ demo: { buttons, broken }, inject }: Props) {
         <fieldset>
           <legend>{codeTitle(code)}</legend>
           {faults.map(({ id, effect }) => (
-            <ActionButton class={broken.includes(id) ? "danger" : ""} action={() => inject(id)}>
+            <ActionButton
+              class={broken.includes(id) ? "danger" : ""}
+              action={() => inject(id)}
+              needs="operator"
+            >
               <span class="hidden">Inject: {codeTitle(code)}, </span>
               <b>{effectWord(effect)}</b>
               <br />

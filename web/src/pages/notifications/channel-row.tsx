@@ -1,5 +1,6 @@
 import { alarmApi, type Channel } from "../../api/alarms";
 import { ActionButton } from "../../parts/action-button";
+import { ConfirmButton } from "../../parts/confirm-button";
 
 /** Where a channel sends, in a few words. */
 const target = ({ url, email }: Channel) => url ?? `${email?.to.join(", ")} by ${email?.host}:${email?.port}`;
@@ -28,9 +29,16 @@ export function ChannelRow({ channel, refetch }: { channel: Channel; refetch: ()
         <ActionButton class="small" label={`Test ${name}`} action={test}>
           Test
         </ActionButton>{" "}
-        <ActionButton class="small" label={`Delete ${name}`} action={remove}>
-          Delete
-        </ActionButton>
+        <ConfirmButton
+          class="small"
+          word="Delete"
+          label={`Delete ${name}`}
+          question={`Delete the channel ${name}?`}
+          action={remove}
+        >
+          Messages that wait for it are not sent any more, and the list of those that were sent is deleted. A
+          channel that a rule uses cannot be deleted.
+        </ConfirmButton>
       </td>
     </tr>
   );

@@ -1,5 +1,6 @@
 import { alarmApi, type NewRule, type Rule } from "../../api/alarms";
 import { ActionButton } from "../../parts/action-button";
+import { ConfirmButton } from "../../parts/confirm-button";
 import { alarmCodeTitle, CHANGES } from "../../words/alarm";
 import { dateTime, duration } from "../../words/time";
 
@@ -12,6 +13,8 @@ function settingsOf(rule: Rule): { [Key in keyof Required<NewRule>]: NewRule[Key
   return { name, asset, tag, channel, codes, changes, enabled, repeat_s, silent_until };
 }
 
+const isSilent = ({ silent_until }: Rule) => !!silent_until && Date.parse(silent_until) > Date.now();
+
 interface Props {
   rule: Rule;
   mayChange: boolean;
@@ -19,23 +22,13 @@ interface Props {
 }
 
 export function RuleRow({ rule, mayChange, refetch }: Props) {
-  const isSilent = !!rule.silent_until && Date.parse(rule.silent_until) > Date.now();
-  const change = (more: Partial<NewRule>) => async () => {
-    await alarmApi.putRule(rule.id, { ...settingsOf(rule), ...more });
-    await refetch();
-  };
-  const silenceEnd = () => new Date(Date.now() + SILENCE_H * 3_600_000).toISOString();
-  const remove = async () => {
-    await alarmApi.deleteRule(rule.id);
-    await refetch();
-  };
   const codes = rule.codes?.length ? rule.codes.map(alarmCodeTitle).join(", ") : "any fault";
   return (
     <tr>
       <th scope="row">
         {rule.name}
         {!rule.enabled && <span class="quiet"> (off)</span>}
-        {isSilent && <p class="quiet small-text">silent until {dateTime(rule.silent_until)}</p>}
+        {isSilent(rule) && <p class="quiet small-text">silent until {dateTime(rule.silent_until)}</p>}
       </th>
       <td data-word="rigs">
         {rule.asset === "*" ? "all" : rule.asset}
@@ -48,17 +41,42 @@ export function RuleRow({ rule, mayChange, refetch }: Props) {
       <td data-word="repeated">{rule.repeat_s ? `every ${duration(rule.repeat_s)}` : "–"}</td>
       {mayChange && (
         <td>
-          <ActionButton class="small" action={change({ enabled: !rule.enabled })}>
-            {rule.enabled ? "Turn off" : "Turn on"}
-          </ActionButton>{" "}
-          <ActionButton class="small" action={change({ silent_until: isSilent ? null : silenceEnd() })}>
-            {isSilent ? "End the silence" : `Silence ${SILENCE_H} h`}
-          </ActionButton>{" "}
-          <ActionButton class="small" label={`Delete ${rule.name}`} action={remove}>
-            Delete
-          </ActionButton>
+          <RuleActions rule={rule} refetch={refetch} />
         </td>
       )}
     </tr>
+  );
+}
+
+function RuleActions({ rule, refetch }: Omit<Props, "mayChange">) {
+  const isSilenced = isSilent(rule);
+  const silenceEnd = () => new Date(Date.now() + SILENCE_H * 3_600_000).toISOString();
+  const change = (more: Partial<NewRule>) => async () => {
+    await alarmApi.putRule(rule.id, { ...settingsOf(rule), ...more });
+    await refetch();
+  };
+  const remove = async () => {
+    await alarmApi.deleteRule(rule.id);
+    await refetch();
+  };
+  return (
+    <>
+      <ActionButton class="small" action={change({ enabled: !rule.enabled })}>
+        {rule.enabled ? "Turn off" : "Turn on"}
+      </ActionButton>{" "}
+      <ActionButton class="small" action={change({ silent_until: isSilenced ? null : silenceEnd() })}>
+        {isSilenced ? "End the silence" : `Silence ${SILENCE_H} h`}
+      </ActionButton>{" "}
+      <ConfirmButton
+        class="small"
+        word="Delete"
+        label={`Delete ${rule.name}`}
+        question={`Delete the rule ${rule.name}?`}
+        action={remove}
+      >
+        Nobody is told any more of what only this rule selects. To be left alone for a while, silence it or
+        turn it off instead.
+      </ConfirmButton>
+    </>
   );
 }

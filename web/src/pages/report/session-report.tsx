@@ -8,6 +8,7 @@ import { TraceBuffer } from "../../live/buffer";
 import { ChartGroup } from "../../parts/charts/chart-group";
 import { faultMark } from "../../parts/charts/fault-marks";
 import { RigCharts } from "../../parts/charts/rig-charts";
+import { ThinnedNote } from "../../parts/charts/thinned-note";
 import { Facts } from "../../parts/facts";
 import { UnloadedPage } from "../../parts/unloaded-page";
 import { sessionPath } from "../../router/paths";
@@ -86,5 +87,10 @@ function SessionCharts({ session, faults }: { session: Session; faults: FaultLin
     group.draw(buffer, [buffer.first, buffer.last]);
   }, [data, faults, group]);
   if (!data?.t_s.length) return null;
-  return <RigCharts group={group} kinds={["position", "residual"]} height={130} />;
+  return (
+    <>
+      <ThinnedNote stride={data.stride} hint="The page of the session shows all of them." />
+      <RigCharts group={group} kinds={["position", "residual"]} height={130} />
+    </>
+  );
 }

@@ -5,14 +5,21 @@ import type { Histogram } from "./histogram";
 const WIDTH = 300;
 const HEIGHT = 90;
 
+interface Props {
+  axis: Axis;
+  histogram: Histogram;
+  /** What is counted. */
+  moments: string;
+}
+
 /** A bar for each bin, and the limit on both sides. */
-export function HistogramPlot({ axis, histogram }: { axis: Axis; histogram: Histogram }) {
+export function HistogramPlot({ axis, histogram, moments }: Props) {
   const { counts, extent, n, nBeyond, limit } = histogram;
   const most = Math.max(...counts);
   const width = WIDTH / counts.length;
   const x = (value: number) => (WIDTH * (value + extent)) / (2 * extent);
   const label =
-    `Histogram of the residual along ${axis}: ${count(nBeyond)} of ${count(n)} judged moments ` +
+    `Histogram of the residual along ${axis}: ${count(nBeyond)} of ${count(n)} ${moments} ` +
     `are at or beyond the limit`;
   return (
     <svg viewBox={`0 0 ${WIDTH} ${HEIGHT}`} role="img" aria-label={label}>

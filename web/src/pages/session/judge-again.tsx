@@ -9,7 +9,7 @@ export function JudgeAgain({ session }: { session: Session }) {
   const { replay, judge } = useReplay(session.id);
   return (
     <section class="card">
-      <h2>Judge it again</h2>
+      <h2>Judge again</h2>
       <p class="quiet">Judges the same samples with other settings. The session itself is not changed.</p>
       <ReplayFields judge={(form) => judge(replaySettings(form))} />
       {replay && !isFinished(replay) && (

@@ -12,8 +12,8 @@ interface Props {
   /** The values at which the monitors decide. */
   thresholds: Thresholds[];
   height: number;
-  onSeek: (t: number) => void;
-  onZoom: (range: [number, number] | undefined) => void;
+  onSeek?: (t: number) => void;
+  onZoom?: (range: [number, number] | undefined) => void;
 }
 
 /** Where a monitor is drawn: its counter, and the axis of its servo. */
@@ -24,30 +24,37 @@ const DRAWN: Record<FaultCode, { counter: ChartKindName; axis?: Axis }> = {
   sensor: { counter: "sensor" },
 };
 
+/** The charts of one monitor, which can be chosen: at first that of `first`. */
+export function MonitorCharts({ first = "x_servo", ...chart }: Props & { first?: FaultCode }) {
+  const [code, setCode] = useState(first);
+  const monitors = chart.thresholds.map((one) => [one.code, codeTitle(one.code)] as const);
+  return (
+    <>
+      <Choice isInline label="Monitor" options={monitors} value={code} change={setCode} />
+      <ChartsOfMonitor code={code} {...chart} />
+    </>
+  );
+}
+
 /** The evidence and the debounce counter of one monitor, against the values at which they decide. */
-export function MonitorCharts({ thresholds, ...chart }: Props) {
-  const [code, setCode] = useState<FaultCode>("x_servo");
+export function ChartsOfMonitor({ code, thresholds, ...chart }: Props & { code: FaultCode }) {
   const found = thresholds.find((one) => one.code === code);
   const evidence = useMemo(() => found && evidenceLines(found), [found]);
   const ends = useMemo(() => found && counterLines(found), [found]);
   const { counter, axis } = DRAWN[code];
-  const monitors = thresholds.map((one) => [one.code, codeTitle(one.code)] as const);
   return (
-    <>
-      <Choice isInline label="Monitor" options={monitors} value={code} change={setCode} />
-      <div class="charts charts-2">
-        {axis && evidence && evidence.length > 0 && (
-          <RigChart
-            key={`evidence ${axis}`}
-            kind="evidence"
-            axis={axis}
-            thresholds={evidence}
-            minExtent={found?.confirm_nats ?? undefined}
-            {...chart}
-          />
-        )}
-        <RigChart key={code} kind={counter} axis={axis ?? "x"} thresholds={ends} {...chart} />
-      </div>
-    </>
+    <div class="charts charts-2">
+      {axis && evidence && evidence.length > 0 && (
+        <RigChart
+          key={`evidence ${axis}`}
+          kind="evidence"
+          axis={axis}
+          thresholds={evidence}
+          minExtent={found?.confirm_nats ?? undefined}
+          {...chart}
+        />
+      )}
+      <RigChart key={code} kind={counter} axis={axis ?? "x"} thresholds={ends} {...chart} />
+    </div>
   );
 }

@@ -62,7 +62,7 @@ export function PlayerCard(props: Props) {
         <Choice isInline label="Speed" options={SPEED_OPTIONS} value={speed} change={setSpeed} />
         <Choice<number> isInline label="Show" options={SPANS} value={span} change={setSpan} />
         <ProfileChoice label="Judged by" isInline chosen={profile} choose={setProfile} />
-        <ZoomButtons charts={charts} />
+        <ZoomButtons zoom={charts} />
       </div>
       {stride > 1 && (
         <p ref={resolution} class="resolution small-text" data-resolution="thinned">

@@ -59,7 +59,7 @@ export function Player(props: Props) {
     const tried = alarmMarks(trial.trial?.monitors ?? []);
     return [...faults.map(faultMark), ...tried, ...remarkMarks(remarks.data ?? [])];
   }, [faults, trial, remarks.data]);
-  const charts = usePlaybackCharts({ buffer, detail, marks, playback });
+  const charts = usePlaybackCharts({ buffer, stride, detail, marks, playback });
   useHotkeys(playback);
   if (!buffer?.t.length) return null;
   return (

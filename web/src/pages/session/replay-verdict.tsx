@@ -22,13 +22,13 @@ export function ReplayVerdict({ session, result }: { session: Session; result: R
         <Facts
           facts={[
             ["Recorded", recorded],
-            ["Hash", <Hash hash={recorded_hash} />],
+            ["Checksum", <Hash hash={recorded_hash} />],
           ]}
         />
         <Facts
           facts={[
             ["Judged again", verdict(summary).text],
-            ["Hash", <Hash hash={summary.verdict_hash} />],
+            ["Checksum", <Hash hash={summary.verdict_hash} />],
           ]}
         />
       </div>

@@ -52,7 +52,7 @@ export function TrialCard({ thresholds, settings, choose, state: { trial, error 
       </div>
       <ErrorMessage error={error} />
       <button type="button" disabled={!isTried(settings)} onClick={() => choose({})}>
-        As set
+        Reset
       </button>
     </section>
   );

@@ -7,7 +7,8 @@ import { seconds } from "../../words/numbers";
 import type { Shown } from "./use-shown";
 import type { DetailLoader } from "./use-detail";
 import type { Playback } from "./use-playback";
-import { panned, visibleRange, zoomRange } from "./visible-range";
+import { useZoom } from "./use-zoom";
+import { visibleRange } from "./visible-range";
 
 /** Charts are drawn in every second frame: they move by less than a pixel per frame. */
 const CHART_EVERY = 2;
@@ -15,6 +16,8 @@ const CHART_EVERY = 2;
 interface Options {
   /** The trace of the whole recording; undefined while it is fetched. */
   buffer?: TraceBuffer;
+  /** Every how many judged moments it has one. */
+  stride: number;
   /** The loader of parts with every sample, if `buffer` is thinned. */
   detail?: DetailLoader;
   /** Moments that are marked in all charts. */
@@ -31,12 +34,14 @@ function showTime(t: number, slider: HTMLInputElement | null, clock: HTMLOutputE
 }
 
 /** The charts, the slider and the clock of the playback, updated without rendering components. */
-export function usePlaybackCharts({ buffer, detail, marks, playback: { t } }: Options) {
+export function usePlaybackCharts({ buffer, stride, detail, marks, playback: { t } }: Options) {
   const group = useMemo(() => new ChartGroup(), []);
   /** Time span of the charts, s; 0 for the whole recording. */
   const [span, setSpan] = useState<number>(30);
+  const first = buffer?.first ?? 0;
+  const last = buffer?.last ?? 0;
   /** The range that was zoomed to, instead of one around the current time. */
-  const [zoom, setZoom] = useState<[number, number]>();
+  const { zoom, zoomTo, pan } = useZoom(first, last);
   const slider = useRef<HTMLInputElement>(null);
   const clock = useRef<HTMLOutputElement>(null);
   const resolution = useRef<HTMLParagraphElement>(null);
@@ -58,11 +63,9 @@ export function usePlaybackCharts({ buffer, detail, marks, playback: { t } }: Op
       resolution.current.dataset["resolution"] = detail && source === buffer ? "thinned" : "full";
   });
   const chooseSpan = (next: number) => {
-    setZoom(undefined);
+    zoomTo(undefined);
     setSpan(next);
   };
-  const first = buffer?.first ?? 0;
-  const last = buffer?.last ?? 0;
   return {
     group,
     span,
@@ -71,12 +74,12 @@ export function usePlaybackCharts({ buffer, detail, marks, playback: { t } }: Op
     clock,
     resolution,
     zoom,
-    zoomTo: (range: [number, number] | undefined) => setZoom(range && zoomRange(range, first, last)),
-    pan: (share: number) => setZoom((range) => range && panned(range, share, first, last)),
+    zoomTo,
+    pan,
     /** What is drawn now. */
     shown: (): Shown | undefined => {
       const { buffer: source, range } = drawn.current;
-      return source && range && { buffer: source, range };
+      return source && range && { buffer: source, range, stride: source === buffer ? stride : 1 };
     },
     /** The buffer that is drawn now. */
     drawnBuffer: () => {

@@ -5,6 +5,8 @@ import type { TraceBuffer } from "../../live/buffer";
 export interface Shown {
   buffer: TraceBuffer;
   range: [number, number];
+  /** Every how many judged moments the buffer has one. */
+  stride: number;
 }
 
 /** Least time between two updates, ms: what is rendered from it is slower than a chart. */

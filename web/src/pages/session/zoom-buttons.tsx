@@ -1,11 +1,11 @@
 import { seconds } from "../../words/numbers";
-import type { PlaybackCharts } from "./use-playback-charts";
+import type { Zoom } from "./use-zoom";
 
 /** Part of the shown range by which a button moves it. */
 const STEP = 0.5;
 
 /** The range that was zoomed to, with buttons that move it and that end the zoom. */
-export function ZoomButtons({ charts: { zoom, zoomTo, pan } }: { charts: PlaybackCharts }) {
+export function ZoomButtons({ zoom: { zoom, zoomTo, pan } }: { zoom: Zoom }) {
   if (!zoom) return null;
   return (
     <span class="chips" role="group" aria-label="Zoom">

@@ -21,13 +21,15 @@ export function UnitWarnings({ evidence, change }: Props) {
       {isFar && (
         <p class="trouble" role="alert">
           The position of the ball exceeds 2 m.{" "}
-          <ActionButton action={() => change({ position_unit_m: 0.001 })}>Positions are in mm</ActionButton>
+          <ActionButton action={() => change({ position_unit_m: 0.001 })} needs="operator">
+            Positions are in mm
+          </ActionButton>
         </p>
       )}
       {isSteep && (
         <p class="trouble" role="alert">
           A command exceeds 90°.{" "}
-          <ActionButton action={() => change({ command_unit_rad: DEGREE })}>
+          <ActionButton action={() => change({ command_unit_rad: DEGREE })} needs="operator">
             Commands are in degrees
           </ActionButton>
         </p>

@@ -5,7 +5,7 @@ import type { RigScene } from "./rig-scene";
 
 const VIEWS: ViewName[] = ["free", "top", "along x", "along y"];
 
-/** Buttons for the views of the camera and for the frames of reference. */
+/** Buttons for the views of the camera and for the axes of the frames of reference. */
 export function ViewButtons({ scene }: { scene: RefObject<RigScene | null> }) {
   const [view, setView] = useState<ViewName>("free");
   const [hasFrames, setFrames] = useState(true);
@@ -25,7 +25,7 @@ export function ViewButtons({ scene }: { scene: RefObject<RigScene | null> }) {
         </button>
       ))}
       <button type="button" class="small" aria-pressed={hasFrames} onClick={toggleFrames}>
-        frames
+        axes
       </button>
     </>
   );

@@ -1,10 +1,12 @@
 import type { PlateSize } from "../../live/rig-size";
 import { colour } from "../../theme";
 import type { PlanView } from "./plan-view";
+import { servoArrows, type ServoArrow } from "./servo-arrows";
 
-/** Draws the outline of the plate and its axes through the centre. */
-export function drawPlate(view: PlanView, { length, width, isRound }: PlateSize): void {
+/** Draws the outline of the plate, its axes through the centre, and which servo moves the ball which way. */
+export function drawPlate(view: PlanView, plate: PlateSize): void {
   const { context, scale, toCanvas } = view;
+  const { length, width, isRound } = plate;
   context.strokeStyle = colour("edge");
   context.fillStyle = colour("plate");
   context.lineWidth = 1.5;
@@ -15,6 +17,30 @@ export function drawPlate(view: PlanView, { length, width, isRound }: PlateSize)
   context.fill();
   context.stroke();
   drawAxes(view, length, width);
+  for (const arrow of servoArrows(plate, toCanvas)) drawServo(view, arrow);
+}
+
+/** Half of the width of an arrowhead, which is as long as it is wide, px. */
+const HEAD = 4;
+
+/** Draws which way a positive command of a servo moves the ball. */
+function drawServo({ context }: PlanView, { from, to, label }: ServoArrow): void {
+  const [x, y] = to;
+  const along = Math.hypot(x - from[0], y - from[1]);
+  const [ux, uy] = [(x - from[0]) / along, (y - from[1]) / along];
+  context.strokeStyle = context.fillStyle = colour("command");
+  context.lineWidth = 2;
+  context.beginPath();
+  context.moveTo(...from);
+  context.lineTo(x - HEAD * ux, y - HEAD * uy);
+  context.stroke();
+  context.beginPath();
+  context.moveTo(x, y);
+  context.lineTo(x - 2 * HEAD * ux + HEAD * uy, y - 2 * HEAD * uy - HEAD * ux);
+  context.lineTo(x - 2 * HEAD * ux - HEAD * uy, y - 2 * HEAD * uy + HEAD * ux);
+  context.fill();
+  context.font = "12px system-ui, sans-serif";
+  context.fillText(label, x + 1.5 * HEAD, y + HEAD);
 }
 
 function drawAxes({ context, toCanvas }: PlanView, length: number, width: number): void {

@@ -23,6 +23,8 @@ export function XyTrace({ asset, moment }: Props) {
     drawn.current = key;
     drawXyTrace(element, asset, now);
   });
-  const label = "Path of the ball on the plate, seen from above: x to the right, y up";
+  const label =
+    "Path of the ball on the plate, seen from above: x to the right, y up. " +
+    "A positive command of the x servo (qy) moves the ball to the right, one of the y servo (qx) down.";
   return <canvas ref={canvas} class="xy" role="img" aria-label={label} />;
 }

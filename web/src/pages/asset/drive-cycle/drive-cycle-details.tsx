@@ -30,7 +30,7 @@ export function DriveCycleDetails({ cycle }: { cycle: DriveCycle }) {
               ["Motion", ORDER[cycle.order]],
               ["Amplitude x, y", `${millimetres(amplitude_m.x)}, ${millimetres(amplitude_m.y)}`],
               ["Largest tilt", larger(cycle.tilt_rad)],
-              ["Tolerated change of level", larger(cycle.level_within_rad)],
+              ["Plate may be off level by", larger(cycle.level_within_rad)],
             ]}
           />
           <SetPointPlot cycle={cycle} />

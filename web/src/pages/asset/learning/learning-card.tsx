@@ -11,7 +11,7 @@ import { TeachingSessions } from "./teaching-sessions";
 const TITLES: Record<LearningState, string> = {
   gathering: "This rig has not been learnt yet",
   learning: "Learning",
-  offered: "Ready: was the rig healthy?",
+  offered: "Was the rig healthy while it was recorded?",
   learnt: "Learnt automatically",
 };
 

@@ -1,0 +1,19 @@
+/** Problems of the service in words for people: their details name the requests of programs. */
+import type { Problem } from "../api/types";
+
+const PREFIX = "urn:offbd:problem:";
+
+const WORDS: Record<string, string> = {
+  "asset-exists":
+    "There is a rig of this name already. Choose another name, or open that rig and change it in its set-up.",
+  "unknown-asset": "There is no rig of this name. Register it under Set up first.",
+  "nothing-offered":
+    "Nothing that was learnt waits for an answer. It was answered before, or the rig must move more first.",
+  "already-learnt":
+    "This rig has been learnt already. Learn it again from sessions that you choose in its set-up, or use an " +
+    "earlier one of its calibrations.",
+};
+
+/** Returns the words for a problem whose detail is for programs; undefined if its detail is for people. */
+export const problemWords = ({ type }: Partial<Problem>): string | undefined =>
+  type?.startsWith(PREFIX) ? WORDS[type.slice(PREFIX.length)] : undefined;
