@@ -182,6 +182,13 @@ mod tests {
         }
     }
 
+    #[tokio::test]
+    async fn one_of_several_servers_must_tell_its_settings() {
+        let nobody = "http://127.0.0.1:1";
+        let error = check_streams(&format!("{nobody}, {nobody}")).await.unwrap_err();
+        assert!(matches!(&error, UnsafeServer::Unreadable { url, .. } if url == nobody), "{error}");
+    }
+
     #[test]
     fn a_server_in_doubt_is_told_of() {
         let info = |version: &str, jetstream| ServerInfo {
