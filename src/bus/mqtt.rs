@@ -83,6 +83,7 @@ pub fn start(
     closing: CancellationToken,
 ) -> Result<JoinHandle<()>, MqttError> {
     let options = options(&settings)?;
+    metrics::gauge!("offbd_bus_connected", "bus" => BUS).set(0.0);
     Ok(tokio::spawn(run(service, settings, options, closing)))
 }
 

@@ -8,7 +8,7 @@ use std::time::Duration;
 use async_nats::{Client, ConnectOptions, Event as ClientEvent, Message, Subject};
 use futures_util::StreamExt;
 use futures_util::stream::{SelectAll, select_all};
-use tokio::sync::{Semaphore, mpsc};
+use tokio::sync::{Notify, Semaphore, mpsc};
 use tokio::task::JoinHandle;
 use tokio::time::timeout;
 use tokio_util::sync::CancellationToken;
@@ -16,7 +16,7 @@ use tokio_util::sync::CancellationToken;
 use super::callout::{self, Issuer};
 use super::faults::{FaultMessage, Publishing, publish_faults};
 use super::intake::{Answering, BatchAnswer, Delivery, Form, Intake, queue};
-use super::settings::{UnsafeServer, check_streams, check_version};
+use super::settings::{UnsafeServer, check_streams, check_version, doubts};
 use super::{RETRY_INTERVAL, SEND_TIMEOUT};
 use crate::service::Service;
 use crate::wire::bus::{DeviceTopic, TopicStyle};
@@ -44,7 +44,8 @@ pub struct NatsSettings {
     /// Certificates that the server's must come from, a PEM file; without it those of the
     /// machine.
     pub ca: Option<PathBuf>,
-    /// The server's monitoring port, `http://HOST:PORT`, to check its settings.
+    /// The monitoring ports of the servers, `http://HOST:PORT` with `,` between, to check their
+    /// settings.
     pub monitor: Option<String>,
     /// Whether faults are published.
     pub faults: bool,
@@ -82,7 +83,16 @@ pub async fn start(
         let issuer = Issuer::new(seed, settings.account.clone());
         issuer.map(Arc::new).map_err(|error| NatsError::Key(error.to_string()))
     });
-    let bus = NatsBus { service, issuer: issuer.transpose()?, settings, closing };
+    for gauge in ["offbd_bus_connected", "offbd_bus_unsafe"] {
+        metrics::gauge!(gauge, "bus" => BUS).set(0.0);
+    }
+    let bus = NatsBus {
+        service,
+        issuer: issuer.transpose()?,
+        settings,
+        closing,
+        connected: Arc::default(),
+    };
     let client = match bus.connect().await? {
         Some(client) => {
             bus.check(&client).await?;
@@ -98,18 +108,21 @@ struct NatsBus {
     settings: NatsSettings,
     issuer: Option<Arc<Issuer>>,
     closing: CancellationToken,
+    /// Told after each connection.
+    connected: Arc<Notify>,
 }
 
 impl NatsBus {
     /// Returns a client; `None` if no server can be reached.
     async fn connect(&self) -> Result<Option<Client>, NatsError> {
         let NatsSettings { servers, user, credentials, ca, .. } = &self.settings;
+        let connected = self.connected.clone();
         let mut options = ConnectOptions::new()
             .name("offbd")
             .connection_timeout(CONNECT_TIMEOUT)
             .subscription_capacity(MAX_UNREAD)
             .custom_inbox_prefix("_INBOX.offbd.service")
-            .event_callback(noted);
+            .event_callback(move |event| noted(event, connected.clone()));
         if let Some((user, password)) = user {
             options = options.user_and_password(user.clone(), password.clone());
         }
@@ -132,20 +145,40 @@ impl NatsBus {
         }
     }
 
-    async fn check(&self, client: &Client) -> Result<(), UnsafeServer> {
-        let info = client.server_info();
-        check_version(&info.version)?;
-        let batch_bytes = self.service.limits().batch_bytes;
-        if info.max_payload < batch_bytes {
-            tracing::warn!(
-                "the NATS server takes messages of {} bytes (`max_payload`), `limits.batch_bytes` is \
-                 {batch_bytes}; a longer batch disconnects its device",
-                info.max_payload
-            );
-        }
+    /// Checks the server, and those whose monitoring ports are known. Returns their ids.
+    async fn check(&self, client: &Client) -> Result<Vec<String>, UnsafeServer> {
+        check_version(&client.server_info().version)?;
         match &self.settings.monitor {
-            Some(monitor) => check_streams(monitor).await,
-            None => Ok(()),
+            Some(monitors) => check_streams(monitors).await,
+            None => Ok(Vec::new()),
+        }
+    }
+
+    /// Checks again after each connection, and tells what is found.
+    async fn check_connections(&self, client: &Client) {
+        loop {
+            self.connected.notified().await;
+            // The client knows the new server once this is sent.
+            if !matches!(timeout(SEND_TIMEOUT, client.flush()).await, Ok(Ok(()))) {
+                continue;
+            }
+            let is_unsafe = metrics::gauge!("offbd_bus_unsafe", "bus" => BUS);
+            match self.check(client).await {
+                Ok(checked) => {
+                    is_unsafe.set(0.0);
+                    let batch_bytes = self.service.limits().batch_bytes;
+                    for doubt in doubts(&client.server_info(), batch_bytes, &checked) {
+                        tracing::warn!("about the NATS server: {doubt}");
+                    }
+                }
+                Err(error @ UnsafeServer::Unreadable { .. }) => {
+                    tracing::warn!(%error, "not checked")
+                }
+                Err(error) => {
+                    is_unsafe.set(1.0);
+                    tracing::error!(%error, "the NATS server may lose messages; it is used");
+                }
+            }
         }
     }
 
@@ -169,7 +202,7 @@ impl NatsBus {
             tokio::time::sleep(RETRY_INTERVAL).await;
             let Ok(Some(client)) = self.connect().await else { continue };
             match self.check(&client).await {
-                Ok(()) => return client,
+                Ok(_) => return client,
                 Err(error) => tracing::error!(%error, "the NATS server is not used"),
             }
         }
@@ -200,10 +233,11 @@ impl NatsBus {
                 self.closing.run_until_cancelled(self.answer(&client, issuer, asked)).await;
             }
         };
+        let checking = self.closing.run_until_cancelled(self.check_connections(&client));
         let (sender, receiver) = queue();
         let reading = self.read(&intake, &client, select_all(subscriptions), sender);
         let answering = intake.clone().run(&client, receiver);
-        tokio::join!(publishing, answering_questions, reading, answering);
+        tokio::join!(publishing, answering_questions, checking, reading, answering);
         Ok(())
     }
 
@@ -261,10 +295,11 @@ impl NatsBus {
     }
 }
 
-async fn noted(event: ClientEvent) {
+async fn noted(event: ClientEvent, connected: Arc<Notify>) {
     match event {
         ClientEvent::Connected => {
             tracing::info!("connected to the NATS server");
+            connected.notify_one();
             metrics::gauge!("offbd_bus_connected", "bus" => BUS).set(1.0);
         }
         ClientEvent::Disconnected | ClientEvent::Closed => {

@@ -1,6 +1,6 @@
 //! `/metrics`: the service's metrics in the text format of Prometheus.
 //!
-//! [`METRICS`] lists all of them. Series without labels, or with labels known in advance,
+//! [`METRICS`] lists all of them but `offbd_partition_epoch`. Series without labels, or with labels known in advance,
 //! are exported as 0 from the start, so that `rate()` sees the first event. No label
 //! has a value from outside the service.
 
@@ -44,6 +44,7 @@ const METRICS: &[(&str, MetricKind, &str)] = &[
     ("offbd_bus_faults_total", Counter, "Events published over NATS or MQTT"),
     ("offbd_bus_logins_total", Counter, "Questions of the NATS server for rights, by outcome"),
     ("offbd_bus_messages_total", Counter, "Messages of devices over NATS and MQTT, by outcome"),
+    ("offbd_bus_unsafe", Gauge, "1 if the NATS server may lose messages, see the log"),
     ("offbd_cluster_nodes", Gauge, "Nodes of the cluster that are alive"),
     ("offbd_cold_bytes_total", Counter, "Bytes of the files that hold moved sessions"),
     ("offbd_cold_failures_total", Counter, "Files of sessions not written, verified or removed"),
@@ -68,6 +69,7 @@ const METRICS: &[(&str, MetricKind, &str)] = &[
     ("offbd_partitions_lost_total", Counter, "Partitions that other nodes have taken"),
     ("offbd_partitions_owned", Gauge, "Partitions that this node owns"),
     ("offbd_partitions_taken_total", Counter, "Partitions that this node has taken"),
+    ("offbd_partitions_unowned", Gauge, "Partitions without an owner, as this node last saw"),
     ("offbd_process_resident_bytes", Gauge, "Resident memory of the process (Linux)"),
     ("offbd_refused_total", Counter, "Requests denied by the guard, by status"),
     ("offbd_requests_forwarded_total", Counter, "Requests sent to the node that owns the asset"),
@@ -195,7 +197,6 @@ fn initialize_series() {
     zero("offbd_bus_logins_total", "outcome", &["accepted", "refused"]);
     for bus in ["nats", "mqtt"] {
         counter!("offbd_bus_faults_total", "bus" => bus).absolute(0);
-        gauge!("offbd_bus_connected", "bus" => bus).set(0.0);
         for outcome in BUS_OUTCOMES {
             counter!("offbd_bus_messages_total", "bus" => bus, "outcome" => outcome).absolute(0);
         }
@@ -231,9 +232,19 @@ pub(super) async fn metrics(State(app): State<App>) -> impl IntoResponse {
     let handle = RECORDER.get().and_then(Option::as_ref);
     let text = handle.map(|handle| {
         handle.run_upkeep();
-        handle.render()
+        handle.render() + &epochs(&app.service.partition_epochs())
     });
     ([(CONTENT_TYPE, "text/plain; version=0.0.4")], text.unwrap_or_default())
+}
+
+/// The epochs of the partitions that this process owns. Written here, because the recorder
+/// would go on showing those that another node has taken.
+fn epochs(owned: &[(u32, i64)]) -> String {
+    let head = "# HELP offbd_partition_epoch Owners so far of a partition that this node owns\n\
+                # TYPE offbd_partition_epoch gauge\n";
+    owned.iter().fold(head.to_owned(), |text, (partition, epoch)| {
+        format!("{text}offbd_partition_epoch{{partition=\"{partition}\"}} {epoch}\n")
+    })
 }
 
 /// Sets the gauges that are read on each scrape.
@@ -244,8 +255,10 @@ fn sample_gauges(app: &App) {
     gauge!("offbd_samples_in_flight_limit").set(app.service.limits().in_flight_samples as f64);
     gauge!("offbd_assets_rebuilding").set(app.service.n_rebuilding() as f64);
     gauge!("offbd_assets_untested").set(app.service.n_untested() as f64);
-    gauge!("offbd_cluster_nodes").set(app.service.cluster(None).nodes.len() as f64);
+    let cluster = app.service.cluster(None);
+    gauge!("offbd_cluster_nodes").set(cluster.nodes.len() as f64);
     gauge!("offbd_partitions_owned").set(app.service.n_partitions_owned() as f64);
+    gauge!("offbd_partitions_unowned").set(cluster.unowned as f64);
     gauge!("offbd_writer_queue").set(load.writer as f64);
     for (shard, waiting) in load.shards.iter().enumerate() {
         gauge!("offbd_shard_queue", "shard" => shard.to_string()).set(*waiting as f64);

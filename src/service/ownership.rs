@@ -49,6 +49,12 @@ impl Ownership {
         self.epochs.read().unwrap_or_else(PoisonError::into_inner).keys().copied().collect()
     }
 
+    /// The owned partitions, each with its epoch.
+    pub(in crate::service) fn epochs(&self) -> Vec<(PartitionId, i64)> {
+        let epochs = self.epochs.read().unwrap_or_else(PoisonError::into_inner);
+        epochs.iter().map(|(partition, epoch)| (*partition, *epoch)).collect()
+    }
+
     /// Whether this process owns all partitions.
     pub(in crate::service) fn is_whole(&self) -> bool {
         let n = self.epochs.read().unwrap_or_else(PoisonError::into_inner).len();

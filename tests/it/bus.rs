@@ -111,6 +111,31 @@ async fn an_unsafe_server_is_refused_at_the_start() {
     assert!(error.contains("nats.issuer_seed"), "{error}");
 }
 
+/// A client that has lost its server connects to another one of its list: that one is checked
+/// too, and used, but told of. At the start one of several servers may be away.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_server_that_is_connected_to_later_is_checked() {
+    let mut safe = Nats::start();
+    let mut other = Nats::start_with(|shipped| shipped.replace("sync_interval: always", ""));
+    other.kill();
+    let fixture = start_with(|config| {
+        let (first, second) = (safe.config(), other.config());
+        let both = |a: &str, b: &str| format!("{a},{b}");
+        let monitor = both(&first.monitor.clone().unwrap(), &second.monitor.unwrap());
+        let url = both(&first.url, &second.url);
+        config.nats = Some(offbd::config::NatsConfig { url, monitor: Some(monitor), ..first });
+    })
+    .await;
+    connected(&fixture.client, "nats").await;
+    let is_unsafe = "offbd_bus_unsafe{bus=\"nats\"}";
+    assert_eq!(count(&fixture.client, is_unsafe).await, 0.0);
+    other.restart();
+    safe.kill();
+    metric(&fixture.client, is_unsafe, |value| value == 1.0).await;
+    connected(&fixture.client, "nats").await;
+    fixture.client.get("/readyz").await.expect(200);
+}
+
 /// Without a broker the service starts, and connects when there is one.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_broker_that_is_away_is_waited_for() {

@@ -68,4 +68,11 @@ impl Service {
     pub fn n_untested(&self) -> usize {
         self.inner.presences.n_untested()
     }
+
+    /// Returns the partitions that this process owns, each with its epoch.
+    #[must_use]
+    pub fn partition_epochs(&self) -> Vec<(u32, i64)> {
+        let epochs = self.inner.handles.ownership.epochs();
+        epochs.into_iter().map(|(partition, epoch)| (partition.0, epoch)).collect()
+    }
 }
