@@ -78,7 +78,7 @@ const METRICS: &[(&str, MetricKind, &str)] = &[
     ("offbd_samples_reevaluated_total", Counter, "Recorded samples evaluated again on loading"),
     ("offbd_samples_total", Counter, "Samples, by outcome"),
     ("offbd_samples_unjudged_total", Counter, "Samples rejected or set aside, by reason"),
-    ("offbd_scrub_findings_total", Counter, "Damaged recordings, engines and tables, by kind"),
+    ("offbd_scrub_findings_total", Counter, "Damage and differences found, by kind"),
     ("offbd_scrub_sessions_total", Counter, "Sessions that the scrub found in order"),
     ("offbd_sessions_expired_total", Counter, "Sessions deleted by retention, by reason"),
     ("offbd_shard_queue", Gauge, "Commands in the queue of a shard"),

@@ -33,6 +33,8 @@ pub(super) enum ColdFileError {
     Format(#[from] SessionFileError),
     #[error(transparent)]
     System(#[from] io::Error),
+    #[error("its file {0}")]
+    Recorded(String),
     #[error("what was written cannot be read: {0}")]
     Unreadable(String),
     #[error("sample {index} of what was written is not that of the recording")]

@@ -181,6 +181,7 @@ impl WayToWriter {
             lost: lost_sender,
             events: events.clone(),
             outage: outage_sender,
+            reported: Vec::new(),
             n_commits: n_commits.clone(),
             closing: closing.clone(),
             journal_bytes: limits.journal_bytes,

@@ -246,18 +246,32 @@ async fn check_ended(
         Vec::new()
     });
     for session in found {
-        let mut n = check_chunks(db, &session, report).await;
-        if n != session.n_samples
-            && let Some(n_cold) = check_cold(db, cold, &session, report).await
-        {
-            n = n_cold;
-        }
+        let n = check_recording(db, cold, &session, report).await;
         if n != session.n_samples && is_visible(db, &session.id).await {
             let CheckedSession { id, n_samples } = &session;
             report.add(format!("session {id}: {n} of {n_samples} samples are there"));
         }
         report.n_sessions += 1;
     }
+}
+
+/// Checks the samples of the ended `session`: in its file, or else in the chunks. Returns their
+/// number.
+async fn check_recording(
+    db: &mut AnyConnection,
+    cold: Option<&ColdDirectory>,
+    session: &CheckedSession,
+    report: &mut CheckReport,
+) -> i64 {
+    if let Some(n) = check_cold(db, cold, session, report).await {
+        return n;
+    }
+    let n = check_chunks(db, session, report).await;
+    if n == session.n_samples {
+        return n;
+    }
+    // It may have moved meanwhile.
+    check_cold(db, cold, session, report).await.unwrap_or(n)
 }
 
 /// Checks the file of `session`. Returns the number of its samples, or of those that are

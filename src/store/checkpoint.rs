@@ -11,6 +11,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use sqlx::{AnyConnection, Connection};
 use tokio::sync::mpsc;
@@ -33,6 +34,13 @@ const SMALL_REST_PAGES: i64 = 1024;
 /// Copies per checkpoint. Each has only the pages to copy that were committed during the
 /// previous one, so that further copies would not make the rest smaller.
 const COPIES: u32 = 4;
+
+/// Pause before the log is copied again because a connection still reads an older state of the
+/// database. Chosen.
+const COPY_AGAIN_AFTER: Duration = Duration::from_millis(100);
+
+/// How often it is logged that copying the whole log goes on. Chosen.
+const STILL_COPYING_EVERY: Duration = Duration::from_secs(10);
 
 /// Estimated bytes of the log per commit (four pages), and per sample: about 45 in the
 /// journal and later 20 in a chunk.
@@ -113,7 +121,7 @@ async fn copy_most(
     };
     let mut before = 0;
     for _ in 0..COPIES {
-        let LogPages { pages, copied } = copy(connection).await?;
+        let LogPages { pages, copied, .. } = copy(connection).await?;
         if copied < pages {
             return Ok(false);
         }
@@ -131,13 +139,50 @@ async fn copy_most(
 pub(super) struct LogPages {
     pages: i64,
     copied: i64,
+    /// Whether another connection was copying the log, so that nothing was copied.
+    is_busy: bool,
 }
 
 /// Copies the log as far as no reader prevents it.
 pub(super) async fn copy(connection: &mut AnyConnection) -> Result<LogPages, sqlx::Error> {
     let copy = sqlx::query_as("PRAGMA wal_checkpoint(PASSIVE)");
-    let (_busy, pages, copied): (i64, i64, i64) = copy.fetch_one(connection).await?;
-    Ok(LogPages { pages, copied })
+    let (busy, pages, copied): (i64, i64, i64) = copy.fetch_one(connection).await?;
+    Ok(LogPages { pages, copied, is_busy: busy != 0 })
+}
+
+/// Copies the whole log. There is no limit of time: SQLite notes what it has copied only at
+/// the end, so that on a slow disk an interrupted copy would begin anew each time.
+pub(super) async fn copy_all(connection: &mut AnyConnection) -> Result<(), sqlx::Error> {
+    let mut copied = std::pin::pin!(copy_until_whole(connection));
+    loop {
+        match tokio::time::timeout(STILL_COPYING_EVERY, &mut copied).await {
+            Ok(copied) => return copied,
+            Err(_) => tracing::warn!(
+                "the write-ahead log is still being copied into the database file; on a slow \
+                 disk this takes long"
+            ),
+        }
+    }
+}
+
+async fn copy_until_whole(connection: &mut AnyConnection) -> Result<(), sqlx::Error> {
+    let mut is_reported = false;
+    loop {
+        let LogPages { pages, copied, is_busy } = copy(connection).await?;
+        if copied == pages && !is_busy {
+            return Ok(());
+        }
+        if !is_reported {
+            tracing::warn!(
+                pages,
+                copied,
+                "the write-ahead log waits to be copied into the database file until other \
+                 programs have read what they began to read, such as a backup or a check"
+            );
+            is_reported = true;
+        }
+        tokio::time::sleep(COPY_AGAIN_AFTER).await;
+    }
 }
 
 #[cfg(test)]

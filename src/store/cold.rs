@@ -1,7 +1,9 @@
 //! Cold data: ended sessions whose samples are in a file outside the database.
 //!
 //! A row of `cold_file` says which file, with its checksum; `cold_chunk` keeps the places and
-//! times of the chunks that were deleted. The row is made before the file (a *plan*) and
+//! times of the chunks that were deleted. They are deleted in pieces, from the first one on,
+//! once the file is the recording; until then a reader may find a sample in either. The row is
+//! made before the file (a *plan*) and
 //! removed after it, so that whatever a crash leaves is named in the database. Each attempt
 //! to write a file has a path of its own, so that a process that no longer owns the
 //! partition never touches a file that counts.

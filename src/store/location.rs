@@ -101,9 +101,10 @@ impl Location {
     /// that still holds it; returns what the server knows the new one as. An SQLite file
     /// is locked by the caller.
     ///
-    /// The main writer of an SQLite file first copies the write-ahead log into the file. If a
-    /// sync of the log has failed, SQLite may find commits there that the system has in
-    /// memory but no longer writes to the disk; commits after them would be lost with them.
+    /// The main writer of an SQLite file first copies the whole write-ahead log into the file,
+    /// however long that takes. If a sync of the log has failed, SQLite may find commits there
+    /// that the system has in memory but no longer writes to the disk; commits after them
+    /// would be lost with them.
     pub(super) async fn writer(
         &self,
         role: WriterRole,
@@ -127,15 +128,15 @@ impl Location {
                     };
                     Some(writer_lock::take(&mut connection, mode, lost).await?)
                 }
-                Self::File(_) if role == WriterRole::Main => {
-                    checkpoint::copy(&mut connection).await?;
-                    None
-                }
                 _ => None,
             };
             Ok((connection, backend))
         };
-        within(connect).await
+        let (mut connection, backend) = within(connect).await?;
+        if self.file().is_some() && role == WriterRole::Main {
+            checkpoint::copy_all(&mut connection).await?;
+        }
+        Ok((connection, backend))
     }
 
     /// Checks the write-ahead log of an SQLite file before the first connection opens it:

@@ -354,12 +354,13 @@ impl Store {
         if rows.len() + n_cold > limit as usize {
             return Ok(None);
         }
+        if n_cold > 0 {
+            // The file has all samples, those of chunks that are not deleted yet too.
+            return self.cold_samples(session, is_asked).await.map(Some);
+        }
         for (first_index, data) in rows {
             let samples = decode_chunk(&data, ChunkKey { session, first_index })?;
             found.extend(samples.into_iter().filter(is_asked));
-        }
-        if n_cold > 0 {
-            found.extend(self.cold_samples(session, is_asked).await?);
         }
         Ok(Some(found))
     }

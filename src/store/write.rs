@@ -356,8 +356,13 @@ impl Writer {
     /// been changed by another process.
     pub async fn reconnect(&mut self) -> Result<bool, StoreError> {
         self.connection = None;
+        self.check_file()?;
+        let lost = self.backend.as_ref();
+        // Has time limits of its own.
+        let (connection, backend) = self.location.writer(self.role, lost).await?;
+        self.backend = backend.or(self.backend.take());
         let late = |_| Err(sqlx::Error::Io(std::io::ErrorKind::TimedOut.into()).into());
-        let attempt = tokio::time::timeout(COMMIT_TIMEOUT, self.connect_again());
+        let attempt = tokio::time::timeout(COMMIT_TIMEOUT, self.resume(connection));
         attempt.await.unwrap_or_else(late)
     }
 
@@ -371,11 +376,8 @@ impl Writer {
         Err(StoreError::FileGone { file })
     }
 
-    async fn connect_again(&mut self) -> Result<bool, StoreError> {
-        self.check_file()?;
-        let lost = self.backend.as_ref();
-        let (mut connection, backend) = self.location.writer(self.role, lost).await?;
-        self.backend = backend.or(self.backend.take());
+    /// Goes on with a new connection. Returns whether the transaction in doubt is committed.
+    async fn resume(&mut self, mut connection: AnyConnection) -> Result<bool, StoreError> {
         self.probe(&mut connection).await?;
         let was_committed = self.own_again(&mut connection).await?;
         if was_committed {

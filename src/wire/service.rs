@@ -185,8 +185,8 @@ pub struct FleetEntryView {
     /// Delay of the last batch, relative to the smallest delay of a batch in the session, s;
     /// null until a batch arrives.
     pub lag_s: Option<f64>,
-    /// Why the rig is not tested at present: its latest samples are not judged; null if
-    /// they are.
+    /// Why the rig is not tested at present: many of its latest samples are not judged; null
+    /// if they are.
     #[serde(default)]
     pub unjudged: Option<UnjudgedView>,
     /// Pending and confirmed faults, also those of muted monitors.
@@ -223,16 +223,16 @@ pub struct FleetView {
     pub missing_nodes: Vec<String>,
 }
 
-/// The latest samples of a rig, if they are not judged.
+/// Samples of a rig that are not judged, if they are at least 11 of the last 32.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct UnjudgedView {
-    /// Number of consecutive samples that are not judged.
+    /// Number of samples that have not been judged since they are so many.
     pub samples: u64,
     /// Why the last of them is not judged.
     pub reason: String,
 }
 
-/// Returns the view of a run of unjudged samples.
+/// Returns the view of unjudged samples.
 #[must_use]
 pub fn unjudged_view(run: Unjudged) -> UnjudgedView {
     UnjudgedView { samples: run.n, reason: run.why.to_string() }
@@ -335,8 +335,8 @@ pub struct StateView {
     /// Number of samples that wait for an earlier one, or until a jump of the clock is
     /// confirmed.
     pub waiting: usize,
-    /// Why the rig is not tested at present: its latest samples are not judged, and the
-    /// evidence is that before them; null if they are judged.
+    /// Why the rig is not tested at present: many of its latest samples are not judged, and the
+    /// evidence is that of the others; null if they are judged.
     #[serde(default)]
     pub unjudged: Option<UnjudgedView>,
     /// The twin's ball position relative to the plate, m.

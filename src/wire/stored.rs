@@ -1,4 +1,4 @@
-//! The stored form of the fault memory. It is separate from the views of the API, so that a
+//! The stored form of the fault memory and of verdicts. It is separate from the views of the API, so that a
 //! change of the API does not change the store.
 //!
 //! Documents of earlier versions can be read: unknown keys are ignored, and missing keys
@@ -6,12 +6,43 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::verdict::SummaryView;
 use super::words::{CodeWord, KindWord};
 use offbd_core::diagnosis::{
     AxisEvidence, Candidate, Evidence, FaultMemory, FaultRecord, InUse, PositionJump, ServoAnswer,
     StatusByte, Suspicion,
 };
+use offbd_core::engine::JUDGEMENT;
 use offbd_core::vocabulary::{FaultCode, PerAxis, SimTime};
+
+/// The verdict of an ended session.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct StoredVerdict {
+    #[serde(flatten)]
+    pub summary: SummaryView,
+    /// What gives the same verdict again, to the bit: the version of the judgement and the
+    /// kind of machine; `None` if an earlier version stored it.
+    #[serde(default)]
+    judged_by: Option<String>,
+}
+
+impl StoredVerdict {
+    /// The verdict `summary` of this program.
+    #[must_use]
+    pub fn new(summary: SummaryView) -> Self {
+        Self { summary, judged_by: Some(judged_by()) }
+    }
+
+    /// Whether this program on this machine gives the same verdict on the same recording.
+    #[must_use]
+    pub fn can_be_repeated(&self) -> bool {
+        self.judged_by == Some(judged_by())
+    }
+}
+
+fn judged_by() -> String {
+    format!("{JUDGEMENT} {} {}", std::env::consts::OS, std::env::consts::ARCH)
+}
 
 /// The fault memory of one rig.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]

@@ -8,6 +8,7 @@ use offbd::config::{ColdConfig, Config};
 use offbd_core::vocabulary::Sample;
 use serde_json::{Value, json};
 
+use crate::support::deletions::{block_deletion, deletions, record_deletions, unblock_deletion};
 use crate::support::process::Process;
 use crate::support::{
     Client, ServiceFixture, config, connection, eventually, on_postgres, rig, url,
@@ -17,6 +18,15 @@ use crate::support::{
 fn set_cold(config: &mut Config, directory: &Path) {
     config.cold = Some(ColdConfig { directory: directory.to_owned(), after_days: Some(0) });
     config.retention.sweep_s = 1;
+}
+
+/// As [`set_cold`], for a process.
+fn environment(directory: &Path) -> [(&str, &Path); 3] {
+    [
+        ("OFFBD_COLD__DIRECTORY", directory),
+        ("OFFBD_COLD__AFTER_DAYS", Path::new("0")),
+        ("OFFBD_RETENTION__SWEEP_S", Path::new("1")),
+    ]
 }
 
 async fn record(client: &Client, asset: &str, name: &str, samples: &[Sample]) -> String {
@@ -38,7 +48,7 @@ async fn wait_until_moved(data: &Path, n: i64) {
     })
     .await;
     let left = "SELECT COUNT(*) FROM chunk WHERE session IN (SELECT session FROM cold_file)";
-    assert_eq!(count(left).await, 0);
+    eventually(async || (count(left).await == 0).then_some(())).await;
 }
 
 /// All files below `directory`.
@@ -136,6 +146,110 @@ async fn moved_sessions_answer_as_before() {
     assert!(report.n_samples >= 10_800, "{}", report.n_samples);
 }
 
+/// Records a session of twenty chunks, which are more than are deleted in one transaction.
+async fn record_twenty_chunks(client: &Client, data: &Path) -> (String, Vec<Sample>) {
+    client.asset("a").await;
+    let samples = rig(20 * 2048, usize::MAX);
+    for part in samples.chunks(2048) {
+        client.telemetry("a", Some("long"), part).await;
+    }
+    let id = client.end("a", "long").await["id"].as_str().unwrap().to_owned();
+    assert_eq!(n_chunks(data).await, 20);
+    (id, samples)
+}
+
+async fn n_chunks(data: &Path) -> i64 {
+    let mut db = connection(&url(data)).await;
+    sqlx::query_scalar("SELECT COUNT(*) FROM chunk").fetch_one(&mut db).await.unwrap()
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn the_chunks_of_a_long_session_leave_in_parts() {
+    let (data, directory) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let process = Process::start(data.path());
+    let (_, samples) = record_twenty_chunks(&process.client, data.path()).await;
+    drop(process);
+    record_deletions(data.path()).await;
+    let process = Process::start_with(data.path(), &environment(directory.path()));
+    wait_until_moved(data.path(), 1).await;
+    assert_eq!(deletions(data.path()).await, (20, 16));
+    assert_eq!(process.client.recording("a", "long").await, samples);
+}
+
+/// The state that a kill between the parts of a move leaves.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_session_that_has_lost_a_part_of_its_chunks_answers_as_before() {
+    let (data, directory) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let process = Process::start(data.path());
+    let (id, samples) = record_twenty_chunks(&process.client, data.path()).await;
+    let before = answers(&process.client, &id, &samples).await;
+    drop(process);
+    block_deletion(data.path(), 18 * 2048).await;
+    let environment = environment(directory.path());
+    // Twice: a start changes nothing while the deletion is refused.
+    for _ in 0..2 {
+        let process = Process::start_with(data.path(), &environment);
+        eventually(async || process.log().contains("are deleted later").then_some(())).await;
+        assert_eq!(n_chunks(data.path()).await, 4);
+        let after = answers(&process.client, &id, &samples).await;
+        for (after, before) in after.iter().zip(&before) {
+            assert_eq!(after, before);
+        }
+        check_half_moved(data.path(), directory.path()).await;
+    }
+    // What was compared before is no reason to delete anything if the file is another one.
+    let file = file_of(directory.path(), &id);
+    let whole = std::fs::read(&file).unwrap();
+    std::fs::write(&file, &whole[1..]).unwrap();
+    unblock_deletion(data.path()).await;
+    let process = Process::start_with(data.path(), &environment);
+    eventually(async || process.log().contains("chunks of a moved session are kept").then_some(()))
+        .await;
+    assert_eq!(n_chunks(data.path()).await, 4);
+    std::fs::write(&file, &whole).unwrap();
+    eventually(async || (n_chunks(data.path()).await == 0).then_some(())).await;
+    assert_eq!(process.client.recording("a", "long").await, samples);
+}
+
+/// Checks the database of a session that has moved in part, and a backup of it.
+async fn check_half_moved(data: &Path, directory: &Path) {
+    let mut config = config(data);
+    set_cold(&mut config, directory);
+    let (location, cold) = (config.location().unwrap(), config.cold_directory());
+    let report = offbd::store::check(&location, cold.as_ref()).await.unwrap();
+    assert_eq!((report.findings, report.n_samples), (vec![], 20 * 2048));
+    if !on_postgres() {
+        let copy = data.join("copy");
+        let output = offbd("backup", data, Some(directory), &[&copy]);
+        assert!(output.status.success(), "{output:?}");
+        std::fs::remove_file(copy).unwrap();
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_retransmission_after_a_part_of_the_chunks_has_left_is_recognised() {
+    let (data, directory) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let process = Process::start(data.path());
+    process.client.asset("a").await;
+    let samples = rig(20 * 2048, usize::MAX);
+    let mut name = None;
+    for part in samples.chunks(2048) {
+        name = Some(process.client.telemetry("a", None, part).await["session"].clone());
+    }
+    let name = name.as_ref().and_then(Value::as_str).unwrap();
+    process.client.end("a", name).await;
+    drop(process);
+    block_deletion(data.path(), 18 * 2048).await;
+    let process = Process::start_with(data.path(), &environment(directory.path()));
+    eventually(async || process.log().contains("are deleted later").then_some(())).await;
+    // Of chunks that have left and of some that have not.
+    for part in [&samples[..100], &samples[samples.len() - 100..]] {
+        let ack = process.client.telemetry("a", None, part).await;
+        assert_eq!((&ack["duplicate"], &ack["session"]), (&json!(100), &json!(name)), "{ack}");
+    }
+    assert_eq!(process.client.recording("a", name).await, samples);
+}
+
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_retransmission_of_a_moved_session_is_recognised() {
     let directory = tempfile::tempdir().unwrap();
@@ -204,11 +318,7 @@ async fn a_service_that_is_killed_while_it_moves_loses_nothing_and_leaves_nothin
         record(&process.client, "a", name, &samples).await;
     }
     drop(process);
-    let environment = [
-        ("OFFBD_COLD__DIRECTORY", directory.path()),
-        ("OFFBD_COLD__AFTER_DAYS", Path::new("0")),
-        ("OFFBD_RETENTION__SWEEP_S", Path::new("1")),
-    ];
+    let environment = environment(directory.path());
     // Killed as soon as there is another file, complete or not.
     for n in 0..names.len() {
         let process = Process::start_with(data.path(), &environment);

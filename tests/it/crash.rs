@@ -4,9 +4,10 @@
 use std::path::Path;
 
 use crate::support::device::{Random, ServiceLink, device};
-use crate::support::process::{Process, ended};
-use crate::support::{judged, rig};
+use crate::support::process::{Process, ended, program};
+use crate::support::{connection, eventually, judged, on_postgres, rig, url};
 use serde_json::json;
+use sqlx::Executor;
 
 /// Number of kills, unless the environment variable KILLS is set.
 const KILLS: usize = 10;
@@ -90,6 +91,40 @@ async fn a_killed_service_continues_open_sessions_without_loss() {
     let session = process.client.end("a", "s").await;
     assert_eq!(session["verdict"]["verdict_hash"], hash);
     assert_eq!(session["verdict"]["faults"], json!(faults));
+    assert_eq!(process.client.recording("a", "s").await, samples);
+}
+
+/// Commits that are in the write-ahead log only might be lost with a log that could not be
+/// written, and with them all later ones.
+#[cfg(unix)]
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_start_waits_until_the_whole_log_is_in_the_database_file() {
+    if on_postgres() {
+        return;
+    }
+    let data = tempfile::tempdir().unwrap();
+    let process = Process::start(data.path());
+    process.client.asset("a").await;
+    let samples = rig(500, 500);
+    process.client.telemetry("a", Some("s"), &samples[..300]).await;
+    // Another program reads the database as it is now.
+    let mut reader = connection(&url(data.path())).await;
+    for sql in ["BEGIN", "SELECT * FROM asset"] {
+        reader.execute(sql).await.unwrap();
+    }
+    process.client.telemetry("a", Some("s"), &samples[300..]).await;
+    drop(process);
+    let waiting = async || {
+        let starting = Process::begin(&program(), data.path(), &[]);
+        eventually(async || starting.log().contains("waits to be copied").then_some(())).await;
+        assert!(!starting.log().contains("serving"), "{}", starting.log());
+        starting
+    };
+    let status = waiting().await.stop().await;
+    assert!(status.success(), "{status}");
+    let starting = waiting().await;
+    reader.execute("ROLLBACK").await.unwrap();
+    let process = starting.served().unwrap();
     assert_eq!(process.client.recording("a", "s").await, samples);
 }
 

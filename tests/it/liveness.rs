@@ -1,6 +1,7 @@
 //! Ingest continues regardless of one device, one deletion or one failing change, and the
 //! service shuts down in bounded time.
 
+use crate::support::deletions::{block_deletion, deletions, record_deletions, unblock_deletion};
 use crate::support::{Client, DEADLINE, ServiceFixture, batch, eventually, packed, rig};
 use futures_util::{SinkExt, StreamExt};
 use offbd_core::vocabulary::Sample;
@@ -177,49 +178,13 @@ async fn service_with_large_asset() -> ServiceFixture {
     fixture
 }
 
-/// Makes the database reject the deletion of a chunk that is not in the first part.
-async fn block_deletion(fixture: &ServiceFixture) {
-    let words = if crate::support::on_postgres() {
-        "CREATE FUNCTION refuse() RETURNS trigger LANGUAGE plpgsql AS
-         'BEGIN RAISE ''stuck'' USING ERRCODE = ''23514''; END';
-         CREATE TRIGGER stuck BEFORE DELETE ON chunk FOR EACH ROW
-         WHEN (OLD.first_index = 1000500) EXECUTE FUNCTION refuse()"
-    } else {
-        "CREATE TRIGGER stuck BEFORE DELETE ON chunk WHEN OLD.first_index = 1000500
-         BEGIN SELECT RAISE(ABORT, 'stuck'); END"
-    };
-    fixture.store().await.execute(words).await.unwrap();
-}
-
-async fn unblock_deletion(fixture: &ServiceFixture) {
-    let on = if crate::support::on_postgres() { " ON chunk" } else { "" };
-    let words = format!("DROP TRIGGER stuck{on}");
-    fixture.store().await.execute(AssertSqlSafe(words)).await.unwrap();
-}
-
-/// Makes the database record the commit that deletes each chunk.
-async fn record_deletions(fixture: &ServiceFixture) {
-    let note = "INSERT INTO gone SELECT n_commits FROM partition";
-    let words = if crate::support::on_postgres() {
-        format!(
-            "CREATE TABLE gone (at BIGINT);
-             CREATE FUNCTION note() RETURNS trigger LANGUAGE plpgsql AS
-             $$BEGIN {note}; RETURN OLD; END$$;
-             CREATE TRIGGER noted BEFORE DELETE ON chunk FOR EACH ROW EXECUTE FUNCTION note()"
-        )
-    } else {
-        format!(
-            "CREATE TABLE gone (at BIGINT);
-             CREATE TRIGGER noted BEFORE DELETE ON chunk BEGIN {note}; END"
-        )
-    };
-    fixture.store().await.execute(AssertSqlSafe(words)).await.unwrap();
-}
+/// A chunk of [`enlarge`] that is not in the first part of a deletion.
+const LATE_CHUNK: i64 = 1_000_500;
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_large_asset_is_deleted_in_parts_between_other_commits() {
     let fixture = service_with_large_asset().await;
-    record_deletions(&fixture).await;
+    record_deletions(fixture.data.path()).await;
     let deleting = tokio::spawn({
         let client = fixture.client.clone();
         async move { client.delete("assets/large").await.expect(204) }
@@ -229,9 +194,8 @@ async fn a_large_asset_is_deleted_in_parts_between_other_commits() {
         assert_eq!(ack["accepted"], 20, "batch {i}");
     }
     deleting.await.unwrap();
-    let most = "(SELECT at FROM gone GROUP BY at HAVING COUNT(*) > 16) large";
-    assert!(count(&fixture, "gone").await > 200);
-    assert_eq!(count(&fixture, most).await, 0, "too much in one transaction");
+    let (deleted, most) = deletions(fixture.data.path()).await;
+    assert!(deleted > 200 && most <= 16, "{deleted} chunks, {most} of them in one transaction");
     assert_eq!(count(&fixture, "session WHERE asset = 'large'").await, 0);
     assert_eq!(count(&fixture, "chunk WHERE session NOT IN (SELECT id FROM session)").await, 0);
     assert_eq!(count(&fixture, "transition WHERE asset = 'large'").await, 0);
@@ -245,7 +209,7 @@ async fn a_large_asset_is_deleted_in_parts_between_other_commits() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn an_interrupted_deletion_is_hidden_and_continues_at_the_next_start() {
     let mut fixture = service_with_large_asset().await;
-    block_deletion(&fixture).await;
+    block_deletion(fixture.data.path(), LATE_CHUNK).await;
     let problem = fixture.client.delete("assets/large").await.problem(503);
     let detail = problem["detail"].as_str().unwrap();
     let session = "SELECT id FROM session WHERE asset = 'large' AND name = 'first'";
@@ -265,7 +229,7 @@ async fn an_interrupted_deletion_is_hidden_and_continues_at_the_next_start() {
     fixture.client.delete("assets/large").await.problem(404);
     fixture.client.post("assets", &json!({ "name": "large" })).await.problem(429);
     fixture.client.telemetry("b", Some("second"), &rig(700, usize::MAX)[600..]).await;
-    unblock_deletion(&fixture).await;
+    unblock_deletion(fixture.data.path()).await;
     fixture.restart().await;
     eventually(|| async { (count(&fixture, "asset").await == 1).then_some(()) }).await;
     assert_eq!(count(&fixture, "session").await, 2);
@@ -277,12 +241,12 @@ async fn a_large_session_is_hidden_at_once_and_deleted_in_parts() {
     let mut fixture = service_with_large_asset().await;
     let path = |session: &Value| format!("sessions/{}", session["id"].as_str().unwrap());
     let first = path(&fixture.client.session("large", "first").await);
-    block_deletion(&fixture).await;
+    block_deletion(fixture.data.path(), LATE_CHUNK).await;
     fixture.client.delete(&first).await.problem(503);
     fixture.client.get(&first).await.problem(404);
     let second = path(&fixture.client.session("large", "second").await);
     fixture.client.delete(&second).await.expect(204);
-    unblock_deletion(&fixture).await;
+    unblock_deletion(fixture.data.path()).await;
     fixture.restart().await;
     eventually(|| async { (count(&fixture, "session").await == 2).then_some(()) }).await;
     fixture.client.telemetry("large", Some("first"), &rig(10, usize::MAX)).await;

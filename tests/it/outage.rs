@@ -1,18 +1,23 @@
 //! The database fails under load and recovers: acknowledged samples are stored once, and
 //! meanwhile the service reports the reason.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::pin::pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
 
 #[cfg(target_os = "linux")]
 use crate::support::calls::FaultySystem;
 use crate::support::device::DeviceLoad;
 use crate::support::postgres::Postgres;
-use crate::support::process::Process;
-use crate::support::{ServiceFixture, batch, eventually, registration, rig};
+use crate::support::process::{Process, ended, program};
+use crate::support::{Client, ServiceFixture, batch, eventually, registration, rig};
 use futures_util::future::select;
+use offbd_core::vocabulary::Sample;
+use reqwest::Method;
+use serde_json::Value;
 use sqlx::Executor;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{UnixListener, UnixStream};
@@ -145,6 +150,95 @@ async fn a_commit_with_a_lost_answer_is_neither_lost_nor_repeated() {
     // refused.
     assert_eq!(link.n_refused(), 0);
     proxy.abort();
+}
+
+/// Passes connections on to the socket in `to`, and counts those for which nobody listens
+/// there.
+async fn pass(listener: UnixListener, to: PathBuf, n_refused: Arc<AtomicUsize>) {
+    while let Ok((mut client, _)) = listener.accept().await {
+        match UnixStream::connect(to.join(".s.PGSQL.5432")).await {
+            Ok(mut server) => {
+                tokio::spawn(async move {
+                    let _ = tokio::io::copy_bidirectional(&mut client, &mut server).await;
+                });
+            }
+            Err(_) => drop(n_refused.fetch_add(1, Ordering::SeqCst)),
+        }
+    }
+}
+
+/// The reasons for which the database is unavailable, in the lines of `log`.
+fn reasons(log: &str) -> Vec<String> {
+    let lines = log.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
+    let of = |line: Value| {
+        let is_one = line["message"] == "the database is unavailable; retrying";
+        is_one.then(|| line["reason"].as_str().unwrap().to_owned())
+    };
+    lines.filter_map(of).collect()
+}
+
+/// Sends samples whose acknowledgement nobody waits for.
+fn send(client: &Client, samples: &[Sample]) {
+    let request = client.request(Method::POST, "assets/a/telemetry");
+    let body = batch(Some("s"), samples).to_string();
+    tokio::spawn(request.header("content-type", "application/json").body(body).send());
+}
+
+/// Longest duration of a stop, `limits.shutdown_s`.
+const STOP_TIMEOUT: Duration = Duration::from_secs(20);
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn an_outage_is_logged_once_and_does_not_hold_up_a_stop() {
+    let mut server = Postgres::new();
+    let direct = server.database("twin");
+    let (data, socket) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let listener = UnixListener::bind(socket.path().join(".s.PGSQL.5432")).unwrap();
+    let n_refused = Arc::<AtomicUsize>::default();
+    let passing = tokio::spawn(pass(listener, server.directory().to_owned(), n_refused.clone()));
+    let through = crate::support::postgres::url(socket.path(), "twin");
+    let mut process = Process::start_with(data.path(), &[("OFFBD_DATABASE", Path::new(&through))]);
+    process.client.asset("a").await;
+    let samples = rig(400, 400);
+    process.client.telemetry("a", Some("s"), &samples[..100]).await;
+    for part in [&samples[100..200], &samples[200..300]] {
+        let n_bytes = process.log().len();
+        server.stop("QUIT");
+        send(&process.client, part);
+        process.client.readiness(503).await;
+        n_refused.store(0, Ordering::SeqCst);
+        eventually(async || (n_refused.load(Ordering::SeqCst) >= 8).then_some(())).await;
+        server.start();
+        process.client.readiness(200).await;
+        let found = reasons(&process.log()[n_bytes..]);
+        let different: BTreeSet<_> = found.iter().collect();
+        assert!(!found.is_empty() && found.len() == different.len(), "{found:?}");
+    }
+    server.stop("QUIT");
+    send(&process.client, &samples[300..]);
+    process.client.readiness(503).await;
+    let stopping = Instant::now();
+    process.terminate();
+    let status = ended(&mut process.child).await;
+    assert!(status.success() && stopping.elapsed() < STOP_TIMEOUT, "{status}");
+    server.start();
+    let process = Process::start_with(data.path(), &[("OFFBD_DATABASE", Path::new(&direct))]);
+    let ack = process.client.telemetry("a", Some("s"), &samples).await;
+    assert!(ack["duplicate"].as_u64().unwrap() >= 300, "{ack}");
+    assert_eq!(process.client.recording("a", "s").await, samples);
+    passing.abort();
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn sigterm_while_the_start_waits_for_the_database_ends_the_service() {
+    let (data, socket) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let listener = UnixListener::bind(socket.path().join(".s.PGSQL.5432")).unwrap();
+    let silent = crate::support::postgres::url(socket.path(), "twin");
+    let environment = [("OFFBD_DATABASE", Path::new(&silent))];
+    let starting = Process::begin(&program(), data.path(), &environment);
+    let _held = listener.accept().await.unwrap();
+    let stopping = Instant::now();
+    let status = starting.stop().await;
+    assert!(status.success() && stopping.elapsed() < STOP_TIMEOUT, "{status}");
 }
 
 #[cfg(target_os = "linux")]

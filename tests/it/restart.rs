@@ -150,6 +150,39 @@ async fn the_scrub_finds_damaged_recordings_and_engines_that_differ() {
     assert_eq!(outcome(&service.client, "live").await, expected);
 }
 
+/// The scrub judges one in 16 ended sessions again, if this version has judged them.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn the_scrub_finds_verdicts_that_differ() {
+    let data = tempfile::tempdir().unwrap();
+    let mut service = Process::start(data.path());
+    service.client.asset("a").await;
+    let samples = long_rig(600);
+    for name in 0..16 {
+        service.client.telemetry("a", Some(&name.to_string()), &samples).await;
+    }
+    service.client.end("a", "15").await;
+    let wrong_hash = "UPDATE session SET verdict_hash = 'x' || substr(verdict_hash, 2)";
+    let by_another = r#"UPDATE session SET
+        verdict = REPLACE(verdict, '"judged_by":"', '"judged_by":"9')"#;
+    let by_this = r#"UPDATE session SET
+        verdict = REPLACE(verdict, '"judged_by":"9', '"judged_by":"')"#;
+    for (damage, n_found) in [("SELECT 1", 0), (by_another, 0), (wrong_hash, 0), (by_this, 1)] {
+        service = restart_after(service, &data, damage).await;
+        let text = eventually(|| async {
+            let text = service.client.get("/metrics").await.text;
+            let series = |name: &str| {
+                let line = text.lines().find_map(|line| line.strip_prefix(name));
+                line.map_or(0, |n| n.trim().parse::<u32>().unwrap())
+            };
+            let found = series("offbd_scrub_findings_total{kind=\"verdict\"}");
+            (series("offbd_scrub_sessions_total") + found == 16).then_some(text)
+        })
+        .await;
+        let found = format!("offbd_scrub_findings_total{{kind=\"verdict\"}} {n_found}\n");
+        assert!(text.contains(&found), "after {damage}: {text}");
+    }
+}
+
 /// Stores the snapshot of `session` as one after a sample less, with a valid checksum.
 async fn put_off_by_one(store: &mut AnyConnection, session: &str) {
     let select = "SELECT n_samples, version, data FROM snapshot WHERE session = $1";

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::support::process::Process;
 use crate::support::{Client, ServiceFixture, batch, judged, rig};
 use offbd_core::vocabulary::Sample;
 use proptest::prelude::*;
@@ -212,6 +213,67 @@ async fn conflicting_samples_are_rejected_by_name() {
         send(client, Some("s"), &take(rig(3200, usize::MAX))[3000..]).await;
         assert_eq!(fleet().await["unjudged"], Value::Null);
         assert!(enabled(&state().await));
+    }
+}
+
+#[tokio::test]
+async fn a_rig_whose_rows_are_no_samples_is_not_tested_and_not_silent() {
+    let data = tempfile::tempdir().unwrap();
+    let Process { client, .. } = &Process::start(data.path());
+    client.asset("a").await;
+    let fleet = || async { client.get("fleet").await.expect(200)["items"][0].clone() };
+    let good = rig(1000, usize::MAX);
+    // Sends `good` with other rows instead of those that are wanted.
+    let send_with = async |samples: &[Sample], is_malformed: &dyn Fn(usize) -> bool| {
+        let mut body = batch(Some("s"), samples);
+        for row in (0..samples.len()).filter(|&row| is_malformed(row)) {
+            body["samples"][row]["t_s"] = json!("now");
+        }
+        client.post("assets/a/telemetry", &body).await.expect(200)
+    };
+    let untested = async |n: u64, seen_before: &Value| {
+        let rig = fleet().await;
+        assert_eq!(rig["unjudged"]["samples"], n, "{rig}");
+        assert!(rig["unjudged"]["reason"].as_str().unwrap().contains("no sample"), "{rig}");
+        assert!(rig["last_seen"].is_string() && rig["last_seen"] != *seen_before, "{rig}");
+        rig["last_seen"].clone()
+    };
+    // Before there is a session.
+    send_with(&good[..10], &|_| true).await;
+    assert_eq!(fleet().await["unjudged"], Value::Null);
+    send_with(&good[..2], &|_| true).await;
+    let seen = untested(12, &Value::Null).await;
+    assert!(fleet().await["lag_s"].is_null() && fleet().await["session"].is_null());
+    send(client, Some("s"), &good[..100]).await;
+    assert_eq!(fleet().await["unjudged"], Value::Null);
+    // One row at a time, and a few of many.
+    for row in 0..11 {
+        send_with(&good[row..=row], &|_| true).await;
+    }
+    untested(11, &seen).await;
+    send_with(&good[100..200], &|row| row % 10 == 0).await;
+    assert_eq!(fleet().await["unjudged"], Value::Null);
+    // As many as samples.
+    send(client, Some("s"), &good[200..240]).await;
+    send_with(&good[240..300], &|row| row % 2 == 1).await;
+    untested(30, &seen).await;
+    let state = client.get("assets/a/state").await.expect(200);
+    assert_eq!(state["unjudged"], fleet().await["unjudged"]);
+}
+
+#[tokio::test]
+async fn two_devices_that_take_turns_under_one_name_are_not_tested() {
+    let data = tempfile::tempdir().unwrap();
+    let Process { client, .. } = &Process::start(data.path());
+    client.asset("a").await;
+    let (one, other) = (rig(300, usize::MAX), shifted(rig(300, usize::MAX)));
+    for (turn, (one, other)) in one.chunks(5).zip(other.chunks(5)).enumerate() {
+        for (half, device) in [one, other].into_iter().enumerate() {
+            send(client, Some("s"), device).await;
+            let unjudged = client.get("fleet").await.expect(200)["items"][0]["unjudged"].clone();
+            // From the third turn of the other device on.
+            assert_eq!(unjudged.is_object(), (turn, half) >= (2, 1), "turn {turn}: {unjudged}");
+        }
     }
 }
 

@@ -1,7 +1,10 @@
 //! Small promises at the edge of the service: names, headers, files and closing codes.
 
-use crate::support::{ServiceFixture, eventually, on_postgres, rig};
+use crate::support::{ServiceFixture, config, eventually, on_postgres, rig};
 use futures_util::StreamExt;
+use offbd::config::Auth;
+use offbd::server::tokens::create_token;
+use offbd::service::access::{NewToken, Role};
 use reqwest::Method;
 use serde_json::json;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -86,9 +89,17 @@ async fn an_answer_before_the_body_announces_that_the_connection_is_closed() {
              content-length: 100000\r\n\r\n{{"
         )
     };
-    let early = raw(&client.address, &head("assets/a/telemetry", "image/png")).await;
-    assert!(early.starts_with("HTTP/1.1 415"), "{early}");
-    assert!(early.to_lowercase().contains("connection: close"), "{early}");
+    let json = "application/json";
+    let too_long = head("assets/a/telemetry", json).replace("100000", "100000000");
+    for (head, status) in [
+        (head("assets/a/telemetry", "image/png"), 415),
+        (head("assets/a/nothing", json), 404),
+        (too_long, 413),
+    ] {
+        let early = raw(&client.address, &head).await;
+        assert!(early.starts_with(&format!("HTTP/1.1 {status}")), "{early}");
+        assert!(early.to_lowercase().contains("connection: close"), "{early}");
+    }
     // A refused body that arrives as a whole leaves the connection open, whether its first
     // byte tells that it is refused or its end. It is larger than the buffers of a socket.
     let request = client.request(Method::POST, "assets/a/telemetry").body(vec![b' '; 10 << 20]);
@@ -146,6 +157,84 @@ async fn the_files_of_the_store_are_readable_by_their_owner_only() {
     for name in ["offbd.sqlite", "offbd.sqlite-wal", "offbd.sqlite-shm", "copy.sqlite"] {
         let mode = std::fs::metadata(data.join(name)).unwrap().permissions().mode();
         assert_eq!(mode & 0o777, 0o600, "{name}");
+    }
+}
+
+#[cfg(unix)]
+#[tokio::test]
+async fn a_link_to_the_file_of_a_store_is_not_another_store() {
+    if on_postgres() {
+        return;
+    }
+    let fixture = ServiceFixture::start().await;
+    let elsewhere = tempfile::tempdir().unwrap();
+    let file = fixture.data.path().join("offbd.sqlite");
+    std::os::unix::fs::symlink(file, elsewhere.path().join("offbd.sqlite")).unwrap();
+    let second = offbd::server::start(config(elsewhere.path())).await;
+    let error = format!("{:#}", second.err().expect("the store is locked"));
+    assert!(error.contains("another process"), "{error}");
+}
+
+#[cfg(unix)]
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn readiness_tells_the_words_of_the_database_only_without_tokens() {
+    if on_postgres() {
+        return;
+    }
+    for (auth, reason) in [(None, "was removed or replaced"), (Some(Auth::Required), "see the log")]
+    {
+        let fixture = ServiceFixture::start_with(|config| config.auth = auth).await;
+        let file = fixture.data.path().join("offbd.sqlite");
+        let (name, role) = ("root".to_owned(), Role::Admin);
+        let wanted = NewToken { name, role, asset: None, expires_at: None };
+        let secret = create_token(&config(fixture.data.path()), wanted).await.unwrap();
+        let client = fixture.client.with(&secret);
+        std::fs::rename(&file, file.with_extension("aside")).unwrap();
+        let creating =
+            tokio::spawn(async move { client.post("assets", &json!({"name": "a"})).await });
+        let detail = fixture.client.readiness(503).await;
+        assert!(detail.contains(reason), "{detail}");
+        assert_eq!(detail.contains("removed"), auth.is_none(), "{detail}");
+        std::fs::rename(file.with_extension("aside"), &file).unwrap();
+        creating.await.unwrap().expect(201);
+    }
+}
+
+/// A replay or a calibration of a session that is deleted meanwhile is accepted, or the
+/// session is not found; never is that an error of the service.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_job_beside_a_deletion_is_accepted_or_finds_no_session() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
+    client.asset("a").await;
+    for round in 0..40 {
+        client.telemetry("a", Some(&round.to_string()), &rig(20, 20)).await;
+        let session = client.end("a", &round.to_string()).await;
+        let id = session["id"].as_str().unwrap();
+        let jobs = ["replays", "calibrations"].map(|kind| {
+            let (client, id) = (client.clone(), id.to_owned());
+            tokio::spawn(async move {
+                for _ in 0..4 {
+                    let answer = match kind {
+                        "replays" => {
+                            client.post(&format!("sessions/{id}/replays"), &json!({})).await
+                        }
+                        _ => {
+                            let body = json!({ "sessions": [id] });
+                            client.post("assets/a/calibrations", &body).await
+                        }
+                    };
+                    let status = answer.status.as_u16();
+                    // A calibration names its sessions in its body.
+                    let unknown = if kind == "replays" { 404 } else { 422 };
+                    assert!([202, 429, unknown].contains(&status), "{kind}: {}", answer.text);
+                }
+            })
+        });
+        client.delete(&format!("sessions/{id}")).await.expect(204);
+        for job in jobs {
+            job.await.unwrap();
+        }
     }
 }
 

@@ -24,6 +24,9 @@ pub(super) struct Asset {
     pub(super) provenance: Provenance,
     pub(super) open: Option<OpenSession>,
     pub(super) session_rate: SessionRate,
+    /// Rows of the batch that is being recorded that are no samples, and that the engine has
+    /// not been told of yet.
+    pub(super) malformed: Vec<usize>,
     /// The last sessions that have ended, the newest first.
     pub(super) ended: Vec<EndedSession>,
     /// The progress of the automatic calibration.

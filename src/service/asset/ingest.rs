@@ -23,7 +23,9 @@ impl Asset {
         turn: &mut Turn<'_>,
     ) -> Result<AckView, ServiceError> {
         let mut ack = AckView::default();
-        let samples = samples(batch.rows, &mut ack);
+        let (samples, malformed) = samples(batch.rows, &mut ack);
+        let n_malformed = malformed.len();
+        self.malformed = malformed;
         if self.open.as_ref().is_some_and(|open| open.importing != importing) {
             let what = "a recording is being imported into this asset";
             return Err(ServiceError::Busy { what });
@@ -38,10 +40,10 @@ impl Asset {
                 None => self.record_nameless(samples, turn, &mut ack)?,
             }
         }
-        if let (Some(open), Some(last_t_s)) = (&self.open, last_t_s) {
-            let unjudged = open.judging.engine().unjudged();
-            turn.env.presences.record(&self.row.name, &open.id, turn.at, last_t_s, unjudged);
+        if let Some(open) = &mut self.open {
+            note_malformed(&mut self.malformed, usize::MAX, open);
         }
+        self.note_presence(last_t_s, n_malformed, turn);
         if ack.session_id.is_none()
             || ack.session_id == self.open.as_ref().map(|open| open.id.clone())
         {
@@ -51,6 +53,23 @@ impl Asset {
         ack.rejected.sort_by_key(|row| row.index);
         count_outcomes(&ack);
         Ok(ack)
+    }
+
+    /// Notes the arrival of a batch whose last sample has the time `last_t_s`, with `n_malformed`
+    /// rows that are no samples.
+    fn note_presence(&self, last_t_s: Option<f64>, n_malformed: usize, turn: &Turn<'_>) {
+        let (presences, name) = (&turn.env.presences, &self.row.name);
+        let open = self.open.as_ref().map(|open| (&*open.id, open.judging.engine().unjudged()));
+        match (open, last_t_s) {
+            (Some((session, unjudged)), Some(t_s)) => {
+                presences.record(name, session, turn.at, t_s, unjudged);
+            }
+            (open, None) if n_malformed > 0 => {
+                let unjudged = open.map(|(_, unjudged)| unjudged);
+                presences.record_malformed(name, turn.at, n_malformed, unjudged);
+            }
+            _ => {}
+        }
     }
 
     /// Records samples of the open session, which their batch has named, unless an earlier
@@ -129,6 +148,7 @@ impl Asset {
         // New samples that are in `recorded` too.
         let mut n_added = 0;
         for (index, sample) in samples {
+            note_malformed(&mut self.malformed, *index, open);
             let row = |reason: String| RowView { index: *index, reason };
             let mut admission = open.take(sample);
             if admission == Admission::Unknown {
@@ -151,6 +171,7 @@ impl Asset {
                     ack.rejected.push(row(why.to_string()));
                 }
                 Admission::Unknown => {
+                    open.judging.note_rejected(Rejection::TooOld);
                     count_unjudged(Rejection::TooOld.as_str(), 1);
                     ack.rejected.push(row(Rejection::TooOld.to_string()));
                 }
@@ -193,6 +214,14 @@ impl Asset {
     }
 }
 
+/// Tells the engine of the rows before `index` that are no samples.
+fn note_malformed(malformed: &mut Vec<usize>, index: usize, open: &mut OpenSession) {
+    let n = malformed.partition_point(|&malformed| malformed < index);
+    for _ in malformed.drain(..n) {
+        open.judging.note_rejected(Rejection::Malformed);
+    }
+}
+
 /// Evaluates a sample that is older than those the engine remembers. Returns
 /// [`Admission::Unknown`] if it could not be looked up.
 fn take_old(open: &mut OpenSession, sample: &Sample, recorded: &RecordedSamples) -> Admission {
@@ -206,18 +235,22 @@ fn take_old(open: &mut OpenSession, sample: &Sample, recorded: &RecordedSamples)
     Admission::Rejected(rejection)
 }
 
-/// Returns the valid samples, each with its row index; adds the other rows to the
-/// rejections.
-fn samples(rows: Vec<Result<Sample, String>>, ack: &mut AckView) -> Vec<(usize, Sample)> {
-    let mut samples = Vec::with_capacity(rows.len());
+/// Returns the valid samples, each with its row index, and the indexes of the other rows, which
+/// are added to the rejections.
+fn samples(
+    rows: Vec<Result<Sample, String>>,
+    ack: &mut AckView,
+) -> (Vec<(usize, Sample)>, Vec<usize>) {
+    let (mut samples, mut malformed) = (Vec::with_capacity(rows.len()), Vec::new());
     for (index, row) in rows.into_iter().enumerate() {
         match row {
             Ok(sample) => samples.push((index, sample)),
             Err(reason) => {
-                count_unjudged("form", 1);
+                count_unjudged(Rejection::Malformed.as_str(), 1);
+                malformed.push(index);
                 ack.rejected.push(RowView { index, reason });
             }
         }
     }
-    samples
+    (samples, malformed)
 }

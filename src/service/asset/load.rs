@@ -51,6 +51,7 @@ impl StoredAsset {
                 provenance,
                 open: None,
                 session_rate: SessionRate::default(),
+                malformed: Vec::new(),
                 ended,
                 learning,
                 generation: EngineGeneration::default(),

@@ -5,17 +5,20 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::store::Micros;
-use offbd_core::engine::Unjudged;
+use offbd_core::engine::{Rejection, UNTESTED_FROM, Unjudged};
 
 /// The last telemetry of one asset.
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::service) struct Presence {
     session: String,
     pub(in crate::service) seen_at: Micros,
-    /// Lag of the last batch behind the fastest batch of the session, s.
-    pub(in crate::service) lag_s: f64,
-    /// The present run of unjudged samples, if the rig counts as not tested.
+    /// Lag of the last batch with a sample behind the fastest one of the session, s; `None` if
+    /// there was none.
+    pub(in crate::service) lag_s: Option<f64>,
+    /// The unjudged samples, if the rig counts as not tested.
     pub(in crate::service) unjudged: Option<Unjudged>,
+    /// Rows that were no samples, while no session was open.
+    n_malformed: u64,
     /// Smallest difference of arrival time and device clock in the session, s.
     least_offset_s: f64,
 }
@@ -32,7 +35,7 @@ impl Presences {
     }
 
     /// Records that a batch of `session`, whose last sample has the time `t_s`, arrived at
-    /// `at`; `unjudged` is the run of unjudged samples after it.
+    /// `at`; `unjudged` are the unjudged samples after it, if they are many.
     pub(in crate::service) fn record(
         &self,
         asset: &str,
@@ -45,10 +48,38 @@ impl Presences {
         let mut all = self.lock();
         let before = all.get(asset).filter(|before| before.session == session);
         let least_offset_s = before.map_or(offset_s, |before| before.least_offset_s.min(offset_s));
-        let lag_s = offset_s - least_offset_s;
-        let session = session.to_owned();
-        let presence = Presence { session, seen_at: at, lag_s, unjudged, least_offset_s };
+        let (session, lag_s) = (session.to_owned(), Some(offset_s - least_offset_s));
+        let n_malformed = 0;
+        let presence =
+            Presence { session, seen_at: at, lag_s, unjudged, n_malformed, least_offset_s };
         all.insert(asset.to_owned(), presence);
+    }
+
+    /// Records that a batch without a sample arrived at `at`: only `n` rows that are none.
+    /// `unjudged` are the unjudged samples of the open session after it, if they are many;
+    /// `None` if no session is open.
+    pub(in crate::service) fn record_malformed(
+        &self,
+        asset: &str,
+        at: Micros,
+        n: usize,
+        unjudged: Option<Option<Unjudged>>,
+    ) {
+        let mut all = self.lock();
+        let presence = all.entry(asset.to_owned()).or_insert_with(|| Presence {
+            session: String::new(),
+            seen_at: at,
+            lag_s: None,
+            unjudged: None,
+            n_malformed: 0,
+            least_offset_s: f64::INFINITY,
+        });
+        presence.seen_at = at;
+        presence.unjudged = unjudged.unwrap_or_else(|| {
+            presence.n_malformed += n as u64;
+            let (n, why) = (presence.n_malformed, Rejection::Malformed);
+            (n >= UNTESTED_FROM).then_some(Unjudged { n, why })
+        });
     }
 
     /// Number of assets whose last samples were not judged.
@@ -59,7 +90,7 @@ impl Presences {
     /// Records that `asset` has no open session, so that nothing is to be judged.
     pub(in crate::service) fn end_session(&self, asset: &str) {
         if let Some(presence) = self.lock().get_mut(asset) {
-            presence.unjudged = None;
+            (presence.unjudged, presence.n_malformed) = (None, 0);
         }
     }
 
@@ -81,7 +112,7 @@ mod tests {
         let presences = Presences::default();
         let lag_s = |at_s: f64, t_s: f64, session: &str| {
             presences.record("a", session, (at_s * 1e6) as Micros, t_s, None);
-            presences.of("a").unwrap().lag_s
+            presences.of("a").unwrap().lag_s.unwrap()
         };
         assert!(lag_s(1000.5, 0.5, "one").abs() < 1e-6);
         assert!((lag_s(1003.5, 1.0, "one") - 2.5).abs() < 1e-6, "3 s for 0.5 s of samples");

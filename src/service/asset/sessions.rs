@@ -14,7 +14,7 @@ use crate::service::writing::Handles;
 use crate::service::{ServiceError, views};
 use crate::store::{SessionProgress, SessionRow, Write};
 use crate::wire::asset;
-use crate::wire::stored::StoredMemory;
+use crate::wire::stored::{StoredMemory, StoredVerdict};
 use crate::wire::words::SessionState;
 use offbd_core::engine::{Input, Setup};
 
@@ -208,7 +208,7 @@ impl Asset {
         turn.writes.push(Write::EndSession {
             session: open.id.clone(),
             ended_at: turn.at,
-            verdict: views::to_json(&summary)?,
+            verdict: views::to_json(&StoredVerdict::new(summary.clone()))?,
             hash: summary.verdict_hash.clone(),
             found_fault: !summary.faults.is_empty(),
         });

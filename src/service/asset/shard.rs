@@ -416,6 +416,7 @@ mod tests {
             provenance: Default::default(),
             open: None,
             session_rate: SessionRate::default(),
+            malformed: Vec::new(),
             ended: Vec::new(),
             learning: Default::default(),
             generation: EngineGeneration::default(),

@@ -121,7 +121,7 @@ impl Service {
             last_t_s: progress.last_t_s,
             silent: open.is_some() && is_silent(seen, self.inner.handles.clock.now()),
             last_seen: seen.map(rfc3339),
-            lag_s: presence.as_ref().map(|p| p.lag_s),
+            lag_s: presence.as_ref().and_then(|p| p.lag_s),
             unjudged: presence.and_then(|p| p.unjudged).map(unjudged_view),
             asset: row.name,
         })

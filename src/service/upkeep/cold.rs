@@ -1,12 +1,13 @@
 //! Cold data: moves the samples of old ended sessions from the database to files, and removes
 //! the files of deleted sessions.
 //!
-//! A session moves in four steps: a plan with the file's path is stored; the file is written
+//! A session moves in five steps: a plan with the file's path is stored; the file is written
 //! and is on the disk; it is read back and compared with the recording; one transaction makes
-//! it the recording and deletes the chunks. Wherever this is interrupted, the recording is
-//! whole, and the plan names what is left. One task does all of it, so that nothing is removed
-//! that is being written. The work of another process that does not know yet that it has lost
-//! the partition is in files of other names.
+//! it the recording; the chunks are deleted in pieces, each in its own transaction, so that
+//! other changes are committed in between. Wherever this is interrupted, the recording is
+//! whole, the plan names what is left, and the next round deletes the other chunks. One task
+//! does all of it, so that nothing is removed that is being written. The work of another
+//! process that does not know yet that it has lost the partition is in files of other names.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -21,6 +22,9 @@ use offbd_core::vocabulary::Sample;
 
 /// Sessions that are read from the database at a time.
 const SESSIONS_AT_ONCE: u32 = 64;
+
+/// Chunks deleted in one transaction, as in other deletions.
+const CHUNKS_AT_ONCE: u32 = 16;
 
 /// Pause after a session, in which other changes are committed. Chosen.
 const PAUSE_AFTER_SESSION: Duration = Duration::from_millis(50);
@@ -56,6 +60,7 @@ impl ColdMover {
 
     async fn round(&self, directory: &ColdDirectory) -> Result<(), ServiceError> {
         self.remove_leftovers(directory).await?;
+        self.finish_moves(directory).await?;
         let age = self.after.map(|after| i64::try_from(after.as_micros()).unwrap_or(i64::MAX));
         match age.and_then(|age| self.handles.clock.now().checked_sub(age)) {
             Some(moment) => self.move_sessions(directory, moment).await,
@@ -82,6 +87,44 @@ impl ColdMover {
             }
             let forget = Write::Cold(ColdWrite::Forget { session });
             self.handles.write(&asset, vec![forget]).await?;
+        }
+        Ok(())
+    }
+
+    /// Deletes the chunks of sessions that have moved, if something has interrupted that and
+    /// the file is still the one that was recorded.
+    async fn finish_moves(&self, directory: &ColdDirectory) -> Result<(), ServiceError> {
+        for row in self.handles.store.cold_files_with_chunks().await? {
+            if !self.handles.ownership.owns(&row.asset) {
+                continue;
+            }
+            let (session, asset) = (row.session.clone(), row.asset.clone());
+            let directory = directory.clone();
+            let checked =
+                blocking(move || directory.compare(&row).map_err(ColdFileError::Recorded));
+            if let Err(error) = checked.await {
+                count_failure();
+                tracing::warn!(session, %error, "the chunks of a moved session are kept");
+                continue;
+            }
+            self.drop_chunks(&asset, &session).await;
+        }
+        Ok(())
+    }
+
+    /// Deletes the chunks of a session that has moved. If that fails, the next round goes on.
+    async fn drop_chunks(&self, asset: &str, session: &str) {
+        if let Err(error) = self.try_drop_chunks(asset, session).await {
+            count_failure();
+            tracing::warn!(session, %error, "the chunks of a moved session are deleted later");
+        }
+    }
+
+    async fn try_drop_chunks(&self, asset: &str, session: &str) -> Result<(), ServiceError> {
+        while self.handles.store.has_chunks_of_file(session).await? {
+            let session = session.to_owned();
+            let drop = ColdWrite::DropChunks { session, limit: CHUNKS_AT_ONCE };
+            self.handles.write(asset, vec![Write::Cold(drop)]).await?;
         }
         Ok(())
     }
@@ -130,10 +173,12 @@ impl ColdMover {
         let (bytes, checksum) = written.await?;
         let moved_at = Some(handles.clock.now());
         let moved = ColdFileRow { bytes, checksum, moved_at, ..plan };
-        tracing::info!(session = moved.session, path = moved.path, bytes, "a session moves");
+        let id = moved.session.clone();
+        tracing::info!(session = id, path = moved.path, bytes, "a session moves");
         handles.write(&asset, vec![Write::Cold(ColdWrite::Move(moved))]).await?;
         metrics::counter!("offbd_cold_files_total").increment(1);
         metrics::counter!("offbd_cold_bytes_total").increment(bytes.unsigned_abs());
+        self.drop_chunks(&asset, &id).await;
         Ok(())
     }
 

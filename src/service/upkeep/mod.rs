@@ -6,6 +6,7 @@ mod deletion;
 mod page_scrub;
 mod retention;
 mod scrub;
+mod verdict_check;
 mod watchdog;
 
 use tokio::task::JoinHandle;

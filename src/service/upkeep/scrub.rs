@@ -1,17 +1,17 @@
 //! The background scrub: reads every recording now and then, so that damage is known before
-//! the data are needed, and compares the snapshot of every open session with its recording,
-//! judged again from the start.
+//! the data are needed, and compares the snapshot of every open session, and the verdict of some
+//! ended ones, with the recording, judged again from the start.
 
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
+use super::verdict_check::VerdictCheck;
 use crate::judging::Judging;
 use crate::service::asset::{AssetCommand, Shards};
 use crate::service::playback::play;
 use crate::service::writing::Handles;
 use crate::service::{ServiceError, snapshots, views};
 use crate::store::{SessionRow, Snapshot};
-use crate::wire::words::SessionState;
 use offbd_core::diagnosis::FaultMemory;
 use offbd_core::engine::{Admission, Input, Setup, UsableMotion};
 
@@ -30,9 +30,14 @@ const PAUSE_AFTER_SESSION: Duration = Duration::from_millis(50);
 /// Pause after all sessions. Chosen: damage is rare.
 pub(super) const PAUSE_AFTER_ALL: Duration = Duration::from_secs(3600);
 
+/// Of the ended sessions, one in as many is judged again. Chosen: judging takes some twenty
+/// times as long as reading, so that a round takes twice as long as without it.
+const JUDGED_OF: i64 = 16;
+
 /// The kinds of findings, as a label of a metric.
 const RECORDING: &str = "recording";
 const ENGINE: &str = "engine";
+const VERDICT: &str = "verdict";
 
 /// The background task of the scrub.
 pub(in crate::service) struct Scrubber {
@@ -47,13 +52,15 @@ enum Finding {
     Damage(String),
     /// The engine has another state than the recording gives.
     Snapshot,
+    /// The recording gives another verdict than the stored one.
+    Verdict,
 }
 
 impl Scrubber {
     /// Goes through all sessions again and again until the service shuts down.
     pub(in crate::service) async fn run(self) {
         count_sessions(0);
-        for kind in [RECORDING, ENGINE] {
+        for kind in [RECORDING, ENGINE, VERDICT] {
             count_findings(kind, 0);
         }
         let closing = self.handles.closing.clone();
@@ -62,8 +69,10 @@ impl Scrubber {
 
     async fn forever(self) {
         let mut last = String::new();
+        // Begins anywhere: other sessions are judged after each start.
+        let mut n_ended = self.handles.clock.now() % JUDGED_OF;
         loop {
-            let pause = match self.next(&mut last).await {
+            let pause = match self.next(&mut last, &mut n_ended).await {
                 Ok(true) => PAUSE_AFTER_SESSION,
                 Ok(false) => PAUSE_AFTER_ALL,
                 Err(error) => {
@@ -75,9 +84,9 @@ impl Scrubber {
         }
     }
 
-    /// Examines the session after `last`, which becomes `last`. Returns `false` after the
-    /// last one.
-    async fn next(&self, last: &mut String) -> Result<bool, ServiceError> {
+    /// Examines the session after `last`, which becomes `last`; `n_ended` counts the ended
+    /// ones. Returns `false` after the last one.
+    async fn next(&self, last: &mut String, n_ended: &mut i64) -> Result<bool, ServiceError> {
         let store = &self.handles.store;
         let Some(id) = store.session_after(last).await? else {
             last.clear();
@@ -88,9 +97,11 @@ impl Scrubber {
         if !self.handles.ownership.owns(&session.asset) {
             return Ok(true);
         }
+        *n_ended += i64::from(!session.is_open());
+        let judges = *n_ended % JUDGED_OF == 0;
         let (asset, handles) = (session.asset.clone(), self.handles.clone());
-        let found = tokio::task::spawn_blocking(move || examine(&handles, &session, pause)).await;
-        match found {
+        let examine = move || examine(&handles, &session, judges, pause);
+        match tokio::task::spawn_blocking(examine).await {
             Ok(Ok(None)) => count_sessions(1),
             Ok(Ok(Some(finding))) => self.report(&id, &asset, finding).await,
             // It was deleted meanwhile.
@@ -115,6 +126,10 @@ impl Scrubber {
                 }
                 ENGINE
             }
+            Finding::Verdict => {
+                tracing::error!(session, asset, "a verdict differs from its recording");
+                VERDICT
+            }
         };
         count_findings(kind, 1);
     }
@@ -134,16 +149,17 @@ fn pause(worked: Duration) {
 }
 
 /// Reads the recording of `session`, and judges it again if there is a snapshot to compare
-/// with. Calls `pause` now and then, and at the end, with the duration of the work since the
+/// with or, if it `judges` ended ones, a verdict. Calls `pause` now and then, and at the end, with the duration of the work since the
 /// last call. Returns `None` also if the service shuts down. Blocks on the store.
 #[expect(clippy::disallowed_methods, reason = "pauses are a multiple of the work")]
 fn examine(
     handles: &Handles,
     session: &SessionRow,
+    judges: bool,
     pause: impl Fn(Duration),
 ) -> Result<Option<Finding>, ServiceError> {
     let (mut comparison, mut n, mut since) = (None, 0, Instant::now());
-    let played = Comparison::start(handles, session).and_then(|started| {
+    let played = Comparison::start(handles, session, judges).and_then(|started| {
         comparison = started;
         play(handles, session, 0, |input| {
             if let Some(comparison) = &mut comparison {
@@ -165,12 +181,52 @@ fn examine(
         Err(ServiceError::Corrupt { what }) => return Ok(Some(Finding::Damage(what))),
         played => played?,
     }
-    let differs = comparison.is_some_and(|comparison| comparison.differs == Some(true));
-    Ok(differs.then_some(Finding::Snapshot))
+    if handles.closing.is_cancelled() {
+        return Ok(None);
+    }
+    Ok(comparison.and_then(Comparison::end))
+}
+
+/// What the recording of a session is compared with.
+enum Comparison {
+    Snapshot(SnapshotCheck),
+    Verdict(VerdictCheck),
+}
+
+impl Comparison {
+    /// Returns `None` if there is nothing to compare `session` with, or if it has ended and is
+    /// not one that is judged.
+    fn start(
+        handles: &Handles,
+        session: &SessionRow,
+        judges: bool,
+    ) -> Result<Option<Self>, ServiceError> {
+        match (session.is_open(), judges) {
+            (true, _) => Ok(SnapshotCheck::start(handles, session)?.map(Self::Snapshot)),
+            (false, true) => Ok(VerdictCheck::start(session)?.map(Self::Verdict)),
+            (false, false) => Ok(None),
+        }
+    }
+
+    /// Takes the next input, after `n` samples.
+    fn take(&mut self, input: Input, n: i64) {
+        match self {
+            Self::Snapshot(check) => check.take(input, n),
+            Self::Verdict(check) => check.take(input),
+        }
+    }
+
+    /// Returns the finding at the end of the recording.
+    fn end(self) -> Option<Finding> {
+        match self {
+            Self::Snapshot(check) => (check.differs == Some(true)).then_some(Finding::Snapshot),
+            Self::Verdict(check) => check.differs().then_some(Finding::Verdict),
+        }
+    }
 }
 
 /// Compares a snapshot with the engine that evaluates the recording from its start.
-struct Comparison {
+struct SnapshotCheck {
     snapshot: Snapshot,
     judging: Judging,
     motion: Option<UsableMotion>,
@@ -178,12 +234,9 @@ struct Comparison {
     differs: Option<bool>,
 }
 
-impl Comparison {
-    /// Returns `None` if `session` has ended, or has no snapshot of its present settings.
+impl SnapshotCheck {
+    /// Returns `None` if the open `session` has no snapshot of its present settings.
     fn start(handles: &Handles, session: &SessionRow) -> Result<Option<Self>, ServiceError> {
-        if session.state != SessionState::Open.as_str() {
-            return Ok(None);
-        }
         let setup = Setup::new(views::rig(&session.setup)?, None)?;
         let Some((snapshot, restored)) = snapshots::last(handles, session, &setup, i64::MAX)?
         else {
@@ -248,7 +301,7 @@ mod tests {
         let handles = service.inner.handles.clone();
         tokio::task::spawn_blocking(move || {
             let works = Mutex::new(Vec::new());
-            let found = examine(&handles, &session, |work| works.lock().unwrap().push(work));
+            let found = examine(&handles, &session, false, |work| works.lock().unwrap().push(work));
             assert_eq!(found.unwrap(), None);
             works.into_inner().unwrap()
         })

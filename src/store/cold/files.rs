@@ -73,15 +73,24 @@ impl ColdDirectory {
         (self.read)(file)
     }
 
-    /// Returns the samples of the file of `row` after comparing its size and its checksum.
-    pub(super) fn open(&self, row: &ColdFileRow) -> Result<SampleStream, String> {
+    /// Compares size and checksum of the file of `row` with those that are recorded.
+    ///
+    /// # Errors
+    /// In words, if it is missing, damaged or cannot be read.
+    pub fn compare(&self, row: &ColdFileRow) -> Result<(), String> {
         let measured = self.measure(&row.path).map_err(|error| match error.kind() {
             io::ErrorKind::NotFound => "is missing".to_owned(),
             _ => format!("cannot be read: {error}"),
         })?;
-        if measured != (row.bytes, row.checksum.clone()) {
-            return Err("is damaged: its checksum is wrong".to_owned());
+        match measured == (row.bytes, row.checksum.clone()) {
+            true => Ok(()),
+            false => Err("is damaged: its checksum is wrong".to_owned()),
         }
+    }
+
+    /// Returns the samples of the file of `row` after comparing its size and its checksum.
+    pub(super) fn open(&self, row: &ColdFileRow) -> Result<SampleStream, String> {
+        self.compare(row)?;
         self.samples(&row.path).map_err(|error| format!("cannot be read: {error}"))
     }
 

@@ -1,10 +1,15 @@
 //! The rows about cold data, and the changes of them.
 
-use sqlx::{AnyConnection, Executor};
+use sqlx::{AnyConnection, AssertSqlSafe, Executor};
 
 use crate::store::from_row::from_row;
 use crate::store::query_builder::QueryBuilder;
 use crate::store::{Micros, PartitionId, SessionRow, Store, StoreError, read};
+
+/// Files that are recordings whose chunks are not all deleted yet. The chunks are asked for
+/// file by file, because they are many more.
+const WITH_CHUNKS: &str = "SELECT * FROM cold_file WHERE moved_at IS NOT NULL AND
+     (SELECT n FROM chunk WHERE chunk.session = cold_file.session LIMIT 1) > 0";
 
 /// The file of a session.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -75,9 +80,12 @@ pub enum ColdWrite {
     /// Records a plan, instead of an earlier one of its session. A file that is the recording
     /// already stays so.
     Plan(ColdFileRow),
-    /// The planned file becomes the recording: the chunks are deleted. Nothing changes if
-    /// there is no such plan or session any more.
+    /// The planned file becomes the recording. Nothing changes if there is no such plan or
+    /// session any more.
     Move(ColdFileRow),
+    /// Deletes the first chunks of a session whose recording is a file, at most `limit`, and
+    /// keeps their places and times.
+    DropChunks { session: String, limit: u32 },
     /// Forgets a file that has been removed.
     Forget { session: String },
 }
@@ -87,14 +95,15 @@ impl ColdWrite {
     pub(in crate::store) fn session(&self) -> &str {
         match self {
             Self::Plan(row) | Self::Move(row) => &row.session,
-            Self::Forget { session } => session,
+            Self::DropChunks { session, .. } | Self::Forget { session } => session,
         }
     }
 
     pub(in crate::store) async fn apply(&self, db: &mut AnyConnection) -> Result<(), StoreError> {
         match self {
             Self::Plan(row) => plan(db, row).await,
-            Self::Move(row) => move_out(db, row).await,
+            Self::Move(row) => record(db, row).await,
+            Self::DropChunks { session, limit } => drop_chunks(db, session, *limit).await,
             Self::Forget { session } => {
                 let forget = sqlx::query("DELETE FROM cold_file WHERE session = $1");
                 forget.bind(session).execute(db).await?;
@@ -120,8 +129,8 @@ async fn plan(db: &mut AnyConnection, row: &ColdFileRow) -> Result<(), StoreErro
     Ok(())
 }
 
-async fn move_out(db: &mut AnyConnection, row: &ColdFileRow) -> Result<(), StoreError> {
-    let moved = sqlx::query(
+async fn record(db: &mut AnyConnection, row: &ColdFileRow) -> Result<(), StoreError> {
+    sqlx::query(
         "UPDATE cold_file SET bytes = $3, checksum = $4, moved_at = $5
          WHERE session = $1 AND path = $2 AND moved_at IS NULL AND EXISTS
              (SELECT 1 FROM session WHERE session.id = cold_file.session)",
@@ -131,18 +140,26 @@ async fn move_out(db: &mut AnyConnection, row: &ColdFileRow) -> Result<(), Store
     .bind(row.bytes)
     .bind(&row.checksum)
     .bind(row.moved_at.unwrap_or_default())
-    .execute(&mut *db)
+    .execute(db)
     .await?;
-    if moved.rows_affected() == 0 {
+    Ok(())
+}
+
+/// Chunks disappear from the first one on, so that a reader that does not find one finds the
+/// rest in the file.
+async fn drop_chunks(db: &mut AnyConnection, session: &str, limit: u32) -> Result<(), StoreError> {
+    let keep = "INSERT INTO cold_chunk (session, first_index, n, min_t_s, max_t_s)
+         SELECT session, first_index, n, min_t_s, max_t_s FROM chunk
+         WHERE session = $1 AND EXISTS
+             (SELECT 1 FROM cold_file WHERE cold_file.session = $1 AND moved_at IS NOT NULL)
+         ORDER BY first_index LIMIT $2";
+    let kept = sqlx::query(keep).bind(session).bind(i64::from(limit)).execute(&mut *db).await?;
+    if kept.rows_affected() == 0 {
         return Ok(());
     }
-    for sql in [
-        "INSERT INTO cold_chunk (session, first_index, n, min_t_s, max_t_s)
-         SELECT session, first_index, n, min_t_s, max_t_s FROM chunk WHERE session = $1",
-        "DELETE FROM chunk WHERE session = $1",
-    ] {
-        sqlx::query(sql).bind(&row.session).execute(&mut *db).await?;
-    }
+    let drop = "DELETE FROM chunk WHERE session = $1 AND first_index <=
+         (SELECT MAX(first_index) FROM cold_chunk WHERE session = $1)";
+    sqlx::query(drop).bind(session).execute(db).await?;
     Ok(())
 }
 
@@ -153,7 +170,8 @@ pub(super) async fn moved(db: &mut AnyConnection) -> Result<Vec<ColdFileRow>, St
     Ok(sqlx::query_as(sql).fetch_all(db).await?)
 }
 
-/// First index and number of samples of the chunks that `session` had.
+/// First index and number of samples of the chunks that `session` had: all from the first
+/// one on that are not in the database any more.
 pub(super) async fn chunks(
     db: &mut AnyConnection,
     session: &str,
@@ -195,6 +213,20 @@ impl Store {
                    (SELECT 1 FROM session WHERE session.id = cold_file.session)
                    ORDER BY session";
         Ok(sqlx::query_as(sql).fetch_all(&self.pool).await?)
+    }
+
+    /// The files that are recordings of sessions whose chunks are not all deleted yet.
+    pub async fn cold_files_with_chunks(&self) -> Result<Vec<ColdFileRow>, StoreError> {
+        let sql = AssertSqlSafe(format!("{WITH_CHUNKS} ORDER BY session"));
+        Ok(sqlx::query_as(sql).fetch_all(&self.pool).await?)
+    }
+
+    /// Whether the recording of `session` is a file, and not all of its chunks are deleted yet.
+    pub async fn has_chunks_of_file(&self, session: &str) -> Result<bool, StoreError> {
+        let sql = AssertSqlSafe(format!("{WITH_CHUNKS} AND session = $1"));
+        let found: Option<ColdFileRow> =
+            sqlx::query_as(sql).bind(session).fetch_optional(&self.pool).await?;
+        Ok(found.is_some())
     }
 
     /// Ended sessions whose samples are in the database and which ended before `moment`: those

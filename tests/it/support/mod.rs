@@ -9,6 +9,7 @@ pub mod bus_device;
 #[cfg(unix)]
 pub mod calls;
 pub mod cluster;
+pub mod deletions;
 pub mod described;
 pub mod device;
 pub mod held_socket;

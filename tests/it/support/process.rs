@@ -13,6 +13,13 @@ pub struct Process {
     log: Arc<Mutex<String>>,
 }
 
+/// A service that does not serve yet. It is killed when this is dropped.
+pub struct Starting {
+    child: Option<Child>,
+    address: mpsc::Receiver<String>,
+    log: Arc<Mutex<String>>,
+}
+
 /// A service that ended before it served.
 #[derive(Debug)]
 pub struct Refusal {
@@ -42,21 +49,15 @@ impl Process {
         data: &Path,
         environment: &[(&str, &Path)],
     ) -> Result<Self, Refusal> {
-        let mut child = command(program, data).envs(environment.iter().copied()).spawn().unwrap();
+        Self::begin(program, data, environment).served()
+    }
+
+    /// Starts the service without waiting until it serves.
+    pub fn begin(program: &Path, data: &Path, environment: &[(&str, &Path)]) -> Starting {
+        let mut child = command(program, data, environment).spawn().unwrap();
         let log = Arc::<Mutex<String>>::default();
         let address = read_log(child.stderr.take().unwrap(), log.clone());
-        match address.recv_timeout(DEADLINE) {
-            Ok(address) => Ok(Self { child, client: Client::new(address), log }),
-            Err(mpsc::RecvTimeoutError::Disconnected) => {
-                let status = child.wait().unwrap();
-                Err(Refusal { status, log: log.lock().unwrap().clone() })
-            }
-            Err(mpsc::RecvTimeoutError::Timeout) => {
-                child.kill().unwrap();
-                child.wait().unwrap();
-                panic!("the service neither serves nor ends: {}", log.lock().unwrap())
-            }
-        }
+        Starting { child: Some(child), address, log }
     }
 
     /// Returns what the service has logged so far.
@@ -66,19 +67,67 @@ impl Process {
 
     /// Sends SIGTERM.
     pub fn terminate(&self) {
-        let pid = self.child.id().to_string();
-        assert!(Command::new("kill").args(["-TERM", &pid]).status().unwrap().success());
+        terminate(&self.child);
     }
 
     /// Starts a service and kills it during its start, after a time that grows with `n`.
     pub fn start_and_kill(data: &Path, n: u64) {
-        let mut child = command(&program(), data).spawn().unwrap();
+        let mut child = command(&program(), data, &[]).spawn().unwrap();
         for _ in 0..n {
             assert!(child.try_wait().unwrap().is_none_or(|status| status.success()));
         }
         child.kill().unwrap();
         child.wait().unwrap();
     }
+}
+
+impl Starting {
+    /// Returns what the service has logged so far.
+    pub fn log(&self) -> String {
+        self.log.lock().unwrap().clone()
+    }
+
+    /// Waits until the service serves, unless it ends before.
+    pub fn served(mut self) -> Result<Process, Refusal> {
+        let address = self.address.recv_timeout(DEADLINE);
+        let mut child = self.child.take().unwrap();
+        match address {
+            Ok(address) => {
+                Ok(Process { child, client: Client::new(address), log: self.log.clone() })
+            }
+            Err(mpsc::RecvTimeoutError::Disconnected) => {
+                let status = child.wait().unwrap();
+                Err(Refusal { status, log: self.log() })
+            }
+            Err(mpsc::RecvTimeoutError::Timeout) => {
+                child.kill().unwrap();
+                child.wait().unwrap();
+                panic!("the service neither serves nor ends: {}", self.log())
+            }
+        }
+    }
+
+    /// Sends SIGTERM, and waits until the service has ended.
+    pub async fn stop(mut self) -> ExitStatus {
+        let child = self.child.as_mut().unwrap();
+        terminate(child);
+        ended(child).await
+    }
+}
+
+impl Drop for Starting {
+    fn drop(&mut self) {
+        if let Some(child) = &mut self.child {
+            // Fails if the process has already ended.
+            let _ = child.kill();
+            child.wait().unwrap();
+        }
+    }
+}
+
+fn terminate(child: &Child) {
+    let pid = child.id().to_string();
+    assert!(Command::new("kill").args(["-TERM", &pid]).status().unwrap().success());
 }
 
 /// Reads the log on a thread; the address at which the service listens is sent.
@@ -112,13 +161,16 @@ pub fn program() -> PathBuf {
     PathBuf::from(env!("CARGO_BIN_EXE_offbd"))
 }
 
-fn command(program: &Path, data: &Path) -> Command {
+fn command(program: &Path, data: &Path, environment: &[(&str, &Path)]) -> Command {
     let mut command = Command::new(program);
     command
         .args(["serve", "--listen", "127.0.0.1:0", "--log-format", "json", "--data"])
         .arg(data)
-        .args(super::config(data).database.iter().flat_map(|url| ["--database", url]))
+        .envs(environment.iter().copied())
         .stderr(Stdio::piped());
+    if !environment.iter().any(|(name, _)| *name == "OFFBD_DATABASE") {
+        command.args(super::config(data).database.iter().flat_map(|url| ["--database", url]));
+    }
     command
 }
 

@@ -322,7 +322,10 @@ mod tests {
         let unjudged = state.unjudged.unwrap();
         assert_eq!((unjudged.n, unjudged.why.as_str()), (20, "late"));
         assert!(state.monitors.iter().all(|monitor| !monitor.readiness.enabled));
-        engine.handle(Input::Sample(row(Some(2000), 10.0)), &mut transitions);
+        for i in 0..22_u32 {
+            let next = row(Some(2000 + u64::from(i)), 10.0 + f64::from(i) / HZ);
+            engine.handle(Input::Sample(next), &mut transitions);
+        }
         assert_eq!(engine.state().unjudged, None);
     }
 

@@ -25,6 +25,7 @@ mod rig;
 mod span;
 mod trial;
 mod types;
+mod untested;
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
@@ -44,6 +45,7 @@ pub use trial::Trial;
 pub use types::{
     Admission, Input, MonitorState, Reach, Readiness, Rejection, State, Thresholds, Unjudged,
 };
+pub use untested::UNTESTED_FROM;
 
 use align::Align;
 use clock::{ClockContext, ClockDecision, DeviceClock};
@@ -51,6 +53,7 @@ use coverage::Coverage;
 use ledger::Ledger;
 use pipeline::Pipeline;
 use span::Span;
+use untested::LastSamples;
 
 use crate::diagnosis::{Evidence, FaultMemory, ServoEstimate, Transition};
 use crate::vocabulary::{FaultCode, PerAxis, Sample};
@@ -64,10 +67,6 @@ pub const JUDGEMENT: u32 = 3;
 /// [`UsableMotion`], and of what a caller stores with them: raised with every change of the
 /// fields or of what these mean.
 pub const SNAPSHOT_FORMAT: u32 = 4;
-
-/// Consecutive unjudged samples after which a rig counts as not tested. Chosen: a few late
-/// samples are common.
-const UNTESTED_AFTER: u64 = 10;
 
 /// The pipeline of one rig for one session (one operation cycle).
 ///
@@ -88,9 +87,9 @@ pub struct Engine {
     n_accepted: u64,
     /// Samples that were too late to be judged.
     n_late: u64,
-    /// Counted anew after a restart.
+    /// Begins anew after a restart.
     #[serde(skip)]
-    unjudged: Option<Unjudged>,
+    last_samples: LastSamples,
 }
 
 impl Engine {
@@ -108,7 +107,7 @@ impl Engine {
             pipeline: Pipeline::new(&setup),
             n_accepted: 0,
             n_late: 0,
-            unjudged: None,
+            last_samples: LastSamples::default(),
             memory,
             setup,
         }
@@ -170,8 +169,12 @@ impl Engine {
     ) -> Admission {
         let decided = self.admit(sample, is_new);
         let admission = decided.unwrap_or_else(|| self.take_new(sample, transitions, seen));
-        if let Admission::Rejected(why) | Admission::SetAside(why) = admission {
-            self.count_unjudged(why);
+        match admission {
+            Admission::Accepted => self.last_samples.note_judged(),
+            Admission::Rejected(why) | Admission::SetAside(why) => {
+                self.last_samples.note_unjudged(why);
+            }
+            Admission::Duplicate | Admission::Unknown => {}
         }
         admission
     }
@@ -218,6 +221,8 @@ impl Engine {
                 if set_back {
                     self.set_clock_back(transitions, seen);
                 }
+                // All but this one have been noted as set aside.
+                self.last_samples.judge_last(held.len() - 1);
                 held.iter().for_each(|sample| self.arrange(sample, transitions, seen));
             }
             ClockDecision::Late { behind_s } => {
@@ -235,7 +240,6 @@ impl Engine {
         transitions: &mut Vec<Transition>,
         seen: &mut impl FnMut(&Evidence),
     ) {
-        self.unjudged = None;
         self.n_accepted += 1;
         self.span.take(sample.t_s);
         self.align.push(*sample);
@@ -257,11 +261,6 @@ impl Engine {
         self.span.set_back();
         self.coverage.set_back();
         self.pipeline.set_clock_back();
-    }
-
-    fn count_unjudged(&mut self, why: Rejection) {
-        let n = self.unjudged.map_or(0, |run| run.n) + 1;
-        self.unjudged = Some(Unjudged { n, why });
     }
 
     /// The interval without a sample that makes a gap, s.
@@ -348,9 +347,10 @@ impl Engine {
         self.pipeline.servo_estimates()
     }
 
-    /// Notes that a sample was rejected by the caller, who has looked it up.
+    /// Notes that a sample was rejected by the caller, who has looked it up, or could not read
+    /// it.
     pub fn note_rejected(&mut self, why: Rejection) {
-        self.count_unjudged(why);
+        self.last_samples.note_unjudged(why);
     }
 
     /// Returns what is known of a sample; its numbers must be finite.
@@ -405,14 +405,14 @@ impl Engine {
         self.span.duration_s()
     }
 
-    /// The present run of unjudged samples, if it is so long that the rig counts as not
+    /// The unjudged ones of the last samples, if they are so many that the rig counts as not
     /// tested.
     #[must_use]
     pub fn unjudged(&self) -> Option<Unjudged> {
-        self.unjudged.filter(|run| run.n >= UNTESTED_AFTER)
+        self.last_samples.unjudged()
     }
 
-    /// The state after the last judged sample. No monitor is enabled while the samples go
+    /// The state after the last judged sample. No monitor is enabled while many samples go
     /// unjudged.
     #[must_use]
     pub fn state(&self) -> State {

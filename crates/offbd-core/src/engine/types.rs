@@ -55,6 +55,9 @@ pub enum Rejection {
     Conflict { key: &'static str },
     #[error("too old to tell whether it is recorded: send it in a batch that spans less time")]
     TooOld,
+    /// Given by a caller that cannot read it.
+    #[error("it is no sample: the answer to its batch says what is wrong")]
+    Malformed,
 }
 
 impl Rejection {
@@ -68,6 +71,7 @@ impl Rejection {
             Self::Jump { .. } => "jump",
             Self::Conflict { .. } => "conflict",
             Self::TooOld => "too_old",
+            Self::Malformed => "form",
         }
     }
 
@@ -78,10 +82,10 @@ impl Rejection {
     }
 }
 
-/// A run of samples none of which is judged.
+/// Samples that are not judged, so many of the last ones that the rig counts as not tested.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unjudged {
-    /// Consecutive samples that are not judged.
+    /// Their number since they are so many.
     pub n: u64,
     /// Why the last of them is not judged.
     pub why: Rejection,
@@ -147,8 +151,8 @@ pub struct State {
     pub n_judged: u64,
     /// Samples waiting for an earlier one.
     pub n_waiting: usize,
-    /// The present run of unjudged samples, if it is so long that the rig counts as not
-    /// tested; the evidence and the monitors are those before it.
+    /// The unjudged ones of the last samples, if they are so many that the rig counts as not
+    /// tested; the evidence and the monitors are those of the judged samples.
     pub unjudged: Option<Unjudged>,
     /// The twin's position relative to the plate, drawn beside the measured one, m.
     pub twin_position_m: PerAxis<f64>,
