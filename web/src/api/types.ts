@@ -23,6 +23,11 @@ export type FaultFilter = NonNullable<
   NonNullable<operations["list_asset_faults"]["parameters"]["query"]>["status"]
 >;
 
+/** Selects, orders and pages the list of sessions. */
+export type SessionQuery = Omit<NonNullable<operations["list_sessions"]["parameters"]["query"]>, "cursor"> & {
+  cursor?: string | null;
+};
+
 export type TagUse = Schemas["TagUse"];
 export type Asset = Schemas["Asset"];
 export type AssetAxes = Schemas["Axes"];
