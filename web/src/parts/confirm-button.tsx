@@ -10,19 +10,30 @@ interface Props {
   /** The question, as the title of the dialog. */
   question: string;
   action: () => Promise<unknown>;
+  class?: string;
+  /** What a screen reader says instead of the text of the button. */
+  label?: string;
   needs?: NeededRole;
   /** What will happen. */
   children: ComponentChildren;
 }
 
 /** A button whose action is carried out after a question. */
-export function ConfirmButton({ word, question, action, needs, children }: Props) {
+export function ConfirmButton(props: Props) {
+  const { word, question, action, class: className, label, needs, children } = props;
   const [isAsking, setAsking] = useState(false);
   const refused = useRefusal(needs);
   const confirmed = () => action().then(() => setAsking(false));
   return (
     <>
-      <button type="button" disabled={refused !== undefined} title={refused} onClick={() => setAsking(true)}>
+      <button
+        type="button"
+        class={className}
+        disabled={refused !== undefined}
+        title={refused}
+        aria-label={label}
+        onClick={() => setAsking(true)}
+      >
         {word}
       </button>
       {isAsking && (
