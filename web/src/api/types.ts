@@ -45,6 +45,7 @@ export type DriveCycle = Schemas["DriveCycle"];
 export type Evidence = Schemas["Evidence"];
 export type FaultEntry = Schemas["FaultEntry"];
 export type FaultLine = Schemas["Fault"] & { asset?: string; session_id?: string };
+export type CommunicationLine = Schemas["CommunicationEvent"];
 export type FleetEntry = Schemas["FleetEntry"];
 export type ServiceHealth = Schemas["Health"];
 export type HistoryEntry = Schemas["History"];

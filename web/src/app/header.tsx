@@ -29,8 +29,8 @@ function tabs([first, , third]: string[], isDemo: boolean, isAdmin: boolean) {
 
 /** The header of every view. */
 export function Header({ segments, isDemo }: { segments: string[]; isDemo: boolean }) {
-  const [connection, setConnection] = useState(faultEvents.state);
-  useEffect(() => faultEvents.watch(setConnection), []);
+  const [connection, setConnection] = useState(fleetEvents.state);
+  useEffect(() => fleetEvents.watch(setConnection), []);
   // Every view shows the state of the connection, so it is open on all of them.
   useEffect(() => fleetEvents.listen(() => {}), []);
   const isAdmin = useRefusal("admin") === undefined;
