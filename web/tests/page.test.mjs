@@ -101,6 +101,7 @@ const VIEWS = () => [
   ["/rigs/bench/faults/x_servo/report", "Calibration and certificate"],
   ["/alarms", "What to do"],
   ["/notifications", "nobody is told of anything"],
+  ["/administration", "Audit log"],
   ["/set-up", "Units that the device sends"],
   ["/rigs/bench/set-up?step=connect", "Waiting for the first sample"],
   ["/rigs/bench/set-up?step=check", "Signs and units"],

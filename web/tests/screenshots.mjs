@@ -118,6 +118,7 @@ try {
   await shoot(of, "notifications", `${base}/notifications`, heading("Notifications"), (view) =>
     view.getByText("workshop").first().waitFor(),
   );
+  await shoot(of, "administration", `${base}/administration`, heading("Audit log"));
   await shoot(of, "calibrations", `${base}/rigs/taught/calibrations`, heading("What calibration"), (view) =>
     view
       .getByRole("img", { name: /^Residual along/ })

@@ -43,11 +43,21 @@ test("described, connected, corrected, learnt", async () => {
   assert.equal(await view.getByLabel("Mass").evaluate((field) => field.validity.valid), false);
   assert.match(view.url(), /set-up$/, "nothing was registered");
   await view.getByLabel("Mass").fill("51");
+  await view.getByText("Advanced").click();
+  await view.getByLabel("Debounce time").fill("61");
+  await view.getByText("Advanced").click();
   await view.getByLabel("Name").fill("bench-1");
+  await view.getByLabel("Name").press("Enter");
+  await view.getByLabel("Debounce time").waitFor();
+  assert.match(view.url(), /set-up$/, "a value out of range is shown, though it was hidden");
+  await view.getByLabel("Debounce time").fill("0.5");
+  await view.getByLabel("Accepted false alarms").fill("12");
   await view.getByLabel("Ball's position").selectOption({ label: "mm" });
   assert.equal(await isValid(), true);
   await view.getByLabel("Mass").press("Enter");
   await view.getByText("Waiting for the first sample").waitFor();
+  const { diagnostics } = await ask(service.url, "GET", "/assets/bench-1");
+  assert.deepEqual([diagnostics.debounce_s, diagnostics.false_alarms_per_rig_year], [0.5, 12]);
   for (const word of ["curl", "Python", "Arduino / ESP32"]) {
     await view.getByRole("button", { name: word, exact: true }).click();
     await view.getByLabel(`${word} snippet`).getByText("mm", { exact: false }).first().waitFor();

@@ -40,7 +40,7 @@ test("tags are set on the rig's page and select rigs, alarms and sessions", asyn
   await view.goto(`${service.url}/sessions?tag=hall-2`);
   await view.getByRole("link", { name: "monday" }).waitFor();
   await view.getByLabel("Tag").selectOption("hall-1");
-  await view.getByText("No session yet").waitFor();
+  await view.getByText("No session matches").waitFor();
   assert.deepEqual(view.errors, []);
   await view.done();
 });

@@ -1,5 +1,6 @@
 /** The requests of the page to the service. */
 import { actor, withCredentials } from "./access";
+import { FORMATS, type FormatName } from "./formats";
 import { BASE, failure, get, getAll, LOGIN, query, request, segment, send } from "./request";
 import type {
   Asset,
@@ -26,7 +27,7 @@ import type {
   ServiceHealth,
   Session,
   SessionCalibration,
-  SessionState,
+  SessionQuery,
   State,
   Trace,
   Trends,
@@ -70,13 +71,7 @@ export const api = {
     ),
   clear: (name: string, code: FaultCode) =>
     send<void>("DELETE", `/assets/${segment(name)}/faults/${segment(code)}${query({ by: actor() })}`),
-  sessions: (values: {
-    asset?: string;
-    tag?: string;
-    state?: SessionState;
-    cursor?: string | null;
-    limit?: number;
-  }) => get<Page<Session>>(`/sessions${query(values)}`),
+  sessions: (values: SessionQuery) => get<Page<Session>>(`/sessions${query(values)}`),
   session: (session: string) => get<Session>(`/sessions/${segment(session)}`),
   /** The calibration that a session is judged with. */
   sessionCalibration: (session: string) =>
@@ -96,11 +91,11 @@ export const api = {
     send<Remark>("POST", `/sessions/${segment(session)}/remarks${query({ by: actor() })}`, remark),
   removeRemark: (session: string, id: string) =>
     send<void>("DELETE", `/sessions/${segment(session)}/remarks/${segment(id)}`),
-  importCsv: (asset: string, name: string, csv: string) =>
+  importRecording: (asset: string, name: string, file: string | File, format: FormatName) =>
     request<ImportResult>(`${BASE}/assets/${segment(asset)}/sessions/import${query({ name })}`, {
       method: "POST",
-      body: csv,
-      headers: { "content-type": "text/csv" },
+      body: file,
+      headers: { "content-type": FORMATS[format].mediaType },
       signal: AbortSignal.timeout(900_000),
     }),
   replay: (session: string, settings: ReplaySettings) =>
@@ -122,9 +117,9 @@ export const api = {
       "POST",
       `/assets/${segment(asset)}/calibrations/${segment(job)}/activate${query({ by: actor() })}`,
     ),
-  /** Fetches the recording as CSV, with the same credentials as all requests. */
-  recording: async (session: string) => {
-    const init = withCredentials({ headers: { accept: "text/csv" } });
+  /** Fetches the recording as a file, with the same credentials as all requests. */
+  recording: async (session: string, format: FormatName) => {
+    const init = withCredentials({ headers: { accept: FORMATS[format].mediaType } });
     const response = await fetch(`${BASE}/sessions/${segment(session)}/telemetry`, init);
     if (!response.ok) throw await failure(response);
     return response.blob();

@@ -1,27 +1,39 @@
 /**
- * Fault events of the whole fleet, over one connection for the whole page. After a lost
- * connection, the stream resumes after the last received event.
+ * Events of the whole fleet, of faults and of data that stay away, over one connection for the whole page.
+ * After a lost connection, the stream resumes after the last received event.
  */
 import { streamUrl } from "./access";
-import type { FaultLine } from "./types";
+import type { CommunicationLine, FaultLine } from "./types";
 
 export type ConnectionState = "connecting" | "live" | "lost";
 
 export type FaultEvent = FaultLine & { event: number };
 
+/** Data of a rig stay away, or are back. */
+export type CommunicationEvent = CommunicationLine & { event: number };
+
+export type FleetEvent = FaultEvent | CommunicationEvent;
+
+export const isCommunication = <T extends FaultLine | CommunicationLine>(
+  line: T,
+): line is Extract<T, CommunicationLine> => line.type === "communication";
+
+/** The types of the stream's messages that are events of a rig. */
+const TYPES = ["fault", "communication"];
+
 /** First and longest delay before a retry, ms. */
 const RETRY_MS = [500, 5000] as const;
 
-class FaultEvents {
+class FleetEvents {
   private source?: EventSource;
   private lastEvent?: number;
   private delay: number = RETRY_MS[0];
-  private listeners = new Set<(line: FaultEvent) => void>();
+  private listeners = new Set<(line: FleetEvent) => void>();
   private watchers = new Set<(state: ConnectionState) => void>();
   state: ConnectionState = "connecting";
 
   /** Calls `listener` with every event from now on; returns a function that unsubscribes it. */
-  listen(listener: (line: FaultEvent) => void): () => void {
+  listen(listener: (line: FleetEvent) => void): () => void {
     this.listeners.add(listener);
     if (!this.source) this.open();
     return () => this.listeners.delete(listener);
@@ -56,11 +68,12 @@ class FaultEvents {
       this.delay = Math.min(this.delay * 2, RETRY_MS[1]);
     };
     source.addEventListener("begin", (message) => (this.lastEvent = Number(message.lastEventId)));
-    source.addEventListener("fault", (message: MessageEvent<string>) => {
+    const receive = (message: MessageEvent<string>) => {
       this.lastEvent = Number(message.lastEventId);
-      const line = { ...(JSON.parse(message.data) as FaultLine), event: this.lastEvent };
+      const line = { ...(JSON.parse(message.data) as FleetEvent), event: this.lastEvent };
       this.listeners.forEach((listener) => listener(line));
-    });
+    };
+    TYPES.forEach((type) => source.addEventListener(type, receive));
   }
 
   private setState(state: ConnectionState) {
@@ -70,4 +83,4 @@ class FaultEvents {
   }
 }
 
-export const faultEvents = new FaultEvents();
+export const fleetEvents = new FleetEvents();

@@ -1,6 +1,6 @@
 /** The live state and trace of one asset, over a WebSocket that reconnects by itself. */
 import { streamUrl } from "./access";
-import type { FaultEvent } from "./events";
+import type { CommunicationEvent, FaultEvent } from "./events";
 import type { State, Trace } from "./types";
 
 export type StateFrame = State & { trace?: Trace };
@@ -8,10 +8,15 @@ export type StateFrame = State & { trace?: Trace };
 export interface StreamListener {
   state?: (state: StateFrame) => void;
   fault?: (fault: FaultEvent) => void;
+  /** Called when data of the rig stay away, and when they are back. */
+  communication?: () => void;
   connection?: (state: "live" | "lost") => void;
 }
 
-type Frame = ({ type: "state" } & StateFrame) | ({ type: "fault" } & FaultEvent);
+type Frame =
+  | ({ type: "state" } & StateFrame)
+  | ({ type: "fault" } & FaultEvent)
+  | ({ type: "communication" } & CommunicationEvent);
 
 /** First and longest delay before a retry, ms. */
 const RETRY_MS = [400, 5000] as const;
@@ -25,7 +30,7 @@ const CHECK_MS = 1000;
 class RigStream {
   private socket?: WebSocket;
   private delay: number = RETRY_MS[0];
-  private lastFault?: number;
+  private lastEvent?: number;
   private closed = false;
   private receivedAt = 0;
   private retry?: ReturnType<typeof setTimeout>;
@@ -51,7 +56,7 @@ class RigStream {
 
   private address(): string {
     const query = new URLSearchParams({ state: String(this.statesPerSecond), trace: "true" });
-    if (this.lastFault !== undefined) query.set("after", String(this.lastFault));
+    if (this.lastEvent !== undefined) query.set("after", String(this.lastEvent));
     const origin = location.origin.replace(/^http/, "ws");
     return streamUrl(`${origin}/api/v1/assets/${encodeURIComponent(this.asset)}/stream?${query}`);
   }
@@ -77,8 +82,12 @@ class RigStream {
     this.receivedAt = performance.now();
     if (frame.type === "state") this.listener.state?.(frame);
     if (frame.type === "fault") {
-      this.lastFault = frame.event;
+      this.lastEvent = frame.event;
       this.listener.fault?.(frame);
+    }
+    if (frame.type === "communication") {
+      this.lastEvent = frame.event;
+      this.listener.communication?.();
     }
   }
 

@@ -23,6 +23,11 @@ export type FaultFilter = NonNullable<
   NonNullable<operations["list_asset_faults"]["parameters"]["query"]>["status"]
 >;
 
+/** Selects, orders and pages the list of sessions. */
+export type SessionQuery = Omit<NonNullable<operations["list_sessions"]["parameters"]["query"]>, "cursor"> & {
+  cursor?: string | null;
+};
+
 export type TagUse = Schemas["TagUse"];
 export type Asset = Schemas["Asset"];
 export type AssetAxes = Schemas["Axes"];
@@ -40,6 +45,7 @@ export type DriveCycle = Schemas["DriveCycle"];
 export type Evidence = Schemas["Evidence"];
 export type FaultEntry = Schemas["FaultEntry"];
 export type FaultLine = Schemas["Fault"] & { asset?: string; session_id?: string };
+export type CommunicationLine = Schemas["CommunicationEvent"];
 export type FleetEntry = Schemas["FleetEntry"];
 export type ServiceHealth = Schemas["Health"];
 export type HistoryEntry = Schemas["History"];

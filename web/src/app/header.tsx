@@ -1,6 +1,7 @@
-import { useEffect, useState } from "preact/hooks";
-import { faultEvents, type ConnectionState } from "../api/events";
+import { useEffect, useRef, useState } from "preact/hooks";
+import { fleetEvents, type ConnectionState } from "../api/events";
 import { LoggedIn } from "../parts/login/logged-in";
+import { useRefusal } from "../parts/login/rights";
 import { Link } from "../router/link";
 import { sessionsPath } from "../router/paths";
 import { ThemeButton } from "./theme-button";
@@ -12,7 +13,7 @@ const CONNECTION: Record<ConnectionState, string> = {
 };
 
 /** The links to the views, and whether each is the current view. */
-function tabs([first, , third]: string[], isDemo: boolean) {
+function tabs([first, , third]: string[], isDemo: boolean, isAdmin: boolean) {
   const isSetUp = first === "set-up" || third === "set-up";
   return [
     { to: "/", word: "Fleet", isHere: !first || (first === "rigs" && !isSetUp) },
@@ -20,23 +21,33 @@ function tabs([first, , third]: string[], isDemo: boolean) {
     { to: sessionsPath(), word: "Sessions", isHere: first === "sessions" },
     { to: "/set-up", word: "Set up", isHere: isSetUp },
     { to: "/learn", word: isDemo ? "Demo" : "Learn", isHere: first === "learn" },
+    ...(isAdmin
+      ? [{ to: "/administration", word: "Administration", isHere: first === "administration" }]
+      : []),
   ];
 }
 
 /** The header of every view. */
 export function Header({ segments, isDemo }: { segments: string[]; isDemo: boolean }) {
-  const [connection, setConnection] = useState(faultEvents.state);
-  useEffect(() => faultEvents.watch(setConnection), []);
+  const [connection, setConnection] = useState(fleetEvents.state);
+  useEffect(() => fleetEvents.watch(setConnection), []);
   // Every view shows the state of the connection, so it is open on all of them.
-  useEffect(() => faultEvents.listen(() => {}), []);
+  useEffect(() => fleetEvents.listen(() => {}), []);
+  const isAdmin = useRefusal("admin") === undefined;
+  const [first] = segments;
+  const nav = useRef<HTMLElement>(null);
+  // On a phone not all links are on the screen.
+  useEffect(() => {
+    nav.current!.querySelector("[aria-current]")?.scrollIntoView({ block: "nearest", inline: "nearest" });
+  }, [first]);
   return (
     <header class="top">
       <Link to="/" class="brand">
         <img src="/icon.svg" alt="" width="24" height="24" />
         offbd
       </Link>
-      <nav aria-label="Views">
-        {tabs(segments, isDemo).map(({ to, word, isHere }) => (
+      <nav aria-label="Views" ref={nav}>
+        {tabs(segments, isDemo, isAdmin).map(({ to, word, isHere }) => (
           <Link to={to} aria-current={isHere ? "page" : undefined}>
             {word}
           </Link>

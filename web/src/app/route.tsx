@@ -14,6 +14,9 @@ const SetUpPage = lazy(() => import("../pages/set-up").then((module) => module.S
 const CalibrationsPage = lazy(() =>
   import("../pages/calibrations").then((module) => module.CalibrationsPage),
 );
+const AdministrationPage = lazy(() =>
+  import("../pages/administration").then((module) => module.AdministrationPage),
+);
 const AlarmsPage = lazy(() => import("../pages/alarms").then((module) => module.AlarmsPage));
 const NotificationsPage = lazy(() =>
   import("../pages/notifications").then((module) => module.NotificationsPage),
@@ -44,6 +47,7 @@ export function Route({ segments, isDemo }: { segments: string[]; isDemo: boolea
   if (first === "compare") return <ComparePage />;
   if (first === "alarms") return <AlarmsPage />;
   if (first === "notifications") return <NotificationsPage />;
+  if (first === "administration") return <AdministrationPage />;
   if (first === "learn") return <LearnPage isDemo={isDemo} />;
   return (
     <main>

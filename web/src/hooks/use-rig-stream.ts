@@ -11,6 +11,7 @@ interface Options {
   renderInterval?: number;
   newSession?: () => void;
   fault?: (line: FaultEvent) => void;
+  communication?: () => void;
 }
 
 /** The live state of a rig, and the trace of its session in a buffer, which does not cause renderings. */
@@ -41,6 +42,7 @@ export function useRigStream(name: string, options: Options) {
         setState(frame);
       },
       fault: (line) => latest.current.fault?.(line),
+      communication: () => latest.current.communication?.(),
     });
   }, [name, statesPerSecond, renderInterval, buffer, latest]);
   /** Whether no sample has arrived for `limit` ms before `now`. */

@@ -10,10 +10,10 @@ interface Props {
   /** The question, as the title of the dialog. */
   question: string;
   action: () => Promise<unknown>;
-  needs?: NeededRole;
   class?: string;
-  /** What a screen reader says instead of the word of the button. */
+  /** What a screen reader says instead of the text of the button. */
   label?: string;
+  needs?: NeededRole;
   /** What will happen. */
   children: ComponentChildren;
 }

@@ -38,6 +38,8 @@ test("an asset converts back to the description that it was made from", () => {
       limit: typed(60),
       positionUnit: [1, 0.001, 0.01][i % 3],
       commandUnit: [1, DEGREE][i % 2],
+      debounce: [NaN, 0, typed(60)][i % 3],
+      falseAlarms: [NaN, typed(100)][i % 2],
     };
     const back = describeAsset(assetOf(description));
     // Only the dimensions of the chosen shape are kept.
@@ -59,7 +61,15 @@ test("properties that are not in the form keep their values", () => {
   assert.deepEqual(after.plate, before.plate);
   assert.deepEqual(after.servo, { angle_limit_rad: 10 * DEGREE, rate_limit_rad_s: 4 });
   assert.deepEqual([after.axes.swap, after.axes.x_sign, after.axes.y_sign], [true, -1, 1]);
-  assert.equal(after.diagnostics, before.diagnostics);
+  assert.deepEqual(after.diagnostics, before.diagnostics);
+});
+
+test("a setting of the diagnosis that is emptied is that of the service again", () => {
+  const before = { name: "bench", diagnostics: { debounce_s: 0, false_alarms_per_rig_year: 5 } };
+  const description = describeAsset(before);
+  assert.deepEqual([description.debounce, description.falseAlarms], [0, 5]);
+  assert.deepEqual(assetOf({ ...description, falseAlarms: NaN }, before).diagnostics, { debounce_s: 0 });
+  assert.equal(assetOf({ ...description, debounce: NaN, falseAlarms: NaN }, before).diagnostics, undefined);
 });
 
 test("a name has letters, digits, dash, underline and point", () => {

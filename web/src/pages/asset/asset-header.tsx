@@ -4,6 +4,7 @@ import { HealthMark } from "../../parts/health-mark";
 import { Link } from "../../router/link";
 import { calibrationsPath, sessionsPath, setUpPath } from "../../router/paths";
 import type { RigHealth } from "../../words/severity";
+import { DeleteRig } from "./delete-rig";
 import { RigTags } from "./rig-tags";
 
 interface Props {
@@ -45,6 +46,7 @@ export function AssetHeader({ name, health, session }: Props) {
             Its verdict becomes final. A rig that goes on sending opens a new session with its next sample.
           </ConfirmButton>
         )}
+        <DeleteRig name={name} />
       </div>
     </header>
   );

@@ -1,4 +1,5 @@
 /** The page of one rig: live view, monitors, charts, drive cycle and trends. */
+import { alarmApi } from "../../api/alarms";
 import { api } from "../../api/client";
 import { useQuery } from "../../hooks/use-query";
 import { useTitle } from "../../hooks/use-title";
@@ -13,8 +14,18 @@ export function AssetPage({ name }: { name: string }) {
   useTitle(name);
   const asset = useQuery(() => api.asset(name), name, ASSET_MS);
   const faults = useQuery(() => api.faultsOf(name), `${name} faults`, FAULTS_MS);
-  const refetch = () => Promise.all([faults.refetch(), asset.refetch()]);
+  const fetchLost = () => alarmApi.alarms({ asset: name, code: "communication_lost", state: "failing" });
+  const lost = useQuery(fetchLost, `${name} communication`, FAULTS_MS);
+  const refetch = () => Promise.all([faults.refetch(), lost.refetch(), asset.refetch()]);
   if (!asset.data)
     return <UnloadedPage title={name} what={name} kind="rig" error={asset.error} retry={asset.refetch} />;
-  return <LiveRig key={name} asset={asset.data} faults={faults.data ?? []} refetch={refetch} />;
+  return (
+    <LiveRig
+      key={name}
+      asset={asset.data}
+      faults={faults.data ?? []}
+      lost={lost.data?.items[0]}
+      refetch={refetch}
+    />
+  );
 }

@@ -1,3 +1,4 @@
+import type { Alarm } from "../../api/alarms";
 import type { Asset, FaultEntry } from "../../api/types";
 import { RigView } from "../../parts/rig-view/rig-view";
 import { XyTrace } from "../../parts/xy-trace/xy-trace";
@@ -9,6 +10,7 @@ import { activeFaults, healthOf } from "./health";
 import { LastSession } from "./last-session";
 import { LearningCard } from "./learning/learning-card";
 import { LiveChartsCard } from "./live-charts-card";
+import { LostCommunication } from "./lost-communication";
 import { Monitors } from "./monitors";
 import { NowCard } from "./now-card";
 import { TrendWarnings } from "./trends/trend-warnings";
@@ -20,11 +22,13 @@ import { useLiveRig } from "./use-live-rig";
 interface Props {
   asset: Asset;
   faults: FaultEntry[];
-  /** Fetches the rig's description and its faults again. */
+  /** The alarm that data of the rig stay away, if they do. */
+  lost?: Alarm;
+  /** Fetches the rig's description and its alarms again. */
   refetch: () => Promise<unknown>;
 }
 
-export function LiveRig({ asset, faults, refetch }: Props) {
+export function LiveRig({ asset, faults, lost, refetch }: Props) {
   const { state, connection, isSilent, charts } = useLiveRig(asset.name, () => void refetch());
   const trends = useTrends(asset.name);
   const active = activeFaults(faults);
@@ -47,6 +51,7 @@ export function LiveRig({ asset, faults, refetch }: Props) {
           ).
         </p>
       )}
+      {lost && <LostCommunication alarm={lost} refetch={refetch} />}
       <ActiveFaults asset={asset.name} faults={active} hasSession={state?.session_id != null} />
       <TrendWarnings trends={trends.data} />
       <LearningCard name={asset.name} state={state} changed={refetch} />

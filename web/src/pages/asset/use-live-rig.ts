@@ -16,7 +16,7 @@ const RENDER_MS = 150;
 const SILENT_MS = 10_000;
 
 /** The live state of the rig, and its charts with marks at the faults. */
-export function useLiveRig(name: string, faultChanged: () => void) {
+export function useLiveRig(name: string, changed: () => void) {
   const group = useMemo(() => new ChartGroup(), []);
   const marks = useRef<Mark[]>([]);
   const setMarks = (next: Mark[]) => {
@@ -28,9 +28,10 @@ export function useLiveRig(name: string, faultChanged: () => void) {
     renderInterval: RENDER_MS,
     newSession: () => setMarks([]),
     fault: (line) => {
-      faultChanged();
+      changed();
       setMarks([...marks.current, faultMark(line)]);
     },
+    communication: changed,
   });
   const charts = useLiveCharts(buffer, group);
   const now = useNow(500);

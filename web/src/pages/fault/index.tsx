@@ -1,7 +1,7 @@
 /** The page of one fault: evidence, possible causes, record and history. */
 import { useEffect } from "preact/hooks";
 import { api } from "../../api/client";
-import { faultEvents } from "../../api/events";
+import { fleetEvents } from "../../api/events";
 import type { FaultCode } from "../../api/types";
 import { useLatest } from "../../hooks/use-latest";
 import { useQuery } from "../../hooks/use-query";
@@ -21,7 +21,7 @@ export function FaultPage({ name, code }: { name: string; code: FaultCode }) {
   const refetch = () => Promise.all([fault.refetch(), history.refetch()]);
   const latestRefetch = useLatest(refetch);
   useEffect(() => {
-    return faultEvents.listen((line) => {
+    return fleetEvents.listen((line) => {
       if (line.asset === name && line.code === code) void latestRefetch.current();
     });
   }, [name, code, latestRefetch]);

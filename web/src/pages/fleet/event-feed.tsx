@@ -1,5 +1,7 @@
+import { isCommunication } from "../../api/events";
 import { Link } from "../../router/link";
-import { faultPath } from "../../router/paths";
+import { faultPath, rigPath } from "../../router/paths";
+import { communicationText } from "../../words/communication";
 import { faultTitle } from "../../words/fault-names";
 import { changeOf } from "../../words/fault-state";
 import { seconds } from "../../words/numbers";
@@ -11,30 +13,40 @@ const SHOWN = 20;
 
 const timeOfDay = (moment: Date) => moment.toLocaleTimeString(undefined, { timeStyle: "medium" });
 
+/** What an event tells, and the view that shows more of it. */
+function told(line: ReceivedEvent) {
+  if (isCommunication(line))
+    return { ...communicationText(line), title: "Communication", path: rigPath(line.asset) };
+  const at = line.t_s == null ? "" : ` At ${seconds(line.t_s)} of ${line.session}.`;
+  return {
+    ...changeOf(line),
+    sentence: lineSentence(line) + at,
+    title: faultTitle(line.code, line.kind),
+    path: faultPath(line.asset ?? "", line.code),
+  };
+}
+
 function Event({ line }: { line: ReceivedEvent }) {
-  const { text, look } = changeOf(line);
+  const { title, text, look, sentence, path } = told(line);
   return (
     <li>
-      <Link to={faultPath(line.asset ?? "", line.code)}>
+      <Link to={path}>
         <time class="quiet small-text" dateTime={line.received.toISOString()}>
           {timeOfDay(line.received)}
         </time>{" "}
-        <b>{line.asset}</b>: {faultTitle(line.code, line.kind)} <span class={look}>{text}</span>
+        <b>{line.asset}</b>: {title} <span class={look}>{text}</span>
       </Link>
-      <p>
-        {lineSentence(line)}
-        {line.t_s != null && ` At ${seconds(line.t_s)} of ${line.session}.`}
-      </p>
+      <p>{sentence}</p>
     </li>
   );
 }
 
-/** Fault changes since the page was opened, the newest first, with the time at which they arrived. */
+/** Events since the page was opened, the newest first, with the time at which they arrived. */
 export function EventFeed({ lines }: { lines: ReceivedEvent[] }) {
   return (
     <section class={`feed${lines.length ? "" : " none"}`} aria-label="Events">
       <h2>Events since the page was opened</h2>
-      {lines.length === 0 && <p class="quiet">No fault has changed since. New events appear here at once.</p>}
+      {lines.length === 0 && <p class="quiet">Nothing has happened since. New events appear here at once.</p>}
       <ol aria-live="polite">
         {lines.slice(0, SHOWN).map((line) => (
           <Event key={line.event} line={line} />

@@ -7,7 +7,7 @@ import { rigPath } from "../../router/paths";
 import { alarmCodeTitle } from "../../words/alarm";
 import { number } from "../../words/numbers";
 import { severity } from "../../words/severity";
-import { dateTime, timeAgo } from "../../words/time";
+import { dateTime, sinceText, timeAgo } from "../../words/time";
 import type { FleetRow as Row } from "./rows";
 
 /** Lag from which on it is highlighted, s. */
@@ -43,7 +43,11 @@ function Findings({ entry }: { entry: Row["entry"] }) {
           {entry.unjudged.reason}
         </span>
       )}
-      {entry.communication_lost_since && <span class="chip chip-failing">Communication lost</span>}
+      {entry.communication_lost_since && (
+        <span class="chip chip-failing" title={`Last data: ${dateTime(entry.communication_lost_since)}`}>
+          <b>Communication lost</b> since {sinceText(entry.communication_lost_since)}
+        </span>
+      )}
       {entry.muted?.map((mute) => (
         <span
           class="chip chip-muted"

@@ -1,11 +1,11 @@
 /** The state of each rig by its fleet entry and events. */
-import type { FaultEvent } from "../../api/events";
-import type { FaultLine, FleetEntry } from "../../api/types";
+import { isCommunication, type FleetEvent } from "../../api/events";
+import type { CommunicationLine, FaultLine, FleetEntry } from "../../api/types";
 import { healthByFaults, type RigHealth } from "../../words/severity";
 import { isFailing } from "../../words/status-byte";
 
 /** An event, and when it arrived at the page. */
-export type ReceivedEvent = FaultEvent & { received: Date };
+export type ReceivedEvent = FleetEvent & { received: Date };
 
 /** Number of event lines that the page keeps. */
 const MAX_LINES = 50;
@@ -22,8 +22,19 @@ export function healthOf(entry: FleetEntry): RigHealth {
   return entry.calibrated ? "ok" : "unlearnt";
 }
 
+/** Returns the entry after data stay away, or are back. */
+function afterCommunication(entry: FleetEntry, { status, since }: CommunicationLine): FleetEntry {
+  const isLost = status === "confirmed";
+  return { ...entry, silent: isLost, communication_lost_since: isLost ? since : null };
+}
+
 /** Returns the entry after an event. */
-export function afterEvent(entry: FleetEntry, line: FaultLine, now = new Date()): FleetEntry {
+export function afterEvent(
+  entry: FleetEntry,
+  line: FaultLine | CommunicationLine,
+  now = new Date(),
+): FleetEntry {
+  if (isCommunication(line)) return afterCommunication(entry, line);
   const others = entry.faults.filter((fault) => fault.code !== line.code);
   const isActive = line.status === "pending" || line.status === "confirmed";
   if (!isActive) return { ...entry, faults: others };
@@ -42,12 +53,13 @@ export function afterEvent(entry: FleetEntry, line: FaultLine, now = new Date())
   return { ...entry, faults: [...others, fault] };
 }
 
-/** Whether two events report the same change, as when the kind is determined later. */
-const isSameChange = (a: FaultLine, b: FaultLine) =>
-  (["asset", "session", "code", "status", "status_byte", "onset_s"] as const).every(
-    (key) => a[key] === b[key],
-  );
+/** What two events about the same change have in common, as when the kind is determined later. */
+function changeKey(line: FleetEvent): string {
+  const { asset, session, code, status } = line;
+  const more = isCommunication(line) ? [line.since] : [line.status_byte, line.onset_s];
+  return JSON.stringify([asset, session, code, status, ...more]);
+}
 
 /** Returns the event lines with a new one first; it replaces lines about the same change. */
 export const withLine = (lines: ReceivedEvent[], line: ReceivedEvent): ReceivedEvent[] =>
-  [line, ...lines.filter((known) => !isSameChange(known, line))].slice(0, MAX_LINES);
+  [line, ...lines.filter((known) => changeKey(known) !== changeKey(line))].slice(0, MAX_LINES);

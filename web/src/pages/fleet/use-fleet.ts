@@ -1,6 +1,6 @@
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { api } from "../../api/client";
-import { faultEvents } from "../../api/events";
+import { fleetEvents } from "../../api/events";
 import type { FleetEntry } from "../../api/types";
 import { useLatest } from "../../hooks/use-latest";
 import { useQuery } from "../../hooks/use-query";
@@ -44,7 +44,7 @@ export function useFleet() {
         return { base: latestPolled.current, entries: new Map(known).set(entry.asset, entry) };
       });
     };
-    return faultEvents.listen((line) => {
+    return fleetEvents.listen((line) => {
       setLines((before) => withLine(before, { ...line, received: new Date() }));
       const entry = current.current.get(line.asset ?? "");
       if (entry) patch(afterEvent(entry, line));
@@ -57,8 +57,8 @@ export function useFleet() {
 
   // After a lost connection, the missed changes are fetched.
   useEffect(() => {
-    let before = faultEvents.state;
-    return faultEvents.watch((state) => {
+    let before = fleetEvents.state;
+    return fleetEvents.watch((state) => {
       if (state === "live" && before === "lost") void refetch();
       before = state;
     });

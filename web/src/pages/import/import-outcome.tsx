@@ -1,3 +1,4 @@
+import type { FormatName } from "../../api/formats";
 import type { ImportResult } from "../../api/types";
 import { navigate } from "../../router/navigation";
 import { sessionPath } from "../../router/paths";
@@ -6,11 +7,12 @@ import { count } from "../../words/numbers";
 /** Number of listed rejections. */
 const SHOWN = 8;
 
-/** Row number of the first sample: the first row of the file has the column names. */
-const FIRST_ROW = 2;
+/** The formats in which a row with the names of the columns is before the first sample. */
+const NAMED: FormatName[] = ["csv", "xlsx"];
 
 /** The result of an import of which not all rows were accepted. */
-export function ImportOutcome({ result }: { result: ImportResult }) {
+export function ImportOutcome({ result, format }: { result: ImportResult; format: FormatName }) {
+  const firstRow = NAMED.includes(format) ? 2 : 1;
   const { accepted, rejected, late, duplicate, rejections, session } = result;
   return (
     <div>
@@ -22,7 +24,7 @@ export function ImportOutcome({ result }: { result: ImportResult }) {
         <ul class="plain quiet">
           {rejections.slice(0, SHOWN).map(({ index, reason }) => (
             <li>
-              row {index + FIRST_ROW}: {reason}
+              row {index + firstRow}: {reason}
             </li>
           ))}
         </ul>

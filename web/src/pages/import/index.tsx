@@ -2,12 +2,16 @@
 import { useState } from "preact/hooks";
 import type { ImportResult } from "../../api/types";
 import { Dialog } from "../../parts/dialog";
+import { count } from "../../words/numbers";
 import { ImportForm } from "./import-form";
 import { ImportOutcome } from "./import-outcome";
 import { useRecordingFile } from "./use-recording-file";
+import { WholeFileForm } from "./whole-file-form";
 
 interface Props {
   file: File;
+  /** Number of files that were dropped with it and are not imported. */
+  nOthers: number;
   /** The names of all rigs. */
   assets: string[];
   /** The rig that the list of sessions is filtered by, if any. */
@@ -15,33 +19,33 @@ interface Props {
   close: () => void;
 }
 
-export function ImportDialog({ file, assets, asset, close }: Props) {
-  const { recording, problem, setMapping } = useRecordingFile(file);
+export function ImportDialog({ file, nOthers, assets, asset, close }: Props) {
+  const { opened, problem, setMapping } = useRecordingFile(file);
   const [result, setResult] = useState<ImportResult>();
+  const { format, recording } = opened ?? {};
+  const target = { fileName: file.name, assets, wantedAsset: asset, imported: setResult, cancel: close };
   return (
     <Dialog title={`Import ${file.name}`} close={close}>
+      {nOthers > 0 && (
+        <p class="note" role="status">
+          One file is imported at a time: {file.name} was taken, the {othersText(nOthers)} not.
+        </p>
+      )}
       {problem && (
         <p class="trouble" role="alert">
           {problem}
         </p>
       )}
-      {!problem && !recording && (
+      {!problem && !opened && (
         <p class="quiet" role="status">
           Reading the file…
         </p>
       )}
-      {result && <ImportOutcome result={result} />}
-      {!result && recording && (
-        <ImportForm
-          recording={recording}
-          setMapping={setMapping}
-          fileName={file.name}
-          assets={assets}
-          wantedAsset={asset}
-          imported={setResult}
-          cancel={close}
-        />
-      )}
+      {result && format && <ImportOutcome result={result} format={format} />}
+      {!result && recording && <ImportForm recording={recording} setMapping={setMapping} {...target} />}
+      {!result && format && !recording && <WholeFileForm file={file} format={format} {...target} />}
     </Dialog>
   );
 }
+
+const othersText = (n: number) => (n === 1 ? "other file was" : `${count(n)} other files were`);

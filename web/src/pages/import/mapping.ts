@@ -16,8 +16,8 @@ const NAMES: Record<Quantity, RegExp[]> = {
   t_s: [/^t_s$/i, /^(t|time|timestamp|zeit)([_ ([].*)?$/i, /time|stamp|seconds|millis/i],
   cmd_qx_rad: [/^cmd_qx_rad$/i, /qx|cmd.*x$|tilt.*x|alpha|roll|servo.*y/i],
   cmd_qy_rad: [/^cmd_qy_rad$/i, /qy|cmd.*y$|tilt.*y|beta|pitch|servo.*x/i],
-  x_m: [/^x_m$/i, /^(ball|pos|meas)?[_ ]?x([_ ([](m|mm|cm|in|px).*)?$/i, /(ball|pos).*x/i],
-  y_m: [/^y_m$/i, /^(ball|pos|meas)?[_ ]?y([_ ([](m|mm|cm|in|px).*)?$/i, /(ball|pos).*y/i],
+  x_m: [/^x_m$/i, /^(ball|pos|meas)?[_ ]?x([_ ([]+(m|mm|cm|in|px).*)?$/i, /(ball|pos).*x/i],
+  y_m: [/^y_m$/i, /^(ball|pos|meas)?[_ ]?y([_ ([]+(m|mm|cm|in|px).*)?$/i, /(ball|pos).*y/i],
 };
 
 const UNIT_SUFFIX = /(?:[_ ([])(s|ms|us|µs|rad|mrad|deg|°|m|mm|cm|in)[)\]]?$/;

@@ -16,7 +16,6 @@ const HEAD_LINES = 50;
 const MIN_COLUMNS = 3;
 
 const EMPTY = "The file is empty.";
-const WORKBOOK = "This is a spreadsheet, not a text file. Save it as CSV in the spreadsheet program.";
 const TOO_FEW_COLUMNS =
   "No line has three or more columns, separated by commas, semicolons, tabs or blanks. A recording has " +
   "at least time and two coordinates, as in t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m.";
@@ -32,16 +31,21 @@ function parse(text: string, delimiter: string, limit = 0): string[][] {
   return data.filter((row) => row.join(delimiter).trim() !== "");
 }
 
-/** Returns the separator with which the names stand in the earliest line; of equal ones that of the most columns. */
+/**
+ * Returns the separator with which the names stand in the earliest line; of equal ones that with the most numbers in
+ * the line after it, which decimal commas do not add to, and then that of the most columns.
+ */
 function guessSeparator(text: string): string {
   const names = (separator: string) => {
     const rows = parse(text, separator, HEAD_LINES);
     const line = headerIndex(rows);
-    return { line: line < 0 ? Infinity : line, columns: rows[line]?.length ?? 0 };
+    const numbers = rows[line + 1]?.filter((cell) => isNumber(withPoint(bare(cell)))) ?? [];
+    return [line < 0 ? -Infinity : -line, numbers.length, rows[line]?.length ?? 0];
   };
   const isBetter = (a: string, b: string) => {
     const [one, other] = [names(a), names(b)];
-    return one.line < other.line || (one.line === other.line && one.columns > other.columns);
+    const i = one.findIndex((value, i) => value !== other[i]);
+    return i >= 0 && one[i]! > other[i]!;
   };
   return SEPARATORS.reduce((best, each) => (isBetter(each, best) ? each : best));
 }
@@ -50,9 +54,6 @@ function guessSeparator(text: string): string {
 const bare = (cell: string) => cell.trim().replace(/^"(.*)"$/s, "$1");
 
 const isNumber = (text: string) => text !== "" && Number.isFinite(Number(text));
-
-/** The beginning of a ZIP archive, which .xlsx and .ods files are, as text. */
-const ZIP = "PK\u0003\u0004";
 
 /**
  * Returns the index of the column names: of the first line that has as many cells as the one after it. The lines
@@ -73,23 +74,34 @@ function withSeparators(text: string): string {
 
 /** Reads a table whose first line, apart from a preamble, has the column names; numbers alone get names. */
 export function readTable(file: string): Table {
-  if (file.startsWith(ZIP)) throw new Error(WORKBOOK);
   if (!file.trim()) throw new Error(EMPTY);
   const text = withSeparators(file.replace(/^\uFEFF/, "").replace(/\r\n?/g, "\n"));
   const separator = guessSeparator(text);
   const all = parse(text, separator).map((row) => row.map(bare));
   const start = headerIndex(all);
   if (start < 0) throw new Error(TOO_FEW_COLUMNS);
-  const isNamed = !all[start]!.every((cell) => isNumber(decimal(cell, separator)));
+  const hasCommas = hasDecimalCommas(all.slice(start), separator);
+  const isNamed = !all[start]!.every((cell) => isNumber(hasCommas ? withPoint(cell) : cell));
   const header = isNamed ? all[start]! : all[start]!.map((_, i) => `column ${i + 1}`);
   const rows = all.slice(isNamed ? start + 1 : start);
   if (rows.length < 2) throw new Error(NO_ROWS);
-  if (separator !== ";") return { header, rows };
-  return { header, rows: rows.map((row) => row.map((cell) => decimal(cell, separator))) };
+  return { header, rows: hasCommas ? rows.map((row) => row.map(withPoint)) : rows };
 }
 
-/** Returns a cell with a decimal point: with semicolons as separators, the comma is the decimal separator. */
-const decimal = (cell: string, separator: string) => (separator === ";" ? cell.replace(",", ".") : cell);
+/** A number with a decimal point, and perhaps commas between the thousands. */
+const POINT = /^[-+]?[\d,]*\.\d+(e[-+]?\d+)?$/i;
+
+/**
+ * Whether commas are decimal separators: always if semicolons separate the columns, with tabs if no number has a
+ * decimal point.
+ */
+function hasDecimalCommas(rows: string[][], separator: string): boolean {
+  if (separator !== "\t") return separator === ";";
+  return !rows.some((row) => row.some((cell) => POINT.test(cell)));
+}
+
+/** Returns a cell with a decimal point instead of a comma. */
+const withPoint = (cell: string) => cell.replace(",", ".");
 
 /** Returns the numbers of a column; null for cells that are not numbers. */
 export function numbersOf({ rows }: Table, index: number): (number | null)[] {

@@ -1,6 +1,9 @@
 import { useEffect, useState } from "preact/hooks";
+import type { FormatName } from "../../api/formats";
+import { fileFormat, HEAD_BYTES } from "./file-format";
 import { guessMapping, type Mapping } from "./mapping";
 import { readTable, type Table } from "./table";
+import { textOf } from "./text-of";
 
 /** Largest file, bytes; also the default limit of the service. */
 const MAX_BYTES = 64 << 20;
@@ -10,26 +13,33 @@ export interface RecordingFile {
   mapping: Mapping;
 }
 
-/** Returns the text of a file: UTF-16 if a byte order mark says so, otherwise UTF-8. */
-function textOf(bytes: Uint8Array): string {
-  const mark = `${bytes[0]},${bytes[1]}`;
-  const encoding = { "255,254": "utf-16le", "254,255": "utf-16be" }[mark] ?? "utf-8";
-  return new TextDecoder(encoding).decode(bytes);
+/** A file that is opened: its format, and what it holds if that is a text. */
+interface OpenedFile {
+  format: FormatName;
+  recording?: RecordingFile;
 }
 
-async function read(file: File): Promise<RecordingFile> {
+const bytesOf = async (file: Blob) => new Uint8Array(await file.arrayBuffer());
+
+async function open(file: File): Promise<OpenedFile> {
   if (file.size > MAX_BYTES) throw new Error("The file is larger than 64 MiB. Split it.");
-  const table = readTable(textOf(new Uint8Array(await file.arrayBuffer())));
-  return { table, mapping: guessMapping(table) };
+  const format = fileFormat(await bytesOf(file.slice(0, HEAD_BYTES)));
+  if (format !== "csv") return { format };
+  const table = readTable(textOf(await bytesOf(file)));
+  return { format, recording: { table, mapping: guessMapping(table) } };
 }
 
-/** Reads a file as a table with an editable mapping, or returns the problem; neither while it is being read. */
+/**
+ * Opens a file. A text is read as a table with an editable mapping, another format is left to the service.
+ * Returns nothing while it is being read, and the problem if it cannot be read.
+ */
 export function useRecordingFile(file: File) {
-  const [recording, setRecording] = useState<RecordingFile>();
+  const [opened, setOpened] = useState<OpenedFile>();
   const [problem, setProblem] = useState<string>();
   useEffect(() => {
-    read(file).then(setRecording, (error: Error) => setProblem(error.message));
+    open(file).then(setOpened, (error: Error) => setProblem(error.message));
   }, [file]);
-  const setMapping = (mapping: Mapping) => setRecording((before) => before && { ...before, mapping });
-  return { recording, problem, setMapping };
+  const setMapping = (mapping: Mapping) =>
+    setOpened((before) => before?.recording && { ...before, recording: { ...before.recording, mapping } });
+  return { opened, problem, setMapping };
 }

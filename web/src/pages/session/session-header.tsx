@@ -1,19 +1,17 @@
 import { useState } from "preact/hooks";
 import { api } from "../../api/client";
 import type { Session } from "../../api/types";
-import { ActionButton } from "../../parts/action-button";
 import { ConfirmButton } from "../../parts/confirm-button";
 import { useRefusal } from "../../parts/login/rights";
-import { saveFile } from "../../parts/save-file";
 import { Link } from "../../router/link";
 import { rigPath, sessionReportPath, sessionsPath } from "../../router/paths";
 import { DeleteDialog } from "./delete-dialog";
+import { Download } from "./download";
 
 export function SessionHeader({ session, refetch }: { session: Session; refetch: () => Promise<void> }) {
   const { id, name, asset, state } = session;
   const [isDeleting, setDeleting] = useState(false);
   const cannotDelete = useRefusal("admin");
-  const download = async () => saveFile(await api.recording(id), `${asset}-${name}.csv`);
   const end = () => api.endSession(id).then(refetch);
   return (
     <>
@@ -28,7 +26,7 @@ export function SessionHeader({ session, refetch }: { session: Session; refetch:
           <Link class="button" to={sessionReportPath(id)}>
             Report
           </Link>
-          <ActionButton action={download}>Download CSV</ActionButton>
+          <Download session={session} />
           {state === "open" ? (
             <ConfirmButton word="End session" question="End this session?" action={end} needs="operator">
               Its verdict becomes final. A rig that goes on sending opens a new session with its next sample.

@@ -1,17 +1,15 @@
-import { navigate } from "../../router/navigation";
-import { sessionsPath } from "../../router/paths";
-
 /** Selects the rig whose sessions are listed: by typing, since there may be thousands. */
-export function RigChoice({ names, chosen, tag }: { names: string[]; chosen: string; tag: string }) {
+export function RigChoice(props: { names: string[]; chosen: string; change: (name: string) => void }) {
+  const { names, chosen, change } = props;
   return (
-    <label class="inline">
-      Rig{" "}
+    <label>
+      Rig
       <input
         type="search"
         list="session-assets"
         placeholder="all"
         value={chosen}
-        onChange={(e) => navigate(sessionsPath(e.currentTarget.value.trim(), tag), true)}
+        onChange={(e) => change(e.currentTarget.value.trim())}
       />
       <datalist id="session-assets">
         {names.map((name) => (

@@ -1,28 +1,79 @@
 import { tagApi } from "../../api/tags";
 import { useQuery } from "../../hooks/use-query";
+import { Choice } from "../../parts/choice";
 import { TagChoice } from "../../parts/tag-choice";
-import { navigate } from "../../router/navigation";
-import { sessionsPath } from "../../router/paths";
 import { RigChoice } from "./rig-choice";
+import type { SessionKey } from "./session-filter";
+
+const VERDICTS = [
+  ["", "Any"],
+  ["fault", "A fault confirmed"],
+  ["no_fault", "No fault confirmed"],
+] as const;
+
+const SORTS = [
+  ["", "Newest first"],
+  ["opened_at", "Oldest first"],
+] as const;
 
 interface Props {
   /** The names of all rigs. */
   names: string[];
-  asset: string;
-  tag: string;
+  /** The value of a parameter of the address; empty if it is missing. */
+  word: (key: SessionKey) => string;
+  change: (key: SessionKey, value: string) => void;
 }
 
-/** Selects sessions by their rig and by a tag. */
-export function SessionTools({ names, asset, tag }: Props) {
+/** A day of the range in which sessions were started. */
+function DayField({
+  label,
+  field,
+  word,
+  change,
+}: { label: string; field: "from" | "to" } & Omit<Props, "names">) {
+  return (
+    <label>
+      {label}
+      <input
+        type="date"
+        value={word(field)}
+        min={field === "to" ? word("from") || undefined : undefined}
+        onChange={(e) => change(field, e.currentTarget.value)}
+      />
+    </label>
+  );
+}
+
+/** Selects and orders sessions. */
+export function SessionTools({ names, word, change }: Props) {
   const { data: tags } = useQuery(tagApi.inUse, "tags");
   return (
-    <>
-      <RigChoice names={names} chosen={asset} tag={tag} />
-      <TagChoice
-        tags={tags ?? []}
-        chosen={tag}
-        change={(chosen) => navigate(sessionsPath(asset, chosen), true)}
+    <div class="form-row">
+      <RigChoice names={names} chosen={word("asset")} change={(name) => change("asset", name)} />
+      <label>
+        Session
+        <input
+          type="search"
+          placeholder="begins with"
+          value={word("name")}
+          onChange={(e) => change("name", e.currentTarget.value.trim())}
+        />
+      </label>
+      <Choice<string>
+        label="Verdict"
+        options={VERDICTS}
+        value={word("verdict")}
+        change={(verdict) => change("verdict", verdict)}
       />
-    </>
+      <DayField label="Started from" field="from" word={word} change={change} />
+      <DayField label="Started until" field="to" word={word} change={change} />
+      <TagChoice tags={tags ?? []} chosen={word("tag")} change={(tag) => change("tag", tag)} />
+      <Choice<string>
+        label="Order"
+        options={SORTS}
+        value={word("sort")}
+        change={(sort) => change("sort", sort)}
+      />
+    </div>
   );
 }

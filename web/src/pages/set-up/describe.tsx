@@ -4,6 +4,7 @@ import type { Asset } from "../../api/types";
 import { useRefusal } from "../../parts/login/rights";
 import { BallFields } from "./ball-fields";
 import { assetOf, describeAsset, type Description } from "./description";
+import { DiagnosisFields } from "./diagnosis-fields";
 import { NameFields } from "./name-fields";
 import { PlateFields } from "./plate-fields";
 import { problemText } from "./problem-text";
@@ -46,6 +47,7 @@ export function Describe({ asset, done }: Props) {
       <BallFields {...fields} />
       <PlateFields {...fields} />
       <UnitFields {...fields} />
+      <DiagnosisFields {...fields} />
       <div class="form-end">
         {error !== undefined && (
           <span class="trouble-inline" role="alert">

@@ -20,10 +20,16 @@ export interface Description {
   /** One unit of the device in metres and in radians. */
   positionUnit: number;
   commandUnit: number;
+  /** Settings of the diagnosis: NaN for those of the service. */
+  debounce: number;
+  falseAlarms: number;
 }
 
 /** The fields with typed numbers. */
 export type NumberField = "rate" | "radius" | "mass" | "length" | "width" | "diameter" | "limit";
+
+/** The fields with numbers that may be left empty. */
+export type OptionalField = "debounce" | "falseAlarms";
 
 /** Inertia factors: moment of inertia over mass times radius squared. */
 export const SOLID = 0.4;
@@ -44,7 +50,7 @@ const DEFAULT = {
 };
 
 export function describeAsset(asset?: Asset): Description {
-  const { plate, ball, servo, axes } = asset ?? {};
+  const { plate, ball, servo, axes, diagnostics } = asset ?? {};
   const millimetres = (m: number | null | undefined, fallback: number) => rounded((m ?? fallback) * 1e3);
   return {
     name: asset?.name ?? "",
@@ -60,7 +66,16 @@ export function describeAsset(asset?: Asset): Description {
     limit: rounded((servo?.angle_limit_rad ?? DEFAULT.angle_limit_rad) / DEGREE),
     positionUnit: axes?.position_unit_m ?? DEFAULT_AXES.position_unit_m,
     commandUnit: axes?.command_unit_rad ?? DEFAULT_AXES.command_unit_rad,
+    debounce: diagnostics?.debounce_s ?? NaN,
+    falseAlarms: diagnostics?.false_alarms_per_rig_year ?? NaN,
   };
+}
+
+/** Returns the settings of the diagnosis; undefined if all are those of the service. */
+function diagnosticsOf({ debounce, falseAlarms }: Description, before?: Asset): Asset["diagnostics"] {
+  const settings = { ...before?.diagnostics, debounce_s: debounce, false_alarms_per_rig_year: falseAlarms };
+  const given = Object.entries(settings).filter(([, value]) => value != null && !Number.isNaN(value));
+  return given.length ? Object.fromEntries(given) : undefined;
 }
 
 /** Returns the asset of a description; properties that are not in the form keep their values. */
@@ -78,6 +93,7 @@ export function assetOf(description: Description, before?: Asset): Asset {
     servo: { ...before?.servo, angle_limit_rad: limit * DEGREE },
     axes: { ...DEFAULT_AXES, ...before?.axes, ...units },
     ball: { radius_m: radius / 1e3, mass_kg: mass / 1e3, inertia_factor: inertia },
+    diagnostics: diagnosticsOf(description, before),
   } as Asset;
 }
 

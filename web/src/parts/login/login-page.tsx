@@ -35,7 +35,7 @@ export function LoginPage({ loggedIn }: { loggedIn: () => Promise<void> }) {
           />
         </label>
         <p class="quiet small-text">
-          This service requires a token. An administrator creates one with{" "}
+          This service requires a token. An administrator creates one on the page Administration, or with{" "}
           <code>offbd token create --name NAME --role viewer</code>
         </p>
         <ErrorMessage error={error} />

@@ -1,0 +1,9 @@
+import { api } from "../api/client";
+import { useQuery } from "./use-query";
+
+const NONE: string[] = [];
+
+const fetchNames = () => api.fleet().then((fleet) => fleet.map((entry) => entry.asset));
+
+/** The names of all rigs; none until they are known. */
+export const useRigNames = (): string[] => useQuery(fetchNames, "names").data ?? NONE;

@@ -1,0 +1,50 @@
+// Events about data of a rig that stay away, in the fleet.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { afterEvent, healthOf, withLine } from "../../src/pages/fleet/fleet-state.ts";
+import { communicationText } from "../../src/words/communication.ts";
+
+const SINCE = "2026-01-01T11:59:51Z";
+
+const communication = (status, more = {}) => ({
+  type: "communication",
+  code: "communication_lost",
+  asset: "a",
+  session: "run",
+  status,
+  since: SINCE,
+  ...more,
+});
+
+const rig = {
+  asset: "a",
+  faults: [],
+  tags: [],
+  warnings: [],
+  session_id: "1",
+  silent: false,
+  calibrated: true,
+};
+
+test("a rig whose data stay away is silent since its last data, until they are back", () => {
+  const recorded = { code: "sensor", status: "pending", failing: false, acknowledged: false };
+  const lost = afterEvent({ ...rig, faults: [recorded] }, communication("confirmed"));
+  assert.deepEqual([lost.silent, lost.communication_lost_since, lost.faults], [true, SINCE, [recorded]]);
+  assert.equal(healthOf({ ...lost, faults: [] }), "silent");
+  const back = afterEvent(lost, communication("passed"));
+  assert.deepEqual([back.silent, back.communication_lost_since], [false, null]);
+});
+
+test("each loss of communication is an event of its own", () => {
+  const first = communication("confirmed", { event: 1, since: "2026-01-01T11:00:00Z" });
+  const again = communication("confirmed", { event: 3 });
+  assert.deepEqual(withLine([first], again), [again, first]);
+  assert.deepEqual(withLine([first], { ...first, event: 2 }), [{ ...first, event: 2 }], "received twice");
+});
+
+test("an event of lost communication says whether data are awaited", () => {
+  const words = (status, more) => communicationText(communication(status, more));
+  assert.match(words("confirmed").sentence, /No data arrive although a session is open/);
+  assert.equal(words("passed").text, "back");
+  assert.equal(words("passed", { session: null }).text, "no longer expected");
+});
