@@ -50,7 +50,7 @@ async fn round_of(port: u16, round: usize, bodies: &[Bytes], n_samples: usize) -
     config.listen.set_port(0);
     config.mqtt = Some(MqttConfig {
         url: format!("mqtt://127.0.0.1:{port}"),
-        client_id: format!("offbd{round}"),
+        client_id: Some(format!("offbd{round}")),
         user: None,
         password: None,
         ca: None,

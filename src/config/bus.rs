@@ -4,7 +4,14 @@ use std::path::PathBuf;
 
 use serde::Deserialize;
 
-use super::ConfigError;
+use super::{ClusterConfig, ConfigError};
+
+/// The name by which a broker knows a service that works alone; a node's has the name of the
+/// node behind it.
+const CLIENT_ID: &str = "offbd";
+
+/// Longest name by which a broker knows the service. Chosen: longer than that of any node.
+const MAX_CLIENT_ID: usize = 128;
 
 /// A NATS server whose devices are served.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
@@ -20,7 +27,8 @@ pub struct NatsConfig {
     pub credentials: Option<PathBuf>,
     /// Certificates that the server's must come from, a PEM file.
     pub ca: Option<PathBuf>,
-    /// The server's monitoring port, `http://HOST:PORT`; its settings are checked there.
+    /// The server's monitoring port, `http://HOST:PORT`; its settings are checked there. Several
+    /// with `,` between.
     pub monitor: Option<String>,
     /// Whether faults are published.
     #[serde(default = "yes")]
@@ -39,9 +47,9 @@ pub struct NatsConfig {
 pub struct MqttConfig {
     /// `mqtt://HOST[:PORT]`, or `mqtts://HOST[:PORT]` for an encrypted connection.
     pub url: String,
-    /// The name by which the broker knows the service; two services need two.
-    #[serde(default = "client_id")]
-    pub client_id: String,
+    /// The name by which the broker knows the service; two services need two. By default
+    /// `offbd`, with the name of the node behind it, as `offbd-node-1`.
+    pub client_id: Option<String>,
     /// The user that the service connects as, with `password`.
     pub user: Option<String>,
     pub password: Option<String>,
@@ -73,10 +81,6 @@ const fn yes() -> bool {
 
 fn account() -> String {
     "$G".to_owned()
-}
-
-fn client_id() -> String {
-    "offbd".to_owned()
 }
 
 fn invalid<T>(key: &'static str, reason: impl Into<String>) -> Result<T, ConfigError> {
@@ -112,7 +116,8 @@ impl NatsConfig {
                  their own",
             );
         }
-        if self.monitor.as_ref().is_some_and(|monitor| !monitor.starts_with("http://")) {
+        let is_monitor = |url: &str| url.trim().starts_with("http://");
+        if self.monitor.as_ref().is_some_and(|urls| !urls.split(',').all(is_monitor)) {
             return invalid("nats.monitor", "is not `http://HOST:PORT`");
         }
         if self.account.is_empty() || self.account.contains(char::is_whitespace) {
@@ -138,12 +143,14 @@ impl MqttConfig {
         if !cfg!(feature = "mqtt") {
             return invalid("mqtt", "needs a build with MQTT: cargo build --features mqtt");
         }
-        // MQTT 3.1.1, section 3.1.3.1: what every broker must accept.
-        let is_id = |id: &str| {
-            (1..=23).contains(&id.len()) && id.chars().all(|c| c.is_ascii_alphanumeric())
-        };
-        if !is_id(&self.client_id) {
-            return invalid("mqtt.client_id", "must be 1 to 23 letters or digits");
+        // MQTT 3.1.1, section 3.1.3.1, permits any text. Every broker must accept up to 23
+        // letters and digits; the usual ones accept all that is accepted here.
+        let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+        let is_id =
+            |id: &String| (1..=MAX_CLIENT_ID).contains(&id.len()) && id.chars().all(is_plain);
+        if !self.client_id.iter().all(is_id) {
+            let reason = "must be 1 to 128 letters, digits, `-`, `_` and `.`";
+            return invalid("mqtt.client_id", reason);
         }
         if self.ca.is_some() && !self.address()?.encrypted {
             return invalid("mqtt.ca", "is set, but `mqtt.url` is not `mqtts://…`");
@@ -156,6 +163,16 @@ impl MqttConfig {
         }
         self.address()?;
         self.login().map(drop)
+    }
+
+    /// The name by which the broker knows this process, a node of `cluster` if there is one.
+    #[must_use]
+    pub fn client_id(&self, cluster: Option<&ClusterConfig>) -> String {
+        let own = || match cluster {
+            Some(ClusterConfig { name, .. }) => format!("{CLIENT_ID}-{name}"),
+            None => CLIENT_ID.to_owned(),
+        };
+        self.client_id.clone().unwrap_or_else(own)
     }
 
     /// The user and the password of the service.
@@ -212,19 +229,41 @@ mod tests {
         config.check().map_err(|error| error.to_string())
     }
 
-    fn mqtt(change: impl FnOnce(&mut MqttConfig)) -> Result<BrokerAddress, String> {
-        let mut config = MqttConfig {
+    fn broker() -> MqttConfig {
+        MqttConfig {
             url: "mqtt://a".to_owned(),
-            client_id: client_id(),
+            client_id: None,
             user: None,
             password: None,
             ca: None,
             telemetry: true,
             faults: true,
             mapping: None,
-        };
+        }
+    }
+
+    fn mqtt(change: impl FnOnce(&mut MqttConfig)) -> Result<BrokerAddress, String> {
+        let mut config = broker();
         change(&mut config);
         config.check(false).and_then(|()| config.address()).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_broker_knows_each_node_by_a_name_of_its_own() {
+        let node = |name: &str| ClusterConfig {
+            name: name.to_owned(),
+            listen: ([127, 0, 0, 1], 0).into(),
+            advertise: None,
+            partitions: 1,
+        };
+        assert_eq!(broker().client_id(None), "offbd");
+        assert_eq!(broker().client_id(Some(&node("node-1"))), "offbd-node-1");
+        assert_eq!(broker().client_id(Some(&node("node-2"))), "offbd-node-2");
+        for id in ["node-1", "a.b_c", &node(&"n".repeat(64)).name] {
+            let named = MqttConfig { client_id: Some(id.to_owned()), ..broker() };
+            assert_eq!(named.check(false).map_err(|error| error.to_string()), Ok(()), "{id}");
+            assert_eq!(named.client_id(Some(&node("node-1"))), id);
+        }
     }
 
     #[test]
@@ -255,7 +294,8 @@ mod tests {
             (mqtt(|config| config.url = "h:1883".to_owned()).map(drop), "mqtt.url"),
             (mqtt(|config| config.url = "mqtt://".to_owned()).map(drop), "mqtt.url"),
             (mqtt(|config| config.password = secret()).map(drop), "mqtt.user"),
-            (mqtt(|config| config.client_id = "a-b".to_owned()).map(drop), "mqtt.client_id"),
+            (mqtt(|config| config.client_id = Some("a b".to_owned())).map(drop), "mqtt.client_id"),
+            (mqtt(|config| config.client_id = Some(String::new())).map(drop), "mqtt.client_id"),
             (mqtt(|config| config.ca = Some("ca".into())).map(drop), "mqtt.ca"),
             (
                 mqtt(|config| {

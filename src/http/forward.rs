@@ -3,6 +3,7 @@
 //! 503, and the client tries again.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use axum::body::Body;
 use axum::extract::Request;
@@ -27,6 +28,10 @@ const FORWARDED: HeaderName = HeaderName::from_static("x-offbd-forwarded");
 
 /// The client's address in a forwarded request.
 const CLIENT: HeaderName = HeaderName::from_static("x-offbd-client");
+
+/// How long the answer of a node is waited for that owns the asset no more. Chosen: much longer
+/// than an answer takes that is under way.
+const LAST_ANSWERS: Duration = Duration::from_secs(1);
 
 /// Sends requests to other nodes.
 #[derive(Clone)]
@@ -100,7 +105,11 @@ impl Forwarder {
             return Err(ServiceError::Moving.into());
         }
         metrics::counter!("offbd_requests_forwarded_total").increment(1);
-        self.send(service, &address, request).await.map(Ok)
+        tokio::select! {
+            biased;
+            answer = self.send(service, &address, request) => answer.map(Ok),
+            () = moved(service, asset, &address) => Err(ServiceError::Moving.into()),
+        }
     }
 
     /// Sends `request` to the node at `address`.
@@ -124,6 +133,13 @@ impl Forwarder {
         })?;
         Ok(response(answer, upgrade))
     }
+}
+
+/// Waits until the node at `address` has lost `asset`, and has had time to answer what it had
+/// completed before. One that is paused or cut off does not answer.
+async fn moved(service: &Service, asset: &str, address: &str) {
+    service.moved_from(asset, address).await;
+    tokio::time::sleep(LAST_ANSWERS).await;
 }
 
 /// Changes the head of a request so that it goes to `address`.

@@ -21,7 +21,7 @@ pub(super) async fn start(
     let mut buses = Vec::new();
     #[cfg(feature = "mqtt")]
     if let Some(mqtt) = &config.mqtt {
-        let settings = mqtt::settings(mqtt)?;
+        let settings = mqtt::settings(mqtt, config.cluster.as_ref())?;
         let bus = crate::bus::mqtt::start(service.clone(), settings, closing.clone())?;
         buses.push(bus);
     }
@@ -40,7 +40,9 @@ pub(super) async fn start(
 /// Names the key and the file.
 pub(super) fn check(config: &Config) -> Result<()> {
     #[cfg(feature = "mqtt")]
-    config.mqtt.as_ref().map(mqtt::settings).transpose()?;
+    if let Some(mqtt) = &config.mqtt {
+        mqtt::settings(mqtt, config.cluster.as_ref())?;
+    }
     #[cfg(feature = "nats")]
     config.nats.as_ref().map(nats::settings).transpose()?;
     let _ = config;
@@ -79,17 +81,20 @@ mod mqtt {
     use anyhow::{Context, Result, anyhow};
 
     use crate::bus::mqtt::MqttSettings;
-    use crate::config::MqttConfig;
+    use crate::config::{ClusterConfig, MqttConfig};
     use crate::wire::mapping::{Mapping, MappingView};
 
-    pub(super) fn settings(config: &MqttConfig) -> Result<MqttSettings> {
+    pub(super) fn settings(
+        config: &MqttConfig,
+        cluster: Option<&ClusterConfig>,
+    ) -> Result<MqttSettings> {
         let address = config.address()?;
         Ok(MqttSettings {
             host: address.host,
             port: address.port,
             encrypted: address.encrypted,
             ca: config.ca.clone(),
-            client_id: config.client_id.clone(),
+            client_id: config.client_id(cluster),
             user: config.login()?,
             telemetry: config.telemetry,
             faults: config.faults,

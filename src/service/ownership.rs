@@ -1,6 +1,7 @@
 //! Which partitions this process owns. Without a cluster it owns all of them.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, PoisonError, RwLock};
 
 use crate::store::{PartitionId, Partitions};
@@ -10,11 +11,29 @@ use crate::store::{PartitionId, Partitions};
 pub(in crate::service) struct Ownership {
     partitions: Partitions,
     epochs: Arc<RwLock<BTreeMap<PartitionId, i64>>>,
+    n_disconnections: Arc<AtomicU64>,
 }
 
 impl Ownership {
-    pub(in crate::service) fn new(partitions: Partitions, owned: Vec<(PartitionId, i64)>) -> Self {
-        Self { partitions, epochs: Arc::new(RwLock::new(owned.into_iter().collect())) }
+    /// The partitions `owned`. `n_disconnections` counts how often the connection was lost that
+    /// keeps them.
+    pub(in crate::service) fn new(
+        partitions: Partitions,
+        owned: Vec<(PartitionId, i64)>,
+        n_disconnections: Arc<AtomicU64>,
+    ) -> Self {
+        let epochs = Arc::new(RwLock::new(owned.into_iter().collect()));
+        Self { partitions, epochs, n_disconnections }
+    }
+
+    /// How often the database server may have released the owned partitions so far.
+    pub(in crate::service) fn n_disconnections(&self) -> u64 {
+        self.n_disconnections.load(Ordering::SeqCst)
+    }
+
+    /// Notes that another connection to the database was lost, and perhaps all.
+    pub(in crate::service) fn note_disconnected(&self) {
+        self.n_disconnections.fetch_add(1, Ordering::SeqCst);
     }
 
     pub(in crate::service) const fn n_partitions(&self) -> usize {

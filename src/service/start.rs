@@ -170,7 +170,8 @@ impl WayToWriter {
         let (outage_sender, outage) = watch::channel(None);
         let closing = CancellationToken::new();
         let n_commits = Arc::new(AtomicU64::new(0));
-        let ownership = Ownership::new(writer.partitions(), writer.owned());
+        let ownership =
+            Ownership::new(writer.partitions(), writer.owned(), writer.n_disconnections());
         let (transfers, transfer_requests) = Transfers::new();
         let (lost_sender, lost) = mpsc::channel(MAX_PARTITIONS as usize);
         let committer = Committer {

@@ -135,6 +135,11 @@ pub enum StoreError {
          restart the service to continue with the present contents"
     )]
     UnexpectedCommits { expected: i64, found: i64 },
+    #[error(
+        "another node of the cluster has the name `{name}`: each node needs a `cluster.name` of \
+         its own"
+    )]
+    NameInUse { name: String },
     /// Other nodes of the cluster have taken these partitions. Nothing was changed.
     #[error("{} partitions now belong to other nodes", partitions.len())]
     Overtaken { partitions: Vec<PartitionId> },
@@ -220,7 +225,10 @@ impl StoreError {
                 error,
                 sqlx::Error::Encode(_) | sqlx::Error::ColumnDecode { .. } | sqlx::Error::Decode(_)
             ),
-            Self::InUse | Self::UnexpectedCommits { .. } | Self::FileGone { .. } => true,
+            Self::InUse
+            | Self::NameInUse { .. }
+            | Self::UnexpectedCommits { .. }
+            | Self::FileGone { .. } => true,
             Self::Migration(_)
             | Self::DamagedPage(_)
             | Self::DamagedHeader

@@ -9,7 +9,7 @@ use super::{EVENTS, Location, Store, StoreError, TRANSFERS};
 pub enum Notification {
     Transfer,
     Event,
-    /// Anything may have changed: the connection was lost for a while.
+    /// Anything may have changed.
     Unknown,
 }
 
@@ -18,16 +18,15 @@ pub enum Notification {
 pub struct Notifications(PgListener);
 
 impl Notifications {
-    /// Waits for the next notification. Connects again if the connection was lost. Cancel
-    /// safe.
+    /// Waits for the next notification. Cancel safe.
     ///
     /// # Errors
-    /// [`StoreError`] if the database is unavailable.
+    /// [`StoreError`] as soon as the connection is lost.
     pub async fn next(&mut self) -> Result<Notification, StoreError> {
         Ok(match self.0.try_recv().await? {
             Some(received) if received.channel() == TRANSFERS => Notification::Transfer,
             Some(_) => Notification::Event,
-            None => Notification::Unknown,
+            None => return Err(sqlx::Error::PoolClosed.into()),
         })
     }
 }
@@ -40,6 +39,7 @@ impl Store {
     pub async fn notifications(&self) -> Result<Option<Notifications>, StoreError> {
         let Location::Server(url) = &self.location else { return Ok(None) };
         let mut listener = PgListener::connect(url).await?;
+        listener.eager_reconnect(false);
         listener.listen_all([TRANSFERS, EVENTS]).await?;
         Ok(Some(Notifications(listener)))
     }

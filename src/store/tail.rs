@@ -27,8 +27,8 @@ const LONG_CHUNK_SAMPLES: usize = 2048;
 /// them.
 pub const MAX_TAIL_CHUNKS: usize = 128;
 
-/// Tails whose size is cached. When there are more, the cache is emptied, and tails are
-/// counted in the database again.
+/// Tails whose size is cached. When there are more, the one of the oldest session is counted in
+/// the database again.
 const MAX_CACHED: usize = 10_000;
 
 /// The size of the tail of a session: chunks shorter than [`LONG_CHUNK_SAMPLES`], all at
@@ -42,13 +42,28 @@ struct Tail {
 /// The tails of open sessions, with their sizes cached.
 #[derive(Debug, Default)]
 pub(super) struct Tails {
-    cached: BTreeMap<String, Tail>,
+    /// By session, whose ids have the order of time.
+    cached: BTreeMap<String, (PartitionId, Tail)>,
+    /// Sessions whose tail the transaction changes that is open or was the last one.
+    changed: Vec<String>,
 }
 
 impl Tails {
-    /// Empties the cache, which a failed transaction may have made wrong.
-    pub(super) fn forget_all(&mut self) {
-        self.cached.clear();
+    /// Forgets the tails that a failed transaction may have made wrong.
+    pub(super) fn forget_uncommitted(&mut self) {
+        for session in std::mem::take(&mut self.changed) {
+            self.cached.remove(&session);
+        }
+    }
+
+    /// Notes that the last transaction is committed.
+    pub(super) fn note_committed(&mut self) {
+        self.changed.clear();
+    }
+
+    /// Forgets the tails of `partitions`, which another writer may change.
+    pub(super) fn forget(&mut self, partitions: &[PartitionId]) {
+        self.cached.retain(|_, (partition, _)| !partitions.contains(partition));
     }
 
     /// Removes the deleted `session` from the cache.
@@ -72,7 +87,7 @@ impl Tails {
             } else {
                 merge(connection, run, tail, Packing::Plain).await?
             };
-            self.cache(&run.session, tail);
+            self.cache(run, tail);
         }
         insert(connection, &small).await
     }
@@ -83,7 +98,7 @@ impl Tails {
         session: &str,
     ) -> Result<Tail, StoreError> {
         match self.cached.get(session) {
-            Some(cached) => Ok(*cached),
+            Some((_, cached)) => Ok(*cached),
             None => count(connection, session).await,
         }
     }
@@ -99,11 +114,12 @@ impl Tails {
         merge(connection, run, tail, Packing::Compact).await.map(drop)
     }
 
-    fn cache(&mut self, session: &str, tail: Tail) {
-        if self.cached.len() >= MAX_CACHED {
-            self.cached.clear();
+    fn cache(&mut self, run: &Run, tail: Tail) {
+        self.changed.push(run.session.clone());
+        self.cached.insert(run.session.clone(), (run.partition, tail));
+        if self.cached.len() > MAX_CACHED {
+            self.cached.pop_first();
         }
-        self.cached.insert(session.to_owned(), tail);
     }
 }
 
@@ -248,4 +264,33 @@ fn decode_all(session: &str, chunks: &[(i64, Vec<u8>)]) -> Result<Vec<Sample>, S
         samples.extend(decode_chunk(data, ChunkKey { session, first_index })?);
     }
     Ok(samples)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cached(tails: &Tails) -> Vec<&str> {
+        tails.cached.keys().map(String::as_str).collect()
+    }
+
+    #[test]
+    fn one_session_too_many_and_a_partition_that_goes_cost_no_others() {
+        let mut tails = Tails::default();
+        let sessions: Vec<_> = (0..=MAX_CACHED).map(|i| format!("{i:06}")).collect();
+        for (i, session) in sessions.iter().enumerate() {
+            let partition = PartitionId(u32::from(i % 2 == 0));
+            tails.cache(&Run::empty(partition, session), Tail::default());
+        }
+        tails.note_committed();
+        assert_eq!(cached(&tails), sessions[1..], "all but the oldest");
+        // One that is cached already takes no other's place.
+        tails.cache(&Run::empty(PartitionId(0), &sessions[1]), Tail::default());
+        assert_eq!(tails.cached.len(), MAX_CACHED);
+        tails.forget_uncommitted();
+        assert_eq!(cached(&tails), sessions[2..], "what the failed transaction has changed");
+        tails.forget(&[PartitionId(1)]);
+        let odd: Vec<_> = sessions[2..].iter().skip(1).step_by(2).collect();
+        assert_eq!(cached(&tails), odd);
+    }
 }

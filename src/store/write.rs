@@ -20,6 +20,8 @@ pub use fault::{CommitFault, CommitPoint, FaultPlan};
 
 use std::collections::{BTreeSet, HashSet};
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use sqlx::{AnyConnection, Connection};
@@ -188,6 +190,7 @@ pub struct Writer {
     location: Location,
     /// `None` after a failure, until [`Writer::reconnect`].
     connection: Option<AnyConnection>,
+    n_disconnections: Arc<AtomicU64>,
     /// The SQLite file that the writer has opened.
     file_identity: Option<(u64, u64)>,
     /// The last connection as PostgreSQL knows it.
@@ -202,6 +205,9 @@ pub struct Writer {
     pub(super) checkpointer: Option<Checkpointer>,
     /// The transaction whose outcome is not known yet.
     in_doubt: Option<InDoubt>,
+    /// Expected and found number of commits, once they were not the same: a partition that
+    /// another process goes on with may have as many later.
+    unexpected: Option<(i64, i64)>,
     tails: Tails,
     journal: Journal,
     /// Sessions that could not be folded because the database refused their chunks. Until
@@ -254,6 +260,7 @@ impl Writer {
             location: location.clone(),
             file_identity: location.file_identity(),
             connection: Some(connection),
+            n_disconnections: Arc::default(),
             backend,
             partitions,
             owned: OwnedPartitions::default(),
@@ -261,6 +268,7 @@ impl Writer {
             role,
             checkpointer: None,
             in_doubt: None,
+            unexpected: None,
             tails: Tails::default(),
             journal: Journal::default(),
             refused: HashSet::new(),
@@ -315,17 +323,19 @@ impl Writer {
         match &result {
             Ok(()) => {
                 self.note_committed();
+                self.tails.note_committed();
                 if let Some(checkpointer) = &mut self.checkpointer {
                     checkpointer.count_commit(n_samples(sets));
                 }
             }
             Err(error) => {
-                self.tails.forget_all();
+                self.tails.forget_uncommitted();
+                self.note_unexpected(error);
                 match error {
                     // The transaction was rolled back, and the connection holds locks.
                     StoreError::Overtaken { partitions } => self.lose(partitions),
                     // After another failure the connection may be in any state.
-                    _ => self.connection = None,
+                    _ => self.disconnect(),
                 }
             }
         }
@@ -344,7 +354,7 @@ impl Writer {
         let copied = tokio::time::timeout(COMMIT_TIMEOUT, checkpoint::copy(connection)).await;
         if let Err(error) = copied.unwrap_or_else(late) {
             tracing::warn!(%error, "cannot copy the write-ahead log into the database file");
-            self.connection = None;
+            self.disconnect();
         }
     }
 
@@ -353,9 +363,17 @@ impl Writer {
     ///
     /// # Errors
     /// [`StoreError`] if the database is still unavailable, does not accept changes, or has
-    /// been changed by another process.
+    /// ever been found changed by another process.
     pub async fn reconnect(&mut self) -> Result<bool, StoreError> {
-        self.connection = None;
+        self.disconnect();
+        if let Some((expected, found)) = self.unexpected {
+            return Err(StoreError::UnexpectedCommits { expected, found });
+        }
+        let connected = self.connect_again().await;
+        connected.inspect_err(|error| self.note_unexpected(error))
+    }
+
+    async fn connect_again(&mut self) -> Result<bool, StoreError> {
         self.check_file()?;
         let lost = self.backend.as_ref();
         // Has time limits of its own.
@@ -364,6 +382,27 @@ impl Writer {
         let late = |_| Err(sqlx::Error::Io(std::io::ErrorKind::TimedOut.into()).into());
         let attempt = tokio::time::timeout(COMMIT_TIMEOUT, self.resume(connection));
         attempt.await.unwrap_or_else(late)
+    }
+
+    fn note_unexpected(&mut self, error: &StoreError) {
+        let StoreError::UnexpectedCommits { expected, found } = error else { return };
+        self.unexpected = Some((*expected, *found));
+        if self.role == WriterRole::Node {
+            let all: Vec<_> = self.owned().into_iter().map(|(partition, _)| partition).collect();
+            self.lose(&all);
+        }
+    }
+
+    /// Drops the connection. From now on other nodes may take what this writer owns.
+    pub fn disconnect(&mut self) {
+        self.connection = None;
+        self.n_disconnections.fetch_add(1, Ordering::SeqCst);
+    }
+
+    /// How often the connection was dropped so far; counts on.
+    #[must_use]
+    pub fn n_disconnections(&self) -> Arc<AtomicU64> {
+        self.n_disconnections.clone()
     }
 
     /// Checks that the SQLite file is still there: what is written to a removed file is lost
@@ -468,7 +507,7 @@ impl Writer {
             ownership::notify(&mut transaction, EVENTS).await?;
         }
         if !partitions.is_empty() {
-            self.owned.fence(&mut transaction, &partitions, self.role).await?;
+            self.owned.fence(&mut transaction, &partitions, self.node.as_ref()).await?;
             self.in_doubt = Some(InDoubt { partitions, journal });
         }
         #[cfg(test)]

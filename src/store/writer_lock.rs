@@ -87,8 +87,13 @@ pub(super) async fn is_free(connection: &mut AnyConnection) -> Result<bool, Stor
 
 /// Converts the error of a failed attempt to take the lock.
 fn lock_error(error: sqlx::Error) -> StoreError {
+    if is_timeout(&error) { StoreError::InUse } else { error.into() }
+}
+
+/// Whether a lock was not free in time.
+pub(super) fn is_timeout(error: &sqlx::Error) -> bool {
     /// `lock_not_available`
     const NOT_AVAILABLE: &str = "55P03";
     let code = error.as_database_error().and_then(|error| error.code());
-    if code.is_some_and(|code| code == NOT_AVAILABLE) { StoreError::InUse } else { error.into() }
+    code.is_some_and(|code| code == NOT_AVAILABLE)
 }

@@ -437,7 +437,8 @@ mod tests {
         let (_, outage) = watch::channel(None);
         let (limits, closing) =
             (Limits { shards: 1, ..Limits::default() }, CancellationToken::new());
-        let ownership = Ownership::new(Partitions::ONE, vec![(PartitionId(0), 1)]);
+        let ownership =
+            Ownership::new(Partitions::ONE, vec![(PartitionId(0), 1)], std::sync::Arc::default());
         let handles =
             Handles::new(store, Clock::System, &limits, ownership, writer, outage, closing);
         let env = Environment { handles, presences: Presences::default(), jobs };

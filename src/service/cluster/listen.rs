@@ -25,13 +25,16 @@ pub(super) async fn run(handles: Handles, cluster: Cluster, events: Events) {
 
 async fn listen(handles: &Handles, cluster: &Cluster, events: &Events) -> Result<(), ServiceError> {
     let Some(mut notifications) = handles.store.notifications().await? else { return Ok(()) };
+    let mut notification = Notification::Unknown;
     loop {
-        let notification = notifications.next().await?;
         if notification != Notification::Event {
             cluster.poke.notify_one();
         }
         if notification != Notification::Transfer {
             events.wake();
         }
+        // The server may have ended all connections of this process, that of the writer too.
+        let lost = |_: &_| handles.ownership.note_disconnected();
+        notification = notifications.next().await.inspect_err(lost)?;
     }
 }

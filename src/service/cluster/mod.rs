@@ -16,6 +16,7 @@ use tokio::time::timeout;
 use tokio_util::sync::CancellationToken;
 
 use self::plan::OwnershipPlan;
+use self::routes::Look;
 pub use self::routes::Route;
 pub(super) use self::routes::Routes;
 use super::asset::Shards;
@@ -29,10 +30,6 @@ use crate::wire::cluster::{ClusterView, NodeView, PlaceView};
 /// How often a node looks at the partitions. A quarter of the time after which the server
 /// ends an idle connection.
 const LOOK_EVERY: Duration = Duration::from_millis(500);
-
-/// How long after the start of a look nothing can have been taken from this node: the server
-/// holds its locks for at least a second after a statement.
-const LOOK_VALID_FOR: Duration = Duration::from_secs(1);
 
 /// Longest wait for a look before a read is answered.
 const CONFIRM_TIMEOUT: Duration = Duration::from_secs(3);
@@ -160,11 +157,10 @@ impl NodeTask {
     }
 
     /// Reads who owns what.
-    #[expect(clippy::disallowed_methods, reason = "partitions move by the time of this process")]
     async fn observe(&self) -> Result<(Vec<NodeRow>, Vec<PartitionRow>), ServiceError> {
-        let looked_at = Instant::now();
+        let look = Look::begin(&self.handles.ownership);
         let (nodes, partitions) = self.transfers.call(TransferRequest::Observe).await?;
-        self.cluster.routes.set(looked_at, &nodes, &partitions);
+        self.cluster.routes.set(look, &nodes, &partitions);
         Ok((nodes, partitions))
     }
 
@@ -225,21 +221,32 @@ impl Service {
         cluster.routes.of(ownership.partition_of(asset), &cluster.me.id)
     }
 
-    /// Waits for another look at the database if the last one is so old that another node may
-    /// own, by now, what this one does. Call it before a read is answered; writes need no such
+    /// Waits until requests about `asset` are not for the node at `address` any more.
+    pub async fn moved_from(&self, asset: &str, address: &str) {
+        let Some(cluster) = &self.inner.cluster else { return };
+        let is_there =
+            || matches!(self.route(asset), Route::Node { address: a, .. } if a == address);
+        let mut looked = cluster.routes.looked();
+        // An error means that the service has ended.
+        while is_there() && looked.changed().await.is_ok() {}
+    }
+
+    /// Waits for another look at the database if the last one is so old, or the connection was
+    /// lost since, that another node may own, by now, what this one does. Call it before a read is answered; writes need no such
     /// check, because the database makes it.
     ///
     /// # Errors
     /// [`ServiceError::Moving`] if the database does not answer in time.
     pub async fn confirm_ownership(&self) -> Result<(), ServiceError> {
         let Some(cluster) = &self.inner.cluster else { return Ok(()) };
-        let is_recent = |at: &Option<Instant>| at.is_some_and(|at| at.elapsed() < LOOK_VALID_FOR);
+        let ownership = &self.inner.handles.ownership;
+        let is_valid = |look: &Option<Look>| look.is_some_and(|look| look.is_valid(ownership));
         let mut looked = cluster.routes.looked();
-        if is_recent(&looked.borrow_and_update()) {
+        if is_valid(&looked.borrow_and_update()) {
             return Ok(());
         }
         cluster.poke.notify_one();
-        match timeout(CONFIRM_TIMEOUT, looked.wait_for(is_recent)).await {
+        match timeout(CONFIRM_TIMEOUT, looked.wait_for(is_valid)).await {
             Ok(Ok(_)) => Ok(()),
             _ => Err(ServiceError::Moving),
         }

@@ -2,11 +2,16 @@
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, PoisonError, RwLock};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 
+use crate::service::ownership::Ownership;
 use crate::store::{NodeRow, PartitionId, PartitionRow};
+
+/// How long after the start of a look nothing can have been taken from this node, unless its
+/// connection was lost: the server holds its locks for at least a second after a statement.
+const VALID_FOR: Duration = Duration::from_secs(1);
 
 /// Where requests about an asset are answered.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -25,8 +30,28 @@ pub enum Route {
 #[derive(Clone, Debug, Default)]
 pub(in crate::service) struct Routes {
     table: Arc<RwLock<Table>>,
-    /// The start of the last look at the database, on the monotonic clock of this process.
-    looked: watch::Sender<Option<Instant>>,
+    looked: watch::Sender<Option<Look>>,
+}
+
+/// A look at the database, by its start.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Look {
+    /// On the monotonic clock of this process.
+    at: Instant,
+    n_disconnections: u64,
+}
+
+impl Look {
+    /// Begins a look.
+    #[expect(clippy::disallowed_methods, reason = "partitions move by the time of this process")]
+    pub(super) fn begin(ownership: &Ownership) -> Self {
+        Self { at: Instant::now(), n_disconnections: ownership.n_disconnections() }
+    }
+
+    /// Whether nothing can have been taken from this node since.
+    pub(super) fn is_valid(&self, ownership: &Ownership) -> bool {
+        self.n_disconnections == ownership.n_disconnections() && self.at.elapsed() < VALID_FOR
+    }
 }
 
 #[derive(Debug, Default)]
@@ -36,8 +61,8 @@ struct Table {
 }
 
 impl Routes {
-    /// Sets what a look that began at `looked_at` has found.
-    pub(super) fn set(&self, looked_at: Instant, nodes: &[NodeRow], partitions: &[PartitionRow]) {
+    /// Sets what `look` has found.
+    pub(super) fn set(&self, look: Look, nodes: &[NodeRow], partitions: &[PartitionRow]) {
         let owner = |row: &PartitionRow| {
             let owner = nodes.iter().find(|node| Some(&node.id) == row.owner.as_ref())?;
             Some((row.partition(), owner.clone()))
@@ -45,11 +70,11 @@ impl Routes {
         let table =
             Table { owners: partitions.iter().filter_map(owner).collect(), nodes: nodes.to_vec() };
         *self.table.write().unwrap_or_else(PoisonError::into_inner) = table;
-        self.looked.send_replace(Some(looked_at));
+        self.looked.send_replace(Some(look));
     }
 
-    /// The start of the last look.
-    pub(super) fn looked(&self) -> watch::Receiver<Option<Instant>> {
+    /// The last look.
+    pub(super) fn looked(&self) -> watch::Receiver<Option<Look>> {
         self.looked.subscribe()
     }
 
@@ -69,5 +94,23 @@ impl Routes {
         let table = self.table.read().unwrap_or_else(PoisonError::into_inner);
         let n_owned = |node: &NodeRow| table.owners.values().filter(|o| o.id == node.id).count();
         table.nodes.iter().map(|node| (node.clone(), n_owned(node))).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::Partitions;
+
+    #[test]
+    fn a_look_is_void_once_the_connection_is_lost() {
+        let ownership = Ownership::new(Partitions::ONE, Vec::new(), Arc::default());
+        let look = Look::begin(&ownership);
+        assert!(look.is_valid(&ownership));
+        ownership.note_disconnected();
+        assert!(!look.is_valid(&ownership), "others may have taken everything");
+        assert!(Look::begin(&ownership).is_valid(&ownership));
+        let old = Look { at: look.at.checked_sub(VALID_FOR).unwrap(), ..Look::begin(&ownership) };
+        assert!(!old.is_valid(&ownership));
     }
 }

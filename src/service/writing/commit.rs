@@ -204,11 +204,11 @@ impl Committer {
         is_available
     }
 
-    /// Publishes which partitions other nodes have taken.
+    /// Publishes which partitions are not owned any more: other nodes take them.
     fn note_lost(&mut self) {
         for partition in self.writer.lost() {
             self.ownership.remove(partition);
-            tracing::warn!(%partition, "another node has taken the partition");
+            tracing::warn!(%partition, "the partition is not owned any more");
             metrics::counter!("offbd_partitions_lost_total").increment(1);
             // There is room for all partitions.
             let _ = self.lost.try_send(partition);
@@ -379,6 +379,7 @@ impl Committer {
 
     /// Waits after `error` until the database is available or the service shuts down.
     async fn recover(&mut self, error: &StoreError) -> Recovery {
+        self.writer.disconnect();
         self.set_unavailable(error);
         let closing = self.closing.clone();
         match unless_closing(&closing, self.reconnect()).await {
@@ -402,6 +403,7 @@ impl Committer {
                 }
                 Err(error) => self.set_unavailable(&error),
             }
+            self.note_lost();
         }
     }
 

@@ -22,6 +22,13 @@ use crate::store::{Location, MIGRATIONS, PartitionId, Partitions, Store, StoreEr
 /// The first key of the advisory locks of partitions; the second is the partition.
 const PARTITION_LOCKS: i32 = i32::from_be_bytes(*b"part");
 
+/// The first key of the advisory locks of nodes' names; the second is a hash of the name.
+const NAME_LOCKS: i32 = i32::from_be_bytes(*b"name");
+
+/// How long a node waits for its name, which a process that was killed or cut off may still
+/// have. Chosen: twice the time after which the server ends the connection of that one.
+const NAME_LOCK_TIMEOUT: &str = "4s";
+
 /// After this long without a statement the server ends the connection of a node's writer.
 /// Chosen: four times the interval at which a node looks at the partitions.
 const IDLE_TIMEOUT: &str = "2s";
@@ -70,6 +77,23 @@ struct OwnedPartition {
     n_commits: i64,
 }
 
+impl OwnedPartition {
+    const fn unexpected(self, found: &PartitionRow) -> StoreError {
+        StoreError::UnexpectedCommits { expected: self.n_commits, found: found.n_commits }
+    }
+
+    /// Checks that the database has what this writer, the node `me`, has seen committed.
+    /// Another owner increments the epoch and goes on with the count, so lower numbers, or this
+    /// epoch with another owner, are those of an older copy.
+    fn check_age(self, found: &PartitionRow, me: Option<&NodeIdentity>) -> Result<(), StoreError> {
+        let is_other = || found.owner.as_ref() != me.map(|node| &node.id);
+        let is_older = found.epoch < self.epoch
+            || found.n_commits < self.n_commits
+            || found.epoch == self.epoch && is_other();
+        if is_older { Err(self.unexpected(found)) } else { Ok(()) }
+    }
+}
+
 /// The partitions that a writer may change.
 #[derive(Debug, Default)]
 pub(super) struct OwnedPartitions {
@@ -100,18 +124,33 @@ impl OwnedPartitions {
         }
     }
 
-    /// Counts the transaction `db` in each of `partitions`. The last statement before its
-    /// commit.
+    /// Checks that the database is no older copy of what the node `me` has seen.
+    ///
+    /// # Errors
+    /// [`StoreError::UnexpectedCommits`] if it is.
+    fn check_age(
+        &self,
+        rows: &BTreeMap<PartitionId, PartitionRow>,
+        me: Option<&NodeIdentity>,
+    ) -> Result<(), StoreError> {
+        let missing = PartitionRow::default();
+        let found = |partition| rows.get(partition).unwrap_or(&missing);
+        self.by_id.iter().try_for_each(|(partition, mine)| mine.check_age(found(partition), me))
+    }
+
+    /// Counts the transaction `db` in each of `partitions`, for the node `me` or a writer that
+    /// works alone. The last statement before its commit.
     ///
     /// # Errors
     /// [`StoreError::Overtaken`] if another node has taken a partition, which does not happen to
     /// a writer that works alone;
-    /// [`StoreError::UnexpectedCommits`] if there are other transactions than this writer's.
+    /// [`StoreError::UnexpectedCommits`] if there are other transactions than this writer's, or
+    /// fewer.
     pub(super) async fn fence(
         &self,
         db: &mut AnyConnection,
         partitions: &BTreeSet<PartitionId>,
-        role: WriterRole,
+        me: Option<&NodeIdentity>,
     ) -> Result<(), StoreError> {
         static COUNT: MultiRowStatement = MultiRowStatement::new(
             "UPDATE partition SET n_commits = n_commits + 1 FROM (VALUES ",
@@ -135,18 +174,19 @@ impl OwnedPartitions {
         let rows = read(db).await?;
         let (mut overtaken, mut unexpected) = (Vec::new(), None);
         for (partition, mine) in counted {
-            match rows.get(&partition) {
-                Some(row) if row.epoch == mine.epoch && row.n_commits == mine.n_commits => {}
-                Some(row) if row.epoch == mine.epoch || role == WriterRole::Main => {
-                    unexpected = Some((mine.n_commits, row.n_commits));
-                }
-                _ => overtaken.push(partition),
+            let found = rows.get(&partition).cloned().unwrap_or_default();
+            mine.check_age(&found, me)?;
+            if found.epoch != mine.epoch && me.is_some() {
+                overtaken.push(partition);
+            } else if found.epoch != mine.epoch || found.n_commits - mine.n_commits > 1 {
+                return Err(mine.unexpected(&found));
+            } else {
+                // Either this transaction has just counted itself here, or there was another one.
+                unexpected = Some(mine.unexpected(&found));
             }
         }
         match unexpected {
-            Some((expected, found)) if overtaken.is_empty() => {
-                Err(StoreError::UnexpectedCommits { expected, found })
-            }
+            Some(unexpected) if overtaken.is_empty() => Err(unexpected),
             _ => Err(StoreError::Overtaken { partitions: overtaken }),
         }
     }
@@ -165,36 +205,112 @@ async fn read(db: &mut AnyConnection) -> Result<BTreeMap<PartitionId, PartitionR
     Ok(rows.into_iter().map(|row| (row.partition(), row)).collect())
 }
 
-/// Takes the lock of `partition`; returns whether it was free.
-async fn try_lock(db: &mut AnyConnection, partition: PartitionId) -> Result<bool, StoreError> {
-    let lock = "SELECT CASE WHEN pg_try_advisory_lock($1, $2) THEN 1 ELSE 0 END";
-    let lock = sqlx::query_scalar(lock).bind(PARTITION_LOCKS).bind(partition.0.cast_signed());
-    let is_locked: i32 = lock.fetch_one(db).await?;
-    Ok(is_locked == 1)
-}
-
-/// Increments the epoch of `partition`. In a transaction of its own, because the error of an
-/// implicit commit is not reported once there is a row.
-async fn begin_epoch(
+/// Takes the locks of those `partitions` whose lock is free; returns which. Not for one whose
+/// lock this connection has: the server would count it twice.
+async fn try_lock(
     db: &mut AnyConnection,
-    partition: PartitionId,
-    owner: Option<&str>,
-) -> Result<OwnedPartition, StoreError> {
-    let mut transaction = sqlx::Connection::begin(db).await?;
-    let take = "UPDATE partition SET epoch = epoch + 1, owner = $2 WHERE id = $1
-                RETURNING epoch, n_commits";
-    let taken = sqlx::query_as(take).bind(partition.bound()).bind(owner);
-    let (epoch, n_commits) = taken.fetch_one(&mut *transaction).await?;
-    transaction.commit().await?;
-    Ok(OwnedPartition { epoch, n_commits })
+    partitions: &[PartitionId],
+) -> Result<Vec<PartitionId>, StoreError> {
+    static LOCK: MultiRowStatement = MultiRowStatement::new(
+        "SELECT wanted.column1 FROM (VALUES ",
+        2,
+        ") AS wanted WHERE pg_try_advisory_lock(CAST(wanted.column2 AS INT),
+         CAST(wanted.column1 AS INT))",
+    );
+    let mut locked = Vec::new();
+    for part in in_parts(partitions) {
+        let mut query = sqlx::query_scalar(LOCK.sql(part.len()));
+        for partition in part {
+            query = query.bind(partition.bound()).bind(i64::from(PARTITION_LOCKS));
+        }
+        let ids: Vec<i64> = query.fetch_all(&mut *db).await?;
+        locked.extend(ids.into_iter().filter_map(|id| u32::try_from(id).ok()).map(PartitionId));
+    }
+    Ok(locked)
 }
 
-async fn unlock(db: &mut AnyConnection, partition: PartitionId) -> Result<(), StoreError> {
-    sqlx::query("SELECT pg_advisory_unlock($1, $2)")
-        .bind(PARTITION_LOCKS)
-        .bind(partition.0.cast_signed())
-        .execute(db)
-        .await?;
+/// Increments the epochs of `partitions`, in one transaction. Not by an implicit commit, whose
+/// error is not reported once there is a row.
+async fn begin_epochs(
+    db: &mut AnyConnection,
+    partitions: &[PartitionId],
+    me: Option<&NodeIdentity>,
+) -> Result<Vec<(PartitionId, OwnedPartition)>, StoreError> {
+    static TAKE: MultiRowStatement = MultiRowStatement::new(
+        "UPDATE partition SET epoch = epoch + 1, owner = NULLIF(taken.column2, '') FROM (VALUES ",
+        2,
+        ") AS taken WHERE id = taken.column1 RETURNING id, epoch, n_commits, owner",
+    );
+    let owner = me.map_or("", |node| &node.id);
+    let mut taken = Vec::new();
+    let mut transaction = sqlx::Connection::begin(db).await?;
+    for part in in_parts(partitions) {
+        let mut query = sqlx::query_as(TAKE.sql(part.len()));
+        for partition in part {
+            query = query.bind(partition.bound()).bind(owner);
+        }
+        let rows: Vec<PartitionRow> = query.fetch_all(&mut *transaction).await?;
+        taken.extend(rows.into_iter().map(|row| {
+            let PartitionRow { epoch, n_commits, .. } = row;
+            (row.partition(), OwnedPartition { epoch, n_commits })
+        }));
+    }
+    transaction.commit().await?;
+    Ok(taken)
+}
+
+/// Stores that partitions have no owner any more, each unless its epoch is another one.
+async fn end_epochs(
+    db: &mut AnyConnection,
+    epochs: &[(PartitionId, i64)],
+) -> Result<(), StoreError> {
+    static GIVE_UP: MultiRowStatement = MultiRowStatement::new(
+        "UPDATE partition SET owner = NULL FROM (VALUES ",
+        2,
+        ") AS mine WHERE id = mine.column1 AND epoch = mine.column2",
+    );
+    let mut transaction = sqlx::Connection::begin(db).await?;
+    for part in in_parts(epochs) {
+        let mut query = sqlx::query(GIVE_UP.sql(part.len()));
+        for (partition, epoch) in part {
+            query = query.bind(partition.bound()).bind(epoch);
+        }
+        query.execute(&mut *transaction).await?;
+    }
+    Ok(transaction.commit().await?)
+}
+
+async fn unlock(db: &mut AnyConnection, partitions: &[PartitionId]) -> Result<(), StoreError> {
+    static UNLOCK: MultiRowStatement = MultiRowStatement::new(
+        "SELECT pg_advisory_unlock(CAST(held.column2 AS INT), CAST(held.column1 AS INT))
+         FROM (VALUES ",
+        2,
+        ") AS held",
+    );
+    for part in in_parts(partitions) {
+        let mut query = sqlx::query(UNLOCK.sql(part.len()));
+        for partition in part {
+            query = query.bind(partition.bound()).bind(i64::from(PARTITION_LOCKS));
+        }
+        query.execute(&mut *db).await?;
+    }
+    Ok(())
+}
+
+/// Takes the lock of a node's name.
+///
+/// # Errors
+/// [`StoreError::NameInUse`] if a process has it that is alive; [`StoreError`].
+async fn lock_name(db: &mut AnyConnection, name: &str) -> Result<(), StoreError> {
+    db.execute(AssertSqlSafe(format!("SET lock_timeout = '{NAME_LOCK_TIMEOUT}'"))).await?;
+    let lock = sqlx::query("SELECT pg_advisory_lock($1, hashtext($2))").bind(NAME_LOCKS).bind(name);
+    match lock.execute(&mut *db).await {
+        Err(error) if writer_lock::is_timeout(&error) => {
+            return Err(StoreError::NameInUse { name: name.to_owned() });
+        }
+        locked => locked?,
+    };
+    db.execute("SET lock_timeout = DEFAULT").await?;
     Ok(())
 }
 
@@ -300,7 +416,8 @@ impl Writer {
         Ok(())
     }
 
-    /// Stores which connection this node writes with, and forgets nodes that are gone.
+    /// Takes the name of this node, stores which connection it writes with, and forgets nodes
+    /// that are gone.
     async fn register(&mut self, db: &mut AnyConnection) -> Result<(), StoreError> {
         let (Some(node), Some(backend)) = (&self.node, &self.backend) else { return Ok(()) };
         let settings = format!(
@@ -308,6 +425,7 @@ impl Writer {
              SET idle_in_transaction_session_timeout = '{IDLE_IN_TRANSACTION_TIMEOUT}'"
         );
         db.execute(AssertSqlSafe(settings)).await?;
+        lock_name(db, &node.name).await?;
         sqlx::query(
             "INSERT INTO node (id, name, address, version, leaving, pid, started)
              VALUES ($1, $2, $3, $4, 0, $5, $6)
@@ -348,10 +466,11 @@ impl Writer {
             }
             self.journal.forget(*partition);
         }
-        self.tails.forget_all();
+        self.tails.forget(partitions);
     }
 
-    /// Takes those of `partitions` that have no owner, and reads their journal. Returns which.
+    /// Takes those of `partitions` that have no owner, or that this writer owns already, and
+    /// reads their journal. Returns which.
     ///
     /// # Errors
     /// [`StoreError`]; then none is taken.
@@ -374,15 +493,13 @@ impl Writer {
         db: &mut AnyConnection,
         partitions: &[PartitionId],
     ) -> Result<Vec<PartitionId>, StoreError> {
-        let owner = self.node.as_ref().map(|node| node.id.clone());
-        let mut taken = Vec::new();
-        for &partition in partitions {
-            if self.role == WriterRole::Node && !try_lock(db, partition).await? {
-                continue;
-            }
-            taken.push((partition, begin_epoch(db, partition, owner.as_deref()).await?));
+        let (mut ids, mut free): (Vec<_>, Vec<_>) =
+            partitions.iter().partition(|partition| self.owned.contains(**partition));
+        if self.role == WriterRole::Node {
+            free = try_lock(db, &free).await?;
         }
-        let ids: Vec<_> = taken.iter().map(|(partition, _)| *partition).collect();
+        ids.extend(free);
+        let taken = begin_epochs(db, &ids, self.node.as_ref()).await?;
         self.journal.load(db, &ids).await?;
         self.owned.by_id.extend(taken);
         if self.role == WriterRole::Node && !ids.is_empty() {
@@ -399,17 +516,16 @@ impl Writer {
         let Some(mut connection) = self.connection.take() else {
             return Err(sqlx::Error::PoolClosed.into());
         };
-        for partition in partitions {
-            let Some(owned) = self.owned.by_id.remove(partition) else { continue };
+        let released = partitions.iter().filter_map(|partition| {
+            let owned = self.owned.by_id.remove(partition)?;
             self.journal.forget(*partition);
-            sqlx::query("UPDATE partition SET owner = NULL WHERE id = $1 AND epoch = $2")
-                .bind(partition.bound())
-                .bind(owned.epoch)
-                .execute(&mut connection)
-                .await?;
-            unlock(&mut connection, *partition).await?;
-        }
-        self.tails.forget_all();
+            Some((*partition, owned.epoch))
+        });
+        let released: Vec<_> = released.collect();
+        self.tails.forget(partitions);
+        end_epochs(&mut connection, &released).await?;
+        let released: Vec<_> = released.into_iter().map(|(partition, _)| partition).collect();
+        unlock(&mut connection, &released).await?;
         notify(&mut connection, TRANSFERS).await?;
         self.connection = Some(connection);
         Ok(())
@@ -451,16 +567,20 @@ impl Writer {
 
     /// After connecting again: which partitions are still owned. Returns whether the
     /// transaction in doubt was committed.
+    ///
+    /// # Errors
+    /// [`StoreError::UnexpectedCommits`] if the database lacks commits, or has others than this
+    /// writer's where no other may write; [`StoreError`].
     pub(super) async fn own_again(&mut self, db: &mut AnyConnection) -> Result<bool, StoreError> {
         if self.role == WriterRole::Auxiliary {
             return Ok(false);
         }
+        // Before the other nodes see this one.
+        self.owned.check_age(&read(db).await?, self.node.as_ref())?;
         self.register(db).await?;
-        let mut locked = BTreeSet::new();
-        for &partition in self.owned.by_id.keys() {
-            if self.role == WriterRole::Main || try_lock(db, partition).await? {
-                locked.insert(partition);
-            }
+        let mut locked: Vec<_> = self.owned.by_id.keys().copied().collect();
+        if self.role == WriterRole::Node {
+            locked = try_lock(db, &locked).await?;
         }
         let rows = read(db).await?;
         let (mut lost, mut was_committed) = (Vec::new(), false);
@@ -476,15 +596,11 @@ impl Writer {
             match found.n_commits - mine.n_commits {
                 0 if is_mine => {}
                 1 if is_mine && is_in_doubt => was_committed = true,
-                _ => {
-                    let (expected, found) = (mine.n_commits, found.n_commits);
-                    return Err(StoreError::UnexpectedCommits { expected, found });
-                }
+                _ => return Err(mine.unexpected(&found)),
             }
         }
-        for partition in lost.iter().filter(|partition| locked.contains(partition)) {
-            unlock(db, *partition).await?;
-        }
+        locked.retain(|partition| lost.contains(partition));
+        unlock(db, &locked).await?;
         self.lose(&lost);
         Ok(was_committed)
     }

@@ -139,6 +139,71 @@ impl Nats {
     }
 }
 
+/// Servers of one NATS cluster, without JetStream and so without MQTT.
+pub struct NatsServers {
+    directory: tempfile::TempDir,
+    pub ports: Vec<u16>,
+    issuer: nkeys::KeyPair,
+    running: Vec<Option<Watched>>,
+}
+
+impl NatsServers {
+    pub fn start(n: usize) -> Self {
+        let directory = tempfile::tempdir().unwrap();
+        let between: Vec<_> = (0..n).map(|_| free_port()).collect();
+        let routes: Vec<_> =
+            between.iter().map(|port| format!("nats://127.0.0.1:{port}")).collect();
+        let ports: Vec<_> = (0..n).map(|_| free_port()).collect();
+        for (i, port) in ports.iter().enumerate() {
+            let configuration = format!(
+                "server_name: n{i}\nlisten: 127.0.0.1:{port}\nmax_payload: 8MB\n\
+                 cluster {{ name: offbd, listen: 127.0.0.1:{}, routes: [ {} ] }}\n\
+                 accounts {{ OFFBD {{ users: [ {{ user: offbd, password: \
+                 $OFFBD_NATS_PASSWORD }} ] }} }}\n\
+                 authorization {{ timeout: 5, auth_callout {{ account: OFFBD, \
+                 auth_users: [ offbd ], issuer: $OFFBD_ISSUER }} }}\n",
+                between[i],
+                routes.join(", "),
+            );
+            std::fs::write(directory.path().join(i.to_string()), configuration).unwrap();
+        }
+        let (issuer, running) = (nkeys::KeyPair::new_account(), (0..n).map(|_| None).collect());
+        let mut servers = Self { directory, ports, issuer, running };
+        (0..n).for_each(|i| servers.restart(i));
+        servers
+    }
+
+    pub fn kill(&mut self, i: usize) {
+        self.running[i] = None;
+    }
+
+    pub fn restart(&mut self, i: usize) {
+        self.kill(i);
+        let conf = self.directory.path().join(i.to_string()).display().to_string();
+        let environment = [
+            ("OFFBD_NATS_PASSWORD", NATS_PASSWORD.to_owned()),
+            ("OFFBD_ISSUER", self.issuer.public_key()),
+        ];
+        let server = Watched::start(&nats_server(), &["-c".to_owned(), conf], &environment);
+        self.running[i] = Some(server);
+        wait_for_port(self.ports[i]);
+    }
+
+    /// All servers, as in the service's configuration.
+    pub fn url(&self) -> String {
+        let urls: Vec<_> =
+            self.ports.iter().map(|port| format!("nats://127.0.0.1:{port}")).collect();
+        urls.join(",")
+    }
+
+    /// A file with the key that signs the rights of devices.
+    pub fn seed(&self) -> PathBuf {
+        let file = self.directory.path().join("seed");
+        std::fs::write(&file, self.issuer.seed().unwrap()).unwrap();
+        file
+    }
+}
+
 fn nats_server() -> PathBuf {
     let target = std::env::var_os("CARGO_TARGET_DIR")
         .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("target"), PathBuf::from);
@@ -222,7 +287,7 @@ impl Mosquitto {
 pub fn mqtt_config(port: u16) -> offbd::config::MqttConfig {
     offbd::config::MqttConfig {
         url: format!("mqtt://127.0.0.1:{port}"),
-        client_id: "offbd".to_owned(),
+        client_id: None,
         user: None,
         password: None,
         ca: None,

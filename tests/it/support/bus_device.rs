@@ -11,6 +11,9 @@ use tokio::time::timeout;
 use super::{DEADLINE, batch};
 use offbd_core::vocabulary::Sample;
 
+/// After this long a device sends a batch again.
+const ANSWERED_WITHIN: Duration = Duration::from_secs(1);
+
 /// A client of a broker.
 pub struct MqttDevice {
     pub client: AsyncClient,
@@ -104,7 +107,12 @@ impl BusDevice {
     }
 
     pub async fn nats(port: u16, asset: &str, login: (&str, &str)) -> Self {
-        let client = nats(port, asset, login).await.unwrap();
+        Self::nats_of(&[port], asset, login).await
+    }
+
+    /// Connects to one of the servers on `ports`, and to another one when that is gone.
+    pub async fn nats_of(ports: &[u16], asset: &str, login: (&str, &str)) -> Self {
+        let client = nats_of(ports, asset, login).await.unwrap();
         let subject = format!("offbd.v1.{}.ack", asset.replace('.', "=2E"));
         let acks = client.subscribe(subject).await.unwrap();
         client.flush().await.unwrap();
@@ -144,6 +152,34 @@ impl BusDevice {
     pub async fn ask(&mut self, document: Vec<u8>) -> Value {
         self.send(document).await;
         self.answer().await
+    }
+
+    /// Sends batches one after the other, each again until it is acknowledged: while no node
+    /// owns the asset, or no server is connected, nobody answers.
+    pub async fn deliver(&mut self, samples: &[Sample], size: usize) {
+        for part in samples.chunks(size) {
+            let id = format!("{:?}", part[0].seq);
+            let delivered = async {
+                loop {
+                    self.send(numbered(&id, part)).await;
+                    let answer = timeout(ANSWERED_WITHIN, self.answer_to(&id)).await;
+                    if answer.is_ok_and(|answer| answer["accepted"].is_number()) {
+                        break;
+                    }
+                }
+            };
+            timeout(DEADLINE, delivered).await.expect("an acknowledgement in time");
+        }
+    }
+
+    /// Returns the next answer to the batch `id`; skips those to others.
+    async fn answer_to(&mut self, id: &str) -> Value {
+        loop {
+            let answer = self.answer().await;
+            if answer["id"] == id {
+                return answer;
+            }
+        }
     }
 
     /// Sends all batches at first, of which some are lost on the way, and some acknowledgements
@@ -187,12 +223,22 @@ impl BusDevice {
 pub async fn nats(
     port: u16,
     asset: &str,
+    login: (&str, &str),
+) -> Result<async_nats::Client, async_nats::ConnectError> {
+    nats_of(&[port], asset, login).await
+}
+
+async fn nats_of(
+    ports: &[u16],
+    asset: &str,
     (user, password): (&str, &str),
 ) -> Result<async_nats::Client, async_nats::ConnectError> {
+    let server = |port: &u16| format!("nats://127.0.0.1:{port}").parse().unwrap();
+    let servers: Vec<async_nats::ServerAddr> = ports.iter().map(server).collect();
     async_nats::ConnectOptions::new()
         .user_and_password(user.to_owned(), password.to_owned())
         .custom_inbox_prefix(format!("_INBOX.offbd.{}", asset.replace('.', "=2E")))
-        .connect(format!("nats://127.0.0.1:{port}"))
+        .connect(servers)
         .await
 }
 

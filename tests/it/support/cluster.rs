@@ -13,7 +13,7 @@ use super::{Client, eventually};
 
 /// Nodes, unless a test wants another number.
 pub const N_NODES: usize = 3;
-const N_PARTITIONS: u64 = 16;
+pub const N_PARTITIONS: u64 = 16;
 
 /// A cluster of processes, and the database server that they share.
 pub struct Cluster {
@@ -126,6 +126,13 @@ impl Cluster {
 
     /// Returns those of the rigs that a node owns; there are some.
     pub async fn owned_by(&self, i: usize, names: &[String]) -> Vec<String> {
+        let owned = self.rigs_of(i, names).await;
+        assert!(!owned.is_empty(), "node-{i} owns none of the rigs");
+        owned
+    }
+
+    /// Returns those of the rigs that a node owns, perhaps none.
+    pub async fn rigs_of(&self, i: usize, names: &[String]) -> Vec<String> {
         let (client, node) = (self.client(0), format!("node-{i}"));
         let mut owned = Vec::new();
         for name in names {
@@ -134,8 +141,16 @@ impl Cluster {
                 owned.push(name.clone());
             }
         }
-        assert!(!owned.is_empty(), "{node} owns none of the rigs");
         owned
+    }
+
+    /// Stops the database server with a signal; see [`Postgres::stop`].
+    pub fn stop_database(&mut self, signal: &str) {
+        self.postgres.stop(signal);
+    }
+
+    pub fn start_database(&mut self) {
+        self.postgres.start();
     }
 
     pub fn signal(&self, i: usize, signal: &str) {

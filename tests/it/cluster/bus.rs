@@ -1,0 +1,121 @@
+//! Devices over NATS and a cluster: nodes and servers fail, and nothing is lost or doubled.
+
+use offbd_core::vocabulary::Sample;
+use serde_json::json;
+
+use super::{count, register_rigs};
+use crate::support::broker::{Mosquitto, NATS_PASSWORD, Nats, NatsServers};
+use crate::support::bus_device::{BusDevice, numbered};
+use crate::support::cluster::{Cluster, N_NODES, NodeKind};
+use crate::support::postgres::Postgres;
+use crate::support::{Client, eventually, rig};
+
+/// Samples of a batch.
+const BATCH: usize = 10;
+
+/// Starts nodes that serve the devices of these servers, and registers rigs.
+async fn start(servers: &str, seed: &std::path::Path) -> (Cluster, Vec<String>) {
+    start_with(vec![
+        ("OFFBD_NATS__URL", servers.to_owned()),
+        ("OFFBD_NATS__USER", "offbd".to_owned()),
+        ("OFFBD_NATS__PASSWORD", NATS_PASSWORD.to_owned()),
+        ("OFFBD_NATS__ISSUER_SEED", seed.display().to_string()),
+        ("OFFBD_NATS__ACCOUNT", "OFFBD".to_owned()),
+    ])
+    .await
+}
+
+async fn start_with(environment: Vec<(&'static str, String)>) -> (Cluster, Vec<String>) {
+    let kind = NodeKind { environment, ..NodeKind::default() };
+    let cluster = Cluster::of(Postgres::new(), vec![kind; N_NODES]).await;
+    let names = register_rigs(&cluster).await;
+    (cluster, names)
+}
+
+/// Connects a device of each of `names`.
+async fn devices(client: &Client, names: &[String], ports: &[u16]) -> Vec<BusDevice> {
+    let mut devices = Vec::new();
+    for name in names {
+        let token = json!({ "name": name, "role": "device", "asset": name });
+        let made = client.post("tokens", &token).await.expect(201);
+        let login = (name.as_str(), made["secret"].as_str().unwrap());
+        devices.push(BusDevice::nats_of(ports, name, login).await);
+    }
+    devices
+}
+
+/// Sends `samples` of each device, all at the same time.
+async fn deliver(devices: &mut [BusDevice], samples: &[Sample]) {
+    let delivered = devices.iter_mut().map(|device| device.deliver(samples, BATCH));
+    futures_util::future::join_all(delivered).await;
+}
+
+async fn are_stored_once(client: &Client, names: &[String], samples: &[Sample]) {
+    for name in names {
+        assert_eq!(client.recording(name, "s").await, samples, "{name}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn nodes_that_are_killed_and_paused_lose_nothing_of_devices_over_nats() {
+    let (nats, samples) = (Nats::start(), rig(900, 300));
+    let seed = nats.config().issuer_seed.unwrap();
+    let (mut cluster, names) = start(&nats.config().url, &seed).await;
+    let owned = [cluster.owned_by(1, &names).await, cluster.owned_by(2, &names).await].concat();
+    let mut devices = devices(&cluster.client(0), &owned, &[nats.port]).await;
+    deliver(&mut devices, &samples[..300]).await;
+    cluster.kill(1);
+    deliver(&mut devices, &samples[300..600]).await;
+    cluster.restart(1);
+    cluster.signal(2, "-STOP");
+    deliver(&mut devices, &samples[600..800]).await;
+    // What was sent meanwhile reaches the node when it wakes up: it is not its any more.
+    cluster.signal(2, "-CONT");
+    deliver(&mut devices, &samples[800..]).await;
+    cluster.settled(N_NODES).await;
+    are_stored_once(&cluster.client(2), &owned, &samples).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_killed_server_of_three_stops_no_request_and_devices_are_answered_by_another() {
+    let (mut servers, samples) = (NatsServers::start(3), rig(900, 300));
+    let (cluster, names) = start(&servers.url(), &servers.seed()).await;
+    let (by_nats, by_http) = names.split_at(4);
+    let mut devices = devices(&cluster.client(0), by_nats, &servers.ports).await;
+    deliver(&mut devices, &samples[..300]).await;
+    for i in 0..3 {
+        servers.kill(i);
+        let part = &samples[300 + i * 200..500 + i * 200];
+        let over_http = async {
+            for part in part.chunks(BATCH) {
+                for (n, name) in by_http.iter().enumerate() {
+                    // At once, without another try.
+                    cluster.client(n % N_NODES).telemetry(name, Some("s"), part).await;
+                }
+            }
+        };
+        tokio::join!(over_http, deliver(&mut devices, part));
+        servers.restart(i);
+    }
+    are_stored_once(&cluster.client(0), by_nats, &samples).await;
+    are_stored_once(&cluster.client(0), by_http, &samples[300..]).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_broker_serves_all_nodes_at_the_same_time() {
+    let (mosquitto, samples) = (Mosquitto::start(), rig(300, 300));
+    let (cluster, names) = start_with(vec![("OFFBD_MQTT__URL", mosquitto.config().url)]).await;
+    for client in cluster.clients() {
+        let connected = async || count(&client, "offbd_bus_connected{bus=\"mqtt\"}").await == 1.0;
+        eventually(|| async { connected().await.then_some(()) }).await;
+    }
+    for name in &names {
+        let mut device = BusDevice::mqtt(mosquitto.port, name, None).await;
+        for (i, part) in samples.chunks(30).enumerate() {
+            // Once: a node that another one has thrown off would not get it.
+            let answer = device.ask(numbered(&i.to_string(), part)).await;
+            assert_eq!(answer["accepted"], json!(part.len()), "{answer}");
+        }
+    }
+    are_stored_once(&cluster.client(0), &names, &samples).await;
+}

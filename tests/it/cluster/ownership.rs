@@ -1,0 +1,95 @@
+//! Partitions and names of nodes, as the database keeps them.
+
+use offbd::store::{Location, NodeIdentity, PartitionId, Partitions, Store, StoreError, Writer};
+
+use super::not_ready;
+use crate::support::cluster::Cluster;
+use crate::support::connection;
+use crate::support::postgres::Postgres;
+use crate::support::process::Refusal;
+
+const N: u32 = 64;
+
+async fn node(url: &str, id: &str, name: &str) -> Result<Writer, StoreError> {
+    let [id, name] = [id, name].map(str::to_owned);
+    let (address, version) = ("127.0.0.1:1".to_owned(), "0".to_owned());
+    let node = NodeIdentity { id, name, address, version };
+    let location = Location::of_url(url).unwrap();
+    Ok(Store::open_node(&location, node, Partitions::new(N)).await?.1)
+}
+
+/// Returns the number of transactions that have changed the partitions last, and of owners.
+async fn transactions_and_owners(url: &str) -> (i64, i64) {
+    let count = "SELECT COUNT(DISTINCT CAST(xmin AS TEXT)), COUNT(owner) FROM partition";
+    sqlx::query_as(count).fetch_one(&mut connection(url).await).await.unwrap()
+}
+
+#[tokio::test]
+async fn all_partitions_are_taken_and_released_in_one_transaction() {
+    let server = Postgres::new();
+    let url = server.database("cluster");
+    let mut a = node(&url, "1", "a").await.unwrap();
+    let all: Vec<_> = Partitions::new(N).all().collect();
+    assert_eq!(a.take(&all).await.unwrap(), all);
+    assert_eq!(transactions_and_owners(&url).await, (1, i64::from(N)));
+    assert!(a.owned().into_iter().map(|(partition, _)| partition).eq(all.iter().copied()));
+    let mut b = node(&url, "2", "b").await.unwrap();
+    assert_eq!(b.take(&all).await.unwrap(), [], "each has its owner");
+    a.release(&all).await.unwrap();
+    assert_eq!(transactions_and_owners(&url).await, (1, 0));
+    assert_eq!(b.take(&all).await.unwrap(), all);
+}
+
+#[tokio::test]
+async fn what_is_taken_again_after_a_failed_hand_over_is_free_after_the_next_one() {
+    let server = Postgres::new();
+    let url = server.database("cluster");
+    let (p, q) = (PartitionId(3), PartitionId(4));
+    let mut a = node(&url, "1", "a").await.unwrap();
+    let mut b = node(&url, "2", "b").await.unwrap();
+    assert_eq!(a.take(&[p]).await.unwrap(), [p]);
+    let mut again = a.take(&[q, p]).await.unwrap();
+    again.sort();
+    assert_eq!(again, [p, q], "what it owns, and what is free");
+    assert_eq!(b.take(&[p, q]).await.unwrap(), []);
+    a.release(&[p, q]).await.unwrap();
+    assert_eq!(b.take(&[p, q]).await.unwrap(), [p, q]);
+}
+
+#[tokio::test]
+async fn a_name_belongs_to_one_node_as_long_as_that_is_connected() {
+    let server = Postgres::new();
+    let url = server.database("cluster");
+    let a = node(&url, "1", "a").await.unwrap();
+    // It has to be heard of now and then, or the server would take it for dead.
+    let mut other = node(&url, "2", "other").await.unwrap();
+    other.observe().await.unwrap();
+    let (alive, refused) = (tokio::spawn(observe(a)), node(&url, "3", "a").await);
+    let error = refused.err().expect("the name is taken").to_string();
+    assert!(error.contains("another node of the cluster has the name `a`"), "{error}");
+    alive.abort();
+    assert!(alive.await.unwrap_err().is_cancelled());
+    node(&url, "3", "a").await.unwrap();
+}
+
+async fn observe(mut writer: Writer) {
+    loop {
+        writer.observe().await.unwrap();
+        tokio::task::yield_now().await;
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_node_that_is_paused_has_its_name_again_once_the_other_one_is_gone() {
+    let cluster = Cluster::start().await;
+    let Err(Refusal { log, .. }) = cluster.try_node(1, &[]) else { panic!("two with one name") };
+    assert!(log.contains("another node of the cluster has the name `node-1`"), "{log}");
+    cluster.signal(1, "-STOP");
+    let second = cluster.try_node(1, &[]).unwrap_or_else(|Refusal { log, .. }| panic!("{log}"));
+    cluster.signal(1, "-CONT");
+    not_ready(&cluster.client(1), "has the name `node-1`").await;
+    second.client.readiness(200).await;
+    drop(second);
+    cluster.client(1).readiness(200).await;
+    cluster.settled(3).await;
+}
