@@ -1,4 +1,4 @@
-//! `offbd scene`: runs a scene by any model and method, and the chapter's exercises.
+//! `offbd scene`: runs a scene by any model and method, and the book's exercises.
 
 mod catalogue;
 mod control;
@@ -34,7 +34,8 @@ use recorded::RecordedArgs;
     offbd scene steep --model compliant --method rodas4 --tolerance 1e-9\n  \
     offbd scene my.json --model rolling --method rk4 --step 0.005 --format json\n  \
     offbd scene --commands monday.csv --asset learnt.json -o out\n\n\
-    A scene file says what differs from the chapter's rig:\n  \
+    A scene file says what differs from the default rig (plate 0.38 × 0.24 m,\n\
+    steel ball):\n  \
     { \"duration_s\": 2, \"contact\": { \"friction\": 0.3 },\n    \
     \"qy\": [ { \"sine\": { \"amplitude_rad\": 0.1, \"frequency_hz\": 0.5 } } ] }\n\
     Beside sine there are constant_rad (a number) and smoothstep (to_rad, start_s,\n\
