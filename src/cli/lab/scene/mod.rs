@@ -65,7 +65,7 @@ pub(in crate::cli) struct SceneArgs {
     /// Write trajectory.csv and plots into this directory; created if missing
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// A table for people, or one JSON object
+    /// A table for people, or one JSON object; with --list one per line
     #[arg(long, value_enum, default_value = "table")]
     format: OutputFormat,
 }
@@ -75,7 +75,7 @@ pub(super) fn run(args: &SceneArgs) -> anyhow::Result<()> {
         return recorded::run(args, session);
     }
     let Some(word) = args.scene.as_deref().filter(|_| !args.list) else {
-        return catalogue::list();
+        return catalogue::list(args.format);
     };
     match catalogue::find(word)? {
         Exercise::Laws { scenes, tolerance_m } => laws::run(args, &scenes, tolerance_m),
