@@ -85,8 +85,14 @@ fn regress_the_sentence_of_a_servo_fault_depends_on_its_kind() {
         (Some(FaultKind::Dead), "does not answer qy (52 ± 6 %)"),
         (Some(FaultKind::Held), "stays where it is whatever qy asks for (52 ± 6 %)"),
         (Some(FaultKind::Reversed), "answers qy the wrong way round (52 ± 6 %)"),
-        (Some(FaultKind::Gain), "answers 52 ± 6 % of qy with an unexplained acceleration of +0.30 m/s²"),
-        (Some(FaultKind::Offset), "has a constant error, which accelerates the ball by +0.30 ± 0.02 m/s²"),
+        (
+            Some(FaultKind::Gain),
+            "answers 52 ± 6 % of qy with an unexplained acceleration of +0.30 m/s²",
+        ),
+        (
+            Some(FaultKind::Offset),
+            "has a constant error, which accelerates the ball by +0.30 ± 0.02 m/s²",
+        ),
         (Some(FaultKind::Slow), "answers qy 0.25 ± 0.03 s late"),
         (Some(FaultKind::Intermittent), "answers qy intermittently"),
         (None, "answers 52 ± 6 % of qy with an unexplained acceleration of +0.30 m/s²"),
