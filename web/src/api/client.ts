@@ -6,6 +6,8 @@ import type {
   CalibrationJob,
   Caller,
   Demo,
+  DemoGains,
+  DemoTuning,
   DriveCycle,
   FaultCode,
   FaultEntry,
@@ -133,4 +135,6 @@ export const api = {
   injectDemoFault: (fault: string) => send<void>("POST", "/demo/faults", { fault }),
   repairDemo: () => send<void>("DELETE", "/demo/faults"),
   resumeDemoScript: () => send<void>("POST", "/demo/script"),
+  demoTuning: () => get<DemoTuning>("/demo/gains"),
+  tuneDemo: (gains: DemoGains) => send<DemoTuning>("PUT", "/demo/gains", gains),
 };
