@@ -95,7 +95,8 @@ detail = get(f"{component['faults']}/x_servo")
 assert detail["item"] == fault
 environment = detail["environment_data"]
 assert environment["extended_data_records"]["data"]["occurrence_counter"] >= 1
-assert environment["snapshots"][0]["type"] == "freeze_frame"
+snapshots = environment["snapshots"]
+assert [snapshot["type"] for snapshot in snapshots] == ["freeze_frame", "recording"]
 assert detail["x-offbd"]["code"] == "x_servo"
 bare = get(f"{component['faults']}/x_servo", include_snapshot_data="false")["environment_data"]
 assert "snapshots" not in bare and "extended_data_records" in bare
@@ -108,6 +109,7 @@ for value in get(component["data"])["items"]:
 [category] = get(component["bulk-data"])["items"]
 recordings = get(category["href"])["items"]
 _, csv = ask(recordings[0]["href"])
+assert snapshots[1]["bulk_data_uri"] == recordings[0]["href"], snapshots[1]
 assert csv.startswith("t_s,") or csv.startswith("seq,"), csv[:40]
 assert len(csv.splitlines()) == recordings[0]["x-offbd"]["samples"] + 1
 

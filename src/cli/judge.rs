@@ -14,7 +14,7 @@ use offbd_core::diagnosis::Profile;
 use offbd_core::engine::{Rig, Setup};
 use offbd_core::vocabulary::Sample;
 
-/// Loads the rig of an asset file; without a path, the chapter's rig.
+/// Loads the rig of an asset file; without a path, the default rig.
 pub(super) fn load_rig(path: Option<&Path>) -> Result<Rig, InputError> {
     let Some(path) = path else { return Ok(Rig::chapter("chapter")) };
     asset::parse(&read(path)?).map_err(|e| InputError::file(path, e))

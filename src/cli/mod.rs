@@ -49,7 +49,7 @@ const SQLITE_THREAD: &str = "sqlx-sqlite-worker-";
     offbd calibrate --asset rig.json healthy.csv -o learnt.json\n  \
     offbd simulate --fault x_servo:dead@20 --seed 2 -o sick.csv\n  \
     offbd replay --asset learnt.json healthy.csv sick.csv\n\n\
-    The chapter's exercises:\n  \
+    The book's exercises:\n  \
     offbd scene --list\n\n\
     Exit status: 0 success (faults or not), 2 invalid arguments, 3 unusable input,\n\
     4 a fault was found, with --fail-on-fault; 1 any other error.")]

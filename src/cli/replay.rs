@@ -37,7 +37,8 @@ use offbd_core::engine::Setup;
     are judged; 4 a fault was confirmed, with --fail-on-fault."
 )]
 pub(super) struct ReplayArgs {
-    /// The rig's asset file, preferably calibrated [default: the chapter's rig]
+    /// The rig's asset file, preferably calibrated [default: the default rig (plate
+    /// 0.38 × 0.24 m, steel ball)]
     #[arg(long, value_name = "ASSET.json")]
     asset: Option<PathBuf>,
     /// Recorded sessions

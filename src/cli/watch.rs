@@ -205,7 +205,7 @@ fn bar(name: &str, axis: &AxisEvidenceView) -> String {
         }
     };
     let cells: String = (0..BAR).map(cell).collect();
-    let gate = if axis.enabled { "judged" } else { "gate closed" };
+    let gate = if axis.enabled { "judged" } else { "not tested" };
     format!("         {name} [{cells}] {residual:+.2} of {:.2} m/s², {gate}", axis.limit_m_s2)
 }
 

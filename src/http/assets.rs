@@ -48,7 +48,7 @@ pub(super) async fn list(
         (status = 400, body = Problem,
             description = "Malformed asset file; `pointer` names the element"),
         (status = 409, body = Problem, description = "An asset of this name exists"),
-        (status = 422, body = Problem, description = "Invalid element; `pointer` names it"),
+        (status = 422, body = Problem, description = "Invalid value; `pointer` names the element"),
         (status = 507, body = Problem, description = "The limit of assets is reached")))]
 pub(super) async fn create(
     State(app): State<App>,

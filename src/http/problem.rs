@@ -189,7 +189,7 @@ impl From<Invalid> for Problem {
             let detail = invalid.reason;
             return Self::new(StatusCode::BAD_REQUEST, "malformed", title, detail).at("");
         }
-        let title = "Invalid element";
+        let title = "Invalid value";
         Self::new(StatusCode::UNPROCESSABLE_ENTITY, "invalid", title, detail).at(&invalid.element)
     }
 }

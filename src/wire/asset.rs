@@ -16,8 +16,8 @@ use offbd_core::engine::{AxisMapping, DiagnosticsSpec, Rig, ServoSpec};
 use offbd_core::plant::{Ball, Contact, Plate, PlateShape};
 use offbd_core::vocabulary::{Axis, Invalid, PerAxis, in_range, positive};
 
-/// The description of a rig by its owner. Everything but `name` has a default, which is
-/// the rig of the chapter (see `docs/notation.md`).
+/// The description of a rig by its owner. Everything but `name` has a default: that of
+/// the default rig (plate 0.38 × 0.24 m, steel ball; see `docs/notation.md`).
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AssetView {
@@ -82,11 +82,11 @@ impl Default for BallView {
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlateView {
-    /// Length along x, in (0, 10] m; the chapter's if neither it nor a diameter is given.
+    /// Length along x, in (0, 10] m; 0.38 if neither it nor a diameter is given.
     #[schema(exclusive_minimum = 0, maximum = 10)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub length_m: Option<f64>,
-    /// Width along y, in (0, 10] m; the chapter's if neither it nor a diameter is given.
+    /// Width along y, in (0, 10] m; 0.24 if neither it nor a diameter is given.
     #[schema(exclusive_minimum = 0, maximum = 10)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub width_m: Option<f64>,

@@ -149,9 +149,29 @@ pub struct SovdExtendedDataView {
     pub aging_counter: u8,
 }
 
+/// What was recorded of a fault.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(untagged)]
+pub enum SovdSnapshotView {
+    FreezeFrame(SovdFreezeFrameView),
+    Recording(SovdFaultRecordingView),
+}
+
+/// The recording of the session of a fault's last occurrence.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct SovdFaultRecordingView {
+    /// Always `recording`.
+    #[serde(rename = "type")]
+    pub kind: String,
+    /// Name of the session.
+    pub name: String,
+    /// Path of the recording among the bulk data.
+    pub bulk_data_uri: String,
+}
+
 /// The freeze frame of a fault.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
-pub struct SovdSnapshotView {
+pub struct SovdFreezeFrameView {
     /// Always `freeze_frame`.
     #[serde(rename = "type")]
     pub kind: String,
@@ -306,13 +326,14 @@ pub fn fault_item(entry: &FaultEntryView) -> SovdFaultView {
 /// The scope of all faults.
 pub const SCOPE: &str = "rig";
 
-/// Returns the fault with its environment: the counters if `with_extended`, the freeze frame if
-/// `with_snapshots`.
+/// Returns the fault with its environment: the counters if `with_extended`; the freeze frame,
+/// and the recording if it still exists, if `with_snapshots`.
 #[must_use]
 pub fn fault_detail(
     entry: FaultEntryView,
     with_extended: bool,
     with_snapshots: bool,
+    recording: Option<SovdFaultRecordingView>,
 ) -> SovdFaultDetailView {
     let record = &entry.record;
     let provenance = &entry.provenance;
@@ -326,14 +347,19 @@ pub fn fault_detail(
         },
         errors: Vec::new(),
     };
-    let snapshot = |frame: &EvidenceView| SovdSnapshotView {
+    let freeze_frame = |frame: &EvidenceView| SovdFreezeFrameView {
         kind: "freeze_frame".to_owned(),
         name: "first_failed".to_owned(),
         data: Box::new(frame.clone()),
     };
+    let frames = record.freeze_frame.iter().map(|frame| freeze_frame(frame));
+    let snapshots = frames
+        .map(SovdSnapshotView::FreezeFrame)
+        .chain(recording.map(SovdSnapshotView::Recording))
+        .collect();
     let environment = SovdEnvironmentView {
         extended_data_records: with_extended.then(extended),
-        snapshots: with_snapshots.then(|| record.freeze_frame.iter().map(snapshot).collect()),
+        snapshots: with_snapshots.then_some(snapshots),
     };
     SovdFaultDetailView {
         item: fault_item(&entry),

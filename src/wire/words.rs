@@ -108,7 +108,7 @@ mirrored! {
 
 mirrored! {
     /// Named set of settings of the diagnosis: `default` for real rigs, `textbook` for the
-    /// rule of the chapter.
+    /// rule of the book.
     ProfileWord as Profile of Profile { Default = "default", Textbook = "textbook" }
 }
 

@@ -9,6 +9,31 @@ async fn fault(client: &Client, asset: &str, code: &str) -> Value {
     client.get(&format!("assets/{asset}/faults/{code}")).await.expect(200)
 }
 
+/// The adapter for SOVD names the recording of a fault as long as there is one.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_fault_of_sovd_refers_to_its_recording() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
+    client.asset("a").await;
+    client.telemetry("a", Some("first"), &rig(1500, 300)).await;
+    client.end("a", "first").await;
+    client.telemetry("a", Some("last"), &rig(1500, 300)).await;
+    client.end("a", "last").await;
+    let fault = "/sovd/v1/components/a/faults/x_servo";
+    let snapshots = async || {
+        let detail = client.get(fault).await.expect(200);
+        detail["environment_data"]["snapshots"].as_array().unwrap().clone()
+    };
+    let [frame, recording] = &snapshots().await[..] else { panic!("two snapshots") };
+    assert_eq!(frame["type"], "freeze_frame");
+    assert_eq!((&recording["type"], &recording["name"]), (&json!("recording"), &json!("last")));
+    let csv = client.get(recording["bulk_data_uri"].as_str().unwrap()).await;
+    assert_eq!((csv.status.as_u16(), csv.text.lines().count()), (200, 1501));
+    let id = client.session("a", "last").await["id"].as_str().unwrap().to_owned();
+    client.delete(&format!("sessions/{id}")).await.expect(204);
+    assert_eq!(snapshots().await, [frame.clone()]);
+}
+
 /// Returns the fault without the key that depends on the wall clock.
 fn without_changed_at(fault: &Value) -> Value {
     let mut fault = fault.clone();

@@ -413,6 +413,41 @@ mod email {
         assert_eq!(id(&refused), id(&taken));
     }
 
+    /// Nobody listens at first: the attempts fail, and the mail arrives once the server is back.
+    #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+    async fn a_mail_server_that_is_away_gets_the_mail_once_it_is_back() {
+        let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+        let port = listener.local_addr().unwrap().port();
+        drop(listener);
+        let fixture = ServiceFixture::start_with(quick).await;
+        let client = &fixture.client;
+        let email = json!({ "host": "localhost", "port": port, "security": "none",
+            "from": "offbd@lab.example", "to": ["ann@lab.example"] });
+        let new = json!({ "name": "mail", "email": email });
+        let made = client.post("notifications/channels", &new).await.expect(201);
+        let test = format!("notifications/channels/{}/test", made["id"].as_str().unwrap());
+        let answer = client.post(&test, &Value::Null).await;
+        let path = answer.headers["location"].to_str().unwrap().to_owned();
+        let delivery = || async { client.get(&path).await.expect(200) };
+        let refused = eventually(async || {
+            let delivery = delivery().await;
+            (delivery["attempts"].as_u64() >= Some(2)).then_some(delivery)
+        })
+        .await;
+        assert_eq!(refused["state"], "pending", "{refused}");
+        assert!(refused["error"].as_str().unwrap().contains("refused"), "{refused}");
+        let mut server = MailServer::start(&[&port.to_string()]);
+        let taken = tokio::task::spawn_blocking(move || server.next()).await.unwrap();
+        assert_eq!(taken["to"], json!(["ann@lab.example"]));
+        let delivered = eventually(async || {
+            let delivery = delivery().await;
+            (delivery["state"] == "delivered").then_some(delivery)
+        })
+        .await;
+        assert!(delivered["attempts"].as_u64() >= Some(3), "{delivered}");
+        assert_eq!(delivered["error"], Value::Null);
+    }
+
     #[tokio::test]
     async fn invalid_mail_settings_are_refused_with_their_element() {
         let fixture = ServiceFixture::start().await;

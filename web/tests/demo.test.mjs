@@ -123,6 +123,25 @@ test("the script resumes, and the demo continues after a visitor ends the sessio
   await view.done();
 });
 
+test("a visitor tunes the controller of the rig", async () => {
+  const view = await page(chromium);
+  await view.goto(`${show.url}/learn`);
+  const slider = view.getByRole("slider", { name: "Kd" });
+  const { gains, initial } = await ask(show.url, "GET", "/demo/gains");
+  assert.deepEqual(gains, initial);
+  await slider.press("Home");
+  await until(async () => (await ask(show.url, "GET", "/demo/gains")).gains.kd === 0);
+  // The other gains stay, to the precision of the sliders.
+  const tuned = await ask(show.url, "GET", "/demo/gains");
+  assert.deepEqual(tuned, { gains: { ...initial, kd: 0 }, initial });
+  assert.match(await slider.getAttribute("aria-valuetext"), /^0\.00/);
+  await view.getByRole("button", { name: "Reset the gains" }).click();
+  await until(async () => (await ask(show.url, "GET", "/demo/gains")).gains.kd === initial.kd);
+  await slider.and(view.locator(`[aria-valuetext^="${initial.kd.toFixed(2)}"]`)).waitFor();
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});
+
 test("a rig that is healthy by the default profile exceeds the textbook's limit", async () => {
   const view = await page(chromium);
   await view.goto(`${show.url}/learn`);

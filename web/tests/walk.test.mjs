@@ -40,6 +40,9 @@ test("from the demo to the explanation of a fault", async () => {
   });
 
   await press("Demo", "link");
+  await view.getByText("A script injects and repairs faults").waitFor();
+  await press("Repair all");
+  await view.getByText("The script is paused: you control the faults.").waitFor();
   await press("dead", "button", "Inject: X servo, dead");
   await press("Watch demo-rig", "link");
   const monitor = view
@@ -82,6 +85,10 @@ test("from the demo to the explanation of a fault", async () => {
 
 test("the rig can be followed in a terminal", () => {
   assert.ok(WALK.includes("`offbd watch demo-rig`"));
-  const lines = offbd("watch", "demo-rig", "--address", `127.0.0.1:${show.port}`, "--states", "2");
-  assert.match(lines, /x/);
+  const text = offbd("watch", "demo-rig", "--address", `127.0.0.1:${show.port}`, "--states", "2");
+  assert.match(text, /^demo-rig, demo-\S+\n/);
+  // Time, samples, and the residuals with their limits, as the rig moves.
+  const state = /^ *(\d+\.\d\d) s +(\d+) +[-+]\d\.\d\d\/\d\.\d\d +[-+]\d\.\d\d\/\d\.\d\d /gm;
+  const [before, now] = [...text.matchAll(state)].map(([, ...numbers]) => numbers.map(Number));
+  assert.ok(now[0] > before[0] && now[1] > before[1], text);
 });

@@ -133,6 +133,30 @@ def test_nothing_is_lost_or_doubled_by_a_lossy_line_and_a_kill(
     assert [asset["name"] for asset in client.assets()] == ["rig"]
 
 
+def test_an_imported_fault_is_an_alarm_until_somebody_clears_it(
+    service: Service, folder: Path
+) -> None:
+    client = offbd.Client(service.url)
+    client.put_asset("rig", json.loads((folder / "learnt.json").read_text()))
+    content = (folder / "sick.csv").read_bytes()
+    imported = client.import_session("rig", content, name="monday & co")
+    assert imported["session"]["name"] == "monday & co"
+    assert imported["accepted"] == content.count(b"\n") - 1
+    series = client.series("rig", step_s=3600, aggregate="last")
+    assert (series["step_s"], series["aggregate"]) == (3600, "last")
+    assert [row["faulty"] for row in series["rows"]] == [1]
+    assert client.series("rig", before="2000-01-01T00:00:00Z")["rows"] == []
+    assert [alarm["code"] for alarm in client.alarms("rig")] == ["x_servo"]
+    client.acknowledge_fault("rig", "x_servo", "Ada & Bob")
+    client.clear_fault("rig", "x_servo", "Eve")
+    assert list(client.alarms("rig")) == []
+    acts = [entry for entry in client.fault_history("rig", "x_servo") if entry["by"]]
+    assert [(entry["what"], entry["by"]) for entry in acts] == [
+        ("clear", "Eve"),
+        ("acknowledge", "Ada & Bob"),
+    ]
+
+
 def test_a_refusal_is_an_error_with_its_problem(service: Service) -> None:
     client = offbd.Client(service.url)
     with pytest.raises(offbd.ClientError, match="404") as refusal:

@@ -25,7 +25,7 @@ use crate::wire::fmu::{FmuPlatform, archive};
     An FMU holds a shared library for each platform on which it runs. cargo builds\n\
     the one for this platform, beside the program, where it is found.")]
 pub(in crate::cli) struct FmuArgs {
-    /// The rig's asset file [default: the chapter's rig]
+    /// The rig's asset file [default: the default rig (plate 0.38 × 0.24 m, steel ball)]
     #[arg(long, value_name = "ASSET.json")]
     asset: Option<PathBuf>,
     /// The shared library of a platform; can be repeated [default: the one beside this

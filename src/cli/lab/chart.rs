@@ -6,20 +6,22 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::cli::errors::InputError;
-use crate::cli::{output, table};
+use crate::cli::output::{self, OutputFormat};
+use crate::cli::table;
 use crate::wire::scene;
 use offbd_lab::chart::work_precision::{self, ChartedScene, Peers};
 use offbd_lab::chart::{self, Chart, ChartError, Effort};
 
 /// Measures a trade-off on this machine: SVG, PNG and the records as JSON.
 ///
-/// Writes a short table to stdout, and the names of the files to stderr. Costs are
+/// Writes a short table or the records to stdout, and the names of the files to stderr. Costs are
 /// CPU times: keep the machine idle meanwhile.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "Examples:\n  \
     offbd chart work-precision\n  \
     offbd chart work-precision --with peers.json\n  \
     offbd chart estimators -o measured --quick\n  \
+    offbd chart stability --format json | jq .\n  \
     offbd chart detectors")]
 pub(in crate::cli) struct ChartArgs {
     /// Which chart
@@ -34,6 +36,9 @@ pub(in crate::cli) struct ChartArgs {
     /// Measure a few points only
     #[arg(long)]
     quick: bool,
+    /// A table for people, or the records, one JSON object per line
+    #[arg(long, value_enum, default_value_t = OutputFormat::Table)]
+    format: OutputFormat,
 }
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
@@ -77,7 +82,10 @@ pub(super) fn run(args: &ChartArgs) -> anyhow::Result<()> {
     let effort = if args.quick { Effort::Quick } else { Effort::Full };
     let chart = args.name.make(effort, &args.with).map_err(unusable)?;
     let written = chart::write(&chart, &args.output)?;
-    write_table(&chart.table)?;
+    match args.format {
+        OutputFormat::Table => write_table(&chart.table)?,
+        OutputFormat::Json => chart.records.iter().try_for_each(output::print_json)?,
+    }
     for path in written {
         output::remark(format_args!("{}", path.display()));
     }

@@ -6,12 +6,13 @@ use axum::{Extension, Json};
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::{AssetItemPath, AssetPath, Problem, Query, SchemaQuery, answer};
-use crate::service::Service;
+use super::{AssetItemPath, AssetPath, Problem, Query, SchemaQuery, answer, recordings};
 use crate::service::access::Caller;
+use crate::service::{Service, ServiceError};
+use crate::wire::service::FaultEntryView;
 use crate::wire::sovd::{
-    SCOPE, SovdFaultDetailView, SovdFaultView, SovdFaultsView, SovdStatusView, fault_detail,
-    fault_item,
+    SCOPE, SovdFaultDetailView, SovdFaultRecordingView, SovdFaultView, SovdFaultsView,
+    SovdStatusView, fault_detail, fault_item,
 };
 use crate::wire::words::{CodeWord, StatusFilter, StatusWord};
 use offbd_core::vocabulary::Invalid;
@@ -97,10 +98,28 @@ pub(super) struct DetailQuery {
     #[serde(rename = "include-extended-data")]
     #[param(rename = "include-extended-data")]
     extended: Option<bool>,
-    /// Whether the answer has the freeze frame; `true` by default.
+    /// Whether the answer has the freeze frame and the path of the recording; `true` by default.
     #[serde(rename = "include-snapshot-data")]
     #[param(rename = "include-snapshot-data")]
     snapshots: Option<bool>,
+}
+
+/// Returns a reference to the recording of the last occurrence, unless it has been deleted.
+async fn recording(
+    service: &Service,
+    entry: &FaultEntryView,
+) -> Result<Option<SovdFaultRecordingView>, Problem> {
+    let Some(last) = &entry.provenance.last_occurrence else { return Ok(None) };
+    let session = match service.session(&last.session_id).await {
+        Ok(session) => session,
+        Err(ServiceError::UnknownSession { .. }) => return Ok(None),
+        Err(error) => return Err(error.into()),
+    };
+    Ok(Some(SovdFaultRecordingView {
+        kind: "recording".to_owned(),
+        bulk_data_uri: format!("{}/{}", recordings::path(&session.asset), session.id),
+        name: session.name,
+    }))
 }
 
 /// Returns a fault with the environment in which it occurred.
@@ -117,7 +136,8 @@ pub(super) async fn get(
 ) -> Result<Json<Value>, Problem> {
     let entry = service.fault(&asset, &code).await?;
     let (extended, snapshots) = (detail.extended.unwrap_or(true), detail.snapshots.unwrap_or(true));
-    Ok(answer(&fault_detail(entry, extended, snapshots), "SovdFaultDetail", &query))
+    let recording = if snapshots { recording(&service, &entry).await? } else { None };
+    Ok(answer(&fault_detail(entry, extended, snapshots, recording), "SovdFaultDetail", &query))
 }
 
 /// Clears a fault: erases its record.

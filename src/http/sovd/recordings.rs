@@ -7,6 +7,7 @@ use axum::response::Response;
 use serde_json::Value;
 
 use super::{AssetItemPath, AssetPath, BASE, Problem, Query, SchemaQuery, answer};
+use crate::http::session_format::BinaryFile;
 use crate::http::{MAX_PAGE, Path, sessions};
 use crate::service::{Service, ServiceError, SessionListQuery};
 use crate::wire::service::SessionView;
@@ -14,7 +15,8 @@ use crate::wire::sovd::{
     SovdRecordingView, SovdRecordingsView, SovdReferenceView, SovdReferencesView,
 };
 
-fn path(asset: &str) -> String {
+/// Returns the path of the recordings of an asset.
+pub(super) fn path(asset: &str) -> String {
     format!("{BASE}/components/{asset}/bulk-data/recordings")
 }
 
@@ -59,13 +61,17 @@ pub(super) async fn list(
     Ok(answer(&SovdRecordingsView { items }, "SovdRecordings", &query))
 }
 
-/// Returns a recording: CSV, or JSON rows if `Accept` prefers `application/json`.
+/// Returns a recording: as CSV, or as `Accept` prefers as JSON rows, a Parquet file, an Arrow
+/// stream or an MCAP file. The last three need a build with these formats.
 #[utoipa::path(get, path = "/v1/components/{asset}/bulk-data/recordings/{id}", tag = "sovd",
     operation_id = "sovd_recording",
     params(("asset" = String, description = "Name of the asset"),
         ("id" = String, description = "The service's id of the session")),
     responses((status = 200, content((String = "text/csv"),
-            (crate::wire::telemetry::RowsView = "application/json"))),
+            (crate::wire::telemetry::RowsView = "application/json"),
+            (BinaryFile = "application/vnd.apache.parquet"),
+            (BinaryFile = "application/vnd.apache.arrow.stream"),
+            (BinaryFile = "application/vnd.mcap"))),
         (status = 404, body = Problem), (status = 406, body = Problem)))]
 pub(super) async fn get(
     State(service): State<Service>,

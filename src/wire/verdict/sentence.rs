@@ -88,8 +88,8 @@ fn stuck_ball(evidence: &Evidence) -> String {
     if evidence.still_s < LEAST_REPORTED_STILL_S {
         let nats = evidence.axes.x.nats + evidence.axes.y.nats;
         return format!(
-            "the ball hardly moves although the plate asks it to along both axes (weight of \
-             evidence {nats:.0} nats)"
+            "the ball hardly moves although the plate asks it to along both axes (evidence \
+             {nats:.0} nats)"
         );
     }
     format!(
@@ -118,7 +118,7 @@ fn sensor(kind: Option<FaultKind>, evidence: &Evidence) -> String {
 }
 
 fn unseen(evidence: &Evidence) -> String {
-    let share = format!("in {:.0} % of the samples of late", 100.0 * evidence.missing_share);
+    let share = format!("in {:.0} % of recent samples", 100.0 * evidence.missing_share);
     match evidence.unseen_s > 0.0 {
         true => format!("no ball seen for {:.1} s, and {share}", evidence.unseen_s),
         false => format!("no ball seen {share}"),
@@ -128,14 +128,13 @@ fn unseen(evidence: &Evidence) -> String {
 /// Identical readings along one axis, or along both.
 fn repeated(evidence: &Evidence) -> String {
     if evidence.identical_s > 0.0 {
-        return format!("readings have been the same to the bit for {:.1} s", evidence.identical_s);
+        return format!("readings have been unchanged for {:.1} s", evidence.identical_s);
     }
     let of = |axis: Axis| evidence.axes[axis].identical_s;
     let axis = if of(Axis::X) >= of(Axis::Y) { Axis::X } else { Axis::Y };
     let (own, other) = (axis.as_str(), axis.other().as_str());
     format!(
-        "readings along {own} have been the same to the bit for {:.1} s while those along {other} \
-         change",
+        "readings along {own} have been unchanged for {:.1} s while those along {other} change",
         of(axis)
     )
 }
@@ -144,7 +143,7 @@ fn repeated(evidence: &Evidence) -> String {
 fn all_readings(evidence: &Evidence) -> String {
     let scatter = evidence.scatter_m.map_or("unknown".to_owned(), |s| format!("{:.2} mm", s * 1e3));
     format!(
-        "no ball seen for {:.1} s, readings identical for {:.1} s, {} set aside in 10 s, scatter \
+        "no ball seen for {:.1} s, readings unchanged for {:.1} s, {} outliers in 10 s, scatter \
          {scatter}",
         evidence.unseen_s, evidence.identical_s, evidence.outliers,
     )
@@ -166,7 +165,7 @@ fn accelerated(axis: Axis, e: &AxisEvidence) -> String {
             error * 1e3,
             limit * 1e3
         ),
-        (false, _) => format!("weight of evidence {:.0} nats", e.nats),
+        (false, _) => format!("evidence {:.0} nats", e.nats),
     };
     let (along, command) = (axis.as_str(), axis.command());
     match (e.measured_m_s2, e.twin_m_s2) {
@@ -196,14 +195,17 @@ fn response(axis: Axis, kind: Option<FaultKind>, answer: &ServoAnswer) -> Option
             format!("the servo answers {command} the wrong way round{known}")
         }
         Some(FaultKind::Offset) => {
-            format!("the servo is off by as much as gives the ball {off:+.2} ± {off_error:.2} m/s²")
+            format!(
+                "the servo has a constant error, which accelerates the ball by {off:+.2} ± \
+                 {off_error:.2} m/s²"
+            )
         }
         Some(FaultKind::Slow) if answer.delay_s > answer.delay_error_s => format!(
             "the servo answers {command} {:.2} ± {:.2} s late",
             answer.delay_s, answer.delay_error_s
         ),
         Some(FaultKind::Slow) => format!("the servo answers {command} late"),
-        Some(FaultKind::Intermittent) => format!("the servo answers {command} now and then"),
+        Some(FaultKind::Intermittent) => format!("the servo answers {command} intermittently"),
         _ => format!("the servo answers {} of {command}{}", share?, unexplained(answer)),
     };
     Some(words)
@@ -219,7 +221,7 @@ fn share(answer: &ServoAnswer) -> Option<String> {
 fn unexplained(answer: &ServoAnswer) -> String {
     let off = answer.offset_m_s2;
     match off.abs() > 2.0 * answer.offset_error_m_s2 {
-        true => format!(" with {off:+.2} m/s² that nobody asked for"),
+        true => format!(" with an unexplained acceleration of {off:+.2} m/s²"),
         false => String::new(),
     }
 }

@@ -44,10 +44,12 @@ fn work_precision_includes_the_automatic_choice_and_the_records_of_peers() {
         "method":"euler","setting":"step_s","value":0.001,"error_m":1e-4,"cpu_us_per_s":50.0,
         "spread":1.0,"note":null}]}"#;
     std::fs::write(cli.path("peers.json"), peer).unwrap();
-    let done = cli.ok("chart work-precision --quick --with peers.json -o charts");
-    assert!(done.stdout.contains("contact-step"), "{}", done.stdout);
+    let line = "chart work-precision --quick --with peers.json -o charts";
+    let done = cli.ok(&format!("{line} --format json"));
+    assert!(done.stderr.contains("work-precision.svg"), "{}", done.stderr);
     assert!(cli.read("charts/work-precision.svg").contains("anvil"));
     let records = records(&cli, "charts/work-precision.json");
+    assert_eq!(done.json(), records, "what is printed and what is written");
     assert!(records.iter().any(|r| r["engine"] == "anvil"));
     let own: Vec<&Value> = records.iter().filter(|r| r["engine"] == "offbd").collect();
     assert!(own.iter().any(|r| r["front"] == true));

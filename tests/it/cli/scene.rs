@@ -47,6 +47,9 @@ fn the_output_of_every_listed_scene_fits_in_eighty_columns() {
         .filter_map(|line| line.split_whitespace().next())
         .collect();
     assert_eq!(names.len(), 12, "{list}");
+    let listed = cli.ok("scene --list --format json").json();
+    assert!(listed.iter().map(|entry| entry["scene"].as_str().unwrap()).eq(names.iter().copied()));
+    assert!(listed.iter().all(|entry| entry["about"].as_str().is_some_and(|text| text.len() > 9)));
     for name in names {
         let result = cli.ok(&format!("scene {name}")).stdout;
         let wide = result.lines().find(|line| line.chars().count() > 80);

@@ -1,5 +1,6 @@
 """A mail server for the tests. Prints its port, then each mail as a line of JSON. With the
-argument `refuse-first` it answers the first mail with a temporary error."""
+argument `refuse-first` it answers the first mail with a temporary error; a number is its port,
+which the system chooses otherwise."""
 
 import json
 import sys
@@ -41,13 +42,14 @@ controller = Controller(
     auth_require_tls=False,
     auth_required="auth" in sys.argv,
 )
-# The port is chosen by the system, so the controller's own check of it cannot be used.
+port = next((int(word) for word in sys.argv[1:] if word.isdigit()), 0)
+# The port may be chosen by the system, so the controller's own check of it cannot be used.
 import asyncio
 
 
 async def main():
     loop = asyncio.get_running_loop()
-    server = await loop.create_server(controller.factory, host="127.0.0.1", port=0)
+    server = await loop.create_server(controller.factory, host="127.0.0.1", port=port)
     print(server.sockets[0].getsockname()[1], flush=True)
     await server.serve_forever()
 

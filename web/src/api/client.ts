@@ -7,6 +7,8 @@ import type {
   CalibrationJob,
   Caller,
   Demo,
+  DemoGains,
+  DemoTuning,
   DriveCycle,
   FaultCode,
   FaultEntry,
@@ -128,4 +130,6 @@ export const api = {
   injectDemoFault: (fault: string) => send<void>("POST", "/demo/faults", { fault }),
   repairDemo: () => send<void>("DELETE", "/demo/faults"),
   resumeDemoScript: () => send<void>("POST", "/demo/script"),
+  demoTuning: () => get<DemoTuning>("/demo/gains"),
+  tuneDemo: (gains: DemoGains) => send<DemoTuning>("PUT", "/demo/gains", gains),
 };

@@ -86,3 +86,20 @@ export interface Demo {
   /** The faults that can be injected. */
   buttons: string[];
 }
+
+/** The gains of the controller of the demo's rig. */
+export interface DemoGains {
+  /** rad/m */
+  kp: number;
+  /** rad/(m·s) */
+  ki: number;
+  /** rad·s/m */
+  kd: number;
+}
+
+/** How the controller of the demo's rig is tuned. */
+export interface DemoTuning {
+  gains: DemoGains;
+  /** The gains with which the demo began. */
+  initial: DemoGains;
+}

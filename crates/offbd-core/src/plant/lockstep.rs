@@ -96,18 +96,23 @@ impl fmt::Display for Fidelity {
             Rung::Planar => {
                 write!(
                     f,
-                    "small angles neglect up to {left_out:.1e} m/s², {accuracy:.1e} is allowed"
+                    "the small-angle model is off by at most {left_out:.4} m/s²; {accuracy:.4} \
+                     allowed"
                 )
             }
             Rung::Rolling if left_out <= accuracy => {
-                write!(f, "small angles would do, once the motion has been calm for {CALM_S} s")
+                write!(
+                    f,
+                    "the small-angle model will do once the motion has been calm for {CALM_S} s"
+                )
             }
             Rung::Rolling => write!(
                 f,
-                "small angles would neglect up to {left_out:.1e} m/s², {accuracy:.1e} is allowed"
+                "the small-angle model would be off by up to {left_out:.4} m/s²; {accuracy:.4} \
+                 allowed"
             ),
             Rung::Sliding if self.demand.is_infinite() => {
-                write!(f, "rolling needs the plate to pull, or needed it a moment ago")
+                write!(f, "the ball would lift off, or would have done so a moment ago")
             }
             Rung::Sliding => write!(
                 f,
@@ -293,7 +298,7 @@ mod tests {
         let tilt = Tilt::constant(0.0, 0.2);
         ladder.acceleration(&mut fidelity, &RollingState::default(), &tilt, H);
         assert_eq!(fidelity.rung, Rung::Rolling);
-        assert!(fidelity.to_string().contains("small angles would neglect"));
+        assert!(fidelity.to_string().contains("the small-angle model would be off by up to 0."));
         ladder.acceleration(&mut fidelity, &RollingState::default(), &Tilt::default(), H);
         assert_eq!(fidelity.rung, Rung::Rolling, "one calm step is not enough");
         settle(&ladder, &mut fidelity, &Tilt::default());

@@ -4,6 +4,8 @@
 //! The device runs one loop: read, command, log a row. At the chapter's 100 rows per
 //! second the loops close every 10 ms, as in the chapter.
 
+use std::ops::RangeInclusive;
+
 use super::steps::{rounded, step_in};
 use offbd_core::plant::Ball;
 use offbd_core::vocabulary::{Axis, Invalid, PerAxis, in_range, positive};
@@ -34,13 +36,35 @@ pub struct ControllerModel {
 /// levelled. Chosen so that a single missing reading does not make the plate twitch.
 const BLIND_S: f64 = 0.3;
 
-/// The gains of one axis: rad per m, per m·s, per m/s and per m/s².
-#[derive(Clone, Copy, Debug)]
-struct PidGains {
-    proportional: f64,
-    integral: f64,
-    derivative: f64,
-    feedforward: f64,
+/// The gains of a PID controller, the same for both axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PidGains {
+    /// Kp, rad/m.
+    pub proportional: f64,
+    /// Ki, rad/(m·s).
+    pub integral: f64,
+    /// Kd, rad·s/m.
+    pub derivative: f64,
+}
+
+impl PidGains {
+    /// Range of Kp, rad/m. Chosen: up to eight times that of the fastest preset.
+    pub const PROPORTIONAL: RangeInclusive<f64> = 0.0..=10.0;
+    /// Range of Ki, rad/(m·s); chosen likewise.
+    pub const INTEGRAL: RangeInclusive<f64> = 0.0..=4.0;
+    /// Range of Kd, rad·s/m; chosen likewise.
+    pub const DERIVATIVE: RangeInclusive<f64> = 0.0..=7.0;
+
+    /// Checks the ranges.
+    ///
+    /// # Errors
+    /// [`Invalid`] naming `/kp`, `/ki` or `/kd`.
+    pub fn check(&self) -> Result<(), Invalid> {
+        in_range("/kp", self.proportional, Self::PROPORTIONAL)?;
+        in_range("/ki", self.integral, Self::INTEGRAL)?;
+        in_range("/kd", self.derivative, Self::DERIVATIVE)?;
+        Ok(())
+    }
 }
 
 impl ControllerModel {
@@ -62,14 +86,13 @@ impl ControllerModel {
 
     /// Returns the gains by pole placement on ẍ = g/(1 + κ)·q, with the bandwidth limited
     /// by the period.
-    fn gains(&self, ball: &Ball, period_s: f64) -> PidGains {
+    pub(super) fn gains(&self, ball: &Ball, period_s: f64) -> PidGains {
         let (w, g) =
             (self.bandwidth_rad_s.min(self.turn_per_period_rad / period_s), ball.rolling_gravity());
         PidGains {
             proportional: w * w / g,
             integral: self.integral * w * w * w / g,
             derivative: 2.0 * self.damping * w / g,
-            feedforward: self.feedforward / g,
         }
     }
 }
@@ -97,12 +120,21 @@ pub(super) struct Controller {
     model: ControllerModel,
     period_s: f64,
     gains: PidGains,
+    /// Command per acceleration of the reference, rad per m/s².
+    feedforward: f64,
     axes: PerAxis<AxisControlState>,
 }
 
 impl Controller {
     pub(super) fn new(model: ControllerModel, ball: &Ball, period_s: f64) -> Self {
-        Self { model, period_s, gains: model.gains(ball, period_s), axes: PerAxis::default() }
+        let gains = model.gains(ball, period_s);
+        let feedforward = model.feedforward / ball.rolling_gravity();
+        Self { model, period_s, gains, feedforward, axes: PerAxis::default() }
+    }
+
+    /// Uses other gains from the next period on; the integral keeps its share of the command.
+    pub(super) fn tune(&mut self, gains: PidGains) {
+        self.gains = gains;
     }
 
     /// Returns the current commands, rad.
@@ -145,7 +177,7 @@ impl Controller {
         // Anti-windup: the integral may use at most half of the command range.
         let integral = integral.clamp(-model.limit_rad / 2.0, model.limit_rad / 2.0);
         let wish = self.gains.proportional * error + integral - self.gains.derivative * rate;
-        let wish = wish + self.gains.feedforward * wanted.acceleration;
+        let wish = wish + self.feedforward * wanted.acceleration;
         let command = self.quantise(wish * axis.drive_sign());
         AxisControlState { integral, rate, last: Some(position), unseen_s: 0.0, command }
     }

@@ -26,7 +26,7 @@ mod truth;
 mod variety;
 
 pub use ball::Surface;
-pub use controller::ControllerModel;
+pub use controller::{ControllerModel, PidGains};
 pub use disturbance::Disturbances;
 pub use fault::{BallFault, Fault, FaultEffect, FaultSyntax, SensorFault, ServoFault};
 pub use model::RigModel;

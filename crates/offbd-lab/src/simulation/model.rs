@@ -1,7 +1,7 @@
 //! The true properties of one simulated rig, and its description by the owner.
 
 use super::ball::Surface;
-use super::controller::ControllerModel;
+use super::controller::{ControllerModel, PidGains};
 use super::sensor::SensorModel;
 use super::servo::ServoTruth;
 use super::session::SessionSpread;
@@ -35,6 +35,12 @@ impl RigModel {
         self.controller.limit_rad = rig.servo.angle_limit_rad;
         self.rig = rig;
         self
+    }
+
+    /// The gains of the rig's controller.
+    #[must_use]
+    pub fn gains(&self) -> PidGains {
+        self.controller.gains(&self.rig.ball, 1.0 / self.rig.sample_rate_hz)
     }
 
     /// Checks every number.

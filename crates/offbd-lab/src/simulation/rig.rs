@@ -7,7 +7,7 @@
 use nalgebra::Vector2;
 
 use super::ball::{BallOnPlate, BallState};
-use super::controller::{Controller, Setpoint};
+use super::controller::{Controller, PidGains, Setpoint};
 use super::disturbance::{DisturbanceState, Disturbances};
 use super::fault::{BallFault, Fault, FaultEffect, SensorFault, ServoFault};
 use super::model::RigModel;
@@ -134,6 +134,16 @@ impl SimulatedRig {
         let now_s = self.now_s;
         let of_code = |w: &&mut FaultObserver| w.fault().effect.code() == code;
         self.faults.iter_mut().filter(of_code).for_each(|w| w.end(now_s));
+    }
+
+    /// Uses other gains of the rig's controller from its next command on.
+    ///
+    /// # Errors
+    /// [`Invalid`] naming the gain that is out of range.
+    pub fn tune(&mut self, gains: PidGains) -> Result<(), Invalid> {
+        gains.check()?;
+        self.controller.tune(gains);
+        Ok(())
     }
 
     /// Pushes the ball with an acceleration of the free ball, m/s², for `seconds`.

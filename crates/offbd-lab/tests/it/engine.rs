@@ -6,7 +6,7 @@ mod real_world;
 use offbd_core::diagnosis::{FaultMemory, Profile, Transition};
 use offbd_core::engine::{Admission, Engine, Input, Rejection, Rig, Setup, calibrate};
 use offbd_core::vocabulary::{FaultCode, FaultStatus, Sample};
-use offbd_lab::simulation::{Disturbances, Fault, Preset, Reference, SimulatedRig};
+use offbd_lab::simulation::{Disturbances, Fault, PidGains, Preset, Reference, SimulatedRig};
 use proptest::prelude::*;
 
 const LIVELY: Disturbances = Disturbances { pushes_per_minute: 4.0, gusts_per_minute: 1.0 };
@@ -70,6 +70,36 @@ fn healthy_rigs_are_silent() {
             let samples = session(preset, reference, 180.0, seed, "");
             let found = confirmed(&transitions(&setup, &samples));
             assert!(found.is_empty(), "{preset} {reference:?}: {found:?}");
+        }
+    }
+}
+
+/// A badly tuned controller makes the ball travel more, because it oscillates. That is no fault of
+/// the rig, which obeys it, and none is found as long as the ball stays off the rim.
+#[test]
+fn a_ball_that_oscillates_because_of_its_controller_is_no_fault() {
+    let model = Preset::Chapter.model().unwrap();
+    let (setup, usual) = (learnt(Preset::Chapter), model.gains());
+    let run = |gains: PidGains, seed: u64| {
+        let undisturbed = Disturbances::default();
+        let mut rig =
+            SimulatedRig::new(model.clone(), Reference::Steps, undisturbed, seed).unwrap();
+        rig.tune(gains).unwrap();
+        let (mut samples, mut travelled_m) = (Vec::new(), 0.0);
+        while rig.truth().t_s < 120.0 {
+            samples.push(rig.next_sample());
+            travelled_m += rig.truth().velocity.norm() / model.rig.sample_rate_hz;
+        }
+        (confirmed(&transitions(&setup, &samples)), travelled_m)
+    };
+    let little_damping = PidGains { derivative: 0.5 * usual.derivative, ..usual };
+    let much_integral = PidGains { integral: 5.0 * usual.integral, ..usual };
+    for seed in 1..5 {
+        let (_, wanted_m) = run(usual, seed);
+        for gains in [little_damping, much_integral] {
+            let (found, travelled_m) = run(gains, seed);
+            assert!(found.is_empty(), "{gains:?}: {found:?}");
+            assert!(travelled_m > 1.3 * wanted_m, "{gains:?}: {travelled_m} of {wanted_m} m");
         }
     }
 }

@@ -22,6 +22,8 @@ FIRST_DELAY_S = 0.2
 """Delay after the first failed attempt, s; it doubles with each further one."""
 MAX_BATCH_ROWS = 500
 """Most samples of one request; more are sent in several."""
+NO_CONTENT = 204
+"""Status of an answer without content."""
 RETRIED = (408, 425, 429)
 """Statuses below 500 after which a request may succeed unchanged."""
 
@@ -136,6 +138,34 @@ class Client:
         samples: list[dict[str, Any]] = answer["samples"]
         return samples
 
+    def import_session(
+        self, asset: str, content: bytes, *, name: str | None = None, media_type: str = "text/csv"
+    ) -> dict[str, Any]:
+        """Imports the content of a recorded file as a session, and ends it; returns the session
+        with its verdict, and the counts of rows. Without a `name`, a file is stored twice if the
+        first answer is lost; with one, the second attempt is refused with 409. The media type
+        says which format it is, such as application/vnd.apache.parquet.
+        """
+        path = f"/assets/{_part(asset)}/sessions/import" + _query({"name": name})
+        result: dict[str, Any] = self._answer("POST", path, content, media_type)
+        return result
+
+    def series(
+        self,
+        asset: str,
+        *,
+        after: str | None = None,
+        before: str | None = None,
+        step_s: int | None = None,
+        aggregate: str | None = None,
+    ) -> dict[str, Any]:
+        """Returns the results of an asset's ended sessions over time, of those opened from
+        `after` on and before `before`, both RFC 3339: a row for each session, or for each step
+        of `step_s`.
+        """
+        query = {"from": after, "to": before, "step_s": step_s, "aggregate": aggregate}
+        return self._object("GET", f"/assets/{_part(asset)}/series" + _query(query))
+
     def faults(
         self, asset: str | None = None, *, status: str = "active"
     ) -> Iterator[dict[str, Any]]:
@@ -144,9 +174,28 @@ class Client:
         return self._items(path, {"status": status})
 
     def acknowledge_fault(self, asset: str, code: str, by: str) -> dict[str, Any]:
-        """Acknowledges the present occurrence of a fault in the name of `by`."""
+        """Acknowledges the present occurrence of a fault in the name of `by`; with a token, in
+        that of the token.
+        """
         path = f"/assets/{_part(asset)}/faults/{_part(code)}/acknowledge"
-        return self._object("POST", path, {"by": by})
+        return self._object("POST", path + _query({"by": by}))
+
+    def clear_fault(self, asset: str, code: str, by: str) -> None:
+        """Erases the entry of a fault in the name of `by`; with a token, in that of the token."""
+        path = f"/assets/{_part(asset)}/faults/{_part(code)}"
+        self._answer("DELETE", path + _query({"by": by}))
+
+    def fault_history(self, asset: str, code: str) -> Iterator[dict[str, Any]]:
+        """Yields the changes of a fault, newest first, and who acknowledged or cleared it."""
+        return self._items(f"/assets/{_part(asset)}/faults/{_part(code)}/history", {})
+
+    def alarms(
+        self, asset: str | None = None, *, state: str = "active"
+    ) -> Iterator[dict[str, Any]]:
+        """Yields the alarms of an asset, or of all: faults that fail or are on record, and rigs
+        whose data stay away. `state` is failing, on_record, active or all.
+        """
+        return self._items("/alarms", {"asset": asset, "state": state})
 
     def replay(
         self, session_id: str, settings: Mapping[str, Any] | None = None, *, poll_s: float = 0.2
@@ -195,15 +244,23 @@ class Client:
                 return
 
     def _object(self, method: str, path: str, body: Any = None) -> dict[str, Any]:
-        """Sends a request until it succeeds; returns the JSON of the answer."""
+        """Sends a request until it succeeds; returns the JSON object of the answer."""
         content = None if body is None else json.dumps(body).encode()
+        value: dict[str, Any] = self._answer(method, path, content)
+        return value
+
+    def _answer(
+        self, method: str, path: str, content: bytes | None = None, kind: str = "application/json"
+    ) -> Any:
+        """Sends a request with content of the media type `kind` until it succeeds; returns the
+        JSON of the answer, None if it has no content.
+        """
         end = None if self._patience_s is None else time.monotonic() + self._patience_s
         delay_s = FIRST_DELAY_S
         while True:
             try:
-                with self._open(method, path, content) as answer:
-                    value: dict[str, Any] = json.load(answer)
-                    return value
+                with self._open(method, path, content, kind) as answer:
+                    return None if answer.status == NO_CONTENT else json.load(answer)
             except urllib.error.HTTPError as error:
                 failure = _refusal(error)
                 if not _may_pass(error.code):
@@ -217,10 +274,12 @@ class Client:
             time.sleep(pause_s)
             delay_s = min(2 * delay_s, MAX_DELAY_S)
 
-    def _open(self, method: str, path: str, content: bytes | None) -> Any:
+    def _open(
+        self, method: str, path: str, content: bytes | None, kind: str = "application/json"
+    ) -> Any:
         headers = {"Accept": "application/json, text/event-stream"}
         if content is not None:
-            headers["Content-Type"] = "application/json"
+            headers["Content-Type"] = kind
         if self._token is not None:
             headers["Authorization"] = f"Bearer {self._token}"
         request = urllib.request.Request(self._base + path, content, headers, method=method)

@@ -19,7 +19,7 @@ use clap::Args;
 use data_encoding::HEXLOWER;
 
 use super::simulate;
-use crate::cli::calibrate;
+use crate::cli::{calibrate, table};
 use crate::config::Config;
 use crate::server;
 use crate::wire::session_csv;
@@ -41,6 +41,11 @@ use show::Show;
     offbd demo --seconds 60\n  \
     offbd demo --seconds 90 --fault y_servo:gain=0.3@20 --fault sensor:freeze@60\n  \
     offbd demo --seconds 120 --speed 10 --port 0\n\n\
+    With --seconds, a script injects and repairs faults from the beginning, and\n\
+    clears a code before it injects its fault again. Without, the rig stays healthy\n\
+    for a minute, so that you can inject faults yourself on the page Demo; then the\n\
+    script injects and repairs faults, and what was found stays on record until you\n\
+    clear it. On that page you can tune the controller as well.\n\n\
     A fault is CODE:KIND[=SIZE]@START[-END]; `offbd simulate --help` lists them.\n\n\
     Exit status with --seconds: 0 if what was injected and what was found agree,\n\
     else 1.")]
@@ -91,7 +96,8 @@ async fn demo(args: &DemoArgs) -> anyhow::Result<()> {
     let listen = SocketAddr::from((Ipv4Addr::LOCALHOST, args.port));
     let data = store.path.clone();
     let config = Config { listen, data, ..Config::default() };
-    let (controls, routes) = controls::visitor_controls(ASSET);
+    let gains = Preset::Chapter.model()?.gains();
+    let (controls, routes) = controls::visitor_controls(ASSET, gains);
     let server = server::start_with(config, Some(routes));
     let server = server.await.context("cannot start; --port 0 takes a free port")?;
     let result = show(args, &server.address.to_string(), &store, controls).await;
@@ -116,22 +122,44 @@ async fn show(
     controls: VisitorControls,
 ) -> anyhow::Result<DemoOutcome> {
     let seconds = args.seconds.unwrap_or(ENDLESS_S);
-    let asked = args.fault.clone();
-    let faults = if asked.is_empty() { plan::shown(seconds) } else { asked };
     anstream::println!("dashboard  http://{address}/");
     anstream::println!("interface  http://{address}/docs");
     anstream::println!("store      {}", store.path.display());
     if store.temporary {
         anstream::println!("           removed at the end; --data DIR keeps one");
     }
+    let faults = planned(args, seconds);
+    if args.seconds.is_none() {
+        anstream::println!("{}", table::wrapped("faults     ", &first_fault(args, &faults)));
+    }
     let rig = calibrated_rig(args.seed)?;
     let client = Client::new(address.to_owned(), &rig.name)?;
     client.register(&rig).await?;
     let simulated = simulated_rig(Reference::Steps, args.seed)?;
-    let mut show = Show::new(client, simulated, args.speed, controls).await?;
+    let clears = args.seconds.is_some();
+    let mut show = Show::new(client, simulated, args.speed, controls, clears).await?;
     let interrupted = show.run(plan::episodes(faults, seconds)).await?;
     let agreed = show.conclude()?;
     Ok(DemoOutcome { agreed, interrupted })
+}
+
+/// Returns the faults that the script injects within `seconds`.
+fn planned(args: &DemoArgs, seconds: f64) -> Vec<Fault> {
+    match (args.fault.as_slice(), args.seconds) {
+        ([], Some(seconds)) => plan::shown(seconds),
+        // A fast rig gives the visitor no less time.
+        ([], None) => plan::shown_later(plan::HEALTHY_FIRST_S * args.speed.max(1.0), seconds),
+        (asked, _) => asked.to_vec(),
+    }
+}
+
+/// Says when the script injects the first of `faults`.
+fn first_fault(args: &DemoArgs, faults: &[Fault]) -> String {
+    let first_s = faults.iter().map(|f| f.onset_s).fold(f64::INFINITY, f64::min) / args.speed;
+    format!(
+        "the first in {first_s:.0} s, unless you inject one on the page Demo; what was found \
+         stays on record until you clear it"
+    )
 }
 
 fn simulated_rig(reference: Reference, seed: u64) -> anyhow::Result<SimulatedRig> {

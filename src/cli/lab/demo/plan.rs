@@ -27,6 +27,9 @@ const SHOWN: [FaultEffect; 4] = [
 
 /// Approximate interval between faults, s; chosen.
 const SLOT_S: f64 = 30.0;
+/// Time for which the rig of a demo without an end stays healthy, s of the visitor's time.
+/// Chosen: enough to open the page, look at the rig and press a button first.
+pub(super) const HEALTHY_FIRST_S: f64 = 60.0;
 /// Onset of a fault as a share of its interval; chosen.
 const ONSET_SHARE: f64 = 0.35;
 /// Repair of a fault as a share of its interval; chosen.
@@ -47,6 +50,17 @@ pub(super) fn shown(seconds: f64) -> Vec<Fault> {
         Fault { effect, onset_s: at(ONSET_SHARE), end_s: Some(at(END_SHARE)) }
     };
     (0..n as usize).map(fault).collect()
+}
+
+/// Returns the default faults within `seconds`, the first one at `first_s`.
+pub(super) fn shown_later(first_s: f64, seconds: f64) -> Vec<Fault> {
+    let later_s = first_s - ONSET_SHARE * SLOT_S;
+    let later = |fault: Fault| Fault {
+        onset_s: fault.onset_s + later_s,
+        end_s: fault.end_s.map(|end_s| end_s + later_s),
+        ..fault
+    };
+    shown(seconds - later_s).into_iter().map(later).collect()
 }
 
 /// Divides `seconds` into sessions with `faults`.
@@ -114,6 +128,16 @@ mod tests {
             assert!(fault.onset_s > episode.start_s + 3.0 && fault.onset_s < episode.end_s);
             assert!(fault.end_s.unwrap() <= episode.end_s);
         }
+    }
+
+    #[test]
+    fn a_demo_without_an_end_begins_with_a_healthy_rig() {
+        let later = shown_later(60.0, 86_400.0);
+        let codes: Vec<_> = later[..2].iter().map(|f| f.effect.code().as_str()).collect();
+        assert_eq!(codes, ["x_servo", "stuck_ball"]);
+        assert!((later[0].onset_s - 60.0).abs() < 0.1, "{:?}", later[0]);
+        assert!(later.iter().all(|f| f.end_s.is_some_and(|end_s| end_s > f.onset_s)));
+        assert!(later.last().unwrap().end_s.unwrap() < 86_400.0);
     }
 
     #[test]

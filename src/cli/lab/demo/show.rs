@@ -40,6 +40,8 @@ pub(super) struct Show {
     controls: VisitorControls,
     /// Whether the script injects and repairs faults.
     script: bool,
+    /// Whether the script clears codes, so that it can show each fault anew.
+    clears: bool,
     /// Prefix of the names of this show's sessions.
     name: String,
     n_sessions: u32,
@@ -93,13 +95,16 @@ fn announcements(episode: &Episode) -> Vec<(f64, String)> {
 
 impl Show {
     #[expect(clippy::disallowed_methods, reason = "the show runs in real time")]
+    /// Begins a show. If it `clears`, nothing of earlier faults is on record.
     pub(super) async fn new(
         client: Client,
         mut rig: SimulatedRig,
         speed: f64,
         controls: VisitorControls,
+        clears: bool,
     ) -> anyhow::Result<Self> {
-        for &code in FaultCode::ALL {
+        let cleared = FaultCode::ALL.iter().filter(|_| clears);
+        for &code in cleared {
             client.clear(code).await?;
         }
         let events = events::listen(client.events().await?);
@@ -121,6 +126,7 @@ impl Show {
             comparison,
             controls,
             script: true,
+            clears,
             name,
             n_sessions: 0,
         })
@@ -223,7 +229,9 @@ impl Show {
             Uplink::Http(self.client.clone())
         };
         for fault in &episode.faults {
-            self.clear_if_found_before(fault.effect.code()).await?;
+            if self.clears {
+                self.clear_if_found_before(fault.effect.code()).await?;
+            }
             self.rig.inject(*fault);
         }
         say(episode.start_s, &format!(">> session {name} begins, over {}", uplink.name()));
@@ -261,6 +269,7 @@ impl Show {
     }
 
     async fn send_due(&mut self, session: &mut StreamedSession, due_s: f64) -> anyhow::Result<()> {
+        self.rig.tune(self.controls.gains())?;
         let mut rows = Vec::new();
         while self.next.t_s < due_s {
             rows.push(std::mem::replace(&mut self.next, self.rig.next_sample()));
@@ -308,7 +317,7 @@ impl Show {
         }
         let now_s = self.rig.truth().t_s.min(episode.end_s);
         let short = hash.get(..12).unwrap_or(&hash);
-        say(now_s, &format!(">> session {name} ends, verdict {short}"));
+        say(now_s, &format!(">> session {name} ends, checksum {short}"));
         let of_episode = |truth: &&offbd_lab::simulation::FaultTruth| {
             // The end is not compared: a visitor's repair may differ from the plan.
             let is_it =

@@ -2,8 +2,11 @@
 
 use std::path::Path;
 
+use serde_json::json;
+
 use crate::cli::errors::{BadArgument, InputError, read};
-use crate::cli::{output, table};
+use crate::cli::output::{self, OutputFormat};
+use crate::cli::table;
 use crate::wire::scene::{NamedScene, parse};
 use offbd_core::vocabulary::Invalid;
 
@@ -107,7 +110,11 @@ const ENTRIES: [CatalogueEntry; 12] = [
 ];
 
 /// Prints one line per named scene.
-pub(super) fn list() -> anyhow::Result<()> {
+pub(super) fn list(format: OutputFormat) -> anyhow::Result<()> {
+    if format == OutputFormat::Json {
+        let line = |entry: &CatalogueEntry| json!({ "scene": entry.name, "about": entry.about });
+        return ENTRIES.iter().try_for_each(|entry| output::print_json(&line(entry)));
+    }
     let mut rows = table::table(&["scene", "what happens"], &[]);
     for entry in &ENTRIES {
         rows.add_row([entry.name, entry.about]);

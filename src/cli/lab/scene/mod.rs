@@ -1,4 +1,4 @@
-//! `offbd scene`: runs a scene by any model and method, and the chapter's exercises.
+//! `offbd scene`: runs a scene by any model and method, and the book's exercises.
 
 mod catalogue;
 mod control;
@@ -34,7 +34,8 @@ use recorded::RecordedArgs;
     offbd scene steep --model compliant --method rodas4 --tolerance 1e-9\n  \
     offbd scene my.json --model rolling --method rk4 --step 0.005 --format json\n  \
     offbd scene --commands monday.csv --asset learnt.json -o out\n\n\
-    A scene file says what differs from the chapter's rig:\n  \
+    A scene file says what differs from the default rig (plate 0.38 × 0.24 m,\n\
+    steel ball):\n  \
     { \"duration_s\": 2, \"contact\": { \"friction\": 0.3 },\n    \
     \"qy\": [ { \"sine\": { \"amplitude_rad\": 0.1, \"frequency_hz\": 0.5 } } ] }\n\
     Beside sine there are constant_rad (a number) and smoothstep (to_rad, start_s,\n\
@@ -64,7 +65,7 @@ pub(in crate::cli) struct SceneArgs {
     /// Write trajectory.csv and plots into this directory; created if missing
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// A table for people, or one JSON object
+    /// A table for people, or one JSON object; with --list one per line
     #[arg(long, value_enum, default_value = "table")]
     format: OutputFormat,
 }
@@ -74,7 +75,7 @@ pub(super) fn run(args: &SceneArgs) -> anyhow::Result<()> {
         return recorded::run(args, session);
     }
     let Some(word) = args.scene.as_deref().filter(|_| !args.list) else {
-        return catalogue::list();
+        return catalogue::list(args.format);
     };
     match catalogue::find(word)? {
         Exercise::Laws { scenes, tolerance_m } => laws::run(args, &scenes, tolerance_m),

@@ -87,7 +87,7 @@ fn effort(scene_run: &SceneRun) -> Vec<String> {
     let Ok(outcome) = &scene_run.outcome else { return Vec::new() };
     let rejected = match outcome.statistics.rejected {
         0 => String::new(),
-        n => format!(" and {n} tried in vain"),
+        n => format!(" and {n} rejected"),
     };
     let choosing = match scene_run.decision.choosing_s {
         0.0 => String::new(),

@@ -66,7 +66,7 @@ fn lines(name: &str, judged: &[ProfileVerdict]) -> Vec<String> {
         row(
             "rig",
             &format!(
-                "the chapter's without noise, on a plate of 1 m (its models have no edge), in \
+                "the default rig without noise, on a plate of 1 m (its models have no edge), in \
                  closed loop beside its twin; {what}"
             ),
         ),

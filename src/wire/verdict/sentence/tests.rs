@@ -61,8 +61,8 @@ fn regress_the_sentence_of_a_sensor_fault_depends_on_its_kind() {
         (FaultKind::Jump, "readings stepped by 100 mm at 4.97 s"),
         (FaultKind::Noise, "readings scatter by 3.00 mm where healthy ones do by 0.20 mm"),
         (FaultKind::Spikes, "7 lone readings far off the ball's path in 10 s"),
-        (FaultKind::Dropout, "no ball seen for 0.8 s, and in 62 % of the samples of late"),
-        (FaultKind::Frozen, "readings have been the same to the bit for 1.2 s"),
+        (FaultKind::Dropout, "no ball seen for 0.8 s, and in 62 % of recent samples"),
+        (FaultKind::Frozen, "readings have been unchanged for 1.2 s"),
     ];
     for (kind, wanted) in cases {
         assert_eq!(findings_of(FaultCode::Sensor, Some(kind), evidence()), wanted);
@@ -70,12 +70,12 @@ fn regress_the_sentence_of_a_sensor_fault_depends_on_its_kind() {
     let one = Evidence { identical_s: 0.0, ..evidence() };
     assert_eq!(
         findings_of(FaultCode::Sensor, Some(FaultKind::Frozen), one),
-        "readings along x have been the same to the bit for 1.2 s while those along y change"
+        "readings along x have been unchanged for 1.2 s while those along y change"
     );
     let seen = Evidence { unseen_s: 0.0, ..evidence() };
     assert_eq!(
         findings_of(FaultCode::Sensor, Some(FaultKind::Dropout), seen),
-        "no ball seen in 62 % of the samples of late"
+        "no ball seen in 62 % of recent samples"
     );
 }
 
@@ -85,11 +85,17 @@ fn regress_the_sentence_of_a_servo_fault_depends_on_its_kind() {
         (Some(FaultKind::Dead), "does not answer qy (52 ± 6 %)"),
         (Some(FaultKind::Held), "stays where it is whatever qy asks for (52 ± 6 %)"),
         (Some(FaultKind::Reversed), "answers qy the wrong way round (52 ± 6 %)"),
-        (Some(FaultKind::Gain), "answers 52 ± 6 % of qy with +0.30 m/s² that nobody asked for"),
-        (Some(FaultKind::Offset), "is off by as much as gives the ball +0.30 ± 0.02 m/s²"),
+        (
+            Some(FaultKind::Gain),
+            "answers 52 ± 6 % of qy with an unexplained acceleration of +0.30 m/s²",
+        ),
+        (
+            Some(FaultKind::Offset),
+            "has a constant error, which accelerates the ball by +0.30 ± 0.02 m/s²",
+        ),
         (Some(FaultKind::Slow), "answers qy 0.25 ± 0.03 s late"),
-        (Some(FaultKind::Intermittent), "answers qy now and then"),
-        (None, "answers 52 ± 6 % of qy with +0.30 m/s² that nobody asked for"),
+        (Some(FaultKind::Intermittent), "answers qy intermittently"),
+        (None, "answers 52 ± 6 % of qy with an unexplained acceleration of +0.30 m/s²"),
     ];
     for (kind, wanted) in cases {
         let rest = "the ball accelerates by 0.05 m/s² along x where qy asks for -0.20 m/s² \
@@ -108,8 +114,7 @@ fn regress_a_still_ball_and_a_slow_ball_have_different_sentences() {
     let slow = Evidence { still_s: 0.1, ..evidence() };
     assert_eq!(
         findings_of(FaultCode::StuckBall, None, slow),
-        "the ball hardly moves although the plate asks it to along both axes (weight of evidence \
-         23 nats)"
+        "the ball hardly moves although the plate asks it to along both axes (evidence 23 nats)"
     );
 }
 
@@ -168,6 +173,6 @@ fn a_path_error_is_mentioned_if_it_is_the_reason() {
     };
     let bends = "(over two seconds its path bends 9.1 mm from the twin's, limit 6.0 mm)";
     assert!(reason(false, 9.1e-3).ends_with(bends), "{}", reason(false, 9.1e-3));
-    assert!(reason(false, 5e-3).ends_with("(weight of evidence 14 nats)"));
+    assert!(reason(false, 5e-3).ends_with("(evidence 14 nats)"));
     assert!(reason(true, 9.1e-3).ends_with("(limit 0.21)"));
 }

@@ -6,6 +6,7 @@ import { Loading } from "../../parts/loading";
 import { Link } from "../../router/link";
 import { rigPath } from "../../router/paths";
 import { DemoFaultButtons } from "./demo-fault-buttons";
+import { DemoGains } from "./demo-gains";
 import { DemoStatus } from "./demo-status";
 
 /** Polling interval, ms: other visitors of the demo may change its state too. */
@@ -39,6 +40,7 @@ export function DemoControls() {
         stays on record after the repair until you clear it on its page; a fault that is injected again is
         cleared first, so that its detection can be watched.
       </p>
+      <DemoGains />
     </section>
   );
 }

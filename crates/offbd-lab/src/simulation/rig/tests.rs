@@ -162,6 +162,22 @@ fn an_open_edge_loses_the_ball_and_no_reading_follows() {
 }
 
 #[test]
+fn other_gains_act_from_the_next_command_on_and_are_checked() {
+    let mut rig = rig(Preset::Chapter, Reference::Circle, 4);
+    run(&mut rig, 5.0);
+    let none = PidGains { proportional: 0.0, integral: 0.0, derivative: 0.0 };
+    rig.tune(none).unwrap();
+    let held = run(&mut rig, 6.0);
+    let commands = |s: &Sample| (s.cmd_qx_rad, s.cmd_qy_rad);
+    assert!(held.iter().skip(1).all(|s| commands(s) == commands(&held[1])));
+    let refused = rig.tune(PidGains { derivative: 7.1, ..none }).unwrap_err();
+    assert_eq!(refused.element, "/kd");
+    rig.tune(rig.model.gains()).unwrap();
+    let moving = run(&mut rig, 7.0);
+    assert_ne!(commands(&moving[10]), commands(&moving[20]));
+}
+
+#[test]
 fn a_log_faster_than_the_plant_is_refused() {
     let mut model = Preset::Chapter.model().unwrap();
     model.rig.sample_rate_hz = 5000.0;
