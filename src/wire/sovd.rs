@@ -352,7 +352,7 @@ pub fn fault_detail(
         name: "first_failed".to_owned(),
         data: Box::new(frame.clone()),
     };
-    let frames = record.freeze_frame.iter().map(|frame| freeze_frame(frame));
+    let frames = record.freeze_frame.iter().map(freeze_frame);
     let snapshots = frames
         .map(SovdSnapshotView::FreezeFrame)
         .chain(recording.map(SovdSnapshotView::Recording))
