@@ -442,6 +442,17 @@ mod tests {
     }
 
     #[test]
+    fn what_a_failed_hand_over_has_left_is_taken_back() {
+        let me = NodeRow { id: "a".to_owned(), name: "a".to_owned(), ..NodeRow::default() };
+        let row = PartitionRow { owner: Some("a".to_owned()), ..PartitionRow::default() };
+        let mut plan = OwnershipPlan::new("a".to_owned());
+        let mut step =
+            |owned: &[PartitionId]| plan.step(Duration::ZERO, from_ref(&me), from_ref(&row), owned);
+        assert_eq!(step(&[]).take, [PartitionId(0)]);
+        assert_eq!(step(&[PartitionId(0)]), OwnershipStep::default());
+    }
+
+    #[test]
     fn a_node_that_leaves_keeps_its_partitions_until_another_can_take_them() {
         let me =
             NodeRow { id: "a".to_owned(), name: "a".to_owned(), leaving: 1, ..NodeRow::default() };

@@ -65,7 +65,7 @@ async fn a_name_belongs_to_one_node_as_long_as_that_is_connected() {
     let mut other = node(&url, "2", "other").await.unwrap();
     other.observe().await.unwrap();
     let (alive, refused) = (tokio::spawn(observe(a)), node(&url, "3", "a").await);
-    let error = refused.err().expect("the name is taken").to_string();
+    let error = refused.expect_err("the name is taken").to_string();
     assert!(error.contains("another node of the cluster has the name `a`"), "{error}");
     alive.abort();
     assert!(alive.await.unwrap_err().is_cancelled());
