@@ -223,7 +223,8 @@ async fn an_outage_is_logged_once_and_does_not_hold_up_a_stop() {
     server.start();
     let process = Process::start_with(data.path(), &[("OFFBD_DATABASE", Path::new(&direct))]);
     let ack = process.client.telemetry("a", Some("s"), &samples).await;
-    assert!(ack["duplicate"].as_u64().unwrap() >= 300, "{ack}");
+    // What was not acknowledged may be there as well.
+    assert!(ack["duplicate"].as_u64().unwrap() >= 100, "{ack}");
     assert_eq!(process.client.recording("a", "s").await, samples);
     passing.abort();
 }
