@@ -189,8 +189,8 @@ fn examine(
 
 /// What the recording of a session is compared with.
 enum Comparison {
-    Snapshot(SnapshotCheck),
-    Verdict(VerdictCheck),
+    Snapshot(Box<SnapshotCheck>),
+    Verdict(Box<VerdictCheck>),
 }
 
 impl Comparison {
@@ -201,11 +201,11 @@ impl Comparison {
         session: &SessionRow,
         judges: bool,
     ) -> Result<Option<Self>, ServiceError> {
-        match (session.is_open(), judges) {
-            (true, _) => Ok(SnapshotCheck::start(handles, session)?.map(Self::Snapshot)),
-            (false, true) => Ok(VerdictCheck::start(session)?.map(Self::Verdict)),
-            (false, false) => Ok(None),
-        }
+        Ok(match (session.is_open(), judges) {
+            (true, _) => SnapshotCheck::start(handles, session)?.map(Box::new).map(Self::Snapshot),
+            (false, true) => VerdictCheck::start(session)?.map(Box::new).map(Self::Verdict),
+            (false, false) => None,
+        })
     }
 
     /// Takes the next input, after `n` samples.

@@ -60,6 +60,14 @@ mod tests {
     }
 
     #[test]
+    fn infinite_numbers_are_no_samples() {
+        let rig = Rig::chapter("rig");
+        let infinite = Sample { x_m: Some(f64::INFINITY), ..at(1.0) };
+        assert_eq!(rejection(&rig, &infinite), Some(Rejection::NotFinite { field: "x_m" }));
+        assert_eq!(rejection(&rig, &at(1.0)), None);
+    }
+
+    #[test]
     fn limits_are_in_the_units_of_the_rig() {
         let mapping =
             AxisMapping { position_unit_m: 0.001, command_unit_rad: 0.1, ..AxisMapping::default() };

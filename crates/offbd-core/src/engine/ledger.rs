@@ -330,6 +330,62 @@ mod tests {
         }
     }
 
+    #[test]
+    fn the_first_key_divides_what_is_earlier_from_what_may_have_been_lost() {
+        let mut ledger = Ledger::default();
+        for sample in [
+            sample(Some(5), 1.0, 0.0),
+            sample(None, 2.0, 0.0),
+            sample(None, 2.2, 0.0),
+            sample(None, 10.0, 0.0),
+        ] {
+            ledger.note(&sample, 0.25);
+        }
+        let keys = |seq, t_s| {
+            let sample = sample(seq, t_s, 0.0);
+            (ledger.precedes(&sample), ledger.fits_gap(&sample))
+        };
+        assert_eq!(
+            [4, 5, 6].map(|seq| keys(Some(seq), 0.0)),
+            [(true, false), (false, false), (false, true)]
+        );
+        let at = |t_s| keys(None, t_s);
+        assert_eq!([at(1.9), at(2.0), at(2.1)], [(true, false), (false, false), (false, false)]);
+        assert_eq!([at(5.0), at(11.0)], [(false, true), (false, true)]);
+        // Between two samples that are remembered none was taken.
+        assert_eq!(ledger.recognise(&sample(None, 2.1, 0.0)), Recognition::New);
+    }
+
+    #[test]
+    fn keys_next_to_each_other_are_one_range() {
+        let mut ledger = Ledger::default();
+        let mut ranges = |keys: &[u64]| {
+            keys.iter().for_each(|&seq| ledger.note(&sample(Some(seq), 0.0, 0.0), 0.25));
+            ledger.by_seq.ranges.iter().copied().collect::<Vec<_>>()
+        };
+        assert_eq!(ranges(&[0, 1, 5, 6, 3]), [(0, 1), (3, 3), (5, 6)]);
+        assert_eq!(ranges(&[2, 4]), [(0, 6)]);
+        assert_eq!(ranges(&[10, 9, 7]), [(0, 7), (9, 10)]);
+    }
+
+    #[test]
+    fn the_memory_is_bounded_and_forgets_the_oldest() {
+        let mut ledger = Ledger::default();
+        let row = |seq| sample(Some(seq), 0.0, 0.0);
+        for seq in 0..MAX_RECENT as u64 {
+            ledger.note(&row(1000 + seq), 0.25);
+        }
+        // Older than all that are remembered.
+        ledger.note(&row(5), 0.25);
+        assert_eq!(ledger.recognise(&row(5)), Recognition::Taken);
+        for seq in (2000..10_000).step_by(2) {
+            ledger.note(&row(seq), 0.25);
+        }
+        assert_eq!(ledger.by_seq.recent.len(), MAX_RECENT);
+        assert_eq!(ledger.by_seq.ranges.len(), MAX_RANGES);
+        assert_eq!(ledger.recognise(&row(9998)), Recognition::Same);
+    }
+
     proptest! {
         /// Against a model that remembers everything: what is stated is true.
         #[test]

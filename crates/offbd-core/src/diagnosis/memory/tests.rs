@@ -184,6 +184,103 @@ fn healing_comes_before_aging_and_both_are_counted() {
     assert_eq!(counted, [(1, 0), (2, 0), (2, 1), (2, 2), (0, 0)], "then it is erased");
 }
 
+#[test]
+fn what_changes_the_status_byte_is_told() {
+    let mut bench = Bench::new(1, true);
+    let (none, frame) = (Suspicion::default(), Evidence::default());
+    let rules = bench.rules;
+    assert_eq!([(); 2].map(|()| bench.memory.failed(CODE, &none, &frame)), [true, false]);
+    assert_eq!([(); 2].map(|()| bench.memory.trip(CODE, &none, &rules)), [true, false]);
+    assert_eq!([(); 2].map(|()| bench.memory.passed(CODE)), [true, false]);
+}
+
+#[test]
+fn the_last_suspicion_counts() {
+    let mut bench = Bench::new(1, false);
+    let of = |kind| Suspicion { kind: Some(kind), ..Suspicion::default() };
+    bench.memory.failed(CODE, &of(FaultKind::Dead), &Evidence::default());
+    bench.memory.failed(CODE, &of(FaultKind::Held), &Evidence::default());
+    assert_eq!(bench.memory.record(CODE).kind(), Some(FaultKind::Held));
+    bench.memory.trip(CODE, &of(FaultKind::Dead), &bench.rules);
+    assert_eq!(bench.memory.record(CODE).kind(), Some(FaultKind::Dead));
+}
+
+#[test]
+fn a_kind_is_not_told_after_the_failure_has_passed() {
+    let mut bench = Bench::new(1, false);
+    bench.failed();
+    bench.passed();
+    let dead = Suspicion { kind: Some(FaultKind::Dead), ..Suspicion::default() };
+    assert!(!bench.memory.set_kind(CODE, &dead));
+}
+
+#[test]
+fn a_failure_after_healing_begins_anew_and_aging_erases_all() {
+    let mut bench = Bench::new(1, true);
+    bench.rules.aging_cycles = 2;
+    let good_cycle = |bench: &mut Bench| {
+        bench.start();
+        bench.passed();
+        bench.end();
+    };
+    bench.failed();
+    bench.end();
+    good_cycle(&mut bench);
+    assert_eq!(bench.memory.record(CODE).word(), FaultStatus::Healed);
+    bench.start();
+    bench.failed();
+    let record = bench.memory.record(CODE);
+    assert_eq!((record.word(), record.good_cycles), (FaultStatus::Confirmed, 0));
+    bench.end();
+    (0..3).for_each(|_| good_cycle(&mut bench));
+    let record = bench.memory.record(CODE);
+    assert_eq!((record.occurrences, record.first_onset, record.good_cycles), (0, None, 0));
+    assert_eq!((record.freeze_frame.is_none(), record.word()), (true, FaultStatus::Cleared));
+}
+
+#[test]
+fn what_was_never_confirmed_does_not_heal() {
+    let mut bench = Bench::new(2, true);
+    bench.failed();
+    bench.end();
+    for _ in 0..2 {
+        bench.start();
+        bench.passed();
+        bench.end();
+    }
+    let record = bench.memory.record(CODE);
+    assert!(!record.healed && record.occurrences == 1);
+    let counters = (record.healing_counter(&bench.rules), record.aging_counter(&bench.rules));
+    assert_eq!(counters, (0, 0));
+}
+
+#[test]
+fn a_pending_fault_and_a_confirmed_one_of_the_past_can_be_acknowledged() {
+    let mut pending = Bench::new(2, false);
+    assert!(!pending.memory.acknowledge(CODE) && !pending.memory.record(CODE).acknowledged);
+    pending.failed();
+    assert!(pending.memory.acknowledge(CODE) && pending.memory.record(CODE).acknowledged);
+    let mut confirmed = Bench::new(1, false);
+    confirmed.rules.healing_cycles = 5;
+    confirmed.failed();
+    for _ in 0..2 {
+        confirmed.passed();
+        confirmed.end();
+        confirmed.start();
+    }
+    assert!(!confirmed.memory.record(CODE).status.pending());
+    assert!(confirmed.memory.acknowledge(CODE) && confirmed.memory.record(CODE).acknowledged);
+}
+
+#[test]
+fn just_enough_data_count_and_none_never_do() {
+    let mut in_use = InUse::default();
+    in_use.count(8.0, 0.0, 0.8);
+    assert_eq!(in_use, InUse { cycles: 1, with_data: 1, judged: 0 });
+    in_use.count(0.0, 0.0, 0.0);
+    assert_eq!(in_use, InUse { cycles: 2, with_data: 1, judged: 0 });
+}
+
 /// SAE J1979: the ratio counts cycles and survives a clear by a scan tool.
 #[test]
 fn validate_the_in_use_ratio_outlives_a_clear() {
