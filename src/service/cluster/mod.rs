@@ -231,9 +231,9 @@ impl Service {
         while is_there() && looked.changed().await.is_ok() {}
     }
 
-    /// Waits for another look at the database if the last one is so old, or the connection was
-    /// lost since, that another node may own, by now, what this one does. Call it before a read is answered; writes need no such
-    /// check, because the database makes it.
+    /// Waits for another look at the database if the last one is so old that another node may
+    /// own, by now, what this one does, or if the connection was lost since. Call it before a
+    /// read is answered; writes need no such check, because the database makes it.
     ///
     /// # Errors
     /// [`ServiceError::Moving`] if the database does not answer in time.

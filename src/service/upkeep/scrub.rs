@@ -149,8 +149,9 @@ fn pause(worked: Duration) {
 }
 
 /// Reads the recording of `session`, and judges it again if there is a snapshot to compare
-/// with or, if it `judges` ended ones, a verdict. Calls `pause` now and then, and at the end, with the duration of the work since the
-/// last call. Returns `None` also if the service shuts down. Blocks on the store.
+/// with or, if it `judges` ended ones, a verdict. Calls `pause` now and then, and at the end,
+/// with the duration of the work since the last call. Returns `None` also if the service shuts
+/// down. Blocks on the store.
 #[expect(clippy::disallowed_methods, reason = "pauses are a multiple of the work")]
 fn examine(
     handles: &Handles,

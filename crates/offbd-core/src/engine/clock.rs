@@ -195,6 +195,9 @@ impl DeviceClock {
 }
 
 #[cfg(test)]
+mod decisions;
+
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::engine::{Admission, Engine, Input, Rig, Setup};

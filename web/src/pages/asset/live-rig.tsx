@@ -47,8 +47,8 @@ export function LiveRig({ asset, faults, lost, refetch }: Props) {
       )}
       {state?.unjudged && (
         <p class="trouble" role="alert">
-          Not tested: the last {count(state.unjudged.samples)} samples are not judged ({state.unjudged.reason}
-          ).
+          Not tested: {count(state.unjudged.samples)} of its latest samples are not judged (
+          {state.unjudged.reason}).
         </p>
       )}
       {lost && <LostCommunication alarm={lost} refetch={refetch} />}
