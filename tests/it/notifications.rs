@@ -437,7 +437,9 @@ mod email {
         assert_eq!(refused["state"], "pending", "{refused}");
         assert!(refused["error"].as_str().unwrap().contains("refused"), "{refused}");
         let mut server = MailServer::start(&[&port.to_string()]);
-        let taken = tokio::task::spawn_blocking(move || server.next()).await.unwrap();
+        // It is kept until it has answered.
+        let received = tokio::task::spawn_blocking(move || (server.next(), server));
+        let (taken, _server) = received.await.unwrap();
         assert_eq!(taken["to"], json!(["ann@lab.example"]));
         let delivered = eventually(async || {
             let delivery = delivery().await;

@@ -34,6 +34,7 @@ for (const name of FOREIGN)
     const dialogue = await chosen(view, `${name}.bin`, foreign(name));
     await dialogue.getByText("the columns must have the names").waitFor();
     await dialogue.getByRole("button", { name: "Import the file" }).click();
+    await dialogue.waitFor({ state: "hidden" });
     await view.getByRole("heading", { name }).waitFor();
     const { items } = await ask(service.url, "GET", `/sessions?name=${name}`);
     assert.ok(items[0].samples >= 2, `${items[0].samples} samples`);
@@ -60,6 +61,7 @@ test("a recording is downloaded in the chosen format, and imported from it", asy
   const bytes = await download("MCAP", "mcap", "\x89MCAP0");
   const dialogue = await chosen(view, "copied.mcap", bytes);
   await dialogue.getByRole("button", { name: "Import the file" }).click();
+  await dialogue.waitFor({ state: "hidden" });
   await view.getByRole("heading", { name: "copied" }).waitFor();
   const { items } = await ask(service.url, "GET", "/sessions?name=copied");
   assert.equal(items[0].samples, session.samples);

@@ -130,6 +130,9 @@ async function asDemo(view) {
   await view.route("**/healthz", (route) => route.fulfill({ json: { ...health, demo: true } }));
   const demo = { asset: "bench-1", script: false, broken: [], buttons: ["y_servo:dead"] };
   await view.route("**/api/v1/demo", (route) => route.fulfill({ json: demo }));
+  const gains = { kp: 1, ki: 0.1, kd: 0.5 };
+  const tuning = { gains, initial: gains };
+  await view.route("**/api/v1/demo/gains", (route) => route.fulfill({ json: tuning }));
 }
 
 test("an action that a viewer may not do is disabled and says which role it needs", async () => {

@@ -2,8 +2,8 @@
 //! check what is stored in the end.
 
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use futures_util::{SinkExt, StreamExt};
@@ -23,6 +23,9 @@ use super::{
 /// Ways in which a device can send a batch: JSON, MessagePack, CSV, NDJSON and a WebSocket.
 const N_WAYS: usize = 5;
 
+/// Answers to refused batches that are kept.
+const MAX_REFUSALS: usize = 20;
+
 /// The connection of several devices to the service, whose address may change.
 #[derive(Clone)]
 pub struct ServiceLink {
@@ -30,15 +33,23 @@ pub struct ServiceLink {
     address: watch::Sender<String>,
     acknowledged: Arc<AtomicU64>,
     refused: Arc<AtomicU64>,
+    /// The first answers to refused batches.
+    refusals: Arc<Mutex<Vec<String>>>,
     stopped: Arc<AtomicBool>,
 }
 
 impl ServiceLink {
     pub fn to(client: &Client) -> Self {
         let (address, _) = watch::channel(client.address.clone());
-        let (client, zero) = (client.clone(), || Arc::new(AtomicU64::new(0)));
-        let stopped = Arc::default();
-        Self { client, address, acknowledged: zero(), refused: zero(), stopped }
+        let client = client.clone();
+        Self {
+            client,
+            address,
+            acknowledged: Arc::default(),
+            refused: Arc::default(),
+            refusals: Arc::default(),
+            stopped: Arc::default(),
+        }
     }
 
     /// Sets the address of the service to that of `client`.
@@ -54,6 +65,18 @@ impl ServiceLink {
     /// Returns how often a batch was refused with 429 or 503.
     pub fn n_refused(&self) -> u64 {
         self.refused.load(Ordering::SeqCst)
+    }
+
+    /// Returns the answers to the first batches that were refused.
+    pub fn refusals(&self) -> Vec<String> {
+        self.refusals.lock().unwrap().clone()
+    }
+
+    fn note_refusals(&self, refusals: Vec<String>) {
+        self.refused.fetch_add(refusals.len() as u64, Ordering::SeqCst);
+        let mut first = self.refusals.lock().unwrap();
+        first.extend(refusals);
+        first.truncate(MAX_REFUSALS);
     }
 
     /// Waits until `n` more samples are acknowledged.
@@ -73,10 +96,13 @@ impl ServiceLink {
     }
 
     /// Sends the request that `make` returns until there is a response other than 429 and 503.
-    /// Returns the response and how many were refused before.
-    async fn send(&self, make: impl Fn(&Client) -> reqwest::RequestBuilder) -> (Answer, u64) {
+    /// Returns the response and the refusals before.
+    async fn send(
+        &self,
+        make: impl Fn(&Client) -> reqwest::RequestBuilder,
+    ) -> (Answer, Vec<String>) {
         let mut address = self.address.subscribe();
-        let mut refused = 0;
+        let mut refusals = Vec::new();
         loop {
             let mut client = self.client.clone();
             client.address = address.borrow_and_update().clone();
@@ -87,12 +113,12 @@ impl ServiceLink {
             let (status, headers) = (response.status(), response.headers().clone());
             if [429, 503].contains(&status.as_u16()) {
                 assert_eq!(headers["retry-after"], "1");
-                refused += 1;
+                refusals.push(response.text().await.unwrap_or_default());
                 tokio::task::yield_now().await;
                 continue;
             }
             match response.text().await {
-                Ok(text) => return (Answer { status, headers, text }, refused),
+                Ok(text) => return (Answer { status, headers, text }, refusals),
                 Err(_) => wait_for_service(&mut address).await,
             }
         }
@@ -115,7 +141,7 @@ impl ServiceLink {
             }
         };
         let json = |client: &Client| client.request(Method::POST, &path).json(&document);
-        let (answer, refused) = match way {
+        let (answer, refusals) = match way {
             0 => self.send(json).await,
             1 => {
                 let packed = |client: &Client| {
@@ -132,7 +158,7 @@ impl ServiceLink {
             }
             _ => return self.post_by_stream(asset, &document).await,
         };
-        self.refused.fetch_add(refused, Ordering::SeqCst);
+        self.note_refusals(refusals);
         answer.expect(200)
     }
 
@@ -143,8 +169,8 @@ impl ServiceLink {
             let service = address.borrow_and_update().clone();
             match post_once(&service, asset, document).await {
                 Some(answer) if answer["accepted"].is_u64() => return answer,
-                Some(_) => {
-                    self.refused.fetch_add(1, Ordering::SeqCst);
+                Some(refusal) => {
+                    self.note_refusals(vec![refusal.to_string()]);
                     tokio::task::yield_now().await;
                 }
                 None => wait_for_service(&mut address).await,
