@@ -94,10 +94,8 @@ pub enum ServiceError {
     /// The database rejects these changes, even alone, and accepts others.
     #[error("the store does not accept {what}; see the log")]
     NotStored { what: String },
-    /// The samples in flight are at their limit, and nothing is committed.
-    #[error(
-        "the samples in flight are at their limit, and nothing has been committed for {seconds} s"
-    )]
+    /// Batches wait, and nothing is committed.
+    #[error("batches wait, and nothing has been committed for {seconds} s")]
     Stalled { seconds: u64 },
     /// The database is unavailable. Accepted changes wait, up to the limits.
     #[error("the database is unavailable: {reason}")]

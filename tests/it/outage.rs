@@ -148,8 +148,10 @@ async fn a_commit_with_a_lost_answer_is_neither_lost_nor_repeated() {
     let link = load.link.clone();
     load.stop().await;
     // The service finds out whether a commit was done and retries it if not; no batch is
-    // refused.
-    assert_eq!(link.refusals(), Vec::<String>::new());
+    // refused, unless it begins a session: that waits for earlier changes, 5 s at most.
+    let looks_up = |refusal: &String| refusal.contains("urn:offbd:problem:unavailable");
+    let others: Vec<_> = link.refusals().into_iter().filter(|r| !looks_up(r)).collect();
+    assert_eq!(others, Vec::<String>::new());
     proxy.abort();
 }
 
