@@ -47,7 +47,7 @@ pub(super) struct Inner {
     pub(super) job_context: JobContext,
     /// One permit for each sample between arrival and commit.
     pub(super) in_flight: Arc<Semaphore>,
-    /// Whether the samples in flight are at their limit and nothing is committed.
+    /// Whether batches wait and nothing is committed.
     pub(super) stalled: Arc<AtomicBool>,
     /// Assets whose engine is still to be rebuilt after the start.
     pub(super) n_rebuilding: AtomicUsize,
