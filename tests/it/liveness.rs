@@ -323,51 +323,54 @@ async fn an_asset_that_is_not_in_memory_does_not_hold_up_its_shard() {
         .await;
 }
 
-/// Write sets that can wait for the writer.
+/// Write sets that can wait for the writer, and those that it commits together.
 const QUEUED: usize = 1024;
+const COMMITTED_TOGETHER: usize = 512;
 
 /// Batches of a stream that can wait for their commit.
 const OF_A_STREAM: usize = 32;
 
+/// Returns the number of write sets that wait for the writer.
+async fn writer_queue(client: &Client) -> usize {
+    let text = client.get("/metrics").await.text;
+    let value = text.lines().find_map(|line| line.strip_prefix("offbd_writer_queue "));
+    value.unwrap().parse().unwrap()
+}
+
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_shard_answers_while_the_writer_has_no_room() {
     let mut fixture = ServiceFixture::start_with(|config| config.workers.shards = 1).await;
-    let n_streams = QUEUED / OF_A_STREAM + 2;
-    let name = |i: usize| format!("rig-{i}");
-    for i in 0..n_streams {
-        fixture.client.asset(&name(i)).await;
-    }
     fixture.client.asset("idle").await;
     fixture.restart().await;
     let client = &fixture.client;
-    for i in 0..n_streams {
-        client.get(&format!("assets/{}/state", name(i))).await.expect(200);
+    let samples = rig((OF_A_STREAM + 1) * ROWS, usize::MAX);
+    let (first, rest) = samples.split_at(ROWS);
+    let mut streams = Vec::new();
+    for i in 0..(QUEUED + COMMITTED_TOGETHER) / OF_A_STREAM + 2 {
+        let name = format!("rig-{i}");
+        client.asset(&name).await;
+        client.telemetry(&name, Some("s"), first).await;
+        streams.push((stream(client, &name).await, name));
     }
-    let samples = rig(OF_A_STREAM * ROWS, usize::MAX);
     let lock = fixture.lock_store().await;
-    let mut sockets = Vec::new();
-    for i in 0..n_streams {
-        let mut socket = stream(client, &name(i)).await;
-        send_all(&mut socket, &samples).await;
-        sockets.push(socket);
+    for (socket, _) in &mut streams {
+        send_all(socket, rest).await;
     }
-    // The last batches find no room.
-    let refused = answer(sockets.last_mut().unwrap()).await.unwrap();
-    assert_eq!(refused["problem"]["status"], 503, "{refused}");
+    eventually(async || (writer_queue(client).await >= QUEUED).then_some(())).await;
     for _ in 0..3 {
+        let sent = batch(Some("s"), &rest[..1]);
+        client.post("assets/rig-0/telemetry", &sent).await.problem(503);
         client.get("assets/rig-0/state").await.expect(200);
         client.get("assets/idle/state").await.problem(503);
-        client.post("assets/rig-0/telemetry", &batch(Some("s"), &samples[..1])).await.problem(503);
     }
     lock.release().await;
-    for (i, mut socket) in sockets.into_iter().enumerate() {
-        send_all(&mut socket, &samples).await;
-        let mut n_accepted = 0;
-        while n_accepted < samples.len() as u64 {
-            let answer = answer(&mut socket).await.expect("the stream continues");
-            n_accepted += answer["accepted"].as_u64().unwrap_or_default();
-        }
-        let mut stored = client.recording(&name(i), "s").await;
+    readiness(client, 200).await;
+    // The devices send again what was not acknowledged.
+    for (_, name) in &streams {
+        let path = format!("assets/{name}/telemetry");
+        let sent = batch(Some("s"), &samples);
+        eventually(async || (client.post(&path, &sent).await.status == 200).then_some(())).await;
+        let mut stored = client.recording(name, "s").await;
         stored.sort_by_key(|sample| sample.seq);
         assert_eq!(stored, samples);
     }
