@@ -357,9 +357,12 @@ async fn a_shard_answers_while_the_writer_has_no_room() {
         send_all(socket, rest).await;
     }
     eventually(async || (writer_queue(client).await >= QUEUED).then_some(())).await;
+    // The shard waits for room for a while, and its queue fills.
+    let sent = batch(Some("s"), &rest[..1]);
+    let answer = async || client.post("assets/rig-0/telemetry", &sent).await;
+    eventually(async || (answer().await.status == 503).then_some(())).await;
     for _ in 0..3 {
-        let sent = batch(Some("s"), &rest[..1]);
-        client.post("assets/rig-0/telemetry", &sent).await.problem(503);
+        answer().await.problem(503);
         client.get("assets/rig-0/state").await.expect(200);
         client.get("assets/idle/state").await.problem(503);
     }
