@@ -30,10 +30,10 @@ export function SessionRow({ session, isChosen, toggle }: Props) {
           result && <span class={result.look}>{result.text}</span>
         )}
       </td>
-      <td>
+      <td class="name">
         <Link to={rigPath(session.asset)}>{session.asset}</Link>
       </td>
-      <td>{dateTime(session.opened_at)}</td>
+      <td class="time">{dateTime(session.opened_at)}</td>
       <td class="n">{duration(sessionLength(session))}</td>
       <td class="n">{count(session.samples)}</td>
     </tr>

@@ -67,7 +67,7 @@ export function SessionTools({ names, word, change }: Props) {
       />
       <DayField label="Started from" field="from" word={word} change={change} />
       <DayField label="Started until" field="to" word={word} change={change} />
-      <TagChoice tags={tags ?? []} chosen={word("tag")} change={(tag) => change("tag", tag)} />
+      <TagChoice isAbove tags={tags ?? []} chosen={word("tag")} change={(tag) => change("tag", tag)} />
       <Choice<string>
         label="Order"
         options={SORTS}
