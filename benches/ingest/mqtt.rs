@@ -112,9 +112,12 @@ impl MqttDevice {
     /// Sends every body until all are acknowledged.
     async fn send_all(mut self, bodies: Vec<Bytes>) -> Result<()> {
         let mut fresh = bodies.into_iter().enumerate();
+        // A device without session names waits for its first acknowledgement, so that its first
+        // batch is not taken for a restart if it is lost and comes late.
+        let mut window = 1;
         let mut kept: BTreeMap<usize, (Bytes, Instant)> = BTreeMap::new();
         loop {
-            while kept.len() < WINDOW
+            while kept.len() < window
                 && let Some((n, body)) = fresh.next()
             {
                 self.publish(body.clone()).await?;
@@ -125,6 +128,7 @@ impl MqttDevice {
             }
             if let Ok(n) = timeout(SILENCE, self.acknowledged()).await {
                 kept.remove(&n?);
+                window = WINDOW;
             }
             for (body, sent) in kept.values_mut().filter(|(_, sent)| sent.elapsed() > SILENCE) {
                 *sent = Instant::now();
