@@ -15,8 +15,8 @@ const PARTITIONS: usize = 64;
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ClusterConfig {
-    /// The name of the node, unique in the cluster: a second one does not start. A node that restarts with the same name
-    /// gets the same partitions again.
+    /// The name of the node, unique in the cluster: a second one does not start. A node that
+    /// restarts with the same name gets the same partitions again.
     pub name: String,
     /// The address to listen on for other nodes. Not encrypted: use a private network.
     pub listen: SocketAddr,

@@ -1,19 +1,15 @@
 // The page of administrators: tokens and the audit log; and how a rig is deleted.
 import assert from "node:assert/strict";
-import { writeFileSync } from "node:fs";
-import { join } from "node:path";
 import { after, before, test } from "node:test";
-import { ask, browser, directory, offbd, page, remove, serve } from "./support.mjs";
+import { secured } from "./secured.mjs";
+import { ask, browser, directory, page, remove, serve } from "./support.mjs";
 
-let work, service, chromium, admin;
+let work, service, chromium, admin, asks;
 
 before(async () => {
   work = directory();
   chromium = await browser();
-  const data = join(work, "data");
-  admin = offbd("token", "create", "--name", "ann", "--role", "admin", "--data", data).trim();
-  writeFileSync(join(work, "offbd.toml"), "auth = 'required'\n");
-  service = await serve(data, 0, "--config", join(work, "offbd.toml"));
+  ({ service, admin, asks } = await secured(work));
   for (const name of ["bench-1", "bench-2"]) await asks("POST", "/assets", admin, { name });
 });
 
@@ -22,13 +18,6 @@ after(async () => {
   await service?.stop();
   remove(work);
 });
-
-const asks = (method, path, token, body) =>
-  fetch(`${service.url}/api/v1${path}`, {
-    method,
-    headers: { authorization: `Bearer ${token}`, "content-type": "application/json" },
-    body: body && JSON.stringify(body),
-  });
 
 /** Opens the page as the holder of a token. */
 async function loggedIn(token, path) {

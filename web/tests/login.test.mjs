@@ -1,22 +1,20 @@
 // The login of a service that requires a token.
 import assert from "node:assert/strict";
-import { readFileSync, writeFileSync } from "node:fs";
+import { readFileSync } from "node:fs";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
 import { createRequire } from "node:module";
-import { browser, directory, offbd, page, remove, serve } from "./support.mjs";
+import { secured } from "./secured.mjs";
+import { browser, directory, offbd, page, remove } from "./support.mjs";
 
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 
-let work, service, chromium, view, admin;
+let work, service, chromium, view, admin, asks;
 
 before(async () => {
   work = directory();
   chromium = await browser();
-  const data = join(work, "data");
-  admin = offbd("token", "create", "--name", "ann", "--role", "admin", "--data", data).trim();
-  writeFileSync(join(work, "offbd.toml"), "auth = 'required'\n");
-  service = await serve(data, 0, "--config", join(work, "offbd.toml"));
+  ({ service, admin, asks } = await secured(work));
   const made = await asks("POST", "/assets", admin, { name: "bench-1" });
   assert.equal(made.status, 201);
   view = await page(chromium);
@@ -28,13 +26,6 @@ after(async () => {
   await service?.stop();
   remove(work);
 });
-
-const asks = (method, path, token, body) =>
-  fetch(`${service.url}/api/v1${path}`, {
-    method,
-    headers: { authorization: `Bearer ${token}`, "content-type": "application/json" },
-    body: JSON.stringify(body),
-  });
 
 /** Simulates a session, imports it, and returns its id. */
 async function imported(name, ...options) {

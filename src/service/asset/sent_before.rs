@@ -12,9 +12,6 @@ use crate::wire::telemetry::{AckView, RowView};
 use offbd_core::engine::Rejection;
 use offbd_core::vocabulary::Sample;
 
-/// Number of the first part of a session before which there are parts that are not searched.
-const FIRST_LEFT_OUT: i64 = MAX_SESSIONS as i64 + 1;
-
 impl Asset {
     /// Notes that `session` has ended.
     pub(super) fn note_ended(&mut self, session: EndedSession) {
@@ -68,7 +65,7 @@ impl Asset {
         }
         // A deleted part leaves none out.
         let are_left_out =
-            parts.len() >= MAX_SESSIONS as usize && open.part.number > FIRST_LEFT_OUT;
+            parts.len() >= MAX_SESSIONS as usize && open.part.number > i64::from(MAX_SESSIONS) + 1;
         if let Some(oldest) = parts.last().filter(|_| are_left_out) {
             samples.retain(|(index, sample)| {
                 let engine = open.judging.engine();
