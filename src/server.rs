@@ -275,7 +275,7 @@ impl Server {
 /// # Errors
 /// As for [`start`] and [`Server::shutdown`].
 pub async fn serve(config: Config) -> Result<()> {
-    let mut stop = pin!(stop_signal());
+    let mut stop = pin!(stop_signal()?);
     let server = tokio::select! {
         server = start(config) => server?,
         // Nothing has been acknowledged yet.
@@ -286,20 +286,25 @@ pub async fn serve(config: Config) -> Result<()> {
     server.shutdown().await
 }
 
+/// Waits for SIGINT or SIGTERM. The system's own reaction, which is to end the process, no
+/// longer applies once this has returned, before anything waits.
 #[cfg(unix)]
-async fn stop_signal() -> Result<()> {
+fn stop_signal() -> Result<impl Future<Output = Result<()>>> {
     use tokio::signal::unix::{SignalKind, signal};
+    let mut interrupt = signal(SignalKind::interrupt())?;
     let mut terminate = signal(SignalKind::terminate())?;
-    tokio::select! {
-        interrupted = tokio::signal::ctrl_c() => interrupted?,
-        _ = terminate.recv() => {}
-    }
-    Ok(())
+    Ok(async move {
+        tokio::select! {
+            _ = interrupt.recv() => {}
+            _ = terminate.recv() => {}
+        }
+        Ok(())
+    })
 }
 
 #[cfg(not(unix))]
-async fn stop_signal() -> Result<()> {
-    Ok(tokio::signal::ctrl_c().await?)
+fn stop_signal() -> Result<impl Future<Output = Result<()>>> {
+    Ok(async { Ok(tokio::signal::ctrl_c().await?) })
 }
 
 /// Brings the store's schema to this version. Returns a message with its location and the

@@ -61,7 +61,8 @@ pub(super) fn run(args: &WatchArgs) -> anyhow::Result<()> {
 
 async fn watch(args: &WatchArgs) -> anyhow::Result<()> {
     let mut socket = connect(&args.connect, &args.asset, args.hz).await?;
-    let mut screen = Screen { redraws: std::io::stdout().is_terminal(), ..Screen::default() };
+    let redraws = std::io::stdout().is_terminal();
+    let mut screen = Screen { asset: args.asset.clone(), redraws, ..Screen::default() };
     let mut left = args.states.unwrap_or(u64::MAX);
     while left > 0 {
         let Some(message) = socket.next().await else { bail!("the service closed the stream") };
@@ -85,6 +86,8 @@ async fn watch(args: &WatchArgs) -> anyhow::Result<()> {
 /// The output, in a terminal or as plain lines.
 #[derive(Default)]
 struct Screen {
+    /// Name of the asset.
+    asset: String,
     /// Whether each state replaces the previous one.
     redraws: bool,
     /// Number of lines of the previous state.
@@ -107,13 +110,7 @@ impl Screen {
     /// A state as one line, after a heading if the session is another one, and after the
     /// progress of learning if it has changed.
     fn plain(&mut self, state: &StateView) -> Vec<String> {
-        let mut lines = Vec::new();
-        let session = state.session.clone().unwrap_or_else(|| "no session".to_owned());
-        if self.session.as_ref() != Some(&session) {
-            lines.push(format!("{}, {session}", state.asset));
-            lines.push(HEADING.to_owned());
-            self.session = Some(session);
-        }
+        let mut lines = self.heading(state.session.as_deref().unwrap_or("no session"));
         let learning = state.learning.as_ref().map(|learning| learning.summary.clone());
         if self.learning != learning {
             let summary = learning.iter().map(|summary| table::wrapped("  learning: ", summary));
@@ -124,13 +121,32 @@ impl Screen {
         lines
     }
 
+    /// The heading of plain lines, if they are about another session than those before.
+    fn heading(&mut self, session: &str) -> Vec<String> {
+        if self.session.as_deref() == Some(session) {
+            return Vec::new();
+        }
+        self.session = Some(session.to_owned());
+        vec![format!("{}, {session}", self.asset), HEADING.to_owned()]
+    }
+
     fn fault(&mut self, fault: &FaultView) -> std::io::Result<()> {
+        let lines = self.transition(fault);
         let mut out = output::stdout();
         self.erase(&mut out)?;
         self.drawn = 0;
-        let when = format!("{:>8.2} s  ", fault.t_s);
-        writeln!(out, "{}", table::wrapped(&when, &fault.summary))?;
+        lines.iter().try_for_each(|line| writeln!(out, "{line}"))?;
         out.flush()
+    }
+
+    /// A transition, after a heading if plain lines were about another session.
+    fn transition(&mut self, fault: &FaultView) -> Vec<String> {
+        let mut lines = match self.redraws {
+            true => Vec::new(),
+            false => self.heading(&fault.session),
+        };
+        lines.push(table::wrapped(&format!("{:>8.2} s  ", fault.t_s), &fault.summary));
+        lines
     }
 
     /// Erases the lines of the previous state (ECMA-48 CUU, ED).
@@ -212,9 +228,13 @@ fn bar(name: &str, axis: &AxisEvidenceView) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::wire::basis::Basis;
     use crate::wire::learning::LearningState;
     use crate::wire::service::state_view;
+    use crate::wire::verdict::fault_view;
+    use offbd_core::diagnosis::{Evidence, StatusByte, Suspicion, Transition};
     use offbd_core::engine::State;
+    use offbd_core::vocabulary::{FaultCode, FaultStatus, SimTime};
 
     fn axis(residual: Option<f64>) -> AxisEvidenceView {
         AxisEvidenceView {
@@ -262,7 +282,7 @@ mod tests {
 
     #[test]
     fn plain_lines_fit_and_say_once_what_they_are_about() {
-        let mut screen = Screen::default();
+        let mut screen = Screen { asset: "rig".to_owned(), ..Screen::default() };
         let mut state = state_view("rig", None, &State::default());
         state.session = Some("monday".to_owned());
         state.t_s = Some(123_456.78);
@@ -275,6 +295,26 @@ mod tests {
         assert_eq!(screen.plain(&state).len(), 1);
         state.session = None;
         assert_eq!(screen.plain(&state)[0], "rig, no session");
+    }
+
+    #[test]
+    fn a_transition_comes_after_the_heading_of_its_session() {
+        let transition = Transition {
+            at: SimTime::new(2.5).unwrap(),
+            code: FaultCode::XServo,
+            status: FaultStatus::Confirmed,
+            byte: StatusByte::default(),
+            suspicion: Suspicion::default(),
+            evidence: Evidence::default(),
+        };
+        let fault = fault_view("monday", &Basis::default(), &transition);
+        let mut screen = Screen { asset: "rig".to_owned(), ..Screen::default() };
+        let first = screen.transition(&fault);
+        assert_eq!(first[..2], ["rig, monday", HEADING]);
+        assert!(first[2].starts_with("    2.50 s  x_servo "), "{first:?}");
+        assert_eq!(screen.transition(&fault), first[2..]);
+        let mut terminal = Screen { redraws: true, ..Screen::default() };
+        assert_eq!(terminal.transition(&fault), first[2..], "the session is in the state's lines");
     }
 
     #[test]
