@@ -54,8 +54,8 @@ impl From<StoredProvenance> for ProvenanceView {
         Self {
             first_occurrence: stored.first_occurrence.map(occurrence),
             last_occurrence: stored.last_occurrence.map(occurrence),
-            acknowledgement: stored.acknowledgement.map(ActView::from),
-            cleared: stored.cleared.map(ActView::from),
+            acknowledgement: stored.acknowledgement.map(|act| ActView::from(*act)),
+            cleared: stored.cleared.map(|act| ActView::from(*act)),
         }
     }
 }

@@ -148,7 +148,7 @@ struct StoredAnswer {
 
 /// Sessions and people behind a fault record: where and when the fault occurred, who
 /// acknowledged or cleared it. The engine knows neither.
-// Occurrences are boxed: most codes of most assets have none.
+// Boxed: most codes of most assets have none of them.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StoredProvenance {
     #[serde(default)]
@@ -157,10 +157,10 @@ pub struct StoredProvenance {
     pub last_occurrence: Option<Box<StoredOccurrence>>,
     /// Of the current occurrence.
     #[serde(default)]
-    pub acknowledgement: Option<StoredAct>,
+    pub acknowledgement: Option<Box<StoredAct>>,
     /// The last clear of the code.
     #[serde(default)]
-    pub cleared: Option<StoredAct>,
+    pub cleared: Option<Box<StoredAct>>,
 }
 
 /// An occurrence of a fault.
@@ -206,7 +206,7 @@ impl StoredMemory {
 impl StoredRecord {
     #[must_use]
     pub fn of(code: FaultCode, record: &FaultRecord) -> Self {
-        let suspicion = record.suspicion.as_ref();
+        let suspicion = record.suspicion.as_deref();
         let candidates = suspicion.map(|s| s.candidates.iter().map(StoredCandidate::of).collect());
         Self {
             code: code.into(),
@@ -255,7 +255,7 @@ impl StoredRecord {
             last_onset: self.last_onset_s.and_then(SimTime::new),
             failed_cycles: self.failed_cycles,
             acknowledged: self.acknowledged,
-            suspicion: (suspicion != Suspicion::default()).then_some(suspicion),
+            suspicion: (suspicion != Suspicion::default()).then(|| Box::new(suspicion)),
             freeze_frame: self.freeze_frame.as_ref().map(StoredEvidence::evidence).map(Box::new),
             in_use: InUse {
                 cycles: self.in_use.operation_cycles,

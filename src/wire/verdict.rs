@@ -312,7 +312,7 @@ pub struct Verdict {
     n_accepted: u64,
     confirmed: Vec<FaultCode>,
     /// The suspicion of each code when its test last failed in this session.
-    suspected: [Option<Suspicion>; FaultCode::COUNT],
+    suspected: [Option<Box<Suspicion>>; FaultCode::COUNT],
 }
 
 /// The state of a hasher as bytes.
@@ -361,7 +361,7 @@ impl Verdict {
     fn note(&mut self, transition: &Transition) {
         let Transition { code, status, byte, suspicion, .. } = transition;
         if byte.test_failed() {
-            self.suspected[*code as usize] = Some(suspicion.clone());
+            self.suspected[*code as usize] = Some(Box::new(suspicion.clone()));
             if *status == FaultStatus::Confirmed && !self.confirmed.contains(code) {
                 self.confirmed.push(*code);
             }

@@ -152,9 +152,9 @@ fn next_provenance(
 ) -> StoredProvenance {
     let mut known = known.clone();
     match action.map(|action| (action.kind, &action.act)) {
-        Some((ActionKind::Clear, view)) => known.cleared = Some(view.clone()),
+        Some((ActionKind::Clear, view)) => known.cleared = Some(Box::new(view.clone())),
         Some((ActionKind::Acknowledge, view)) if !before.acknowledged => {
-            known.acknowledgement = Some(view.clone());
+            known.acknowledgement = Some(Box::new(view.clone()));
         }
         _ => {}
     }

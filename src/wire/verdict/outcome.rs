@@ -95,7 +95,7 @@ impl Verdict {
     }
 
     fn judged_view(&self, code: FaultCode, monitor: &MonitorState) -> JudgedView {
-        let suspected = self.suspected[code as usize].as_ref();
+        let suspected = self.suspected[code as usize].as_deref();
         let candidates = suspected.map(|s| s.candidates.iter().map(candidate_view).collect());
         JudgedView {
             code: code.into(),
@@ -107,7 +107,7 @@ impl Verdict {
     }
 
     fn outcome(&self, code: FaultCode, reach: Reach) -> Outcome {
-        let suspected = self.suspected[code as usize].as_ref();
+        let suspected = self.suspected[code as usize].as_deref();
         match (self.confirmed.contains(&code), suspected, reach) {
             (true, Some(suspicion), _) if is_ambiguous(suspicion) => Outcome::CannotTell,
             (true, ..) => Outcome::Fault,

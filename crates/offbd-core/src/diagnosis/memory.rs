@@ -99,10 +99,10 @@ pub struct FaultRecord {
     pub failed_cycles: u32,
     /// Whether the current occurrence has been acknowledged.
     pub acknowledged: bool,
-    /// The suspicion when the test last failed.
-    pub suspicion: Option<Suspicion>,
-    /// The evidence at the first failure of the current occurrence. Boxed: most records
-    /// have none, and every asset has several.
+    /// The suspicion when the test last failed. Boxed: most records have none, and every
+    /// asset has several.
+    pub suspicion: Option<Box<Suspicion>>,
+    /// The evidence at the first failure of the current occurrence. Boxed likewise.
     pub freeze_frame: Option<Box<Evidence>>,
     /// How often the monitor could judge.
     pub in_use: InUse,
@@ -188,7 +188,7 @@ impl FaultMemory {
         if !before.failed_this_cycle() {
             record.failed_cycles = record.failed_cycles.saturating_add(1);
         }
-        record.suspicion = Some(suspicion.clone());
+        record.suspicion = Some(Box::new(suspicion.clone()));
         record.good_cycles = 0;
         record.healed = false;
         record.status.failed();
@@ -200,7 +200,7 @@ impl FaultMemory {
     pub fn trip(&mut self, code: FaultCode, suspicion: &Suspicion, rules: &MemoryRules) -> bool {
         let record = self.record_mut(code);
         let before = record.status;
-        record.suspicion = Some(suspicion.clone());
+        record.suspicion = Some(Box::new(suspicion.clone()));
         if !record.tripped_this_cycle {
             record.tripped_this_cycle = true;
             record.trips = record.trips.saturating_add(1);
@@ -218,7 +218,7 @@ impl FaultMemory {
         let named = record.kind().is_none() && suspicion.kind.is_some();
         let named = named && record.status.test_failed() && record.status.confirmed();
         if named {
-            record.suspicion = Some(suspicion.clone());
+            record.suspicion = Some(Box::new(suspicion.clone()));
         }
         named
     }

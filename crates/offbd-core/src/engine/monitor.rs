@@ -260,7 +260,7 @@ pub(super) fn transition(
         code,
         status: record.word(),
         byte: record.status,
-        suspicion: record.suspicion.clone().unwrap_or_default(),
+        suspicion: record.suspicion.as_deref().cloned().unwrap_or_default(),
         evidence: evidence.clone(),
     }
 }
