@@ -63,7 +63,7 @@ pub(super) fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
     if args.format == OutputFormat::Table {
         report(&rig, &calibration);
     }
-    rig.calibration = Some(calibration);
+    rig.calibration = Some(Box::new(calibration));
     write_asset(&rig, &args.output)?;
     match args.format {
         OutputFormat::Table => Ok(()),

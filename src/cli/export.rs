@@ -123,7 +123,7 @@ fn info(args: &SessionExport) -> anyhow::Result<SessionInfo> {
     Ok(SessionInfo {
         session,
         asset_file: Some(serde_json::to_string(&asset::view(&setup.rig))?),
-        calibration_id: setup.rig.calibration.as_ref().map(asset::calibration_id),
+        calibration_id: setup.rig.calibration.as_deref().map(asset::calibration_id),
         verdict_hash: Some(judged.summary.verdict_hash),
     })
 }

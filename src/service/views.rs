@@ -61,7 +61,7 @@ pub(super) fn session_info(row: &SessionRow) -> Result<SessionInfo, ServiceError
     Ok(SessionInfo {
         session: row.name.clone(),
         asset_file: Some(row.setup.clone()),
-        calibration_id: rig(&row.setup)?.calibration.as_ref().map(asset::calibration_id),
+        calibration_id: rig(&row.setup)?.calibration.as_deref().map(asset::calibration_id),
         verdict_hash: row.verdict_hash.clone(),
     })
 }

@@ -437,7 +437,7 @@ pub fn rig(view: &AssetView) -> Result<Rig, Invalid> {
         },
         mapping: mapping(&view.axes.clone().unwrap_or_default())?,
         diagnostics: diagnostics(&view.diagnostics.clone().unwrap_or_default())?,
-        calibration: view.calibration.as_ref().map(calibration).transpose()?,
+        calibration: view.calibration.as_ref().map(calibration).transpose()?.map(Box::new),
     };
     rig.check()?;
     Ok(rig)
@@ -648,7 +648,7 @@ pub fn view(rig: &Rig) -> AssetView {
             false_alarms_per_rig_year: rig.diagnostics.false_alarms_per_rig_year,
             debounce_s: rig.diagnostics.debounce_s,
         }),
-        calibration: rig.calibration.as_ref().map(calibration_view),
+        calibration: rig.calibration.as_deref().map(calibration_view),
     }
 }
 
@@ -796,7 +796,7 @@ mod tests {
         rig.mapping.swap = true;
         rig.mapping.origin_m.y = -0.02;
         rig.diagnostics.debounce_s = Some(2.0);
-        rig.calibration = Some(Calibration {
+        let calibration = Calibration {
             axes: PerAxis { x: Some(learnt), y: None },
             sensor: SensorCalibration {
                 refresh_s: 0.05,
@@ -825,7 +825,8 @@ mod tests {
                 stuck_s: Some(1.5),
                 ..Prospects::default()
             }),
-        });
+        };
+        rig.calibration = Some(Box::new(calibration));
         let json = serde_json::to_vec(&view(&rig)).unwrap();
         assert_eq!(parse(&json).unwrap(), rig);
     }

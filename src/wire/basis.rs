@@ -30,7 +30,7 @@ impl Basis {
         file.diagnostics.get_or_insert_default().profile = None;
         let hash = Sha256::digest(canonical(&file, &setup.settings).to_string());
         Self {
-            calibration_id: setup.rig.calibration.as_ref().map(calibration_id),
+            calibration_id: setup.rig.calibration.as_deref().map(calibration_id),
             settings_id: HEXLOWER.encode(&hash[..8]),
         }
     }

@@ -204,7 +204,7 @@ pub(crate) fn calibrate(
         let learnt = calibrate_with_prospects(&rig, &sessions).map_err(unusable)?;
         Ok(Calibration { origin, ..learnt })
     })?;
-    rig.calibration = Some(calibration);
+    rig.calibration = Some(Box::new(calibration));
     json(&asset::view(&rig))
 }
 

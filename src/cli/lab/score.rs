@@ -111,7 +111,7 @@ fn set_up(args: &ScoreArgs, folder: &Path) -> Result<Setup, InputError> {
         let (samples, _) = judge::read_samples(&path)?;
         let data = calibrate::data_hash(std::slice::from_ref(&path))?;
         let learnt = calibrate::learn(&rig, &[samples], &data);
-        rig.calibration = Some(learnt.map_err(|e| InputError::file(&path, e))?);
+        rig.calibration = Some(Box::new(learnt.map_err(|e| InputError::file(&path, e))?));
     }
     judge::set_up(rig, args.profile)
 }

@@ -157,7 +157,7 @@ fn calibrated(
 ) -> Result<Result<Setup, CannotCalibrate>, InputError> {
     let mut rig = model.rig.clone();
     rig.calibration = match calibrate(&rig, healthy) {
-        Ok(calibration) => Some(calibration),
+        Ok(calibration) => Some(Box::new(calibration)),
         Err(refusal) => return Ok(Err(refusal)),
     };
     rig.diagnostics.false_alarms_per_rig_year = args.per_year;

@@ -142,7 +142,7 @@ fn calibration(input: &[u8]) -> String {
     let samples: Vec<Sample> = reader.filter_map(Result::ok).collect();
     match calibrate(&Rig::chapter("fuzz"), &[samples]) {
         Ok(learnt) => {
-            let rig = Rig { calibration: Some(learnt), ..Rig::chapter("fuzz") };
+            let rig = Rig { calibration: Some(Box::new(learnt)), ..Rig::chapter("fuzz") };
             let file = serde_json::to_vec(&asset::view(&rig)).unwrap();
             let again = asset::parse(&file).map(|rig| asset::view(&rig));
             format!("learnt {}", again.is_ok())

@@ -411,7 +411,7 @@ pub fn learnt(name: &str) -> Rig {
         let origin = CalibrationOrigin { made_at, ..CalibrationOrigin::default() };
         Calibration { origin, ..calibrate(&Rig::chapter("a"), &[healthy]).unwrap() }
     };
-    let calibration = Some(LEARNT.get_or_init(learn).clone());
+    let calibration = Some(Box::new(LEARNT.get_or_init(learn).clone()));
     Rig { calibration, ..Rig::chapter(name) }
 }
 

@@ -74,7 +74,8 @@ pub struct Rig {
     pub servo: ServoSpec,
     pub mapping: AxisMapping,
     pub diagnostics: DiagnosticsSpec,
-    pub calibration: Option<Calibration>,
+    /// Boxed: it is most of a rig, and many rigs have none.
+    pub calibration: Option<Box<Calibration>>,
 }
 
 /// Distance between ball and edge at which contact may begin, m. Chosen.

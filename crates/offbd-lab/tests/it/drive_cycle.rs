@@ -56,7 +56,7 @@ fn learnt(model: &RigModel, n_sessions: u64) -> Rig {
     };
     let sessions: Vec<Vec<Sample>> = (5..5 + n_sessions).map(session).collect();
     let calibration = calibrate(&model.rig, &sessions).unwrap();
-    Rig { calibration: Some(calibration), ..model.rig.clone() }
+    Rig { calibration: Some(Box::new(calibration)), ..model.rig.clone() }
 }
 
 /// The chapter's rig, calibrated on one session, and its drive cycle.

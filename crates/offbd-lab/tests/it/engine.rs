@@ -30,7 +30,7 @@ fn session(
 fn learnt(preset: Preset) -> Setup {
     let mut rig: Rig = preset.model().unwrap().rig;
     let healthy = session(preset, Reference::Steps, 120.0, 1000, "");
-    rig.calibration = Some(calibrate(&rig, &[healthy]).unwrap());
+    rig.calibration = Some(Box::new(calibrate(&rig, &[healthy]).unwrap()));
     Setup::new(rig, None).unwrap()
 }
 

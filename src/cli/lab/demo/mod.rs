@@ -178,7 +178,7 @@ fn calibrated_rig(seed: u64) -> anyhow::Result<Rig> {
     let sha256 = HEXLOWER.encode(&Sha256::digest(&file));
     let calibration = calibrate::learn(&rig, &[samples], &sha256)?;
     calibrate::report(&rig, &calibration);
-    rig.calibration = Some(calibration);
+    rig.calibration = Some(Box::new(calibration));
     Ok(rig)
 }
 

@@ -39,7 +39,7 @@ fn log_likelihood_nats(
     learnt: &Calibration,
     sessions: &[Vec<Sample>],
 ) -> Option<PerAxis<f64>> {
-    let rig = Rig { calibration: Some(learnt.clone()), ..rig.clone() };
+    let rig = Rig { calibration: Some(Box::new(learnt.clone())), ..rig.clone() };
     let setup = Setup::new(rig, None).ok()?;
     let nats = |session: &Vec<Sample>| judge(&setup, 1, session).log_likelihood_nats;
     let sum = |a: PerAxis<f64>, b: PerAxis<f64>| PerAxis { x: a.x + b.x, y: a.y + b.y };

@@ -195,7 +195,7 @@ pub fn calibrate_with_prospects(
     sessions: &[Vec<Sample>],
 ) -> Result<Calibration, CannotCalibrate> {
     let mut calibration = calibrate(rig, sessions)?;
-    let learnt = Rig { calibration: Some(calibration.clone()), ..rig.clone() };
+    let learnt = Rig { calibration: Some(Box::new(calibration.clone())), ..rig.clone() };
     calibration.prospects = prospects(&learnt, sessions);
     Ok(calibration)
 }

@@ -101,7 +101,7 @@ struct Fold {
 
 impl Fold {
     fn tests(&self, rig: &Rig, widening: &Widening) -> Vec<SelfTest> {
-        let rig = Rig { calibration: Some(widening.of(&self.taught)), ..rig.clone() };
+        let rig = Rig { calibration: Some(Box::new(widening.of(&self.taught))), ..rig.clone() };
         let Ok(mut setup) = Setup::new(rig, None) else { return Vec::new() };
         setup.settings = impatient(&setup.settings);
         self.judged.iter().map(|(session, samples)| judge(&setup, *session, samples)).collect()

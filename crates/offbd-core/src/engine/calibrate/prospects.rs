@@ -310,7 +310,7 @@ mod tests {
     fn foreseen() -> Prospects {
         let mut rig = Rig::chapter("a");
         let sessions = [session(60.0, 0.03, 1.0)];
-        rig.calibration = Some(calibrate(&rig, &sessions).unwrap());
+        rig.calibration = Some(Box::new(calibrate(&rig, &sessions).unwrap()));
         prospects(&rig, &sessions).unwrap()
     }
 
@@ -332,7 +332,7 @@ mod tests {
         let mut rig = Rig::chapter("a");
         let session = session(60.0, 0.03, 1.0);
         assert_eq!(prospects(&rig, core::slice::from_ref(&session)), None);
-        rig.calibration = Some(calibrate(&rig, core::slice::from_ref(&session)).unwrap());
+        rig.calibration = Some(Box::new(calibrate(&rig, core::slice::from_ref(&session)).unwrap()));
         assert_eq!(prospects(&rig, &[session[..1400].to_vec()]), None);
     }
 }

@@ -37,7 +37,7 @@ fn learnt(x: Option<AxisCalibration>, y: Option<AxisCalibration>) -> Rig {
         certificate: None,
         prospects: None,
     };
-    Rig { calibration: Some(calibration), ..Rig::chapter("a") }
+    Rig { calibration: Some(Box::new(calibration)), ..Rig::chapter("a") }
 }
 
 fn good() -> Rig {

@@ -104,7 +104,8 @@ fn a_wrong_sign_is_named_of_its_axis() {
 fn a_calibration_answers_for_the_axes() {
     let mut rig = Rig::chapter("a");
     let beam = changed(|s| s.y_m = None);
-    rig.calibration = Some(crate::engine::calibrate(&rig, core::slice::from_ref(&beam)).unwrap());
+    let learnt = crate::engine::calibrate(&rig, core::slice::from_ref(&beam)).unwrap();
+    rig.calibration = Some(Box::new(learnt));
     let found = |samples: &[Sample]| Plausibility::of(&rig, samples).misfits();
     assert_eq!(found(&beam), []);
     assert_eq!(found(&changed(|s| scale(&mut s.x_m, -1.0))), []);

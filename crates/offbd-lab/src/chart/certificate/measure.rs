@@ -75,7 +75,7 @@ pub(super) fn rig(plan: &CertificatePlan, seed: u64) -> Result<RigResult, ChartE
         Ok(calibration) => calibration,
         Err(refusal) => return Ok(RigResult { refused: Some(refusal.to_string()), ..none }),
     };
-    let rig = Rig { calibration: Some(calibration.clone()), ..model.rig.clone() };
+    let rig = Rig { calibration: Some(Box::new(calibration.clone())), ..model.rig.clone() };
     let setup = Setup::new(rig, None)?;
     let monitors = watch(plan, &model, &setup, &calibration, seed)?;
     let delays = promises(&calibration)

@@ -91,7 +91,7 @@ impl CalibratedRig {
             ..Session::healthy(preset, Reference::Lissajous, CALIBRATION_S, u64::MAX)
         };
         let samples = session.record()?.samples;
-        rig.calibration = Some(calibrate(&rig, std::slice::from_ref(&samples))?);
+        rig.calibration = Some(Box::new(calibrate(&rig, std::slice::from_ref(&samples))?));
         let setup = |profile| Setup::new(rig.clone(), Some(profile));
         let setups = [setup(Profile::Default)?, setup(Profile::Textbook)?];
         let trace = follow(&setups, &samples);

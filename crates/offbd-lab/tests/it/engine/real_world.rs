@@ -49,7 +49,7 @@ fn refreshed(samples: &[Sample], n: usize) -> Vec<Sample> {
 
 fn learnt_from(rig: &Rig, sessions: &[Vec<Sample>]) -> Setup {
     let calibration = calibrate(rig, sessions).unwrap();
-    Setup::new(Rig { calibration: Some(calibration), ..rig.clone() }, None).unwrap()
+    Setup::new(Rig { calibration: Some(Box::new(calibration)), ..rig.clone() }, None).unwrap()
 }
 
 fn x_of(calibration: &Calibration) -> offbd_core::diagnosis::AxisCalibration {
@@ -219,7 +219,8 @@ fn a_calibration_accuses_none_of_its_own_sessions() {
                 let rig = rig(preset);
                 let Ok(calibration) = calibrate(&rig, &sessions) else { continue };
                 let setup =
-                    Setup::new(Rig { calibration: Some(calibration), ..rig }, None).unwrap();
+                    Setup::new(Rig { calibration: Some(Box::new(calibration)), ..rig }, None)
+                        .unwrap();
                 let found = confirmed(&transitions(&setup, &sessions[0]));
                 assert!(found.is_empty(), "{preset} {seed}: {found:?}");
             }
