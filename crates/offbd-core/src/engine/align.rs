@@ -13,6 +13,9 @@ use crate::vocabulary::Sample;
 /// kHz.
 const MAX_WAITING: usize = 4096;
 
+/// Waiting samples for which there is always room. Chosen: most wait for none or few others.
+const FEW_WAITING: usize = 4;
+
 /// The waiting samples.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Align {
@@ -51,6 +54,9 @@ impl Align {
     pub(super) fn flush(&mut self) -> Option<Sample> {
         let next = self.waiting.pop_front()?;
         self.released = Some(next);
+        if self.waiting.is_empty() {
+            self.waiting.shrink_to(FEW_WAITING);
+        }
         Some(next)
     }
 
@@ -109,5 +115,13 @@ mod tests {
         assert_eq!(out, [0.0, 0.01, 0.15]);
         align.push(sample(Some(11), 0.16));
         assert!(align.pop(0.1, 0.1).is_none(), "seq 10 may still come");
+    }
+
+    #[test]
+    fn the_memory_of_many_that_have_waited_is_returned() {
+        let mut align = Align::default();
+        (0..1000).for_each(|i| align.push(sample(None, f64::from(i))));
+        while align.flush().is_some() {}
+        assert!(align.waiting.capacity() <= FEW_WAITING, "{}", align.waiting.capacity());
     }
 }

@@ -176,7 +176,8 @@ impl DeviceClock {
     /// Gives up the samples held back: the clock goes on as before.
     pub(super) fn drop_held(&mut self) {
         self.n_dropped += self.held.len() as u64;
-        self.held.clear();
+        // Keeps no memory: samples are rarely held back, and then often only once.
+        self.held = Vec::new();
     }
 
     pub(super) fn n_held(&self) -> usize {

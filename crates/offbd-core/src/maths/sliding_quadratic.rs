@@ -19,6 +19,9 @@ use nalgebra::{Matrix3, Vector3};
 /// window. 4096 is 0.5 s at 8 kHz.
 const MAX_POINTS: usize = 4096;
 
+/// Least number of readings to make room for. Chosen.
+const LEAST_GROWTH: usize = 4;
+
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Point {
     t: f64,
@@ -112,6 +115,9 @@ impl SlidingQuadratic {
             self.origin = t;
             self.sums = PowerSums::default();
         }
+        if self.points.len() == self.points.capacity() {
+            self.points.reserve_exact(self.growth(t, window_s));
+        }
         self.points.push_back(point);
         self.sums.add(t - self.origin, &point, 1.0);
         while let Some(oldest) = self.points.front().copied()
@@ -123,6 +129,17 @@ impl SlidingQuadratic {
         if t - self.origin > 2.0 * window_s {
             self.rebuild();
         }
+    }
+
+    /// The number of readings at `t` and later to make room for: as many as there are, but
+    /// no more than the window will hold at their rate.
+    fn growth(&self, t: f64, window_s: f64) -> usize {
+        let n = self.points.len();
+        let span_s = self.points.front().map_or(0.0, |oldest| t - oldest.t);
+        // Both ends of the window, and the reading that has just left it.
+        let full = (n as f64 * window_s / span_s).round() as usize;
+        let full = full.min(MAX_POINTS - 1) + 2;
+        full.saturating_sub(n).clamp(LEAST_GROWTH, n.max(LEAST_GROWTH))
     }
 
     /// Subtracts the straight line through (`t`, `position`) with slope `velocity` from
@@ -235,6 +252,17 @@ mod tests {
         assert!((fit.measured.acceleration - 0.3).abs() < 1e-6, "{fit:?}");
         assert!((fit.measured.velocity - (0.3 * t - 0.2)).abs() < 1e-6, "{fit:?}");
         assert!((fit.measured.position - path(t)).abs() < 1e-9, "{fit:?}");
+    }
+
+    #[test]
+    fn the_memory_is_that_of_the_window() {
+        for (n, period_s) in [(51, 0.01), (101, 0.005), (4, 0.2)] {
+            let filter = filled(1000, period_s, 0.5 + 1e-6, |t| t);
+            let (held, room) = (filter.points.len(), filter.points.capacity());
+            assert!(held.abs_diff(n) <= 1 && room <= n + 1 + LEAST_GROWTH, "{held} of {room}");
+        }
+        let at_once = filled(100, 0.0, 0.5, |t| t).points.capacity();
+        assert!(at_once < 200, "{at_once}");
     }
 
     proptest! {
