@@ -22,7 +22,8 @@ pub(super) struct Asset {
     pub(super) memory: FaultMemory,
     /// The provenance of its entries, as last written.
     pub(super) provenance: Provenance,
-    pub(super) open: Option<OpenSession>,
+    /// Boxed: most of an asset, and many assets have none.
+    pub(super) open: Option<Box<OpenSession>>,
     pub(super) session_rate: SessionRate,
     /// Rows of the batch that is being recorded that are no samples, and that the engine has
     /// not been told of yet.

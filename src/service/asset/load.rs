@@ -77,7 +77,8 @@ impl StoredAsset {
         metrics::counter!("offbd_samples_reevaluated_total").increment(n_behind);
         let Self { mut asset, open } = self;
         if let Some((row, open, n_evaluated)) = open {
-            asset.open = Some(evaluate(handles, &row, open, n_evaluated, &mut asset.snapshots)?);
+            let open = evaluate(handles, &row, open, n_evaluated, &mut asset.snapshots)?;
+            asset.open = Some(Box::new(open));
         }
         Ok(asset)
     }

@@ -169,7 +169,8 @@ impl Asset {
             verdict_hash: None,
         };
         let refines = self.learning.refines();
-        self.open = Some(OpenSession::new(&row, setup, self.memory.clone(), refines));
+        let open = OpenSession::new(&row, setup, self.memory.clone(), refines);
+        self.open = Some(Box::new(open));
         turn.writes.push(Write::OpenSession(row));
         self.write_memory(None, turn)
     }

@@ -459,7 +459,8 @@ mod tests {
         let ingest = |asset: &mut Asset, turn: &mut Turn<'_>| {
             let setup = Setup::new(asset.rig.clone(), None)?;
             let row = SessionRow { id: "1".to_owned(), ..SessionRow::default() };
-            asset.open = Some(OpenSession::new(&row, setup, asset.memory.clone(), false));
+            let open = OpenSession::new(&row, setup, asset.memory.clone(), false);
+            asset.open = Some(Box::new(open));
             let sample = Sample { t_s: 1.0, x_m: Some(0.0), ..Sample::default() };
             asset.record_in_open(&[(0, sample)], turn, &mut Default::default())?;
             // The error occurs before any write is collected.

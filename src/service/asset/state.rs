@@ -31,6 +31,6 @@ impl Asset {
     /// Returns the monitors of the open session; none without one.
     pub(super) fn monitors(&self) -> Vec<MonitorView> {
         let monitors = |open: &OpenSession| monitor_views(&open.judging.engine().state());
-        self.open.as_ref().map(monitors).unwrap_or_default()
+        self.open.as_deref().map(monitors).unwrap_or_default()
     }
 }
