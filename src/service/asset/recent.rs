@@ -28,7 +28,7 @@ impl RecentTrace {
     pub(in crate::service) fn push(&mut self, state: impl FnOnce() -> State) {
         let Some(n_remaining) = self.n_remaining.get().checked_sub(1) else {
             self.n_dropped += self.points.len() as u64;
-            self.points.clear();
+            self.points = VecDeque::new();
             return;
         };
         self.n_remaining.set(n_remaining);
