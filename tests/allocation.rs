@@ -5,6 +5,7 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
+use offbd::judging::Judging;
 use offbd_core::diagnosis::FaultMemory;
 use offbd_core::engine::{Engine, Input, Rig, Setup};
 use offbd_core::plant::{Ball, Contact, Motion, Plate};
@@ -93,7 +94,20 @@ fn an_engine_is_small() {
         transitions.clear();
     }
     let held = HELD.get() - before;
-    assert!((1..18 << 10).contains(&held), "{held} bytes");
+    assert!((1..14 << 10).contains(&held), "{held} bytes");
+}
+
+/// So must the rest of what their sessions need.
+#[test]
+fn a_session_that_is_judged_is_small() {
+    let before = HELD.get();
+    let setup = Setup::new(Rig::chapter("a"), None).unwrap();
+    let mut judging = Box::new(Judging::new(setup, FaultMemory::default()));
+    for i in 0..6000 {
+        judging.sample(sample(i));
+    }
+    let held = HELD.get() - before;
+    assert!((1..17 << 10).contains(&held), "{held} bytes");
 }
 
 #[test]
