@@ -227,6 +227,8 @@ impl OutlierGate {
         noise_m: f64,
         may_turn: bool,
     ) -> GateOutcome {
+        // The rim may have made what looked like a jump.
+        self.suspect = self.suspect.take().filter(|_| !may_turn);
         let held = self.track.map_or(Vector2::zeros(), |t| t.position_m);
         let position_m =
             Vector2::new(position_m.x.unwrap_or(held.x), position_m.y.unwrap_or(held.y));
@@ -332,8 +334,14 @@ impl OutlierGate {
         let before = self.new_path.take();
         let n = before.map_or(1, |e| e.n + 1);
         let agrees = |e: NewPath| (position_m - e.position_m).amax() <= reach(e.at_s);
-        if n >= BELIEVED_AFTER || before.is_some_and(agrees) {
-            return self.accept(Track::start(t_s, position_m, n));
+        let start = Track::start(t_s, position_m, n);
+        match before {
+            Some(e) if agrees(e) => return self.accept(start),
+            Some(e) if n >= BELIEVED_AFTER => {
+                let velocity_m_s = (position_m - e.position_m) / (t_s - e.at_s);
+                return self.accept(Track { velocity_m_s, ..start });
+            }
+            _ => {}
         }
         self.new_path = Some(NewPath { n, ..NewPath::start(t_s, position_m, false) });
         GateOutcome::Refused
@@ -512,6 +520,22 @@ mod tests {
             gate.take(t, along_x(1.5 * t), 1e-3).usable()
         };
         assert_eq!([0, 1, 2, 3].map(&mut take), [false, false, false, true]);
+        assert!((4..50).all(take), "its velocity is known");
+    }
+
+    /// What looked like a jump just before a ball may have met the rim is none.
+    #[test]
+    fn a_jump_is_not_suspected_any_more_at_a_rim() {
+        let jumped = |at_rim: u32| {
+            let mut gate = resting(0.1);
+            let take = |i: u32| match i == at_rim {
+                true => gate.take_at_rim(f64::from(i) * 0.1, along_x(0.03), 1e-3),
+                false => gate.take(f64::from(i) * 0.1, along_x(0.03), 1e-3),
+            };
+            (0..10).map(take).any(|gated| matches!(gated, GateOutcome::Jumped(_)))
+        };
+        assert!(jumped(10), "never at the rim");
+        assert!(!jumped(1));
     }
 
     #[test]

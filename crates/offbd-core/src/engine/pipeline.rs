@@ -383,7 +383,8 @@ impl Pipeline {
         for (i, axis) in Axis::ALL.into_iter().enumerate() {
             let servo = &mut self.servos[axis];
             match moment.position[axis] {
-                _ if self.edge.at_edge || moment.command[axis].is_none() => servo.pause(),
+                _ if self.edge.at_edge => servo.restart(),
+                _ if moment.command[axis].is_none() => servo.pause(),
                 Some(_) if !answers[axis] => servo.pause(),
                 Some(position) if !refused && !self.gate.suspects_jump() => {
                     let path = TwinPath {

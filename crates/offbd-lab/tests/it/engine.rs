@@ -104,6 +104,40 @@ fn a_ball_that_oscillates_because_of_its_controller_is_no_fault() {
     }
 }
 
+/// A controller that makes the ball beat against the rim is no fault of the rig either: what
+/// comes before and after a bounce is not one path.
+#[test]
+fn bounces_off_the_rim_are_no_fault() {
+    let mut n_bounced = 0;
+    for preset in [Preset::Chapter, Preset::Pingpong] {
+        let model = preset.model().unwrap();
+        let (setup, usual) = (learnt(preset), model.gains());
+        let derivative = usual.derivative;
+        let gains = [
+            PidGains { derivative: 0.3 * derivative, ..usual },
+            PidGains { derivative: 3.0 * derivative, ..usual },
+            PidGains { proportional: 3.0 * usual.proportional, ..usual },
+            PidGains { proportional: 3.0 * usual.proportional, derivative: 0.0, ..usual },
+        ];
+        for (gains, seed) in gains.into_iter().flat_map(|g| [(g, 10), (g, 13), (g, 15)]) {
+            let calm = Disturbances::default();
+            let mut rig = SimulatedRig::new(model.clone(), Reference::Steps, calm, seed).unwrap();
+            rig.tune(gains).unwrap();
+            let (mut samples, mut bounced) = (Vec::new(), false);
+            while rig.truth().t_s < 60.0 {
+                samples.push(rig.next_sample());
+                let (plate, place) = (&model.rig.plate, rig.truth().position);
+                let left_m = plate.edge_distance_m(place.x, place.y);
+                bounced |= left_m < model.rig.ball.radius_m() + 1e-3;
+            }
+            let found = confirmed(&transitions(&setup, &samples));
+            assert!(found.is_empty(), "{preset} {gains:?} {seed}: {found:?}");
+            n_bounced += u32::from(bounced);
+        }
+    }
+    assert!(n_bounced >= 12, "{n_bounced} of 24");
+}
+
 #[test]
 fn validate_that_injected_faults_are_found_and_nothing_else() {
     let setup = learnt(Preset::Chapter);

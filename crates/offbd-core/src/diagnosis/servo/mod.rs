@@ -253,7 +253,9 @@ impl ServoFilterBank {
         self.last = None;
     }
 
-    /// Restarts after a gap, in which anything may have happened to the ball.
+    /// Restarts after a gap, in which anything may have happened to the ball, and at the
+    /// edge: what comes before and after a bounce is not one path, and at first the speed
+    /// of the ball is not known. The estimates of the servo and the evidence are kept.
     pub fn restart(&mut self) {
         self.pause();
         self.path.clear();
