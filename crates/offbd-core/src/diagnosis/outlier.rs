@@ -227,6 +227,21 @@ impl OutlierGate {
         noise_m: f64,
         may_turn: bool,
     ) -> GateOutcome {
+        let gated = self.weigh(t_s, position_m, noise_m, may_turn);
+        // After a bounce the track is a new one.
+        if let (true, Some(track)) = (may_turn, &mut self.track) {
+            track.n = 1;
+        }
+        gated
+    }
+
+    fn weigh(
+        &mut self,
+        t_s: f64,
+        position_m: PerAxis<Option<f64>>,
+        noise_m: f64,
+        may_turn: bool,
+    ) -> GateOutcome {
         // The rim may have made what looked like a jump.
         self.suspect = self.suspect.take().filter(|_| !may_turn);
         let held = self.track.map_or(Vector2::zeros(), |t| t.position_m);
@@ -261,9 +276,7 @@ impl OutlierGate {
                 self.follow(Track::start(t_s, position_m, BELIEVED_AFTER));
                 return GateOutcome::Jumped(jump);
             }
-            let next = track.followed_by(t_s, position_m);
-            // After a bounce the track is a new one.
-            return self.accept(if may_turn { Track { n: 1, ..next } } else { next });
+            return self.accept(track.followed_by(t_s, position_m));
         }
         if let Some(before) = self.before.take()
             && before.off_m(t_s, position_m) <= reach(before.at_s)
