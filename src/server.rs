@@ -286,8 +286,8 @@ pub async fn serve(config: Config) -> Result<()> {
     server.shutdown().await
 }
 
-/// Waits for SIGINT or SIGTERM. The system's own reaction, which is to end the process, no
-/// longer applies once this has returned, before anything waits.
+/// Returns a future that waits for SIGINT or SIGTERM. From now on these do not end the process
+/// by themselves, even if nothing has waited yet.
 #[cfg(unix)]
 fn stop_signal() -> Result<impl Future<Output = Result<()>>> {
     use tokio::signal::unix::{SignalKind, signal};

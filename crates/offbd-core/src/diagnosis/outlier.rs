@@ -217,7 +217,14 @@ impl OutlierGate {
         position_m: PerAxis<Option<f64>>,
         noise_m: f64,
     ) -> GateOutcome {
-        self.judge(t_s, position_m, noise_m, true)
+        // The rim may have made what looked like a jump.
+        self.suspect = None;
+        let gated = self.judge(t_s, position_m, noise_m, true);
+        // After a bounce the track is a new one.
+        if let Some(track) = &mut self.track {
+            track.n = 1;
+        }
+        gated
     }
 
     fn judge(
@@ -227,23 +234,6 @@ impl OutlierGate {
         noise_m: f64,
         may_turn: bool,
     ) -> GateOutcome {
-        let gated = self.weigh(t_s, position_m, noise_m, may_turn);
-        // After a bounce the track is a new one.
-        if let (true, Some(track)) = (may_turn, &mut self.track) {
-            track.n = 1;
-        }
-        gated
-    }
-
-    fn weigh(
-        &mut self,
-        t_s: f64,
-        position_m: PerAxis<Option<f64>>,
-        noise_m: f64,
-        may_turn: bool,
-    ) -> GateOutcome {
-        // The rim may have made what looked like a jump.
-        self.suspect = self.suspect.take().filter(|_| !may_turn);
         let held = self.track.map_or(Vector2::zeros(), |t| t.position_m);
         let position_m =
             Vector2::new(position_m.x.unwrap_or(held.x), position_m.y.unwrap_or(held.y));
