@@ -95,38 +95,60 @@ pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Ser
     let address = listener.local_addr()?;
     let limits = config.service_limits();
     let senders = Senders::new(&limits.notifications);
-    let (service, workers) = match &node {
-        None => Service::start(store.clone(), writer, limits, provider).await?,
+    let policy = Arc::new(policy(&config)?);
+    warn_of_access(&config, &policy, &store).await?;
+    let started = match &node {
+        None => Service::start(store.clone(), writer, limits, provider).await,
         Some(NodeListener { identity, .. }) => {
             let me = identity.clone();
-            Service::start_node(store.clone(), writer, limits, provider, me).await?
+            Service::start_node(store.clone(), writer, limits, provider, me).await
+        }
+    };
+    let (service, workers) = match started {
+        Ok(started) => started,
+        Err(error) => {
+            store.close().await;
+            return Err(error.into());
         }
     };
     let closing = CancellationToken::new();
-    let budget = BodyBudget::new(config.limits.bodies_bytes);
-    let policy = Arc::new(policy(&config)?);
-    warn_of_access(&config, &policy, &store).await?;
+    let mut server = Server {
+        address,
+        closing: closing.clone(),
+        deadline: Duration::from_secs(config.limits.shutdown_s),
+        serving: JoinSet::new(),
+        buses: Vec::new(),
+        service: service.clone(),
+        store,
+        workers,
+        lock,
+    };
+    match buses::start(&config, &service, &closing).await {
+        Ok(buses) => server.buses = buses,
+        Err(error) => {
+            drop(service);
+            server.shutdown().await?;
+            return Err(error);
+        }
+    }
     tokio::spawn(service.notifier(senders).run());
-    let buses = buses::start(&config, &service, &closing).await?;
     tokio::spawn(rebuild(service.clone(), closing.clone()));
-    let (leaving, demo_routes) = (service.clone(), demo.is_some());
+    let budget = BodyBudget::new(config.limits.bodies_bytes);
+    let demo_routes = demo.is_some();
     let app = App { service, budget, policy, closing: closing.clone(), demo: demo_routes };
     let router = http::router(app, demo.unwrap_or_default());
-    let mut serving = JoinSet::new();
     if let Some(NodeListener { listener, .. }) = node {
         let http = HttpListener::new(&config.limits, None, closing.clone());
-        serving.spawn(http.serve(listener, router.clone()));
+        server.serving.spawn(http.serve(listener, router.clone()));
     }
     let http = HttpListener::new(&config.limits, tls.clone(), closing.clone());
-    serving.spawn(http.serve(listener, router));
+    server.serving.spawn(http.serve(listener, router));
     tls.map(|tls| tokio::spawn(tls.watch(closing.clone())));
     keys.map(|keys| tokio::spawn(keys.watch(closing.clone())));
     tokio::spawn(http::keep_metrics(closing.clone()));
     tokio::spawn(keep_threads(closing.clone()));
-    tracing::info!(%address, store = %store.location(), "serving");
-    let deadline = Duration::from_secs(config.limits.shutdown_s);
-    let service = leaving;
-    Ok(Server { address, closing, deadline, serving, buses, service, store, workers, lock })
+    tracing::info!(%address, store = %server.store.location(), "serving");
+    Ok(server)
 }
 
 /// Checks that the directory of cold data is there. It is not created, because it may be a

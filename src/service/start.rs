@@ -129,20 +129,41 @@ pub(super) struct Parts {
 }
 
 impl Parts {
-    /// Starts the writer, then the other threads and tasks.
-    async fn start(self, service: &Service) -> Result<Workers, ServiceError> {
+    /// Starts the writer, then the other threads and tasks, and queues unfinished jobs again.
+    /// If that fails, nothing of it is left: it would still change the store.
+    async fn start(self, service: Service) -> Result<(Service, Workers), ServiceError> {
+        let Self { committer, shards, loader, jobs, upkeep, node, communication } = self;
+        let mut workers = Workers {
+            shards: Vec::new(),
+            jobs: Vec::new(),
+            closing: service.inner.handles.closing.clone(),
+            committer: committer.spawn()?,
+        };
         let Inner { limits, handles, job_context, .. } = &*service.inner;
-        let committer = self.committer.spawn()?;
-        // Before the sweeper, which deletes them.
-        service.discard_imports(handles.ownership.filter().as_deref()).await?;
-        service.inner.mutes.load(handles.store.mutes(handles.clock.now()).await?);
-        let shards = self.shards.into_iter().map(Shard::spawn).collect::<Result<_, _>>()?;
-        let mut jobs = jobs::spawn(limits.jobs, job_context, self.jobs);
-        jobs.push(tokio::spawn(self.loader.run()));
-        jobs.extend(self.upkeep.spawn());
-        jobs.extend(self.node.into_iter().flat_map(|node| cluster::spawn(node, service)));
-        jobs.push(tokio::spawn(self.communication.run()));
-        Ok(Workers { shards, jobs, closing: handles.closing.clone(), committer })
+        let started = async {
+            // Before the sweeper, which deletes them.
+            service.discard_imports(handles.ownership.filter().as_deref()).await?;
+            service.inner.mutes.load(handles.store.mutes(handles.clock.now()).await?);
+            for shard in shards {
+                workers.shards.push(shard.spawn()?);
+            }
+            workers.jobs = jobs::spawn(limits.jobs, job_context, jobs);
+            workers.jobs.push(tokio::spawn(loader.run()));
+            workers.jobs.extend(upkeep.spawn());
+            let is_node = node.is_some();
+            workers.jobs.extend(node.into_iter().flat_map(|node| cluster::spawn(node, &service)));
+            workers.jobs.push(tokio::spawn(communication.run()));
+            // A node does so for each partition that it takes.
+            if is_node { Ok(()) } else { service.resume_jobs(None).await }
+        };
+        match started.await {
+            Ok(()) => Ok((service, workers)),
+            Err(error) => {
+                drop(service);
+                workers.finish().await;
+                Err(error)
+            }
+        }
     }
 }
 
@@ -207,9 +228,7 @@ impl Service {
         provider: Option<Provider>,
     ) -> Result<(Self, Workers), ServiceError> {
         let (service, parts) = Self::assemble(store, writer, limits, provider, None, Clock::System);
-        let workers = parts.start(&service).await?;
-        service.resume_jobs(None).await?;
-        Ok((service, workers))
+        parts.start(service).await
     }
 
     /// Starts the service as the node `me` of a cluster. It takes partitions by and by.
@@ -226,8 +245,7 @@ impl Service {
         let cluster = Some(Cluster::new(me, store.cluster_secret().await?));
         let (service, parts) =
             Self::assemble(store, writer, limits, provider, cluster, Clock::System);
-        let workers = parts.start(&service).await?;
-        Ok((service, workers))
+        parts.start(service).await
     }
 
     /// Continues what former owners of these partitions have left unfinished.

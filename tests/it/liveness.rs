@@ -6,7 +6,7 @@ use crate::support::{Client, DEADLINE, ServiceFixture, batch, eventually, packed
 use futures_util::{SinkExt, StreamExt};
 use offbd_core::vocabulary::Sample;
 use serde_json::{Value, json};
-use sqlx::{AssertSqlSafe, Executor};
+use sqlx::{AssertSqlSafe, Connection, Executor};
 use tokio::net::TcpStream;
 use tokio_tungstenite::tungstenite::Message;
 use tokio_tungstenite::{MaybeTlsStream, WebSocketStream, connect_async};
@@ -376,5 +376,38 @@ async fn a_shard_answers_while_the_writer_has_no_room() {
         let mut stored = client.recording(name, "s").await;
         stored.sort_by_key(|sample| sample.seq);
         assert_eq!(stored, samples);
+    }
+}
+
+/// Returns whether this process has a file in `directory` open, other than by a test's own
+/// connection.
+#[cfg(target_os = "linux")]
+fn is_open(directory: &std::path::Path) -> bool {
+    let files = std::fs::read_dir("/proc/self/fd").unwrap();
+    let mut targets = files.filter_map(|file| std::fs::read_link(file.unwrap().path()).ok());
+    targets.any(|target| target.starts_with(directory))
+}
+
+#[cfg(target_os = "linux")]
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn of_a_start_that_fails_nothing_is_left_that_could_change_the_store() {
+    // Of the first the service learns before its threads are started, of the second after it.
+    for table in ["mute", "replay"] {
+        let mut fixture = ServiceFixture::start().await;
+        fixture.server.take().unwrap().shutdown().await.unwrap();
+        let rename = async |from: &str, to: &str| {
+            let rename = AssertSqlSafe(format!("ALTER TABLE {from} RENAME TO {to}"));
+            let mut store = fixture.store().await;
+            store.execute(rename).await.unwrap();
+            store.close().await.unwrap();
+        };
+        rename(table, "renamed").await;
+        let error = offbd::server::start(fixture.config.clone()).await.err().expect("it fails");
+        assert!(format!("{error:#}").contains(table), "{error:#}");
+        eventually(async || (!is_open(fixture.data.path())).then_some(())).await;
+        rename("renamed", table).await;
+        // In PostgreSQL a writer that is left would still have the lock.
+        let server = offbd::server::start(fixture.config.clone()).await.unwrap();
+        server.shutdown().await.unwrap();
     }
 }

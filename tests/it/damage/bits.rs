@@ -36,7 +36,8 @@ enum Outcome {
     Named,
     /// Nothing that is asked for needs the damaged part.
     NotNeeded,
-    /// At least one answer is wrong, or an error that does not name the damage.
+    /// At least one answer is wrong, or an error that does not name the damage, or the service
+    /// does not stop.
     Wrong,
 }
 
@@ -202,8 +203,10 @@ impl Stopped {
         };
         let client = Client::new(server.address.to_string());
         let found = responses(&client, &self.paths).await;
-        // Folding the journal may need the damaged part.
-        drop(server.shutdown().await);
+        // What is still running would change the next file.
+        if let Err(error) = server.shutdown().await {
+            return (Outcome::Wrong, format!("{error:#}"));
+        }
         let mut outcome = (Outcome::NotNeeded, String::new());
         for ((path, found), right) in self.paths.iter().zip(found).zip(&self.right) {
             if found == Response::Damaged && outcome.0 == Outcome::NotNeeded {
