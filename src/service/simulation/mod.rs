@@ -1,13 +1,14 @@
 //! The whole service in a simulation: devices, network, shards, writer and database take
 //! their steps in an order that a random number generator chooses, with lost and repeated
-//! requests, failing transactions and reads, kills at every point of a transaction, deletions,
-//! and clocks that are set. What the devices were told is compared with what is stored.
+//! requests, failing transactions and reads, kills at every point of a transaction, commits of
+//! which a power cut leaves any part, deletions, and clocks that are set. What the devices were told is compared with what is stored.
 //!
 //! The code of the service is the real one. Only its threads are missing: the simulation
 //! calls what they would do. A scenario that fails is shrunk, printed and kept by `proptest`.
 
 mod check;
 mod device;
+mod disk;
 mod scenario;
 mod world;
 

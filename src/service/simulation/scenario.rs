@@ -3,6 +3,7 @@
 
 use proptest::prelude::*;
 
+use super::disk::PowerCut;
 use crate::store::{CommitFault, CommitPoint};
 
 /// Most devices of a scenario.
@@ -49,6 +50,8 @@ pub(super) enum Step {
     Commit { most: usize },
     /// The next transaction fails.
     Fail { at: CommitPoint, fault: CommitFault },
+    /// The power is cut while the next transaction is committed.
+    CutPower(PowerCut),
     /// The next `n` reads for a command fail.
     FailReads { n: u32 },
     /// A person deletes the oldest ended session of a rig.
@@ -98,6 +101,7 @@ fn step() -> impl Strategy<Value = Step> {
         4 => Just(Step::Load),
         8 => (1..6_usize).prop_map(|most| Step::Commit { most }),
         2 => (point, fault).prop_map(|(at, fault)| Step::Fail { at, fault }),
+        1 => power_cut().prop_map(Step::CutPower),
         1 => (1..4_u32).prop_map(|n| Step::FailReads { n }),
         1 => device().prop_map(|device| Step::Delete { device }),
         1 => Just(Step::Sweep),
@@ -107,6 +111,14 @@ fn step() -> impl Strategy<Value = Step> {
         1 => device().prop_map(|device| Step::End { device }),
         5 => (1..10_usize).prop_map(|rounds| Step::Run { rounds }),
     ]
+}
+
+/// A quarter of the time everything was written. Half of the time the sectors were written in
+/// order, otherwise some before the end were not.
+fn power_cut() -> impl Strategy<Value = PowerCut> {
+    let end = prop_oneof![1 => Just(u16::MAX), 3 => any::<u16>()];
+    let written = prop_oneof![Just(u64::MAX), any::<u64>()];
+    (end, written).prop_map(|(end, written)| PowerCut { end, written })
 }
 
 /// Draws a scenario.

@@ -15,12 +15,13 @@ use tokio::runtime::Runtime;
 
 use super::check;
 use super::device::{Device, SAMPLES_PER_PART, SentBatch, content};
+use super::disk::{self, PowerCut};
 use super::scenario::{DeviceKind, Scenario, Step};
 use crate::service::asset::{AssetCommand, Loader, Shard};
 use crate::service::start::Inner;
 use crate::service::writing::Committer;
 use crate::service::{Clock, Limits, Service, ServiceError, SessionLimits, views};
-use crate::store::{FaultPlan, Location, Store};
+use crate::store::{CommitFault, CommitPoint, FaultPlan, Location, Store};
 use crate::wire::asset;
 use offbd_core::engine::Rig;
 use offbd_core::vocabulary::FaultCode;
@@ -114,6 +115,8 @@ pub(super) struct World {
     n_acts: usize,
     /// The persons whose acts were confirmed.
     pub(super) confirmed: Vec<String>,
+    /// What happens to the log at the next commit.
+    power_cut: Option<PowerCut>,
 }
 
 impl World {
@@ -130,6 +133,7 @@ impl World {
             acts: Vec::new(),
             n_acts: 0,
             confirmed: Vec::new(),
+            power_cut: None,
         };
         this.start();
         for i in 0..this.devices.len() {
@@ -149,9 +153,24 @@ impl World {
         scenario.steps.iter().try_for_each(|step| self.step(step))
     }
 
+    fn file(&self) -> PathBuf {
+        self.folder.path().join("offbd.sqlite")
+    }
+
     fn start(&mut self) {
-        let file = self.folder.path().join("offbd.sqlite");
-        self.process = Some(Process::start(file, Clock::Simulated(self.now.clone())));
+        self.process = Some(Process::start(self.file(), Clock::Simulated(self.now.clone())));
+    }
+
+    /// Cuts the power before a commit was synced: of what it wrote to the log, which was
+    /// `before`, any part is on the disk. Starts another process on what is left.
+    fn cut_power(&mut self, before: &[u8], cut: PowerCut) {
+        let left = cut.apply(before, &disk::log_of(&self.file()));
+        let database = std::fs::read(self.file()).unwrap();
+        // Elsewhere, because connections that are closing still write to the old files.
+        self.folder = folder();
+        std::fs::write(self.file(), database).unwrap();
+        std::fs::write(disk::log(&self.file()), left).unwrap();
+        self.kill();
     }
 
     /// Ends the process without any notice, and starts another one.
@@ -198,7 +217,15 @@ impl World {
             Step::Shard { which } => drop(self.work(|process| process.shards[which % 2].step())),
             Step::Load => drop(self.work(|process| process.loader.step())),
             Step::Commit { most } => drop(self.work(|process| commit(&process.committer, most))),
-            Step::Fail { at, fault } => self.process().faults.set(Some((at, fault))),
+            Step::Fail { at, fault } => {
+                self.power_cut = None;
+                self.process().faults.set(Some((at, fault)));
+            }
+            Step::CutPower(cut) => {
+                self.power_cut = Some(cut);
+                let fault = (CommitPoint::AfterCommit, CommitFault::Kill);
+                self.process().faults.set(Some(fault));
+            }
             Step::FailReads { n } => {
                 self.inner().handles.failing_reads.store(n, Ordering::SeqCst);
             }
@@ -222,11 +249,14 @@ impl World {
     /// Lets a part of the service work; starts the service again if it is killed thereby.
     /// Returns whether there was something to do.
     fn work(&mut self, work: impl FnOnce(&mut Process) -> bool) -> bool {
+        let log = self.power_cut.map(|_| disk::log_of(&self.file()));
         let process = self.process();
         let worked = catch_unwind(AssertUnwindSafe(|| work(process)));
         let is_killed = process.faults.is_killed();
-        if is_killed {
-            self.kill();
+        match (log, self.power_cut.take_if(|_| is_killed)) {
+            (Some(log), Some(cut)) => self.cut_power(&log, cut),
+            _ if is_killed => self.kill(),
+            _ => {}
         }
         match worked {
             Ok(worked) => worked || is_killed,
@@ -442,6 +472,7 @@ impl World {
     /// # Errors
     /// If that does not come to an end, or the service has done something wrong.
     pub(super) fn finish(&mut self) -> Result<(), String> {
+        self.power_cut = None;
         self.process().faults.set(None);
         self.inner().handles.failing_reads.store(0, Ordering::SeqCst);
         for round in 0..MAX_ROUNDS {
