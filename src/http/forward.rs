@@ -12,6 +12,7 @@ use axum::http::request::Parts;
 use axum::http::uri::{PathAndQuery, Uri};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode};
 use axum::response::Response;
+use hyper::upgrade::OnUpgrade;
 use hyper_util::client::legacy::Client;
 use hyper_util::client::legacy::connect::HttpConnector;
 use hyper_util::rt::{TokioExecutor, TokioIo};
@@ -105,14 +106,22 @@ impl Forwarder {
             return Err(ServiceError::Moving.into());
         }
         metrics::counter!("offbd_requests_forwarded_total").increment(1);
-        tokio::select! {
+        let (mut request, mut moved) = (request, Box::pin(moved(service, asset, &address)));
+        let upgrade = request.extensions_mut().remove::<OnUpgrade>();
+        let answer = tokio::select! {
             biased;
-            answer = self.send(service, &address, request) => answer.map(Ok),
-            () = moved(service, asset, &address) => Err(ServiceError::Moving.into()),
-        }
+            answer = self.send(service, &address, request) => answer?,
+            () = &mut moved => return Err(ServiceError::Moving.into()),
+        };
+        Ok(Ok(match upgrade {
+            Some(client) if answer.status() == StatusCode::SWITCHING_PROTOCOLS => {
+                upgraded(answer, client, moved)
+            }
+            _ => answer,
+        }))
     }
 
-    /// Sends `request` to the node at `address`.
+    /// Sends `request` to the node at `address`. Returns its answer as this node's.
     ///
     /// # Errors
     /// A [`Problem`] if it cannot be reached.
@@ -125,21 +134,27 @@ impl Forwarder {
         let secret = service.cluster_secret().unwrap_or_default();
         let (mut parts, body) = request.into_parts();
         address_to(&mut parts, address, secret)?;
-        let upgrade = parts.extensions.remove::<hyper::upgrade::OnUpgrade>();
         let answer = self.client.request(Request::from_parts(parts, body)).await;
-        let answer = answer.map_err(|error| {
+        let mut answer = answer.map_err(|error| {
             tracing::debug!(address, %error, "another node cannot be reached");
             Problem::from(ServiceError::Moving)
         })?;
-        Ok(response(answer, upgrade))
+        if answer.status() != StatusCode::SWITCHING_PROTOCOLS {
+            answer.headers_mut().remove(CONNECTION);
+        }
+        answer.headers_mut().remove(TRANSFER_ENCODING);
+        Ok(answer.map(Body::new))
     }
 }
 
 /// Waits until the node at `address` has lost `asset`, and has had time to answer what it had
 /// completed before. One that is paused or cut off does not answer.
-async fn moved(service: &Service, asset: &str, address: &str) {
-    service.moved_from(asset, address).await;
-    tokio::time::sleep(LAST_ANSWERS).await;
+fn moved(service: &Service, asset: &str, address: &str) -> impl Future<Output = ()> + use<> {
+    let moved = service.moved_from(asset, address);
+    async {
+        moved.await;
+        tokio::time::sleep(LAST_ANSWERS).await;
+    }
 }
 
 /// Changes the head of a request so that it goes to `address`.
@@ -171,25 +186,23 @@ fn address_to(parts: &mut Parts, address: &str, secret: &str) -> Result<(), Prob
     Ok(())
 }
 
-/// The owner's answer as this node's. After an upgrade, copies bytes in both directions until
-/// one side ends.
-fn response(
-    mut answer: hyper::Response<hyper::body::Incoming>,
-    upgrade: Option<hyper::upgrade::OnUpgrade>,
+/// Returns the answer to a client that is to speak another protocol from now on: bytes are
+/// copied in both directions until one side ends, or the asset has `moved` to another node. The
+/// client then connects again.
+fn upgraded(
+    mut answer: Response,
+    client: OnUpgrade,
+    moved: impl Future<Output = ()> + Send + 'static,
 ) -> Response {
-    if answer.status() == StatusCode::SWITCHING_PROTOCOLS
-        && let Some(client) = upgrade
-    {
-        let owner = hyper::upgrade::on(&mut answer);
-        tokio::spawn(async move {
-            let (Ok(client), Ok(owner)) = tokio::join!(client, owner) else { return };
-            let (mut client, mut owner) = (TokioIo::new(client), TokioIo::new(owner));
+    let owner = hyper::upgrade::on(&mut answer);
+    tokio::spawn(async move {
+        let (Ok(client), Ok(owner)) = tokio::join!(client, owner) else { return };
+        let (mut client, mut owner) = (TokioIo::new(client), TokioIo::new(owner));
+        tokio::select! {
             // Ends when one side is gone, which is no error.
-            let _ = tokio::io::copy_bidirectional(&mut client, &mut owner).await;
-        });
-    } else {
-        answer.headers_mut().remove(CONNECTION);
-    }
-    answer.headers_mut().remove(TRANSFER_ENCODING);
-    answer.map(Body::new)
+            _ = tokio::io::copy_bidirectional(&mut client, &mut owner) => {}
+            () = moved => {}
+        }
+    });
+    answer
 }

@@ -88,7 +88,8 @@ pub(super) struct FrameView {
 /// sends JSON objects with a `type`: `ack` (once the batch is durable), `error` (with a
 /// `problem`), `fault` and, if requested, `state`. Sending batches requires the right
 /// `feed` for the asset; without it the stream is read-only. The stream is closed when
-/// the token expires or is revoked.
+/// the token expires or is revoked. In a cluster it is closed, with code 1012, when another
+/// node takes the asset over: connect again, to any node.
 #[utoipa::path(get, path = "/assets/{asset}/stream", tag = "telemetry",
     operation_id = "stream_telemetry",
     params(("asset" = String, description = "Name of the asset"), StreamQuery),
@@ -194,6 +195,8 @@ struct StreamConnection {
     share: BodyShare,
     /// Completes when the caller's token expires or is revoked.
     revoked: Pin<Box<dyn Future<Output = ()> + Send>>,
+    /// Completes when another node owns the asset.
+    moved: Pin<Box<dyn Future<Output = ()> + Send>>,
     asset: String,
     events: EventFeed,
     states: Option<Interval>,
@@ -212,6 +215,7 @@ struct StreamConnection {
 enum StreamEvent {
     Closing,
     Revoked,
+    Moved,
     Acknowledged(Result<AckView, ServiceError>),
     Submitted(Result<PendingBatch, ServiceError>),
     Frame(Option<Result<Message, axum::Error>>),
@@ -242,12 +246,15 @@ impl StreamConnection {
         let may_send = caller.may(Right::SendTelemetry, &asset);
         let service = app.service.clone();
         let revoked = Box::pin(async move { service.wait_for_revocation(&caller).await });
+        let (service, name) = (app.service.clone(), asset.clone());
+        let moved = Box::pin(async move { service.moved_away(&name).await });
         Self {
             socket,
             app,
             may_send,
             share,
             revoked,
+            moved,
             asset,
             events,
             states,
@@ -274,7 +281,8 @@ impl StreamConnection {
 
     async fn next_event(&mut self) -> StreamEvent {
         let full = self.is_full();
-        let Self { socket, app, revoked, events, states, pings, pending, waiting, .. } = self;
+        let Self { socket, app, revoked, moved, events, states, pings, pending, waiting, .. } =
+            self;
         let state = async {
             match states {
                 Some(states) => states.tick().await,
@@ -285,6 +293,7 @@ impl StreamConnection {
             biased;
             () = app.closing.cancelled() => StreamEvent::Closing,
             () = revoked => StreamEvent::Revoked,
+            () = moved => StreamEvent::Moved,
             ack = wait(pending.front_mut().map(|pending| &mut pending.ack)) => {
                 StreamEvent::Acknowledged(ack)
             }
@@ -307,7 +316,13 @@ impl StreamConnection {
 
     async fn handle(&mut self, event: StreamEvent) -> Result<(), CloseReason> {
         match event {
-            StreamEvent::Closing => self.close().await,
+            StreamEvent::Closing => {
+                self.close(close_code::AWAY, "the service is shutting down").await
+            }
+            StreamEvent::Moved => {
+                let reason = "another node serves the asset now; connect again";
+                self.close(close_code::RESTART, reason).await
+            }
             StreamEvent::Revoked => {
                 Err(CloseReason::Close(close_code::POLICY, "the token has expired or was revoked"))
             }
@@ -340,15 +355,15 @@ impl StreamConnection {
         }
     }
 
-    /// Closes the connection when the service stops: queued batches are still
-    /// acknowledged, one that waits for room is dropped.
-    async fn close(&mut self) -> Result<(), CloseReason> {
+    /// Closes the connection when the service stops or the asset has moved: queued batches are
+    /// still answered, one that waits for room is dropped.
+    async fn close(&mut self, code: u16, reason: &'static str) -> Result<(), CloseReason> {
         self.waiting = None;
         while let Some(pending) = self.pending.pop_front() {
             let ack = pending.ack.await;
             self.send_messages(vec![text(&answer(pending.id, ack))]).await?;
         }
-        Err(CloseReason::Close(close_code::AWAY, "the service is shutting down"))
+        Err(CloseReason::Close(code, reason))
     }
 
     #[expect(clippy::disallowed_methods, reason = "an idle socket is closed after a timeout")]

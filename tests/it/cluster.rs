@@ -6,6 +6,7 @@ mod bus;
 mod old_copy;
 mod outage;
 mod ownership;
+mod streams;
 mod versions;
 
 use std::collections::BTreeMap;

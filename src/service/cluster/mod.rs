@@ -221,14 +221,34 @@ impl Service {
         cluster.routes.of(ownership.partition_of(asset), &cluster.me.id)
     }
 
-    /// Waits until requests about `asset` are not for the node at `address` any more.
-    pub async fn moved_from(&self, asset: &str, address: &str) {
-        let Some(cluster) = &self.inner.cluster else { return };
-        let is_there =
-            || matches!(self.route(asset), Route::Node { address: a, .. } if a == address);
+    /// Waits until requests about `asset` are not for the node at `address` any more. Does not
+    /// keep the service from ending.
+    pub fn moved_from(
+        &self,
+        asset: &str,
+        address: &str,
+    ) -> impl Future<Output = ()> + Send + use<> {
+        let cluster = self.inner.cluster.clone();
+        let partition = self.inner.handles.ownership.partition_of(asset);
+        let address = address.to_owned();
+        async move {
+            let Some(Cluster { routes, me, .. }) = cluster else { return };
+            let is_there = || routes.of(partition, &me.id).is_at(&address);
+            let mut looked = routes.looked();
+            while is_there() && looked.changed().await.is_ok() {}
+        }
+    }
+
+    /// Waits until another node owns `asset`.
+    pub async fn moved_away(&self, asset: &str) {
+        let Some(cluster) = &self.inner.cluster else { return std::future::pending().await };
         let mut looked = cluster.routes.looked();
-        // An error means that the service has ended.
-        while is_there() && looked.changed().await.is_ok() {}
+        while !matches!(self.route(asset), Route::Node { .. }) {
+            // An error means that the service has ended.
+            if looked.changed().await.is_err() {
+                return;
+            }
+        }
     }
 
     /// Waits for another look at the database if the last one is so old that another node may

@@ -26,6 +26,13 @@ pub enum Route {
     Nowhere,
 }
 
+impl Route {
+    /// Whether it leads to the node at `address`.
+    pub(super) fn is_at(&self, address: &str) -> bool {
+        matches!(self, Self::Node { address: at, .. } if at == address)
+    }
+}
+
 /// The owner of each partition. Cheap to clone; all clones share it.
 #[derive(Clone, Debug, Default)]
 pub(in crate::service) struct Routes {
