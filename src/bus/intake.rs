@@ -3,14 +3,15 @@
 use std::future::Future;
 use std::sync::Arc;
 
-use futures_util::StreamExt;
+use futures_util::future::BoxFuture;
 use futures_util::stream::FuturesUnordered;
+use futures_util::{FutureExt, StreamExt};
 use hyper::body::Bytes;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
 
 use super::presence::Attendance;
 use super::{MAX_PENDING, MAX_QUEUED, MAX_QUEUED_BYTES};
-use crate::http::Problem;
+use crate::http::{Forwarder, Problem};
 use crate::service::{Route, Service, ServiceError};
 use crate::wire::bus::{BatchAckView, BatchRefusalView, DeviceTopic};
 use crate::wire::mapping::MappedTopic;
@@ -34,6 +35,24 @@ pub(super) struct Delivery<R> {
 pub(super) enum Form {
     Device(DeviceTopic),
     Mapped(Arc<MappedTopic>),
+}
+
+impl Form {
+    /// Parses a batch of at most `limit` samples.
+    ///
+    /// # Errors
+    /// The topic, if the message is no batch.
+    fn batch(
+        &self,
+        payload: &[u8],
+        limit: usize,
+    ) -> Result<Result<Batch, BatchError>, DeviceTopic> {
+        match self {
+            Self::Device(DeviceTopic::Telemetry) => Ok(parse(payload, limit)),
+            Self::Mapped(topic) => Ok(topic.batch(payload, limit)),
+            Self::Device(topic) => Err(*topic),
+        }
+    }
 }
 
 /// The answer to a batch.
@@ -95,17 +114,30 @@ fn refusal(id: Option<String>, problem: Problem) -> BatchRefusalView {
     }
 }
 
+/// What becomes of a message.
+pub(super) enum Reply {
+    /// The answer is sent to the device.
+    Answer(BatchAnswer),
+    /// Nothing is sent: it was no batch, or the owner of the asset answers.
+    Nothing,
+    /// Nothing is sent, and the message has to come again, if the bus can repeat it.
+    Again,
+}
+
+/// The reply to a message, with its asset and receipt, once it is known.
+type PendingReply<R> = BoxFuture<'static, (String, R, Reply)>;
+
 /// How a bus answers a message.
 pub(super) trait Answering: Send + Sync {
     /// What it needs for this, besides the asset.
-    type Receipt: Send;
+    type Receipt: Send + 'static;
 
-    /// Sends the answer to a batch; `None` if the message was no batch.
+    /// Sends the answer to a message.
     fn answer(
         &self,
         asset: &str,
         receipt: Self::Receipt,
-        answer: Option<BatchAnswer>,
+        reply: Reply,
     ) -> impl Future<Output = ()> + Send;
 
     /// Ends the connection after the last answer.
@@ -119,12 +151,14 @@ pub(super) struct Intake {
     pub(super) service: Service,
     attendance: Attendance,
     bytes: Arc<Semaphore>,
+    forwarder: Forwarder,
 }
 
 impl Intake {
     pub(super) fn new(bus: &'static str, service: Service) -> Self {
         let bytes = Arc::new(Semaphore::new(MAX_QUEUED_BYTES));
-        Self { bus, service, attendance: Attendance::default(), bytes }
+        let (attendance, forwarder) = Default::default();
+        Self { bus, service, attendance, bytes, forwarder }
     }
 
     /// Counts a message by what became of it.
@@ -184,36 +218,34 @@ impl Intake {
                     }
                     None => open = false,
                 },
-                Some((asset, receipt, answer)) = pending.next(), if !pending.is_empty() => {
-                    self.count(BatchAnswer::outcome(&answer));
-                    bus.answer(&asset, receipt, Some(answer)).await;
+                Some((asset, receipt, reply)) = pending.next(), if !pending.is_empty() => {
+                    if let Reply::Answer(answer) = &reply {
+                        self.count(answer.outcome());
+                    }
+                    bus.answer(&asset, receipt, reply).await;
                 }
             }
         }
         bus.finish().await;
     }
 
-    /// Submits a batch and returns its pending answer; anything else is done at once.
+    /// Submits a batch and returns its pending reply; anything else is done at once.
     async fn take<A: Answering>(
         &self,
         bus: &A,
         delivery: Delivery<A::Receipt>,
-    ) -> Option<impl Future<Output = (String, A::Receipt, BatchAnswer)> + use<A>> {
-        let Delivery { asset, form, payload, receipt, waits, room } = delivery;
-        if self.service.route(&asset) != Route::Here {
-            // In a cluster each node gets the message, and the owner of the asset answers.
-            self.count("elsewhere");
-            bus.answer(&asset, receipt, None).await;
-            return None;
+    ) -> Option<PendingReply<A::Receipt>> {
+        if self.service.route(&delivery.asset) != Route::Here {
+            return self.pass_on(bus, delivery).await;
         }
         let limit = self.service.limits().batch_samples;
-        let batch = match form {
-            Form::Device(DeviceTopic::Telemetry) => parse(&payload, limit),
-            Form::Mapped(topic) => topic.batch(&payload, limit),
-            Form::Device(topic) => {
+        let Delivery { asset, form, payload, receipt, waits, room } = delivery;
+        let batch = match form.batch(&payload, limit) {
+            Ok(batch) => batch,
+            Err(topic) => {
                 let outcome = self.attendance.note(&self.service, &asset, topic, &payload).await;
                 self.count(outcome);
-                bus.answer(&asset, receipt, None).await;
+                bus.answer(&asset, receipt, Reply::Nothing).await;
                 return None;
             }
         };
@@ -222,13 +254,37 @@ impl Intake {
             Err(error) => (None, Err(error.into())),
             Ok(mut batch) => (batch.id.take(), self.submit(&asset, batch, waits).await),
         };
-        Some(async move {
+        let answered = async move {
             let ack = match submitted {
                 Ok(pending) => pending.acknowledged().await,
                 Err(error) => Err(error),
             };
-            (asset, receipt, BatchAnswer::of(id, ack.map_err(Problem::from)))
-        })
+            (asset, receipt, Reply::Answer(BatchAnswer::of(id, ack.map_err(Problem::from))))
+        };
+        Some(answered.boxed())
+    }
+
+    /// Handles a message of an asset that another node owns. In a cluster each node gets the
+    /// message, and the owner takes and answers it. A batch that the bus keeps until it is
+    /// acknowledged is sent to the owner as well, which may have failed before it was stored.
+    async fn pass_on<A: Answering>(
+        &self,
+        bus: &A,
+        delivery: Delivery<A::Receipt>,
+    ) -> Option<PendingReply<A::Receipt>> {
+        self.count("elsewhere");
+        let Delivery { asset, form, payload, receipt, waits, .. } = delivery;
+        let limit = self.service.limits().batch_samples;
+        let Some(Ok(Ok(batch))) = waits.then(|| form.batch(&payload, limit)) else {
+            bus.answer(&asset, receipt, Reply::Nothing).await;
+            return None;
+        };
+        let (service, forwarder) = (self.service.clone(), self.forwarder.clone());
+        let delivered = async move {
+            let is_settled = forwarder.deliver(&service, &asset, &batch).await;
+            (asset, receipt, if is_settled { Reply::Nothing } else { Reply::Again })
+        };
+        Some(delivered.boxed())
     }
 
     async fn submit(

@@ -24,7 +24,7 @@ use tokio_rustls::rustls::{ClientConfig, RootCertStore};
 use tokio_util::sync::CancellationToken;
 
 use super::faults::{FaultMessage, Publishing, publish_faults};
-use super::intake::{Answering, BatchAnswer, Delivery, Form, Intake, queue};
+use super::intake::{Answering, BatchAnswer, Delivery, Form, Intake, Reply, queue};
 use super::puback::PubackQueue;
 use super::{RETRY_INTERVAL, SEND_TIMEOUT};
 use crate::service::Service;
@@ -351,8 +351,12 @@ impl MqttConnection {
 impl Answering for Arc<MqttConnection> {
     type Receipt = MqttReceipt;
 
-    async fn answer(&self, asset: &str, receipt: MqttReceipt, answer: Option<BatchAnswer>) {
-        let Some(answer) = answer else { return self.acknowledge(receipt) };
+    async fn answer(&self, asset: &str, receipt: MqttReceipt, reply: Reply) {
+        let answer = match reply {
+            Reply::Answer(answer) => answer,
+            Reply::Nothing => return self.acknowledge(receipt),
+            Reply::Again => return self.end(),
+        };
         let topic = TopicStyle::Mqtt.ack(asset);
         let sent = self.client.publish(topic, QoS::AtMostOnce, false, answer.document());
         if self.renew.run_until_cancelled(timeout(SEND_TIMEOUT, sent)).await.is_none() {

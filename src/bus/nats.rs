@@ -15,7 +15,7 @@ use tokio_util::sync::CancellationToken;
 
 use super::callout::{self, Issuer};
 use super::faults::{FaultMessage, Publishing, publish_faults};
-use super::intake::{Answering, BatchAnswer, Delivery, Form, Intake, queue};
+use super::intake::{Answering, Delivery, Form, Intake, Reply, queue};
 use super::settings::{UnsafeServer, check_streams, check_version, doubts};
 use super::{RETRY_INTERVAL, SEND_TIMEOUT};
 use crate::service::Service;
@@ -263,7 +263,7 @@ impl NatsBus {
             if let Err((asset, receipt, answer)) =
                 intake.queue(&sender, addressed, payload, reply, false)
             {
-                client.answer(&asset, receipt, Some(*answer)).await;
+                client.answer(&asset, receipt, Reply::Answer(*answer)).await;
             }
         }
     }
@@ -325,11 +325,11 @@ async fn send(client: &Client, subject: impl async_nats::subject::ToSubject, doc
 impl Answering for Client {
     type Receipt = Option<Subject>;
 
-    async fn answer(&self, asset: &str, reply: Option<Subject>, answer: Option<BatchAnswer>) {
-        let Some(answer) = answer else { return };
+    async fn answer(&self, asset: &str, reply_to: Option<Subject>, reply: Reply) {
+        let Reply::Answer(answer) = reply else { return };
         let document = answer.document();
-        if let Some(reply) = reply {
-            send(self, reply, document.clone()).await;
+        if let Some(reply_to) = reply_to {
+            send(self, reply_to, document.clone()).await;
         }
         send(self, TopicStyle::Nats.ack(asset), document).await;
     }

@@ -30,13 +30,16 @@ const FORWARDED: HeaderName = HeaderName::from_static("x-offbd-forwarded");
 /// The client's address in a forwarded request.
 const CLIENT: HeaderName = HeaderName::from_static("x-offbd-client");
 
+/// The header of a forwarded request that carries a batch from NATS or MQTT.
+pub(super) const FROM_BUS: HeaderName = HeaderName::from_static("x-offbd-from-bus");
+
 /// How long the answer of a node is waited for that owns the asset no more. Chosen: much longer
 /// than an answer takes that is under way.
 const LAST_ANSWERS: Duration = Duration::from_secs(1);
 
 /// Sends requests to other nodes.
 #[derive(Clone)]
-pub(super) struct Forwarder {
+pub(crate) struct Forwarder {
     // Shared, as every request has a copy of the forwarder.
     client: Arc<Client<HttpConnector, Body>>,
 }
@@ -57,6 +60,12 @@ pub(super) fn is_forwarded(service: &Service, headers: &HeaderMap) -> bool {
     headers
         .get(FORWARDED)
         .is_some_and(|given| digest(given.as_bytes()) == digest(secret.as_bytes()))
+}
+
+/// Whether a forwarded request carries a batch that has come over NATS or MQTT. There the server
+/// or broker has checked who sends for the asset.
+pub(super) fn is_from_bus(headers: &HeaderMap) -> bool {
+    headers.contains_key(FROM_BUS)
 }
 
 /// The address of the client of a forwarded request.
@@ -149,7 +158,11 @@ impl Forwarder {
 
 /// Waits until the node at `address` has lost `asset`, and has had time to answer what it had
 /// completed before. One that is paused or cut off does not answer.
-fn moved(service: &Service, asset: &str, address: &str) -> impl Future<Output = ()> + use<> {
+pub(super) fn moved(
+    service: &Service,
+    asset: &str,
+    address: &str,
+) -> impl Future<Output = ()> + use<> {
     let moved = service.moved_from(asset, address);
     async {
         moved.await;

@@ -16,6 +16,8 @@ mod body;
 mod calibrations;
 mod cluster;
 mod credential;
+#[cfg(any(feature = "nats", feature = "mqtt"))]
+mod deliver;
 mod description;
 mod drive_cycles;
 mod events;
@@ -78,7 +80,7 @@ pub use routes::ExtraRoutes;
 pub(crate) use telemetry::TelemetryFormat;
 
 use self::api::api;
-use self::forward::Forwarder;
+pub(crate) use self::forward::Forwarder;
 use self::guard::Guard;
 use self::routes::RouteRules;
 use crate::service::{Service, parse_timestamp};

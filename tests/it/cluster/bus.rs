@@ -1,14 +1,15 @@
 //! Devices over NATS and a cluster: nodes and servers fail, and nothing is lost or doubled.
 
 use offbd_core::vocabulary::Sample;
+use rumqttc::{Packet, QoS};
 use serde_json::json;
 
 use super::{count, register_rigs};
 use crate::support::broker::{Mosquitto, NATS_PASSWORD, Nats, NatsServers};
-use crate::support::bus_device::{BusDevice, numbered};
+use crate::support::bus_device::{BusDevice, MqttDevice, numbered};
 use crate::support::cluster::{Cluster, N_NODES, NodeKind};
 use crate::support::postgres::Postgres;
-use crate::support::{Client, eventually, rig};
+use crate::support::{Client, batch, eventually, rig};
 
 /// Samples of a batch.
 const BATCH: usize = 10;
@@ -48,6 +49,14 @@ async fn devices(client: &Client, names: &[String], ports: &[u16]) -> Vec<BusDev
 async fn deliver(devices: &mut [BusDevice], samples: &[Sample]) {
     let delivered = devices.iter_mut().map(|device| device.deliver(samples, BATCH));
     futures_util::future::join_all(delivered).await;
+}
+
+/// Waits until all nodes are connected to the MQTT broker.
+async fn are_connected(cluster: &Cluster) {
+    for client in cluster.clients() {
+        let connected = async || count(&client, "offbd_bus_connected{bus=\"mqtt\"}").await == 1.0;
+        eventually(|| async { connected().await.then_some(()) }).await;
+    }
 }
 
 async fn are_stored_once(client: &Client, names: &[String], samples: &[Sample]) {
@@ -105,10 +114,7 @@ async fn a_killed_server_of_three_stops_no_request_and_devices_are_answered_by_a
 async fn a_broker_serves_all_nodes_at_the_same_time() {
     let (mosquitto, samples) = (Mosquitto::start(), rig(300, 300));
     let (cluster, names) = start_with(vec![("OFFBD_MQTT__URL", mosquitto.config().url)]).await;
-    for client in cluster.clients() {
-        let connected = async || count(&client, "offbd_bus_connected{bus=\"mqtt\"}").await == 1.0;
-        eventually(|| async { connected().await.then_some(()) }).await;
-    }
+    are_connected(&cluster).await;
     for name in &names {
         let mut device = BusDevice::mqtt(mosquitto.port, name, None).await;
         for (i, part) in samples.chunks(30).enumerate() {
@@ -118,4 +124,44 @@ async fn a_broker_serves_all_nodes_at_the_same_time() {
         }
     }
     are_stored_once(&cluster.client(0), &names, &samples).await;
+}
+
+/// Publishes batches at QoS 1, and leaves them to the broker.
+async fn leave_to_broker(device: &mut MqttDevice, names: &[String], samples: &[Sample]) {
+    for part in samples.chunks(BATCH) {
+        for name in names {
+            let topic = format!("offbd/v1/{name}/telemetry");
+            let document = batch(Some("s"), part).to_string();
+            device.client.publish(topic, QoS::AtLeastOnce, false, document).await.unwrap();
+            device.until(|packet| matches!(packet, Packet::PubAck(_)).then_some(())).await;
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn nodes_that_are_paused_and_killed_lose_nothing_that_a_broker_has_at_qos_1() {
+    let (mosquitto, samples) = (Mosquitto::start(), rig(400, 400));
+    let (mut cluster, names) = start_with(vec![("OFFBD_MQTT__URL", mosquitto.config().url)]).await;
+    are_connected(&cluster).await;
+    let mut device = MqttDevice::connect(mosquitto.port, "all", None).await;
+    leave_to_broker(&mut device, &names, &samples[..100]).await;
+    cluster.owned_by(1, &names).await;
+    cluster.signal(1, "-STOP");
+    // Some arrive before the others know that it is paused, some while nobody owns its rigs.
+    leave_to_broker(&mut device, &names, &samples[100..200]).await;
+    cluster.taken_over_from(1).await;
+    cluster.owned_by(2, &names).await;
+    cluster.kill(2);
+    leave_to_broker(&mut device, &names, &samples[200..]).await;
+    for name in &names {
+        let stored = async || {
+            let stored = cluster.client(0).recording(name, "s").await;
+            (stored.len() >= samples.len()).then_some(stored)
+        };
+        let mut stored = eventually(stored).await;
+        stored.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
+        assert_eq!(stored, samples, "{name}");
+    }
+    cluster.signal(1, "-CONT");
+    cluster.settled(2).await;
 }
