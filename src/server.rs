@@ -42,6 +42,12 @@ use crate::store::{self, CheckReport, ColdDirectory, Location, NodeIdentity, Par
 /// enough to cost nothing.
 const THREAD_INTERVAL: Duration = Duration::from_secs(1);
 
+/// How often the lock of a store is tried, and the pause between: 0.5 s in all. A process that
+/// has just ended may hold it a little longer, as a child process has its open files until it
+/// runs its own program. Chosen.
+const LOCK_TRIES: u32 = 11;
+const LOCK_INTERVAL: Duration = Duration::from_millis(50);
+
 /// A running server.
 pub struct Server {
     /// The address that it listens on, with the actual port.
@@ -82,7 +88,7 @@ pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Ser
         None => (None, None),
     };
     let location = config.location()?;
-    let lock = lock(&location)?;
+    let lock = lock(&location).await?;
     let node = match &config.cluster {
         Some(cluster) => Some(NodeListener::bind(cluster).await?),
         None => None,
@@ -208,7 +214,7 @@ async fn warn_of_access(config: &Config, policy: &AccessPolicy, store: &Store) -
 /// Locks an SQLite store for this process, because two main writers would not notice each
 /// other. The operating system releases the lock when the process ends. In PostgreSQL the
 /// writer's connection takes a lock instead.
-fn lock(location: &Location) -> Result<Option<File>> {
+async fn lock(location: &Location) -> Result<Option<File>> {
     let Some(file) = location.file() else { return Ok(None) };
     // A link to the file must not be another lock.
     let file = std::fs::canonicalize(file).unwrap_or_else(|_| file.to_owned());
@@ -218,13 +224,20 @@ fn lock(location: &Location) -> Result<Option<File>> {
             .with_context(|| format!("`data`: cannot create {}", directory.display()))?;
     }
     let lock = File::create(&path).with_context(|| format!("cannot create {}", path.display()))?;
-    match lock.try_lock() {
-        Ok(()) => Ok(Some(lock)),
-        Err(TryLockError::WouldBlock) => {
-            bail!("`data`: another process uses this store ({} is locked)", path.display())
-        }
-        Err(TryLockError::Error(error)) => {
-            Err(error).with_context(|| format!("cannot lock {}", path.display()))
+    let mut n_tries = 0;
+    loop {
+        n_tries += 1;
+        match lock.try_lock() {
+            Ok(()) => return Ok(Some(lock)),
+            Err(TryLockError::WouldBlock) if n_tries < LOCK_TRIES => {
+                tokio::time::sleep(LOCK_INTERVAL).await;
+            }
+            Err(TryLockError::WouldBlock) => {
+                bail!("`data`: another process uses this store ({} is locked)", path.display())
+            }
+            Err(TryLockError::Error(error)) => {
+                return Err(error).with_context(|| format!("cannot lock {}", path.display()));
+            }
         }
     }
 }
@@ -337,7 +350,7 @@ fn stop_signal() -> Result<impl Future<Output = Result<()>>> {
 pub async fn migrate(config: &Config) -> Result<usize> {
     config.check()?;
     let location = config.location()?;
-    let _lock = lock(&location)?;
+    let _lock = lock(&location).await?;
     let migrated = Store::migrate(&location).await;
     migrated.with_context(|| format!("cannot migrate the store {location}"))
 }
@@ -358,7 +371,7 @@ pub async fn back_up(config: &Config, file: &Path) -> Result<()> {
 /// If the copy is invalid, the store is in use, or it exists and `replace` is not set.
 pub async fn restore(config: &Config, file: &Path, replace: bool) -> Result<()> {
     let location = config.location()?;
-    let _lock = lock(&location)?;
+    let _lock = lock(&location).await?;
     let cold = config.cold_directory();
     let result = store::restore(&location, file, replace, cold.as_ref()).await;
     result.with_context(|| format!("cannot restore the store {location}"))

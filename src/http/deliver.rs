@@ -1,16 +1,23 @@
 //! Sends batches that have come over NATS or MQTT to the node that owns their asset.
 
+use std::time::Duration;
+
 use axum::body::Body;
 use axum::extract::Request;
 use axum::http::StatusCode;
 use axum::http::header::{CONTENT_TYPE, HOST};
 use percent_encoding::{NON_ALPHANUMERIC, utf8_percent_encode};
+use tokio::time::timeout;
 
 use super::forward::{FROM_BUS, Forwarder, moved};
 use crate::service::{Route, Service};
 use crate::wire::session_csv;
 use crate::wire::telemetry::Batch;
 use offbd_core::vocabulary::Sample;
+
+/// Longest time until the owner has stored a batch; then it has to be sent again. Chosen: a
+/// commit takes at most 30 s, but a node that stops has no more than 20 s for everything.
+const DELIVERY_TIMEOUT: Duration = Duration::from_secs(10);
 
 impl Forwarder {
     /// Sends the valid samples of a batch to the owner of `asset`. Returns whether they are
@@ -23,12 +30,13 @@ impl Forwarder {
         let Route::Node { address, .. } = service.route(asset) else { return false };
         let Ok(request) = request(asset, batch.session.as_deref(), &samples) else { return true };
         metrics::counter!("offbd_requests_forwarded_total").increment(1);
+        let moved = timeout(DELIVERY_TIMEOUT, moved(service, asset, &address));
         tokio::select! {
             biased;
             answer = self.send(service, &address, request) => {
                 answer.is_ok_and(|answer| !is_temporary(answer.status()))
             }
-            () = moved(service, asset, &address) => false,
+            _ = moved => false,
         }
     }
 }

@@ -16,6 +16,11 @@ import pandas
 import polars
 import pyarrow.ipc
 import pyarrow.parquet
+from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+from foxglove_schemas_protobuf.Log_pb2 import Log
+from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+from google.protobuf import message_factory
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
 
 PROGRAM, DATA, ROWS = sys.argv[1], Path(sys.argv[2]), int(sys.argv[3])
 COLUMNS = ["t_s", "cmd_qx_rad", "cmd_qy_rad", "x_m", "y_m"]
@@ -88,25 +93,43 @@ for metadata in [pyarrow.parquet.read_metadata(parquet).metadata, stream.schema.
     assert asset["calibration"]["id"] == metadata[b"offbd.calibration_id"].decode(), metadata
 print("metadata: asset file, calibration and verdict hash")
 
-# An MCAP file has the samples, and each message is as its schema says.
+# An MCAP file has the samples. Messages in JSON are as their schemas say; those of Foxglove are
+# read with its own types and, like any program does, with those that the file describes.
+FOXGLOVE = {f"foxglove.{kind.DESCRIPTOR.name}": kind for kind in (FrameTransforms, Log, SceneUpdate)}
+
+
+def described_type(schema):
+    """The message type that the file itself describes."""
+    files = FileDescriptorSet.FromString(schema.data)
+    return message_factory.GetMessages(files.file)[schema.name]
+
+
 offbd("export", "sick.csv", "--asset", "learnt.json", "-o", "sick.mcap")
 messages = {}
 with open(DATA / "sick.mcap", "rb") as file:
     reader = mcap.reader.make_reader(file, validate_crcs=True)
     metadata = {record.name: record.metadata for record in reader.iter_metadata()}["offbd"]
     (attachment,) = reader.iter_attachments()
-    validators = {}
+    validators, types = {}, {}
     for schema, channel, message in reader.iter_messages():
-        assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json"), channel
-        content = json.loads(message.data)
-        if schema.id not in validators:
-            document = json.loads(schema.data)
-            jsonschema.Draft202012Validator.check_schema(document)
-            validators[schema.id] = jsonschema.Draft202012Validator(document)
-        # One in fifty of each topic, for the time that it takes.
         of_topic = messages.setdefault((channel.topic, schema.name), [])
-        if len(of_topic) % 50 == 0:
-            validators[schema.id].validate(content)
+        if schema.name in FOXGLOVE:
+            assert (schema.encoding, channel.message_encoding) == ("protobuf", "protobuf"), channel
+            content = FOXGLOVE[schema.name].FromString(message.data)
+            if schema.id not in types:
+                types[schema.id] = described_type(schema)
+            described = types[schema.id].FromString(message.data)
+            assert str(described) == str(content), schema.name
+        else:
+            assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json"), channel
+            content = json.loads(message.data)
+            if schema.id not in validators:
+                document = json.loads(schema.data)
+                jsonschema.Draft202012Validator.check_schema(document)
+                validators[schema.id] = jsonschema.Draft202012Validator(document)
+            # One in fifty of each topic, for the time that it takes.
+            if len(of_topic) % 50 == 0:
+                validators[schema.id].validate(content)
         of_topic.append(content)
     counts = reader.get_summary().statistics.channel_message_counts
     assert sum(counts.values()) == sum(map(len, messages.values())), counts
@@ -116,7 +139,7 @@ topics = {("/rig", "foxglove.SceneUpdate"), ("/twin", "foxglove.SceneUpdate"), (
 assert topics <= messages.keys(), messages.keys()
 lines = map(json.loads, offbd("replay", "--asset", "learnt.json", "--format", "json", "sick.csv").stdout.splitlines())
 replayed = [line["summary"] for line in lines if "verdict_hash" not in line]
-check("the faults in the log", [log["message"] for log in messages["/faults", "foxglove.Log"]], replayed)
+check("the faults in the log", [log.message for log in messages["/faults", "foxglove.Log"]], replayed)
 assert replayed, "no fault"
 assert metadata["offbd.verdict_hash"] == expected_hash, metadata
 assert json.loads(attachment.data)["calibration"]["id"] == metadata["offbd.calibration_id"], metadata

@@ -264,3 +264,17 @@ async fn nothing_is_acknowledged_into_a_removed_file() {
     std::fs::rename(&aside, &file).unwrap();
     assert_eq!(sending.await.unwrap()["accepted"], 10, "once the file is back");
 }
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_start_waits_a_little_for_the_lock_of_a_process_that_is_ending() {
+    if on_postgres() {
+        return;
+    }
+    let data = tempfile::tempdir().unwrap();
+    let lock = std::fs::File::create(data.path().join("offbd.lock")).unwrap();
+    lock.lock().unwrap();
+    let mut start = Box::pin(offbd::server::start(config(data.path())));
+    assert!(futures_util::poll!(&mut start).is_pending(), "it is locked");
+    drop(lock);
+    start.await.unwrap().shutdown().await.unwrap();
+}

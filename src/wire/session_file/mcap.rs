@@ -1,7 +1,8 @@
 //! Sessions as MCAP files, as robotics tools record and show them.
 //!
 //! Each sample is a JSON message of the topic [`SAMPLES`]; only these are read back. A file
-//! that is written with an asset file also shows the rig (`mcap_scene.rs`). All times are those
+//! that is written with an asset file also shows the rig (`mcap_scene.rs`), in Foxglove's own
+//! messages, which are in protobuf. All times are those
 //! of the device, whose clock may count from anywhere; times before its zero are shown at zero.
 
 use std::collections::BTreeMap;
@@ -9,6 +10,7 @@ use std::io::{self, Write};
 use std::mem;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use foxglove::{Encode, Schema};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::{NoSeek, Writer};
 use mcap::{Attachment, WriteOptions};
@@ -19,20 +21,25 @@ use super::{SessionFileError, SessionFormat, SessionInfo};
 use crate::wire::telemetry::sample_view;
 use offbd_core::vocabulary::Sample;
 
-/// A topic of a file: its name, the name of its schema, and the schema as JSON.
-#[derive(Clone, Copy, Debug)]
+/// A topic of a file: its name, and the schema of its messages.
+#[derive(Clone, Copy)]
 pub(super) struct Topic {
     pub(super) name: &'static str,
-    pub(super) schema: &'static str,
-    pub(super) json_schema: &'static str,
+    pub(super) schema: fn() -> Option<Schema>,
 }
 
-/// The samples as the device sent them.
-pub(super) const SAMPLES: Topic = Topic {
+/// The schema of samples, as the device sent them.
+pub(super) const SAMPLE_SCHEMA: &str = "offbd.Sample";
+
+const SAMPLES: Topic = Topic {
     name: "/offbd/samples",
-    schema: "offbd.Sample",
-    json_schema: include_str!("mcap_schemas/sample.json"),
+    schema: || json_schema(SAMPLE_SCHEMA, include_str!("mcap_schemas/sample.json")),
 };
+
+/// The schema of messages in JSON.
+pub(super) fn json_schema(name: &str, document: &'static str) -> Option<Schema> {
+    Some(Schema::new(name, "jsonschema", document.as_bytes()))
+}
 
 pub(super) fn unwritten(error: impl ToString) -> SessionFileError {
     SessionFileError::Write { format: SessionFormat::Mcap, reason: error.to_string() }
@@ -56,7 +63,7 @@ impl McapEncoder {
 
     pub(super) fn rows(&mut self, samples: &[Sample]) -> Result<Vec<u8>, SessionFileError> {
         for sample in samples {
-            self.file.message(SAMPLES, sample.t_s, &sample_view(sample))?;
+            self.file.json(SAMPLES, sample.t_s, &sample_view(sample))?;
             if let Some(scene) = &mut self.scene {
                 scene.sample(sample, &mut self.file)?;
             }
@@ -114,28 +121,54 @@ impl McapFile {
         match self.channels.entry(topic.name) {
             Entry::Occupied(known) => Ok(known.into_mut()),
             Entry::Vacant(new) => {
-                let (writer, json) = (&mut self.writer, topic.json_schema.as_bytes());
-                let schema = writer.add_schema(topic.schema, "jsonschema", json);
-                let channel = schema
-                    .and_then(|id| writer.add_channel(id, topic.name, "json", &BTreeMap::new()));
+                let schema = (topic.schema)().ok_or_else(|| unwritten("a topic has no schema"))?;
+                let encoding = match schema.encoding.as_str() {
+                    "jsonschema" => "json",
+                    other => other,
+                };
+                let writer = &mut self.writer;
+                let channel = writer
+                    .add_schema(&schema.name, &schema.encoding, &schema.data)
+                    .and_then(|id| writer.add_channel(id, topic.name, encoding, &BTreeMap::new()));
                 Ok(new.insert((channel.map_err(unwritten)?, 0)))
             }
         }
     }
 
-    /// Appends a message of `topic` at `t_s` on the device's clock.
-    pub(super) fn message(
+    /// Appends a message in JSON of `topic` at `t_s` on the device's clock.
+    pub(super) fn json(
         &mut self,
         topic: Topic,
         t_s: f64,
         content: &impl Serialize,
+    ) -> Result<(), SessionFileError> {
+        self.append(topic, t_s, |message| {
+            Ok(serde_json::to_writer(message, content).map_err(io::Error::from)?)
+        })
+    }
+
+    /// Appends one of Foxglove's messages.
+    pub(super) fn foxglove(
+        &mut self,
+        topic: Topic,
+        t_s: f64,
+        content: &impl Encode,
+    ) -> Result<(), SessionFileError> {
+        self.append(topic, t_s, |message| content.encode(message).map_err(unwritten))
+    }
+
+    fn append(
+        &mut self,
+        topic: Topic,
+        t_s: f64,
+        encode: impl FnOnce(&mut Vec<u8>) -> Result<(), SessionFileError>,
     ) -> Result<(), SessionFileError> {
         let (channel_id, n) = self.add(topic)?;
         let (channel_id, sequence) = (*channel_id, mem::replace(n, n.wrapping_add(1)));
         let time = nanoseconds(t_s);
         let header = MessageHeader { channel_id, sequence, log_time: time, publish_time: time };
         self.message.clear();
-        serde_json::to_writer(&mut self.message, content).map_err(io::Error::from)?;
+        encode(&mut self.message)?;
         self.writer.write_to_known_channel(&header, &self.message).map_err(unwritten)
     }
 

@@ -8,7 +8,7 @@ use mcap::records::Record;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, parse_record};
 
-use super::mcap::SAMPLES;
+use super::mcap::SAMPLE_SCHEMA;
 use super::{
     RejectedRow, RowPlace, SessionFileError, SessionFormat, SessionRowError, SessionRows, guarded,
 };
@@ -65,7 +65,7 @@ impl<S: Read> McapRows<S> {
             }
         }
         if self.channels.is_empty() {
-            return Err(SessionFileError::NoTopic(SAMPLES.schema));
+            return Err(SessionFileError::NoTopic(SAMPLE_SCHEMA));
         }
         Ok(None)
     }
@@ -78,7 +78,7 @@ fn note(
     record: &Record<'_>,
 ) -> Option<Result<Sample, String>> {
     match record {
-        Record::Schema { header, .. } if header.name == SAMPLES.schema => {
+        Record::Schema { header, .. } if header.name == SAMPLE_SCHEMA => {
             schemas.insert(header.id);
         }
         Record::Channel(channel)

@@ -7,11 +7,16 @@
 
 use std::f64::consts::PI;
 
+use foxglove::Encode;
+use foxglove::messages::log::Level;
+use foxglove::messages::{
+    self, ArrowPrimitive, Color, CubePrimitive, CylinderPrimitive, FrameTransform, FrameTransforms,
+    Log, Pose, Quaternion, SceneEntity, SceneUpdate, SpherePrimitive, Timestamp,
+};
 use nalgebra::{UnitQuaternion, Vector3};
-use serde_json::{Value, json};
 
 use super::SessionFileError;
-use super::mcap::{McapFile, Topic, nanoseconds, unwritten};
+use super::mcap::{McapFile, Topic, json_schema, nanoseconds, unwritten};
 use crate::wire::verdict::{evidence_view, sentence};
 use crate::wire::{asset, words::CodeWord};
 use offbd_core::diagnosis::{AxisEvidence, Evidence, FaultMemory, Transition};
@@ -19,26 +24,15 @@ use offbd_core::engine::{Admission, Engine, Input, Rig, Setup};
 use offbd_core::plant::PlateShape;
 use offbd_core::vocabulary::{FaultStatus, Sample};
 
-const SCENE: &str = include_str!("mcap_schemas/scene_update.json");
-
-const FRAMES: Topic = Topic {
-    name: "/tf",
-    schema: "foxglove.FrameTransforms",
-    json_schema: include_str!("mcap_schemas/frame_transforms.json"),
-};
+const FRAMES: Topic = Topic { name: "/tf", schema: FrameTransforms::get_schema };
 /// Plate and ball, once: viewers keep what they were shown.
-const RIG: Topic = Topic { name: "/rig", schema: "foxglove.SceneUpdate", json_schema: SCENE };
+const RIG: Topic = Topic { name: "/rig", schema: SceneUpdate::get_schema };
 /// The accelerations.
-const TWIN: Topic = Topic { name: "/twin", schema: "foxglove.SceneUpdate", json_schema: SCENE };
-const FAULTS: Topic = Topic {
-    name: "/faults",
-    schema: "foxglove.Log",
-    json_schema: include_str!("mcap_schemas/log.json"),
-};
+const TWIN: Topic = Topic { name: "/twin", schema: SceneUpdate::get_schema };
+const FAULTS: Topic = Topic { name: "/faults", schema: Log::get_schema };
 const EVIDENCE: Topic = Topic {
     name: "/offbd/evidence",
-    schema: "offbd.Evidence",
-    json_schema: include_str!("mcap_schemas/evidence.json"),
+    schema: || json_schema("offbd.Evidence", include_str!("mcap_schemas/evidence.json")),
 };
 
 // The fixed frame, and those of plate and ball.
@@ -76,7 +70,7 @@ impl RigScene {
         if !self.is_shown {
             self.is_shown = true;
             let rig = &self.engine.setup().rig;
-            file.message(RIG, sample.t_s, &rig_message(rig, sample.t_s))?;
+            file.foxglove(RIG, sample.t_s, &rig_message(rig, sample.t_s))?;
         }
         if self.input(Input::Sample(*sample)) == Some(Admission::Unknown) {
             // Rows as old as this are no retransmissions in a recording.
@@ -101,79 +95,93 @@ impl RigScene {
         for evidence in self.evidence.drain(..) {
             let Some(at) = evidence.at else { continue };
             let t_s = at.seconds();
-            file.message(FRAMES, t_s, &frames_message(&evidence, height_m, t_s))?;
-            file.message(TWIN, t_s, &twin_message(&evidence, t_s))?;
-            file.message(EVIDENCE, t_s, &evidence_view(&evidence))?;
+            file.foxglove(FRAMES, t_s, &frames_message(&evidence, height_m, t_s))?;
+            file.foxglove(TWIN, t_s, &twin_message(&evidence, t_s))?;
+            file.json(EVIDENCE, t_s, &evidence_view(&evidence))?;
         }
         for transition in self.transitions.drain(..) {
             let t_s = transition.at.seconds();
-            file.message(FAULTS, t_s, &log_message(&transition, t_s))?;
+            file.foxglove(FAULTS, t_s, &log_message(&transition, t_s))?;
         }
         Ok(())
     }
 }
 
-fn timestamp(t_s: f64) -> Value {
+fn timestamp(t_s: f64) -> Option<Timestamp> {
     let ns = nanoseconds(t_s);
-    json!({"sec": ns / 1_000_000_000, "nsec": ns % 1_000_000_000})
+    let s = u32::try_from(ns / 1_000_000_000).ok()?;
+    Timestamp::new_checked(s, (ns % 1_000_000_000) as u32)
 }
 
-fn vector(v: Vector3<f64>) -> Value {
-    json!({"x": v.x, "y": v.y, "z": v.z})
+fn vector(v: Vector3<f64>) -> Option<messages::Vector3> {
+    Some(messages::Vector3 { x: v.x, y: v.y, z: v.z })
 }
 
-fn pose(position: Vector3<f64>, turned: UnitQuaternion<f64>) -> Value {
-    json!({"position": vector(position), "orientation": orientation(turned)})
+fn pose(position: Vector3<f64>, turned: UnitQuaternion<f64>) -> Option<Pose> {
+    Some(Pose { position: vector(position), orientation: orientation(turned) })
 }
 
-fn orientation(turned: UnitQuaternion<f64>) -> Value {
+fn orientation(turned: UnitQuaternion<f64>) -> Option<Quaternion> {
     let q = turned.coords;
-    json!({"x": q.x, "y": q.y, "z": q.z, "w": q.w})
+    Some(Quaternion { x: q.x, y: q.y, z: q.z, w: q.w })
 }
 
-/// A solid or arrow of the scene. All lists of primitives must be there.
-fn entity(id: &str, frame: &str, t_s: f64, primitives: &str, solids: Value) -> Value {
-    let mut entity = json!({
-        "timestamp": timestamp(t_s), "frame_id": frame, "id": id,
-        "lifetime": {"sec": 0, "nsec": 0}, "frame_locked": true, "metadata": [],
-        "arrows": [], "cubes": [], "spheres": [], "cylinders": [],
-        "lines": [], "triangles": [], "texts": [], "models": [],
-    });
-    entity[primitives] = solids;
-    entity
+const fn color(r: f64, g: f64, b: f64, a: f64) -> Option<Color> {
+    Some(Color { r, g, b, a })
 }
 
-fn rig_message(rig: &Rig, t_s: f64) -> Value {
-    let thickness_m = rig.plate.thickness_m();
-    let (solid, size) = match rig.plate.shape() {
-        PlateShape::Rectangle { length_m, width_m } => ("cubes", [length_m, width_m]),
-        PlateShape::Round { diameter_m } => ("cylinders", [diameter_m; 2]),
-    };
-    // The origin is the middle of the upper side.
-    let middle = Vector3::new(0.0, 0.0, -thickness_m / 2.0);
-    let mut plate = json!({
-        "pose": pose(middle, UnitQuaternion::identity()),
-        "size": vector(Vector3::new(size[0], size[1], thickness_m)),
-        "color": {"r": 0.6, "g": 0.6, "b": 0.6, "a": 0.8},
-    });
-    if solid == "cylinders" {
-        plate["bottom_scale"] = json!(1.0);
-        plate["top_scale"] = json!(1.0);
+/// A part of the scene that moves with a frame, without anything to show yet.
+fn entity(id: &str, frame: &str, t_s: f64) -> SceneEntity {
+    SceneEntity {
+        timestamp: timestamp(t_s),
+        frame_id: frame.to_owned(),
+        id: id.to_owned(),
+        frame_locked: true,
+        ..SceneEntity::default()
     }
-    let diameter_m = 2.0 * rig.ball.radius_m();
-    let ball = json!({
-        "pose": pose(Vector3::zeros(), UnitQuaternion::identity()),
-        "size": vector(Vector3::repeat(diameter_m)),
-        "color": {"r": 0.9, "g": 0.5, "b": 0.1, "a": 1.0},
-    });
-    json!({"deletions": [], "entities": [
-        entity("plate", PLATE, t_s, solid, json!([plate])),
-        entity("ball", BALL, t_s, "spheres", json!([ball])),
-    ]})
+}
+
+fn scene(entities: Vec<SceneEntity>) -> SceneUpdate {
+    SceneUpdate { deletions: Vec::new(), entities }
+}
+
+fn rig_message(rig: &Rig, t_s: f64) -> SceneUpdate {
+    scene(vec![plate(rig, t_s), ball(rig, t_s)])
+}
+
+fn plate(rig: &Rig, t_s: f64) -> SceneEntity {
+    let thickness_m = rig.plate.thickness_m();
+    // The origin is the middle of the upper side.
+    let pose = pose(Vector3::new(0.0, 0.0, -thickness_m / 2.0), UnitQuaternion::identity());
+    let color = color(0.6, 0.6, 0.6, 0.8);
+    let size = |x, y| vector(Vector3::new(x, y, thickness_m));
+    let (mut cubes, mut cylinders) = (Vec::new(), Vec::new());
+    match rig.plate.shape() {
+        PlateShape::Rectangle { length_m, width_m } => {
+            cubes.push(CubePrimitive { pose, size: size(length_m, width_m), color });
+        }
+        PlateShape::Round { diameter_m } => cylinders.push(CylinderPrimitive {
+            pose,
+            size: size(diameter_m, diameter_m),
+            bottom_scale: 1.0,
+            top_scale: 1.0,
+            color,
+        }),
+    }
+    SceneEntity { cubes, cylinders, ..entity("plate", PLATE, t_s) }
+}
+
+fn ball(rig: &Rig, t_s: f64) -> SceneEntity {
+    let ball = SpherePrimitive {
+        pose: pose(Vector3::zeros(), UnitQuaternion::identity()),
+        size: vector(Vector3::repeat(2.0 * rig.ball.radius_m())),
+        color: color(0.9, 0.5, 0.1, 1.0),
+    };
+    SceneEntity { spheres: vec![ball], ..entity("ball", BALL, t_s) }
 }
 
 /// The plate as commanded, and the ball as measured; without one, it stays where it was.
-fn frames_message(evidence: &Evidence, height_m: f64, t_s: f64) -> Value {
+fn frames_message(evidence: &Evidence, height_m: f64, t_s: f64) -> FrameTransforms {
     let angle = |axis: &AxisEvidence| axis.command_rad.unwrap_or(0.0);
     let axes = &evidence.axes;
     // The x servo turns the plate about y, within the frame that the y servo turns about x.
@@ -185,7 +193,7 @@ fn frames_message(evidence: &Evidence, height_m: f64, t_s: f64) -> Value {
         let position = Vector3::new(along(&axes.x), along(&axes.y), height_m);
         transforms.push(transform(PLATE, BALL, t_s, position, UnitQuaternion::identity()));
     }
-    json!({ "transforms": transforms })
+    FrameTransforms { transforms }
 }
 
 fn transform(
@@ -194,53 +202,57 @@ fn transform(
     t_s: f64,
     translation: Vector3<f64>,
     turned: UnitQuaternion<f64>,
-) -> Value {
-    json!({
-        "timestamp": timestamp(t_s), "parent_frame_id": parent, "child_frame_id": child,
-        "translation": vector(translation), "rotation": orientation(turned),
-    })
+) -> FrameTransform {
+    FrameTransform {
+        timestamp: timestamp(t_s),
+        parent_frame_id: parent.to_owned(),
+        child_frame_id: child.to_owned(),
+        translation: vector(translation),
+        rotation: orientation(turned),
+    }
 }
 
 /// The measured acceleration in blue and the twin's in green; unknown ones are no arrows.
-fn twin_message(evidence: &Evidence, t_s: f64) -> Value {
-    let arrows = |of: fn(&AxisEvidence) -> Option<f64>, color: Value| {
+fn twin_message(evidence: &Evidence, t_s: f64) -> SceneUpdate {
+    let arrows = |id: &str, of: fn(&AxisEvidence) -> Option<f64>, color| {
         let (x, y) = (of(&evidence.axes.x), of(&evidence.axes.y));
         let acceleration = Vector3::new(x.unwrap_or(0.0), y.unwrap_or(0.0), 0.0);
-        json!(arrow(acceleration, &color).into_iter().collect::<Vec<_>>())
+        let arrows = arrow(acceleration, color).into_iter().collect();
+        SceneEntity { arrows, ..entity(id, BALL, t_s) }
     };
-    let measured = arrows(|a| a.measured_m_s2, json!({"r": 0.1, "g": 0.4, "b": 0.9, "a": 1.0}));
-    let twin = arrows(|a| a.twin_m_s2, json!({"r": 0.1, "g": 0.7, "b": 0.3, "a": 1.0}));
-    json!({"deletions": [], "entities": [
-        entity("measured acceleration", BALL, t_s, "arrows", measured),
-        entity("acceleration of the twin", BALL, t_s, "arrows", twin),
-    ]})
+    scene(vec![
+        arrows("measured acceleration", |a| a.measured_m_s2, color(0.1, 0.4, 0.9, 1.0)),
+        arrows("acceleration of the twin", |a| a.twin_m_s2, color(0.1, 0.7, 0.3, 1.0)),
+    ])
 }
 
 /// An arrow along the plate; `None` if it has no length.
-fn arrow(acceleration: Vector3<f64>, color: &Value) -> Option<Value> {
+fn arrow(acceleration: Vector3<f64>, color: Option<Color>) -> Option<ArrowPrimitive> {
     let length_m = acceleration.norm() * ARROW_M_PER_M_S2;
     // An arrow points along x until it is turned.
     let turned = UnitQuaternion::rotation_between(&Vector3::x(), &acceleration)
         .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::z_axis(), PI));
-    (length_m > 0.0).then(|| {
-        json!({
-            "pose": pose(Vector3::zeros(), turned),
-            "shaft_length": 0.8 * length_m, "shaft_diameter": 0.004,
-            "head_length": 0.2 * length_m, "head_diameter": 0.01,
-            "color": color,
-        })
+    (length_m > 0.0).then(|| ArrowPrimitive {
+        pose: pose(Vector3::zeros(), turned),
+        shaft_length: 0.8 * length_m,
+        shaft_diameter: 0.004,
+        head_length: 0.2 * length_m,
+        head_diameter: 0.01,
+        color,
     })
 }
 
-/// The levels are those of the schema: 2 is information, 3 a warning, 4 an error.
-fn log_message(transition: &Transition, t_s: f64) -> Value {
+fn log_message(transition: &Transition, t_s: f64) -> Log {
     let level = match transition.status {
-        _ if !transition.byte.test_failed() => 2,
-        FaultStatus::Confirmed => 4,
-        _ => 3,
+        _ if !transition.byte.test_failed() => Level::Info,
+        FaultStatus::Confirmed => Level::Error,
+        _ => Level::Warning,
     };
-    json!({
-        "timestamp": timestamp(t_s), "level": level, "message": sentence(transition),
-        "name": CodeWord::from(transition.code), "file": "", "line": 0,
-    })
+    Log {
+        timestamp: timestamp(t_s),
+        level: level.into(),
+        message: sentence(transition),
+        name: CodeWord::from(transition.code).to_string(),
+        ..Log::default()
+    }
 }

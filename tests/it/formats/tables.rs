@@ -242,13 +242,14 @@ mod mcap_files {
     use super::*;
     use std::collections::BTreeMap;
 
+    use foxglove::Decode;
+    use foxglove::messages::{FrameTransforms, Log, SceneUpdate, log};
     use mcap::records::MessageHeader;
     use mcap::{MessageStream, WriteOptions};
     use nalgebra::{Quaternion, UnitQuaternion, Vector3};
     use offbd::wire::asset;
     use offbd::wire::session_file::{SessionInfo, SessionWriter};
     use offbd_core::engine::Rig;
-    use serde_json::Value;
 
     /// A file of one topic with the given messages.
     fn file(schema: &str, encoding: &str, messages: &[&str]) -> Vec<u8> {
@@ -292,7 +293,7 @@ mod mcap_files {
     }
 
     /// The messages of a session that is written with an asset file, by topic.
-    fn shown(samples: &[Sample]) -> BTreeMap<String, Vec<Value>> {
+    fn shown(samples: &[Sample]) -> BTreeMap<String, Vec<Vec<u8>>> {
         let rig = Rig::chapter("shown");
         let info = SessionInfo {
             asset_file: Some(serde_json::to_string(&asset::view(&rig)).unwrap()),
@@ -301,13 +302,17 @@ mod mcap_files {
         let (mut writer, mut file) = SessionWriter::new(SessionFormat::Mcap, &info, true).unwrap();
         file.extend(writer.rows(samples).unwrap());
         file.extend(writer.end().unwrap());
-        let mut topics = BTreeMap::<String, Vec<Value>>::new();
+        let mut topics = BTreeMap::<String, Vec<Vec<u8>>>::new();
         for message in MessageStream::new(&file).unwrap() {
             let message = message.unwrap();
-            let content = serde_json::from_slice(&message.data).unwrap();
-            topics.entry(message.channel.topic.clone()).or_default().push(content);
+            let of_topic = topics.entry(message.channel.topic.clone()).or_default();
+            of_topic.push(message.data.into_owned());
         }
         topics
+    }
+
+    fn decoded<M: Decode<Error: std::fmt::Debug>>(messages: &[Vec<u8>]) -> Vec<M> {
+        messages.iter().map(|message| M::decode(&message[..]).unwrap()).collect()
     }
 
     #[test]
@@ -322,19 +327,21 @@ mod mcap_files {
                 ..Sample::default()
             };
             let topics = shown(&(0..100).map(still).collect::<Vec<_>>());
-            let last = topics["/tf"].last().unwrap();
-            let turned = &last["transforms"][0]["rotation"];
-            let part = |name: &str| turned[name].as_f64().unwrap();
-            let turned = Quaternion::new(part("w"), part("x"), part("y"), part("z"));
+            let frames: Vec<FrameTransforms> = decoded(&topics["/tf"]);
+            let [plate, ball] = &frames.last().unwrap().transforms[..] else {
+                panic!("{frames:?}")
+            };
+            let turned = plate.rotation.as_ref().unwrap();
+            let turned = Quaternion::new(turned.w, turned.x, turned.y, turned.z);
             let turned = UnitQuaternion::from_quaternion(turned);
             let heights = [turned * Vector3::x(), turned * Vector3::y()].map(|side| side.z);
             let expected = [-cmd_qy_rad.sin(), cmd_qx_rad.sin()];
             for (height, expected) in heights.iter().zip(expected) {
                 assert!((height - expected).abs() < 1e-9, "{heights:?}");
             }
-            let ball = &last["transforms"][1]["translation"];
-            assert!((ball["x"].as_f64().unwrap() - 0.05).abs() < 1e-9, "{ball}");
-            assert!((ball["y"].as_f64().unwrap() + 0.02).abs() < 1e-9, "{ball}");
+            let ball = ball.translation.as_ref().unwrap();
+            assert!((ball.x - 0.05).abs() < 1e-9, "{ball:?}");
+            assert!((ball.y + 0.02).abs() < 1e-9, "{ball:?}");
         }
     }
 
@@ -343,11 +350,14 @@ mod mcap_files {
         let topics = shown(&crate::support::rig(6000, 3000));
         assert_eq!(topics["/offbd/samples"].len(), 6000);
         assert_eq!(topics["/rig"].len(), 1);
-        let ids: Vec<_> = topics["/rig"][0]["entities"].as_array().unwrap().iter().collect();
-        assert_eq!((&ids[0]["id"], &ids[1]["id"]), (&"plate".into(), &"ball".into()));
+        let shown: Vec<SceneUpdate> = decoded(&topics["/rig"]);
+        let ids: Vec<_> = shown[0].entities.iter().map(|entity| entity.id.as_str()).collect();
+        assert_eq!(ids, ["plate", "ball"]);
         assert_eq!(topics["/tf"].len(), topics["/offbd/evidence"].len());
-        let failed = |log: &Value| log["name"] == "x_servo" && log["level"].as_u64() >= Some(3);
-        assert!(topics["/faults"].iter().any(failed), "{:?}", topics["/faults"]);
+        let logs: Vec<Log> = decoded(&topics["/faults"]);
+        let failed =
+            |entry: &Log| entry.name == "x_servo" && entry.level >= i32::from(log::Level::Warning);
+        assert!(logs.iter().any(failed), "{logs:?}");
     }
 }
 
