@@ -1,6 +1,7 @@
 //! `offbd export`: a recorded session in another format, or the twin of a rig.
 
 mod fmu;
+mod trace;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -13,6 +14,7 @@ use super::output::{self, NewFile};
 use crate::judging::MAX_NAMED_ROWS;
 use crate::wire::asset;
 use crate::wire::session_file::{SessionFormat, SessionInfo, SessionRowError, SessionWriter};
+use offbd_core::engine::Setup;
 use offbd_core::vocabulary::Sample;
 
 /// Samples that are written at a time.
@@ -31,6 +33,7 @@ const BATCH: usize = 8192;
     offbd export monday.csv -o monday.parquet\n  \
     offbd export monday.csv --asset learnt.json -o monday.mcap\n  \
     offbd export monday.parquet --asset learnt.json --format arrow -o - | other-program\n  \
+    offbd export monday.csv --asset learnt.json --trace monday-trace.parquet\n  \
     offbd export fmu --asset learnt.json -o ball_on_plate.fmu\n\n\
     With an asset file the session is judged: asset file, calibration and verdict\n\
     hash are in the metadata of the new file (Parquet, Arrow, MCAP). An MCAP file then\n\
@@ -56,14 +59,18 @@ struct SessionExport {
     #[arg(value_name = "SESSION.csv")]
     session: PathBuf,
     /// The file to write, replaced once it is complete; - is stdout
-    #[arg(short, long, value_name = "FILE")]
-    output: PathBuf,
+    #[arg(short, long, value_name = "FILE", required_unless_present = "trace")]
+    output: Option<PathBuf>,
     /// The format [default: by the suffix of FILE]
     #[arg(long, value_parser = parse_format, value_name = "FORMAT")]
     format: Option<SessionFormat>,
     /// The rig's asset file, with which the session is judged
     #[arg(long, value_name = "ASSET.json")]
     asset: Option<PathBuf>,
+    /// Also write what the session is judged by, .parquet or .arrow: one row for each judged
+    /// moment, as the service's GET /api/v1/sessions/ID/trace
+    #[arg(long, value_name = "FILE", requires = "asset")]
+    trace: Option<PathBuf>,
 }
 
 /// The formats that are written.
@@ -83,43 +90,65 @@ pub(super) fn run(args: &ExportArgs) -> anyhow::Result<()> {
 }
 
 fn export_session(args: &SessionExport) -> anyhow::Result<()> {
-    let format = format(args)?;
-    format.check().map_err(|e| BadArgument(e.to_string()))?;
+    let output = args.output.as_deref();
+    let format = output.map(|output| format(args, output)).transpose()?;
+    args.trace.as_deref().map(trace::format).transpose()?;
     if !args.session.is_file() {
         let reason = "is not a regular file, which can be read twice";
         return Err(InputError::file(&args.session, reason).into());
     }
-    let info = info(args)?;
+    let setup = args.asset.as_deref().map(set_up).transpose()?;
+    let info = info(args, setup.as_ref())?;
+    if let (Some(output), Some(format)) = (output, format) {
+        write_session(args, format, &info, output)?;
+    }
+    if let (Some(file), Some(setup)) = (&args.trace, &setup) {
+        trace::write(setup, &args.session, &info, file)?;
+    }
+    Ok(())
+}
+
+fn write_session(
+    args: &SessionExport,
+    format: SessionFormat,
+    info: &SessionInfo,
+    output: &Path,
+) -> anyhow::Result<()> {
     // Only CSV has the column `seq` where it is needed.
     let with_seq = format == SessionFormat::Csv && has_seq(&args.session)?;
-    let begun = SessionWriter::new(format, &info, with_seq)?;
-    if args.output == Path::new("-") {
+    let begun = SessionWriter::new(format, info, with_seq)?;
+    if output == Path::new("-") {
         let mut out = output::stdout();
         write(&args.session, begun, &mut out)?;
         return Ok(out.flush()?);
     }
-    let mut file = NewFile::create(&args.output)?;
+    let mut file = NewFile::create(output)?;
     write(&args.session, begun, &mut file)?;
     file.keep()
 }
 
-fn format(args: &SessionExport) -> Result<SessionFormat, BadArgument> {
-    let suffix = args.output.extension().and_then(|suffix| suffix.to_str());
+fn format(args: &SessionExport, output: &Path) -> Result<SessionFormat, BadArgument> {
+    let suffix = output.extension().and_then(|suffix| suffix.to_str());
     let by_suffix = || suffix.and_then(|suffix| parse_format(suffix).ok());
-    args.format.or_else(by_suffix).ok_or_else(|| {
+    let format = args.format.or_else(by_suffix).ok_or_else(|| {
         let formats = FORMATS.map(SessionFormat::suffix).join(", ");
         BadArgument(format!("the suffix of FILE is no format; add --format, one of {formats}"))
-    })
+    })?;
+    format.check().map_err(|e| BadArgument(e.to_string()))?;
+    Ok(format)
 }
 
-/// Judges the session if there is an asset file.
-fn info(args: &SessionExport) -> anyhow::Result<SessionInfo> {
+fn set_up(asset: &Path) -> Result<Setup, InputError> {
+    judge::set_up(judge::load_rig(Some(asset))?, None)
+}
+
+/// Judges the session if there is a setup.
+fn info(args: &SessionExport, setup: Option<&Setup>) -> anyhow::Result<SessionInfo> {
     let session = judge::session_name(&args.session);
-    let Some(path) = args.asset.as_deref() else {
+    let Some(setup) = setup else {
         return Ok(SessionInfo { session, ..SessionInfo::default() });
     };
-    let setup = judge::set_up(judge::load_rig(Some(path))?, None)?;
-    let judged = judge::judge_file(&setup, &args.session)?;
+    let judged = judge::judge_file(setup, &args.session)?;
     Ok(SessionInfo {
         session,
         asset_file: Some(serde_json::to_string(&asset::view(&setup.rig))?),

@@ -1,15 +1,23 @@
-//! `/sessions/{id}/trace`: the time series of a session for plotting.
+//! `/sessions/{id}/trace`: the time series of a session, for plotting and as a table.
 
-use crate::wire::words::ProfileWord;
 use axum::Json;
+use axum::body::{Body, Bytes};
 use axum::extract::State;
+use axum::http::HeaderMap;
+use axum::http::header::{CONTENT_DISPOSITION, CONTENT_TYPE};
+use axum::response::{IntoResponse, Response};
+use futures_util::{Stream, StreamExt};
 use serde::Deserialize;
 use serde_json::json;
 
+use super::session_format::{self, BinaryFile};
 use super::{Path, Problem, Query, query_word, time_range};
-use crate::service::{MAX_TRACE_POINTS, Service, TraceQuery};
+use crate::service::{MAX_TRACE_POINTS, Service, TraceQuery, TraceReader};
 use crate::wire::service::ReplaySettingsView;
+use crate::wire::session_file::{SessionFormat, TraceWriter};
 use crate::wire::trace::TraceView;
+use crate::wire::words::ProfileWord;
+use offbd_core::vocabulary::Invalid;
 
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
 #[into_params(parameter_in = Query)]
@@ -18,8 +26,8 @@ pub(super) struct TraceRangeQuery {
     from_s: Option<f64>,
     /// End on the device's clock, s; the end of the session by default.
     to_s: Option<f64>,
-    /// Most points to return, 1 to 20000; 5000 by default. A range with more points is
-    /// decimated.
+    /// Most points to return as JSON, 1 to 20000; 5000 by default. A range with more points is
+    /// decimated. A Parquet file and an Arrow stream have all points.
     #[param(format = Int32, minimum = 1, maximum = 20_000)]
     points: Option<u32>,
     /// The profile of the asset file by default.
@@ -44,6 +52,10 @@ fn settings(profile: Option<ProfileWord>, calibration: Option<String>) -> Replay
     }
 }
 
+/// The formats of a trace; the first is the one by default.
+const FORMATS: [SessionFormat; 3] =
+    [SessionFormat::Json, SessionFormat::Parquet, SessionFormat::Arrow];
+
 /// Points of a trace without `points`.
 const DEFAULT_POINTS: u32 = 5000;
 
@@ -51,23 +63,64 @@ const DEFAULT_POINTS: u32 = 5000;
 /// limits and gates of rig and twin. The service evaluates the recording again to compute
 /// them, from its start or from a stored state of the engine shortly before the range;
 /// nothing stored is changed, also with another calibration than the recorded one.
+///
+/// As `Accept` prefers, the answer is JSON, or a Parquet file or an Arrow stream with every
+/// judged moment, whose columns are those of the JSON document: `x.nats` is `x_nats`. Their
+/// metadata are those of the recording, and the `thresholds` (`offbd.thresholds`). They need a
+/// build with these formats. The body breaks off if the recording cannot be read.
 #[utoipa::path(get, path = "/sessions/{id}/trace", tag = "sessions",
     operation_id = "get_trace",
     params(("id" = String, description = "The service's id of the session"), TraceRangeQuery),
-    responses((status = 200, body = TraceView), (status = 400, body = Problem),
-        (status = 404, body = Problem),
+    responses((status = 200, content((TraceView = "application/json"),
+            (BinaryFile = "application/vnd.apache.parquet"),
+            (BinaryFile = "application/vnd.apache.arrow.stream"))),
+        (status = 400, body = Problem), (status = 404, body = Problem),
+        (status = 406, body = Problem),
         (status = 413, body = Problem, description = "The range is too long"),
         (status = 422, body = Problem), (status = 429, body = Problem)))]
 pub(super) async fn trace(
     State(service): State<Service>,
     Path(id): Path<String>,
     Query(query): Query<TraceRangeQuery>,
-) -> Result<Json<TraceView>, Problem> {
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    let format = session_format::negotiate(&headers, &FORMATS, SessionFormat::Json)?;
     let profile = query_word("?profile", query.profile.as_deref())?;
-    let range = TraceQuery {
-        range: time_range(query.from_s, query.to_s)?,
-        points: query.points.unwrap_or(DEFAULT_POINTS).clamp(1, MAX_TRACE_POINTS),
-        settings: settings(profile, query.calibration),
-    };
-    Ok(Json(service.trace(&id, range).await?))
+    let range = time_range(query.from_s, query.to_s)?;
+    let settings = settings(profile, query.calibration);
+    if format == SessionFormat::Json {
+        let points = query.points.unwrap_or(DEFAULT_POINTS).clamp(1, MAX_TRACE_POINTS);
+        let trace = service.trace(&id, TraceQuery { range, points, settings }).await?;
+        return Ok(Json(trace).into_response());
+    }
+    if query.points.is_some() {
+        let reason = "is for JSON only; this format has all points";
+        return Err(Invalid::new("?points", reason).into());
+    }
+    let trace = service.whole_trace(&id, range, settings).await?;
+    let writer = TraceWriter::new(format, &trace.info, &trace.thresholds)?;
+    let file = format!("attachment; filename=\"{id}-trace.{}\"", format.suffix());
+    let body = Body::from_stream(parts(trace, writer));
+    let kind = session_format::content_type(format).to_owned();
+    Ok(([(CONTENT_TYPE, kind), (CONTENT_DISPOSITION, file)], body).into_response())
+}
+
+/// Streams a trace block by block. If the recording cannot be read, the response is aborted,
+/// so that the client does not take it for complete.
+fn parts(
+    trace: TraceReader,
+    writer: TraceWriter,
+) -> impl Stream<Item = Result<Bytes, std::io::Error>> + Send {
+    let begin = (trace, Some(writer));
+    let parts = futures_util::stream::unfold(begin, |(mut trace, writer)| async move {
+        let mut writer = writer?;
+        let (sent, writer) = match trace.next().await {
+            Some(Ok(block)) => (writer.rows(&block), Some(writer)),
+            Some(Err(error)) => return Some((Err(std::io::Error::other(error)), (trace, None))),
+            None => (writer.end(), None),
+        };
+        Some((sent.map(Bytes::from).map_err(std::io::Error::other), (trace, writer)))
+    });
+    // The compression layer polls once more after the end.
+    parts.fuse()
 }

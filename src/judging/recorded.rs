@@ -2,9 +2,10 @@
 
 use super::Judging;
 use crate::wire::session_file::{RejectedRow, RowPlace};
+use crate::wire::trace::ThresholdsView;
 use crate::wire::verdict::{FaultView, SummaryView, fault_view};
 use offbd_core::diagnosis::{Evidence, FaultMemory, ServoEstimate};
-use offbd_core::engine::{Admission, Input, Misfit, Setup};
+use offbd_core::engine::{Admission, Input, Misfit, Setup, State};
 use offbd_core::vocabulary::{PerAxis, Sample};
 
 /// Number of invalid rows of a recording that are reported one by one; further ones are only
@@ -82,6 +83,18 @@ impl RecordedSession {
     #[must_use]
     pub fn faults(&self) -> &[FaultView] {
         &self.faults
+    }
+
+    /// The state of the engine.
+    #[must_use]
+    pub fn state(&self) -> State {
+        self.judging.engine().state()
+    }
+
+    /// The values at which the monitors decide.
+    #[must_use]
+    pub fn thresholds(&self) -> Vec<ThresholdsView> {
+        ThresholdsView::of(self.judging.engine())
     }
 
     /// The summary of the session so far.

@@ -109,6 +109,9 @@ pub(super) const MAX_DRIVE_CYCLES: usize = 1;
 /// Traces that are computed at a time; further requests are refused meanwhile.
 pub(super) const MAX_TRACES: usize = 2;
 
+/// Whole traces that are computed and read at a time; further requests are refused meanwhile.
+pub(super) const MAX_WHOLE_TRACES: usize = 2;
+
 /// Fault recordings that are computed at a time; further requests are refused meanwhile.
 pub(super) const MAX_RECORDINGS: usize = 2;
 

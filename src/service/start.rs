@@ -14,7 +14,7 @@ use super::cluster::{self, Cluster, NodeTask};
 use super::communication::CommunicationWatch;
 use super::job::{self, Job};
 use super::jobs::{self, JobContext};
-use super::limits::{MAX_DRIVE_CYCLES, MAX_RECORDINGS, MAX_TRACES};
+use super::limits::{MAX_DRIVE_CYCLES, MAX_RECORDINGS, MAX_TRACES, MAX_WHOLE_TRACES};
 use super::mutes::Mutes;
 use super::notifications::{NotificationTransport, Notifier};
 use super::ownership::Ownership;
@@ -58,6 +58,7 @@ pub(super) struct Inner {
 pub(super) struct Computing {
     pub(super) recordings: Arc<Semaphore>,
     pub(super) traces: Arc<Semaphore>,
+    pub(super) whole_traces: Arc<Semaphore>,
     pub(super) drive_cycles: Arc<Semaphore>,
 }
 
@@ -67,6 +68,7 @@ impl Computing {
         Self {
             recordings: permits(MAX_RECORDINGS),
             traces: permits(MAX_TRACES),
+            whole_traces: permits(MAX_WHOLE_TRACES),
             drive_cycles: permits(MAX_DRIVE_CYCLES),
         }
     }

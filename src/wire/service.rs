@@ -423,7 +423,7 @@ pub struct ImportView {
 }
 
 /// Settings with which a session is judged again.
-#[derive(Clone, Debug, Default, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ReplaySettingsView {
     /// Profile of the diagnosis; if absent, that of the asset file.

@@ -23,8 +23,13 @@ mod parquet;
 mod parquet_pages;
 #[cfg(feature = "xlsx")]
 mod sheet_rows;
+#[cfg(feature = "parquet")]
+mod trace_columns;
+mod trace_writer;
 #[cfg(feature = "xlsx")]
 mod xlsx;
+
+pub use trace_writer::TraceWriter;
 
 use std::fmt;
 use std::io::{self, Read, Seek, SeekFrom};

@@ -1,8 +1,11 @@
 """Compares what offbd and other programs read and write. See scripts/formats."""
 
+import contextlib
 import json
+import re
 import subprocess
 import sys
+import urllib.request
 from csv import DictReader
 from pathlib import Path
 
@@ -56,6 +59,62 @@ def bits(frame):
     return found
 
 
+def value_bits(value, dtype):
+    """A number as an integer of the same bits; truth values and missing ones as they are."""
+    if value is None or isinstance(value, bool):
+        return value
+    return int(numpy.array(value, dtype=dtype).view(f"uint{8 * numpy.dtype(dtype).itemsize}"))
+
+
+def table_bits(columns):
+    """The columns of a trace: times as doubles, other quantities in single precision."""
+    dtype = lambda name: "float64" if name == "t_s" else "float32"
+    return {name: [value_bits(v, dtype(name)) for v in values] for name, values in columns.items()}
+
+
+def trace_bits(document):
+    """The columns of a trace that is a JSON document."""
+    columns = {"t_s": document["t_s"]}
+    for axis in ["x", "y"]:
+        columns |= {f"{axis}_{name}": values for name, values in document[axis].items()}
+    return table_bits(columns | {n: document[n] for n in ["stuck_ball_counter", "sensor_counter"]})
+
+
+class Api:
+    """The interface of a running service."""
+
+    def __init__(self, base):
+        self.base = f"{base}/api/v1"
+
+    def ask(self, path, body=None, headers={}):
+        request = urllib.request.Request(self.base + path, body, headers)
+        with urllib.request.urlopen(request) as answer:
+            return answer.read()
+
+    def get(self, path, media_type):
+        return self.ask(path, headers={"accept": media_type})
+
+    def imported(self, asset, csv):
+        """Registers `asset`, and imports the session `csv`; returns the id of the session."""
+        self.ask("/assets", json.dumps(asset).encode(), {"content-type": "application/json"})
+        path = f"/assets/{asset['name']}/sessions/import?name=sick.csv"
+        return json.loads(self.ask(path, csv, {"content-type": "text/csv"}))["session"]["id"]
+
+
+@contextlib.contextmanager
+def service():
+    """A service with an empty store."""
+    command = [PROGRAM, "serve", "--data", str(DATA / "store"), "--listen", "127.0.0.1:0"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            for line in process.stderr:
+                if found := re.search(r"address=(127\.0\.0\.1:\d+)", re.sub(r"\x1b\[[0-9;]*m", "", line)):
+                    yield Api(f"http://{found[1]}")
+                    break
+        finally:
+            process.terminate()
+
+
 def check(what, found, expected):
     assert found == expected, f"{what} differs"
     print(f"{what}: the same")
@@ -92,6 +151,31 @@ for metadata in [pyarrow.parquet.read_metadata(parquet).metadata, stream.schema.
     asset = json.loads(metadata[b"offbd.asset_file"])
     assert asset["calibration"]["id"] == metadata[b"offbd.calibration_id"].decode(), metadata
 print("metadata: asset file, calibration and verdict hash")
+
+# The trace of the session is the same in each format, and as the service answers in JSON.
+for suffix in ["parquet", "arrow"]:
+    offbd("export", "sick.csv", "--asset", "learnt.json", "--trace", f"trace.{suffix}")
+with service() as api:
+    session = api.imported(json.loads((DATA / "learnt.json").read_text()), (DATA / "sick.csv").read_bytes())
+    document = json.loads(api.get(f"/sessions/{session}/trace?points=20000", "application/json"))
+    for media_type, name in [("parquet", "served.parquet"), ("arrow.stream", "served.arrow")]:
+        (DATA / name).write_bytes(api.get(f"/sessions/{session}/trace", f"application/vnd.apache.{media_type}"))
+traced = trace_bits(document)
+assert len(traced["t_s"]) > 500, len(traced["t_s"])
+for name in ["trace", "served"]:
+    parquet, arrow = DATA / f"{name}.parquet", DATA / f"{name}.arrow"
+    found = {
+        "Parquet in pyarrow": pyarrow.parquet.read_table(parquet).to_pydict(),
+        "Parquet in DuckDB": duckdb.read_parquet(str(parquet)).to_arrow_table().to_pydict(),
+        "Parquet in polars": polars.read_parquet(parquet).to_dict(as_series=False),
+        "Arrow in pyarrow": pyarrow.ipc.open_stream(arrow.read_bytes()).read_all().to_pydict(),
+        "Arrow in polars": polars.read_ipc_stream(arrow).to_dict(as_series=False),
+    }
+    for what, columns in found.items():
+        check(f"{name}: {what}", table_bits(columns), traced)
+    metadata = pyarrow.parquet.read_metadata(parquet).metadata
+    assert json.loads(metadata[b"offbd.thresholds"]) == document["thresholds"], metadata
+    assert metadata[b"offbd.verdict_hash"].decode() == expected_hash, metadata
 
 # An MCAP file has the samples. Messages in JSON are as their schemas say; those of Foxglove are
 # read with its own types and, like any program does, with those that the file describes.

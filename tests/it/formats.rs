@@ -2,6 +2,8 @@
 //! programs read and write is tested by `scripts/formats`.
 
 mod tables;
+#[cfg(feature = "parquet")]
+mod traces;
 
 use offbd::wire::session_file::SessionFormat;
 #[cfg(feature = "parquet")]

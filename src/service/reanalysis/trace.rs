@@ -1,25 +1,24 @@
 //! The trace of a session, for plots: evaluates the recording again and keeps a limited
-//! number of points.
+//! number of points, or passes on all of them in blocks.
 
 use std::ops::ControlFlow;
 
-use crate::service::playback::play;
-use crate::service::replay_settings;
+use tokio::sync::mpsc;
+
+use super::evaluation::Evaluation;
+use crate::service::ServiceError;
 use crate::service::writing::Handles;
-use crate::service::{ServiceError, snapshots};
 use crate::store::SessionRow;
 use crate::wire::asset::CalibrationView;
 use crate::wire::service::ReplaySettingsView;
-use crate::wire::trace::{ThresholdsView, TracePoint, TraceView};
-use offbd_core::engine::Input;
+use crate::wire::trace::{TracePoint, TraceView};
 use offbd_core::vocabulary::TimeRange;
-
-/// Limit of the samples to evaluate, which take several seconds of one core. A request for a
-/// longer range is refused.
-const MAX_EVALUATED: i64 = 2_000_000;
 
 /// Limit of the points of a trace; a range with more points is decimated.
 pub const MAX_TRACE_POINTS: u32 = 20_000;
+
+/// Points of a block of a trace that is not decimated.
+const BLOCK_POINTS: usize = 8192;
 
 /// The time range, the number of points and the settings of a trace.
 #[derive(Clone, Debug)]
@@ -30,46 +29,53 @@ pub struct TraceQuery {
     pub settings: ReplaySettingsView,
 }
 
+/// A block of a trace, or why there are no more.
+pub(in crate::service) type TraceBlock = Result<TraceView, ServiceError>;
+
 /// Computes the trace of `session`, with the calibration `learnt` if it is not the recorded
-/// one; ends early if the service shuts down.
+/// one.
 ///
 /// # Errors
-/// [`ServiceError::TooMany`] if too many samples must be evaluated: those of the range, and
-/// those from the last snapshot before it, or from the start of the session, without one.
+/// Those of [`Evaluation::begin`] and [`Evaluation::run`].
 pub(in crate::service) fn trace(
     handles: &Handles,
     session: &SessionRow,
     query: &TraceQuery,
     learnt: Option<&CalibrationView>,
 ) -> Result<TraceView, ServiceError> {
-    let setup = replay_settings::setup(session, &query.settings, learnt)?;
-    let expected = expected_points(session, query, setup.settings.period_s);
-    let (first, end) = handles.wait(handles.store.indexes(session, query.range))?;
-    let (first, mut judging) = snapshots::engine_before(handles, session, setup, first)?;
-    if end - first > MAX_EVALUATED {
-        let what = "samples to evaluate for this range";
-        let limit = usize::try_from(MAX_EVALUATED).unwrap_or(usize::MAX);
-        return Err(ServiceError::TooMany { what, limit });
-    }
+    let (range, settings) = (query.range, &query.settings);
+    let evaluation = Evaluation::begin(handles, session, range, settings, learnt)?;
+    let thresholds = evaluation.thresholds();
+    let expected = expected_points(session, query, evaluation.period_s());
     let mut decimator = Decimator::new(query.points, expected);
-    play(handles, session, first, |input| {
-        let is_sample = matches!(input, Input::NewSample(_));
-        judging.input(input);
-        let point = is_sample.then(|| TracePoint::of(&judging.engine().state())).flatten();
-        let Some(point) = point.filter(|point| point.t_s() >= query.range.from_s) else {
-            return match handles.closing.is_cancelled() {
-                true => ControlFlow::Break(()),
-                false => ControlFlow::Continue(()),
-            };
-        };
-        if point.t_s() > query.range.to_s || handles.closing.is_cancelled() {
-            return ControlFlow::Break(());
-        }
+    evaluation.run(handles, session, |point| {
         decimator.push(point);
         ControlFlow::Continue(())
     })?;
-    let thresholds = ThresholdsView::of(judging.engine());
     Ok(TraceView { thresholds, ..decimator.view() })
+}
+
+/// Sends every point of `evaluation` to `blocks`, in blocks, until nobody reads them; the last
+/// message is the error if the evaluation fails. Waits for the reader.
+pub(in crate::service) fn send_blocks(
+    evaluation: Evaluation,
+    handles: &Handles,
+    session: &SessionRow,
+    blocks: &mpsc::Sender<TraceBlock>,
+) {
+    let mut block = TraceView::default();
+    let done = evaluation.run(handles, session, |point| {
+        block.push(&point);
+        if block.t_s.len() < BLOCK_POINTS {
+            return ControlFlow::Continue(());
+        }
+        match blocks.blocking_send(Ok(std::mem::take(&mut block))) {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(_) => ControlFlow::Break(()),
+        }
+    });
+    // Without a reader there is nobody to tell.
+    let _ = blocks.blocking_send(done.map(|()| block));
 }
 
 /// Returns the expected number of points in the range, assuming evenly spaced samples and
@@ -100,11 +106,8 @@ impl Decimator {
         Self { points: Vec::new(), limit: limit as usize, stride, n_seen: 0 }
     }
 
-    /// Adds the next point; one that is not later than the last is ignored.
+    /// Adds the next point.
     fn push(&mut self, point: TracePoint) {
-        if self.points.last().is_some_and(|last| last.t_s() >= point.t_s()) {
-            return;
-        }
         let n_seen = self.n_seen;
         self.n_seen += 1;
         if n_seen.is_multiple_of(self.stride) && self.points.len() == self.limit {

@@ -38,3 +38,4 @@ pub use readiness::QueueLoad;
 pub use series::{MAX_SERIES_SESSIONS, SeriesQuery};
 pub use sessions::SessionListQuery;
 pub use telemetry::PendingBatch;
+pub use traces::TraceReader;

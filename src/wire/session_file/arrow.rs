@@ -40,15 +40,23 @@ pub(super) struct ArrowEncoder {
 }
 
 impl ArrowEncoder {
+    /// Begins a stream of the samples of a session.
     pub(super) fn new(info: &SessionInfo) -> Result<Self, SessionFileError> {
-        let schema = columns::schema(info);
+        Self::of(columns::schema(info))
+    }
+
+    /// Begins a stream with the columns and the metadata of `schema`.
+    pub(super) fn of(schema: SchemaRef) -> Result<Self, SessionFileError> {
         let writer = StreamWriter::try_new(Vec::new(), &schema).map_err(unwritten)?;
         Ok(Self { schema, writer })
     }
 
     pub(super) fn rows(&mut self, samples: &[Sample]) -> Result<Vec<u8>, SessionFileError> {
-        let batch = columns::batch(&self.schema, samples).map_err(unwritten)?;
-        self.writer.write(&batch).map_err(unwritten)?;
+        self.write(&columns::batch(&self.schema, samples).map_err(unwritten)?)
+    }
+
+    pub(super) fn write(&mut self, batch: &RecordBatch) -> Result<Vec<u8>, SessionFileError> {
+        self.writer.write(batch).map_err(unwritten)?;
         Ok(std::mem::take(self.writer.get_mut()))
     }
 

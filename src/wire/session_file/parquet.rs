@@ -6,6 +6,7 @@
 use std::io::{self, Read, Seek, SeekFrom};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use arrow_array::RecordBatch;
 use arrow_schema::{ArrowError, SchemaRef};
 use bytes::Bytes;
 use parquet::arrow::ArrowWriter;
@@ -57,10 +58,17 @@ pub(super) struct ParquetEncoder {
 }
 
 impl ParquetEncoder {
+    /// Begins a file of the samples of a session.
     pub(super) fn new(info: &SessionInfo) -> Result<Self, SessionFileError> {
-        let schema = columns::schema(info);
-        let metadata =
-            info.entries().map(|(key, value)| KeyValue::new(key.to_owned(), value.to_owned()));
+        Self::of(columns::schema(info), info.entries())
+    }
+
+    /// Begins a file with the columns of `schema` and the metadata `entries`.
+    pub(super) fn of(
+        schema: SchemaRef,
+        entries: impl Iterator<Item = (impl Into<String>, impl Into<String>)>,
+    ) -> Result<Self, SessionFileError> {
+        let metadata = entries.map(|(key, value)| KeyValue::new(key.into(), value.into()));
         let properties = WriterProperties::builder()
             .set_created_by(concat!("offbd ", env!("CARGO_PKG_VERSION")).to_owned())
             .set_compression(Compression::ZSTD(ZstdLevel::default()))
@@ -80,8 +88,11 @@ impl ParquetEncoder {
     }
 
     pub(super) fn rows(&mut self, samples: &[Sample]) -> Result<Vec<u8>, SessionFileError> {
-        let batch = columns::batch(&self.schema, samples).map_err(unwritten)?;
-        self.writer.write(&batch).map_err(unwritten)?;
+        self.write(&columns::batch(&self.schema, samples).map_err(unwritten)?)
+    }
+
+    pub(super) fn write(&mut self, batch: &RecordBatch) -> Result<Vec<u8>, SessionFileError> {
+        self.writer.write(batch).map_err(unwritten)?;
         Ok(std::mem::take(self.writer.inner_mut()))
     }
 
