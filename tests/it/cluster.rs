@@ -3,17 +3,17 @@
 
 #[cfg(all(feature = "nats", feature = "mqtt"))]
 mod bus;
+mod clients;
+mod history;
+mod kills;
 mod old_copy;
 mod outage;
 mod ownership;
 mod streams;
 mod versions;
+mod zombies;
 
-use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
 
 use reqwest::Method;
 use serde_json::{Value, json};
@@ -21,15 +21,11 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 
 use crate::support::cluster::{Cluster, N_NODES, call};
-use crate::support::device::{DeviceLoad, Random};
 use crate::support::held_socket::HeldSocket;
 use crate::support::postgres;
 use crate::support::process::{Process, Refusal};
 use crate::support::{Client, Events, batch, eventually, judged, registration, rig};
 use offbd_core::vocabulary::Sample;
-
-/// Faults of the long test, unless the environment variable FAULTS is set.
-const FAULTS: usize = 6;
 
 /// Registers rigs through the first node: many, so that each node owns some.
 async fn register_rigs(cluster: &Cluster) -> Vec<String> {
@@ -121,150 +117,10 @@ async fn not_ready(client: &Client, words: &str) {
     .await;
 }
 
-/// Rigs that are asked, at each fault of their node, for an acknowledgement.
-struct Probes {
-    names: Vec<String>,
-    samples: Vec<Sample>,
-    /// How long the first acknowledgement took after a fault, by its kind; of a node that is
-    /// stopped, the longest until it had ended.
-    times: BTreeMap<&'static str, Vec<Duration>>,
-}
-
-impl Probes {
-    async fn new(cluster: &Cluster) -> Self {
-        let names = register_rigs(cluster).await;
-        Self { names, samples: rig(6000, 6000), times: BTreeMap::new() }
-    }
-
-    /// Returns the batch of this fault.
-    fn part(&self, fault: usize) -> Vec<Sample> {
-        let at = fault * 10 % self.samples.len();
-        self.samples[at..at + 10].to_vec()
-    }
-
-    fn add(&mut self, kind: &'static str, times: Vec<Duration>) {
-        self.times.entry(kind).or_default().extend(times);
-    }
-
-    fn print(&mut self) {
-        for (kind, times) in &mut self.times {
-            times.sort();
-            let at = |percent: usize| times[(times.len() * percent / 100).min(times.len() - 1)];
-            if !times.is_empty() {
-                let (p50, p99, worst) = (at(50), at(99), at(100));
-                let n = times.len();
-                println!("{kind}, {n} rigs: p50 {p50:?}, p99 {p99:?}, worst {worst:?}");
-            }
-        }
-    }
-}
-
-/// Sends a batch of each rig to `client` until it is acknowledged, and again until `ended`.
-/// Returns the longest time that took, of each.
-async fn longest_acknowledgements(
-    client: Client,
-    names: Vec<String>,
-    part: Vec<Sample>,
-    ended: Arc<AtomicBool>,
-) -> Vec<Duration> {
-    let longest = async |name: &String| {
-        let mut longest = acknowledgement(&client, name, &part).await;
-        while !ended.load(Ordering::SeqCst) {
-            longest = longest.max(acknowledgement(&client, name, &part).await);
-        }
-        longest
-    };
-    futures_util::future::join_all(names.iter().map(longest)).await
-}
-
-#[expect(clippy::disallowed_methods, reason = "the time is measured")]
-async fn acknowledgement(client: &Client, name: &str, part: &[Sample]) -> Duration {
-    let start = Instant::now();
-    let path = format!("assets/{name}/telemetry");
-    let (status, ack) = call(client, Method::POST, &path, &batch(Some("s"), part)).await;
-    assert_eq!(status, 200, "{ack}");
-    start.elapsed()
-}
-
-/// How often a node was refused because another one had taken what it owned.
-async fn n_refused(client: &Client) -> f64 {
-    let lost = count(client, "offbd_partitions_lost_total").await;
-    lost + count(client, "offbd_commits_overtaken_total").await
-}
-
 async fn count(client: &Client, metric: &str) -> f64 {
     let text = client.get("/metrics").await.text;
     let value = text.lines().find_map(|line| line.strip_prefix(metric)?.strip_prefix(' '));
     value.map_or(0.0, |value| value.parse().unwrap())
-}
-
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn nodes_that_are_killed_paused_and_stopped_lose_nothing() {
-    let n_faults = std::env::var("FAULTS").map_or(FAULTS, |n| n.parse().unwrap());
-    let mut cluster = Cluster::start().await;
-    let (mut probes, mut n_met) = (Probes::new(&cluster).await, 0);
-    let load = DeviceLoad::start(4, &cluster.client(0), cluster.data.path(), Some(&cluster.url()));
-    let mut random = Random(7);
-    let mut n_by_kind = BTreeMap::<&str, usize>::new();
-    for fault in 0..n_faults {
-        load.link.wait_for_samples(random.below(400) as u64 + 50).await;
-        let node = random.below(N_NODES);
-        let other = (node + 1 + random.below(N_NODES - 1)) % N_NODES;
-        let kind = ["kill", "pause", "stop"][fault % 3];
-        *n_by_kind.entry(kind).or_default() += 1;
-        let names = cluster.rigs_of(node, &probes.names).await;
-        let owned_any = !names.is_empty();
-        let ended = Arc::new(AtomicBool::new(kind != "stop"));
-        let asked = longest_acknowledgements(
-            cluster.client(other),
-            names,
-            probes.part(fault),
-            ended.clone(),
-        );
-        let times = match kind {
-            "kill" => {
-                cluster.kill(node);
-                load.link.set_service(&cluster.client(other));
-                let asked = tokio::spawn(asked);
-                cluster.restart(node);
-                asked.await.unwrap()
-            }
-            "pause" => {
-                let n_before = n_refused(&cluster.client(node)).await;
-                cluster.signal(node, "-STOP");
-                load.link.set_service(&cluster.client(other));
-                let times = asked.await;
-                cluster.taken_over_from(node).await;
-                cluster.signal(node, "-CONT");
-                // A node that is not refused when it wakes up has owned nothing.
-                if owned_any {
-                    let woken = cluster.client(node);
-                    eventually(|| async { (n_refused(&woken).await > n_before).then_some(()) })
-                        .await;
-                    n_met += 1;
-                }
-                times
-            }
-            _ => {
-                load.link.set_service(&cluster.client(other));
-                let asked = tokio::spawn(asked);
-                cluster.stop(node).await;
-                ended.store(true, Ordering::SeqCst);
-                cluster.restart(node);
-                asked.await.unwrap()
-            }
-        };
-        probes.add(kind, times);
-        // After each fault everything goes on, through each node.
-        load.link.set_service(&cluster.client(random.below(N_NODES)));
-        load.link.wait_for_samples(50).await;
-    }
-    let samples = load.link.acknowledged();
-    let laps = load.stop().await;
-    println!("{n_by_kind:?}; {laps} recordings, {samples} samples: each stored once");
-    probes.print();
-    cluster.settled(N_NODES).await;
-    assert!(n_met > 0 || n_faults < 2, "no node was paused that owned something");
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

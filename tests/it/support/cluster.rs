@@ -51,15 +51,23 @@ impl Cluster {
         Self::of(postgres, kinds).await
     }
 
-    /// Starts a node of each of `kinds`, one after the other.
+    /// Starts a node of each of `kinds`, one after the other, and waits until each has its share.
     pub async fn of(postgres: Postgres, kinds: Vec<NodeKind>) -> Self {
+        let n = kinds.len();
+        let this = Self::begin(postgres, kinds).await;
+        this.settled(n).await;
+        this
+    }
+
+    /// As [`Self::of`], without waiting until the partitions are shared.
+    pub async fn begin(postgres: Postgres, kinds: Vec<NodeKind>) -> Self {
         let (data, n) = (tempfile::tempdir().unwrap(), kinds.len());
         let mut this = Self { postgres, data, nodes: Vec::new(), kinds };
         for i in 0..n {
             this.nodes.push(None);
             this.restart(i);
         }
-        this.settled(n).await;
+        this.complete(n).await;
         this
     }
 
@@ -112,12 +120,20 @@ impl Cluster {
 
     /// Waits until `n` nodes know each other and share all partitions.
     pub async fn settled(&self, n: usize) {
+        self.shared_by(n, N_PARTITIONS / n as u64).await;
+    }
+
+    /// Waits until `n` nodes know each other and each partition has an owner.
+    pub async fn complete(&self, n: usize) {
+        self.shared_by(n, 0).await;
+    }
+
+    async fn shared_by(&self, n: usize, least: u64) {
         for client in self.clients() {
             eventually(|| async {
                 let cluster = try_get(&client, "cluster").await?;
                 let nodes = cluster["nodes"].as_array()?;
-                let share = N_PARTITIONS / n as u64;
-                let is_shared = nodes.iter().all(|node| node["partitions"].as_u64() >= Some(share));
+                let is_shared = nodes.iter().all(|node| node["partitions"].as_u64() >= Some(least));
                 (nodes.len() == n && is_shared && cluster["unowned"] == 0).then_some(())
             })
             .await;

@@ -16,6 +16,7 @@ use tokio::task::JoinHandle;
 use tokio_tungstenite::connect_async;
 use tokio_tungstenite::tungstenite::Message;
 
+use super::history::Recorder;
 use super::{
     Answer, Client, batch, csv, eventually, judgement, packed, registration, rig, try_connection,
 };
@@ -36,6 +37,9 @@ pub struct ServiceLink {
     /// The first answers to refused batches.
     refusals: Arc<Mutex<Vec<String>>>,
     stopped: Arc<AtomicBool>,
+    /// If there is one, what is stored is compared with its history in the end, and not by the
+    /// devices.
+    recorder: Option<Recorder>,
 }
 
 impl ServiceLink {
@@ -49,12 +53,30 @@ impl ServiceLink {
             refused: Arc::default(),
             refusals: Arc::default(),
             stopped: Arc::default(),
+            recorder: None,
         }
+    }
+
+    /// Returns the address of the service, now and whenever it changes.
+    pub fn address(&self) -> watch::Receiver<String> {
+        self.address.subscribe()
     }
 
     /// Sets the address of the service to that of `client`.
     pub fn set_service(&self, client: &Client) {
         self.address.send_replace(client.address.clone());
+    }
+
+    /// Returns a client of the service at its present address.
+    pub fn client(&self) -> Client {
+        let address = self.address.borrow().clone();
+        Client { address, ..self.client.clone() }
+    }
+
+    /// Registers an asset, unless it is there.
+    pub async fn register(&self, asset: &str) {
+        let made = self.request(Method::POST, "assets", &registration(asset)).await;
+        assert!([201, 409].contains(&made.status.as_u16()), "{}", made.text);
     }
 
     /// Returns the number of samples acknowledged so far.
@@ -186,7 +208,11 @@ impl ServiceLink {
             let repeated = if random.below(5) == 0 { random.below(100) } else { 0 };
             let end = (at + 1 + random.below(100)).min(samples.len());
             let part = &samples[at.saturating_sub(repeated)..end];
+            let number = self.recorder.as_ref().map(|to| to.lock().send_batch(asset, "s", part));
             let ack = self.post(asset, part, random.below(N_WAYS)).await;
+            if let (Some(recorder), Some(number)) = (&self.recorder, number) {
+                recorder.lock().tell_batch(number, &ack);
+            }
             let n = |field: &str| ack[field].as_u64().unwrap();
             assert_eq!(n("accepted") + n("duplicate"), part.len() as u64, "{ack}");
             self.acknowledged.fetch_add((end - at) as u64, Ordering::SeqCst);
@@ -224,7 +250,16 @@ pub struct DeviceLoad {
 
 impl DeviceLoad {
     pub fn start(n: usize, client: &Client, data: &Path, url: Option<&str>) -> Self {
-        let link = ServiceLink::to(client);
+        Self::start_on(ServiceLink::to(client), n, data, url)
+    }
+
+    /// Starts devices whose history is recorded.
+    pub fn start_recorded(n: usize, client: &Client, data: &Path, recorder: &Recorder) -> Self {
+        let recorder = Some(recorder.clone());
+        Self::start_on(ServiceLink { recorder, ..ServiceLink::to(client) }, n, data, None)
+    }
+
+    fn start_on(link: ServiceLink, n: usize, data: &Path, url: Option<&str>) -> Self {
         let devices =
             (0..n).map(|i| device(&link, &format!("d{i}"), i % 2 == 0, data, url)).collect();
         Self { link, devices }
@@ -242,7 +277,7 @@ impl DeviceLoad {
 }
 
 /// Starts a device that sends recordings, each for a new asset, and compares what is stored in
-/// the database at `url`, or in the store of `data`. Returns the number of recordings.
+/// the database at `url`, or in the store of `data`, unless it is recorded. Returns the number of recordings.
 pub fn device(
     link: &ServiceLink,
     name: &str,
@@ -260,10 +295,12 @@ pub fn device(
         }
         for lap in 1.. {
             let asset = format!("{name}-{lap}");
-            let made = link.request(Method::POST, "assets", &registration(&asset)).await;
-            assert!([201, 409].contains(&made.status.as_u16()), "{}", made.text);
+            link.register(&asset).await;
             link.stream(&asset, &samples, &mut random).await;
-            check(&link, &asset, &samples, &url).await;
+            let (id, verdict) = end(&link, &asset).await;
+            if link.recorder.is_none() {
+                check(&link, &asset, &samples, (&id, &verdict), &url).await;
+            }
             if link.stopped.load(Ordering::SeqCst) {
                 return lap;
             }
@@ -272,14 +309,24 @@ pub fn device(
     })
 }
 
-/// Checks that each of `samples` is stored once, with the right verdict, faults and
-/// transitions.
-async fn check(link: &ServiceLink, asset: &str, samples: &[Sample], url: &str) {
+/// Ends the only session of an asset; returns its id and its verdict.
+async fn end(link: &ServiceLink, asset: &str) -> (String, Value) {
     let page = link.get(&format!("sessions?asset={asset}")).await;
     assert_eq!(page["items"].as_array().unwrap().len(), 1, "{page}");
     let id = page["items"][0]["id"].as_str().unwrap();
     let ended = link.request(Method::POST, &format!("sessions/{id}/end"), &Value::Null).await;
-    let verdict = &ended.expect(200)["verdict"];
+    (id.to_owned(), ended.expect(200)["verdict"].take())
+}
+
+/// Checks that each of `samples` is stored once, with the right verdict, faults and
+/// transitions.
+async fn check(
+    link: &ServiceLink,
+    asset: &str,
+    samples: &[Sample],
+    (id, verdict): (&str, &Value),
+    url: &str,
+) {
     let wanted = judgement(asset, samples);
     assert_eq!(verdict["verdict_hash"], wanted.hash, "{asset}");
     assert_eq!(verdict["faults"], json!(wanted.faults), "{asset}");

@@ -13,11 +13,13 @@ pub mod deletions;
 pub mod described;
 pub mod device;
 pub mod held_socket;
+pub mod history;
 pub mod postgres;
 pub mod process;
 pub mod provider;
 pub mod proxy;
 pub mod receiver;
+pub mod statement_gate;
 
 use std::future::Future;
 use std::path::Path;
