@@ -37,6 +37,7 @@ export const alarmApi = {
     send<Schemas["Acknowledged"]>("POST", `/alarms/acknowledge${by()}`, { alarms }),
   advice: () => get<Advice>("/advice"),
   putNote: (code: AlarmCode, text: string) => send("PUT", `/advice/${segment(code)}/note${by()}`, { text }),
+  mutes: async (asset: string) => (await get<Page<Mute>>(`/assets/${segment(asset)}/mutes`)).items,
   mute: (asset: string, code: AlarmCode, reason: string, until: string) =>
     send<Mute>("PUT", `/assets/${segment(asset)}/mutes/${segment(code)}${by()}`, { reason, until }),
   unmute: (asset: string, code: AlarmCode) =>
