@@ -44,6 +44,8 @@ export const alarmApi = {
     send("DELETE", `/assets/${segment(asset)}/mutes/${segment(code)}`),
   channels: async () => (await get<Page<Channel>>(CHANNELS)).items,
   createChannel: (channel: NewChannel) => send<Schemas["MadeChannel"]>("POST", CHANNELS, channel),
+  putChannel: (id: string, channel: NewChannel) =>
+    send<Schemas["MadeChannel"]>("PUT", `${CHANNELS}/${segment(id)}`, channel),
   deleteChannel: (id: string) => send("DELETE", `${CHANNELS}/${segment(id)}`),
   testChannel: (id: string) => send<Delivery>("POST", `${CHANNELS}/${segment(id)}/test`),
   rules: async () => (await get<Page<Rule>>(RULES)).items,
