@@ -35,6 +35,7 @@ fn with_assets(router: GuardedRouter) -> GuardedRouter {
         .routes(Operate, routes!(assets::put))
         .routes(Administer, routes!(assets::delete))
         .routes(ReadAsset, routes!(assets::state))
+        .routes(ReadAsset, routes!(assets::link))
         .routes(Read, routes!(assets::trends))
         .routes(Read, routes!(series::series))
         .routes(Read, routes!(series::annotations))

@@ -12,6 +12,7 @@ use super::layers::record_asset;
 use super::{App, AssetPath, Problem, Query, json_body, page_limit};
 use crate::service::Service;
 use crate::wire::asset::AssetView;
+use crate::wire::link::LinkView;
 use crate::wire::service::{Page, StateView};
 use crate::wire::trend::TrendsView;
 
@@ -115,6 +116,19 @@ pub(super) async fn state(
     AssetPath(asset): AssetPath,
 ) -> Result<Json<StateView>, Problem> {
     Ok(Json(service.state(&asset).await?))
+}
+
+/// Returns how the samples of a rig arrive, in its session and in the last minutes: rate and
+/// spacing on the device's clock, gaps, the delay of batches, rows sent twice, rows that are not
+/// judged and why, and how far the device's clock is from that of the service.
+#[utoipa::path(get, path = "/assets/{asset}/link", tag = "assets", operation_id = "get_link",
+    params(("asset" = String, description = "Name of the asset")),
+    responses((status = 200, body = LinkView), (status = 404, body = Problem)))]
+pub(super) async fn link(
+    State(service): State<Service>,
+    AssetPath(asset): AssetPath,
+) -> Result<Json<LinkView>, Problem> {
+    Ok(Json(service.link(&asset).await?))
 }
 
 /// Returns the drift of both servos over the sessions: the estimates of each session,

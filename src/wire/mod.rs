@@ -19,6 +19,7 @@ pub mod drive_cycle;
 pub mod fmu;
 pub mod json;
 pub mod learning;
+pub mod link;
 pub mod mapping;
 pub mod memory;
 pub mod notification;

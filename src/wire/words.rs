@@ -12,7 +12,7 @@ use utoipa::ToSchema;
 
 use offbd_core::diagnosis::Profile;
 use offbd_core::diagnosis::trend::Parameter;
-use offbd_core::engine::{Misfit, Order};
+use offbd_core::engine::{Misfit, Order, Rejection};
 use offbd_core::plant::Rung;
 use offbd_core::vocabulary::{Axis, FaultCode, FaultKind, FaultStatus, UnknownWord};
 
@@ -76,6 +76,42 @@ macro_rules! mirrored {
             }
         }
     };
+}
+
+words! {
+    /// Why a row of telemetry is not judged.
+    UnjudgedWord as UnjudgedReason {
+        /// A value is not a finite number.
+        NotFinite = "not_finite",
+        /// A value is beyond all reason.
+        Absurd = "absurd",
+        /// It came too late; it is recorded.
+        Late = "late",
+        /// The clock jumped and no further row confirmed it; it is recorded.
+        Jump = "jump",
+        /// Another row with its number, or time, has other values.
+        Conflict = "conflict",
+        /// It is too old to tell whether it is recorded.
+        TooOld = "too_old",
+        /// It is no sample.
+        Form = "form",
+        /// Its session has ended.
+        SessionEnded = "session_ended",
+    }
+}
+
+impl From<Rejection> for UnjudgedWord {
+    fn from(why: Rejection) -> Self {
+        match why {
+            Rejection::NotFinite { .. } => Self::NotFinite,
+            Rejection::Absurd { .. } => Self::Absurd,
+            Rejection::Late { .. } => Self::Late,
+            Rejection::Jump { .. } => Self::Jump,
+            Rejection::Conflict { .. } => Self::Conflict,
+            Rejection::TooOld => Self::TooOld,
+            Rejection::Malformed => Self::Form,
+        }
+    }
 }
 
 mirrored! {

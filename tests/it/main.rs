@@ -26,6 +26,7 @@ mod fuzz;
 mod journal;
 mod jwt;
 mod learning;
+mod link;
 mod lists;
 mod liveness;
 mod main_job;

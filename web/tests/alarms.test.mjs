@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { createServer } from "node:http";
 import { after, test } from "node:test";
 import { imported, recordings } from "./rigs.mjs";
-import { ask, page, started } from "./support.mjs";
+import { ask, page, started, until } from "./support.mjs";
 
 /** The label of the field for the name that is recorded with an action. */
 const ACTOR = "Your name, recorded with the action";
@@ -101,6 +101,49 @@ test("a channel and a rule are made in the page, and a test message arrives", as
   const [rule] = (await ask(service.url, "GET", "/notifications/rules")).items;
   assert.deepEqual([rule.name, rule.asset, rule.channel_name], ["everything", "*", "workshop"]);
   assert.ok(Date.parse(rule.silent_until) > Date.now());
+  await view.done();
+});
+
+test("a channel is changed in the page, and its secrets stay and are not shown", async () => {
+  const password = "correct horse";
+  const email = { host: "127.0.0.1", port: 2525, security: "none", from: "offbd@bench", to: ["ada@bench"] };
+  const mail = { name: "mail", email: { ...email, user: "offbd", password } };
+  const mailId = (await ask(service.url, "POST", "/notifications/channels", mail)).id;
+  const view = await page(chromium);
+  await view.goto(`${service.url}/notifications`);
+  const edit = async (name) => {
+    await view.getByRole("button", { name: `Edit ${name}` }).click();
+    return view.getByRole("dialog", { name: `Edit the channel ${name}` });
+  };
+  const webhook = await edit("workshop");
+  assert.match(await webhook.getByLabel("URL").inputValue(), /\/hook$/);
+  await webhook.getByLabel("URL").fill(`http://127.0.0.1:${receiver.address().port}/other`);
+  await webhook.getByRole("button", { name: "Save" }).click();
+  await webhook.waitFor({ state: "detached" });
+  await view.getByText("/other").waitFor();
+  assert.equal(await view.getByText(/^whsec_/).count(), 0, "the key is the one before");
+  const before = received.length;
+  await view.getByRole("button", { name: "Test workshop" }).click();
+  await until(() => received.length > before);
+
+  const dialog = await edit("mail");
+  assert.equal(await dialog.getByLabel("User").inputValue(), "offbd");
+  assert.equal(await dialog.getByLabel("New password").inputValue(), "");
+  assert.equal(await dialog.getByLabel("To").inputValue(), "ada@bench");
+  await dialog.getByLabel("To").fill("ada@bench, bob@bench");
+  await dialog.getByRole("button", { name: "Save" }).click();
+  await dialog.waitFor({ state: "detached" });
+  await view.getByText("ada@bench, bob@bench by 127.0.0.1:2525").waitFor();
+  assert.ok(!(await view.content()).includes(password));
+  const channel = await ask(service.url, "GET", `/notifications/channels/${mailId}`);
+  assert.deepEqual(channel.email, {
+    ...email,
+    to: ["ada@bench", "bob@bench"],
+    user: "offbd",
+    has_password: true,
+  });
+  await ask(service.url, "DELETE", `/notifications/channels/${mailId}`);
+  assert.deepEqual(view.errors, []);
   await view.done();
 });
 

@@ -1,4 +1,4 @@
-// A rig whose data stay away: in the feed of the fleet, in its row, and on its page.
+// How data of a rig arrive, and that they stay away: in the feed of the fleet, in its row, and on its page.
 import assert from "node:assert/strict";
 import { writeFileSync } from "node:fs";
 import { join } from "node:path";
@@ -45,7 +45,7 @@ test("lost communication is told since when and by whom it is acknowledged, and 
   await alarm.getByLabel("Your name, recorded with the action").fill("ada");
   await alarm.getByRole("button", { name: "Acknowledge" }).click();
   await alarm.getByText(/Acknowledged by ada, /).waitFor();
-  assert.equal(await alarm.getByRole("button").count(), 0);
+  assert.equal(await alarm.getByRole("button", { name: "Acknowledge" }).count(), 0);
 
   // Data arrive again, until they count as back.
   await until(async () => {
@@ -58,4 +58,74 @@ test("lost communication is told since when and by whom it is acknowledged, and 
   assert.deepEqual([...fleet.errors, ...rig.errors], []);
   await rig.done();
   await fleet.done();
+});
+
+/** The text of a cell of the card of the link. */
+const cell = (card, row, column) =>
+  card
+    .getByRole("row", { name: new RegExp(`^${row} `) })
+    .getByRole("cell")
+    .nth(column);
+
+test("the card of the link tells how the samples of a rig arrive", async () => {
+  await ask(service.url, "POST", "/assets", { name: "linked", sample_rate_hz: 100 });
+  const view = await page(chromium);
+  await view.goto(`${service.url}/rigs/linked`);
+  const card = view.getByRole("region", { name: "Link" });
+  await card.getByText("No samples have arrived since the service was started.").waitFor();
+  // 10 ms apart, with a gap of 1.5 s, and with two rows that are none.
+  const times = [...Array(50).keys()].map((i) => (i < 25 ? i * 0.01 : i * 0.01 + 1.49));
+  const samples = [...times.map((t_s) => ({ t_s, x_m: 0, y_m: 0 })), { t_s: "?" }, {}];
+  const { rejected } = await ask(service.url, "POST", "/assets/linked/telemetry", { session: "s", samples });
+  assert.equal(rejected.length, 2);
+  await card.getByText("100.0 per second").first().waitFor();
+  for (const column of [0, 1]) {
+    assert.equal(await cell(card, "Samples", column).textContent(), "50");
+    assert.equal(await cell(card, "Rate", column).textContent(), "100.0 per second, 100 expected");
+    assert.equal(await cell(card, "Spacing", column).textContent(), "10.0\u202fms ± 0.0\u202fms");
+    assert.equal(await cell(card, "Gaps", column).textContent(), "1, of 1.5\u202fs");
+    assert.equal(await cell(card, "Not judged", column).textContent(), "2 not readable");
+    assert.equal(await cell(card, "Sent twice", column).textContent(), "none");
+  }
+  await card.getByText("which does not tell the time of day").waitFor();
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});
+
+test("lost communication is muted with a reason and for a time, before it is lost and after", async () => {
+  await ask(service.url, "POST", "/assets", { name: "moved" });
+  const view = await page(chromium);
+  await view.goto(`${service.url}/rigs/moved`);
+  const card = view.getByRole("region", { name: "Link" });
+  await card.getByText("An alarm is raised if data stay away").waitFor();
+  await card.getByRole("button", { name: "Mute Communication lost" }).click();
+  const dialog = view.getByRole("dialog", { name: "Mute Communication lost of moved" });
+  await dialog.getByText(/Nobody is told if data stay away/).waitFor();
+  assert.ok(await dialog.getByRole("button", { name: "Mute" }).isDisabled(), "without a reason");
+  await dialog.getByLabel("Why").fill("the rig moves to hall 2");
+  await dialog.getByLabel("For").selectOption({ label: "a day" });
+  await dialog.getByLabel("Your name, recorded with the action").fill("ada");
+  await dialog.getByRole("button", { name: "Mute" }).click();
+  await card.getByText(/muted by ada until .*: the rig moves to hall 2/).waitFor();
+  const { items } = await ask(service.url, "GET", "/assets/moved/mutes");
+  assert.deepEqual([items.length, items[0].code, items[0].by], [1, "communication_lost", "ada"]);
+  const hours = (Date.parse(items[0].until) - Date.parse(items[0].at)) / 3_600_000;
+  assert.equal(Math.round(hours), 24);
+
+  await ask(service.url, "POST", "/assets/moved/telemetry", { samples: [{ t_s: 0, x_m: 0, y_m: 0 }] });
+  const alarm = view.getByRole("alert").filter({ hasText: "Communication lost" });
+  await alarm.getByText(/Muted by ada until .*: the rig moves to hall 2/).waitFor();
+  const fleet = await page(chromium, { viewport: { width: 1500, height: 900 } });
+  await fleet.goto(service.url);
+  const row = fleet.getByRole("link", { name: /moved/ });
+  await row.getByText("lost communication muted").waitFor();
+  assert.match(await row.getByText(/Communication lost since/).getAttribute("class"), /chip-muted/);
+
+  await alarm.getByRole("button", { name: /^End the mute of Communication lost/ }).click();
+  await alarm.getByRole("button", { name: "Mute Communication lost" }).waitFor();
+  await card.getByText("An alarm is raised if data stay away").waitFor();
+  await row.getByText("lost communication muted").waitFor({ state: "detached" });
+  assert.deepEqual([...view.errors, ...fleet.errors], []);
+  await fleet.done();
+  await view.done();
 });

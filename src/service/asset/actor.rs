@@ -2,6 +2,7 @@
 
 use super::ended_session::EndedSession;
 use super::learning_record::LearningRecord;
+use super::link_health::LinkHealth;
 use super::session::OpenSession;
 use super::session_rate::SessionRate;
 use crate::service::writing::EngineGeneration;
@@ -25,6 +26,7 @@ pub(super) struct Asset {
     /// Boxed: most of an asset, and many assets have none.
     pub(super) open: Option<Box<OpenSession>>,
     pub(super) session_rate: SessionRate,
+    pub(super) link: LinkHealth,
     /// Rows of the batch that is being recorded that are no samples, and that the engine has
     /// not been told of yet.
     pub(super) malformed: Vec<usize>,

@@ -7,6 +7,7 @@ use crate::service::ServiceError;
 use crate::store::CalibrationRow;
 use crate::wire::asset::CalibrationView;
 use crate::wire::learning::LearningView;
+use crate::wire::link::LinkView;
 use crate::wire::service::{MonitorView, StateView, WatchView};
 use crate::wire::telemetry::{AckView, Batch};
 use offbd_core::engine::Rig;
@@ -68,6 +69,8 @@ pub(in crate::service) enum AssetCommand {
     Load { reply: Reply<()> },
     /// Returns the state of the twin.
     State { reply: Reply<StateView> },
+    /// Returns how the samples arrive.
+    Link { reply: Reply<LinkView> },
     /// Returns the state and the trace after the first `seen` points of a session.
     Watch { session: Option<String>, seen: u64, reply: Reply<WatchView> },
     /// Returns the monitors of the open session.

@@ -10,6 +10,7 @@ use super::turn::Turn;
 use crate::service::ServiceError;
 use crate::store::Write;
 use crate::wire::telemetry::{AckView, Batch, RowView};
+use crate::wire::words::UnjudgedWord;
 use offbd_core::engine::{Admission, Recognition, Rejection};
 use offbd_core::vocabulary::Sample;
 
@@ -35,7 +36,11 @@ impl Asset {
             match batch.session {
                 Some(name) => match self.switch(&name, turn)? {
                     SessionSwitch::Open => self.record_in_parts(samples, turn, &mut ack)?,
-                    SessionSwitch::Ended(row) => retransmitted(&row, &samples, turn, &mut ack)?,
+                    SessionSwitch::Ended(row) => {
+                        for reason in retransmitted(&row, &samples, turn, &mut ack)? {
+                            count_unjudged(&mut self.link, reason, 1, turn.at);
+                        }
+                    }
                 },
                 None => self.record_nameless(samples, turn, &mut ack)?,
             }
@@ -43,6 +48,8 @@ impl Asset {
         if let Some(open) = &mut self.open {
             note_malformed(&mut self.malformed, usize::MAX, open);
         }
+        // Not before the session is open that its batch names.
+        count_unjudged(&mut self.link, Rejection::Malformed, n_malformed as u64, turn.at);
         self.note_presence(last_t_s, n_malformed, turn);
         if ack.session_id.is_none()
             || ack.session_id == self.open.as_ref().map(|open| open.id.clone())
@@ -52,17 +59,21 @@ impl Asset {
         self.learn_if_due(turn)?;
         ack.rejected.sort_by_key(|row| row.index);
         count_outcomes(&ack);
+        if ack.duplicate > 0 {
+            self.link.duplicates(ack.duplicate, turn.at);
+        }
         Ok(ack)
     }
 
     /// Notes the arrival of a batch whose last sample has the time `last_t_s`, with `n_malformed`
     /// rows that are no samples.
-    fn note_presence(&self, last_t_s: Option<f64>, n_malformed: usize, turn: &Turn<'_>) {
+    fn note_presence(&mut self, last_t_s: Option<f64>, n_malformed: usize, turn: &Turn<'_>) {
         let (presences, name) = (&turn.env.presences, &self.row.name);
         let open = self.open.as_ref().map(|open| (&*open.id, open.judging.engine().unjudged()));
         match (open, last_t_s) {
             (Some((session, unjudged)), Some(t_s)) => {
-                presences.record(name, session, turn.at, t_s, unjudged);
+                let (lag_s, offset_s) = presences.record(name, session, turn.at, t_s, unjudged);
+                self.link.batch(lag_s, offset_s, turn.at);
             }
             (open, None) if n_malformed > 0 => {
                 let unjudged = open.map(|(_, unjudged)| unjudged);
@@ -142,6 +153,8 @@ impl Asset {
     ) -> Result<(), ServiceError> {
         let Some(open) = &mut self.open else { return Ok(()) };
         turn.engine_changed = true;
+        let (link, at) = (&mut self.link, turn.at);
+        link.follow(&open.id, open.judging.engine().gap_s(), at);
         let (first_index, n_dropped) = (open.progress.n_samples, open.n_unconfirmed());
         let mut new = Vec::with_capacity(samples.len());
         let mut transitions = Vec::new();
@@ -157,28 +170,35 @@ impl Asset {
                 admission = take_old(open, sample, recorded);
             }
             match admission {
-                Admission::Accepted => new.push(*sample),
+                Admission::Accepted => {
+                    link.sample(sample.t_s, at);
+                    new.push(*sample);
+                }
                 Admission::SetAside(why) => {
                     new.push(*sample);
                     // A jump may still be confirmed.
                     let is_late = matches!(why, Rejection::Late { .. });
-                    count_unjudged(why.as_str(), u64::from(is_late));
+                    match is_late {
+                        true => link.late_sample(at),
+                        false => link.doubted_sample(sample.t_s, at),
+                    }
+                    count_unjudged(link, why, u64::from(is_late), at);
                     ack.late.push(row(why.to_string()));
                 }
                 Admission::Duplicate => ack.duplicate += 1,
                 Admission::Rejected(why) => {
-                    count_unjudged(why.as_str(), 1);
+                    count_unjudged(link, why, 1, at);
                     ack.rejected.push(row(why.to_string()));
                 }
                 Admission::Unknown => {
                     open.judging.note_rejected(Rejection::TooOld);
-                    count_unjudged(Rejection::TooOld.as_str(), 1);
+                    count_unjudged(link, Rejection::TooOld, 1, at);
                     ack.rejected.push(row(Rejection::TooOld.to_string()));
                 }
             }
             open.report(&self.row.name, turn.at, &mut transitions)?;
         }
-        count_unjudged("jump", open.n_unconfirmed() - n_dropped);
+        count_unjudged(link, UnjudgedWord::Jump, open.n_unconfirmed() - n_dropped, at);
         ack.accepted += new.len();
         ack.session = Some(open.name.clone());
         ack.session_id = Some(open.id.clone());
@@ -246,7 +266,6 @@ fn samples(
         match row {
             Ok(sample) => samples.push((index, sample)),
             Err(reason) => {
-                count_unjudged(Rejection::Malformed.as_str(), 1);
                 malformed.push(index);
                 ack.rejected.push(RowView { index, reason });
             }

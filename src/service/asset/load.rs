@@ -6,6 +6,7 @@ use std::ops::ControlFlow;
 use super::actor::{Asset, Provenance};
 use super::ended_session::EndedSession;
 use super::learning_record::LearningRecord;
+use super::link_health::LinkHealth;
 use super::session::OpenSession;
 use super::session_rate::SessionRate;
 use crate::service::playback::play;
@@ -51,6 +52,7 @@ impl StoredAsset {
                 provenance,
                 open: None,
                 session_rate: SessionRate::default(),
+                link: LinkHealth::default(),
                 malformed: Vec::new(),
                 ended,
                 learning,

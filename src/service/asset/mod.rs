@@ -15,6 +15,7 @@
 //! - `memory`, `trend`: the fault memory, servo estimates over the sessions.
 //! - `learning`, `learning_record`: automatic calibration.
 //! - `registry`, `presence`: the asset file, the time of the last telemetry.
+//! - `link_health`, `link_tally`: how the samples arrive.
 
 mod actor;
 mod command;
@@ -22,6 +23,8 @@ mod ended_session;
 mod ingest;
 mod learning;
 mod learning_record;
+mod link_health;
+mod link_tally;
 mod load;
 mod loader;
 mod memory;

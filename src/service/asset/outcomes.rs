@@ -1,10 +1,22 @@
-//! What became of samples, as metrics.
+//! What became of samples, as metrics and for each asset.
 
+use super::link_health::LinkHealth;
+use crate::store::Micros;
 use crate::wire::telemetry::AckView;
+use crate::wire::words::UnjudgedWord;
 
-/// Counts `n` samples that are not evaluated. `reason` is a metric label with few values.
-pub(super) fn count_unjudged(reason: &'static str, n: u64) {
-    metrics::counter!("offbd_samples_unjudged_total", "reason" => reason).increment(n);
+/// Counts `n` samples that arrive over `link` at `at` and are not judged.
+pub(super) fn count_unjudged(
+    link: &mut LinkHealth,
+    reason: impl Into<UnjudgedWord>,
+    n: u64,
+    at: Micros,
+) {
+    let reason = reason.into();
+    metrics::counter!("offbd_samples_unjudged_total", "reason" => reason.as_str()).increment(n);
+    if n > 0 {
+        link.unjudged(reason, n, at);
+    }
 }
 
 /// Counts the samples of a batch by what became of them.

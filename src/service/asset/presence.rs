@@ -35,7 +35,8 @@ impl Presences {
     }
 
     /// Records that a batch of `session`, whose last sample has the time `t_s`, arrived at
-    /// `at`; `unjudged` are the unjudged samples after it, if they are many.
+    /// `at`; `unjudged` are the unjudged samples after it, if they are many. Returns the lag of
+    /// the batch and the smallest offset, s.
     pub(in crate::service) fn record(
         &self,
         asset: &str,
@@ -43,16 +44,22 @@ impl Presences {
         at: Micros,
         t_s: f64,
         unjudged: Option<Unjudged>,
-    ) {
+    ) -> (f64, f64) {
         let offset_s = at as f64 / 1e6 - t_s;
         let mut all = self.lock();
         let before = all.get(asset).filter(|before| before.session == session);
         let least_offset_s = before.map_or(offset_s, |before| before.least_offset_s.min(offset_s));
-        let (session, lag_s) = (session.to_owned(), Some(offset_s - least_offset_s));
-        let n_malformed = 0;
-        let presence =
-            Presence { session, seen_at: at, lag_s, unjudged, n_malformed, least_offset_s };
+        let lag_s = offset_s - least_offset_s;
+        let presence = Presence {
+            session: session.to_owned(),
+            seen_at: at,
+            lag_s: Some(lag_s),
+            unjudged,
+            n_malformed: 0,
+            least_offset_s,
+        };
         all.insert(asset.to_owned(), presence);
+        (lag_s, least_offset_s)
     }
 
     /// Records that a batch without a sample arrived at `at`: only `n` rows that are none.

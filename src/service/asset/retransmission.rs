@@ -1,16 +1,17 @@
 //! Samples that a device sends again for a session that it names and that has ended.
 
 use super::ended_session::MAX_SESSIONS;
-use super::outcomes::count_unjudged;
 use super::recorded::RecordedSamples;
 use super::turn::Turn;
 use crate::service::{ServiceError, views};
 use crate::store::SessionRow;
 use crate::wire::telemetry::{AckView, RowView};
+use crate::wire::words::UnjudgedWord;
 use offbd_core::engine::{Recognition, Rejection, rejection};
 use offbd_core::vocabulary::Sample;
 
 /// Answers for samples of a session that has ended: those that are recorded are duplicates.
+/// Returns why rows are rejected.
 /// Rows that the session rejected are rejected again, and so are others that are not later
 /// than what it has, so that a device that resends until it gets 200 gets there.
 ///
@@ -21,7 +22,7 @@ pub(super) fn retransmitted(
     samples: &[(usize, Sample)],
     turn: &Turn<'_>,
     ack: &mut AckView,
-) -> Result<(), ServiceError> {
+) -> Result<Vec<UnjudgedWord>, ServiceError> {
     let rig = views::rig(&row.setup)?;
     let valid = samples.iter().map(|(_, sample)| sample);
     let valid = valid.filter(|sample| rejection(&rig, sample).is_none());
@@ -42,14 +43,15 @@ pub(super) fn retransmitted(
         }
     }
     ack.duplicate += samples.len() - rejected.len();
+    let mut reasons = Vec::with_capacity(rejected.len());
     for (index, why) in rejected {
-        count_unjudged(why.label(), 1);
+        reasons.push(why.word());
         ack.rejected.push(RowView { index, reason: why.to_string() });
     }
     ack.session = Some(row.name.clone());
     ack.session_id = Some(row.id.clone());
     ack.last_seq = row.progress.last_seq.and_then(|seq| u64::try_from(seq).ok());
-    Ok(())
+    Ok(reasons)
 }
 
 /// What a session that has ended knows of samples.
@@ -123,10 +125,10 @@ enum Refusal {
 }
 
 impl Refusal {
-    const fn label(self) -> &'static str {
+    fn word(self) -> UnjudgedWord {
         match self {
-            Self::Rejected(why) => why.as_str(),
-            Self::SessionEnded => "session_ended",
+            Self::Rejected(why) => why.into(),
+            Self::SessionEnded => UnjudgedWord::SessionEnded,
         }
     }
 }

@@ -50,6 +50,13 @@ impl Asset {
         ack: &mut AckView,
     ) -> Result<Vec<(usize, Sample)>, ServiceError> {
         let Some(open) = &mut self.open else { return Ok(samples) };
+        let (link, at) = (&mut self.link, turn.at);
+        let mut reject =
+            |open: &mut OpenSession, index: usize, why: Rejection, ack: &mut AckView| {
+                open.judging.note_rejected(why);
+                count_unjudged(link, why, 1, at);
+                ack.rejected.push(RowView { index, reason: why.to_string() });
+            };
         let parts: Vec<_> =
             self.ended.iter().filter(|ended| ended.first_part == open.part.first).collect();
         for part in &parts {
@@ -78,11 +85,4 @@ impl Asset {
         }
         Ok(samples)
     }
-}
-
-/// Rejects the row `index` of a batch for the open session.
-fn reject(open: &mut OpenSession, index: usize, why: Rejection, ack: &mut AckView) {
-    open.judging.note_rejected(why);
-    count_unjudged(why.as_str(), 1);
-    ack.rejected.push(RowView { index, reason: why.to_string() });
 }

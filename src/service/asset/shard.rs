@@ -276,6 +276,10 @@ impl Shard {
             C::Rebuild { reply } => self.change(name, asset, reply, |a, turn| a.rebuild(turn)),
             C::Load { reply } => self.query(name, asset, reply, |_| ()),
             C::State { reply } => self.query(name, asset, reply, Asset::state),
+            C::Link { reply } => {
+                let now = self.env.handles.clock.now();
+                self.query(name, asset, reply, |a| a.link(now));
+            }
             C::Watch { session, seen, reply } => {
                 self.query(name, asset, reply, |a| a.watch(session, seen));
             }
@@ -389,6 +393,7 @@ impl Shard {
 mod tests {
     use super::*;
     use crate::service::asset::Shards;
+    use crate::service::asset::link_health::LinkHealth;
     use crate::service::asset::presence::Presences;
     use crate::service::asset::session::OpenSession;
     use crate::service::asset::session_rate::SessionRate;
@@ -416,6 +421,7 @@ mod tests {
             provenance: Default::default(),
             open: None,
             session_rate: SessionRate::default(),
+            link: LinkHealth::default(),
             malformed: Vec::new(),
             ended: Vec::new(),
             learning: Default::default(),

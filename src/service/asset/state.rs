@@ -2,6 +2,8 @@
 
 use super::actor::Asset;
 use super::session::OpenSession;
+use crate::store::Micros;
+use crate::wire::link::LinkView;
 use crate::wire::service::{MonitorView, StateView, WatchView, monitor_views, state_view};
 use offbd_core::engine::State;
 
@@ -17,6 +19,11 @@ impl Asset {
         let samples = u64::try_from(open.progress.n_samples).unwrap_or_default();
         let session = (open.id.as_str(), open.name.as_str(), samples);
         StateView { learning, ..state_view(name, Some(session), &open.judging.engine().state()) }
+    }
+
+    /// Returns how the samples arrive, at `now`.
+    pub(super) fn link(&self, now: Micros) -> LinkView {
+        self.link.view(&self.row.name, self.rig.sample_rate_hz, now)
     }
 
     /// Returns the state and the trace after the first `seen` points of `session`.

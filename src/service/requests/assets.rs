@@ -4,6 +4,7 @@ use crate::service::asset::AssetCommand;
 use crate::service::{Service, ServiceError, views};
 use crate::store::AssetFilter;
 use crate::wire::asset::{self, AssetView};
+use crate::wire::link::LinkView;
 use crate::wire::service::{Page, StateView, WatchView};
 use offbd_core::engine::Rig;
 use offbd_core::vocabulary::Invalid;
@@ -113,6 +114,14 @@ impl Service {
     pub async fn state(&self, name: &str) -> Result<StateView, ServiceError> {
         let state = self.inner.shards.call(name, |reply| AssetCommand::State { reply }).await?;
         Ok(self.with_mutes(state))
+    }
+
+    /// Returns how the samples of `name` arrive.
+    ///
+    /// # Errors
+    /// [`ServiceError::UnknownAsset`].
+    pub async fn link(&self, name: &str) -> Result<LinkView, ServiceError> {
+        self.inner.shards.call(name, |reply| AssetCommand::Link { reply }).await
     }
 
     /// Returns the state of the twin, and the trace after the first `seen` points of the

@@ -37,12 +37,15 @@ export const alarmApi = {
     send<Schemas["Acknowledged"]>("POST", `/alarms/acknowledge${by()}`, { alarms }),
   advice: () => get<Advice>("/advice"),
   putNote: (code: AlarmCode, text: string) => send("PUT", `/advice/${segment(code)}/note${by()}`, { text }),
+  mutes: async (asset: string) => (await get<Page<Mute>>(`/assets/${segment(asset)}/mutes`)).items,
   mute: (asset: string, code: AlarmCode, reason: string, until: string) =>
     send<Mute>("PUT", `/assets/${segment(asset)}/mutes/${segment(code)}${by()}`, { reason, until }),
   unmute: (asset: string, code: AlarmCode) =>
     send("DELETE", `/assets/${segment(asset)}/mutes/${segment(code)}`),
   channels: async () => (await get<Page<Channel>>(CHANNELS)).items,
   createChannel: (channel: NewChannel) => send<Schemas["MadeChannel"]>("POST", CHANNELS, channel),
+  putChannel: (id: string, channel: NewChannel) =>
+    send<Schemas["MadeChannel"]>("PUT", `${CHANNELS}/${segment(id)}`, channel),
   deleteChannel: (id: string) => send("DELETE", `${CHANNELS}/${segment(id)}`),
   testChannel: (id: string) => send<Delivery>("POST", `${CHANNELS}/${segment(id)}/test`),
   rules: async () => (await get<Page<Rule>>(RULES)).items,

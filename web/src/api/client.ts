@@ -26,6 +26,7 @@ import type {
   Remark,
   Replay,
   ReplaySettings,
+  RigLink,
   ServiceHealth,
   Session,
   SessionCalibration,
@@ -53,6 +54,7 @@ export const api = {
   putAsset: (asset: Asset) => send<Asset>("PUT", `/assets/${segment(asset.name)}`, asset),
   deleteAsset: (name: string) => send<void>("DELETE", `/assets/${segment(name)}`),
   state: (name: string) => get<State>(`/assets/${segment(name)}/state`),
+  link: (name: string) => get<RigLink>(`/assets/${segment(name)}/link`),
   driveCycle: (name: string) => get<DriveCycle>(`/assets/${segment(name)}/drive-cycle`),
   trends: (name: string) => get<Trends>(`/assets/${segment(name)}/trends`),
   faultsOf: (name: string, status: FaultFilter = "all") =>

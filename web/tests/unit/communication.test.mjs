@@ -2,6 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { afterEvent, healthOf, withLine } from "../../src/pages/fleet/fleet-state.ts";
+import { alarmState } from "../../src/words/alarm.ts";
 import { communicationText } from "../../src/words/communication.ts";
 
 const SINCE = "2026-01-01T11:59:51Z";
@@ -47,4 +48,13 @@ test("an event of lost communication says whether data are awaited", () => {
   assert.match(words("confirmed").sentence, /No data arrive although a session is open/);
   assert.equal(words("passed").text, "back");
   assert.equal(words("passed", { session: null }).text, "no longer expected");
+});
+
+test("a rig is tested while only its lost communication is muted", () => {
+  const mute = (code) => ({ asset: "a", code, by: "ada", reason: "moves", at: SINCE, until: SINCE });
+  assert.equal(healthOf({ ...rig, muted: [mute("communication_lost")] }), "ok");
+  assert.equal(healthOf({ ...rig, muted: [mute("communication_lost"), mute("sensor")] }), "untested");
+  const alarm = { failing: true, status: "confirmed", muted: mute("communication_lost") };
+  assert.equal(alarmState({ ...alarm, code: "communication_lost" }).text, "muted by ada");
+  assert.equal(alarmState({ ...alarm, code: "sensor" }).text, "not tested (muted by ada)");
 });

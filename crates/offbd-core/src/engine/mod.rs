@@ -263,8 +263,9 @@ impl Engine {
         self.pipeline.set_clock_back();
     }
 
-    /// The interval without a sample that makes a gap, s.
-    fn gap_s(&self) -> f64 {
+    /// The interval without a sample that makes a gap, after which evidence begins anew, s.
+    #[must_use]
+    pub fn gap_s(&self) -> f64 {
         self.setup.settings.gap_after_s(1.0 / self.setup.rig.sample_rate_hz)
     }
 

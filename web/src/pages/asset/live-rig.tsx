@@ -9,6 +9,7 @@ import { DriveCycleCard } from "./drive-cycle/drive-cycle-card";
 import { activeFaults, healthOf } from "./health";
 import { LastSession } from "./last-session";
 import { LearningCard } from "./learning/learning-card";
+import { LinkCard } from "./link-card";
 import { LiveChartsCard } from "./live-charts-card";
 import { LostCommunication } from "./lost-communication";
 import { Monitors } from "./monitors";
@@ -71,6 +72,7 @@ export function LiveRig({ asset, faults, lost, refetch }: Props) {
         <NowCard state={state} />
         <TwinCard asset={asset} state={state} />
       </div>
+      <LinkCard asset={asset.name} />
       <DriveCycleCard asset={asset} />
       <TrendsCard query={trends} />
     </main>

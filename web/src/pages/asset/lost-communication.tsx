@@ -2,6 +2,7 @@ import { alarmApi, type Alarm } from "../../api/alarms";
 import { ActionButton } from "../../parts/action-button";
 import { ActorField, useActor } from "../../parts/actor-field";
 import { dateTime, sinceText } from "../../words/time";
+import { MuteButton } from "./mute-button";
 
 interface Props {
   alarm: Alarm;
@@ -28,6 +29,7 @@ export function LostCommunication({ alarm, refetch }: Props) {
         {muted && ` Muted by ${muted.by} until ${dateTime(muted.until)}: ${muted.reason}`}
       </span>
       {isOpen && <ActorField actor={actor} />}
+      <MuteButton asset={asset} code={code} mute={muted} changed={refetch} />
       {isOpen && (
         <ActionButton class="small" action={acknowledge} needs="operator">
           Acknowledge

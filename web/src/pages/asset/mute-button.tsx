@@ -19,8 +19,16 @@ const DURATIONS = [
 
 const hoursFromNow = (hours: number) => new Date(Date.now() + hours * 3_600_000).toISOString();
 
-/** Mutes a monitor of a rig, or ends its mute. */
-export function MuteButton({ asset, code, mute }: { asset: string; code: AlarmCode; mute?: Mute | null }) {
+interface Props {
+  asset: string;
+  code: AlarmCode;
+  mute?: Mute | null;
+  /** Called after a change that no stream tells. */
+  changed?: () => Promise<unknown>;
+}
+
+/** Mutes a monitor of a rig, or the alarm of lost communication; or ends the mute. */
+export function MuteButton({ asset, code, mute, changed }: Props) {
   const [isOpen, setOpen] = useState(false);
   const refused = useRefusal("operator");
   if (mute)
@@ -28,7 +36,10 @@ export function MuteButton({ asset, code, mute }: { asset: string; code: AlarmCo
       <ActionButton
         class="small"
         label={`End the mute of ${alarmCodeTitle(code)}: ${mute.reason}, until ${dateTime(mute.until)}`}
-        action={() => alarmApi.unmute(asset, code)}
+        action={async () => {
+          await alarmApi.unmute(asset, code);
+          await changed?.();
+        }}
         needs="operator"
       >
         Unmute
@@ -46,12 +57,18 @@ export function MuteButton({ asset, code, mute }: { asset: string; code: AlarmCo
       >
         Mute
       </button>
-      {isOpen && <MuteDialog asset={asset} code={code} close={() => setOpen(false)} />}
+      {isOpen && <MuteDialog asset={asset} code={code} changed={changed} close={() => setOpen(false)} />}
     </>
   );
 }
 
-function MuteDialog({ asset, code, close }: { asset: string; code: AlarmCode; close: () => void }) {
+const MONITOR_EFFECT =
+  "The monitor is shown as not tested, and nobody is told of what it finds. " +
+  "The fault memory records it all the same.";
+const COMMUNICATION_EFFECT =
+  "Nobody is told if data stay away; the page and the history show it all the same.";
+
+function MuteDialog({ asset, code, changed, close }: Omit<Props, "mute"> & { close: () => void }) {
   const [reason, setReason] = useState("");
   const [hours, setHours] = useState(8);
   const actor = useActor();
@@ -59,12 +76,12 @@ function MuteDialog({ asset, code, close }: { asset: string; code: AlarmCode; cl
     actor.remember();
     await alarmApi.mute(asset, code, reason.trim(), hoursFromNow(hours));
     close();
+    await changed?.();
   };
   return (
     <Dialog title={`Mute ${alarmCodeTitle(code)} of ${asset}`} close={close}>
       <p class="quiet">
-        The monitor is shown as not tested, and nobody is told of what it finds. The fault memory records it
-        all the same. The mute ends by itself.
+        {code === "communication_lost" ? COMMUNICATION_EFFECT : MONITOR_EFFECT} The mute ends by itself.
       </p>
       <div class="form-row">
         <label>

@@ -27,9 +27,12 @@ const NOT_LEARNT: Record<LearningState, { word: string; meaning: string }> = {
   learnt: { word: "", meaning: "" },
 };
 
+const COMMUNICATION = "communication_lost";
+
 /** Faults, warnings, and what is not tested. */
 function Findings({ entry }: { entry: Row["entry"] }) {
   const faults = [...entry.faults].sort((a, b) => severity(b) - severity(a));
+  const isMuted = entry.muted?.some(({ code }) => code === COMMUNICATION);
   return (
     <span class="faults">
       {faults.map((fault) => (
@@ -44,7 +47,10 @@ function Findings({ entry }: { entry: Row["entry"] }) {
         </span>
       )}
       {entry.communication_lost_since && (
-        <span class="chip chip-failing" title={`Last data: ${dateTime(entry.communication_lost_since)}`}>
+        <span
+          class={`chip ${isMuted ? "chip-muted" : "chip-failing"}`}
+          title={`Last data: ${dateTime(entry.communication_lost_since)}`}
+        >
           <b>Communication lost</b> since {sinceText(entry.communication_lost_since)}
         </span>
       )}
@@ -53,7 +59,9 @@ function Findings({ entry }: { entry: Row["entry"] }) {
           class="chip chip-muted"
           title={`Muted by ${mute.by} until ${dateTime(mute.until)}: ${mute.reason}`}
         >
-          {alarmCodeTitle(mute.code)} not tested
+          {mute.code === COMMUNICATION
+            ? "lost communication muted"
+            : `${alarmCodeTitle(mute.code)} not tested`}
         </span>
       ))}
       {entry.stale && (

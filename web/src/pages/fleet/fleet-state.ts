@@ -18,7 +18,7 @@ export function healthOf(entry: FleetEntry): RigHealth {
   if (!entry.session_id) return "idle";
   // The service judges it: between two looks at a large fleet, every rig would seem silent here.
   if (entry.silent) return "silent";
-  if (entry.unjudged || entry.muted?.length) return "untested";
+  if (entry.unjudged || entry.muted?.some(({ code }) => code !== "communication_lost")) return "untested";
   return entry.calibrated ? "ok" : "unlearnt";
 }
 

@@ -1,4 +1,4 @@
-import type { NewChannel } from "../../api/alarms";
+import type { Channel, NewChannel } from "../../api/alarms";
 
 /** What the form of a channel holds at first, as text. */
 export const EMPTY_DRAFT = {
@@ -16,13 +16,21 @@ export const EMPTY_DRAFT = {
 
 export type ChannelDraft = typeof EMPTY_DRAFT;
 
-/** The channel that the form describes. */
+/** What the form of `channel` holds. Its password and its key are told to nobody. */
+export function draftOf({ kind, name, url, email }: Channel): ChannelDraft {
+  if (!email) return { ...EMPTY_DRAFT, kind, name, url: url ?? "" };
+  const { host, port, security, user, from, to } = email;
+  const text = { port: String(port), user: user ?? "", to: to.join(", ") };
+  return { ...EMPTY_DRAFT, kind, name, host, security, from, ...text };
+}
+
+/** The channel that the form describes. Without a password, that of the channel before stays. */
 export function channelOf(draft: ChannelDraft): NewChannel {
   const { name, url, host, user, password, from } = draft;
   if (draft.kind === "webhook") return { name, webhook: { url } };
   const security = draft.security as "tls" | "starttls" | "none";
   const to = draft.to.split(/[\s,;]+/).filter((address) => address);
-  const login = user ? { user, password } : {};
+  const login = user ? { user, ...(password && { password }) } : {};
   return { name, email: { host, port: Number(draft.port), security, from, to, ...login } };
 }
 

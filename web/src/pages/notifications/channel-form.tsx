@@ -1,8 +1,8 @@
 import { useState } from "preact/hooks";
-import { alarmApi } from "../../api/alarms";
+import { alarmApi, type Channel } from "../../api/alarms";
 import { ActionButton } from "../../parts/action-button";
 import { Choice } from "../../parts/choice";
-import { channelOf, EMPTY_DRAFT, isComplete, type ChannelDraft } from "./channel-draft";
+import { channelOf, draftOf, EMPTY_DRAFT, isComplete, type ChannelDraft } from "./channel-draft";
 import { ChannelField } from "./channel-field";
 import { EmailFields } from "./email-fields";
 
@@ -11,15 +11,27 @@ const KINDS = [
   ["email", "E-mail"],
 ] as const;
 
-export function ChannelForm({ made }: { made: (secret?: string | null) => void }) {
-  const [draft, setDraft] = useState(EMPTY_DRAFT);
+interface Props {
+  /** The channel to change; a new one without it. */
+  channel?: Channel;
+  /** Called with the key of the signature if there is a new one. */
+  made: (secret?: string | null) => void;
+}
+
+/** Makes or changes a channel. */
+export function ChannelForm({ channel, made }: Props) {
+  const [draft, setDraft] = useState(channel ? draftOf(channel) : EMPTY_DRAFT);
   const { kind, name, url } = draft;
   const change = (part: Partial<ChannelDraft>) => setDraft((before) => ({ ...before, ...part }));
-  const save = async () => made((await alarmApi.createChannel(channelOf(draft))).secret);
+  const save = async () => {
+    const settings = channelOf(draft);
+    const saved = channel ? alarmApi.putChannel(channel.id, settings) : alarmApi.createChannel(settings);
+    made((await saved).secret);
+  };
   return (
     <>
       <div class="form-row">
-        <Choice label="Kind" value={kind} options={KINDS} change={(kind) => change({ kind })} />
+        {!channel && <Choice label="Kind" value={kind} options={KINDS} change={(kind) => change({ kind })} />}
         <ChannelField word="Name" value={name} change={(name) => change({ name })} />
         {kind === "webhook" && (
           <ChannelField word="URL" type="url" value={url} change={(url) => change({ url })} />
@@ -27,14 +39,16 @@ export function ChannelForm({ made }: { made: (secret?: string | null) => void }
       </div>
       {kind === "webhook" && (
         <p class="quiet">
-          Each message is posted as a CloudEvent (JSON). It is signed as Standard Webhooks say; the key is
-          shown once.
+          Each message is posted as a CloudEvent (JSON). It is signed as Standard Webhooks say; the key{" "}
+          {channel ? "stays as it is." : "is shown once."}
         </p>
       )}
-      {kind === "email" && <EmailFields draft={draft} change={change} />}
+      {kind === "email" && (
+        <EmailFields draft={draft} hasPassword={channel?.email?.has_password} change={change} />
+      )}
       <div class="form-end">
         <ActionButton class="primary" disabled={!isComplete(draft)} action={save}>
-          Add
+          {channel ? "Save" : "Add"}
         </ActionButton>
       </div>
     </>

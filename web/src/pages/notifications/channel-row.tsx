@@ -1,6 +1,7 @@
 import { alarmApi, type Channel } from "../../api/alarms";
 import { ActionButton } from "../../parts/action-button";
 import { ConfirmButton } from "../../parts/confirm-button";
+import { EditChannel } from "./edit-channel";
 
 /** Where a channel sends, in a few words. */
 const target = ({ url, email }: Channel) => url ?? `${email?.to.join(", ")} by ${email?.host}:${email?.port}`;
@@ -29,6 +30,7 @@ export function ChannelRow({ channel, refetch }: { channel: Channel; refetch: ()
         <ActionButton class="small" label={`Test ${name}`} action={test}>
           Test
         </ActionButton>{" "}
+        <EditChannel channel={channel} refetch={refetch} />{" "}
         <ConfirmButton
           class="small"
           word="Delete"

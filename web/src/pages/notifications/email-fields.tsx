@@ -10,11 +10,13 @@ const ENCRYPTIONS = [
 
 interface Props {
   draft: ChannelDraft;
+  /** Whether the channel has a password, which stays if none is given. */
+  hasPassword?: boolean;
   change: (part: Partial<ChannelDraft>) => void;
 }
 
 /** The fields of a channel that sends e-mail. */
-export function EmailFields({ draft, change }: Props) {
+export function EmailFields({ draft, hasPassword, change }: Props) {
   const { host, port, security, user, password, from, to } = draft;
   return (
     <>
@@ -31,7 +33,7 @@ export function EmailFields({ draft, change }: Props) {
       <div class="form-row">
         <ChannelField word="User (if needed)" value={user} change={(user) => change({ user })} />
         <ChannelField
-          word="Password"
+          word={hasPassword ? "New password (if it changes)" : "Password"}
           type="password"
           value={password}
           change={(password) => change({ password })}

@@ -1,0 +1,89 @@
+import { alarmApi } from "../../api/alarms";
+import { api } from "../../api/client";
+import type { LinkStretch, RigLink } from "../../api/types";
+import { useQuery } from "../../hooks/use-query";
+import { clockText, delayText, gapsText, rateText, spacingText, unjudgedText } from "../../words/link";
+import { count, NONE, seconds } from "../../words/numbers";
+import { dateTime, sinceText } from "../../words/time";
+import { MuteButton } from "./mute-button";
+
+/** Interval between two requests, ms. */
+const LINK_MS = 5000;
+
+type Row = [name: string, text: (of: LinkStretch) => string];
+
+const rows = (expected: number): Row[] => [
+  ["Samples", (of) => count(of.samples)],
+  ["Rate", (of) => rateText(of, expected)],
+  ["Spacing", spacingText],
+  ["Gaps", gapsText],
+  ["Delay", delayText],
+  ["Not judged", unjudgedText],
+  ["Sent twice", (of) => (of.duplicates ? count(of.duplicates) : "none")],
+  ["Out of order", (of) => (of.unordered ? count(of.unordered) : "none")],
+];
+
+function LinkTable({ link: { session, recent, expected_rate_hz: expected } }: { link: RigLink }) {
+  return (
+    <table class="numbers link">
+      <thead>
+        <tr>
+          <th scope="col">
+            <span class="hidden">Quantity</span>
+          </th>
+          <th scope="col">Last 5 minutes</th>
+          <th scope="col">This session{session && `, since ${sinceText(session.from)}`}</th>
+        </tr>
+      </thead>
+      <tbody>
+        {rows(expected).map(([name, text]) => (
+          <tr>
+            <th scope="row">{name}</th>
+            <td>{recent ? text(recent) : NONE}</td>
+            <td>{session ? text(session) : NONE}</td>
+          </tr>
+        ))}
+      </tbody>
+    </table>
+  );
+}
+
+/** Whether an alarm tells that data stay away, and by whom it is muted. */
+function CommunicationMute({ asset }: { asset: string }) {
+  const { data: mutes, refetch } = useQuery(() => alarmApi.mutes(asset), `${asset} mutes`, LINK_MS);
+  if (!mutes) return null;
+  const mute = mutes.find(({ code }) => code === "communication_lost");
+  return (
+    <div class="mute-line">
+      <span class="quiet">
+        {mute
+          ? `Nobody is told if data stay away: muted by ${mute.by} until ${dateTime(mute.until)}: ${mute.reason}`
+          : "An alarm is raised if data stay away while a session is open."}
+      </span>
+      <MuteButton asset={asset} code="communication_lost" mute={mute} changed={refetch} />
+    </div>
+  );
+}
+
+/** How the samples of the rig arrive, in its session and in the last minutes. */
+export function LinkCard({ asset }: { asset: string }) {
+  const { data: link } = useQuery(() => api.link(asset), `${asset} link`, LINK_MS);
+  const isCounted = link?.session ?? link?.recent;
+  return (
+    <section class="card" aria-labelledby="link-heading">
+      <h2 id="link-heading">Link</h2>
+      {link && !isCounted && <p class="quiet">No samples have arrived since the service was started.</p>}
+      {link && isCounted && (
+        <>
+          <LinkTable link={link} />
+          <p class="quiet small-text">
+            Rate and spacing are by the clock of the device, which {clockText(link.clock_offset_s)}. A gap is
+            longer than {seconds(link.gap_s, 1)}; evidence begins anew after it. The delay is that behind the
+            fastest batch.
+          </p>
+        </>
+      )}
+      <CommunicationMute asset={asset} />
+    </section>
+  );
+}
