@@ -115,7 +115,7 @@ fn refusal(id: Option<String>, problem: Problem) -> BatchRefusalView {
 }
 
 /// What becomes of a message.
-pub(super) enum Reply {
+pub(super) enum MessageReply {
     /// The answer is sent to the device.
     Answer(BatchAnswer),
     /// Nothing is sent: it was no batch, or the owner of the asset answers.
@@ -125,7 +125,7 @@ pub(super) enum Reply {
 }
 
 /// The reply to a message, with its asset and receipt, once it is known.
-type PendingReply<R> = BoxFuture<'static, (String, R, Reply)>;
+type PendingReply<R> = BoxFuture<'static, (String, R, MessageReply)>;
 
 /// How a bus answers a message.
 pub(super) trait Answering: Send + Sync {
@@ -137,7 +137,7 @@ pub(super) trait Answering: Send + Sync {
         &self,
         asset: &str,
         receipt: Self::Receipt,
-        reply: Reply,
+        reply: MessageReply,
     ) -> impl Future<Output = ()> + Send;
 
     /// Ends the connection after the last answer.
@@ -219,7 +219,7 @@ impl Intake {
                     None => open = false,
                 },
                 Some((asset, receipt, reply)) = pending.next(), if !pending.is_empty() => {
-                    if let Reply::Answer(answer) = &reply {
+                    if let MessageReply::Answer(answer) = &reply {
                         self.count(answer.outcome());
                     }
                     bus.answer(&asset, receipt, reply).await;
@@ -245,7 +245,7 @@ impl Intake {
             Err(topic) => {
                 let outcome = self.attendance.note(&self.service, &asset, topic, &payload).await;
                 self.count(outcome);
-                bus.answer(&asset, receipt, Reply::Nothing).await;
+                bus.answer(&asset, receipt, MessageReply::Nothing).await;
                 return None;
             }
         };
@@ -259,7 +259,7 @@ impl Intake {
                 Ok(pending) => pending.acknowledged().await,
                 Err(error) => Err(error),
             };
-            (asset, receipt, Reply::Answer(BatchAnswer::of(id, ack.map_err(Problem::from))))
+            (asset, receipt, MessageReply::Answer(BatchAnswer::of(id, ack.map_err(Problem::from))))
         };
         Some(answered.boxed())
     }
@@ -276,13 +276,13 @@ impl Intake {
         let Delivery { asset, form, payload, receipt, waits, .. } = delivery;
         let limit = self.service.limits().batch_samples;
         let Some(Ok(Ok(batch))) = waits.then(|| form.batch(&payload, limit)) else {
-            bus.answer(&asset, receipt, Reply::Nothing).await;
+            bus.answer(&asset, receipt, MessageReply::Nothing).await;
             return None;
         };
         let (service, forwarder) = (self.service.clone(), self.forwarder.clone());
         let delivered = async move {
             let is_settled = forwarder.deliver(&service, &asset, &batch).await;
-            (asset, receipt, if is_settled { Reply::Nothing } else { Reply::Again })
+            (asset, receipt, if is_settled { MessageReply::Nothing } else { MessageReply::Again })
         };
         Some(delivered.boxed())
     }

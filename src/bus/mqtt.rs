@@ -24,7 +24,7 @@ use tokio_rustls::rustls::{ClientConfig, RootCertStore};
 use tokio_util::sync::CancellationToken;
 
 use super::faults::{FaultMessage, Publishing, publish_faults};
-use super::intake::{Answering, BatchAnswer, Delivery, Form, Intake, Reply, queue};
+use super::intake::{Answering, BatchAnswer, Delivery, Form, Intake, MessageReply, queue};
 use super::puback::PubackQueue;
 use super::{RETRY_INTERVAL, SEND_TIMEOUT};
 use crate::service::Service;
@@ -351,11 +351,11 @@ impl MqttConnection {
 impl Answering for Arc<MqttConnection> {
     type Receipt = MqttReceipt;
 
-    async fn answer(&self, asset: &str, receipt: MqttReceipt, reply: Reply) {
+    async fn answer(&self, asset: &str, receipt: MqttReceipt, reply: MessageReply) {
         let answer = match reply {
-            Reply::Answer(answer) => answer,
-            Reply::Nothing => return self.acknowledge(receipt),
-            Reply::Again => return self.end(),
+            MessageReply::Answer(answer) => answer,
+            MessageReply::Nothing => return self.acknowledge(receipt),
+            MessageReply::Again => return self.end(),
         };
         let topic = TopicStyle::Mqtt.ack(asset);
         let sent = self.client.publish(topic, QoS::AtMostOnce, false, answer.document());

@@ -15,7 +15,7 @@ use tokio_util::sync::CancellationToken;
 
 use super::callout::{self, Issuer};
 use super::faults::{FaultMessage, Publishing, publish_faults};
-use super::intake::{Answering, Delivery, Form, Intake, Reply, queue};
+use super::intake::{Answering, Delivery, Form, Intake, MessageReply, queue};
 use super::settings::{UnsafeServer, check_streams, check_version, doubts};
 use super::{RETRY_INTERVAL, SEND_TIMEOUT};
 use crate::service::Service;
@@ -263,7 +263,7 @@ impl NatsBus {
             if let Err((asset, receipt, answer)) =
                 intake.queue(&sender, addressed, payload, reply, false)
             {
-                client.answer(&asset, receipt, Reply::Answer(*answer)).await;
+                client.answer(&asset, receipt, MessageReply::Answer(*answer)).await;
             }
         }
     }
@@ -325,8 +325,8 @@ async fn send(client: &Client, subject: impl async_nats::subject::ToSubject, doc
 impl Answering for Client {
     type Receipt = Option<Subject>;
 
-    async fn answer(&self, asset: &str, reply_to: Option<Subject>, reply: Reply) {
-        let Reply::Answer(answer) = reply else { return };
+    async fn answer(&self, asset: &str, reply_to: Option<Subject>, reply: MessageReply) {
+        let MessageReply::Answer(answer) = reply else { return };
         let document = answer.document();
         if let Some(reply_to) = reply_to {
             send(self, reply_to, document.clone()).await;
