@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
+use async_nats::connection::State;
 use async_nats::{Client, ConnectOptions, Event as ClientEvent, Message, Subject};
 use futures_util::StreamExt;
 use futures_util::stream::{SelectAll, select_all};
@@ -25,6 +26,13 @@ const BUS: &str = "nats";
 
 /// Longest time of one attempt to connect.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
+
+/// Pause between two messages to itself.
+const ECHO_INTERVAL: Duration = Duration::from_secs(2);
+
+/// Longest wait for a message to itself; then the connection is made again. Chosen: much longer
+/// than a message takes.
+const ECHO_TIMEOUT: Duration = Duration::from_secs(4);
 
 /// Messages of one subject that the client holds; when there are more, they are dropped, and
 /// devices send them again.
@@ -234,10 +242,11 @@ impl NatsBus {
             }
         };
         let checking = self.closing.run_until_cancelled(self.check_connections(&client));
+        let listening = self.closing.run_until_cancelled(listen_to_itself(&client));
         let (sender, receiver) = queue();
         let reading = self.read(&intake, &client, select_all(subscriptions), sender);
         let answering = intake.clone().run(&client, receiver);
-        tokio::join!(publishing, answering_questions, checking, reading, answering);
+        tokio::join!(publishing, answering_questions, checking, listening, reading, answering);
         Ok(())
     }
 
@@ -350,6 +359,31 @@ impl Publishing for Client {
                 return;
             }
             tokio::time::sleep(RETRY_INTERVAL).await;
+        }
+    }
+}
+
+/// Sends messages to itself, and makes the connection again if one does not arrive although earlier
+/// ones did: a link may lose messages without a word. The client itself asks the server for a sign
+/// of life only while nothing arrives, so it does not notice that what it sends is lost.
+async fn listen_to_itself(client: &Client) {
+    let inbox = client.new_inbox();
+    let Ok(mut echoes) = client.subscribe(inbox.clone()).await else { return };
+    let mut has_arrived = false;
+    loop {
+        tokio::time::sleep(ECHO_INTERVAL).await;
+        // The client has closed if this fails.
+        if client.publish(inbox.clone(), "".into()).await.is_err() {
+            return;
+        }
+        match timeout(ECHO_TIMEOUT, echoes.next()).await {
+            Ok(None) => return,
+            Ok(Some(_)) => has_arrived = true,
+            Err(_) if has_arrived && client.connection_state() == State::Connected => {
+                tracing::warn!("messages to the NATS server or from it are lost; connecting again");
+                let _ = client.force_reconnect().await;
+            }
+            Err(_) => {}
         }
     }
 }

@@ -13,7 +13,7 @@ use std::time::Duration;
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, percent_encode};
 use sqlx::any::{AnyConnectOptions, AnyPoolOptions};
 use sqlx::postgres::PgConnectOptions;
-use sqlx::{AnyConnection, AnyPool, AssertSqlSafe, ConnectOptions, Executor};
+use sqlx::{AnyConnection, AnyPool, AssertSqlSafe, ConnectOptions, Connection, Executor};
 
 use super::StoreError;
 use super::checkpoint::{self, AUTOCHECKPOINT_PAGES};
@@ -33,6 +33,10 @@ const CACHE_KIB: u32 = 512;
 
 /// How long a reader waits for a free connection before it fails.
 const READER_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// Longest wait for the answer of a connection for reading that is no longer used; then it is
+/// closed. One whose read was given up may never answer, and sqlx would wait for it.
+const RELEASE_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Longest time to establish a connection.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(10);
@@ -187,7 +191,10 @@ impl Location {
                 pool.idle_timeout(None).max_lifetime(None),
                 format!("PRAGMA query_only = on; PRAGMA cache_size = -{CACHE_KIB}"),
             ),
-            Self::Server(_) => (pool, "SET default_transaction_read_only = on".to_owned()),
+            Self::Server(_) => (
+                pool.after_release(|connection, _| Box::pin(is_answering(connection))),
+                "SET default_transaction_read_only = on".to_owned(),
+            ),
         };
         let pool = pool.after_connect(move |connection, _| {
             let read_only = read_only.clone();
@@ -220,6 +227,13 @@ impl Location {
             Self::Server(_) => "BEGIN",
         }
     }
+}
+
+/// Fails if a connection does not answer, so that it is closed.
+async fn is_answering(connection: &mut AnyConnection) -> sqlx::Result<bool> {
+    let late = |_| sqlx::Error::Io(std::io::ErrorKind::TimedOut.into());
+    let ping = Connection::ping(connection);
+    tokio::time::timeout(RELEASE_TIMEOUT, ping).await.map_err(late)?.map(|()| true)
 }
 
 /// Options to write a file that only its owner can read once it is created.

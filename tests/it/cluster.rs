@@ -6,6 +6,8 @@ mod bus;
 mod clients;
 mod history;
 mod kills;
+#[cfg(all(feature = "nats", feature = "mqtt"))]
+mod links;
 mod old_copy;
 mod outage;
 mod ownership;

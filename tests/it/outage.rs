@@ -11,6 +11,7 @@ use std::time::Duration;
 #[cfg(target_os = "linux")]
 use crate::support::calls::FaultySystem;
 use crate::support::device::DeviceLoad;
+use crate::support::link::{Link, LinkMode};
 use crate::support::postgres::Postgres;
 use crate::support::process::{Process, ended, program};
 use crate::support::{Client, ServiceFixture, batch, eventually, registration, rig};
@@ -300,4 +301,35 @@ async fn a_database_locked_by_another_process_loses_nothing() {
     lock.release().await;
     fixture.client.readiness(200).await;
     load.stop().await;
+}
+
+/// Reads at the same time, more than there are connections for reading.
+const READS: usize = 8;
+
+/// Asks for faults, as often as that is at the same time.
+fn read_faults(
+    client: &Client,
+) -> Vec<tokio::task::JoinHandle<reqwest::Result<reqwest::Response>>> {
+    (0..READS).map(|_| tokio::spawn(client.request(Method::GET, "faults").send())).collect()
+}
+
+/// A firewall that forgets connections, or a cut in one direction, tells neither side.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn reads_whose_answers_are_lost_do_not_hold_up_later_ones() {
+    let (server, data) = (Postgres::new(), tempfile::tempdir().unwrap());
+    server.database("twin");
+    let (link, directory) = Link::to_database(server.directory());
+    let url = crate::support::postgres::url(directory.path(), "twin");
+    let process = Process::start_with(data.path(), &[("OFFBD_DATABASE", Path::new(&url))]);
+    // All connections for reading are made.
+    link.set(LinkMode::Delay(Duration::from_millis(50)), LinkMode::Pass);
+    for read in read_faults(&process.client) {
+        assert_eq!(read.await.unwrap().unwrap().status(), 200);
+    }
+    link.set(LinkMode::Pass, LinkMode::Drop);
+    let reads = read_faults(&process.client);
+    link.has_lost(4).await;
+    reads.iter().for_each(tokio::task::JoinHandle::abort);
+    link.set(LinkMode::Pass, LinkMode::Pass);
+    eventually(|| async { (process.client.get("faults").await.status == 200).then_some(()) }).await;
 }

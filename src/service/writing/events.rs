@@ -9,6 +9,7 @@ use tokio::sync::broadcast::error::RecvError;
 use tokio::sync::{Notify, broadcast};
 use tokio_util::sync::CancellationToken;
 
+use super::handles::READ_TIMEOUT;
 use crate::service::ServiceError;
 use crate::store::{ActionRow, CommunicationChange, EventRow, Store, StoreError, TransitionRow};
 
@@ -146,7 +147,8 @@ impl Events {
         let forever = async {
             let mut last = None;
             loop {
-                if let Err(error) = self.read_new(&mut last).await {
+                let read = tokio::time::timeout(READ_TIMEOUT, self.read_new(&mut last)).await;
+                if let Err(error) = read.unwrap_or_else(|_| Err(StoreError::too_slow())) {
                     tracing::debug!(%error, "cannot read the events of the cluster");
                 }
                 let _ = tokio::time::timeout(LOOK_EVERY, reader.notified()).await;

@@ -51,7 +51,7 @@ const WRITER_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Longest time for one read of the store. Chosen: twice the time that a reader waits for
 /// a connection; a database that takes longer is unavailable.
-const READ_TIMEOUT: Duration = Duration::from_secs(20);
+pub(super) const READ_TIMEOUT: Duration = Duration::from_secs(20);
 
 fn stopped() -> ServiceError {
     ServiceError::Unavailable { what: "the writer has stopped" }

@@ -8,11 +8,12 @@
 //! reads anything, and every transaction of the former owner finds another epoch.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
 
 use data_encoding::HEXLOWER;
 use sqlx::{AnyConnection, AssertSqlSafe, Executor};
 
-use super::{Writer, WriterRole};
+use super::{COMMIT_TIMEOUT, Writer, WriterRole};
 use crate::store::from_row::from_row;
 use crate::store::multi_row::{MultiRowStatement, in_parts};
 use crate::store::partition::PartitionRow;
@@ -36,6 +37,10 @@ const IDLE_TIMEOUT: &str = "2s";
 /// After this long within a transaction without a statement the server ends the connection.
 /// Chosen: much longer than the work between two statements.
 const IDLE_IN_TRANSACTION_TIMEOUT: &str = "1s";
+
+/// Longest wait for a look at the partitions; then its connection is dropped. Chosen: longer than
+/// the server keeps the locks of a node that it does not hear of.
+const LOOK_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Whether the server still has the connection with which a row of `node` writes.
 macro_rules! is_alive {
@@ -280,6 +285,17 @@ async fn end_epochs(
     Ok(transaction.commit().await?)
 }
 
+/// Gives up partitions, each unless its epoch is another one.
+async fn release_on(
+    db: &mut AnyConnection,
+    epochs: &[(PartitionId, i64)],
+) -> Result<(), StoreError> {
+    end_epochs(db, epochs).await?;
+    let released: Vec<_> = epochs.iter().map(|(partition, _)| *partition).collect();
+    unlock(db, &released).await?;
+    notify(db, TRANSFERS).await
+}
+
 async fn unlock(db: &mut AnyConnection, partitions: &[PartitionId]) -> Result<(), StoreError> {
     static UNLOCK: MultiRowStatement = MultiRowStatement::new(
         "SELECT pg_advisory_unlock(CAST(held.column2 AS INT), CAST(held.column1 AS INT))
@@ -328,6 +344,15 @@ pub(super) async fn notify(
 ) -> Result<(), StoreError> {
     db.execute(AssertSqlSafe(format!("SELECT pg_notify('{channel}', '')"))).await?;
     Ok(())
+}
+
+/// Waits for statements at most this long: their answer may be lost on the way, and nobody tells.
+async fn within<T>(
+    longest: Duration,
+    statements: impl Future<Output = Result<T, StoreError>>,
+) -> Result<T, StoreError> {
+    let late = |_| Err(StoreError::too_slow());
+    tokio::time::timeout(longest, statements).await.unwrap_or_else(late)
 }
 
 impl Writer {
@@ -481,7 +506,7 @@ impl Writer {
         let Some(mut connection) = self.connection.take() else {
             return Err(sqlx::Error::PoolClosed.into());
         };
-        let taken = self.take_on(&mut connection, partitions).await;
+        let taken = within(COMMIT_TIMEOUT, self.take_on(&mut connection, partitions)).await;
         if taken.is_ok() {
             self.connection = Some(connection);
         }
@@ -523,10 +548,7 @@ impl Writer {
         });
         let released: Vec<_> = released.collect();
         self.tails.forget(partitions);
-        end_epochs(&mut connection, &released).await?;
-        let released: Vec<_> = released.into_iter().map(|(partition, _)| partition).collect();
-        unlock(&mut connection, &released).await?;
-        notify(&mut connection, TRANSFERS).await?;
+        within(COMMIT_TIMEOUT, release_on(&mut connection, &released)).await?;
         self.connection = Some(connection);
         Ok(())
     }
@@ -539,11 +561,14 @@ impl Writer {
         let (Some(node), Some(connection)) = (&self.node, &mut self.connection) else {
             return Ok(());
         };
-        sqlx::query("UPDATE node SET leaving = 1 WHERE id = $1")
-            .bind(&node.id)
-            .execute(&mut *connection)
-            .await?;
-        notify(connection, TRANSFERS).await
+        let leave = async {
+            sqlx::query("UPDATE node SET leaving = 1 WHERE id = $1")
+                .bind(&node.id)
+                .execute(&mut *connection)
+                .await?;
+            notify(connection, TRANSFERS).await
+        };
+        within(COMMIT_TIMEOUT, leave).await
     }
 
     /// Reads which nodes are alive and who owns which partition. Also keeps the connection
@@ -560,9 +585,12 @@ impl Writer {
             is_alive!(),
             " ORDER BY id"
         ));
-        let nodes = nodes.fetch_all(&mut *connection).await?;
         let partitions = sqlx::query_as("SELECT * FROM partition ORDER BY id");
-        Ok((nodes, partitions.fetch_all(&mut *connection).await?))
+        let look = async {
+            let nodes = nodes.fetch_all(&mut *connection).await?;
+            Ok((nodes, partitions.fetch_all(&mut *connection).await?))
+        };
+        within(LOOK_TIMEOUT, look).await
     }
 
     /// After connecting again: which partitions are still owned. Returns whether the

@@ -34,7 +34,7 @@ async fn start_with(environment: Vec<(&'static str, String)>) -> (Cluster, Vec<S
 }
 
 /// Connects a device of each of `names`.
-async fn devices(client: &Client, names: &[String], ports: &[u16]) -> Vec<BusDevice> {
+pub(super) async fn devices(client: &Client, names: &[String], ports: &[u16]) -> Vec<BusDevice> {
     let mut devices = Vec::new();
     for name in names {
         let token = json!({ "name": name, "role": "device", "asset": name });

@@ -152,7 +152,8 @@ impl Cluster {
         let (client, node) = (self.client(0), format!("node-{i}"));
         let mut owned = Vec::new();
         for name in names {
-            let place = client.get(&format!("cluster?asset={name}")).await.expect(200);
+            let path = format!("cluster?asset={name}");
+            let (_, place) = call(&client, Method::GET, &path, &Value::Null).await;
             if place["asset"]["owner"] == node.as_str() {
                 owned.push(name.clone());
             }

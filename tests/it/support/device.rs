@@ -128,7 +128,12 @@ impl ServiceLink {
         loop {
             let mut client = self.client.clone();
             client.address = address.borrow_and_update().clone();
-            let Ok(response) = make(&client).send().await else {
+            // What was asked at the former address is asked again.
+            let answered = tokio::select! {
+                response = make(&client).send() => response,
+                Ok(()) = address.changed() => continue,
+            };
+            let Ok(response) = answered else {
                 wait_for_service(&mut address).await;
                 continue;
             };
@@ -189,7 +194,11 @@ impl ServiceLink {
         let mut address = self.address.subscribe();
         loop {
             let service = address.borrow_and_update().clone();
-            match post_once(&service, asset, document).await {
+            let answered = tokio::select! {
+                answer = post_once(&service, asset, document) => answer,
+                Ok(()) = address.changed() => continue,
+            };
+            match answered {
                 Some(answer) if answer["accepted"].is_u64() => return answer,
                 Some(refusal) => {
                     self.note_refusals(vec![refusal.to_string()]);

@@ -14,6 +14,7 @@ pub mod described;
 pub mod device;
 pub mod held_socket;
 pub mod history;
+pub mod link;
 pub mod postgres;
 pub mod process;
 pub mod provider;
