@@ -16,7 +16,7 @@ use parquet::arrow::arrow_writer::ArrowWriterOptions;
 use parquet::basic::{Compression, Encoding, ZstdLevel};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
-use parquet::file::properties::WriterProperties;
+use parquet::file::properties::{WriterProperties, WriterPropertiesBuilder};
 use parquet::file::reader::{ChunkReader, Length};
 use parquet::schema::types::ColumnPath;
 
@@ -29,6 +29,9 @@ use offbd_core::vocabulary::Sample;
 
 /// Rows in a row group, which is in memory, compressed, until it is complete.
 const ROW_GROUP_ROWS: usize = 131_072;
+
+/// Size of the pages of a file with many columns, bytes. Chosen: some 10 000 rows.
+const WIDE_PAGE_BYTES: usize = 64 << 10;
 
 /// Rows that are decoded at a time.
 const BATCH_ROWS: usize = 8192;
@@ -60,23 +63,36 @@ pub(super) struct ParquetEncoder {
 impl ParquetEncoder {
     /// Begins a file of the samples of a session.
     pub(super) fn new(info: &SessionInfo) -> Result<Self, SessionFileError> {
-        Self::of(columns::schema(info), info.entries())
-    }
-
-    /// Begins a file with the columns of `schema` and the metadata `entries`.
-    pub(super) fn of(
-        schema: SchemaRef,
-        entries: impl Iterator<Item = (impl Into<String>, impl Into<String>)>,
-    ) -> Result<Self, SessionFileError> {
-        let metadata = entries.map(|(key, value)| KeyValue::new(key.into(), value.into()));
         let properties = WriterProperties::builder()
-            .set_created_by(concat!("offbd ", env!("CARGO_PKG_VERSION")).to_owned())
-            .set_compression(Compression::ZSTD(ZstdLevel::default()))
             // Times and numbers do not repeat.
             .set_column_dictionary_enabled(ColumnPath::from("t_s"), false)
             .set_column_encoding(ColumnPath::from("t_s"), Encoding::BYTE_STREAM_SPLIT)
             .set_column_dictionary_enabled(ColumnPath::from("seq"), false)
-            .set_column_encoding(ColumnPath::from("seq"), Encoding::DELTA_BINARY_PACKED)
+            .set_column_encoding(ColumnPath::from("seq"), Encoding::DELTA_BINARY_PACKED);
+        Self::of(columns::schema(info), info.entries(), properties)
+    }
+
+    /// Begins a file of many columns, most of which do not repeat, with the metadata `entries`.
+    /// Pages are small, because each column has one in memory, and no dictionaries.
+    pub(super) fn wide(
+        schema: SchemaRef,
+        entries: impl Iterator<Item = (impl Into<String>, impl Into<String>)>,
+    ) -> Result<Self, SessionFileError> {
+        let properties = WriterProperties::builder()
+            .set_dictionary_enabled(false)
+            .set_data_page_size_limit(WIDE_PAGE_BYTES);
+        Self::of(schema, entries, properties)
+    }
+
+    fn of(
+        schema: SchemaRef,
+        entries: impl Iterator<Item = (impl Into<String>, impl Into<String>)>,
+        properties: WriterPropertiesBuilder,
+    ) -> Result<Self, SessionFileError> {
+        let metadata = entries.map(|(key, value)| KeyValue::new(key.into(), value.into()));
+        let properties = properties
+            .set_created_by(concat!("offbd ", env!("CARGO_PKG_VERSION")).to_owned())
+            .set_compression(Compression::ZSTD(ZstdLevel::default()))
             .set_max_row_group_row_count(Some(ROW_GROUP_ROWS))
             .set_key_value_metadata(Some(metadata.collect()))
             .build();

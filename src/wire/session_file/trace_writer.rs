@@ -90,7 +90,7 @@ mod columns {
     ) -> Result<Box<dyn TraceEncoder>, SessionFileError> {
         let entries = entries(info, thresholds)?;
         let schema = trace_columns::schema(&entries);
-        let encoder = ParquetEncoder::of(schema.clone(), entries.into_iter())?;
+        let encoder = ParquetEncoder::wide(schema.clone(), entries.into_iter())?;
         Ok(Box::new(Table { schema, encoder }))
     }
 
