@@ -34,6 +34,10 @@ const ECHO_INTERVAL: Duration = Duration::from_secs(2);
 /// than a message takes.
 const ECHO_TIMEOUT: Duration = Duration::from_secs(4);
 
+/// How often the connection is made again although no message to itself has ever arrived: the
+/// server may not permit them.
+const ECHO_TRIES: u32 = 3;
+
 /// Messages of one subject that the client holds; when there are more, they are dropped, and
 /// devices send them again.
 const MAX_UNREAD: usize = 1024;
@@ -363,15 +367,14 @@ impl Publishing for Client {
     }
 }
 
-/// Sends messages to itself, and makes the connection again if one does not arrive although earlier
-/// ones did: a link may lose messages without a word. The client itself asks the server for a sign
-/// of life only while nothing arrives, so it does not notice that what it sends is lost.
+/// Sends messages to itself, and makes the connection again if one does not arrive: a link may
+/// lose messages without a word. The client itself asks the server for a sign of life only while
+/// nothing arrives, so it does not notice that what it sends is lost.
 async fn listen_to_itself(client: &Client) {
     let inbox = client.new_inbox();
     let Ok(mut echoes) = client.subscribe(inbox.clone()).await else { return };
-    let mut has_arrived = false;
+    let (mut has_arrived, mut n_missed) = (false, 0);
     loop {
-        tokio::time::sleep(ECHO_INTERVAL).await;
         // The client has closed if this fails.
         if client.publish(inbox.clone(), "".into()).await.is_err() {
             return;
@@ -379,11 +382,14 @@ async fn listen_to_itself(client: &Client) {
         match timeout(ECHO_TIMEOUT, echoes.next()).await {
             Ok(None) => return,
             Ok(Some(_)) => has_arrived = true,
-            Err(_) if has_arrived && client.connection_state() == State::Connected => {
+            Err(_) if client.connection_state() != State::Connected => {}
+            Err(_) if has_arrived || n_missed < ECHO_TRIES => {
+                n_missed += 1;
                 tracing::warn!("messages to the NATS server or from it are lost; connecting again");
                 let _ = client.force_reconnect().await;
             }
             Err(_) => {}
         }
+        tokio::time::sleep(ECHO_INTERVAL).await;
     }
 }
