@@ -22,6 +22,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
+use axum::Router;
 use serde::Serialize;
 use tokio::net::TcpListener;
 use tokio::task::{JoinHandle, JoinSet};
@@ -110,13 +111,10 @@ pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Ser
             Service::start_node(store.clone(), writer, limits, provider, me).await
         }
     };
-    let (service, workers) = match started {
-        Ok(started) => started,
-        Err(error) => {
-            store.close().await;
-            return Err(error.into());
-        }
-    };
+    if started.is_err() {
+        store.close().await;
+    }
+    let (service, workers) = started?;
     let closing = CancellationToken::new();
     let mut server = Server {
         address,
@@ -133,7 +131,9 @@ pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Ser
         Ok(buses) => server.buses = buses,
         Err(error) => {
             drop(service);
-            server.shutdown().await?;
+            if let Err(late) = server.shutdown().await {
+                tracing::error!(error = %late, "cannot stop what was started");
+            }
             return Err(error);
         }
     }
@@ -144,15 +144,13 @@ pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Ser
     let app = App { service, budget, policy, closing: closing.clone(), demo: demo_routes };
     let router = http::router(app, demo.unwrap_or_default());
     if let Some(NodeListener { listener, .. }) = node {
-        let http = HttpListener::new(&config.limits, None, closing.clone());
-        server.serving.spawn(http.serve(listener, router.clone()));
+        server.listen(&config, None, listener, router.clone());
     }
-    let http = HttpListener::new(&config.limits, tls.clone(), closing.clone());
-    server.serving.spawn(http.serve(listener, router));
+    server.listen(&config, tls.clone(), listener, router);
     tls.map(|tls| tokio::spawn(tls.watch(closing.clone())));
     keys.map(|keys| tokio::spawn(keys.watch(closing.clone())));
     tokio::spawn(http::keep_metrics(closing.clone()));
-    tokio::spawn(keep_threads(closing.clone()));
+    tokio::spawn(keep_threads(closing));
     tracing::info!(%address, store = %server.store.location(), "serving");
     Ok(server)
 }
@@ -270,6 +268,12 @@ impl NodeListener {
 }
 
 impl Server {
+    /// Serves `router` on `listener` until the service stops.
+    fn listen(&mut self, config: &Config, tls: Option<Tls>, listener: TcpListener, router: Router) {
+        let http = HttpListener::new(&config.limits, tls, self.closing.clone());
+        self.serving.spawn(http.serve(listener, router));
+    }
+
     /// Stops gracefully: accepts no new connections, ends streams, finishes the requests
     /// in progress, commits their changes, and closes the store.
     ///

@@ -221,6 +221,19 @@ async fn a_request_without_a_valid_token_gets_a_challenge() {
     assert_eq!(viewer.get("assets").await.headers["cache-control"], "no-store");
 }
 
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn the_headers_of_nodes_give_no_rights_without_the_secret_of_their_cluster() {
+    let service = SecuredService::new().await;
+    for secret in [None, Some(""), Some("guessed")] {
+        let request = service.fixture.client.request(Method::POST, "assets/a/telemetry");
+        let mut request = request.header("x-offbd-from-bus", "1").json(&batch(None, &rig(10, 10)));
+        if let Some(secret) = secret {
+            request = request.header("x-offbd-forwarded", secret);
+        }
+        assert_eq!(request.send().await.unwrap().status(), 401, "{secret:?}");
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_device_cannot_read_or_change_another_asset() {
     let service = SecuredService::new().await;
