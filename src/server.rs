@@ -36,7 +36,8 @@ use self::tls::Tls;
 pub use self::traces::Traces;
 use crate::config::{ClusterConfig, Config, LogFormat};
 use crate::http::{self, AccessPolicy, App, BodyBudget, ExtraRoutes, RateLimit, RateLimits};
-use crate::service::{Clock, Service, Workers};
+use crate::service::access::Provider;
+use crate::service::{Clock, Limits, Service, Workers};
 use crate::store::{self, CheckReport, ColdDirectory, Location, NodeIdentity, Partitions, Store};
 
 /// How often a blocking thread is asked for: often enough for a device that waits, and rarely
@@ -104,17 +105,8 @@ pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Ser
     let senders = Senders::new(&limits.notifications);
     let policy = Arc::new(policy(&config)?);
     warn_of_access(&config, &policy, &store).await?;
-    let started = match &node {
-        None => Service::start(store.clone(), writer, limits, provider).await,
-        Some(NodeListener { identity, .. }) => {
-            let me = identity.clone();
-            Service::start_node(store.clone(), writer, limits, provider, me).await
-        }
-    };
-    if started.is_err() {
-        store.close().await;
-    }
-    let (service, workers) = started?;
+    let me = node.as_ref().map(|node| node.identity.clone());
+    let (service, workers) = start_service(&store, writer, limits, provider, me).await?;
     let closing = CancellationToken::new();
     let mut server = Server {
         address,
@@ -153,6 +145,26 @@ pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Ser
     tokio::spawn(keep_threads(closing));
     tracing::info!(%address, store = %server.store.location(), "serving");
     Ok(server)
+}
+
+/// Starts the service, as the node `me` of a cluster if there is one. If that fails, the store is
+/// closed.
+async fn start_service(
+    store: &Store,
+    writer: store::Writer,
+    limits: Limits,
+    provider: Option<Provider>,
+    me: Option<NodeIdentity>,
+) -> Result<(Service, Workers)> {
+    let store_of_service = store.clone();
+    let started = match me {
+        None => Service::start(store_of_service, writer, limits, provider).await,
+        Some(me) => Service::start_node(store_of_service, writer, limits, provider, me).await,
+    };
+    if started.is_err() {
+        store.close().await;
+    }
+    Ok(started?)
 }
 
 /// Checks that the directory of cold data is there. It is not created, because it may be a
