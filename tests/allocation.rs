@@ -6,6 +6,9 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 use offbd::judging::Judging;
+use offbd::store::{
+    AssetRow, ChangeSet, Location, SessionFilter, SessionProgress, SessionRow, Store, Write,
+};
 use offbd_core::diagnosis::FaultMemory;
 use offbd_core::engine::{Engine, Input, Rig, Setup};
 use offbd_core::plant::{Ball, Contact, Motion, Plate};
@@ -193,4 +196,45 @@ fn a_run_of_a_scene_does_not_allocate() {
             assert_eq!(ALLOCATIONS.get() - start, expected, "{model} by {method}");
         }
     }
+}
+
+/// The number of allocations of a query for the session of one asset, of `n` whose last
+/// samples are in the journal.
+async fn allocations_of_a_query(n: usize) -> usize {
+    let folder = tempfile::tempdir().unwrap();
+    let location = Location::File(folder.path().join("offbd.sqlite"));
+    let (store, mut writer) = Store::open(&location).await.unwrap();
+    let of_asset = |i: usize| {
+        let (asset, id) = (format!("rig-{i}"), format!("session-{i}"));
+        let row = AssetRow { name: asset.clone(), document: "{}".into(), ..AssetRow::default() };
+        let progress = SessionProgress { n_samples: 1, ..SessionProgress::default() };
+        let session =
+            SessionRow { id: id.clone(), asset, state: "open".into(), ..SessionRow::default() };
+        let samples = vec![sample(0)];
+        [
+            Write::CreateAsset(row),
+            Write::OpenSession(session),
+            Write::Append { session: id, first_index: 0, samples, progress },
+        ]
+    };
+    let mut writes: Vec<Write> = (0..n).flat_map(of_asset).collect();
+    writer.commit(&mut [ChangeSet::unpartitioned(&mut writes)]).await.unwrap();
+    let filter = SessionFilter { asset: Some("rig-0".into()), ..SessionFilter::default() };
+    let query = async || {
+        let found = store.sessions(&filter, 4).await.unwrap();
+        assert_eq!(found[0].progress.n_samples, 1);
+    };
+    query().await;
+    let before = ALLOCATIONS.get();
+    query().await;
+    let n_allocations = ALLOCATIONS.get() - before;
+    writer.close().await.unwrap();
+    n_allocations
+}
+
+#[tokio::test]
+async fn a_query_for_one_asset_does_not_copy_the_journal_of_all() {
+    let (few, many) = (allocations_of_a_query(2).await, allocations_of_a_query(2000).await);
+    assert!(few > 0, "the counter counts");
+    assert!(many < few + 200, "{many} allocations instead of {few}");
 }

@@ -9,11 +9,10 @@
 //! never in both or in neither.
 //!
 //! The memory holds exactly those journal entries of owned partitions that are beyond the
-//! progress in the rows of the open sessions. So [`Journal::load`] restores it when a
+//! progress in the rows of their sessions. So [`Journal::load`] restores it when a
 //! partition is taken, and entries that are folded already are skipped even if their journal
 //! row still exists.
 
-use super::from_row::from_row;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -23,9 +22,9 @@ use sqlx::AnyConnection;
 
 use super::codec::{self, ChunkKey, Packing};
 use super::multi_row::{MultiRowStatement, in_parts};
-use super::query_builder::QueryBuilder;
+use super::progress::stored_progress;
 use super::tail::{FULL_CHUNK_SAMPLES, Run};
-use super::{PartitionId, SessionProgress, SessionRow, StoreError, decode_chunk};
+use super::{PartitionId, SessionProgress, StoreError, decode_chunk};
 use offbd_core::vocabulary::Sample;
 
 /// Samples from which on a run is folded by its own commit: it fills whole pages anyway.
@@ -34,9 +33,6 @@ const LARGE_RUN_SAMPLES: usize = 1024;
 /// Samples of a session in the journal; the commit that reaches this number folds the
 /// session.
 const MAX_SESSION_SAMPLES: usize = 2 * FULL_CHUNK_SAMPLES;
-
-/// Sessions per query when a partition is loaded.
-const SESSIONS_AT_ONCE: usize = 500;
 
 /// The journal of one database, as kept in memory. Clones share the contents.
 #[derive(Clone, Debug, Default)]
@@ -339,6 +335,13 @@ impl Journal {
         self.lock().sessions.get(session).map(|unfolded| unfolded.progress)
     }
 
+    /// The progress of those of `sessions` whose rows are not up to date, by session id.
+    pub(super) fn progress_of(&self, sessions: &[String]) -> HashMap<String, SessionProgress> {
+        let contents = self.lock();
+        let progress = |id: &String| Some((id.clone(), contents.sessions.get(&**id)?.progress));
+        sessions.iter().filter_map(progress).collect()
+    }
+
     /// The progress of all sessions whose row is not up to date, by session id.
     pub(super) fn all_progress(&self) -> HashMap<String, SessionProgress> {
         let contents = self.lock();
@@ -347,16 +350,6 @@ impl Journal {
 
     fn lock(&self) -> MutexGuard<'_, JournalContents> {
         self.contents.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl SessionRow {
-    /// The row with the progress that the journal has, if that is later than the row's own.
-    pub(super) fn with_progress(mut self, in_journal: Option<&SessionProgress>) -> Self {
-        if let Some(later) = in_journal.filter(|progress| progress.is_beyond(&self.progress)) {
-            self.progress = *later;
-        }
-        self
     }
 }
 
@@ -514,35 +507,14 @@ fn checksum(id: i64, entries: &[u8]) -> [u8; 4] {
     hasher.finalize().to_le_bytes()
 }
 
-/// The progress in the rows of the open sessions that are in the journal's `rows`, by id.
-/// Other sessions are folded completely.
+/// The progress in the rows of the sessions that are in the journal's `rows`, by id.
 async fn folded_progress(
     db: &mut AnyConnection,
     rows: &[(i64, Vec<u8>)],
 ) -> Result<HashMap<String, SessionProgress>, StoreError> {
-    struct SessionProgressRow {
-        id: String,
-        progress: SessionProgress,
-    }
-
-    from_row!(SessionProgressRow { id }[progress]);
     let mut sessions = BTreeSet::new();
     for (id, data) in rows {
         sessions.extend(entries(*id, data)?.iter().map(|entry| entry.session.to_owned()));
     }
-    let mut folded = HashMap::new();
-    let sessions: Vec<_> = sessions.into_iter().collect();
-    for part in sessions.chunks(SESSIONS_AT_ONCE) {
-        let mut query = QueryBuilder::new(
-            "SELECT id, n_samples, n_rejected, first_t_s, last_t_s, last_seq FROM session
-             WHERE state = 'open' AND id IN (",
-        );
-        for (i, session) in part.iter().enumerate() {
-            query.push(if i == 0 { "" } else { ", " }).bind(session.clone())?;
-        }
-        query.push(")");
-        let rows: Vec<SessionProgressRow> = query.rows().fetch_all(&mut *db).await?;
-        folded.extend(rows.into_iter().map(|row| (row.id, row.progress)));
-    }
-    Ok(folded)
+    stored_progress(db, &sessions.into_iter().collect::<Vec<_>>()).await
 }

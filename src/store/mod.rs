@@ -40,6 +40,7 @@ mod notification;
 mod notifications;
 mod page_checksums;
 mod partition;
+mod progress;
 mod query_builder;
 mod read;
 mod recording;

@@ -1,6 +1,7 @@
 //! Queries of the store.
 
 use super::codec::ChunkKey;
+use super::progress::stored_progress;
 use super::query_builder::QueryBuilder;
 use super::write::published_counter;
 use super::{
@@ -179,7 +180,10 @@ impl Store {
         let mut query = QueryBuilder::new(SESSION);
         query.push(VISIBLE).push("id = ").bind(id)?;
         let row: Option<SessionRow> = query.rows().fetch_optional(&self.pool).await?;
-        Ok(row.map(|row| row.with_progress(progress.as_ref())))
+        Ok(row.map(|mut row| {
+            row.advance(progress.as_ref());
+            row
+        }))
     }
 
     /// The open session of `asset`.
@@ -291,18 +295,25 @@ impl Store {
         }
     }
 
-    /// The result of `query` for sessions.
+    /// The result of `query` for sessions. The progress of the open ones is queried again by
+    /// their ids, because the journal is indexed by id and must be read before the tables.
     pub(super) async fn session_rows(
         &self,
         query: QueryBuilder,
     ) -> Result<Vec<SessionRow>, StoreError> {
-        let in_journal = self.journal.all_progress();
-        let rows: Vec<SessionRow> = query.rows().fetch_all(&self.pool).await?;
-        let rows = rows.into_iter().map(|row| {
-            let progress = in_journal.get(&row.id);
-            row.with_progress(progress)
-        });
-        Ok(rows.collect())
+        let mut rows: Vec<SessionRow> = query.rows().fetch_all(&self.pool).await?;
+        let is_open = |row: &&SessionRow| row.is_open();
+        let open: Vec<_> = rows.iter().filter(is_open).map(|row| row.id.clone()).collect();
+        let in_journal = self.journal.progress_of(&open);
+        if open.is_empty() {
+            return Ok(rows);
+        }
+        let stored = stored_progress(&mut *self.pool.acquire().await?, &open).await?;
+        for row in &mut rows {
+            row.advance(stored.get(&row.id));
+            row.advance(in_journal.get(&row.id));
+        }
+        Ok(rows)
     }
 
     /// Samples of `session` from `index` on, as many as are stored together (in one chunk

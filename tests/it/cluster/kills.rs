@@ -16,7 +16,10 @@ use crate::support::{Client, batch, eventually, rig};
 use offbd_core::vocabulary::Sample;
 
 /// Faults, unless the environment variable FAULTS is set.
-const FAULTS: usize = 6;
+const FAULTS: usize = 8;
+
+/// The kinds of the faults, in turns.
+const KINDS: [&str; 8] = ["kill", "pause", "kill", "stop", "kill", "kill", "pause", "kill"];
 
 /// Rigs that are asked, at each fault of their node, for an acknowledgement.
 struct Probes {
@@ -111,7 +114,7 @@ async fn nodes_that_are_killed_paused_and_stopped_lose_nothing() {
         link.wait_for_samples(random.below(400) as u64 + 50).await;
         let node = random.below(N_NODES);
         let other = (node + 1 + random.below(N_NODES - 1)) % N_NODES;
-        let kind = ["kill", "pause", "stop"][fault % 3];
+        let kind = KINDS[fault % KINDS.len()];
         *n_by_kind.entry(kind).or_default() += 1;
         let names = cluster.rigs_of(node, &probes.names).await;
         let owned_any = !names.is_empty();
