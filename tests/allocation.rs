@@ -1,6 +1,7 @@
 //! Code that runs for every sample or step does not allocate memory.
 
 #![expect(unsafe_code, reason = "implementing an allocator requires it")]
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;

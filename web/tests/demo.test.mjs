@@ -81,7 +81,7 @@ test("a fault is shown after its event, on the pages of the fleet and the rig", 
     .first()
     .click();
   await rig.getByRole("heading", { name: /Status byte/ }).waitFor();
-  await rig.getByText("The test fails right now.").waitFor();
+  await rig.getByText("The test failed when it last gave a result.").waitFor();
   await rig.getByRole("img", { name: /Residual along y/ }).waitFor();
   await rig.getByLabel("Your name, recorded with the action").fill("ada");
   await rig.getByRole("button", { name: "Acknowledge" }).click();

@@ -15,6 +15,9 @@ use super::{Client, eventually};
 pub const N_NODES: usize = 3;
 pub const N_PARTITIONS: u64 = 16;
 
+/// Lines of the log of each node that are printed when a test fails.
+const N_LINES: usize = 100;
+
 /// A cluster of processes, and the database server that they share.
 pub struct Cluster {
     postgres: Postgres,
@@ -186,6 +189,18 @@ impl Cluster {
             (is_gone && cluster["unowned"] == 0).then_some(())
         })
         .await;
+    }
+}
+
+/// What the nodes have logged last, if a test fails.
+impl Drop for Cluster {
+    fn drop(&mut self) {
+        for (i, node) in self.nodes.iter().enumerate().filter(|_| std::thread::panicking()) {
+            let log = node.as_ref().map(Process::log).unwrap_or_default();
+            let last = log.lines().rev().take(N_LINES).collect::<Vec<_>>();
+            eprintln!("node-{i}:");
+            last.iter().rev().for_each(|line| eprintln!("{line}"));
+        }
     }
 }
 

@@ -42,7 +42,12 @@ export const STATUS_BITS = [
     on: "The test has failed in this session.",
     off: "The test has not failed in this session.",
   },
-  { bit: 0, name: "testFailed", on: "The test fails right now.", off: "The test does not fail right now." },
+  {
+    bit: 0,
+    name: "testFailed",
+    on: "The test failed when it last gave a result.",
+    off: "The test did not fail when it last gave a result.",
+  },
 ] as const;
 
 /** Whether the test of a fault line fails; false for a line that reports a test that passes again. */

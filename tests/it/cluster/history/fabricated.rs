@@ -58,7 +58,8 @@ impl Fabricated {
     fn store(&mut self, recording: &[Sample]) {
         let [id, asset, name] = ["1", "a", "s"].map(str::to_owned);
         let recording = recording.to_vec();
-        let mut session = StoredSession { id, asset, name, recording, hash: String::new() };
+        let mut session =
+            StoredSession { id, asset, name, opened_at: 0, recording, hash: String::new() };
         let actions: Vec<_> = self.stored.actions.iter().collect();
         let judged = replay(&session, &actions);
         session.hash = judged.hash;
@@ -88,7 +89,7 @@ fn event((id, (code, status)): (i64, (String, String))) -> SeenEvent {
 fn acknowledged(number: usize) -> StoredAction {
     let [asset, kind, code] = ["a", "acknowledge", "x_servo"].map(str::to_owned);
     let (session, actor) = (Some("1".to_owned()), format!("person-{number}"));
-    StoredAction { asset, session, after_index: 1300, kind, code, actor }
+    StoredAction { asset, at: 0, session, after_index: 1300, kind, code, actor }
 }
 
 /// A partition that node `one` takes, changes and gives up, and that node `two` takes and
@@ -160,6 +161,20 @@ fn another_verdict_than_that_of_the_recording_is_found() {
         it.stored.events.pop();
         it.history.events.pop();
     });
+}
+
+#[test]
+fn a_fault_that_is_cleared_is_cleared_and_not_one_that_comes_later() {
+    let found = |at| {
+        let Fabricated { mut history, mut stored } = Fabricated::new();
+        let number = history.send_action("a", FaultCode::XServo, "clear");
+        history.tell_action(number, 204);
+        let (session, kind) = (None, "clear".to_owned());
+        stored.actions.push(StoredAction { at, session, kind, ..acknowledged(number) });
+        Vec::from_iter(violations(&history, &stored).iter().map(|found| found.invariant))
+    };
+    assert_eq!(found(-1), [], "before the session");
+    assert_eq!(found(1), [Invariant::VerdictRepeats], "after it");
 }
 
 #[test]

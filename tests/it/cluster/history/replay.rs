@@ -17,7 +17,8 @@ pub struct Replayed {
     pub memory: FaultMemory,
 }
 
-/// Judges the recording of `session`, the only one of its asset, with the asset's `actions`.
+/// Judges the recording of `session`, the only one of its asset, with the asset's `actions`. What
+/// was done before the session was opened has changed nothing: there was no fault.
 pub fn replay(session: &StoredSession, actions: &[&StoredAction]) -> Replayed {
     let setup = Setup::new(learnt(&session.asset), None).unwrap();
     let (mut engine, mut verdict) =
@@ -30,7 +31,8 @@ pub fn replay(session: &StoredSession, actions: &[&StoredAction]) -> Replayed {
         transitions.extend(new.iter().map(|t| (t.code.to_string(), t.status.to_string())));
     }
     let mut memory = engine.memory().clone();
-    for action in actions.iter().filter(|action| action.session.is_none()) {
+    let is_later = |a: &&&StoredAction| a.session.is_none() && a.at >= session.opened_at;
+    for action in actions.iter().filter(is_later) {
         match input(action) {
             Input::Clear(code) => memory.clear(code),
             Input::Acknowledge(code) => drop(memory.acknowledge(code)),

@@ -35,6 +35,8 @@ pub struct StoredSession {
     pub id: String,
     pub asset: String,
     pub name: String,
+    /// µs since 1970.
+    pub opened_at: i64,
     /// Exported by a node.
     pub recording: Vec<Sample>,
     pub hash: String,
@@ -44,6 +46,8 @@ pub struct StoredSession {
 #[derive(Clone, Debug)]
 pub struct StoredAction {
     pub asset: String,
+    /// µs since 1970.
+    pub at: i64,
     /// The session that was open.
     pub session: Option<String>,
     /// Number of the session's samples before it.
@@ -57,17 +61,17 @@ impl Stored {
     /// Ends all sessions and reads everything. Waits until the subscriber has the last event.
     pub async fn read(cluster: &Cluster, recorder: &Recorder) -> Self {
         let (clients, mut store) = (cluster.clients(), connection(&cluster.url()).await);
-        let rows: Vec<(String, String, String)> =
-            sqlx::query_as("SELECT id, asset, name FROM session ORDER BY id")
+        let rows: Vec<(String, String, String, i64)> =
+            sqlx::query_as("SELECT id, asset, name, opened_at FROM session ORDER BY id")
                 .fetch_all(&mut store)
                 .await
                 .unwrap();
-        let sessions = rows.into_iter().enumerate().map(|(i, (id, asset, name))| {
+        let sessions = rows.into_iter().enumerate().map(|(i, (id, asset, name, opened_at))| {
             let clients = &clients;
             async move {
                 let client = &clients[i % clients.len()];
                 let (recording, hash) = end(client, &id).await;
-                StoredSession { id, asset, name, recording, hash }
+                StoredSession { id, asset, name, opened_at, recording, hash }
             }
         });
         let sessions = stream::iter(sessions).buffered(AT_A_TIME).collect().await;
@@ -114,15 +118,16 @@ async fn events(store: &mut AnyConnection) -> Vec<SeenEvent> {
 }
 
 async fn actions(store: &mut AnyConnection) -> Vec<StoredAction> {
-    let query = "SELECT asset, COALESCE(session, ''), after_index, kind, code, actor FROM action
-        ORDER BY id";
-    let rows: Vec<(String, String, i64, String, String, String)> =
+    let query = "SELECT asset, at, COALESCE(session, ''), after_index, kind, code, actor
+        FROM action ORDER BY id";
+    let rows: Vec<(String, i64, String, i64, String, String, String)> =
         sqlx::query_as(query).fetch_all(store).await.unwrap();
-    let action = |(asset, session, after_index, kind, code, actor): (_, String, i64, _, _, _)| {
-        let session = (!session.is_empty()).then_some(session);
-        let after_index = usize::try_from(after_index).unwrap();
-        StoredAction { asset, session, after_index, kind, code, actor }
-    };
+    let action =
+        |(asset, at, session, after_index, kind, code, actor): (_, _, String, i64, _, _, _)| {
+            let session = (!session.is_empty()).then_some(session);
+            let after_index = usize::try_from(after_index).unwrap();
+            StoredAction { asset, at, session, after_index, kind, code, actor }
+        };
     rows.into_iter().map(action).collect()
 }
 
