@@ -1,16 +1,12 @@
 import type { FleetEntry } from "../api/types";
-import { codeTitle } from "../words/fault-names";
+import { driftText, driftTitle } from "../words/drift";
 import { sentence } from "../words/sentence";
 
 /** A drifting parameter, and the number of sessions until it is a fault. */
 export function DriftChip({ warning }: { warning: FleetEntry["warnings"][number] }) {
-  const { code, parameter, sessions_left, summary } = warning;
   return (
-    <span class="chip chip-drift" title={sentence(summary)}>
-      <b>
-        {codeTitle(code)}, {parameter}
-      </b>{" "}
-      <span>{sessions_left == null ? "drifted" : `fault in ${Math.round(sessions_left)} sessions`}</span>
+    <span class="chip chip-drift" title={sentence(warning.summary)}>
+      <b>{driftTitle(warning)}</b> <span>{driftText(warning)}</span>
     </span>
   );
 }

@@ -11,6 +11,6 @@ const ROWS: AxisRow<AxisCalibration>[] = [
 /** The standard deviations of what was learnt. */
 export function UncertaintyTable({ calibration: { sessions, x, y } }: { calibration: Calibration }) {
   const n = sessions?.length ?? 0;
-  const caption = n ? `standard deviation, over ${plural(n, "session")}` : "standard deviation";
+  const caption = n ? `Standard deviation, over ${plural(n, "session")}` : "Standard deviation";
   return <AxisTable caption={caption} rows={ROWS} x={x} y={y} />;
 }

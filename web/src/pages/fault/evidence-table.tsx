@@ -23,7 +23,7 @@ export function EvidenceTable({ evidence, thresholds }: { evidence: Evidence; th
         <table class="numbers">
           <thead>
             <tr>
-              <th scope="col">at {seconds(evidence.t_s)}</th>
+              <th scope="col">At {seconds(evidence.t_s)}</th>
               <th scope="col" class="n">
                 x
               </th>

@@ -1,6 +1,7 @@
 import { HealthMark } from "../../parts/health-mark";
 import { Link } from "../../router/link";
 import { rigPath } from "../../router/paths";
+import { driftText, driftTitle } from "../../words/drift";
 import { faultTitle } from "../../words/fault-names";
 import { severity } from "../../words/severity";
 import { sinceText } from "../../words/time";
@@ -10,6 +11,8 @@ import type { FleetRow } from "./rows";
 function worstFinding({ entry }: FleetRow): string {
   if (entry.communication_lost_since) return `no data since ${sinceText(entry.communication_lost_since)}`;
   const [worst] = [...entry.faults].sort((a, b) => severity(b) - severity(a));
+  const [drift] = entry.warnings;
+  if (!worst && drift) return `${driftTitle(drift)}: ${driftText(drift)}`;
   if (!worst) return entry.unjudged?.reason ?? entry.session ?? "";
   const since = worst.failing && worst.failed_at ? ` since ${sinceText(worst.failed_at)}` : "";
   return faultTitle(worst.code, worst.kind) + since;

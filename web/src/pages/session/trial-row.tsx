@@ -23,20 +23,22 @@ export function TrialRow({ thresholds: { code, fail_s }, values, set, found }: P
       <th scope="row">{title}</th>
       <td>
         {hasLimit(code) ? (
-          <input
-            type="range"
-            min={-1}
-            max={3}
-            step={0.02}
-            value={positionOf(limit ?? 1)}
-            aria-label={`Limit of ${title}`}
-            aria-valuetext={`${limit ?? 1} times`}
-            onInput={(e) => set({ ...values, limit: factorAt(Number(e.currentTarget.value)) })}
-          />
+          <>
+            <input
+              type="range"
+              min={-1}
+              max={3}
+              step={0.02}
+              value={positionOf(limit ?? 1)}
+              aria-label={`Limit of ${title}`}
+              aria-valuetext={`${limit ?? 1} times`}
+              onInput={(e) => set({ ...values, limit: factorAt(Number(e.currentTarget.value)) })}
+            />{" "}
+            <span class="n">{limit === undefined ? "as set" : `× ${limit}`}</span>
+          </>
         ) : (
           "–"
-        )}{" "}
-        <span class="n">{limit === undefined ? "" : `× ${limit}`}</span>
+        )}
       </td>
       <td>
         <input

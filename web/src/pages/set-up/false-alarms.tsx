@@ -11,15 +11,15 @@ export function FalseAlarms({ certificate }: { certificate: MonitorCertificate[]
       <table class="numbers">
         <thead>
           <tr>
-            <th scope="col">tested on recordings not learnt from</th>
+            <th scope="col">Tested on recordings not learnt from</th>
             <th scope="col" class="n">
-              judged
+              Judged
             </th>
             <th scope="col" class="n">
-              closest to an alarm
+              Closest to an alarm
             </th>
             <th scope="col" class="n">
-              false alarms
+              False alarms
             </th>
           </tr>
         </thead>

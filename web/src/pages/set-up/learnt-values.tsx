@@ -18,5 +18,5 @@ const ROWS: AxisRow<AxisCalibration>[] = [
 ];
 
 export function LearntValues({ calibration: { samples, x, y } }: { calibration: Calibration }) {
-  return <AxisTable caption={`from ${count(samples)} samples`} rows={ROWS} x={x} y={y} />;
+  return <AxisTable caption={`From ${count(samples)} samples`} rows={ROWS} x={x} y={y} />;
 }

@@ -23,8 +23,8 @@ export function NameFields({ isRegistered, ...fields }: FieldsProps & { isRegist
         <NumberInput {...fields} field="rate" label="Sample rate" unit="Hz" />
       </div>
       <p id="name-rule" class="quiet small-text">
-        Letters, digits, “-”, “_” and “.”. A rig cannot be renamed: its name identifies it in recordings, in
-        the audit log and in the configurations of its devices.
+        The name consists of letters, digits, “-”, “_” and “.”. A rig cannot be renamed: its name identifies
+        it in recordings, in the audit log and in the configurations of its devices.
       </p>
     </fieldset>
   );

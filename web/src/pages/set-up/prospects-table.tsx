@@ -25,7 +25,7 @@ export function ProspectsTable({ prospects }: { prospects: Prospects }) {
   ];
   return (
     <>
-      <AxisTable caption={`confirmed after, median of ${trials} trials`} rows={ROWS} x={x} y={y}>
+      <AxisTable caption={`Confirmed after, median of ${trials} trials`} rows={ROWS} x={x} y={y}>
         {ofBothAxes.map(({ name, after_s }) => (
           <tr>
             <th scope="row">{name}</th>
