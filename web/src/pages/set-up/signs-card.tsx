@@ -1,7 +1,7 @@
 import type { AssetAxes, Evidence } from "../../api/types";
 import { correctedAxes, type Signs } from "../../live/signs";
 import { ActionButton } from "../../parts/action-button";
-import { number, seconds } from "../../words/numbers";
+import { seconds } from "../../words/numbers";
 import { SignList } from "./sign-list";
 import { UnitWarnings } from "./unit-warnings";
 
@@ -55,7 +55,7 @@ export function SignsCard({ axes, signs, evidence, change, next }: Props) {
       <p class="quiet small-text">
         Current axes: {axes.swap ? "x and y swapped, " : ""}x sign {sign(axes.x_sign)}, y sign{" "}
         {sign(axes.y_sign)}, position unit {axes.position_unit_m} m, command unit{" "}
-        {number(axes.command_unit_rad, 4)} rad.
+        {Number(axes.command_unit_rad.toFixed(4))} rad.
       </p>
       <div class="form-end">
         <button type="button" class={agrees ? "primary" : ""} onClick={next}>
