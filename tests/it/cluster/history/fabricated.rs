@@ -88,7 +88,7 @@ fn event((id, (code, status)): (i64, (String, String))) -> SeenEvent {
 fn acknowledged(number: usize) -> StoredAction {
     let [asset, kind, code] = ["a", "acknowledge", "x_servo"].map(str::to_owned);
     let (session, actor) = (Some("1".to_owned()), format!("person-{number}"));
-    StoredAction { asset, session, after_index: 1300, kind, code, actor }
+    StoredAction { asset, session, is_early: false, after_index: 1300, kind, code, actor }
 }
 
 /// A partition that node `one` takes, changes and gives up, and that node `two` takes and
@@ -221,4 +221,19 @@ fn actions_that_are_lost_twice_refused_unsent_or_exchanged_are_found() {
         it.history.actions[1].told.as_mut().unwrap().is_done = true;
         it.stored.actions.insert(0, acknowledged(1));
     });
+}
+
+#[test]
+fn what_is_cleared_before_the_session_begins_changes_no_fault_of_it() {
+    let Fabricated { mut history, mut stored } = Fabricated::new();
+    let number = history.send_action("a", FaultCode::XServo, "clear");
+    let mut early = acknowledged(number);
+    (early.session, early.is_early, early.after_index) = (None, true, 0);
+    early.kind = "clear".to_owned();
+    stored.actions.insert(0, early);
+    let found = violations(&history, &stored);
+    assert!(found.is_empty(), "{found:?}");
+    // The same after its end changes what has to be stored.
+    stored.actions[0].is_early = false;
+    assert_eq!(violations(&history, &stored)[0].invariant, Invariant::VerdictRepeats);
 }

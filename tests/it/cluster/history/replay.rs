@@ -30,7 +30,8 @@ pub fn replay(session: &StoredSession, actions: &[&StoredAction]) -> Replayed {
         transitions.extend(new.iter().map(|t| (t.code.to_string(), t.status.to_string())));
     }
     let mut memory = engine.memory().clone();
-    for action in actions.iter().filter(|action| action.session.is_none()) {
+    // Before the session there was no fault to change.
+    for action in actions.iter().filter(|action| action.session.is_none() && !action.is_early) {
         match input(action) {
             Input::Clear(code) => memory.clear(code),
             Input::Acknowledge(code) => drop(memory.acknowledge(code)),

@@ -46,6 +46,8 @@ pub struct StoredAction {
     pub asset: String,
     /// The session that was open.
     pub session: Option<String>,
+    /// Whether the asset's session began later: it may be sent before the first batch arrives.
+    pub is_early: bool,
     /// Number of the session's samples before it.
     pub after_index: usize,
     pub kind: String,
@@ -113,15 +115,18 @@ async fn events(store: &mut AnyConnection) -> Vec<SeenEvent> {
     rows.into_iter().map(event).collect()
 }
 
+type ActionColumns = (String, String, i64, String, String, String, i64);
+
 async fn actions(store: &mut AnyConnection) -> Vec<StoredAction> {
-    let query = "SELECT asset, COALESCE(session, ''), after_index, kind, code, actor FROM action
-        ORDER BY id";
-    let rows: Vec<(String, String, i64, String, String, String)> =
-        sqlx::query_as(query).fetch_all(store).await.unwrap();
-    let action = |(asset, session, after_index, kind, code, actor): (_, String, i64, _, _, _)| {
+    let query = "SELECT asset, COALESCE(session, ''), after_index, kind, code, actor,
+        CAST(CASE WHEN session IS NULL AND at < (SELECT MIN(opened_at) FROM session s
+            WHERE s.asset = action.asset) THEN 1 ELSE 0 END AS BIGINT) FROM action ORDER BY id";
+    let rows: Vec<ActionColumns> = sqlx::query_as(query).fetch_all(store).await.unwrap();
+    let action = |columns: ActionColumns| {
+        let (asset, session, after_index, kind, code, actor, is_early) = columns;
         let session = (!session.is_empty()).then_some(session);
-        let after_index = usize::try_from(after_index).unwrap();
-        StoredAction { asset, session, after_index, kind, code, actor }
+        let (is_early, after_index) = (is_early != 0, usize::try_from(after_index).unwrap());
+        StoredAction { asset, session, is_early, after_index, kind, code, actor }
     };
     rows.into_iter().map(action).collect()
 }
