@@ -373,7 +373,7 @@ impl Publishing for Client {
 async fn listen_to_itself(client: &Client) {
     let inbox = client.new_inbox();
     let Ok(mut echoes) = client.subscribe(inbox.clone()).await else { return };
-    let (mut has_arrived, mut n_missed) = (false, 0);
+    let mut trust = EchoTrust::default();
     loop {
         // The client has closed if this fails.
         if client.publish(inbox.clone(), "".into()).await.is_err() {
@@ -381,15 +381,50 @@ async fn listen_to_itself(client: &Client) {
         }
         match timeout(ECHO_TIMEOUT, echoes.next()).await {
             Ok(None) => return,
-            Ok(Some(_)) => has_arrived = true,
+            Ok(Some(_)) => trust.has_arrived = true,
             Err(_) if client.connection_state() != State::Connected => {}
-            Err(_) if has_arrived || n_missed < ECHO_TRIES => {
-                n_missed += 1;
+            Err(_) if trust.missed() => {
                 tracing::warn!("messages to the NATS server or from it are lost; connecting again");
                 let _ = client.force_reconnect().await;
             }
             Err(_) => {}
         }
         tokio::time::sleep(ECHO_INTERVAL).await;
+    }
+}
+
+/// Whether a missing message to itself means that the connection loses messages.
+#[derive(Default)]
+struct EchoTrust {
+    /// Whether one has ever arrived: then the server permits them.
+    has_arrived: bool,
+    n_missed: u32,
+}
+
+impl EchoTrust {
+    /// Counts a message that has not arrived. Returns whether the connection is to be made again.
+    fn missed(&mut self) -> bool {
+        self.n_missed = self.n_missed.saturating_add(1);
+        self.has_arrived || self.n_missed <= ECHO_TRIES
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_connection_is_made_again_some_times_if_no_message_to_itself_ever_arrives() {
+        let mut trust = EchoTrust::default();
+        let n = (0..100).filter(|_| trust.missed()).count();
+        assert_eq!(n, ECHO_TRIES as usize);
+    }
+
+    #[test]
+    fn the_connection_is_always_made_again_once_a_message_to_itself_has_arrived() {
+        let mut trust = EchoTrust::default();
+        assert!((0..100).filter(|_| trust.missed()).count() < 100);
+        trust.has_arrived = true;
+        assert!((0..100).all(|_| trust.missed()));
     }
 }

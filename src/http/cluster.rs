@@ -24,5 +24,9 @@ pub(super) async fn get(
     State(service): State<Service>,
     Query(query): Query<ClusterQuery>,
 ) -> Json<ClusterView> {
+    if query.asset.is_some() {
+        // If the database does not answer, the last look at it has to do.
+        let _ = service.confirm_ownership().await;
+    }
     Json(service.cluster(query.asset.as_deref()))
 }

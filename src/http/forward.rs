@@ -37,6 +37,25 @@ pub(super) const FROM_BUS: HeaderName = HeaderName::from_static("x-offbd-from-bu
 /// than an answer takes that is under way.
 const LAST_ANSWERS: Duration = Duration::from_secs(1);
 
+/// Longest time to connect to another node. Chosen: the first packet is sent again after 1 s and
+/// after 3 s, so two of them may be lost.
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
+
+/// Longest time that what was sent to another node stays unacknowledged, and that a connection
+/// stays silent although it is probed. Then it is given up: its packets may vanish without a word,
+/// while the node reaches the database and owns what it owned. As for connections to PostgreSQL
+/// (`src/store/writer_lock.rs`). A node that reads nothing for so long although more is sent than
+/// the buffers hold loses the connection too.
+#[cfg(target_os = "linux")]
+const SILENCE_TIMEOUT: Duration = Duration::from_secs(6);
+
+/// A connection on which nothing has come for so long is probed,
+const PROBE_AFTER: Duration = Duration::from_secs(3);
+
+/// with this pause between two probes. An idle one is given up after so many without an answer.
+const PROBE_PAUSE: Duration = Duration::from_secs(1);
+const PROBES: u32 = 3;
+
 /// Sends requests to other nodes.
 #[derive(Clone)]
 pub(crate) struct Forwarder {
@@ -46,10 +65,21 @@ pub(crate) struct Forwarder {
 
 impl Default for Forwarder {
     fn default() -> Self {
-        let mut connector = HttpConnector::new();
-        connector.set_nodelay(true);
-        Self { client: Arc::new(Client::builder(TokioExecutor::new()).build(connector)) }
+        Self { client: Arc::new(Client::builder(TokioExecutor::new()).build(connector())) }
     }
+}
+
+/// Makes connections that end when the other node cannot be reached any more.
+fn connector() -> HttpConnector {
+    let mut connector = HttpConnector::new();
+    connector.set_nodelay(true);
+    connector.set_connect_timeout(Some(CONNECT_TIMEOUT));
+    connector.set_keepalive(Some(PROBE_AFTER));
+    connector.set_keepalive_interval(Some(PROBE_PAUSE));
+    connector.set_keepalive_retries(Some(PROBES));
+    #[cfg(target_os = "linux")]
+    connector.set_tcp_user_timeout(Some(SILENCE_TIMEOUT));
+    connector
 }
 
 /// Whether a request comes from another node of the cluster.

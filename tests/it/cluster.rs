@@ -8,10 +8,14 @@ mod history;
 mod kills;
 #[cfg(all(feature = "nats", feature = "mqtt"))]
 mod links;
+#[cfg(all(target_os = "linux", target_env = "gnu", feature = "nats", feature = "mqtt"))]
+mod lossy;
 mod old_copy;
 mod outage;
 mod ownership;
 mod streams;
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+mod vanishing;
 mod versions;
 mod zombies;
 

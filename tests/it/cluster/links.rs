@@ -117,8 +117,8 @@ impl LinkedCluster {
     }
 }
 
-/// The settings of a node that reaches a NATS server through a link on `port`.
-fn of_nats(nats: &Nats, port: u16) -> Vec<(&'static str, String)> {
+/// The settings of a node that reaches a NATS server on `port`, perhaps that of a link.
+pub(super) fn of_nats(nats: &Nats, port: u16) -> Vec<(&'static str, String)> {
     vec![
         ("OFFBD_NATS__URL", format!("nats://127.0.0.1:{port}")),
         ("OFFBD_NATS__USER", "offbd".to_owned()),
@@ -189,8 +189,8 @@ async fn a_node_that_others_cannot_reach_is_asked_directly_and_then_reached_agai
 /// Samples of a batch over NATS.
 const BATCH: usize = 10;
 
-/// Delivers samples of all rigs, all at the same time.
-async fn deliver(
+/// Delivers samples of all rigs, all at the same time, and records it.
+pub(super) async fn deliver(
     devices: &mut [BusDevice],
     names: &[String],
     recorder: &Recorder,

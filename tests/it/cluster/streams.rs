@@ -14,16 +14,16 @@ use crate::support::cluster::{Cluster, N_NODES, NodeKind};
 use crate::support::postgres::Postgres;
 use crate::support::{Client, DEADLINE, batch, eventually, rig};
 
-type Socket = WebSocketStream<MaybeTlsStream<TcpStream>>;
+pub(super) type Socket = WebSocketStream<MaybeTlsStream<TcpStream>>;
 
 /// Opens a stream, once the asset has an owner.
-async fn stream(client: &Client, asset: &str) -> Socket {
+pub(super) async fn stream(client: &Client, asset: &str) -> Socket {
     let url = format!("ws://{}/api/v1/assets/{asset}/stream", client.address);
     eventually(async || connect_async(&url).await.ok()).await.0
 }
 
 /// Sends a batch and waits for its acknowledgement. Returns `None` if the stream ends before.
-async fn is_acknowledged(socket: &mut Socket, samples: &[Sample]) -> Option<()> {
+pub(super) async fn is_acknowledged(socket: &mut Socket, samples: &[Sample]) -> Option<()> {
     let text = batch(Some("s"), samples).to_string();
     socket.send(Message::text(text)).await.ok()?;
     while let Some(Ok(message)) = socket.next().await {
@@ -37,7 +37,7 @@ async fn is_acknowledged(socket: &mut Socket, samples: &[Sample]) -> Option<()> 
 }
 
 /// Reads to the end of a stream. Returns the code with which it is closed, if there is one.
-async fn closed(socket: &mut Socket) -> Option<CloseCode> {
+pub(super) async fn closed(socket: &mut Socket) -> Option<CloseCode> {
     let mut code = None;
     let end = async {
         while let Some(Ok(message)) = socket.next().await {

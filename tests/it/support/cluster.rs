@@ -150,14 +150,17 @@ impl Cluster {
         owned
     }
 
-    /// Returns those of the rigs that a node owns, perhaps none.
+    /// Returns those of the rigs that a node owns, as it says itself, perhaps none.
     pub async fn rigs_of(&self, i: usize, names: &[String]) -> Vec<String> {
-        let (client, node) = (self.client(0), format!("node-{i}"));
+        let (client, node) = (self.client(i), format!("node-{i}"));
         let mut owned = Vec::new();
         for name in names {
             let path = format!("cluster?asset={name}");
-            let (_, place) = call(&client, Method::GET, &path, &Value::Null).await;
-            if place["asset"]["owner"] == node.as_str() {
+            let owner = eventually(async || {
+                let place = try_get(&client, &path).await?;
+                place["asset"]["owner"].as_str().map(str::to_owned)
+            });
+            if owner.await == node {
                 owned.push(name.clone());
             }
         }

@@ -15,6 +15,8 @@ pub mod device;
 pub mod held_socket;
 pub mod history;
 pub mod link;
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+pub mod packets;
 pub mod postgres;
 pub mod process;
 pub mod provider;

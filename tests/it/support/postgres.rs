@@ -9,11 +9,11 @@ use std::sync::OnceLock;
 const MISSING: &str = "no `initdb` of PostgreSQL in PATH or /usr/lib/postgresql/*/bin: install \
     `postgresql`, or set POSTGRES_PROGRAMS to the directory that has it";
 
-/// Runs the server with the programs in $1 and the data in $2 until it reads a line, which is
-/// the signal to stop with. Prints `ready` when the server is ready and `gone` when it has
+/// Runs the server with the programs in $1, the data in $2 and the address $3, if it is not empty,
+/// with the port $4, until it reads a line, which is the signal to stop with. Prints `ready` when the server is ready and `gone` when it has
 /// stopped. At the end of input it stops the server at once and removes the data.
 const WATCH: &str = r#"
-"$1/postgres" -D "$2" -c listen_addresses= -c unix_socket_directories="$2" \
+"$1/postgres" -D "$2" -c listen_addresses="$3" -c port="$4" -c unix_socket_directories="$2" \
     -c max_connections=200 >>"$2/log" 2>&1 & server=$!
 until grep -qs ready "$2/postmaster.pid"; do kill -0 $server || exit 1; sleep 0.05; done
 echo ready
@@ -26,8 +26,13 @@ else
 fi
 "#;
 
+/// The port in the name of the server's socket, unless it listens on one of its own.
+const PORT: u16 = 5432;
+
 pub struct Postgres {
     directory: PathBuf,
+    /// The port of 127.0.0.1 that it listens on, if it does.
+    tcp_port: Option<u16>,
     running: Option<(Child, ChildStdin, BufReader<std::process::ChildStdout>)>,
 }
 
@@ -35,10 +40,15 @@ impl Postgres {
     /// Starts a new server in an empty directory. Its collation is English, to show that
     /// nothing depends on the order of bytes.
     pub fn new() -> Self {
-        Self::in_directory(tempfile::tempdir().unwrap().keep())
+        Self::in_directory(tempfile::tempdir().unwrap().keep(), None)
     }
 
-    fn in_directory(directory: PathBuf) -> Self {
+    /// As [`Self::new`], for clients over TCP on `port`, which has to be free.
+    pub fn on_port(port: u16) -> Self {
+        Self::in_directory(tempfile::tempdir().unwrap().keep(), Some(port))
+    }
+
+    fn in_directory(directory: PathBuf, tcp_port: Option<u16>) -> Self {
         if is_root() {
             let owner = Command::new("chown").arg("nobody").arg(&directory).status().unwrap();
             assert!(owner.success());
@@ -50,15 +60,17 @@ impl Postgres {
             .output()
             .unwrap();
         assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
-        let mut server = Self { directory, running: None };
+        let mut server = Self { directory, tcp_port, running: None };
         server.start();
         server
     }
 
     pub fn start(&mut self) {
+        let address = if self.tcp_port.is_some() { "127.0.0.1" } else { "" };
         let mut child = as_nobody("sh")
             .args(["-c", WATCH, "watch"])
             .args([programs(), &self.directory])
+            .args([address, &self.tcp_port.unwrap_or(PORT).to_string()])
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()
@@ -87,7 +99,10 @@ impl Postgres {
 
     /// Returns the URL of the database of this name, which is created if it does not exist.
     pub fn database(&self, name: &str) -> String {
-        database(&self.directory, name)
+        match self.tcp_port {
+            Some(port) => database(Path::new(&format!("127.0.0.1:{port}")), name),
+            None => database(&self.directory, name),
+        }
     }
 }
 
@@ -99,21 +114,21 @@ impl Drop for Postgres {
     }
 }
 
-fn database(directory: &Path, name: &str) -> String {
+fn database(server: &Path, name: &str) -> String {
     let made = Command::new(programs().join("createdb"))
-        .args(["-U", "offbd", "-h"])
-        .args([directory, Path::new(name)])
+        .args(["--maintenance-db", &url(server, "postgres"), name])
         .output()
         .unwrap();
     let error = String::from_utf8_lossy(&made.stderr);
     assert!(made.status.success() || error.contains("already exists"), "{error}");
-    url(directory, name)
+    url(server, name)
 }
 
-/// Returns the URL of a database on the server with its socket in `directory`.
-pub fn url(directory: &Path, name: &str) -> String {
-    let socket = directory.to_str().unwrap().replace('/', "%2F");
-    format!("postgres://offbd@{socket}/{name}")
+/// Returns the URL of a database on a server: the directory of its socket, or its address and
+/// port.
+pub fn url(server: &Path, name: &str) -> String {
+    let server = server.to_str().unwrap().replace('/', "%2F");
+    format!("postgres://offbd@{server}/{name}")
 }
 
 /// Returns the URL of a database on the server that all tests of this process share.
@@ -123,7 +138,7 @@ pub fn shared_database(name: &str) -> String {
         let directory = std::env::temp_dir().join(format!("offbd-postgres-{}", std::process::id()));
         std::fs::create_dir(&directory).unwrap();
         // The server runs as long as the process.
-        std::mem::forget(Postgres::in_directory(directory.clone()));
+        std::mem::forget(Postgres::in_directory(directory.clone(), None));
         directory
     });
     database(directory, name)
