@@ -6,12 +6,15 @@ mod bus;
 mod clients;
 mod history;
 mod kills;
+mod link_figures;
 #[cfg(all(feature = "nats", feature = "mqtt"))]
 mod links;
 mod old_copy;
 mod outage;
 mod ownership;
 mod streams;
+#[cfg(all(feature = "nats", feature = "mqtt"))]
+mod tokens;
 mod versions;
 mod zombies;
 
