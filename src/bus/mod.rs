@@ -13,7 +13,8 @@
 //! - `presence`: which devices are connected;
 //! - `nats`: a NATS server, with `callout`, by which it asks for the rights of a device, and
 //!   `settings`, the check of its settings;
-//! - `mqtt`: an MQTT broker, with `puback`, the order of its acknowledgements.
+//! - `mqtt`: an MQTT broker, with `puback`, the order of its acknowledgements, and
+//!   `mqtt_publisher`, by which faults go there; `marker` finds out which of them it has kept.
 //!
 //! Contains no SQL and no engines, and reads no configuration.
 
@@ -22,7 +23,11 @@ mod callout;
 mod faults;
 mod intake;
 #[cfg(feature = "mqtt")]
+mod marker;
+#[cfg(feature = "mqtt")]
 pub mod mqtt;
+#[cfg(feature = "mqtt")]
+mod mqtt_publisher;
 #[cfg(feature = "nats")]
 pub mod nats;
 mod presence;

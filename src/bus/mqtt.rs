@@ -5,6 +5,7 @@
 //! connection is made again, and the broker repeats what was not acknowledged. Each connection
 //! has a client of its own, so that no acknowledgement of one is sent on another.
 
+use std::future::pending;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -14,7 +15,7 @@ use rumqttc::{
     AsyncClient, ConnectionError, EventLoop, MqttOptions, Outgoing, Packet, Publish, QoS,
     SubscribeFilter, TlsConfiguration, Transport,
 };
-use tokio::sync::{Notify, mpsc, watch};
+use tokio::sync::{mpsc, watch};
 use tokio::task::JoinHandle;
 use tokio::time::timeout;
 use tokio_rustls::rustls::crypto::ring;
@@ -23,8 +24,9 @@ use tokio_rustls::rustls::pki_types::pem::PemObject;
 use tokio_rustls::rustls::{ClientConfig, RootCertStore};
 use tokio_util::sync::CancellationToken;
 
-use super::faults::{FaultMessage, Publishing, publish_faults};
+use super::faults::publish_faults;
 use super::intake::{Answering, BatchAnswer, Delivery, Form, Intake, MessageReply, queue};
+use super::mqtt_publisher::{BrokerLink, Connected, MqttPublisher};
 use super::puback::PubackQueue;
 use super::{RETRY_INTERVAL, SEND_TIMEOUT};
 use crate::service::Service;
@@ -94,7 +96,7 @@ async fn run(
     closing: CancellationToken,
 ) {
     let (connected, clients) = watch::channel(None);
-    let publisher = MqttPublisher { clients };
+    let publisher = || MqttPublisher::new(clients.clone());
     let publishing = async {
         if settings.faults {
             publish_faults(BUS, service.clone(), publisher, closing.clone()).await;
@@ -147,10 +149,6 @@ fn tls(settings: &MqttSettings) -> Result<ClientConfig, MqttError> {
     Ok(config.with_root_certificates(roots).with_no_client_auth())
 }
 
-/// The client of the present connection, if there is one, and what is notified when the broker
-/// has confirmed a message.
-type Connected = Option<(AsyncClient, Arc<Notify>)>;
-
 struct Broker<'a> {
     service: Service,
     settings: &'a MqttSettings,
@@ -168,6 +166,7 @@ impl Broker<'_> {
             let reading = self.read(&intake, &connection, events, sender, closing);
             let (reason, ()) = tokio::join!(reading, answering);
             self.connected.send_replace(None);
+            connection.link.ended.cancel();
             metrics::gauge!("offbd_bus_connected", "bus" => BUS).set(0.0);
             if let Some(error) = reason {
                 tracing::warn!(%error, "the connection to the MQTT broker is lost");
@@ -186,12 +185,12 @@ impl Broker<'_> {
         sender: mpsc::Sender<Delivery<MqttReceipt>>,
         closing: &CancellationToken,
     ) -> Option<ConnectionError> {
-        let mut sender = Some(sender);
+        let (mut sender, marker_topic) = (Some(sender), TopicStyle::Mqtt.marker());
         loop {
             let stopping = async {
                 match &sender {
                     Some(_) => closing.cancelled().await,
-                    None => std::future::pending().await,
+                    None => pending().await,
                 }
             };
             let event = tokio::select! {
@@ -206,7 +205,14 @@ impl Broker<'_> {
             match event {
                 Ok(rumqttc::Event::Incoming(Packet::ConnAck(_))) => self.greet(connection),
                 Ok(rumqttc::Event::Incoming(Packet::PubAck(_))) => {
-                    connection.confirmed.notify_one()
+                    connection.link.confirmed.notify_one()
+                }
+                Ok(rumqttc::Event::Incoming(Packet::Publish(publish)))
+                    if publish.topic == marker_topic =>
+                {
+                    connection.link.markers.arrive(&publish.payload);
+                    // A topic of a mapping may be the same, at QoS 1.
+                    connection.acknowledge(connection.arrive(&publish));
                 }
                 Ok(rumqttc::Event::Incoming(Packet::Publish(publish))) => {
                     if let Some(sender) = &sender {
@@ -237,8 +243,7 @@ impl Broker<'_> {
                 connection.renew.cancel();
             }
         }
-        let publishing = (connection.client.clone(), connection.confirmed.clone());
-        self.connected.send_replace(Some(publishing));
+        self.connected.send_replace(Some(connection.link.clone()));
     }
 
     /// Queues a message of a device. One that is no batch, or cannot be read, is answered at
@@ -295,16 +300,15 @@ type MqttReceipt = Option<u64>;
 struct MqttConnection {
     client: AsyncClient,
     pubacks: Mutex<PubackQueue<Publish>>,
-    /// Notified when the broker has confirmed a message.
-    confirmed: Arc<Notify>,
+    link: Arc<BrokerLink>,
     /// Cancelled if the connection is to be made again at once.
     renew: CancellationToken,
 }
 
 impl MqttConnection {
     fn new(client: AsyncClient) -> Self {
-        let (pubacks, confirmed) = (Mutex::default(), Arc::default());
-        Self { client, pubacks, confirmed, renew: CancellationToken::new() }
+        let link = Arc::new(BrokerLink::new(client.clone()));
+        Self { client, pubacks: Mutex::default(), link, renew: CancellationToken::new() }
     }
 
     fn arrive(&self, publish: &Publish) -> MqttReceipt {
@@ -367,31 +371,5 @@ impl Answering for Arc<MqttConnection> {
 
     async fn finish(&self) {
         let _ = timeout(SEND_TIMEOUT, self.client.disconnect()).await;
-    }
-}
-
-/// Publishes faults over the present connection.
-struct MqttPublisher {
-    clients: watch::Receiver<Connected>,
-}
-
-impl Publishing for MqttPublisher {
-    async fn publish(&self, message: FaultMessage<'_>) {
-        let FaultMessage { asset, code, document, retained } = message;
-        let topic = TopicStyle::Mqtt.fault(asset, code);
-        let mut clients = self.clients.clone();
-        loop {
-            let Ok(client) = clients.wait_for(Option::is_some).await.map(|client| client.clone())
-            else {
-                return std::future::pending().await;
-            };
-            let Some((client, confirmed)) = client else { continue };
-            let sent = client.publish(&topic, QoS::AtLeastOnce, retained, document.clone());
-            tokio::select! {
-                sent = async { (sent.await, confirmed.notified().await).0 } => if sent.is_ok() { return },
-                // Another connection: the message may be lost.
-                _ = clients.changed() => {}
-            }
-        }
     }
 }

@@ -237,7 +237,7 @@ impl NatsBus {
         let publishing = async {
             if self.settings.faults {
                 let (service, closing) = (self.service.clone(), self.closing.clone());
-                publish_faults(BUS, service, client.clone(), closing).await;
+                publish_faults(BUS, service, || client.clone(), closing).await;
             }
         };
         let answering_questions = async {

@@ -33,6 +33,8 @@ const SCHEMA: &str = "#/components/schemas/";
     bus::BatchMessageView,
     bus::BatchRefusalView,
     bus::CommunicationMessageView,
+    bus::FaultMarkerQuestionView,
+    bus::FaultMarkerView,
     bus::FaultMessageView,
     bus::HelloView,
     bus::PresenceWord,

@@ -98,7 +98,7 @@ pub use reanalysis::fault_recording::RecordingWindow;
 pub use reanalysis::trace::{MAX_TRACE_POINTS, TraceQuery};
 pub use requests::{
     AlarmQuery, DeliveryQuery, FaultQuery, FleetQuery, MAX_SERIES_SESSIONS, PendingBatch,
-    QueueLoad, SeriesQuery, SessionListQuery, TraceReader,
+    PresentFault, QueueLoad, SeriesQuery, SessionListQuery, TraceReader,
 };
 pub use start::{Service, Workers};
 pub use writing::{Event, EventFeed, EventKind};

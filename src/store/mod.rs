@@ -40,6 +40,7 @@ mod notification;
 mod notifications;
 mod page_checksums;
 mod partition;
+mod present;
 mod progress;
 mod query_builder;
 mod read;
@@ -75,6 +76,7 @@ pub use page_checksums::install_drivers;
 pub use partition::{
     EVENTS, MAX_PARTITIONS, PartitionId, PartitionRow, Partitions, TRANSFERS, subject_token,
 };
+pub use present::PresentFaultRow;
 pub use read::{AssetFilter, FaultFilter, FaultOrder, SessionFilter};
 pub use recording::RecordingReader;
 pub use remark::{RemarkRow, RemarkWrite};

@@ -15,6 +15,9 @@ use super::telemetry::{AckView, ColumnsView, RowsView};
 /// The first levels of every topic.
 const ROOT: [&str; 2] = ["offbd", "v1"];
 
+/// The level of offbd's own topic. No asset has it: `=` is in no name.
+const SERVICE_LEVEL: &str = "=service";
+
 /// Longest name of an asset, bytes, as in the asset file.
 const NAME_BYTES: usize = 128;
 
@@ -51,6 +54,12 @@ impl TopicStyle {
     #[must_use]
     pub fn fault(self, asset: &str, code: &str) -> String {
         self.topic(&[&encoded(asset), "fault", code])
+    }
+
+    /// Returns the topic on which offbd notes which events it has published.
+    #[must_use]
+    pub fn marker(self) -> String {
+        self.topic(&[SERVICE_LEVEL, "faults"])
     }
 
     /// Parses a topic that a device publishes on.
@@ -240,6 +249,24 @@ pub struct CommunicationMessageView {
     pub change: CommunicationEventView,
 }
 
+/// What offbd notes for itself at an MQTT broker, retained: without it the broker has lost the
+/// retained messages, and with a number that is too low the latest of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FaultMarkerView {
+    /// Number of an event; it and all before it have been published.
+    pub published: i64,
+}
+
+/// What offbd sends to itself through an MQTT broker: when it arrives, a marker that the broker
+/// has kept has arrived before.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FaultMarkerQuestionView {
+    /// Is different in each question.
+    pub question: String,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -265,6 +292,7 @@ mod tests {
             assert_eq!(error, TopicError::Name { level: level.to_owned() });
         }
         assert!(parse(&format!("offbd/v1/{}/state", "a".repeat(129))).is_err());
+        assert!(decoded(SERVICE_LEVEL).is_err());
     }
 
     proptest! {

@@ -7,13 +7,12 @@ use super::words::UnjudgedWord;
 
 /// How the samples of a rig arrive: their rate and spacing on the device's clock, gaps, delay,
 /// and rows that are not judged. It is counted in memory, and anew after a restart of the
-/// service.
+/// service, or when another node of a cluster takes the asset over.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[schema(as = Link)]
 pub struct LinkView {
     pub asset: String,
-    /// Id of the session whose samples came last; null if none has come since the start of
-    /// the service.
+    /// Id of the session whose samples came last; null if none has come since it is counted.
     pub session_id: Option<String>,
     /// The rate that the asset file states, Hz.
     pub expected_rate_hz: f64,

@@ -8,6 +8,7 @@ mod mapping;
 mod messages;
 mod partition;
 mod puback;
+mod retained;
 mod verdict;
 
 use crate::support::broker::{Mosquitto, Nats};

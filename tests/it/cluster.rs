@@ -6,6 +6,7 @@ mod bus;
 mod clients;
 mod history;
 mod kills;
+mod link_figures;
 #[cfg(all(feature = "nats", feature = "mqtt"))]
 mod links;
 #[cfg(all(target_os = "linux", target_env = "gnu", feature = "nats", feature = "mqtt"))]
@@ -14,6 +15,8 @@ mod old_copy;
 mod outage;
 mod ownership;
 mod streams;
+#[cfg(all(feature = "nats", feature = "mqtt"))]
+mod tokens;
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 mod vanishing;
 mod versions;

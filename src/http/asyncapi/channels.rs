@@ -21,7 +21,7 @@ pub(super) const JSON: &str = "application/json";
 const CLOUD_EVENT: &str = "application/cloudevents+json";
 
 /// Every message.
-pub(super) const MESSAGES: [Message; 12] = [
+pub(super) const MESSAGES: [Message; 14] = [
     message("batch", "BatchMessage", JSON, "Samples; either document also as MessagePack"),
     message("batchAck", "BatchAck", JSON, "The batch is durable"),
     message("batchRefusal", "BatchRefusal", JSON, "Nothing of the batch was taken"),
@@ -30,6 +30,8 @@ pub(super) const MESSAGES: [Message; 12] = [
     message("fault", "FaultMessage", JSON, "A change of a fault code"),
     message("communication", "CommunicationMessage", JSON, "Data stay away, or are back"),
     message("cleared", NOTHING, "text/plain", "Removes the retained message"),
+    message("faultMarker", "FaultMarker", JSON, "The event up to which all is published; retained"),
+    message("faultQuestion", "FaultMarkerQuestion", JSON, "A question of offbd to itself"),
     message("frame", "StreamFrame", JSON, "An answer to a batch, or a state"),
     message("faultEvent", "Event", JSON, "Data of an event `fault`"),
     message("communicationEvent", "CommunicationEvent", JSON, "Data of an event `communication`"),
@@ -142,6 +144,11 @@ pub(super) fn webhook_channel() -> Channel {
     }
 }
 
+const MARKER: &str = "By which offbd finds out, after it has connected, whether the broker has lost \
+    retained faults. Nobody else needs it";
+
+const MARK: Operation = Operation::new(Action::Send, &["faultMarker"]);
+
 /// Returns the channels of a bus.
 pub(super) fn bus_channels(style: TopicStyle) -> Vec<Channel> {
     let (server, suffix) = match style {
@@ -167,6 +174,11 @@ pub(super) fn bus_channels(style: TopicStyle) -> Vec<Channel> {
     let fault = Operation::new(Action::Send, &["fault", "communication", "cleared"]).retained();
     let summary = "The present state of each fault code; NATS alone keeps no message";
     channels.push(channel("fault", style.fault("{asset}", "{code}"), summary, fault));
+    if style == TopicStyle::Mqtt {
+        let mut marker = channel("faultMarker", style.marker(), MARKER, MARK.retained());
+        marker.operations.push(Operation::new(Action::Receive, &["faultMarker", "faultQuestion"]));
+        channels.push(marker);
+    }
     channels
 }
 

@@ -26,7 +26,10 @@ struct Observer {
 impl Observer {
     fn channels(&self) -> Vec<String> {
         let names = ["ack", "fault", "hello", "state", "telemetry"];
-        names.iter().map(|name| format!("{name}{}", self.suffix)).collect()
+        let mut channels: Vec<_> =
+            names.iter().map(|name| format!("{name}{}", self.suffix)).collect();
+        channels.extend((self.suffix == "Mqtt").then(|| "faultMarkerMqtt".to_owned()));
+        channels
     }
 
     /// Takes note of messages until one has this name.
@@ -34,7 +37,10 @@ impl Observer {
         let found = async {
             loop {
                 let (topic, payload) = self.published.next().await.unwrap();
-                let level = topic.split(['/', '.']).nth(3).unwrap();
+                let level = match topic.split(['/', '.']).nth(3).unwrap() {
+                    "faults" => "faultMarker",
+                    level => level,
+                };
                 let channel = format!("{level}{}", self.suffix);
                 if self.described.note(&channel, &document(level, &payload)) == wanted {
                     return;
@@ -87,6 +93,9 @@ fn quick(config: &mut offbd::config::Config) {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn messages_over_mqtt_are_as_described() {
     let mosquitto = Mosquitto::start();
+    // Before the service, which asks the broker something when it has connected.
+    let mut subscriber = MqttDevice::connect(mosquitto.port, "observer", None).await;
+    subscriber.subscribe("offbd/v1/#").await;
     let fixture = crate::bus::start_with(|config| {
         config.mqtt = Some(mosquitto.config());
         quick(config);
@@ -94,8 +103,6 @@ async fn messages_over_mqtt_are_as_described() {
     .await;
     connected(&fixture.client, "mqtt").await;
     fixture.client.asset("a").await;
-    let mut subscriber = MqttDevice::connect(mosquitto.port, "observer", None).await;
-    subscriber.subscribe("offbd/v1/#").await;
     let published = futures_util::stream::unfold(subscriber, |mut subscriber| async {
         let message = subscriber.next().await;
         Some(((message.topic, message.payload.to_vec()), subscriber))

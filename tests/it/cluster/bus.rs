@@ -127,7 +127,7 @@ async fn a_broker_serves_all_nodes_at_the_same_time() {
 }
 
 /// Publishes batches at QoS 1, and leaves them to the broker.
-async fn leave_to_broker(device: &mut MqttDevice, names: &[String], samples: &[Sample]) {
+pub(super) async fn leave_to_broker(device: &mut MqttDevice, names: &[String], samples: &[Sample]) {
     for part in samples.chunks(BATCH) {
         for name in names {
             let topic = format!("offbd/v1/{name}/telemetry");

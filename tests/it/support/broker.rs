@@ -121,6 +121,13 @@ impl Nats {
         wait_for_port(self.mqtt_port);
     }
 
+    /// Kills the server, and starts it without what it has stored.
+    pub fn forget(&mut self) {
+        self.kill();
+        std::fs::remove_dir_all(self.directory.path().join("store")).unwrap();
+        self.restart();
+    }
+
     /// Returns the section of the service's configuration.
     pub fn config(&self) -> offbd::config::NatsConfig {
         let seed = self.directory.path().join("seed");
@@ -213,6 +220,9 @@ fn nats_server() -> PathBuf {
     find("nats-server", &places, "no nats-server: run scripts/nats-server, or set NATS_SERVER")
 }
 
+/// The file that mosquitto stores everything in.
+const MOSQUITTO_STORE: &str = "mosquitto.db";
+
 /// A mosquitto that everybody may use.
 pub struct Mosquitto {
     directory: tempfile::TempDir,
@@ -222,9 +232,14 @@ pub struct Mosquitto {
 
 impl Mosquitto {
     pub fn start() -> Self {
+        Self::start_with(None)
+    }
+
+    /// Starts a broker with these lines as its list of permitted topics, if there are some.
+    pub fn start_with(topics: Option<&str>) -> Self {
         let directory = tempfile::tempdir().unwrap();
         let port = free_port();
-        let lines = [
+        let mut lines = vec![
             format!("listener {port} 127.0.0.1"),
             "allow_anonymous true".to_owned(),
             // So that a kill loses nothing that it has acknowledged, and devices in tests are not
@@ -235,6 +250,11 @@ impl Mosquitto {
             "autosave_interval 1".to_owned(),
             "max_queued_messages 0".to_owned(),
         ];
+        if let Some(topics) = topics {
+            let list = directory.path().join("topics");
+            std::fs::write(&list, topics).unwrap();
+            lines.push(format!("acl_file {}", list.display()));
+        }
         std::fs::write(directory.path().join("conf"), lines.join("\n") + "\n").unwrap();
         #[cfg(unix)]
         {
@@ -250,6 +270,23 @@ impl Mosquitto {
 
     pub fn kill(&mut self) {
         self.running = None;
+    }
+
+    /// What is stored; the broker must not run.
+    pub fn stored(&self) -> Vec<u8> {
+        std::fs::read(self.directory.path().join(MOSQUITTO_STORE)).unwrap()
+    }
+
+    /// Kills the broker, and starts it with `stored`, or with nothing.
+    pub fn restart_with(&mut self, stored: Option<&[u8]>) {
+        self.kill();
+        let store = self.directory.path().join(MOSQUITTO_STORE);
+        match stored {
+            Some(stored) => std::fs::write(store, stored),
+            None => std::fs::remove_file(store),
+        }
+        .unwrap();
+        self.restart();
     }
 
     pub fn restart(&mut self) {

@@ -33,11 +33,13 @@ pub struct NodeKind {
     pub program: PathBuf,
     /// Its own environment variables.
     pub environment: Vec<(&'static str, String)>,
+    /// The token of its client, if it requires one.
+    pub token: Option<String>,
 }
 
 impl Default for NodeKind {
     fn default() -> Self {
-        Self { program: process::program(), environment: Vec::new() }
+        Self { program: process::program(), environment: Vec::new(), token: None }
     }
 }
 
@@ -92,7 +94,9 @@ impl Cluster {
         environment.extend(settings.iter().copied());
         let environment: Vec<_> =
             environment.iter().map(|(key, value)| (*key, Path::new(value))).collect();
-        Process::try_start_program(&kind.program, self.data.path(), &environment)
+        let mut node = Process::try_start_program(&kind.program, self.data.path(), &environment)?;
+        node.client.token = kind.token;
+        Ok(node)
     }
 
     /// Starts a node that does not run.
