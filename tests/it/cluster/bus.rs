@@ -153,6 +153,7 @@ async fn nodes_that_are_paused_and_killed_lose_nothing_that_a_broker_has_at_qos_
     cluster.owned_by(2, &names).await;
     cluster.kill(2);
     leave_to_broker(&mut device, &names, &samples[200..]).await;
+    cluster.taken_over_from(2).await;
     for name in &names {
         let stored = async || {
             let stored = cluster.client(0).recording(name, "s").await;

@@ -4,9 +4,9 @@ use offbd::store::{Location, NodeIdentity, PartitionId, Partitions, Store, Store
 
 use super::not_ready;
 use crate::support::cluster::Cluster;
-use crate::support::connection;
 use crate::support::postgres::Postgres;
 use crate::support::process::Refusal;
+use crate::support::{DEADLINE, connection};
 
 const N: u32 = 64;
 
@@ -38,6 +38,36 @@ async fn all_partitions_are_taken_and_released_in_one_transaction() {
     a.release(&all).await.unwrap();
     assert_eq!(transactions_and_owners(&url).await, (1, 0));
     assert_eq!(b.take(&all).await.unwrap(), all);
+}
+
+/// A node that is paused while the server sends it a long answer.
+#[tokio::test]
+async fn a_node_that_reads_nothing_of_an_answer_loses_its_partitions() {
+    let server = Postgres::new();
+    let url = server.database("cluster");
+    let mut other = node(&url, "2", "b").await.unwrap();
+    let (p, key) = (PartitionId(3), i32::from_be_bytes(*b"part"));
+    let mut paused = server.unread_client(
+        "cluster",
+        &[
+            &format!("SELECT pg_advisory_lock({key}, 3)"),
+            "INSERT INTO node SELECT '1', 'a', '127.0.0.1:1', '0', 0, pid,
+             CAST(backend_start AS TEXT) FROM pg_stat_activity WHERE pid = pg_backend_pid()",
+            "COPY (SELECT repeat('x', 1000) FROM generate_series(1, 100000)) TO STDOUT",
+        ],
+    );
+    let mut watch = connection(&url).await;
+    let unread = "SELECT COUNT(*) FROM pg_stat_activity WHERE wait_event = 'ClientWrite'";
+    while sqlx::query_scalar::<_, i64>(unread).fetch_one(&mut watch).await.unwrap() == 0 {}
+    assert_eq!(other.take(&[p]).await.unwrap(), []);
+    let taken = async {
+        while other.take(&[p]).await.unwrap() != [p] {
+            other.observe().await.unwrap();
+        }
+    };
+    tokio::time::timeout(DEADLINE, taken).await.expect("it is taken in time");
+    paused.kill().unwrap();
+    paused.wait().unwrap();
 }
 
 #[tokio::test]

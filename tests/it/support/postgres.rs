@@ -37,6 +37,17 @@ pub struct Postgres {
 }
 
 impl Postgres {
+    /// Starts `psql` with these commands, and does not read what it prints: once the pipe is full,
+    /// it reads nothing from the server any more.
+    pub fn unread_client(&self, database: &str, commands: &[&str]) -> Child {
+        let mut psql = Command::new(programs().join("psql"));
+        psql.args(["-X", "-U", "offbd", "-d", database, "-h"]).arg(&self.directory);
+        for command in commands {
+            psql.args(["-c", command]);
+        }
+        psql.stdout(Stdio::piped()).spawn().unwrap()
+    }
+
     /// Starts a new server in an empty directory. Its collation is English, to show that
     /// nothing depends on the order of bytes.
     pub fn new() -> Self {
