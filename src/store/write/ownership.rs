@@ -45,11 +45,12 @@ const LOOK_TIMEOUT: Duration = Duration::from_secs(5);
 /// Ends the connections of nodes that have read nothing of an answer for so long. The server has no
 /// time limit for these: a node that is paused while it reads more than the buffers hold would
 /// keep its partitions. (Over TCP the server gives such a connection up by itself, see
-/// `store/writer_lock.rs`; not over a socket of the same machine.) Chosen: much longer than the
-/// journal of a partition takes, the longest answer.
+/// `store/writer_lock.rs`; not over a socket of the same machine.) Only those of the same user,
+/// which is permitted. Chosen: much longer than the journal of a partition takes, the longest
+/// answer.
 const END_UNREAD: &str = "SELECT pg_terminate_backend(a.pid) FROM node JOIN pg_stat_activity a
     ON a.pid = node.pid AND CAST(a.backend_start AS TEXT) = node.started
-    WHERE a.wait_event = 'ClientWrite'
+    WHERE a.usename = current_user AND a.wait_event = 'ClientWrite'
     AND a.query_start < clock_timestamp() - INTERVAL '10 s'";
 
 /// Whether the server still has the connection with which a row of `node` writes.
