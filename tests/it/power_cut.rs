@@ -102,7 +102,9 @@ async fn resume(client: &Client, asset: &str, samples: &[Sample], all: &Acknowle
 /// Returns how many samples of a rig are stored, which must be the first ones, and whether
 /// their session has ended.
 async fn stored(client: &Client, asset: &str, samples: &[Sample], at: &str) -> (usize, bool) {
-    let page = client.get(&format!("sessions?asset={asset}")).await.expect(200);
+    let page = client.get(&format!("sessions?asset={asset}")).await;
+    assert_eq!(page.status, 200, "{at}: {asset}: {}", page.text);
+    let page = page.json();
     let Some(session) = page["items"].as_array().unwrap().first() else { return (0, false) };
     let recording = client.recording(asset, "s").await;
     assert_eq!(recording, samples[..recording.len()], "{at}: {asset}");

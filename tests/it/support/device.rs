@@ -237,7 +237,13 @@ async fn post_once(service: &str, asset: &str, document: &Value) -> Option<Value
     socket.send(Message::text(document.to_string())).await.ok()?;
     loop {
         match socket.next().await?.ok()? {
-            Message::Text(text) => return serde_json::from_str(&text).ok(),
+            Message::Text(text) => {
+                let message: Value = serde_json::from_str(&text).ok()?;
+                // The fault of an earlier batch may come first.
+                if message["type"] != "fault" {
+                    return Some(message);
+                }
+            }
             Message::Close(_) => return None,
             _ => {}
         }
