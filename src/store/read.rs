@@ -285,14 +285,9 @@ impl Store {
         self.session_rows(query).await
     }
 
-    /// The result of `query` for one session. An open session is queried again by its id,
-    /// because the journal is indexed by id and must be read before the tables.
+    /// The result of `query` for one session.
     async fn session_row(&self, query: QueryBuilder) -> Result<Option<SessionRow>, StoreError> {
-        let row: Option<SessionRow> = query.rows().fetch_optional(&self.pool).await?;
-        match row {
-            Some(row) if row.is_open() => self.session(&row.id).await,
-            row => Ok(row),
-        }
+        Ok(self.session_rows(query).await?.into_iter().next())
     }
 
     /// The result of `query` for sessions. The progress of the open ones is queried again by

@@ -58,7 +58,10 @@ async fn a_node_that_reads_nothing_of_an_answer_loses_its_partitions() {
     );
     let mut watch = connection(&url).await;
     let unread = "SELECT COUNT(*) FROM pg_stat_activity WHERE wait_event = 'ClientWrite'";
-    while sqlx::query_scalar::<_, i64>(unread).fetch_one(&mut watch).await.unwrap() == 0 {}
+    let blocked = async {
+        while sqlx::query_scalar::<_, i64>(unread).fetch_one(&mut watch).await.unwrap() == 0 {}
+    };
+    tokio::time::timeout(DEADLINE, blocked).await.expect("the pipe is full in time");
     assert_eq!(other.take(&[p]).await.unwrap(), []);
     let taken = async {
         while other.take(&[p]).await.unwrap() != [p] {
