@@ -7,7 +7,7 @@ use sqlx::{AnyConnection, AssertSqlSafe, Connection, Executor};
 
 use super::check::{check_copy, check_pages};
 use super::cold::{self, ColdDirectory};
-use super::location::{create_private, file_url};
+use super::location::{create_private, file_url, sync_directory_of};
 use super::page_checksums::{self, open};
 use super::{Location, MIGRATIONS, StoreError};
 
@@ -126,9 +126,7 @@ async fn copy_rows(copy: &mut AnyConnection, file: &Path) -> Result<(), StoreErr
 fn publish(part: &Path, file: &Path) -> Result<(), StoreError> {
     File::open(part).and_then(|file| file.sync_all()).map_err(file_error(part))?;
     std::fs::rename(part, file).map_err(file_error(file))?;
-    let directory = file.parent().filter(|directory| !directory.as_os_str().is_empty());
-    let directory = directory.unwrap_or(Path::new("."));
-    File::open(directory).and_then(|directory| directory.sync_all()).map_err(file_error(directory))
+    sync_directory_of(file)
 }
 
 fn check_absent(file: &Path) -> Result<(), StoreError> {

@@ -5,7 +5,7 @@
 //! `checkpoint.rs` and `backup.rs` (SQLite only), and in the error codes of `mod.rs`.
 
 use std::fmt;
-use std::fs::OpenOptions;
+use std::fs::{File, OpenOptions};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
@@ -109,6 +109,11 @@ impl Location {
     /// however long that takes. If a sync of the log has failed, SQLite may find commits there
     /// that the system has in memory but no longer writes to the disk; commits after them
     /// would be lost with them.
+    ///
+    /// The names of the file and of its log are on the disk on return: without its name, a
+    /// log and all commits in it are lost in a power cut. SQLite syncs the directory as well,
+    /// after the first commit of a connection, and ignores that this fails
+    /// (`unixSync` in its `os_unix.c`).
     pub(super) async fn writer(
         &self,
         role: WriterRole,
@@ -137,8 +142,13 @@ impl Location {
             Ok((connection, backend))
         };
         let (mut connection, backend) = within(connect).await?;
-        if self.file().is_some() && role == WriterRole::Main {
-            checkpoint::copy_all(&mut connection).await?;
+        if let Self::File(file) = self {
+            if role == WriterRole::Main {
+                checkpoint::copy_all(&mut connection).await?;
+            }
+            let file = file.clone();
+            let synced = tokio::task::spawn_blocking(move || sync_directory_of(&file)).await;
+            synced.unwrap_or_else(|panic| std::panic::resume_unwind(panic.into_panic()))?;
         }
         Ok((connection, backend))
     }
@@ -254,6 +264,18 @@ pub(super) fn create_private(file: &Path) -> Result<(), StoreError> {
         }
         _ => Ok(()),
     }
+}
+
+/// Returns once the names in the directory of `file` are on the disk.
+///
+/// # Errors
+/// [`StoreError::Directory`].
+pub(super) fn sync_directory_of(file: &Path) -> Result<(), StoreError> {
+    let directory = file.parent().filter(|directory| !directory.as_os_str().is_empty());
+    let directory = directory.unwrap_or(Path::new("."));
+    // Other systems cannot open a directory as a file.
+    let synced = if cfg!(unix) { File::open(directory).and_then(|d| d.sync_all()) } else { Ok(()) };
+    synced.map_err(|source| StoreError::Directory { directory: directory.to_owned(), source })
 }
 
 /// What is not escaped in a path.

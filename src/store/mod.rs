@@ -157,6 +157,8 @@ pub enum StoreError {
     Exists { file: PathBuf },
     #[error("{}: {source}", file.display())]
     File { file: PathBuf, source: std::io::Error },
+    #[error("cannot write the names of the files in {} to the disk: {source}", directory.display())]
+    Directory { directory: PathBuf, source: std::io::Error },
     #[error("{} was removed or replaced while the service was running; restart it", file.display())]
     FileGone { file: PathBuf },
     #[error("the copy is damaged: {found}")]
@@ -231,7 +233,8 @@ impl StoreError {
             Self::InUse
             | Self::NameInUse { .. }
             | Self::UnexpectedCommits { .. }
-            | Self::FileGone { .. } => true,
+            | Self::FileGone { .. }
+            | Self::Directory { .. } => true,
             Self::Migration(_)
             | Self::DamagedPage(_)
             | Self::DamagedHeader

@@ -7,7 +7,7 @@ mod history;
 
 use std::path::Path;
 
-use disk::{Disk, Image};
+use disk::Image;
 use history::{Acknowledged, COPY, History, RIGS};
 use offbd::server;
 use offbd::store::Location;
@@ -41,6 +41,35 @@ async fn a_power_cut_loses_nothing_that_was_acknowledged() {
     println!("{n_cuts} power cuts, {n_failed_syncs} failed syncs: {n_samples} samples are there");
 }
 
+/// A disk that does not keep the names in a directory is noticed before anything is
+/// acknowledged.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_service_whose_directory_is_not_synced_acknowledges_nothing() {
+    assert!(!on_postgres(), "this is a test of the files of SQLite");
+    let scratch = tempfile::tempdir().unwrap();
+    let library = preloaded("calls", scratch.path());
+    let (mut n_refused, mut n_served) = (0, 0);
+    for n_earlier in 0..=1 {
+        for number in 1.. {
+            let history = History::of_failed_start(&library, n_earlier, number).await;
+            if history.failed_syncs(history.records.len()).is_empty() {
+                break;
+            }
+            match history.answers().last() {
+                Some(at) => {
+                    let log = history.folder().join("offbd.sqlite-wal");
+                    let failed = history.failed_syncs(*at);
+                    assert!(history.disk(*at).keeps(&log), "{n_earlier} {number}: {failed:?}");
+                    n_served += 1;
+                }
+                None => n_refused += 1,
+            }
+        }
+    }
+    println!("{n_refused} starts were refused, {n_served} were not");
+    assert!(n_refused > 0 && n_served > 0);
+}
+
 /// Cuts the power somewhere in a history, half of the time when an answer is being sent.
 /// Checks what is left; returns the number of samples that were acknowledged.
 async fn cut(history: &History, random: &mut Random) -> usize {
@@ -49,9 +78,7 @@ async fn cut(history: &History, random: &mut Random) -> usize {
         0 => sent[random.below(sent.len())] + 1,
         _ => random.below(history.records.len()),
     };
-    let mut disk = Disk::new(history.folder());
-    history.records[..at].iter().for_each(|record| disk.apply(record));
-    let image = disk.cut(random);
+    let image = history.disk(at).cut(random);
     let acknowledged = history.acknowledged(at);
     let at = format!("after {at} records, failed syncs {:?}", history.failed_syncs(at));
     go_on(&image, &acknowledged, history, &at).await

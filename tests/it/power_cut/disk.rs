@@ -99,6 +99,11 @@ impl Disk {
         self.unsynced_names.push(names);
     }
 
+    /// Whether a file is there after a power cut, whatever that leaves.
+    pub fn keeps(&self, path: &Path) -> bool {
+        self.synced_names.contains_key(path.to_str().unwrap())
+    }
+
     /// Draws what a power cut leaves: of the changes of names that are not synced the first
     /// ones, of the writes that are not synced any, whole or some of their sectors.
     pub fn cut(&self, random: &mut Random) -> Image {

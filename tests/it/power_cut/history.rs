@@ -9,6 +9,7 @@ use offbd_core::vocabulary::Sample;
 use reqwest::Method;
 use serde_json::Value;
 
+use super::disk::Disk;
 use crate::support::calls::{
     CallControl, CallError, CallFault, CallKind, CallRecord, Operation, read_records,
 };
@@ -74,6 +75,34 @@ impl History {
             records.extend(read_records(&file)?);
         }
         Some(Self { folder, records })
+    }
+
+    /// Lets a service live `n_earlier` times, and starts it again while the sync with this
+    /// number fails; if it starts nevertheless, a rig is registered.
+    pub async fn of_failed_start(library: &Path, n_earlier: u64, number: u64) -> Self {
+        let (folder, scratch) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let file = scratch.path().join("record");
+        let control = CallControl::new(library, folder.path(), &scratch.path().join("control"));
+        let control = control.record_to(&file);
+        for _ in 0..n_earlier {
+            stop(Process::start_with(folder.path(), &control.environment())).await;
+        }
+        let fault = CallFault { kind: CallKind::Sync, number, error: CallError::Io };
+        control.begin(Some(fault), 0);
+        if let Ok(process) = Process::try_start(folder.path(), &control.environment()) {
+            let (asset, body) = (RIGS[0].0, registration(RIGS[0].0));
+            let id = format!("registered/{asset}");
+            request(&process.client, Method::POST, "assets", &body, &id).await;
+            stop(process).await;
+        }
+        Self { records: read_records(&file).unwrap(), folder }
+    }
+
+    /// The disk after the first `n` records.
+    pub fn disk(&self, n: usize) -> Disk {
+        let mut disk = Disk::new(self.folder());
+        self.records[..n].iter().for_each(|record| disk.apply(record));
+        disk
     }
 
     pub fn folder(&self) -> &Path {
