@@ -183,6 +183,10 @@ impl Cluster {
     pub fn signal(&self, i: usize, signal: &str) {
         let pid = self.nodes[i].as_ref().unwrap().child.id().to_string();
         assert!(Command::new("kill").args([signal, &pid]).status().unwrap().success());
+        // On a busy machine a process goes on until one of its threads takes the signal.
+        while signal == "-STOP" && !is_paused(&pid) {
+            std::thread::yield_now();
+        }
     }
 
     /// Waits until the other nodes own everything.
@@ -197,6 +201,19 @@ impl Cluster {
         })
         .await;
     }
+}
+
+/// Whether all threads of a process are stopped by a signal.
+fn is_paused(pid: &str) -> bool {
+    let threads = std::fs::read_dir(format!("/proc/{pid}/task")).unwrap();
+    threads.into_iter().all(|thread| {
+        // One that has ended runs no more.
+        let Ok(stat) = std::fs::read_to_string(thread.unwrap().path().join("stat")) else {
+            return true;
+        };
+        // The state comes after the name, which is in parentheses.
+        stat.rsplit_once(") ").is_some_and(|(_, rest)| rest.starts_with('T'))
+    })
 }
 
 /// What the nodes have logged last, if a test fails.
