@@ -64,8 +64,14 @@ pub struct AxisStillness {
 /// Time constant of the velocity, s: some readings of a camera. Chosen.
 const VELOCITY_MEMORY_S: f64 = 0.1;
 
+/// Returns how much a reading that has changed after `since_s` moves the velocity.
+fn velocity_gain(since_s: f64) -> f64 {
+    1.0 - (-since_s / VELOCITY_MEMORY_S).exp()
+}
+
 impl AxisStillness {
-    fn update(&mut self, position_m: f64, asked_m_s2: f64, reading: &Reading) {
+    /// `gain` is that of the velocity after one reading.
+    fn update(&mut self, position_m: f64, asked_m_s2: f64, reading: &Reading, gain: f64) {
         let strays = self.anchor_m.is_none_or(|a| (position_m - a).abs() > reading.still_m);
         let moved = strays && (self.strayed || self.anchor_m.is_none());
         self.strayed = strays;
@@ -82,10 +88,10 @@ impl AxisStillness {
         } else {
             (self.pressed_s, self.asked_m_s, self.asked_widths) = (0.0, 0.0, 0.0);
         }
-        self.repeat(position_m, reading.dt);
+        self.repeat(position_m, reading.dt, gain);
     }
 
-    fn repeat(&mut self, position_m: f64, dt: f64) {
+    fn repeat(&mut self, position_m: f64, dt: f64, gain: f64) {
         let last_m = self.last_m.replace(position_m);
         if last_m.is_some_and(|l| l.to_bits() == position_m.to_bits()) {
             self.identical_s += dt;
@@ -93,7 +99,7 @@ impl AxisStillness {
         }
         let since_s = self.identical_s + dt;
         if let (Some(last_m), true) = (last_m, since_s > 0.0) {
-            let gain = 1.0 - (-since_s / VELOCITY_MEMORY_S).exp();
+            let gain = if self.identical_s == 0.0 { gain } else { velocity_gain(since_s) };
             self.velocity_m_s += gain * ((position_m - last_m) / since_s - self.velocity_m_s);
         }
         self.identical_s = 0.0;
@@ -152,9 +158,10 @@ impl Stillness {
         if reading.refused {
             return;
         }
+        let gain = velocity_gain(reading.dt);
         for axis in Axis::ALL {
             if let Some(position_m) = reading.position_m[axis] {
-                self.axes[axis].update(position_m, reading.asked_m_s2[axis], reading);
+                self.axes[axis].update(position_m, reading.asked_m_s2[axis], reading, gain);
             }
         }
     }

@@ -30,12 +30,14 @@ pub(super) fn check(mapping: &AxisMapping, sample: &Sample) -> Result<(), Reject
     ];
     for (field, value, limit) in fields {
         let Some(value) = value else { continue };
-        if !value.is_finite() {
-            return Err(Rejection::NotFinite { field });
+        // False for NaN.
+        if value.abs() <= limit {
+            continue;
         }
-        if value.abs() > limit {
-            return Err(Rejection::Absurd { field, value, limit });
-        }
+        return Err(match value.is_finite() {
+            true => Rejection::Absurd { field, value, limit },
+            false => Rejection::NotFinite { field },
+        });
     }
     Ok(())
 }

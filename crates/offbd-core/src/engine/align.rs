@@ -38,16 +38,31 @@ impl Align {
         }
     }
 
-    /// Returns the next sample in order if it is due, or if it follows the last one by at
-    /// most two sample intervals.
+    /// Lets a sample pass that follows the last one while none waits. Returns whether it has
+    /// passed; then it is not to be added. Most samples do.
+    pub(super) fn pass(&mut self, sample: &Sample, interval_s: f64) -> bool {
+        let passes = self.waiting.is_empty() && self.follows(sample, interval_s);
+        if passes {
+            self.newest_s = self.newest_s.max(sample.t_s);
+            self.released = Some(*sample);
+        }
+        passes
+    }
+
+    /// Returns the next sample in order if it is due, or if it follows the last one.
     pub(super) fn pop(&mut self, reorder_s: f64, interval_s: f64) -> Option<Sample> {
         let next = self.waiting.front()?;
-        let follows = self.released.is_some_and(|last| {
+        let due = self.newest_s - next.t_s >= reorder_s || self.waiting.len() > MAX_WAITING;
+        if due || self.follows(next, interval_s) { self.flush() } else { None }
+    }
+
+    /// Whether a sample is the one after the last released, by its number and at most two
+    /// sample intervals later.
+    fn follows(&self, next: &Sample, interval_s: f64) -> bool {
+        self.released.as_ref().is_some_and(|last| {
             let seq = last.seq.and_then(|seq| seq.checked_add(1));
             seq.is_some() && seq == next.seq && next.t_s - last.t_s <= 2.0 * interval_s
-        });
-        let due = self.newest_s - next.t_s >= reorder_s || self.waiting.len() > MAX_WAITING;
-        if follows || due { self.flush() } else { None }
+        })
     }
 
     /// Returns the next sample in order, due or not.

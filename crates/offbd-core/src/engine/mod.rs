@@ -242,8 +242,11 @@ impl Engine {
     ) {
         self.n_accepted += 1;
         self.span.take(sample.t_s);
-        self.align.push(*sample);
         let (reorder_s, interval_s) = (self.setup.settings.reorder_s, self.clock.interval_s());
+        if self.align.pass(sample, interval_s) {
+            return self.judge(sample, transitions, seen);
+        }
+        self.align.push(*sample);
         while let Some(next) = self.align.pop(reorder_s, interval_s) {
             self.judge(&next, transitions, seen);
         }

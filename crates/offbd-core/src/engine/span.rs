@@ -15,11 +15,14 @@ pub(super) struct Span {
 
 impl Span {
     pub(super) fn take(&mut self, t_s: f64) {
-        let with = |span: Option<(f64, f64)>| {
-            let (first, last) = span.unwrap_or((t_s, t_s));
-            Some((first.min(t_s), last.max(t_s)))
-        };
-        (self.present_s, self.whole_s) = (with(self.present_s), with(self.whole_s));
+        for span in [&mut self.present_s, &mut self.whole_s] {
+            let (first, last) = span.get_or_insert((t_s, t_s));
+            if t_s > *last {
+                *last = t_s;
+            } else if t_s < *first {
+                *first = t_s;
+            }
+        }
     }
 
     /// The clock is set back before the next sample.
