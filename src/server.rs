@@ -97,9 +97,12 @@ pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Ser
     };
     let (store, writer) = open(&location, node.as_ref()).await?;
     let store = store.with_cold(config.cold_directory());
-    let listener = TcpListener::bind(config.listen)
-        .await
-        .with_context(|| format!("`listen`: cannot listen on {}", config.listen))?;
+    let listener = TcpListener::bind(config.listen).await.with_context(|| {
+        format!(
+            "`listen`: cannot listen on {} (`--listen` chooses another address, port 0 a free one)",
+            config.listen
+        )
+    })?;
     let address = listener.local_addr()?;
     let limits = config.service_limits();
     let senders = Senders::new(&limits.notifications);

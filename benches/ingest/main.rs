@@ -14,6 +14,8 @@
 //!   the open session of each;
 //! - `-- cluster ALONE ONE TWO [ROUNDS]`: nodes of a cluster; the URLs of three empty PostgreSQL
 //!   databases;
+//! - `-- fleet URL ASSETS MINUTES`: many slow rigs on three nodes, one of which is killed each
+//!   minute; the URL of an empty PostgreSQL database;
 //! - `-- mqtt PORT [ROUNDS]`: devices over an MQTT broker on that port of this machine, with
 //!   messages lost on the way (feature `mqtt`);
 //! - `-- latency`: time from a sample to its fault event, at half the maximum rate;
@@ -31,9 +33,11 @@
 
 mod client;
 mod cluster;
+mod fleet;
 mod load;
 #[cfg(feature = "mqtt")]
 mod mqtt;
+mod process;
 mod restart;
 
 use std::net::SocketAddr;
@@ -80,6 +84,12 @@ fn main() -> Result<()> {
                 |n: usize| arguments.get(n).context("`cluster` takes the URLs of three databases");
             let databases = [url(1)?.as_str(), url(2)?, url(3)?];
             return runtime.block_on(cluster::measure(databases, &samples, rounds));
+        }
+        Some("fleet") => {
+            let usage = "`fleet` takes the URL of a database, ASSETS and MINUTES";
+            let argument = |n: usize| arguments.get(n).context(usage);
+            let (assets, minutes) = (argument(2)?.parse()?, argument(3)?.parse()?);
+            return runtime.block_on(fleet::measure(argument(1)?, assets, minutes));
         }
         #[cfg(feature = "mqtt")]
         Some("mqtt") => {

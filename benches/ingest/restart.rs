@@ -1,71 +1,31 @@
 //! A restart after SIGKILL: when the service answers, when the first device is acknowledged,
 //! and when all devices are that come back at the same time.
 
-use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
-use std::path::Path;
-use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use axum::body::Bytes;
 use tokio::task::JoinSet;
 
 use crate::client::Client;
 use crate::load::{DEVICES as CONNECTIONS, columns_as_msgpack, recording};
+use crate::process::Process;
 use crate::{resident, telemetry};
 
 /// Samples of a request before the kill, and after it.
 const BATCH: usize = 5000;
 const LIVE_BATCH: usize = 10;
 
-/// A service as a separate process; it is killed when this is dropped.
-struct Service {
-    process: Child,
-    address: SocketAddr,
-}
-
-impl Service {
-    fn start(data: &Path, assets: usize) -> Result<Self> {
-        let settings = data.join("offbd.toml");
-        let limits = format!("[limits]\nassets = {assets}\n");
-        std::fs::write(&settings, limits)?;
-        let mut process = Command::new(env!("CARGO_BIN_EXE_offbd"))
-            .args(["serve", "--listen", "127.0.0.1:0", "--log-format", "json", "--data"])
-            .arg(data)
-            .arg("--config")
-            .arg(&settings)
-            .stderr(Stdio::piped())
-            .spawn()?;
-        let mut log = BufReader::new(process.stderr.take().context("the log is piped")?).lines();
-        let address = loop {
-            let line = log.next().context("the service does not start")??;
-            let line: serde_json::Value = serde_json::from_str(&line)?;
-            if line["message"] == "serving" {
-                break line["address"].as_str().context("no address")?.parse()?;
-            }
-        };
-        // The rest of the log is read, so that the service does not wait.
-        std::thread::spawn(move || log.map_while(Result::ok).count());
-        Ok(Self { process, address })
-    }
-}
-
-impl Drop for Service {
-    fn drop(&mut self) {
-        let _ = self.process.kill();
-        let _ = self.process.wait();
-    }
-}
-
 pub(crate) async fn measure(assets: usize, samples: usize) -> Result<()> {
     let data = tempfile::tempdir()?;
+    let limits = format!("[limits]\nassets = {assets}\n");
     let recorded = recording(samples + LIVE_BATCH, None)?;
     let (before, after) = recorded.split_at(samples);
     let before: Vec<Bytes> = before.chunks(BATCH).map(|b| columns_as_msgpack(b).into()).collect();
     let after: Bytes = columns_as_msgpack(after).into();
-    let service = Service::start(data.path(), assets)?;
+    let service = Process::start(data.path(), &limits)?;
     let clock = Instant::now();
     post_all(service.address, assets, |n| {
         let asset = serde_json::json!({ "name": format!("device-{n}") }).to_string();
@@ -78,7 +38,7 @@ pub(crate) async fn measure(assets: usize, samples: usize) -> Result<()> {
     drop(service);
 
     let clock = Instant::now();
-    let service = Service::start(data.path(), assets)?;
+    let service = Process::start(data.path(), &limits)?;
     let mut client = Client::connect(service.address).await?;
     client.get("/api/v1/assets").await?;
     println!("first answer after the start: {:.2?}", clock.elapsed());
@@ -94,7 +54,7 @@ pub(crate) async fn measure(assets: usize, samples: usize) -> Result<()> {
     let [half, most, worst] = [0.5, 0.99, 1.0].map(at);
     println!("all acknowledged, from {CONNECTIONS} connections: {all:.1?}");
     println!("of each: median {half:.1?}, p99 {most:.1?}, worst {worst:.1?}");
-    println!("memory: {:.0} MiB", resident(service.process.id())? / f64::from(1 << 20));
+    println!("memory: {:.0} MiB", resident(service.id())? / f64::from(1 << 20));
     Ok(())
 }
 

@@ -24,6 +24,7 @@ mod events;
 mod faults;
 mod fleet;
 mod forward;
+mod gather;
 mod guard;
 mod headers;
 mod json_body;

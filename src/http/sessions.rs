@@ -1,5 +1,6 @@
 //! `/sessions`: opening, ending, importing, listing and exporting sessions.
 
+use std::collections::HashMap;
 use std::io::Cursor;
 
 use axum::body::{Body, Bytes};
@@ -12,13 +13,14 @@ use futures_util::{Stream, StreamExt};
 use serde::Deserialize;
 
 use super::body::BodyShare;
+use super::gather::Gathering;
 use super::json_body::JsonBody;
 use super::session_format::BinaryFile;
 use super::{
     App, AssetPath, PageQuery, Path, Problem, Query, body, page_limit, query_time, query_word,
     session_format, time_range,
 };
-use crate::service::{RecordingReader, Service, SessionListQuery};
+use crate::service::{RecordingReader, Route, Service, SessionListQuery};
 use crate::wire::service::{ImportView, Page, SessionCalibrationView, SessionView};
 use crate::wire::session_file::{self, SessionFormat, SessionWriter};
 use crate::wire::verdict::FaultView;
@@ -153,7 +155,9 @@ pub(super) async fn import(
     Ok(created(&imported.session.id.clone(), imported))
 }
 
-/// Lists sessions by the time at which they were opened.
+/// Lists sessions by the time at which they were opened. In a cluster, the open sessions of a
+/// node that does not answer in time are listed as last stored, with fewer samples than it has
+/// acknowledged.
 #[utoipa::path(get, path = "/sessions", tag = "sessions", operation_id = "list_sessions",
     params(SessionsQuery),
     responses((status = 200, body = Page<SessionView>), (status = 400, body = Problem),
@@ -161,9 +165,33 @@ pub(super) async fn import(
 pub(super) async fn list(
     State(service): State<Service>,
     Query(query): Query<SessionsQuery>,
+    gathering: Gathering,
 ) -> Result<Json<Page<SessionView>>, Problem> {
     let limit = page_limit(query.limit);
-    Ok(Json(service.sessions(query.parsed()?, limit).await?))
+    let mut page = service.sessions(query.parsed()?, limit).await?;
+    let is_elsewhere = |session: &SessionView| {
+        session.state == SessionState::Open && service.route(&session.asset) != Route::Here
+    };
+    if gathering.is_needed() && page.items.iter().any(is_elsewhere) {
+        let answers: Vec<(String, Option<Page<SessionView>>)> = gathering.ask_all().await;
+        let known = answers.into_iter().filter_map(|(_, page)| page).flat_map(|page| page.items);
+        take_latest(&mut page.items, known);
+    }
+    Ok(Json(page))
+}
+
+/// Replaces sessions by what their owner knows of them: it alone counts the samples that are not
+/// in the tables yet.
+fn take_latest(sessions: &mut [SessionView], known: impl Iterator<Item = SessionView>) {
+    let mut at: HashMap<String, &mut SessionView> =
+        sessions.iter_mut().map(|session| (session.id.clone(), session)).collect();
+    for session in known {
+        if let Some(listed) = at.get_mut(&session.id)
+            && (session.samples, session.rejected) > (listed.samples, listed.rejected)
+        {
+            **listed = session;
+        }
+    }
 }
 
 /// Returns a session, with its verdict if it has ended.

@@ -20,6 +20,16 @@ const PAGE_SIZE: u32 = 500;
 
 /// Opens the store with an auxiliary writer. It is not locked: a running service
 /// continues, and sees what is written here.
+/// Opens the store that a service has used before.
+async fn open_existing_store(config: &Config) -> Result<(Store, Writer)> {
+    config.check()?;
+    if let Some(file) = config.location()?.file().filter(|file| !file.exists()) {
+        bail!("there is no store {}: `--data` names the directory of the service", file.display());
+    }
+    open_store(config).await
+}
+
+/// Opens the store; a missing one is created.
 async fn open_store(config: &Config) -> Result<(Store, Writer)> {
     config.check()?;
     let location = config.location()?;
@@ -68,7 +78,7 @@ pub async fn create_token(config: &Config, wanted: NewToken) -> Result<String> {
 /// # Errors
 /// If the store cannot be read.
 pub async fn tokens(config: &Config) -> Result<Vec<TokenView>> {
-    let (store, writer) = open_store(config).await?;
+    let (store, writer) = open_existing_store(config).await?;
     let mut tokens: Vec<TokenView> = Vec::new();
     loop {
         let before = tokens.last().map_or(LAST_ID, |token| token.id.as_str());
@@ -88,7 +98,7 @@ pub async fn tokens(config: &Config) -> Result<Vec<TokenView>> {
 /// # Errors
 /// If there is none that is not revoked, or the store cannot be written.
 pub async fn revoke_token(config: &Config, name_or_id: &str) -> Result<()> {
-    let (store, writer) = open_store(config).await?;
+    let (store, writer) = open_existing_store(config).await?;
     let found = match store.token_named(name_or_id).await? {
         Some(row) => Some(row),
         None => store.token(name_or_id).await?.filter(|row| row.revoked_at.is_none()),

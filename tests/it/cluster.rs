@@ -136,6 +136,19 @@ async fn count(client: &Client, metric: &str) -> f64 {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn every_node_lists_the_samples_of_open_sessions() {
+    let (cluster, samples) = (Cluster::start().await, rig(100, 100));
+    let names = register_rigs(&cluster).await;
+    send_all(&cluster.client(0), &names, &samples).await;
+    for client in cluster.clients() {
+        let page = client.get("sessions?state=open").await.json();
+        let items = page["items"].as_array().unwrap();
+        assert_eq!(items.len(), names.len());
+        assert!(items.iter().all(|session| session["samples"] == 100), "{page}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_paused_node_is_refused_when_it_wakes_up_and_takes_part_again() {
     let (cluster, samples) = (Cluster::start().await, rig(900, 300));
     let names = pause_second_node(&cluster, &samples).await;

@@ -62,8 +62,8 @@ fn beside_program() -> anyhow::Result<PathBuf> {
     if path.is_file() {
         return Ok(path);
     }
-    let reason = "is missing; build it with `cargo build --release --package offbd-fmu`, or name \
-                  it with --library";
+    let reason = "is missing, the library of the twin: build it with `cargo build --release \
+                  --package offbd-fmu`, and name it with --library, unless it is beside offbd";
     Err(InputError::file(&path, reason).into())
 }
 

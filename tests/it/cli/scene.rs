@@ -287,6 +287,9 @@ fn validate_a_twin_under_recorded_commands() {
     let result = object(&cli.ok(line));
     assert_eq!((&result["asset"], &result["samples"]), (&"slow".into(), &101.into()));
     assert_eq!(result["farthest_from_measured_m"], 0.0);
+    // 5/7·g·0.1 rad, twice integrated from 0.11 s on, is 0.16 m, from 0.03 m to the edge at 0.19 m.
+    let leaves_s = result["leaves_plate_s"].as_f64().unwrap();
+    assert!((leaves_s - 0.96).abs() < 0.011, "{leaves_s}");
     let text = cli.read("out/trajectory.csv");
     let mut lines = text.lines();
     assert_eq!(lines.next(), Some("t_s,x_m,y_m,vx_m_s,vy_m_s,qx_rad,qy_rad"));

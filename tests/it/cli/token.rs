@@ -1,6 +1,16 @@
 use super::fixture::CliFixture;
 
 #[test]
+fn a_store_that_is_not_there_is_named_and_not_created() {
+    let cli = CliFixture::new();
+    for line in ["token list --data nowhere", "token revoke ada --data nowhere"] {
+        let refused = cli.run(1, line).stderr;
+        assert!(refused.contains("no store nowhere"), "{refused}");
+        assert!(!cli.path("nowhere").exists(), "{line}");
+    }
+}
+
+#[test]
 fn a_token_can_be_created_listed_and_revoked() {
     let cli = CliFixture::new();
     let made = cli.ok("token create --name ann --role admin --data store");

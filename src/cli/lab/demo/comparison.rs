@@ -21,6 +21,8 @@ pub(super) struct Injected {
 pub(super) struct FaultComparison {
     injected: Vec<Injected>,
     found: Vec<FaultView>,
+    /// Session and code of the confirmed faults whose test fails.
+    failing: Vec<(String, CodeWord)>,
 }
 
 impl FaultComparison {
@@ -29,12 +31,15 @@ impl FaultComparison {
         self.injected.extend(truths.into_iter().map(of_session));
     }
 
-    /// Records a fault transition. The first confirmation of a code in a session counts; a
-    /// fault confirmed earlier whose test passes again is no confirmation.
+    /// Records a fault transition. A confirmed fault counts when its test begins to fail, for
+    /// the first time or again after it has passed or the fault was cleared.
     pub(super) fn heard(&mut self, fault: &FaultView) {
-        let same = |f: &&FaultView| f.session == fault.session && f.code == fault.code;
-        let confirmed = fault.status == StatusWord::Confirmed && fails(fault);
-        if confirmed && !self.found.iter().any(|f| same(&f)) {
+        let place = (fault.session.clone(), fault.code);
+        let is_found = fault.status == StatusWord::Confirmed && fails(fault);
+        if !is_found {
+            self.failing.retain(|known| *known != place);
+        } else if !self.failing.contains(&place) {
+            self.failing.push(place);
             self.found.push(fault.clone());
         }
     }
@@ -56,8 +61,17 @@ impl FaultComparison {
         self.injected.iter().all(|i| self.answer(i).is_some()) && self.unexplained().count() == 0
     }
 
+    /// The first fault that was confirmed after `injected`, and before its code was injected
+    /// again.
     fn answer(&self, injected: &Injected) -> Option<&FaultView> {
-        self.found.iter().find(|found| explains(injected, found))
+        let onset_s = |injected: &Injected| injected.truth.fault.onset_s;
+        let same_code = |other: &&Injected| {
+            other.session == injected.session
+                && other.truth.fault.effect.code() == injected.truth.fault.effect.code()
+        };
+        let later = self.injected.iter().filter(same_code).map(onset_s);
+        let next_s = later.filter(|s| *s > onset_s(injected)).fold(f64::INFINITY, f64::min);
+        self.found.iter().find(|found| explains(injected, found) && found.t_s < next_s)
     }
 
     /// Returns the confirmed faults that were not injected.
@@ -145,6 +159,21 @@ mod tests {
         comparison.injected("a", [truth("x_servo:dead@10-20")]);
         heard.iter().for_each(|f| comparison.heard(f));
         comparison
+    }
+
+    #[test]
+    fn a_fault_that_is_injected_again_is_found_again() {
+        let at = |t_s, status| found("a", FaultCode::XServo, t_s, status);
+        let first = at(11.0, FaultStatus::Confirmed);
+        let cleared = at(20.0, FaultStatus::Cleared);
+        let again = at(31.0, FaultStatus::Confirmed);
+        let mut comparison = comparison(&[first.clone(), first.clone()]);
+        comparison.injected("a", [truth("x_servo:dead@30")]);
+        assert!(!comparison.agrees(), "the second one is not found yet");
+        [cleared, again].iter().for_each(|fault| comparison.heard(fault));
+        let answers = comparison.injected.iter().map(|i| comparison.answer(i).unwrap().t_s);
+        assert_eq!(answers.collect::<Vec<_>>(), [11.0, 31.0]);
+        assert!(comparison.agrees());
     }
 
     #[test]

@@ -64,7 +64,7 @@ const ENTRIES: [CatalogueEntry; 12] = [
     },
     CatalogueEntry {
         name: "block",
-        about: "application 2: a cube that slides, at pi/20 on both axes, beside the ball",
+        about: "application 2: a cube, which friction holds at pi/20 on both axes, beside the ball",
         what: EntryContent::Fine(1e-7, &[file!("block"), file!("tilt")]),
     },
     CatalogueEntry {

@@ -39,6 +39,8 @@ struct RecordedRun {
     end: FreeRunPoint,
     /// Largest distance from the measured position, m, and its time, s.
     apart: Option<(f64, f64)>,
+    /// When the ball leaves the plate, s. The twin has no edge: it goes on as if the plate did.
+    leaves_s: Option<f64>,
 }
 
 /// Runs the twin under the commands of the session at `path`.
@@ -67,8 +69,12 @@ impl RecordedRun {
         };
         let apart = points.iter().filter_map(|p| Some((distance_m(p)?, p.at.seconds())));
         let apart = apart.max_by(|a, b| a.0.total_cmp(&b.0));
+        let plate = setup.rig.plate;
+        let on_plate =
+            |p: &&FreeRunPoint| plate.edge_distance_m(p.ball.position.x, p.ball.position.y) >= 0.0;
+        let leaves_s = points.iter().find(|p| !on_plate(p)).map(|p| p.at.seconds());
         let session = judge::session_name(path);
-        Ok(Self { session, rig: setup.rig.name, step_s, points, end, apart })
+        Ok(Self { session, rig: setup.rig.name, step_s, points, end, apart, leaves_s })
     }
 
     fn duration_s(&self) -> f64 {
@@ -88,8 +94,18 @@ impl RecordedRun {
             self.rig,
             words::plain(self.step_s)
         );
+        let leaves = self.leaves_s.map_or_else(
+            || "the ball stays on the plate".to_owned(),
+            |at| {
+                format!(
+                    "the ball leaves the plate at {at:.2} s; the twin has no edge and goes on as \
+                     if the plate did. The plot ends there"
+                )
+            },
+        );
         vec![
             report::row("commands", &format!("{}, {n} samples, {duration_s:.2} s", self.session)),
+            report::row("plate", &leaves),
             report::row("end", &format!("x {x:.6}, y {y:.6} m")),
             report::row("apart", &apart),
             String::new(),
@@ -112,25 +128,34 @@ impl RecordedRun {
                 "qx_rad": plate.y,
                 "qy_rad": plate.x,
             },
+            "leaves_plate_s": self.leaves_s,
             "farthest_from_measured_m": self.apart.map(|apart| apart.0),
             "farthest_from_measured_s": self.apart.map(|apart| apart.1),
         })
     }
 
+    /// The points up to the one at which the ball leaves the plate.
+    fn points_on_plate(&self) -> &[FreeRunPoint] {
+        let beyond = |p: &FreeRunPoint| self.leaves_s.is_some_and(|s| p.at.seconds() > s);
+        let n = self.points.iter().position(beyond).unwrap_or(self.points.len());
+        &self.points[..n]
+    }
+
     /// Draws the twin's x and y beside the measured ones, over the time from the first sample.
     fn figure(&self) -> Figure {
-        let start = self.points[0].at;
+        let (start, points) = (self.points[0].at, self.points_on_plate());
         let mut series = Vec::new();
         for (i, axis) in Axis::ALL.into_iter().enumerate() {
-            let twin = plots::over_time(&self.points, |p| (p.at - start, p.ball.position[i]));
+            let twin = plots::over_time(points, |p| (p.at - start, p.ball.position[i]));
             series.push(plots::line(&format!("{}, twin", axis.as_str()), 2 * i, twin));
-            let seen = self.points.iter().filter_map(|p| Some((p.at - start, p.measured[axis]?)));
+            let seen = points.iter().filter_map(|p| Some((p.at - start, p.measured[axis]?)));
             let seen = plots::over_time(&seen.collect::<Vec<_>>(), |p| *p);
             if !seen.is_empty() {
                 series.push(plots::line(&format!("{}, measured", axis.as_str()), 2 * i + 1, seen));
             }
         }
-        let panel = plots::time_panel("position on the plate (m)", self.duration_s(), series);
+        let duration_s = points.last().map_or(0.0, |last| last.at - start);
+        let panel = plots::time_panel("position on the plate (m)", duration_s, series);
         let title = format!("{}: position over time", self.session);
         let subtitle = format!("The twin of {} under the recorded commands.", self.rig);
         plots::figure(title, subtitle, 1, vec![panel])

@@ -11,7 +11,7 @@ use super::report::row;
 use crate::cli::errors::BadArgument;
 use crate::cli::output::{self, OutputFormat};
 use crate::cli::table;
-use ideal_rig::{ProfileVerdict, judge, record};
+use ideal_rig::{ProfileVerdict, ReportedFault, judge, record};
 use offbd_core::diagnosis::Profile;
 
 /// Runs the healthy rig, or the one with a bad x servo.
@@ -42,12 +42,14 @@ fn show(format: OutputFormat, name: &str, judged: &[ProfileVerdict]) -> anyhow::
     match format {
         OutputFormat::Table => output::print_line(&lines(name, judged).join("\n")),
         OutputFormat::Json => {
+            let view = |fault: &ReportedFault| json!({ "code": fault.code.to_string(), "kind": fault.kind, "t_s": fault.t_s });
+            let list = |faults: &[ReportedFault]| faults.iter().map(view).collect::<Vec<_>>();
             let verdicts = judged.iter().map(|judged| {
-                let faults = judged.faults.iter();
-                let faults: Vec<_> = faults
-                    .map(|f| json!({ "code": f.code, "kind": f.kind, "t_s": f.t_s }))
-                    .collect();
-                json!({ "profile": judged.profile.as_str(), "faults": faults })
+                json!({
+                    "profile": judged.profile.as_str(),
+                    "faults": list(&judged.faults),
+                    "pending": list(&judged.pending),
+                })
             });
             let verdicts: Vec<_> = verdicts.collect();
             output::print_line(&json!({ "scene": name, "verdicts": verdicts }).to_string())

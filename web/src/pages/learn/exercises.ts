@@ -30,15 +30,15 @@ export const EXERCISES: Exercise[] = [
     suits: isFaultless,
   },
   {
-    title: "2. Models: a block slides where a ball rolls",
+    title: "2. Models: a cube rests where a ball rolls",
     steps: [
       "Run the command, which puts a cube beside the ball on the tilted plate.",
       "Open the session, go to its rig, and read the plant model of the twin and the reason for it.",
     ],
     seen:
-      "Without friction a block takes the whole pull of gravity along the plate. A solid ball that " +
-      "rolls also begins to rotate, and takes 1 / (1 + 0.4) = 5/7 of it. The twin uses the cheapest " +
-      "model that is accurate enough.",
+      "Friction (0.6) holds the cube up to a tilt of 31°, and the plate tilts by 12.7°. The ball rolls: " +
+      "as it also begins to rotate, it takes 1 / (1 + 0.4) = 5/7 of the pull of gravity along the plate. " +
+      "The twin uses the cheapest model that is accurate enough.",
     commands: ["offbd scene block"],
     suits: () => true,
   },

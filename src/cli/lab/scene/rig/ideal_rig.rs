@@ -4,7 +4,7 @@ use crate::cli::lab::scene::scene_run::Sampled;
 use offbd_core::diagnosis::{FaultMemory, Profile, Transition};
 use offbd_core::engine::{Engine, Input, Rig, Setup};
 use offbd_core::plant::{Motion, Plate, PlateShape};
-use offbd_core::vocabulary::{Axis, FaultStatus, Invalid, PerAxis, Sample};
+use offbd_core::vocabulary::{Axis, FaultCode, FaultStatus, Invalid, PerAxis, Sample};
 use offbd_lab::simulation::{
     ControllerModel, Disturbances, Reference, Refresh, RigModel, SensorModel, ServoTruth,
     SessionSpread, SimulatedRig, Surface, Truth,
@@ -37,7 +37,7 @@ pub(super) struct DeviationSignal {
 
 /// A fault that was reported.
 pub(super) struct ReportedFault {
-    pub code: String,
+    pub code: FaultCode,
     pub kind: Option<String>,
     pub t_s: f64,
 }
@@ -46,6 +46,8 @@ pub(super) struct ReportedFault {
 pub(super) struct ProfileVerdict {
     pub profile: Profile,
     pub faults: Vec<ReportedFault>,
+    /// Faults that were suspected, and not confirmed.
+    pub pending: Vec<ReportedFault>,
     pub signals: Vec<DeviationSignal>,
 }
 
@@ -142,7 +144,8 @@ fn motion(truth: &Truth, height: f64, radius: f64) -> Motion {
 pub(super) fn judge(recording: &RigRecording, profile: Profile) -> Result<ProfileVerdict, Invalid> {
     let setup = Setup::new(recording.rig.clone(), Some(profile))?;
     let mut engine = Engine::new(setup, FaultMemory::default());
-    let mut judged = ProfileVerdict { profile, faults: Vec::new(), signals: Vec::new() };
+    let mut judged =
+        ProfileVerdict { profile, faults: Vec::new(), pending: Vec::new(), signals: Vec::new() };
     let mut transitions = Vec::new();
     for sample in &recording.samples {
         engine.handle(Input::Sample(*sample), &mut transitions);
@@ -157,14 +160,16 @@ pub(super) fn judge(recording: &RigRecording, profile: Profile) -> Result<Profil
 impl ProfileVerdict {
     fn take(&mut self, transition: &Transition) {
         let Transition { code, status, at, suspicion, .. } = transition;
-        let known = self.faults.iter().any(|fault| fault.code == code.to_string());
-        if *status == FaultStatus::Confirmed && !known {
-            self.faults.push(ReportedFault {
-                code: code.to_string(),
-                kind: suspicion.kind.map(|kind| kind.to_string()),
-                t_s: at.seconds(),
-            });
+        let list = match status {
+            FaultStatus::Confirmed => &mut self.faults,
+            FaultStatus::Pending => &mut self.pending,
+            _ => return,
+        };
+        if list.iter().all(|fault| fault.code != *code) {
+            let kind = suspicion.kind.map(|kind| kind.to_string());
+            list.push(ReportedFault { code: *code, kind, t_s: at.seconds() });
         }
+        self.pending.retain(|fault| self.faults.iter().all(|found| found.code != fault.code));
     }
 
     fn look(&mut self, engine: &Engine) {
@@ -188,13 +193,18 @@ impl ProfileVerdict {
         })
     }
 
-    /// Describes the reported faults with their times.
+    /// Describes the reported faults with their times, or the suspected ones.
     pub(super) fn words(&self) -> String {
         let named = |fault: &ReportedFault| {
             let kind = fault.kind.as_ref().map(|kind| format!(" ({kind})")).unwrap_or_default();
             format!("{}{kind} at {:.2} s", fault.code, fault.t_s)
         };
-        let words: Vec<String> = self.faults.iter().map(named).collect();
-        if words.is_empty() { "nothing".to_owned() } else { words.join(", ") }
+        let list =
+            |faults: &[ReportedFault]| faults.iter().map(named).collect::<Vec<_>>().join(", ");
+        match (&self.faults[..], &self.pending[..]) {
+            ([], []) => "nothing".to_owned(),
+            ([], pending) => format!("{}, pending: the rig is not learnt", list(pending)),
+            (faults, _) => list(faults),
+        }
     }
 }
