@@ -32,12 +32,12 @@ const BATCH: usize = 8192;
 #[command(after_help = "Examples:\n  \
     offbd export monday.csv -o monday.parquet\n  \
     offbd export monday.csv --asset learnt.json -o monday.mcap\n  \
-    offbd export monday.parquet --asset learnt.json --format arrow -o - | other-program\n  \
+    offbd export monday.parquet --format arrow -o - | other-program\n  \
     offbd export monday.csv --asset learnt.json --trace monday-trace.parquet\n  \
     offbd export fmu --asset learnt.json -o ball_on_plate.fmu\n\n\
     With an asset file the session is judged: asset file, calibration and verdict\n\
-    hash are in the metadata of the new file (Parquet, Arrow, MCAP). An MCAP file then\n\
-    also shows the rig, the twin and the faults in Foxglove.\n\n\
+    hash are in the metadata of the new file (Parquet, Arrow, MCAP). An MCAP file\n\
+    then also shows the rig, the twin and the faults in Foxglove.\n\n\
     Invalid rows are reported on stderr, and left out. Exit status: 0 written, 3 the\n\
     session is unusable; then there is no new file.")]
 pub(super) struct ExportArgs {

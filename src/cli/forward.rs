@@ -26,8 +26,10 @@ use offbd_core::engine::Rig;
     after_help = "GET /api/v1/spool says how much waits, and which batches the service has refused\n\
     for good. The agent has no access control: let it listen where only devices are.\n\n\
     Examples:\n  \
-    offbd forward --to https://offbd.example:8087 --token-file token --spool spool.sqlite\n  \
-    my_logger | offbd forward --to http://10.0.0.2:8087 --asset my-rig --session monday"
+    offbd forward --to https://offbd.example:8087 --token-file token \\\n      \
+    --spool spool.sqlite\n  \
+    my_logger | offbd forward --to http://10.0.0.2:8087 --asset my-rig \\\n      \
+    --session monday"
 )]
 pub(super) struct ForwardArgs {
     /// Address of the service

@@ -158,12 +158,23 @@ fn block_on<T>(command: impl Future<Output = anyhow::Result<T>>) -> anyhow::Resu
     ManuallyDrop::new(runtime).block_on(command)
 }
 
+/// Describes `error` and its causes. Some errors of libraries name their cause themselves.
+fn with_causes(error: &anyhow::Error) -> String {
+    let mut text = error.to_string();
+    for cause in error.chain().skip(1).map(ToString::to_string) {
+        if !text.ends_with(&cause) {
+            text = format!("{text}: {cause}");
+        }
+    }
+    text
+}
+
 /// Prints `error` and returns its exit code.
 fn report(error: &anyhow::Error) -> ExitCode {
     if output::is_closed_pipe(error) {
         return ExitCode::SUCCESS;
     }
-    anstream::eprintln!("offbd: {error:#}");
+    anstream::eprintln!("offbd: {}", with_causes(error));
     if error.is::<errors::BadArgument>() {
         return ExitCode::from(2);
     }
@@ -172,4 +183,35 @@ fn report(error: &anyhow::Error) -> ExitCode {
     }
     let unusable = error.is::<errors::InputError>() || error.is::<ConfigError>();
     ExitCode::from(if unusable { 3 } else { 1 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    /// Returns the texts below the help of a command and of its subcommands.
+    fn texts(command: &clap::Command) -> Vec<String> {
+        let own = command.get_after_help().map(ToString::to_string);
+        own.into_iter().chain(command.get_subcommands().flat_map(texts)).collect()
+    }
+
+    #[test]
+    fn lines_of_the_help_that_are_broken_by_hand_fit_in_eighty_columns() {
+        for text in texts(&Cli::command()) {
+            // A paragraph that is one line is broken where it has to be.
+            for lines in text.split("\n\n").map(|part| part.lines().collect::<Vec<_>>()) {
+                let wide = lines.iter().find(|line| lines.len() > 1 && line.chars().count() > 80);
+                assert_eq!(wide, None);
+            }
+        }
+    }
+
+    #[test]
+    fn a_cause_that_an_error_names_itself_is_not_repeated() {
+        let error = anyhow::anyhow!("no file").context("database: no file").context("store");
+        assert_eq!(with_causes(&error), "store: database: no file");
+        let error = anyhow::anyhow!("no file").context("store");
+        assert_eq!(with_causes(&error), "store: no file");
+    }
 }

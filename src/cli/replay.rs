@@ -33,8 +33,8 @@ use offbd_core::engine::Setup;
     offbd replay --profile textbook sick.csv\n  \
     offbd replay --asset learnt.json --against relearnt.json monday.csv\n\n\
     Invalid rows are reported on stderr with their line number, and counted.\n\n\
-    Exit status: 0 all files judged (faults or not), 3 a file is unusable; the others\n\
-    are judged; 4 a fault was confirmed, with --fail-on-fault."
+    Exit status: 0 all files judged (faults or not), 3 a file is unusable; the\n\
+    others are judged; 4 a fault was confirmed, with --fail-on-fault."
 )]
 pub(super) struct ReplayArgs {
     /// The rig's asset file, preferably calibrated [default: the default rig (plate

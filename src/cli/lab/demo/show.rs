@@ -317,7 +317,7 @@ impl Show {
         }
         let now_s = self.rig.truth().t_s.min(episode.end_s);
         let short = hash.get(..12).unwrap_or(&hash);
-        say(now_s, &format!(">> session {name} ends, checksum {short}"));
+        say(now_s, &format!(">> session {name} ends, verdict hash {short}"));
         let of_episode = |truth: &&offbd_lab::simulation::FaultTruth| {
             // The end is not compared: a visitor's repair may differ from the plan.
             let is_it =
