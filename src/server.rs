@@ -38,7 +38,9 @@ use crate::config::{ClusterConfig, Config, LogFormat};
 use crate::http::{self, AccessPolicy, App, BodyBudget, ExtraRoutes, RateLimit, RateLimits};
 use crate::service::access::Provider;
 use crate::service::{Clock, Limits, Service, Workers};
-use crate::store::{self, CheckReport, ColdDirectory, Location, NodeIdentity, Partitions, Store};
+use crate::store::{
+    self, CheckReport, ColdDirectory, Location, NodeIdentity, Partitions, Store, StoreError,
+};
 
 /// How often a blocking thread is asked for: often enough for a device that waits, and rarely
 /// enough to cost nothing.
@@ -393,7 +395,11 @@ pub async fn restore(config: &Config, file: &Path, replace: bool) -> Result<()> 
     let _lock = lock(&location).await?;
     let cold = config.cold_directory();
     let result = store::restore(&location, file, replace, cold.as_ref()).await;
-    result.with_context(|| format!("cannot restore the store {location}"))
+    let hint = match &result {
+        Err(StoreError::Exists { .. }) if !replace => " without --replace",
+        _ => "",
+    };
+    result.with_context(|| format!("cannot restore the store {location}{hint}"))
 }
 
 /// What a configuration amounts to.

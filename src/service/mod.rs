@@ -59,6 +59,7 @@
 
 pub mod access;
 mod asset;
+mod asset_quota;
 mod clock;
 mod cluster;
 mod cold_files;

@@ -10,6 +10,7 @@ use tokio_util::sync::CancellationToken;
 
 use super::access::{PrincipalCache, Provider};
 use super::asset::{AssetCommand, Environment, Loader, MANY_SAMPLES, Presences, Shard, Shards};
+use super::asset_quota::AssetQuota;
 use super::cluster::{self, Cluster, NodeTask};
 use super::communication::CommunicationWatch;
 use super::job::{self, Job};
@@ -43,6 +44,7 @@ pub(super) struct Inner {
     pub(super) provider: Option<Provider>,
     pub(super) shards: Shards,
     pub(super) deleter: Deleter,
+    pub(super) quota: AssetQuota,
     pub(super) jobs: mpsc::Sender<Job>,
     pub(super) job_context: JobContext,
     /// One permit for each sample between arrival and commit.
@@ -279,6 +281,7 @@ impl Service {
         };
         let (queues, shards, loader) = Shards::new(&limits, &env);
         let deleter = Deleter::new(handles.clone());
+        let quota = AssetQuota::new(limits.assets);
         let in_flight = Arc::new(Semaphore::new(limits.in_flight_samples));
         let stalled = Arc::new(AtomicBool::new(false));
         let watchdog = Watchdog {
@@ -313,6 +316,7 @@ impl Service {
             provider,
             shards: queues,
             deleter,
+            quota,
             jobs,
             in_flight,
             stalled,

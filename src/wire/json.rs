@@ -60,7 +60,7 @@ fn place<T: DeserializeOwned>(document: &[u8]) -> String {
 /// [`Invalid`] with the empty pointer.
 pub fn check_object(document: &[u8]) -> Result<(), Invalid> {
     if document.trim_ascii_start().starts_with(b"[") {
-        return Err(Invalid::new("", "is an array, not an object"));
+        return Err(Invalid::new("", "the document is an array, not an object"));
     }
     Ok(())
 }

@@ -98,7 +98,7 @@ async fn a_failed_restore_changes_nothing() {
         assert!(text(&used.stderr).contains("another process uses"), "{used:?}");
     }
     let there = offbd("restore", data.path(), &[&copy]);
-    assert!(text(&there.stderr).contains("already exists"), "{there:?}");
+    assert!(text(&there.stderr).contains("without --replace: "), "{there:?}");
     let whole = std::fs::read(&copy).unwrap();
     let mut damaged = whole.clone();
     let page = page_of_an_index(&copy).await;

@@ -49,10 +49,12 @@ impl Service {
     }
 
     async fn create(&self, rig: &Rig) -> Result<(), ServiceError> {
-        let limit = self.inner.limits.assets;
-        let n_assets = self.inner.handles.store.n_assets().await?;
-        if usize::try_from(n_assets).is_ok_and(|n| n >= limit) {
-            return Err(ServiceError::RegistryFull { limit });
+        let quota = &self.inner.quota;
+        if !quota.take() {
+            let n_assets = self.inner.handles.store.n_assets().await?;
+            if !quota.take_of(usize::try_from(n_assets).unwrap_or(usize::MAX)) {
+                return Err(ServiceError::RegistryFull { limit: quota.limit() });
+            }
         }
         let document = views::to_json(&asset::view(rig))?;
         self.inner.shards.call(&rig.name, |reply| AssetCommand::Create { document, reply }).await
