@@ -49,13 +49,7 @@ impl Service {
     }
 
     async fn create(&self, rig: &Rig) -> Result<(), ServiceError> {
-        let quota = &self.inner.quota;
-        if !quota.take() {
-            let n_assets = self.inner.handles.store.n_assets().await?;
-            if !quota.take_of(usize::try_from(n_assets).unwrap_or(usize::MAX)) {
-                return Err(ServiceError::RegistryFull { limit: quota.limit() });
-            }
-        }
+        self.inner.quota.claim(|| self.inner.handles.store.n_assets()).await?;
         let document = views::to_json(&asset::view(rig))?;
         self.inner.shards.call(&rig.name, |reply| AssetCommand::Create { document, reply }).await
     }
