@@ -11,6 +11,7 @@ import { RigCharts } from "../../parts/charts/rig-charts";
 import { ThinnedNote } from "../../parts/charts/thinned-note";
 import { Facts } from "../../parts/facts";
 import { UnloadedPage } from "../../parts/unloaded-page";
+import { VerdictWarnings } from "../../parts/verdict-warnings";
 import { sessionPath } from "../../router/paths";
 import { changeOf } from "../../words/fault-state";
 import { faultTitle } from "../../words/fault-names";
@@ -48,6 +49,7 @@ function Report({ session, asset, faults }: { session: Session; asset: Asset; fa
   return (
     <ReportFrame title={`${session.name} of ${session.asset}`} back={sessionPath(session.id)}>
       <p class={`result ${result?.look ?? "quiet"}`}>{result?.text ?? "The session is open."}</p>
+      <VerdictWarnings verdict={session.verdict} asset={session.asset} />
       <Facts
         facts={[
           ["Opened", dateTime(session.opened_at)],
