@@ -10,6 +10,8 @@ interface Props {
   asset: string;
 }
 
+const asSentence = (text: string) => `${capitalised(text)}${text.endsWith("?") ? "" : "."}`;
+
 /** What does not fit between the samples of a session and the description of its rig, such as a wrong unit. */
 export function VerdictWarnings({ verdict, asset }: Props) {
   const warnings = verdict?.warnings ?? [];
@@ -19,7 +21,7 @@ export function VerdictWarnings({ verdict, asset }: Props) {
       <b>The samples and the description of the rig do not fit:</b>
       <ul>
         {warnings.map(({ message }) => (
-          <li>{capitalised(message)}.</li>
+          <li>{asSentence(message)}</li>
         ))}
       </ul>
       <Link to={setUpPath(asset, "describe")}>Look at the description of the rig</Link>
