@@ -9,7 +9,7 @@ import { LastChangeChoice } from "./last-change-choice";
 
 const STATES = [
   ["active", "Failing or on record"],
-  ["failing", "Failing now"],
+  ["failing", "Failing"],
   ["on_record", "Passing, on record"],
   ["all", "All, healed ones too"],
 ] as const;
