@@ -23,11 +23,29 @@ pub(super) struct HealthView {
     /// Assets whose engine is still to be rebuilt after the start. Until then, requests that
     /// need it are answered with 503 and `Retry-After`.
     rebuilding: usize,
+    /// The optional parts of this build: `email`, `mcap`, `mqtt`, `nats`, `otel`, `parquet`,
+    /// `xlsx`. Without one, its formats are refused with 406 or 415, and its settings with 422.
+    features: Vec<&'static str>,
+}
+
+/// Returns the optional parts of this build, by the names of the features of its crate.
+fn features() -> Vec<&'static str> {
+    let all = [
+        ("email", cfg!(feature = "email")),
+        ("mcap", cfg!(feature = "mcap")),
+        ("mqtt", cfg!(feature = "mqtt")),
+        ("nats", cfg!(feature = "nats")),
+        ("otel", cfg!(feature = "otel")),
+        ("parquet", cfg!(feature = "parquet")),
+        ("xlsx", cfg!(feature = "xlsx")),
+    ];
+    all.into_iter().filter_map(|(name, is_built)| is_built.then_some(name)).collect()
 }
 
 fn healthy(app: &App) -> Json<HealthView> {
     let (demo, rebuilding) = (app.demo, app.service.n_rebuilding());
-    Json(HealthView { status: "ok", version: env!("CARGO_PKG_VERSION"), demo, rebuilding })
+    let (version, features) = (env!("CARGO_PKG_VERSION"), features());
+    Json(HealthView { status: "ok", version, demo, rebuilding, features })
 }
 
 /// Liveness: succeeds while the process runs.

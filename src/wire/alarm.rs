@@ -43,8 +43,11 @@ pub struct AlarmView {
     pub kind: Option<KindWord>,
     /// Status of the fault; of lost communication `confirmed`, or `healed` once data arrive.
     pub status: StatusWord,
-    /// Whether the test fails now.
+    /// Whether the last result of its test is a failure.
     pub failing: bool,
+    /// Whether this result is one of the last session that was opened; false if the test has had
+    /// none in it yet.
+    pub tested: bool,
     /// Time at which the last occurrence was found, RFC 3339; of lost communication the
     /// arrival of the last data before it. Null if unknown.
     pub since: Option<String>,

@@ -250,6 +250,11 @@ pub struct FleetFaultView {
     #[serde(default)]
     #[schema(required)]
     pub failing: bool,
+    /// Whether this result is one of the last session that was opened; false if the test has had
+    /// none in it yet.
+    #[serde(default)]
+    #[schema(required)]
+    pub tested: bool,
     /// Time at which the service judged the sample at which the test last began to fail,
     /// RFC 3339; null if unknown.
     #[serde(default)]

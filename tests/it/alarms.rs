@@ -63,6 +63,26 @@ async fn the_list_tells_what_fails_now_from_what_is_on_record() {
     assert!(all.len() >= 2);
 }
 
+/// A new session does not know yet what an earlier one has found.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_failure_of_an_earlier_session_is_not_tested_in_a_new_one() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
+    client.asset("bench").await;
+    client.telemetry("bench", Some("sick"), &rig(2000, 300)).await;
+    let told = async || {
+        let alarms = alarms(client, "?asset=bench&code=x_servo").await;
+        let fleet = client.get("fleet").await.expect(200);
+        let faults = fleet["items"][0]["faults"].as_array().unwrap();
+        let fault = faults.iter().find(|fault| fault["code"] == "x_servo").unwrap().clone();
+        [&alarms[0], &fault].map(|told| (told["failing"].clone(), told["tested"].clone()))
+    };
+    assert_eq!(told().await, [(json!(true), json!(true)), (json!(true), json!(true))]);
+    client.end("bench", "sick").await;
+    client.telemetry("bench", Some("new"), &rig(20, 6000)).await;
+    assert_eq!(told().await, [(json!(true), json!(false)), (json!(true), json!(false))]);
+}
+
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn several_alarms_are_acknowledged_at_once() {
     let fixture = with_faults().await;

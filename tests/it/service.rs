@@ -587,7 +587,11 @@ async fn health_metrics_description_and_pages_are_served() {
     let client = &fixture.client;
     client.asset("a").await;
     client.telemetry("a", None, &rig(10, 10)).await;
-    assert_eq!(client.get("/healthz").await.expect(200)["status"], "ok");
+    let health = client.get("/healthz").await.expect(200);
+    assert_eq!(health["status"], "ok");
+    let has = |name: &str| health["features"].as_array().unwrap().iter().any(|each| each == name);
+    assert_eq!(has("email"), cfg!(feature = "email"), "{health}");
+    assert_eq!(has("parquet"), cfg!(feature = "parquet"), "{health}");
     assert_eq!(client.get("/readyz").await.expect(200)["status"], "ok");
     let metrics = client.get("/metrics").await.text;
     assert!(metrics.contains("offbd_samples_total{outcome=\"accepted\"}"), "{metrics}");

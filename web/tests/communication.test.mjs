@@ -40,6 +40,13 @@ test("lost communication is told since when and by whom it is acknowledged, and 
   const row = fleet.getByRole("list", { name: "Rigs" });
   await row.getByText(/Communication lost since \d/).waitFor();
 
+  // A page that is opened now has no reason of its own to call the rig silent.
+  const late = await page(chromium);
+  await late.goto(`${service.url}/rigs/bench`);
+  await late.getByText(/Communication lost since \d/).waitFor();
+  assert.equal(await late.locator("h1 .health").textContent(), "○silent");
+  await late.done();
+
   const alarm = rig.getByRole("alert").filter({ hasText: "Communication lost" });
   await alarm.getByText(/Communication lost since \d/).waitFor();
   await alarm.getByLabel("Your name, recorded with the action").fill("ada");
@@ -88,6 +95,12 @@ test("the card of the link tells how the samples of a rig arrive", async () => {
     assert.equal(await cell(card, "Sent twice", column).textContent(), "none");
   }
   await card.getByText("which does not tell the time of day").waitFor();
+  await card.getByText(/^as of \d/).waitFor();
+  await card.getByText(/^This session, counted since \d/).waitFor();
+  // A page that is opened after the samples has nothing to draw, and says so instead of empty charts.
+  await view.reload();
+  await view.getByText(/The last sample was at \d\.\d\d\u202fs on the device's clock/).waitFor();
+  assert.equal(await view.getByRole("img", { name: /over time/ }).count(), 0);
   assert.deepEqual(view.errors, []);
   await view.done();
 });

@@ -105,7 +105,9 @@ test("a fault is shown after its event, on the pages of the fleet and the rig", 
 
 test("the script resumes, and the demo continues after a visitor ends the session", async () => {
   const view = await page(chromium);
-  await view.goto(`${show.url}/learn`);
+  // Another address of the lessons.
+  await view.goto(`${show.url}/demo`);
+  await view.waitForURL(/\/learn$/);
   await view.getByRole("button", { name: "Resume the script" }).click();
   await view.getByText("A script injects and repairs faults").waitFor();
   await view.goto(`${show.url}/rigs/demo-rig`);

@@ -106,6 +106,28 @@ test("a service without the format says so", async () => {
   await view.done();
 });
 
+test("a build offers only what it has", async () => {
+  const view = await page(chromium);
+  const health = await (await fetch(`${service.url}/healthz`)).json();
+  assert.ok(health.features.includes("parquet") && health.features.includes("email"));
+  await view.route("**/healthz", (route) => route.fulfill({ json: { ...health, features: ["mcap"] } }));
+  await view.goto(`${service.url}/sessions/${session.id}`);
+  const formats = view.getByLabel("Format").locator("option");
+  await view.waitForFunction(
+    () => document.querySelector("option[value=mcap]") && !document.querySelector("option[value=parquet]"),
+  );
+  assert.deepEqual(await formats.allTextContents(), ["CSV", "JSON", "MCAP"]);
+  await view.goto(`${service.url}/sessions`);
+  await view.getByText("Drop a recording here (CSV or MCAP), or").waitFor();
+  await view.goto(`${service.url}/notifications`);
+  await view.getByRole("button", { name: "Add a channel" }).click();
+  await view.getByLabel("Kind").selectOption({ label: "E-mail (not in this build)" });
+  await view.getByText("This service is built without e-mail").waitFor();
+  assert.equal(await view.getByLabel("Mail server").count(), 0);
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});
+
 test("of several dropped files one is taken, and the page says which", async () => {
   const view = await page(chromium);
   await view.goto(`${service.url}/sessions`);

@@ -47,6 +47,10 @@ test("a dropped file opens the dialogue; a file that is not a recording is refus
   await view.getByRole("alert").getByText("No line has three or more columns").waitFor();
   await view.keyboard.press("Escape");
   await view.getByRole("dialog").waitFor({ state: "detached" });
+  await drop("picture.csv", "\x89PNG\r\n\x1a\n\0\0\0\rIHDR,\x02,\x01\n1,2,3\n4,5,6\n");
+  await view.getByRole("alert").getByText("This file is neither a text nor").waitFor();
+  await view.keyboard.press("Escape");
+  await view.getByRole("dialog").waitFor({ state: "detached" });
 
   // Times that are dates: nothing can be imported, and no rig is registered.
   await drop("dates.csv", "t_s,x_m,y_m\n2026-03-01T10:00:00.020,0,0\n2026-03-01T10:00:00.040,0,0\n");
@@ -61,6 +65,24 @@ test("a dropped file opens the dialogue; a file that is not a recording is refus
   await dialogue.getByText("There is no rig new-rig yet").waitFor();
   await dialogue.getByRole("button", { name: /^Import/ }).click();
   await view.getByRole("heading", { name: "dropped" }).waitFor();
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});
+
+test("a time in milliseconds under the name of seconds is found by the rate of the rig", async () => {
+  const [head, ...lines] = rig.healthy.trim().split("\n");
+  const rows = lines.map((line) => line.replace(/^[\d.]+/, (t) => String(Math.round(Number(t) * 1000))));
+  const view = await page(chromium);
+  await view.goto(`${service.url}/sessions`);
+  const buffer = Buffer.from([head, ...rows].join("\n"));
+  await view.locator("input[type=file]").setInputFiles({ name: "ms.csv", mimeType: "text/csv", buffer });
+  const dialogue = view.getByRole("dialog");
+  await dialogue
+    .getByText(/A row comes every 10.* but the rig sends 100 per second: is the time in ms\?/)
+    .waitFor();
+  await dialogue.getByRole("button", { name: "Time is in ms" }).click();
+  await dialogue.getByText("90.0\u202fs: 100.0\u202fHz").waitFor();
+  assert.equal(await dialogue.getByText("is the time in").count(), 0);
   assert.deepEqual(view.errors, []);
   await view.done();
 });

@@ -43,11 +43,18 @@ test("motion is gathered, a calibration offered and confirmed", async () => {
   await send("new", 5000, 7000);
   await view.getByRole("heading", { name: "Was the rig healthy while it was recorded?" }).waitFor();
   await panel(view).getByRole("link", { name: "first" }).waitFor();
+  const step = await page(chromium);
+  await step.goto(`${service.url}/rigs/new/set-up?step=learn`);
+  await step.getByText(/A calibration is ready/).waitFor();
+  await step.done();
+  const drift = view.locator("#drift");
+  await drift.getByText("no trends before the rig has been learnt").waitFor();
   await panel(view).getByRole("button", { name: "Yes, use what was learnt" }).click();
   await view.getByRole("heading", { name: "Learnt automatically" }).waitFor();
   await panel(view)
     .getByText(/Learnt from 1 session; further healthy sessions refine it until it is based on 5/)
     .waitFor();
+  await drift.getByText("0 of 7 required sessions").waitFor();
   const { calibration } = await ask(service.url, "GET", "/assets/new");
   assert.ok(
     Math.abs(calibration.x.gain - rig.learnt.calibration.x.gain) < 0.05,

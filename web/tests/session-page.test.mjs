@@ -93,6 +93,22 @@ test("a session without a calibration says what its verdict rests on", async () 
   await view.done();
 });
 
+test("a session of which nothing could be judged shows its samples, its verdict and its warnings", async () => {
+  const [head, ...lines] = rig.healthy.trim().split("\n");
+  const rows = lines.map((line) => line.replace(/^[\d.]+/, (t) => String(Math.round(Number(t) * 1000))));
+  const session = await imported(service.url, "bench", "in-milliseconds", [head, ...rows].join("\n"));
+  const view = await page(chromium);
+  await view.goto(`${service.url}/sessions/${session.id}`);
+  await view.getByText(/^\d+\u202f\d{3} samples are recorded, but no moment could be judged/).waitFor();
+  await view.locator(".verdict").getByText("Not judged", { exact: true }).waitFor();
+  const warnings = view.getByRole("region", { name: "Warnings" });
+  await warnings.getByText(/^A sample comes every 10\S* s, .*: is t_s in ms\?/).waitFor();
+  await view.getByRole("link", { name: "Report" }).click();
+  await warnings.getByText(/^A sample comes every 10\S* s, .*: is t_s in ms\?/).waitFor();
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});
+
 test("sliders show the alarms that other limits and debounce times would raise", async () => {
   const session = await imported(service.url, "bench", "tried", rig.sick);
   const view = await page(chromium);

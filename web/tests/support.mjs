@@ -111,10 +111,11 @@ export async function until(condition) {
   }
 }
 
-export async function browser() {
+export async function browser(options = {}) {
   const executablePath = BROWSERS.find((path) => path && existsSync(path));
   assert.ok(executablePath, "no Chromium found; name one in CHROMIUM");
   return chromium.launch({
+    ...options,
     executablePath,
     args: [
       "--no-sandbox",
@@ -129,13 +130,18 @@ export async function browser() {
 const UNREACHABLE =
   /ERR_CONNECTION_REFUSED|ERR_CONNECTION_RESET|ERR_INCOMPLETE_CHUNKED_ENCODING|ERR_EMPTY_RESPONSE/;
 
-/** Opens a page that collects its errors. */
+/** Opens a page that collects its errors, in a context of its own. */
 export async function page(of, options = {}) {
   const context = await of.newContext({
     viewport: { width: 1280, height: 800 },
     reducedMotion: "reduce",
     ...options,
   });
+  return tab(context);
+}
+
+/** Opens a page that collects its errors. */
+export async function tab(context) {
   const view = await context.newPage();
   view.setDefaultTimeout(SOON);
   const errors = [];

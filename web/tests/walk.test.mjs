@@ -39,7 +39,7 @@ test("from the demo to the explanation of a fault", async () => {
     return items.some(({ first_t_s: first, last_t_s: last }) => last - first > 8);
   });
 
-  await press("Demo", "link");
+  await press("Lessons", "link");
   await view.getByText("A script injects and repairs faults").waitFor();
   await press("Repair all");
   await view.getByText("The script is paused: you control the faults.").waitFor();
@@ -64,7 +64,7 @@ test("from the demo to the explanation of a fault", async () => {
   await press("Judge again");
   await view.getByText("Another verdict").waitFor();
 
-  await press("Demo", "link");
+  await press("Lessons", "link");
   await press("Repair all");
   await view.getByText("The simulated rig is healthy.").waitFor();
   await view.getByRole("heading", { name: "textbook" }).waitFor();

@@ -142,6 +142,7 @@ fn fault(row: FaultRow) -> Result<FleetFaultView, ServiceError> {
         kind: stored.kind,
         status: views::word(&row.status)?,
         failing: record.status.test_failed(),
+        tested: record.status.completed_this_cycle(),
         failed_at: provenance.last_occurrence.map(|occurrence| occurrence.noted_at),
         acknowledged: row.acknowledged != 0,
         changed_at: rfc3339(row.changed_at),

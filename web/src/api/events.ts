@@ -1,9 +1,10 @@
 /**
  * Events of the whole fleet, of faults and of data that stay away, over one connection for the whole page.
- * After a lost connection, the stream resumes after the last received event.
+ * After a lost connection, and when a hidden page is visible again, the stream resumes after the last received event.
  */
 import { streamUrl } from "./access";
 import type { CommunicationLine, FaultLine } from "./types";
+import { whileVisible } from "./visibility";
 
 export type ConnectionState = "connecting" | "live" | "lost";
 
@@ -26,6 +27,8 @@ const RETRY_MS = [500, 5000] as const;
 
 class FleetEvents {
   private source?: EventSource;
+  private retry?: ReturnType<typeof setTimeout>;
+  private isFollowed = false;
   private lastEvent?: number;
   private delay: number = RETRY_MS[0];
   private listeners = new Set<(line: FleetEvent) => void>();
@@ -35,7 +38,8 @@ class FleetEvents {
   /** Calls `listener` with every event from now on; returns a function that unsubscribes it. */
   listen(listener: (line: FleetEvent) => void): () => void {
     this.listeners.add(listener);
-    if (!this.source) this.open();
+    if (!this.isFollowed) whileVisible({ open: () => this.open(), close: () => this.close() });
+    this.isFollowed = true;
     return () => this.listeners.delete(listener);
   }
 
@@ -64,7 +68,7 @@ class FleetEvents {
     source.onerror = () => {
       source.close();
       this.setState("lost");
-      setTimeout(() => this.open(), this.delay);
+      this.retry = setTimeout(() => this.open(), this.delay);
       this.delay = Math.min(this.delay * 2, RETRY_MS[1]);
     };
     source.addEventListener("begin", (message) => (this.lastEvent = Number(message.lastEventId)));
@@ -74,6 +78,12 @@ class FleetEvents {
       this.listeners.forEach((listener) => listener(line));
     };
     TYPES.forEach((type) => source.addEventListener(type, receive));
+  }
+
+  /** Closes the stream of a hidden page. A closed source delivers nothing more, so `lastEvent` is final. */
+  private close() {
+    clearTimeout(this.retry);
+    this.source?.close();
   }
 
   private setState(state: ConnectionState) {

@@ -1,7 +1,8 @@
-/** The live state and trace of one asset, over a WebSocket that reconnects by itself. */
+/** The live state and trace of one asset, over a WebSocket that reconnects by itself, while the page is visible. */
 import { streamUrl } from "./access";
 import type { CommunicationEvent, FaultEvent } from "./events";
 import type { State, Trace } from "./types";
+import { whileVisible } from "./visibility";
 
 export type StateFrame = State & { trace?: Trace };
 
@@ -31,24 +32,27 @@ class RigStream {
   private socket?: WebSocket;
   private delay: number = RETRY_MS[0];
   private lastEvent?: number;
-  private closed = false;
   private receivedAt = 0;
   private retry?: ReturnType<typeof setTimeout>;
-  private readonly watchdog = setInterval(() => this.closeIfSilent(), CHECK_MS);
+  private watchdog?: ReturnType<typeof setInterval>;
 
   constructor(
     private readonly asset: string,
     private readonly statesPerSecond: number,
     private readonly listener: StreamListener,
-  ) {
-    this.open();
+  ) {}
+
+  open(): void {
+    this.watchdog = setInterval(() => this.closeIfSilent(), CHECK_MS);
+    this.connect();
   }
 
   close(): void {
-    this.closed = true;
     clearInterval(this.watchdog);
     clearTimeout(this.retry);
     const { socket } = this;
+    this.socket = undefined;
+    if (socket) socket.onmessage = null;
     // The browser reports an error of the page if a socket is closed before it is open.
     if (socket?.readyState === WebSocket.CONNECTING) socket.onopen = () => socket.close();
     else socket?.close();
@@ -61,7 +65,7 @@ class RigStream {
     return streamUrl(`${origin}/api/v1/assets/${encodeURIComponent(this.asset)}/stream?${query}`);
   }
 
-  private open(): void {
+  private connect(): void {
     const socket = new WebSocket(this.address());
     this.socket = socket;
     this.receivedAt = performance.now();
@@ -71,9 +75,9 @@ class RigStream {
     };
     socket.onmessage = (message: MessageEvent<string>) => this.receive(JSON.parse(message.data) as Frame);
     socket.onclose = () => {
-      if (this.closed || this.socket !== socket) return;
+      if (this.socket !== socket) return;
       this.listener.connection?.("lost");
-      this.retry = setTimeout(() => this.open(), this.delay);
+      this.retry = setTimeout(() => this.connect(), this.delay);
       this.delay = Math.min(this.delay * 2, RETRY_MS[1]);
     };
   }
@@ -97,8 +101,11 @@ class RigStream {
   }
 }
 
-/** Streams `statesPerSecond` states of `asset` with their traces; returns a function that closes the stream. */
+/**
+ * Streams `statesPerSecond` states of `asset` with their traces while the page is visible; returns a function that
+ * closes the stream.
+ */
 export function followRig(asset: string, statesPerSecond: number, listener: StreamListener): () => void {
   const stream = new RigStream(asset, statesPerSecond, listener);
-  return () => stream.close();
+  return whileVisible(stream);
 }

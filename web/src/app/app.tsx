@@ -3,6 +3,7 @@ import { api } from "../api/client";
 import { useQuery } from "../hooks/use-query";
 import { Suspense } from "../parts/lazy";
 import { Loading } from "../parts/loading";
+import { HealthContext } from "../parts/service-health";
 import { useLocation } from "../router/navigation";
 import { Header } from "./header";
 import { Route } from "./route";
@@ -17,11 +18,11 @@ export function App() {
     </main>
   );
   return (
-    <>
+    <HealthContext.Provider value={health.data}>
       <a class="skip" href="#content">
         Skip to the content
       </a>
-      <Header segments={segments} isDemo={isDemo} />
+      <Header segments={segments} />
       <div id="content" tabIndex={-1}>
         <Suspense fallback={loading}>
           <Route segments={segments} isDemo={isDemo} />
@@ -35,6 +36,6 @@ export function App() {
         <a href="/metrics">Metrics</a>
         <span class="quiet">offbd {health.data?.version}</span>
       </footer>
-    </>
+    </HealthContext.Provider>
   );
 }

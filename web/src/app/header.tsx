@@ -3,7 +3,7 @@ import { fleetEvents, type ConnectionState } from "../api/events";
 import { LoggedIn } from "../parts/login/logged-in";
 import { useRefusal } from "../parts/login/rights";
 import { Link } from "../router/link";
-import { sessionsPath } from "../router/paths";
+import { lessonsPath, sessionsPath } from "../router/paths";
 import { ThemeButton } from "./theme-button";
 
 const CONNECTION: Record<ConnectionState, string> = {
@@ -13,14 +13,14 @@ const CONNECTION: Record<ConnectionState, string> = {
 };
 
 /** The links to the views, and whether each is the current view. */
-function tabs([first, , third]: string[], isDemo: boolean, isAdmin: boolean) {
+function tabs([first, , third]: string[], isAdmin: boolean) {
   const isSetUp = first === "set-up" || third === "set-up";
   return [
     { to: "/", word: "Fleet", isHere: !first || (first === "rigs" && !isSetUp) },
     { to: "/alarms", word: "Alarms", isHere: first === "alarms" || first === "notifications" },
     { to: sessionsPath(), word: "Sessions", isHere: first === "sessions" },
     { to: "/set-up", word: "Set up", isHere: isSetUp },
-    { to: "/learn", word: isDemo ? "Demo" : "Learn", isHere: first === "learn" },
+    { to: lessonsPath(), word: "Lessons", isHere: first === "learn" },
     ...(isAdmin
       ? [{ to: "/administration", word: "Administration", isHere: first === "administration" }]
       : []),
@@ -28,7 +28,7 @@ function tabs([first, , third]: string[], isDemo: boolean, isAdmin: boolean) {
 }
 
 /** The header of every view. */
-export function Header({ segments, isDemo }: { segments: string[]; isDemo: boolean }) {
+export function Header({ segments }: { segments: string[] }) {
   const [connection, setConnection] = useState(fleetEvents.state);
   useEffect(() => fleetEvents.watch(setConnection), []);
   // Every view shows the state of the connection, so it is open on all of them.
@@ -47,7 +47,7 @@ export function Header({ segments, isDemo }: { segments: string[]; isDemo: boole
         offbd
       </Link>
       <nav aria-label="Views" ref={nav}>
-        {tabs(segments, isDemo, isAdmin).map(({ to, word, isHere }) => (
+        {tabs(segments, isAdmin).map(({ to, word, isHere }) => (
           <Link to={to} aria-current={isHere ? "page" : undefined}>
             {word}
           </Link>

@@ -4,6 +4,8 @@ import { EmptyState } from "../parts/empty-state";
 import { lazy } from "../parts/lazy";
 import { FleetPage } from "../pages/fleet";
 import { Link } from "../router/link";
+import { lessonsPath } from "../router/paths";
+import { Redirect } from "../router/redirect";
 
 const AssetPage = lazy(() => import("../pages/asset").then((module) => module.AssetPage));
 const FaultPage = lazy(() => import("../pages/fault").then((module) => module.FaultPage));
@@ -48,6 +50,7 @@ export function Route({ segments, isDemo }: { segments: string[]; isDemo: boolea
   if (first === "alarms") return <AlarmsPage />;
   if (first === "notifications") return <NotificationsPage />;
   if (first === "administration") return <AdministrationPage />;
+  if (first === "demo") return <Redirect to={lessonsPath()} />;
   if (first === "learn") return <LearnPage isDemo={isDemo} />;
   return (
     <main>

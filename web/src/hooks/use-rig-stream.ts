@@ -1,7 +1,7 @@
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import type { FaultEvent } from "../api/events";
 import { followRig } from "../api/stream";
-import type { State } from "../api/types";
+import type { State, Trace } from "../api/types";
 import { TraceBuffer } from "../live/buffer";
 import { useLatest } from "./use-latest";
 
@@ -25,8 +25,19 @@ export function useRigStream(name: string, options: Options) {
   const latest = useLatest(options);
   useEffect(() => {
     let renderedAt = -Infinity;
+    /** Whether nothing of the trace has come over this connection yet. */
+    let isNew = true;
+    const take = (trace: Trace) => {
+      if (!trace.t_s.length) return;
+      if (isNew) buffer.resume(trace);
+      else buffer.append(trace);
+      isNew = false;
+    };
     return followRig(name, statesPerSecond, {
-      connection: setConnection,
+      connection: (next) => {
+        isNew = true;
+        setConnection(next);
+      },
       state: (frame) => {
         const session = frame.session_id ?? "";
         if (session !== lastSample.current.session) {
@@ -34,7 +45,7 @@ export function useRigStream(name: string, options: Options) {
           buffer.clear();
           latest.current.newSession?.();
         }
-        if (frame.trace) buffer.append(frame.trace);
+        if (frame.trace) take(frame.trace);
         if (frame.t_s != null && frame.t_s !== lastSample.current.t_s)
           Object.assign(lastSample.current, { t_s: frame.t_s, at: Date.now() });
         if (performance.now() - renderedAt < renderInterval) return;

@@ -40,9 +40,9 @@ export const emptyColumns = (): AxisColumns => ({
 const difference = (a: number | null | undefined, b: number | null | undefined) =>
   a == null || b == null ? null : a - b;
 
-/** Appends the first `n` moments of a trace along one axis. */
-export function appendTrace(to: AxisColumns, from: Trace["x"], n: number): void {
-  for (let i = 0; i < n; i++) {
+/** Appends the moments `begin` to `end` of a trace along one axis. */
+export function appendTrace(to: AxisColumns, from: Trace["x"], begin: number, end: number): void {
+  for (let i = begin; i < end; i++) {
     const limit = from.limit_m_s2[i] ?? null;
     to.command.push(from.command_rad[i] ?? null);
     to.plate.push(from.plate_angle_rad[i] ?? null);
@@ -70,9 +70,9 @@ export type SharedColumn = keyof SharedColumns;
 
 export const emptyShared = (): SharedColumns => ({ stuckBall: [], sensor: [] });
 
-/** Appends the first `n` moments of what a trace has besides the axes. */
-export function appendShared(to: SharedColumns, from: Trace, n: number): void {
-  for (let i = 0; i < n; i++) {
+/** Appends the moments `begin` to `end` of what a trace has besides the axes. */
+export function appendShared(to: SharedColumns, from: Trace, begin: number, end: number): void {
+  for (let i = begin; i < end; i++) {
     to.stuckBall.push(from.stuck_ball_counter[i] ?? null);
     to.sensor.push(from.sensor_counter[i] ?? null);
   }

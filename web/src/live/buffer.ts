@@ -44,11 +44,23 @@ export class TraceBuffer {
     this.shared = emptyShared();
   }
 
+  /**
+   * Appends the first moments that came over a new connection, which may be there already. If others between are
+   * missing, only the new ones are kept: a line across a hole would be no measurement.
+   */
+  resume(trace: Trace): void {
+    if (trace.t_s[0]! > this.last) this.clear();
+    this.append(trace);
+  }
+
+  /** Appends the moments that are later than those that are there. */
   append(trace: Trace): void {
-    const n = trace.t_s.length;
-    for (let i = 0; i < n; i++) this.t.push(trace.t_s[i]!);
-    for (const axis of AXES) appendTrace(this[axis], trace[axis], n);
-    appendShared(this.shared, trace, n);
+    const end = trace.t_s.length;
+    const first = this.t.length ? trace.t_s.findIndex((t) => t > this.last) : 0;
+    const begin = first < 0 ? end : first;
+    for (let i = begin; i < end; i++) this.t.push(trace.t_s[i]!);
+    for (const axis of AXES) appendTrace(this[axis], trace[axis], begin, end);
+    appendShared(this.shared, trace, begin, end);
     // Dropping moves all columns, so it is done only for a tenth of the capacity at once.
     const over = this.t.length - this.capacity;
     if (over > this.capacity / 10) this.drop(over);

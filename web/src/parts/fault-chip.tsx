@@ -1,21 +1,21 @@
 import type { FaultCode, FaultKind } from "../api/types";
 import { faultTitle } from "../words/fault-names";
-import { chipClass, stateText } from "../words/fault-state";
+import { chipClass, isPresent, stateText } from "../words/fault-state";
 import type { FaultState } from "../words/severity";
 import { sinceText } from "../words/time";
 
 interface Props {
   fault: FaultState & { code: FaultCode; kind?: FaultKind | null };
-  /** Whether a session is open, so that the test has a result now. */
+  /** Whether a session is open. */
   hasSession: boolean;
   /** Time at which the test last began to fail. */
   since?: string | null;
 }
 
 /** When a fault began to fail, to follow the text of its state. */
-function whenText({ failing }: FaultState, hasSession: boolean, since: string): string {
-  if (!failing) return `, failed ${sinceText(since)}`;
-  return hasSession ? ` since ${sinceText(since)}` : `, began ${sinceText(since)}`;
+function whenText(fault: FaultState, hasSession: boolean, since: string): string {
+  if (!fault.failing) return `, failed ${sinceText(since)}`;
+  return isPresent(fault, hasSession) ? ` since ${sinceText(since)}` : `, began ${sinceText(since)}`;
 }
 
 /** A fault, its state, and since when. */

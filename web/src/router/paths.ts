@@ -23,6 +23,9 @@ function withQuery(path: string, values: Record<string, string | undefined>): st
 /** The address of the fleet, or of its rigs with a tag. */
 export const fleetPath = (values: { tag?: string } = {}) => withQuery("/", values);
 
+/** The address of the lessons, which have the controls of the demo. */
+export const lessonsPath = () => path("learn");
+
 /** The addresses of the reports to print. */
 export const sessionReportPath = (id: string) => path("sessions", id, "report");
 export const faultReportPath = (name: string, code: FaultCode) =>

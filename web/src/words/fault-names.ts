@@ -2,8 +2,8 @@
 import type { FaultCode, FaultKind } from "../api/types";
 
 const CODE: Record<FaultCode, { title: string; meaning: string }> = {
-  x_servo: { title: "X servo", meaning: "moves the ball along x: turns the plate about y (qy)" },
-  y_servo: { title: "Y servo", meaning: "moves the ball along y: turns the plate about x (qx)" },
+  x_servo: { title: "X servo", meaning: "moves the ball along x by turning the plate about y (qy)" },
+  y_servo: { title: "Y servo", meaning: "moves the ball along y by turning the plate about x (qx)" },
   stuck_ball: { title: "Stuck ball", meaning: "the ball does not roll although the plate is tilted" },
   sensor: { title: "Position sensor", meaning: "measures the position of the ball" },
 };

@@ -1,13 +1,14 @@
 /** The state of a fault, and of a line about it: a class of the style sheet, and text. */
 import type { FaultEntry, FaultLine } from "../api/types";
 import { standing, type FaultState } from "./severity";
-import { isFailing } from "./status-byte";
+import { isFailing, isTested } from "./status-byte";
 
 /** The state of a fault by its entry in the fault memory. */
 export const stateOf = ({ status, status_byte, acknowledged }: FaultEntry): FaultState => ({
   status,
   acknowledged,
   failing: isFailing({ status_byte }),
+  tested: isTested({ status_byte }),
 });
 
 export const chipClass = (fault: FaultState) => {
@@ -15,12 +16,19 @@ export const chipClass = (fault: FaultState) => {
   return `chip chip-${standing(fault)}${seen}`;
 };
 
-/** Returns the state of a fault as text; without a session, a test has no result now. */
+/**
+ * Whether the result of a test is one of now: there is an open session, and the test has had a result in it. Otherwise
+ * it is that of an earlier session.
+ */
+export const isPresent = ({ tested }: FaultState, hasSession: boolean) => hasSession && tested;
+
+/** Returns the state of a fault as text; `hasSession` says whether a session is open. */
 export function stateText(fault: FaultState, hasSession = true): string {
-  const failing = hasSession ? "failing now" : "failed when last tested";
+  const isNow = isPresent(fault, hasSession);
+  const failing = isNow ? "failing now" : "failed when last tested";
   const text = {
     failing,
-    pending: hasSession ? "failing, not yet confirmed" : "failed, not yet confirmed",
+    pending: isNow ? "failing, not yet confirmed" : "failed, not yet confirmed",
     recorded: `on record${fault.status === "pending" ? " as pending" : ""}, passes again`,
     none: fault.status,
   }[standing(fault)];

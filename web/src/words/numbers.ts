@@ -23,4 +23,4 @@ export const seconds = (s: number | null | undefined, digits = 2) => number(s, d
 export const count = (n: number) => n.toLocaleString("en").replaceAll(",", "\u202f");
 
 /** Formats a number with its noun: 1 session, 2 sessions. */
-export const plural = (n: number, noun: string) => `${n} ${noun}${n === 1 ? "" : "s"}`;
+export const plural = (n: number, noun: string) => `${count(n)} ${noun}${n === 1 ? "" : "s"}`;

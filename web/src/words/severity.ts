@@ -13,6 +13,8 @@ export interface FaultState {
   status: FaultStatus;
   /** Whether the last result of its test is a failure. */
   failing: boolean;
+  /** Whether this result is one of the last session that was opened, not of one before. */
+  tested: boolean;
   acknowledged?: boolean;
 }
 

@@ -50,5 +50,14 @@ export const STATUS_BITS = [
   },
 ] as const;
 
+/** Bits that say no more than that a test has not run yet. */
+const NEUTRAL_BITS = [6, 4];
+
+/** Whether a bit tells nothing bad if it is set. */
+export const isNeutralBit = (bit: number) => NEUTRAL_BITS.includes(bit);
+
+/** Whether the test has given a result in the session of a fault line, or in the last one that was opened. */
+export const isTested = (line: { status_byte: string }) => (parseInt(line.status_byte, 16) & 64) === 0;
+
 /** Whether the test of a fault line fails; false for a line that reports a test that passes again. */
 export const isFailing = (line: { status_byte: string }) => (parseInt(line.status_byte, 16) & 1) === 1;

@@ -34,6 +34,9 @@ export function timeAgo(moment: string | null | undefined, now = Date.now()): st
 export const dateTime = (moment: string | null | undefined) =>
   moment ? new Date(moment).toLocaleString(undefined, { dateStyle: "medium", timeStyle: "medium" }) : NONE;
 
+/** Formats the time of day of a moment, to the second. */
+export const timeOfDay = (moment: Date) => moment.toLocaleTimeString(undefined, { timeStyle: "medium" });
+
 /** Formats a moment: its time of day if it is today, else with its date. */
 export function sinceText(moment: string, now = new Date()): string {
   const at = new Date(moment);

@@ -1,5 +1,5 @@
 /** The verdict of a session as text. */
-import type { Candidate, FaultCode, Outcome, Summary } from "../api/types";
+import type { Candidate, FaultCode, FaultLine, Outcome, Summary } from "../api/types";
 import { codeTitle, faultTitle } from "./fault-names";
 import { capitalised } from "./sentence";
 import { duration } from "./time";
@@ -20,10 +20,14 @@ export function ambiguousCauses(candidates: Candidate[]): string {
   return `Cannot tell: ${first} or ${others.join(" or ")}`;
 }
 
-/** Returns the title of a fault, or its candidates if its monitor could not distinguish them. */
-function faultText(summary: Summary, code: FaultCode): string {
+type Finding = Pick<FaultLine, "code" | "kind" | "status">;
+
+/** Returns the title of a fault with its kind, or its candidates if its monitor could not distinguish them. */
+function faultText(summary: Summary, code: FaultCode, lines: Finding[]): string {
   const monitor = summary.monitors?.find((each) => each.code === code && each.outcome === "cannot tell");
-  return ambiguousCauses(monitor?.candidates ?? []) || codeTitle(code);
+  const confirmed = lines.filter((line) => line.code === code && line.status === "confirmed");
+  const kind = confirmed.map((line) => line.kind).findLast((kind) => kind);
+  return ambiguousCauses(monitor?.candidates ?? []) || codeTitle(code) + (kind ? ` (${kind})` : "");
 }
 
 export interface Verdict {
@@ -32,14 +36,17 @@ export interface Verdict {
   look: string;
 }
 
-/** Returns the result of a session, with the monitors that did not judge it, and its style. */
-export function verdict(summary: Summary): Verdict {
+/**
+ * Returns the result of a session, with the monitors that did not judge it, and its style. The kinds of its faults are
+ * in the lines of their changes.
+ */
+export function verdict(summary: Summary, lines: Finding[] = []): Verdict {
   if (summary.outcome === "not judged") return { text: "Not judged", look: "quiet" };
   const titles = (outcome: Outcome) => {
     const monitors = (summary.monitors ?? []).filter((monitor) => monitor.outcome === outcome);
     return monitors.map((monitor) => codeTitle(monitor.code)).join(", ");
   };
-  const found = summary.faults.map((code) => faultText(summary, code)).join(", ");
+  const found = summary.faults.map((code) => faultText(summary, code, lines)).join(", ");
   const pending = titles("pending");
   const passed = titles("no fault");
   const notLearnt = titles("not learnt");

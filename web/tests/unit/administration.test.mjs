@@ -38,16 +38,27 @@ test("an audited action is told in words, with the way to what is still there", 
   assert.deepEqual(["clear_fault", "put_asset"].map(actText), ["clear fault", "change rig"]);
   const target = (act, target) => auditTarget({ act, target }, (id) => (id === "7" ? "ann" : undefined));
   assert.deepEqual(target("clear_fault", "/api/v1/assets/a%20b/faults/x_servo"), {
-    text: "rig a b: faults/x_servo",
+    text: "rig a b: X servo",
     path: "/rigs/a%20b",
   });
-  const ended = { text: "session 5: end", path: "/sessions/5" };
+  const ended = { text: "session 5", path: "/sessions/5" };
   assert.deepEqual(target("end_session", "/api/v1/sessions/5/end"), ended);
   assert.deepEqual(target("delete_asset", "/api/v1/assets/a"), { text: "rig a" });
   assert.equal(target("revoke_token", "/api/v1/tokens/7").text, "token ann");
   assert.equal(target("revoke_token", "/api/v1/tokens/8").text, "token 8");
+  assert.equal(
+    target("acknowledge_fault", "/api/v1/assets/a/faults/sensor/acknowledge").text,
+    "rig a: Position sensor",
+  );
+  assert.equal(
+    target("import_session", "/api/v1/assets/a/sessions/import").text,
+    "rig a: an imported session",
+  );
+  assert.equal(target("activate", "/api/v1/assets/a/calibrations/9/activate").text, "rig a: calibration 9");
+  assert.equal(target("repair_demo", "/api/v1/demo/faults").text, "the demo");
+  assert.equal(target("anything", "/api/v1/assets/a/else/b").text, "rig a: else/b", "what has no words");
   assert.deepEqual(target("log_in", "/api/v1/login"), { text: "login" });
   const rule = target("delete_rule", "/api/v1/notifications/rules/4");
-  assert.deepEqual(rule, { text: "notifications/rules/4" });
+  assert.deepEqual(rule, { text: "notification rule 4" });
   assert.deepEqual(target("clear", "/sovd/v1/components/a"), { text: "/sovd/v1/components/a" });
 });

@@ -52,6 +52,20 @@ test("a full buffer keeps the newest moments in all columns", () => {
   assert.deepEqual([buffer.t, buffer.x.command, buffer.first, buffer.last], [[], [], 0, 0]);
 });
 
+test("over a new connection no moment is there twice, and nothing is drawn across a hole", () => {
+  const buffer = new TraceBuffer();
+  buffer.append(trace(0, 10));
+  buffer.resume(trace(0.05, 10));
+  assert.deepEqual(buffer.t, trace(0, 15).t_s);
+  for (const columns of [buffer.x, buffer.y, buffer.shared])
+    for (const column of Object.values(columns)) assert.equal(column.length, 15);
+  assert.deepEqual(buffer.x.command, buffer.t);
+  buffer.append(trace(0.1, 2));
+  assert.equal(buffer.t.length, 15);
+  buffer.resume(trace(5, 3));
+  assert.deepEqual(buffer.x.command, [5, 5.01, 5.02]);
+});
+
 test("the index of a moment is that of the last one not after it", () => {
   const next = random(11);
   const buffer = TraceBuffer.of(trace(0, 500));

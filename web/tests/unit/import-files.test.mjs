@@ -7,6 +7,7 @@ import { fileFormat } from "../../src/pages/import/file-format.ts";
 import { guessFactor, guessMapping } from "../../src/pages/import/mapping.ts";
 import { readTable } from "../../src/pages/import/table.ts";
 import { textOf } from "../../src/pages/import/text-of.ts";
+import { likelyUnit } from "../../src/pages/import/time-unit.ts";
 
 const bytes = (text) => Uint8Array.from(text, (letter) => letter.charCodeAt(0));
 const format = (head) => fileFormat(bytes(head));
@@ -24,6 +25,21 @@ test("a spreadsheet that the service does not read is refused with what to do", 
   const archive = `PK\x03\x04\x14${"\0".repeat(25)}mimetypeapplication/vnd.oasis.opendocument.spreadsheet`;
   assert.throws(() => format(archive), /OpenDocument.*Excel workbook \(\.xlsx\) or as CSV/);
   assert.throws(() => format("\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"), /old Excel workbook/);
+});
+
+test("a file that is no text is refused in words", () => {
+  for (const binary of ["\x89PNG\r\n\x1a\n\0", "a,b,c\n1,2,\0\n", "\x7fELF\x02\x01"])
+    assert.throws(() => textOf(bytes(binary)), /neither a text nor/, JSON.stringify(binary));
+  assert.equal(textOf(bytes("a\tb\r\n\f1\n")), "a\tb\r\n\f1\n");
+  assert.equal(textOf(bytes("\xff\xfea\0,\0")), "a,", "UTF-16");
+});
+
+test("a time that is 1000 times too slow for the rig is in milliseconds", () => {
+  const columns = (step) => ({ t_s: [0, 1, null, 2, 3].map((i) => (i === null ? null : i * step)) });
+  assert.deepEqual(likelyUnit(columns(10), 100), { word: "ms", factor: 1e-3, spacing: 10 });
+  assert.equal(likelyUnit(columns(10_000), 100).word, "µs");
+  for (const step of [0.01, 0.1, 1]) assert.equal(likelyUnit(columns(step), 100), undefined, `${step} s`);
+  assert.equal(likelyUnit({ t_s: [1] }, 100), undefined);
 });
 
 test("a text that is not UTF-8 is Windows-1252, and its units keep their signs", () => {

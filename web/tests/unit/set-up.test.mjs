@@ -60,6 +60,9 @@ test("properties that are not in the form keep their values", () => {
   const after = assetOf({ ...describeAsset(before), limit: 10 }, before);
   assert.deepEqual(after.plate, before.plate);
   assert.deepEqual(after.servo, { angle_limit_rad: 10 * DEGREE, rate_limit_rad_s: 4 });
+  const unchanged = assetOf(describeAsset(before), before);
+  assert.equal(unchanged.servo.angle_limit_rad, 0.3, "to the bit, although the form rounds it");
+  assert.equal(assetOf(describeAsset()).servo.angle_limit_rad, 0.2);
   assert.deepEqual([after.axes.swap, after.axes.x_sign, after.axes.y_sign], [true, -1, 1]);
   assert.deepEqual(after.diagnostics, before.diagnostics);
 });

@@ -42,10 +42,13 @@ test("severity decreases from failing over acknowledged and pending to on record
 });
 
 test("a fault that fails now, one on record and an acknowledged one look different", () => {
-  const fails = { status: "confirmed", failing: true };
-  const passes = { status: "confirmed", failing: false };
+  const fails = { status: "confirmed", failing: true, tested: true };
+  const passes = { status: "confirmed", failing: false, tested: true };
   assert.equal(stateText(fails), "failing now");
   assert.equal(stateText(fails, false), "failed when last tested", "no session is open");
+  const earlier = { ...fails, tested: false };
+  assert.equal(stateText(earlier), "failed when last tested", "in a session before the open one");
+  assert.equal(stateText({ ...earlier, status: "pending" }), "failed, not yet confirmed");
   assert.equal(stateText(passes), "on record, passes again");
   assert.equal(stateText({ ...fails, acknowledged: true }), "failing now, acknowledged");
   assert.equal(stateText({ status: "cleared", failing: false, acknowledged: true }), "cleared");
@@ -164,4 +167,18 @@ test("a message is told without codes and times of the interface", () => {
   const text = deliverySummary("my_x_servo-1: x_servo (dead) confirmed since 4.50 s: qy asks for -0.2 m/s²");
   assert.equal(text, "my_x_servo-1: X servo (dead) confirmed since 4.50 s: qy asks for −0.2 m/s²");
   assert.doesNotMatch(deliverySummary("a: last heard 2026-11-25T20:02:59.031397Z"), /T20/);
+});
+
+test("a verdict tells the kinds of its faults, as the last lines about them do", () => {
+  const of = { outcome: "fault", faults: ["x_servo", "sensor"], monitors: [] };
+  const line = (code, status, kind) => ({ code, status, kind });
+  const lines = [
+    line("x_servo", "pending", "gain"),
+    line("x_servo", "confirmed", null),
+    line("x_servo", "confirmed", "dead"),
+    line("x_servo", "confirmed", null),
+    line("sensor", "pending", "noise"),
+  ];
+  assert.equal(verdict(of, lines).text, "X servo (dead), Position sensor");
+  assert.equal(verdict(of).text, "X servo, Position sensor");
 });

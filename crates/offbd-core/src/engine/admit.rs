@@ -59,6 +59,12 @@ mod tests {
         let far = Sample { x_m: Some(-1e9), ..at(1.0) };
         let reason = check(&mapping, &far).unwrap_err();
         assert_eq!(reason.to_string(), "x_m is -1000000000, beyond ±50");
+        let turn = Sample { cmd_qx_rad: Some(400.0), ..Sample::default() };
+        let degrees = AxisMapping { command_unit_rad: 0.017_453_292_5, ..AxisMapping::default() };
+        let reason = check(&degrees, &turn).unwrap_err();
+        assert_eq!(reason.to_string(), "cmd_qx_rad is 400, beyond ±360");
+        let reason = check(&AxisMapping::default(), &turn).unwrap_err();
+        assert_eq!(reason.to_string(), "cmd_qx_rad is 400, beyond ±6.28");
     }
 
     #[test]

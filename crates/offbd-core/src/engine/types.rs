@@ -1,8 +1,18 @@
 //! The inputs of the engine, its decisions on them and its state.
 
+use alloc::borrow::ToOwned;
+use alloc::format;
+use alloc::string::String;
+
 use crate::diagnosis::{DebounceTimes, Evidence};
 use crate::plant::Fidelity;
 use crate::vocabulary::{Brief, FaultCode, PerAxis, Sample, SimTime};
+
+/// Returns a number with at most two decimals: a limit converted to the units of a device has many.
+fn hundredths(number: f64) -> String {
+    let text = format!("{number:.2}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
 
 /// An input of the engine.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,7 +52,7 @@ pub enum Admission {
 pub enum Rejection {
     #[error("{field} is not a finite number")]
     NotFinite { field: &'static str },
-    #[error("{field} is {}, beyond ±{limit}", Brief(*value))]
+    #[error("{field} is {}, beyond ±{}", Brief(*value), hundredths(*limit))]
     Absurd { field: &'static str, value: f64, limit: f64 },
     #[error("t_s is {behind_s:.3} s before the last judged sample: recorded, not judged")]
     Late { behind_s: f64 },

@@ -43,7 +43,7 @@ use show::Show;
     offbd demo --seconds 120 --speed 10 --port 0\n\n\
     With --seconds, a script injects and repairs faults from the beginning, and\n\
     clears a code before it injects its fault again. Without, the rig stays healthy\n\
-    for a minute, so that you can inject faults yourself on the page Demo; then the\n\
+    for a minute, so that you can inject faults yourself on the page Lessons; then the\n\
     script injects and repairs faults, and what was found stays on record until you\n\
     clear it. On that page you can tune the controller as well.\n\n\
     A fault is CODE:KIND[=SIZE]@START[-END]; `offbd simulate --help` lists them.\n\n\
@@ -157,7 +157,7 @@ fn planned(args: &DemoArgs, seconds: f64) -> Vec<Fault> {
 fn first_fault(args: &DemoArgs, faults: &[Fault]) -> String {
     let first_s = faults.iter().map(|f| f.onset_s).fold(f64::INFINITY, f64::min) / args.speed;
     format!(
-        "the first in {first_s:.0} s, unless you inject one on the page Demo; what was found \
+        "the first in {first_s:.0} s, unless you inject one on the page Lessons; what was found \
          stays on record until you clear it"
     )
 }

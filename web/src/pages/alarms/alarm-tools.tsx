@@ -9,7 +9,7 @@ import { LastChangeChoice } from "./last-change-choice";
 
 const STATES = [
   ["active", "Failing or on record"],
-  ["failing", "Failing now"],
+  ["failing", "Failing"],
   ["on_record", "Passing, on record"],
   ["all", "All, healed ones too"],
 ] as const;
@@ -43,7 +43,7 @@ export function AlarmTools({ filter, hours, change }: Props) {
           onChange={(e) => change("asset", e.currentTarget.value.trim())}
         />
       </label>
-      <TagChoice tags={tags ?? []} chosen={filter.tag ?? ""} change={(tag) => change("tag", tag)} />
+      <TagChoice isAbove tags={tags ?? []} chosen={filter.tag ?? ""} change={(tag) => change("tag", tag)} />
       <label class="check">
         <input
           type="checkbox"

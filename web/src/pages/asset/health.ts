@@ -10,7 +10,7 @@ export const activeFaults = (faults: FaultEntry[]) =>
 interface Known {
   /** Whether the page receives the states of the rig. */
   isConnected: boolean;
-  /** Whether no sample has arrived for some time. */
+  /** Whether no sample has arrived for some time, or communication with the rig is lost. */
   isSilent: boolean;
   /** Whether the rig has a calibration. */
   isLearnt: boolean;

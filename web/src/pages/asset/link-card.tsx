@@ -4,7 +4,7 @@ import type { LinkStretch, RigLink } from "../../api/types";
 import { useQuery } from "../../hooks/use-query";
 import { clockText, delayText, gapsText, rateText, spacingText, unjudgedText } from "../../words/link";
 import { count, NONE, seconds } from "../../words/numbers";
-import { dateTime, sinceText } from "../../words/time";
+import { dateTime, sinceText, timeOfDay } from "../../words/time";
 import { MuteButton } from "./mute-button";
 
 /** Interval between two requests, ms. */
@@ -32,7 +32,7 @@ function LinkTable({ link: { session, recent, expected_rate_hz: expected } }: { 
             <span class="hidden">Quantity</span>
           </th>
           <th scope="col">Last 5 minutes</th>
-          <th scope="col">This session{session && `, since ${sinceText(session.from)}`}</th>
+          <th scope="col">This session{session && `, counted since ${sinceText(session.from)}`}</th>
         </tr>
       </thead>
       <tbody>
@@ -67,11 +67,16 @@ function CommunicationMute({ asset }: { asset: string }) {
 
 /** How the samples of the rig arrive, in its session and in the last minutes. */
 export function LinkCard({ asset }: { asset: string }) {
-  const { data: link } = useQuery(() => api.link(asset), `${asset} link`, LINK_MS);
+  const fetchLink = () => api.link(asset).then((counted) => ({ link: counted, at: new Date() }));
+  const { data } = useQuery(fetchLink, `${asset} link`, LINK_MS);
+  const { link, at } = data ?? {};
   const isCounted = link?.session ?? link?.recent;
   return (
     <section class="card" aria-labelledby="link-heading">
-      <h2 id="link-heading">Link</h2>
+      <div class="card-head">
+        <h2 id="link-heading">Link</h2>
+        {at && <span class="quiet small-text">as of {timeOfDay(at)}</span>}
+      </div>
       {link && !isCounted && <p class="quiet">No samples have arrived since the service was started.</p>}
       {link && isCounted && (
         <>

@@ -1,5 +1,5 @@
 import type { Alarm } from "../../api/alarms";
-import type { Asset, FaultEntry } from "../../api/types";
+import type { Asset, FaultEntry, State } from "../../api/types";
 import { RigView } from "../../parts/rig-view/rig-view";
 import { XyTrace } from "../../parts/xy-trace/xy-trace";
 import { count } from "../../words/numbers";
@@ -29,19 +29,11 @@ interface Props {
   refetch: () => Promise<unknown>;
 }
 
-export function LiveRig({ asset, faults, lost, refetch }: Props) {
-  const { state, connection, isSilent, charts } = useLiveRig(asset.name, () => void refetch());
-  const trends = useTrends(asset.name);
-  const active = activeFaults(faults);
-  const health = healthOf(active, state, {
-    isConnected: connection === "live",
-    isSilent,
-    isLearnt: asset.calibration != null,
-  });
+/** What keeps the page from showing the rig as it is now. */
+function Notices({ isLost, state }: { isLost: boolean; state?: State }) {
   return (
-    <main class="asset">
-      <AssetHeader name={asset.name} health={health} session={state?.session_id} />
-      {connection === "lost" && (
+    <>
+      {isLost && (
         <p class="trouble" role="alert">
           Connection lost; reconnecting. The page shows the last received data.
         </p>
@@ -52,10 +44,32 @@ export function LiveRig({ asset, faults, lost, refetch }: Props) {
           {state.unjudged.reason}).
         </p>
       )}
+    </>
+  );
+}
+
+export function LiveRig({ asset, faults, lost, refetch }: Props) {
+  const { state, connection, isSilent, isStill, charts } = useLiveRig(asset.name, () => void refetch());
+  const trends = useTrends(asset.name);
+  const active = activeFaults(faults);
+  const health = healthOf(active, state, {
+    isConnected: connection === "live",
+    isSilent: isSilent || lost !== undefined,
+    isLearnt: asset.calibration != null,
+  });
+  const still = isStill ? { t_s: state?.t_s, at: lost?.since } : undefined;
+  return (
+    <main class="asset">
+      <AssetHeader name={asset.name} health={health} session={state?.session_id} />
+      <Notices isLost={connection === "lost"} state={state} />
       {lost && <LostCommunication alarm={lost} refetch={refetch} />}
       <ActiveFaults asset={asset.name} faults={active} hasSession={state?.session_id != null} />
       <TrendWarnings trends={trends.data} />
-      <LearningCard name={asset.name} state={state} changed={refetch} />
+      <LearningCard
+        name={asset.name}
+        state={state}
+        changed={() => Promise.all([refetch(), trends.refetch()])}
+      />
       {state && !state.session_id && <LastSession name={asset.name} />}
       <div class="live-top">
         <RigView asset={asset} pose={charts.pose} name={`${asset.name}-live`} />
@@ -67,7 +81,7 @@ export function LiveRig({ asset, faults, lost, refetch }: Props) {
           <Monitors asset={asset.name} monitors={state?.monitors ?? []} />
         </div>
       </div>
-      {(!state || state.session_id) && <LiveChartsCard charts={charts} />}
+      {(!state || state.session_id) && <LiveChartsCard charts={charts} still={still} />}
       <div class="pair">
         <NowCard state={state} />
         <TwinCard asset={asset} state={state} />

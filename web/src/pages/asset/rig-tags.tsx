@@ -44,7 +44,7 @@ function TagsDialog({ asset, tags, changed, close }: DialogProps) {
   return (
     <Dialog title={`Tags of ${asset}`} close={close}>
       <label>
-        Words with blanks between them
+        Tags, separated by blanks
         <input value={text} onInput={(e) => setText(e.currentTarget.value)} />
       </label>
       <p class="quiet">At most 20 words of letters, digits, “-”, “_” and “.”, such as a room or a line.</p>

@@ -15,6 +15,9 @@ const RENDER_MS = 150;
 /** Time without a sample after which a rig counts as silent, ms. */
 const SILENT_MS = 10_000;
 
+/** Time without a sample after which the page says that empty charts have nothing to show, ms. */
+const STILL_MS = 3000;
+
 /** The live state of the rig, and its charts with marks at the faults. */
 export function useLiveRig(name: string, changed: () => void) {
   const group = useMemo(() => new ChartGroup(), []);
@@ -35,5 +38,7 @@ export function useLiveRig(name: string, changed: () => void) {
   });
   const charts = useLiveCharts(buffer, group);
   const now = useNow(500);
-  return { state, connection, isSilent: isSilent(now, SILENT_MS), charts };
+  /** Whether there is nothing to draw: the samples of the session came before the page was opened. */
+  const isStill = state !== undefined && buffer.t.length === 0 && isSilent(now, STILL_MS);
+  return { state, connection, isSilent: isSilent(now, SILENT_MS), isStill, charts };
 }

@@ -3,7 +3,7 @@ import { EmptyState } from "../../parts/empty-state";
 import { codeMeaning, codeTitle, faultMeaning } from "../../words/fault-names";
 import { isRepair } from "../../words/fault-state";
 import { capitalised, sentence } from "../../words/sentence";
-import { isFailing } from "../../words/status-byte";
+import { isFailing, isTested } from "../../words/status-byte";
 import { sinceText } from "../../words/time";
 import { isActive } from "./is-active";
 
@@ -14,10 +14,11 @@ const latestFailure = (history: HistoryEntry[]) =>
 /** Since when the test passes again or fails, and whether that is known for now. */
 function presentText(fault: FaultEntry, history: HistoryEntry[]): string {
   const began = fault.last_occurrence && sinceText(fault.last_occurrence.noted_at);
-  if (isFailing(fault))
-    return fault.monitor
-      ? `It fails now${began ? `, since ${began}` : ""}.`
-      : `It failed when it was last tested${began ? `; the failure began at ${began}` : ""}. No session is open.`;
+  if (isFailing(fault)) {
+    if (fault.monitor && isTested(fault)) return `It fails now${began ? `, since ${began}` : ""}.`;
+    const last = `It failed when it was last tested${began ? `; the failure began at ${began}` : ""}.`;
+    return `${last} ${fault.monitor ? "It has not been tested in the open session yet." : "No session is open."}`;
+  }
   const repair = history.find((entry) => entry.fault && isRepair(entry.fault));
   const passes = `Its test passes again${repair ? ` since ${sinceText(repair.at)}` : ""}`;
   return `${passes}; it stays on record${began ? ` (last failure ${began})` : ""}.`;

@@ -1,4 +1,4 @@
-import { STATUS_BITS } from "../../words/status-byte";
+import { isNeutralBit, STATUS_BITS } from "../../words/status-byte";
 
 /** The bits of the status byte. */
 export function StatusByte({ byte }: { byte: string }) {
@@ -20,7 +20,7 @@ export function StatusByte({ byte }: { byte: string }) {
           {STATUS_BITS.map(({ bit, name, on, off }) => {
             const isSet = ((bits >> bit) & 1) === 1;
             return (
-              <tr class={isSet ? "set" : ""}>
+              <tr class={`${isSet ? "set" : ""}${isNeutralBit(bit) ? " neutral" : ""}`}>
                 <th scope="row">{bit}</th>
                 <td class="bit">{isSet ? "1" : "0"}</td>
                 <td>

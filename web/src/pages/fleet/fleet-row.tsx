@@ -5,7 +5,7 @@ import { HealthMark } from "../../parts/health-mark";
 import { Link } from "../../router/link";
 import { rigPath } from "../../router/paths";
 import { alarmCodeTitle } from "../../words/alarm";
-import { number } from "../../words/numbers";
+import { NONE, number } from "../../words/numbers";
 import { severity } from "../../words/severity";
 import { dateTime, sinceText, timeAgo } from "../../words/time";
 import type { FleetRow as Row } from "./rows";
@@ -96,9 +96,9 @@ export function FleetRow({ row: { entry, health }, seenAt }: { row: Row; seenAt:
       <HealthMark health={health} />
       <Findings entry={entry} />
       <span class="quiet clip">{entry.session ?? "–"}</span>
-      <span class={`n${(entry.lag_s ?? 0) > LATE_S ? " late" : ""}`}>
+      <span class={`n${entry.session_id && (entry.lag_s ?? 0) > LATE_S ? " late" : ""}`}>
         <span class="only-small">lag </span>
-        {number(entry.lag_s, 1, "s")}
+        {entry.session_id ? number(entry.lag_s, 1, "s") : NONE}
       </span>
       <span class="n quiet">{timeAgo(entry.last_seen, seenAt)}</span>
     </Link>

@@ -2,7 +2,7 @@
 import { isCommunication, type FleetEvent } from "../../api/events";
 import type { CommunicationLine, FaultLine, FleetEntry } from "../../api/types";
 import { healthByFaults, type RigHealth } from "../../words/severity";
-import { isFailing } from "../../words/status-byte";
+import { isFailing, isTested } from "../../words/status-byte";
 
 /** An event, and when it arrived at the page. */
 export type ReceivedEvent = FleetEvent & { received: Date };
@@ -46,6 +46,7 @@ export function afterEvent(
     kind: line.kind,
     status: line.status,
     failing,
+    tested: isTested(line),
     failed_at: hasBegun ? now.toISOString() : known?.failed_at,
     acknowledged: !hasBegun && (known?.acknowledged ?? false),
     changed_at: now.toISOString(),

@@ -1,4 +1,6 @@
 import { useMemo } from "preact/hooks";
+import { api } from "../../api/client";
+import { useQuery } from "../../hooks/use-query";
 import { ColumnMapping } from "./column-mapping";
 import { countSeen, finite, toColumns, toCsv } from "./columns";
 import { ImportButtons } from "./import-buttons";
@@ -14,17 +16,31 @@ interface Props extends ImportProps {
   setMapping: (mapping: Mapping) => void;
 }
 
+/** Samples per second of a rig that is not described yet. */
+const DEFAULT_RATE_HZ = 100;
+
+/** The samples per second of the chosen rig. */
+function useRate(name: string, known: string[]): number {
+  const isKnown = known.includes(name);
+  const { data } = useQuery(
+    () => (isKnown ? api.asset(name) : Promise.resolve(undefined)),
+    `${name} ${isKnown}`,
+  );
+  return data?.sample_rate_hz ?? DEFAULT_RATE_HZ;
+}
+
 /** Imports a table whose columns are assigned here. */
 export function ImportForm({ recording, setMapping, ...props }: Props) {
   const { table, mapping } = recording;
   const columns = useMemo(() => toColumns(table, mapping), [table, mapping]);
   const { target, send } = useImport(props);
+  const rate = useRate(target.asset, target.assets);
   return (
     <>
       <ImportTarget {...target} />
       <ColumnMapping table={table} mapping={mapping} change={setMapping} />
       <Preview columns={columns} />
-      <SanityCheck columns={columns} mapping={mapping} change={setMapping} />
+      <SanityCheck rate={rate} columns={columns} mapping={mapping} change={setMapping} />
       <ImportButtons
         mapping={mapping}
         nRows={finite(columns.t_s).length}

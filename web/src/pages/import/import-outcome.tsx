@@ -27,6 +27,7 @@ export function ImportOutcome({ result, format }: { result: ImportResult; format
               row {index + firstRow}: {reason}
             </li>
           ))}
+          {rejected > SHOWN && <li>and {count(rejected - SHOWN)} more</li>}
         </ul>
       )}
       <div class="form-end">

@@ -6,6 +6,8 @@ import type { Mapping } from "./mapping";
 import type { Quantity } from "./quantities";
 import { checkSigns } from "./sign-check";
 import { SignRemark } from "./sign-remark";
+import { TimeRemark } from "./time-remark";
+import { likelyUnit } from "./time-unit";
 
 /** Limits beyond which a unit must be wrong. */
 const LARGEST_POSITION_M = 2;
@@ -21,15 +23,19 @@ function countNonIncreasing({ t_s }: Columns): number {
 }
 
 interface Props {
+  /** The samples per second of the rig. */
+  rate: number;
   columns: Columns;
   mapping: Mapping;
   change: (mapping: Mapping) => void;
 }
 
 /** Checks of the mapped columns, with buttons that correct them. */
-export function SanityCheck({ columns, mapping, change }: Props) {
+export function SanityCheck({ rate, columns, mapping, change }: Props) {
+  const unit = useMemo(() => likelyUnit(columns, rate), [columns, rate]);
+  const { t_s } = mapping;
   const check = useMemo(() => checkSigns(columns), [columns]);
-  const nTimeless = mapping.t_s.index === null ? 0 : columns.t_s.length - finite(columns.t_s).length;
+  const nTimeless = t_s.index === null ? 0 : columns.t_s.length - finite(columns.t_s).length;
   const nNonIncreasing = countNonIncreasing(columns);
   const isFar = isBeyond(LARGEST_POSITION_M, columns.x_m, columns.y_m);
   const isSteep = isBeyond(LARGEST_ANGLE_RAD, columns.cmd_qx_rad, columns.cmd_qy_rad);
@@ -42,6 +48,13 @@ export function SanityCheck({ columns, mapping, change }: Props) {
         <li class="warn">
           {count(nTimeless)} rows are left out: their time is not a number (a date is not read as one).
         </li>
+      )}
+      {unit && (
+        <TimeRemark
+          unit={unit}
+          rate={rate}
+          correct={() => change({ ...mapping, t_s: { ...t_s, factor: t_s.factor * unit.factor } })}
+        />
       )}
       {nNonIncreasing > 0 && <li class="warn">Time does not increase in {count(nNonIncreasing)} rows.</li>}
       {isFar && <li class="warn">Positions exceed 2 m: check the unit of the ball's position.</li>}

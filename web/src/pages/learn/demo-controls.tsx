@@ -20,6 +20,7 @@ export function DemoControls() {
   const thenRefetch = (action: () => Promise<unknown>) => () => action().then(refetch);
   return (
     <section class="card">
+      <h2>Inject faults</h2>
       <div class="card-head">
         <DemoStatus demo={demo} />
         <div class="page-tools">

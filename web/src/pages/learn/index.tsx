@@ -6,10 +6,10 @@ import { ExercisesCard } from "./exercises-card";
 import { Textbook } from "./textbook";
 
 export function LearnPage({ isDemo }: { isDemo: boolean }) {
-  useTitle(isDemo ? "Demo" : "Learn");
+  useTitle("Lessons");
   return (
     <main>
-      <h1>{isDemo ? "Inject faults" : "Learn"}</h1>
+      <h1>Lessons</h1>
       {isDemo ? (
         <DemoControls />
       ) : (

@@ -2,14 +2,17 @@ import { useState } from "preact/hooks";
 import { alarmApi, type Channel } from "../../api/alarms";
 import { ActionButton } from "../../parts/action-button";
 import { Choice } from "../../parts/choice";
+import { useFeature } from "../../parts/service-health";
 import { channelOf, draftOf, EMPTY_DRAFT, isComplete, type ChannelDraft } from "./channel-draft";
 import { ChannelField } from "./channel-field";
 import { EmailFields } from "./email-fields";
 
-const KINDS = [
-  ["webhook", "Webhook"],
-  ["email", "E-mail"],
-] as const;
+/** The kinds of channels; a build without e-mail says so before its form is filled in. */
+const kinds = (hasEmail: boolean) =>
+  [
+    ["webhook", "Webhook"],
+    ["email", hasEmail ? "E-mail" : "E-mail (not in this build)"],
+  ] as const;
 
 interface Props {
   /** The channel to change; a new one without it. */
@@ -22,6 +25,8 @@ interface Props {
 export function ChannelForm({ channel, made }: Props) {
   const [draft, setDraft] = useState(channel ? draftOf(channel) : EMPTY_DRAFT);
   const { kind, name, url } = draft;
+  const hasEmail = useFeature()("email");
+  const isMissing = kind === "email" && !hasEmail;
   const change = (part: Partial<ChannelDraft>) => setDraft((before) => ({ ...before, ...part }));
   const save = async () => {
     const settings = channelOf(draft);
@@ -31,7 +36,9 @@ export function ChannelForm({ channel, made }: Props) {
   return (
     <>
       <div class="form-row">
-        {!channel && <Choice label="Kind" value={kind} options={KINDS} change={(kind) => change({ kind })} />}
+        {!channel && (
+          <Choice label="Kind" value={kind} options={kinds(hasEmail)} change={(kind) => change({ kind })} />
+        )}
         <ChannelField word="Name" value={name} change={(name) => change({ name })} />
         {kind === "webhook" && (
           <ChannelField word="URL" type="url" value={url} change={(url) => change({ url })} />
@@ -43,11 +50,16 @@ export function ChannelForm({ channel, made }: Props) {
           {channel ? "stays as it is." : "is shown once."}
         </p>
       )}
-      {kind === "email" && (
+      {isMissing && (
+        <p class="note" role="status">
+          This service is built without e-mail. Use a webhook, or ask for a build with the feature “email”.
+        </p>
+      )}
+      {kind === "email" && hasEmail && (
         <EmailFields draft={draft} hasPassword={channel?.email?.has_password} change={change} />
       )}
       <div class="form-end">
-        <ActionButton class="primary" disabled={!isComplete(draft)} action={save}>
+        <ActionButton class="primary" disabled={isMissing || !isComplete(draft)} action={save}>
           {channel ? "Save" : "Add"}
         </ActionButton>
       </div>

@@ -11,6 +11,7 @@ import { RigCharts } from "../../parts/charts/rig-charts";
 import { ThinnedNote } from "../../parts/charts/thinned-note";
 import { Facts } from "../../parts/facts";
 import { UnloadedPage } from "../../parts/unloaded-page";
+import { VerdictWarnings } from "../../parts/verdict-warnings";
 import { sessionPath } from "../../router/paths";
 import { changeOf } from "../../words/fault-state";
 import { faultTitle } from "../../words/fault-names";
@@ -44,15 +45,16 @@ export function SessionReport({ id }: { id: string }) {
 }
 
 function Report({ session, asset, faults }: { session: Session; asset: Asset; faults: FaultLine[] }) {
-  const result = session.verdict && verdict(session.verdict);
+  const result = session.verdict && verdict(session.verdict, faults);
   return (
     <ReportFrame title={`${session.name} of ${session.asset}`} back={sessionPath(session.id)}>
       <p class={`result ${result?.look ?? "quiet"}`}>{result?.text ?? "The session is open."}</p>
+      <VerdictWarnings verdict={session.verdict} asset={session.asset} />
       <Facts
         facts={[
-          ["Opened", dateTime(session.opened_at)],
+          ["Opened, by the service's clock", dateTime(session.opened_at)],
           ["Ended", session.ended_at ? dateTime(session.ended_at) : "not yet"],
-          ["Length", duration(sessionLength(session))],
+          ["Length, by the device's clock", duration(sessionLength(session))],
           ["Samples", `${count(session.samples)}, ${count(session.rejected ?? 0)} rejected`],
           ["Checksum of the verdict", session.verdict?.verdict_hash ?? "when the session has ended"],
         ]}

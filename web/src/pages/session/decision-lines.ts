@@ -1,4 +1,4 @@
-/** The values at which a monitor decides, as lines of its charts. */
+/** The values at which a monitor decides, as lines of its charts, and in words. */
 import type { Thresholds } from "../../api/types";
 import type { Threshold } from "../../parts/charts/chart-options";
 import { seconds } from "../../words/numbers";
@@ -12,11 +12,6 @@ export function evidenceLines({ suspect_nats, confirm_nats }: Thresholds): Thres
   ];
 }
 
-/** The ends of the fault detection counter, with the time of failure that leads to the upper one. */
-export function counterLines({ fail_s, confirm_s }: Thresholds): Threshold[] {
-  const failed = `failed after ${seconds(fail_s)}, confirmed ${seconds(confirm_s)} later`;
-  return [
-    { value: 127, label: failed },
-    { value: -128, label: "passed" },
-  ];
-}
+/** How long a failure must last until the counter is at its upper end, and until the fault is confirmed. */
+export const debounceText = ({ fail_s, confirm_s }: Thresholds) =>
+  `The test fails after ${seconds(fail_s)} of failure; the fault is confirmed ${seconds(confirm_s)} later.`;

@@ -20,7 +20,7 @@ interface Props {
 /** The verdict on the session, what it rests on, and the data of the session. */
 export function FoundCard({ session, asset, faults, seek }: Props) {
   const { verdict: summary, rejected } = session;
-  const result = summary && verdict(summary);
+  const result = summary && verdict(summary, faults);
   const hash = summary && <Hash hash={summary.verdict_hash} title={summary.verdict_hash} />;
   return (
     <section class="card verdict">

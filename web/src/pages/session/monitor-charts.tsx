@@ -5,7 +5,7 @@ import type { ChartKindName } from "../../parts/charts/chart-kinds";
 import { RigChart } from "../../parts/charts/rig-chart";
 import { Choice } from "../../parts/choice";
 import { codeTitle } from "../../words/fault-names";
-import { counterLines, evidenceLines } from "./decision-lines";
+import { debounceText, evidenceLines } from "./decision-lines";
 
 interface Props {
   group: ChartGroup;
@@ -40,21 +40,23 @@ export function MonitorCharts({ first = "x_servo", ...chart }: Props & { first?:
 export function ChartsOfMonitor({ code, thresholds, ...chart }: Props & { code: FaultCode }) {
   const found = thresholds.find((one) => one.code === code);
   const evidence = useMemo(() => found && evidenceLines(found), [found]);
-  const ends = useMemo(() => found && counterLines(found), [found]);
   const { counter, axis } = DRAWN[code];
   return (
-    <div class="charts charts-2">
-      {axis && evidence && evidence.length > 0 && (
-        <RigChart
-          key={`evidence ${axis}`}
-          kind="evidence"
-          axis={axis}
-          thresholds={evidence}
-          minExtent={found?.confirm_nats ?? undefined}
-          {...chart}
-        />
-      )}
-      <RigChart key={code} kind={counter} axis={axis ?? "x"} thresholds={ends} {...chart} />
-    </div>
+    <>
+      <div class="charts charts-2">
+        {axis && evidence && evidence.length > 0 && (
+          <RigChart
+            key={`evidence ${axis}`}
+            kind="evidence"
+            axis={axis}
+            thresholds={evidence}
+            minExtent={found?.confirm_nats ?? undefined}
+            {...chart}
+          />
+        )}
+        <RigChart key={code} kind={counter} axis={axis ?? "x"} {...chart} />
+      </div>
+      {found && <p class="quiet small-text">{debounceText(found)}</p>}
+    </>
   );
 }

@@ -6,7 +6,9 @@ import { TraceBuffer } from "../../live/buffer";
 import { Choice } from "../../parts/choice";
 import { ErrorMessage } from "../../parts/error-message";
 import { Loading } from "../../parts/loading";
+import { VerdictWarnings } from "../../parts/verdict-warnings";
 import { JudgeAgain } from "./judge-again";
+import { NothingPlayed } from "./nothing-played";
 import { Player } from "./player";
 import type { ProfileOrRecorded } from "./profile-choice";
 import { SessionHeader } from "./session-header";
@@ -45,6 +47,7 @@ export function SessionDetails({ session, asset, faults, refetch }: Props) {
   return (
     <main class="asset">
       <SessionHeader session={session} refetch={refetch} />
+      <VerdictWarnings verdict={session.verdict} asset={session.asset} />
       <ErrorMessage error={trace.error} retry={trace.refetch} />
       {pieces.length > 1 && (
         <p class="note">
@@ -53,7 +56,7 @@ export function SessionDetails({ session, asset, faults, refetch }: Props) {
         </p>
       )}
       {!buffer && !trace.error && <Loading what="the recording" />}
-      {buffer?.t.length === 0 && <p class="note">Nothing has been recorded in this session.</p>}
+      {buffer?.t.length === 0 && <NothingPlayed session={session} asset={asset} faults={faults} />}
       <Player
         session={session}
         asset={asset}

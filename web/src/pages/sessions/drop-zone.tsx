@@ -1,12 +1,27 @@
 import { useRef } from "preact/hooks";
+import { FORMATS, type FormatName } from "../../api/formats";
+import { useFeature } from "../../parts/service-health";
 import { useFileDrop, type Dropped } from "./use-file-drop";
 
-/** The suffixes of the names of the files that are proposed; others can be chosen, too. */
-const SUFFIXES = ".csv,.txt,.tsv,.xlsx,.parquet,.arrow,.arrows,.mcap,text/csv";
+/** The suffixes of the names of the files that are proposed, by format; others can be chosen, too. */
+const SUFFIXES: [FormatName, string][] = [
+  ["csv", ".csv,.txt,.tsv,text/csv"],
+  ["xlsx", ".xlsx"],
+  ["parquet", ".parquet"],
+  ["arrow", ".arrow,.arrows"],
+  ["mcap", ".mcap"],
+];
+
+/** Lists words: a, b or c. */
+const oneOf = (words: string[]) =>
+  words.length > 1 ? `${words.slice(0, -1).join(", ")} or ${words.at(-1)}` : words.join();
 
 /** The area for dropping or choosing a recording to import. */
 export function DropZone({ take }: { take: (dropped: Dropped) => void }) {
   const isOver = useFileDrop(take);
+  const isBuilt = useFeature();
+  const read = SUFFIXES.filter(([format]) => isBuilt(FORMATS[format].feature));
+  const words = oneOf(read.map(([format]) => FORMATS[format].word));
   const input = useRef<HTMLInputElement>(null);
   const chosen = ({ currentTarget }: { currentTarget: HTMLInputElement }) => {
     const file = currentTarget.files?.[0];
@@ -19,15 +34,13 @@ export function DropZone({ take }: { take: (dropped: Dropped) => void }) {
       <input
         ref={input}
         type="file"
-        accept={SUFFIXES}
+        accept={read.map(([, suffixes]) => suffixes).join()}
         class="hidden"
         aria-label="Recording to import"
         tabIndex={-1}
         onChange={chosen}
       />
-      <span>
-        {isOver ? "Release to import" : "Drop a recording here (CSV, Excel, Parquet, Arrow or MCAP), or"}
-      </span>{" "}
+      <span>{isOver ? "Release to import" : `Drop a recording here (${words}), or`}</span>{" "}
       {!isOver && (
         <button type="button" onClick={() => input.current?.click()}>
           choose a file

@@ -13,7 +13,8 @@ const TOKEN_PLACEHOLDER = "offbd_TOKEN";
 const LOCAL = /localhost|127\.0\.0\.1/;
 const LOCAL_NOTE =
   " A device on the network needs the name or address of this computer instead of 127.0.0.1, " +
-  "and the service must listen on it (--listen 0.0.0.0:8087).";
+  "and the service must listen on it (--listen 0.0.0.0:8087). Then it requires a token of everyone: make the first " +
+  "one with “offbd token create”.";
 
 /** Snippets for sending samples, and whether samples arrive. */
 export function Connect({ asset, next }: { asset: Asset; next: () => void }) {
@@ -27,7 +28,7 @@ export function Connect({ asset, next }: { asset: Asset; next: () => void }) {
   return (
     <section class="card">
       <p>
-        Send samples in batches, about ten times per second. The service answers after they are stored;
+        Send samples in batches, several times per second. The service answers after they are stored;
         duplicates count once.
       </p>
       <div class="chips" role="group" aria-label="Language">

@@ -50,7 +50,7 @@ const DEFAULT = {
 };
 
 export function describeAsset(asset?: Asset): Description {
-  const { plate, ball, servo, axes, diagnostics } = asset ?? {};
+  const { plate, ball, axes, diagnostics } = asset ?? {};
   const millimetres = (m: number | null | undefined, fallback: number) => rounded((m ?? fallback) * 1e3);
   return {
     name: asset?.name ?? "",
@@ -63,7 +63,7 @@ export function describeAsset(asset?: Asset): Description {
     width: millimetres(plate?.width_m, DEFAULT.plate.width_m),
     diameter: millimetres(plate?.diameter_m, DEFAULT.plate.diameter_m),
     hasRim: plate?.rim ?? DEFAULT.plate.rim,
-    limit: rounded((servo?.angle_limit_rad ?? DEFAULT.angle_limit_rad) / DEGREE),
+    limit: rounded(limitOfAsset(asset) / DEGREE),
     positionUnit: axes?.position_unit_m ?? DEFAULT_AXES.position_unit_m,
     commandUnit: axes?.command_unit_rad ?? DEFAULT_AXES.command_unit_rad,
     debounce: diagnostics?.debounce_s ?? NaN,
@@ -78,6 +78,14 @@ function diagnosticsOf({ debounce, falseAlarms }: Description, before?: Asset): 
   return given.length ? Object.fromEntries(given) : undefined;
 }
 
+const limitOfAsset = (asset?: Asset) => asset?.servo?.angle_limit_rad ?? DEFAULT.angle_limit_rad;
+
+/** Returns the largest plate angle, rad: exactly that of before if the form shows its degrees, which are rounded. */
+function limitOf(degrees: number, before?: Asset): number {
+  const known = limitOfAsset(before);
+  return degrees === rounded(known / DEGREE) ? known : degrees * DEGREE;
+}
+
 /** Returns the asset of a description; properties that are not in the form keep their values. */
 export function assetOf(description: Description, before?: Asset): Asset {
   const { name, rate, radius, mass, inertia, isRound, length, width, diameter } = description;
@@ -90,7 +98,7 @@ export function assetOf(description: Description, before?: Asset): Asset {
     name,
     sample_rate_hz: rate,
     plate: { thickness_m, rim: hasRim, ...size },
-    servo: { ...before?.servo, angle_limit_rad: limit * DEGREE },
+    servo: { ...before?.servo, angle_limit_rad: limitOf(limit, before) },
     axes: { ...DEFAULT_AXES, ...before?.axes, ...units },
     ball: { radius_m: radius / 1e3, mass_kg: mass / 1e3, inertia_factor: inertia },
     diagnostics: diagnosticsOf(description, before),

@@ -13,9 +13,7 @@ export function DeviceToken({ asset, created }: Props) {
   const caller = useCaller();
   if (caller?.authentication !== "required")
     return (
-      <>
-        The service requires no token: anyone who reaches this address can send. Keep it within your network.
-      </>
+      <>The service requires no token while it listens on this computer only: every local user can send.</>
     );
   const create = async () => created((await api.createDeviceToken(asset)).secret);
   return (

@@ -28,7 +28,8 @@ export function DiagnosisFields(fields: FieldsProps) {
       >
         How often a healthy rig that always runs may be accused of a servo fault, up to a million times a
         year. Fewer false alarms need more evidence: faults are found later, and small ones not at all. Empty:
-        about 26 a year.
+        about 26 a year. This is for the servos alone; ball and sensor have tests of their own, and what is
+        expected of each is shown after learning.
       </OptionalNumber>
       <p class="quiet small-text">An open session keeps the settings that it began with.</p>
     </details>

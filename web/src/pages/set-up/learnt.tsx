@@ -3,6 +3,7 @@ import type { Asset, CalibrationJob } from "../../api/types";
 import { Link } from "../../router/link";
 import { rigPath } from "../../router/paths";
 import { CalibrationDetails } from "./calibration-details";
+import { NothingLearnt } from "./nothing-learnt";
 
 /** The progress of the calibration, and its result. */
 export function Learnt({ asset, job }: { asset: Asset; job?: CalibrationJob }) {
@@ -25,9 +26,7 @@ export function Learnt({ asset, job }: { asset: Asset; job?: CalibrationJob }) {
           <b>Learnt.</b> The next session is judged by it.
         </p>
       )}
-      {!calibration && !job && (
-        <p class="quiet">Nothing yet. Until then, only sensor faults are confirmed.</p>
-      )}
+      {!calibration && !job && <NothingLearnt asset={asset.name} />}
       {calibration && (
         <>
           <CalibrationDetails calibration={calibration} />

@@ -69,7 +69,7 @@ def send(samples):
     request = urllib.request.Request(
         URL, json.dumps({"samples": samples}).encode(), {"content-type": "application/json"${header}})
     with urllib.request.urlopen(request, timeout=5) as answer:
-        return json.load(answer)       # {"accepted": 10, "rejected": [], ...}: stored
+        return json.load(answer)       # {"accepted": 20, "rejected": [], ...}: stored
 
 seq, batch, start = 0, [], time.monotonic()
 while True:
@@ -77,7 +77,7 @@ while True:
     seq += 1
     batch.append({"seq": seq, "t_s": time.monotonic() - start,
                   "cmd_qx_rad": qx, "cmd_qy_rad": qy, "x_m": x, "y_m": y})
-    if len(batch) >= 20:
+    if len(batch) >= 20:               # 5 times per second at 100 samples per second
         try:
             send(batch)
             batch = []
@@ -103,7 +103,7 @@ void sample(float qx, float qy, float x, float y) {   // ${units.angle} and ${un
     "%s{\\"seq\\":%u,\\"t_s\\":%.4f,\\"cmd_qx_rad\\":%.5f,\\"cmd_qy_rad\\":%.5f,\\"x_m\\":%.5f,\\"y_m\\":%.5f}",
     n ? "," : "", ++seq, millis() / 1000.0, qx, qy, x, y);
   batch += row;
-  if (++n < 20) return;
+  if (++n < 20) return;                              // a batch of 20 samples, 5 times per second
   HTTPClient http;
   http.begin(URL);
   http.addHeader("content-type", "application/json");${header}

@@ -1,6 +1,7 @@
 /** The uPlot options of a chart over time. */
 import type uPlot from "uplot";
 import { colour } from "../../theme";
+import { valueLabels, valueRange } from "./axis-labels";
 
 export interface Line {
   label: string;
@@ -41,21 +42,6 @@ export interface LineChartOptions {
 /** Scale of the text: the style sheet enlarges it on large screens. */
 export const textScale = () => parseFloat(getComputedStyle(document.documentElement).fontSize) / 16;
 
-const withTrueMinus = (text: string) => text.replace("-", "−");
-
-/** Returns the range of the value axis, with a margin above and below. */
-function valueRange(
-  low: number | null,
-  high: number | null,
-  minExtent: number,
-  isPositive: boolean,
-): [number, number] {
-  const bottom = isPositive ? 0 : Math.min(Number.isFinite(low) ? low! : 0, -minExtent);
-  const top = Math.max(Number.isFinite(high) ? high! : 0, minExtent);
-  const margin = Math.max((top - bottom) * 0.08, 1e-6);
-  return [bottom - margin, top + margin];
-}
-
 const series = (line: Line): uPlot.Series => ({
   label: line.label,
   stroke: colour(line.colour),
@@ -74,11 +60,21 @@ function axes(digits: number): uPlot.Axis[] {
     font: `${12 * scale}px system-ui, sans-serif`,
     gap: 4,
   };
-  const time = (t: number) => withTrueMinus(`${Number(t.toFixed(2))}`);
-  const value = (n: number | null) => (n === null ? "" : withTrueMinus(n.toFixed(digits)));
+  const time = (ticks: number[], step: number) => valueLabels(ticks, step, 0);
+  const value = (ticks: (number | null)[], step: number) => valueLabels(ticks, step, digits);
   return [
-    { ...common, size: 22 * scale, space: 60 * scale, values: (_, ticks) => ticks.map(time) },
-    { ...common, size: 46 * scale, space: 26 * scale, values: (_, ticks) => ticks.map(value) },
+    {
+      ...common,
+      size: 22 * scale,
+      space: 60 * scale,
+      values: (_, ticks, _axis, _space, step) => time(ticks, step),
+    },
+    {
+      ...common,
+      size: 46 * scale,
+      space: 26 * scale,
+      values: (_, ticks, _axis, _space, step) => value(ticks, step),
+    },
   ];
 }
 

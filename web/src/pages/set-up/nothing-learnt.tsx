@@ -1,0 +1,27 @@
+import { api } from "../../api/client";
+import { useQuery } from "../../hooks/use-query";
+import { Link } from "../../router/link";
+import { rigPath } from "../../router/paths";
+
+/** Polling interval, ms: the rig is learnt by itself while it runs. */
+const INTERVAL_MS = 5000;
+
+/** A rig that is judged without a calibration: whether one is being made, or waits for an answer. */
+export function NothingLearnt({ asset }: { asset: string }) {
+  const { data: learning } = useQuery(() => api.learning(asset), `${asset} learning`, INTERVAL_MS);
+  if (learning?.state === "offered")
+    return (
+      <p class="wait wait-good" role="status">
+        <b>A calibration is ready,</b> learnt from the motion of the rig itself. It is used once you have
+        answered whether the rig was healthy meanwhile.{" "}
+        <Link to={rigPath(asset)}>Answer on the page of the rig</Link>
+      </p>
+    );
+  if (learning?.state === "learning")
+    return (
+      <p role="status">
+        <span class="spinner" aria-hidden="true" /> The rig is being learnt from its own motion…
+      </p>
+    );
+  return <p class="quiet">Nothing yet. Until then, only sensor faults are confirmed.</p>;
+}

@@ -1,0 +1,31 @@
+/** The numbers along the axis of a chart. */
+import { number } from "../../words/numbers";
+
+/** Most decimals of a number. */
+const MOST_DIGITS = 6;
+
+/** Returns the decimals with which multiples of `step` differ from each other, at least `digits`. */
+export function digitsFor(step: number, digits: number): number {
+  let enough = digits;
+  const isExact = (n: number) => Math.abs(step * 10 ** n - Math.round(step * 10 ** n)) < 1e-6;
+  while (enough < MOST_DIGITS && !isExact(enough)) enough++;
+  return enough;
+}
+
+/** Returns the labels of `values`, which are `step` apart, with at least `digits` decimals. */
+export const valueLabels = (values: (number | null)[], step: number, digits: number): string[] =>
+  values.map((value) => (value === null ? "" : number(value, digitsFor(step, digits))));
+
+/** Returns the range of an axis that shows `low` to `high`, with a margin, and zero in any case. */
+export function valueRange(
+  low: number | null,
+  high: number | null,
+  minExtent: number,
+  isPositive: boolean,
+): [number, number] {
+  const bottom = isPositive ? 0 : Math.min(Number.isFinite(low) ? low! : 0, -minExtent);
+  const top = Math.max(Number.isFinite(high) ? high! : 0, minExtent);
+  // A chart without any value has a range, too.
+  const margin = top > bottom ? (top - bottom) * 0.08 : 1;
+  return [bottom - margin, top + margin];
+}
