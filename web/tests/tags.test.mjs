@@ -18,7 +18,7 @@ test("tags are set on the rig's page and select rigs, alarms and sessions", asyn
   const view = await page(chromium);
   await view.goto(`${service.url}/rigs/bench`);
   await view.getByRole("button", { name: "Add tags" }).click();
-  await view.getByRole("textbox", { name: "Words with blanks between them" }).fill("hall-2 spare");
+  await view.getByRole("textbox", { name: "Tags, separated by blanks" }).fill("hall-2 spare");
   await view.getByRole("button", { name: "Keep" }).click();
   await view.getByRole("link", { name: "hall-2" }).click();
   const rigs = view.getByRole("list", { name: "Rigs" });

@@ -56,7 +56,7 @@ function Report({ session, asset, faults }: { session: Session; asset: Asset; fa
           ["Ended", session.ended_at ? dateTime(session.ended_at) : "not yet"],
           ["Length, by the device's clock", duration(sessionLength(session))],
           ["Samples", `${count(session.samples)}, ${count(session.rejected ?? 0)} rejected`],
-          ["Checksum of the verdict", session.verdict?.verdict_hash ?? "when the session has ended"],
+          ["Verdict hash", session.verdict?.verdict_hash ?? "when the session has ended"],
         ]}
       />
       <SessionCharts session={session} faults={faults} />

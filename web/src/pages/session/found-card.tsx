@@ -41,7 +41,7 @@ export function FoundCard({ session, asset, faults, seek }: Props) {
           ["State", session.state === "open" ? "open" : `ended ${dateTime(session.ended_at)}`],
           ["Samples", `${count(session.samples)}${rejected ? `, ${count(rejected)} rejected` : ""}`],
           ["Length", duration(sessionLength(session))],
-          ["Checksum of the verdict", hash ?? "when the session has ended"],
+          ["Verdict hash", hash ?? "when the session has ended"],
         ]}
       />
     </section>

@@ -22,13 +22,13 @@ export function ReplayVerdict({ session, result }: { session: Session; result: R
         <Facts
           facts={[
             ["Recorded", recorded],
-            ["Checksum", <Hash hash={recorded_hash} />],
+            ["Verdict hash", <Hash hash={recorded_hash} />],
           ]}
         />
         <Facts
           facts={[
             ["Judged again", verdict(summary).text],
-            ["Checksum", <Hash hash={summary.verdict_hash} />],
+            ["Verdict hash", <Hash hash={summary.verdict_hash} />],
           ]}
         />
       </div>
