@@ -43,9 +43,9 @@ use show::Show;
     offbd demo --seconds 120 --speed 10 --port 0\n\n\
     With --seconds, a script injects and repairs faults from the beginning, and\n\
     clears a code before it injects its fault again. Without, the rig stays healthy\n\
-    for a minute, so that you can inject faults yourself on the page Lessons; then the\n\
-    script injects and repairs faults, and what was found stays on record until you\n\
-    clear it. On that page you can tune the controller as well.\n\n\
+    for a minute, so that you can inject faults yourself on the page Lessons; then\n\
+    the script injects and repairs faults, and what was found stays on record until\n\
+    you clear it. On that page you can tune the controller as well.\n\n\
     A fault is CODE:KIND[=SIZE]@START[-END]; `offbd simulate --help` lists them.\n\n\
     Exit status with --seconds: 0 if what was injected and what was found agree,\n\
     else 1.")]
