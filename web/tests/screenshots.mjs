@@ -92,11 +92,11 @@ try {
     settle(view),
   );
   await shoot(of, "asset", `${base}/rigs/demo-rig`, heading("Monitors"), async (view) => {
-    // A healthy rig whose servo is then reversed.
+    // A healthy rig whose servo then dies.
     await ask(base, "DELETE", "/demo/faults");
     await ask(base, "DELETE", "/assets/demo-rig/faults/x_servo");
     await settle(view, 5000);
-    await ask(base, "POST", "/demo/faults", { fault: "x_servo:reversed" });
+    await ask(base, "POST", "/demo/faults", { fault: "x_servo:dead" });
     await view.getByRole("list", { name: "Active faults" }).waitFor();
   });
   await shoot(of, "drift", `${base}/rigs/weak`, heading("Drift over sessions"), async (view) => {
