@@ -6,8 +6,8 @@ use super::ServiceError;
 use crate::store::StoreError;
 
 /// Registrations after which the assets are counted again, because other nodes of a cluster
-/// register some as well: together they may exceed the limit by as many each. Chosen: PostgreSQL
-/// takes about 10 ms to count 100 000.
+/// register some as well: together they may exceed the limit by as many each. Chosen: a count
+/// reads an entry of each asset.
 const COUNT_EVERY: usize = 64;
 
 /// The number of assets as last counted, with those registered since.
