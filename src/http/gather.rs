@@ -1,9 +1,10 @@
 //! Questions to all other nodes of a cluster: the same request, for what only they know.
 
-use std::convert::Infallible;
 use std::time::Duration;
 
+use axum::Extension;
 use axum::body::{Body, to_bytes};
+use axum::extract::rejection::ExtensionRejection;
 use axum::extract::{FromRef, FromRequestParts, OriginalUri};
 use axum::http::header::{AUTHORIZATION, COOKIE};
 use axum::http::request::Parts;
@@ -24,7 +25,7 @@ const MAX_ANSWER_BYTES: usize = 16 << 20;
 /// A request that can be passed on to all other nodes.
 pub(super) struct Gathering {
     service: Service,
-    forwarder: Option<Forwarder>,
+    forwarder: Forwarder,
     uri: Uri,
     /// The headers of the request, with the caller's credentials.
     headers: HeaderMap,
@@ -34,11 +35,11 @@ impl<S: Send + Sync> FromRequestParts<S> for Gathering
 where
     Service: FromRef<S>,
 {
-    type Rejection = Infallible;
+    type Rejection = ExtensionRejection;
 
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Infallible> {
-        let OriginalUri(uri) = OriginalUri::from_request_parts(parts, state).await?;
-        let forwarder = parts.extensions.get::<Forwarder>().cloned();
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Self::Rejection> {
+        let Ok(OriginalUri(uri)) = OriginalUri::from_request_parts(parts, state).await;
+        let Extension(forwarder) = Extension::from_request_parts(parts, state).await?;
         let (service, headers) = (Service::from_ref(state), parts.headers.clone());
         Ok(Self { service, forwarder, uri, headers })
     }
@@ -69,8 +70,7 @@ impl Gathering {
                 request.headers_mut().insert(name, value.clone());
             }
         }
-        let forwarder = self.forwarder.as_ref()?;
-        let answer = forwarder.send(&self.service, address, request).await.ok()?;
+        let answer = self.forwarder.send(&self.service, address, request).await.ok()?;
         if answer.status() != StatusCode::OK {
             return None;
         }
