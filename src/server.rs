@@ -2,6 +2,7 @@
 //! graceful stop. Also the functions behind the commands `migrate`, `check`, `backup`,
 //! `restore` and `token`.
 
+mod allocator;
 mod buses;
 mod connections;
 mod delivery;
@@ -85,6 +86,7 @@ pub async fn start(config: Config) -> Result<Server> {
 pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Server> {
     config.check()?;
     config.cold_directory().map_or(Ok(()), |cold| check_cold(&cold))?;
+    allocator::keep_large_blocks_apart();
     http::gather_metrics();
     let tls = config.tls.as_ref().map(Tls::read).transpose()?;
     let (provider, keys) = match &config.jwt {

@@ -11,8 +11,9 @@ use serde::{Deserialize, Serialize};
 use crate::vocabulary::Sample;
 
 /// Samples of each kind (with and without `seq`) whose values are remembered; bounds the
-/// memory to 3 KiB each. Chosen: the rows of a batch.
-const MAX_RECENT: usize = 256;
+/// memory to 1.5 KiB each. Chosen: a usual batch of 100 rows that is sent again; those of a
+/// larger one are looked up in the recording.
+const MAX_RECENT: usize = 128;
 
 /// Most separate ranges of keys that are remembered; bounds the memory. Beyond it the
 /// oldest gap is closed: whether a key in it was taken is then unknown.

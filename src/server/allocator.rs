@@ -1,0 +1,39 @@
+//! The memory allocator of the C library.
+
+/// Blocks from this size on, bytes, are mapped by themselves and return to the system as soon
+/// as they are freed. It is the value that glibc begins with; left alone, it rises to the
+/// largest block that was freed, up to 32 MiB. Then the blocks of large requests lie between
+/// what assets hold, and the space that they leave is not used again: 2.2 KiB for each of
+/// 10 000 assets (`docs/benchmarks.md`).
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+const MAPPED_FROM: libc::c_int = 128 * 1024;
+
+/// Keeps the size from which on blocks are mapped by themselves from rising, for the whole
+/// process. Without glibc it does nothing.
+pub(super) fn keep_large_blocks_apart() {
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    {
+        #[expect(unsafe_code, reason = "a function of the C library")]
+        // SAFETY: may be called at any time, by any thread, with any values (mallopt(3)).
+        let accepted = unsafe { libc::mallopt(libc::M_MMAP_THRESHOLD, MAPPED_FROM) };
+        if accepted == 0 {
+            tracing::debug!("the allocator does not accept a size for mapped blocks");
+        }
+    }
+}
+
+#[cfg(all(test, target_os = "linux", target_env = "gnu"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn large_blocks_are_mapped_after_a_larger_one_was_freed() {
+        const MIB: usize = 1 << 20;
+        // A mapped block begins with a page, of which the allocator takes two words.
+        let is_mapped = |block: &Vec<u8>| block.as_ptr().addr() % 4096 == 2 * size_of::<usize>();
+        keep_large_blocks_apart();
+        drop(Vec::<u8>::with_capacity(16 * MIB));
+        let blocks: Vec<Vec<u8>> = (0..8).map(|_| Vec::with_capacity(MIB)).collect();
+        assert!(blocks.iter().all(is_mapped));
+    }
+}
