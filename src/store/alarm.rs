@@ -271,4 +271,22 @@ impl Store {
         let rows: Vec<(String,)> = query.rows().fetch_all(&self.pool).await?;
         Ok(rows.into_iter().map(|(id,)| id).collect())
     }
+
+    /// Those of `assets` that have an open session.
+    ///
+    /// # Errors
+    /// [`StoreError`] if the database fails.
+    pub async fn assets_with_session(&self, assets: &[String]) -> Result<Vec<String>, StoreError> {
+        if assets.is_empty() {
+            return Ok(Vec::new());
+        }
+        let mut query =
+            QueryBuilder::new("SELECT asset FROM session WHERE state = 'open' AND asset IN (");
+        for (i, asset) in assets.iter().enumerate() {
+            query.push(if i == 0 { "" } else { ", " }).bind(asset.clone())?;
+        }
+        query.push(")");
+        let rows: Vec<(String,)> = query.rows().fetch_all(&self.pool).await?;
+        Ok(rows.into_iter().map(|(asset,)| asset).collect())
+    }
 }

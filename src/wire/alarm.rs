@@ -48,6 +48,9 @@ pub struct AlarmView {
     /// Whether this result is one of the last session that was opened; false if the test has had
     /// none in it yet.
     pub tested: bool,
+    /// Whether the rig has an open session. Without one, the results of its tests are those of
+    /// a session that has ended.
+    pub session_open: bool,
     /// Time at which the last occurrence was found, RFC 3339; of lost communication the
     /// arrival of the last data before it. Null if unknown.
     pub since: Option<String>,

@@ -78,9 +78,14 @@ async fn a_failure_of_an_earlier_session_is_not_tested_in_a_new_one() {
         [&alarms[0], &fault].map(|told| (told["failing"].clone(), told["tested"].clone()))
     };
     assert_eq!(told().await, [(json!(true), json!(true)), (json!(true), json!(true))]);
+    let open =
+        async || alarms(client, "?asset=bench&code=x_servo").await[0]["session_open"].clone();
+    assert_eq!(open().await, true);
     client.end("bench", "sick").await;
+    assert_eq!(open().await, false);
     client.telemetry("bench", Some("new"), &rig(20, 6000)).await;
     assert_eq!(told().await, [(json!(true), json!(false)), (json!(true), json!(false))]);
+    assert_eq!(open().await, true);
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

@@ -90,7 +90,7 @@ impl Service {
         found.truncate(limit);
         let items = found.into_iter().map(|(_, alarm)| alarm).collect();
         let mut page = Page { items, next: next.as_ref().map(views::to_cursor).transpose()? };
-        self.add_evidence(&mut page.items).await?;
+        self.add_sessions(&mut page.items).await?;
         Ok(page)
     }
 
@@ -176,6 +176,8 @@ impl Service {
             status: record.status,
             failing: record.status_bits.test_failed,
             tested: !record.status_bits.test_not_completed_this_operation_cycle,
+            // Looked up later, for the whole page at once.
+            session_open: false,
             since: last.as_ref().map(|last| last.noted_at.clone()),
             changed_at,
             occurrences: record.occurrences,
@@ -204,6 +206,7 @@ impl Service {
             status: if is_lost { StatusWord::Confirmed } else { StatusWord::Healed },
             failing: is_lost,
             tested: true,
+            session_open: false,
             since: Some(rfc3339(row.since)),
             changed_at: rfc3339(row.changed_at),
             occurrences: u32::try_from(row.occurrences).unwrap_or(u32::MAX),
@@ -213,14 +216,19 @@ impl Service {
         }
     }
 
-    /// Completes the evidence of a page: whether the recordings are there.
-    async fn add_evidence(&self, alarms: &mut [AlarmView]) -> Result<(), ServiceError> {
+    /// Completes a page by what is stored of sessions: whether the recordings are there, and
+    /// which rigs have an open session.
+    async fn add_sessions(&self, alarms: &mut [AlarmView]) -> Result<(), ServiceError> {
+        let store = &self.inner.handles.store;
         let ids: Vec<_> = alarms.iter().filter_map(|alarm| alarm.session_id.clone()).collect();
-        let existing = self.inner.handles.store.existing_sessions(&ids).await?;
-        let existing: BTreeSet<_> = existing.into_iter().collect();
+        let existing: BTreeSet<_> = store.existing_sessions(&ids).await?.into_iter().collect();
+        let assets: BTreeSet<_> = alarms.iter().map(|alarm| alarm.asset.clone()).collect();
+        let assets: Vec<_> = assets.into_iter().collect();
+        let open: BTreeSet<_> = store.assets_with_session(&assets).await?.into_iter().collect();
         for alarm in alarms {
             let is_there = alarm.session_id.as_ref().is_some_and(|id| existing.contains(id));
             alarm.evidence = evidence(alarm, is_there);
+            alarm.session_open = open.contains(&alarm.asset);
         }
         Ok(())
     }

@@ -24,13 +24,16 @@ export const alarmPath = ({ asset, code }: Pick<Alarm, "asset" | "code">) =>
   code === "communication_lost" ? rigPath(asset) : faultPath(asset, code);
 
 /** What an alarm is now, and the class of its look. */
-export function alarmState(alarm: Pick<Alarm, "code" | "failing" | "tested" | "status" | "muted">) {
-  const { code, failing, tested, status, muted } = alarm;
+export function alarmState(
+  alarm: Pick<Alarm, "code" | "failing" | "tested" | "session_open" | "status" | "muted">,
+) {
+  const { code, failing, tested, session_open, status, muted } = alarm;
   // Whether data arrive is tested all the same; only nobody is told.
   if (muted && code === "communication_lost") return { text: `muted by ${muted.by}`, look: "status-cleared" };
   if (muted) return { text: `not tested (muted by ${muted.by})`, look: "status-cleared" };
-  if (failing)
-    return { text: tested ? "▲ fails now" : "▲ failed when last tested", look: "status-confirmed" };
+  // Whether data arrive is watched without a session, too.
+  const isNow = code === "communication_lost" || (tested && session_open);
+  if (failing) return { text: isNow ? "▲ fails now" : "▲ failed when last tested", look: "status-confirmed" };
   if (status === "healed") return { text: "healed", look: "status-healed" };
   return { text: `passes, on record as ${status}`, look: "status-pending" };
 }

@@ -54,10 +54,19 @@ test("a rig is tested while only its lost communication is muted", () => {
   const mute = (code) => ({ asset: "a", code, by: "ada", reason: "moves", at: SINCE, until: SINCE });
   assert.equal(healthOf({ ...rig, muted: [mute("communication_lost")] }), "ok");
   assert.equal(healthOf({ ...rig, muted: [mute("communication_lost"), mute("sensor")] }), "untested");
-  const alarm = { failing: true, tested: true, status: "confirmed", muted: mute("communication_lost") };
+  const alarm = {
+    failing: true,
+    tested: true,
+    session_open: true,
+    status: "confirmed",
+    muted: mute("communication_lost"),
+  };
   assert.equal(alarmState({ ...alarm, code: "communication_lost" }).text, "muted by ada");
   assert.equal(alarmState({ ...alarm, code: "sensor" }).text, "not tested (muted by ada)");
   const failing = { ...alarm, code: "sensor", muted: null };
   assert.equal(alarmState(failing).text, "▲ fails now");
   assert.equal(alarmState({ ...failing, tested: false }).text, "▲ failed when last tested");
+  const ended = { ...failing, session_open: false };
+  assert.equal(alarmState(ended).text, "▲ failed when last tested");
+  assert.equal(alarmState({ ...ended, code: "communication_lost" }).text, "▲ fails now");
 });
