@@ -26,8 +26,12 @@ const EVERY: Duration = Duration::from_secs(30);
 const KILL_EVERY: Duration = Duration::from_secs(60);
 const DOWN_FOR: Duration = Duration::from_secs(5);
 
-/// Requests under way at a time.
-const CONNECTIONS: usize = 200;
+/// Requests under way at a time. So many that those for rigs that are being loaded do not hold
+/// up the others: each rig has a connection of its own in reality.
+const CONNECTIONS: usize = 2000;
+
+/// Silence after which the data of a rig count as lost, s: longer than from one batch to the next.
+const LOST_AFTER_S: u32 = 120;
 
 /// How long a device waits that was refused, as `Retry-After` says.
 const RETRY_AFTER: Duration = Duration::from_secs(1);
@@ -171,6 +175,7 @@ impl Fleet {
         let settings = std::array::from_fn(|i| {
             format!(
                 "database = \"{database}\"\n[limits]\nassets = {assets}\n\
+                 [communication]\nlost_after_s = {LOST_AFTER_S}\n\
                  [cluster]\nname = \"node-{i}\"\nlisten = \"127.0.0.1:0\"\n"
             )
         });
