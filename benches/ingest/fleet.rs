@@ -33,7 +33,7 @@ const CONNECTIONS: usize = 2000;
 /// Silence after which the data of a rig count as lost, s: longer than from one batch to the next.
 const LOST_AFTER_S: u32 = 120;
 
-/// How long a device waits that was refused, as `Retry-After` says.
+/// How long a device waits that was refused without `Retry-After`.
 const RETRY_AFTER: Duration = Duration::from_secs(1);
 
 /// A device that is refused more often makes the measurement fail.
@@ -161,6 +161,13 @@ async fn check(fleet: &Fleet, assets: usize, each: usize) -> Result<()> {
     Ok(())
 }
 
+/// How long a device waits that was refused so.
+fn retry_after(refusal: &anyhow::Error) -> Duration {
+    let answer = refusal.to_string();
+    let seconds = answer.lines().find_map(|line| line.strip_prefix("retry-after: "));
+    seconds.and_then(|s| s.trim().parse().ok()).map_or(RETRY_AFTER, Duration::from_secs)
+}
+
 /// The nodes, and the connections of the devices to them.
 struct Fleet {
     nodes: [Mutex<Option<Process>>; NODES],
@@ -215,10 +222,8 @@ impl Fleet {
         let mut tried = Ok(());
         for attempt in 0..MAX_ATTEMPTS {
             tried = self.try_deliver((device + attempt) % NODES, request).await;
-            if tried.is_ok() {
-                break;
-            }
-            tokio::time::sleep(RETRY_AFTER).await;
+            let Err(refusal) = &tried else { break };
+            tokio::time::sleep(retry_after(refusal)).await;
         }
         tried
     }

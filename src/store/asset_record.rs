@@ -29,6 +29,8 @@ pub struct AssetRecord {
     pub open: Option<(SessionRow, Result<Option<Snapshot>, StoreError>)>,
     /// The last ended sessions, the newest first.
     pub ended: Vec<EndedSessionRow>,
+    /// Whether there is any session of the asset, also one that is being deleted.
+    pub has_sessions: bool,
 }
 
 /// An ended session, as far as a retransmission is compared with it.
@@ -47,10 +49,12 @@ from_row!(EndedSessionRow { id, asset, name, first_part, last_seq, newest_t_s })
 
 struct RowWithLearning {
     learning: Option<String>,
+    /// 1 if there is any session of the asset, else 0.
+    has_sessions: i32,
     row: AssetRow,
 }
 
-from_row!(RowWithLearning { learning }[row]);
+from_row!(RowWithLearning { learning, has_sessions }[row]);
 
 impl Store {
     /// Those of the assets `names` that exist, with the last snapshots by this `version` of
@@ -93,12 +97,17 @@ async fn assets(
     db: &mut AnyConnection,
     names: &[String],
 ) -> Result<HashMap<String, AssetRecord>, StoreError> {
-    let mut query = QueryBuilder::new("SELECT * FROM asset WHERE deleted_at IS NULL AND name IN (");
+    let mut query = QueryBuilder::new(
+        "SELECT asset.*, CASE WHEN EXISTS (SELECT 1 FROM session WHERE session.asset = asset.name)
+             THEN 1 ELSE 0 END AS has_sessions
+         FROM asset WHERE deleted_at IS NULL AND asset.name IN (",
+    );
     query.bind_list(names)?.push(")");
     let rows: Vec<RowWithLearning> = query.rows().fetch_all(db).await?;
-    let record = |RowWithLearning { row, learning }| {
-        let name = row.name.clone();
-        (name, AssetRecord { row, learning, faults: Vec::new(), open: None, ended: Vec::new() })
+    let record = |RowWithLearning { row, learning, has_sessions }| {
+        let (name, has_sessions) = (row.name.clone(), has_sessions != 0);
+        let (faults, open, ended) = (Vec::new(), None, Vec::new());
+        (name, AssetRecord { row, learning, faults, open, ended, has_sessions })
     };
     Ok(rows.into_iter().map(record).collect())
 }

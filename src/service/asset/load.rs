@@ -82,7 +82,7 @@ fn unless_panicking<T>(
 impl TryFrom<AssetRecord> for StoredAsset {
     type Error = ServiceError;
     fn try_from(record: AssetRecord) -> Result<Self, ServiceError> {
-        let AssetRecord { row, learning, faults, open, ended } = record;
+        let AssetRecord { row, learning, faults, open, ended, has_sessions } = record;
         let rig = views::rig(&row.document)?;
         let (memory, provenance) = stored_memory(&faults)?;
         let learning: LearningRecord =
@@ -99,6 +99,7 @@ impl TryFrom<AssetRecord> for StoredAsset {
             link: LinkHealth::default(),
             malformed: Vec::new(),
             ended: ended.into_iter().map(EndedSession::stored).collect(),
+            has_sessions,
             learning,
             generation: EngineGeneration::default(),
             deleted: false,

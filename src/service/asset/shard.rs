@@ -426,6 +426,7 @@ mod tests {
             link: LinkHealth::default(),
             malformed: Vec::new(),
             ended: Vec::new(),
+            has_sessions: false,
             learning: Default::default(),
             generation: EngineGeneration::default(),
             deleted: false,
