@@ -9,7 +9,7 @@ use super::query_builder::QueryBuilder;
 use super::{SessionProgress, SessionRow, StoreError};
 
 /// Sessions per query.
-const SESSIONS_AT_ONCE: usize = 256;
+pub(super) const SESSIONS_AT_ONCE: usize = 256;
 
 struct StoredProgress {
     id: String,
