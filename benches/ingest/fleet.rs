@@ -26,10 +26,14 @@ const EVERY: Duration = Duration::from_secs(30);
 const KILL_EVERY: Duration = Duration::from_secs(60);
 const DOWN_FOR: Duration = Duration::from_secs(5);
 
-/// Requests under way at a time.
-const CONNECTIONS: usize = 200;
+/// Requests under way at a time. So many that those for rigs that are being loaded do not hold
+/// up the others: each rig has a connection of its own in reality.
+const CONNECTIONS: usize = 2000;
 
-/// How long a device waits that was refused, as `Retry-After` says.
+/// Silence after which the data of a rig count as lost, s: longer than from one batch to the next.
+const LOST_AFTER_S: u32 = 120;
+
+/// How long a device waits that was refused without `Retry-After`.
 const RETRY_AFTER: Duration = Duration::from_secs(1);
 
 /// A device that is refused more often makes the measurement fail.
@@ -157,6 +161,13 @@ async fn check(fleet: &Fleet, assets: usize, each: usize) -> Result<()> {
     Ok(())
 }
 
+/// How long a device waits that was refused so.
+fn retry_after(refusal: &anyhow::Error) -> Duration {
+    let answer = refusal.to_string();
+    let seconds = answer.lines().find_map(|line| line.strip_prefix("retry-after: "));
+    seconds.and_then(|s| s.trim().parse().ok()).map_or(RETRY_AFTER, Duration::from_secs)
+}
+
 /// The nodes, and the connections of the devices to them.
 struct Fleet {
     nodes: [Mutex<Option<Process>>; NODES],
@@ -171,6 +182,7 @@ impl Fleet {
         let settings = std::array::from_fn(|i| {
             format!(
                 "database = \"{database}\"\n[limits]\nassets = {assets}\n\
+                 [communication]\nlost_after_s = {LOST_AFTER_S}\n\
                  [cluster]\nname = \"node-{i}\"\nlisten = \"127.0.0.1:0\"\n"
             )
         });
@@ -210,10 +222,8 @@ impl Fleet {
         let mut tried = Ok(());
         for attempt in 0..MAX_ATTEMPTS {
             tried = self.try_deliver((device + attempt) % NODES, request).await;
-            if tried.is_ok() {
-                break;
-            }
-            tokio::time::sleep(RETRY_AFTER).await;
+            let Err(refusal) = &tried else { break };
+            tokio::time::sleep(retry_after(refusal)).await;
         }
         tried
     }

@@ -41,6 +41,7 @@ mod problem;
 mod rates;
 mod remarks;
 mod replays;
+mod retry;
 mod routes;
 mod series;
 mod session_format;

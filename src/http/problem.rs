@@ -8,6 +8,7 @@ use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
 
+use super::retry::retry_after_s;
 use crate::service::{RETRY_AFTER_S, ServiceError};
 use crate::wire::sovd::SovdErrorView;
 use crate::wire::telemetry::BatchError;
@@ -150,7 +151,11 @@ impl From<ServiceError> for Problem {
             E::RegistryFull { .. } => {
                 new(StatusCode::INSUFFICIENT_STORAGE, "registry-full", "Asset limit reached")
             }
-            E::Busy { .. } => new(StatusCode::TOO_MANY_REQUESTS, "busy", "Too many requests"),
+            E::Busy { .. } => {
+                let retry_after_s = retry_after_s();
+                let status = StatusCode::TOO_MANY_REQUESTS;
+                Self { retry_after_s, ..new(status, "busy", "Too many requests") }
+            }
             E::Unavailable { .. } | E::Outage { .. } | E::Stalled { .. } => {
                 new(StatusCode::SERVICE_UNAVAILABLE, "unavailable", "Service unavailable")
             }

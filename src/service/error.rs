@@ -76,7 +76,7 @@ pub enum ServiceError {
     #[error("the limit of {limit} assets is reached")]
     RegistryFull { limit: usize },
     /// A limit is reached. The request had no effect; retry after
-    /// [`RETRY_AFTER_S`](super::RETRY_AFTER_S).
+    /// [`RETRY_AFTER_S`](super::RETRY_AFTER_S), or later if many are refused.
     #[error("{what}; the request was not processed, retry it")]
     Busy { what: &'static str },
     /// The asset is being loaded, and its recording is long.

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use super::ServiceError;
 use super::writing::Handles;
-use crate::store::{ActionKind, SessionRow};
+use crate::store::{ActionKind, ActionRow, RecordingReader, SessionRow};
 use offbd_core::engine::Input;
 use offbd_core::vocabulary::FaultCode;
 
@@ -15,17 +15,28 @@ pub(super) fn play(
     handles: &Handles,
     session: &SessionRow,
     first: i64,
+    take: impl FnMut(Input) -> ControlFlow<()>,
+) -> Result<(), ServiceError> {
+    let rows = handles.wait(handles.store.actions(&session.id))?;
+    play_inputs(handles, rows, handles.store.recording(session, first), first, take)
+}
+
+/// As [`play`], with the actions of the session and its recording from its sample `first` on.
+pub(super) fn play_inputs(
+    handles: &Handles,
+    rows: Vec<ActionRow>,
+    mut recording: RecordingReader,
+    first: i64,
     mut take: impl FnMut(Input) -> ControlFlow<()>,
 ) -> Result<(), ServiceError> {
     let mut actions = Vec::new();
-    for row in handles.wait(handles.store.actions(&session.id))? {
+    for row in rows {
         let kind: ActionKind = row.kind.parse()?;
         let code: FaultCode = row.code.parse().map_err(ServiceError::corrupt)?;
         actions.push((row.after_index, input(kind, code)));
     }
     let mut actions = actions.into_iter().filter(|(after, _)| *after >= first).peekable();
     let mut n_played = first;
-    let mut recording = handles.store.recording(session, first);
     while let Some(samples) = handles.wait(recording.next())? {
         for sample in samples {
             while let Some((_, action)) = actions.next_if(|(after, _)| *after <= n_played) {

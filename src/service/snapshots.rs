@@ -6,7 +6,7 @@ use super::ServiceError;
 use super::views;
 use super::writing::Handles;
 use crate::judging::Judging;
-use crate::store::{SessionRow, Snapshot};
+use crate::store::{SessionRow, Snapshot, StoreError};
 use crate::wire::basis::Basis;
 use offbd_core::engine::{JUDGEMENT, SNAPSHOT_FORMAT, Setup, UsableMotion};
 
@@ -50,6 +50,16 @@ pub(super) fn last(
 ) -> Result<Option<(Snapshot, RestoredEngine)>, ServiceError> {
     let at_most = at_most.min(session.progress.n_samples);
     let snapshot = handles.wait(handles.store.snapshot(&session.id, &version(), at_most));
+    restore(snapshot, session, setup)
+}
+
+/// Returns the `snapshot` of `session` that was read, with the engine in it; `None` if it is
+/// damaged, or not one for `setup`.
+pub(super) fn restore(
+    snapshot: Result<Option<Snapshot>, StoreError>,
+    session: &SessionRow,
+    setup: &Setup,
+) -> Result<Option<(Snapshot, RestoredEngine)>, ServiceError> {
     let read = snapshot.map_err(ServiceError::from).and_then(|s| s.map(read).transpose());
     let found = match read {
         Ok(found) => found,

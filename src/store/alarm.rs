@@ -4,7 +4,7 @@ use sqlx::AnyConnection;
 
 use super::from_row::from_row;
 use super::query_builder::QueryBuilder;
-use super::{Micros, Store, StoreError};
+use super::{Micros, PartitionId, Store, StoreError};
 
 /// A monitor that a person has muted.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -241,15 +241,19 @@ impl Store {
         Ok(query.rows().fetch_all(&self.pool).await?)
     }
 
-    /// The open sessions that have samples, except imports.
-    pub async fn open_links(&self) -> Result<Vec<OpenLink>, StoreError> {
+    /// The open sessions that have samples, except imports; of the partitions `owned`, or of
+    /// all.
+    pub async fn open_links(
+        &self,
+        owned: Option<&[PartitionId]>,
+    ) -> Result<Vec<OpenLink>, StoreError> {
         let in_journal = self.journal.all_progress();
-        let rows: Vec<(String, String, String, i64)> = sqlx::query_as(
+        let mut query = QueryBuilder::new(
             "SELECT asset, id, name, n_samples FROM session
-             WHERE state = 'open' AND importing = 0 AND expired_at IS NULL ORDER BY asset",
-        )
-        .fetch_all(&self.pool)
-        .await?;
+             WHERE state = 'open' AND importing = 0 AND expired_at IS NULL",
+        );
+        query.push_owned(owned)?;
+        let rows: Vec<(String, String, String, i64)> = query.rows().fetch_all(&self.pool).await?;
         let has_samples = |(_, id, _, n): &(String, String, String, i64)| {
             *n > 0 || in_journal.get(id).is_some_and(|progress| progress.n_samples > 0)
         };

@@ -23,6 +23,7 @@
 
 mod access;
 mod alarm;
+mod asset_record;
 mod backup;
 mod check;
 mod checkpoint;
@@ -47,6 +48,7 @@ mod read;
 mod recording;
 mod remark;
 mod rows;
+mod session_inputs;
 mod snapshot;
 mod tag;
 mod tail;
@@ -63,6 +65,7 @@ use sqlx::migrate::MigrateError;
 
 pub use access::{AccessWrite, AuditRow, LAST_ID, MAX_LOGINS, TokenRow};
 pub use alarm::{AlarmWrite, CommunicationChange, CommunicationRow, MuteRow, NoteRow, OpenLink};
+pub use asset_record::{AssetRecord, EndedSessionRow, MAX_ASSETS_AT_ONCE, MAX_ENDED_SESSIONS};
 pub use backup::{back_up, restore};
 pub use check::{CheckReport, check};
 pub use cold::{ColdDirectory, ColdFileRow, ColdWrite, ReadSamples, SampleStream};
@@ -84,6 +87,7 @@ pub use rows::{
     ActionKind, ActionRow, AssetRow, CalibrationRow, EventRow, FaultRow, Micros, ReplayRow,
     SessionProgress, SessionRow, TransitionRow, TrendEntry, TrendRow, WarningRow,
 };
+pub use session_inputs::SessionInputs;
 pub use snapshot::Snapshot;
 pub use tag::TagsByAsset;
 pub use tail::{FULL_CHUNK_SAMPLES, MAX_TAIL_CHUNKS};

@@ -9,7 +9,7 @@ use super::query_builder::QueryBuilder;
 use super::{SessionProgress, SessionRow, StoreError};
 
 /// Sessions per query.
-const SESSIONS_AT_ONCE: usize = 500;
+pub(super) const SESSIONS_AT_ONCE: usize = 256;
 
 struct StoredProgress {
     id: String,
@@ -29,10 +29,7 @@ pub(super) async fn stored_progress(
             "SELECT id, n_samples, n_rejected, first_t_s, last_t_s, last_seq FROM session
              WHERE id IN (",
         );
-        for (i, session) in part.iter().enumerate() {
-            query.push(if i == 0 { "" } else { ", " }).bind(session.clone())?;
-        }
-        query.push(")");
+        query.bind_list(part)?.push(")");
         let rows: Vec<StoredProgress> = query.rows().fetch_all(&mut *db).await?;
         stored.extend(rows.into_iter().map(|row| (row.id, row.progress)));
     }

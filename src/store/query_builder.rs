@@ -7,6 +7,10 @@ use sqlx::{Any, Arguments, AssertSqlSafe, Encode, FromRow, Type};
 
 use super::{PartitionId, StoreError};
 
+/// Lengths of bound lists. Few, so that few statements are prepared; a list in between is
+/// filled up with NULL, which equals nothing.
+const LIST_LENGTHS: [usize; 5] = [1, 4, 16, 64, 256];
+
 #[derive(Default)]
 pub(super) struct QueryBuilder {
     sql: String,
@@ -34,6 +38,24 @@ impl QueryBuilder {
         Ok(self)
     }
 
+    /// Appends a placeholder for each of `values`, separated by commas; at most 256.
+    pub(super) fn bind_list(&mut self, values: &[String]) -> Result<&mut Self, StoreError> {
+        for i in 0..list_length(values.len()) {
+            self.push(if i == 0 { "" } else { ", " }).bind(values.get(i).cloned())?;
+        }
+        Ok(self)
+    }
+
+    /// Appends rows of two placeholders for `VALUES`, one for each of `rows`; at most 256.
+    pub(super) fn bind_rows(&mut self, rows: &[(String, i64)]) -> Result<&mut Self, StoreError> {
+        for i in 0..list_length(rows.len()) {
+            let (text, number) = rows.get(i).cloned().unzip();
+            self.push(if i == 0 { "(" } else { ", (" }).bind(text)?;
+            self.push(", ").bind(number)?.push(")");
+        }
+        Ok(self)
+    }
+
     /// Appends the condition that the column `asset` is in one of the partitions `owned`;
     /// nothing for all partitions.
     pub(super) fn push_owned(
@@ -54,4 +76,8 @@ impl QueryBuilder {
     ) -> QueryAs<'static, Any, T, AnyArguments> {
         sqlx::query_as_with(AssertSqlSafe(self.sql), self.arguments)
     }
+}
+
+fn list_length(n: usize) -> usize {
+    LIST_LENGTHS.into_iter().find(|&length| length >= n).unwrap_or(n)
 }

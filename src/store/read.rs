@@ -9,6 +9,7 @@ use super::{
     SessionRow, Store, StoreError, TransitionRow, TrendEntry, TrendRow, decode_chunk,
 };
 use offbd_core::vocabulary::Sample;
+use sqlx::AnyConnection;
 
 /// A filter for a list of sessions, by their time of opening.
 #[derive(Clone, Debug, Default)]
@@ -296,14 +297,23 @@ impl Store {
         &self,
         query: QueryBuilder,
     ) -> Result<Vec<SessionRow>, StoreError> {
-        let mut rows: Vec<SessionRow> = query.rows().fetch_all(&self.pool).await?;
+        self.session_rows_of(&mut *self.pool.acquire().await?, query).await
+    }
+
+    /// As [`session_rows`](Self::session_rows), on the connection `db`.
+    pub(super) async fn session_rows_of(
+        &self,
+        db: &mut AnyConnection,
+        query: QueryBuilder,
+    ) -> Result<Vec<SessionRow>, StoreError> {
+        let mut rows: Vec<SessionRow> = query.rows().fetch_all(&mut *db).await?;
         let is_open = |row: &&SessionRow| row.is_open();
         let open: Vec<_> = rows.iter().filter(is_open).map(|row| row.id.clone()).collect();
         let in_journal = self.journal.progress_of(&open);
         if open.is_empty() {
             return Ok(rows);
         }
-        let stored = stored_progress(&mut *self.pool.acquire().await?, &open).await?;
+        let stored = stored_progress(db, &open).await?;
         for row in &mut rows {
             row.advance(stored.get(&row.id));
             row.advance(in_journal.get(&row.id));

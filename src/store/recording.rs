@@ -1,7 +1,10 @@
 //! Reading the recording of a session, or a stretch of it.
 
+use std::collections::BTreeMap;
+
+use super::codec::ChunkKey;
 use super::cold::ColdReader;
-use super::{SessionRow, Store, StoreError};
+use super::{SessionRow, Store, StoreError, decode_chunk};
 use offbd_core::vocabulary::{Sample, TimeRange};
 
 /// Reads the samples that a session has when the reader is made, in order of arrival. The
@@ -13,6 +16,8 @@ pub struct RecordingReader {
     next: i64,
     end: i64,
     range: TimeRange,
+    /// Chunks that are read already, by their first indexes.
+    ahead: BTreeMap<i64, Vec<u8>>,
     /// The file of the samples, once the database has them no longer.
     cold: Option<ColdReader>,
 }
@@ -23,7 +28,7 @@ impl Store {
     pub fn recording(&self, session: &SessionRow, first: i64) -> RecordingReader {
         let (next, end) = (first.max(0), session.progress.n_samples);
         let (store, session, range) = (self.clone(), session.id.clone(), TimeRange::ALL);
-        RecordingReader { store, session, next, end, range, cold: None }
+        RecordingReader { store, session, next, end, range, ahead: BTreeMap::new(), cold: None }
     }
 
     /// Returns a reader of the samples of `session` whose times are in `range`.
@@ -37,7 +42,7 @@ impl Store {
     ) -> Result<RecordingReader, StoreError> {
         let (next, end) = self.indexes(session, range).await?;
         let (store, session) = (self.clone(), session.id.clone());
-        Ok(RecordingReader { store, session, next, end, range, cold: None })
+        Ok(RecordingReader { store, session, next, end, range, ahead: BTreeMap::new(), cold: None })
     }
 
     /// Returns indexes of `session` between which all samples with times in `range` are: the
@@ -91,6 +96,23 @@ impl Store {
 }
 
 impl RecordingReader {
+    /// Returns the reader with `chunks` of its session that are read already, by their first
+    /// indexes. What is not among them is looked for in the journal and in the tables.
+    pub(super) fn with_chunks(self, chunks: BTreeMap<i64, Vec<u8>>) -> Self {
+        Self { ahead: chunks, ..self }
+    }
+
+    /// Takes samples from the next one on, if they are read already.
+    fn take_ahead(&mut self) -> Result<Option<Vec<Sample>>, StoreError> {
+        let Some((&first_index, _)) = self.ahead.range(..=self.next).next_back() else {
+            return Ok(None);
+        };
+        let data = self.ahead.remove(&first_index).unwrap_or_default();
+        let mut samples = decode_chunk(&data, ChunkKey { session: &self.session, first_index })?;
+        let at = usize::try_from(self.next - first_index).unwrap_or(usize::MAX);
+        Ok((at < samples.len()).then(|| samples.split_off(at)))
+    }
+
     /// Reads the next samples, as many as are stored together; returns `None` at the end.
     ///
     /// # Errors
@@ -116,6 +138,9 @@ impl RecordingReader {
     /// Reads samples from the next one on: from the database or, if they have left it, from
     /// their file.
     async fn stored(&mut self) -> Result<Option<Vec<Sample>>, StoreError> {
+        if let Some(samples) = self.take_ahead()? {
+            return Ok(Some(samples));
+        }
         if self.cold.is_none() {
             if let Some(samples) = self.store.samples_from(&self.session, self.next).await? {
                 return Ok(Some(samples));

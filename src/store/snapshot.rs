@@ -28,6 +28,18 @@ impl Snapshot {
         hasher.finalize().to_le_bytes()
     }
 
+    /// Returns the snapshot that is stored with these columns, after checking its checksum.
+    pub(super) fn opened(
+        session: String,
+        n_samples: i64,
+        kept: i64,
+        version: &str,
+        data: &[u8],
+    ) -> Result<Self, StoreError> {
+        let (kept, version) = (kept != 0, version.to_owned());
+        Self { session, n_samples, kept, version, state: Vec::new() }.open(data)
+    }
+
     /// Returns the snapshot with the state in `data`, after checking its checksum.
     pub(super) fn open(mut self, data: &[u8]) -> Result<Self, StoreError> {
         let (checksum, state) = data.split_first_chunk().unwrap_or((&[0; 4], &[]));
@@ -96,8 +108,7 @@ impl Store {
         .fetch_optional(&self.pool)
         .await?;
         let open = |(n_samples, kept, data): (i64, i64, Vec<u8>)| {
-            let (session, version, state) = (session.to_owned(), version.to_owned(), Vec::new());
-            Snapshot { session, n_samples, kept: kept != 0, version, state }.open(&data)
+            Snapshot::opened(session.to_owned(), n_samples, kept, version, &data)
         };
         row.map(open).transpose()
     }

@@ -7,12 +7,14 @@
 //! bounded tail, and appending never rewrites long chunks. When a session ends, its tail
 //! is merged a last time.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 use sqlx::AnyConnection;
 
 use super::codec::{ChunkKey, Packing};
 use super::multi_row::{MultiRowStatement, in_parts};
+use super::progress::SESSIONS_AT_ONCE;
+use super::query_builder::QueryBuilder;
 use super::{PartitionId, SessionProgress, StoreError, codec, decode_chunk};
 use offbd_core::vocabulary::Sample;
 
@@ -77,9 +79,10 @@ impl Tails {
         connection: &mut AnyConnection,
         runs: &[Run],
     ) -> Result<(), StoreError> {
+        let runs: Vec<_> = runs.iter().filter(|run| !run.samples.is_empty()).collect();
+        let tails = self.tails(connection, &runs).await?;
         let mut small = Vec::new();
-        for run in runs.iter().filter(|run| !run.samples.is_empty()) {
-            let tail = self.tail(connection, &run.session).await?;
+        for (run, tail) in runs.into_iter().zip(tails) {
             let (n_chunks, n_samples) = (tail.n_chunks + 1, tail.n_samples + run.samples.len());
             let tail = if n_chunks < MAX_TAIL_CHUNKS && n_samples < LONG_CHUNK_SAMPLES {
                 small.extend(cut(&run.session, run.first_index, &run.samples, Packing::Plain));
@@ -92,15 +95,18 @@ impl Tails {
         insert(connection, &small).await
     }
 
-    async fn tail(
+    /// The tails of the sessions of `runs`.
+    async fn tails(
         &self,
         connection: &mut AnyConnection,
-        session: &str,
-    ) -> Result<Tail, StoreError> {
-        match self.cached.get(session) {
-            Some((_, cached)) => Ok(*cached),
-            None => count(connection, session).await,
-        }
+        runs: &[&Run],
+    ) -> Result<Vec<Tail>, StoreError> {
+        let unknown = runs.iter().filter(|run| !self.cached.contains_key(&run.session));
+        let unknown: Vec<_> = unknown.map(|run| run.session.clone()).collect();
+        let counted = count_each(connection, &unknown).await?;
+        let cached = |session| self.cached.get(session).map(|(_, tail)| tail);
+        let tail = |session| cached(session).or(counted.get(session)).copied().unwrap_or_default();
+        Ok(runs.iter().map(|run| tail(&run.session)).collect())
     }
 
     /// Appends the last run of a session that ends, and merges its tail.
@@ -109,8 +115,10 @@ impl Tails {
         connection: &mut AnyConnection,
         run: &Run,
     ) -> Result<(), StoreError> {
-        let tail = self.tail(connection, &run.session).await?;
-        self.cached.remove(&run.session);
+        let tail = match self.cached.remove(&run.session) {
+            Some((_, cached)) => cached,
+            None => count(connection, &run.session).await?,
+        };
         merge(connection, run, tail, Packing::Compact).await.map(drop)
     }
 
@@ -171,16 +179,30 @@ fn cut<'a>(
 }
 
 async fn count(connection: &mut AnyConnection, session: &str) -> Result<Tail, StoreError> {
-    let (n_chunks, n_samples): (i64, i64) = sqlx::query_as(
-        "SELECT COUNT(*), CAST(COALESCE(SUM(n), 0) AS BIGINT) FROM chunk
-         WHERE session = $1 AND n < $2",
-    )
-    .bind(session)
-    .bind(LONG_CHUNK_SAMPLES as i64)
-    .fetch_one(connection)
-    .await?;
-    let count = |n: i64| usize::try_from(n).unwrap_or(0);
-    Ok(Tail { n_chunks: count(n_chunks), n_samples: count(n_samples) })
+    let session = session.to_owned();
+    let counted = count_each(connection, std::slice::from_ref(&session)).await?;
+    Ok(counted.get(&session).copied().unwrap_or_default())
+}
+
+/// The tails of those of `sessions` that have one.
+async fn count_each(
+    connection: &mut AnyConnection,
+    sessions: &[String],
+) -> Result<HashMap<String, Tail>, StoreError> {
+    let mut tails = HashMap::new();
+    for part in sessions.chunks(SESSIONS_AT_ONCE) {
+        let mut query = QueryBuilder::new(
+            "SELECT session, COUNT(*), CAST(SUM(n) AS BIGINT) FROM chunk WHERE n < ",
+        );
+        query.bind(LONG_CHUNK_SAMPLES as i64)?.push(" AND session IN (");
+        query.bind_list(part)?.push(") GROUP BY session");
+        let rows: Vec<(String, i64, i64)> = query.rows().fetch_all(&mut *connection).await?;
+        let count = |n: i64| usize::try_from(n).unwrap_or(0);
+        tails.extend(rows.into_iter().map(|(session, n_chunks, n_samples)| {
+            (session, Tail { n_chunks: count(n_chunks), n_samples: count(n_samples) })
+        }));
+    }
+    Ok(tails)
 }
 
 async fn insert(connection: &mut AnyConnection, chunks: &[NewChunk<'_>]) -> Result<(), StoreError> {

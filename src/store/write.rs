@@ -236,7 +236,6 @@ impl Writer {
         let mut this = Self::connected(location, WriterRole::Main, connection, backend).await?;
         let all: Vec<_> = this.partitions.all().collect();
         this.take(&all).await?;
-        this.n_bytes_before = this.journal.n_bytes();
         this.checkpointer = Checkpointer::start(location);
         Ok(this)
     }

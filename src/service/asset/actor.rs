@@ -32,6 +32,8 @@ pub(super) struct Asset {
     pub(super) malformed: Vec<usize>,
     /// The last sessions that have ended, the newest first.
     pub(super) ended: Vec<EndedSession>,
+    /// Whether it has, or may have had, any session.
+    pub(super) has_sessions: bool,
     /// The progress of the automatic calibration.
     pub(super) learning: LearningRecord,
     pub(super) generation: EngineGeneration,

@@ -6,15 +6,10 @@ use super::recorded::RecordedSamples;
 use super::session::OpenSession;
 use super::turn::Turn;
 use crate::service::ServiceError;
-use crate::service::writing::Handles;
-use crate::store::{SessionFilter, SessionRow};
+use crate::store::EndedSessionRow;
 use crate::wire::telemetry::AckView;
 use offbd_core::engine::{Engine, Recognition};
 use offbd_core::vocabulary::Sample;
-
-/// Limit of the ended sessions that are searched, the newest first. Chosen: a retransmission
-/// is rarely older.
-pub(super) const MAX_SESSIONS: u32 = 4;
 
 /// An ended session that a device may be sending again.
 #[derive(Clone, Debug)]
@@ -47,23 +42,17 @@ impl EndedSession {
         }
     }
 
-    /// Reads the last ended sessions of `asset`, the newest first. Blocks on the store.
-    pub(super) fn read(handles: &Handles, asset: &str) -> Result<Vec<Self>, ServiceError> {
-        let (asset, state) = (Some(asset.to_owned()), Some("ended".to_owned()));
-        let filter = SessionFilter { asset, state, ..SessionFilter::default() };
-        let rows = handles.wait(handles.store.sessions(&filter, MAX_SESSIONS))?;
-        let session = |row: SessionRow| {
-            Ok(Self {
-                newest_t_s: handles.wait(handles.store.newest_t_s(&row.id))?,
-                first_part: row.first_part().to_owned(),
-                id: row.id,
-                name: row.name,
-                last_seq: row.progress.last_seq,
-                is_other_run: false,
-                is_same_run: false,
-            })
-        };
-        rows.into_iter().map(session).collect()
+    /// Returns the session of `row`.
+    pub(super) fn stored(row: EndedSessionRow) -> Self {
+        Self {
+            first_part: row.first_part.unwrap_or_else(|| row.id.clone()),
+            id: row.id,
+            name: row.name,
+            newest_t_s: row.newest_t_s,
+            last_seq: row.last_seq,
+            is_other_run: false,
+            is_same_run: false,
+        }
     }
 
     /// Whether `sample` may be recorded in this session, if `open` does not have it.

@@ -1,19 +1,21 @@
-//! Loads assets beside the thread of their shard, so that an asset with a long recording, or
-//! a database that is slow, does not hold up the others.
+//! Loads assets beside the threads of their shards, so that an asset with a long recording, or
+//! a database that is slow, does not hold up the others. What waits is read in groups: most of
+//! the time of reading one asset is spent on the way to the database and back.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use tokio::sync::mpsc::{
     Sender, UnboundedReceiver, UnboundedSender, WeakSender, unbounded_channel,
 };
-use tokio::sync::{AcquireError, Semaphore};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
-use super::actor::Asset;
-use super::load::StoredAsset;
+use super::load::{self, StoredAsset};
 use super::message::{LoadResult, ShardMessage};
 use crate::service::ServiceError;
 use crate::service::writing::Handles;
+use crate::store::MAX_ASSETS_AT_ONCE;
 
 /// Samples to evaluate from which on requests are refused instead of waiting: less take some
 /// 0.1 s. With a snapshot there are much less.
@@ -28,7 +30,7 @@ const LONGEST_RETRY_S: i64 = 60;
 
 /// Assets waiting to be loaded above which requests do not wait any more. Chosen: some
 /// seconds of work.
-const MANY_ASSETS: usize = 256;
+const MANY_ASSETS: usize = 4096;
 
 /// The queue of assets to load, as a shard sees it. Unbounded, since a shard requests each
 /// of its assets once at a time.
@@ -46,8 +48,9 @@ impl LoadQueue {
         Self { shard: shard.downgrade(), ..self.clone() }
     }
 
-    /// Requests to load the asset `name`, whose partition has this epoch; the shard gets the result as a message. Returns why
-    /// commands must not wait for it, if many assets are to be loaded before.
+    /// Requests to load the asset `name`, whose partition has this epoch; the shard gets the
+    /// result as a message. Returns why commands must not wait for it, if many assets are to be
+    /// loaded before.
     pub(super) fn load(&self, name: &str, epoch: i64) -> Option<ServiceError> {
         let closing = ServiceError::Unavailable { what: "the service is shutting down" };
         let Some(shard) = self.shard.upgrade() else { return Some(closing) };
@@ -62,10 +65,18 @@ impl LoadQueue {
 }
 
 /// A request to load an asset.
+#[derive(Clone)]
 pub(in crate::service) struct LoadRequest {
     asset: String,
     epoch: i64,
     shard: Sender<ShardMessage>,
+}
+
+impl LoadRequest {
+    fn answer(&self, result: LoadResult) -> ShardMessage {
+        let (asset, epoch, result) = (self.asset.clone(), self.epoch, Box::new(result));
+        ShardMessage::Loaded { asset, epoch, result }
+    }
 }
 
 /// Executes the requests of all shards.
@@ -76,16 +87,18 @@ pub(in crate::service) struct Loader {
 }
 
 struct LoadLimits {
-    /// One permit for each asset that is being loaded, while it has few samples to evaluate.
-    few: Semaphore,
+    /// Groups that are loaded at a time.
+    n_groups: usize,
+    /// One permit for each of them.
+    groups: Arc<Semaphore>,
     /// One permit for each asset that has many samples to evaluate.
     many: Semaphore,
     n_waiting: Arc<AtomicUsize>,
 }
 
-/// An asset after its first step.
+/// An asset of a group.
 enum Progress {
-    Loaded(Box<Asset>),
+    Done(LoadResult),
     /// It has many samples to evaluate.
     Behind(Box<StoredAsset>),
 }
@@ -99,90 +112,149 @@ impl Loader {
     ) -> (Self, LoadQueue) {
         let (sender, requests) = unbounded_channel();
         let n_waiting = Arc::new(AtomicUsize::new(0));
-        let (few, many) = (Semaphore::new(2 * n_shards), Semaphore::new(n_shards));
-        let limits = LoadLimits { few, many, n_waiting: n_waiting.clone() };
+        let limits = LoadLimits {
+            n_groups: n_shards,
+            groups: Arc::new(Semaphore::new(n_shards)),
+            many: Semaphore::new(n_shards),
+            n_waiting: n_waiting.clone(),
+        };
         let queue = LoadQueue { requests: sender, n_waiting, shard: shard.downgrade() };
         (Self { handles, requests, limits: Arc::new(limits) }, queue)
     }
 
-    /// Executes the next request if there is one, on this thread.
+    /// Executes the next requests if there are some, on this thread.
     #[cfg(test)]
     pub(in crate::service) fn step(&mut self) -> bool {
-        let Ok(LoadRequest { asset, epoch, shard }) = self.requests.try_recv() else {
-            return false;
+        let Ok(first) = self.requests.try_recv() else { return false };
+        let group = self.group(first);
+        let handles = &self.handles;
+        let answer = |request: &LoadRequest, result| {
+            let sent = request.shard.try_send(request.answer(result));
+            assert!(sent.is_ok(), "a simulation leaves room in the queues");
         };
-        self.limits.n_waiting.fetch_sub(1, Ordering::Relaxed);
-        let begun = self.handles.fence().and_then(|()| begin(&self.handles, &asset));
-        let loaded = begun.map(|progress| match progress {
-            Progress::Loaded(asset) => asset,
-            Progress::Behind(stored) => Box::new(stored.catch_up(&self.handles).unwrap()),
-        });
-        let message = ShardMessage::Loaded { asset, epoch, result: Box::new(loaded) };
-        assert!(shard.try_send(message).is_ok(), "a simulation leaves room in the queues");
+        match handles.fence() {
+            Ok(()) => load_group(handles, &group, |request, progress| match progress {
+                Progress::Done(result) => answer(request, result),
+                Progress::Behind(stored) => {
+                    answer(request, stored.catch_up(handles).map(Box::new));
+                }
+            }),
+            Err(error) => group.iter().for_each(|request| answer(request, Err(error.clone()))),
+        }
+        self.limits.n_waiting.fetch_sub(group.len(), Ordering::Relaxed);
         true
     }
 
-    /// Executes the requests, several at a time, until all shards have ended.
+    /// Executes the requests, in several groups at a time, until all shards have ended.
     pub(in crate::service) async fn run(mut self) {
-        while let Some(LoadRequest { asset, epoch, shard }) = self.requests.recv().await {
-            let (handles, limits) = (self.handles.clone(), self.limits.clone());
-            tokio::spawn(async move {
-                let result = Box::new(load(&handles, &limits, &asset, &shard).await);
-                limits.n_waiting.fetch_sub(1, Ordering::Relaxed);
-                // Fails only if the thread of the shard has panicked.
-                let _ = shard.send(ShardMessage::Loaded { asset, epoch, result }).await;
-            });
+        while let Some(first) = self.requests.recv().await {
+            let permit = self.limits.groups.clone().acquire_owned().await;
+            let Ok(permit) = permit else { return };
+            let group = self.group(first);
+            tokio::spawn(execute(self.handles.clone(), self.limits.clone(), group, permit));
+        }
+    }
+
+    /// Returns the next group: `first` and others that wait, divided among all groups that
+    /// may be loaded at a time.
+    fn group(&mut self, first: LoadRequest) -> Vec<LoadRequest> {
+        let n_waiting = 1 + self.requests.len();
+        let size = n_waiting.div_ceil(self.limits.n_groups).min(MAX_ASSETS_AT_ONCE);
+        let mut group = BTreeMap::from([(first.asset.clone(), first)]);
+        for _ in 1..size {
+            let Ok(next) = self.requests.try_recv() else { break };
+            if group.insert(next.asset.clone(), next).is_some() {
+                // The shard does not wait for the earlier request any more.
+                self.limits.n_waiting.fetch_sub(1, Ordering::Relaxed);
+            }
+        }
+        group.into_values().collect()
+    }
+}
+
+/// Loads a group, and answers each of its requests.
+async fn execute(
+    handles: Handles,
+    limits: Arc<LoadLimits>,
+    group: Vec<LoadRequest>,
+    permit: OwnedSemaphorePermit,
+) {
+    let n = group.len();
+    let failed = match handles.fence_async().await {
+        Ok(()) => load_blocking(&handles, &limits, &group).await.err(),
+        Err(error) => Some(error),
+    };
+    drop(permit);
+    limits.n_waiting.fetch_sub(n, Ordering::Relaxed);
+    if let Some(error) = failed {
+        for request in group {
+            // Fails only if the thread of the shard has panicked.
+            let _ = request.shard.send(request.answer(Err(error.clone()))).await;
         }
     }
 }
 
-async fn load(
+/// Loads a group on a thread that may block.
+async fn load_blocking(
     handles: &Handles,
-    limits: &LoadLimits,
-    name: &str,
-    shard: &Sender<ShardMessage>,
-) -> LoadResult {
-    // Before there is a permit, so that one commit completes the fences of all that wait.
-    handles.fence_async().await?;
-    let permit = limits.few.acquire().await.map_err(closed)?;
-    let (for_reading, asset) = (handles.clone(), name.to_owned());
-    let stored = match blocking(name, move || begin(&for_reading, &asset)).await? {
-        Progress::Loaded(asset) => return Ok(asset),
-        Progress::Behind(stored) => stored,
+    limits: &Arc<LoadLimits>,
+    group: &[LoadRequest],
+) -> Result<(), ServiceError> {
+    let (handles, limits, group) = (handles.clone(), limits.clone(), group.to_vec());
+    let load = move || {
+        load_group(&handles, &group, |request, progress| match progress {
+            Progress::Done(result) => drop(request.shard.blocking_send(request.answer(result))),
+            Progress::Behind(stored) => {
+                let rebuilding = rebuild(handles.clone(), limits.clone(), request.clone(), stored);
+                drop(handles.runtime.spawn(rebuilding));
+            }
+        });
     };
-    drop(permit);
-    let n_behind = stored.n_behind();
-    tracing::info!(asset = name, n_behind, "the engine is rebuilt from a long recording");
-    let retry_after_s = (1 + n_behind / SAMPLES_PER_S).min(LONGEST_RETRY_S).unsigned_abs();
-    let message = ShardMessage::Rebuilding { asset: name.to_owned(), retry_after_s };
-    let _ = shard.send(message).await;
-    let _permit = limits.many.acquire().await.map_err(closed)?;
-    let handles = handles.clone();
-    blocking(name, move || stored.catch_up(&handles).map(Box::new)).await
-}
-
-/// Reads the asset `name`, and evaluates its recording unless that takes long.
-fn begin(handles: &Handles, name: &str) -> Result<Progress, ServiceError> {
-    let stored = StoredAsset::read(handles, name)?;
-    if stored.n_behind() >= MANY_SAMPLES {
-        return Ok(Progress::Behind(Box::new(stored)));
-    }
-    stored.catch_up(handles).map(|asset| Progress::Loaded(Box::new(asset)))
-}
-
-fn closed(_: AcquireError) -> ServiceError {
-    ServiceError::Unavailable { what: "the service is shutting down" }
-}
-
-/// Runs `work` on a thread that may block.
-async fn blocking<T: Send + 'static>(
-    asset: &str,
-    work: impl FnOnce() -> Result<T, ServiceError> + Send + 'static,
-) -> Result<T, ServiceError> {
-    tokio::task::spawn_blocking(work).await.unwrap_or_else(|_| {
-        tracing::error!(asset, "rebuilding the engine panicked");
-        Err(ServiceError::Unavailable { what: "the engine of the asset cannot be rebuilt" })
+    tokio::task::spawn_blocking(load).await.map_err(|_| {
+        tracing::error!("loading assets panicked");
+        ServiceError::Unavailable { what: "the asset cannot be loaded" }
     })
+}
+
+/// Reads the assets of a group, and evaluates their recordings unless that takes long. Passes
+/// each to `take` as soon as that is done. Blocks on the store.
+fn load_group(
+    handles: &Handles,
+    group: &[LoadRequest],
+    mut take: impl FnMut(&LoadRequest, Progress),
+) {
+    let names: Vec<_> = group.iter().map(|request| request.asset.clone()).collect();
+    let is_behind = |stored: &StoredAsset| stored.n_behind() >= MANY_SAMPLES;
+    let mut stored = load::read(handles, &names);
+    let few = stored.iter_mut().flatten().filter(|stored| !is_behind(stored));
+    let ahead = load::read_ahead(handles, few);
+    for (request, stored) in group.iter().zip(stored) {
+        let progress = match (stored, &ahead) {
+            (Ok(stored), _) if is_behind(&stored) => Progress::Behind(Box::new(stored)),
+            (Ok(_), Err(error)) => Progress::Done(Err(error.clone())),
+            (Ok(stored), Ok(())) => Progress::Done(stored.catch_up(handles).map(Box::new)),
+            (Err(error), _) => Progress::Done(Err(error)),
+        };
+        take(request, progress);
+    }
+}
+
+/// Evaluates the long recording of an asset, after telling its shard that this takes long.
+async fn rebuild(
+    handles: Handles,
+    limits: Arc<LoadLimits>,
+    request: LoadRequest,
+    stored: Box<StoredAsset>,
+) {
+    let (asset, n_behind) = (request.asset.clone(), stored.n_behind());
+    tracing::info!(asset, n_behind, "the engine is rebuilt from a long recording");
+    let retry_after_s = (1 + n_behind / SAMPLES_PER_S).min(LONGEST_RETRY_S).unsigned_abs();
+    let _ = request.shard.send(ShardMessage::Rebuilding { asset, retry_after_s }).await;
+    let Ok(_permit) = limits.many.acquire().await else { return };
+    let caught_up = tokio::task::spawn_blocking(move || stored.catch_up(&handles)).await;
+    let cannot = ServiceError::Unavailable { what: "the engine of the asset cannot be rebuilt" };
+    let result = caught_up.unwrap_or(Err(cannot)).map(Box::new);
+    let _ = request.shard.send(request.answer(result)).await;
 }
 
 #[cfg(test)]
@@ -192,7 +264,7 @@ mod tests {
     use crate::store::{Location, Store};
 
     #[tokio::test]
-    async fn assets_that_load_wait_for_the_same_commit() {
+    async fn assets_that_load_wait_for_the_same_fence() {
         const N: usize = 50;
         let data = tempfile::tempdir().unwrap();
         let location = Location::File(data.path().join("offbd.sqlite"));
@@ -208,7 +280,7 @@ mod tests {
         for _ in 0..10 * N {
             tokio::task::yield_now().await;
         }
-        assert_eq!(parts.committer.queue.len(), N, "all wait, and nothing is committed");
+        assert_eq!(parts.committer.queue.len(), 1, "all wait for one fence");
         assert!(parts.committer.step(N).await);
         for _ in 0..N {
             let Some(ShardMessage::Loaded { result, .. }) = results.recv().await else { panic!() };

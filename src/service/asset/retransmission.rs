@@ -1,10 +1,9 @@
 //! Samples that a device sends again for a session that it names and that has ended.
 
-use super::ended_session::MAX_SESSIONS;
 use super::recorded::RecordedSamples;
 use super::turn::Turn;
 use crate::service::{ServiceError, views};
-use crate::store::SessionRow;
+use crate::store::{MAX_ENDED_SESSIONS, SessionRow};
 use crate::wire::telemetry::{AckView, RowView};
 use crate::wire::words::UnjudgedWord;
 use offbd_core::engine::{Recognition, Rejection, rejection};
@@ -79,7 +78,7 @@ impl EndedRecording {
         turn: &Turn<'_>,
     ) -> Result<Self, ServiceError> {
         let handles = &turn.env.handles;
-        let parts = handles.wait(handles.store.parts(row.first_part(), MAX_SESSIONS))?;
+        let parts = handles.wait(handles.store.parts(row.first_part(), MAX_ENDED_SESSIONS))?;
         let mut found = RecordedSamples::default();
         for part in &parts {
             found.merge(RecordedSamples::find(&part.id, samples.iter().copied(), turn)?);
@@ -89,7 +88,7 @@ impl EndedRecording {
         Ok(Self {
             samples: found,
             // A deleted part leaves none out.
-            is_whole: parts.len() < MAX_SESSIONS as usize || is_first,
+            is_whole: parts.len() < MAX_ENDED_SESSIONS as usize || is_first,
             last_seq: last.progress.last_seq,
             newest_t_s: handles.wait(handles.store.newest_t_s(&last.id))?,
         })

@@ -2,12 +2,13 @@
 //! another: it must not be recorded a second time, in the next session.
 
 use super::actor::Asset;
-use super::ended_session::{EndedSession, MAX_SESSIONS};
+use super::ended_session::EndedSession;
 use super::outcomes::count_unjudged;
 use super::restart::CERTAIN_AFTER;
 use super::session::OpenSession;
 use super::turn::Turn;
 use crate::service::ServiceError;
+use crate::store::MAX_ENDED_SESSIONS;
 use crate::wire::telemetry::{AckView, RowView};
 use offbd_core::engine::Rejection;
 use offbd_core::vocabulary::Sample;
@@ -17,7 +18,7 @@ impl Asset {
     pub(super) fn note_ended(&mut self, session: EndedSession) {
         self.ended.iter_mut().for_each(|earlier| earlier.is_other_run = false);
         self.ended.insert(0, session);
-        self.ended.truncate(MAX_SESSIONS as usize);
+        self.ended.truncate(MAX_ENDED_SESSIONS as usize);
     }
 
     /// Returns `samples`, each with its index in the batch, without those that an ended
@@ -71,8 +72,8 @@ impl Asset {
             });
         }
         // A deleted part leaves none out.
-        let are_left_out =
-            parts.len() >= MAX_SESSIONS as usize && open.part.number > i64::from(MAX_SESSIONS) + 1;
+        let are_left_out = parts.len() >= MAX_ENDED_SESSIONS as usize
+            && open.part.number > i64::from(MAX_ENDED_SESSIONS) + 1;
         if let Some(oldest) = parts.last().filter(|_| are_left_out) {
             samples.retain(|(index, sample)| {
                 let engine = open.judging.engine();

@@ -10,7 +10,6 @@ use super::trend;
 use super::turn::Turn;
 use crate::service::clock::rfc3339;
 use crate::service::limits::check_session_name;
-use crate::service::writing::Handles;
 use crate::service::{ServiceError, views};
 use crate::store::{SessionProgress, SessionRow, Write};
 use crate::wire::asset;
@@ -113,9 +112,7 @@ impl Asset {
             return Ok(SessionSwitch::Open);
         }
         check_session_name(name)?;
-        let handles = &turn.env.handles;
-        handles.fence()?;
-        if let Some(row) = self.ended_session_named(name, handles)? {
+        if let Some(row) = self.ended_session_named(name, turn)? {
             return Ok(SessionSwitch::Ended(Box::new(row)));
         }
         if !self.session_rate.allows(turn.at) {
@@ -127,12 +124,18 @@ impl Asset {
         Ok(SessionSwitch::Open)
     }
 
-    /// Returns a session that a device has called `name`, or a part of it.
+    /// Returns a session that a device has called `name`, or a part of it. An asset without any
+    /// session does not wait for earlier changes.
     fn ended_session_named(
         &self,
         name: &str,
-        handles: &Handles,
+        turn: &Turn<'_>,
     ) -> Result<Option<SessionRow>, ServiceError> {
+        if !self.has_sessions {
+            return Ok(None);
+        }
+        let handles = &turn.env.handles;
+        handles.fence()?;
         let (store, asset) = (&handles.store, &self.row.name);
         match handles.wait(store.session_named(asset, name))? {
             None => handles.wait(store.later_part_of(asset, name)).map_err(Into::into),
@@ -150,6 +153,7 @@ impl Asset {
         turn: &mut Turn<'_>,
     ) -> Result<(), ServiceError> {
         self.session_rate.count(turn.at);
+        self.has_sessions = true;
         let id = Uuid::now_v7().to_string();
         let setup = Setup::new(self.rig.clone(), None)?;
         let row = SessionRow {
@@ -178,11 +182,13 @@ impl Asset {
     /// Opens a session named by the current time, or by the next microsecond whose name is
     /// not used yet: the clock may stand still or go back.
     pub(super) fn open_nameless(&mut self, turn: &mut Turn<'_>) -> Result<(), ServiceError> {
-        let handles = &turn.env.handles;
-        handles.fence()?;
         let mut at = turn.at;
-        while handles.wait(handles.store.session_named(&self.row.name, &rfc3339(at)))?.is_some() {
-            at += 1;
+        if self.has_sessions {
+            let (handles, asset) = (&turn.env.handles, &self.row.name);
+            handles.fence()?;
+            while handles.wait(handles.store.session_named(asset, &rfc3339(at)))?.is_some() {
+                at += 1;
+            }
         }
         self.open(rfc3339(at), None, false, turn)
     }

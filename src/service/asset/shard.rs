@@ -16,6 +16,10 @@ use crate::service::ServiceError;
 use crate::service::writing::{EngineGeneration, WriteSet};
 use crate::store::{AssetRow, PartitionId, Write};
 
+/// Commands of a shard that wait for assets to be loaded; at the limit, others are refused.
+/// Chosen: some seconds of loading.
+const MAX_WAITING: usize = 4096;
+
 /// An asset of a shard.
 enum Slot {
     /// Boxed, because it is large and is moved out for each command.
@@ -41,8 +45,7 @@ pub(in crate::service) struct Shard {
     env: Environment,
     loads: LoadQueue,
     slots: BTreeMap<String, Slot>,
-    /// Limit of the commands that wait for assets to be loaded.
-    max_waiting: usize,
+    /// Commands that wait for assets to be loaded.
     n_waiting: usize,
     n_running: metrics::Gauge,
 }
@@ -56,9 +59,8 @@ impl Shard {
         queue: mpsc::Receiver<ShardMessage>,
     ) -> Self {
         let n_running = metrics::gauge!("offbd_engines", "shard" => number.to_string());
-        let max_waiting = queue.max_capacity();
         let (slots, n_waiting) = (BTreeMap::new(), 0);
-        Self { number, queue, env, loads, slots, max_waiting, n_waiting, n_running }
+        Self { number, queue, env, loads, slots, n_waiting, n_running }
     }
 
     /// Starts the thread of the shard, which ends when all senders of its queue are dropped.
@@ -148,7 +150,7 @@ impl Shard {
     /// Lets `command` wait for the asset `name`, unless that is refused.
     fn wait(&mut self, name: &str, mut loading: Loading, command: AssetCommand) {
         let full = ServiceError::Busy { what: "too many requests wait for assets to be loaded" };
-        let is_full = self.n_waiting >= self.max_waiting;
+        let is_full = self.n_waiting >= MAX_WAITING;
         match loading.refusal.clone().or(is_full.then_some(full)) {
             Some(refusal) if !matches!(command, AssetCommand::Load { .. }) => {
                 self.apply(name, Err(refusal), command);
@@ -424,6 +426,7 @@ mod tests {
             link: LinkHealth::default(),
             malformed: Vec::new(),
             ended: Vec::new(),
+            has_sessions: false,
             learning: Default::default(),
             generation: EngineGeneration::default(),
             deleted: false,

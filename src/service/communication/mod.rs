@@ -7,7 +7,7 @@
 mod link;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 pub use link::CommunicationSettings;
 
@@ -21,8 +21,16 @@ use crate::store::{CommunicationChange, Micros, OpenLink, Write};
 use crate::wire::alarm::CommunicationView;
 use crate::wire::words::{AlarmChangeWord, AlarmCodeWord};
 
-/// Interval between two looks.
-const INTERVAL: Duration = Duration::from_secs(1);
+/// Shortest and longest pause between two looks. The longest is half of [`JUMP`].
+const SHORTEST_PAUSE: Duration = Duration::from_secs(1);
+const LONGEST_PAUSE: Duration = Duration::from_secs(5);
+
+/// The pause after a look, as a multiple of its duration: with very many rigs, looking takes a
+/// twentieth of the time of a core. Chosen.
+const PAUSE_PER_LOOK: u32 = 20;
+
+/// Changes that are stored in one transaction. Chosen: the samples of other rigs wait for it.
+const CHANGES_AT_ONCE: usize = 64;
 
 /// Time between two looks from which on the clock has jumped or the process has slept, so that
 /// rigs had no chance to be heard.
@@ -46,17 +54,18 @@ impl CommunicationWatch {
         Self { handles, presences, settings, links: BTreeMap::new(), last_look: None }
     }
 
-    /// Looks every [`INTERVAL`] until the service shuts down.
+    /// Looks again and again until the service shuts down.
+    #[expect(clippy::disallowed_methods, reason = "the duration of a look, not a time")]
     pub(super) async fn run(mut self) {
         let closing = self.handles.closing.clone();
         let forever = async {
-            let mut ticks = tokio::time::interval(INTERVAL);
-            ticks.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
             loop {
-                ticks.tick().await;
+                let begun = Instant::now();
                 if let Err(error) = self.look(self.handles.clock.now()).await {
                     tracing::warn!(%error, "cannot look for lost communication; tried again");
                 }
+                let pause = begun.elapsed().saturating_mul(PAUSE_PER_LOOK);
+                tokio::time::sleep(pause.clamp(SHORTEST_PAUSE, LONGEST_PAUSE)).await;
             }
         };
         let _: Option<()> = closing.run_until_cancelled(forever).await;
@@ -65,7 +74,7 @@ impl CommunicationWatch {
     /// Looks at all rigs at `now` and stores what has changed.
     async fn look(&mut self, now: Micros) -> Result<(), ServiceError> {
         let store = &self.handles.store;
-        let open = store.open_links().await?;
+        let open = store.open_links(self.handles.ownership.filter().as_deref()).await?;
         let lost = store.communications(None, None, true).await?;
         let was_lost: BTreeMap<_, _> = lost.into_iter().map(|row| (row.asset, row.since)).collect();
         self.wait_anew_after_jump(now);
@@ -92,11 +101,25 @@ impl CommunicationWatch {
         }
         let n_lost = self.links.values().filter(|link| link.is_lost()).count();
         metrics::gauge!("offbd_communication_lost").set(n_lost as f64);
+        let stored = self.store(changes).await;
+        if stored.is_err() {
+            // Found again by the next look.
+            self.links.clear();
+        }
+        stored
+    }
+
+    /// Stores the changes of some assets, several in one transaction.
+    async fn store(&self, changes: Vec<(String, Write)>) -> Result<(), ServiceError> {
+        let mut by_partition = BTreeMap::<_, Vec<_>>::new();
         for (asset, change) in changes {
-            if let Err(error) = self.handles.write(&asset, vec![change]).await {
-                // Found again by the next look.
-                self.links.clear();
-                return Err(error);
+            let partition = self.handles.ownership.partition_of(&asset);
+            by_partition.entry(partition).or_default().push((asset, change));
+        }
+        for changes in by_partition.into_values() {
+            for part in changes.chunks(CHANGES_AT_ONCE) {
+                let writes = part.iter().map(|(_, change)| change.clone()).collect();
+                self.handles.write(&part[0].0, writes).await?;
             }
         }
         Ok(())

@@ -536,7 +536,10 @@ impl Writer {
         }
         ids.extend(free);
         let taken = begin_epochs(db, &ids, self.node.as_ref()).await?;
+        let before = self.journal.n_bytes();
         self.journal.load(db, &ids).await?;
+        // What is taken has not grown: it is folded by and by, as one fold of it would take long.
+        self.n_bytes_before += self.journal.n_bytes().saturating_sub(before);
         self.owned.by_id.extend(taken);
         if self.role == WriterRole::Node && !ids.is_empty() {
             notify(db, TRANSFERS).await?;

@@ -1,6 +1,10 @@
 //! Partitions and names of nodes, as the database keeps them.
 
-use offbd::store::{Location, NodeIdentity, PartitionId, Partitions, Store, StoreError, Writer};
+use offbd::store::{
+    AssetRow, ChangeSet, Location, NodeIdentity, PartitionId, Partitions, SessionProgress,
+    SessionRow, Store, StoreError, Write, Writer,
+};
+use offbd_core::vocabulary::Sample;
 
 use super::not_ready;
 use crate::support::cluster::Cluster;
@@ -38,6 +42,51 @@ async fn all_partitions_are_taken_and_released_in_one_transaction() {
     a.release(&all).await.unwrap();
     assert_eq!(transactions_and_owners(&url).await, (1, 0));
     assert_eq!(b.take(&all).await.unwrap(), all);
+}
+
+/// Records ten samples of a new session, alone in a row of the journal.
+async fn record(writer: &mut Writer, session: String) {
+    let asset =
+        AssetRow { name: session.clone(), document: "{}".to_owned(), ..AssetRow::default() };
+    let partition = Partitions::new(N).of(&asset.name);
+    let row = SessionRow {
+        id: session.clone(),
+        asset: session.clone(),
+        name: session.clone(),
+        state: "open".to_owned(),
+        setup: "{}".to_owned(),
+        baseline: "{}".to_owned(),
+        ..SessionRow::default()
+    };
+    let samples = (0..10).map(|i| Sample { t_s: f64::from(i), ..Sample::default() }).collect();
+    let progress = SessionProgress { n_samples: 10, ..SessionProgress::default() };
+    let append = Write::Append { session, first_index: 0, samples, progress };
+    let mut writes = vec![Write::CreateAsset(asset), Write::OpenSession(row), append];
+    let set = ChangeSet { partition: Some(partition), writes: &mut writes };
+    writer.commit(&mut [set]).await.unwrap();
+}
+
+/// One transaction for all that a killed node had in its journal would take so long that it
+/// is given up, and with it the partitions.
+#[tokio::test]
+async fn the_journal_of_another_node_is_folded_by_and_by() {
+    let server = Postgres::new();
+    let url = server.database("cluster");
+    let all: Vec<_> = Partitions::new(N).all().collect();
+    let mut a = node(&url, "1", "a").await.unwrap();
+    a.take(&all).await.unwrap();
+    for i in 0..100 {
+        record(&mut a, format!("rig-{i}")).await;
+    }
+    a.release(&all).await.unwrap();
+    let mut b = node(&url, "2", "b").await.unwrap();
+    assert_eq!(b.take(&all).await.unwrap(), all);
+    let taken = b.journal_bytes();
+    b.fold(taken / 3).await.unwrap();
+    assert!(b.journal_bytes() > taken / 2, "{} of {taken}", b.journal_bytes());
+    while b.journal_bytes() > taken / 3 {
+        b.fold(taken / 3).await.unwrap();
+    }
 }
 
 /// A node that is paused while the server sends it a long answer.

@@ -139,7 +139,8 @@ impl ServiceLink {
             };
             let (status, headers) = (response.status(), response.headers().clone());
             if [429, 503].contains(&status.as_u16()) {
-                assert_eq!(headers["retry-after"], "1");
+                // More than 1 if many are refused.
+                assert!(headers["retry-after"].to_str().unwrap().parse::<u32>().unwrap() >= 1);
                 refusals.push(response.text().await.unwrap_or_default());
                 tokio::task::yield_now().await;
                 continue;
