@@ -268,10 +268,7 @@ impl Store {
         }
         let mut query =
             QueryBuilder::new("SELECT id FROM session WHERE expired_at IS NULL AND id IN (");
-        for (i, id) in ids.iter().enumerate() {
-            query.push(if i == 0 { "" } else { ", " }).bind(id.clone())?;
-        }
-        query.push(")");
+        query.bind_list(ids)?.push(")");
         let rows: Vec<(String,)> = query.rows().fetch_all(&self.pool).await?;
         Ok(rows.into_iter().map(|(id,)| id).collect())
     }
@@ -286,10 +283,7 @@ impl Store {
         }
         let mut query =
             QueryBuilder::new("SELECT asset FROM session WHERE state = 'open' AND asset IN (");
-        for (i, asset) in assets.iter().enumerate() {
-            query.push(if i == 0 { "" } else { ", " }).bind(asset.clone())?;
-        }
-        query.push(")");
+        query.bind_list(assets)?.push(")");
         let rows: Vec<(String,)> = query.rows().fetch_all(&self.pool).await?;
         Ok(rows.into_iter().map(|(asset,)| asset).collect())
     }

@@ -8,7 +8,7 @@ use sqlx::{Any, Arguments, AssertSqlSafe, Encode, FromRow, Type};
 use super::{PartitionId, StoreError};
 
 /// Lengths of bound lists. Few, so that few statements are prepared; a list in between is
-/// filled up with NULL, which equals nothing.
+/// filled up with NULL, which equals nothing. A longer one is bound as it is.
 const LIST_LENGTHS: [usize; 5] = [1, 4, 16, 64, 256];
 
 #[derive(Default)]
@@ -38,7 +38,7 @@ impl QueryBuilder {
         Ok(self)
     }
 
-    /// Appends a placeholder for each of `values`, separated by commas; at most 256.
+    /// Appends a placeholder for each of `values`, separated by commas.
     pub(super) fn bind_list(&mut self, values: &[String]) -> Result<&mut Self, StoreError> {
         for i in 0..list_length(values.len()) {
             self.push(if i == 0 { "" } else { ", " }).bind(values.get(i).cloned())?;
@@ -46,7 +46,7 @@ impl QueryBuilder {
         Ok(self)
     }
 
-    /// Appends rows of two placeholders for `VALUES`, one for each of `rows`; at most 256.
+    /// Appends rows of two placeholders for `VALUES`, one for each of `rows`.
     pub(super) fn bind_rows(&mut self, rows: &[(String, i64)]) -> Result<&mut Self, StoreError> {
         for i in 0..list_length(rows.len()) {
             let (text, number) = rows.get(i).cloned().unzip();
