@@ -170,7 +170,7 @@ fn the_fields_of_a_snapshot_change_only_with_its_version() {
     for setup in setups() {
         let mut motion = UsableMotion::new(&setup.rig);
         let mut judging = Judging::new(setup, FaultMemory::default());
-        let disturbances = [Disturbance::Spike(900), Disturbance::ClockStep(1200, -5.0)];
+        let disturbances = [Disturbance::Spike(900), Disturbance::ClockStep(1200, -4.0)];
         for (i, input) in inputs(1500, fields.is_empty(), &disturbances).into_iter().enumerate() {
             judging.input(input);
             if let Input::Sample(sample) = input {

@@ -21,8 +21,10 @@ use crate::store::{CommunicationChange, Micros, OpenLink, Write};
 use crate::wire::alarm::CommunicationView;
 use crate::wire::words::{AlarmChangeWord, AlarmCodeWord};
 
-/// Shortest and longest pause between two looks. The longest is half of [`JUMP`].
-const SHORTEST_PAUSE: Duration = Duration::from_secs(1);
+/// Shortest and longest pause between two looks. The shortest is half of the shortest silence
+/// that can be configured, so that data which come back for a moment are seen; the longest is
+/// half of [`JUMP`].
+const SHORTEST_PAUSE: Duration = Duration::from_millis(500);
 const LONGEST_PAUSE: Duration = Duration::from_secs(5);
 
 /// The pause after a look, as a multiple of its duration: with very many rigs, looking takes a
