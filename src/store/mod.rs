@@ -147,6 +147,9 @@ pub enum StoreError {
          its own"
     )]
     NameInUse { name: String },
+    /// The database does not list this node any more; it registers when it connects again.
+    #[error("the database has forgotten this node of the cluster, which registers again")]
+    Forgotten,
     /// Other nodes of the cluster have taken these partitions. Nothing was changed.
     #[error("{} partitions now belong to other nodes", partitions.len())]
     Overtaken { partitions: Vec<PartitionId> },
@@ -236,6 +239,7 @@ impl StoreError {
             ),
             Self::InUse
             | Self::NameInUse { .. }
+            | Self::Forgotten
             | Self::UnexpectedCommits { .. }
             | Self::FileGone { .. }
             | Self::Directory { .. } => true,

@@ -475,10 +475,14 @@ impl Writer {
         .bind(&backend.started)
         .execute(&mut *db)
         .await?;
+        // With the process: a node that registers again meanwhile has another one, which this
+        // statement does not know to be alive.
         let forget = concat!(
             "DELETE FROM node WHERE id NOT IN
-             (SELECT owner FROM partition WHERE owner IS NOT NULL) AND NOT ",
-            is_alive!()
+             (SELECT owner FROM partition WHERE owner IS NOT NULL)
+             AND (id, pid, started) IN (SELECT id, pid, started FROM node WHERE NOT ",
+            is_alive!(),
+            ")"
         );
         sqlx::query(forget).execute(db).await?;
         Ok(())
@@ -589,7 +593,7 @@ impl Writer {
     /// from being idle.
     ///
     /// # Errors
-    /// [`StoreError`].
+    /// [`StoreError`]; [`StoreError::Forgotten`] if this node is not one of them.
     pub async fn observe(&mut self) -> Result<(Vec<NodeRow>, Vec<PartitionRow>), StoreError> {
         let Some(connection) = &mut self.connection else {
             return Err(sqlx::Error::PoolClosed.into());
@@ -608,7 +612,12 @@ impl Writer {
             let nodes = nodes.fetch_all(&mut *connection).await?;
             Ok((nodes, partitions.fetch_all(&mut *connection).await?))
         };
-        within(LOOK_TIMEOUT, look).await
+        let (nodes, partitions): (Vec<NodeRow>, _) = within(LOOK_TIMEOUT, look).await?;
+        let is_me = |node: &NodeRow| self.node.as_ref().is_none_or(|me| me.id == node.id);
+        if !nodes.iter().any(is_me) {
+            return Err(StoreError::Forgotten);
+        }
+        Ok((nodes, partitions))
     }
 
     /// After connecting again: which partitions are still owned. Returns whether the

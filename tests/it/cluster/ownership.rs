@@ -5,6 +5,7 @@ use offbd::store::{
     SessionRow, Store, StoreError, Write, Writer,
 };
 use offbd_core::vocabulary::Sample;
+use sqlx::Executor;
 
 use super::not_ready;
 use crate::support::cluster::Cluster;
@@ -174,4 +175,48 @@ async fn a_node_that_is_paused_has_its_name_again_once_the_other_one_is_gone() {
     drop(second);
     cluster.client(1).readiness(200).await;
     cluster.settled(3).await;
+}
+
+#[tokio::test]
+async fn a_node_that_the_database_has_forgotten_registers_again() {
+    let server = Postgres::new();
+    let url = server.database("cluster");
+    let mut a = node(&url, "1", "a").await.unwrap();
+    assert_eq!(a.observe().await.unwrap().0.len(), 1);
+    connection(&url).await.execute("DELETE FROM node").await.unwrap();
+    let forgotten = a.observe().await.unwrap_err();
+    assert!(matches!(forgotten, StoreError::Forgotten) && forgotten.is_outage(), "{forgotten}");
+    a.reconnect().await.unwrap();
+    assert_eq!(a.observe().await.unwrap().0.len(), 1);
+}
+
+/// Another node begins to forget it, and knows only the connections that there are by then.
+#[tokio::test]
+async fn a_node_that_connects_again_is_not_forgotten() {
+    let server = Postgres::new();
+    let url = server.database("cluster");
+    let mut a = node(&url, "1", "a").await.unwrap();
+    a.disconnect();
+    let mut row = connection(&url).await;
+    let mut watch = connection(&url).await;
+    let n_alive = "SELECT COUNT(*) FROM node JOIN pg_stat_activity USING (pid)";
+    while sqlx::query_scalar::<_, i64>(n_alive).fetch_one(&mut watch).await.unwrap() > 0 {}
+    row.execute("BEGIN").await.unwrap();
+    row.execute("UPDATE node SET leaving = 0").await.unwrap();
+    let register = async {
+        let blocked = "SELECT COUNT(*) FROM pg_stat_activity
+                       WHERE wait_event_type = 'Lock' AND query LIKE 'DELETE%'";
+        while sqlx::query_scalar::<_, i64>(blocked).fetch_one(&mut watch).await.unwrap() == 0 {}
+        let mut new = connection(&url).await;
+        let pid: i32 =
+            sqlx::query_scalar("SELECT pg_backend_pid()").fetch_one(&mut new).await.unwrap();
+        let registered = "UPDATE node SET pid = $1, started = (SELECT CAST(backend_start AS TEXT)
+                          FROM pg_stat_activity WHERE pid = $1)";
+        sqlx::query(registered).bind(pid).execute(&mut row).await.unwrap();
+        row.execute("COMMIT").await.unwrap();
+        new
+    };
+    let both = async { tokio::join!(node(&url, "2", "b"), register) };
+    let (b, _registered) = tokio::time::timeout(DEADLINE, both).await.expect("b opens in time");
+    assert_eq!(b.unwrap().observe().await.unwrap().0.len(), 2);
 }
