@@ -263,14 +263,7 @@ impl Store {
 
     /// Those of the sessions `ids` that are there and not hidden.
     pub async fn existing_sessions(&self, ids: &[String]) -> Result<Vec<String>, StoreError> {
-        if ids.is_empty() {
-            return Ok(Vec::new());
-        }
-        let mut query =
-            QueryBuilder::new("SELECT id FROM session WHERE expired_at IS NULL AND id IN (");
-        query.bind_list(ids)?.push(")");
-        let rows: Vec<(String,)> = query.rows().fetch_all(&self.pool).await?;
-        Ok(rows.into_iter().map(|(id,)| id).collect())
+        self.names("SELECT id FROM session WHERE expired_at IS NULL AND id IN (", ids).await
     }
 
     /// Those of `assets` that have an open session.
@@ -278,13 +271,21 @@ impl Store {
     /// # Errors
     /// [`StoreError`] if the database fails.
     pub async fn assets_with_session(&self, assets: &[String]) -> Result<Vec<String>, StoreError> {
-        if assets.is_empty() {
+        self.names("SELECT asset FROM session WHERE state = 'open' AND asset IN (", assets).await
+    }
+
+    /// Returns the names that `select`, which ends in `IN (`, finds with the list `among`.
+    async fn names(
+        &self,
+        select: &'static str,
+        among: &[String],
+    ) -> Result<Vec<String>, StoreError> {
+        if among.is_empty() {
             return Ok(Vec::new());
         }
-        let mut query =
-            QueryBuilder::new("SELECT asset FROM session WHERE state = 'open' AND asset IN (");
-        query.bind_list(assets)?.push(")");
+        let mut query = QueryBuilder::new(select);
+        query.bind_list(among)?.push(")");
         let rows: Vec<(String,)> = query.rows().fetch_all(&self.pool).await?;
-        Ok(rows.into_iter().map(|(asset,)| asset).collect())
+        Ok(rows.into_iter().map(|(name,)| name).collect())
     }
 }

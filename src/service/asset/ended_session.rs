@@ -86,7 +86,7 @@ impl EndedSession {
         if doubtful.is_empty() {
             return Ok(found);
         }
-        turn.env.handles.fence()?;
+        turn.barrier()?;
         let recorded =
             RecordedSamples::find(&self.id, doubtful.iter().map(|(_, sample)| sample), turn)?;
         for (index, sample) in doubtful {

@@ -41,7 +41,7 @@ struct OutdatedSession {
     inputs: Option<SessionInputs>,
 }
 
-/// Reads the assets `names`, which differ, and the last snapshots of their engines; a fence
+/// Reads the assets `names`, which differ, and the last snapshots of their engines; a barrier
 /// must be complete since their last change. Returns for each either the asset or the reason
 /// why it cannot be read: [`ServiceError::UnknownAsset`], [`ServiceError::Store`],
 /// [`ServiceError::Corrupt`]. Blocks on the store.

@@ -132,7 +132,7 @@ impl Loader {
             let sent = request.shard.try_send(request.answer(result));
             assert!(sent.is_ok(), "a simulation leaves room in the queues");
         };
-        match handles.fence() {
+        match handles.barrier() {
             Ok(()) => load_group(handles, &group, |request, progress| match progress {
                 Progress::Done(result) => answer(request, result),
                 Progress::Behind(stored) => {
@@ -180,7 +180,7 @@ async fn execute(
     permit: OwnedSemaphorePermit,
 ) {
     let n = group.len();
-    let failed = match handles.fence_async().await {
+    let failed = match handles.barrier_async().await {
         Ok(()) => load_blocking(&handles, &limits, &group).await.err(),
         Err(error) => Some(error),
     };
@@ -264,7 +264,7 @@ mod tests {
     use crate::store::{Location, Store};
 
     #[tokio::test]
-    async fn assets_that_load_wait_for_the_same_fence() {
+    async fn assets_that_load_wait_for_the_same_barrier() {
         const N: usize = 50;
         let data = tempfile::tempdir().unwrap();
         let location = Location::File(data.path().join("offbd.sqlite"));
@@ -280,7 +280,7 @@ mod tests {
         for _ in 0..10 * N {
             tokio::task::yield_now().await;
         }
-        assert_eq!(parts.committer.queue.len(), 1, "all wait for one fence");
+        assert_eq!(parts.committer.queue.len(), 1, "all wait for one barrier");
         assert!(parts.committer.step(N).await);
         for _ in 0..N {
             let Some(ShardMessage::Loaded { result, .. }) = results.recv().await else { panic!() };

@@ -31,8 +31,8 @@ impl Asset {
         if !self.session_rate.allows(turn.at) {
             return Ok(());
         }
+        turn.barrier()?;
         let handles = &turn.env.handles;
-        handles.fence()?;
         let mut part = open.part.next();
         let named = |part: &Part| {
             handles.wait(handles.store.session_named(&self.row.name, &part.session_name()))

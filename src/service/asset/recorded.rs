@@ -59,7 +59,7 @@ impl RecordedSamples {
         if old.is_empty() {
             return Ok(Self::default());
         }
-        turn.env.handles.fence()?;
+        turn.barrier()?;
         Self::find(&open.id, old, turn)
     }
 

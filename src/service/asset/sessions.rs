@@ -134,8 +134,8 @@ impl Asset {
         if !self.has_sessions {
             return Ok(None);
         }
+        turn.barrier()?;
         let handles = &turn.env.handles;
-        handles.fence()?;
         let (store, asset) = (&handles.store, &self.row.name);
         match handles.wait(store.session_named(asset, name))? {
             None => handles.wait(store.later_part_of(asset, name)).map_err(Into::into),
@@ -184,8 +184,8 @@ impl Asset {
     pub(super) fn open_nameless(&mut self, turn: &mut Turn<'_>) -> Result<(), ServiceError> {
         let mut at = turn.at;
         if self.has_sessions {
+            turn.barrier()?;
             let (handles, asset) = (&turn.env.handles, &self.row.name);
-            handles.fence()?;
             while handles.wait(handles.store.session_named(asset, &rfc3339(at)))?.is_some() {
                 at += 1;
             }

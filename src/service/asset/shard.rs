@@ -304,18 +304,18 @@ impl Shard {
             Ok(asset) => asset,
             Err(error) => return reply.send(Err(error)),
         };
-        let generation = asset.generation.clone();
-        let mut turn = match Turn::begin(&self.env) {
+        let mut turn = match Turn::begin(&self.env, &mut asset.generation) {
             Ok(turn) => turn,
             Err(error) => {
                 self.keep(name, asset);
                 return reply.send(Err(error));
             }
         };
+        let generation = turn.generation.clone();
         let outcome = catch_unwind(AssertUnwindSafe(|| change(&mut asset, &mut turn)));
         match outcome {
             Ok(Ok(answer)) => {
-                turn.commit(name, generation, answer, reply);
+                turn.commit(name, answer, reply);
                 if asset.deleted {
                     self.env.presences.remove(name);
                 } else if !asset.dropped {
@@ -368,7 +368,7 @@ impl Shard {
         if let Err(error) = absent {
             return reply.send(Err(error));
         }
-        let mut turn = match Turn::begin(&self.env) {
+        let mut turn = match Turn::begin(&self.env, &mut EngineGeneration::default()) {
             Ok(turn) => turn,
             Err(error) => return reply.send(Err(error)),
         };
@@ -379,7 +379,7 @@ impl Shard {
             created_at: turn.at,
             updated_at: turn.at,
         }));
-        turn.commit(name, EngineGeneration::default(), (), reply);
+        turn.commit(name, (), reply);
     }
 
     fn check_not_being_deleted(&self, name: &str) -> Result<(), ServiceError> {

@@ -27,8 +27,8 @@ pub(super) fn ended(
     let calibration_id = open.judging.basis().calibration_id.clone();
     let mut estimates_so_far = Vec::new();
     if calibration_id.is_some() {
+        turn.barrier()?;
         let handles = &turn.env.handles;
-        handles.fence()?;
         let points = points(handles.wait(handles.store.trend(asset, MAX_ROWS))?);
         let same = points.into_iter().filter(|p| p.calibration_id == calibration_id);
         estimates_so_far = same.map(|p| p.estimates).chain([estimates]).collect();

@@ -30,31 +30,50 @@ pub(super) struct Turn<'a> {
     pub(super) engine_changed: bool,
     /// Jobs to queue once the writes are durable, each with its permit of the queue.
     pub(super) jobs: Vec<(OwnedPermit<Job>, Job)>,
+    /// The engine that the changes belong to.
+    pub(super) generation: EngineGeneration,
+    /// Whether changes of earlier turns may not be settled yet.
+    is_behind: bool,
     /// The room for the changes in the writer's queue.
     room: OwnedPermit<WriteSet>,
 }
 
 impl<'a> Turn<'a> {
-    /// Begins a turn; blocks while the writer's queue is full.
+    /// Begins a turn of the engine `generation`; blocks while the writer's queue is full.
     ///
     /// # Errors
     /// Those of [`Handles::reserve`].
-    pub(super) fn begin(env: &'a Environment) -> Result<Self, ServiceError> {
+    pub(super) fn begin(
+        env: &'a Environment,
+        generation: &mut EngineGeneration,
+    ) -> Result<Self, ServiceError> {
         let room = env.handles.reserve()?;
-        let at = env.handles.clock.now();
-        Ok(Self { env, at, writes: Vec::new(), engine_changed: false, jobs: Vec::new(), room })
+        Ok(Self {
+            env,
+            at: env.handles.clock.now(),
+            writes: Vec::new(),
+            engine_changed: false,
+            jobs: Vec::new(),
+            is_behind: generation.has_unsettled(),
+            generation: generation.clone(),
+            room,
+        })
+    }
+
+    /// Blocks until the changes of earlier turns of the asset are committed or refused, so that
+    /// the next read sees them; returns at once if all are and the database is available.
+    ///
+    /// # Errors
+    /// Those of [`Handles::barrier`].
+    pub(super) fn barrier(&self) -> Result<(), ServiceError> {
+        let handles = &self.env.handles;
+        if self.is_behind || handles.is_away() { handles.barrier() } else { Ok(()) }
     }
 
     /// Submits the changes to the writer. Once they are durable, the jobs are queued and
     /// `answer` is sent to `reply`.
-    pub(super) fn commit<T: Send + 'static>(
-        self,
-        asset: &str,
-        generation: EngineGeneration,
-        answer: T,
-        reply: Reply<T>,
-    ) {
-        let Self { env, writes, jobs, room, .. } = self;
+    pub(super) fn commit<T: Send + 'static>(self, asset: &str, answer: T, reply: Reply<T>) {
+        let Self { env, writes, jobs, generation, room, .. } = self;
         let completion = Box::new(move |outcome: Result<(), ServiceError>| {
             if outcome.is_ok() {
                 jobs.into_iter().for_each(|(permit, job)| drop(permit.send(job)));
@@ -63,5 +82,46 @@ impl<'a> Turn<'a> {
         });
         let partition = Some(env.handles.ownership.partition_of(asset));
         room.send(WriteSet { partition, writes, generation, completion });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::service::{Clock, Limits, Service};
+    use crate::store::{Location, Store};
+
+    #[tokio::test]
+    async fn a_turn_waits_only_for_earlier_changes_of_its_asset() {
+        let data = tempfile::tempdir().unwrap();
+        let location = Location::File(data.path().join("offbd.sqlite"));
+        let (store, writer) = Store::open(&location).await.unwrap();
+        let (service, mut parts) =
+            Service::assemble(store, writer, Limits::default(), None, None, Clock::System);
+        let handles = service.inner.handles.clone();
+        let env =
+            Environment { handles, presences: Presences::default(), jobs: mpsc::channel(1).0 };
+        let (mut this, mut other) = (EngineGeneration::default(), EngineGeneration::default());
+        let commit = |generation: &mut EngineGeneration| {
+            let mut turn = Turn::begin(&env, generation).unwrap();
+            turn.writes.push(Write::RemoveSnapshots { session: "none".to_owned() });
+            turn.commit("a", (), Reply::new().0);
+        };
+
+        commit(&mut other);
+        let turn = Turn::begin(&env, &mut this).unwrap();
+        assert!(!turn.is_behind);
+        turn.barrier().unwrap();
+        drop(turn);
+        commit(&mut this);
+        assert!(Turn::begin(&env, &mut this).unwrap().is_behind);
+        assert_eq!(
+            parts.committer.queue.len(),
+            2,
+            "a turn without earlier changes sends no barrier"
+        );
+
+        assert!(parts.committer.step(usize::MAX).await);
+        assert!(!Turn::begin(&env, &mut this).unwrap().is_behind);
     }
 }

@@ -201,7 +201,7 @@ impl NodeTask {
         let ownership: &Ownership = &self.handles.ownership;
         partitions.iter().for_each(|partition| ownership.remove(*partition));
         self.shards.release(partitions.clone(), false).await;
-        self.handles.fence_async().await?;
+        self.handles.barrier_async().await?;
         let n = partitions.len() as u64;
         self.transfers.call(|answer| TransferRequest::Release(partitions, answer)).await?;
         metrics::counter!("offbd_partitions_handed_over_total").increment(n);

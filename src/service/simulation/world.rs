@@ -84,8 +84,8 @@ impl Process {
         let (service, mut parts) = Service::assemble(store, writer, limits(), None, None, clock);
         parts.committer.first_retry = Duration::ZERO;
         let committer = Arc::new(Mutex::new(parts.committer));
-        let for_fence = committer.clone();
-        let commit_queued = Box::new(move || while commit(&for_fence, usize::MAX) {});
+        let for_barrier = committer.clone();
+        let commit_queued = Box::new(move || while commit(&for_barrier, usize::MAX) {});
         assert!(service.inner.handles.commit_queued.set(commit_queued).is_ok());
         Self { service, shards: parts.shards, loader: parts.loader, committer, faults }
     }

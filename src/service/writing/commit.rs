@@ -57,6 +57,11 @@ impl EngineGeneration {
     pub(in crate::service) fn is_invalid(&self) -> bool {
         self.invalid.load(Ordering::SeqCst)
     }
+
+    /// Whether some of its write sets may not be committed or refused yet; each holds a clone.
+    pub(in crate::service) fn has_unsettled(&mut self) -> bool {
+        Arc::get_mut(&mut self.invalid).is_none()
+    }
 }
 
 /// Called once the write set is durable, or with the reason why it is not.
@@ -435,7 +440,8 @@ impl Committer {
 
     /// Publishes the events of a committed write set and completes it.
     fn complete(&self, set: WriteSet) {
-        for write in set.writes {
+        let WriteSet { writes, generation, completion, .. } = set;
+        for write in writes {
             let event = match write {
                 Write::Transition(row) => {
                     count(&row);
@@ -447,7 +453,9 @@ impl Committer {
             };
             event.into_iter().for_each(|event| self.events.publish(event));
         }
-        (set.completion)(Ok(()));
+        // First, so that a request that follows on the answer finds nothing unsettled.
+        drop(generation);
+        completion(Ok(()));
     }
 }
 

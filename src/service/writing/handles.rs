@@ -30,7 +30,7 @@ pub(in crate::service) struct Handles {
     pub(in crate::service) ownership: Ownership,
     writer: mpsc::Sender<WriteSet>,
     pub(in crate::service) outage: watch::Receiver<Outage>,
-    /// Whether a fence has timed out and is not complete yet.
+    /// Whether a barrier has timed out and is not complete yet.
     is_stuck: Arc<AtomicBool>,
     /// Whether the writer's queue had no room for too long, and has not had any since.
     is_full: Arc<AtomicBool>,
@@ -45,7 +45,7 @@ pub(in crate::service) struct Handles {
 #[cfg(test)]
 type CommitQueued = Box<dyn Fn() + Send + Sync>;
 
-/// Longest time for a fence, and longest wait for room in the writer's queue. Chosen: much
+/// Longest time for a barrier, and longest wait for room in the writer's queue. Chosen: much
 /// longer than a commit, and short enough for the other assets of a shard to wait.
 const WRITER_TIMEOUT: Duration = Duration::from_secs(5);
 
@@ -173,44 +173,49 @@ impl Handles {
     /// read sees it. Must not run on a thread of the runtime.
     ///
     /// # Errors
-    /// [`ServiceError::Outage`] after 5 s, and at once as long as that fence is not complete,
+    /// [`ServiceError::Outage`] after 5 s, and at once as long as that barrier is not complete,
     /// so that assets that must be read do not hold up the others of their shard; those of
     /// [`reserve`](Self::reserve).
-    pub(in crate::service) fn fence(&self) -> Result<(), ServiceError> {
-        self.check_fences()?;
-        let (set, done) = self.new_fence();
+    pub(in crate::service) fn barrier(&self) -> Result<(), ServiceError> {
+        self.check_barriers()?;
+        let (set, done) = self.new_barrier();
         self.reserve()?.send(set);
         #[cfg(test)]
         if let Some(commit_queued) = self.commit_queued.get() {
             commit_queued();
         }
-        self.runtime.block_on(self.fenced(done))
+        self.runtime.block_on(self.passed(done))
     }
 
-    /// Waits like [`fence`](Self::fence), on the runtime. Fences that wait at the same time
+    /// Waits like [`barrier`](Self::barrier), on the runtime. Barriers that wait at the same time
     /// are complete after one commit.
     ///
     /// # Errors
-    /// As for [`fence`](Self::fence).
-    pub(in crate::service) async fn fence_async(&self) -> Result<(), ServiceError> {
-        self.check_fences()?;
-        let (set, done) = self.new_fence();
+    /// As for [`barrier`](Self::barrier).
+    pub(in crate::service) async fn barrier_async(&self) -> Result<(), ServiceError> {
+        self.check_barriers()?;
+        let (set, done) = self.new_barrier();
         match self.writer.send_timeout(set, WRITER_TIMEOUT).await {
-            Ok(()) => self.fenced(done).await,
+            Ok(()) => self.passed(done).await,
             Err(SendTimeoutError::Timeout(_)) => Err(self.stuck()),
             Err(SendTimeoutError::Closed(_)) => Err(stopped()),
         }
     }
 
-    fn check_fences(&self) -> Result<(), ServiceError> {
+    /// Whether the database is known to be unavailable, or a barrier has timed out.
+    pub(in crate::service) fn is_away(&self) -> bool {
+        self.is_stuck.load(Ordering::SeqCst) || self.outage.borrow().is_some()
+    }
+
+    fn check_barriers(&self) -> Result<(), ServiceError> {
         if self.is_stuck.load(Ordering::SeqCst) { Err(self.stuck()) } else { Ok(()) }
     }
 
-    fn new_fence(&self) -> (WriteSet, oneshot::Receiver<()>) {
+    fn new_barrier(&self) -> (WriteSet, oneshot::Receiver<()>) {
         let (sender, done) = oneshot::channel();
         let is_stuck = self.is_stuck.clone();
         let completion = Box::new(move |_| {
-            // In this order, so that a fence that times out now sees one of the two.
+            // In this order, so that a barrier that times out now sees one of the two.
             let _ = sender.send(());
             is_stuck.store(false, Ordering::SeqCst);
         });
@@ -218,7 +223,7 @@ impl Handles {
         (WriteSet { partition: None, writes: Vec::new(), generation, completion }, done)
     }
 
-    async fn fenced(&self, mut done: oneshot::Receiver<()>) -> Result<(), ServiceError> {
+    async fn passed(&self, mut done: oneshot::Receiver<()>) -> Result<(), ServiceError> {
         if let Ok(done) = tokio::time::timeout(WRITER_TIMEOUT, &mut done).await {
             return done.map_err(|_| stopped());
         }

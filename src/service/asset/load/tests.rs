@@ -149,7 +149,7 @@ async fn compare(histories: Vec<AssetHistory>) {
     let rigs = Rigs::new(&histories).await;
     let (handles, names) = (rigs.handles(), rigs.names.clone());
     let compared = blocking(move || {
-        handles.fence().unwrap();
+        handles.barrier().unwrap();
         let together = read_together(&handles, &names);
         for ((name, stored), history) in names.iter().zip(together).zip(histories) {
             let asset = stored.unwrap().catch_up(&handles).unwrap();
@@ -188,7 +188,7 @@ async fn nothing_more_is_read_for_an_asset_of_a_group() {
     let stored = blocking({
         let handles = handles.clone();
         move || {
-            handles.fence().unwrap();
+            handles.barrier().unwrap();
             read_together(&handles, &names)
         }
     });
