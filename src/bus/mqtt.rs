@@ -29,7 +29,7 @@ use super::intake::{Answering, BatchAnswer, Delivery, Form, Intake, MessageReply
 use super::mqtt_publisher::{BrokerLink, Connected, MqttPublisher};
 use super::puback::PubackQueue;
 use super::{RETRY_INTERVAL, SEND_TIMEOUT};
-use crate::service::Service;
+use crate::service::{Reasons, Service};
 use crate::wire::bus::{DeviceTopic, TopicStyle};
 use crate::wire::mapping::Mapping;
 
@@ -158,6 +158,7 @@ struct Broker<'a> {
 impl Broker<'_> {
     async fn stay_connected(self, options: MqttOptions, closing: &CancellationToken) {
         let intake = Intake::new(BUS, self.service.clone());
+        let reasons = Reasons::default();
         while !closing.is_cancelled() {
             let (client, events) = AsyncClient::new(options.clone(), MAX_OUTGOING);
             let connection = Arc::new(MqttConnection::new(client));
@@ -165,10 +166,12 @@ impl Broker<'_> {
             let answering = intake.clone().run(&connection, receiver);
             let reading = self.read(&intake, &connection, events, sender, closing);
             let (reason, ()) = tokio::join!(reading, answering);
-            self.connected.send_replace(None);
+            if self.connected.send_replace(None).is_some() {
+                reasons.clear();
+            }
             connection.link.ended.cancel();
             metrics::gauge!("offbd_bus_connected", "bus" => BUS).set(0.0);
-            if let Some(error) = reason {
+            if let Some(error) = reason.filter(|error| reasons.is_new(error)) {
                 tracing::warn!(%error, "the connection to the MQTT broker is lost");
             }
             closing.run_until_cancelled(tokio::time::sleep(RETRY_INTERVAL)).await;

@@ -19,7 +19,7 @@ use super::faults::{FaultMessage, Publishing, publish_faults};
 use super::intake::{Answering, Delivery, Form, Intake, MessageReply, queue};
 use super::settings::{UnsafeServer, check_streams, check_version, doubts};
 use super::{RETRY_INTERVAL, SEND_TIMEOUT};
-use crate::service::Service;
+use crate::service::{Reasons, Service};
 use crate::wire::bus::{DeviceTopic, TopicStyle};
 
 const BUS: &str = "nats";
@@ -104,6 +104,7 @@ pub async fn start(
         settings,
         closing,
         connected: Arc::default(),
+        reasons: Arc::default(),
     };
     let client = match bus.connect().await? {
         Some(client) => {
@@ -122,19 +123,21 @@ struct NatsBus {
     closing: CancellationToken,
     /// Told after each connection.
     connected: Arc<Notify>,
+    /// Why there is no connection.
+    reasons: Arc<Reasons>,
 }
 
 impl NatsBus {
     /// Returns a client; `None` if no server can be reached.
     async fn connect(&self) -> Result<Option<Client>, NatsError> {
         let NatsSettings { servers, user, credentials, ca, .. } = &self.settings;
-        let connected = self.connected.clone();
+        let (connected, reasons) = (self.connected.clone(), self.reasons.clone());
         let mut options = ConnectOptions::new()
             .name("offbd")
             .connection_timeout(CONNECT_TIMEOUT)
             .subscription_capacity(MAX_UNREAD)
             .custom_inbox_prefix("_INBOX.offbd.service")
-            .event_callback(move |event| noted(event, connected.clone()));
+            .event_callback(move |event| noted(event, connected.clone(), reasons.clone()));
         if let Some((user, password)) = user {
             options = options.user_and_password(user.clone(), password.clone());
         }
@@ -151,7 +154,9 @@ impl NatsBus {
         match options.connect(addresses).await {
             Ok(client) => Ok(Some(client)),
             Err(error) => {
-                tracing::warn!(%error, "cannot connect to the NATS server; trying again");
+                if self.reasons.is_new(&error) {
+                    tracing::warn!(%error, "cannot connect to the NATS server; trying again");
+                }
                 Ok(None)
             }
         }
@@ -210,12 +215,17 @@ impl NatsBus {
     }
 
     async fn connect_later(&self) -> Client {
+        // Apart: each connection to a server that is not used succeeds.
+        let refused = Reasons::default();
         loop {
             tokio::time::sleep(RETRY_INTERVAL).await;
             let Ok(Some(client)) = self.connect().await else { continue };
             match self.check(&client).await {
                 Ok(_) => return client,
-                Err(error) => tracing::error!(%error, "the NATS server is not used"),
+                Err(error) if refused.is_new(&error) => {
+                    tracing::error!(%error, "the NATS server is not used");
+                }
+                Err(_) => {}
             }
         }
     }
@@ -308,10 +318,11 @@ impl NatsBus {
     }
 }
 
-async fn noted(event: ClientEvent, connected: Arc<Notify>) {
+async fn noted(event: ClientEvent, connected: Arc<Notify>, reasons: Arc<Reasons>) {
     match event {
         ClientEvent::Connected => {
             tracing::info!("connected to the NATS server");
+            reasons.clear();
             connected.notify_one();
             metrics::gauge!("offbd_bus_connected", "bus" => BUS).set(1.0);
         }
@@ -323,7 +334,10 @@ async fn noted(event: ClientEvent, connected: Arc<Notify>) {
             metrics::counter!("offbd_bus_messages_total", "bus" => BUS, "outcome" => "dropped")
                 .increment(1);
         }
-        event => tracing::warn!(%event, "the NATS server reports"),
+        event if reasons.is_new(&event) => {
+            tracing::warn!(%event, "the NATS server reports");
+        }
+        _ => {}
     }
 }
 

@@ -73,6 +73,7 @@ mod notifications;
 mod ownership;
 mod playback;
 mod reanalysis;
+mod reasons;
 mod replay_settings;
 mod requests;
 #[cfg(test)]
@@ -97,6 +98,7 @@ pub use notifications::{
 };
 pub use reanalysis::fault_recording::RecordingWindow;
 pub use reanalysis::trace::{MAX_TRACE_POINTS, TraceQuery};
+pub(crate) use reasons::Reasons;
 pub use requests::{
     AlarmQuery, DeliveryQuery, FaultQuery, FleetQuery, MAX_SERIES_SESSIONS, PendingBatch,
     PresentFault, QueueLoad, SeriesQuery, SessionListQuery, TraceReader,

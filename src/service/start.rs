@@ -21,7 +21,7 @@ use super::notifications::{NotificationTransport, Notifier};
 use super::ownership::Ownership;
 use super::upkeep::{Deleter, Upkeep, Watchdog};
 use super::writing::{Committer, Events, FIRST_RETRY, Handles, Transfers};
-use super::{Clock, Limits, ServiceError, snapshots};
+use super::{Clock, Limits, Reasons, ServiceError, snapshots};
 use crate::store::{MAX_PARTITIONS, NodeIdentity, PartitionId, Store, Write, Writer};
 
 /// A handle to the running service. Cheap to clone; all clones share one service.
@@ -207,7 +207,7 @@ impl WayToWriter {
             lost: lost_sender,
             events: events.clone(),
             outage: outage_sender,
-            reported: Vec::new(),
+            reasons: Reasons::default(),
             n_commits: n_commits.clone(),
             closing: closing.clone(),
             journal_bytes: limits.journal_bytes,

@@ -171,8 +171,12 @@ pub enum StoreError {
     #[error("the copy is damaged: {found}")]
     Damaged { found: String },
     #[error(
-        "the database has schema {found}, and this version has {expected}: start the service \
-         or run `offbd migrate` first"
+        "the database has schema {found}, and this version has {expected}: {}",
+        if found > expected {
+            "use a newer version of offbd"
+        } else {
+            "start the service or run `offbd migrate` first"
+        }
     )]
     Schema { found: i64, expected: i64 },
 }

@@ -23,7 +23,7 @@ use super::asset::Shards;
 use super::ownership::Ownership;
 use super::start::Inner;
 use super::writing::{Handles, TransferRequest, Transfers};
-use super::{Service, ServiceError};
+use super::{Reasons, Service, ServiceError};
 use crate::store::{NodeIdentity, NodeRow, PartitionId, PartitionRow};
 use crate::wire::cluster::{ClusterView, NodeView, PlaceView};
 
@@ -117,7 +117,7 @@ impl NodeTask {
         let started = Instant::now();
         let mut plan = OwnershipPlan::new(self.cluster.me.id.clone());
         let (cluster, closing) = (self.cluster.clone(), self.handles.closing.clone());
-        let mut deadline = None;
+        let (mut deadline, reasons) = (None, Reasons::default());
         loop {
             if cluster.leaving.is_cancelled() && deadline.is_none() {
                 deadline = Some(started.elapsed() + LEAVE_TIMEOUT);
@@ -126,8 +126,8 @@ impl NodeTask {
                 left.unwrap_or_else(|error| tracing::warn!(%error, "cannot announce the stop"));
             }
             let looked = self.look(&mut plan, started.elapsed(), &resume).await;
-            if let Err(error) = looked {
-                tracing::warn!(%error, "cannot look at the partitions");
+            if let Some(error) = reasons.new_error(looked) {
+                tracing::warn!(%error, "cannot look at the partitions; trying again");
             }
             if let Some(deadline) = deadline
                 && (self.is_alone_or_empty() || started.elapsed() >= deadline)

@@ -16,7 +16,7 @@ use super::asset::Presences;
 use super::clock::rfc3339;
 use super::notifications::micros;
 use super::writing::Handles;
-use super::{ServiceError, views};
+use super::{Reasons, ServiceError, views};
 use crate::store::{CommunicationChange, Micros, OpenLink, Write};
 use crate::wire::alarm::CommunicationView;
 use crate::wire::words::{AlarmChangeWord, AlarmCodeWord};
@@ -60,11 +60,13 @@ impl CommunicationWatch {
     #[expect(clippy::disallowed_methods, reason = "the duration of a look, not a time")]
     pub(super) async fn run(mut self) {
         let closing = self.handles.closing.clone();
+        let reasons = Reasons::default();
         let forever = async {
             loop {
                 let begun = Instant::now();
-                if let Err(error) = self.look(self.handles.clock.now()).await {
-                    tracing::warn!(%error, "cannot look for lost communication; tried again");
+                let looked = self.look(self.handles.clock.now()).await;
+                if let Some(error) = reasons.new_error(looked) {
+                    tracing::warn!(%error, "cannot look for lost communication; trying again");
                 }
                 let pause = begun.elapsed().saturating_mul(PAUSE_PER_LOOK);
                 tokio::time::sleep(pause.clamp(SHORTEST_PAUSE, LONGEST_PAUSE)).await;

@@ -37,7 +37,7 @@ pub use targets::TargetPolicy;
 
 use super::mutes::Mutes;
 use super::writing::{Events, Handles};
-use super::{ServiceError, views};
+use super::{Reasons, ServiceError, views};
 use crate::store::ChannelRow;
 use crate::wire::notification::{NotificationView, StoredChannel};
 
@@ -148,6 +148,7 @@ impl<T: NotificationTransport> Notifier<T> {
         let mut events = self.events.subscribe();
         let mut ticks = tokio::time::interval(INTERVAL);
         ticks.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+        let reasons = Reasons::default();
         loop {
             tokio::select! {
                 _ = ticks.tick() => {}
@@ -158,7 +159,7 @@ impl<T: NotificationTransport> Notifier<T> {
                     Err(RecvError::Closed) => return,
                 },
             }
-            if let Err(error) = self.turn().await {
+            if let Some(error) = reasons.new_error(self.turn().await) {
                 tracing::warn!(%error, "notifications cannot be planned and are planned later");
             }
         }

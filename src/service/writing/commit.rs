@@ -12,8 +12,8 @@ use tracing::Instrument;
 
 use super::events::{Event, Events};
 use super::transfer::TransferRequest;
-use crate::service::ServiceError;
 use crate::service::ownership::Ownership;
+use crate::service::{Reasons, ServiceError};
 use crate::store::{ChangeSet, PartitionId, StoreError, TransitionRow, Write, Writer};
 
 /// Limit of write sets in one transaction; further ones form the next group.
@@ -23,10 +23,6 @@ const MAX_GROUP_SETS: usize = 512;
 /// attempt up to the longest.
 pub(in crate::service) const FIRST_RETRY: Duration = Duration::from_millis(50);
 const RETRY_LONGEST: Duration = Duration::from_secs(2);
-
-/// Reasons of an outage that are remembered as logged; then the oldest is forgotten. Chosen: a
-/// server that is stopped and started again gives about five.
-const REPORTED_REASONS: usize = 16;
 
 /// How often a group of write sets may fail while the database accepts other changes.
 /// After that each set is tried alone, and a set that fails alone as often is refused. Two
@@ -86,8 +82,8 @@ pub(in crate::service) struct Committer {
     pub(in crate::service) lost: mpsc::Sender<PartitionId>,
     pub(in crate::service) events: Events,
     pub(in crate::service) outage: watch::Sender<Outage>,
-    /// The reasons of the present outage that are logged, at most [`REPORTED_REASONS`].
-    pub(in crate::service) reported: Vec<String>,
+    /// The reasons of the present outage.
+    pub(in crate::service) reasons: Reasons,
     /// Number of successful commits.
     pub(in crate::service) n_commits: Arc<AtomicU64>,
     /// Cancelled at shutdown: from then on an unavailable database is awaited for
@@ -415,10 +411,8 @@ impl Committer {
     /// Publishes why the database is unavailable; logs each reason once.
     fn set_unavailable(&mut self, error: &StoreError) {
         let reason = error.to_string();
-        if !self.reported.contains(&reason) {
+        if self.reasons.is_new(&reason) {
             tracing::error!(reason, "the database is unavailable; retrying");
-            self.reported.truncate(REPORTED_REASONS - 1);
-            self.reported.insert(0, reason.clone());
         }
         metrics::gauge!("offbd_store_writable").set(0.0);
         self.outage.send_if_modified(|outage| {
@@ -431,7 +425,7 @@ impl Committer {
     }
 
     fn set_available(&mut self) {
-        self.reported.clear();
+        self.reasons.clear();
         metrics::gauge!("offbd_store_writable").set(1.0);
         if self.outage.send_replace(None).is_some() {
             tracing::info!("the database is available again");
