@@ -256,8 +256,7 @@ impl Journal {
         let mut rows = Vec::with_capacity(by_row.len());
         for (id, runs) in by_row {
             let entries: Vec<_> = runs.iter().map(EncodedRun::entry).collect();
-            let entries = rmp_serde::to_vec(&entries).map_err(|e| StoreError::journal(id, &e))?;
-            let data = seal(id, &entries);
+            let data = sealed(id, &entries)?;
             changes.appended_rows.push((id, data.len()));
             changes.runs.extend(runs);
             rows.push((id, data));
@@ -484,9 +483,19 @@ fn entries(id: i64, data: &[u8]) -> Result<Vec<JournalEntry<'_>>, StoreError> {
 /// rows of earlier versions are told apart.
 const SEALED: u8 = 0xc1;
 
-/// Returns the row `id` with the contents `entries`: a CRC-32 of both, and the contents.
-fn seal(id: i64, entries: &[u8]) -> Vec<u8> {
-    [&[SEALED][..], &checksum(id, entries), entries].concat()
+/// Bytes of an entry without its session and chunk, at most.
+const ENTRY_BYTES: usize = 64;
+
+/// Returns the row `id` with the contents `entries`: a CRC-32 of both, and the contents. It is
+/// written in one piece, since it may have megabytes.
+fn sealed(id: i64, entries: &[JournalEntry<'_>]) -> Result<Vec<u8>, StoreError> {
+    let n_bytes = |entry: &JournalEntry<'_>| ENTRY_BYTES + entry.session.len() + entry.chunk.len();
+    let mut row = Vec::with_capacity(ENTRY_BYTES + entries.iter().map(n_bytes).sum::<usize>());
+    row.extend([SEALED, 0, 0, 0, 0]);
+    rmp_serde::encode::write(&mut row, entries).map_err(|e| StoreError::journal(id, &e))?;
+    let (head, contents) = row.split_at_mut(5);
+    head[1..].copy_from_slice(&checksum(id, contents));
+    Ok(row)
 }
 
 /// Returns the contents of the row `id` after checking its checksum.
