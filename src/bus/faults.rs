@@ -18,7 +18,7 @@ use serde::Deserialize;
 use tokio_util::sync::CancellationToken;
 
 use super::RETRY_INTERVAL;
-use crate::service::{Event, EventFeed, PresentFault, Service, ServiceError};
+use crate::service::{Event, EventFeed, PresentFault, Reasons, Service, ServiceError};
 use crate::wire::words::{AlarmChangeWord, AlarmCodeWord};
 
 /// Events published without storing the last one, while further ones wait.
@@ -82,6 +82,7 @@ pub(super) async fn publish_faults<P: Publishing>(
     link: impl Fn() -> P + Send + Sync,
     closing: CancellationToken,
 ) {
+    let reasons = Reasons::default();
     let forever = async {
         loop {
             if !service.is_leader() {
@@ -89,10 +90,14 @@ pub(super) async fn publish_faults<P: Publishing>(
                 tokio::time::sleep(RETRY_INTERVAL).await;
                 continue;
             }
-            let publisher = FaultPublisher { bus, service: &service, link: link() };
+            let publisher =
+                FaultPublisher { bus, service: &service, link: link(), reasons: &reasons };
             match publisher.run().await {
                 Ok(()) => return,
-                Err(error) => tracing::error!(bus, %error, "cannot publish faults; trying again"),
+                Err(error) if reasons.is_new(&error) => {
+                    tracing::error!(bus, %error, "cannot publish faults; trying again");
+                }
+                Err(_) => {}
             }
             tokio::time::sleep(RETRY_INTERVAL).await;
         }
@@ -107,6 +112,8 @@ struct FaultPublisher<'a, P> {
     /// Asks what the bus has kept once more than the publisher before: that may have failed
     /// before it had made up for what was lost.
     link: P,
+    /// Why the store could not be read.
+    reasons: &'a Reasons,
 }
 
 impl<P: Publishing> FaultPublisher<'_, P> {
@@ -114,6 +121,7 @@ impl<P: Publishing> FaultPublisher<'_, P> {
     async fn run(mut self) -> Result<(), ServiceError> {
         let last = self.service.published(self.bus).await?;
         let mut feed = self.service.events(None, Some(last)).await?;
+        self.reasons.clear();
         let mut unstored = 0;
         loop {
             let ready = if unstored < UNSTORED_EVENTS { feed.next().now_or_never() } else { None };

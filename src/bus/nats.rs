@@ -123,7 +123,7 @@ struct NatsBus {
     closing: CancellationToken,
     /// Told after each connection.
     connected: Arc<Notify>,
-    /// Why there is no connection.
+    /// What has been logged since the last connection.
     reasons: Arc<Reasons>,
 }
 

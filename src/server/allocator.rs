@@ -4,7 +4,7 @@
 /// as they are freed. glibc begins with 128 KiB, and raises it to the largest block that was
 /// freed, up to 32 MiB. Then the large blocks that commits need lie between what assets hold,
 /// and the space that they leave is not used again: 2.3 KiB for each of 10 000 assets
-/// (`docs/benchmarks.md`). Smaller values save no more, and each mapped block costs the time in
+/// (`docs/benchmarks.md`). 128 KiB saves no more, and each mapped block costs the time in
 /// which the system clears it.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 const MAPPED_FROM: libc::c_int = 1 << 20;
