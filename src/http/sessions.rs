@@ -145,7 +145,7 @@ pub(super) async fn import(
     body: Body,
 ) -> Result<impl IntoResponse, Problem> {
     let format = session_format::of_file(&headers)?;
-    app.service.asset(&asset).await?;
+    app.service.check_known(&asset).await?;
     let limits = app.service.limits();
     let timeout = limits.body_timeout * IMPORT_TIMEOUT_FACTOR;
     let read = body::read(body, limits.import_bytes, timeout, &share).await?;

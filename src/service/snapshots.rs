@@ -73,7 +73,11 @@ pub(super) fn restore(
     Ok(found.filter(|(_, restored)| *restored.judging.basis() == basis))
 }
 
-fn read(snapshot: Snapshot) -> Result<(Snapshot, RestoredEngine), ServiceError> {
+/// Returns the engine in `snapshot`.
+///
+/// # Errors
+/// [`ServiceError::Corrupt`] for a state that cannot be read.
+pub(super) fn read(snapshot: Snapshot) -> Result<(Snapshot, RestoredEngine), ServiceError> {
     let (judging, motion) =
         rmp_serde::from_slice(&snapshot.state).map_err(ServiceError::corrupt)?;
     Ok((snapshot, RestoredEngine { judging, motion }))

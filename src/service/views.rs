@@ -53,6 +53,7 @@ pub(super) fn fault(row: FaultRow) -> Result<FaultEntryView, ServiceError> {
         asset: row.asset,
         changed_at: rfc3339(row.changed_at),
         monitor: None,
+        session_open: None,
     })
 }
 
@@ -101,6 +102,7 @@ pub(super) async fn never_failed(
         record: memory::record_view(code, &record, &rules),
         provenance: ProvenanceView::default(),
         monitor: None,
+        session_open: None,
     })
 }
 

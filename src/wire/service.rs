@@ -18,7 +18,7 @@ use super::words::{
 };
 use offbd_core::diagnosis::StatusByte;
 use offbd_core::engine::{MonitorState, State, Unjudged};
-use offbd_core::vocabulary::{Axis, FaultCode, PerAxis, TimeRange};
+use offbd_core::vocabulary::{Axis, FaultCode, PerAxis, SimTime, TimeRange};
 
 /// One page of a list.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
@@ -77,9 +77,13 @@ pub struct FaultEntryView {
     pub record: FaultRecordView,
     #[serde(flatten)]
     pub provenance: ProvenanceView,
-    /// State of the monitor in the open session; null if no session is open, and in lists
-    /// of several assets.
+    /// State of the monitor in the open session; null if no session is open, in lists of
+    /// several assets, and after a restart until the service has loaded the rig's engine, if
+    /// none of its states is stored yet.
     pub monitor: Option<MonitorView>,
+    /// Whether the asset has an open session; null in lists of several assets.
+    #[serde(default)]
+    pub session_open: Option<bool>,
 }
 
 /// An event: a person cleared a code while no session was open. It has the keys of a fault
@@ -311,6 +315,11 @@ pub struct MonitorView {
     pub judged_share: f64,
     /// Former name of `judged_s`, with the same value.
     pub enabled_s: f64,
+    /// Time of the last judged sample of which this is the state, s on the device's clock; null
+    /// before the first. While the service has not loaded the rig's engine, for example after a
+    /// restart, this is the last stored state.
+    #[serde(default)]
+    pub t_s: Option<f64>,
     /// The mute in force: the monitor counts as not tested; null without one.
     #[serde(default)]
     pub muted: Option<Box<MuteView>>,
@@ -394,11 +403,14 @@ fn xy(pair: &PerAxis<f64>) -> XyView {
 /// Returns the views of the monitors, in the order of [`FaultCode::ALL`].
 #[must_use]
 pub fn monitor_views(state: &State) -> Vec<MonitorView> {
-    FaultCode::ALL.iter().zip(&state.monitors).map(monitor_view).collect()
+    let t_s = state.at.map(SimTime::seconds);
+    let view = |(code, monitor)| MonitorView { t_s, ..monitor_view(code, monitor) };
+    FaultCode::ALL.iter().zip(&state.monitors).map(view).collect()
 }
 
-fn monitor_view((code, monitor): (&FaultCode, &MonitorState)) -> MonitorView {
+fn monitor_view(code: &FaultCode, monitor: &MonitorState) -> MonitorView {
     MonitorView {
+        t_s: None,
         code: (*code).into(),
         counter: monitor.counter,
         enabled: monitor.readiness.enabled,

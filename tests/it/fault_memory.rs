@@ -75,7 +75,14 @@ async fn a_fault_record_is_complete_and_unchanged_after_a_restart() {
     assert_eq!(again["acknowledgement"]["by"], "ann", "only the first acknowledgement counts");
     let before = fault(&fixture.client, "a", "x_servo").await;
     fixture.restart().await;
+    let after = fault(&fixture.client, "a", "x_servo").await;
+    assert_eq!(after["monitor"], Value::Null, "no engine is loaded, and none is stored yet");
+    assert_eq!(after["session_open"], true);
+    fixture.client.get("assets/a/state").await.expect(200);
     assert_eq!(fault(&fixture.client, "a", "x_servo").await, before);
+    for (key, value) in before.as_object().unwrap().iter().filter(|(key, _)| *key != "monitor") {
+        assert_eq!(&after[key], value, "{key}");
+    }
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -98,7 +105,7 @@ async fn in_use_counts_are_updated_per_session_and_survive_clearing() {
     };
     let x = fault(&fixture.client, "a", "x_servo").await;
     assert_eq!(ratio(&x), ([3, 1, 1], Some(1.0)));
-    assert_eq!(x["monitor"], Value::Null, "no session is open");
+    assert_eq!((&x["monitor"], &x["session_open"]), (&Value::Null, &json!(false)));
     let sensor = fault(&fixture.client, "a", "sensor").await;
     assert_eq!(ratio(&sensor), ([3, 2, 2], Some(1.0)), "the sensor needs no ball");
     fixture.client.delete("assets/a/faults/x_servo?by=ann").await.expect(204);

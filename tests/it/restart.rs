@@ -87,6 +87,35 @@ async fn an_engine_goes_on_from_its_snapshot() {
     assert_eq!(replayed["result"]["summary"]["verdict_hash"], live.0, "{replayed}");
 }
 
+/// A question about the faults of a rig loads no engine: until another request does, the
+/// monitors are those of the last snapshot, with their time.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_query_of_faults_shows_the_stored_monitors_and_loads_no_engine() {
+    let data = tempfile::tempdir().unwrap();
+    let mut service = Process::start(data.path());
+    let samples = long_rig(24_000);
+    let last_t_s = samples.last().map(|sample| sample.t_s).unwrap();
+    service.client.asset("a").await;
+    send(&service.client, "a", &samples).await;
+    let monitor = async |client: &Client| {
+        client.get("assets/a/faults/x_servo").await.expect(200)["monitor"].clone()
+    };
+    let live = monitor(&service.client).await;
+    assert_eq!(live["t_s"], last_t_s, "{live}");
+
+    drop(service);
+    service = Process::start(data.path());
+    let client = &service.client;
+    let stored = monitor(client).await;
+    assert!(stored["t_s"].as_f64().is_some_and(|t_s| 0.0 < t_s && t_s < last_t_s), "{stored}");
+    let all = client.get("assets/a/faults?status=all").await.expect(200);
+    assert_eq!(all["items"][0]["monitor"]["t_s"], stored["t_s"], "{all}");
+    assert_eq!(client.n_evaluated_again().await, 0.0, "no engine is loaded");
+
+    client.get("assets/a/state").await.expect(200);
+    assert_eq!(monitor(client).await, live);
+}
+
 /// A snapshot that cannot be used costs time, and changes nothing.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_snapshot_that_is_damaged_or_of_another_version_is_not_used() {

@@ -25,7 +25,8 @@ pub(super) async fn list(
     AssetPath(asset): AssetPath,
     Query(query): Query<SchemaQuery>,
 ) -> Result<Json<Value>, Problem> {
-    let name = service.asset(&asset).await?.name;
+    service.check_known(&asset).await?;
+    let name = asset;
     let item = |(id, title, category): (&str, &str, &str)| SovdReferenceView {
         id: id.to_owned(),
         name: title.to_owned(),
@@ -51,7 +52,7 @@ pub(super) async fn get(
         "state" => SovdValueView::State(Box::new(service.state(&asset).await?)),
         "description" => SovdValueView::Description(Box::new(service.asset(&asset).await?)),
         _ => {
-            service.asset(&asset).await?;
+            service.check_known(&asset).await?;
             let detail = format!("there is no value `{id}`; there are state and description");
             let title = "No such value";
             return Err(Problem::new(StatusCode::NOT_FOUND, "unknown-data", title, detail));

@@ -61,7 +61,8 @@ pub(super) async fn component(
     AssetPath(asset): AssetPath,
     Query(query): Query<SchemaQuery>,
 ) -> Result<Json<Value>, Problem> {
-    let name = service.asset(&asset).await?.name;
+    service.check_known(&asset).await?;
+    let name = asset;
     let path = format!("{BASE}/components/{name}");
     let view = SovdComponentView {
         id: name.clone(),

@@ -30,7 +30,8 @@ pub(super) async fn categories(
     AssetPath(asset): AssetPath,
     Query(query): Query<SchemaQuery>,
 ) -> Result<Json<Value>, Problem> {
-    let name = service.asset(&asset).await?.name;
+    service.check_known(&asset).await?;
+    let name = asset;
     let (id, title) = ("recordings".to_owned(), "Recordings".to_owned());
     let recordings = SovdReferenceView { id, name: title, category: None, href: path(&name) };
     let view = SovdReferencesView { items: vec![recordings] };

@@ -73,8 +73,9 @@ pub(in crate::service) enum AssetCommand {
     Link { reply: Reply<LinkView> },
     /// Returns the state and the trace after the first `seen` points of a session.
     Watch { session: Option<String>, seen: u64, reply: Reply<WatchView> },
-    /// Returns the monitors of the open session.
-    Monitors { reply: Reply<Vec<MonitorView>> },
+    /// Returns the monitors of the open session; `None` if the asset is not loaded, which this
+    /// command does not change.
+    Monitors { reply: Reply<Option<Vec<MonitorView>>> },
     /// Returns the progress of the automatic calibration.
     Learning { reply: Reply<LearningView> },
 }

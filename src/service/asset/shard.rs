@@ -108,6 +108,12 @@ impl Shard {
         let Some(epoch) = self.env.handles.ownership.epoch_of(name) else {
             return self.apply(name, Err(ServiceError::Moving), command);
         };
+        let command = match command {
+            AssetCommand::Monitors { reply } if !self.is_running(name) => {
+                return reply.send(Ok(None));
+            }
+            command => command,
+        };
         match self.slots.remove(name) {
             Some(Slot::Loading(loading)) => return self.wait(name, loading, command),
             Some(Slot::Running(asset)) => {
@@ -120,6 +126,12 @@ impl Shard {
         }
         let refusal = self.loads.load(name, epoch);
         self.wait(name, Loading { refusal, epoch, ..Loading::default() }, command);
+    }
+
+    /// Returns whether the asset `name` is loaded, with an engine that the next command uses.
+    fn is_running(&self, name: &str) -> bool {
+        let slot = self.slots.get(name);
+        matches!(slot, Some(Slot::Running(asset)) if !asset.generation.is_invalid())
     }
 
     /// Drops the engines of `partitions`, and refuses the commands that wait for them.
@@ -285,7 +297,7 @@ impl Shard {
             C::Watch { session, seen, reply } => {
                 self.query(name, asset, reply, |a| a.watch(session, seen));
             }
-            C::Monitors { reply } => self.query(name, asset, reply, Asset::monitors),
+            C::Monitors { reply } => self.query(name, asset, reply, |a| Some(a.monitors())),
             C::Learning { reply } => self.query(name, asset, reply, Asset::learning),
         }
     }

@@ -271,7 +271,7 @@ impl Service {
         if let Some(fault) = code.fault_code() {
             return self.acknowledge(asset, fault.as_str(), actor).await.map(drop);
         }
-        self.asset(asset).await?;
+        self.check_known(asset).await?;
         let lost = self.inner.handles.store.communications(Some(asset), None, true).await?;
         if lost.is_empty() {
             let (asset, code) = (asset.to_owned(), code.to_string());

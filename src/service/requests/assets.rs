@@ -20,6 +20,17 @@ impl Service {
         views::from_json(&row.document)
     }
 
+    /// Checks that there is an asset `name`, without reading its file.
+    ///
+    /// # Errors
+    /// [`ServiceError::UnknownAsset`].
+    pub async fn check_known(&self, name: &str) -> Result<(), ServiceError> {
+        match self.inner.handles.store.has_asset(name).await? {
+            true => Ok(()),
+            false => Err(ServiceError::UnknownAsset { name: name.to_owned() }),
+        }
+    }
+
     /// Returns a page of asset files, sorted by name, of the assets whose name begins with
     /// `name`.
     ///

@@ -24,7 +24,7 @@ impl Service {
         sessions: Vec<TrainingDataView>,
         by: Option<String>,
     ) -> Result<CalibrationJobView, ServiceError> {
-        self.asset(asset).await?;
+        self.check_known(asset).await?;
         if !(1..=MAX_CALIBRATION_SESSIONS).contains(&sessions.len()) {
             let reason = format!("must name 1 to {MAX_CALIBRATION_SESSIONS} sessions");
             return Err(Invalid::new("/sessions", reason).into());
@@ -59,7 +59,7 @@ impl Service {
             self.inner.handles.write(asset, vec![Write::PutCalibration(row.clone())]).await
         {
             // The asset may have been deleted meanwhile.
-            self.asset(&row.asset).await?;
+            self.check_known(&row.asset).await?;
             return Err(error);
         }
         permit.send(Job::Calibration(row.id.clone()));
@@ -98,7 +98,7 @@ impl Service {
         cursor: Option<&str>,
         limit: u32,
     ) -> Result<Page<CalibrationJobView>, ServiceError> {
-        self.asset(asset).await?;
+        self.check_known(asset).await?;
         let before = cursor.map(views::cursor::<(i64, String)>).transpose()?;
         let before = before.as_ref().map(|(made_at, id)| (*made_at, id.as_str()));
         let rows = self.inner.handles.store.calibrations(asset, before, limit + 1).await?;

@@ -29,7 +29,7 @@ impl Service {
         after: Option<i64>,
     ) -> Result<EventFeed, ServiceError> {
         if let Some(name) = &asset {
-            self.asset(name).await?;
+            self.check_known(name).await?;
         }
         self.inner.events.feed(asset, after).await
     }

@@ -1,10 +1,10 @@
 //! The fault memory, of one asset and of the fleet.
 
 use crate::service::asset::AssetCommand;
-use crate::service::{Service, ServiceError, views};
+use crate::service::{Service, ServiceError, snapshots, views};
 use crate::store::{FaultFilter, FaultOrder};
-use crate::wire::service::{FaultEntryView, MonitorView, Page};
-use crate::wire::words::{CodeWord, FaultSort, StatusFilter, StatusWord};
+use crate::wire::service::{FaultEntryView, MonitorView, Page, monitor_views};
+use crate::wire::words::{FaultSort, StatusFilter, StatusWord};
 use offbd_core::vocabulary::FaultCode;
 
 /// Returns the statuses that `filter` selects; an empty list selects all.
@@ -28,9 +28,22 @@ fn code(word: &str) -> Result<FaultCode, ServiceError> {
     word.parse().map_err(ServiceError::UnknownCode)
 }
 
-fn take(monitors: &mut Vec<MonitorView>, code: CodeWord) -> Option<MonitorView> {
-    let at = monitors.iter().position(|monitor| monitor.code == code)?;
-    Some(monitors.swap_remove(at))
+/// The monitors of the open session of an asset.
+#[derive(Default)]
+struct SessionMonitors {
+    session_open: bool,
+    /// Empty without a session, or if none of its states is known.
+    monitors: Vec<MonitorView>,
+}
+
+impl SessionMonitors {
+    /// Adds its monitor to the entry of a fault.
+    fn complete(&mut self, entry: &mut FaultEntryView) {
+        let is_of_entry = |monitor: &MonitorView| monitor.code == entry.record.code;
+        let at = self.monitors.iter().position(is_of_entry);
+        entry.monitor = at.map(|at| self.monitors.swap_remove(at));
+        entry.session_open = Some(self.session_open);
+    }
 }
 
 /// The parameters of a query for faults.
@@ -85,26 +98,37 @@ impl Service {
         let query = FaultQuery { status, asset: asset.clone(), sort, ..FaultQuery::default() };
         let mut page = self.faults(query, FaultCode::COUNT as u32).await?;
         let mut monitors = self.monitors(asset.as_deref().unwrap_or_default()).await?;
-        for entry in &mut page.items {
-            entry.monitor = take(&mut monitors, entry.record.code);
-        }
+        page.items.iter_mut().for_each(|entry| monitors.complete(entry));
         Ok(page)
     }
 
-    /// Returns the monitors of the open session; none without one, or if the shard is busy.
+    /// Returns the monitors of the open session; none without one. Those of an asset that is
+    /// not loaded are the ones stored last: a question about a rig does not load its engine.
     ///
     /// # Errors
-    /// [`ServiceError::Corrupt`]: an answer without the monitors would look complete.
-    async fn monitors(&self, asset: &str) -> Result<Vec<MonitorView>, ServiceError> {
-        let monitors = self.inner.shards.call(asset, |reply| AssetCommand::Monitors { reply });
-        match monitors.await {
-            Err(error @ ServiceError::Corrupt { .. }) => Err(error),
-            monitors => {
-                let mut monitors = monitors.unwrap_or_default();
-                self.show_mutes(asset, &mut monitors);
-                Ok(monitors)
-            }
-        }
+    /// An answer without the monitors would look complete, so a shard that does not answer is an
+    /// error too.
+    async fn monitors(&self, asset: &str) -> Result<SessionMonitors, ServiceError> {
+        let loaded = self.inner.shards.call(asset, |reply| AssetCommand::Monitors { reply });
+        let mut found = match loaded.await? {
+            Some(monitors) => SessionMonitors { session_open: !monitors.is_empty(), monitors },
+            None => self.stored_monitors(asset).await?,
+        };
+        self.show_mutes(asset, &mut found.monitors);
+        Ok(found)
+    }
+
+    /// Returns the monitors of the open session as its last snapshot has them; none without a
+    /// session or a snapshot.
+    async fn stored_monitors(&self, asset: &str) -> Result<SessionMonitors, ServiceError> {
+        let store = &self.inner.handles.store;
+        let Some(session) = store.open_session(asset).await? else {
+            return Ok(SessionMonitors::default());
+        };
+        let snapshot = store.snapshot(&session.id, &snapshots::version(), i64::MAX).await?;
+        let restored = snapshot.map(snapshots::read).transpose()?;
+        let monitors = restored.map(|(_, engine)| monitor_views(&engine.judging.engine().state()));
+        Ok(SessionMonitors { session_open: true, monitors: monitors.unwrap_or_default() })
     }
 
     /// Returns the fault memory entry of one code; a code that never failed is `cleared`.
@@ -113,12 +137,12 @@ impl Service {
     /// [`ServiceError::UnknownAsset`]; [`ServiceError::UnknownCode`].
     pub async fn fault(&self, asset: &str, word: &str) -> Result<FaultEntryView, ServiceError> {
         let code = code(word)?;
-        self.asset(asset).await?;
+        self.check_known(asset).await?;
         let mut entry = match self.inner.handles.store.fault(asset, code.as_str()).await? {
             Some(row) => views::fault(row)?,
             None => views::never_failed(&self.inner.handles.store, asset, code).await?,
         };
-        entry.monitor = take(&mut self.monitors(asset).await?, code.into());
+        self.monitors(asset).await?.complete(&mut entry);
         Ok(entry)
     }
 

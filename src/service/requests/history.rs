@@ -21,7 +21,7 @@ impl Service {
         limit: u32,
     ) -> Result<Page<HistoryView>, ServiceError> {
         let code: FaultCode = word.parse().map_err(ServiceError::UnknownCode)?;
-        self.asset(asset).await?;
+        self.check_known(asset).await?;
         let before = cursor.map(views::cursor::<i64>).transpose()?.unwrap_or(i64::MAX);
         let (store, code) = (&self.inner.handles.store, code.as_str());
         let changes = store.transitions_before(asset, code, before, limit + 1).await?;

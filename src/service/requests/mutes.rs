@@ -32,7 +32,7 @@ impl Service {
         actor: String,
     ) -> Result<MuteView, ServiceError> {
         let code = alarm_code(word)?;
-        self.asset(asset).await?;
+        self.check_known(asset).await?;
         let now = self.inner.handles.clock.now();
         let NewMuteView { reason, until } = new;
         let is_permitted = (1..=MAX_MUTE_REASON).contains(&reason.len());
@@ -61,7 +61,7 @@ impl Service {
     /// As for [`Self::mute`].
     pub async fn unmute(&self, asset: &str, word: &str) -> Result<(), ServiceError> {
         let code = alarm_code(word)?;
-        self.asset(asset).await?;
+        self.check_known(asset).await?;
         let write = AlarmWrite::Unmute { asset: asset.to_owned(), code: code.to_string() };
         self.inner.handles.write(asset, vec![Write::Alarm(write)]).await?;
         self.inner.mutes.remove(asset, code);
@@ -73,7 +73,7 @@ impl Service {
     /// # Errors
     /// [`ServiceError::UnknownAsset`].
     pub async fn mutes(&self, asset: &str) -> Result<Vec<MuteView>, ServiceError> {
-        self.asset(asset).await?;
+        self.check_known(asset).await?;
         Ok(self.mutes_of(asset))
     }
 

@@ -35,7 +35,7 @@ impl Service {
         asset: Option<&str>,
     ) -> Result<(), ServiceError> {
         match asset {
-            Some(asset) => self.asset(asset).await.map(drop),
+            Some(asset) => self.check_known(asset).await,
             None => Ok(()),
         }
     }

@@ -11,7 +11,7 @@ impl Service {
     /// # Errors
     /// [`ServiceError::UnknownAsset`].
     pub async fn tags(&self, asset: &str) -> Result<TagsView, ServiceError> {
-        self.asset(asset).await?;
+        self.check_known(asset).await?;
         let mut known = self.inner.handles.store.tags_of([asset]).await?;
         Ok(TagsView { tags: known.remove(asset).unwrap_or_default() })
     }
@@ -21,7 +21,7 @@ impl Service {
     /// # Errors
     /// [`ServiceError::UnknownAsset`]; [`ServiceError::Invalid`] with the invalid tag.
     pub async fn put_tags(&self, asset: &str, new: TagsView) -> Result<TagsView, ServiceError> {
-        self.asset(asset).await?;
+        self.check_known(asset).await?;
         let tags = tags::checked(new.tags)?;
         let write = Write::PutTags { asset: asset.to_owned(), tags: tags.clone() };
         self.inner.handles.write(asset, vec![write]).await?;

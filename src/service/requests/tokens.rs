@@ -19,7 +19,7 @@ impl Service {
     ) -> Result<MadeTokenView, ServiceError> {
         let minted = mint(token, by, self.inner.handles.clock.now())?;
         if let Some(asset) = &minted.row.asset {
-            self.asset(asset).await?;
+            self.check_known(asset).await?;
         }
         if self.inner.handles.store.token_named(&minted.row.name).await?.is_some() {
             return Err(ServiceError::TokenExists { name: minted.row.name });

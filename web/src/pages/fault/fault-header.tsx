@@ -16,7 +16,8 @@ export function FaultHeader({ fault, refetch }: { fault: FaultEntry; refetch: ()
           <Link to="/">Fleet</Link> / <Link to={rigPath(asset)}>{asset}</Link>
         </p>
         <h1>
-          {faultTitle(code, kind)} <StatusChip fault={stateOf(fault)} hasSession={fault.monitor != null} />
+          {faultTitle(code, kind)}{" "}
+          <StatusChip fault={stateOf(fault)} hasSession={fault.session_open === true} />
         </h1>
         <Link to={faultReportPath(asset, code)}>Report to print</Link>
       </div>

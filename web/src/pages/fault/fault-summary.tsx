@@ -15,9 +15,9 @@ const latestFailure = (history: HistoryEntry[]) =>
 function presentText(fault: FaultEntry, history: HistoryEntry[]): string {
   const began = fault.last_occurrence && sinceText(fault.last_occurrence.noted_at);
   if (isFailing(fault)) {
-    if (fault.monitor && isTested(fault)) return `It fails now${began ? `, since ${began}` : ""}.`;
+    if (fault.session_open && isTested(fault)) return `It fails now${began ? `, since ${began}` : ""}.`;
     const last = `It failed when it was last tested${began ? `; the failure began at ${began}` : ""}.`;
-    return `${last} ${fault.monitor ? "It has not been tested in the open session yet." : "No session is open."}`;
+    return `${last} ${fault.session_open ? "It has not been tested in the open session yet." : "No session is open."}`;
   }
   const repair = history.find((entry) => entry.fault && isRepair(entry.fault));
   const passes = `Its test passes again${repair ? ` since ${sinceText(repair.at)}` : ""}`;

@@ -6,8 +6,9 @@ import { judgedShare } from "../../words/verdict";
 /** In-use ratio below which the monitor is of little use. */
 const LOW_RATIO = 0.5;
 
-function sessionText(monitor: FaultEntry["monitor"]): string {
-  if (!monitor) return "no session is open";
+function sessionText({ monitor, session_open }: FaultEntry): string {
+  if (!session_open) return "no session is open";
+  if (!monitor) return "not known until the rig sends again";
   const result = monitor.complete_this_cycle ? "test completed" : "no result yet";
   return `${result}; judged ${judgedShare(monitor)}`;
 }
@@ -19,7 +20,8 @@ function ratioText(use: FaultEntry["in_use"]): string {
 }
 
 /** The state of the test, and how often the monitor was able to judge. */
-export function MonitorCard({ fault: { monitor, in_use } }: { fault: FaultEntry }) {
+export function MonitorCard({ fault }: { fault: FaultEntry }) {
+  const { monitor, in_use } = fault;
   const counter = monitor && `${monitor.counter}, of −128 (passed) to 127 (failed)`.replace("-", "−");
   const ratio = in_use?.ratio;
   return (
@@ -27,7 +29,7 @@ export function MonitorCard({ fault: { monitor, in_use } }: { fault: FaultEntry 
       <h2>Monitor</h2>
       <Facts
         facts={[
-          ["In this session", sessionText(monitor)],
+          ["In this session", sessionText(fault)],
           ...(counter ? [["Fault detection counter", counter] satisfies [string, string]] : []),
           ["Able to judge", ratioText(in_use)],
         ]}
