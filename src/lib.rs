@@ -40,6 +40,7 @@ pub mod config;
 pub mod edge_agent;
 pub mod http;
 pub mod judging;
+mod reasons;
 pub mod server;
 pub mod service;
 pub mod store;

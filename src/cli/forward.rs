@@ -1,4 +1,6 @@
-//! `offbd forward`: the edge agent.
+//! `offbd forward`: the edge agent, and what it has set aside.
+
+mod refused;
 
 use std::io::BufReader;
 use std::net::SocketAddr;
@@ -15,6 +17,8 @@ use crate::edge_agent::{
 };
 use offbd_core::engine::Rig;
 
+const DEFAULT_SPOOL: &str = "offbd-spool.sqlite";
+
 /// Keeps telemetry on this machine until the service has stored it.
 ///
 /// Takes batches like the service (POST /api/v1/assets/ASSET/telemetry), or with
@@ -22,16 +26,29 @@ use offbd_core::engine::Rig;
 /// connections and restarts. When the spool is full it takes no more: devices get
 /// 429, a pipe waits.
 #[derive(Clone, Debug, Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 #[command(
-    after_help = "GET /api/v1/spool says how much waits, and which batches the service has refused\n\
-    for good. The agent has no access control: let it listen where only devices are.\n\n\
+    after_help = "GET /api/v1/spool says how much waits and why, and what the service has refused for\n\
+    good. The agent has no access control: let it listen where only devices are.\n\n\
+    Only an acknowledgement of all rows ends the wait of a batch. What the service\n\
+    refuses, and samples that it rejects, are set aside with the reason.\n\n\
     Examples:\n  \
     offbd forward --to https://offbd.example:8087 --token-file token \\\n      \
     --spool spool.sqlite\n  \
     my_logger | offbd forward --to http://10.0.0.2:8087 --asset my-rig \\\n      \
-    --session monday"
+    --session monday\n  \
+    offbd forward list --spool spool.sqlite\n  \
+    offbd forward send-again --spool spool.sqlite 17 18"
 )]
 pub(super) struct ForwardArgs {
+    #[command(subcommand)]
+    refused: Option<refused::RefusedCommand>,
+    #[command(flatten)]
+    agent: Option<AgentArgs>,
+}
+
+#[derive(Clone, Debug, Args)]
+struct AgentArgs {
     /// Address of the service
     #[arg(long, value_name = "URL")]
     to: String,
@@ -39,7 +56,7 @@ pub(super) struct ForwardArgs {
     #[arg(long, value_name = "FILE")]
     token_file: Option<PathBuf>,
     /// File of the spool; created if missing
-    #[arg(long, value_name = "FILE", default_value = "offbd-spool.sqlite")]
+    #[arg(long, value_name = "FILE", default_value = DEFAULT_SPOOL)]
     spool: PathBuf,
     /// Most bytes in the spool
     #[arg(long, value_name = "N", default_value_t = MAX_SPOOL_BYTES)]
@@ -70,6 +87,14 @@ enum LineFormatArg {
 }
 
 pub(super) fn run(args: &ForwardArgs) -> anyhow::Result<()> {
+    match (&args.refused, &args.agent) {
+        (Some(command), _) => super::block_on(command.run()),
+        (None, Some(args)) => forward(args),
+        (None, None) => Err(BadArgument("name the service with --to".to_owned()).into()),
+    }
+}
+
+fn forward(args: &AgentArgs) -> anyhow::Result<()> {
     let token = args.token_file.as_deref().map(read).transpose()?;
     let token = token.map(|token| String::from_utf8_lossy(&token).trim().to_owned());
     let to = ServiceUrl::new(&args.to, token.as_deref())
@@ -87,26 +112,27 @@ pub(super) fn run(args: &ForwardArgs) -> anyhow::Result<()> {
 }
 
 async fn serve(
-    args: &ForwardArgs,
+    args: &AgentArgs,
     spool: Arc<Spool>,
-    mut delivery: SpoolSender,
+    delivery: SpoolSender,
     waiting: u64,
 ) -> anyhow::Result<()> {
     let listener = tokio::net::TcpListener::bind(args.listen).await;
     let listener = listener.with_context(|| format!("cannot listen on {}", args.listen))?;
     let address = listener.local_addr()?;
     tracing::info!(%address, to = args.to, waiting, "forwarding");
+    let router = router(spool, delivery.delays());
     tokio::select! {
-        served = async { axum::serve(listener, router(spool)).await } => Ok(served?),
+        served = async { axum::serve(listener, router).await } => Ok(served?),
         ended = delivery.run() => Ok(ended?),
     }
 }
 
 async fn forward_lines(
-    args: &ForwardArgs,
+    args: &AgentArgs,
     asset: &str,
     spool: &Spool,
-    mut delivery: SpoolSender,
+    delivery: SpoolSender,
 ) -> anyhow::Result<()> {
     Rig::chapter(asset).check().map_err(|e| BadArgument(format!("--asset: {}", e.reason)))?;
     let name = |name: &String| format!("session={}", utf8_percent_encode(name, NON_ALPHANUMERIC));
@@ -122,7 +148,7 @@ async fn forward_lines(
     }
     // What was under way when the source ended is sent again.
     delivery.drain().await?;
-    let refused = spool.status().await?.refused.len();
-    anyhow::ensure!(refused == 0, "the service has refused {refused} batches for good");
+    let n = spool.refused().await?.len();
+    anyhow::ensure!(n == 0, "of {n} batches all or a part is refused: see `offbd forward list`");
     Ok(())
 }

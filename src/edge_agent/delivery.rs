@@ -1,28 +1,26 @@
 //! Forwards the batches of a spool, in order for each asset, until each is acknowledged.
 
-use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::Duration;
 
 use axum::body::{Body, to_bytes};
 use futures_util::future::join_all;
 use hyper::header::{AUTHORIZATION, CONTENT_TYPE, HeaderValue, RETRY_AFTER};
-use hyper::{Request, StatusCode, Uri};
-use tokio::time::{Instant, sleep, timeout};
+use hyper::{Request, Uri};
+use tokio::time::{sleep, timeout};
 
+use super::answer::{Attempt, Failure, meaning};
+use super::delays::{Delays, LONGEST_DELAY};
 use super::spool::{NewBatch, Spool, SpoolError, WaitingBatch};
 use crate::server::{HttpsClient, https_client};
 
 /// Longest wait for an answer; then the batch is sent again.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(30);
-/// Delay after the first failure of an asset; it doubles with each further one.
-const FIRST_DELAY: Duration = Duration::from_millis(200);
-/// Longest delay between two attempts of an asset.
-const LONGEST_DELAY: Duration = Duration::from_secs(30);
 /// Most assets whose batches are under way at the same time; the others wait for their turn.
 const MAX_AT_ONCE: usize = 8;
-/// Longest answer that is read, bytes; of a longer one the reason is not reported.
-const MAX_ANSWER_BYTES: usize = 64 << 10;
+/// Longest response that is read, bytes; a longer one counts as cut off. Chosen: the
+/// acknowledgement of the largest batch with a reason for each row has about 2.5 MB.
+const MAX_ANSWER_BYTES: usize = 4 << 20;
 
 /// The service to which batches go.
 #[derive(Debug)]
@@ -72,8 +70,8 @@ impl ServiceUrl {
     async fn send(&self, batch: &NewBatch) -> Attempt {
         match timeout(ANSWER_TIMEOUT, self.post(batch)).await {
             Ok(Ok(attempt)) => attempt,
-            Ok(Err(reason)) => Attempt::Failed { reason, wait: None },
-            Err(_) => Attempt::Failed { reason: "no answer in time".to_owned(), wait: None },
+            Ok(Err(reason)) => Attempt::Failed(Failure::new(reason)),
+            Err(_) => Attempt::Failed(Failure::new("no answer in time")),
         }
     }
 
@@ -89,17 +87,12 @@ impl ServiceUrl {
         let response = self.client.request(request).await.map_err(|e| reasons(&e))?;
         let status = response.status();
         let wait = response.headers().get(RETRY_AFTER).and_then(seconds);
-        // Only a complete answer is an acknowledgement.
         let answer = to_bytes(Body::new(response.into_body()), MAX_ANSWER_BYTES).await;
-        let answer = answer.map_err(|e| reasons(&e))?;
-        if status.is_success() {
-            return Ok(Attempt::Stored);
-        }
-        let reason = format!("{status}: {}", String::from_utf8_lossy(&answer));
-        Ok(if is_final(status) {
-            Attempt::Refused(reason)
-        } else {
-            Attempt::Failed { reason, wait }
+        let answer = answer
+            .map_err(|e| format!("{status}, of which the rest is missing: {}", reasons(&e)))?;
+        Ok(match meaning(status, &answer, batch) {
+            Attempt::Failed(failure) => Attempt::Failed(Failure { wait, ..failure }),
+            attempt => attempt,
         })
     }
 }
@@ -116,54 +109,30 @@ fn seconds(header: &HeaderValue) -> Option<Duration> {
     Some(Duration::from_secs(seconds).min(LONGEST_DELAY))
 }
 
-/// Whether the same batch would be refused again. An asset or a token that is missing may come.
-fn is_final(status: StatusCode) -> bool {
-    matches!(
-        status,
-        StatusCode::BAD_REQUEST
-            | StatusCode::CONFLICT
-            | StatusCode::PAYLOAD_TOO_LARGE
-            | StatusCode::UNSUPPORTED_MEDIA_TYPE
-            | StatusCode::UNPROCESSABLE_ENTITY
-    )
-}
-
-/// The result of sending a batch.
-enum Attempt {
-    Stored,
-    Refused(String),
-    Failed {
-        reason: String,
-        /// The delay that the service asks for.
-        wait: Option<Duration>,
-    },
-}
-
-/// When an asset is tried again.
-struct Pause {
-    until: Instant,
-    delay: Duration,
-}
-
 /// Forwards what is in a spool.
 pub struct SpoolSender {
     spool: Arc<Spool>,
     to: ServiceUrl,
-    /// Of assets whose last attempt failed.
-    pauses: HashMap<String, Pause>,
+    delays: Arc<Delays>,
 }
 
 impl SpoolSender {
     #[must_use]
     pub fn new(spool: Arc<Spool>, to: ServiceUrl) -> Self {
-        Self { spool, to, pauses: HashMap::new() }
+        Self { spool, to, delays: Arc::default() }
+    }
+
+    /// The assets whose batches could not be sent, for [`super::router`].
+    #[must_use]
+    pub fn delays(&self) -> Arc<Delays> {
+        self.delays.clone()
     }
 
     /// Forwards for ever.
     ///
     /// # Errors
     /// [`SpoolError`] if the spool fails.
-    pub async fn run(&mut self) -> Result<(), SpoolError> {
+    pub async fn run(&self) -> Result<(), SpoolError> {
         loop {
             if !self.send_due().await? {
                 self.wait().await;
@@ -175,7 +144,7 @@ impl SpoolSender {
     ///
     /// # Errors
     /// [`SpoolError`] if the spool fails.
-    pub async fn drain(&mut self) -> Result<(), SpoolError> {
+    pub async fn drain(&self) -> Result<(), SpoolError> {
         while !self.spool.assets().await?.is_empty() {
             if !self.send_due().await? {
                 self.wait().await;
@@ -185,12 +154,8 @@ impl SpoolSender {
     }
 
     /// Sends the oldest batch of each asset that is due; returns whether there was one.
-    async fn send_due(&mut self) -> Result<bool, SpoolError> {
-        let assets = self.spool.assets().await?;
-        self.pauses.retain(|asset, _| assets.contains(asset));
-        let now = now();
-        let is_due = |asset: &String| self.pauses.get(asset).is_none_or(|p| p.until <= now);
-        let due: Vec<String> = assets.into_iter().filter(is_due).take(MAX_AT_ONCE).collect();
+    async fn send_due(&self) -> Result<bool, SpoolError> {
+        let due = self.delays.due(self.spool.assets().await?, MAX_AT_ONCE);
         let (spool, to) = (&self.spool, &self.to);
         let sent = join_all(due.iter().map(|asset| async move {
             let Some(waiting) = spool.oldest(asset).await? else { return Ok(None) };
@@ -206,41 +171,36 @@ impl SpoolSender {
         Ok(!due.is_empty())
     }
 
-    async fn settle(&mut self, waiting: WaitingBatch, attempt: Attempt) -> Result<(), SpoolError> {
-        let asset = waiting.batch.asset.as_str();
+    async fn settle(&self, waiting: WaitingBatch, attempt: Attempt) -> Result<(), SpoolError> {
+        let (asset, id) = (waiting.batch.asset.as_str(), waiting.id);
         match attempt {
-            Attempt::Stored => {
-                self.pauses.remove(asset);
-                self.spool.remove(&waiting).await
+            Attempt::Stored => self.spool.remove(&waiting).await?,
+            Attempt::Rejected { samples, reason } => {
+                tracing::error!(asset, id, reason, "samples are rejected and set aside");
+                self.spool.set_aside(&waiting, &samples, &reason).await?;
             }
             Attempt::Refused(reason) => {
-                tracing::error!(asset, id = waiting.id, reason, "a batch is refused for good");
-                self.spool.set_aside(waiting.id, &reason).await
+                tracing::error!(asset, id, reason, "a batch is refused and set aside");
+                self.spool.set_aside(&waiting, &waiting.batch, &reason).await?;
             }
-            Attempt::Failed { reason, wait } => {
-                let last = self.pauses.get(asset).map(|pause| pause.delay * 2);
-                let delay = last.unwrap_or(FIRST_DELAY).min(LONGEST_DELAY);
-                let until = now() + wait.unwrap_or(delay).max(delay);
-                self.pauses.insert(asset.to_owned(), Pause { until, delay });
-                let waiting = self.spool.status().await?.waiting_batches;
-                tracing::warn!(asset, reason, waiting, "a batch waits");
-                Ok(())
+            Attempt::Failed(failure) => {
+                if self.delays.failed(asset, &failure) {
+                    let Failure { cause, answer, .. } = failure;
+                    let waiting = self.spool.status().await?.waiting_batches;
+                    tracing::warn!(asset, reason = cause, answer, waiting, "a batch waits");
+                }
+                return Ok(());
             }
         }
+        self.delays.succeeded(asset);
+        Ok(())
     }
 
-    /// Waits for a new batch or the end of a pause.
+    /// Waits for a new batch or the end of a delay.
     async fn wait(&self) {
-        let next = self.pauses.values().map(|pause| pause.until).min();
-        let rest = next.map_or(LONGEST_DELAY, |at| at.saturating_duration_since(now()));
         tokio::select! {
-            () = sleep(rest) => {}
+            () = sleep(self.delays.rest()) => {}
             () = self.spool.added.notified() => {}
         }
     }
-}
-
-#[expect(clippy::disallowed_methods, reason = "delays between attempts")]
-fn now() -> Instant {
-    Instant::now()
 }

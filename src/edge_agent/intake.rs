@@ -8,7 +8,9 @@ use axum::http::{HeaderMap, StatusCode};
 use axum::routing::{get, post};
 use axum::{Json, Router};
 use offbd_core::engine::Rig;
+use serde::Serialize;
 
+use super::delays::{DelayView, Delays};
 use super::media_type;
 use super::spool::{NewBatch, Spool, SpoolError, SpoolStatus};
 use crate::http::{Problem, TelemetryFormat, add_basics};
@@ -17,25 +19,36 @@ use crate::wire::telemetry::{AckView, Batch, RowView};
 /// Longest body, bytes; a longer one is refused with 413.
 const MAX_BODY_BYTES: usize = 4 << 20;
 /// Most samples of a batch; more are refused with 413. The default limit of the service.
-const MAX_BATCH_SAMPLES: usize = 10_000;
+pub(super) const MAX_BATCH_SAMPLES: usize = 10_000;
 /// When a device may try again while the spool is full, s.
 const RETRY_AFTER_S: u32 = 5;
 
+type AgentState = (Arc<Spool>, Arc<Delays>);
+
+/// What `GET /api/v1/spool` says.
+#[derive(Serialize)]
+struct AgentStatus {
+    #[serde(flatten)]
+    spool: SpoolStatus,
+    /// Assets whose batches could not be sent, at most [`MAX_NAMED`](super::spool::MAX_NAMED).
+    held_up: Vec<DelayView>,
+}
+
 /// The routes of the agent.
-pub fn router(spool: Arc<Spool>) -> Router {
+pub fn router(spool: Arc<Spool>, delays: Arc<Delays>) -> Router {
     let router = Router::new()
         .route("/api/v1/assets/{asset}/telemetry", post(take))
         .route("/api/v1/spool", get(status))
         .route("/healthz", get(|| async { Json(serde_json::json!({ "status": "ok" })) }))
         .layer(DefaultBodyLimit::max(MAX_BODY_BYTES))
-        .with_state(spool);
+        .with_state((spool, delays));
     add_basics(router)
 }
 
 /// Takes a batch; the answer is sent once it is on the disk. It is checked as the service
 /// checks it, so that a device learns of invalid rows at once.
 async fn take(
-    State(spool): State<Arc<Spool>>,
+    State((spool, _)): State<AgentState>,
     Path(asset): Path<String>,
     RawQuery(query): RawQuery,
     headers: HeaderMap,
@@ -68,8 +81,8 @@ fn acknowledgement(batch: Batch) -> AckView {
     }
 }
 
-async fn status(State(spool): State<Arc<Spool>>) -> Result<Json<SpoolStatus>, Problem> {
-    Ok(Json(spool.status().await?))
+async fn status(State((spool, delays)): State<AgentState>) -> Result<Json<AgentStatus>, Problem> {
+    Ok(Json(AgentStatus { spool: spool.status().await?, held_up: delays.views() }))
 }
 
 impl From<SpoolError> for Problem {
@@ -79,7 +92,7 @@ impl From<SpoolError> for Problem {
             SpoolError::Full { .. } => {
                 Self::new(StatusCode::TOO_MANY_REQUESTS, "spool-full", "Spool full", detail)
             }
-            SpoolError::Sql(_) => {
+            SpoolError::Locked | SpoolError::NotSetAside(_) | SpoolError::Sql(_) => {
                 Self::new(StatusCode::SERVICE_UNAVAILABLE, "spool", "Not stored", detail)
             }
         };

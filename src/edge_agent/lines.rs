@@ -6,7 +6,9 @@ use std::time::Duration;
 use tokio::sync::mpsc;
 use tokio::time::{sleep, timeout};
 
+use super::parsed;
 use super::spool::{NewBatch, Spool, SpoolError};
+use crate::reasons::Reasons;
 
 /// Most lines of a batch.
 const MAX_BATCH_LINES: usize = 100;
@@ -52,6 +54,7 @@ pub async fn spool_lines(
         LineFormat::Csv => lines.recv().await.unwrap_or_default(),
         LineFormat::Ndjson => Vec::new(),
     };
+    let invalid = Reasons::default();
     while let Some(first) = lines.recv().await {
         let mut body = header.clone();
         body.extend(first);
@@ -65,9 +68,25 @@ pub async fn spool_lines(
         .await;
         let (asset, query) = (asset.to_owned(), query.to_owned());
         let media_type = format.media_type().to_owned();
-        put(spool, &NewBatch { asset, query, media_type, body }).await?;
+        let batch = NewBatch { asset, query, media_type, body };
+        log_invalid(&batch, &invalid);
+        put(spool, &batch).await?;
     }
     Ok(())
+}
+
+/// Logs why lines are not samples, each reason once: the service rejects them, and a pipe, unlike
+/// a device, has no answer.
+fn log_invalid(batch: &NewBatch, logged: &Reasons) {
+    let Ok(parsed) = parsed(batch) else { return };
+    for reason in parsed.rows.iter().filter_map(|row| row.as_ref().err()) {
+        // Without the line of the batch, which is not that of the pipe.
+        let numbered = reason.split_once(": ").filter(|(line, _)| line.starts_with("line "));
+        let reason = numbered.map_or(reason.as_str(), |(_, reason)| reason);
+        if logged.is_new(&reason) {
+            tracing::error!(reason, "a line is not a sample, and is not recorded");
+        }
+    }
 }
 
 /// Adds a batch, and waits for room if there is none.

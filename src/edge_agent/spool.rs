@@ -1,10 +1,11 @@
 //! The spool: batches that wait, in an SQLite file.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use serde::Serialize;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqliteLockingMode, SqliteSynchronous};
-use sqlx::{ConnectOptions, Row, SqliteConnection};
+use sqlx::{ConnectOptions, Connection, Row, SqliteConnection};
 use tokio::sync::{Mutex, Notify};
 
 /// Default of the most bytes of batches that a spool holds; further ones are refused with 429.
@@ -20,6 +21,11 @@ pub enum SpoolError {
     /// Nothing of the batch was taken.
     #[error("the spool is full: {used} of {limit} bytes wait for the service")]
     Full { used: u64, limit: u64 },
+    #[error("the spool is locked by an agent that is running")]
+    Locked,
+    /// Nothing was changed.
+    #[error("no batch {0} is set aside")]
+    NotSetAside(i64),
     #[error("the spool cannot be used: {0}")]
     Sql(#[from] sqlx::Error),
 }
@@ -46,23 +52,24 @@ pub(super) struct WaitingBatch {
 pub struct SpoolStatus {
     /// Batches that wait for the service.
     pub waiting_batches: u64,
-    /// Bytes of the spool in use, refused batches included.
+    /// Bytes of the spool in use, with what is set aside.
     pub used_bytes: u64,
     pub limit_bytes: u64,
-    /// Batches that the service has refused for good.
+    /// What the service has refused for good, at most [`MAX_NAMED`], the oldest first.
     pub refused: Vec<RefusedBatch>,
 }
 
-/// A batch that the service has refused for good.
+/// A batch that the service has refused for good, or the samples of one that it has rejected.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct RefusedBatch {
     pub id: i64,
     pub asset: String,
+    pub bytes: u64,
     pub reason: String,
 }
 
-/// Most refused batches that a status names, the oldest first.
-const MAX_NAMED_REFUSALS: i64 = 100;
+/// Most batches, and most assets, that a status names.
+pub(super) const MAX_NAMED: usize = 100;
 
 /// The spool. One process at a time uses its file.
 #[derive(Debug)]
@@ -105,11 +112,9 @@ impl Spool {
             .journal_mode(SqliteJournalMode::Wal)
             // A commit is on the disk before it returns, also after a power cut.
             .synchronous(SqliteSynchronous::Full);
-        let mut connection = options.connect().await?;
-        sqlx::raw_sql(SCHEMA).execute(&mut connection).await?;
-        let sum = "SELECT COALESCE(SUM(LENGTH(body)), 0), COUNT(*) FROM batch";
-        let (bytes, n): (i64, i64) = sqlx::query_as(sum).fetch_one(&mut connection).await?;
-        let used_bytes = bytes.unsigned_abs() + n.unsigned_abs() * ROW_BYTES;
+        let mut connection = options.connect().await.map_err(open_error)?;
+        sqlx::raw_sql(SCHEMA).execute(&mut connection).await.map_err(open_error)?;
+        let used_bytes = used_bytes(&mut connection).await?;
         let file = Mutex::new(SpoolFile { connection, used_bytes });
         Ok(Self { limit_bytes, file, added: Notify::new(), freed: Notify::new() })
     }
@@ -171,11 +176,73 @@ impl Spool {
         Ok(())
     }
 
-    /// Sets a batch aside that the service has refused for good.
-    pub(super) async fn set_aside(&self, id: i64, reason: &str) -> Result<(), SpoolError> {
-        let update = "UPDATE batch SET refusal = $1 WHERE id = $2";
+    /// Sets a batch aside that the service has refused for good: all of it, or those of its
+    /// samples that the service does not have.
+    pub(super) async fn set_aside(
+        &self,
+        refused: &WaitingBatch,
+        kept: &NewBatch,
+        reason: &str,
+    ) -> Result<(), SpoolError> {
+        let update = "UPDATE batch SET query = $1, media_type = $2, body = $3, refusal = $4 \
+            WHERE id = $5";
         let mut file = self.file.lock().await;
-        sqlx::query(update).bind(reason).bind(id).execute(&mut file.connection).await?;
+        sqlx::query(update)
+            .bind(&kept.query)
+            .bind(&kept.media_type)
+            .bind(&kept.body)
+            .bind(reason)
+            .bind(refused.id)
+            .execute(&mut file.connection)
+            .await?;
+        file.used_bytes += cost(&kept.body);
+        file.used_bytes = file.used_bytes.saturating_sub(cost(&refused.batch.body));
+        drop(file);
+        self.freed.notify_waiters();
+        Ok(())
+    }
+
+    /// Returns all that is set aside, the oldest first.
+    ///
+    /// # Errors
+    /// [`SpoolError::Sql`] if the file fails.
+    pub async fn refused(&self) -> Result<Vec<RefusedBatch>, SpoolError> {
+        refused(&mut self.file.lock().await.connection, usize::MAX).await
+    }
+
+    /// Lets batches that are set aside wait for the service again.
+    ///
+    /// # Errors
+    /// [`SpoolError`] if one of them is not set aside, or the file fails. Nothing is changed then.
+    pub async fn send_again(&self, ids: &[i64]) -> Result<(), SpoolError> {
+        self.change(ids, "UPDATE batch SET refusal = NULL WHERE id = $1 AND refusal IS NOT NULL")
+            .await?;
+        self.added.notify_one();
+        Ok(())
+    }
+
+    /// Deletes batches that are set aside.
+    ///
+    /// # Errors
+    /// As [`Self::send_again`].
+    pub async fn delete(&self, ids: &[i64]) -> Result<(), SpoolError> {
+        self.change(ids, "DELETE FROM batch WHERE id = $1 AND refusal IS NOT NULL").await
+    }
+
+    /// Makes a change to each of the batches, or to none.
+    async fn change(&self, ids: &[i64], change: &'static str) -> Result<(), SpoolError> {
+        let mut file = self.file.lock().await;
+        let mut changes = file.connection.begin().await?;
+        for id in ids {
+            let changed = sqlx::query(change).bind(id).execute(&mut *changes).await?;
+            if changed.rows_affected() == 0 {
+                return Err(SpoolError::NotSetAside(*id));
+            }
+        }
+        changes.commit().await?;
+        file.used_bytes = used_bytes(&mut file.connection).await?;
+        drop(file);
+        self.freed.notify_waiters();
         Ok(())
     }
 
@@ -187,20 +254,43 @@ impl Spool {
         let mut file = self.file.lock().await;
         let count = sqlx::query_scalar("SELECT COUNT(*) FROM batch WHERE refusal IS NULL");
         let waiting: i64 = count.fetch_one(&mut file.connection).await?;
-        let select = "SELECT id, asset, refusal FROM batch WHERE refusal IS NOT NULL \
-            ORDER BY id LIMIT $1";
-        let select = sqlx::query_as(select).bind(MAX_NAMED_REFUSALS);
-        let refused: Vec<(i64, String, String)> = select.fetch_all(&mut file.connection).await?;
-        let refused = refused.into_iter();
+        let refused = refused(&mut file.connection, MAX_NAMED).await?;
         Ok(SpoolStatus {
             waiting_batches: waiting.unsigned_abs(),
             used_bytes: file.used_bytes,
             limit_bytes: self.limit_bytes,
-            refused: refused
-                .map(|(id, asset, reason)| RefusedBatch { id, asset, reason })
-                .collect(),
+            refused,
         })
     }
+}
+
+/// Returns what is set aside, up to `limit` batches, the oldest first.
+async fn refused(
+    connection: &mut SqliteConnection,
+    limit: usize,
+) -> Result<Vec<RefusedBatch>, SpoolError> {
+    let select = "SELECT id, asset, LENGTH(body), refusal FROM batch \
+        WHERE refusal IS NOT NULL ORDER BY id LIMIT $1";
+    let select = sqlx::query_as(select).bind(i64::try_from(limit).unwrap_or(i64::MAX));
+    let rows: Vec<(i64, String, i64, String)> = select.fetch_all(connection).await?;
+    let batches = rows.into_iter().map(|(id, asset, bytes, reason)| {
+        let bytes = bytes.unsigned_abs();
+        RefusedBatch { id, asset, bytes, reason }
+    });
+    Ok(batches.collect())
+}
+
+/// The bytes of all batches.
+async fn used_bytes(connection: &mut SqliteConnection) -> Result<u64, SpoolError> {
+    let sum = "SELECT COALESCE(SUM(LENGTH(body)), 0), COUNT(*) FROM batch";
+    let (bytes, n): (i64, i64) = sqlx::query_as(sum).fetch_one(connection).await?;
+    Ok(bytes.unsigned_abs() + n.unsigned_abs() * ROW_BYTES)
+}
+
+/// Another process that uses the file is a case of its own.
+fn open_error(error: sqlx::Error) -> SpoolError {
+    let code = error.as_database_error().and_then(|error| error.code().map(Cow::into_owned));
+    if code.as_deref() == Some("5") { SpoolError::Locked } else { error.into() }
 }
 
 /// What a batch counts against the limit, bytes.

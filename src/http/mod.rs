@@ -75,6 +75,7 @@ pub use guard::AccessPolicy;
 pub use json_body::parse_json;
 pub(crate) use layers::add_basics;
 pub use metrics::{gather_metrics, keep_metrics};
+pub(crate) use problem::PROBLEM_TYPE;
 pub use problem::Problem;
 pub(crate) use rates::subscriber;
 pub use rates::{RateLimit, RateLimits};

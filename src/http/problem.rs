@@ -14,6 +14,9 @@ use crate::wire::sovd::SovdErrorView;
 use crate::wire::telemetry::BatchError;
 use offbd_core::vocabulary::Invalid;
 
+/// Start of the type of every problem of this service, by which they are told from those of others.
+pub(crate) const PROBLEM_TYPE: &str = "urn:offbd:problem:";
+
 /// An error (`application/problem+json`, RFC 9457).
 #[derive(Clone, Debug, Serialize, ToSchema)]
 pub struct Problem {
@@ -53,7 +56,7 @@ impl Problem {
         detail: impl Into<String>,
     ) -> Self {
         Self {
-            kind: format!("urn:offbd:problem:{slug}").into(),
+            kind: format!("{PROBLEM_TYPE}{slug}").into(),
             title,
             status: status.as_u16(),
             detail: detail.into().into(),

@@ -24,9 +24,13 @@ pub(crate) enum TelemetryFormat {
 impl TelemetryFormat {
     /// Returns the format in `Content-Type`; JSON without the header.
     pub(crate) fn of(headers: &HeaderMap) -> Result<Self, Problem> {
-        let Some(header) = headers.get(CONTENT_TYPE) else { return Ok(Self::Json) };
-        let text = header.to_str().unwrap_or_default();
-        let essence = text.split(';').next().unwrap_or_default().trim().to_ascii_lowercase();
+        let header = headers.get(CONTENT_TYPE);
+        header.map_or(Ok(Self::Json), |header| Self::of_type(header.to_str().unwrap_or_default()))
+    }
+
+    /// Returns the format of a media type.
+    pub(crate) fn of_type(media_type: &str) -> Result<Self, Problem> {
+        let essence = media_type.split(';').next().unwrap_or_default().trim().to_ascii_lowercase();
         match essence.as_str() {
             "application/json" => Ok(Self::Json),
             "application/msgpack" | "application/vnd.msgpack" | "application/x-msgpack" => {
@@ -34,7 +38,7 @@ impl TelemetryFormat {
             }
             "application/x-ndjson" | "application/ndjson" | "application/jsonl" => Ok(Self::Ndjson),
             "text/csv" => Ok(Self::Csv),
-            _ => Err(unsupported(text)),
+            _ => Err(unsupported(media_type)),
         }
     }
 

@@ -73,7 +73,6 @@ mod notifications;
 mod ownership;
 mod playback;
 mod reanalysis;
-mod reasons;
 mod replay_settings;
 mod requests;
 #[cfg(test)]
@@ -85,6 +84,7 @@ mod upkeep;
 mod views;
 mod writing;
 
+pub(crate) use crate::reasons::Reasons;
 pub use crate::store::RecordingReader;
 pub use clock::{Clock, parse_timestamp};
 pub use cluster::Route;
@@ -98,7 +98,6 @@ pub use notifications::{
 };
 pub use reanalysis::fault_recording::RecordingWindow;
 pub use reanalysis::trace::{MAX_TRACE_POINTS, TraceQuery};
-pub(crate) use reasons::Reasons;
 pub use requests::{
     AlarmQuery, DeliveryQuery, FaultQuery, FleetQuery, MAX_SERIES_SESSIONS, PendingBatch,
     PresentFault, QueueLoad, SeriesQuery, SessionListQuery, TraceReader,

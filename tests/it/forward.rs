@@ -1,9 +1,12 @@
 //! The edge agent `offbd forward`, as a process, between a device and the real service.
 
+mod answers;
+mod set_aside;
+
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
-use std::sync::mpsc;
+use std::sync::{Arc, Mutex, mpsc};
 
 use crate::support::device::Random;
 use crate::support::process::{Process, ended};
@@ -16,6 +19,8 @@ use serde_json::{Value, json};
 struct Agent {
     child: Child,
     client: Client,
+    /// The fields of each line that it has logged.
+    log: Arc<Mutex<Vec<Value>>>,
 }
 
 impl Agent {
@@ -23,17 +28,27 @@ impl Agent {
         let mut child =
             command(spool, to, &["--listen", "127.0.0.1:0"]).args(more).spawn().unwrap();
         let (send, address) = mpsc::channel();
-        let log = BufReader::new(child.stderr.take().unwrap());
+        let lines = BufReader::new(child.stderr.take().unwrap()).lines();
+        let log = Arc::<Mutex<Vec<Value>>>::default();
+        let logged = log.clone();
         std::thread::spawn(move || {
-            for line in log.lines().map_while(Result::ok) {
+            for line in lines.map_while(Result::ok) {
                 let fields = serde_json::from_str::<Value>(&line).unwrap_or_default();
                 if fields["message"] == "forwarding" {
                     let _ = send.send(fields["address"].as_str().unwrap().to_owned());
                 }
+                logged.lock().unwrap().push(fields);
             }
         });
         let client = Client::new(address.recv_timeout(DEADLINE).expect("the agent starts"));
-        Self { child, client }
+        Self { child, client, log }
+    }
+
+    /// Returns the reasons that were logged with `message`.
+    fn logged(&self, message: &str) -> Vec<String> {
+        let log = self.log.lock().unwrap();
+        let lines = log.iter().filter(|fields| fields["message"] == message);
+        lines.map(|fields| fields["reason"].as_str().unwrap().to_owned()).collect()
     }
 
     async fn status(&self) -> Value {

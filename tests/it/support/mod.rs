@@ -14,6 +14,7 @@ pub mod described;
 pub mod device;
 pub mod held_socket;
 pub mod history;
+pub mod liar;
 pub mod link;
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 pub mod packets;
