@@ -17,7 +17,7 @@ rules:
 
 # A minute of a simulated rig with faults, against the real service
 demo:
-    cargo run --release -- demo --seconds 60
+    cargo run -- demo --seconds 60
 
 # The service on the embedded store
 serve *ARGS:
