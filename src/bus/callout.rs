@@ -15,10 +15,13 @@ use uuid::Uuid;
 
 use crate::service::access::{AccessScope, Credential, PREFIX, Principal, Right};
 use crate::service::{Clock, Service, ServiceError};
-use crate::wire::bus::{DeviceTopic, TopicStyle, encoded};
+use crate::wire::bus::{DeviceTopic, TopicStyle, encoded, inbox};
 
 /// The subject of the server's questions.
 pub(super) const SUBJECT: &str = "$SYS.REQ.USER.AUTH";
+
+/// Below it the server receives the answers.
+pub(super) const SERVER_INBOX: &str = "$SYS._INBOX";
 
 /// How long a device stays connected; then the server disconnects it, and it connects again. A
 /// revoked token is refused after this time at the latest.
@@ -198,7 +201,7 @@ fn permissions(principal: &Principal, by_mqtt: bool) -> (Vec<String>, Vec<String
             subscribe.push(subject(&level, kind));
         }
         // Answers to requests, apart from those of others.
-        subscribe.push(format!("_INBOX.offbd.{level}.>"));
+        subscribe.push(format!("{}.>", inbox(&level)));
         if by_mqtt {
             // By which the server delivers what the client has subscribed to at QoS 1.
             subscribe.push("$MQTT.sub.>".to_owned());

@@ -10,14 +10,14 @@ use hyper::body::Bytes;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
 
 use super::presence::Attendance;
-use super::{MAX_PENDING, MAX_QUEUED, MAX_QUEUED_BYTES};
+use super::{MAX_PENDING, MAX_QUEUED, MAX_QUEUED_BYTES, count};
 use crate::http::{Forwarder, Problem};
 use crate::service::{Route, Service, ServiceError};
 use crate::wire::bus::{BatchAckView, BatchRefusalView, DeviceTopic};
 use crate::wire::mapping::MappedTopic;
 use crate::wire::telemetry::{self, AckView, Batch, BatchError};
 
-/// A message of a device that waits to be parsed.
+/// A batch of a device that waits to be parsed.
 pub(super) struct Delivery<R> {
     pub(super) asset: String,
     pub(super) form: Form,
@@ -30,27 +30,35 @@ pub(super) struct Delivery<R> {
     room: OwnedSemaphorePermit,
 }
 
-/// The form of a payload.
+/// What a message is.
+pub(super) enum Content {
+    Batch(Form),
+    /// On a topic other than that of telemetry.
+    Presence(DeviceTopic),
+}
+
+impl From<DeviceTopic> for Content {
+    fn from(topic: DeviceTopic) -> Self {
+        match topic {
+            DeviceTopic::Telemetry => Self::Batch(Form::Own),
+            DeviceTopic::Hello | DeviceTopic::State => Self::Presence(topic),
+        }
+    }
+}
+
+/// The form of a batch.
 #[derive(Clone)]
 pub(super) enum Form {
-    Device(DeviceTopic),
+    Own,
     Mapped(Arc<MappedTopic>),
 }
 
 impl Form {
     /// Parses a batch of at most `limit` samples.
-    ///
-    /// # Errors
-    /// The topic, if the message is no batch.
-    fn batch(
-        &self,
-        payload: &[u8],
-        limit: usize,
-    ) -> Result<Result<Batch, BatchError>, DeviceTopic> {
+    fn batch(&self, payload: &[u8], limit: usize) -> Result<Batch, BatchError> {
         match self {
-            Self::Device(DeviceTopic::Telemetry) => Ok(parse(payload, limit)),
-            Self::Mapped(topic) => Ok(topic.batch(payload, limit)),
-            Self::Device(topic) => Err(*topic),
+            Self::Own => parse(payload, limit),
+            Self::Mapped(topic) => topic.batch(payload, limit),
         }
     }
 }
@@ -157,26 +165,32 @@ pub(super) struct Intake {
 impl Intake {
     pub(super) fn new(bus: &'static str, service: Service) -> Self {
         let bytes = Arc::new(Semaphore::new(MAX_QUEUED_BYTES));
-        let (attendance, forwarder) = Default::default();
-        Self { bus, service, attendance, bytes, forwarder }
+        let attendance = Attendance::new(bus);
+        Self { bus, service, attendance, bytes, forwarder: Forwarder::default() }
     }
 
     /// Counts a message by what became of it.
     pub(super) fn count(&self, outcome: &'static str) {
-        metrics::counter!("offbd_bus_messages_total", "bus" => self.bus, "outcome" => outcome)
-            .increment(1);
+        count(self.bus, outcome, 1);
     }
 
-    /// Puts a message into the queue. If it is too long or there is no room, returns the answer
-    /// with the receipt.
+    /// Puts a batch into the queue. If it is too long or there is no room, or the message is a
+    /// presence, returns the reply with the receipt.
     pub(super) fn queue<R>(
         &self,
         queue: &mpsc::Sender<Delivery<R>>,
-        (asset, form): (String, Form),
+        (asset, content): (String, Content),
         payload: Bytes,
         receipt: R,
         waits: bool,
-    ) -> Result<(), (String, R, Box<BatchAnswer>)> {
+    ) -> Result<(), (String, R, Box<MessageReply>)> {
+        let form = match content {
+            Content::Batch(form) => form,
+            Content::Presence(topic) => {
+                self.attendance.arrive(&self.service, asset.clone(), topic, &payload);
+                return Err((asset, receipt, Box::new(MessageReply::Nothing)));
+            }
+        };
         let limit = self.service.limits().batch_bytes;
         if payload.len() > limit {
             let error = ServiceError::TooMany { what: "bytes in one message", limit };
@@ -194,15 +208,28 @@ impl Intake {
         })
     }
 
-    fn refused(&self, error: ServiceError) -> BatchAnswer {
+    fn refused(&self, error: ServiceError) -> MessageReply {
         let answer = BatchAnswer::of(None, Err(error.into()));
         self.count(answer.outcome());
-        answer
+        MessageReply::Answer(answer)
     }
 
-    /// Handles the messages of the queue until it is closed, and answers all of them.
+    /// Handles the batches of the queue until it is closed, and answers all of them; presences
+    /// meanwhile.
     pub(super) async fn run<A: Answering>(
         self,
+        bus: &A,
+        queue: mpsc::Receiver<Delivery<A::Receipt>>,
+    ) {
+        tokio::select! {
+            () = self.answer_batches(bus, queue) => {}
+            () = self.attendance.check_assets(&self.service) => {}
+        }
+        bus.finish().await;
+    }
+
+    async fn answer_batches<A: Answering>(
+        &self,
         bus: &A,
         mut queue: mpsc::Receiver<Delivery<A::Receipt>>,
     ) {
@@ -226,10 +253,9 @@ impl Intake {
                 }
             }
         }
-        bus.finish().await;
     }
 
-    /// Submits a batch and returns its pending reply; anything else is done at once.
+    /// Submits a batch and returns its pending reply; `None` if there is none.
     async fn take<A: Answering>(
         &self,
         bus: &A,
@@ -240,15 +266,7 @@ impl Intake {
         }
         let limit = self.service.limits().batch_samples;
         let Delivery { asset, form, payload, receipt, waits, room } = delivery;
-        let batch = match form.batch(&payload, limit) {
-            Ok(batch) => batch,
-            Err(topic) => {
-                let outcome = self.attendance.note(&self.service, &asset, topic, &payload).await;
-                self.count(outcome);
-                bus.answer(&asset, receipt, MessageReply::Nothing).await;
-                return None;
-            }
-        };
+        let batch = form.batch(&payload, limit);
         drop((payload, room));
         let (id, submitted) = match batch {
             Err(error) => (None, Err(error.into())),
@@ -275,7 +293,7 @@ impl Intake {
         self.count("elsewhere");
         let Delivery { asset, form, payload, receipt, waits, .. } = delivery;
         let limit = self.service.limits().batch_samples;
-        let Some(Ok(Ok(batch))) = waits.then(|| form.batch(&payload, limit)) else {
+        let Some(Ok(batch)) = waits.then(|| form.batch(&payload, limit)) else {
             bus.answer(&asset, receipt, MessageReply::Nothing).await;
             return None;
         };

@@ -54,3 +54,8 @@ const MAX_PENDING: usize = 1024;
 
 /// Bytes of messages that wait to be parsed; at the limit as for [`MAX_QUEUED`].
 const MAX_QUEUED_BYTES: usize = 64 << 20;
+
+/// Counts messages of a bus by what became of them.
+fn count(bus: &'static str, outcome: &'static str, n: u64) {
+    metrics::counter!("offbd_bus_messages_total", "bus" => bus, "outcome" => outcome).increment(n);
+}

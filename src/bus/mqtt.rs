@@ -25,7 +25,7 @@ use tokio_rustls::rustls::{ClientConfig, RootCertStore};
 use tokio_util::sync::CancellationToken;
 
 use super::faults::publish_faults;
-use super::intake::{Answering, BatchAnswer, Delivery, Form, Intake, MessageReply, queue};
+use super::intake::{Answering, BatchAnswer, Content, Delivery, Form, Intake, MessageReply, queue};
 use super::mqtt_publisher::{BrokerLink, Connected, MqttPublisher};
 use super::puback::PubackQueue;
 use super::{RETRY_INTERVAL, SEND_TIMEOUT};
@@ -268,18 +268,22 @@ impl Broker<'_> {
         };
         let waits = receipt.is_some();
         let queued = intake.queue(sender, addressed, publish.payload, receipt, waits);
-        if let Err((asset, receipt, answer)) = queued {
-            connection.send_now(&asset, receipt, &answer);
+        if let Err((asset, receipt, reply)) = queued {
+            match *reply {
+                MessageReply::Answer(answer) => connection.send_now(&asset, receipt, &answer),
+                MessageReply::Nothing => connection.acknowledge(receipt),
+                MessageReply::Again => connection.end(),
+            }
         }
     }
 
-    /// Returns the asset of a message and the form of its payload, or the label of the metric.
-    fn address(&self, publish: &Publish) -> Result<(String, Form), &'static str> {
+    /// Returns the asset of a message and what it is, or the label of the metric.
+    fn address(&self, publish: &Publish) -> Result<(String, Content), &'static str> {
         let topic = publish.topic.as_str();
         if let Some((entry, asset)) = self.settings.mapping.find(topic) {
             let asset = asset.map_err(|error| refused(topic, &error))?;
-            let form = Form::Mapped(entry);
-            return if publish.retain { Err("retained") } else { Ok((asset, form)) };
+            let batch = Content::Batch(Form::Mapped(entry));
+            return if publish.retain { Err("retained") } else { Ok((asset, batch)) };
         }
         let (asset, kind) =
             TopicStyle::Mqtt.parse(topic).map_err(|error| refused(topic, &error))?;
@@ -287,7 +291,7 @@ impl Broker<'_> {
             tracing::warn!(topic, "a retained message is no new telemetry; it is ignored");
             return Err("retained");
         }
-        Ok((asset, Form::Device(kind)))
+        Ok((asset, kind.into()))
     }
 }
 

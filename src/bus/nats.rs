@@ -16,11 +16,11 @@ use tokio_util::sync::CancellationToken;
 
 use super::callout::{self, Issuer};
 use super::faults::{FaultMessage, Publishing, publish_faults};
-use super::intake::{Answering, Delivery, Form, Intake, MessageReply, queue};
+use super::intake::{Answering, Delivery, Intake, MessageReply, queue};
 use super::settings::{UnsafeServer, check_streams, check_version, doubts};
-use super::{RETRY_INTERVAL, SEND_TIMEOUT};
+use super::{RETRY_INTERVAL, SEND_TIMEOUT, count};
 use crate::service::{Reasons, Service};
-use crate::wire::bus::{DeviceTopic, TopicStyle};
+use crate::wire::bus::{DeviceTopic, INBOX, TopicStyle, encoded, inbox, is_below, service_inbox};
 
 const BUS: &str = "nats";
 
@@ -136,7 +136,7 @@ impl NatsBus {
             .name("offbd")
             .connection_timeout(CONNECT_TIMEOUT)
             .subscription_capacity(MAX_UNREAD)
-            .custom_inbox_prefix("_INBOX.offbd.service")
+            .custom_inbox_prefix(service_inbox())
             .event_callback(move |event| noted(event, connected.clone(), reasons.clone()));
         if let Some((user, password)) = user {
             options = options.user_and_password(user.clone(), password.clone());
@@ -232,6 +232,11 @@ impl NatsBus {
 
     async fn serve(&self, client: Client) -> Result<(), async_nats::SubscribeError> {
         let intake = Intake::new(BUS, self.service.clone());
+        let answers = NatsAnswers {
+            client: client.clone(),
+            own_inboxes: self.issuer.is_some(),
+            reasons: self.reasons.clone(),
+        };
         let mut subscriptions = Vec::new();
         for topic in DeviceTopic::ALL {
             let subject = TopicStyle::Nats.topic(&["*", topic.as_str()]);
@@ -252,14 +257,14 @@ impl NatsBus {
         };
         let answering_questions = async {
             if let Some((issuer, asked)) = questions {
-                self.closing.run_until_cancelled(self.answer(&client, issuer, asked)).await;
+                self.closing.run_until_cancelled(self.answer(&answers, issuer, asked)).await;
             }
         };
         let checking = self.closing.run_until_cancelled(self.check_connections(&client));
         let listening = self.closing.run_until_cancelled(listen_to_itself(&client));
         let (sender, receiver) = queue();
-        let reading = self.read(&intake, &client, select_all(subscriptions), sender);
-        let answering = intake.clone().run(&client, receiver);
+        let reading = self.read(&intake, &answers, select_all(subscriptions), sender);
+        let answering = intake.clone().run(&answers, receiver);
         tokio::join!(publishing, answering_questions, checking, listening, reading, answering);
         Ok(())
     }
@@ -268,7 +273,7 @@ impl NatsBus {
     async fn read(
         &self,
         intake: &Intake,
-        client: &Client,
+        answers: &NatsAnswers,
         mut messages: SelectAll<async_nats::Subscriber>,
         sender: mpsc::Sender<Delivery<Option<Subject>>>,
     ) {
@@ -282,11 +287,11 @@ impl NatsBus {
                     continue;
                 }
             };
-            let addressed = (asset, Form::Device(kind));
-            if let Err((asset, receipt, answer)) =
+            let addressed = (asset, kind.into());
+            if let Err((asset, receipt, reply)) =
                 intake.queue(&sender, addressed, payload, reply, false)
             {
-                client.answer(&asset, receipt, MessageReply::Answer(*answer)).await;
+                answers.answer(&asset, receipt, *reply).await;
             }
         }
     }
@@ -294,16 +299,20 @@ impl NatsBus {
     /// Answers the questions of the server for the rights of devices.
     async fn answer(
         &self,
-        client: &Client,
+        answers: &NatsAnswers,
         issuer: Arc<Issuer>,
         mut asked: async_nats::Subscriber,
     ) {
         let permits = Arc::new(Semaphore::new(MAX_QUESTIONS));
         while let Some(message) = asked.next().await {
+            let Some(reply) = message.reply else { continue };
+            if !answers.may_reply(callout::SUBJECT, &reply, callout::SERVER_INBOX) {
+                continue;
+            }
             let Ok(permit) = permits.clone().acquire_owned().await else { return };
-            let (service, client, issuer) = (self.service.clone(), client.clone(), issuer.clone());
+            let (service, issuer) = (self.service.clone(), issuer.clone());
+            let client = answers.client.clone();
             let answering = async move {
-                let Some(reply) = message.reply else { return };
                 match issuer.answer(&service, &message.payload).await {
                     Ok(answer) => send(&client, reply, answer.into_bytes()).await,
                     Err(error) => {
@@ -330,10 +339,7 @@ async fn noted(event: ClientEvent, connected: Arc<Notify>, reasons: Arc<Reasons>
             tracing::warn!("the connection to the NATS server is lost");
             metrics::gauge!("offbd_bus_connected", "bus" => BUS).set(0.0);
         }
-        ClientEvent::SlowConsumer(_) => {
-            metrics::counter!("offbd_bus_messages_total", "bus" => BUS, "outcome" => "dropped")
-                .increment(1);
-        }
+        ClientEvent::SlowConsumer(_) => count(BUS, "dropped", 1),
         event if reasons.is_new(&event) => {
             tracing::warn!(%event, "the NATS server reports");
         }
@@ -349,20 +355,52 @@ async fn send(client: &Client, subject: impl async_nats::subject::ToSubject, doc
     }
 }
 
-impl Answering for Client {
+/// Answers devices with the service's own rights, and so only where they may receive.
+struct NatsAnswers {
+    client: Client,
+    /// Whether the devices of each asset receive replies below a subject of their own.
+    own_inboxes: bool,
+    reasons: Arc<Reasons>,
+}
+
+impl NatsAnswers {
+    /// Returns whether a message to `subject` may be answered on `reply`, which must be below
+    /// `parent`; counts and logs it if not.
+    fn may_reply(&self, subject: &str, reply: &str, parent: &str) -> bool {
+        if is_below(reply, parent) {
+            return true;
+        }
+        metrics::counter!("offbd_bus_replies_refused_total").increment(1);
+        // Any number of devices may do this, each with any number of subjects.
+        if self.reasons.is_new(&"a reply subject") {
+            tracing::warn!(
+                subject,
+                reply,
+                "not answered there: the reply subject is not below {parent}."
+            );
+        }
+        false
+    }
+}
+
+impl Answering for NatsAnswers {
     type Receipt = Option<Subject>;
 
     async fn answer(&self, asset: &str, reply_to: Option<Subject>, reply: MessageReply) {
         let MessageReply::Answer(answer) = reply else { return };
         let document = answer.document();
+        let ack = TopicStyle::Nats.ack(asset);
         if let Some(reply_to) = reply_to {
-            send(self, reply_to, document.clone()).await;
+            let parent = if self.own_inboxes { inbox(&encoded(asset)) } else { INBOX.to_owned() };
+            if self.may_reply(&ack, &reply_to, &parent) {
+                send(&self.client, reply_to, document.clone()).await;
+            }
         }
-        send(self, TopicStyle::Nats.ack(asset), document).await;
+        send(&self.client, ack, document).await;
     }
 
     async fn finish(&self) {
-        let _ = timeout(SEND_TIMEOUT, self.flush()).await;
+        let _ = timeout(SEND_TIMEOUT, self.client.flush()).await;
     }
 }
 

@@ -44,6 +44,11 @@ const METRICS: &[(&str, MetricKind, &str)] = &[
     ("offbd_bus_faults_total", Counter, "Events published over NATS or MQTT"),
     ("offbd_bus_logins_total", Counter, "Questions of the NATS server for rights, by outcome"),
     ("offbd_bus_messages_total", Counter, "Messages of devices over NATS and MQTT, by outcome"),
+    (
+        "offbd_bus_replies_refused_total",
+        Counter,
+        "NATS messages not answered on their reply subject",
+    ),
     ("offbd_bus_unsafe", Gauge, "1 if the NATS server may lose messages, see the log"),
     ("offbd_cluster_nodes", Gauge, "Nodes of the cluster that are alive"),
     ("offbd_cold_bytes_total", Counter, "Bytes of the files that hold moved sessions"),
@@ -173,6 +178,7 @@ fn initialize_series() {
         values.iter().for_each(|value| counter!(name, label => *value).absolute(0));
     };
     for name in [
+        "offbd_bus_replies_refused_total",
         "offbd_cold_bytes_total",
         "offbd_cold_failures_total",
         "offbd_cold_files_total",

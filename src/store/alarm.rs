@@ -274,6 +274,15 @@ impl Store {
         self.names("SELECT asset FROM session WHERE state = 'open' AND asset IN (", assets).await
     }
 
+    /// Those of `assets` that exist.
+    ///
+    /// # Errors
+    /// [`StoreError`] if the database fails.
+    pub async fn existing_assets(&self, assets: &[String]) -> Result<Vec<String>, StoreError> {
+        let select = "SELECT name FROM asset WHERE deleted_at IS NULL AND name IN (";
+        self.names(select, assets).await
+    }
+
     /// Returns the names that `select`, which ends in `IN (`, finds with the list `among`.
     async fn names(
         &self,

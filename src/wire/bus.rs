@@ -18,6 +18,9 @@ const ROOT: [&str; 2] = ["offbd", "v1"];
 /// The level of offbd's own topic. No asset has it: `=` is in no name.
 const SERVICE_LEVEL: &str = "=service";
 
+/// Below it NATS clients receive the replies to their requests.
+pub const INBOX: &str = "_INBOX";
+
 /// Longest name of an asset, bytes, as in the asset file.
 const NAME_BYTES: usize = 128;
 
@@ -140,6 +143,27 @@ pub fn decoded(level: &str) -> Result<String, TopicError> {
         return Ok(name);
     }
     Err(TopicError::Name { level: shortened(level) })
+}
+
+/// Returns the NATS subject below which the devices of an asset receive replies. `level` is the
+/// encoded name of the asset, or `*` for all assets.
+#[must_use]
+pub fn inbox(level: &str) -> String {
+    [INBOX, ROOT[0], level].join(".")
+}
+
+/// Returns the NATS subject below which offbd receives replies itself.
+#[must_use]
+pub fn service_inbox() -> String {
+    inbox(SERVICE_LEVEL)
+}
+
+/// Returns whether `subject` is a single NATS subject below `parent`: one without wildcards and
+/// empty levels.
+#[must_use]
+pub fn is_below(subject: &str, parent: &str) -> bool {
+    let rest = subject.strip_prefix(parent).and_then(|rest| rest.strip_prefix('.'));
+    rest.is_some_and(|rest| rest.split('.').all(|level| !matches!(level, "" | "*" | ">")))
 }
 
 /// What a device tells about itself after it has connected. Further fields are ignored.
@@ -303,6 +327,21 @@ mod tests {
                 let topic = style.topic(&[&encoded(&name), "telemetry"]);
                 prop_assert_eq!(style.parse(&topic), Ok((name.clone(), DeviceTopic::Telemetry)));
             }
+        }
+
+        #[test]
+        fn a_reply_is_below_the_inbox_of_one_asset_at_most(
+            [asset, other] in ["[ab.]{1,3}", "[ab.]{1,3}"],
+            rest in "[ab.*>]{0,5}",
+        ) {
+            let inbox_of = |asset: &str| inbox(&encoded(asset));
+            let subject = format!("{}.{rest}", inbox_of(&asset));
+            let levels = || rest.split('.');
+            let is_single = levels().all(|level| !["", "*", ">"].contains(&level));
+            prop_assert_eq!(is_below(&subject, &inbox_of(&asset)), is_single);
+            prop_assert_eq!(is_below(&subject, INBOX), is_single);
+            prop_assert_eq!(is_below(&subject, &inbox_of(&other)), is_single && asset == other);
+            prop_assert!(!is_below(&subject, &service_inbox()));
         }
 
         #[test]

@@ -7,7 +7,9 @@ mod loss;
 mod mapping;
 mod messages;
 mod partition;
+mod presence;
 mod puback;
+mod replies;
 mod retained;
 mod verdict;
 

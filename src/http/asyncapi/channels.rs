@@ -169,7 +169,8 @@ pub(super) fn bus_channels(style: TopicStyle) -> Vec<Channel> {
     };
     let mut channels: Vec<Channel> = DeviceTopic::ALL.into_iter().map(of_device).collect();
     let ack = Operation::new(Action::Send, ANSWERS);
-    let summary = "Answers to batches; a request over NATS gets them as its reply too";
+    let summary = "Answers to batches; a request over NATS gets them as its reply too, if its reply \
+         subject is below `_INBOX.`";
     channels.push(channel("ack", style.ack("{asset}"), summary, ack));
     let fault = Operation::new(Action::Send, &["fault", "communication", "cleared"]).retained();
     let summary = "The present state of each fault code; NATS alone keeps no message";

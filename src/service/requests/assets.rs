@@ -31,6 +31,14 @@ impl Service {
         }
     }
 
+    /// Returns those of `names` that are assets.
+    ///
+    /// # Errors
+    /// [`ServiceError::Store`].
+    pub async fn existing_assets(&self, names: &[String]) -> Result<Vec<String>, ServiceError> {
+        Ok(self.inner.handles.store.existing_assets(names).await?)
+    }
+
     /// Returns a page of asset files, sorted by name, of the assets whose name begins with
     /// `name`.
     ///
