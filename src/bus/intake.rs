@@ -31,13 +31,13 @@ pub(super) struct Delivery<R> {
 }
 
 /// What a message is.
-pub(super) enum Content {
+pub(super) enum BusMessage {
     Batch(Form),
     /// On a topic other than that of telemetry.
     Presence(DeviceTopic),
 }
 
-impl From<DeviceTopic> for Content {
+impl From<DeviceTopic> for BusMessage {
     fn from(topic: DeviceTopic) -> Self {
         match topic {
             DeviceTopic::Telemetry => Self::Batch(Form::Own),
@@ -179,14 +179,14 @@ impl Intake {
     pub(super) fn queue<R>(
         &self,
         queue: &mpsc::Sender<Delivery<R>>,
-        (asset, content): (String, Content),
+        (asset, content): (String, BusMessage),
         payload: Bytes,
         receipt: R,
         waits: bool,
     ) -> Result<(), (String, R, Box<MessageReply>)> {
         let form = match content {
-            Content::Batch(form) => form,
-            Content::Presence(topic) => {
+            BusMessage::Batch(form) => form,
+            BusMessage::Presence(topic) => {
                 self.attendance.arrive(&self.service, asset.clone(), topic, &payload);
                 return Err((asset, receipt, Box::new(MessageReply::Nothing)));
             }

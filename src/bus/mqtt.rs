@@ -25,7 +25,9 @@ use tokio_rustls::rustls::{ClientConfig, RootCertStore};
 use tokio_util::sync::CancellationToken;
 
 use super::faults::publish_faults;
-use super::intake::{Answering, BatchAnswer, Content, Delivery, Form, Intake, MessageReply, queue};
+use super::intake::{
+    Answering, BatchAnswer, BusMessage, Delivery, Form, Intake, MessageReply, queue,
+};
 use super::mqtt_publisher::{BrokerLink, Connected, MqttPublisher};
 use super::puback::PubackQueue;
 use super::{RETRY_INTERVAL, SEND_TIMEOUT};
@@ -278,11 +280,11 @@ impl Broker<'_> {
     }
 
     /// Returns the asset of a message and what it is, or the label of the metric.
-    fn address(&self, publish: &Publish) -> Result<(String, Content), &'static str> {
+    fn address(&self, publish: &Publish) -> Result<(String, BusMessage), &'static str> {
         let topic = publish.topic.as_str();
         if let Some((entry, asset)) = self.settings.mapping.find(topic) {
             let asset = asset.map_err(|error| refused(topic, &error))?;
-            let batch = Content::Batch(Form::Mapped(entry));
+            let batch = BusMessage::Batch(Form::Mapped(entry));
             return if publish.retain { Err("retained") } else { Ok((asset, batch)) };
         }
         let (asset, kind) =
