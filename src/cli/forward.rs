@@ -27,9 +27,9 @@ const DEFAULT_SPOOL: &str = "offbd-spool.sqlite";
 /// 429, a pipe waits.
 #[derive(Clone, Debug, Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
-#[command(
-    after_help = "GET /api/v1/spool says how much waits and why, and what the service has refused for\n\
-    good. The agent has no access control: let it listen where only devices are.\n\n\
+#[command(after_help = "GET /api/v1/spool says how much waits and why, and what the service has\n\
+    refused for good. The agent has no access control: let it listen where only\n\
+    devices are.\n\n\
     Only an acknowledgement of all rows ends the wait of a batch. What the service\n\
     refuses, and samples that it rejects, are set aside with the reason.\n\n\
     Examples:\n  \
@@ -38,8 +38,7 @@ const DEFAULT_SPOOL: &str = "offbd-spool.sqlite";
     my_logger | offbd forward --to http://10.0.0.2:8087 --asset my-rig \\\n      \
     --session monday\n  \
     offbd forward list --spool spool.sqlite\n  \
-    offbd forward send-again --spool spool.sqlite 17 18"
-)]
+    offbd forward send-again --spool spool.sqlite 17 18")]
 pub(super) struct ForwardArgs {
     #[command(subcommand)]
     refused: Option<refused::RefusedCommand>,

@@ -44,7 +44,8 @@ mod tests {
         let is_mapped = |block: &Vec<u8>| block.as_ptr().addr() % 4096 == 2 * size_of::<usize>();
         keep_large_blocks_apart();
         drop(Vec::<u8>::with_capacity(16 * MIB));
-        let blocks: Vec<Vec<u8>> = (0..8).map(|_| Vec::with_capacity(2 * MIB)).collect();
-        assert!(blocks.iter().all(is_mapped));
+        // Space that other tests of this process have freed before serves some of the blocks.
+        let blocks: Vec<Vec<u8>> = (0..24).map(|_| Vec::with_capacity(2 * MIB)).collect();
+        assert!(blocks.iter().filter(|block| is_mapped(block)).count() >= 8);
     }
 }
