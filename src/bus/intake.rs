@@ -30,10 +30,10 @@ pub(super) struct Delivery<R> {
     room: OwnedSemaphorePermit,
 }
 
-/// What a message is.
+/// A message of a device.
 pub(super) enum BusMessage {
     Batch(Form),
-    /// On a topic other than that of telemetry.
+    /// A greeting or a presence.
     Presence(DeviceTopic),
 }
 
@@ -174,17 +174,17 @@ impl Intake {
         count(self.bus, outcome, 1);
     }
 
-    /// Puts a batch into the queue. If it is too long or there is no room, or the message is a
-    /// presence, returns the reply with the receipt.
+    /// Queues a batch. Returns the reply with the receipt if the batch is too long, the queue is
+    /// full, or the message is a presence, which is not queued here.
     pub(super) fn queue<R>(
         &self,
         queue: &mpsc::Sender<Delivery<R>>,
-        (asset, content): (String, BusMessage),
+        (asset, message): (String, BusMessage),
         payload: Bytes,
         receipt: R,
         waits: bool,
     ) -> Result<(), (String, R, Box<MessageReply>)> {
-        let form = match content {
+        let form = match message {
             BusMessage::Batch(form) => form,
             BusMessage::Presence(topic) => {
                 self.attendance.arrive(&self.service, asset.clone(), topic, &payload);
@@ -214,8 +214,7 @@ impl Intake {
         MessageReply::Answer(answer)
     }
 
-    /// Handles the batches of the queue until it is closed, and answers all of them; presences
-    /// meanwhile.
+    /// Answers the batches of the queue until it is closed, and checks presences meanwhile.
     pub(super) async fn run<A: Answering>(
         self,
         bus: &A,

@@ -27,7 +27,7 @@ const MAX_UNCHECKED_BYTES: usize = 16 << 20;
 /// than a node of a map takes for one.
 const UNCHECKED_OVERHEAD: usize = 256;
 
-/// Assets that one query checks.
+/// Assets that one query checks. Chosen: their names take at most 32 KiB.
 const MAX_CHECKED: usize = 256;
 
 /// The presences of the devices of one bus.
@@ -41,7 +41,7 @@ struct Shared {
     devices: Mutex<Devices>,
     /// The last presence of each asset that is to be checked.
     unchecked: Mutex<BTreeMap<String, Unchecked>>,
-    /// Told when there is one.
+    /// Notified when a presence arrives.
     arrived: Notify,
     room: Arc<Semaphore>,
 }
@@ -51,7 +51,7 @@ struct Unchecked {
     presence: PresenceWord,
     /// The last greeting, as it was sent.
     hello: Vec<u8>,
-    /// Messages that this is the last one of.
+    /// Number of messages of this asset that wait; only the last presence is kept.
     n_messages: u64,
     /// Counts the bytes.
     _room: OwnedSemaphorePermit,
@@ -174,7 +174,7 @@ struct Devices {
 }
 
 impl Devices {
-    /// Notes a presence; returns whether it is another one than before.
+    /// Notes a presence; returns whether it differs from the one before.
     fn set(&mut self, asset: &str, presence: PresenceWord) -> bool {
         if self.by_asset.len() >= MAX_ATTENDANCE && !self.by_asset.contains_key(asset) {
             return false;

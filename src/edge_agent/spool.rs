@@ -287,7 +287,7 @@ async fn used_bytes(connection: &mut SqliteConnection) -> Result<u64, SpoolError
     Ok(bytes.unsigned_abs() + n.unsigned_abs() * ROW_BYTES)
 }
 
-/// Another process that uses the file is a case of its own.
+/// Returns [`SpoolError::Locked`] if another process uses the file (`SQLITE_BUSY`).
 fn open_error(error: sqlx::Error) -> SpoolError {
     let code = error.as_database_error().and_then(|error| error.code().map(Cow::into_owned));
     if code.as_deref() == Some("5") { SpoolError::Locked } else { error.into() }

@@ -14,7 +14,7 @@ use crate::wire::sovd::SovdErrorView;
 use crate::wire::telemetry::BatchError;
 use offbd_core::vocabulary::Invalid;
 
-/// Start of the type of every problem of this service, by which they are told from those of others.
+/// Start of the type of every problem of this service; problems of other servers have another one.
 pub(crate) const PROBLEM_TYPE: &str = "urn:offbd:problem:";
 
 /// An error (`application/problem+json`, RFC 9457).

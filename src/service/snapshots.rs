@@ -60,24 +60,27 @@ pub(super) fn restore(
     session: &SessionRow,
     setup: &Setup,
 ) -> Result<Option<(Snapshot, RestoredEngine)>, ServiceError> {
-    let read = snapshot.map_err(ServiceError::from).and_then(|s| s.map(read).transpose());
-    let found = match read {
-        Ok(found) => found,
-        Err(error @ ServiceError::Corrupt { .. }) => {
-            tracing::error!(session = session.id, %error, "a snapshot is not used");
-            None
-        }
-        Err(error) => return Err(error),
-    };
     let basis = Basis::of(setup);
+    let found = undamaged(snapshot, session)?;
     Ok(found.filter(|(_, restored)| *restored.judging.basis() == basis))
 }
 
-/// Returns the engine in `snapshot`.
-///
-/// # Errors
-/// [`ServiceError::Corrupt`] for a state that cannot be read.
-pub(super) fn read(snapshot: Snapshot) -> Result<(Snapshot, RestoredEngine), ServiceError> {
+/// Returns the `snapshot` of `session` that was read, with the engine in it; `None` if it is
+/// damaged, which is logged.
+pub(super) fn undamaged(
+    snapshot: Result<Option<Snapshot>, StoreError>,
+    session: &SessionRow,
+) -> Result<Option<(Snapshot, RestoredEngine)>, ServiceError> {
+    match snapshot.map_err(ServiceError::from).and_then(|s| s.map(read).transpose()) {
+        Err(error @ ServiceError::Corrupt { .. }) => {
+            tracing::error!(session = session.id, %error, "a snapshot is not used");
+            Ok(None)
+        }
+        read => read,
+    }
+}
+
+fn read(snapshot: Snapshot) -> Result<(Snapshot, RestoredEngine), ServiceError> {
     let (judging, motion) =
         rmp_serde::from_slice(&snapshot.state).map_err(ServiceError::corrupt)?;
     Ok((snapshot, RestoredEngine { judging, motion }))

@@ -102,17 +102,6 @@ impl Store {
             .await?)
     }
 
-    /// Returns whether there is an asset `name`.
-    ///
-    /// # Errors
-    /// [`StoreError`] if the database cannot be read.
-    pub async fn has_asset(&self, name: &str) -> Result<bool, StoreError> {
-        let query = "SELECT 1 FROM asset WHERE name = $1 AND deleted_at IS NULL";
-        let found: Option<i32> =
-            sqlx::query_scalar(query).bind(name).fetch_optional(&self.pool).await?;
-        Ok(found.is_some())
-    }
-
     /// The learning record of the asset `name`, if it has one.
     pub async fn learning(&self, name: &str) -> Result<Option<String>, StoreError> {
         let query = "SELECT learning FROM asset WHERE name = $1 AND learning IS NOT NULL";

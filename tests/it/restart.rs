@@ -137,6 +137,8 @@ async fn a_snapshot_that_is_damaged_or_of_another_version_is_not_used() {
     send(&service.client, "a", first).await;
     for sql in spoil {
         service = restart_after(service, &data, sql).await;
+        let fault = service.client.get("assets/a/faults/x_servo").await.expect(200);
+        assert_eq!((&fault["monitor"], &fault["session_open"]), (&Value::Null, &json!(true)));
         service.client.get("assets/a/state").await.expect(200);
         let n = service.client.n_evaluated_again().await;
         assert_eq!(n, 20_000.0, "{sql}");

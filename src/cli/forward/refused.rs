@@ -48,7 +48,7 @@ pub(super) struct SendAgainArgs {
     chosen: ChosenArgs,
 }
 
-/// Deletes batches that are set aside. They are lost then.
+/// Deletes batches that are set aside, for good.
 ///
 /// Stop the agent first: devices keep what it does not acknowledge.
 #[derive(Clone, Debug, Args)]
@@ -89,7 +89,7 @@ impl SpoolArgs {
     async fn open(&self) -> Result<Spool, InputError> {
         let unusable = |reason: String| InputError::file(&self.spool, reason);
         if !self.spool.is_file() {
-            return Err(unusable("there is no such spool".to_owned()));
+            return Err(unusable("the spool does not exist".to_owned()));
         }
         Spool::open(&self.spool, MAX_SPOOL_BYTES).await.map_err(|error| match error {
             SpoolError::Locked => unusable(format!("{error}; stop it first")),

@@ -25,10 +25,12 @@ impl Service {
     /// # Errors
     /// [`ServiceError::UnknownAsset`].
     pub async fn check_known(&self, name: &str) -> Result<(), ServiceError> {
-        match self.inner.handles.store.has_asset(name).await? {
-            true => Ok(()),
-            false => Err(ServiceError::UnknownAsset { name: name.to_owned() }),
+        let name = [name.to_owned()];
+        if self.existing_assets(&name).await?.is_empty() {
+            let [name] = name;
+            return Err(ServiceError::UnknownAsset { name });
         }
+        Ok(())
     }
 
     /// Returns those of `names` that are assets.

@@ -125,8 +125,8 @@ impl Service {
         let Some(session) = store.open_session(asset).await? else {
             return Ok(SessionMonitors::default());
         };
-        let snapshot = store.snapshot(&session.id, &snapshots::version(), i64::MAX).await?;
-        let restored = snapshot.map(snapshots::read).transpose()?;
+        let snapshot = store.snapshot(&session.id, &snapshots::version(), i64::MAX).await;
+        let restored = snapshots::undamaged(snapshot, &session)?;
         let monitors = restored.map(|(_, engine)| monitor_views(&engine.judging.engine().state()));
         Ok(SessionMonitors { session_open: true, monitors: monitors.unwrap_or_default() })
     }
