@@ -55,7 +55,7 @@ pub struct SpoolStatus {
     /// Bytes of the spool in use, with what is set aside.
     pub used_bytes: u64,
     pub limit_bytes: u64,
-    /// What the service has refused for good, at most [`MAX_NAMED`], the oldest first.
+    /// What the service has refused for good, at most 100 batches, the oldest first.
     pub refused: Vec<RefusedBatch>,
 }
 
