@@ -173,6 +173,10 @@ impl SpoolSender {
 
     async fn settle(&self, waiting: WaitingBatch, attempt: Attempt) -> Result<(), SpoolError> {
         let (asset, id) = (waiting.batch.asset.as_str(), waiting.id);
+        if !matches!(attempt, Attempt::Failed(_)) {
+            // Before the spool, so that no status names an asset of which nothing waits.
+            self.delays.succeeded(asset);
+        }
         match attempt {
             Attempt::Stored => self.spool.remove(&waiting).await?,
             Attempt::Rejected { samples, reason } => {
@@ -189,10 +193,8 @@ impl SpoolSender {
                     let waiting = self.spool.status().await?.waiting_batches;
                     tracing::warn!(asset, reason = cause, answer, waiting, "a batch waits");
                 }
-                return Ok(());
             }
         }
-        self.delays.succeeded(asset);
         Ok(())
     }
 
