@@ -4,7 +4,6 @@
 //! The service does not need this crate. The crate depends on neither the
 //! service, its store nor HTTP.
 
-pub mod batch;
 pub mod chart;
 pub mod estimators;
 pub mod methods;
