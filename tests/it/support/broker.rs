@@ -51,7 +51,7 @@ fn wait_for_port(port: u16) {
     let start = std::time::Instant::now();
     while TcpStream::connect(("127.0.0.1", port)).is_err() {
         assert!(start.elapsed() < super::DEADLINE, "nobody listens on port {port}");
-        std::thread::yield_now();
+        std::thread::sleep(super::POLL_PAUSE);
     }
 }
 

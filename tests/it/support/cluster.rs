@@ -185,7 +185,7 @@ impl Cluster {
         assert!(Command::new("kill").args([signal, &pid]).status().unwrap().success());
         // On a busy machine a process goes on until one of its threads takes the signal.
         while signal == "-STOP" && !is_paused(&pid) {
-            std::thread::yield_now();
+            std::thread::sleep(super::POLL_PAUSE);
         }
     }
 

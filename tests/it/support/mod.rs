@@ -498,6 +498,10 @@ impl Events {
     }
 }
 
+/// Pause between two looks at what is to come. It leaves the processors to the service that is
+/// waited for, and is short beside what a test does.
+const POLL_PAUSE: Duration = Duration::from_millis(2);
+
 /// Repeats `done` until it returns something; fails after [`DEADLINE`].
 #[expect(clippy::disallowed_methods, reason = "a test must not wait forever")]
 pub async fn eventually<T, F: Future<Output = Option<T>>>(mut done: impl FnMut() -> F) -> T {
@@ -507,7 +511,7 @@ pub async fn eventually<T, F: Future<Output = Option<T>>>(mut done: impl FnMut()
             return found;
         }
         assert!(start.elapsed() < DEADLINE, "not fulfilled within the deadline");
-        tokio::task::yield_now().await;
+        tokio::time::sleep(POLL_PAUSE).await;
     }
 }
 
