@@ -25,7 +25,7 @@ serve *ARGS:
 
 # Regenerate openapi.yaml from the code
 openapi:
-    UPDATE_OPENAPI=1 cargo test --test it openapi
+    UPDATE_OPENAPI=1 cargo test --package offbd-http --test description
 
 # Update the command output in README.md
 tour:
@@ -50,10 +50,9 @@ picture:
     cargo build --release
     scripts/picture
 
-# Benchmarks of ingest and of many twins
+# Benchmarks of ingest
 bench:
     cargo bench --bench ingest
-    cargo bench -p offbd-lab --bench batch
 
 # Benchmark other engines and solvers on the scenes of `offbd chart work-precision`
 peers *ARGS:

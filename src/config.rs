@@ -19,11 +19,11 @@ use serde::{Deserialize, Serialize};
 pub use self::bus::{BrokerAddress, MqttConfig, NatsConfig};
 pub use self::cluster::ClusterConfig;
 pub use self::cold::ColdConfig;
-use crate::service::access::jwt::ExpectedClaims;
-use crate::service::{
+use offbd_service::access::jwt::ExpectedClaims;
+use offbd_service::{
     CommunicationSettings, Limits, NotificationSettings, Retention, SessionLimits, TargetPolicy,
 };
-use crate::store::{ColdDirectory, Location};
+use offbd_store::{ColdDirectory, Location};
 
 /// Name of the database file in the data directory.
 const DATABASE_FILE: &str = "offbd.sqlite";

@@ -11,37 +11,33 @@
 //! `textbook`, it is raised by a fixed limit on the residual, the measured minus the
 //! twin's acceleration, without debounce.
 //!
-//! This crate is the service and the command line. The twin and the diagnosis are the
-//! crate `offbd-core`, which other programs can embed; scenes, simulated rigs and charts
-//! are the crate `offbd-lab`. The modules, from the lowest layer to the highest:
+//! This crate is the program: configuration, assembly and command line. The crates below it,
+//! from the lowest layer to the highest:
 //!
-//! - [`wire`]: the formats of files and messages (assets, scenes, sessions, verdicts),
-//!   and their conversion to and from the types of `offbd-core`;
-//! - [`judging`]: the judgement of one session, shared by the service and the command
-//!   line;
+//! - `offbd-core`: the twin and the diagnosis, which other programs can embed;
+//! - `offbd-lab`: scenes, simulated rigs and charts;
+//! - [`wire`]: the formats of files and messages (assets, sessions, verdicts), and the
+//!   judgement of one session, shared by the service and the command line;
 //! - [`store`]: assets, sessions, recordings and faults in a database (SQLite or
 //!   PostgreSQL);
 //! - [`service`]: the engines of all assets, sessions, jobs, access control and events;
 //! - [`http`]: the HTTP and WebSocket interface;
 //! - `bus`, with the features `nats` and `mqtt`: devices over NATS and MQTT;
-//! - [`edge_agent`]: `offbd forward`, which keeps telemetry until the service has stored it;
+//! - `offbd-forward`: the edge agent, which keeps telemetry until the service has stored it;
+//! - `offbd-file-cli`, `offbd-lab-cli`: the commands that need no service;
 //! - [`config`]: the configuration of the service;
 //! - [`server`]: the assembly of these parts, with TLS and limits on connections;
 //! - [`cli`]: the subcommands of the program `offbd`.
 //!
 //! `ARCHITECTURE.md` describes how they work together, `docs/notation.md` the terms.
 
-#[cfg(test)]
-mod any_sample;
-#[cfg(any(feature = "nats", feature = "mqtt"))]
-pub mod bus;
 pub mod cli;
 pub mod config;
-pub mod edge_agent;
-pub mod http;
-pub mod judging;
-mod reasons;
 pub mod server;
-pub mod service;
-pub mod store;
-pub mod wire;
+
+#[cfg(any(feature = "nats", feature = "mqtt"))]
+pub use offbd_bus as bus;
+pub use offbd_http as http;
+pub use offbd_service as service;
+pub use offbd_store as store;
+pub use offbd_wire as wire;

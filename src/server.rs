@@ -31,16 +31,15 @@ use tokio_util::sync::CancellationToken;
 
 use self::delivery::Senders;
 use self::keys::KeyRefresher;
-pub(crate) use self::keys::{HttpsClient, https_client};
 use self::listen::HttpListener;
 use self::tls::Tls;
 pub use self::traces::Traces;
 use crate::config::{ClusterConfig, Config, LogFormat};
-use crate::http::{self, AccessPolicy, App, BodyBudget, ExtraRoutes, RateLimit, RateLimits};
-use crate::service::access::Provider;
-use crate::service::{Clock, Limits, Service, Workers};
-use crate::store::{
-    self, CheckReport, ColdDirectory, Location, NodeIdentity, Partitions, Store, StoreError,
+use offbd_http::{AccessPolicy, App, BodyBudget, ExtraRoutes, RateLimit, RateLimits};
+use offbd_service::access::Provider;
+use offbd_service::{Clock, Limits, Service, Workers};
+use offbd_store::{
+    CheckReport, ColdDirectory, Location, NodeIdentity, Partitions, Store, StoreError,
 };
 
 /// How often a blocking thread is asked for: often enough for a device that waits, and rarely
@@ -52,6 +51,24 @@ const THREAD_INTERVAL: Duration = Duration::from_secs(1);
 /// runs its own program. Chosen.
 const LOCK_TRIES: u32 = 11;
 const LOCK_INTERVAL: Duration = Duration::from_millis(50);
+
+/// The optional parts of this build, by the names of the features.
+const FEATURES: &[&str] = &[
+    #[cfg(feature = "email")]
+    "email",
+    #[cfg(feature = "mcap")]
+    "mcap",
+    #[cfg(feature = "mqtt")]
+    "mqtt",
+    #[cfg(feature = "nats")]
+    "nats",
+    #[cfg(feature = "otel")]
+    "otel",
+    #[cfg(feature = "parquet")]
+    "parquet",
+    #[cfg(feature = "xlsx")]
+    "xlsx",
+];
 
 /// A running server.
 pub struct Server {
@@ -87,7 +104,7 @@ pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Ser
     config.check()?;
     config.cold_directory().map_or(Ok(()), |cold| check_cold(&cold))?;
     allocator::keep_large_blocks_apart();
-    http::gather_metrics();
+    offbd_http::gather_metrics();
     let tls = config.tls.as_ref().map(Tls::read).transpose()?;
     let (provider, keys) = match &config.jwt {
         Some(jwt) => Some(KeyRefresher::start(jwt).await?).unzip(),
@@ -140,15 +157,23 @@ pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Ser
     tokio::spawn(rebuild(service.clone(), closing.clone()));
     let budget = BodyBudget::new(config.limits.bodies_bytes);
     let demo_routes = demo.is_some();
-    let app = App { service, budget, policy, closing: closing.clone(), demo: demo_routes };
-    let router = http::router(app, demo.unwrap_or_default());
+    let app_closing = closing.clone();
+    let app = App {
+        service,
+        budget,
+        policy,
+        closing: app_closing,
+        demo: demo_routes,
+        features: FEATURES,
+    };
+    let router = offbd_http::router(app, demo.unwrap_or_default());
     if let Some(NodeListener { listener, .. }) = node {
         server.listen(&config, None, listener, router.clone());
     }
     server.listen(&config, tls.clone(), listener, router);
     tls.map(|tls| tokio::spawn(tls.watch(closing.clone())));
     keys.map(|keys| tokio::spawn(keys.watch(closing.clone())));
-    tokio::spawn(http::keep_metrics(closing.clone()));
+    tokio::spawn(offbd_http::keep_metrics(closing.clone()));
     tokio::spawn(keep_threads(closing));
     tracing::info!(%address, store = %server.store.location(), "serving");
     Ok(server)
@@ -158,7 +183,7 @@ pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Ser
 /// closed.
 async fn start_service(
     store: &Store,
-    writer: store::Writer,
+    writer: offbd_store::Writer,
     limits: Limits,
     provider: Option<Provider>,
     me: Option<NodeIdentity>,
@@ -259,7 +284,10 @@ async fn lock(location: &Location) -> Result<Option<File>> {
     }
 }
 
-async fn open(location: &Location, node: Option<&NodeListener>) -> Result<(Store, store::Writer)> {
+async fn open(
+    location: &Location,
+    node: Option<&NodeListener>,
+) -> Result<(Store, offbd_store::Writer)> {
     let opened = match node {
         None => Store::open(location).await,
         Some(NodeListener { identity, partitions, .. }) => {
@@ -384,7 +412,7 @@ pub async fn migrate(config: &Config) -> Result<usize> {
 /// If there is no embedded store, `file` exists, or it cannot be written.
 pub async fn back_up(config: &Config, file: &Path) -> Result<()> {
     let location = config.location()?;
-    let result = store::back_up(&location, file, config.cold_directory().as_ref()).await;
+    let result = offbd_store::back_up(&location, file, config.cold_directory().as_ref()).await;
     result.with_context(|| format!("cannot back up the store {location}"))
 }
 
@@ -396,7 +424,7 @@ pub async fn restore(config: &Config, file: &Path, replace: bool) -> Result<()> 
     let location = config.location()?;
     let _lock = lock(&location).await?;
     let cold = config.cold_directory();
-    let result = store::restore(&location, file, replace, cold.as_ref()).await;
+    let result = offbd_store::restore(&location, file, replace, cold.as_ref()).await;
     let hint = match &result {
         Err(StoreError::Exists { .. }) if !replace => " without --replace",
         _ => "",
@@ -467,6 +495,6 @@ pub async fn check_store(config: &Config) -> Result<Option<CheckReport>> {
     if location.file().is_some_and(|file| !file.exists()) {
         return Ok(None);
     }
-    let report = store::check(&location, config.cold_directory().as_ref()).await;
+    let report = offbd_store::check(&location, config.cold_directory().as_ref()).await;
     report.map(Some).with_context(|| format!("cannot check the store {location}"))
 }

@@ -6,15 +6,14 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-use offbd::judging::Judging;
 use offbd::store::{
     AssetRow, ChangeSet, Location, SessionFilter, SessionProgress, SessionRow, Store, Write,
 };
+use offbd::wire::judging::Judging;
 use offbd_core::diagnosis::FaultMemory;
 use offbd_core::engine::{Engine, Input, Rig, Setup};
 use offbd_core::plant::{Ball, Contact, Motion, Plate};
 use offbd_core::vocabulary::Sample;
-use offbd_lab::batch::{Instructions, PlateColumns, RollingBatch, RollingConstants};
 use offbd_lab::scene::{
     Configuration, Law, Laws, Method, Model, Pace, Samples, Scene, Subject, Term, run,
 };
@@ -137,30 +136,6 @@ fn an_announced_array_length_reserves_little_memory() {
         assert!(msgpack(&document, 1 << 20).is_err(), "{name}");
         let peak = PEAK.get() - before;
         assert!((1..32 << 10).contains(&peak), "{name}: {peak} bytes");
-    }
-}
-
-#[test]
-fn a_step_of_a_batch_does_not_allocate() {
-    let before = ALLOCATIONS.get();
-    let constants = [RollingConstants::new(&Ball::default(), &Plate::default()); 75];
-    for instructions in Instructions::available() {
-        let mut batch = RollingBatch::new(&constants, instructions);
-        let ready = ALLOCATIONS.get();
-        for step in 0..100 {
-            let column = &[f64::from(step) * 1e-3; 75];
-            batch.step(&PlateColumns {
-                qx_rad: column,
-                qy_rad: column,
-                qx_rate: column,
-                qy_rate: column,
-                qx_acceleration: column,
-                qy_acceleration: column,
-                step_s: column,
-            });
-        }
-        assert_eq!(ALLOCATIONS.get(), ready, "{instructions}");
-        assert!(ready > before, "the counter counts");
     }
 }
 

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 
-use super::output::{self, OutputFormat};
 use super::serve::ConfigArgs;
 use crate::server;
+use offbd_terminal::output::{self, OutputFormat};
 
 /// Copies the embedded store to a file, also while the service runs.
 ///
@@ -50,7 +50,7 @@ pub(super) struct RestoreArgs {
 
 pub(super) fn backup(args: &BackupArgs) -> anyhow::Result<()> {
     let config = args.config.load()?;
-    super::block_on(server::back_up(&config, &args.file))?;
+    offbd_terminal::block_on(server::back_up(&config, &args.file))?;
     let (file, store) = (args.file.display().to_string(), config.location()?.to_string());
     match args.format {
         OutputFormat::Table => output::print_line(&format!("{file}: a copy of {store}")),
@@ -60,7 +60,7 @@ pub(super) fn backup(args: &BackupArgs) -> anyhow::Result<()> {
 
 pub(super) fn restore(args: &RestoreArgs) -> anyhow::Result<()> {
     let config = args.config.load()?;
-    super::block_on(server::restore(&config, &args.file, args.replace))?;
+    offbd_terminal::block_on(server::restore(&config, &args.file, args.replace))?;
     let (file, store) = (args.file.display().to_string(), config.location()?.to_string());
     match args.format {
         OutputFormat::Table => output::print_line(&format!("{store}: restored from {file}")),

@@ -6,29 +6,21 @@
 //! error.
 
 mod backup;
-mod calibrate;
 mod completions;
-mod drive_cycle;
-mod errors;
-mod export;
-mod forward;
-mod judge;
 #[cfg(feature = "lab")]
-mod lab;
-mod logging;
-mod output;
-mod replay;
+mod demo;
 mod serve;
-mod table;
 mod token;
-mod trends;
 mod usage;
 mod watch;
 
-use std::mem::ManuallyDrop;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use offbd_file_cli::{calibrate, drive_cycle, export, replay, trends};
+use offbd_forward::command as forward;
+use offbd_terminal::logging::LoggingArgs;
+use offbd_terminal::output;
 
 use crate::config::{ConfigError, LogConfig};
 
@@ -57,7 +49,7 @@ struct Cli {
     #[command(subcommand)]
     command: CliCommand,
     #[command(flatten)]
-    logging: logging::LoggingArgs,
+    logging: LoggingArgs,
     /// Print results and errors only: no remarks, no progress, no logs but errors
     #[arg(short, long, global = true)]
     quiet: bool,
@@ -67,7 +59,9 @@ struct Cli {
 enum CliCommand {
     #[cfg(feature = "lab")]
     #[command(flatten)]
-    Lab(lab::LabCommand),
+    Lab(offbd_lab_cli::LabCommand),
+    #[cfg(feature = "lab")]
+    Demo(demo::DemoArgs),
     Calibrate(calibrate::CalibrateArgs),
     Replay(replay::ReplayArgs),
     Trends(trends::TrendsArgs),
@@ -90,7 +84,11 @@ enum CliCommand {
 pub fn main() -> ExitCode {
     end_with_essential_threads();
     match Cli::try_parse() {
-        Ok(cli) => run(cli).map_or_else(|error| report(&error), |()| ExitCode::SUCCESS),
+        Ok(cli) => {
+            let report =
+                |error: anyhow::Error| offbd_terminal::report(&error, error.is::<ConfigError>());
+            run(cli).map_or_else(report, |()| ExitCode::SUCCESS)
+        }
         Err(error) => usage::print(error),
     }
 }
@@ -105,15 +103,17 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         // Starts logging itself, as its configuration says.
         CliCommand::Serve(_) => {}
         #[cfg(feature = "lab")]
-        CliCommand::Lab(command) if command.log_level().is_some() => {
-            let level = command.log_level().unwrap_or_default().to_owned();
-            logging.start(&LogConfig { level, ..LogConfig::default() }, None);
+        CliCommand::Demo(_) => {
+            let level = "warn".to_owned();
+            serve::start_logging(&logging, &LogConfig { level, ..LogConfig::default() }, None);
         }
-        _ => logging.start(&LogConfig::default(), None),
+        _ => serve::start_logging(&logging, &LogConfig::default(), None),
     }
     match cli.command {
         #[cfg(feature = "lab")]
         CliCommand::Lab(command) => command.run(),
+        #[cfg(feature = "lab")]
+        CliCommand::Demo(args) => demo::run(&args),
         CliCommand::Calibrate(args) => calibrate::run(&args),
         CliCommand::Replay(args) => replay::run(&args),
         CliCommand::Trends(args) => trends::run(&args),
@@ -151,40 +151,6 @@ fn end_with_essential_threads() {
     }));
 }
 
-/// Runs an asynchronous command to its end, which is that of the process.
-fn block_on<T>(command: impl Future<Output = anyhow::Result<T>>) -> anyhow::Result<T> {
-    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build()?;
-    // Not dropped: after an error tasks may still run, and some would panic without timers.
-    ManuallyDrop::new(runtime).block_on(command)
-}
-
-/// Describes `error` and its causes. Some errors of libraries name their cause themselves.
-fn with_causes(error: &anyhow::Error) -> String {
-    let mut text = error.to_string();
-    for cause in error.chain().skip(1).map(ToString::to_string) {
-        if !text.ends_with(&cause) {
-            text = format!("{text}: {cause}");
-        }
-    }
-    text
-}
-
-/// Prints `error` and returns its exit code.
-fn report(error: &anyhow::Error) -> ExitCode {
-    if output::is_closed_pipe(error) {
-        return ExitCode::SUCCESS;
-    }
-    anstream::eprintln!("offbd: {}", with_causes(error));
-    if error.is::<errors::BadArgument>() {
-        return ExitCode::from(2);
-    }
-    if error.is::<errors::FaultFound>() {
-        return ExitCode::from(4);
-    }
-    let unusable = error.is::<errors::InputError>() || error.is::<ConfigError>();
-    ExitCode::from(if unusable { 3 } else { 1 })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -205,13 +171,5 @@ mod tests {
                 assert_eq!(wide, None);
             }
         }
-    }
-
-    #[test]
-    fn a_cause_that_an_error_names_itself_is_not_repeated() {
-        let error = anyhow::anyhow!("no file").context("database: no file").context("store");
-        assert_eq!(with_causes(&error), "store: database: no file");
-        let error = anyhow::anyhow!("no file").context("store");
-        assert_eq!(with_causes(&error), "store: no file");
     }
 }

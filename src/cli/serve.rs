@@ -7,11 +7,11 @@ use clap::Args;
 use serde::Serialize;
 use serde_json::json;
 
-use super::logging::LoggingArgs;
-use super::output::{self, OutputFormat};
-use crate::config::{Config, ConfigError, Flags};
+use crate::config::{Config, ConfigError, Flags, LogConfig, LogFormat};
 use crate::server::{self, ConfigSummary, Traces};
-use crate::store::CheckReport;
+use offbd_store::CheckReport;
+use offbd_terminal::logging::LoggingArgs;
+use offbd_terminal::output::{self, OutputFormat};
 
 /// The arguments of the service's configuration. They override the environment, which
 /// overrides the file, which overrides the defaults.
@@ -87,18 +87,23 @@ pub(super) struct CheckArgs {
     format: OutputFormat,
 }
 
+/// Starts logging by the arguments or else by `config`, and sends `traces` if given.
+pub(super) fn start_logging(logging: &LoggingArgs, config: &LogConfig, traces: Option<&Traces>) {
+    logging.start(&config.level, config.format == LogFormat::Json, traces.map(Traces::layer));
+}
+
 pub(super) fn serve(args: &ServeArgs, logging: &LoggingArgs) -> anyhow::Result<()> {
     let config = args.config.load()?;
     let traces = Traces::start(&config.traces)?;
-    logging.start(&config.log, traces.as_ref());
-    let result = super::block_on(server::serve(config));
+    start_logging(logging, &config.log, traces.as_ref());
+    let result = offbd_terminal::block_on(server::serve(config));
     traces.iter().for_each(Traces::stop);
     result
 }
 
 pub(super) fn migrate(args: &MigrateArgs) -> anyhow::Result<()> {
     let config = args.config.load()?;
-    let applied = super::block_on(server::migrate(&config))?;
+    let applied = offbd_terminal::block_on(server::migrate(&config))?;
     let store = config.location()?.to_string();
     match args.format {
         OutputFormat::Table => {
@@ -144,7 +149,7 @@ pub(super) fn check(args: &CheckArgs) -> anyhow::Result<()> {
     let configuration = server::check(&config)?;
     let is_asked = args.config.data.is_some() || args.config.database.is_some();
     let report = match is_asked {
-        true => super::block_on(server::check_store(&config))?,
+        true => offbd_terminal::block_on(server::check_store(&config))?,
         false => None,
     };
     let result = CheckResult { configuration, checked: report.map(CheckedStore::from) };

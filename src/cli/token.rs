@@ -4,15 +4,15 @@ use std::io::Write as _;
 
 use clap::{Args, Subcommand};
 
-use super::errors::BadArgument;
-use super::output::{self, OutputFormat};
 use super::serve::ConfigArgs;
-use super::table;
 use crate::server::tokens;
-use crate::service::access::{NewToken, Role};
-use crate::service::{Clock, ServiceError};
-use crate::store::Micros;
-use crate::wire::access::TokenView;
+use offbd_service::access::{NewToken, Role};
+use offbd_service::{Clock, ServiceError};
+use offbd_store::Micros;
+use offbd_terminal::errors::BadArgument;
+use offbd_terminal::output::{self, OutputFormat};
+use offbd_terminal::table;
+use offbd_wire::access::TokenView;
 
 /// Creates, lists and revokes tokens, directly in the store.
 ///
@@ -76,10 +76,10 @@ struct RevokeArgs {
 
 pub(super) fn run(args: &TokenArgs) -> anyhow::Result<()> {
     match &args.command {
-        TokenCommand::Create(args) => super::block_on(create(args)),
-        TokenCommand::List(args) => super::block_on(list(args)),
+        TokenCommand::Create(args) => offbd_terminal::block_on(create(args)),
+        TokenCommand::List(args) => offbd_terminal::block_on(list(args)),
         TokenCommand::Revoke(args) => {
-            super::block_on(tokens::revoke_token(&args.config.load()?, &args.token))
+            offbd_terminal::block_on(tokens::revoke_token(&args.config.load()?, &args.token))
         }
     }
 }

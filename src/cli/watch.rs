@@ -12,11 +12,11 @@ use serde_json::Value;
 use tokio_tungstenite::tungstenite::Message;
 
 use self::connect::{ConnectArgs, connect};
-use super::output::{self, OutputFormat};
-use super::table;
-use crate::wire::learning::LearningView;
-use crate::wire::service::{MonitorView, StateView};
-use crate::wire::verdict::{AxisEvidenceView, FaultView};
+use offbd_terminal::output::{self, OutputFormat};
+use offbd_terminal::table;
+use offbd_wire::learning::LearningView;
+use offbd_wire::service::{MonitorView, StateView};
+use offbd_wire::verdict::{AxisEvidenceView, FaultView};
 
 /// Shows an asset live: residuals and their limits, monitors, faults.
 ///
@@ -56,7 +56,7 @@ fn rate(word: &str) -> Result<f64, String> {
 const BAR: usize = 24;
 
 pub(super) fn run(args: &WatchArgs) -> anyhow::Result<()> {
-    super::block_on(watch(args))
+    offbd_terminal::block_on(watch(args))
 }
 
 async fn watch(args: &WatchArgs) -> anyhow::Result<()> {
@@ -228,13 +228,13 @@ fn bar(name: &str, axis: &AxisEvidenceView) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::basis::Basis;
-    use crate::wire::learning::LearningState;
-    use crate::wire::service::state_view;
-    use crate::wire::verdict::fault_view;
     use offbd_core::diagnosis::{Evidence, StatusByte, Suspicion, Transition};
     use offbd_core::engine::State;
     use offbd_core::vocabulary::{FaultCode, FaultStatus, SimTime};
+    use offbd_wire::basis::Basis;
+    use offbd_wire::learning::LearningState;
+    use offbd_wire::service::state_view;
+    use offbd_wire::verdict::fault_view;
 
     fn axis(residual: Option<f64>) -> AxisEvidenceView {
         AxisEvidenceView {

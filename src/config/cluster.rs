@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 use serde::Deserialize;
 
 use super::{ConfigError, within};
-use crate::store::{Location, MAX_PARTITIONS, NodeIdentity, Partitions};
+use offbd_store::{Location, MAX_PARTITIONS, NodeIdentity, Partitions};
 
 /// Number of partitions without a setting. Chosen: several for each node of a cluster as
 /// large as one database supports.

@@ -6,9 +6,9 @@ use std::time::Duration;
 use serde::Deserialize;
 
 use super::{ConfigError, within};
-use crate::service::cold_directory;
-use crate::store::ColdDirectory;
-use crate::wire::session_file::SessionFormat;
+use offbd_service::cold_directory;
+use offbd_store::ColdDirectory;
+use offbd_wire::session_file::SessionFormat;
 
 /// A hundred years, days.
 const HUNDRED_YEARS: usize = 36_525;

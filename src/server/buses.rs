@@ -5,7 +5,7 @@ use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
 
 use crate::config::Config;
-use crate::service::Service;
+use offbd_service::Service;
 
 /// Starts the buses of the configuration. The tasks end when the service stops, after they have
 /// answered all that was submitted.
@@ -22,13 +22,13 @@ pub(super) async fn start(
     #[cfg(feature = "mqtt")]
     if let Some(mqtt) = &config.mqtt {
         let settings = mqtt::settings(mqtt, config.cluster.as_ref())?;
-        let bus = crate::bus::mqtt::start(service.clone(), settings, closing.clone())?;
+        let bus = offbd_bus::mqtt::start(service.clone(), settings, closing.clone())?;
         buses.push(bus);
     }
     #[cfg(feature = "nats")]
     if let Some(nats) = &config.nats {
         let settings = nats::settings(nats)?;
-        buses.push(crate::bus::nats::start(service.clone(), settings, closing.clone()).await?);
+        buses.push(offbd_bus::nats::start(service.clone(), settings, closing.clone()).await?);
     }
     let _ = (config, service, closing);
     Ok(buses)
@@ -53,8 +53,8 @@ pub(super) fn check(config: &Config) -> Result<()> {
 mod nats {
     use anyhow::{Context, Result};
 
-    use crate::bus::nats::NatsSettings;
     use crate::config::NatsConfig;
+    use offbd_bus::nats::NatsSettings;
 
     pub(super) fn settings(config: &NatsConfig) -> Result<NatsSettings> {
         let issuer_seed = config.issuer_seed.as_ref().map(|path| {
@@ -80,9 +80,9 @@ mod mqtt {
 
     use anyhow::{Context, Result, anyhow};
 
-    use crate::bus::mqtt::MqttSettings;
     use crate::config::{ClusterConfig, MqttConfig};
-    use crate::wire::mapping::{Mapping, MappingView};
+    use offbd_bus::mqtt::MqttSettings;
+    use offbd_wire::mapping::{Mapping, MappingView};
 
     pub(super) fn settings(
         config: &MqttConfig,

@@ -7,10 +7,10 @@ mod webhook;
 use std::net::{IpAddr, SocketAddr};
 
 use self::webhook::WebhookSender;
-use crate::service::{
+use offbd_service::{
     Clock, NotificationSettings, NotificationTransport, SendOutcome, TargetPolicy,
 };
-use crate::wire::notification::{NotificationView, StoredChannel};
+use offbd_wire::notification::{NotificationView, StoredChannel};
 
 /// Sends by all kinds of channels.
 pub(super) struct Senders {

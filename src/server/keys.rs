@@ -8,20 +8,16 @@ use std::time::Duration;
 use anyhow::{Context, Result, bail};
 use axum::body::{Body, Bytes, to_bytes};
 use hyper::{StatusCode, Uri};
-use hyper_rustls::{HttpsConnector, HttpsConnectorBuilder};
-use hyper_util::client::legacy::Client;
-use hyper_util::client::legacy::connect::HttpConnector;
-use hyper_util::rt::TokioExecutor;
 use tokio::io::AsyncReadExt;
 use tokio::time::{Instant, timeout};
-use tokio_rustls::rustls::crypto::ring;
-use tokio_rustls::rustls::{ClientConfig, RootCertStore};
 use tokio_util::sync::CancellationToken;
 
+use offbd_net::{HttpsClient, https_client};
+
 use crate::config::{JwtConfig, KeyLocation};
-use crate::service::Clock;
-use crate::service::access::jwt::KeySet;
-use crate::service::access::{KeyFeed, Provider};
+use offbd_service::Clock;
+use offbd_service::access::jwt::KeySet;
+use offbd_service::access::{KeyFeed, Provider};
 
 /// Interval at which the keys are read. A withdrawn key is refused after this time at most.
 const REFRESH_INTERVAL: Duration = Duration::from_secs(300);
@@ -137,23 +133,4 @@ async fn fetch(client: &HttpsClient, url: &Uri) -> Result<Bytes> {
     }
     let body = to_bytes(Body::new(response.into_body()), MAX_DOCUMENT).await;
     body.with_context(|| format!("the response is incomplete or exceeds {MAX_DOCUMENT} bytes"))
-}
-
-/// An HTTP client, with TLS on request.
-pub(crate) type HttpsClient = Client<HttpsConnector<HttpConnector>, Body>;
-
-/// Returns a client that trusts the root certificates of the machine, or of `SSL_CERT_FILE`.
-pub(crate) fn https_client(url: &Uri) -> Result<HttpsClient> {
-    let builder = HttpsConnectorBuilder::new();
-    let builder = if url.scheme_str() == Some("https") {
-        builder.with_provider_and_native_roots(ring::default_provider())?
-    } else {
-        let tls = ClientConfig::builder_with_provider(ring::default_provider().into());
-        let tls = tls.with_safe_default_protocol_versions()?;
-        builder.with_tls_config(
-            tls.with_root_certificates(RootCertStore::empty()).with_no_client_auth(),
-        )
-    };
-    let connector = builder.https_or_http().enable_http1().build();
-    Ok(Client::builder(TokioExecutor::new()).build(connector))
 }

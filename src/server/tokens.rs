@@ -7,10 +7,10 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 
 use crate::config::Config;
-use crate::service::Clock;
-use crate::service::access::{AuditEntry, NewToken, mint, token_view};
-use crate::store::{AccessWrite, ChangeSet, LAST_ID, Store, Write, Writer};
-use crate::wire::access::TokenView;
+use offbd_service::Clock;
+use offbd_service::access::{AuditEntry, NewToken, mint, token_view};
+use offbd_store::{AccessWrite, ChangeSet, LAST_ID, Store, Write, Writer};
+use offbd_wire::access::TokenView;
 
 /// The actor in the audit log.
 const ACTOR: &str = "command line";

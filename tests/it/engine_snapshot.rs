@@ -1,7 +1,7 @@
 //! An engine that goes on from a snapshot does exactly what the original would do.
 
 use crate::support::{learnt, rig};
-use offbd::judging::Judging;
+use offbd::wire::judging::Judging;
 use offbd_core::diagnosis::{FaultMemory, Profile};
 use offbd_core::engine::{Input, Rig, SNAPSHOT_FORMAT, Setup, UsableMotion};
 use offbd_core::vocabulary::{FaultCode, Sample};

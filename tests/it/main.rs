@@ -36,7 +36,6 @@ mod network;
 mod notifications;
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 mod one_failure;
-mod openapi;
 mod outage;
 mod outcome;
 mod parts;

@@ -24,8 +24,8 @@ use pyo3::prelude::*;
 use pyo3::types::{PyCapsule, PyMapping};
 
 use crate::table::STREAM;
-use offbd::wire::session_csv::COLUMNS;
 use offbd_core::vocabulary::Sample;
+use offbd_wire::session_csv::COLUMNS;
 
 /// A recording in batches.
 pub(crate) enum Recording {

@@ -11,13 +11,13 @@ use sha2::{Digest, Sha256};
 use crate::columns::{ColumnError, Recording};
 use crate::table::{Table, numbers};
 use crate::{rig, unusable};
-use offbd::judging::{JudgedSession, RecordedSession};
-use offbd::wire::session_file::RowPlace;
-use offbd::wire::verdict::FaultView;
-use offbd::wire::{asset, session_csv};
 use offbd_core::diagnosis::{AxisEvidence, Calibration, CalibrationOrigin, Evidence, Profile};
 use offbd_core::engine::{Setup, calibrate_with_prospects};
 use offbd_core::vocabulary::{PerAxis, Sample};
+use offbd_wire::judging::{JudgedSession, RecordedSession};
+use offbd_wire::session_file::RowPlace;
+use offbd_wire::verdict::FaultView;
+use offbd_wire::{asset, session_csv};
 
 /// Returns the setup of an engine for an asset file and the name of a profile.
 fn set_up(asset_file: Option<&str>, profile: Option<&str>) -> PyResult<Setup> {

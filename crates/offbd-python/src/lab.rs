@@ -4,14 +4,14 @@ use pyo3::prelude::*;
 
 use crate::table::{Table, numbers};
 use crate::{rig, unusable};
-use offbd::wire::asset;
-use offbd::wire::scene::{NamedScene, parse};
 use offbd_core::plant::Motion;
 use offbd_core::vocabulary::{Invalid, Sample, positive};
 use offbd_lab::scene::{Configuration, Method, Model, Pace, Samples, choose, run, suits};
 use offbd_lab::simulation::{
     Disturbances, Fault, Preset, Reference, RigModel, SimulatedRig, Variety,
 };
+use offbd_scene_file::{NamedScene, parse};
+use offbd_wire::asset;
 
 /// Longest simulated session, s: a day, as for `offbd simulate`.
 const MAX_SECONDS: f64 = 86_400.0;

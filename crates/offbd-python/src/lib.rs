@@ -13,9 +13,9 @@ mod table;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use offbd::wire::asset;
 use offbd_core::engine::Rig;
 use offbd_core::vocabulary::Invalid;
+use offbd_wire::asset;
 
 #[pymodule]
 mod _offbd {

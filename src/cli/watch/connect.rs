@@ -20,7 +20,7 @@ use tokio_tungstenite::tungstenite::handshake::client::Request;
 use tokio_tungstenite::tungstenite::http::header::AUTHORIZATION;
 use tokio_tungstenite::tungstenite::http::{HeaderValue, StatusCode, Uri};
 
-use crate::cli::errors::{self, InputError};
+use offbd_terminal::errors::{self, InputError};
 
 /// Where the service is, and how to be let in.
 #[derive(Clone, Debug, Args)]

@@ -8,9 +8,9 @@ use lettre::transport::smtp::client::{Tls, TlsParameters};
 use lettre::{AsyncSmtpTransport, AsyncTransport, Tokio1Executor};
 
 use super::{addresses, failed};
-use crate::service::{SendOutcome, TargetPolicy};
-use crate::wire::notification::{NotificationView, StoredEmail};
-use crate::wire::words::MailSecurity;
+use offbd_service::{SendOutcome, TargetPolicy};
+use offbd_wire::notification::{NotificationView, StoredEmail};
+use offbd_wire::words::MailSecurity;
 
 /// Sends `message` to all recipients.
 pub(super) async fn send(

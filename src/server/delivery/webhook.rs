@@ -24,8 +24,8 @@ use tokio_rustls::rustls::{ALL_VERSIONS, ClientConfig, RootCertStore};
 use tower_service::Service;
 
 use super::{addresses, failed};
-use crate::service::{SendOutcome, TargetPolicy, webhook_key};
-use crate::wire::notification::NotificationView;
+use offbd_service::{SendOutcome, TargetPolicy, webhook_key};
+use offbd_wire::notification::NotificationView;
 
 type WebhookClient = Client<HttpsConnector<HttpConnector<PermittedHosts>>, Body>;
 

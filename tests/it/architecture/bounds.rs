@@ -6,14 +6,15 @@ use std::path::Path;
 use super::{ROOT, files};
 
 /// The folders whose constants are bounds of the service.
-const FOLDERS: [&str; 7] = [
-    "src/bus",
-    "src/edge_agent",
+const FOLDERS: [&str; 8] = [
     "src/server",
-    "src/http",
-    "src/service",
-    "src/store",
-    "src/wire/session_file",
+    "crates/offbd-bus/src",
+    "crates/offbd-forward/src",
+    "crates/offbd-http/src",
+    "crates/offbd-net/src",
+    "crates/offbd-service/src",
+    "crates/offbd-store/src",
+    "crates/offbd-wire/src/session_file",
 ];
 
 /// The structs of the configuration whose fields are bounds, with their section.
@@ -53,15 +54,22 @@ fn bounds_in_code() -> BTreeSet<String> {
     files.flat_map(of_file).collect()
 }
 
+/// How the manual names a file.
+const STARTS: [&str; 2] = ["`src/", "`crates/"];
+
 fn bounds_in_manual() -> BTreeSet<String> {
     let manual = read("docs/operations.md");
-    let rows = manual.lines().filter(|line| line.starts_with("| ") && line.contains("`src/"));
+    let rows = manual
+        .lines()
+        .filter(|line| line.starts_with("| ") && STARTS.iter().any(|s| line.contains(s)));
     let entries = rows.filter_map(|row| row.trim_end_matches(" |").rsplit(" | ").next());
-    entries.flat_map(|cell| cell.split(", `src/").map(with_start)).collect()
-}
-
-fn with_start(entry: &str) -> String {
-    if entry.starts_with('`') { entry.to_owned() } else { format!("`src/{entry}") }
+    let one_a_line = |cell: &str| {
+        STARTS.iter().fold(cell.to_owned(), |text, start| {
+            text.replace(&format!(", {start}"), &format!("\n{start}"))
+        })
+    };
+    let entries = entries.map(one_a_line).collect::<Vec<_>>();
+    entries.iter().flat_map(|cell| cell.lines()).map(str::to_owned).collect()
 }
 
 #[test]

@@ -17,7 +17,7 @@ use offbd_core::vocabulary::Sample;
 
 const NODES: usize = 2;
 
-/// Longest wait for a refusal. It comes within the bounds of `src/http/forward.rs`, and without
+/// Longest wait for a refusal. It comes within the bounds of `crates/offbd-http/src/forward.rs`, and without
 /// them after a minute.
 const REFUSED_WITHIN: Duration = Duration::from_secs(30);
 

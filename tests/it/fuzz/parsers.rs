@@ -7,10 +7,11 @@ use offbd::store::codec::ChunkKey;
 use offbd::wire::bus::{TopicError, TopicStyle, encoded};
 use offbd::wire::mapping::Mapping;
 use offbd::wire::telemetry::{self, Batch, BatchError};
-use offbd::wire::{asset, scene, session_csv, session_file};
+use offbd::wire::{asset, session_csv, session_file};
 use offbd_core::diagnosis::FaultMemory;
 use offbd_core::engine::{Engine, Input, Rig, Setup, calibrate};
 use offbd_core::vocabulary::Sample;
+use offbd_scene_file as scene;
 
 use crate::support::provider::{self, Key};
 

@@ -6,7 +6,7 @@
 //! charts share axes, legend, colours and markers.
 //!
 //! To add a chart: a module here whose `make` returns a [`Chart`], and its name
-//! in `src/cli/lab/chart.rs`.
+//! in `crates/offbd-lab-cli/src/chart.rs`.
 
 mod canvas;
 pub mod certificate;

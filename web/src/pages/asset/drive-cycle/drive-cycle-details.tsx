@@ -1,4 +1,4 @@
-import program from "../../../../../src/wire/drive_cycle/run.py?raw";
+import program from "../../../../../crates/offbd-wire/src/drive_cycle/run.py?raw";
 import type { DriveCycle, DriveCycleOrder } from "../../../api/types";
 import { CodeBlock } from "../../../parts/code-block";
 import { Facts } from "../../../parts/facts";

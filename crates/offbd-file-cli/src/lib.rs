@@ -1,0 +1,8 @@
+//! The commands of offbd that work on files alone: they judge, calibrate and convert recordings.
+
+pub mod calibrate;
+pub mod drive_cycle;
+pub mod export;
+pub mod judge;
+pub mod replay;
+pub mod trends;

@@ -1,0 +1,36 @@
+//! The edge agent, `offbd forward`: takes telemetry beside the rig, keeps it in a spool that
+//! survives crashes, and forwards it until the service has acknowledged it.
+//!
+//! What the agent has acknowledged is on its disk. It is sent in order for each asset, and again
+//! until the service says that it is stored; as the service recognises a sample that comes again,
+//! nothing is lost or counted twice. When the spool is full the agent takes no more. A batch that
+//! the service refuses for good, and samples that it rejects, stay in the spool, with the reason,
+//! until a person sends them again or deletes them.
+
+mod answer;
+pub mod command;
+mod delays;
+mod delivery;
+mod intake;
+mod lines;
+mod refusal;
+mod spool;
+
+use offbd_wire::telemetry::{Batch, TelemetryFormat};
+
+pub use delays::Delays;
+pub use delivery::{InvalidServiceUrl, ServiceUrl, SpoolSender};
+pub use intake::router;
+pub use lines::{LineFormat, spool_lines};
+pub use spool::{MAX_SPOOL_BYTES, NewBatch, RefusedBatch, Spool, SpoolError, SpoolStatus};
+
+/// Parses a batch, as the service does.
+fn parsed(batch: &NewBatch) -> Result<Batch, String> {
+    let format = TelemetryFormat::of_type(&batch.media_type).map_err(|e| e.to_string())?;
+    format.parse(&batch.body, intake::MAX_BATCH_SAMPLES).map_err(|e| e.to_string())
+}
+
+/// The format of a batch, by its media type.
+fn media_type(header: Option<&str>) -> &str {
+    header.unwrap_or("application/json")
+}

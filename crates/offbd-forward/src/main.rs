@@ -1,0 +1,26 @@
+//! `offbd-forward`: the edge agent as a small program of its own, for the machine beside the rig.
+
+use std::process::ExitCode;
+
+use clap::{CommandFactory, FromArgMatches, Parser};
+use offbd_forward::command::{self, ForwardArgs};
+use offbd_terminal::logging::LoggingArgs;
+use offbd_terminal::report;
+
+#[derive(Debug, Parser)]
+#[command(name = "offbd-forward", version, max_term_width = 80)]
+struct Cli {
+    #[command(flatten)]
+    forward: ForwardArgs,
+    #[command(flatten)]
+    logging: LoggingArgs,
+}
+
+fn main() -> ExitCode {
+    let help = Cli::command().get_after_help().map(ToString::to_string).unwrap_or_default();
+    let named = help.replace("offbd forward", "offbd-forward");
+    let matches = Cli::command().after_help(named).get_matches();
+    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    cli.logging.start("info", false, None::<tracing_subscriber::layer::Identity>);
+    command::run(&cli.forward).map_or_else(|error| report(&error, false), |()| ExitCode::SUCCESS)
+}

@@ -1,0 +1,149 @@
+//! Reading request bodies under limits of size, time and total memory.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::time::Duration;
+
+use axum::body::Body;
+use axum::http::StatusCode;
+use futures_util::StreamExt;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::time::timeout;
+
+use super::Problem;
+use offbd_service::ServiceError;
+
+/// The limit of request body bytes in memory at a time, over all requests. A request
+/// that would exceed it is answered with 429.
+#[derive(Clone, Debug)]
+pub struct BodyBudget {
+    bytes: Arc<Semaphore>,
+    limit: usize,
+    /// What is left of the share of each caller who has a body in memory.
+    shares: Arc<Mutex<HashMap<String, Weak<Semaphore>>>>,
+}
+
+/// The bytes that one caller may have in memory: half of the budget, so that one caller
+/// never turns away all others.
+#[derive(Clone, Debug)]
+pub(super) struct BodyShare {
+    all: Arc<Semaphore>,
+    own: Option<Arc<Semaphore>>,
+}
+
+/// Shares from which on those of callers without a body in memory are removed.
+const MANY_SHARES: usize = 1024;
+
+impl BodyBudget {
+    #[must_use]
+    pub fn new(bytes: usize) -> Self {
+        let limit = bytes.min(Semaphore::MAX_PERMITS);
+        Self { bytes: Arc::new(Semaphore::new(limit)), limit, shares: Arc::default() }
+    }
+
+    /// Returns the share of the caller with this id.
+    pub(super) fn share_of(&self, caller: &str) -> BodyShare {
+        let mut shares = self.shares.lock().unwrap_or_else(PoisonError::into_inner);
+        if shares.len() >= MANY_SHARES {
+            shares.retain(|_, share| share.strong_count() > 0);
+        }
+        let known = shares.get(caller).and_then(Weak::upgrade);
+        let own = known.unwrap_or_else(|| {
+            let own = Arc::new(Semaphore::new(self.limit / 2));
+            shares.insert(caller.to_owned(), Arc::downgrade(&own));
+            own
+        });
+        BodyShare { all: self.bytes.clone(), own: Some(own) }
+    }
+
+    /// Returns the whole budget, for callers that cannot be told apart and for small bodies.
+    pub(super) fn whole(&self) -> BodyShare {
+        BodyShare { all: self.bytes.clone(), own: None }
+    }
+
+    /// Returns the bytes in memory now.
+    pub(super) fn used(&self) -> usize {
+        self.limit - self.bytes.available_permits()
+    }
+}
+
+/// A request body and its permits of the [`BodyBudget`], released on drop.
+pub(super) struct BudgetedBody {
+    pub(super) bytes: Vec<u8>,
+    /// Of the caller's share, if there is one, and of the whole budget.
+    permits: Vec<OwnedSemaphorePermit>,
+}
+
+/// Reads a body of at most `limit` bytes within `time`.
+///
+/// # Errors
+/// 413 if it is longer, 408 if it takes longer, 429 if the budget is exhausted, and 400
+/// if the client aborts.
+pub(super) async fn read(
+    body: Body,
+    limit: usize,
+    time: Duration,
+    share: &BodyShare,
+) -> Result<BudgetedBody, Problem> {
+    timeout(time, collect(body, limit, share)).await.unwrap_or_else(|_| {
+        let detail = format!("the body was not complete within {} s", time.as_secs());
+        Err(Problem::new(StatusCode::REQUEST_TIMEOUT, "slow-body", "Request timeout", detail))
+    })
+}
+
+async fn collect(body: Body, limit: usize, share: &BodyShare) -> Result<BudgetedBody, Problem> {
+    let mut read = BudgetedBody { bytes: Vec::new(), permits: Vec::new() };
+    let mut frames = body.into_data_stream();
+    while let Some(frame) = frames.next().await {
+        let frame = frame.map_err(|error| {
+            let detail = format!("the body was not received completely: {error}");
+            Problem::new(StatusCode::BAD_REQUEST, "malformed", "Malformed body", detail)
+        })?;
+        if read.bytes.len() + frame.len() > limit {
+            let detail = format!("the body is longer than {limit} bytes");
+            return Err(Problem::new(
+                StatusCode::PAYLOAD_TOO_LARGE,
+                "too-large",
+                "Content too large",
+                detail,
+            ));
+        }
+        read.reserve(frame.len(), share)?;
+        read.bytes.extend_from_slice(&frame);
+    }
+    Ok(read)
+}
+
+impl AsRef<[u8]> for BudgetedBody {
+    fn as_ref(&self) -> &[u8] {
+        &self.bytes
+    }
+}
+
+impl BudgetedBody {
+    fn reserve(&mut self, n: usize, share: &BodyShare) -> Result<(), Problem> {
+        for (i, permit) in share.reserve(n)?.into_iter().enumerate() {
+            match self.permits.get_mut(i) {
+                Some(held) => held.merge(permit),
+                None => self.permits.push(permit),
+            }
+        }
+        Ok(())
+    }
+}
+
+impl BodyShare {
+    /// Reserves `n` bytes, until the permits are dropped: of the caller's share, if there is
+    /// one, and of the whole budget.
+    ///
+    /// # Errors
+    /// [`ServiceError::Busy`] if one of them is exhausted.
+    pub(super) fn reserve(&self, n: usize) -> Result<Vec<OwnedSemaphorePermit>, ServiceError> {
+        let n = u32::try_from(n).unwrap_or(u32::MAX);
+        let reserve = |bytes: &Arc<Semaphore>| bytes.clone().try_acquire_many_owned(n);
+        let permits: Result<_, _> = self.own.iter().chain([&self.all]).map(reserve).collect();
+        permits.map_err(|_| ServiceError::Busy {
+            what: "the limit of request bodies in memory is reached",
+        })
+    }
+}

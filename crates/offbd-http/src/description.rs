@@ -1,0 +1,255 @@
+//! Completes the description that the handlers give of themselves.
+//!
+//! Middleware may send responses before or instead of the handler: they are added to every
+//! operation. Schemas get the names that users of a generated client read: those of the
+//! program without `View`, and `SessionPage` for a page of `Session`s, which refers to its
+//! items instead of repeating them.
+
+use axum::http::StatusCode;
+use utoipa::openapi::path::Operation;
+use utoipa::openapi::schema::{AdditionalProperties, ArrayItems, Schema};
+use utoipa::openapi::{Content, ContentBuilder, OpenApi as Document, Ref, RefOr, Response};
+
+use super::routes::operations_mut;
+
+const PROBLEM: &str = "application/problem+json";
+
+/// A response that operations share: its status, its component name, its description.
+type SharedResponse = (StatusCode, &'static str, &'static str);
+
+/// Responses of every operation.
+const ALWAYS: [SharedResponse; 3] = [
+    (
+        StatusCode::MISDIRECTED_REQUEST,
+        "MisdirectedRequest",
+        "Unknown host name in `Host`, while authentication is off",
+    ),
+    (StatusCode::TOO_MANY_REQUESTS, "TooManyRequests", "Too many requests; see `Retry-After`"),
+    (
+        StatusCode::SERVICE_UNAVAILABLE,
+        "ServiceUnavailable",
+        "Temporarily unavailable; see `Retry-After`",
+    ),
+];
+
+/// Responses of operations that require a token.
+const GUARDED: [SharedResponse; 2] = [
+    (StatusCode::UNAUTHORIZED, "Unauthorized", "No token, or an invalid one"),
+    (
+        StatusCode::FORBIDDEN,
+        "Forbidden",
+        "The token has no such right, or the request comes from a page of another site",
+    ),
+];
+
+/// Responses of operations with parameters in path or query.
+const WITH_PARAMETERS: [SharedResponse; 1] =
+    [(StatusCode::BAD_REQUEST, "InvalidParameter", "Invalid path or query parameter")];
+
+/// Responses of operations with a body.
+const WITH_BODY: [SharedResponse; 3] = [
+    (StatusCode::BAD_REQUEST, "MalformedBody", "Malformed body; `pointer` names the element"),
+    (StatusCode::REQUEST_TIMEOUT, "RequestTimeout", "The body was not received in time"),
+    (StatusCode::PAYLOAD_TOO_LARGE, "ContentTooLarge", "The body is too long"),
+];
+
+/// Returns `document` with the shared responses added to every operation, and with the public
+/// names of the schemas.
+pub(super) fn complete(mut document: Document) -> Document {
+    for operation in document.paths.paths.values_mut().flat_map(operations_mut) {
+        add_responses(operation);
+        for (code, response) in &mut operation.responses.responses {
+            if let RefOr::T(response) = response {
+                complete_response(code, response);
+            }
+        }
+    }
+    let shared = [&ALWAYS[..], &GUARDED, &WITH_PARAMETERS, &WITH_BODY].concat();
+    let components = document.components.get_or_insert_default();
+    for (_, name, description) in shared {
+        components.responses.insert(name.to_owned(), problem(description).into());
+    }
+    use_public_names(&mut document);
+    document
+}
+
+/// Gives the schemas their public names, and lets pages refer to their items.
+fn use_public_names(document: &mut Document) {
+    let paths = document.paths.paths.values_mut();
+    for operation in paths.flat_map(operations_mut) {
+        operation_schemas(operation).for_each(rename);
+    }
+    let schemas = &mut document.components.get_or_insert_default().schemas;
+    for (name, mut schema) in std::mem::take(schemas) {
+        if let Some(item) = name.strip_prefix(PAGE) {
+            refer_to_items(&mut schema, item);
+        }
+        rename(&mut schema);
+        schemas.insert(public_name(&name), schema);
+    }
+}
+
+/// Returns the schemas of the parameters, the body and the responses of an operation.
+fn operation_schemas(operation: &mut Operation) -> impl Iterator<Item = &mut RefOr<Schema>> {
+    let parameters = operation.parameters.iter_mut().flatten().filter_map(|parameter| {
+        let RefOr::T(parameter) = parameter else { return None };
+        parameter.schema.as_mut()
+    });
+    let body = operation.request_body.iter_mut().filter_map(|body| match body {
+        RefOr::T(body) => Some(body.content.values_mut()),
+        RefOr::Ref(_) => None,
+    });
+    let responses = operation.responses.responses.values_mut().filter_map(|response| {
+        let RefOr::T(response) = response else { return None };
+        Some(response.content.values_mut())
+    });
+    let contents = body.flatten().chain(responses.flatten()).filter_map(|content| {
+        let RefOr::T(content) = content else { return None };
+        content.schema.as_mut()
+    });
+    parameters.chain(contents)
+}
+
+/// Replaces the items of a page, which are repeated in it, by a reference.
+fn refer_to_items(page: &mut RefOr<Schema>, item: &str) {
+    if let RefOr::T(Schema::Object(page)) = page
+        && let Some(RefOr::T(Schema::Array(array))) = page.properties.get_mut("items")
+    {
+        let reference = RefOr::Ref(Ref::from_schema_name(item));
+        array.items = ArrayItems::RefOrSchema(Box::new(reference));
+    }
+}
+
+/// Renames the references in a schema.
+fn rename(schema: &mut RefOr<Schema>) {
+    let schema = match schema {
+        RefOr::T(schema) => schema,
+        RefOr::Ref(reference) => {
+            if let Some(name) = reference.ref_location.strip_prefix(SCHEMAS) {
+                reference.ref_location = format!("{SCHEMAS}{}", public_name(name));
+            }
+            return;
+        }
+    };
+    match schema {
+        Schema::Array(array) => {
+            if let ArrayItems::RefOrSchema(items) = &mut array.items {
+                rename(items);
+            }
+        }
+        Schema::Object(object) => {
+            object.properties.values_mut().for_each(rename);
+            if let Some(AdditionalProperties::RefOr(values)) =
+                object.additional_properties.as_deref_mut()
+            {
+                rename(values);
+            }
+        }
+        Schema::OneOf(one) => one.items.iter_mut().for_each(rename),
+        Schema::AllOf(all) => all.items.iter_mut().for_each(rename),
+        Schema::AnyOf(any) => any.items.iter_mut().for_each(rename),
+        _ => {}
+    }
+}
+
+/// How the name of a page of items begins in the program.
+const PAGE: &str = "Page_";
+
+/// How a reference to a schema begins.
+const SCHEMAS: &str = "#/components/schemas/";
+
+fn public_name(name: &str) -> String {
+    let without_view = |name: &str| name.strip_suffix("View").unwrap_or(name).to_owned();
+    match name.strip_prefix(PAGE) {
+        Some(item) => format!("{}Page", without_view(item)),
+        None => without_view(name),
+    }
+}
+
+fn add_responses(operation: &mut Operation) {
+    let with_parameters =
+        operation.parameters.as_ref().is_some_and(|parameters| !parameters.is_empty());
+    let sets: [(bool, &[SharedResponse]); 4] = [
+        (true, &ALWAYS),
+        (operation.security.is_some(), &GUARDED),
+        (operation.request_body.is_some(), &WITH_BODY),
+        (with_parameters, &WITH_PARAMETERS),
+    ];
+    let sets = sets.into_iter().filter_map(|(applies, set)| applies.then_some(set));
+    for (status, name, _) in sets.flatten() {
+        let shared = || Ref::from_response_name(*name).into();
+        operation.responses.responses.entry(status.as_str().to_owned()).or_insert_with(shared);
+    }
+}
+
+fn problem(description: &str) -> Response {
+    let content = ContentBuilder::new().schema(Some(Ref::from_schema_name("Problem"))).build();
+    let mut response = Response::new(description);
+    response.content.insert(PROBLEM.to_owned(), content.into());
+    response
+}
+
+/// Sets the description that OpenAPI requires, and the media type of problems.
+fn complete_response(code: &str, response: &mut Response) {
+    if response.description.is_empty() {
+        let status = code.parse::<StatusCode>().ok();
+        let reason = status.and_then(|status| status.canonical_reason());
+        reason.unwrap_or_default().clone_into(&mut response.description);
+    }
+    let is_problem = |content: &RefOr<Content>| {
+        let RefOr::T(Content { schema: Some(RefOr::Ref(schema)), .. }) = content else {
+            return false;
+        };
+        schema.ref_location.ends_with("/Problem")
+    };
+    if response.content.get("application/json").is_some_and(is_problem)
+        && let Some(content) = response.content.swap_remove("application/json")
+    {
+        response.content.insert(PROBLEM.to_owned(), content);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::*;
+
+    #[test]
+    fn every_reference_is_to_a_schema_with_a_public_name() {
+        let document = crate::openapi();
+        let json = serde_json::to_value(&document).unwrap();
+        let schemas = json["components"]["schemas"].as_object().unwrap();
+        for name in schemas.keys() {
+            assert!(!name.ends_with("View") && !name.contains('_'), "{name}");
+        }
+        let mut references = Vec::new();
+        collect(&json, &mut references);
+        assert!(references.len() > 100);
+        for reference in references.iter().filter_map(|name| name.strip_prefix(SCHEMAS)) {
+            assert!(schemas.contains_key(reference), "{reference}");
+        }
+        let items = &schemas["SessionPage"]["properties"]["items"]["items"];
+        assert_eq!(*items, json!({ "$ref": "#/components/schemas/Session" }));
+    }
+
+    fn collect(json: &Value, references: &mut Vec<String>) {
+        match json {
+            Value::Object(fields) => {
+                references.extend(fields.get("$ref").and_then(Value::as_str).map(str::to_owned));
+                fields.values().for_each(|value| collect(value, references));
+            }
+            Value::Array(items) => items.iter().for_each(|item| collect(item, references)),
+            _ => {}
+        }
+    }
+
+    /// Two names of the program must not become one.
+    #[test]
+    fn no_public_name_occurs_twice() {
+        let document = crate::api().split().1;
+        let names: Vec<_> = document.components.unwrap().schemas.into_keys().collect();
+        let public: std::collections::BTreeSet<_> = names.iter().map(|n| public_name(n)).collect();
+        assert_eq!(public.len(), names.len());
+    }
+}

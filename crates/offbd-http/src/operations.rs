@@ -1,0 +1,65 @@
+//! Health, readiness and the descriptions of the interface.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::header::CONTENT_TYPE;
+use axum::response::IntoResponse;
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use super::{App, Problem};
+use offbd_service::ServiceError;
+
+/// The health of the process.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct HealthView {
+    /// Always `ok`.
+    status: &'static str,
+    version: &'static str,
+    /// Whether this is the demo, with a simulated rig.
+    demo: bool,
+    /// Assets whose engine is still to be rebuilt after the start. Until then, requests that
+    /// need it are answered with 503 and `Retry-After`.
+    rebuilding: usize,
+    /// The optional parts of this build: `email`, `mcap`, `mqtt`, `nats`, `otel`, `parquet`,
+    /// `xlsx`. Without one, its formats are refused with 406 or 415, and its settings with 422.
+    features: &'static [&'static str],
+}
+
+fn healthy(app: &App) -> Json<HealthView> {
+    let (demo, rebuilding) = (app.demo, app.service.n_rebuilding());
+    let (version, features) = (env!("CARGO_PKG_VERSION"), app.features);
+    Json(HealthView { status: "ok", version, demo, rebuilding, features })
+}
+
+/// Liveness: succeeds while the process runs.
+#[utoipa::path(get, path = "/healthz", tag = "operation",
+    responses((status = 200, body = HealthView)))]
+pub(super) async fn healthz(State(app): State<App>) -> Json<HealthView> {
+    healthy(&app)
+}
+
+/// Readiness: succeeds if the service can accept telemetry now.
+#[utoipa::path(get, path = "/readyz", tag = "operation",
+    responses((status = 200, body = HealthView),
+        (status = 503, body = Problem, description = "Not ready; `detail` has the reason")))]
+pub(super) async fn readyz(State(app): State<App>) -> Result<Json<HealthView>, Problem> {
+    if app.closing.is_cancelled() {
+        let what = "the service is shutting down";
+        return Err(ServiceError::Unavailable { what }.into());
+    }
+    app.service.ready().await.map_err(|error| match error {
+        // The database's own words are not for everybody.
+        ServiceError::Outage { .. } if app.policy.required => {
+            Problem::from(ServiceError::Outage { reason: "see the log".to_owned() })
+        }
+        error => error.into(),
+    })?;
+    Ok(healthy(&app))
+}
+
+pub(super) async fn yaml(yaml: Arc<str>) -> impl IntoResponse {
+    ([(CONTENT_TYPE, "application/yaml")], yaml.to_string())
+}

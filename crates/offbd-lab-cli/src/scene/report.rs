@@ -1,0 +1,182 @@
+//! The output of a run: lines of text, the result first, or a JSON object.
+
+use serde_json::{Value, json};
+
+use super::scene_run::SceneRun;
+use super::words;
+use offbd_core::plant::Motion;
+use offbd_lab::scene::{Event, Model, Pace, TriedCandidate};
+use offbd_terminal::table;
+
+/// Maximum number of events printed as text; chosen. JSON has all of them.
+const SHOWN_EVENTS: usize = 12;
+
+/// Returns the lines of text.
+pub(super) fn lines(scene_run: &SceneRun) -> Vec<String> {
+    let mut lines = vec![
+        row("scene", &format!("{}, {} s", scene_run.name, scene_run.scene.duration_s)),
+        end(scene_run),
+        row("error", &error(scene_run)),
+    ];
+    lines.extend(events(scene_run));
+    lines.push(String::new());
+    lines.push(row("ran", &words::configuration(&scene_run.decision.configuration)));
+    lines.push(row("why", &why(scene_run)));
+    lines.extend(effort(scene_run));
+    lines.extend(tried(scene_run.decision.choice.as_ref().map_or(&[], |choice| &choice.tried)));
+    lines
+}
+
+/// Returns the line of the result: where the body is at the end, or why the run failed.
+fn end(scene_run: &SceneRun) -> String {
+    match &scene_run.outcome {
+        Ok(outcome) => {
+            let p = outcome.end.position;
+            row("end", &format!("x {:.6}, y {:.6}, z {:.6} m", p.x, p.y, p.z))
+        }
+        Err(failure) => row("failed", &failure.to_string()),
+    }
+}
+
+/// Formats a name and its value, wrapped to 80 columns.
+pub(super) fn row(word: &str, text: &str) -> String {
+    table::wrapped(&format!("{word:<11}"), text)
+}
+
+fn why(scene_run: &SceneRun) -> String {
+    let decision = &scene_run.decision;
+    let (Some(wanted), Some(choice)) = (decision.wanted_m, &decision.choice) else {
+        return "asked for".to_owned();
+    };
+    if choice.configuration == decision.configuration {
+        return format!("the cheapest that meets {} m", words::plain(wanted));
+    }
+    let model = choice.configuration.model();
+    if model == decision.configuration.model() {
+        format!("the {model} model meets {} m; the rest was asked for", words::plain(wanted))
+    } else {
+        format!("the {model} model would do, but what was asked for does not step it")
+    }
+}
+
+fn error(scene_run: &SceneRun) -> String {
+    let decision = &scene_run.decision;
+    if let Some(choice) =
+        decision.choice.as_ref().filter(|c| c.configuration == decision.configuration)
+    {
+        return format!("about {}, estimated", words::metres(choice.error_m));
+    }
+    let model = match decision.configuration.model() {
+        Model::Planar | Model::Rolling => Some(scene_run.survey.rolling_error_m),
+        Model::Creeping => Some(scene_run.survey.creeping_error_m),
+        Model::Sliding | Model::Compliant => None,
+    };
+    let method = match (decision.configuration.pace(), &scene_run.outcome) {
+        (Pace::Tolerance(_), Ok(outcome)) => {
+            format!("the method's about {}", words::metres(outcome.statistics.method_error_m))
+        }
+        _ => "the method's not estimated at fixed steps".to_owned(),
+    };
+    match model {
+        Some(model) => format!("the model's about {}, {method}", words::metres(model)),
+        None => method,
+    }
+}
+
+fn effort(scene_run: &SceneRun) -> Vec<String> {
+    let Ok(outcome) = &scene_run.outcome else { return Vec::new() };
+    let rejected = match outcome.statistics.rejected {
+        0 => String::new(),
+        n => format!(" and {n} rejected"),
+    };
+    let choosing = match scene_run.decision.choosing_s {
+        0.0 => String::new(),
+        s => format!(", {} to choose", words::work(s)),
+    };
+    vec![
+        row("steps", &format!("{}{rejected}", outcome.statistics.steps)),
+        row("CPU time", &format!("{} to run{choosing}", words::work(scene_run.running_s))),
+    ]
+}
+
+/// Returns the candidates in the order in which they were tried, as a table.
+pub(super) fn tried(tried: &[TriedCandidate]) -> Vec<String> {
+    if tried.is_empty() {
+        return Vec::new();
+    }
+    let mut rows = table::table(&["tried", "by", "error", "verdict"], &[2]);
+    for one in tried {
+        let error = one.error_m.map(words::metres).unwrap_or_default();
+        rows.add_row([one.model.name(), one.method.name(), &error, &one.verdict]);
+    }
+    std::iter::once(String::new()).chain(table::lines(&rows)).collect()
+}
+
+fn events(scene_run: &SceneRun) -> Vec<String> {
+    if scene_run.events.is_empty() {
+        return Vec::new();
+    }
+    let body = if scene_run.scene.body().turns() { "ball" } else { "block" };
+    let mut lines = vec![String::new(), format!("what happens, by the sliding model: the {body}")];
+    for event in scene_run.events.iter().take(SHOWN_EVENTS) {
+        lines.push(format!("{:>10.4} s  {}", event.at_s, words::event(event, &scene_run.scene)));
+    }
+    if scene_run.events.len() > SHOWN_EVENTS {
+        lines.push(format!("             and {} more", scene_run.events.len() - SHOWN_EVENTS));
+    }
+    lines
+}
+
+/// Returns the JSON object.
+pub(super) fn object(scene_run: &SceneRun) -> Value {
+    let SceneRun { decision, outcome, .. } = scene_run;
+    let (step_s, tolerance_m) = match decision.configuration.pace() {
+        Pace::Step(step) => (Some(step), None),
+        Pace::Tolerance(tolerance) => (None, Some(tolerance)),
+    };
+    let choice = decision.choice.as_ref();
+    let statistics = outcome.as_ref().ok().map(|outcome| outcome.statistics);
+    json!({
+        "scene": scene_run.name,
+        "duration_s": scene_run.scene.duration_s,
+        "model": decision.configuration.model().name(),
+        "method": decision.configuration.method().name(),
+        "step_s": step_s,
+        "tolerance_m": tolerance_m,
+        "why": why(scene_run),
+        "wanted_m": decision.wanted_m,
+        "error_m": choice.filter(|c| c.configuration == decision.configuration).map(|c| c.error_m),
+        "friction_demand": scene_run.survey.demand,
+        "tried": choice.map(|c| c.tried.iter().map(tried_object).collect::<Vec<_>>()),
+        "steps": statistics.map(|t| t.steps),
+        "rejected": statistics.map(|t| t.rejected),
+        "cpu_s": scene_run.running_s,
+        "choosing_cpu_s": decision.choosing_s,
+        "end": outcome.as_ref().ok().map(|o| motion_object(&o.end)),
+        "events": scene_run.events.iter().map(|e| event_object(e, scene_run)).collect::<Vec<_>>(),
+        "warnings": scene_run.warnings,
+        "failure": outcome.as_ref().err().map(ToString::to_string),
+    })
+}
+
+fn tried_object(tried: &TriedCandidate) -> Value {
+    json!({
+        "model": tried.model.name(),
+        "method": tried.method.name(),
+        "error_m": tried.error_m,
+        "verdict": tried.verdict,
+    })
+}
+
+fn event_object(event: &Event, scene_run: &SceneRun) -> Value {
+    json!({ "t_s": event.at_s, "what": words::event(event, &scene_run.scene) })
+}
+
+fn motion_object(at: &Motion) -> Value {
+    let row = |v: &nalgebra::Vector3<f64>| [v.x, v.y, v.z];
+    json!({
+        "position_m": row(&at.position),
+        "velocity_m_s": row(&at.velocity),
+        "spin_rad_s": row(&at.spin),
+    })
+}

@@ -1,0 +1,9 @@
+//! What clients and servers of offbd share beside their interfaces: the HTTPS client, the
+//! rest of a refused body, and logs that name each reason once.
+
+mod https;
+mod reasons;
+pub mod unread_body;
+
+pub use https::{HttpsClient, https_client};
+pub use reasons::Reasons;

@@ -1,0 +1,133 @@
+//! The commands of an asset, and their replies.
+
+use tokio::sync::{OwnedSemaphorePermit, oneshot};
+use tracing::Span;
+
+use crate::ServiceError;
+use offbd_core::engine::Rig;
+use offbd_core::vocabulary::FaultCode;
+use offbd_store::CalibrationRow;
+use offbd_wire::asset::CalibrationView;
+use offbd_wire::learning::LearningView;
+use offbd_wire::link::LinkView;
+use offbd_wire::service::{MonitorView, StateView, WatchView};
+use offbd_wire::telemetry::{AckView, Batch};
+
+/// A command to an asset.
+///
+/// The reply to a command that changes something is sent once the change is durable. The
+/// commands from `Load` on are queries; their replies may show changes that are not
+/// durable yet.
+pub(crate) enum AssetCommand {
+    /// Registers the asset with this asset file.
+    Create { document: String, reply: Reply<()> },
+    /// Replaces the asset file. An open session keeps the one that it started with.
+    Replace { rig: Box<Rig>, reply: Reply<()> },
+    /// Hides the asset and revokes the tokens of its devices.
+    Delete { reply: Reply<()> },
+
+    /// Evaluates and records a batch. `importing` is set for a recording that is being
+    /// imported; `request` is the tracing span of the request.
+    Ingest { batch: Batch, importing: bool, request: Span, reply: Reply<AckView> },
+
+    /// Ends the open session and opens a new one, by default named by the current time;
+    /// returns its id.
+    OpenSession { name: Option<String>, importing: bool, reply: Reply<String> },
+    /// Ends the session with this id if it is open.
+    EndSession { session: String, reply: Reply<()> },
+    /// Discards the session with this id, whose import failed.
+    DiscardImport { session: String, reply: Reply<()> },
+    /// Hides the session with this id, and ends it if it is open.
+    DeleteSession { session: String, reply: Reply<()> },
+
+    /// Erases the fault memory entry of a code.
+    Clear { code: FaultCode, actor: String, reply: Reply<()> },
+    /// Acknowledges the current occurrence of a code.
+    Acknowledge { code: FaultCode, actor: String, reply: Reply<()> },
+
+    /// Writes a calibration that a person chose to the asset file.
+    Activate { id: String, calibration: Box<CalibrationView>, by: Option<String>, reply: Reply<()> },
+    /// Records the outcome of a calibration job.
+    FinishCalibration { row: Box<CalibrationRow>, reply: Reply<()> },
+    /// Returns the id of the calibration that waits to be accepted, if there is one.
+    OfferedCalibration { reply: Reply<Option<String>> },
+    /// Writes the offered calibration to the asset file if it is still this one.
+    AcceptLearning {
+        id: String,
+        calibration: Box<CalibrationView>,
+        by: Option<String>,
+        reply: Reply<()>,
+    },
+    /// Discards the motion gathered for the automatic calibration.
+    DiscardLearning { reply: Reply<()> },
+
+    /// Removes the snapshots of the open session and drops its engine, which the next command
+    /// rebuilds from the recording.
+    Rebuild { reply: Reply<()> },
+
+    /// Loads the asset if it is not running, and evaluates its open session again.
+    Load { reply: Reply<()> },
+    /// Returns the state of the twin.
+    State { reply: Reply<StateView> },
+    /// Returns how the samples arrive.
+    Link { reply: Reply<LinkView> },
+    /// Returns the state and the trace after the first `seen` points of a session.
+    Watch { session: Option<String>, seen: u64, reply: Reply<WatchView> },
+    /// Returns the monitors of the open session; `None` if the asset is not loaded, which this
+    /// command does not change.
+    Monitors { reply: Reply<Option<Vec<MonitorView>>> },
+    /// Returns the progress of the automatic calibration.
+    Learning { reply: Reply<LearningView> },
+}
+
+/// The sender of the reply to a command.
+pub(crate) struct Reply<T> {
+    sender: oneshot::Sender<Result<T, ServiceError>>,
+    permit: Option<OwnedSemaphorePermit>,
+}
+
+impl<T> Reply<T> {
+    pub(crate) fn new() -> (Self, Answer<T>) {
+        let (sender, receiver) = oneshot::channel();
+        (Self { sender, permit: None }, Answer(receiver))
+    }
+
+    /// Holds `permit` until the reply is sent or dropped, whether or not it is received.
+    pub(crate) fn with_permit(self, permit: OwnedSemaphorePermit) -> Self {
+        Self { permit: Some(permit), ..self }
+    }
+
+    pub(super) fn send(self, outcome: Result<T, ServiceError>) {
+        drop(self.permit);
+        // The receiver may be gone; the changes are durable nevertheless.
+        let _ = self.sender.send(outcome);
+    }
+}
+
+/// The receiver of the reply to a command.
+pub(crate) struct Answer<T>(oneshot::Receiver<Result<T, ServiceError>>);
+
+impl<T> Answer<T> {
+    /// Waits for the reply.
+    ///
+    /// # Errors
+    /// Those of the command; [`ServiceError::Unavailable`] if the engine panicked.
+    pub(crate) async fn wait(self) -> Result<T, ServiceError> {
+        let failed = ServiceError::Unavailable { what: "the engine of the asset failed" };
+        self.0.await.unwrap_or(Err(failed))
+    }
+}
+
+#[cfg(test)]
+impl<T> Answer<T> {
+    /// Returns the reply if it is there, otherwise the answer.
+    pub(crate) fn now(mut self) -> Result<Result<T, ServiceError>, Self> {
+        match self.0.try_recv() {
+            Ok(answer) => Ok(answer),
+            Err(oneshot::error::TryRecvError::Empty) => Err(self),
+            Err(oneshot::error::TryRecvError::Closed) => {
+                Ok(Err(ServiceError::Unavailable { what: "the engine of the asset failed" }))
+            }
+        }
+    }
+}

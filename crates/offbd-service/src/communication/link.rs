@@ -1,0 +1,179 @@
+//! Decides whether the data of one rig stay away. Time is an argument; both directions are
+//! debounced, so that a rig whose link flaps is lost once, and back once.
+
+use std::time::Duration;
+
+use crate::notifications::micros;
+use offbd_store::Micros;
+
+/// When data count as lost, and as back.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CommunicationSettings {
+    /// Silence after which the data count as lost.
+    pub lost_after: Duration,
+    /// Time for which data must arrive, without a silence of `lost_after`, to be back.
+    pub back_after: Duration,
+}
+
+impl Default for CommunicationSettings {
+    /// Chosen: several times the interval of a device that sends batches every few seconds.
+    fn default() -> Self {
+        Self { lost_after: Duration::from_secs(30), back_after: Duration::from_secs(10) }
+    }
+}
+
+/// A change of a link.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum LinkChange {
+    Lost,
+    Back,
+}
+
+/// What is known of the link of one rig.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Link {
+    /// Arrival of the last data or, before any, the time from which they are waited for.
+    pub(super) seen_at: Micros,
+    is_lost: bool,
+    /// Arrival of the first data of the present run, while the link is lost.
+    arriving_since: Option<Micros>,
+}
+
+impl Link {
+    /// A link of which data are waited for from `now` on.
+    pub(super) const fn new(now: Micros, is_lost: bool) -> Self {
+        Self { seen_at: now, is_lost, arriving_since: None }
+    }
+
+    /// Whether the data stay away.
+    pub(super) const fn is_lost(&self) -> bool {
+        self.is_lost
+    }
+
+    /// Waits anew from `now` on, because the clock has jumped or the process has slept.
+    pub(super) fn wait_from(&mut self, now: Micros) {
+        self.seen_at = self.seen_at.max(now);
+    }
+
+    /// Takes note of the last arrival, if there was one, and returns the change at `now`.
+    pub(super) fn advance(
+        &mut self,
+        now: Micros,
+        arrival: Option<Micros>,
+        settings: &CommunicationSettings,
+    ) -> Option<LinkChange> {
+        let arrival = arrival.filter(|&arrival| arrival > self.seen_at);
+        let gap = arrival.map(|arrival| arrival - self.seen_at);
+        self.seen_at = arrival.unwrap_or(self.seen_at);
+        let lost_after = micros(settings.lost_after);
+        let is_silent = now - self.seen_at >= lost_after;
+        if !self.is_lost {
+            self.is_lost = is_silent;
+            return is_silent.then_some(LinkChange::Lost);
+        }
+        if is_silent {
+            self.arriving_since = None;
+            return None;
+        }
+        match (self.arriving_since, arrival) {
+            (None, Some(arrival)) => self.arriving_since = Some(arrival),
+            (Some(_), Some(arrival)) if gap >= Some(lost_after) => {
+                self.arriving_since = Some(arrival);
+            }
+            _ => {}
+        }
+        let run = self.seen_at - self.arriving_since?;
+        if run < micros(settings.back_after) {
+            return None;
+        }
+        (self.is_lost, self.arriving_since) = (false, None);
+        Some(LinkChange::Back)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const SECOND: Micros = 1_000_000;
+
+    /// Runs a link for `n` seconds, with data in the seconds that `arrives`; returns the
+    /// changes with their times in seconds.
+    fn changes(n: i64, arrives: impl Fn(i64) -> bool) -> Vec<(i64, LinkChange)> {
+        let (settings, mut link) = (CommunicationSettings::default(), Link::new(0, false));
+        let mut last = None;
+        let mut found = Vec::new();
+        for s in 0..n {
+            if arrives(s) {
+                last = Some(s * SECOND);
+            }
+            let change = link.advance(s * SECOND, last, &settings);
+            found.extend(change.map(|change| (s, change)));
+        }
+        found
+    }
+
+    #[test]
+    fn a_silence_is_lost_once_and_back_once() {
+        let found = changes(200, |s| s <= 50 || s >= 100);
+        assert_eq!(found, [(80, LinkChange::Lost), (110, LinkChange::Back)]);
+    }
+
+    #[test]
+    fn short_silences_are_none() {
+        assert_eq!(changes(500, |s| s % 29 == 0), []);
+    }
+
+    /// A batch now and then does not bring a link back, and is no new loss.
+    #[test]
+    fn flapping_is_one_loss() {
+        let found = changes(1000, |s| s < 10 || s % 40 == 0 || s > 800);
+        assert_eq!(found, [(39, LinkChange::Lost), (810, LinkChange::Back)]);
+    }
+
+    #[test]
+    fn a_rig_that_was_lost_before_a_restart_is_lost_until_data_arrive() {
+        let settings = CommunicationSettings::default();
+        let mut link = Link::new(0, true);
+        for s in 0..100 {
+            assert_eq!(link.advance(s * SECOND, None, &settings), None);
+        }
+        for s in 100..110 {
+            assert_eq!(link.advance(s * SECOND, Some(s * SECOND), &settings), None, "{s}");
+        }
+        let back = link.advance(110 * SECOND, Some(110 * SECOND), &settings);
+        assert_eq!(back, Some(LinkChange::Back));
+    }
+
+    #[test]
+    fn a_jump_of_the_clock_is_no_silence() {
+        let settings = CommunicationSettings::default();
+        let mut link = Link::new(0, false);
+        assert_eq!(link.advance(SECOND, Some(SECOND), &settings), None);
+        link.wait_from(3600 * SECOND);
+        assert_eq!(link.advance(3600 * SECOND, Some(SECOND), &settings), None);
+        assert_eq!(link.advance(3630 * SECOND, Some(SECOND), &settings), Some(LinkChange::Lost));
+    }
+
+    proptest! {
+        /// Whatever arrives: losses and returns alternate, a loss follows 30 s of silence, and
+        /// between a loss and the return there are at least 10 s with data.
+        #[test]
+        fn changes_alternate_and_are_debounced(arrivals in prop::collection::vec(any::<bool>(), 0..400)) {
+            let spread: Vec<bool> = arrivals.iter().flat_map(|a| [*a, false, false, false]).collect();
+            let found = changes(spread.len() as i64, |s| spread[s as usize]);
+            for (i, (at, change)) in found.iter().enumerate() {
+                let lost = i % 2 == 0;
+                prop_assert_eq!(*change == LinkChange::Lost, lost);
+                let from = (at - if lost { 29 } else { 10 }).max(0) as usize;
+                let some = spread[from..=*at as usize].iter().any(|arrives| *arrives);
+                prop_assert_eq!(some, !lost);
+            }
+            for pair in found.windows(2) {
+                prop_assert!(pair[1].0 - pair[0].0 >= 10);
+            }
+        }
+    }
+}

@@ -1,0 +1,187 @@
+//! Backup and restore of an SQLite database as one file. PostgreSQL has its own tools.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+use sqlx::{AnyConnection, AssertSqlSafe, Connection, Executor};
+
+use super::check::{check_copy, check_pages};
+use super::cold::{self, ColdDirectory};
+use super::location::{create_private, file_url, sync_directory_of};
+use super::page_checksums::{self, open};
+use super::{Location, MIGRATIONS, StoreError};
+
+/// Copies the database file at `location` to the new file `copy`, also while a service uses
+/// it. The copy is a consistent state of the database with all commits before the call,
+/// with the samples in the files of its `cold` data; its pages have checksums, its contents
+/// are checked, and it is on the disk on return.
+///
+/// # Errors
+/// [`StoreError`] if there is no such database, `copy` exists, it cannot be written, or a file
+/// of cold data cannot be read.
+pub async fn back_up(
+    location: &Location,
+    copy: &Path,
+    cold: Option<&ColdDirectory>,
+) -> Result<(), StoreError> {
+    let file = location.file().ok_or(StoreError::NotSqlite)?;
+    check_absent(copy)?;
+    let part = with_suffix(copy, ".part");
+    remove_if_exists(&part)?;
+    location.check_log().await?;
+    // Fails if there is no such database.
+    open(file).await?.close().await?;
+    page_checksums::create(&part).await?;
+    let mut written = open(&part).await?;
+    copy_rows(&mut written, file).await?;
+    cold::bring_back(&mut written, cold).await?;
+    written.close().await?;
+    let mut written = open(&part).await?;
+    check_copy(&mut written, location, None).await?;
+    written.close().await?;
+    publish(&part, copy)
+}
+
+/// Replaces the database file at `location` by `copy`, with the schema brought to this
+/// version, and its `cold` data checked. An existing file is an error or, with `replace`,
+/// renamed to `*.replaced`. No service may use the database meanwhile.
+///
+/// # Errors
+/// [`StoreError`] if the copy is damaged, is not a database of offbd, or is newer than
+/// this version; then nothing is changed.
+pub async fn restore(
+    location: &Location,
+    copy: &Path,
+    replace: bool,
+    cold: Option<&ColdDirectory>,
+) -> Result<(), StoreError> {
+    let file = location.file().ok_or(StoreError::NotSqlite)?;
+    if !replace {
+        check_absent(file)?;
+    }
+    let part = with_suffix(file, ".part");
+    remove_if_exists(&part)?;
+    create_private(&part)?;
+    let mut target = File::options().write(true).open(&part).map_err(file_error(&part))?;
+    let mut source = File::open(copy).map_err(file_error(copy))?;
+    std::io::copy(&mut source, &mut target).map_err(file_error(copy))?;
+    let mut connection = open(&part).await?;
+    check_pages(&mut connection).await?;
+    // Fails if the file is not a database of offbd.
+    sqlx::query("SELECT version FROM _sqlx_migrations").execute(&mut connection).await?;
+    MIGRATIONS.run_direct(None, &mut connection, false).await?;
+    check_copy(&mut connection, location, cold).await?;
+    connection.close().await?;
+    if file.exists() {
+        set_aside(file)?;
+    }
+    publish(&part, file)
+}
+
+/// Renames the old file and its write-ahead log to `*.replaced`.
+fn set_aside(file: &Path) -> Result<(), StoreError> {
+    let aside = with_suffix(file, ".replaced");
+    for end in ["-shm", "-wal", ""] {
+        remove_if_exists(&with_suffix(&aside, end))?;
+    }
+    for end in ["-wal", ""] {
+        let from = with_suffix(file, end);
+        if from.exists() {
+            std::fs::rename(&from, with_suffix(&aside, end)).map_err(file_error(&from))?;
+        }
+    }
+    remove_if_exists(&with_suffix(file, "-shm"))
+}
+
+/// Copies the schema and all rows of the database `file` to the empty database `copy`.
+/// `VACUUM INTO` would write pages before the first one, which turns the checksums on.
+async fn copy_rows(copy: &mut AnyConnection, file: &Path) -> Result<(), StoreError> {
+    // An incomplete copy is of no use, and a complete one is synchronised at the end.
+    copy.execute("PRAGMA journal_mode = off; PRAGMA synchronous = off").await?;
+    // With foreign keys SQLite would not copy whole records.
+    copy.execute("PRAGMA foreign_keys = off").await?;
+    let source = file_url(file, "rw")?.replacen("sqlite:", "file:", 1);
+    sqlx::query("ATTACH $1 AS source").bind(source).execute(&mut *copy).await?;
+    copy.execute("BEGIN").await?;
+    let schema: Vec<(String, String, String)> = sqlx::query_as(
+        "SELECT type, name, sql FROM source.sqlite_schema
+         WHERE sql IS NOT NULL AND name NOT LIKE 'sqlite^_%' ESCAPE '^' ORDER BY rowid",
+    )
+    .fetch_all(&mut *copy)
+    .await?;
+    // The indexes first, so that SQLite copies them too instead of sorting the rows again.
+    for (_, _, create) in &schema {
+        copy.execute(AssertSqlSafe(create.clone())).await?;
+    }
+    for (_, table, _) in schema.iter().filter(|(kind, ..)| kind == "table") {
+        let rows = format!("INSERT INTO main.\"{table}\" SELECT * FROM source.\"{table}\"");
+        copy.execute(AssertSqlSafe(rows)).await?;
+    }
+    copy.execute("COMMIT").await?;
+    copy.execute("DETACH source").await?;
+    Ok(())
+}
+
+/// Renames the finished `part` to `file`; contents and name are on the disk on return.
+fn publish(part: &Path, file: &Path) -> Result<(), StoreError> {
+    File::open(part).and_then(|file| file.sync_all()).map_err(file_error(part))?;
+    std::fs::rename(part, file).map_err(file_error(file))?;
+    sync_directory_of(file)
+}
+
+fn check_absent(file: &Path) -> Result<(), StoreError> {
+    let exists = file.exists();
+    if exists { Err(StoreError::Exists { file: file.to_owned() }) } else { Ok(()) }
+}
+
+fn remove_if_exists(file: &Path) -> Result<(), StoreError> {
+    match std::fs::remove_file(file) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(file_error(file)(error)),
+        _ => Ok(()),
+    }
+}
+
+fn with_suffix(file: &Path, suffix: &str) -> PathBuf {
+    let mut name = file.as_os_str().to_owned();
+    name.push(suffix);
+    name.into()
+}
+
+fn file_error(file: &Path) -> impl Fn(std::io::Error) -> StoreError {
+    move |source| StoreError::File { file: file.to_owned(), source }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ChangeSet;
+    use crate::{AssetRow, Store, Write};
+
+    /// More rows than the page cache of a connection holds.
+    #[tokio::test]
+    async fn all_pages_of_a_large_copy_have_checksums() {
+        let folder = tempfile::tempdir().unwrap();
+        let location = Location::File(folder.path().join("offbd.db"));
+        let (_store, mut writer) = Store::open(&location).await.unwrap();
+        let asset = |name: usize| {
+            Write::CreateAsset(AssetRow {
+                name: name.to_string(),
+                document: format!("\"{}\"", "x".repeat(20_000)),
+                revision: 1,
+                created_at: 0,
+                updated_at: 0,
+            })
+        };
+        let mut assets: Vec<_> = (0..400).map(asset).collect();
+        writer.commit(&mut [ChangeSet::unpartitioned(&mut assets)]).await.unwrap();
+        let copy = Location::File(folder.path().join("copy"));
+        back_up(&location, copy.file().unwrap(), None).await.unwrap();
+        writer.close().await.unwrap();
+        let report = crate::check(&copy, None).await.unwrap();
+        assert_eq!(report, crate::check(&location, None).await.unwrap());
+        assert_eq!((report.page_checksums, report.n_documents), (Some(true), 400));
+        assert_eq!(report.findings, [""; 0]);
+        let header = std::fs::read(copy.file().unwrap()).unwrap();
+        assert_eq!(header[20], 8, "the number of reserved bytes");
+    }
+}

@@ -1,0 +1,213 @@
+//! The results of the monitors and of the session, and how much was judged.
+//!
+//! No fault line does not mean no fault: a monitor that could not judge, a rig that is not
+//! learnt, and causes that cannot be told apart each have their own result.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::{CandidateView, SummaryView, Verdict, candidate_view, warnings};
+use crate::words::CodeWord;
+use offbd_core::diagnosis::Suspicion;
+use offbd_core::engine::{Misfit, MonitorState, Reach, State};
+use offbd_core::vocabulary::{FaultCode, PerAxis};
+
+/// The result of a session, or of one monitor in a session.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub enum Outcome {
+    /// A fault was confirmed.
+    #[serde(rename = "fault")]
+    Fault,
+    /// A fault was confirmed, but causes in different parts of the rig would explain it
+    /// equally.
+    #[serde(rename = "cannot tell")]
+    CannotTell,
+    /// A test has failed, and nothing was confirmed.
+    #[serde(rename = "pending")]
+    Pending,
+    /// Judged for long enough to confirm a fault, and there was none; for a session: by every
+    /// monitor.
+    #[serde(rename = "no fault")]
+    NoFault,
+    /// Only for a session: no fault, but some monitors have not judged.
+    #[serde(rename = "partly judged")]
+    PartlyJudged,
+    /// No fault, but the rig is not learnt, so that faults of its servos and its ball cannot
+    /// be confirmed.
+    #[serde(rename = "not learnt")]
+    NotLearnt,
+    /// Judged for less time than the confirmation of a fault takes.
+    #[serde(rename = "not judged")]
+    NotJudged,
+}
+
+impl Outcome {
+    /// Returns the word used in JSON.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Fault => "fault",
+            Self::CannotTell => "cannot tell",
+            Self::Pending => "pending",
+            Self::NoFault => "no fault",
+            Self::PartlyJudged => "partly judged",
+            Self::NotLearnt => "not learnt",
+            Self::NotJudged => "not judged",
+        }
+    }
+
+    /// Returns the result of a session whose monitors have the results `each`: the most
+    /// severe finding, or else the least that is known.
+    fn of_session(each: &[Self]) -> Self {
+        let found = [Self::Fault, Self::CannotTell, Self::Pending];
+        let all = |outcome| each.iter().all(|&o| o == outcome);
+        match found.into_iter().find(|outcome| each.contains(outcome)) {
+            Some(outcome) => outcome,
+            None if all(Self::NotJudged) => Self::NotJudged,
+            None if each.contains(&Self::NotLearnt) => Self::NotLearnt,
+            None if all(Self::NoFault) => Self::NoFault,
+            None => Self::PartlyJudged,
+        }
+    }
+}
+
+/// The result of one monitor in a session.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct JudgedView {
+    pub code: CodeWord,
+    /// Time of the session for which it could judge, s.
+    pub judged_s: f64,
+    /// That time as a fraction of the session from its first to its last sample, 0 to 1.
+    pub judged_share: f64,
+    pub outcome: Outcome,
+    /// Causes that would explain the evidence equally, heaviest first; empty if there is only
+    /// one.
+    pub candidates: Vec<CandidateView>,
+}
+
+impl Verdict {
+    /// Returns the result of each monitor, in the order of [`FaultCode::ALL`], of a session
+    /// that leaves the engine in `state`.
+    #[must_use]
+    pub fn monitors(&self, state: &State) -> Vec<JudgedView> {
+        let view = |(&code, monitor)| self.judged_view(code, monitor);
+        FaultCode::ALL.iter().zip(&state.monitors).map(view).collect()
+    }
+
+    fn judged_view(&self, code: FaultCode, monitor: &MonitorState) -> JudgedView {
+        let suspected = self.suspected[code as usize].as_deref();
+        let candidates = suspected.map(|s| s.candidates.iter().map(candidate_view).collect());
+        JudgedView {
+            code: code.into(),
+            judged_s: monitor.judged_s,
+            judged_share: monitor.judged_share,
+            outcome: self.outcome(code, monitor.reach),
+            candidates: candidates.unwrap_or_default(),
+        }
+    }
+
+    fn outcome(&self, code: FaultCode, reach: Reach) -> Outcome {
+        let suspected = self.suspected[code as usize].as_deref();
+        match (self.confirmed.contains(&code), suspected, reach) {
+            (true, Some(suspicion), _) if is_ambiguous(suspicion) => Outcome::CannotTell,
+            (true, ..) => Outcome::Fault,
+            (false, Some(_), _) => Outcome::Pending,
+            (false, None, Reach::Judged) => Outcome::NoFault,
+            (false, None, Reach::NotLearnt) => Outcome::NotLearnt,
+            (false, None, Reach::NotJudged) => Outcome::NotJudged,
+        }
+    }
+}
+
+/// Returns whether the candidates are in different parts of the rig.
+pub(super) fn is_ambiguous(suspicion: &Suspicion) -> bool {
+    let first = suspicion.candidates.first().map(|c| c.code);
+    suspicion.candidates.iter().any(|c| Some(c.code) != first)
+}
+
+impl SummaryView {
+    /// Adds the results of the monitors, and the result of the session that follows.
+    #[must_use]
+    pub fn with_monitors(self, monitors: Vec<JudgedView>) -> Self {
+        let each: Vec<Outcome> = monitors.iter().map(|m| m.outcome).collect();
+        Self { outcome: Some(Outcome::of_session(&each)), monitors, ..self }
+    }
+
+    /// Adds the root mean square of the residual along each axis, m/s².
+    #[must_use]
+    pub fn with_residual(self, rms_m_s2: PerAxis<Option<f64>>) -> Self {
+        Self { residual_x_m_s2: rms_m_s2.x, residual_y_m_s2: rms_m_s2.y, ..self }
+    }
+
+    /// Adds the warnings of `misfits`. If one of them prevents judging and nothing was found,
+    /// the result is [`Outcome::NotJudged`].
+    #[must_use]
+    pub fn with_misfits(self, misfits: &[Misfit]) -> Self {
+        let found =
+            matches!(self.outcome, Some(Outcome::Fault | Outcome::CannotTell | Outcome::Pending));
+        let prevented = !found && misfits.iter().any(|m| m.prevents_judging());
+        let outcome = if prevented { Some(Outcome::NotJudged) } else { self.outcome };
+        Self { outcome, warnings: warnings(misfits), ..self }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use offbd_core::diagnosis::{Candidate, Evidence, StatusByte, Transition};
+    use offbd_core::vocabulary::{FaultKind, FaultStatus, SimTime};
+
+    /// Returns the result of a confirmed stuck ball with these candidates.
+    fn stuck(candidates: Vec<Candidate>) -> JudgedView {
+        let mut byte = StatusByte::default();
+        byte.failed();
+        byte.confirm(false);
+        let (code, at) = (FaultCode::StuckBall, SimTime::new(1.0).unwrap());
+        let suspicion = Suspicion { onset: None, kind: None, candidates };
+        let (status, evidence) = (FaultStatus::Confirmed, Evidence::default());
+        let transition = Transition { at, code, status, byte, suspicion, evidence };
+        let mut verdict = Verdict::default();
+        verdict.take(0, &[transition]);
+        verdict.monitors(&State::default()).swap_remove(code as usize)
+    }
+
+    #[test]
+    fn candidates_in_different_parts_make_the_outcome_cannot_tell() {
+        let ball = Candidate { code: FaultCode::StuckBall, kind: None, weight: 0.6 };
+        let kind = Some(FaultKind::Dead);
+        let servo = Candidate { code: FaultCode::XServo, kind, weight: 0.4 };
+        let found = stuck(vec![ball, servo]);
+        assert_eq!(found.outcome, Outcome::CannotTell);
+        let named: Vec<(&str, f64)> =
+            found.candidates.iter().map(|c| (c.code.as_str(), c.weight)).collect();
+        assert_eq!(named, [("stuck_ball", 0.6), ("x_servo", 0.4)]);
+        assert_eq!(stuck(vec![ball, ball]).outcome, Outcome::Fault);
+        assert_eq!(stuck(Vec::new()).outcome, Outcome::Fault);
+    }
+
+    #[test]
+    fn the_outcome_of_a_session_is_its_worst_finding_or_the_least_known() {
+        use Outcome::{CannotTell, Fault, NoFault, NotJudged, NotLearnt, PartlyJudged, Pending};
+        let cases = [
+            (vec![NoFault, NoFault], NoFault),
+            (vec![NotJudged, NotJudged], NotJudged),
+            (vec![NoFault, NotJudged], PartlyJudged),
+            (vec![NotLearnt, NoFault], NotLearnt),
+            (vec![NotJudged, NotLearnt, NoFault], NotLearnt),
+            (vec![NotJudged, Pending], Pending),
+            (vec![Pending, CannotTell], CannotTell),
+            (vec![NoFault, CannotTell, Fault], Fault),
+        ];
+        for (each, wanted) in cases {
+            assert_eq!(Outcome::of_session(&each), wanted, "{each:?}");
+        }
+    }
+
+    #[test]
+    fn as_str_equals_the_serialised_word() {
+        use Outcome::{CannotTell, Fault, NoFault, NotJudged, NotLearnt, PartlyJudged, Pending};
+        for outcome in [Fault, CannotTell, Pending, NoFault, PartlyJudged, NotLearnt, NotJudged] {
+            assert_eq!(serde_json::to_value(outcome).unwrap(), outcome.as_str());
+        }
+    }
+}
