@@ -23,6 +23,8 @@ mod fault_memory;
 mod formats;
 mod forward;
 mod fuzz;
+#[cfg(all(feature = "mcap", feature = "xlsx"))]
+mod imports;
 mod journal;
 mod jwt;
 mod learning;

@@ -23,7 +23,7 @@ use super::{
 use offbd_core::vocabulary::Invalid;
 use offbd_service::{RecordingReader, Route, Service, SessionListQuery};
 use offbd_wire::service::{ImportView, Page, SessionCalibrationView, SessionView};
-use offbd_wire::session_file::{self, SessionFormat, SessionWriter};
+use offbd_wire::session_file::{SessionFormat, SessionWriter};
 use offbd_wire::verdict::FaultView;
 use offbd_wire::words::{SessionSort, SessionState, VerdictFilter};
 
@@ -123,8 +123,9 @@ pub(super) async fn open(
 /// numeric type, MCAP with JSON messages of the schema `offbd.Sample`, or the first sheet
 /// of an Excel workbook, in which a time may be a date. Its samples are processed like live
 /// telemetry. The asset's open session is ended first, and the new session is ended after
-/// the last row; live telemetry of the asset gets 429 until then. Of a file that is damaged
-/// or ends too early, nothing is kept.
+/// the last row; live telemetry of the asset gets 429 until then. Two files are read at a time,
+/// others wait. Of a file that is damaged, ends too early or expands too far, or if the
+/// connection is closed before the response, nothing is kept.
 #[utoipa::path(post, path = "/assets/{asset}/sessions/import", tag = "sessions",
     operation_id = "import_session",
     params(("asset" = String, description = "Name of the asset"), ImportQuery),
@@ -149,9 +150,8 @@ pub(super) async fn import(
     let limits = app.service.limits();
     let timeout = limits.body_timeout * IMPORT_TIMEOUT_FACTOR;
     let read = body::read(body, limits.import_bytes, timeout, &share).await?;
-    // The rows are parsed while they are imported, so that only the file is in memory.
-    let rows = session_file::open(Cursor::new(read), format)?;
-    let imported = app.service.import(&asset, query.name, rows, MAX_IMPORT_ROWS).await?;
+    let (file, limit) = (Cursor::new(read), MAX_IMPORT_ROWS);
+    let imported = app.service.import(&asset, query.name, file, format, limit).await?;
     Ok(created(&imported.session.id.clone(), imported))
 }
 

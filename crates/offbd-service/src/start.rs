@@ -15,7 +15,7 @@ use super::cluster::{self, Cluster, NodeTask};
 use super::communication::CommunicationWatch;
 use super::job::{self, Job};
 use super::jobs::{self, JobContext};
-use super::limits::{MAX_DRIVE_CYCLES, MAX_RECORDINGS, MAX_TRACES, MAX_WHOLE_TRACES};
+use super::limits::{MAX_DRIVE_CYCLES, MAX_IMPORTS, MAX_RECORDINGS, MAX_TRACES, MAX_WHOLE_TRACES};
 use super::mutes::Mutes;
 use super::notifications::{NotificationTransport, Notifier};
 use super::ownership::Ownership;
@@ -62,6 +62,7 @@ pub(super) struct Computing {
     pub(super) traces: Arc<Semaphore>,
     pub(super) whole_traces: Arc<Semaphore>,
     pub(super) drive_cycles: Arc<Semaphore>,
+    pub(super) imports: Arc<Semaphore>,
 }
 
 impl Computing {
@@ -72,6 +73,7 @@ impl Computing {
             traces: permits(MAX_TRACES),
             whole_traces: permits(MAX_WHOLE_TRACES),
             drive_cycles: permits(MAX_DRIVE_CYCLES),
+            imports: permits(MAX_IMPORTS),
         }
     }
 }

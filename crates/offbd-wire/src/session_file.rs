@@ -9,6 +9,8 @@
 
 #[cfg(feature = "parquet")]
 mod arrow;
+#[cfg(any(feature = "mcap", feature = "parquet", feature = "xlsx"))]
+mod byte_budget;
 #[cfg(feature = "parquet")]
 mod columns;
 #[cfg(feature = "mcap")]
@@ -26,6 +28,8 @@ mod sheet_rows;
 #[cfg(feature = "parquet")]
 mod trace_columns;
 mod trace_writer;
+#[cfg(feature = "xlsx")]
+mod workbook_check;
 #[cfg(feature = "xlsx")]
 mod xlsx;
 
@@ -183,6 +187,9 @@ pub enum SessionFileError {
     /// A part of the file that must be in memory as a whole is too large.
     #[error("{what} of the file has {found} bytes; at most {limit} are read")]
     TooLarge { what: &'static str, found: u64, limit: u64 },
+    /// What is decompressed or kept of the file is too much.
+    #[error("{what} expands to more than {limit} bytes; at most that many are read")]
+    Expands { what: &'static str, limit: u64 },
     #[error("the recording cannot be written as {format}: {reason}")]
     Write { format: SessionFormat, reason: String },
 }
@@ -269,7 +276,7 @@ pub fn open<S: Read + Seek + Send + 'static>(
         #[cfg(feature = "parquet")]
         SessionFormat::Arrow => Ok(Box::new(arrow::ArrowRows::new(source)?)),
         #[cfg(feature = "mcap")]
-        SessionFormat::Mcap => Ok(Box::new(mcap_rows::McapRows::new(source))),
+        SessionFormat::Mcap => Ok(Box::new(mcap_rows::McapRows::new(source)?)),
         #[cfg(feature = "xlsx")]
         SessionFormat::Xlsx => Ok(Box::new(xlsx::rows(source)?)),
         _ => {

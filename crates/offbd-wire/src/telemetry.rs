@@ -161,7 +161,7 @@ fn check_seq(sample: Sample) -> Result<Sample, String> {
 }
 
 /// Truncates a reason that is too long because it quotes the data.
-fn shorten(reason: &str) -> String {
+pub(super) fn shorten(reason: &str) -> String {
     if reason.len() <= MAX_REASON_BYTES {
         return reason.to_owned();
     }

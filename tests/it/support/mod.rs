@@ -24,6 +24,8 @@ pub mod provider;
 pub mod proxy;
 pub mod receiver;
 pub mod statement_gate;
+#[cfg(feature = "xlsx")]
+pub mod workbook;
 
 use std::future::Future;
 use std::path::Path;

@@ -1,13 +1,18 @@
 //! Imports a recording as a session. Its samples are processed like live telemetry.
 
 use std::collections::VecDeque;
+use std::io::{self, Read, Seek, SeekFrom};
+
+use tokio_util::sync::CancellationToken;
 
 use crate::PendingBatch;
 use crate::asset::AssetCommand;
 use crate::{Service, ServiceError};
 use offbd_core::vocabulary::Sample;
 use offbd_wire::service::{ImportView, SessionView};
-use offbd_wire::session_file::SessionRowError;
+use offbd_wire::session_file::{
+    self, SessionFileError, SessionFormat, SessionRowError, SessionRows,
+};
 use offbd_wire::telemetry::{AckView, Batch, BatchError, RowView, file_row};
 
 /// Batches of an import that wait for their acknowledgement at a time.
@@ -19,37 +24,38 @@ const MAX_LISTED: usize = 100;
 /// Samples in one batch of an import.
 const BATCH: usize = 2048;
 
+const STOPPED: ServiceError = ServiceError::Unavailable { what: "the service is shutting down" };
+
 impl Service {
-    /// Imports `rows`, at most `limit`, as the session `name` and ends it. The asset's open session is
-    /// ended first; until the import is complete, live telemetry of the asset is refused
-    /// with [`ServiceError::Busy`]. Continues if the caller is dropped. An import that fails
-    /// leaves neither a session nor faults; one that a stop interrupts is discarded at the
-    /// next start.
+    /// Imports the session file `source` of at most `limit` rows as the session `name` and ends
+    /// it. Waits until few enough other files are read, then reads it on a blocking thread. The
+    /// asset's open session is ended when the file has been opened; from then until the import
+    /// is complete, live telemetry of the asset is refused with [`ServiceError::Busy`]. An import
+    /// that fails, or whose caller is dropped, leaves neither a session nor faults; one that a
+    /// stop interrupts is discarded, at the latest at the next start.
     ///
     /// # Errors
     /// [`ServiceError::SessionExists`]; [`ServiceError::Invalid`] for an invalid name;
     /// [`ServiceError::TooMany`] if there are more rows; [`ServiceError::Batch`] if the file
-    /// cannot be read to its end; those of the samples' batches.
-    pub async fn import(
+    /// cannot be read to its end; [`ServiceError::Unavailable`] if the service stops; those of
+    /// the samples' batches.
+    pub async fn import<S: Read + Seek + Send + 'static>(
         &self,
         asset: &str,
         name: Option<String>,
-        rows: impl Iterator<Item = Result<Sample, SessionRowError>> + Send + 'static,
+        source: S,
+        format: Option<SessionFormat>,
         limit: usize,
     ) -> Result<ImportView, ServiceError> {
-        let (this, asset) = (self.clone(), asset.to_owned());
-        let task = tokio::spawn(async move {
-            let session = this.open_for(&asset, name, true).await?;
-            let id = session.id.clone();
-            match this.run_import(&asset, session, rows, limit).await {
-                Ok(imported) => {
-                    Ok(ImportView { session: this.end_session(&id).await?, ..imported })
-                }
-                Err(error) => {
-                    this.discard_import(&asset, id).await?;
-                    Err(error)
-                }
-            }
+        let stop = self.inner.handles.closing.child_token();
+        let _stop_if_dropped = stop.clone().drop_guard();
+        let permit = self.inner.computing.imports.clone().acquire_owned();
+        let permit = stop.run_until_cancelled(permit).await.and_then(Result::ok).ok_or(STOPPED)?;
+        let import = Import { service: self.clone(), asset: asset.to_owned(), limit, stop };
+        let task = tokio::task::spawn_blocking(move || {
+            let imported = import.run(name, source, format);
+            drop(permit);
+            imported
         });
         task.await.unwrap_or(Err(ServiceError::Unavailable { what: "the import failed" }))
     }
@@ -60,20 +66,67 @@ impl Service {
         self.inner.shards.call(asset, discard).await?;
         self.inner.deleter.session(&id).await
     }
+}
 
-    async fn run_import(
-        &self,
-        asset: &str,
-        session: SessionView,
-        rows: impl Iterator<Item = Result<Sample, SessionRowError>> + Send,
-        limit: usize,
+/// An import on its blocking thread.
+struct Import {
+    service: Service,
+    asset: String,
+    limit: usize,
+    /// Cancelled if the caller is dropped or the service stops.
+    stop: CancellationToken,
+}
+
+impl Import {
+    fn run(
+        self,
+        name: Option<String>,
+        source: impl Read + Seek + Send + 'static,
+        format: Option<SessionFormat>,
     ) -> Result<ImportView, ServiceError> {
+        let source = StoppableSource { source, stop: self.stop.clone() };
+        let rows = session_file::open(source, format).map_err(|error| self.unreadable(&error))?;
+        let runtime = self.service.inner.handles.runtime.clone();
+        runtime.block_on(self.import(name, rows))
+    }
+
+    async fn import(
+        &self,
+        name: Option<String>,
+        rows: Box<dyn SessionRows>,
+    ) -> Result<ImportView, ServiceError> {
+        let Self { service, asset, stop, .. } = self;
+        let session = service.open_for(asset, name, true).await?;
+        let id = session.id.clone();
+        let imported = match stop.run_until_cancelled(self.samples(session, rows)).await {
+            // The rows of a CSV file end also where it cannot be read on.
+            Some(imported) if !stop.is_cancelled() => imported,
+            _ => Err(STOPPED),
+        };
+        match imported {
+            Ok(imported) => Ok(ImportView { session: service.end_session(&id).await?, ..imported }),
+            Err(error) => {
+                service.discard_import(asset, id).await?;
+                Err(error)
+            }
+        }
+    }
+
+    /// Submits the samples of all rows.
+    async fn samples(
+        &self,
+        session: SessionView,
+        rows: Box<dyn SessionRows>,
+    ) -> Result<ImportView, ServiceError> {
+        let Self { service, asset, limit, .. } = self;
+        let limit = *limit;
         let name = session.name.clone();
         let mut counts = ImportCounts { view: empty(session), pending: VecDeque::new() };
         let mut rows = rows.peekable();
         let mut first = 0;
         while rows.peek().is_some() {
-            let rows = rows.by_ref().take(BATCH).map(batch_row).collect::<Result<Vec<_>, _>>()?;
+            let rows = rows.by_ref().take(BATCH).map(|row| self.batch_row(row));
+            let rows = rows.collect::<Result<Vec<_>, _>>()?;
             let n = rows.len();
             if first + n > limit {
                 return Err(ServiceError::TooMany { what: "rows in an imported file", limit });
@@ -82,7 +135,7 @@ impl Service {
             if counts.pending.len() >= MAX_PENDING {
                 counts.settle().await?;
             }
-            counts.pending.push_back((first, self.submit_when_ready(asset, batch, true).await?));
+            counts.pending.push_back((first, service.submit_when_ready(asset, batch, true).await?));
             first += n;
         }
         while !counts.pending.is_empty() {
@@ -90,17 +143,46 @@ impl Service {
         }
         Ok(counts.view)
     }
+
+    /// Returns a row of a file as one of a batch; an error if the file cannot be read on.
+    fn batch_row(
+        &self,
+        row: Result<Sample, SessionRowError>,
+    ) -> Result<Result<Sample, String>, ServiceError> {
+        match row {
+            Err(SessionRowError::Unreadable(error)) => Err(self.unreadable(&error)),
+            Err(SessionRowError::Rejected(row)) => Ok(file_row(Err(row.to_string()))),
+            Ok(sample) => Ok(file_row(Ok(sample))),
+        }
+    }
+
+    fn unreadable(&self, error: &SessionFileError) -> ServiceError {
+        if self.stop.is_cancelled() {
+            return STOPPED;
+        }
+        BatchError::Malformed { pointer: String::new(), reason: error.to_string() }.into()
+    }
 }
 
-/// Returns a row of a file as one of a batch; an error if the file cannot be read on.
-fn batch_row(row: Result<Sample, SessionRowError>) -> Result<Result<Sample, String>, ServiceError> {
-    match row {
-        Err(SessionRowError::Unreadable(error)) => {
-            let (pointer, reason) = (String::new(), error.to_string());
-            Err(BatchError::Malformed { pointer, reason }.into())
+/// A source that cannot be read any more once the import is to stop, so that a file that expands
+/// a lot is not read to its end for nobody.
+struct StoppableSource<S> {
+    source: S,
+    stop: CancellationToken,
+}
+
+impl<S: Read> Read for StoppableSource<S> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if self.stop.is_cancelled() {
+            return Err(io::Error::other("the import has been stopped"));
         }
-        Err(SessionRowError::Rejected(row)) => Ok(file_row(Err(row.to_string()))),
-        Ok(sample) => Ok(file_row(Ok(sample))),
+        self.source.read(buffer)
+    }
+}
+
+impl<S: Seek> Seek for StoppableSource<S> {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.source.seek(to)
     }
 }
 

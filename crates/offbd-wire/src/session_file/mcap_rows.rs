@@ -2,12 +2,13 @@
 //! samples. Other topics are skipped; so is the index, which is not needed.
 
 use std::collections::BTreeSet;
-use std::io::Read;
+use std::io::{Read, Seek, SeekFrom};
 
 use mcap::records::Record;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, parse_record};
 
+use super::byte_budget::ByteBudget;
 use super::mcap::SAMPLE_SCHEMA;
 use super::{
     RejectedRow, RowPlace, SessionFileError, SessionFormat, SessionRowError, SessionRows, guarded,
@@ -19,6 +20,9 @@ use offbd_core::vocabulary::Sample;
 /// picture may be long, a sample has two hundred. A file with a longer one is refused.
 const MAX_RECORD_BYTES: usize = 16 << 20;
 
+/// Bytes before the contents of a record: what it is, and its length.
+const RECORD_HEAD_BYTES: u64 = 9;
+
 fn damaged(error: &McapError) -> SessionFileError {
     SessionFileError::Damaged { format: SessionFormat::Mcap, reason: error.to_string() }
 }
@@ -29,25 +33,31 @@ pub(super) struct McapRows<S> {
     reader: LinearReader,
     schemas: BTreeSet<u16>,
     channels: BTreeSet<u16>,
+    budget: ByteBudget,
     n_read: u64,
     has_ended: bool,
 }
 
-impl<S: Read> McapRows<S> {
-    pub(super) fn new(source: S) -> Self {
+impl<S: Read + Seek> McapRows<S> {
+    pub(super) fn new(mut source: S) -> Result<Self, SessionFileError> {
+        let budget = ByteBudget::of_file(source.seek(SeekFrom::End(0))?);
+        source.rewind()?;
         let options = LinearReaderOptions::default()
             .with_validate_chunk_crcs(true)
             .with_record_length_limit(MAX_RECORD_BYTES);
-        Self {
+        Ok(Self {
             source,
             reader: LinearReader::new_with_options(options),
             schemas: BTreeSet::new(),
             channels: BTreeSet::new(),
+            budget,
             n_read: 0,
             has_ended: false,
-        }
+        })
     }
+}
 
+impl<S: Read> McapRows<S> {
     /// Reads up to the next message that should be a sample; `None` at the end of the file.
     fn advance(&mut self) -> Result<Option<Result<Sample, String>>, SessionFileError> {
         while let Some(event) = self.reader.next_event() {
@@ -57,6 +67,7 @@ impl<S: Read> McapRows<S> {
                     self.reader.notify_read(n);
                 }
                 LinearReadEvent::Record { data, opcode } => {
+                    self.budget.spend(RECORD_HEAD_BYTES + data.len() as u64)?;
                     let record = parse_record(opcode, data).map_err(|error| damaged(&error))?;
                     if let Some(row) = note(&mut self.schemas, &mut self.channels, &record) {
                         return Ok(Some(row));

@@ -204,6 +204,10 @@ impl<S: Read + Seek> SharedSource<S> {
         Ok(Self { source: Arc::new(Mutex::new(source)), n_bytes })
     }
 
+    pub(super) const fn n_bytes(&self) -> u64 {
+        self.n_bytes
+    }
+
     /// Reads up to `n` bytes from `start` on; fewer only at the end of the source.
     pub(super) fn read_at(&self, start: u64, n: usize) -> io::Result<Vec<u8>> {
         let mut source = self.source.lock().unwrap_or_else(PoisonError::into_inner);

@@ -8,6 +8,7 @@ use std::io::{Read, Seek};
 
 use parquet::file::metadata::ParquetMetaData;
 
+use super::byte_budget::ByteBudget;
 use super::parquet::SharedSource;
 use super::{SessionFileError, SessionFormat};
 
@@ -24,22 +25,23 @@ const USUAL_HEAD_BYTES: usize = 512;
 /// Deepest nesting in the head of a page; those of the format have three levels.
 const MAX_DEPTH: usize = 8;
 
-/// Checks the pages of the columns `leaves`.
+/// Checks the pages of the columns `leaves`, each of them and all together.
 ///
 /// # Errors
-/// [`SessionFileError::TooLarge`]; [`SessionFileError::Damaged`].
+/// [`SessionFileError::TooLarge`]; [`SessionFileError::Expands`]; [`SessionFileError::Damaged`].
 pub(super) fn check<S: Read + Seek>(
     source: &SharedSource<S>,
     metadata: &ParquetMetaData,
     leaves: &[usize],
 ) -> Result<(), SessionFileError> {
+    let mut budget = ByteBudget::of_file(source.n_bytes());
     for group in metadata.row_groups() {
         for chunk in leaves.iter().filter_map(|&leaf| group.columns().get(leaf)) {
             let (start, length) = (page_start(chunk), chunk.compressed_size());
             let (Ok(start), Ok(length)) = (u64::try_from(start), u64::try_from(length)) else {
                 return Err(damaged("a column has a negative position"));
             };
-            check_chunk(source, start, start.saturating_add(length))?;
+            check_chunk(source, start, start.saturating_add(length), &mut budget)?;
         }
     }
     Ok(())
@@ -54,6 +56,7 @@ fn check_chunk<S: Read + Seek>(
     source: &SharedSource<S>,
     mut at: u64,
     end: u64,
+    budget: &mut ByteBudget,
 ) -> Result<(), SessionFileError> {
     while at < end {
         let bytes = source.read_at(at, USUAL_HEAD_BYTES)?;
@@ -71,7 +74,10 @@ fn check_chunk<S: Read + Seek>(
                 });
             }
         }
-        at += head.n_bytes as u64 + head.compressed;
+        let n_bytes = head.n_bytes as u64;
+        // Also what is not compressed: the columns of a file may share their pages.
+        budget.spend(n_bytes + head.compressed.max(head.uncompressed))?;
+        at += n_bytes + head.compressed;
     }
     Ok(())
 }
@@ -247,10 +253,23 @@ mod tests {
         {
             let end = bytes.len() as u64;
             let source = SharedSource::new(std::io::Cursor::new(bytes)).unwrap();
-            let found = check_chunk(&source, 0, end);
+            let found = check_chunk(&source, 0, end, &mut ByteBudget::new("", 1 << 30));
             let too_large = matches!(found, Err(SessionFileError::TooLarge { .. }));
             assert_eq!(too_large, is_refused, "{found:?}");
         }
+    }
+
+    #[test]
+    fn the_pages_of_all_columns_count_together() {
+        // Four pages of 100 bytes, none of which are in the file.
+        let bytes = [0x15, 0, 0x15, 0xc8, 0x01, 0x15, 0, 0].repeat(4);
+        let end = bytes.len() as u64;
+        let source = SharedSource::new(std::io::Cursor::new(bytes)).unwrap();
+        let mut budget = ByteBudget::new("", 8 * 108);
+        assert!(check_chunk(&source, 0, end, &mut budget).is_ok());
+        assert!(check_chunk(&source, 0, end, &mut budget).is_ok());
+        let found = check_chunk(&source, 0, end, &mut budget);
+        assert!(matches!(found, Err(SessionFileError::Expands { limit: 864, .. })), "{found:?}");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::SessionFileError;
 use super::xlsx::CellValue;
 use crate::session_csv::COLUMNS;
-use crate::telemetry::MAX_SEQ;
+use crate::telemetry::{MAX_SEQ, shorten};
 use offbd_core::vocabulary::Sample;
 
 /// Most rows of a sheet: all that a spreadsheet has. A sheet with more is refused.
@@ -21,14 +21,15 @@ const fn name(column: usize) -> &'static str {
 pub(super) struct SheetRow {
     /// Counted from 0.
     index: u32,
-    values: [Option<f64>; N_COLUMNS],
+    /// NaN where a cell is empty, because a million rows are in memory.
+    values: [f64; N_COLUMNS],
     /// The first cell that is wrong, and why.
     wrong: Option<Box<str>>,
 }
 
 impl SheetRow {
     const fn new(index: u32) -> Self {
-        Self { index, values: [None; N_COLUMNS], wrong: None }
+        Self { index, values: [f64::NAN; N_COLUMNS], wrong: None }
     }
 
     /// The number of the row, as the spreadsheet shows it.
@@ -41,7 +42,8 @@ impl SheetRow {
         if let Some(wrong) = self.wrong {
             return Err(wrong.into_string());
         }
-        let [t_s, cmd_qx_rad, cmd_qy_rad, x_m, y_m, seq] = self.values;
+        let present = |value: f64| (!value.is_nan()).then_some(value);
+        let [t_s, cmd_qx_rad, cmd_qy_rad, x_m, y_m, seq] = self.values.map(present);
         let t_s = t_s.ok_or_else(|| format!("`{}` is empty", COLUMNS[0]))?;
         let whole = |seq: f64| {
             let is_whole = seq.fract() == 0.0 && (0.0..=MAX_SEQ as f64).contains(&seq);
@@ -57,15 +59,17 @@ impl SheetRow {
 pub(super) struct SheetRows<'a> {
     sheet: &'a str,
     header_row: Option<u32>,
-    header: Vec<(u32, String)>,
-    /// Where the columns are; `None` within the header.
-    columns: Option<[Option<u32>; N_COLUMNS]>,
+    /// Where the columns are.
+    columns: [Option<u32>; N_COLUMNS],
+    /// Whether the header has ended.
+    has_header: bool,
     rows: Vec<SheetRow>,
 }
 
 impl<'a> SheetRows<'a> {
     pub(super) const fn new(sheet: &'a str) -> Self {
-        Self { sheet, header_row: None, header: Vec::new(), columns: None, rows: Vec::new() }
+        let columns = [None; N_COLUMNS];
+        Self { sheet, header_row: None, columns, has_header: false, rows: Vec::new() }
     }
 
     /// Takes the cell at row and column, both counted from 0.
@@ -78,20 +82,20 @@ impl<'a> SheetRows<'a> {
             return Ok(());
         }
         if *self.header_row.get_or_insert(row) == row {
-            if let CellValue::Text(text) = value {
-                self.header.push((column, text.trim().to_owned()));
-            }
-            return Ok(());
+            return self.header(column, value);
         }
-        let columns = self.columns()?;
-        let Some(slot) = columns.iter().position(|at| *at == Some(column)) else { return Ok(()) };
+        self.end_header()?;
+        let Some(slot) = self.columns.iter().position(|at| *at == Some(column)) else {
+            return Ok(());
+        };
         let read = value.number(slot == 0);
         let row = self.row(row)?;
         match read {
-            Ok(value) => row.values[slot] = value,
+            Ok(value) => row.values[slot] = value.unwrap_or(f64::NAN),
             Err(why) => {
                 let (cell, name) = (cell_name(row.index, column), name(slot));
-                row.wrong.get_or_insert_with(|| format!("cell {cell} (`{name}`): {why}").into());
+                let wrong = || shorten(&format!("cell {cell} (`{name}`): {why}")).into();
+                row.wrong.get_or_insert_with(wrong);
             }
         }
         Ok(())
@@ -99,41 +103,43 @@ impl<'a> SheetRows<'a> {
 
     /// Ends the sheet.
     pub(super) fn end(mut self) -> Result<Vec<SheetRow>, SessionFileError> {
-        self.columns()?;
+        self.end_header()?;
         Ok(self.rows)
     }
 
-    fn columns(&mut self) -> Result<[Option<u32>; N_COLUMNS], SessionFileError> {
-        if let Some(columns) = self.columns {
-            return Ok(columns);
+    /// Takes a cell of the header.
+    fn header(&mut self, column: u32, value: CellValue<'_>) -> Result<(), SessionFileError> {
+        let CellValue::Text(text) = value else { return Ok(()) };
+        let Some(slot) = (0..N_COLUMNS).find(|&slot| text.trim() == name(slot)) else {
+            return Ok(());
+        };
+        match self.columns[slot].replace(column) {
+            Some(_) => Err(self.wrong(SessionFileError::TwoColumns(name(slot)))),
+            None => Ok(()),
         }
-        let mut columns = [None; N_COLUMNS];
-        for (i, column) in columns.iter_mut().enumerate() {
-            *column = self.find(name(i), i != SEQ)?;
-        }
-        self.columns = Some(columns);
-        Ok(columns)
     }
 
-    fn find(&self, name: &'static str, required: bool) -> Result<Option<u32>, SessionFileError> {
-        let wrong = |reason: SessionFileError| SessionFileError::Sheet {
-            sheet: self.sheet.to_owned(),
-            reason: reason.to_string(),
-        };
-        let mut found = self.header.iter().filter(|(_, text)| text == name);
-        match (found.next(), found.next()) {
-            (Some(_), Some(_)) => Err(wrong(SessionFileError::TwoColumns(name))),
-            (None, _) if required => Err(wrong(SessionFileError::NoColumn(name))),
-            (first, _) => Ok(first.map(|(column, _)| *column)),
+    /// Checks that the header has the columns of a session.
+    fn end_header(&mut self) -> Result<(), SessionFileError> {
+        if !self.has_header {
+            let missing = COLUMNS.iter().zip(&self.columns).find(|(_, at)| at.is_none());
+            if let Some((name, _)) = missing {
+                return Err(self.wrong(SessionFileError::NoColumn(name)));
+            }
+            self.has_header = true;
         }
+        Ok(())
+    }
+
+    fn wrong(&self, reason: impl ToString) -> SessionFileError {
+        SessionFileError::Sheet { sheet: self.sheet.to_owned(), reason: reason.to_string() }
     }
 
     /// Returns the row with the index; adds it if it is new.
     fn row(&mut self, index: u32) -> Result<&mut SheetRow, SessionFileError> {
         if self.rows.last().is_none_or(|row| row.index != index) {
             if self.rows.len() == MAX_ROWS {
-                let reason = format!("it has more than {MAX_ROWS} rows");
-                return Err(SessionFileError::Sheet { sheet: self.sheet.to_owned(), reason });
+                return Err(self.wrong(format!("it has more than {MAX_ROWS} rows")));
             }
             self.rows.push(SheetRow::new(index));
         }

@@ -3,31 +3,28 @@
 //!
 //! A number may be a number or its text. A time may be a date, which counts from 1970 in UTC, or
 //! a time of day, which counts from midnight. The library reads a sheet only as long as it
-//! borrows the workbook, so all rows are read at once; how much that may be is checked before.
+//! borrows the workbook, so all rows are read at once; how much that may be is checked before
+//! (`workbook_check.rs`).
 
-use std::io::{self, Read, Seek};
+use std::io::{Read, Seek};
 use std::vec;
 
 use calamine::{DataRef, ExcelDateTime, Reader, Xlsx};
-use zip::ZipArchive;
 
 use super::sheet_rows::{SheetRow, SheetRows};
+use super::workbook_check;
 use super::{
     RejectedRow, RowPlace, SessionFileError, SessionFormat, SessionRowError, SessionRows, guarded,
 };
 use crate::session_csv::parse_number;
 use offbd_core::vocabulary::Sample;
 
-/// Longest part of a workbook, once it is decompressed, bytes. Chosen: a sheet with half a
-/// million rows. A workbook with a longer one is refused.
-const MAX_PART_BYTES: u64 = 128 << 20;
-
 /// The day 1970-01-01 as spreadsheets count days, from 1900 and from 1904 on.
 const EPOCH_DAYS: [f64; 2] = [25_569.0, 24_107.0];
 
 const SECONDS_PER_DAY: f64 = 86_400.0;
 
-fn damaged(reason: impl ToString) -> SessionFileError {
+pub(super) fn damaged(reason: impl ToString) -> SessionFileError {
     SessionFileError::Damaged { format: SessionFormat::Xlsx, reason: reason.to_string() }
 }
 
@@ -83,7 +80,7 @@ fn seconds(date: ExcelDateTime, is_1904: bool) -> f64 {
 /// Opens a workbook and reads its first sheet.
 pub(super) fn rows<S: Read + Seek>(mut source: S) -> Result<XlsxRows, SessionFileError> {
     guarded(SessionFormat::Xlsx, || {
-        check_parts(&mut source)?;
+        workbook_check::check(&mut source)?;
         source.rewind()?;
         let mut workbook = Xlsx::new(source).map_err(damaged)?;
         let sheet = workbook.sheet_names().into_iter().next();
@@ -104,21 +101,6 @@ fn read<S: Read + Seek>(
         rows.cell(cell.get_position(), CellValue::of(cell.get_value(), is_1904))?;
     }
     rows.end()
-}
-
-/// Checks that no part is too long. What a part says of its own length may be wrong.
-fn check_parts<S: Read + Seek>(source: &mut S) -> Result<(), SessionFileError> {
-    let mut parts = ZipArchive::new(source).map_err(damaged)?;
-    for i in 0..parts.len() {
-        let part = parts.by_index(i).map_err(damaged)?;
-        let found = io::copy(&mut part.take(MAX_PART_BYTES + 1), &mut io::sink());
-        let found = found.map_err(damaged)?;
-        if found > MAX_PART_BYTES {
-            let (what, limit) = ("a part", MAX_PART_BYTES);
-            return Err(SessionFileError::TooLarge { what, found, limit });
-        }
-    }
-    Ok(())
 }
 
 /// The rows of the first sheet.
