@@ -18,6 +18,8 @@
 //!   minute; the URL of an empty PostgreSQL database;
 //! - `-- mqtt PORT [ROUNDS]`: devices over an MQTT broker on that port of this machine, with
 //!   messages lost on the way (feature `mqtt`);
+//! - `-- learning [ROUNDS]`: rate and latency while all rigs learn by themselves, and while none
+//!   does;
 //! - `-- latency`: time from a sample to its fault event, at half the maximum rate;
 //! - `-- only WORD`: only the loads with the word in their name, without *bare*;
 //! - `-- peer URL`: another database that accepts line protocol, see
@@ -34,6 +36,7 @@
 mod client;
 mod cluster;
 mod fleet;
+mod learning;
 mod load;
 #[cfg(feature = "mqtt")]
 mod mqtt;
@@ -61,6 +64,8 @@ use load::{
     DEVICES, Load, SAMPLES, Transport, columns_as_msgpack, loads, loads_of_peer, recording,
 };
 
+/// Number of samples between the faults of two devices, so that no two fail at the same time.
+const OFFSET: usize = 80;
 /// Number of assets for the measurement of memory.
 const ASSETS: usize = 10_000;
 
@@ -97,6 +102,7 @@ fn main() -> Result<()> {
             let rounds = arguments.get(2).map_or(Ok(3), |n| n.parse())?;
             return runtime.block_on(mqtt::measure(port, &samples, rounds));
         }
+        Some("learning") => return runtime.block_on(learning::measure(&samples, rounds)),
         Some("latency") => {
             for (load, batch) in [("WebSocket by 100", 100), ("WebSocket by 10", 10)] {
                 runtime.block_on(latency(&samples, load, batch))?;
@@ -331,8 +337,6 @@ fn peer(
 /// Measures the time from a sample to its fault event on the WebSocket, while every device
 /// sends at half the maximum rate.
 async fn latency(samples: &[Sample], load: &str, batch: usize) -> Result<()> {
-    /// Number of samples between the faults of two devices.
-    const OFFSET: usize = 80;
     let most = loads(samples).into_iter().find(|l| l.name == load);
     let rate = service(&most.context("no such load")?).await?.rate / 2.0;
     let sick = recording(SAMPLES, Some("x_servo:held@150-160"))?;
@@ -345,7 +349,6 @@ async fn latency(samples: &[Sample], load: &str, batch: usize) -> Result<()> {
         tokio::spawn(async move {
             let mut socket = Socket::connect(address, device).await?;
             let begin = begin + period.mul_f64(device as f64 / DEVICES as f64);
-            // No two devices fail at the same time.
             socket.pace(&sick[device * OFFSET..], batch, begin, period).await
         })
     };

@@ -25,6 +25,7 @@ mod forward;
 mod fuzz;
 #[cfg(all(feature = "mcap", feature = "xlsx"))]
 mod imports;
+mod jobs;
 mod journal;
 mod jwt;
 mod learning;

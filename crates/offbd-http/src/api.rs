@@ -49,6 +49,7 @@ fn with_assets(router: GuardedRouter) -> GuardedRouter {
         .routes(Operate, routes!(calibrations::create))
         .routes(Read, routes!(calibrations::get))
         .routes(Operate, routes!(calibrations::activate))
+        .routes(Operate, routes!(calibrations::cancel))
         .routes(ReadAsset, routes!(learning::get))
         .routes(Operate, routes!(learning::accept))
         .routes(Operate, routes!(learning::discard))
@@ -103,6 +104,7 @@ fn with_sessions(router: GuardedRouter) -> GuardedRouter {
         .routes(Operate, routes!(remarks::add))
         .routes(Operate, routes!(remarks::remove))
         .routes(Read, routes!(replays::get))
+        .routes(Operate, routes!(replays::cancel))
 }
 
 /// Adds tokens and logins.

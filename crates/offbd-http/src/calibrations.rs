@@ -89,3 +89,18 @@ pub(super) async fn activate(
     let by = query.known_actor(&caller);
     Ok(Json(service.activate_calibration(&asset, &id, by).await?))
 }
+
+/// Cancels a calibration that waits or runs. It fails; one that runs may take a moment to stop.
+/// A rig that learns by itself tries again once it has shown half as much motion again.
+#[utoipa::path(post, path = "/assets/{asset}/calibrations/{id}/cancel", tag = "assets",
+    operation_id = "cancel_calibration",
+    params(("asset" = String, description = "Name of the asset"),
+        ("id" = String, description = "Id of the calibration")),
+    responses((status = 200, body = CalibrationJobView), (status = 404, body = Problem),
+        (status = 409, body = Problem, description = "The calibration neither waits nor runs")))]
+pub(super) async fn cancel(
+    State(service): State<Service>,
+    AssetItemPath(asset, id): AssetItemPath,
+) -> Result<Json<CalibrationJobView>, Problem> {
+    Ok(Json(service.cancel_calibration(&asset, &id).await?))
+}

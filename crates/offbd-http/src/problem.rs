@@ -141,6 +141,7 @@ impl From<ServiceError> for Problem {
                 conflict("nothing-to-acknowledge", "No current occurrence")
             }
             E::NoDriveCycle(_) => conflict("no-drive-cycle", "No drive cycle"),
+            E::JobEnded { .. } => conflict("job-ended", "Job neither waits nor runs"),
             E::NotDone { .. } => conflict("not-done", "Calibration not done"),
             E::NothingOffered { .. } => conflict("nothing-offered", "No calibration offered"),
             E::AlreadyLearnt { .. } => conflict("already-learnt", "Rig already calibrated"),

@@ -41,3 +41,16 @@ pub(super) async fn get(
 ) -> Result<Json<ReplayView>, Problem> {
     Ok(Json(service.replay_state(&id).await?))
 }
+
+/// Cancels a replay that waits or runs. It fails; one that runs may take a moment to stop.
+#[utoipa::path(post, path = "/replays/{id}/cancel", tag = "sessions",
+    operation_id = "cancel_replay",
+    params(("id" = String, description = "Id of the replay")),
+    responses((status = 200, body = ReplayView), (status = 404, body = Problem),
+        (status = 409, body = Problem, description = "The replay neither waits nor runs")))]
+pub(super) async fn cancel(
+    State(service): State<Service>,
+    Path(id): Path<String>,
+) -> Result<Json<ReplayView>, Problem> {
+    Ok(Json(service.cancel_replay(&id).await?))
+}

@@ -16,7 +16,7 @@ fn asyncapi_yaml_equals_the_generated_description() {
 fn compare(file: &str, generated: &str) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(file);
     if std::env::var_os("UPDATE_OPENAPI").is_some() {
-        std::fs::write(&path, generated).unwrap();
+        std::fs::write(&path, generated).expect("the description is writable");
     }
     let committed = std::fs::read_to_string(&path).unwrap_or_default();
     assert!(

@@ -55,6 +55,8 @@ pub enum ServiceError {
     NoRecording { asset: String, code: String },
     #[error(transparent)]
     NoDriveCycle(NoDriveCycle),
+    #[error("the job `{id}` neither waits nor runs here")]
+    JobEnded { id: String },
     #[error("calibration `{id}` is not done: {state}")]
     NotDone { id: String, state: String },
     #[error(

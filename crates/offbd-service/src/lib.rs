@@ -50,6 +50,7 @@
 //! - `mutes`: the monitors that a person has muted.
 //! - `tags`: what is permitted as a tag of a rig.
 //! - `upkeep`: deletion in parts, retention, cold data, the watchdog of ingest.
+//! - `background`: long computations on threads of a low priority.
 //! - `cold_files`: ended sessions as files outside the database.
 //! - `simulation`, a test: the whole service without threads, with devices and faults.
 //! - [`access`]: roles and rights, tokens, JSON Web Tokens, audit entries.
@@ -60,6 +61,7 @@
 pub mod access;
 mod asset;
 mod asset_quota;
+mod background;
 mod clock;
 mod cluster;
 mod cold_files;

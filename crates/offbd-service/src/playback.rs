@@ -1,12 +1,20 @@
 //! Plays a recorded session: its samples and actions, in their original order.
 
 use std::ops::ControlFlow;
+use std::sync::mpsc;
 
 use super::ServiceError;
+use super::background::Priority;
 use super::writing::Handles;
 use offbd_core::engine::Input;
 use offbd_core::vocabulary::FaultCode;
 use offbd_store::{ActionKind, ActionRow, RecordingReader, SessionRow};
+
+/// Inputs that are passed to another thread at once.
+const BLOCK: usize = 1024;
+
+/// Blocks that wait for the other thread; reading waits when there are more.
+const MAX_WAITING_BLOCKS: usize = 4;
 
 /// Passes the inputs of `session` from its sample `first` on to `take`, in their original
 /// order, until it breaks at a sample. Blocks on the store, so it must not run on a thread
@@ -19,6 +27,42 @@ pub(super) fn play(
 ) -> Result<(), ServiceError> {
     let rows = handles.wait(handles.store.actions(&session.id))?;
     play_inputs(handles, rows, handles.store.recording(session, first), first, take)
+}
+
+/// As [`play`] from the first sample on, but calls `take` on a thread of its own with this
+/// `priority`. The recording is read on the current thread.
+pub(super) fn play_in_background(
+    handles: &Handles,
+    session: &SessionRow,
+    priority: Priority,
+    mut take: impl FnMut(Input) -> ControlFlow<()> + Send,
+) -> Result<(), ServiceError> {
+    std::thread::scope(|scope| {
+        let (send, blocks) = mpsc::sync_channel::<Vec<Input>>(MAX_WAITING_BLOCKS);
+        let taking = priority.spawn(scope, move || {
+            for input in blocks.into_iter().flatten() {
+                let is_sample = matches!(input, Input::NewSample(_));
+                if take(input).is_break() && is_sample {
+                    return;
+                }
+            }
+        })?;
+        let mut block = Vec::new();
+        let read = play(handles, session, 0, |input| {
+            block.push(input);
+            if block.len() < BLOCK {
+                return ControlFlow::Continue(());
+            }
+            let sent = send.send(std::mem::take(&mut block));
+            if sent.is_ok() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        });
+        // The other thread may have broken off.
+        let _ = send.send(block);
+        drop(send);
+        let panicked = |_| ServiceError::Unavailable { what: "evaluating the recording failed" };
+        taking.join().map_err(panicked)?;
+        read
+    })
 }
 
 /// As [`play`], with the actions of the session and its recording from its sample `first` on.

@@ -13,7 +13,7 @@ use super::asset::{AssetCommand, Environment, Loader, MANY_SAMPLES, Presences, S
 use super::asset_quota::AssetQuota;
 use super::cluster::{self, Cluster, NodeTask};
 use super::communication::CommunicationWatch;
-use super::job::{self, Job};
+use super::job::JobQueues;
 use super::jobs::{self, JobContext};
 use super::limits::{MAX_DRIVE_CYCLES, MAX_IMPORTS, MAX_RECORDINGS, MAX_TRACES, MAX_WHOLE_TRACES};
 use super::mutes::Mutes;
@@ -45,7 +45,7 @@ pub(super) struct Inner {
     pub(super) shards: Shards,
     pub(super) deleter: Deleter,
     pub(super) quota: AssetQuota,
-    pub(super) jobs: mpsc::Sender<Job>,
+    pub(super) jobs: JobQueues,
     pub(super) job_context: JobContext,
     /// One permit for each sample between arrival and commit.
     pub(super) in_flight: Arc<Semaphore>,
@@ -128,7 +128,6 @@ pub(super) struct Parts {
     pub(super) committer: Committer,
     pub(super) shards: Vec<Shard>,
     pub(super) loader: Loader,
-    pub(super) jobs: mpsc::Receiver<Job>,
     pub(super) upkeep: Upkeep,
     pub(super) node: Option<NodeTask>,
     pub(super) communication: CommunicationWatch,
@@ -138,14 +137,14 @@ impl Parts {
     /// Starts the writer, then the other threads and tasks, and queues unfinished jobs again.
     /// If that fails, nothing of it is left: it would still change the store.
     async fn start(self, service: Service) -> Result<(Service, Workers), ServiceError> {
-        let Self { committer, shards, loader, jobs, upkeep, node, communication } = self;
+        let Self { committer, shards, loader, upkeep, node, communication } = self;
         let mut workers = Workers {
             shards: Vec::new(),
             jobs: Vec::new(),
             closing: service.inner.handles.closing.clone(),
             committer: committer.spawn()?,
         };
-        let Inner { limits, handles, job_context, .. } = &*service.inner;
+        let Inner { limits, handles, job_context, jobs, in_flight, .. } = &*service.inner;
         let started = async {
             // Before the sweeper, which deletes them.
             service.discard_imports(handles.ownership.filter().as_deref()).await?;
@@ -153,7 +152,7 @@ impl Parts {
             for shard in shards {
                 workers.shards.push(shard.spawn()?);
             }
-            workers.jobs = jobs::spawn(limits.jobs, job_context, jobs);
+            workers.jobs = jobs::spawn(limits, job_context, jobs, in_flight);
             workers.jobs.push(tokio::spawn(loader.run()));
             workers.jobs.extend(upkeep.spawn());
             let is_node = node.is_some();
@@ -275,11 +274,11 @@ impl Service {
         let way = WayToWriter::new(store, writer, &limits, clock, cluster.is_some());
         let WayToWriter { handles, committer, events, n_commits, transfers, lost } = way;
         let presences = Presences::default();
-        let (jobs, jobs_queue) = mpsc::channel(job::MAX_QUEUED);
+        let jobs = JobQueues::default();
         let env = Environment {
             handles: handles.clone(),
             presences: presences.clone(),
-            jobs: jobs.clone(),
+            jobs: jobs.automatic.clone(),
         };
         let (queues, shards, loader) = Shards::new(&limits, &env);
         let deleter = Deleter::new(handles.clone());
@@ -303,8 +302,7 @@ impl Service {
         });
         let communication =
             CommunicationWatch::new(handles.clone(), presences.clone(), limits.communication);
-        let parts =
-            Parts { committer, shards, loader, jobs: jobs_queue, upkeep, node, communication };
+        let parts = Parts { committer, shards, loader, upkeep, node, communication };
         let inner = Inner {
             job_context: JobContext::new(handles.clone(), queues.clone()),
             handles,

@@ -627,21 +627,11 @@ impl Store {
         &self,
         owned: Option<&[PartitionId]>,
     ) -> Result<Vec<String>, StoreError> {
-        self.unfinished(
+        let mut query = QueryBuilder::new(
             "SELECT replay.id FROM replay JOIN session ON session.id = replay.session
              WHERE replay.state IN ('queued', 'running')",
-            owned,
-        )
-        .await
-    }
-
-    async fn unfinished(
-        &self,
-        jobs: &'static str,
-        owned: Option<&[PartitionId]>,
-    ) -> Result<Vec<String>, StoreError> {
-        let mut query = QueryBuilder::new(jobs);
-        query.push_owned(owned)?;
+        );
+        query.push_owned(owned)?.push(" ORDER BY replay.id");
         let rows: Vec<(String,)> = query.rows().fetch_all(&self.pool).await?;
         Ok(rows.into_iter().map(|(id,)| id).collect())
     }
@@ -672,14 +662,17 @@ impl Store {
         Ok(query.rows().fetch_all(&self.pool).await?)
     }
 
-    /// Ids of the calibrations that an earlier process did not finish; of the partitions
-    /// `owned`, or of all.
+    /// The calibrations that an earlier process did not finish, each by its id and who made it;
+    /// of the partitions `owned`, or of all.
     pub async fn unfinished_calibrations(
         &self,
         owned: Option<&[PartitionId]>,
-    ) -> Result<Vec<String>, StoreError> {
-        let jobs = "SELECT id FROM calibration WHERE state IN ('queued', 'running')";
-        self.unfinished(jobs, owned).await
+    ) -> Result<Vec<(String, Option<String>)>, StoreError> {
+        let mut query = QueryBuilder::new(
+            "SELECT id, made_by FROM calibration WHERE state IN ('queued', 'running')",
+        );
+        query.push_owned(owned)?.push(" ORDER BY id");
+        Ok(query.rows().fetch_all(&self.pool).await?)
     }
 }
 

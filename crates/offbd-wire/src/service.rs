@@ -13,8 +13,8 @@ use super::trace::TraceView;
 use super::trend::TrendWarningView;
 use super::verdict::{EvidenceView, FaultView, SummaryView, evidence_view};
 use super::words::{
-    AxisWord, ChangeWord, CodeWord, CommandWord, HistoryWord, JobState, KindWord, LineWord,
-    ModelWord, ProfileWord, SessionState, StatusWord,
+    AxisWord, ChangeWord, CodeWord, CommandWord, HistoryWord, JobState, JobWaitReason, KindWord,
+    LineWord, ModelWord, ProfileWord, SessionState, StatusWord,
 };
 use offbd_core::diagnosis::StatusByte;
 use offbd_core::engine::{MonitorState, State, Unjudged};
@@ -511,12 +511,22 @@ pub struct ReplayResultView {
     pub truncated: bool,
 }
 
+/// Why a background job waits.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct JobWaitView {
+    pub reason: JobWaitReason,
+    /// Number of jobs that run or come before it. Further short ones may pass it.
+    pub n_before: usize,
+}
+
 /// A replay job: judging a recorded session again.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct ReplayView {
     pub id: String,
     pub session_id: String,
     pub state: JobState,
+    /// Why it waits; null unless it is queued.
+    pub waits: Option<JobWaitView>,
     /// Fraction of the samples judged so far, 0 to 1.
     pub progress: f64,
     pub settings: ReplaySettingsView,
@@ -580,6 +590,8 @@ pub struct CalibrationJobView {
     pub id: String,
     pub asset: String,
     pub state: JobState,
+    /// Why it waits; null unless it is queued.
+    pub waits: Option<JobWaitView>,
     /// The sessions, or stretches of sessions, it learns from.
     pub sessions: Vec<TrainingDataView>,
     /// Time of creation, RFC 3339.

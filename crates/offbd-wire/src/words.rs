@@ -231,6 +231,16 @@ words! {
 }
 
 words! {
+    /// Why a background job waits.
+    JobWaitReason as JobWaitReason {
+        /// Other jobs run or come before it.
+        Jobs = "jobs",
+        /// Samples are queued; what a rig learns by itself begins when fewer are.
+        Samples = "samples",
+    }
+}
+
+words! {
     /// How a transition differs between two verdicts.
     ChangeWord as TransitionChange {
         /// In both verdicts, with equal time, kind and onset.

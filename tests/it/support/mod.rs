@@ -46,8 +46,9 @@ use serde_json::{Value, json};
 use sqlx::{AssertSqlSafe, ConnectOptions, Executor};
 use sse_stream::{Sse, SseStream};
 
-/// Longest time to wait for anything; far more than is needed.
-pub const DEADLINE: Duration = Duration::from_secs(60);
+/// Longest time to wait for anything; far more than is needed, also by a thread of the lowest
+/// priority beside other tests.
+pub const DEADLINE: Duration = Duration::from_secs(180);
 
 /// A service with its own data directory.
 pub struct ServiceFixture {

@@ -6,6 +6,7 @@ import { refusal } from "../../src/parts/login/rights.ts";
 import { dimensions, hasDefaultDimensions } from "../../src/words/dimensions.ts";
 import { codeTitle, faultMeaning, faultTitle, kindMeaning } from "../../src/words/fault-names.ts";
 import { changeOf, chipClass, stateText } from "../../src/words/fault-state.ts";
+import { jobText } from "../../src/words/job.ts";
 import { deliverySummary, lineSentence, sentence } from "../../src/words/sentence.ts";
 import { healthByFaults, severity } from "../../src/words/severity.ts";
 import { isFailing, STATUS_BITS } from "../../src/words/status-byte.ts";
@@ -17,6 +18,14 @@ test("known codes and kinds have titles, unknown ones are shown as plain text", 
   assert.equal(codeTitle("new_code"), "new code");
   assert.equal(kindMeaning("new_kind"), "new kind");
   assert.equal(kindMeaning(null), "the kind of fault is not known");
+});
+
+test("a job that waits tells for what, another one what it does", () => {
+  assert.equal(jobText({ waits: null }, "Judging"), "Judging…");
+  assert.equal(jobText({ waits: { reason: "jobs", n_before: 0 } }, "Judging"), "Judging…");
+  assert.equal(jobText({ waits: { reason: "jobs", n_before: 1 } }, "Judging"), "Waiting for 1 other job…");
+  const samples = { reason: "samples", n_before: 0 };
+  assert.equal(jobText({ waits: samples }, "Learning"), "Waiting until fewer samples are queued…");
 });
 
 test("severity decreases from failing over acknowledged and pending to on record", () => {

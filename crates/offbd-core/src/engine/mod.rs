@@ -30,7 +30,9 @@ mod untested;
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 pub use admit::rejection;
-pub use calibrate::{CannotCalibrate, calibrate, calibrate_with_prospects};
+pub use calibrate::{
+    CannotCalibrate, calibrate, calibrate_with_prospects, calibrate_with_prospects_while,
+};
 pub use drive_cycle::{
     DriveCycle, DriveLaw, FaultVerdict, Feedback, MonitorVerdict, NoDriveCycle, NotReached, Order,
     TriedFault, drive_cycle,

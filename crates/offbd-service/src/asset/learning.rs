@@ -13,7 +13,7 @@ use super::learning_record::{CalibrationEnd, REFINED_SESSIONS, TrainingSession};
 use super::session::OpenSession;
 use super::turn::Turn;
 use crate::access::AuditEntry;
-use crate::job::Job;
+use crate::job::{self, Job, NewJob};
 use crate::{ServiceError, views};
 use offbd_core::vocabulary::Axis;
 use offbd_store::{AccessWrite, CalibrationRow, Write};
@@ -23,7 +23,7 @@ use offbd_wire::verdict::{Outcome, SummaryView};
 use offbd_wire::words::JobState;
 
 /// The actor of what a rig learns by itself.
-const ACTOR: &str = "offbd";
+pub(crate) const ACTOR: &str = "offbd";
 
 /// Motion below which an axis counts as not having moved, s.
 const MOVED_S: f64 = 1.0;
@@ -38,7 +38,7 @@ impl Asset {
         let open = self.open_training_session();
         let calibrated = self.rig.calibration.is_some();
         let Some(training) = self.learning.due(calibrated, open.as_ref()) else { return Ok(()) };
-        let Ok(permit) = turn.env.jobs.clone().try_reserve_owned() else { return Ok(()) };
+        let Some(room) = turn.env.jobs.reserve() else { return Ok(()) };
         let sessions: Vec<&str> = training.iter().map(|t| t.id.as_str()).collect();
         let row = CalibrationRow {
             id: Uuid::now_v7().to_string(),
@@ -55,7 +55,9 @@ impl Asset {
         };
         let id = row.id.clone();
         turn.writes.push(Write::PutCalibration(row));
-        turn.jobs.push((permit, Job::Calibration(id.clone())));
+        let cost = job::calibration_cost(training.iter().map(|t| t.n_samples).sum());
+        let job = Job::Calibration(id.clone());
+        turn.jobs.push((room, NewJob { job, asset: self.row.name.clone(), cost }));
         self.learning.begin(id, training, open.as_ref());
         self.write_learning(turn)
     }

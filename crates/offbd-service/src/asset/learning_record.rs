@@ -46,6 +46,12 @@ impl MotionSeconds {
         Self { x: sum(self.x, other.x), y: sum(self.y, other.y) }
     }
 
+    /// Returns what is left after the part `before`.
+    pub(crate) fn after(self, before: Self) -> Self {
+        let left = |whole: Option<f64>, before: Option<f64>| Some(whole? - before.unwrap_or(0.0));
+        Self { x: left(self.x, before.x), y: left(self.y, before.y) }
+    }
+
     /// Returns the shorter of the two durations; `None` without any axis.
     pub(crate) fn shortest(self) -> Option<f64> {
         self.x.into_iter().chain(self.y).reduce(f64::min)

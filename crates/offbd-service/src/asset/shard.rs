@@ -411,6 +411,7 @@ mod tests {
     use crate::asset::presence::Presences;
     use crate::asset::session::OpenSession;
     use crate::asset::session_rate::SessionRate;
+    use crate::job::JobQueues;
     use crate::ownership::Ownership;
     use crate::writing::Handles;
     use crate::{Clock, Limits};
@@ -454,7 +455,7 @@ mod tests {
         let data = tempfile::tempdir().unwrap();
         let location = Location::File(data.path().join("test.sqlite"));
         let (store, _writer) = Store::open(&location).await.unwrap();
-        let ((jobs, _), (writer, _sets)) = (mpsc::channel(1), mpsc::channel(1));
+        let (jobs, (writer, _sets)) = (JobQueues::default().automatic, mpsc::channel(1));
         let (_, outage) = watch::channel(None);
         let (limits, closing) =
             (Limits { shards: 1, ..Limits::default() }, CancellationToken::new());

@@ -1,11 +1,11 @@
 //! The execution of one command and the changes that result from it.
 
-use tokio::sync::mpsc::{self, OwnedPermit};
+use tokio::sync::mpsc::OwnedPermit;
 
 use super::command::Reply;
 use super::presence::Presences;
 use crate::ServiceError;
-use crate::job::Job;
+use crate::job::{JobQueue, JobRoom, NewJob};
 use crate::writing::{EngineGeneration, Handles, WriteSet};
 use offbd_store::{Micros, Write};
 
@@ -14,8 +14,8 @@ use offbd_store::{Micros, Write};
 pub(crate) struct Environment {
     pub(crate) handles: Handles,
     pub(crate) presences: Presences,
-    /// The queue of background jobs.
-    pub(crate) jobs: mpsc::Sender<Job>,
+    /// The queue of automatic calibrations.
+    pub(crate) jobs: JobQueue,
 }
 
 /// The execution of one command.
@@ -28,8 +28,8 @@ pub(super) struct Turn<'a> {
     /// Whether the engine's state has changed: if the command fails afterwards, the
     /// engine is ahead of the store.
     pub(super) engine_changed: bool,
-    /// Jobs to queue once the writes are durable, each with its permit of the queue.
-    pub(super) jobs: Vec<(OwnedPermit<Job>, Job)>,
+    /// Jobs to queue once the writes are durable, each with its room in the queue.
+    pub(super) jobs: Vec<(JobRoom, NewJob)>,
     /// The engine that the changes belong to.
     pub(super) generation: EngineGeneration,
     /// Whether changes of earlier turns may not be settled yet.
@@ -76,7 +76,7 @@ impl<'a> Turn<'a> {
         let Self { env, writes, jobs, generation, room, .. } = self;
         let completion = Box::new(move |outcome: Result<(), ServiceError>| {
             if outcome.is_ok() {
-                jobs.into_iter().for_each(|(permit, job)| drop(permit.send(job)));
+                jobs.into_iter().for_each(|(room, job)| room.put(job));
             }
             reply.send(outcome.map(|()| answer));
         });
@@ -99,8 +99,8 @@ mod tests {
         let (service, mut parts) =
             Service::assemble(store, writer, Limits::default(), None, None, Clock::System);
         let handles = service.inner.handles.clone();
-        let env =
-            Environment { handles, presences: Presences::default(), jobs: mpsc::channel(1).0 };
+        let jobs = service.inner.jobs.automatic.clone();
+        let env = Environment { handles, presences: Presences::default(), jobs };
         let (mut this, mut other) = (EngineGeneration::default(), EngineGeneration::default());
         let commit = |generation: &mut EngineGeneration| {
             let mut turn = Turn::begin(&env, generation).unwrap();

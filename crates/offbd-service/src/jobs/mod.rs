@@ -1,10 +1,17 @@
-//! Background jobs: replays and calibrations. A few run at a time, others wait in a bounded
-//! queue.
+//! Background jobs: replays and calibrations. A few run at a time, others wait in bounded
+//! queues.
 
-mod calibration;
+pub(super) mod calibration;
 mod context;
-mod replay;
+mod quiet;
+pub(super) mod replay;
 mod workers;
+
+/// Why a job failed that a person cancelled.
+const CANCELLED: &str = "it was cancelled";
 
 pub(super) use context::JobContext;
 pub(super) use workers::spawn;
+
+#[cfg(test)]
+mod tests;

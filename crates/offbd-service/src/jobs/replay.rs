@@ -2,8 +2,13 @@
 
 use std::ops::ControlFlow;
 
+use tokio_util::sync::CancellationToken;
+
+use super::CANCELLED;
 use super::context::JobContext;
-use crate::playback::play;
+use crate::background::Priority;
+use crate::job::{JobProgress, RunningJob};
+use crate::playback::play_in_background;
 use crate::replay_settings::{calibration, setup};
 use crate::{ServiceError, views};
 use offbd_core::engine::Input;
@@ -18,20 +23,28 @@ use offbd_wire::words::JobState;
 /// there are more.
 const MAX_LINES: usize = 10_000;
 
-/// Samples between two checks whether the service is shutting down.
+/// Samples between two checks whether the replay is cancelled.
 const CHECK_EVERY: u64 = 1024;
 
-/// Runs a replay to completion; leaves it unfinished if the service shuts down.
-pub(super) async fn run(context: &JobContext, id: &str) -> Result<(), ServiceError> {
+/// Runs a replay to completion, with this `priority`, or until it is cancelled; leaves it
+/// unfinished if the service shuts down.
+pub(super) async fn run(
+    context: &JobContext,
+    running: &RunningJob,
+    priority: Priority,
+) -> Result<(), ServiceError> {
+    let id = running.job.id();
     let Some(mut row) = context.handles.store.replay(id).await? else { return Ok(()) };
     let Some(session) = context.handles.store.session(&row.session).await? else { return Ok(()) };
     row.state = JobState::Running.to_string();
     context.handles.write(&session.asset, vec![Write::PutReplay(row.clone())]).await?;
-    let (worker, job) = (context.clone(), row.clone());
-    let judged = tokio::task::spawn_blocking(move || judge(&worker, &job)).await;
+    let (worker, job, cancelled) = (context.clone(), row.clone(), running.cancelled.clone());
+    let judge = move || judge(&worker, &job, &cancelled, priority);
+    let judged = tokio::task::spawn_blocking(judge).await;
     let failed = ServiceError::Unavailable { what: "evaluating the recording failed" };
     match judged.unwrap_or(Err(failed)) {
-        Ok(None) => return Ok(()),
+        Ok(None) if context.handles.closing.is_cancelled() => return Ok(()),
+        Ok(None) => cancel(&mut row),
         Ok(Some(result)) => {
             row.state = JobState::Done.to_string();
             row.result = Some(views::to_json(&result)?);
@@ -41,12 +54,37 @@ pub(super) async fn run(context: &JobContext, id: &str) -> Result<(), ServiceErr
             row.error = Some(error.to_string());
         }
     }
-    row.finished_at = Some(context.handles.clock.now());
-    context.handles.write(&session.asset, vec![Write::PutReplay(row)]).await
+    finish(context, &session.asset, row).await
 }
 
-/// Evaluates the session; returns `None` if the service shuts down before the end.
-fn judge(context: &JobContext, row: &ReplayRow) -> Result<Option<ReplayResultView>, ServiceError> {
+/// Stores that the replay `row` of `asset`, which waited, is cancelled.
+pub(crate) async fn cancel_waiting(
+    context: &JobContext,
+    asset: &str,
+    mut row: ReplayRow,
+) -> Result<(), ServiceError> {
+    cancel(&mut row);
+    finish(context, asset, row).await
+}
+
+fn cancel(row: &mut ReplayRow) {
+    row.state = JobState::Failed.to_string();
+    row.error = Some(CANCELLED.to_owned());
+}
+
+/// Stores the outcome of the replay `row`.
+async fn finish(context: &JobContext, asset: &str, mut row: ReplayRow) -> Result<(), ServiceError> {
+    row.finished_at = Some(context.handles.clock.now());
+    context.handles.write(asset, vec![Write::PutReplay(row)]).await
+}
+
+/// Evaluates the session; returns `None` if it is cancelled before the end.
+fn judge(
+    context: &JobContext,
+    row: &ReplayRow,
+    cancelled: &CancellationToken,
+    priority: Priority,
+) -> Result<Option<ReplayResultView>, ServiceError> {
     let session = context.handles.wait(context.handles.store.session(&row.session))?;
     let session =
         session.ok_or_else(|| ServiceError::UnknownSession { id: row.session.clone() })?;
@@ -62,7 +100,9 @@ fn judge(context: &JobContext, row: &ReplayRow) -> Result<Option<ReplayResultVie
         n_played: 0,
         stopped: false,
     };
-    play(&context.handles, &session, 0, |input| replay.take(context, &row.id, input))?;
+    play_in_background(&context.handles, &session, priority, |input| {
+        replay.take(&context.progress, &row.id, cancelled, input)
+    })?;
     if replay.stopped {
         return Ok(None);
     }
@@ -89,14 +129,20 @@ struct ReplayRun<'a> {
 }
 
 impl ReplayRun<'_> {
-    fn take(&mut self, context: &JobContext, id: &str, input: Input) -> ControlFlow<()> {
+    fn take(
+        &mut self,
+        progress: &JobProgress,
+        id: &str,
+        cancelled: &CancellationToken,
+        input: Input,
+    ) -> ControlFlow<()> {
         let n_recorded = u64::try_from(self.session.progress.n_samples).unwrap_or_default();
         if self.n_played >= n_recorded && matches!(input, Input::NewSample(_)) {
             return ControlFlow::Break(());
         }
         if self.n_played.is_multiple_of(CHECK_EVERY) {
-            context.progress.set(id, self.n_played as f64 / n_recorded.max(1) as f64);
-            self.stopped = context.handles.closing.is_cancelled();
+            progress.set(id, self.n_played as f64 / n_recorded.max(1) as f64);
+            self.stopped = cancelled.is_cancelled();
         }
         if self.stopped {
             return ControlFlow::Break(());

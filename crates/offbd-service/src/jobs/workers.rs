@@ -3,41 +3,60 @@
 
 use std::sync::Arc;
 
-use tokio::sync::mpsc;
+use tokio::sync::Semaphore;
 use tokio::task::JoinHandle;
 
 use super::context::JobContext;
+use super::quiet::Quiet;
 use super::{calibration, replay};
-use crate::job::Job;
+use crate::Limits;
+use crate::background::Priority;
+use crate::job::{Job, JobQueue, JobQueues};
 
-/// Runs jobs until the queue is closed or the service shuts down.
-async fn work(context: JobContext, queue: Arc<tokio::sync::Mutex<mpsc::Receiver<Job>>>) {
+/// Automatic calibrations that run at a time. One, because they take what the rest leaves of
+/// the processors.
+const AUTOMATIC_WORKERS: usize = 1;
+
+/// Runs the jobs of `queue` until the service shuts down. If there is a `quiet`, samples that are
+/// queued hold them back.
+async fn work(context: JobContext, queue: JobQueue, priority: Priority, quiet: Option<Quiet>) {
     loop {
-        let job = async { queue.lock().await.recv().await };
-        let job = tokio::select! {
-            () = context.handles.closing.cancelled() => return,
-            job = job => job,
+        let next = async {
+            queue.wait().await;
+            if let Some(quiet) = &quiet {
+                quiet.wait().await;
+            }
         };
-        let Some(job) = job else { return };
-        let (Job::Replay(id) | Job::Calibration(id)) = &job;
+        if context.handles.closing.run_until_cancelled(next).await.is_none() {
+            return;
+        }
+        let Some(running) = queue.begin(&context.handles.closing) else { continue };
+        let id = running.job.id();
         context.progress.set(id, 0.0);
-        let done = match &job {
-            Job::Replay(id) => replay::run(&context, id).await,
-            Job::Calibration(id) => calibration::run(&context, id).await,
+        let done = match &running.job {
+            Job::Replay(_) => replay::run(&context, &running, priority).await,
+            Job::Calibration(_) => calibration::run(&context, &running, priority, &quiet).await,
         };
         context.progress.remove(id);
         if let Err(error) = done {
-            tracing::error!(?job, %error, "cannot store the outcome of a background job");
+            tracing::error!(job = ?running.job, %error, "cannot store the outcome of a background job");
         }
     }
 }
 
-/// Starts `n` workers on `queue`.
+/// Starts the workers for the jobs that persons ask for, and those for automatic calibrations,
+/// which are held back while few permits of `in_flight` are left.
 pub(crate) fn spawn(
-    n: usize,
+    limits: &Limits,
     context: &JobContext,
-    queue: mpsc::Receiver<Job>,
+    queues: &JobQueues,
+    in_flight: &Arc<Semaphore>,
 ) -> Vec<JoinHandle<()>> {
-    let queue = Arc::new(tokio::sync::Mutex::new(queue));
-    (0..n).map(|_| tokio::spawn(work(context.clone(), queue.clone()))).collect()
+    let asked =
+        (0..limits.jobs).map(|_| work(context.clone(), queues.asked.clone(), Priority::Low, None));
+    let automatic = (0..AUTOMATIC_WORKERS).map(|_| {
+        let quiet = Some(Quiet::new(in_flight.clone(), limits.in_flight_samples));
+        work(context.clone(), queues.automatic.clone(), Priority::Lowest, quiet)
+    });
+    asked.chain(automatic).map(tokio::spawn).collect()
 }

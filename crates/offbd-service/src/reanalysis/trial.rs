@@ -4,7 +4,8 @@
 use std::ops::ControlFlow;
 
 use crate::ServiceError;
-use crate::playback::play;
+use crate::background::Priority;
+use crate::playback::play_in_background;
 use crate::replay_settings;
 use crate::writing::Handles;
 use offbd_core::diagnosis::{FaultMemory, MemoryRules, Transition};
@@ -42,7 +43,7 @@ pub(crate) fn try_out(
     setup.settings.memory = MemoryRules::default();
     let mut engine = Engine::new(setup, FaultMemory::default()).with_trial(trial);
     let (mut transitions, mut counter) = (Vec::new(), AlarmCounter::default());
-    play(handles, session, 0, |input| {
+    play_in_background(handles, session, Priority::Low, |input| {
         engine.handle(input, &mut transitions);
         transitions.drain(..).for_each(|transition| counter.take(&transition));
         match handles.closing.is_cancelled() {

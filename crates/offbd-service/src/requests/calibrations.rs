@@ -4,7 +4,8 @@ use uuid::Uuid;
 
 use crate::asset::AssetCommand;
 use crate::clock::rfc3339;
-use crate::job::Job;
+use crate::job::{self, Job, NewJob};
+use crate::jobs::calibration;
 use crate::limits::MAX_CALIBRATION_SESSIONS;
 use crate::{Service, ServiceError, views};
 use offbd_core::vocabulary::Invalid;
@@ -29,6 +30,7 @@ impl Service {
             let reason = format!("must name 1 to {MAX_CALIBRATION_SESSIONS} sessions");
             return Err(Invalid::new("/sessions", reason).into());
         }
+        let mut n_samples: i64 = 0;
         for (i, data) in sessions.iter().enumerate() {
             let (id, range) = (data.session(), data.range());
             if range.from_s > range.to_s {
@@ -36,12 +38,13 @@ impl Service {
                 return Err(Invalid::new(format!("/sessions/{i}/to_s"), reason).into());
             }
             let row = self.inner.handles.store.session(id).await?;
-            if row.is_none_or(|row| row.asset != asset) {
+            let Some(row) = row.filter(|row| row.asset == asset) else {
                 let reason = format!("asset `{asset}` has no session `{id}`");
                 return Err(Invalid::new(format!("/sessions/{i}"), reason).into());
-            }
+            };
+            n_samples = n_samples.saturating_add(row.progress.n_samples);
         }
-        let permit = self.reserve_job()?;
+        let room = self.reserve_job()?;
         let row = CalibrationRow {
             id: Uuid::now_v7().to_string(),
             asset: asset.to_owned(),
@@ -62,8 +65,9 @@ impl Service {
             self.check_known(&row.asset).await?;
             return Err(error);
         }
-        permit.send(Job::Calibration(row.id.clone()));
-        view(row)
+        let (job, cost) = (Job::Calibration(row.id.clone()), job::calibration_cost(n_samples));
+        room.put(NewJob { job, asset: row.asset.clone(), cost });
+        self.view_calibration(row)
     }
 
     /// Returns a calibration.
@@ -75,7 +79,7 @@ impl Service {
         asset: &str,
         id: &str,
     ) -> Result<CalibrationJobView, ServiceError> {
-        view(self.calibration_row(asset, id).await?)
+        self.view_calibration(self.calibration_row(asset, id).await?)
     }
 
     pub(crate) async fn calibration_row(
@@ -102,7 +106,12 @@ impl Service {
         let before = cursor.map(views::cursor::<(i64, String)>).transpose()?;
         let before = before.as_ref().map(|(made_at, id)| (*made_at, id.as_str()));
         let rows = self.inner.handles.store.calibrations(asset, before, limit + 1).await?;
-        views::page(rows, limit, |row| (row.made_at, row.id.clone()), view)
+        views::page(
+            rows,
+            limit,
+            |row| (row.made_at, row.id.clone()),
+            |row| self.view_calibration(row),
+        )
     }
 
     /// Writes a calibration to the asset file, on request of the person `by`. An open session
@@ -125,20 +134,38 @@ impl Service {
         self.inner.shards.call(asset, activate).await?;
         self.calibration(asset, &row.id).await
     }
-}
 
-fn view(row: CalibrationRow) -> Result<CalibrationJobView, ServiceError> {
-    Ok(CalibrationJobView {
-        id: row.id,
-        asset: row.asset,
-        state: views::word(&row.state)?,
-        sessions: views::from_json(&row.sessions)?,
-        made_at: rfc3339(row.made_at),
-        made_by: row.made_by,
-        active: row.active != 0,
-        activated_by: row.activated_by,
-        activated_at: row.activated_at.map(rfc3339),
-        calibration: row.document.as_deref().map(views::from_json).transpose()?,
-        error: row.error,
-    })
+    /// Cancels a calibration that waits or runs; one that runs may take a moment to stop. A rig
+    /// whose own calibration is cancelled tries again with half as much motion again.
+    ///
+    /// # Errors
+    /// [`ServiceError::UnknownAsset`]; [`ServiceError::UnknownCalibration`];
+    /// [`ServiceError::JobEnded`].
+    pub async fn cancel_calibration(
+        &self,
+        asset: &str,
+        id: &str,
+    ) -> Result<CalibrationJobView, ServiceError> {
+        let row = self.calibration_row(asset, id).await?;
+        self.cancel_job(id, calibration::cancel_waiting(&self.inner.job_context, row)).await?;
+        self.calibration(asset, id).await
+    }
+
+    fn view_calibration(&self, row: CalibrationRow) -> Result<CalibrationJobView, ServiceError> {
+        let state = views::word(&row.state)?;
+        Ok(CalibrationJobView {
+            waits: self.inner.jobs.wait(&row.id).filter(|_| state == JobState::Queued),
+            id: row.id,
+            asset: row.asset,
+            state,
+            sessions: views::from_json(&row.sessions)?,
+            made_at: rfc3339(row.made_at),
+            made_by: row.made_by,
+            active: row.active != 0,
+            activated_by: row.activated_by,
+            activated_at: row.activated_at.map(rfc3339),
+            calibration: row.document.as_deref().map(views::from_json).transpose()?,
+            error: row.error,
+        })
+    }
 }

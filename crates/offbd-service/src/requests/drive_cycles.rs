@@ -1,5 +1,6 @@
-//! The drive cycle of a rig, computed on a blocking thread. Nothing is stored.
+//! The drive cycle of a rig. Nothing is stored.
 
+use crate::background::Priority;
 use crate::{Service, ServiceError, views};
 use offbd_core::engine::{DriveCycle, drive_cycle};
 
@@ -15,12 +16,11 @@ impl Service {
         let rig = views::rig(&row.document)?;
         let busy = |_| ServiceError::Busy { what: "another drive cycle is being computed" };
         let permit = self.inner.computing.drive_cycles.clone().try_acquire_owned().map_err(busy)?;
-        let task = tokio::task::spawn_blocking(move || {
+        let computed = Priority::Low.compute(move || {
             let cycle = drive_cycle(&rig);
             drop(permit);
             cycle
         });
-        let failed = ServiceError::Unavailable { what: "computing the drive cycle failed" };
-        task.await.map_err(|_| failed)?.map_err(ServiceError::NoDriveCycle)
+        computed.await?.map_err(ServiceError::NoDriveCycle)
     }
 }

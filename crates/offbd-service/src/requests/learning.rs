@@ -2,7 +2,8 @@
 
 use crate::asset::AssetCommand;
 use crate::{Service, ServiceError, views};
-use offbd_wire::learning::LearningView;
+use offbd_wire::learning::{LearningState, LearningView};
+use offbd_wire::words::JobWaitReason;
 
 impl Service {
     /// Returns the progress of the automatic calibration of `asset`, including samples that
@@ -11,7 +12,16 @@ impl Service {
     /// # Errors
     /// [`ServiceError::UnknownAsset`].
     pub async fn learning(&self, asset: &str) -> Result<LearningView, ServiceError> {
-        self.inner.shards.call(asset, |reply| AssetCommand::Learning { reply }).await
+        let learning = |reply| AssetCommand::Learning { reply };
+        let mut view = self.inner.shards.call(asset, learning).await?;
+        let id = view.calibration.as_ref().filter(|_| view.state == LearningState::Learning);
+        if let Some(wait) = id.and_then(|id| self.inner.jobs.wait(id)) {
+            view.summary += &match wait.reason {
+                JobWaitReason::Jobs => format!(" Rigs to be learnt before it: {}.", wait.n_before),
+                JobWaitReason::Samples => " It waits until fewer samples are queued.".to_owned(),
+            };
+        }
+        Ok(view)
     }
 
     /// Accepts the offered calibration on request of the person `by`, because the rig was

@@ -1,6 +1,7 @@
 import { isFinished } from "../../api/poll";
 import type { Session } from "../../api/types";
 import { useReplay } from "../../hooks/use-replay";
+import { jobText } from "../../words/job";
 import { ReplayFields } from "./replay-fields";
 import { replaySettings } from "./replay-settings";
 import { ReplayVerdict } from "./replay-verdict";
@@ -14,7 +15,7 @@ export function JudgeAgain({ session }: { session: Session }) {
       <ReplayFields judge={(form) => judge(replaySettings(form))} />
       {replay && !isFinished(replay) && (
         <p role="status">
-          Judging… <progress value={replay.progress} max={1} aria-label="Progress" />
+          {jobText(replay, "Judging")} <progress value={replay.progress} max={1} aria-label="Progress" />
         </p>
       )}
       {replay?.error && (

@@ -2,6 +2,7 @@ import { isFinished } from "../../api/poll";
 import type { Asset, CalibrationJob } from "../../api/types";
 import { Link } from "../../router/link";
 import { rigPath } from "../../router/paths";
+import { jobText } from "../../words/job";
 import { CalibrationDetails } from "./calibration-details";
 import { NothingLearnt } from "./nothing-learnt";
 
@@ -13,7 +14,7 @@ export function Learnt({ asset, job }: { asset: Asset; job?: CalibrationJob }) {
       <h2>What was learnt</h2>
       {job && !isFinished(job) && (
         <p role="status">
-          <span class="spinner" aria-hidden="true" /> Learning…
+          <span class="spinner" aria-hidden="true" /> {jobText(job, "Learning")}
         </p>
       )}
       {job?.state === "failed" && (

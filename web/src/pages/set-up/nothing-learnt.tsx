@@ -20,7 +20,7 @@ export function NothingLearnt({ asset }: { asset: string }) {
   if (learning?.state === "learning")
     return (
       <p role="status">
-        <span class="spinner" aria-hidden="true" /> The rig is being learnt from its own motion…
+        <span class="spinner" aria-hidden="true" /> {learning.summary}
       </p>
     );
   return <p class="quiet">Nothing yet. Until then, only sensor faults are confirmed.</p>;

@@ -98,6 +98,8 @@ pub enum CannotCalibrate {
         code = code.as_str(), of_kind = kind.map_or(String::new(), |k| format!(" ({})", k.as_str()))
     )]
     AccusesItself { session: usize, code: FaultCode, kind: Option<FaultKind>, at_s: f64 },
+    #[error("it was stopped before its end")]
+    Stopped,
 }
 
 /// Learns gain, dead time, lag, level, noise and breakaway of each axis from healthy
@@ -109,11 +111,28 @@ pub enum CannotCalibrate {
 /// # Errors
 /// [`CannotCalibrate`], which says what is missing.
 pub fn calibrate(rig: &Rig, sessions: &[Vec<Sample>]) -> Result<Calibration, CannotCalibrate> {
+    calibrate_while(rig, sessions, &|| true)
+}
+
+/// Whether a calibration goes on; asked before each of its steps.
+type GoOn<'a> = &'a dyn Fn() -> bool;
+
+fn calibrate_while(
+    rig: &Rig,
+    sessions: &[Vec<Sample>],
+    go_on: GoOn<'_>,
+) -> Result<Calibration, CannotCalibrate> {
     check_fit(rig, sessions)?;
     let taught =
-        learn_untested(rig, sessions).map_err(|reason| with_cause(rig, sessions, reason))?;
+        learn_untested(rig, sessions, go_on).map_err(|reason| with_cause(rig, sessions, reason))?;
     let learnt = Calibration { n_samples: sessions.iter().map(|s| s.len() as u64).sum(), ..taught };
-    proof::prove(rig, learnt, sessions)
+    proof::prove(rig, learnt, sessions, go_on)
+}
+
+/// # Errors
+/// [`CannotCalibrate::Stopped`] unless it goes on.
+fn check(go_on: GoOn<'_>) -> Result<(), CannotCalibrate> {
+    if go_on() { Ok(()) } else { Err(CannotCalibrate::Stopped) }
 }
 
 /// Checks that the sessions fit the description of `rig`.
@@ -159,9 +178,14 @@ fn known(percent: f64) -> String {
 }
 
 /// Learns from `sessions` of `rig` without testing the result.
-fn learn_untested(rig: &Rig, sessions: &[Vec<Sample>]) -> Result<Calibration, CannotCalibrate> {
+fn learn_untested(
+    rig: &Rig,
+    sessions: &[Vec<Sample>],
+    go_on: GoOn<'_>,
+) -> Result<Calibration, CannotCalibrate> {
     let recordings: Vec<Recording> = sessions.iter().map(|s| Recording::new(rig, s)).collect();
     let learn = |axis: Axis| {
+        check(go_on)?;
         let present = recordings.iter().any(|r| r.has(axis));
         present.then(|| learn_axis(rig, &recordings, axis)).transpose()
     };
@@ -194,7 +218,21 @@ pub fn calibrate_with_prospects(
     rig: &Rig,
     sessions: &[Vec<Sample>],
 ) -> Result<Calibration, CannotCalibrate> {
-    let mut calibration = calibrate(rig, sessions)?;
+    calibrate_with_prospects_while(rig, sessions, &|| true)
+}
+
+/// Like [`calibrate_with_prospects`], but asks `go_on` before each step, some ten in all, and
+/// stops once it returns false. It may also wait.
+///
+/// # Errors
+/// As for [`calibrate`], and [`CannotCalibrate::Stopped`].
+pub fn calibrate_with_prospects_while(
+    rig: &Rig,
+    sessions: &[Vec<Sample>],
+    go_on: &dyn Fn() -> bool,
+) -> Result<Calibration, CannotCalibrate> {
+    let mut calibration = calibrate_while(rig, sessions, go_on)?;
+    check(go_on)?;
     let learnt = Rig { calibration: Some(Box::new(calibration.clone())), ..rig.clone() };
     calibration.prospects = prospects(&learnt, sessions);
     Ok(calibration)
@@ -414,6 +452,28 @@ pub(in crate::engine) mod tests {
             (with_rest.residual_m_s2 / rolling.residual_m_s2 - 1.0).abs() < 0.2,
             "{with_rest:?}"
         );
+    }
+
+    #[test]
+    fn a_calibration_that_is_stopped_takes_no_further_step() {
+        let (rig, recording) = (Rig::chapter("a"), [session(60.0, 0.03, 0.85)]);
+        let asked = core::cell::Cell::new(0);
+        let stopped_at = |last: u32| {
+            asked.set(0);
+            let go_on = || {
+                asked.set(asked.get() + 1);
+                asked.get() < last
+            };
+            calibrate_with_prospects_while(&rig, &recording, &go_on)
+        };
+        let whole = stopped_at(u32::MAX).unwrap();
+        assert_eq!(whole, calibrate_with_prospects(&rig, &recording).unwrap());
+        let n_steps = asked.get();
+        assert!(n_steps >= 8, "{n_steps}");
+        for last in [1, 2, 4, n_steps] {
+            assert_eq!(stopped_at(last), Err(CannotCalibrate::Stopped));
+            assert_eq!(asked.get(), last);
+        }
     }
 
     #[test]

@@ -5,7 +5,7 @@
 
 use super::self_test::{SelfTest, judge};
 use super::widening::Widening;
-use super::{CannotCalibrate, certificate, learn_untested};
+use super::{CannotCalibrate, GoOn, certificate, check, learn_untested};
 use crate::diagnosis::{AxisCalibration, Calibration, Settings};
 use crate::engine::{Rig, Setup};
 #[cfg(not(feature = "std"))]
@@ -41,11 +41,13 @@ pub(super) fn prove(
     rig: &Rig,
     learnt: Calibration,
     sessions: &[Vec<Sample>],
+    go_on: GoOn<'_>,
 ) -> Result<Calibration, CannotCalibrate> {
-    let folds = folds(rig, &learnt, sessions)?;
+    let folds = folds(rig, &learnt, sessions, go_on)?;
     let mut widening = Widening::default();
     let mut tests = Vec::new();
     for _ in 0..MOST_WIDENINGS {
+        check(go_on)?;
         tests = folds.iter().flat_map(|fold| fold.tests(rig, &widening)).collect();
         let asked = tests.iter().filter(|test| widening.widen(test)).count();
         if asked == 0 {
@@ -127,12 +129,17 @@ fn folds(
     rig: &Rig,
     learnt: &Calibration,
     sessions: &[Vec<Sample>],
+    go_on: GoOn<'_>,
 ) -> Result<Vec<Fold>, CannotCalibrate> {
     if let [session] = sessions {
-        return halves(rig, session).or_else(|reason| match learnt.duration_s >= LONG_S {
-            // Long enough to be judged by what was learnt from itself.
-            true => Ok(vec![Fold { taught: learnt.clone(), judged: vec![(1, session.clone())] }]),
-            false => Err(reason),
+        return halves(rig, session, go_on).or_else(|reason| {
+            match learnt.duration_s >= LONG_S && reason != CannotCalibrate::Stopped {
+                // Long enough to be judged by what was learnt from itself.
+                true => {
+                    Ok(vec![Fold { taught: learnt.clone(), judged: vec![(1, session.clone())] }])
+                }
+                false => Err(reason),
+            }
         });
     }
     let n_groups = sessions.len().min(MOST_GROUPS);
@@ -141,16 +148,17 @@ fn folds(
         let (judged, teaching): (Vec<usize>, Vec<usize>) = (0..sessions.len()).partition(of_group);
         let teaching: Vec<Vec<Sample>> = teaching.iter().map(|&i| sessions[i].clone()).collect();
         let judged = judged.iter().map(|&i| (i + 1, sessions[i].clone())).collect();
-        fold_of(rig, "one group of sessions", &teaching, judged)
+        fold_of(rig, "one group of sessions", &teaching, judged, go_on)
     };
     (0..n_groups).map(fold).collect()
 }
 
 /// Each half of a session, to be judged by what was learnt from the other.
-fn halves(rig: &Rig, session: &[Sample]) -> Result<Vec<Fold>, CannotCalibrate> {
+fn halves(rig: &Rig, session: &[Sample], go_on: GoOn<'_>) -> Result<Vec<Fold>, CannotCalibrate> {
     let (first, second) = session.split_at(session.len() / 2);
     let fold = |teaching: &[Sample], judged: &[Sample]| {
-        fold_of(rig, "half of the recording", &[teaching.to_vec()], vec![(1, judged.to_vec())])
+        let judged = vec![(1, judged.to_vec())];
+        fold_of(rig, "half of the recording", &[teaching.to_vec()], judged, go_on)
     };
     Ok(vec![fold(first, second)?, fold(second, first)?])
 }
@@ -160,9 +168,11 @@ fn fold_of(
     what: &'static str,
     teaching: &[Vec<Sample>],
     judged: Vec<(usize, Vec<Sample>)>,
+    go_on: GoOn<'_>,
 ) -> Result<Fold, CannotCalibrate> {
-    match learn_untested(rig, teaching) {
+    match learn_untested(rig, teaching, go_on) {
         Ok(taught) => Ok(Fold { taught, judged }),
+        Err(CannotCalibrate::Stopped) => Err(CannotCalibrate::Stopped),
         Err(reason) => Err(CannotCalibrate::Untested { what, reason: Box::new(reason) }),
     }
 }
