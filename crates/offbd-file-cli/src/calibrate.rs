@@ -10,8 +10,8 @@ use sha2::{Digest, Sha256};
 
 use crate::judge::{load_rig, read_samples};
 use offbd_core::diagnosis::{
-    AxisCalibration, Calibration, CalibrationOrigin, MonitorCertificate, Prospects, ServoProspects,
-    SessionEstimate,
+    AxisCalibration, Calibration, CalibrationOrigin, LeftOut, MonitorCertificate, Prospects,
+    ServoProspects, SessionEstimate,
 };
 use offbd_core::engine::{Rig, calibrate_with_prospects};
 use offbd_core::vocabulary::{Axis, FaultCode, PerAxis, Sample};
@@ -29,7 +29,9 @@ use offbd_wire::asset;
 #[command(
     override_usage = "offbd calibrate --asset ASSET.json HEALTHY.csv... -o OUT.json",
     after_help = "One or two minutes with the ball rolling around the middle of the plate are enough, \
-    with steps or circles of a few degrees. The ball may be pushed by hand now and then.\n\n\
+    with steps or circles of a few degrees. The ball may be pushed by hand now and then. \
+    A moment in which the readings jump is left out and named; the first second counts \
+    for nothing.\n\n\
     Examples:\n  \
     offbd calibrate --asset rig.json healthy.csv -o learnt.json\n  \
     offbd calibrate --asset rig.json monday.csv tuesday.csv -o - | jq .calibration\n\n\
@@ -150,8 +152,22 @@ pub fn report(rig: &Rig, calibration: &Calibration) {
     if calibration.sessions.len() > 1 {
         report_sessions(&calibration.sessions);
     }
+    report_left_out(&calibration.left_out);
     calibration.certificate.iter().for_each(|certificate| report_certificate(certificate));
     calibration.prospects.iter().for_each(report_prospects);
+}
+
+/// Prints the moments that were not learnt from on stderr.
+fn report_left_out(moments: &[LeftOut]) {
+    if moments.is_empty() {
+        return;
+    }
+    output::remark(format_args!(
+        "\nleft out, since it contradicts the rest; in operation it is a fault of the sensor"
+    ));
+    for LeftOut { session, from_s, to_s, reason } in moments {
+        output::remark(format_args!("session {session}, {from_s:.2}–{to_s:.2} s: {reason}"));
+    }
 }
 
 /// Prints the estimates of each session on stderr.

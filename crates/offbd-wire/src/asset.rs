@@ -9,8 +9,8 @@ use super::certificate::{self, MonitorCertificateView};
 use super::json;
 use super::words::ProfileWord;
 use offbd_core::diagnosis::{
-    AxisCalibration, Calibration, CalibrationOrigin, Prospects, SensorCalibration, ServoProspects,
-    SessionEstimate,
+    AxisCalibration, Calibration, CalibrationOrigin, Contradiction, LeftOut, Prospects,
+    SensorCalibration, ServoProspects, SessionEstimate,
 };
 use offbd_core::engine::{AxisMapping, DiagnosticsSpec, Rig, ServoSpec};
 use offbd_core::plant::{Ball, Contact, Plate, PlateShape};
@@ -246,6 +246,34 @@ pub struct CalibrationView {
     /// How soon faults are expected to be found.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prospects: Option<ProspectsView>,
+    /// Moments of the sessions that contradict the rest and were not learnt from.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<LeftOutView>,
+}
+
+/// A moment that was not learnt from.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LeftOutView {
+    /// Number of the session, in the order in which the sessions were given, from 1 on.
+    #[schema(minimum = 1)]
+    pub session: usize,
+    /// Start of the moment on the session's clock, s.
+    pub from_s: f64,
+    /// End of the moment on the session's clock, s.
+    pub to_s: f64,
+    /// Why it contradicts the rest.
+    pub reason: LeftOutReason,
+}
+
+/// Why a moment contradicts the rest of the sessions.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LeftOutReason {
+    /// The readings jumped farther than a ball can move.
+    Jumped,
+    /// The readings were held or missing, and then jumped.
+    Held,
 }
 
 /// Learnt properties of the sensor.
@@ -534,7 +562,24 @@ fn calibration(view: &CalibrationView) -> Result<Calibration, Invalid> {
         duration_s: view.duration_s,
         certificate: certificate::certificate(&view.certificate)?,
         prospects: view.prospects.as_ref().map(prospects),
+        left_out: view.left_out.iter().map(left_out).collect(),
     })
+}
+
+fn left_out(view: &LeftOutView) -> LeftOut {
+    let reason = match view.reason {
+        LeftOutReason::Jumped => Contradiction::Jumped,
+        LeftOutReason::Held => Contradiction::Held,
+    };
+    LeftOut { session: view.session, from_s: view.from_s, to_s: view.to_s, reason }
+}
+
+fn left_out_view(moment: &LeftOut) -> LeftOutView {
+    let reason = match moment.reason {
+        Contradiction::Jumped => LeftOutReason::Jumped,
+        Contradiction::Held => LeftOutReason::Held,
+    };
+    LeftOutView { session: moment.session, from_s: moment.from_s, to_s: moment.to_s, reason }
 }
 
 fn sensor_calibration(view: &SensorCalibrationView) -> Result<SensorCalibration, Invalid> {
@@ -717,6 +762,7 @@ pub fn calibration_view(calibration: &Calibration) -> CalibrationView {
         sessions: calibration.sessions.iter().map(session_estimates_view).collect(),
         certificate: calibration.certificate.as_ref().map_or(Vec::new(), certificate::view),
         prospects: calibration.prospects.as_ref().map(prospects_view),
+        left_out: calibration.left_out.iter().map(left_out_view).collect(),
     }
 }
 
@@ -816,6 +862,12 @@ mod tests {
                 nearest: 0.25 * i as f64,
                 alarms_per_hour: (i > 0).then_some(0.01),
             })),
+            left_out: vec![LeftOut {
+                session: 2,
+                from_s: 30.0,
+                to_s: 30.4,
+                reason: Contradiction::Held,
+            }],
             prospects: Some(Prospects {
                 n_trials: 12,
                 servos: PerAxis {

@@ -33,6 +33,37 @@ fn several_sessions_can_be_calibrated_to_stdout() {
     assert_eq!(asset["calibration"]["data_sha256"].as_str().unwrap().len(), 64);
 }
 
+/// For a quarter of a second at 30 s the touch panel loses contact and reads its corner. What
+/// was left out is still named when the asset file is read again.
+#[test]
+fn a_moment_in_which_the_readings_jump_is_named_and_widens_no_noise() {
+    let cli = CliFixture::new();
+    cli.ok("simulate --rig rig.json --reference lissajous --seconds 60 --seed 7 -o healthy.csv");
+    let lost = |line: &str| match line.split(',').collect::<Vec<_>>()[..] {
+        [t, qx, qy, _, _] if (30.0..30.24).contains(&t.parse().unwrap_or(0.0)) => {
+            format!("{t},{qx},{qy},-0.17,-0.1")
+        }
+        _ => line.to_owned(),
+    };
+    cli.write(
+        "lost.csv",
+        &cli.read("healthy.csv").lines().map(lost).collect::<Vec<_>>().join("\n"),
+    );
+    cli.ok("calibrate --asset rig.json healthy.csv -o healthy.json");
+    let done = cli.ok("calibrate --asset rig.json lost.csv -o lost.json");
+    assert!(done.stderr.contains("session 1, 30.0"), "{}", done.stderr);
+    assert!(done.stderr.contains("readings jumped"), "{}", done.stderr);
+    cli.ok("calibrate --asset lost.json healthy.csv -o again.json");
+    let calibration = |file: &str| -> Value {
+        serde_json::from_str::<Value>(&cli.read(file)).unwrap()["calibration"].take()
+    };
+    let [healthy, lost] = ["healthy.json", "lost.json"].map(calibration);
+    assert_eq!(lost["left_out"][0]["reason"], "jumped");
+    assert!(healthy.get("left_out").is_none(), "{healthy}");
+    let noise_m = |learnt: &Value| learnt["x"]["noise_m"].as_f64().unwrap();
+    assert!((noise_m(&lost) / noise_m(&healthy) - 1.0).abs() < 0.1, "{lost}");
+}
+
 /// Writes a healthy session with its columns `t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m` multiplied by
 /// `factors`.
 fn write_scaled(cli: &CliFixture, name: &str, factors: [f64; 5]) {

@@ -3,6 +3,7 @@
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 use crate::vocabulary::{FaultCode, PerAxis};
+use core::fmt;
 use serde::{Deserialize, Serialize};
 
 /// Acceleration that the twin does not explain on the best and on the worst simulated
@@ -146,6 +147,44 @@ pub struct CalibrationOrigin {
     pub made_at: String,
 }
 
+/// Why a moment contradicts the rest of the data.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Contradiction {
+    /// The readings jumped farther than a ball can move.
+    Jumped,
+    /// The readings repeated the last one, or were missing, and then jumped.
+    Held,
+}
+
+/// A moment of the data that contradicts the rest and was not learnt from.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LeftOut {
+    /// Number of the session among those given, from 1 on.
+    pub session: usize,
+    /// Start of the moment on the session's clock, s.
+    pub from_s: f64,
+    /// End of the moment on the session's clock, s.
+    pub to_s: f64,
+    pub reason: Contradiction,
+}
+
+impl LeftOut {
+    /// Whether the moment includes the time `t_s`.
+    #[must_use]
+    pub fn contains(&self, t_s: f64) -> bool {
+        (self.from_s..=self.to_s).contains(&t_s)
+    }
+}
+
+impl fmt::Display for Contradiction {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Jumped => "readings jumped",
+            Self::Held => "readings were held or missing, then jumped",
+        })
+    }
+}
+
 /// A calibration: the parameters learnt per axis, and the data they come from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
@@ -164,4 +203,6 @@ pub struct Calibration {
     pub certificate: Option<[MonitorCertificate; FaultCode::COUNT]>,
     /// Which faults would be found and how soon; `None` if not tried.
     pub prospects: Option<Prospects>,
+    /// The moments that were not learnt from, in order.
+    pub left_out: Vec<LeftOut>,
 }

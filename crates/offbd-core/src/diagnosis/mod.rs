@@ -18,8 +18,8 @@ mod stillness;
 pub mod trend;
 
 pub use calibration::{
-    AxisCalibration, Calibration, CalibrationOrigin, MonitorCertificate, Prospects,
-    SensorCalibration, ServoProspects, SessionEstimate,
+    AxisCalibration, Calibration, CalibrationOrigin, Contradiction, LeftOut, MonitorCertificate,
+    Prospects, SensorCalibration, ServoProspects, SessionEstimate,
 };
 pub use debounce::{Debounce, DebounceTimes, Qualified, Test};
 pub use evaluator::{Evaluator, Finding, Surroundings};

@@ -21,7 +21,7 @@ pub use contact::{Body, Contact, Ground, Motion};
 pub use lockstep::{Fidelity, Ladder, Rung};
 pub use planar::Planar;
 pub use rolling::{Grip, Rolling, RollingState};
-pub use servo::{ServoModel, ServoState};
+pub use servo::{ServoModel, ServoState, Sweep};
 pub use simulated_twin::SimulatedTwin;
 pub use sliding::{Hold, Phase, Sliding};
 pub use tilt::{PlateMotion, Tilt};

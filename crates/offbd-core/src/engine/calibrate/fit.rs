@@ -1,14 +1,13 @@
-//! Gain, level, dead time and lag of one axis: least trimmed squares over windows, within
-//! a search.
+//! Gain, level and resistance of one axis for a given path of the twin: least trimmed
+//! squares over windows.
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
-use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
 
 use super::recording::{Recording, Stretch};
 use crate::diagnosis::Profile;
 use crate::engine::Rig;
-use crate::engine::frame::Moment;
 use crate::maths::median;
 use crate::plant::{ServoModel, TwinAxis, TwinModel};
 use crate::vocabulary::Axis;
@@ -25,10 +24,10 @@ const MOTION_SHARE: f64 = 0.3;
 /// Rounds of fitting and trimming. Chosen.
 const TRIM_ROUNDS: usize = 4;
 
-/// One window: measured path, twin's path, the parabola t²/2 and the path that a rolling
-/// resistance of 1 m/s² would add, all with their straight line removed (orthogonal to 1
-/// and t).
-struct FitWindow {
+/// The sums of one window: of the measured path, and of the twin's path, the parabola
+/// t²/2 and the path that a rolling resistance of 1 m/s² would add, all with their
+/// straight line removed (orthogonal to 1 and t).
+pub(super) struct FitWindow {
     session: usize,
     yy: f64,
     normal: Matrix3<f64>,
@@ -37,49 +36,137 @@ struct FitWindow {
 }
 
 impl FitWindow {
-    fn new(session: usize, moments: &[Moment], path: &[f64], resisted: &[f64], axis: Axis) -> Self {
-        let t0 = moments[0].at;
-        let read: Vec<usize> =
-            (0..moments.len()).filter(|&i| moments[i].position[axis].is_some()).collect();
-        let times: Vec<f64> = read.iter().map(|&i| moments[i].at - t0).collect();
-        let straighten = |values: Vec<f64>| without_line(&times, values);
-        let of = |values: &[f64]| straighten(read.iter().map(|&i| values[i]).collect());
-        let y = straighten(read.iter().filter_map(|&i| moments[i].position[axis]).collect());
-        let z = of(path);
-        let p = straighten(times.iter().map(|t| t * t / 2.0).collect());
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let r = of(resisted);
-        let causes = [&z, &p, &r];
-        Self {
-            session,
-            yy: dot(&y, &y),
-            normal: Matrix3::from_fn(|i, j| dot(causes[i], causes[j])),
-            right: Vector3::from_fn(|i, _| dot(causes[i], &y)),
-            n: read.len(),
-        }
-    }
-
     /// Mean square that gain, level and resistance leave unexplained, m².
     fn unexplained(&self, c: &Vector3<f64>) -> f64 {
         let squares = self.yy - 2.0 * c.dot(&self.right) + c.dot(&(self.normal * c));
         squares.max(0.0) / self.n as f64
     }
+
+    /// Square sum of the twin's path, m², without what a level would explain.
+    pub(super) fn excitation_m2(&self) -> f64 {
+        let n = &self.normal;
+        n[(0, 0)] - n[(0, 1)] * n[(0, 1)] / n[(1, 1)]
+    }
+}
+
+/// The times of the readings of a window, for straight lines.
+struct Line {
+    /// Less their mean, s.
+    centred: Vec<f64>,
+    squares: f64,
+}
+
+impl Line {
+    fn new(times: &[f64]) -> Self {
+        let mean = times.iter().sum::<f64>() / times.len() as f64;
+        let centred: Vec<f64> = times.iter().map(|t| t - mean).collect();
+        let squares = centred.iter().map(|t| t * t).sum();
+        Self { centred, squares }
+    }
+
+    /// Takes their least-squares straight line from `values`.
+    fn take_from(&self, values: &mut [f64]) {
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        let along: f64 = self.centred.iter().zip(&*values).map(|(t, v)| t * (v - mean)).sum();
+        let slope = if self.squares > 0.0 { along / self.squares } else { 0.0 };
+        for (t, v) in self.centred.iter().zip(values) {
+            *v -= mean + slope * t;
+        }
+    }
 }
 
 /// Returns `values` without their least-squares straight line over `times`.
+#[cfg(test)]
 pub(super) fn without_line(times: &[f64], mut values: Vec<f64>) -> Vec<f64> {
-    let n = times.len() as f64;
-    let (mean_t, mean_v) = (times.iter().sum::<f64>() / n, values.iter().sum::<f64>() / n);
-    let (mut tt, mut tv) = (0.0, 0.0);
-    for (t, v) in times.iter().zip(&values) {
-        tt += (t - mean_t) * (t - mean_t);
-        tv += (t - mean_t) * (v - mean_v);
-    }
-    let slope = if tt > 0.0 { tv / tt } else { 0.0 };
-    for (t, v) in times.iter().zip(values.iter_mut()) {
-        *v -= mean_v + slope * (t - mean_t);
-    }
+    Line::new(times).take_from(&mut values);
     values
+}
+
+/// A window and all that does not depend on the twin.
+pub(super) struct Window {
+    session: usize,
+    /// The moments of its recording.
+    pub(super) stretch: Stretch,
+    /// The readings among them, counted from the start of the stretch.
+    read: Vec<usize>,
+    line: Line,
+    /// Measured path, parabola and resisted path, without their lines.
+    known: [Vec<f64>; 3],
+    /// The products of these three.
+    products: Matrix3<f64>,
+}
+
+impl Window {
+    pub(super) fn new(
+        session: usize,
+        recording: &Recording,
+        stretch: &Stretch,
+        axis: Axis,
+    ) -> Self {
+        let moments = &recording.moments[stretch.clone()];
+        let resisted = &recording.resisted[axis][stretch.clone()];
+        let read: Vec<usize> =
+            (0..moments.len()).filter(|&i| moments[i].position[axis].is_some()).collect();
+        let times: Vec<f64> = read.iter().map(|&i| moments[i].at - moments[0].at).collect();
+        let line = Line::new(&times);
+        let mut known = [
+            read.iter().filter_map(|&i| moments[i].position[axis]).collect::<Vec<f64>>(),
+            times.iter().map(|t| t * t / 2.0).collect(),
+            read.iter().map(|&i| resisted[i]).collect(),
+        ];
+        known.iter_mut().for_each(|values| line.take_from(values));
+        let products = Matrix3::from_fn(|i, j| dot(&known[i], &known[j]));
+        Self { session, stretch: stretch.clone(), read, line, known, products }
+    }
+
+    /// Returns the sums for paths that are given at every moment of the stretch.
+    pub(super) fn sums<const N: usize>(&self, path: impl Fn(usize) -> [f64; N]) -> WindowSums<N> {
+        let mut columns: [Vec<f64>; N] =
+            core::array::from_fn(|_| Vec::with_capacity(self.read.len()));
+        for &i in &self.read {
+            columns.iter_mut().zip(path(i)).for_each(|(column, value)| column.push(value));
+        }
+        columns.iter_mut().for_each(|column| self.line.take_from(column));
+        WindowSums {
+            session: self.session,
+            n: self.read.len(),
+            products: self.products,
+            own: SMatrix::from_fn(|i, j| dot(&columns[i], &columns[j])),
+            with_known: SMatrix::from_fn(|i, j| dot(&columns[i], &self.known[j])),
+        }
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// The sums of a window for a path that is a combination of `N` paths.
+pub(super) struct WindowSums<const N: usize> {
+    session: usize,
+    n: usize,
+    /// Of measured path, parabola and resisted path.
+    products: Matrix3<f64>,
+    own: SMatrix<f64, N, N>,
+    with_known: SMatrix<f64, N, 3>,
+}
+
+impl<const N: usize> WindowSums<N> {
+    /// Returns the sums for the combination with these `weights`.
+    pub(super) fn of(&self, weights: &SVector<f64, N>) -> FitWindow {
+        let zz = weights.dot(&(self.own * weights));
+        let [zy, zp, zr]: [f64; 3] =
+            core::array::from_fn(|j| weights.dot(&self.with_known.column(j)));
+        let of = &self.products;
+        let (pp, pr, rr) = (of[(1, 1)], of[(1, 2)], of[(2, 2)]);
+        FitWindow {
+            session: self.session,
+            yy: of[(0, 0)],
+            normal: Matrix3::new(zz, zp, zr, zp, pp, pr, zr, pr, rr),
+            right: Vector3::new(zy, of[(0, 1)], of[(0, 2)]),
+            n: self.n,
+        }
+    }
 }
 
 /// The best fit of one axis: gain and rolling resistance of the rig, and the level of
@@ -122,7 +209,7 @@ const RESISTANCE_PRIOR: f64 = 0.5;
 const LIKELY_RESISTANCE_M_S2: f64 = 0.1;
 
 impl AxisFit {
-    fn cost(&self) -> f64 {
+    pub(super) fn cost(&self) -> f64 {
         let unlikely = self.gain.abs().ln();
         let resisted = self.resistance_m_s2 / LIKELY_RESISTANCE_M_S2;
         self.left
@@ -147,7 +234,7 @@ impl RigFit {
         Vector3::new(self.gain, offset, self.resistance)
     }
 
-    fn solve(windows: &[FitWindow], n_sessions: usize) -> Option<Self> {
+    fn solve<'a>(windows: impl Iterator<Item = &'a FitWindow>, n_sessions: usize) -> Option<Self> {
         let sums = session_sums(windows, n_sessions);
         let free = Self::solved(&sums, true)?;
         // A negative resistance would drive the ball.
@@ -181,7 +268,10 @@ impl RigFit {
 
 type NormalEquations = (Matrix3<f64>, Vector3<f64>);
 
-fn session_sums(windows: &[FitWindow], n_sessions: usize) -> Vec<Option<NormalEquations>> {
+fn session_sums<'a>(
+    windows: impl Iterator<Item = &'a FitWindow>,
+    n_sessions: usize,
+) -> Vec<Option<NormalEquations>> {
     let mut sums = vec![None; n_sessions];
     for w in windows {
         let (n, r): &mut NormalEquations = sums[w.session].get_or_insert_default();
@@ -192,32 +282,36 @@ fn session_sums(windows: &[FitWindow], n_sessions: usize) -> Vec<Option<NormalEq
 }
 
 /// Least trimmed squares over windows: fit, drop the worst, repeat.
-fn explain(windows: &mut [FitWindow], n_sessions: usize) -> Option<AxisFit> {
+pub(super) fn explain(windows: &[FitWindow], n_sessions: usize) -> Option<AxisFit> {
     let keep = ((windows.len() as f64 * KEPT).ceil() as usize).min(windows.len());
+    let mut order: Vec<usize> = (0..windows.len()).collect();
     let mut kept = windows.len();
     let mut found = RigFit::default();
+    let (mut left, mut sorted) = (Vec::new(), Vec::new());
     for _ in 0..TRIM_ROUNDS {
-        let next = RigFit::solve(&windows[..kept], n_sessions)?;
+        let next = RigFit::solve(order[..kept].iter().map(|&i| &windows[i]), n_sessions)?;
         // A session whose windows were all dropped keeps its level.
         let before = found.offsets.iter().chain(core::iter::repeat(&None));
         let offsets = next.offsets.iter().zip(before).map(|(now, before)| now.or(*before));
         found = RigFit { offsets: offsets.collect(), ..next };
-        let mut left: Vec<f64> = windows.iter().map(|w| w.unexplained(&found.of(w))).collect();
-        let usual = median(&mut left).unwrap_or(0.0);
-        let relative = |w: &FitWindow| {
-            w.unexplained(&found.of(w)) / (usual + MOTION_SHARE * w.yy / w.n as f64)
-        };
-        windows.sort_by(|a, b| relative(a).total_cmp(&relative(b)));
+        left.clear();
+        left.extend(windows.iter().map(|w| w.unexplained(&found.of(w))));
+        sorted.clone_from(&left);
+        let usual = median(&mut sorted).unwrap_or(0.0);
+        for (left, w) in left.iter_mut().zip(windows) {
+            *left /= usual + MOTION_SHARE * w.yy / w.n as f64;
+        }
+        order.sort_by(|&a, &b| left[a].total_cmp(&left[b]));
         kept = keep;
     }
-    let kept = &windows[..kept];
+    let kept: Vec<&FitWindow> = order[..kept].iter().map(|&i| &windows[i]).collect();
     let n: usize = kept.iter().map(|w| w.n).sum();
     let left =
         kept.iter().map(|w| w.unexplained(&found.of(w)) * w.n as f64).sum::<f64>() / n as f64;
     let total = kept.iter().map(|w| w.yy).sum::<f64>() / n as f64;
     // The residual is correlated: each window counts as one reading, not n.
     let variance = left * n as f64 / kept.len() as f64;
-    let sessions = session_sums(kept, n_sessions)
+    let sessions = session_sums(kept.into_iter(), n_sessions)
         .into_iter()
         .map(|sums| {
             sums.and_then(|sums| session_fit(&sums, found.gain, found.resistance, variance))
@@ -254,26 +348,6 @@ fn session_fit(
     (n[(1, 1)] > 0.0 && own > 0.0).then_some(fit)
 }
 
-/// Step of dead time and lag at which the search ends, s. Chosen.
-const FINEST_STEP_S: f64 = 0.001;
-/// Most steps of the search, of which a dozen is common; beyond it the best so far is
-/// taken.
-const MOST_SEARCH_STEPS: usize = 200;
-/// Directions of the search. Dead time and lag trade off along a narrow valley, so it is
-/// also searched diagonally.
-const DIRECTIONS: [(f64, f64); 10] = [
-    (1.0, 0.0),
-    (-1.0, 0.0),
-    (0.0, 1.0),
-    (0.0, -1.0),
-    (1.0, -1.0),
-    (-1.0, 1.0),
-    (2.0, -1.0),
-    (-2.0, 1.0),
-    (1.0, -2.0),
-    (-1.0, 2.0),
-];
-
 /// The recordings of one axis and their windows.
 pub(super) struct Fitter<'a> {
     pub(super) rig: &'a Rig,
@@ -300,64 +374,6 @@ impl Fitter<'_> {
         let servo = ServoModel::new(spec.angle_limit_rad, lag_s, spec.rate_limit_rad_s).ok()?;
         let axis = TwinAxis { servo, dead_time_s, gain, level_rad, resistance_m_s2 };
         Some(TwinModel::new(self.rig.ladder(Profile::Default), axis))
-    }
-
-    fn explain(&self, dead_time_s: f64, lag_s: f64) -> Option<AxisFit> {
-        let model = self.model(dead_time_s, lag_s, 1.0, 0.0, 0.0)?;
-        let mut windows = Vec::with_capacity(self.n_windows());
-        for (session, (recording, stretches)) in
-            self.recordings.iter().zip(&self.stretches).enumerate()
-        {
-            let path = recording.twin_path(&model, self.axis);
-            windows.extend(stretches.iter().map(|s| {
-                let resisted = &recording.resisted[self.axis][s.clone()];
-                FitWindow::new(
-                    session,
-                    &recording.moments[s.clone()],
-                    &path[s.clone()],
-                    resisted,
-                    self.axis,
-                )
-            }));
-        }
-        explain(&mut windows, self.recordings.len())
-    }
-
-    /// Searches the dead time and lag with the least cost: a coarse grid, then a pattern
-    /// search with decreasing steps.
-    pub(super) fn search(&self) -> Option<(f64, f64, AxisFit)> {
-        let mut best: Option<(f64, f64, AxisFit)> = None;
-        let try_at = |dead: f64, lag: f64, best: &mut Option<(f64, f64, AxisFit)>| {
-            if dead < 0.0 || lag < 0.0 {
-                return;
-            }
-            let Some(found) = self.explain(dead, lag) else { return };
-            if best.as_ref().is_none_or(|(.., b)| found.cost() < b.cost()) {
-                *best = Some((dead, lag, found));
-            }
-        };
-        for dead in [0.0, 0.03, 0.06, 0.1, 0.15, 0.2, 0.3] {
-            for lag in [0.01, 0.03, 0.06, 0.1, 0.15, 0.22] {
-                try_at(dead, lag, &mut best);
-            }
-        }
-        let mut step = 0.02;
-        for _ in 0..MOST_SEARCH_STEPS {
-            if step < FINEST_STEP_S {
-                break;
-            }
-            let (dead, lag, before) =
-                best.as_ref().map(|(dead, lag, found)| (*dead, *lag, found.cost()))?;
-            for (d, l) in DIRECTIONS {
-                try_at(dead + d * step, lag + l * step, &mut best);
-            }
-            // Also ends if the cost is NaN.
-            let better = best.as_ref().is_some_and(|(.., after)| after.cost() < before);
-            if !better {
-                step /= 2.0;
-            }
-        }
-        best
     }
 }
 
@@ -392,7 +408,7 @@ mod tests {
             (0..12).map(|i| window(0.01, 0.5, 3e-4, 0.6 * f64::from(i))).collect();
         windows.extend([0.0, 1.5].map(|phase| window(0.06, 0.9, 6e-3, phase)));
         windows.push(window(0.01, 1.0, 0.05, 1.0));
-        let found = explain(&mut windows, 1).unwrap();
+        let found = explain(&windows, 1).unwrap();
         assert!((0.8..0.95).contains(&found.gain), "{found:?}");
     }
 }

@@ -9,11 +9,14 @@
 //! of the variance of real recordings where differences explain 10–60 %.
 
 mod certificate;
+mod commanded;
+mod data;
 mod fit;
 mod likelihood;
 mod proof;
 mod prospects;
 mod recording;
+mod search;
 mod self_test;
 mod sessions;
 mod spread;
@@ -21,16 +24,18 @@ mod widening;
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
+use data::{Data, MOST_LEFT_OUT};
 use fit::{AxisFit, Fitter, SessionFit};
 use prospects::prospects;
 pub(super) use recording::MOVING_M;
 use recording::{Recording, Stretch};
+use search::{Found, search};
 use sessions::{Estimate, Population, combined, session_spread};
 use spread::{healthy_spread, level_at_rest};
 
 use super::{Misfit, Plausibility, Rig};
 use crate::diagnosis::{
-    AxisCalibration, Calibration, CalibrationOrigin, SensorCalibration, SessionEstimate,
+    AxisCalibration, Calibration, CalibrationOrigin, LeftOut, SensorCalibration, SessionEstimate,
 };
 use crate::vocabulary::{Axis, FaultCode, FaultKind, PerAxis, Sample};
 
@@ -93,6 +98,13 @@ pub enum CannotCalibrate {
     )]
     Untested { what: &'static str, reason: Box<CannotCalibrate> },
     #[error(
+        "session {session}: {n} moments, {percent:.1} % of it, contradict the rest, the first at \
+         {from_s:.2} s: {reason}; more than {most:.0} % of a session is not left out, since then the \
+         sensor does so all day: mend it, or leave this session out",
+        from_s = first.from_s, reason = first.reason, most = 100.0 * MOST_LEFT_OUT
+    )]
+    Contradictory { session: usize, percent: f64, n: usize, first: LeftOut },
+    #[error(
         "judged by what the other data taught, session {session} would report {code} at {at_s:.2} s{of_kind}; \
          leave it out if the rig was not healthy then, or record more sessions",
         code = code.as_str(), of_kind = kind.map_or(String::new(), |k| format!(" ({})", k.as_str()))
@@ -111,28 +123,36 @@ pub enum CannotCalibrate {
 /// # Errors
 /// [`CannotCalibrate`], which says what is missing.
 pub fn calibrate(rig: &Rig, sessions: &[Vec<Sample>]) -> Result<Calibration, CannotCalibrate> {
-    calibrate_while(rig, sessions, &|| true)
+    learn(rig, sessions, &|| true).map(|(learnt, _)| learnt)
 }
 
 /// Whether a calibration goes on; asked before each of its steps.
 type GoOn<'a> = &'a dyn Fn() -> bool;
 
-fn calibrate_while(
-    rig: &Rig,
-    sessions: &[Vec<Sample>],
-    go_on: GoOn<'_>,
-) -> Result<Calibration, CannotCalibrate> {
-    check_fit(rig, sessions)?;
-    let taught =
-        learn_untested(rig, sessions, go_on).map_err(|reason| with_cause(rig, sessions, reason))?;
-    let learnt = Calibration { n_samples: sessions.iter().map(|s| s.len() as u64).sum(), ..taught };
-    proof::prove(rig, learnt, sessions, go_on)
-}
-
 /// # Errors
 /// [`CannotCalibrate::Stopped`] unless it goes on.
 fn check(go_on: GoOn<'_>) -> Result<(), CannotCalibrate> {
     if go_on() { Ok(()) } else { Err(CannotCalibrate::Stopped) }
+}
+
+/// Like [`calibrate`]; also returns the sessions without what was left out.
+fn learn(
+    rig: &Rig,
+    sessions: &[Vec<Sample>],
+    go_on: GoOn<'_>,
+) -> Result<(Calibration, Vec<Vec<Sample>>), CannotCalibrate> {
+    check_fit(rig, sessions)?;
+    let n_samples = sessions.iter().map(|s| s.len() as u64).sum();
+    let mut data = Data::new(sessions);
+    // Ends, since each round but the last leaves out more.
+    loop {
+        let taught = learn_untested(rig, &data.sessions, go_on)
+            .map_err(|reason| with_cause(rig, sessions, reason))?;
+        if let Some(proven) = proof::prove(rig, taught, &mut data, go_on)? {
+            let Data { sessions, left_out, .. } = data;
+            return Ok((Calibration { n_samples, left_out, ..proven }, sessions));
+        }
+    }
 }
 
 /// Checks that the sessions fit the description of `rig`.
@@ -206,6 +226,7 @@ fn learn_untested(
         duration_s: recordings.iter().map(Recording::duration_s).sum(),
         certificate: None,
         prospects: None,
+        left_out: Vec::new(),
     };
     Ok(likelihood::with_model_errors(rig, learnt, sessions))
 }
@@ -231,10 +252,10 @@ pub fn calibrate_with_prospects_while(
     sessions: &[Vec<Sample>],
     go_on: &dyn Fn() -> bool,
 ) -> Result<Calibration, CannotCalibrate> {
-    let mut calibration = calibrate_while(rig, sessions, go_on)?;
+    let (mut calibration, sessions) = learn(rig, sessions, go_on)?;
     check(go_on)?;
     let learnt = Rig { calibration: Some(Box::new(calibration.clone())), ..rig.clone() };
-    calibration.prospects = prospects(&learnt, sessions);
+    calibration.prospects = prospects(&learnt, &sessions);
     Ok(calibration)
 }
 
@@ -269,7 +290,7 @@ fn learn_in_windows(
         return Err(CannotCalibrate::TooShort { axis, n_windows });
     }
     let still = CannotCalibrate::TooLittleExcitation { axis, percent: f64::INFINITY };
-    let (dead_time_s, lag_s, found) = fitter.search().ok_or(still)?;
+    let Found { dead_time_s, lag_s, fit: found } = search(&fitter).ok_or(still)?;
     let swings = recordings.iter().any(|r| r.swing_rad(axis) > MOVING_RAD);
     check_explained(axis, &found, swings)?;
     let slope = found.gain * axis.drive_sign() * rig.ball.rolling_gravity();

@@ -1,8 +1,9 @@
 //! Cross-validation of a calibration: each session is judged, with shorter times than
 //! later, by what was learnt from the others. Where that alarms, the rig varies more than
 //! the others showed: the limit concerned is widened until there is no alarm, or the
-//! calibration is refused.
+//! calibration is refused. A moment in which the readings jump is left out instead.
 
+use super::data::Data;
 use super::self_test::{SelfTest, judge};
 use super::widening::Widening;
 use super::{CannotCalibrate, GoOn, certificate, check, learn_untested};
@@ -30,34 +31,64 @@ const FEW_TESTS: f64 = 0.6;
 /// that the fit does not follow. Chosen.
 const MOST_SCATTER_M: f64 = 1e-3;
 
-/// Returns `learnt`, widened until no session gives an alarm, each judged by what was
-/// learnt from the others; of a single session, each half by what was learnt from the
-/// other.
+/// Returns `learnt`, widened until no session of `data` gives an alarm, each judged by
+/// what was learnt from the others; of a single session, each half by what was learnt from
+/// the other. `None` if moments of `data` were left out: then `learnt` is out of date.
 ///
 /// # Errors
-/// [`CannotCalibrate::Untested`] if there is too little to judge by, and
+/// [`CannotCalibrate::Untested`] if there is too little to judge by,
+/// [`CannotCalibrate::Contradictory`] if too much is left out, and
 /// [`CannotCalibrate::AccusesItself`] if nothing that can be widened helps.
 pub(super) fn prove(
     rig: &Rig,
     learnt: Calibration,
-    sessions: &[Vec<Sample>],
+    data: &mut Data,
     go_on: GoOn<'_>,
-) -> Result<Calibration, CannotCalibrate> {
-    let folds = folds(rig, &learnt, sessions, go_on)?;
+) -> Result<Option<Calibration>, CannotCalibrate> {
+    let mut folds = folds(rig, &learnt, &data.sessions, go_on)?;
     let mut widening = Widening::default();
-    let mut tests = Vec::new();
+    let mut tests: Vec<SelfTest> = Vec::new();
+    let mut contradicted = false;
     for _ in 0..MOST_WIDENINGS {
         check(go_on)?;
         tests = folds.iter().flat_map(|fold| fold.tests(rig, &widening)).collect();
+        if leave_out_jumps(data, &mut folds, &tests)? {
+            contradicted = true;
+            continue;
+        }
+        if contradicted {
+            return Ok(None);
+        }
         let asked = tests.iter().filter(|test| widening.widen(test)).count();
         if asked == 0 {
-            return Ok(with_most(widening.of(&learnt), &tests));
+            return Ok(Some(with_most(widening.of(&learnt), &tests)));
         }
         if widening.is_beyond(&learnt) {
             break;
         }
     }
-    Err(accusation(&tests))
+    if contradicted { Ok(None) } else { Err(accusation(&tests)) }
+}
+
+/// Leaves out the moments in which `tests` found that readings jump, of `data` and of
+/// `folds`. Returns whether there was any.
+fn leave_out_jumps(
+    data: &mut Data,
+    folds: &mut [Fold],
+    tests: &[SelfTest],
+) -> Result<bool, CannotCalibrate> {
+    let mut any = false;
+    for test in tests {
+        let jumped = test.alarm.and_then(|alarm| Some((alarm.jump_s?, alarm.at_s)));
+        let Some((jump_s, at_s)) = jumped else { continue };
+        let Some(moment) = data.leave_out_jump(test.session, jump_s, at_s)? else { continue };
+        any = true;
+        let of_session = |(session, _): &&mut (usize, Vec<Sample>)| *session == test.session;
+        for (_, samples) in folds.iter_mut().flat_map(|f| &mut f.judged).filter(of_session) {
+            samples.retain(|s| !moment.contains(s.t_s));
+        }
+    }
+    Ok(any)
 }
 
 /// Returns `learnt` with the largest values seen in the tests, and its certificate.

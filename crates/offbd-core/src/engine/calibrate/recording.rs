@@ -211,14 +211,27 @@ impl Recording {
 
     /// Returns the twin's free path along `axis` at each moment.
     pub(super) fn twin_path(&self, model: &TwinModel, axis: Axis) -> Vec<f64> {
+        self.twin_path_within(&(0..self.moments.len()), model, axis)
+    }
+
+    /// Returns the free path along `axis` at each moment of `stretch`, of a twin that
+    /// begins there.
+    pub(super) fn twin_path_within(
+        &self,
+        stretch: &Stretch,
+        model: &TwinModel,
+        axis: Axis,
+    ) -> Vec<f64> {
         let mut twin = Twin::new(*model);
         let mut before: Option<SimTime> = None;
+        let mut last = PerAxis::from_fn(|_| 0.0);
         let step = |(m, velocity): (&Moment, &Vector2<f64>)| {
             if before.is_some_and(|b| m.at - b > self.gap_s) {
                 twin.restart();
             }
             before = Some(m.at);
-            let at = |a: Axis| m.position[a].unwrap_or(0.0);
+            last = PerAxis::from_fn(|a: Axis| m.position[a].unwrap_or(last[a]));
+            let at = |a: Axis| last[a];
             let observed = RollingState {
                 position: Vector2::new(at(Axis::X), at(Axis::Y)),
                 velocity: *velocity,
@@ -227,7 +240,8 @@ impl Recording {
             twin.advance(m.at, m.command, &observed);
             twin.motion().position[axis as usize]
         };
-        self.moments.iter().zip(&self.velocity).map(step).collect()
+        let of = stretch.clone();
+        self.moments[of.clone()].iter().zip(&self.velocity[of]).map(step).collect()
     }
 }
 

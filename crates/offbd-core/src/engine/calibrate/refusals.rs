@@ -60,9 +60,21 @@ fn no_refusal_shows_what_is_no_number() {
     }
 }
 
-/// Most steps of the twins that a calibration may take per sample. With prospects it
-/// takes some 3000 for a plausible session.
+/// Most steps of the twins that a calibration may take per sample, whatever the clock
+/// says.
 const MOST_LEARNING_STEPS: u64 = 30_000;
+/// Most steps of the twins that a calibration without prospects takes per sample of a long
+/// session: it takes some 25, a search that follows the twin over all of it at each dead
+/// time and lag some 460.
+const USUAL_LEARNING_STEPS: u64 = 50;
+
+#[test]
+fn the_search_follows_the_twin_over_a_long_session_a_few_times() {
+    let samples = session(240.0, 0.03, 1.0);
+    let most = USUAL_LEARNING_STEPS * samples.len() as u64;
+    let (learnt, _) = steps::within(most, || calibrate(&Rig::chapter("a"), &[samples]));
+    assert!(learnt.is_ok(), "{learnt:?}");
+}
 
 /// Clocks that are too fast or too slow, stand still, jump and go back.
 fn clock() -> impl Strategy<Value = (f64, Vec<(usize, f64)>)> {

@@ -40,6 +40,8 @@ pub(super) struct Accusation {
     pub(super) kind: Option<FaultKind>,
     pub(super) still_s: f64,
     pub(super) unseen_s: f64,
+    /// Time of the jump of the readings that the sensor is blamed for, s.
+    pub(super) jump_s: Option<f64>,
 }
 
 /// Judges `samples`, session number `session`, with `setup`.
@@ -74,9 +76,11 @@ pub(super) fn judge(setup: &Setup, session: usize, samples: &[Sample]) -> SelfTe
 }
 
 fn confirmed(t: &Transition) -> Option<Accusation> {
-    let Evidence { still_s, unseen_s, .. } = t.evidence;
+    let Evidence { still_s, unseen_s, jump, .. } = t.evidence;
     let (at_s, code, kind) = (t.at.seconds(), t.code, t.suspicion.kind);
-    let alarm = Accusation { at_s, code, kind, still_s, unseen_s };
+    let jumped = jump.filter(|_| kind == Some(FaultKind::Jump));
+    let jump_s = jumped.map(|jump| jump.at_s);
+    let alarm = Accusation { at_s, code, kind, still_s, unseen_s, jump_s };
     (t.status == FaultStatus::Confirmed).then_some(alarm)
 }
 

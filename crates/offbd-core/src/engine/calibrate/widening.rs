@@ -13,9 +13,6 @@ const WIDENING_STEP: f64 = 1.25;
 const MOST_HEALTHY_NATS: f64 = 22.0;
 /// Largest model error, m/s². Chosen: beyond it nothing is found.
 const MOST_ERROR_M_S2: f64 = 0.4;
-/// Largest standard deviation of the readings, m: twice that of the worst ultrasonic
-/// sensor seen.
-const MOST_NOISE_M: f64 = 0.03;
 /// Least breakaway that is widened, rad. Chosen.
 const LEAST_BREAKAWAY_RAD: f64 = 0.008;
 /// Least repeat that is widened, s. Chosen.
@@ -32,13 +29,12 @@ struct AxisWidening {
     model_error: f64,
     residual: f64,
     breakaway: f64,
-    noise: f64,
     repeat: f64,
 }
 
 impl Default for AxisWidening {
     fn default() -> Self {
-        Self { model_error: 1.0, residual: 1.0, breakaway: 1.0, noise: 1.0, repeat: 1.0 }
+        Self { model_error: 1.0, residual: 1.0, breakaway: 1.0, repeat: 1.0 }
     }
 }
 
@@ -55,7 +51,6 @@ impl AxisWidening {
         AxisCalibration {
             model_error_m_s2: self.model_error * learnt.model_error_m_s2,
             residual_m_s2: self.residual * learnt.residual_m_s2,
-            noise_m: self.noise * learnt.noise_m,
             breakaway_rad,
             longest_repeat_s,
             ..learnt
@@ -123,7 +118,8 @@ impl Widening {
             (FaultCode::Sensor, Some(FaultKind::Noise)) => {
                 self.scatter = WIDENING_STEP * self.scatter.max(1.0);
             }
-            (FaultCode::Sensor, _) => each(|a| a.noise *= WIDENING_STEP),
+            // A jump is left out of the data.
+            (FaultCode::Sensor, _) => {}
         }
     }
 
@@ -131,9 +127,7 @@ impl Widening {
     pub(super) fn is_beyond(&self, learnt: &Calibration) -> bool {
         let wide = self.of(learnt);
         let beyond = |a: &AxisCalibration| {
-            a.model_error_m_s2 > MOST_ERROR_M_S2
-                || a.breakaway_rad > MOST_BREAKAWAY_RAD
-                || a.noise_m > MOST_NOISE_M
+            a.model_error_m_s2 > MOST_ERROR_M_S2 || a.breakaway_rad > MOST_BREAKAWAY_RAD
         };
         [wide.axes.x, wide.axes.y].iter().flatten().any(beyond)
     }

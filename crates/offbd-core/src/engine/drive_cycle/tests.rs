@@ -36,6 +36,7 @@ fn learnt(x: Option<AxisCalibration>, y: Option<AxisCalibration>) -> Rig {
         duration_s: 60.0,
         certificate: None,
         prospects: None,
+        left_out: Vec::new(),
     };
     Rig { calibration: Some(Box::new(calibration)), ..Rig::chapter("a") }
 }
