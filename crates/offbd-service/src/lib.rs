@@ -78,7 +78,7 @@ mod reanalysis;
 mod replay_settings;
 mod requests;
 #[cfg(test)]
-mod simulation;
+mod simulation_tests;
 mod snapshots;
 mod start;
 mod tags;

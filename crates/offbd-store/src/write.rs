@@ -9,14 +9,14 @@
 //! database was replaced; then the writer refuses all changes until a restart.
 
 mod deletion;
-#[cfg(feature = "commit-faults")]
-mod fault;
 mod fold;
 mod ownership;
 mod subject;
+#[cfg(feature = "commit-faults")]
+mod test_faults;
 
 #[cfg(feature = "commit-faults")]
-pub use fault::{CommitFault, CommitPoint, FaultPlan};
+pub use test_faults::{CommitFault, CommitPoint, FaultPlan};
 
 use std::collections::{BTreeSet, HashSet};
 use std::path::Path;

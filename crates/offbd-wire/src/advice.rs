@@ -89,7 +89,15 @@ const fn servo(kind: Option<KindWord>) -> &'static [&'static str] {
             "Look for a worn gear: does the servo skip at one angle?",
             "Measure the supply under load.",
         ],
-        _ => &[
+        // No kind of a servo.
+        Some(
+            KindWord::Frozen
+            | KindWord::Dropout
+            | KindWord::Noise
+            | KindWord::Spikes
+            | KindWord::Jump,
+        )
+        | None => &[
             "Has the servo power, and is its cable plugged in?",
             "Is the horn screw tight, and does the linkage move freely?",
             "Run the drive cycle: it tells which kind of fault it is.",
@@ -121,7 +129,17 @@ const fn sensor(kind: Option<KindWord>) -> &'static [&'static str] {
             "Was the camera or the panel moved? Fasten it and learn the rig again.",
             "Did the sensor's program start again with another origin?",
         ],
-        _ => &[
+        // No kind of a sensor.
+        Some(
+            KindWord::Dead
+            | KindWord::Held
+            | KindWord::Gain
+            | KindWord::Reversed
+            | KindWord::Offset
+            | KindWord::Slow
+            | KindWord::Intermittent,
+        )
+        | None => &[
             "Move the ball by hand: do the readings follow it?",
             "Camera: look at light and focus. Touch panel: clean it and look at its plug.",
         ],

@@ -196,7 +196,7 @@ impl DeviceClock {
 }
 
 #[cfg(test)]
-mod decisions;
+mod decision_tests;
 
 #[cfg(test)]
 mod tests {

@@ -113,7 +113,22 @@ fn sensor(kind: Option<FaultKind>, evidence: &Evidence) -> String {
         }
         (Some(FaultKind::Dropout), ..) => unseen(evidence),
         (Some(FaultKind::Frozen), ..) => repeated(evidence),
-        _ => all_readings(evidence),
+        // A number that the kind needs is missing, or it is no kind of a sensor.
+        (
+            Some(
+                FaultKind::Jump
+                | FaultKind::Noise
+                | FaultKind::Dead
+                | FaultKind::Held
+                | FaultKind::Gain
+                | FaultKind::Reversed
+                | FaultKind::Offset
+                | FaultKind::Slow
+                | FaultKind::Intermittent,
+            )
+            | None,
+            ..,
+        ) => all_readings(evidence),
     }
 }
 
@@ -206,7 +221,16 @@ fn response(axis: Axis, kind: Option<FaultKind>, answer: &ServoAnswer) -> Option
         ),
         Some(FaultKind::Slow) => format!("the servo answers {command} late"),
         Some(FaultKind::Intermittent) => format!("the servo answers {command} intermittently"),
-        _ => format!("the servo answers {} of {command}{}", share?, unexplained(answer)),
+        // A gain, or no kind of a servo.
+        Some(
+            FaultKind::Gain
+            | FaultKind::Frozen
+            | FaultKind::Dropout
+            | FaultKind::Noise
+            | FaultKind::Spikes
+            | FaultKind::Jump,
+        )
+        | None => format!("the servo answers {} of {command}{}", share?, unexplained(answer)),
     };
     Some(words)
 }

@@ -385,7 +385,7 @@ fn by_session(levels: &[Option<Estimate>], found: &AxisFit) -> Vec<Option<Sessio
 }
 
 #[cfg(test)]
-mod refusals;
+mod refusal_tests;
 
 #[cfg(test)]
 pub(in crate::engine) mod tests {
