@@ -1,6 +1,8 @@
 //! The edge agent `offbd forward`, as a process, between a device and the real service.
 
 mod answers;
+#[cfg(target_os = "linux")]
+mod failing_disk;
 mod set_aside;
 
 use std::io::{BufRead, BufReader, Write};
@@ -25,8 +27,14 @@ struct Agent {
 
 impl Agent {
     fn start(spool: &Path, to: &str, more: &[&str]) -> Self {
-        let mut child =
-            command(spool, to, &["--listen", "127.0.0.1:0"]).args(more).spawn().unwrap();
+        Self::start_with(spool, to, more, &[])
+    }
+
+    /// Starts an agent with additional environment variables.
+    fn start_with(spool: &Path, to: &str, more: &[&str], environment: &[(&str, &Path)]) -> Self {
+        let mut command = command(spool, to, &["--listen", "127.0.0.1:0"]);
+        command.args(more).envs(environment.iter().copied());
+        let mut child = command.spawn().unwrap();
         let (send, address) = mpsc::channel();
         let lines = BufReader::new(child.stderr.take().unwrap()).lines();
         let log = Arc::<Mutex<Vec<Value>>>::default();
@@ -49,6 +57,10 @@ impl Agent {
         let log = self.log.lock().unwrap();
         let lines = log.iter().filter(|fields| fields["message"] == message);
         lines.map(|fields| fields["reason"].as_str().unwrap().to_owned()).collect()
+    }
+
+    fn has_logged(&self, message: &str) -> bool {
+        self.log.lock().unwrap().iter().any(|fields| fields["message"] == message)
     }
 
     async fn status(&self) -> Value {

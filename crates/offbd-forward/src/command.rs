@@ -121,7 +121,7 @@ async fn serve(
     let router = router(spool, delivery.delays());
     tokio::select! {
         served = async { axum::serve(listener, router).await } => Ok(served?),
-        ended = delivery.run() => Ok(ended?),
+        never = delivery.run() => match never {},
     }
 }
 
@@ -140,11 +140,11 @@ async fn forward_lines(
     };
     let source = BufReader::new(std::io::stdin());
     tokio::select! {
-        spooled = spool_lines(spool, source, format, asset, &query) => spooled?,
-        ended = delivery.run() => ended?,
+        () = spool_lines(spool, source, format, asset, &query) => {}
+        never = delivery.run() => match never {},
     }
     // What was under way when the source ended is sent again.
-    delivery.drain().await?;
+    delivery.drain().await;
     let n = spool.refused().await?.len();
     anyhow::ensure!(n == 0, "of {n} batches all or a part is refused: see `offbd forward list`");
     Ok(())

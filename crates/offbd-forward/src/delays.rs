@@ -91,6 +91,6 @@ impl Delays {
 }
 
 #[expect(clippy::disallowed_methods, reason = "delays between attempts")]
-fn now() -> Instant {
+pub(super) fn now() -> Instant {
     Instant::now()
 }

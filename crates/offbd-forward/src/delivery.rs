@@ -1,5 +1,6 @@
 //! Forwards the batches of a spool, in order for each asset, until each is acknowledged.
 
+use std::convert::Infallible;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -12,10 +13,12 @@ use tokio::time::{sleep, timeout};
 use super::answer::{Attempt, Failure, meaning};
 use super::delays::{Delays, LONGEST_DELAY};
 use super::spool::{NewBatch, Spool, SpoolError, WaitingBatch};
-use offbd_net::{HttpsClient, https_client};
+use offbd_net::{HttpsClient, Reasons, https_client};
 
 /// Longest wait for an answer; then the batch is sent again.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(30);
+/// Delay after an error of the spool.
+const SPOOL_RETRY: Duration = Duration::from_secs(1);
 /// Most assets whose batches are under way at the same time; the others wait for their turn.
 const MAX_AT_ONCE: usize = 8;
 /// Longest response that is read, bytes; a longer one counts as cut off. Chosen: the
@@ -114,12 +117,14 @@ pub struct SpoolSender {
     spool: Arc<Spool>,
     to: ServiceUrl,
     delays: Arc<Delays>,
+    /// Of the spool.
+    errors: Reasons,
 }
 
 impl SpoolSender {
     #[must_use]
     pub fn new(spool: Arc<Spool>, to: ServiceUrl) -> Self {
-        Self { spool, to, delays: Arc::default() }
+        Self { spool, to, delays: Arc::default(), errors: Reasons::default() }
     }
 
     /// The assets whose batches could not be sent, for [`super::router`].
@@ -129,33 +134,39 @@ impl SpoolSender {
     }
 
     /// Forwards for ever.
-    ///
-    /// # Errors
-    /// [`SpoolError`] if the spool fails.
-    pub async fn run(&self) -> Result<(), SpoolError> {
+    pub async fn run(&self) -> Infallible {
         loop {
-            if !self.send_due().await? {
-                self.wait().await;
-            }
+            self.turn().await;
         }
     }
 
     /// Forwards until nothing waits.
-    ///
-    /// # Errors
-    /// [`SpoolError`] if the spool fails.
-    pub async fn drain(&self) -> Result<(), SpoolError> {
-        while !self.spool.assets().await?.is_empty() {
-            if !self.send_due().await? {
-                self.wait().await;
+    pub async fn drain(&self) {
+        while !self.spool.assets().await.is_ok_and(|assets| assets.is_empty()) {
+            self.turn().await;
+        }
+    }
+
+    /// Sends what is due, or waits. Does not end if the spool fails: the disk may have room again,
+    /// and deletions make some.
+    async fn turn(&self) {
+        match self.send_due().await {
+            Ok(true) => self.errors.clear(),
+            Ok(false) => self.wait().await,
+            Err(error) => {
+                if self.errors.is_new(&error) {
+                    tracing::error!(%error, "trying again");
+                }
+                sleep(SPOOL_RETRY).await;
             }
         }
-        Ok(())
     }
 
     /// Sends the oldest batch of each asset that is due; returns whether there was one.
     async fn send_due(&self) -> Result<bool, SpoolError> {
-        let due = self.delays.due(self.spool.assets().await?, MAX_AT_ONCE);
+        let assets = self.spool.assets().await?;
+        self.spool.regain_reserve(assets.is_empty()).await;
+        let due = self.delays.due(assets, MAX_AT_ONCE);
         let (spool, to) = (&self.spool, &self.to);
         let sent = join_all(due.iter().map(|asset| async move {
             let Some(waiting) = spool.oldest(asset).await? else { return Ok(None) };
@@ -163,39 +174,52 @@ impl SpoolSender {
             Ok(Some((waiting, attempt)))
         }));
         let sent: Vec<Result<Option<(WaitingBatch, Attempt)>, SpoolError>> = sent.await;
+        let mut read = Ok(!due.is_empty());
         for sent in sent {
-            if let Some((waiting, attempt)) = sent? {
-                self.settle(waiting, attempt).await?;
+            match sent {
+                Ok(Some((waiting, attempt))) => self.settle(waiting, attempt).await,
+                Ok(None) => {}
+                Err(error) => read = Err(error),
             }
         }
-        Ok(!due.is_empty())
+        read
     }
 
-    async fn settle(&self, waiting: WaitingBatch, attempt: Attempt) -> Result<(), SpoolError> {
-        let (asset, id) = (waiting.batch.asset.as_str(), waiting.id);
-        if !matches!(attempt, Attempt::Failed(_)) {
-            // Before the spool, so that no status names an asset of which nothing waits.
-            self.delays.succeeded(asset);
+    async fn settle(&self, waiting: WaitingBatch, attempt: Attempt) {
+        let failure = match self.try_settle(&waiting, attempt).await {
+            Ok(None) => return self.delays.succeeded(&waiting.batch.asset),
+            Ok(Some(failure)) => failure,
+            Err(error) => Failure::new(error.to_string()),
+        };
+        let asset = waiting.batch.asset.as_str();
+        if self.delays.failed(asset, &failure) {
+            let Failure { cause, answer, .. } = failure;
+            let waiting = self.spool.status().await.map(|status| status.waiting_batches).ok();
+            tracing::warn!(asset, reason = cause, answer, waiting, "a batch waits");
         }
+    }
+
+    /// Does with a batch what an attempt demands; returns why it still waits.
+    async fn try_settle(
+        &self,
+        waiting: &WaitingBatch,
+        attempt: Attempt,
+    ) -> Result<Option<Failure>, SpoolError> {
+        let WaitingBatch { id, batch } = waiting;
+        let asset = batch.asset.as_str();
         match attempt {
-            Attempt::Stored => self.spool.remove(&waiting).await?,
+            Attempt::Failed(failure) => return Ok(Some(failure)),
+            Attempt::Stored => self.spool.remove(waiting).await?,
             Attempt::Rejected { samples, reason } => {
+                self.spool.set_aside(waiting, &samples, &reason).await?;
                 tracing::error!(asset, id, reason, "samples are rejected and set aside");
-                self.spool.set_aside(&waiting, &samples, &reason).await?;
             }
             Attempt::Refused(reason) => {
+                self.spool.set_aside(waiting, batch, &reason).await?;
                 tracing::error!(asset, id, reason, "a batch is refused and set aside");
-                self.spool.set_aside(&waiting, &waiting.batch, &reason).await?;
-            }
-            Attempt::Failed(failure) => {
-                if self.delays.failed(asset, &failure) {
-                    let Failure { cause, answer, .. } = failure;
-                    let waiting = self.spool.status().await?.waiting_batches;
-                    tracing::warn!(asset, reason = cause, answer, waiting, "a batch waits");
-                }
             }
         }
-        Ok(())
+        Ok(None)
     }
 
     /// Waits for a new batch or the end of a delay.

@@ -88,5 +88,9 @@ fn acknowledgement(batch: Batch) -> AckView {
 }
 
 async fn status(State((spool, delays)): State<AgentState>) -> Result<Json<AgentStatus>, Refusal> {
-    Ok(Json(AgentStatus { spool: spool.status().await?, held_up: delays.views() }))
+    let status = spool.status().await?;
+    // An asset of which the last batch has just been stored is not held up.
+    let (held_up, waiting) = (delays.views(), spool.assets().await?);
+    let held_up = held_up.into_iter().filter(|delay| waiting.contains(&delay.asset)).collect();
+    Ok(Json(AgentStatus { spool: status, held_up }))
 }

@@ -14,6 +14,7 @@ mod delivery;
 mod intake;
 mod lines;
 mod refusal;
+mod reserve;
 mod spool;
 
 use offbd_wire::telemetry::{Batch, TelemetryFormat};

@@ -7,7 +7,7 @@ use tokio::sync::mpsc;
 use tokio::time::{sleep, timeout};
 
 use super::parsed;
-use super::spool::{NewBatch, Spool, SpoolError};
+use super::spool::{NewBatch, Spool};
 use offbd_net::Reasons;
 
 /// Most lines of a batch.
@@ -16,7 +16,7 @@ const MAX_BATCH_LINES: usize = 100;
 const LONGEST_WAIT: Duration = Duration::from_millis(500);
 /// Longest line, bytes; a longer one ends the stream with an error.
 const MAX_LINE_BYTES: u64 = 1 << 20;
-/// How often a full spool is tried if no room is reported.
+/// How often a spool that is full or fails is tried if no room is reported.
 const RETRY: Duration = Duration::from_secs(1);
 
 /// The format of a stream of lines.
@@ -37,17 +37,15 @@ impl LineFormat {
 }
 
 /// Reads `source` to its end on a thread of its own, and spools its lines for `asset`. While the
-/// spool is full the source is not read, so that its writer waits.
-///
-/// # Errors
-/// [`SpoolError`] if the spool fails; an error of the source ends it and is logged.
+/// spool is full or fails the source is not read, so that its writer waits. An error of the source
+/// ends it and is logged.
 pub async fn spool_lines(
     spool: &Spool,
     source: impl BufRead + Send + 'static,
     format: LineFormat,
     asset: &str,
     query: &str,
-) -> Result<(), SpoolError> {
+) {
     let (send, mut lines) = mpsc::channel(MAX_BATCH_LINES);
     std::thread::spawn(move || read(source, &send));
     let header = match format {
@@ -70,9 +68,8 @@ pub async fn spool_lines(
         let media_type = format.media_type().to_owned();
         let batch = NewBatch { asset, query, media_type, body };
         log_invalid(&batch, &invalid);
-        put(spool, &batch).await?;
+        put(spool, &batch).await;
     }
-    Ok(())
 }
 
 /// Logs why lines are not samples, each reason once: the service rejects them, and a pipe, unlike
@@ -89,18 +86,16 @@ fn log_invalid(batch: &NewBatch, logged: &Reasons) {
     }
 }
 
-/// Adds a batch, and waits for room if there is none.
-async fn put(spool: &Spool, batch: &NewBatch) -> Result<(), SpoolError> {
-    loop {
-        match spool.put(batch).await {
-            Err(SpoolError::Full { used, limit }) => {
-                tracing::warn!(used, limit, "the spool is full; the source waits");
-                tokio::select! {
-                    () = spool.freed.notified() => {}
-                    () = sleep(RETRY) => {}
-                }
-            }
-            result => return result,
+/// Adds a batch, once there is room for it and the spool does not fail.
+async fn put(spool: &Spool, batch: &NewBatch) {
+    let logged = Reasons::default();
+    while let Err(error) = spool.put(batch).await {
+        if logged.is_new(&error) {
+            tracing::warn!(%error, "the source waits");
+        }
+        tokio::select! {
+            () = spool.freed.notified() => {}
+            () = sleep(RETRY) => {}
         }
     }
 }

@@ -4,9 +4,13 @@ use std::borrow::Cow;
 use std::path::Path;
 
 use serde::Serialize;
-use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqliteLockingMode, SqliteSynchronous};
+use sqlx::sqlite::{
+    SqliteAutoVacuum, SqliteConnectOptions, SqliteJournalMode, SqliteLockingMode, SqliteSynchronous,
+};
 use sqlx::{ConnectOptions, Connection, Row, SqliteConnection};
 use tokio::sync::{Mutex, Notify};
+
+use super::reserve::{RESERVE_BYTES, Reserve};
 
 /// Default of the most bytes of batches that a spool holds; further ones are refused with 429.
 /// Chosen: ten hours of one rig at 100 Hz as JSON.
@@ -21,6 +25,9 @@ pub enum SpoolError {
     /// Nothing of the batch was taken.
     #[error("the spool is full: {used} of {limit} bytes wait for the service")]
     Full { used: u64, limit: u64 },
+    /// Nothing of the batch was taken.
+    #[error("the disk is full: it has no room for the {RESERVE_BYTES} bytes that deletions need")]
+    NoReserve,
     #[error("the spool is locked by an agent that is running")]
     Locked,
     /// Nothing was changed.
@@ -28,6 +35,19 @@ pub enum SpoolError {
     NotSetAside(i64),
     #[error("the spool cannot be used: {0}")]
     Sql(#[from] sqlx::Error),
+}
+
+impl SpoolError {
+    fn is_of_full_disk(&self) -> bool {
+        /// `SQLITE_FULL`
+        const FULL: &str = "13";
+        matches!(self, Self::Sql(error) if code(error).as_deref() == Some(FULL))
+    }
+}
+
+/// The code of an error of SQLite.
+fn code(error: &sqlx::Error) -> Option<Cow<'_, str>> {
+    error.as_database_error().and_then(|error| error.code())
 }
 
 /// A batch as a device has sent it.
@@ -55,6 +75,8 @@ pub struct SpoolStatus {
     /// Bytes of the spool in use, with what is set aside.
     pub used_bytes: u64,
     pub limit_bytes: u64,
+    /// Bytes on the disk that are kept for deletions; 0 on a full disk, and then no batch is taken.
+    pub reserve_bytes: u64,
     /// What the service has refused for good, at most 100 batches, the oldest first.
     pub refused: Vec<RefusedBatch>,
 }
@@ -86,7 +108,47 @@ pub struct Spool {
 struct SpoolFile {
     connection: SqliteConnection,
     used_bytes: u64,
+    reserve: Reserve,
 }
+
+impl SpoolFile {
+    /// Makes a change, if need be with the room of the reserve.
+    async fn change(
+        &mut self,
+        change: impl AsyncFn(&mut SqliteConnection) -> Result<(), SpoolError>,
+    ) -> Result<(), SpoolError> {
+        let mut changed = change(&mut self.connection).await;
+        if changed.as_ref().is_err_and(SpoolError::is_of_full_disk) && self.reserve.release() {
+            tracing::error!("the disk is full; the agent takes nothing until it has room again");
+            changed = change(&mut self.connection).await;
+        }
+        if changed.is_ok() && !self.reserve.is_kept() {
+            // The next change overwrites the log instead of making it longer. It does not matter
+            // if that fails, as the change is in the log.
+            let _ = sqlx::raw_sql(CHECKPOINT).execute(&mut self.connection).await;
+        }
+        changed
+    }
+
+    /// Gives the pages of deleted batches back to the disk.
+    async fn shrink(&mut self) -> Result<(), SpoolError> {
+        let mut n_before = i64::MAX;
+        loop {
+            let count = sqlx::query_scalar("PRAGMA freelist_count");
+            let n: i64 = count.fetch_one(&mut self.connection).await?;
+            if n == 0 || n >= n_before {
+                return Ok(());
+            }
+            n_before = n;
+            sqlx::raw_sql(VACUUM).execute(&mut self.connection).await?;
+            sqlx::raw_sql(CHECKPOINT).execute(&mut self.connection).await?;
+        }
+    }
+}
+
+/// Pages at a time, so that the log stays short.
+const VACUUM: &str = "PRAGMA incremental_vacuum(256)";
+const CHECKPOINT: &str = "PRAGMA wal_checkpoint(RESTART)";
 
 const SCHEMA: &str = "
     CREATE TABLE IF NOT EXISTS batch (
@@ -109,13 +171,18 @@ impl Spool {
             .filename(path)
             .create_if_missing(true)
             .locking_mode(SqliteLockingMode::Exclusive)
+            .auto_vacuum(SqliteAutoVacuum::Incremental)
             .journal_mode(SqliteJournalMode::Wal)
             // A commit is on the disk before it returns, also after a power cut.
             .synchronous(SqliteSynchronous::Full);
         let mut connection = options.connect().await.map_err(open_error)?;
         sqlx::raw_sql(SCHEMA).execute(&mut connection).await.map_err(open_error)?;
         let used_bytes = used_bytes(&mut connection).await?;
-        let file = Mutex::new(SpoolFile { connection, used_bytes });
+        let mut reserve = Reserve::of(path);
+        if let Err(error) = reserve.keep().await {
+            tracing::error!(%error, "no room for the reserve; the agent takes nothing");
+        }
+        let file = Mutex::new(SpoolFile { connection, used_bytes, reserve });
         Ok(Self { limit_bytes, file, added: Notify::new(), freed: Notify::new() })
     }
 
@@ -128,6 +195,9 @@ impl Spool {
         let bytes = cost(&batch.body);
         if file.used_bytes + bytes > self.limit_bytes {
             return Err(SpoolError::Full { used: file.used_bytes, limit: self.limit_bytes });
+        }
+        if !file.reserve.is_kept() {
+            return Err(SpoolError::NoReserve);
         }
         let insert = "INSERT INTO batch (asset, query, media_type, body) VALUES ($1, $2, $3, $4)";
         sqlx::query(insert)
@@ -168,8 +238,12 @@ impl Spool {
     /// Removes a batch that the service has stored.
     pub(super) async fn remove(&self, stored: &WaitingBatch) -> Result<(), SpoolError> {
         let mut file = self.file.lock().await;
-        let delete = sqlx::query("DELETE FROM batch WHERE id = $1").bind(stored.id);
-        delete.execute(&mut file.connection).await?;
+        file.change(async |connection| {
+            let delete = sqlx::query("DELETE FROM batch WHERE id = $1").bind(stored.id);
+            delete.execute(connection).await?;
+            Ok(())
+        })
+        .await?;
         file.used_bytes = file.used_bytes.saturating_sub(cost(&stored.batch.body));
         drop(file);
         self.freed.notify_waiters();
@@ -187,14 +261,18 @@ impl Spool {
         let update = "UPDATE batch SET query = $1, media_type = $2, body = $3, refusal = $4 \
             WHERE id = $5";
         let mut file = self.file.lock().await;
-        sqlx::query(update)
-            .bind(&kept.query)
-            .bind(&kept.media_type)
-            .bind(&kept.body)
-            .bind(reason)
-            .bind(refused.id)
-            .execute(&mut file.connection)
-            .await?;
+        file.change(async |connection| {
+            sqlx::query(update)
+                .bind(&kept.query)
+                .bind(&kept.media_type)
+                .bind(&kept.body)
+                .bind(reason)
+                .bind(refused.id)
+                .execute(connection)
+                .await?;
+            Ok(())
+        })
+        .await?;
         file.used_bytes += cost(&kept.body);
         file.used_bytes = file.used_bytes.saturating_sub(cost(&refused.batch.body));
         drop(file);
@@ -232,18 +310,37 @@ impl Spool {
     /// Makes a change to each of the batches, or to none.
     async fn change(&self, ids: &[i64], change: &'static str) -> Result<(), SpoolError> {
         let mut file = self.file.lock().await;
-        let mut changes = file.connection.begin().await?;
-        for id in ids {
-            let changed = sqlx::query(change).bind(id).execute(&mut *changes).await?;
-            if changed.rows_affected() == 0 {
-                return Err(SpoolError::NotSetAside(*id));
+        file.change(async |connection| {
+            let mut changes = connection.begin().await?;
+            for id in ids {
+                let changed = sqlx::query(change).bind(id).execute(&mut *changes).await?;
+                if changed.rows_affected() == 0 {
+                    return Err(SpoolError::NotSetAside(*id));
+                }
             }
-        }
-        changes.commit().await?;
+            Ok(changes.commit().await?)
+        })
+        .await?;
         file.used_bytes = used_bytes(&mut file.connection).await?;
         drop(file);
         self.freed.notify_waiters();
         Ok(())
+    }
+
+    /// Makes the reserve again once a full disk has room, or can be given it. Tries at most every
+    /// [`LONGEST_DELAY`](super::delays::LONGEST_DELAY), and when nothing waits.
+    pub(super) async fn regain_reserve(&self, is_empty: bool) {
+        let mut file = self.file.lock().await;
+        if file.reserve.is_kept() || !(is_empty || file.reserve.is_due()) {
+            return;
+        }
+        // What is not given back now is given back at the next attempt.
+        let _ = file.shrink().await;
+        if file.reserve.keep().await.is_ok() {
+            tracing::info!("the disk has room again");
+            drop(file);
+            self.freed.notify_waiters();
+        }
     }
 
     /// Returns how much waits.
@@ -259,6 +356,7 @@ impl Spool {
             waiting_batches: waiting.unsigned_abs(),
             used_bytes: file.used_bytes,
             limit_bytes: self.limit_bytes,
+            reserve_bytes: if file.reserve.is_kept() { RESERVE_BYTES } else { 0 },
             refused,
         })
     }
@@ -289,8 +387,9 @@ async fn used_bytes(connection: &mut SqliteConnection) -> Result<u64, SpoolError
 
 /// Returns [`SpoolError::Locked`] if another process uses the file (`SQLITE_BUSY`).
 fn open_error(error: sqlx::Error) -> SpoolError {
-    let code = error.as_database_error().and_then(|error| error.code().map(Cow::into_owned));
-    if code.as_deref() == Some("5") { SpoolError::Locked } else { error.into() }
+    /// `SQLITE_BUSY`
+    const BUSY: &str = "5";
+    if code(&error).as_deref() == Some(BUSY) { SpoolError::Locked } else { error.into() }
 }
 
 /// What a batch counts against the limit, bytes.

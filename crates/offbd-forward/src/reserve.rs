@@ -1,0 +1,74 @@
+//! Space that is kept on the disk, because SQLite needs some to delete.
+
+use std::ffi::OsString;
+use std::fs::File;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use tokio::time::Instant;
+
+use super::delays::{LONGEST_DELAY, now};
+
+/// Size of the reserve, bytes. Chosen: the log of a spool has up to 4 MiB of pages that are not in
+/// the database yet, and a batch of 4 MiB more; when they get there, and when such a batch is set
+/// aside, either grows by that.
+pub(super) const RESERVE_BYTES: u64 = 16 << 20;
+
+/// A file of [`RESERVE_BYTES`] beside the spool, which is deleted when a full disk prevents a
+/// deletion.
+#[derive(Debug)]
+pub(super) struct Reserve {
+    path: PathBuf,
+    is_kept: bool,
+    /// When it was last released, or could not be kept.
+    since: Instant,
+}
+
+impl Reserve {
+    /// The reserve of the spool at `spool`, which is not kept yet.
+    pub(super) fn of(spool: &Path) -> Self {
+        let mut path = OsString::from(spool);
+        path.push("-reserve");
+        Self { path: path.into(), is_kept: false, since: now() }
+    }
+
+    pub(super) const fn is_kept(&self) -> bool {
+        self.is_kept
+    }
+
+    /// Whether it is time to try to keep it again.
+    pub(super) fn is_due(&self) -> bool {
+        now() >= self.since + LONGEST_DELAY
+    }
+
+    /// Fills the file, or deletes it if the disk has no room for it.
+    pub(super) async fn keep(&mut self) -> io::Result<()> {
+        let path = self.path.clone();
+        let filled = tokio::task::spawn_blocking(move || fill(&path)).await;
+        let filled = filled.unwrap_or_else(|panicked| Err(io::Error::other(panicked)));
+        (self.is_kept, self.since) = (filled.is_ok(), now());
+        if filled.is_err() {
+            // Not to be in the way of others. May not be there at all.
+            let _ = std::fs::remove_file(&self.path);
+        }
+        filled
+    }
+
+    /// Makes room; returns whether it could.
+    pub(super) fn release(&mut self) -> bool {
+        let was_kept = std::mem::replace(&mut self.is_kept, false);
+        self.since = now();
+        was_kept && std::fs::remove_file(&self.path).is_ok()
+    }
+}
+
+fn fill(path: &Path) -> io::Result<()> {
+    let mut file = File::options().append(true).create(true).open(path)?;
+    let block = [0; 64 << 10];
+    let mut n = file.metadata()?.len();
+    while n < RESERVE_BYTES {
+        file.write_all(&block)?;
+        n += block.len() as u64;
+    }
+    file.sync_all()
+}
