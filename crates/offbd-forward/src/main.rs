@@ -7,6 +7,12 @@ use offbd_forward::command::{self, ForwardArgs};
 use offbd_terminal::logging::LoggingArgs;
 use offbd_terminal::report;
 
+/// Keeps telemetry on this machine until the service has stored it.
+///
+/// Takes batches like the service (POST /api/v1/assets/ASSET/telemetry), or with
+/// --asset the lines of stdin, and forwards them in order, across lost
+/// connections and restarts. When the spool is full it takes no more: devices get
+/// 429, a pipe waits.
 #[derive(Debug, Parser)]
 #[command(name = "offbd-forward", version, max_term_width = 80)]
 struct Cli {
