@@ -91,6 +91,6 @@ impl Delays {
 }
 
 #[expect(clippy::disallowed_methods, reason = "delays between attempts")]
-pub(super) fn now() -> Instant {
+fn now() -> Instant {
     Instant::now()
 }

@@ -4,15 +4,18 @@ use std::ffi::OsString;
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use tokio::time::Instant;
-
-use super::delays::{LONGEST_DELAY, now};
 
 /// Size of the reserve, bytes. Chosen: the log of a spool has up to 4 MiB of pages that are not in
 /// the database yet, and a batch of 4 MiB more; when they get there, and when such a batch is set
 /// aside, either grows by that.
 pub(super) const RESERVE_BYTES: u64 = 16 << 20;
+
+/// Pause before the reserve is filled again. Chosen: a disk that has just been full may need room
+/// for others first.
+const PAUSE: Duration = Duration::from_secs(30);
 
 /// A file of [`RESERVE_BYTES`] beside the spool, which is deleted when a full disk prevents a
 /// deletion.
@@ -38,7 +41,7 @@ impl Reserve {
 
     /// Whether it is time to try to keep it again.
     pub(super) fn is_due(&self) -> bool {
-        now() >= self.since + LONGEST_DELAY
+        now() >= self.since + PAUSE
     }
 
     /// Fills the file, or deletes it if the disk has no room for it.
@@ -71,4 +74,9 @@ fn fill(path: &Path) -> io::Result<()> {
         n += block.len() as u64;
     }
     file.sync_all()
+}
+
+#[expect(clippy::disallowed_methods, reason = "a pause between attempts")]
+fn now() -> Instant {
+    Instant::now()
 }

@@ -14,7 +14,8 @@ use axum::middleware::Next;
 use axum::response::Response;
 use tower_http::cors::CorsLayer;
 
-use super::sovd;
+/// How paths of the adapter begin, whose errors have the members of SOVD too.
+pub(super) const SOVD_PREFIX: &str = "/sovd/";
 
 /// The content security policy of responses that are not pages.
 const DENY_ALL: &str = "default-src 'none'; frame-ancestors 'none'";
@@ -40,7 +41,7 @@ pub(super) async fn require_tls(request: Request, next: Next) -> Response {
 pub(super) async fn secure(request: Request, next: Next) -> Response {
     let path = request.uri().path();
     let policy = if path.starts_with("/docs") { DOCS } else { DENY_ALL };
-    let is_api = path.starts_with("/api/") || path.starts_with(sovd::PREFIX);
+    let is_api = path.starts_with("/api/") || path.starts_with(SOVD_PREFIX);
     let mut response = next.run(request).await;
     let mut set_default = |name: HeaderName, value: &'static str| {
         response.headers_mut().entry(name).or_insert(HeaderValue::from_static(value));

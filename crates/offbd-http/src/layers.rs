@@ -22,7 +22,7 @@ use tracing::field::Empty;
 
 use offbd_net::unread_body;
 
-use super::{AccessPolicy, Problem, headers, sovd};
+use super::{AccessPolicy, Problem, headers};
 
 /// Longest time until a response starts, except for an import.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(60);
@@ -105,7 +105,7 @@ async fn count(request: Request, next: Next) -> Response {
 /// read if the request is one of its adapter.
 async fn set_instance(request: Request, next: Next) -> Response {
     let id = request_id(&request);
-    let is_sovd = request.uri().path().starts_with(sovd::PREFIX);
+    let is_sovd = request.uri().path().starts_with(headers::SOVD_PREFIX);
     let mut response = next.run(request).await;
     match response.extensions_mut().remove::<Problem>() {
         Some(problem) => {

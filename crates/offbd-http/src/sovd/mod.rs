@@ -24,9 +24,6 @@ use offbd_service::access::Right;
 /// Path below which the entities are.
 const BASE: &str = "/sovd/v1";
 
-/// How paths of the adapter begin, whose errors have the members of SOVD too.
-pub(super) const PREFIX: &str = "/sovd/";
-
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
 #[into_params(parameter_in = Query)]
 struct SchemaQuery {
