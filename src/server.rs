@@ -155,18 +155,7 @@ pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Ser
     }
     tokio::spawn(service.notifier(senders).run());
     tokio::spawn(rebuild(service.clone(), closing.clone()));
-    let budget = BodyBudget::new(config.limits.bodies_bytes);
-    let demo_routes = demo.is_some();
-    let app_closing = closing.clone();
-    let app = App {
-        service,
-        budget,
-        policy,
-        closing: app_closing,
-        demo: demo_routes,
-        features: FEATURES,
-    };
-    let router = offbd_http::router(app, demo.unwrap_or_default());
+    let router = router(&config, service, policy, &closing, demo);
     if let Some(NodeListener { listener, .. }) = node {
         server.listen(&config, None, listener, router.clone());
     }
@@ -177,6 +166,25 @@ pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Ser
     tokio::spawn(keep_threads(closing));
     tracing::info!(%address, store = %server.store.location(), "serving");
     Ok(server)
+}
+
+/// The interface of the service, with the additional routes of the demo.
+fn router(
+    config: &Config,
+    service: Service,
+    policy: Arc<AccessPolicy>,
+    closing: &CancellationToken,
+    demo: Option<ExtraRoutes>,
+) -> Router {
+    let app = App {
+        service,
+        budget: BodyBudget::new(config.limits.bodies_bytes),
+        policy,
+        closing: closing.clone(),
+        demo: demo.is_some(),
+        features: FEATURES,
+    };
+    offbd_http::router(app, demo.unwrap_or_default())
 }
 
 /// Starts the service, as the node `me` of a cluster if there is one. If that fails, the store is

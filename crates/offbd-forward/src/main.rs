@@ -1,4 +1,4 @@
-//! `offbd-forward`: the edge agent as a small program of its own, for the machine beside the rig.
+//! `offbd-forward`: the edge agent as a separate small program, for the machine beside the rig.
 
 use std::process::ExitCode;
 

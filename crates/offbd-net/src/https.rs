@@ -16,7 +16,7 @@ pub type HttpsClient = Client<HttpsConnector<HttpConnector>, Body>;
 /// Returns a client that trusts the root certificates of the machine, or of `SSL_CERT_FILE`.
 ///
 /// # Errors
-/// If `url` needs TLS and there are no root certificates.
+/// If `url` needs TLS and the machine has no root certificates.
 pub fn https_client(url: &Uri) -> Result<HttpsClient> {
     let builder = HttpsConnectorBuilder::new();
     let builder = if url.scheme_str() == Some("https") {

@@ -1,7 +1,7 @@
 //! The queues of background jobs, and the progress of the running ones.
 //!
 //! Jobs that a person asked for and calibrations that rigs start by themselves have a queue
-//! each, with workers of its own, so that nobody waits for a calibration that nobody asked for.
+//! each, with its own workers: what a person asked for does not wait for automatic calibrations.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -42,8 +42,8 @@ pub(super) struct NewJob {
 }
 
 /// Samples that are replayed in the time in which a calibration uses one of its samples.
-/// Measured: 95 µs against some 1 µs.
-const CALIBRATION_COST: u64 = 100;
+/// Measured: 12 µs against 0.8 µs.
+const CALIBRATION_COST: u64 = 15;
 
 /// Returns the cost of a replay of so many samples.
 pub(super) fn replay_cost(n_samples: i64) -> u64 {

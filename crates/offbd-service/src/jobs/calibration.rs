@@ -22,8 +22,8 @@ use offbd_wire::session_csv;
 use offbd_wire::words::JobState;
 
 /// Longest motion of a session that an automatic calibration learns from, as a multiple of the
-/// motion that is wanted, by default 5 minutes. Chosen: a minute is enough, and a calibration
-/// takes some 10 ms for each second of a recording.
+/// motion that is wanted, by default 5 minutes. Chosen: a minute is enough, and what
+/// comes first tells little about a rig that ages.
 const LONGEST_MOTION: f64 = 5.0;
 
 /// Runs a calibration to completion, with this `priority`, or until it is cancelled or the service

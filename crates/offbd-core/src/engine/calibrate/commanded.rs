@@ -129,7 +129,7 @@ impl Walk<'_> {
         self.point = PathPoint::default();
     }
 
-    /// Advances to the next moment; over a gap, starts anew.
+    /// Advances to the next moment; after a gap, starts again.
     fn step(&mut self) {
         let path = self.path;
         let run = &path.runs[self.run];

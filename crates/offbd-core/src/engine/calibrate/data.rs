@@ -1,7 +1,7 @@
 //! The sessions to learn from, without moments that contradict the rest.
 //!
 //! A sensor that reads elsewhere for a moment, or a ball that a hand sets down elsewhere,
-//! is no noise of the rig: a wider noise would hide faults in all of the other readings.
+//! is not noise: a wider noise would hide faults in all of the other readings.
 //! Such a moment is left out and named; what remains decides.
 
 #[cfg(not(feature = "std"))]

@@ -27,8 +27,8 @@ const LOOKED_AT_S: f64 = 30.0;
 /// Length of the pieces of which that is made up, s: several times what a servo must be
 /// followed for before.
 const PIECE_S: f64 = 10.0;
-/// Dead time and lag, s, by which the motion of the pieces is compared: the middle of
-/// what has been seen on real rigs.
+/// Dead time and lag, s, by which the motion of the pieces is compared: of the middle of the
+/// grid. Chosen.
 const TYPICAL_S: (f64, f64) = (0.1, 0.06);
 /// Difference of lags from which the effect of a change is taken, s.
 const LAG_STEP_S: f64 = 1e-3;
