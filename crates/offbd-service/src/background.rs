@@ -14,20 +14,21 @@ use super::ServiceError;
 /// priorities of single threads; elsewhere it is that of the others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Priority {
-    /// For a result that a person waits for: a tenth of the time of a thread that evaluates
-    /// samples, if both want the same processor.
+    /// For a result that a person waits for: a third of the time of a thread that evaluates
+    /// samples, if both want the same processor. Chosen so that a drive cycle takes some
+    /// seconds also on a busy machine.
     Low,
     /// For what nobody waits for: a seventieth of that time, the least that there is.
     Lowest,
 }
 
 impl Priority {
-    /// Increment of the nice value. The weights of 0, 10 and 19 are 1024, 110 and 15
+    /// Increment of the nice value. The weights of 0, 5 and 19 are 1024, 335 and 15
     /// (`sched_prio_to_weight` of Linux).
     #[cfg(target_os = "linux")]
     const fn nice(self) -> i32 {
         match self {
-            Self::Low => 10,
+            Self::Low => 5,
             Self::Lowest => 19,
         }
     }
@@ -112,7 +113,7 @@ mod tests {
         let (_, here) = this_thread();
         let of = |increment: i32| (here + increment).min(19);
         for (priority, name, increment) in
-            [(Priority::Low, "job", 10), (Priority::Lowest, "learning", 19)]
+            [(Priority::Low, "job", 5), (Priority::Lowest, "learning", 19)]
         {
             let expected = (name.to_owned(), of(increment));
             assert_eq!(priority.compute(this_thread).await.unwrap(), expected);
