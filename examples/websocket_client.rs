@@ -12,7 +12,7 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 use futures_util::{SinkExt, StreamExt};
-use offbd::wire::session_csv::SessionCsvReader;
+use offbd::wire::table::{TableOptions, TableReader};
 use offbd_core::vocabulary::Sample;
 use serde_json::{Value, json};
 use tokio_tungstenite::tungstenite::Message;
@@ -31,8 +31,9 @@ async fn main() -> anyhow::Result<()> {
     let (socket, _) = tokio_tungstenite::connect_async(&url).await.context(url)?;
     let (mut up, mut down) = socket.split();
     let session = Path::new(file).file_stem().unwrap_or_default().to_string_lossy();
-    let rows: Vec<Sample> =
-        SessionCsvReader::new(File::open(file)?)?.filter_map(Result::ok).collect();
+    let rows: Vec<Sample> = TableReader::recording(File::open(file)?, &TableOptions::default())?
+        .filter_map(Result::ok)
+        .collect();
     let mut n_pending = rows.chunks(ROWS).len();
     // Sending and receiving run concurrently: neither waits for the other.
     let send = async {

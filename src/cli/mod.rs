@@ -17,7 +17,7 @@ mod watch;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use offbd_file_cli::{calibrate, drive_cycle, export, replay, trends};
+use offbd_file_cli::{calibrate, drive_cycle, export, inspect, replay, trends};
 use offbd_forward::command as forward;
 use offbd_terminal::logging::LoggingArgs;
 use offbd_terminal::output;
@@ -62,6 +62,7 @@ enum CliCommand {
     Lab(offbd_lab_cli::LabCommand),
     #[cfg(feature = "lab")]
     Demo(demo::DemoArgs),
+    Inspect(inspect::InspectArgs),
     Calibrate(calibrate::CalibrateArgs),
     Replay(replay::ReplayArgs),
     Trends(trends::TrendsArgs),
@@ -114,6 +115,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         CliCommand::Lab(command) => command.run(),
         #[cfg(feature = "lab")]
         CliCommand::Demo(args) => demo::run(&args),
+        CliCommand::Inspect(args) => inspect::run(&args),
         CliCommand::Calibrate(args) => calibrate::run(&args),
         CliCommand::Replay(args) => replay::run(&args),
         CliCommand::Trends(args) => trends::run(&args),

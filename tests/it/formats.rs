@@ -6,6 +6,7 @@ mod tables;
 mod traces;
 
 use offbd::wire::session_file::SessionFormat;
+use offbd::wire::table::TableOptions;
 #[cfg(feature = "parquet")]
 use offbd_core::vocabulary::Sample;
 
@@ -42,7 +43,7 @@ async fn import(client: &Client, path: &str, kind: &str, file: Vec<u8>) -> crate
 #[cfg(feature = "parquet")]
 fn samples(file: &[u8]) -> Vec<Sample> {
     let file = std::io::Cursor::new(file.to_vec());
-    let rows = offbd::wire::session_file::open(file, None).unwrap();
+    let rows = offbd::wire::session_file::open(file, None, &TableOptions::default()).unwrap();
     rows.map(Result::unwrap).collect()
 }
 

@@ -54,6 +54,7 @@ mod small;
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 mod soak;
 mod support;
+mod tables;
 mod tags;
 #[cfg(feature = "otel")]
 mod traces;

@@ -8,7 +8,7 @@ use clap::Args;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-use crate::judge::{load_rig, read_samples};
+use crate::judge::{TableArgs, load_rig, read_samples};
 use offbd_core::diagnosis::{
     AxisCalibration, Calibration, CalibrationOrigin, LeftOut, MonitorCertificate, Prospects,
     ServoProspects, SessionEstimate,
@@ -19,6 +19,7 @@ use offbd_terminal::errors::{BadArgument, InputError, read};
 use offbd_terminal::output::{self, OutputFormat};
 use offbd_terminal::table;
 use offbd_wire::asset;
+use offbd_wire::table::TableOptions;
 
 /// Calibrates a rig from recordings in which it was healthy.
 ///
@@ -50,6 +51,8 @@ pub struct CalibrateArgs {
     /// What was learnt: as tables on stderr, or as one JSON object on stdout
     #[arg(long, value_enum, default_value_t = OutputFormat::Table)]
     format: OutputFormat,
+    #[command(flatten)]
+    table: TableArgs,
 }
 
 pub fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
@@ -59,7 +62,7 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
         return Err(BadArgument(reason.to_owned()).into());
     }
     let mut rig = load_rig(Some(&args.asset))?;
-    let sessions = load(&args.sessions)?;
+    let sessions = load(&args.sessions, &args.table.options())?;
     let calibration = learn(&rig, &sessions, &data_hash(&args.sessions)?)
         .map_err(|e| InputError::new("cannot calibrate", e))?;
     if args.format == OutputFormat::Table {
@@ -84,11 +87,12 @@ fn learnt(rig: &Rig) -> LearntRig {
     LearntRig { asset: rig.name.clone(), calibration: asset::view(rig).calibration }
 }
 
-/// Loads the samples of healthy sessions. Invalid rows are left out and reported on stderr.
-pub fn load(paths: &[PathBuf]) -> Result<Vec<Vec<Sample>>, InputError> {
+/// Loads the samples of healthy sessions, each run as one. Invalid rows are left out and reported
+/// on stderr.
+pub fn load(paths: &[PathBuf], options: &TableOptions) -> Result<Vec<Vec<Sample>>, InputError> {
     let mut sessions = Vec::with_capacity(paths.len());
     for path in paths {
-        let (samples, bad_rows) = read_samples(path)?;
+        let (runs, bad_rows) = read_samples(path, options)?;
         if let Some(first) = bad_rows.first() {
             let n = bad_rows.len();
             output::remark(format_args!(
@@ -96,7 +100,7 @@ pub fn load(paths: &[PathBuf]) -> Result<Vec<Vec<Sample>>, InputError> {
                 path.display()
             ));
         }
-        sessions.push(samples);
+        sessions.extend(runs);
     }
     Ok(sessions)
 }

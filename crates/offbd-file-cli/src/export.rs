@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 
-use crate::judge;
+use crate::judge::{self, TableArgs};
 use offbd_core::engine::Setup;
 use offbd_core::vocabulary::Sample;
 use offbd_terminal::errors::{BadArgument, InputError};
@@ -71,6 +71,8 @@ struct SessionExport {
     /// moment, as the service's GET /api/v1/sessions/ID/trace
     #[arg(long, value_name = "FILE", requires = "asset")]
     trace: Option<PathBuf>,
+    #[command(flatten)]
+    table: TableArgs,
 }
 
 /// The formats that are written.
@@ -103,7 +105,7 @@ fn export_session(args: &SessionExport) -> anyhow::Result<()> {
         write_session(args, format, &info, output)?;
     }
     if let (Some(file), Some(setup)) = (&args.trace, &setup) {
-        trace::write(setup, &args.session, &info, file)?;
+        trace::write(setup, args, &info, file)?;
     }
     Ok(())
 }
@@ -115,15 +117,15 @@ fn write_session(
     output: &Path,
 ) -> anyhow::Result<()> {
     // Only CSV has the column `seq` where it is needed.
-    let with_seq = format == SessionFormat::Csv && has_seq(&args.session)?;
+    let with_seq = format == SessionFormat::Csv && has_seq(args)?;
     let begun = SessionWriter::new(format, info, with_seq)?;
     if output == Path::new("-") {
         let mut out = output::stdout();
-        write(&args.session, begun, &mut out)?;
+        write(args, begun, &mut out)?;
         return Ok(out.flush()?);
     }
     let mut file = NewFile::create(output)?;
-    write(&args.session, begun, &mut file)?;
+    write(args, begun, &mut file)?;
     file.keep()
 }
 
@@ -148,28 +150,34 @@ fn info(args: &SessionExport, setup: Option<&Setup>) -> anyhow::Result<SessionIn
     let Some(setup) = setup else {
         return Ok(SessionInfo { session, ..SessionInfo::default() });
     };
-    let judged = judge::judge_file(setup, &args.session)?;
+    let runs = judge::judge_file(setup, &args.session, &args.table.options())?;
+    let [judged] = &runs[..] else {
+        let reason = "its clock starts again; write each run into a file";
+        return Err(InputError::file(&args.session, reason).into());
+    };
     Ok(SessionInfo {
         session,
         asset_file: Some(serde_json::to_string(&asset::view(&setup.rig))?),
         calibration_id: setup.rig.calibration.as_deref().map(asset::calibration_id),
-        verdict_hash: Some(judged.summary.verdict_hash),
+        verdict_hash: Some(judged.summary.verdict_hash.clone()),
     })
 }
 
-fn has_seq(path: &Path) -> Result<bool, InputError> {
-    Ok(judge::open(path)?.any(|row| row.is_ok_and(|sample| sample.seq.is_some())))
+fn has_seq(args: &SessionExport) -> Result<bool, InputError> {
+    let mut rows = judge::open(&args.session, &args.table.options())?;
+    Ok(rows.any(|row| row.is_ok_and(|sample| sample.seq.is_some())))
 }
 
-/// Writes the valid rows of the session at `path`, and reports the others.
+/// Writes the valid rows of the session, and reports the others.
 fn write(
-    path: &Path,
+    args: &SessionExport,
     (mut writer, start): (SessionWriter, Vec<u8>),
     out: &mut impl Write,
 ) -> anyhow::Result<()> {
     out.write_all(&start)?;
     let (mut samples, mut n_rejected) = (Vec::<Sample>::with_capacity(BATCH), 0_usize);
-    for row in judge::open(path)? {
+    let path = &args.session;
+    for row in judge::open(path, &args.table.options())? {
         match row {
             Ok(sample) => samples.push(sample),
             Err(SessionRowError::Rejected(reason)) => {

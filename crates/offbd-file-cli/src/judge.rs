@@ -4,6 +4,7 @@
 use std::fs::File;
 use std::path::Path;
 
+use clap::Args;
 use offbd_terminal::errors::{InputError, read};
 pub use offbd_wire::judging::JudgedSession;
 
@@ -11,8 +12,34 @@ use offbd_core::diagnosis::Profile;
 use offbd_core::engine::{Rig, Setup};
 use offbd_core::vocabulary::Sample;
 use offbd_wire::asset;
-use offbd_wire::judging::RecordedSession;
+use offbd_wire::judging::{RecordedSession, run_name};
 use offbd_wire::session_file::{self, SessionRowError, SessionRows};
+use offbd_wire::table::{ColumnMapping, TableOptions};
+
+/// How the tables of recordings in text are read.
+#[derive(Clone, Debug, Default, Args)]
+pub struct TableArgs {
+    /// Which columns of a text are which quantities, with units, such as
+    /// "t_s=time/ms, x_m=ball_x/mm"; `offbd inspect FILE` proposes a mapping
+    #[arg(long, value_name = "MAPPING")]
+    columns: Option<ColumnMapping>,
+    /// Rows a second of a text without a time
+    #[arg(long, value_name = "HZ", value_parser = rate)]
+    rate: Option<f64>,
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    let rate = text.parse().ok().filter(|rate: &f64| *rate > 0.0 && rate.is_finite());
+    rate.ok_or_else(|| "expected a number above 0".to_owned())
+}
+
+impl TableArgs {
+    /// The options of the reader.
+    #[must_use]
+    pub fn options(&self) -> TableOptions {
+        TableOptions { columns: self.columns.clone().unwrap_or_default(), rate_hz: self.rate }
+    }
+}
 
 /// Loads the rig of an asset file; without a path, the default rig.
 pub fn load_rig(path: Option<&Path>) -> Result<Rig, InputError> {
@@ -31,35 +58,53 @@ pub fn session_name(path: &Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
-/// Judges the session file at `path`.
-pub fn judge_file(setup: &Setup, path: &Path) -> Result<JudgedSession, InputError> {
-    let mut rows = open(path)?;
-    let mut session = RecordedSession::new(setup.clone(), session_name(path));
+/// Judges each run of the session file at `path` as a session; there is at least one.
+pub fn judge_file(
+    setup: &Setup,
+    path: &Path,
+    options: &TableOptions,
+) -> Result<Vec<JudgedSession>, InputError> {
+    let mut rows = open(path, options)?;
+    let begin = |n_run| RecordedSession::new(setup.clone(), run_name(&session_name(path), n_run));
+    let end = |session: RecordedSession| {
+        session.end(|_| {}).map_err(|reason| InputError::file(path, reason))
+    };
+    let (mut ended, mut session) = (Vec::new(), begin(1));
     while let Some(row) = rows.next() {
+        if rows.n_runs() > ended.len() + 1 {
+            let next = begin(rows.n_runs());
+            ended.push(end(std::mem::replace(&mut session, next))?);
+        }
         match row {
             Ok(sample) => session.sample(sample, || rows.place(), |_| {}),
             Err(SessionRowError::Rejected(row)) => session.reject(row),
             Err(error) => return Err(InputError::file(path, error)),
         }
     }
-    session.end(|_| {}).map_err(|reason| InputError::file(path, reason))
+    ended.push(end(session)?);
+    Ok(ended)
 }
 
-/// Reads the samples of the session file at `path`, and the errors of its invalid rows.
-pub fn read_samples(path: &Path) -> Result<(Vec<Sample>, Vec<String>), InputError> {
-    let (mut samples, mut bad_rows) = (Vec::new(), Vec::new());
-    for row in open(path)? {
+/// Reads the samples of each run of the session file at `path`, and the errors of its invalid rows.
+pub fn read_samples(
+    path: &Path,
+    options: &TableOptions,
+) -> Result<(Vec<Vec<Sample>>, Vec<String>), InputError> {
+    let (mut runs, mut bad_rows) = (vec![Vec::new()], Vec::new());
+    let mut rows = open(path, options)?;
+    while let Some(row) = rows.next() {
+        runs.resize_with(rows.n_runs(), Vec::new);
         match row {
-            Ok(sample) => samples.push(sample),
+            Ok(sample) => runs.last_mut().into_iter().for_each(|run| run.push(sample)),
             Err(SessionRowError::Rejected(row)) => bad_rows.push(row.to_string()),
             Err(error) => return Err(InputError::file(path, error)),
         }
     }
-    Ok((samples, bad_rows))
+    Ok((runs, bad_rows))
 }
 
 /// Opens the session file at `path`, whatever its format.
-pub fn open(path: &Path) -> Result<Box<dyn SessionRows>, InputError> {
+pub fn open(path: &Path, options: &TableOptions) -> Result<Box<dyn SessionRows>, InputError> {
     let file = File::open(path).map_err(|e| InputError::file(path, e))?;
-    session_file::open(file, None).map_err(|e| InputError::file(path, e))
+    session_file::open(file, None, options).map_err(|e| InputError::file(path, e))
 }

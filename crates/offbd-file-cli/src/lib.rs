@@ -3,6 +3,7 @@
 pub mod calibrate;
 pub mod drive_cycle;
 pub mod export;
+pub mod inspect;
 pub mod judge;
 pub mod replay;
 pub mod trends;

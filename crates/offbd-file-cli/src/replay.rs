@@ -10,7 +10,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
-use crate::judge::{self, JudgedSession};
+use crate::judge::{self, JudgedSession, TableArgs};
 use offbd_core::diagnosis::Profile;
 use offbd_core::engine::Setup;
 use offbd_terminal::errors::{FaultFound, InputError};
@@ -24,7 +24,8 @@ use offbd_terminal::table;
 #[derive(Clone, Debug, Args)]
 #[command(
     after_help = "A session is CSV with the header t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m: seconds, \
-    radians, metres. An empty position means that no ball was seen. In a build with the \
+    radians, metres. An empty position means that no ball was seen. For other names \
+    and units give --columns; `offbd inspect FILE` proposes it. In a build with the \
     feature `parquet`, Parquet and Arrow files with these columns are read too; with `mcap`, \
     MCAP files with messages of these keys; with `xlsx`, Excel workbooks.\n\n\
     Examples:\n  \
@@ -63,27 +64,32 @@ pub struct ReplayArgs {
     /// Files judged at a time [default: one per core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
+    #[command(flatten)]
+    table: TableArgs,
 }
 
 pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     let setup = judge::set_up(judge::load_rig(args.asset.as_deref())?, args.profile)?;
     let against = against_setup(args)?;
     let bar = progress(args.sessions.len());
-    let judge_all = || -> Vec<Result<ComparedSession, InputError>> {
+    let options = args.table.options();
+    let judge_all = || -> Vec<Result<Vec<ComparedSession>, InputError>> {
         let judge = |path: &PathBuf| {
-            let judged = judge::judge_file(&setup, path)?;
-            let against = against.as_ref().map(|s| judge::judge_file(s, path)).transpose()?;
+            let judged = judge::judge_file(&setup, path, &options)?;
+            let against = against.as_ref().map(|s| judge::judge_file(s, path, &options));
+            let mut against = against.transpose()?.into_iter().flatten();
             bar.inc(1);
-            Ok(ComparedSession { judged, against })
+            let compared = |judged| ComparedSession { judged, against: against.next() };
+            Ok(judged.into_iter().map(compared).collect())
         };
         args.sessions.par_iter().map(judge).collect()
     };
     let results = in_threads(args.jobs, judge_all)?;
     bar.finish_and_clear();
     for (path, result) in args.sessions.iter().zip(&results) {
-        report_rows(path, result);
+        report_rows(path, result.as_deref().unwrap_or_default());
     }
-    let verdicts: Vec<&ComparedSession> = results.iter().flatten().collect();
+    let verdicts: Vec<&ComparedSession> = results.iter().flatten().flatten().collect();
     match args.format {
         OutputFormat::Json => write_json(&verdicts)?,
         OutputFormat::Table => write_table(&verdicts)?,
@@ -140,9 +146,20 @@ pub fn in_threads<T: Send>(
 }
 
 /// Reports rejected rows and rows that were not judged, on stderr.
-fn report_rows(path: &Path, result: &Result<ComparedSession, InputError>) {
+fn report_rows(path: &Path, sessions: &[ComparedSession]) {
     let name = path.display();
-    let Ok(ComparedSession { judged, .. }) = result else { return };
+    if sessions.len() > 1 {
+        output::remark(format_args!(
+            "{name}: the clock starts again; its {} runs are judged as sessions",
+            sessions.len()
+        ));
+    }
+    for ComparedSession { judged, .. } in sessions {
+        report_rows_of_run(&name.to_string(), judged);
+    }
+}
+
+fn report_rows_of_run(name: &str, judged: &JudgedSession) {
     for row in &judged.bad_rows {
         output::remark(format_args!("{name}: {row}; row rejected"));
     }

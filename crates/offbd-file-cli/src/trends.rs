@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use rayon::prelude::*;
 
-use crate::judge::{self, JudgedSession};
+use crate::judge::{self, JudgedSession, TableArgs};
 use offbd_core::diagnosis::ServoEstimate;
 use offbd_core::diagnosis::trend::{LEAST_SESSIONS, MAX_SESSIONS};
 use offbd_core::vocabulary::{Axis, PerAxis};
@@ -38,6 +38,8 @@ pub struct TrendsArgs {
     /// A table for people, or one JSON object
     #[arg(long, value_enum, default_value = "table")]
     format: OutputFormat,
+    #[command(flatten)]
+    table: TableArgs,
 }
 
 pub fn run(args: &TrendsArgs) -> anyhow::Result<()> {
@@ -48,9 +50,10 @@ pub fn run(args: &TrendsArgs) -> anyhow::Result<()> {
         let reason = "it has no calibration, which trends need";
         return Err(InputError::file(&args.asset, reason).into());
     };
-    let judged: Result<Vec<JudgedSession>, InputError> =
-        args.sessions.par_iter().map(|path| judge::judge_file(&setup, path)).collect();
-    let judged = judged?;
+    let options = args.table.options();
+    let judged: Result<Vec<Vec<JudgedSession>>, InputError> =
+        args.sessions.par_iter().map(|path| judge::judge_file(&setup, path, &options)).collect();
+    let judged: Vec<JudgedSession> = judged?.into_iter().flatten().collect();
     let first = judged.len().saturating_sub(MAX_SESSIONS);
     let estimates: Vec<PerAxis<Option<ServoEstimate>>> =
         judged[first..].iter().map(|j| j.estimates).collect();

@@ -83,6 +83,7 @@ fn acknowledgement(batch: Batch) -> AckView {
         accepted: samples().count(),
         last_seq: samples().filter_map(|sample| sample.seq).max(),
         session: batch.session.clone(),
+        unknown: batch.unknown,
         ..AckView::default()
     }
 }

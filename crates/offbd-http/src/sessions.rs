@@ -24,6 +24,7 @@ use offbd_core::vocabulary::Invalid;
 use offbd_service::{RecordingReader, Route, Service, SessionListQuery};
 use offbd_wire::service::{ImportView, Page, SessionCalibrationView, SessionView};
 use offbd_wire::session_file::{SessionFormat, SessionWriter};
+use offbd_wire::table::{InspectionView, MappingError, TableOptions};
 use offbd_wire::verdict::FaultView;
 use offbd_wire::words::{SessionSort, SessionState, VerdictFilter};
 
@@ -75,6 +76,29 @@ pub(super) struct SessionsQuery {
 pub(super) struct ImportQuery {
     /// Name of the session; the time of the import by default.
     name: Option<String>,
+    /// Which columns of a text are which quantities, such as `t_s=time/ms, x_m=ball_x/mm`: a sum of
+    /// columns and constants for each, with `*NUMBER`, `/NUMBER` or `/UNIT` behind a column. By
+    /// default, the columns with the names of the quantities.
+    columns: Option<String>,
+    /// Rows a second of a text without a time.
+    #[param(exclusive_minimum = 0)]
+    rate: Option<f64>,
+    /// Whether to import nothing, and to answer what the file holds and how its columns are
+    /// probably to be read.
+    dry_run: Option<bool>,
+}
+
+impl ImportQuery {
+    fn options(&self) -> Result<TableOptions, Problem> {
+        let columns = self.columns.as_deref().unwrap_or_default();
+        let columns = columns
+            .parse()
+            .map_err(|error: MappingError| Invalid::new("?columns", error.to_string()))?;
+        if self.rate.is_some_and(|rate| !(rate > 0.0 && rate.is_finite())) {
+            return Err(Invalid::new("?rate", "must be above 0").into());
+        }
+        Ok(TableOptions { columns, rate_hz: self.rate })
+    }
 }
 
 impl SessionsQuery {
@@ -121,7 +145,10 @@ pub(super) async fn open(
 /// Imports a recorded file as a session: CSV or, in a build with these formats, Parquet and
 /// Arrow (streams and files without compression), with the columns of the CSV file in any
 /// numeric type, MCAP with JSON messages of the schema `offbd.Sample`, or the first sheet
-/// of an Excel workbook, in which a time may be a date. Its samples are processed like live
+/// of an Excel workbook, in which a time may be a date. A text may have any usual encoding,
+/// separator and decimal sign, comments and lines before the table; other names, units and a
+/// missing time are given by `columns` and `rate`. If its clock starts again, each run becomes a
+/// session. Its samples are processed like live
 /// telemetry. The asset's open session is ended first, and the new session is ended after
 /// the last row; live telemetry of the asset gets 429 until then. Two files are read at a time,
 /// others wait. Of a file that is damaged, ends too early or expands too far, or if the
@@ -134,7 +161,9 @@ pub(super) async fn open(
         (BinaryFile = "application/vnd.apache.arrow.stream"),
         (BinaryFile = "application/vnd.mcap"),
         (BinaryFile = "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet"))),
-    responses((status = 201, body = ImportView), (status = 400, body = Problem),
+    responses((status = 201, body = ImportView),
+        (status = 200, body = InspectionView, description = "With `dry_run`"),
+        (status = 400, body = Problem),
         (status = 404, body = Problem), (status = 409, body = Problem),
         (status = 413, body = Problem), (status = 415, body = Problem)))]
 pub(super) async fn import(
@@ -144,15 +173,19 @@ pub(super) async fn import(
     Extension(share): Extension<BodyShare>,
     headers: HeaderMap,
     body: Body,
-) -> Result<impl IntoResponse, Problem> {
+) -> Result<Response, Problem> {
     let format = session_format::of_file(&headers)?;
+    let options = query.options()?;
     app.service.check_known(&asset).await?;
     let limits = app.service.limits();
     let timeout = limits.body_timeout * IMPORT_TIMEOUT_FACTOR;
     let read = body::read(body, limits.import_bytes, timeout, &share).await?;
     let (file, limit) = (Cursor::new(read), MAX_IMPORT_ROWS);
-    let imported = app.service.import(&asset, query.name, file, format, limit).await?;
-    Ok(created(&imported.session.id.clone(), imported))
+    if query.dry_run == Some(true) {
+        return Ok(Json(app.service.inspect(file, options).await?).into_response());
+    }
+    let imported = app.service.import(&asset, query.name, file, format, options, limit).await?;
+    Ok(created(&imported.session.id.clone(), imported).into_response())
 }
 
 /// Lists sessions by the time at which they were opened. In a cluster, the open sessions of a

@@ -26,6 +26,7 @@ use offbd_file_cli::replay::{in_threads, progress};
 use offbd_terminal::errors::InputError;
 use offbd_terminal::output::{self, OutputFormat, value_parser};
 use offbd_terminal::table;
+use offbd_wire::table::TableOptions;
 
 /// Scores the diagnosis on a labelled corpus: delays, false alarms, isolation.
 ///
@@ -96,7 +97,14 @@ fn judge_all(
         .par_iter()
         .map(|label| {
             bar.inc(1);
-            judge::judge_file(&setups[label.rig.as_str()], &args.dir.join(&label.file))
+            let path = args.dir.join(&label.file);
+            let runs =
+                judge::judge_file(&setups[label.rig.as_str()], &path, &TableOptions::default());
+            let mut runs = runs?.into_iter();
+            match (runs.next(), runs.next()) {
+                (Some(judged), None) => Ok(judged),
+                _ => Err(InputError::file(&path, "its clock starts again")),
+            }
         })
         .collect::<Result<Vec<JudgedSession>, InputError>>()?;
     bar.finish_and_clear();
@@ -108,9 +116,9 @@ fn set_up(args: &ScoreArgs, folder: &Path) -> Result<Setup, InputError> {
     let mut rig = judge::load_rig(Some(&folder.join("rig.json")))?;
     if !args.no_calibration {
         let path = folder.join("calibration.csv");
-        let (samples, _) = judge::read_samples(&path)?;
+        let (samples, _) = judge::read_samples(&path, &TableOptions::default())?;
         let data = calibrate::data_hash(std::slice::from_ref(&path))?;
-        let learnt = calibrate::learn(&rig, &[samples], &data);
+        let learnt = calibrate::learn(&rig, &samples, &data);
         rig.calibration = Some(Box::new(learnt.map_err(|e| InputError::file(&path, e))?));
     }
     judge::set_up(rig, args.profile)

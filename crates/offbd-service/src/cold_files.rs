@@ -9,6 +9,7 @@ use super::ServiceError;
 use offbd_core::vocabulary::Sample;
 use offbd_store::{ColdDirectory, SampleStream};
 use offbd_wire::session_file::{self, SessionFileError, SessionFormat, SessionInfo, SessionWriter};
+use offbd_wire::table::TableOptions;
 
 /// Returns the directory `root` of cold data.
 #[must_use]
@@ -17,7 +18,7 @@ pub fn cold_directory(root: &Path) -> ColdDirectory {
 }
 
 fn read(file: File) -> Result<SampleStream, String> {
-    let rows = session_file::open(file, Some(SessionFormat::Parquet));
+    let rows = session_file::open(file, Some(SessionFormat::Parquet), &TableOptions::default());
     let rows = rows.map_err(|error| error.to_string())?;
     Ok(Box::new(rows.map(|row| row.map_err(|error| error.to_string()))))
 }

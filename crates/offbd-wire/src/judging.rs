@@ -8,7 +8,7 @@
 mod recorded;
 mod residual;
 
-pub use recorded::{JudgedSession, MAX_NAMED_ROWS, NoUsableRow, RecordedSession};
+pub use recorded::{JudgedSession, MAX_NAMED_ROWS, NoUsableRow, RecordedSession, run_name};
 
 use offbd_core::diagnosis::{Evidence, FaultMemory, Transition};
 use offbd_core::engine::{Admission, Engine, Input, Misfit, Plausibility, Rejection, Setup};

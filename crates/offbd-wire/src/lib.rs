@@ -33,6 +33,7 @@ pub mod session_csv;
 pub mod session_file;
 pub mod sovd;
 pub mod stored;
+pub mod table;
 pub mod tag;
 pub mod telemetry;
 pub mod trace;

@@ -249,7 +249,7 @@ impl MappedTopic {
             }
         };
         let rows = samples.iter().map(|sample| self.sample(sample)).collect();
-        Ok(Batch { session, id: None, rows })
+        Ok(Batch { session, rows, ..Batch::default() })
     }
 
     fn sample(&self, sample: &Value) -> Result<Sample, String> {

@@ -427,6 +427,10 @@ fn monitor_view(code: &FaultCode, monitor: &MonitorState) -> MonitorView {
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct ImportView {
     pub session: SessionView,
+    /// The sessions of the other runs of the file, whose clock starts again; absent if there are
+    /// none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub more_sessions: Vec<SessionView>,
     /// Number of recorded samples, late ones included.
     pub accepted: u64,
     /// Number of samples that were already recorded.

@@ -40,7 +40,8 @@ use std::io::{self, Read, Seek, SeekFrom};
 
 use offbd_core::vocabulary::Sample;
 
-use super::session_csv::{self, CsvError, RowError, SessionCsvReader};
+use super::session_csv;
+use super::table::{CsvError, RowError, TableOptions, TableReader};
 use super::telemetry::sample_view;
 
 /// A format of session files.
@@ -152,7 +153,7 @@ impl fmt::Display for SessionFormat {
 const ARROW_FILE: &[u8] = b"ARROW1\0\0";
 
 /// Bytes that show the format of a file.
-const HEAD_BYTES: u64 = 8;
+pub(crate) const HEAD_BYTES: u64 = 8;
 
 /// Why a file cannot be read or written as a session.
 #[derive(Debug, thiserror::Error)]
@@ -248,9 +249,16 @@ pub enum SessionRowError {
 pub trait SessionRows: Iterator<Item = Result<Sample, SessionRowError>> + Send {
     /// The place of the row read last.
     fn place(&self) -> RowPlace;
+
+    /// The number of runs that have begun, from 1: in a text, a clock that starts again and a second
+    /// header begin another one.
+    fn n_runs(&self) -> usize {
+        1
+    }
 }
 
-/// Opens the session file `source`. Without `format` its first bytes say what it is.
+/// Opens the session file `source`. Without `format` its first bytes say what it is. `options` say
+/// how a text is read; the columns of other formats have the names of the quantities.
 ///
 /// # Errors
 /// [`SessionFileError`] if this build does not read the format, a column is missing or has
@@ -258,6 +266,7 @@ pub trait SessionRows: Iterator<Item = Result<Sample, SessionRowError>> + Send {
 pub fn open<S: Read + Seek + Send + 'static>(
     mut source: S,
     format: Option<SessionFormat>,
+    options: &TableOptions,
 ) -> Result<Box<dyn SessionRows>, SessionFileError> {
     let mut head = Vec::new();
     if format.is_none() {
@@ -267,7 +276,7 @@ pub fn open<S: Read + Seek + Send + 'static>(
     if format == SessionFormat::Csv {
         // A pipe cannot go back to its start.
         let source = io::Cursor::new(head).chain(source);
-        return Ok(Box::new(CsvRows(SessionCsvReader::new(source)?)));
+        return Ok(Box::new(CsvRows(TableReader::recording(source, options)?)));
     }
     source.seek(SeekFrom::Start(0))?;
     match format {
@@ -286,9 +295,10 @@ pub fn open<S: Read + Seek + Send + 'static>(
     }
 }
 
-struct CsvRows<R>(SessionCsvReader<R>);
+/// The rows of a text.
+pub(crate) struct CsvRows<'a>(pub(crate) TableReader<'a>);
 
-impl<R: Read> Iterator for CsvRows<R> {
+impl Iterator for CsvRows<'_> {
     type Item = Result<Sample, SessionRowError>;
 
     fn next(&mut self) -> Option<Self::Item> {
@@ -299,9 +309,13 @@ impl<R: Read> Iterator for CsvRows<R> {
     }
 }
 
-impl<R: Read + Send> SessionRows for CsvRows<R> {
+impl SessionRows for CsvRows<'_> {
     fn place(&self) -> RowPlace {
         RowPlace::Line(self.0.line())
+    }
+
+    fn n_runs(&self) -> usize {
+        self.0.n_runs()
     }
 }
 

@@ -11,12 +11,13 @@ mod lenient;
 
 use std::io::Read;
 
+use serde::de::DeserializeSeed;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use self::cells::{BatchDocument, BatchRow};
+use self::cells::{BatchDocument, BatchRowSeed, UnknownKeys};
 pub use self::format::{TelemetryFormat, UnsupportedMediaType};
-use super::session_csv::SessionCsvReader;
+use super::table::{TableReader, nearest_of};
 use offbd_core::vocabulary::Sample;
 
 /// Largest `seq`: the largest integer of the store.
@@ -34,6 +35,8 @@ pub struct Batch {
     pub id: Option<String>,
     /// A sample, or the reason why the row is invalid.
     pub rows: Vec<Result<Sample, String>>,
+    /// Keys that are not understood, each with the key that is probably meant.
+    pub unknown: Vec<UnknownKeyView>,
 }
 
 /// Why a document is not a valid batch.
@@ -69,7 +72,8 @@ pub fn msgpack(document: &[u8], limit: usize) -> Result<Batch, BatchError> {
 }
 
 fn batch(document: BatchDocument, limit: usize) -> Result<Batch, BatchError> {
-    let BatchDocument { session, id, samples, columns } = document;
+    let BatchDocument { session, id, samples, columns, unknown } = document;
+    let has_unknown = !unknown.is_empty();
     let rows = match (samples, columns.is_empty()) {
         (Some(_), false) => {
             let reason = "a batch has either `samples` or columns, not both".to_owned();
@@ -77,17 +81,17 @@ fn batch(document: BatchDocument, limit: usize) -> Result<Batch, BatchError> {
         }
         (Some(samples), true) => {
             check_length(samples.n, limit)?;
-            samples.values.into_iter().map(BatchRow::sample).collect()
+            samples.values.into_iter().map(|row| row.sample(has_unknown)).collect()
         }
         (None, _) => {
             check_length(columns.n(), limit)?;
-            columns.samples().map_err(|(column, reason)| BatchError::Malformed {
+            columns.samples(has_unknown).map_err(|(column, reason)| BatchError::Malformed {
                 pointer: format!("/{column}"),
                 reason,
             })?
         }
     };
-    Ok(Batch { session, id, rows })
+    Ok(Batch { session, id, rows, unknown: named(unknown) })
 }
 
 fn check_length(found: usize, limit: usize) -> Result<(), BatchError> {
@@ -102,7 +106,9 @@ fn check_length(found: usize, limit: usize) -> Result<(), BatchError> {
 pub fn ndjson(document: &[u8], limit: usize) -> Result<Batch, BatchError> {
     let lines = document.split(|b| *b == b'\n').map(<[u8]>::trim_ascii).filter(|l| !l.is_empty());
     check_length(lines.clone().count(), limit)?;
-    Ok(Batch { rows: lines.map(json_row).collect(), ..Batch::default() })
+    let unknown = UnknownKeys::default();
+    let rows = lines.map(|line| row(line, &unknown)).collect();
+    Ok(Batch { rows, unknown: named(unknown), ..Batch::default() })
 }
 
 /// Parses one sample object.
@@ -110,16 +116,36 @@ pub fn ndjson(document: &[u8], limit: usize) -> Result<Batch, BatchError> {
 /// # Errors
 /// The reason why the row is invalid.
 pub fn json_row(document: &[u8]) -> Result<Sample, String> {
-    match serde_json::from_slice::<BatchRow>(document) {
-        Ok(row) => row.sample(),
+    row(document, &UnknownKeys::default())
+}
+
+fn row(document: &[u8], unknown: &UnknownKeys) -> Result<Sample, String> {
+    let parse = |document: &[u8]| {
+        let mut json = serde_json::Deserializer::from_slice(document);
+        let row = BatchRowSeed(unknown).deserialize(&mut json)?;
+        json.end().map(|()| row)
+    };
+    match parse(document) {
+        Ok(row) => row.sample(!unknown.is_empty()),
         Err(error) => {
             let quoted = lenient::quote_non_finite(document);
-            match quoted.map(|quoted| serde_json::from_slice(&quoted)) {
-                Some(Ok(row)) => BatchRow::sample(row),
+            match quoted.map(|quoted| parse(&quoted)) {
+                Some(Ok(row)) => row.sample(!unknown.is_empty()),
                 _ => Err(super::json::words(&error)),
             }
         }
     }
+}
+
+/// Returns unknown keys with those that are probably meant.
+fn named(unknown: UnknownKeys) -> Vec<UnknownKeyView> {
+    let likely = |key: &str| {
+        let starts = |field: &&&str| !key.is_empty() && field.starts_with(&format!("{key}_"));
+        let alike = nearest_of(key, cells::FIELDS.into_iter());
+        cells::FIELDS.iter().find(starts).copied().or(alike).map(str::to_owned)
+    };
+    let view = |key: String| UnknownKeyView { meant: likely(&key), key };
+    unknown.into_names().into_iter().map(view).collect()
 }
 
 /// Parses CSV with the header of a session file, with at most `limit` rows.
@@ -136,11 +162,11 @@ pub fn csv(document: &[u8], limit: usize) -> Result<Batch, BatchError> {
 }
 
 /// Parses CSV with the header of a session file, row by row.
-fn csv_rows<R: Read>(
-    document: R,
+fn csv_rows<'a>(
+    document: impl Read + Send + 'a,
 ) -> Result<impl Iterator<Item = Result<Sample, String>>, BatchError> {
     let malformed = |reason| BatchError::Malformed { pointer: String::new(), reason };
-    let reader = SessionCsvReader::new(document).map_err(|e| malformed(e.to_string()))?;
+    let reader = TableReader::batch(document).map_err(|e| malformed(e.to_string()))?;
     Ok(reader.map(|row| file_row(row.map_err(|e| e.to_string()))))
 }
 
@@ -196,6 +222,17 @@ pub struct AckView {
     pub late: Vec<RowView>,
     /// Highest `seq` recorded in the session; null if no sample has one.
     pub last_seq: Option<u64>,
+    /// Keys of the batch that are not understood, at most 8; absent if there are none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub unknown: Vec<UnknownKeyView>,
+}
+
+/// A key of a batch that is not understood.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct UnknownKeyView {
+    pub key: String,
+    /// The known key that is most like it; null if none is.
+    pub meant: Option<String>,
 }
 
 /// One sample. A value that the device does not have is null.

@@ -37,15 +37,20 @@ impl CliFixture {
 
     /// Runs `offbd` with the arguments in `line` and expects the exit code `code`.
     pub fn run(&self, code: i32, line: &str) -> CommandOutput {
+        self.args(code, &line.split_whitespace().collect::<Vec<_>>())
+    }
+
+    /// Runs `offbd` with arguments that may have blanks.
+    pub fn args(&self, code: i32, args: &[&str]) -> CommandOutput {
         let mut command = Command::cargo_bin("offbd").unwrap();
-        command.args(line.split_whitespace()).current_dir(self.dir.path());
+        command.args(args).current_dir(self.dir.path());
         // Temporary files also go to the directory, so that tests can check for them.
         let output = command.env("TMPDIR", self.dir.path()).output().unwrap();
         let done = CommandOutput {
             stdout: String::from_utf8(output.stdout).unwrap(),
             stderr: String::from_utf8(output.stderr).unwrap(),
         };
-        assert_eq!(output.status.code(), Some(code), "offbd {line}\n{}", done.stderr);
+        assert_eq!(output.status.code(), Some(code), "offbd {args:?}\n{}", done.stderr);
         done
     }
 

@@ -4,6 +4,7 @@
 use std::io::Cursor;
 
 use offbd::wire::session_file::{SessionFileError, SessionFormat, SessionRowError, open};
+use offbd::wire::table::TableOptions;
 use offbd_core::vocabulary::Sample;
 
 const CSV_FILE: &[u8] =
@@ -11,7 +12,7 @@ const CSV_FILE: &[u8] =
 
 fn rows(file: &[u8]) -> Result<Vec<Result<Sample, String>>, SessionFileError> {
     let mut samples = Vec::new();
-    for row in open(Cursor::new(file.to_vec()), None)? {
+    for row in open(Cursor::new(file.to_vec()), None, &TableOptions::default())? {
         match row {
             Ok(sample) => samples.push(Ok(sample)),
             Err(SessionRowError::Rejected(row)) => samples.push(Err(row.to_string())),

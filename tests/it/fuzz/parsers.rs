@@ -6,6 +6,7 @@ use offbd::service::access::jwt::{KeySet, MAX_SUBJECT, verify};
 use offbd::store::codec::ChunkKey;
 use offbd::wire::bus::{TopicError, TopicStyle, encoded};
 use offbd::wire::mapping::Mapping;
+use offbd::wire::table::{ColumnMapping, TableOptions, TableReader};
 use offbd::wire::telemetry::{self, Batch, BatchError};
 use offbd::wire::{asset, session_csv, session_file};
 use offbd_core::diagnosis::FaultMemory;
@@ -18,7 +19,7 @@ use crate::support::provider::{self, Key};
 pub type Parser = fn(&[u8]) -> String;
 
 /// Every parser, with the directory of its corpus.
-pub const PARSERS: [(&str, Parser); 14] = [
+pub const PARSERS: [(&str, Parser); 15] = [
     ("json", |input| batch(telemetry::json(input, LIMIT))),
     ("msgpack", |input| batch(telemetry::msgpack(input, LIMIT))),
     ("ndjson", |input| batch(telemetry::ndjson(input, LIMIT))),
@@ -33,6 +34,7 @@ pub const PARSERS: [(&str, Parser); 14] = [
     ("jwks", jwks),
     ("mapped", mapped),
     ("topic", topic),
+    ("columns", columns),
 ];
 
 /// Largest number of samples of a batch.
@@ -48,9 +50,22 @@ fn kind(text: &str) -> String {
     words.filter(|word| word.len() > 1).take(12).collect::<Vec<_>>().join(" ")
 }
 
+/// A mapping of columns; what is written is read back.
+fn columns(input: &[u8]) -> String {
+    let text = String::from_utf8_lossy(input);
+    match text.parse::<ColumnMapping>() {
+        Ok(mapping) => {
+            let again = mapping.to_string().parse::<ColumnMapping>();
+            format!("mapping {}", again == Ok(mapping))
+        }
+        Err(error) => kind(&error.to_string()),
+    }
+}
+
 /// Reads a file of any format that the build has, and as many rows of it as of a batch.
 fn session_file(input: &[u8]) -> String {
-    let rows = match session_file::open(std::io::Cursor::new(input.to_vec()), None) {
+    let source = std::io::Cursor::new(input.to_vec());
+    let rows = match session_file::open(source, None, &TableOptions::default()) {
         Ok(rows) => rows,
         Err(error) => return kind(&error.to_string()),
     };
@@ -120,7 +135,7 @@ fn is_finite(sample: &Sample) -> bool {
 fn written_and_read(samples: &[Sample]) -> Vec<Sample> {
     let mut text = Vec::new();
     session_csv::write(&mut text, samples).unwrap();
-    session_csv::SessionCsvReader::new(text.as_slice()).unwrap().map(|row| row.unwrap()).collect()
+    TableReader::batch(text.as_slice()).unwrap().map(|row| row.unwrap()).collect()
 }
 
 /// Checks that the engine does not panic.
@@ -136,7 +151,7 @@ fn judge(samples: &[Sample]) {
 
 /// A recording from which a rig is calibrated.
 fn calibration(input: &[u8]) -> String {
-    let reader = match session_csv::SessionCsvReader::new(input) {
+    let reader = match TableReader::batch(input) {
         Ok(reader) => reader,
         Err(error) => return kind(&error.to_string()),
     };

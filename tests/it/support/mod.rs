@@ -323,7 +323,7 @@ impl Client {
 
 /// Parses a session file.
 pub fn read_csv(text: &str) -> Vec<Sample> {
-    let reader = offbd::wire::session_csv::SessionCsvReader::new(text.as_bytes()).unwrap();
+    let reader = offbd::wire::table::TableReader::batch(text.as_bytes()).unwrap();
     reader.map(Result::unwrap).collect()
 }
 

@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::Path;
 
-use super::{BadArgument, InputError, NewFile, judge};
+use super::{BadArgument, InputError, NewFile, SessionExport, judge};
 use offbd_core::engine::Setup;
 use offbd_wire::judging::RecordedSession;
 use offbd_wire::session_file::{SessionFormat, SessionInfo, SessionRowError, TraceWriter};
@@ -24,10 +24,10 @@ pub(super) fn format(file: &Path) -> Result<SessionFormat, BadArgument> {
     Ok(format)
 }
 
-/// Writes every judged moment of the session at `path` into `file`.
+/// Writes every judged moment of the session into `file`.
 pub(super) fn write(
     setup: &Setup,
-    path: &Path,
+    args: &SessionExport,
     info: &SessionInfo,
     file: &Path,
 ) -> anyhow::Result<()> {
@@ -38,7 +38,8 @@ pub(super) fn write(
         block: TraceView::default(),
         last_t_s: None,
     };
-    let mut rows = judge::open(path)?;
+    let path = &args.session;
+    let mut rows = judge::open(path, &args.table.options())?;
     while let Some(row) = rows.next() {
         match row {
             Ok(sample) => session.sample(sample, || rows.place(), |_| {}),

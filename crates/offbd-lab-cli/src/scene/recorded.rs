@@ -16,6 +16,7 @@ use offbd_file_cli::{calibrate, judge};
 use offbd_lab::chart::Figure;
 use offbd_terminal::errors::{BadArgument, InputError};
 use offbd_terminal::output::{self, OutputFormat};
+use offbd_wire::table::TableOptions;
 
 /// The session whose commands drive the twin.
 #[derive(Clone, Debug, Args)]
@@ -62,7 +63,7 @@ impl RecordedRun {
         in_range("--step", step_s, SimulatedTwin::STEPS_S)
             .map_err(|e| BadArgument(e.to_string()))?;
         let setup = judge::set_up(judge::load_rig(args.recorded.asset.as_deref())?, None)?;
-        let samples = calibrate::load(&[path.to_owned()])?.concat();
+        let samples = calibrate::load(&[path.to_owned()], &TableOptions::default())?.concat();
         let points = free_run(&setup, &samples, step_s).map_err(|e| InputError::file(path, e))?;
         let Some(&end) = points.last() else {
             return Err(InputError::file(path, "has no usable sample").into());

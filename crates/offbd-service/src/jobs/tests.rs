@@ -32,7 +32,7 @@ fn circles() -> impl Iterator<Item = Sample> {
 async fn learn(service: &Service) -> CalibrationJobView {
     service.create_asset(br#"{ "name": "a" }"#).await.unwrap();
     let rows = circles().map(Ok).collect();
-    let batch = Batch { session: Some("s".to_owned()), id: None, rows };
+    let batch = Batch { session: Some("s".to_owned()), rows, ..Batch::default() };
     service.submit("a", batch).unwrap().acknowledged().await.unwrap();
     let learning = service.learning("a").await.unwrap();
     assert_eq!(learning.state, LearningState::Learning, "{}", learning.summary);

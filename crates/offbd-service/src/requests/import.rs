@@ -9,10 +9,12 @@ use crate::PendingBatch;
 use crate::asset::AssetCommand;
 use crate::{Service, ServiceError};
 use offbd_core::vocabulary::Sample;
+use offbd_wire::judging::run_name;
 use offbd_wire::service::{ImportView, SessionView};
 use offbd_wire::session_file::{
     self, SessionFileError, SessionFormat, SessionRowError, SessionRows,
 };
+use offbd_wire::table::{self, InspectionView, TableOptions};
 use offbd_wire::telemetry::{AckView, Batch, BatchError, RowView, file_row};
 
 /// Batches of an import that wait for their acknowledgement at a time.
@@ -28,7 +30,8 @@ const STOPPED: ServiceError = ServiceError::Unavailable { what: "the service is 
 
 impl Service {
     /// Imports the session file `source` of at most `limit` rows as the session `name` and ends
-    /// it. Waits until few enough other files are read, then reads it on a blocking thread. The
+    /// it; a file whose clock starts again becomes several sessions, `name`, `name#2` and so on.
+    /// Waits until few enough other files are read, then reads it on a blocking thread. The
     /// asset's open session is ended when the file has been opened; from then until the import
     /// is complete, live telemetry of the asset is refused with [`ServiceError::Busy`]. An import
     /// that fails, or whose caller is dropped, leaves neither a session nor faults; one that a
@@ -45,6 +48,7 @@ impl Service {
         name: Option<String>,
         source: S,
         format: Option<SessionFormat>,
+        options: TableOptions,
         limit: usize,
     ) -> Result<ImportView, ServiceError> {
         let stop = self.inner.handles.closing.child_token();
@@ -53,11 +57,34 @@ impl Service {
         let permit = stop.run_until_cancelled(permit).await.and_then(Result::ok).ok_or(STOPPED)?;
         let import = Import { service: self.clone(), asset: asset.to_owned(), limit, stop };
         let task = tokio::task::spawn_blocking(move || {
-            let imported = import.run(name, source, format);
+            let imported = import.run(name, source, format, &options);
             drop(permit);
             imported
         });
         task.await.unwrap_or(Err(ServiceError::Unavailable { what: "the import failed" }))
+    }
+
+    /// Returns what a recording holds, and how its columns would be read; nothing is imported.
+    ///
+    /// # Errors
+    /// [`ServiceError::Batch`] if the file cannot be read; [`ServiceError::Unavailable`] if the
+    /// service stops.
+    pub async fn inspect<S: Read + Seek + Send + 'static>(
+        &self,
+        source: S,
+        options: TableOptions,
+    ) -> Result<InspectionView, ServiceError> {
+        let stop = self.inner.handles.closing.child_token();
+        let _stop_if_dropped = stop.clone().drop_guard();
+        let permit = self.inner.computing.imports.clone().acquire_owned();
+        let permit = stop.run_until_cancelled(permit).await.and_then(Result::ok).ok_or(STOPPED)?;
+        let source = StoppableSource { source, stop };
+        let task = tokio::task::spawn_blocking(move || {
+            let inspected = table::inspect(source, &options);
+            drop(permit);
+            inspected.map_err(|error| unreadable(&error))
+        });
+        task.await.unwrap_or(Err(ServiceError::Unavailable { what: "the inspection failed" }))
     }
 
     async fn discard_import(&self, asset: &str, id: String) -> Result<(), ServiceError> {
@@ -83,65 +110,86 @@ impl Import {
         name: Option<String>,
         source: impl Read + Seek + Send + 'static,
         format: Option<SessionFormat>,
+        options: &TableOptions,
     ) -> Result<ImportView, ServiceError> {
         let source = StoppableSource { source, stop: self.stop.clone() };
-        let rows = session_file::open(source, format).map_err(|error| self.unreadable(&error))?;
+        let rows =
+            session_file::open(source, format, options).map_err(|error| self.unreadable(&error))?;
         let runtime = self.service.inner.handles.runtime.clone();
-        runtime.block_on(self.import(name, rows))
+        runtime.block_on(self.import(name, RunRows { rows, next: None }))
     }
 
+    /// Imports each run as a session.
     async fn import(
         &self,
         name: Option<String>,
-        rows: Box<dyn SessionRows>,
+        mut rows: RunRows,
     ) -> Result<ImportView, ServiceError> {
         let Self { service, asset, stop, .. } = self;
-        let session = service.open_for(asset, name, true).await?;
-        let id = session.id.clone();
-        let imported = match stop.run_until_cancelled(self.samples(session, rows)).await {
+        let first = service.open_for(asset, name, true).await?;
+        let name = first.name.clone();
+        let mut sessions = vec![first];
+        let mut counts = ImportCounts::default();
+        let imported = async {
+            loop {
+                let n_run = sessions.len();
+                let session = &mut sessions[n_run - 1];
+                self.samples(&mut counts, &session.name, n_run, &mut rows).await?;
+                *session = service.end_session(&session.id).await?;
+                if rows.run() <= n_run {
+                    return Ok(());
+                }
+                let name = run_name(&name, n_run + 1);
+                sessions.push(service.open_for(asset, Some(name), true).await?);
+            }
+        };
+        let imported = match stop.run_until_cancelled(imported).await {
             // The rows of a CSV file end also where it cannot be read on.
             Some(imported) if !stop.is_cancelled() => imported,
             _ => Err(STOPPED),
         };
-        match imported {
-            Ok(imported) => Ok(ImportView { session: service.end_session(&id).await?, ..imported }),
-            Err(error) => {
-                service.discard_import(asset, id).await?;
-                Err(error)
+        if let Err(error) = imported {
+            for session in sessions {
+                service.discard_import(asset, session.id).await?;
             }
+            return Err(error);
         }
+        Ok(counts.view(sessions))
     }
 
-    /// Submits the samples of all rows.
+    /// Submits the samples of a run.
     async fn samples(
         &self,
-        session: SessionView,
-        rows: Box<dyn SessionRows>,
-    ) -> Result<ImportView, ServiceError> {
+        counts: &mut ImportCounts,
+        session: &str,
+        n_run: usize,
+        rows: &mut RunRows,
+    ) -> Result<(), ServiceError> {
         let Self { service, asset, limit, .. } = self;
-        let limit = *limit;
-        let name = session.name.clone();
-        let mut counts = ImportCounts { view: empty(session), pending: VecDeque::new() };
-        let mut rows = rows.peekable();
-        let mut first = 0;
-        while rows.peek().is_some() {
-            let rows = rows.by_ref().take(BATCH).map(|row| self.batch_row(row));
-            let rows = rows.collect::<Result<Vec<_>, _>>()?;
-            let n = rows.len();
-            if first + n > limit {
-                return Err(ServiceError::TooMany { what: "rows in an imported file", limit });
+        loop {
+            let batch = std::iter::from_fn(|| rows.next_of(n_run)).take(BATCH);
+            let batch =
+                batch.map(|row| self.batch_row(row)).collect::<Result<Vec<_>, ServiceError>>()?;
+            if batch.is_empty() {
+                break;
             }
-            let batch = Batch { session: Some(name.clone()), id: None, rows };
+            let first = counts.n_rows;
+            counts.n_rows += batch.len();
+            if counts.n_rows > *limit {
+                let what = "rows in an imported file";
+                return Err(ServiceError::TooMany { what, limit: *limit });
+            }
+            let batch =
+                Batch { session: Some(session.to_owned()), rows: batch, ..Batch::default() };
             if counts.pending.len() >= MAX_PENDING {
                 counts.settle().await?;
             }
             counts.pending.push_back((first, service.submit_when_ready(asset, batch, true).await?));
-            first += n;
         }
         while !counts.pending.is_empty() {
             counts.settle().await?;
         }
-        Ok(counts.view)
+        Ok(())
     }
 
     /// Returns a row of a file as one of a batch; an error if the file cannot be read on.
@@ -160,8 +208,12 @@ impl Import {
         if self.stop.is_cancelled() {
             return STOPPED;
         }
-        BatchError::Malformed { pointer: String::new(), reason: error.to_string() }.into()
+        unreadable(error)
     }
+}
+
+fn unreadable(error: &SessionFileError) -> ServiceError {
+    BatchError::Malformed { pointer: String::new(), reason: error.to_string() }.into()
 }
 
 /// A source that cannot be read any more once the import is to stop, so that a file that expands
@@ -186,17 +238,49 @@ impl<S: Seek> Seek for StoppableSource<S> {
     }
 }
 
-const fn empty(session: SessionView) -> ImportView {
-    ImportView { session, accepted: 0, duplicate: 0, late: 0, rejected: 0, rejections: Vec::new() }
+/// The rows of a file, one run after the other.
+struct RunRows {
+    rows: Box<dyn SessionRows>,
+    /// The first row of the next run.
+    next: Option<Result<Sample, SessionRowError>>,
+}
+
+impl RunRows {
+    /// The number of the run that the rows have come to, from 1.
+    fn run(&self) -> usize {
+        self.rows.n_runs()
+    }
+
+    /// Returns the next row if it belongs to the run `n_run`.
+    fn next_of(&mut self, n_run: usize) -> Option<Result<Sample, SessionRowError>> {
+        if self.next.is_none() {
+            self.next = self.rows.next();
+        }
+        self.next.take_if(|_| self.rows.n_runs() == n_run)
+    }
 }
 
 /// The counts of an import, and its batches without an acknowledgement.
+#[derive(Default)]
 struct ImportCounts {
-    view: ImportView,
+    n_rows: usize,
+    accepted: u64,
+    duplicate: u64,
+    late: u64,
+    rejected: u64,
+    rejections: Vec<RowView>,
     pending: VecDeque<(usize, PendingBatch)>,
 }
 
 impl ImportCounts {
+    /// Returns the result; `sessions` has at least one.
+    fn view(self, mut sessions: Vec<SessionView>) -> ImportView {
+        let Self { accepted, duplicate, late, rejected, rejections, .. } = self;
+        let session = sessions.remove(0);
+        let more_sessions = sessions;
+        ImportView { session, more_sessions, accepted, duplicate, late, rejected, rejections }
+    }
+
     async fn settle(&mut self) -> Result<(), ServiceError> {
         if let Some((first, pending)) = self.pending.pop_front() {
             self.add(first, pending.acknowledged().await?);
@@ -205,14 +289,13 @@ impl ImportCounts {
     }
 
     fn add(&mut self, first: usize, ack: AckView) {
-        let view = &mut self.view;
-        view.accepted += ack.accepted as u64;
-        view.duplicate += ack.duplicate as u64;
-        view.late += ack.late.len() as u64;
-        view.rejected += ack.rejected.len() as u64;
-        let room = MAX_LISTED.saturating_sub(view.rejections.len());
+        self.accepted += ack.accepted as u64;
+        self.duplicate += ack.duplicate as u64;
+        self.late += ack.late.len() as u64;
+        self.rejected += ack.rejected.len() as u64;
+        let room = MAX_LISTED.saturating_sub(self.rejections.len());
         let rows = ack.rejected.into_iter().take(room);
         let offset = |row: RowView| RowView { index: first + row.index, ..row };
-        view.rejections.extend(rows.map(offset));
+        self.rejections.extend(rows.map(offset));
     }
 }

@@ -9,13 +9,14 @@ use tracing::Span;
 
 use crate::asset::{Answer, AssetCommand, Reply};
 use crate::{Service, ServiceError};
-use offbd_wire::telemetry::{AckView, Batch};
+use offbd_wire::telemetry::{AckView, Batch, UnknownKeyView};
 
 /// A submitted batch whose acknowledgement is pending. Its samples count as in flight until
 /// they are durable or refused, even if this is dropped.
 pub struct PendingBatch {
     answer: Answer<AckView>,
     submitted_at: Instant,
+    unknown: Vec<UnknownKeyView>,
 }
 
 impl PendingBatch {
@@ -24,7 +25,8 @@ impl PendingBatch {
     /// # Errors
     /// [`ServiceError`] if the batch, or a part of it, is not stored.
     pub async fn acknowledged(self) -> Result<AckView, ServiceError> {
-        let ack = self.answer.wait().await?;
+        let mut ack = self.answer.wait().await?;
+        ack.unknown = self.unknown;
         metrics::histogram!("offbd_ack_seconds").record(self.submitted_at.elapsed().as_secs_f64());
         Ok(ack)
     }
@@ -34,8 +36,8 @@ impl PendingBatch {
 impl PendingBatch {
     /// Returns the answer if it is there, otherwise the batch.
     pub(crate) fn now(self) -> Result<Result<AckView, ServiceError>, Self> {
-        let submitted_at = self.submitted_at;
-        self.answer.now().map_err(|answer| Self { answer, submitted_at })
+        let Self { answer, submitted_at, unknown } = self;
+        answer.now().map_err(|answer| Self { answer, submitted_at, unknown })
     }
 }
 
@@ -96,12 +98,13 @@ impl Service {
 /// Returns the command that ingests `batch`, and its pending acknowledgement.
 #[expect(clippy::disallowed_methods, reason = "the time to the acknowledgement is a metric")]
 fn ingest(
-    batch: Batch,
+    mut batch: Batch,
     importing: bool,
     permit: OwnedSemaphorePermit,
 ) -> (AssetCommand, PendingBatch) {
+    let unknown = std::mem::take(&mut batch.unknown);
     let (reply, answer) = Reply::new();
     let (request, reply) = (Span::current(), reply.with_permit(permit));
     let command = AssetCommand::Ingest { batch, importing, request, reply };
-    (command, PendingBatch { answer, submitted_at: Instant::now() })
+    (command, PendingBatch { answer, submitted_at: Instant::now(), unknown })
 }

@@ -157,8 +157,8 @@ impl Device {
     pub(super) fn arriving(&self, batch: &SentBatch) -> Batch {
         Batch {
             session: self.session(batch.run),
-            id: None,
             rows: batch.rows.iter().map(|(sample, _)| Ok(*sample)).collect(),
+            ..Batch::default()
         }
     }
 

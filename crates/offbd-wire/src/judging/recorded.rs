@@ -12,6 +12,12 @@ use offbd_core::vocabulary::{PerAxis, Sample};
 /// counted.
 pub const MAX_NAMED_ROWS: usize = 5;
 
+/// Returns the name of a run of the recording `name`, counted from 1.
+#[must_use]
+pub fn run_name(name: &str, n_run: usize) -> String {
+    if n_run == 1 { name.to_owned() } else { format!("{name}#{n_run}") }
+}
+
 /// The result of judging a recording.
 #[derive(Debug)]
 pub struct JudgedSession {

@@ -16,7 +16,7 @@ use super::workbook_check;
 use super::{
     RejectedRow, RowPlace, SessionFileError, SessionFormat, SessionRowError, SessionRows, guarded,
 };
-use crate::session_csv::parse_number;
+use crate::table::parse_number;
 use offbd_core::vocabulary::Sample;
 
 /// The day 1970-01-01 as spreadsheets count days, from 1900 and from 1904 on.

@@ -1,9 +1,10 @@
 //! The syntactic view of a batch in JSON or MessagePack, whose *cells* (the values of its
 //! rows and columns) may have any type.
 
+use std::cell::RefCell;
 use std::fmt;
 
-use serde::de::{Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
+use serde::de::{DeserializeSeed, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 
 use super::{BatchError, MAX_SEQ};
@@ -62,7 +63,7 @@ impl Cell {
 
 /// Names of the fields of a sample, in the order of [`SampleCells`] and of the columns of a
 /// batch.
-const FIELDS: [&str; 6] = ["t_s", "seq", "cmd_qx_rad", "cmd_qy_rad", "x_m", "y_m"];
+pub(super) const FIELDS: [&str; 6] = ["t_s", "seq", "cmd_qx_rad", "cmd_qy_rad", "x_m", "y_m"];
 
 /// Index of the field `t_s`, which every batch in columns must have.
 const T_S: usize = 0;
@@ -70,15 +71,22 @@ const T_S: usize = 0;
 /// The cells of one sample, in the order of [`FIELDS`].
 pub(super) type SampleCells = [Cell; FIELDS.len()];
 
-fn sample([t_s, seq, cmd_qx_rad, cmd_qy_rad, x_m, y_m]: SampleCells) -> Result<Sample, String> {
-    Ok(Sample {
+/// Returns the sample of a row. `has_unknown` tells whether the batch has keys that are not
+/// understood: then a row without any command or position is not one of a blind sensor.
+fn sample(cells: SampleCells, has_unknown: bool) -> Result<Sample, String> {
+    let [t_s, seq, cmd_qx_rad, cmd_qy_rad, x_m, y_m] = cells;
+    let sample = Sample {
         seq: seq.seq()?,
         t_s: t_s.time()?,
         cmd_qx_rad: cmd_qx_rad.number("cmd_qx_rad")?,
         cmd_qy_rad: cmd_qy_rad.number("cmd_qy_rad")?,
         x_m: x_m.number("x_m")?,
         y_m: y_m.number("y_m")?,
-    })
+    };
+    if has_unknown && [cmd_qx_rad, cmd_qy_rad, x_m, y_m] == [Cell::Missing; 4] {
+        return Err("has none of the keys cmd_qx_rad, cmd_qy_rad, x_m, y_m".to_owned());
+    }
+    Ok(sample)
 }
 
 /// A row of a batch: an object, or a value of another type, with its name.
@@ -89,9 +97,9 @@ pub(super) enum BatchRow {
 }
 
 impl BatchRow {
-    pub(super) fn sample(self) -> Result<Sample, String> {
+    pub(super) fn sample(self, has_unknown: bool) -> Result<Sample, String> {
         match self {
-            Self::Object(cells) => sample(cells),
+            Self::Object(cells) => sample(cells, has_unknown),
             Self::Other(what) => Err(format!("the row is {what}, not an object")),
         }
     }
@@ -122,7 +130,10 @@ impl BatchColumns {
     ///
     /// # Errors
     /// The name of the missing or wrong column, and the reason.
-    pub(super) fn samples(self) -> Result<Vec<Result<Sample, String>>, (&'static str, String)> {
+    pub(super) fn samples(
+        self,
+        has_unknown: bool,
+    ) -> Result<Vec<Result<Sample, String>>, (&'static str, String)> {
         let Some(t_s) = &self.0[T_S] else {
             return Err(("t_s", "the batch has neither `samples` nor a column `t_s`".to_owned()));
         };
@@ -137,7 +148,7 @@ impl BatchColumns {
             column.as_ref().and_then(|c| c.values.get(i)).copied().unwrap_or_default()
         };
         let row = |i: usize| std::array::from_fn(|field| cell(&self.0[field], i));
-        Ok((0..t_s.n).map(|i| sample(row(i))).collect())
+        Ok((0..t_s.n).map(|i| sample(row(i), has_unknown)).collect())
     }
 }
 
@@ -148,6 +159,36 @@ pub(super) struct BatchDocument {
     pub(super) id: Option<String>,
     pub(super) samples: Option<LimitedArray<BatchRow>>,
     pub(super) columns: BatchColumns,
+    pub(super) unknown: UnknownKeys,
+}
+
+/// Unknown keys of a batch that are named.
+const MAX_UNKNOWN: usize = 8;
+
+/// Bytes of an unknown key that are kept.
+const MAX_KEY_BYTES: usize = 64;
+
+/// The unknown keys of a document, each once, in the order of their first occurrence; at most
+/// [`MAX_UNKNOWN`].
+#[derive(Debug, Default)]
+pub(super) struct UnknownKeys(RefCell<Vec<String>>);
+
+impl UnknownKeys {
+    fn note(&self, key: &str) {
+        let mut keys = self.0.borrow_mut();
+        let end = key.floor_char_boundary(MAX_KEY_BYTES);
+        if keys.len() < MAX_UNKNOWN && !keys.iter().any(|known| known == &key[..end]) {
+            keys.push(key[..end].to_owned());
+        }
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.0.borrow().is_empty()
+    }
+
+    pub(super) fn into_names(self) -> Vec<String> {
+        self.0.into_inner()
+    }
 }
 
 /// Parses JSON, keeping at most `limit` values of each array.
@@ -216,16 +257,24 @@ enum BatchKey {
     Unknown,
 }
 
+/// Reads the key of a batch or of a row, and notes it if it is unknown.
+#[derive(Clone, Copy)]
+struct BatchKeySeed<'a> {
+    unknown: &'a UnknownKeys,
+    /// Whether the key is one of a row.
+    is_row: bool,
+}
+
 /// Written by hand because a derived implementation would also accept numbers as keys.
-impl<'de> Deserialize<'de> for BatchKey {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_str(BatchKeyVisitor)
+impl<'de> DeserializeSeed<'de> for BatchKeySeed<'_> {
+    type Value = BatchKey;
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<BatchKey, D::Error> {
+        deserializer.deserialize_str(self)
     }
 }
 
-struct BatchKeyVisitor;
-
-impl Visitor<'_> for BatchKeyVisitor {
+impl Visitor<'_> for BatchKeySeed<'_> {
     type Value = BatchKey;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -237,10 +286,13 @@ impl Visitor<'_> for BatchKeyVisitor {
             return Ok(BatchKey::Field(field));
         }
         Ok(match name {
-            "session" => BatchKey::Session,
-            "id" => BatchKey::Id,
-            "samples" => BatchKey::Samples,
-            _ => BatchKey::Unknown,
+            "session" if !self.is_row => BatchKey::Session,
+            "id" if !self.is_row => BatchKey::Id,
+            "samples" if !self.is_row => BatchKey::Samples,
+            _ => {
+                self.unknown.note(name);
+                BatchKey::Unknown
+            }
         })
     }
 }
@@ -282,7 +334,9 @@ impl<'de> Visitor<'de> for BatchDocumentVisitor {
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<BatchDocument, A::Error> {
         let mut document = BatchDocument::default();
         let mut seen = SeenKeys::default();
-        while let Some(key) = map.next_key()? {
+        let unknown = UnknownKeys::default();
+        let keys = BatchKeySeed { unknown: &unknown, is_row: false };
+        while let Some(key) = map.next_key_seed(keys)? {
             if let Some(name) = seen.repeats(key) {
                 return Err(A::Error::duplicate_field(name));
             }
@@ -290,16 +344,17 @@ impl<'de> Visitor<'de> for BatchDocumentVisitor {
                 BatchKey::Session => document.session = map.next_value()?,
                 BatchKey::Id => document.id = map.next_value::<Option<BatchId>>()?.map(|id| id.0),
                 BatchKey::Samples => {
-                    let rows = LimitedArrayVisitor::<BatchRow>::new(self.limit);
+                    let rows = LimitedArrayVisitor::new(self.limit, BatchRowSeed(&unknown));
                     document.samples = Some(map.next_value_seed(rows)?);
                 }
                 BatchKey::Field(field) => {
-                    let cells = LimitedArrayVisitor::<Cell>::new(self.limit);
+                    let cells = LimitedArrayVisitor::new(self.limit, CellSeed);
                     document.columns.0[field] = Some(map.next_value_seed(cells)?);
                 }
                 BatchKey::Unknown => drop(map.next_value::<IgnoredAny>()?),
             }
         }
+        document.unknown = unknown;
         Ok(document)
     }
 }
@@ -331,39 +386,36 @@ impl Visitor<'_> for BatchIdVisitor {
 }
 
 /// Deserializes an array, keeping at most `limit` values and counting the rest.
-struct LimitedArrayVisitor<T> {
+struct LimitedArrayVisitor<S> {
     limit: usize,
-    of: std::marker::PhantomData<T>,
+    each: S,
 }
 
-impl<T> LimitedArrayVisitor<T> {
-    const fn new(limit: usize) -> Self {
-        Self { limit, of: std::marker::PhantomData }
+impl<S> LimitedArrayVisitor<S> {
+    const fn new(limit: usize, each: S) -> Self {
+        Self { limit, each }
     }
 }
 
-impl<'de, T: Deserialize<'de>> serde::de::DeserializeSeed<'de> for LimitedArrayVisitor<T> {
-    type Value = LimitedArray<T>;
-    fn deserialize<D: Deserializer<'de>>(
-        self,
-        deserializer: D,
-    ) -> Result<LimitedArray<T>, D::Error> {
+impl<'de, S: DeserializeSeed<'de> + Copy> DeserializeSeed<'de> for LimitedArrayVisitor<S> {
+    type Value = LimitedArray<S::Value>;
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Self::Value, D::Error> {
         deserializer.deserialize_seq(self)
     }
 }
 
-impl<'de, T: Deserialize<'de>> Visitor<'de> for LimitedArrayVisitor<T> {
-    type Value = LimitedArray<T>;
+impl<'de, S: DeserializeSeed<'de> + Copy> Visitor<'de> for LimitedArrayVisitor<S> {
+    type Value = LimitedArray<S::Value>;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("an array")
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<LimitedArray<T>, A::Error> {
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Self::Value, A::Error> {
         let announced = seq.size_hint().unwrap_or(MAX_RESERVED).min(self.limit).min(MAX_RESERVED);
         let mut array = LimitedArray { values: Vec::with_capacity(announced), n: 0 };
         while array.n < self.limit {
-            let Some(value) = seq.next_element()? else { return Ok(array) };
+            let Some(value) = seq.next_element_seed(self.each)? else { return Ok(array) };
             array.values.push(value);
             array.n += 1;
         }
@@ -406,6 +458,18 @@ macro_rules! visit_unexpected {
 
 impl<'de> Deserialize<'de> for Cell {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        CellSeed.deserialize(deserializer)
+    }
+}
+
+/// Reads a cell.
+#[derive(Clone, Copy)]
+struct CellSeed;
+
+impl<'de> DeserializeSeed<'de> for CellSeed {
+    type Value = Cell;
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Cell, D::Error> {
         deserializer.deserialize_any(CellVisitor)
     }
 }
@@ -439,15 +503,19 @@ impl<'de> Visitor<'de> for CellVisitor {
     visit_unexpected!(Cell::Other);
 }
 
-impl<'de> Deserialize<'de> for BatchRow {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(BatchRowVisitor)
+/// Reads a row, and notes its unknown keys.
+#[derive(Clone, Copy)]
+pub(super) struct BatchRowSeed<'a>(pub(super) &'a UnknownKeys);
+
+impl<'de> DeserializeSeed<'de> for BatchRowSeed<'_> {
+    type Value = BatchRow;
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<BatchRow, D::Error> {
+        deserializer.deserialize_any(self)
     }
 }
 
-struct BatchRowVisitor;
-
-impl<'de> Visitor<'de> for BatchRowVisitor {
+impl<'de> Visitor<'de> for BatchRowSeed<'_> {
     type Value = BatchRow;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -468,7 +536,8 @@ impl<'de> Visitor<'de> for BatchRowVisitor {
     }
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<BatchRow, A::Error> {
         let mut cells = SampleCells::default();
-        while let Some(key) = map.next_key()? {
+        let keys = BatchKeySeed { unknown: self.0, is_row: true };
+        while let Some(key) = map.next_key_seed(keys)? {
             match key {
                 BatchKey::Field(field) => cells[field] = map.next_value()?,
                 _ => drop(map.next_value::<IgnoredAny>()?),

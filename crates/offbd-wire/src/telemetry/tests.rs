@@ -20,7 +20,9 @@ fn rows_and_columns_are_equivalent() {
         {"seq":1,"t_s":0.5,"cmd_qx_rad":0.1,"x_m":null,"note":[1,{}]},{"t_s":1,"y_m":-2}]}"#;
     let columns = br#"{"session":"a","id":"7","t_s":[0.5,1],"seq":[1,null],
         "cmd_qx_rad":[0.1,null],"y_m":[null,-2]}"#;
-    let batch = json(rows, LIMIT).unwrap();
+    let mut batch = json(rows, LIMIT).unwrap();
+    assert_eq!(batch.unknown, [UnknownKeyView { key: "note".to_owned(), meant: None }]);
+    batch.unknown.clear();
     assert_eq!(batch, json(columns, LIMIT).unwrap());
     assert_eq!(batch.id.as_deref(), Some("7"));
     let first = Sample { seq: Some(1), t_s: 0.5, cmd_qx_rad: Some(0.1), ..Sample::default() };
@@ -45,6 +47,35 @@ fn an_invalid_row_is_reported_and_the_others_are_accepted() {
         (9, "the row is null, not an object"),
     ];
     assert_eq!(reasons(&batch), wanted);
+}
+
+#[test]
+fn keys_that_are_not_understood_are_named_with_those_that_are_meant() {
+    let rows =
+        br#"{"samples":[{"t_s":0,"cmd_qx":0.1,"x":0.2,"y":0.3},{"t_s":1},{"t_s":2,"x_m":0.1}]}"#;
+    let columns = br#"{"t_s":[0,1],"cmd_qx":[0,0],"x":[0,0],"y":[1,1],"samples_":3}"#;
+    let lines = b"{\"t_s\":0,\"x\":1}\n{\"t_s\":1,\"x_m\":1}\n";
+    let reason = "has none of the keys cmd_qx_rad, cmd_qy_rad, x_m, y_m";
+    let meant = |batch: &Batch| -> Vec<(String, Option<String>)> {
+        batch.unknown.iter().map(|key| (key.key.clone(), key.meant.clone())).collect()
+    };
+    let pair = |key: &str, meant: &str| (key.to_owned(), Some(meant.to_owned()));
+    let batch = json(rows, LIMIT).unwrap();
+    assert_eq!(meant(&batch), [pair("cmd_qx", "cmd_qx_rad"), pair("x", "x_m"), pair("y", "y_m")]);
+    assert_eq!(reasons(&batch), [(0, reason), (1, reason)]);
+    let batch = json(columns, LIMIT).unwrap();
+    assert_eq!(
+        meant(&batch)[..3],
+        [pair("cmd_qx", "cmd_qx_rad"), pair("x", "x_m"), pair("y", "y_m")]
+    );
+    assert_eq!(reasons(&batch), [(0, reason), (1, reason)]);
+    let batch = ndjson(lines, LIMIT).unwrap();
+    assert_eq!((meant(&batch), reasons(&batch)), (vec![pair("x", "x_m")], vec![(0, reason)]));
+    let many: Vec<String> = (0..100).map(|i| format!("\"{}{i}\":1", "k".repeat(90))).collect();
+    let batch =
+        json(format!("{{\"samples\":[{{\"t_s\":0,{}}}]}}", many.join(",")).as_bytes(), LIMIT);
+    let unknown = batch.unwrap().unknown;
+    assert!(unknown.len() <= 8 && unknown.iter().all(|key| key.key.len() <= 64), "{unknown:?}");
 }
 
 #[test]

@@ -63,7 +63,7 @@ impl Rigs {
             }
             let samples = (k * BATCH..(k + 1) * BATCH).map(|i| Ok(sample(session, i)));
             let session = Some(format!("run {session}"));
-            let batch = Batch { session, id: None, rows: samples.collect() };
+            let batch = Batch { session, rows: samples.collect(), ..Batch::default() };
             self.service.submit(name, batch).unwrap().acknowledged().await.unwrap();
         }
         self.note_transitions(name, n_batches).await;

@@ -1,0 +1,134 @@
+//! `offbd inspect`: what a recording holds, and how its columns would be read.
+
+use std::fs::File;
+use std::io::Write;
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::judge::TableArgs;
+use offbd_terminal::errors::InputError;
+use offbd_terminal::output::{self, OutputFormat};
+use offbd_terminal::table;
+use offbd_wire::table::{InspectionView, inspect};
+
+/// Shows what a recording holds, and proposes how to read its columns.
+///
+/// Finds separator, decimal sign, encoding, header and units of a text, guesses
+/// which columns are time, commands and positions, and compares the motion with
+/// the commands: a wrong unit, sign or axis shows there. Prints the mapping to
+/// give to `replay`, `calibrate`, `trends`, `export` and to an import.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    offbd inspect log.txt\n  \
+    offbd inspect counts.txt --rate 100 --columns \"x_m=#1*0.0001-0.2, cmd_qy_rad=#3*0.0005-1\"\n\n\
+    Exit status: 0 inspected, 3 the file cannot be read.")]
+pub struct InspectArgs {
+    /// The recording
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    #[command(flatten)]
+    table: TableArgs,
+    /// Text for people, or one JSON object
+    #[arg(long, value_enum, default_value = "table")]
+    format: OutputFormat,
+}
+
+pub fn run(args: &InspectArgs) -> anyhow::Result<()> {
+    let failed = |e: String| InputError::file(&args.file, e);
+    let file = File::open(&args.file).map_err(|e| failed(e.to_string()))?;
+    let view = inspect(file, &args.table.options()).map_err(|e| failed(e.to_string()))?;
+    let mut out = output::stdout();
+    match args.format {
+        OutputFormat::Json => {
+            serde_json::to_writer(&mut out, &view)?;
+            writeln!(out)?;
+        }
+        OutputFormat::Table => write_text(&mut out, &view, args)?,
+    }
+    Ok(out.flush()?)
+}
+
+fn write_text(
+    out: &mut impl Write,
+    view: &InspectionView,
+    args: &InspectArgs,
+) -> anyhow::Result<()> {
+    let format = if view.layout.is_empty() { view.format.clone() } else { view.layout.join("; ") };
+    writeln!(out, "{}", table::wrapped("", &format))?;
+    write_columns(out, view)?;
+    write_rows(out, view)?;
+    for guess in &view.guessed {
+        let line = format!("{} is probably {}: {}", guess.quantity, guess.expression, guess.reason);
+        writeln!(out, "{}", table::wrapped("  ", &line))?;
+    }
+    for remark in &view.remarks {
+        writeln!(out, "{}", table::wrapped("  ", &format!("note: {remark}")))?;
+    }
+    if view.mapping.is_empty() && view.rows == 0 {
+        let example = "--columns \"t_s=#1/ms, cmd_qy_rad=#2/deg, x_m=#3*0.0001-0.2\"";
+        writeln!(out, "\nSay which column is what, for example with {example},")?;
+        writeln!(out, "and the rate with --rate if there is no time.")?;
+    } else if view.mapping.is_empty() {
+        writeln!(out, "\nIts columns have the names of the quantities; no mapping is needed.")?;
+    } else {
+        let rate = args.table.options().rate_hz.map_or(String::new(), |hz| format!(" --rate {hz}"));
+        writeln!(out, "\nCheck the mapping, and give it with the file:")?;
+        writeln!(
+            out,
+            "  offbd replay{rate} --columns {} {}",
+            quoted(&view.mapping),
+            args.file.display()
+        )?;
+    }
+    Ok(())
+}
+
+/// Returns an argument in quotes for a shell.
+fn quoted(argument: &str) -> String {
+    if argument.contains('\'') { format!("\"{argument}\"") } else { format!("'{argument}'") }
+}
+
+fn write_columns(out: &mut impl Write, view: &InspectionView) -> anyhow::Result<()> {
+    if view.columns.is_empty() {
+        return Ok(());
+    }
+    let mut columns = table::table_of_files(&["column", "name", "unit", "first values"], &[]);
+    for column in &view.columns {
+        columns.add_row([
+            format!("#{}", column.number),
+            column.name.clone().unwrap_or_default(),
+            column.unit.clone().unwrap_or_default(),
+            column.values.join("  "),
+        ]);
+    }
+    writeln!(out)?;
+    for line in table::lines(&columns) {
+        writeln!(out, "{line}")?;
+    }
+    Ok(())
+}
+
+fn write_rows(out: &mut impl Write, view: &InspectionView) -> anyhow::Result<()> {
+    write!(out, "\n{} rows", view.rows)?;
+    if let (Some(from), Some(to)) = (view.from_s, view.to_s) {
+        write!(out, " from {from:.2} to {to:.2} s")?;
+    }
+    if let Some(rate) = view.rate_hz {
+        write!(out, ", {rate:.1} a second")?;
+    }
+    writeln!(out, ", without a ball {:.1} %", 100.0 * view.without_ball)?;
+    if view.gaps > 0 {
+        writeln!(out, "{} gaps, the longest of {:.2} s", view.gaps, view.longest_gap_s)?;
+    }
+    if view.runs > 1 {
+        writeln!(out, "{} runs, whose clock starts again: each is a session", view.runs)?;
+    }
+    if view.rejected > 0 {
+        writeln!(out, "{} rows are rejected:", view.rejected)?;
+        for rejection in &view.rejections {
+            writeln!(out, "{}", table::wrapped("  ", rejection))?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,234 @@
+//! Tables of text, as programs and owners write them: any usual encoding, separator and decimal
+//! sign, with comments, a preamble, a line of units, or without names. The samples come from
+//! columns with the names of the quantities (`session_csv.rs`), or by a mapping
+//! ([`ColumnMapping`]).
+//!
+//! An empty cell is a missing value, and so are `nan`, `NA`, `None`, `null` and `-`. An invalid row
+//! is an error with its line number, and reading continues with the next row. A clock that starts
+//! again, or a second header, begins another run.
+
+mod cell;
+mod clock;
+mod columns;
+mod dialect;
+mod encoding;
+mod expression;
+mod guess;
+mod inspection;
+mod motion;
+mod rows;
+
+use std::io::{self, Cursor, Read};
+
+pub use self::expression::{ColumnMapping, ColumnName, Expression, MappingError, Term};
+pub(crate) use self::guess::nearest_of;
+pub use self::inspection::{ColumnView, GuessView, InspectionView, inspect};
+
+use self::clock::RowClock;
+use self::columns::BoundMapping;
+use self::dialect::Dialect;
+use self::rows::{Cells, Rows};
+use offbd_core::vocabulary::{Brief, Sample};
+
+/// How a table is to be read.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TableOptions {
+    /// The columns of the quantities; where it says nothing, the columns of their names.
+    pub columns: ColumnMapping,
+    /// Rows a second of a table without a time.
+    pub rate_hz: Option<f64>,
+}
+
+/// Why a file is not a table of samples.
+#[derive(Debug, thiserror::Error)]
+pub enum CsvError {
+    #[error("no line has two or more columns, separated by commas, semicolons, tabs or blanks")]
+    NoTable,
+    #[error("the table lacks the column `{name}`; it has {found}.{proposal}")]
+    MissingColumn {
+        name: &'static str,
+        /// The columns that there are.
+        found: String,
+        /// A sentence that proposes a mapping, or nothing.
+        proposal: String,
+    },
+    #[error("the header names the column `{0}` twice")]
+    DoubleColumn(&'static str),
+    #[error(transparent)]
+    Mapping(#[from] MappingError),
+    /// The times are probably in another unit.
+    #[error(
+        "`t_s` grows by {} from row to row: is it in {unit}? Then map it: `t_s=t_s/{unit}`",
+        Brief(*step)
+    )]
+    TimeUnit { step: f64, unit: &'static str },
+    #[error("cannot read the header: {0}")]
+    Header(#[from] io::Error),
+}
+
+/// Why a row is not a valid sample.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("line {line}: {reason}")]
+pub struct RowError {
+    /// Line number, from 1, counting the header.
+    pub line: u64,
+    pub reason: String,
+}
+
+/// A text whose table has been found.
+struct OpenedTable<'a> {
+    dialect: Dialect,
+    encoding: &'static str,
+    /// The rows, behind the header.
+    rows: Box<dyn Read + Send + 'a>,
+}
+
+/// Finds the table in `source`.
+///
+/// # Errors
+/// [`CsvError::NoTable`]; [`CsvError::Header`] if `source` cannot be read.
+fn find_table<'a>(mut source: impl Read + Send + 'a) -> Result<OpenedTable<'a>, CsvError> {
+    let mut raw = Vec::new();
+    source.by_ref().take(dialect::HEAD_BYTES as u64).read_to_end(&mut raw)?;
+    let (encoding, mark) = encoding::detect(&raw);
+    raw.drain(..mark);
+    let mut text = encoding::as_utf8(Cursor::new(raw).chain(source), encoding);
+    let mut head = Vec::new();
+    text.by_ref().take(dialect::HEAD_BYTES as u64).read_to_end(&mut head)?;
+    let is_whole = head.len() < dialect::HEAD_BYTES;
+    let dialect = dialect::detect(&head, is_whole).ok_or(CsvError::NoTable)?;
+    head.drain(..dialect.n_bytes);
+    Ok(OpenedTable {
+        dialect,
+        encoding: encoding.name(),
+        rows: Box::new(Cursor::new(head).chain(text)),
+    })
+}
+
+/// Reads samples row by row, in the order of the file.
+pub struct TableReader<'a> {
+    rows: Rows<'a>,
+    dialect: Dialect,
+    mapping: BoundMapping,
+    clock: RowClock,
+    cells: Cells,
+}
+
+impl<'a> TableReader<'a> {
+    /// Opens a batch, whose rows may be of any time.
+    ///
+    /// # Errors
+    /// [`CsvError`] if a column is missing or repeated, or `source` cannot be read.
+    pub fn batch(source: impl Read + Send + 'a) -> Result<Self, CsvError> {
+        Self::new(find_table(source)?, &TableOptions::default(), false)
+    }
+
+    /// Opens a recording. A counter that wraps goes on; a clock that starts again, and a second
+    /// header, begin another [run](Self::n_runs).
+    ///
+    /// # Errors
+    /// [`CsvError`] if a column is missing or repeated, `source` cannot be read, or the times are
+    /// probably not in seconds.
+    pub fn recording(
+        source: impl Read + Send + 'a,
+        options: &TableOptions,
+    ) -> Result<Self, CsvError> {
+        let table = find_table(source)?;
+        let is_named = options.columns.expressions[0].is_none() && options.rate_hz.is_none();
+        if is_named && let Some(error) = guess::wrong_time_unit(&table.dialect) {
+            return Err(error);
+        }
+        Self::new(table, options, true)
+    }
+
+    fn new(
+        table: OpenedTable<'a>,
+        options: &TableOptions,
+        is_recording: bool,
+    ) -> Result<Self, CsvError> {
+        let OpenedTable { dialect, rows, .. } = table;
+        let mapping = BoundMapping::new(&dialect, options)?;
+        let rows = Rows::new(rows, dialect.separator, dialect.comment, dialect.n_lines);
+        let clock = RowClock::new(is_recording);
+        Ok(Self { rows, dialect, mapping, clock, cells: Cells::default() })
+    }
+
+    /// Returns the line number of the row read last, from 1, counting the header.
+    #[must_use]
+    pub fn line(&self) -> u64 {
+        self.rows.line()
+    }
+
+    /// The number of runs that have begun, from 1.
+    #[must_use]
+    pub fn n_runs(&self) -> usize {
+        self.clock.n_runs()
+    }
+
+    fn sample(&mut self) -> Result<Sample, RowError> {
+        let line = self.line();
+        let fail = |reason: String| RowError { line, reason };
+        let has_commas = self.dialect.has_decimal_commas;
+        let t_s = self.clock.next(&self.mapping.time, &self.cells, has_commas).map_err(fail)?;
+        let value = |quantity: usize| match &self.mapping.quantities[quantity] {
+            None => Ok(None),
+            Some(columns) => columns.value(&self.cells, has_commas).map_err(fail),
+        };
+        let seq = match self.mapping.seq.and_then(|i| self.cells.get(i)).map(cell::bare) {
+            None | Some(b"") => None,
+            Some(bytes) => Some(
+                std::str::from_utf8(bytes)
+                    .ok()
+                    .and_then(|s| s.parse().ok())
+                    .ok_or_else(|| fail("`seq` is not a whole number".to_owned()))?,
+            ),
+        };
+        Ok(Sample {
+            seq,
+            t_s,
+            cmd_qx_rad: value(0)?,
+            cmd_qy_rad: value(1)?,
+            x_m: value(2)?,
+            y_m: value(3)?,
+        })
+    }
+
+    /// Whether the row repeats the header.
+    fn is_header(&self) -> bool {
+        let names = &self.dialect.names;
+        let is_name = |(i, name): (usize, &String)| {
+            self.cells.get(i).is_some_and(|cell| cell::bare(cell) == name.as_bytes())
+        };
+        !names.is_empty()
+            && self.cells.len() == names.len()
+            && names.iter().enumerate().all(is_name)
+    }
+}
+
+/// Parses the number in a cell; `None` if it is missing.
+///
+/// # Errors
+/// The reason, which quotes the cell.
+pub(crate) fn parse_number(cell: &[u8]) -> Result<Option<f64>, String> {
+    cell::parse(cell, false)
+}
+
+impl Iterator for TableReader<'_> {
+    type Item = Result<Sample, RowError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            match self.rows.next(&mut self.cells) {
+                Ok(true) if self.is_header() => self.clock.restart(),
+                Ok(true) => return Some(self.sample()),
+                Ok(false) => return None,
+                Err(e) => {
+                    return Some(Err(RowError { line: self.line(), reason: e.to_string() }));
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

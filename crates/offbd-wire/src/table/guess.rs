@@ -1,0 +1,457 @@
+//! What the columns of a table probably are, from their names, units and the size of their values.
+//! A guess is proposed, never taken.
+
+use super::CsvError;
+use super::cell;
+use super::columns::with_own_names;
+use super::dialect::Dialect;
+use super::expression::{ColumnMapping, ColumnName, Dimension, Expression, Term};
+use crate::session_csv::COLUMNS;
+use offbd_core::vocabulary::Brief;
+
+/// Columns that an error lists.
+const LISTED: usize = 20;
+
+/// Longest name that an error lists whole, characters.
+const LONGEST_NAME: usize = 40;
+
+/// The step of a time in seconds that is more likely one of milliseconds or microseconds. Chosen:
+/// a rig that is sampled every two seconds cannot be judged.
+const LONGEST_STEP: [(f64, &str); 3] = [(2e6, "ns"), (2e3, "us"), (2.0, "ms")];
+
+/// Largest length in metres and angle in radians that is taken for one. Chosen: a plate is smaller
+/// than two metres and turns by less than a right angle.
+const LARGEST_M: f64 = 2.0;
+const LARGEST_RAD: f64 = 1.6;
+
+/// Returns a column's name as an error shows it.
+pub(super) fn shown(dialect: &Dialect, column: usize) -> String {
+    match dialect.names.get(column) {
+        Some(name) if name.chars().count() > LONGEST_NAME => {
+            format!("`{}…`", name.chars().take(LONGEST_NAME).collect::<String>())
+        }
+        Some(name) if !name.is_empty() => format!("`{name}`"),
+        _ => format!("#{}", column + 1),
+    }
+}
+
+/// Lists the columns of a table.
+pub(super) fn listed(dialect: &Dialect) -> String {
+    let n = dialect.n_columns();
+    if dialect.names.is_empty() {
+        return format!("{n} columns without names, #1 to #{n}");
+    }
+    let mut list: Vec<String> = (0..n.min(LISTED)).map(|i| shown(dialect, i)).collect();
+    if n > LISTED {
+        list.push(format!("and {} more", n - LISTED));
+    }
+    list.join(", ")
+}
+
+/// Returns the column whose name is most like `wanted`, if one is.
+pub(super) fn nearest<'a>(dialect: &'a Dialect, wanted: &ColumnName) -> Option<&'a str> {
+    let ColumnName::Name(wanted) = wanted else { return None };
+    nearest_of(wanted, dialect.names.iter().map(String::as_str))
+}
+
+/// Returns the word that is most like `wanted`, if one is.
+pub(crate) fn nearest_of<'a>(
+    wanted: &str,
+    words: impl Iterator<Item = &'a str>,
+) -> Option<&'a str> {
+    let likeness = |word: &&str| {
+        (1000.0 * strsim::jaro_winkler(&wanted.to_lowercase(), &word.to_lowercase())) as u64
+    };
+    // The usual threshold of the measure for a typing error.
+    words.max_by_key(likeness).filter(|word| likeness(word) >= 800)
+}
+
+/// Returns the error of a time that is probably not in seconds.
+pub(super) fn wrong_time_unit(dialect: &Dialect) -> Option<CsvError> {
+    let step = median_step(dialect, time_column(dialect)?)?;
+    let (_, unit) = LONGEST_STEP.iter().find(|(longest, _)| step > *longest)?;
+    Some(CsvError::TimeUnit { step, unit })
+}
+
+/// The column with the name of the time.
+fn time_column(dialect: &Dialect) -> Option<usize> {
+    dialect.names.iter().position(|name| name.eq_ignore_ascii_case(COLUMNS[0]))
+}
+
+fn by_step(step: f64) -> String {
+    format!("guessed from a step of {} from row to row", Brief(step))
+}
+
+/// Returns `value` with three significant digits.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.2e}").parse().unwrap_or(value)
+}
+
+fn values(dialect: &Dialect, column: usize) -> impl Iterator<Item = f64> {
+    let rows = dialect.first_rows.iter().filter_map(move |row| row.get(column));
+    rows.filter_map(|cell| cell::parse(cell.as_bytes(), dialect.has_decimal_commas).ok().flatten())
+}
+
+fn median_step(dialect: &Dialect, column: usize) -> Option<f64> {
+    let values: Vec<f64> = values(dialect, column).collect();
+    let mut steps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    steps.get(steps.len() / 2).copied().map(rounded)
+}
+
+/// What a column's name says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Meaning {
+    Time,
+    /// A command that turns the plate about x (0) or y (1); without an axis of a beam.
+    Turn(Option<usize>),
+    /// A command whose axis is more likely that of the motion.
+    Push(Option<usize>),
+    /// The ball's position along x (0) or y (1).
+    Position(usize),
+}
+
+/// Words of names; a name is split at signs and at changes from small to capital letters.
+const TIMES: [&str; 16] = [
+    "t",
+    "ts",
+    "time",
+    "timestamp",
+    "zeit",
+    "clock",
+    "date",
+    "datetime",
+    "sec",
+    "seconds",
+    "millis",
+    "micros",
+    "elapsed",
+    "ms",
+    "us",
+    "stamp",
+];
+const TURNS: [(&str, usize); 8] = [
+    ("qx", 0),
+    ("roll", 0),
+    ("alpha", 0),
+    ("rotx", 0),
+    ("qy", 1),
+    ("pitch", 1),
+    ("beta", 1),
+    ("roty", 1),
+];
+const COMMANDS: [&str; 21] = [
+    "cmd", "command", "u", "mv", "tilt", "angle", "servo", "motor", "mot", "theta", "winkel", "q",
+    "neigung", "control", "output", "out", "plate", "servox", "servoy", "motx", "moty",
+];
+const POSITIONS: [(&str, usize); 16] = [
+    ("x", 0),
+    ("bx", 0),
+    ("px", 0),
+    ("posx", 0),
+    ("ballx", 0),
+    ("xpos", 0),
+    ("xball", 0),
+    ("position", 0),
+    ("y", 1),
+    ("by", 1),
+    ("py", 1),
+    ("posy", 1),
+    ("bally", 1),
+    ("ypos", 1),
+    ("yball", 1),
+    ("distance", 0),
+];
+/// Words of quantities that are none of a sample.
+const OTHERS: [&str; 20] = [
+    "dot", "xdot", "ydot", "v", "vx", "vy", "vel", "velocity", "acc", "ax", "ay", "err", "error",
+    "ex", "ey", "ref", "sp", "setpoint", "target", "dt",
+];
+
+/// Words of units as they stand in names and below them, each with the unit of a mapping.
+const UNIT_WORDS: [(&str, &str); 24] = [
+    ("s", "s"),
+    ("sec", "s"),
+    ("second", "s"),
+    ("seconds", "s"),
+    ("ms", "ms"),
+    ("millis", "ms"),
+    ("us", "us"),
+    ("µs", "us"),
+    ("μs", "us"),
+    ("micros", "us"),
+    ("ns", "ns"),
+    ("m", "m"),
+    ("cm", "cm"),
+    ("mm", "mm"),
+    ("in", "in"),
+    ("inch", "in"),
+    ("rad", "rad"),
+    ("mrad", "mrad"),
+    ("deg", "deg"),
+    ("°", "deg"),
+    ("degree", "deg"),
+    ("degrees", "deg"),
+    ("grad", "deg"),
+    ("min", "min"),
+];
+
+/// Splits a name into words in small letters.
+fn words(name: &str) -> Vec<String> {
+    let mut words = vec![String::new()];
+    let mut was_small = false;
+    for c in name.chars() {
+        if !(c.is_alphanumeric() || c == '°') || c.is_uppercase() && was_small {
+            words.push(String::new());
+        }
+        if c.is_alphanumeric() || c == '°' {
+            if let Some(word) = words.last_mut() {
+                word.extend(c.to_lowercase());
+            }
+        }
+        was_small = c.is_lowercase();
+    }
+    words.retain(|word| !word.is_empty());
+    words
+}
+
+/// Returns the unit that a word names, in the dimension of a quantity.
+fn unit_of(word: &str, dimension: Dimension) -> Option<&'static str> {
+    let word = word.trim_matches(|c: char| "[]()".contains(c)).to_lowercase();
+    let (_, unit) = UNIT_WORDS.iter().find(|(known, _)| *known == word)?;
+    dimension.units().iter().any(|(known, _)| known == unit).then_some(*unit)
+}
+
+fn meaning(name: &str) -> Option<Meaning> {
+    let mut words = words(name);
+    // The unit at the end is not a part of the name, unless it is the whole name.
+    if words.len() > 1 && UNIT_WORDS.iter().any(|(unit, _)| words.last().is_some_and(|w| w == unit))
+    {
+        words.pop();
+    }
+    let has = |known: &[&str]| words.iter().any(|word| known.contains(&word.as_str()));
+    let axis = |known: &[(&str, usize)]| {
+        words.iter().find_map(|word| known.iter().find(|(w, _)| w == word)).map(|(_, axis)| *axis)
+    };
+    if has(&OTHERS) {
+        return None;
+    }
+    if let Some(axis) = axis(&TURNS) {
+        return Some(Meaning::Turn(Some(axis)));
+    }
+    if has(&COMMANDS) {
+        let ends = |end: char| words.iter().any(|word| word.ends_with(end));
+        let axis = if ends('x') {
+            Some(0)
+        } else if ends('y') {
+            Some(1)
+        } else {
+            None
+        };
+        return Some(Meaning::Push(axis));
+    }
+    if let Some(axis) = axis(&POSITIONS) {
+        return Some(Meaning::Position(axis));
+    }
+    has(&TIMES).then_some(Meaning::Time)
+}
+
+/// A guess, with its reason.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Guess {
+    pub(super) quantity: usize,
+    pub(super) column: usize,
+    pub(super) unit: &'static str,
+    pub(super) reason: String,
+}
+
+impl Guess {
+    fn expression(&self, dialect: &Dialect) -> Expression {
+        let units = Dimension::of(self.quantity).units();
+        let factor = units.iter().find(|(word, _)| *word == self.unit).map_or(1.0, |(_, si)| *si);
+        Expression { terms: vec![Term { column: Some(name(dialect, self.column)), factor }] }
+    }
+}
+
+fn name(dialect: &Dialect, column: usize) -> ColumnName {
+    match dialect.names.get(column) {
+        Some(name) if !name.is_empty() => ColumnName::Name(name.clone()),
+        _ => ColumnName::Number(column + 1),
+    }
+}
+
+/// Guesses the columns of the quantities that `known` does not map.
+pub(super) fn guesses(dialect: &Dialect, known: &ColumnMapping) -> Vec<Guess> {
+    let meanings: Vec<Option<Meaning>> = dialect.names.iter().map(|name| meaning(name)).collect();
+    let mut taken: Vec<usize> = Vec::new();
+    let mut guesses = Vec::new();
+    // The order in which columns are taken: what a name says most surely first.
+    let wanted: [(usize, &[Meaning]); 5] = [
+        (0, &[Meaning::Time]),
+        (1, &[Meaning::Turn(Some(0)), Meaning::Push(Some(1))]),
+        (
+            2,
+            &[
+                Meaning::Turn(Some(1)),
+                Meaning::Push(Some(0)),
+                Meaning::Push(None),
+                Meaning::Turn(None),
+            ],
+        ),
+        (3, &[Meaning::Position(0)]),
+        (4, &[Meaning::Position(1)]),
+    ];
+    for (quantity, meanings_wanted) in wanted {
+        if known.expressions[quantity].is_some() {
+            continue;
+        }
+        let has = |meaning: &Meaning| {
+            (0..meanings.len()).find(|i| !taken.contains(i) && meanings[*i] == Some(*meaning))
+        };
+        let time_by_unit = || {
+            let is_time = |i: &usize| {
+                let unit = dialect.units.get(*i)?;
+                unit_of(unit, Dimension::Time).filter(|_| !taken.contains(i))
+            };
+            (0..dialect.names.len()).find(|i| is_time(i).is_some())
+        };
+        let found = if quantity == 0 { time_by_unit() } else { None };
+        if let Some(column) = found.or_else(|| meanings_wanted.iter().find_map(has)) {
+            taken.push(column);
+            guesses.push(Guess { quantity, column, unit: "", reason: String::new() });
+        }
+    }
+    let columns = |dimension: Dimension| {
+        let same = guesses.iter().filter(|guess| Dimension::of(guess.quantity) == dimension);
+        same.map(|guess| guess.column).collect::<Vec<usize>>()
+    };
+    let alike = [columns(Dimension::Time), columns(Dimension::Angle), columns(Dimension::Length)];
+    for guess in &mut guesses {
+        let dimension = Dimension::of(guess.quantity);
+        (guess.unit, guess.reason) =
+            unit(dialect, dimension, guess.column, &alike[dimension as usize]);
+    }
+    guesses
+}
+
+/// The reasons of units that the file itself states.
+pub(super) const BY_NAME: &str = "its name says the unit";
+const BY_UNIT_LINE: &str = "the line below the names says the unit";
+
+impl Guess {
+    /// Whether the file states the unit.
+    pub(super) fn is_stated(&self) -> bool {
+        [BY_NAME, BY_UNIT_LINE].contains(&self.reason.as_str())
+    }
+}
+
+/// Returns the unit of a column, and how it is known. The columns `alike` have the same dimension
+/// and probably the same unit.
+fn unit(
+    dialect: &Dialect,
+    dimension: Dimension,
+    column: usize,
+    alike: &[usize],
+) -> (&'static str, String) {
+    let last_word = dialect.names.get(column).and_then(|name| words(name).pop());
+    if let Some(unit) = last_word.and_then(|word| unit_of(&word, dimension)) {
+        return (unit, BY_NAME.to_owned());
+    }
+    if let Some(unit) = dialect.units.get(column).and_then(|word| unit_of(word, dimension)) {
+        return (unit, BY_UNIT_LINE.to_owned());
+    }
+    let all = alike.iter().flat_map(|column| values(dialect, *column));
+    let largest = all.fold(0.0, |most: f64, value| most.max(value.abs()));
+    let by_size = |unit| (unit, format!("guessed from values up to {largest}"));
+    match dimension {
+        Dimension::Time => {
+            let is_date = dialect.first_rows.first().and_then(|row| row.get(column));
+            if is_date.is_some_and(|cell| cell::is_moment(cell)) {
+                return ("s", "its values are dates or times of day".to_owned());
+            }
+            let step = median_step(dialect, column).unwrap_or_default();
+            let unit = LONGEST_STEP.iter().find(|(longest, _)| step > *longest);
+            let unit = unit.map_or("s", |(_, unit)| unit);
+            (unit, by_step(step))
+        }
+        Dimension::Angle => by_size(if largest > LARGEST_RAD { "deg" } else { "rad" }),
+        Dimension::Length => by_size(if largest > LARGEST_M { "mm" } else { "m" }),
+    }
+}
+
+/// Returns `known` with the guesses for all else.
+pub(super) fn mapping(dialect: &Dialect, known: &ColumnMapping) -> (ColumnMapping, Vec<Guess>) {
+    let mut mapping = with_own_names(known, dialect).unwrap_or_else(|_| known.clone());
+    let mut guesses = guesses(dialect, &mapping);
+    if known.expressions[0].is_none()
+        && let Some(CsvError::TimeUnit { step, unit }) = wrong_time_unit(dialect)
+        && let Some(column) = time_column(dialect)
+    {
+        guesses.insert(0, Guess { quantity: 0, column, unit, reason: by_step(step) });
+    }
+    for guess in &guesses {
+        mapping.expressions[guess.quantity] = Some(guess.expression(dialect));
+    }
+    (mapping, guesses)
+}
+
+/// Returns a sentence that proposes a mapping, with a blank before it; nothing if too little can be
+/// guessed.
+pub(super) fn proposal(dialect: &Dialect, known: &ColumnMapping) -> String {
+    let (mapping, guesses) = mapping(dialect, known);
+    let proposed = ColumnMapping {
+        expressions: std::array::from_fn(|i| {
+            let is_guessed = guesses.iter().any(|guess| guess.quantity == i);
+            mapping.expressions[i].clone().filter(|_| is_guessed || known.expressions[i].is_some())
+        }),
+    };
+    if guesses.is_empty() {
+        return format!(
+            " A mapping says which column is what, such as `t_s=NAME/ms, x_m=NAME/mm`; the \
+             quantities are {}",
+            COLUMNS.join(", ")
+        );
+    }
+    format!(" This mapping is likely; check its units: `{proposed}`")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::dialect::detect;
+    use super::*;
+
+    fn guessed(text: &str) -> String {
+        let dialect = detect(text.as_bytes(), true).unwrap();
+        mapping(&dialect, &ColumnMapping::default()).0.to_string()
+    }
+
+    #[test]
+    fn names_units_and_sizes_say_what_a_column_is() {
+        for (text, mapping) in [
+            (
+                ",time,x,y,MV_x,MV_y\n0,895.71,2.09,0.51,0.43,-1.23\n1,895.73,2.1,0.5,4,-3\n",
+                "t_s=time/s, cmd_qx_rad=MV_y/deg, cmd_qy_rad=MV_x/deg, x_m=x/mm, y_m=y/mm",
+            ),
+            (
+                "time,time_rel,dt,x,xdot,theta,theta_deg\n1.5,0,0.02,0.1,0,0.01,0.5\n1.52,0,0.02,0.1,0,0,0\n",
+                "t_s=time/s, cmd_qy_rad=theta/rad, x_m=x/m",
+            ),
+            (
+                "ts_us;roll_deg;pitch_deg;bx [mm];by [mm]\n0;1;2;3;4\n10000;1;2;3;4\n",
+                "t_s=ts_us/us, cmd_qx_rad=roll_deg/deg, cmd_qy_rad=pitch_deg/deg, x_m='bx [mm]'/mm, y_m='by [mm]'/mm",
+            ),
+            (
+                "Zeit [ms]\tWinkel X [°]\tWinkel Y [°]\tBall X [cm]\tBall Y [cm]\n0\t1\t2\t3\t4\n",
+                "t_s='Zeit [ms]'/ms, cmd_qx_rad='Winkel Y [°]'/deg, cmd_qy_rad='Winkel X [°]'/deg, x_m='Ball X [cm]'/cm, y_m='Ball Y [cm]'/cm",
+            ),
+            ("x-axis,1,2\nsecond,Volt,Volt\n-1.97,0.4,-0.8\n-1.96,0.4,-0.5\n", "t_s='x-axis'/s"),
+            (
+                "cmdX,cmdY,ballX,ballY\n0.1,0.1,0.01,0.01\n",
+                "cmd_qx_rad=cmdY/rad, cmd_qy_rad=cmdX/rad, x_m=ballX/m, y_m=ballY/m",
+            ),
+            ("0,1,2\n1,2,3\n", ""),
+        ] {
+            assert_eq!(guessed(text), mapping, "{text}");
+        }
+    }
+}

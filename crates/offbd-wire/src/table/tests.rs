@@ -1,0 +1,212 @@
+use super::*;
+use crate::session_csv::write;
+use proptest::prelude::*;
+
+fn read(text: &str) -> Vec<Result<Sample, RowError>> {
+    TableReader::batch(text.as_bytes()).unwrap().collect()
+}
+
+#[test]
+fn columns_may_have_any_order_and_unknown_ones_are_ignored() {
+    let rows = read("y_m,note,t_s,cmd_qy_rad,x_m,cmd_qx_rad\n,hello,1.5,,0.25,-0.1\n");
+    let wanted = Sample { t_s: 1.5, cmd_qx_rad: Some(-0.1), x_m: Some(0.25), ..Sample::default() };
+    assert_eq!(rows, [Ok(wanted)]);
+}
+
+#[test]
+fn a_row_that_is_too_long_is_not_held_in_memory() {
+    let start = "t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n0,0,0,0,0\n1,0,0,0,\"";
+    for rest in ["0", "0\n"] {
+        let rest = rest.as_bytes().repeat(8 << 20);
+        let mut reader = TableReader::batch(start.as_bytes().chain(&rest[..])).unwrap();
+        assert!(reader.next().unwrap().is_ok());
+        let error = reader.next().unwrap().unwrap_err();
+        assert!(error.reason.contains("longer than 1 MiB"), "{error}");
+        assert!(reader.next().is_none());
+    }
+    let header = TableReader::batch(io::repeat(b'a'));
+    assert!(matches!(header, Err(CsvError::NoTable)));
+}
+
+#[test]
+fn an_invalid_row_is_reported_with_its_line_and_the_next_row_is_read() {
+    let rows = read(
+        "t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n0,0,0,abc,0\n1,0\n2,0,0,NaN,0\n,0,0,0,0\n4,0,0,0,0\n",
+    );
+    let errors: Vec<String> =
+        rows.iter().filter_map(|r| r.as_ref().err()).map(ToString::to_string).collect();
+    assert_eq!(
+        errors,
+        [
+            "line 2: `x_m`: `abc` is not a number",
+            "line 3: no field `cmd_qy_rad`",
+            "line 5: `t_s` is empty",
+        ]
+    );
+    assert_eq!(rows[4].as_ref().unwrap().t_s, 4.0);
+}
+
+#[test]
+fn a_header_with_a_missing_or_repeated_column_is_rejected() {
+    let error = TableReader::batch("t_s,x_m,y_m,cmd_qx_rad\n".as_bytes()).err().unwrap();
+    assert!(error.to_string().contains("`cmd_qy_rad`"), "{error}");
+    let error =
+        TableReader::batch("t_s,t_s,x_m,y_m,cmd_qx_rad,cmd_qy_rad\n".as_bytes()).err().unwrap();
+    assert!(error.to_string().contains("twice"), "{error}");
+    assert!(TableReader::batch(&b""[..]).is_err());
+}
+
+fn finite() -> impl Strategy<Value = f64> {
+    proptest::num::f64::NORMAL | proptest::num::f64::SUBNORMAL | proptest::num::f64::ZERO
+}
+
+proptest! {
+    #[test]
+    fn written_samples_are_read_back_bit_for_bit(
+        rows in proptest::collection::vec(
+            (proptest::option::of(0..u64::MAX), finite(), proptest::array::uniform4(proptest::option::of(finite()))),
+            0..20,
+        )
+    ) {
+        let samples: Vec<Sample> = rows.into_iter().map(|(seq, t_s, [a, b, c, d])| Sample {
+            seq, t_s, cmd_qx_rad: a, cmd_qy_rad: b, x_m: c, y_m: d,
+        }).collect();
+        let mut text = Vec::new();
+        write(&mut text, &samples).unwrap();
+        let back: Vec<Sample> = TableReader::batch(text.as_slice()).unwrap().map(Result::unwrap).collect();
+        prop_assert_eq!(back.len(), samples.len());
+        for (a, b) in back.iter().zip(&samples) {
+            prop_assert_eq!(format!("{:?}", a), format!("{:?}", b));
+        }
+    }
+}
+
+fn recorded(
+    text: &str,
+    columns: &str,
+    rate_hz: Option<f64>,
+) -> Result<Vec<(usize, Sample)>, String> {
+    let options = TableOptions { columns: columns.parse().unwrap(), rate_hz };
+    let mut reader =
+        TableReader::recording(text.as_bytes(), &options).map_err(|e| e.to_string())?;
+    let mut rows = Vec::new();
+    while let Some(row) = reader.next() {
+        rows.push((reader.n_runs(), row.map_err(|e| e.to_string())?));
+    }
+    Ok(rows)
+}
+
+fn times(text: &str, columns: &str, rate_hz: Option<f64>) -> Vec<(usize, f64)> {
+    let rows = recorded(text, columns, rate_hz).unwrap();
+    rows.iter().map(|(run, sample)| (*run, sample.t_s)).collect()
+}
+
+#[test]
+fn a_spreadsheet_with_decimal_commas_is_read() {
+    let text = "t_s;cmd_qx_rad;cmd_qy_rad;x_m;y_m\r\n0,0201;0,0076;-0,0216;0,0209;0,0051\r\n0,04;;;nan;NA\r\n";
+    let rows = recorded(text, "", None).unwrap();
+    assert_eq!(rows[0].1.x_m, Some(0.0209));
+    assert_eq!((rows[1].1.t_s, rows[1].1.x_m, rows[1].1.cmd_qx_rad), (0.04, None, None));
+}
+
+#[test]
+fn counts_without_names_and_time_are_mapped() {
+    let text = "2286.0\t2197.0\t1879.0\n2284.0\t2190.0\t1940.0\n";
+    let columns = "x_m=#1*0.0001-0.2, cmd_qy_rad=#3*0.0005-1";
+    let rows = recorded(text, columns, Some(50.0)).unwrap();
+    assert_eq!((rows[0].1.t_s, rows[1].1.t_s), (0.0, 0.02));
+    assert!((rows[1].1.x_m.unwrap() - 0.0284).abs() < 1e-12, "{rows:?}");
+    assert!((rows[1].1.cmd_qy_rad.unwrap() + 0.03).abs() < 1e-12, "{rows:?}");
+    let error = recorded(text, columns, None).unwrap_err();
+    assert!(
+        error.contains("lacks the column `t_s`") && error.contains("3 columns without names"),
+        "{error}"
+    );
+    let error = recorded(text, "x_m=#4/mm, cmd_qy_rad=#3", Some(50.0)).unwrap_err();
+    assert!(error.contains("`#4`: is not a column"), "{error}");
+}
+
+#[test]
+fn three_servos_of_a_parallel_rig_give_two_angles() {
+    let text = "t,a,b,c,x,y\n0,3,6,9,0,0\n1,3,6,9,0,0\n";
+    let columns =
+        "t_s=t, cmd_qx_rad=b/deg*0.5-c/deg*0.5, cmd_qy_rad=a/deg-b/deg*0.5-c/deg*0.5, x_m=x, y_m=y";
+    let rows = recorded(text, columns, None).unwrap();
+    let degrees = |value: Option<f64>| value.unwrap().to_degrees();
+    assert!((degrees(rows[0].1.cmd_qx_rad) + 1.5).abs() < 1e-12);
+    assert!((degrees(rows[0].1.cmd_qy_rad) + 4.5).abs() < 1e-12);
+}
+
+#[test]
+fn dates_become_seconds() {
+    let text = "stamp,u,x\n2026-02-20T13:51:00.5+01:00,0,0\n2026-02-20T13:51:01+01:00,0,0\n";
+    let columns = "t_s=stamp, cmd_qy_rad=u, x_m=x";
+    assert_eq!(times(text, columns, None), [(1, 1_771_591_860.5), (1, 1_771_591_861.0)]);
+    let text = "day;clock;u;x\n20.02.2026;23:59:59,5;0;0\n21.02.2026;00:00:00,5;0;0\n";
+    let columns = "t_s=day+clock, cmd_qy_rad=u, x_m=x";
+    let seconds = times(text, columns, None);
+    assert_eq!(seconds[1].1 - seconds[0].1, 1.0);
+    let text = "stamp,u,x\n2026-02-20,0,0\nyesterday,0,0\n";
+    let error = recorded(text, "t_s=stamp, cmd_qy_rad=u, x_m=x", None).unwrap_err();
+    assert!(error.contains("line 3: `t_s`: `yesterday` is not a date or a time of day"), "{error}");
+}
+
+#[test]
+fn a_counter_that_wraps_goes_on() {
+    let text = "ms,u,x\n65500,0,0\n65520,0,0\n4,0,0\n24,0,0\n";
+    let seconds = times(text, "t_s=ms/ms, cmd_qy_rad=u, x_m=x", None);
+    let expected = [65.5, 65.52, 65.54, 65.56];
+    for ((run, t_s), expected) in seconds.iter().zip(expected) {
+        assert!(*run == 1 && (t_s - expected).abs() < 1e-9, "{seconds:?}");
+    }
+}
+
+#[test]
+fn a_clock_that_starts_again_begins_a_run() {
+    let head = "t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n";
+    let run = "0,0,0,0,0\n1,0,0,0,0\n2,0,0,0,0\n";
+    let both = [(1, 0.0), (1, 1.0), (1, 2.0), (2, 0.0), (2, 1.0), (2, 2.0)];
+    assert_eq!(times(&format!("{head}{run}{run}"), "", None), both);
+    assert_eq!(times(&format!("{head}{run}{head}{run}"), "", None), both);
+    // A row that is late is not a run, and a batch has none.
+    let late = format!("{head}0,0,0,0,0\n1,0,0,0,0\n2,0,0,0,0\n1.5,0,0,0,0\n");
+    assert_eq!(times(&late, "", None), [(1, 0.0), (1, 1.0), (1, 2.0), (1, 1.5)]);
+    let text = format!("{head}{run}{run}");
+    let mut batch = TableReader::batch(text.as_bytes()).unwrap();
+    assert_eq!(batch.by_ref().count(), 6);
+    assert_eq!(batch.n_runs(), 1);
+}
+
+#[test]
+fn times_in_another_unit_are_doubted() {
+    for (step, unit) in [(20_u64, "ms"), (20_000, "us"), (20_000_000, "ns")] {
+        let row = |i: u64| format!("{},0,0,0,0\n", 1_771_570_260_336 + i * step);
+        let rows: String = (0..5).map(row).collect();
+        let text = format!("t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n{rows}");
+        let error = recorded(&text, "", None).unwrap_err();
+        assert!(error.contains(&format!("is it in {unit}?")), "{error}");
+        assert_eq!(recorded(&text, &format!("t_s=t_s/{unit}"), None).unwrap().len(), 5);
+    }
+}
+
+#[test]
+fn comments_and_blank_lines_are_skipped_and_lines_counted() {
+    let text = "# a rig\nnotes: none\nt_s  cmd_qy_rad  x_m\n# begun\n 0  0   0\n\n 0.1  0 abc\n";
+    let rows: Vec<_> =
+        TableReader::recording(text.as_bytes(), &TableOptions::default()).unwrap().collect();
+    assert_eq!(rows.len(), 2);
+    assert_eq!(rows[1].as_ref().unwrap_err().to_string(), "line 7: `x_m`: `abc` is not a number");
+}
+
+#[test]
+fn a_file_with_other_names_is_refused_with_a_mapping() {
+    let text = "time,x,u\n0,1,2\n0.01,1,2\n";
+    let error = recorded(text, "", None).unwrap_err();
+    assert_eq!(
+        error,
+        "the table lacks the column `t_s`; it has `time`, `x`, `u`. This mapping is likely; check \
+         its units: `t_s=time/s, cmd_qy_rad=u/deg, x_m=x/m`"
+    );
+    let error = recorded("a\nb\n", "", None).unwrap_err();
+    assert!(error.contains("no line has two or more columns"), "{error}");
+}

@@ -1,0 +1,221 @@
+//! Tables as programs and owners write them, through every door: each gives the same samples and
+//! the same verdict.
+
+use serde_json::{Value, json};
+
+use crate::cli::fixture::CliFixture;
+use crate::support::ServiceFixture;
+
+/// A file as its owner has it.
+struct OddFile {
+    name: &'static str,
+    /// The file.
+    bytes: Vec<u8>,
+    /// How its columns are read; empty if they have the names of the quantities.
+    columns: &'static str,
+    rate: Option<f64>,
+}
+
+/// The rows of a recording in which an x servo dies: time, commands, positions.
+fn rows(cli: &CliFixture) -> Vec<[Option<f64>; 5]> {
+    cli.ok("simulate --seconds 30 --fault x_servo:dead@10 -o sick.csv");
+    let text = cli.read("sick.csv");
+    let cells = |line: &str| -> [Option<f64>; 5] {
+        let cells: Vec<Option<f64>> = line.split(',').map(|cell| cell.parse().ok()).collect();
+        cells.try_into().unwrap()
+    };
+    text.lines().skip(1).map(cells).collect()
+}
+
+/// Writes a table; `cell` returns the text of a value in a column.
+fn table(
+    header: &str,
+    rows: &[[Option<f64>; 5]],
+    separator: &str,
+    cell: impl Fn(usize, Option<f64>) -> String,
+) -> String {
+    let line = |row: &[Option<f64>; 5]| {
+        let cells = row.iter().enumerate().map(|(i, value)| cell(i, *value));
+        cells.collect::<Vec<_>>().join(separator)
+    };
+    let mut lines: Vec<String> = rows.iter().map(line).collect();
+    if !header.is_empty() {
+        lines.insert(0, header.to_owned());
+    }
+    lines.join("\n") + "\n"
+}
+
+const HEADER: &str = "t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m";
+
+fn plain(_: usize, value: Option<f64>) -> String {
+    value.map_or(String::new(), |value| value.to_string())
+}
+
+/// The same recording in the layouts of many programs.
+fn files(rows: &[[Option<f64>; 5]]) -> Vec<OddFile> {
+    let semicolons = HEADER.replace(',', ";");
+    let commas = |i, value| plain(i, value).replace('.', ",");
+    let file = |name, text: String, columns| OddFile {
+        name,
+        bytes: text.into_bytes(),
+        columns,
+        rate: None,
+    };
+    let utf16 = table(&HEADER.replace(',', "\t"), rows, "\t", plain);
+    let utf16 =
+        [0xfeff].into_iter().chain(utf16.encode_utf16()).flat_map(u16::to_le_bytes).collect();
+    vec![
+        file("plain", table(HEADER, rows, ",", plain), ""),
+        file("spreadsheet", table(&semicolons, rows, ";", commas), ""),
+        file(
+            "nan",
+            table(HEADER, rows, ",", |i, value| {
+                value.map_or("nan".to_owned(), |value| plain(i, Some(value)))
+            }),
+            "",
+        ),
+        file(
+            "comments",
+            format!("% a log\n% of Monday\n\n{}", table(HEADER, rows, ",", plain))
+                .replace("\n0.5,", "\n% half\n0.5,"),
+            "",
+        ),
+        OddFile { name: "utf16", bytes: utf16, columns: "", rate: None },
+        file(
+            "numpy",
+            format!(
+                "# {}",
+                table(&HEADER.replace(',', " "), rows, " ", |i, value| {
+                    value.map_or("nan".to_owned(), |value| plain(i, Some(value)))
+                })
+            ),
+            "",
+        ),
+        file("units", format!("{HEADER}\ns,rad,rad,m,m\n{}", table("", rows, ",", plain)), ""),
+        file(
+            "own names",
+            table("Zeit,Winkel X,Winkel Y,Ball X,Ball Y", rows, ",", plain),
+            "t_s=Zeit, cmd_qx_rad='Winkel X', cmd_qy_rad='Winkel Y', x_m='Ball X', y_m='Ball Y'",
+        ),
+        file(
+            "no header",
+            table("", rows, ",", plain),
+            "t_s=#1, cmd_qx_rad=#2, cmd_qy_rad=#3, x_m=#4, y_m=#5",
+        ),
+    ]
+}
+
+/// The verdict of `offbd replay`.
+fn replayed(cli: &CliFixture, file: &OddFile) -> Value {
+    std::fs::write(cli.path("odd.txt"), &file.bytes).unwrap();
+    let mut args = vec!["replay", "--format", "json", "odd.txt"];
+    if !file.columns.is_empty() {
+        args.extend(["--columns", file.columns]);
+    }
+    let rate = file.rate.map(|rate| rate.to_string());
+    if let Some(rate) = &rate {
+        args.extend(["--rate", rate]);
+    }
+    let output = cli.args(0, &args);
+    let summary = output.stdout.lines().last().unwrap();
+    serde_json::from_str(summary).unwrap()
+}
+
+#[tokio::test]
+async fn a_recording_in_any_layout_is_judged_the_same_through_every_door() {
+    let cli = CliFixture::new();
+    let rows = rows(&cli);
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
+    client.asset("a").await;
+    let mut hashes = Vec::new();
+    for (i, file) in files(&rows).iter().enumerate() {
+        let summary = replayed(&cli, file);
+        let path = format!("assets/a/sessions/import?name={i}&columns={}", encoded(file.columns));
+        let request =
+            client.request(reqwest::Method::POST, &path).header("content-type", "text/csv");
+        let imported = client.send(request.body(file.bytes.clone())).await.expect(201);
+        assert_eq!(imported["rejected"], 0, "{}", file.name);
+        let hash = &imported["session"]["verdict"]["verdict_hash"];
+        assert_eq!(hash, &summary["verdict_hash"], "{}", file.name);
+        assert!(!summary["faults"].as_array().unwrap().is_empty(), "{}", file.name);
+        hashes.push((file.name, hash.clone()));
+    }
+    assert!(hashes.iter().all(|(_, hash)| *hash == hashes[0].1), "{hashes:?}");
+}
+
+fn encoded(text: &str) -> String {
+    let kept = |b: u8| b.is_ascii_alphanumeric();
+    text.bytes()
+        .map(|b| if kept(b) { char::from(b).to_string() } else { format!("%{b:02X}") })
+        .collect()
+}
+
+#[tokio::test]
+async fn two_runs_in_one_log_are_two_sessions() {
+    let cli = CliFixture::new();
+    let rows = rows(&cli);
+    let one = table(HEADER, &rows, ",", plain);
+    let log = format!("{one}{one}");
+    cli.write("log.csv", &log);
+    let output = cli.ok("replay --format json log.csv");
+    let names: Vec<Value> = output
+        .stdout
+        .lines()
+        .map(|line| serde_json::from_str::<Value>(line).unwrap())
+        .filter(|line| line["type"] == "summary")
+        .map(|line| json!([line["session"], line["verdict_hash"]]))
+        .collect();
+    assert_eq!(names.len(), 2);
+    assert_eq!((&names[0][0], &names[1][0]), (&json!("log.csv"), &json!("log.csv#2")));
+    assert_eq!(names[0][1], names[1][1]);
+    let fixture = ServiceFixture::start().await;
+    fixture.client.asset("a").await;
+    let path = "assets/a/sessions/import?name=log";
+    let imported = fixture.client.post_text(path, "text/csv", log).await.expect(201);
+    assert_eq!(imported["accepted"], 2 * rows.len());
+    let sessions = [&imported["session"], &imported["more_sessions"][0]];
+    assert_eq!(sessions.map(|session| &session["name"]), [&json!("log"), &json!("log#2")]);
+    for session in sessions {
+        assert_eq!(session["state"], "ended");
+        assert_eq!(session["verdict"]["verdict_hash"], names[0][1]);
+    }
+}
+
+#[tokio::test]
+async fn a_dry_run_says_how_a_file_would_be_read_and_imports_nothing() {
+    let cli = CliFixture::new();
+    let rows = rows(&cli);
+    let text = table("time,MV_x,MV_y,x,y", &rows, ",", plain);
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
+    client.asset("a").await;
+    let path = "assets/a/sessions/import?dry_run=true";
+    let seen = client.post_text(path, "text/csv", text.clone()).await.expect(200);
+    cli.write("odd.csv", &text);
+    let inspected: Value =
+        serde_json::from_str(&cli.ok("inspect --format json odd.csv").stdout).unwrap();
+    assert_eq!(seen, inspected);
+    assert_eq!(seen["rows"], rows.len());
+    assert_eq!(client.get("sessions").await.expect(200)["items"], json!([]));
+    let refused = client.post_text("assets/a/sessions/import", "text/csv", text).await.expect(400);
+    let detail = refused["detail"].as_str().unwrap();
+    assert!(detail.contains("lacks the column `t_s`; it has `time`, `MV_x`"), "{detail}");
+    let path = "assets/a/sessions/import?columns=x_m%3Dball%2Ffurlong";
+    let refused = client.post_text(path, "text/csv", String::new()).await.expect(400);
+    assert!(refused["detail"].as_str().unwrap().contains("`furlong`"), "{refused}");
+    assert_eq!(client.get("sessions").await.expect(200)["items"], json!([]));
+}
+
+#[tokio::test]
+async fn unknown_keys_of_a_batch_are_named() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
+    client.asset("a").await;
+    let batch = json!({ "samples": [{ "t_s": 0.0, "x": 0.1, "cmd_qx": 0.0 }, { "t_s": 0.01, "x_m": 0.1 }] });
+    let ack = client.post("assets/a/telemetry", &batch).await.expect(200);
+    assert_eq!(ack["accepted"], 1);
+    assert!(ack["rejected"][0]["reason"].as_str().unwrap().contains("none of the keys"), "{ack}");
+    let meant = json!([{ "key": "x", "meant": "x_m" }, { "key": "cmd_qx", "meant": "cmd_qx_rad" }]);
+    assert_eq!(ack["unknown"], meant);
+}
