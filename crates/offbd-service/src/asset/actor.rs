@@ -40,6 +40,6 @@ pub(super) struct Asset {
     pub(super) deleted: bool,
     /// Whether it is to be loaded again before its next command.
     pub(super) dropped: bool,
-    /// Snapshots of the engine to be stored, taken while it was rebuilt.
+    /// Snapshots of the engine to be stored, taken while it was rebuilt or before it is dropped.
     pub(super) snapshots: Vec<Snapshot>,
 }

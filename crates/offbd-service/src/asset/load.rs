@@ -234,6 +234,7 @@ fn evaluate(
                 failure = Some(ServiceError::Unavailable { what });
             }
             Ok(Some(snapshot)) => {
+    open.acted_at = actions.last().map(|action| action.after_index);
                 due.retain(|earlier| earlier.kept);
                 due.push(snapshot);
             }

@@ -70,6 +70,10 @@ impl Shard {
             while let Some(message) = self.queue.blocking_recv() {
                 self.handle(message);
             }
+            // Otherwise nobody waits for the writer, and its runtime may be ending.
+            if self.env.handles.closing.is_cancelled() {
+                self.stop();
+            }
         };
         thread.spawn(work).map_err(|error| {
             tracing::error!(%error, "cannot start the thread of a shard");
@@ -82,6 +86,30 @@ impl Shard {
     pub(crate) fn step(&mut self) -> bool {
         let message = self.queue.try_recv().ok();
         message.map(|message| self.handle(message)).is_some()
+    }
+
+    /// Stores the engines of all open sessions at the end of the service.
+    pub(crate) fn stop(&mut self) {
+        for slot in std::mem::take(&mut self.slots).into_values() {
+            if let Slot::Running(mut asset) = slot {
+                self.n_running.decrement(1);
+                self.store_engine(&mut asset);
+            }
+        }
+    }
+
+    /// Stores the engine of an asset that is about to be dropped in order. It is known then without
+    /// being loaded, and has nothing to evaluate again when it is.
+    fn store_engine(&self, asset: &mut Asset) {
+        let interval = self.env.handles.sessions.snapshot_interval;
+        match asset.open.as_mut().map(|open| open.last_snapshot(interval)) {
+            Some(Ok(snapshot)) => asset.snapshots.extend(snapshot),
+            Some(Err(error)) => {
+                tracing::error!(asset = asset.row.name, %error, "an engine is not stored");
+            }
+            None => {}
+        }
+        self.store_snapshots(asset);
     }
 
     fn handle(&mut self, message: ShardMessage) {
@@ -142,10 +170,11 @@ impl Shard {
         for name in names {
             self.env.presences.remove(&name);
             match self.slots.remove(&name) {
-                Some(Slot::Running(asset)) => {
+                Some(Slot::Running(mut asset)) => {
                     self.n_running.decrement(1);
-                    if lost {
-                        asset.generation.invalidate();
+                    match lost {
+                        true => asset.generation.invalidate(),
+                        false => self.store_engine(&mut asset),
                     }
                 }
                 Some(Slot::Loading(loading)) => {
@@ -217,7 +246,7 @@ impl Shard {
         }
     }
 
-    /// Stores the snapshots that were taken while the engine was rebuilt, if there is room for
+    /// Stores the snapshots of the engine that were taken beside its samples, if there is room for
     /// them in the writer's queue; a later rebuild takes them again.
     fn store_snapshots(&self, asset: &mut Asset) {
         let writes: Vec<_> =
