@@ -1,4 +1,4 @@
-//! A loaded asset.
+//! An asset with its engine.
 
 use super::ended_session::EndedSession;
 use super::learning_record::LearningRecord;
@@ -15,8 +15,8 @@ use offbd_wire::stored::StoredProvenance;
 /// The provenance of each code's fault memory entry, in the order of [`FaultCode::ALL`].
 pub(super) type Provenance = [StoredProvenance; FaultCode::COUNT];
 
-/// An asset that is loaded on its shard.
-pub(super) struct Asset {
+/// An asset that is loaded on its shard, or that was read for one question; see [`super::stored`].
+pub(crate) struct Asset {
     pub(super) row: AssetRow,
     pub(super) rig: Rig,
     /// The fault memory as last written.

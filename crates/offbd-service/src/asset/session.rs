@@ -64,6 +64,12 @@ impl OpenSession {
         }
     }
 
+    /// Whether the engine has evaluated any of the recorded samples, if there are some. It has
+    /// not if it was read for a question, and no state of it is stored.
+    pub(super) fn is_known(&self) -> bool {
+        self.progress.n_samples == 0 || self.judging.counts().n_samples > 0
+    }
+
     /// Evaluates one sample that may be a retransmission.
     pub(super) fn take(&mut self, sample: &Sample) -> Admission {
         let admission = self.judging.sample(*sample);

@@ -1,5 +1,5 @@
 //! A shard: a thread that runs the engines of its assets. An asset is loaded by its first
-//! command, on another thread; its commands wait meanwhile.
+//! command that does more than look, on another thread; its commands wait meanwhile.
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -8,7 +8,7 @@ use std::thread::JoinHandle;
 use tokio::sync::mpsc;
 
 use super::actor::Asset;
-use super::command::{AssetCommand, Reply};
+use super::command::{AssetCommand, AssetLook, Reply};
 use super::loader::LoadQueue;
 use super::message::{LoadResult, ShardMessage};
 use super::turn::{Environment, Turn};
@@ -137,9 +137,7 @@ impl Shard {
             return self.apply(name, Err(ServiceError::Moving), command);
         };
         let command = match command {
-            AssetCommand::Monitors { reply } if !self.is_running(name) => {
-                return reply.send(Ok(None));
-            }
+            AssetCommand::Look(look) if !self.is_running(name) => return look(Ok(None)),
             command => command,
         };
         match self.slots.remove(name) {
@@ -317,17 +315,10 @@ impl Shard {
                 self.change(name, asset, reply, |a, turn| a.discard_learning(turn));
             }
             C::Rebuild { reply } => self.change(name, asset, reply, |a, turn| a.rebuild(turn)),
-            C::Load { reply } => self.query(name, asset, reply, |_| ()),
-            C::State { reply } => self.query(name, asset, reply, Asset::state),
-            C::Link { reply } => {
-                let now = self.env.handles.clock.now();
-                self.query(name, asset, reply, |a| a.link(now));
+            C::Load { reply } => {
+                self.show(name, asset, Box::new(|asset| reply.send(asset.map(|_| ()))));
             }
-            C::Watch { session, seen, reply } => {
-                self.query(name, asset, reply, |a| a.watch(session, seen));
-            }
-            C::Monitors { reply } => self.query(name, asset, reply, |a| Some(a.monitors())),
-            C::Learning { reply } => self.query(name, asset, reply, Asset::learning),
+            C::Look(look) => self.show(name, asset, look),
         }
     }
 
@@ -378,21 +369,15 @@ impl Shard {
         }
     }
 
-    /// Executes a query of the asset `name`. The reply may show changes that are not durable
-    /// yet.
-    fn query<T>(
-        &mut self,
-        name: &str,
-        asset: LoadResult,
-        reply: Reply<T>,
-        query: impl FnOnce(&Asset) -> T,
-    ) {
-        let answer = asset.map(|asset| {
-            let answer = query(&asset);
-            self.keep(name, asset);
-            answer
-        });
-        reply.send(answer);
+    /// Shows the asset `name` to `look`.
+    fn show(&mut self, name: &str, asset: LoadResult, look: AssetLook) {
+        match asset {
+            Ok(asset) => {
+                look(Ok(Some(&asset)));
+                self.keep(name, asset);
+            }
+            Err(error) => look(Err(error)),
+        }
     }
 
     /// Registers the asset `name` unless it exists or one of this name is still being
