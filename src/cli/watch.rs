@@ -254,6 +254,7 @@ mod tests {
             wanted_s: 60.0,
             x_s: Some(23.0),
             y_s: None,
+            t_s: None,
             sessions: Vec::new(),
             n_sessions: 0,
             calibration: None,

@@ -64,7 +64,7 @@ pub async fn create_token(config: &Config, wanted: NewToken) -> Result<String> {
         bail!("a token `{name}` exists already; revoke it first, or choose another name");
     }
     if let Some(asset) = &minted.row.asset
-        && store.asset(asset).await?.is_none()
+        && store.existing_assets(std::slice::from_ref(asset)).await?.is_empty()
     {
         tracing::warn!(asset, "there is no such asset yet");
     }

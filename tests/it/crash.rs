@@ -81,6 +81,7 @@ async fn a_killed_service_continues_open_sessions_without_loss() {
             assert_eq!(recording, samples[..recording.len()]);
             if recording.len() == acknowledged {
                 // Loads the engine, whose monitors are known again then.
+                process.client.load("a").await;
                 assert_eq!(process.client.get("assets/a/state").await.expect(200), state);
                 let again = process.client.get("assets/a/faults?status=all").await.expect(200);
                 assert_eq!(again, known);

@@ -294,8 +294,8 @@ async fn a_change_that_always_fails_is_rejected_and_the_others_are_committed() {
     assert_eq!(fixture.client.recording("b", "s").await, samples);
 }
 
-/// While the database is unavailable, an asset that must be read from it is answered with
-/// 503, and does not hold up those that are in memory.
+/// While the database is unavailable for writes, a batch of an asset that must be loaded is answered
+/// with 503, and does not hold up the assets that are in memory.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn an_asset_that_is_not_in_memory_does_not_hold_up_its_shard() {
     let mut fixture = ServiceFixture::start_with(|config| config.workers.shards = 1).await;
@@ -312,15 +312,16 @@ async fn an_asset_that_is_not_in_memory_does_not_hold_up_its_shard() {
     });
     readiness(client, 503).await;
     for _ in 0..3 {
-        client.get("assets/idle/state").await.problem(503);
+        client.post("assets/idle/telemetry", &batch(None, &[])).await.problem(503);
+        client.get("assets/idle/state").await.expect(200);
         let state = client.get("assets/busy/state").await.expect(200);
         assert_eq!(state["samples"], 200, "judged, and not acknowledged yet");
     }
     lock.release().await;
     assert_eq!(sending.await.unwrap()["accepted"], 100);
     readiness(client, 200).await;
-    eventually(|| async { (client.get("assets/idle/state").await.status == 200).then_some(()) })
-        .await;
+    let idle = async || client.post("assets/idle/telemetry", &batch(None, &[])).await;
+    eventually(async || (idle().await.status == 200).then_some(())).await;
 }
 
 /// Write sets that can wait for the writer, and those that it commits together.
@@ -364,7 +365,8 @@ async fn a_shard_answers_while_the_writer_has_no_room() {
     for _ in 0..3 {
         answer().await.problem(503);
         client.get("assets/rig-0/state").await.expect(200);
-        client.get("assets/idle/state").await.problem(503);
+        client.post("assets/idle/telemetry", &batch(None, &[])).await.problem(503);
+        client.get("assets/idle/state").await.expect(200);
     }
     lock.release().await;
     readiness(client, 200).await;

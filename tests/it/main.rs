@@ -44,6 +44,7 @@ mod outcome;
 mod parts;
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 mod power_cut;
+mod reads;
 mod remarks;
 mod restart;
 mod retention;

@@ -65,7 +65,7 @@ async fn an_engine_goes_on_from_its_snapshot() {
             drop(service);
             service = Process::start(data.path());
             assert_eq!(service.client.n_evaluated_again().await, 0.0, "nobody has asked yet");
-            service.client.get("assets/a/state").await.expect(200);
+            service.client.load("a").await;
             let n = service.client.n_evaluated_again().await;
             assert!(n < 16_384.0 + BATCH as f64, "{n}");
         }
@@ -87,10 +87,10 @@ async fn an_engine_goes_on_from_its_snapshot() {
     assert_eq!(replayed["result"]["summary"]["verdict_hash"], live.0, "{replayed}");
 }
 
-/// A question about the faults of a rig loads no engine: until another request does, the
-/// monitors are those of the last snapshot, with their time.
+/// A question about a rig loads no engine: until another request does, what it shows is that of
+/// the last snapshot, with its time.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_query_of_faults_shows_the_stored_monitors_and_loads_no_engine() {
+async fn a_query_shows_the_last_stored_state_and_loads_no_engine() {
     let data = tempfile::tempdir().unwrap();
     let mut service = Process::start(data.path());
     let samples = long_rig(24_000);
@@ -110,10 +110,18 @@ async fn a_query_of_faults_shows_the_stored_monitors_and_loads_no_engine() {
     assert!(stored["t_s"].as_f64().is_some_and(|t_s| 0.0 < t_s && t_s < last_t_s), "{stored}");
     let all = client.get("assets/a/faults?status=all").await.expect(200);
     assert_eq!(all["items"][0]["monitor"]["t_s"], stored["t_s"], "{all}");
+    let state = client.get("assets/a/state").await.expect(200);
+    assert_eq!((&state["t_s"], &state["samples"]), (&stored["t_s"], &json!(samples.len())));
+    assert!((1..samples.len() as u64).contains(&state["judged"].as_u64().unwrap()), "{state}");
+    assert_eq!(state["monitors"].as_array().unwrap().len(), 4, "{state}");
+    let learning = client.get("assets/a/learning").await.expect(200);
+    assert_eq!(learning["t_s"], stored["t_s"], "{learning}");
+    assert_eq!(client.n_engines().await, 0.0);
     assert_eq!(client.n_evaluated_again().await, 0.0, "no engine is loaded");
 
-    client.get("assets/a/state").await.expect(200);
+    client.load("a").await;
     assert_eq!(monitor(client).await, live);
+    assert_eq!(client.get("assets/a/state").await.expect(200)["t_s"], last_t_s);
 }
 
 /// A snapshot that cannot be used costs time, and changes nothing.
@@ -139,7 +147,10 @@ async fn a_snapshot_that_is_damaged_or_of_another_version_is_not_used() {
         service = restart_after(service, &data, sql).await;
         let fault = service.client.get("assets/a/faults/x_servo").await.expect(200);
         assert_eq!((&fault["monitor"], &fault["session_open"]), (&Value::Null, &json!(true)));
-        service.client.get("assets/a/state").await.expect(200);
+        let state = service.client.get("assets/a/state").await.expect(200);
+        assert_eq!((&state["samples"], &state["judged"]), (&json!(20_000), &json!(0)));
+        assert_eq!((&state["monitors"], &state["t_s"]), (&json!([]), &Value::Null));
+        service.client.load("a").await;
         let n = service.client.n_evaluated_again().await;
         assert_eq!(n, 20_000.0, "{sql}");
     }
@@ -169,7 +180,7 @@ async fn the_scrub_finds_damaged_recordings_and_engines_that_differ() {
     store.execute(damage).await.unwrap();
     drop(store);
     let service = Process::start(data.path());
-    service.client.get("assets/live/state").await.expect(200);
+    service.client.load("live").await;
     eventually(|| async {
         let text = service.client.get("/metrics").await.text;
         let found =
@@ -264,7 +275,7 @@ async fn a_long_recording_holds_up_only_its_own_asset() {
     // The rebuilt engine has left a snapshot.
     drop(service);
     let service = Process::start(data.path());
-    service.client.get("assets/long/state").await.expect(200);
+    service.client.load("long").await;
     let n = service.client.n_evaluated_again().await;
     assert!(n < 20_000.0, "{n}");
 }

@@ -92,7 +92,7 @@ async fn samples_that_the_store_rejects_are_not_acknowledged() {
         assert_eq!(answer.headers["retry-after"], "1");
     }
     // Loads the engine, whose monitors are known again then.
-    client.get("assets/a/state").await.expect(200);
+    client.load("a").await;
     assert_eq!(client.get("assets/a/faults?status=all").await.expect(200), known);
     client.telemetry("b", Some("s"), &samples[100..200]).await;
     assert_eq!(client.recording("a", "s").await, samples[..600]);
@@ -373,6 +373,7 @@ async fn a_cleared_fault_stays_cleared_after_a_restart() {
     let before = fixture.client.get("assets/a/faults?status=all").await.expect(200);
     let state = fixture.client.get("assets/a/state").await.expect(200);
     fixture.restart().await;
+    fixture.client.load("a").await;
     assert_eq!(fixture.client.get("assets/a/state").await.expect(200), state);
     assert_eq!(fixture.client.get("assets/a/faults?status=all").await.expect(200), before);
     fixture.client.telemetry("a", Some("t"), &rig(2000, 300)).await;

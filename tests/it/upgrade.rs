@@ -63,7 +63,7 @@ async fn fill(client: &Client) {
 /// Returns what the service shows of what a database of schema `n` holds.
 async fn views(client: &Client, n: usize) -> Value {
     // Loads the engine, whose monitors are known then.
-    client.get("assets/b/state").await.expect(200);
+    client.load("b").await;
     let mut shown = Vec::new();
     for (path, _) in VIEWS.iter().filter(|(_, since)| n >= *since) {
         shown.push((*path, client.get(path).await.expect(200)));

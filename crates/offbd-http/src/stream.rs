@@ -27,7 +27,7 @@ use offbd_core::vocabulary::Invalid;
 use offbd_service::access::{Caller, Right};
 use offbd_service::{Event, EventFeed, PendingBatch, Service, ServiceError};
 use offbd_wire::bus::BatchAckView;
-use offbd_wire::service::StateView;
+use offbd_wire::service::{StateView, TraceCursor};
 use offbd_wire::telemetry::{AckView, TelemetryFormat};
 use offbd_wire::trace::TraceView;
 
@@ -171,13 +171,6 @@ async fn wait<T>(future: Option<&mut ServiceFuture<T>>) -> Result<T, ServiceErro
     }
 }
 
-/// The last point of the trace that was sent.
-#[derive(Default)]
-struct TraceCursor {
-    session_id: Option<String>,
-    seen: u64,
-}
-
 /// The states that a client has requested.
 struct RequestedStates {
     period: Option<Duration>,
@@ -208,6 +201,9 @@ struct StreamConnection {
     waiting: Option<QueuedBatch>,
     /// `None` if no trace is requested.
     cursor: Option<TraceCursor>,
+    /// The last stored state, until the rig's engine is loaded. Read once: it changes only when
+    /// the engine is loaded.
+    stored: Option<StateView>,
 }
 
 /// The next event on a connection.
@@ -262,6 +258,7 @@ impl StreamConnection {
             pending,
             waiting,
             cursor,
+            stored: None,
         }
     }
 
@@ -439,13 +436,17 @@ impl StreamConnection {
     /// Returns the state and, if requested, the trace since the previous state.
     async fn state(&mut self) -> Result<WatchedStateView, ServiceError> {
         let service: &Service = &self.app.service;
-        let Some(cursor) = &mut self.cursor else {
-            let state = service.state(&self.asset).await?;
-            return Ok(WatchedStateView { state, trace: None });
+        let Some(view) = service.watch(&self.asset, self.cursor.clone()).await? else {
+            let state = match self.stored.take() {
+                Some(stored) => service.with_mutes(stored),
+                None => service.state(&self.asset).await?,
+            };
+            self.stored = Some(state.clone());
+            let trace = self.cursor.as_ref().map(|_| TraceView::default());
+            return Ok(WatchedStateView { state, trace });
         };
-        let view = service.watch(&self.asset, cursor.session_id.clone(), cursor.seen).await?;
-        *cursor = TraceCursor { session_id: view.state.session_id.clone(), seen: view.seen };
-        Ok(WatchedStateView { state: view.state, trace: Some(view.trace) })
+        (self.stored, self.cursor) = (None, view.cursor);
+        Ok(WatchedStateView { state: view.state, trace: view.trace })
     }
 
     async fn send_ping(&mut self) -> Result<(), CloseReason> {

@@ -8,8 +8,8 @@
 //!    the acknowledgement.
 //! 2. **Shard** (`asset`): the hash of the asset's name selects a shard, a thread with a
 //!    bounded queue that owns the engines of its assets and executes their commands one
-//!    after the other. An asset is loaded from the store by its first command, beside the
-//!    shard; its commands wait meanwhile.
+//!    after the other. An asset is loaded from the store by its first command that does more than
+//!    look, beside the shard; its commands wait meanwhile.
 //! 3. **Turn**: the shard executes the command. The engine evaluates the samples; all
 //!    resulting changes (samples, transitions, fault memory, session) are collected in a
 //!    `Turn` and handed to the writer as one `WriteSet`. The shard does not wait for the

@@ -93,8 +93,8 @@ pub(super) async fn never_failed(
     name: &str,
     code: FaultCode,
 ) -> Result<FaultEntryView, ServiceError> {
-    let row = store.asset(name).await?;
-    let changed_at = row.map(|row| rfc3339(row.created_at)).unwrap_or_default();
+    let unknown = || ServiceError::UnknownAsset { name: name.to_owned() };
+    let changed_at = rfc3339(store.asset_created_at(name).await?.ok_or_else(unknown)?);
     let (record, rules) = (FaultRecord::default(), MemoryRules::default());
     Ok(FaultEntryView {
         asset: name.to_owned(),

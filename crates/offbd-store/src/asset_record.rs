@@ -68,7 +68,7 @@ impl Store {
         version: &str,
     ) -> Result<HashMap<String, AssetRecord>, StoreError> {
         let mut db = self.pool.acquire().await?;
-        let mut records = assets(&mut db, names).await?;
+        let mut records = self.open_records_of(&mut db, names, version).await?;
         for fault in faults(&mut db, names).await? {
             if let Some(record) = records.get_mut(&fault.asset) {
                 record.faults.push(fault);
@@ -79,10 +79,33 @@ impl Store {
                 record.ended.push(session);
             }
         }
+        Ok(records)
+    }
+
+    /// As [`Self::asset_records`], without the fault memory and the ended sessions.
+    ///
+    /// # Errors
+    /// [`StoreError`] if the database fails.
+    pub async fn open_records(
+        &self,
+        names: &[String],
+        version: &str,
+    ) -> Result<HashMap<String, AssetRecord>, StoreError> {
+        self.open_records_of(&mut *self.pool.acquire().await?, names, version).await
+    }
+
+    /// As [`Self::open_records`], on the connection `db`.
+    async fn open_records_of(
+        &self,
+        db: &mut AnyConnection,
+        names: &[String],
+        version: &str,
+    ) -> Result<HashMap<String, AssetRecord>, StoreError> {
+        let mut records = assets(db, names).await?;
         let mut query = QueryBuilder::new(SESSION);
         query.push("state = 'open' AND asset IN (").bind_list(names)?.push(")");
-        let open = self.session_rows_of(&mut db, query).await?;
-        let mut snapshots = snapshots(&mut db, &open, version).await?;
+        let open = self.session_rows_of(db, query).await?;
+        let mut snapshots = snapshots(db, &open, version).await?;
         for session in open {
             if let Some(record) = records.get_mut(&session.asset) {
                 let snapshot = snapshots.remove(&session.id).transpose();

@@ -102,6 +102,12 @@ impl Store {
             .await?)
     }
 
+    /// When the asset `name` was registered.
+    pub async fn asset_created_at(&self, name: &str) -> Result<Option<Micros>, StoreError> {
+        let query = "SELECT created_at FROM asset WHERE name = $1 AND deleted_at IS NULL";
+        Ok(sqlx::query_scalar(query).bind(name).fetch_optional(&self.pool).await?)
+    }
+
     /// The learning record of the asset `name`, if it has one.
     pub async fn learning(&self, name: &str) -> Result<Option<String>, StoreError> {
         let query = "SELECT learning FROM asset WHERE name = $1 AND learning IS NOT NULL";
@@ -185,6 +191,14 @@ impl Store {
             row.advance(progress.as_ref());
             row
         }))
+    }
+
+    /// The asset of the session `id`.
+    pub async fn asset_of_session(&self, id: &str) -> Result<Option<String>, StoreError> {
+        let mut query = QueryBuilder::new("SELECT asset FROM session WHERE ");
+        query.push(VISIBLE).push("id = ").bind(id)?;
+        let row: Option<(String,)> = query.rows().fetch_optional(&self.pool).await?;
+        Ok(row.map(|(asset,)| asset))
     }
 
     /// The open session of `asset`.

@@ -44,6 +44,11 @@ pub struct LearningView {
     pub x_s: Option<f64>,
     /// Usable motion along y so far, s; null if there are no commands or no positions yet.
     pub y_s: Option<f64>,
+    /// Time of the last sample of the open session whose motion is counted, s on the device's
+    /// clock; null without one. While the service has not loaded the rig's engine, for example
+    /// after a restart, the motion is that of the last stored state.
+    #[serde(default)]
+    pub t_s: Option<f64>,
     /// The sessions gathered so far, or those of the calibration on offer or in use; empty
     /// if a person made the calibration.
     pub sessions: Vec<TeachingSessionView>,

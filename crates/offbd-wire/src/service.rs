@@ -290,8 +290,17 @@ pub struct HistoryView {
 #[derive(Clone, Debug)]
 pub struct WatchView {
     pub state: StateView,
-    pub trace: TraceView,
-    /// Number of moments returned so far, to be passed to the next query.
+    /// What was judged since the last query; `None` if it is not asked for.
+    pub trace: Option<TraceView>,
+    /// To be passed to the next query.
+    pub cursor: Option<TraceCursor>,
+}
+
+/// The last point of the trace that a client has got.
+#[derive(Clone, Debug, Default)]
+pub struct TraceCursor {
+    pub session_id: Option<String>,
+    /// Number of moments of this session that were returned.
     pub seen: u64,
 }
 
@@ -332,7 +341,9 @@ pub struct XyView {
     pub y: f64,
 }
 
-/// The state of the twin and the monitors after the last judged sample.
+/// The state of the twin and the monitors after the last judged sample. While the service has not
+/// loaded the rig's engine, for example after a restart, this is the last stored state, that of the
+/// time `t_s`; if none is stored, the twin is at rest, and `judged` is 0 although there are samples.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct StateView {
     pub asset: String,
@@ -361,7 +372,8 @@ pub struct StateView {
     pub plate_angle_rad: XyView,
     /// The evidence at the last judged sample.
     pub evidence: EvidenceView,
-    /// The monitors, one for each fault code.
+    /// The monitors, one for each fault code. Empty if the service has not loaded the rig's
+    /// engine, for example after its process was killed, and no state of the session is stored.
     pub monitors: Vec<MonitorView>,
     /// The plant model in use.
     pub fidelity: ModelWord,

@@ -239,7 +239,7 @@ impl Stopped {
 }
 
 /// Whether two responses differ only in that the first has no monitors: they are not known while the
-/// engine cannot be loaded, and the records are right without it.
+/// stored state of the engine is damaged, and the records are right without it.
 fn lacks_monitors(found: &Response, right: &Response) -> bool {
     let (Response::Body(found), Response::Body(right)) = (found, right) else { return false };
     let parsed = [found, right].map(|text| serde_json::from_str::<Value>(text).ok());

@@ -232,6 +232,21 @@ impl Client {
         line.map_or(0.0, |line| line.rsplit(' ').next().unwrap().parse().unwrap())
     }
 
+    /// The number of engines in memory.
+    pub async fn n_engines(&self) -> f64 {
+        let text = self.get("/metrics").await.text;
+        let of_shard = |line: &str| {
+            let number = line.strip_prefix("offbd_engines{")?.split(' ').nth(1)?;
+            Some(number.parse::<f64>().unwrap())
+        };
+        text.lines().filter_map(of_shard).sum()
+    }
+
+    /// Loads the engine of an asset by a batch without samples, since no question does.
+    pub async fn load(&self, asset: &str) {
+        assert_eq!(self.telemetry(asset, None, &[]).await["accepted"], 0);
+    }
+
     pub fn new(address: String) -> Self {
         Self { address, token: None, http: reqwest::Client::new() }
     }

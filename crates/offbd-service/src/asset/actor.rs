@@ -1,4 +1,4 @@
-//! A loaded asset.
+//! An asset with its engine.
 
 use super::ended_session::EndedSession;
 use super::learning_record::LearningRecord;
@@ -15,8 +15,8 @@ use offbd_wire::stored::StoredProvenance;
 /// The provenance of each code's fault memory entry, in the order of [`FaultCode::ALL`].
 pub(super) type Provenance = [StoredProvenance; FaultCode::COUNT];
 
-/// An asset that is loaded on its shard.
-pub(super) struct Asset {
+/// An asset that is loaded on its shard, or that was read for one question; see [`super::stored`].
+pub(crate) struct Asset {
     pub(super) row: AssetRow,
     pub(super) rig: Rig,
     /// The fault memory as last written.
@@ -40,6 +40,6 @@ pub(super) struct Asset {
     pub(super) deleted: bool,
     /// Whether it is to be loaded again before its next command.
     pub(super) dropped: bool,
-    /// Snapshots of the engine to be stored, taken while it was rebuilt.
+    /// Snapshots of the engine to be stored, taken while it was rebuilt or before it is dropped.
     pub(super) snapshots: Vec<Snapshot>,
 }

@@ -3,21 +3,18 @@
 use tokio::sync::{OwnedSemaphorePermit, oneshot};
 use tracing::Span;
 
+use super::actor::Asset;
 use crate::ServiceError;
 use offbd_core::engine::Rig;
 use offbd_core::vocabulary::FaultCode;
 use offbd_store::CalibrationRow;
 use offbd_wire::asset::CalibrationView;
-use offbd_wire::learning::LearningView;
-use offbd_wire::link::LinkView;
-use offbd_wire::service::{MonitorView, StateView, WatchView};
 use offbd_wire::telemetry::{AckView, Batch};
 
 /// A command to an asset.
 ///
-/// The reply to a command that changes something is sent once the change is durable. The
-/// commands from `Load` on are queries; their replies may show changes that are not
-/// durable yet.
+/// The reply to a command that changes something is sent once the change is durable. What
+/// `Look` sees may not be durable yet.
 pub(crate) enum AssetCommand {
     /// Registers the asset with this asset file.
     Create { document: String, reply: Reply<()> },
@@ -67,18 +64,12 @@ pub(crate) enum AssetCommand {
 
     /// Loads the asset if it is not running, and evaluates its open session again.
     Load { reply: Reply<()> },
-    /// Returns the state of the twin.
-    State { reply: Reply<StateView> },
-    /// Returns how the samples arrive.
-    Link { reply: Reply<LinkView> },
-    /// Returns the state and the trace after the first `seen` points of a session.
-    Watch { session: Option<String>, seen: u64, reply: Reply<WatchView> },
-    /// Returns the monitors of the open session; `None` if the asset is not loaded, which this
-    /// command does not change.
-    Monitors { reply: Reply<Option<Vec<MonitorView>>> },
-    /// Returns the progress of the automatic calibration.
-    Learning { reply: Reply<LearningView> },
+    /// Looks at the asset. It is the one command that does not load it.
+    Look(AssetLook),
 }
+
+/// Takes the asset; `None` if it is not loaded.
+pub(super) type AssetLook = Box<dyn FnOnce(Result<Option<&Asset>, ServiceError>) + Send>;
 
 /// The sender of the reply to a command.
 pub(crate) struct Reply<T> {

@@ -188,7 +188,7 @@ impl Asset {
     }
 
     /// Returns the progress of the automatic calibration.
-    pub(super) fn learning(&self) -> LearningView {
+    pub(crate) fn learning(&self) -> LearningView {
         let (record, open) = (&self.learning, self.open_training_session());
         let calibration = self.rig.calibration.as_ref();
         let calibrated = calibration.is_some();
@@ -205,6 +205,7 @@ impl Asset {
             wanted_s: record.wanted_s(),
             x_s: motion.x,
             y_s: motion.y,
+            t_s: self.open.as_ref().and_then(|open| open.judging.newest_t_s()),
             sessions: training.into_iter().map(session_view).collect(),
             n_sessions,
             calibration: record.job().map(str::to_owned),
@@ -234,6 +235,9 @@ impl Asset {
         let misfits = self.open.as_ref().map(|open| open.judging.misfits()).unwrap_or_default();
         if let Some(misfit) = misfits.into_iter().find(|misfit| misfit.prevents_learning()) {
             return format!("The rig cannot be learnt from this telemetry: {misfit}.");
+        }
+        if self.open.as_ref().is_some_and(|open| !open.is_known()) {
+            return "The motion of the open session counts again with its next sample.".to_owned();
         }
         let (motion, wanted_s) = (self.learning.motion(open), self.learning.wanted_s());
         let axes = [(Axis::X, motion.x), (Axis::Y, motion.y)];

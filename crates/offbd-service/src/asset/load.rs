@@ -19,7 +19,7 @@ use crate::{ServiceError, snapshots, views};
 use offbd_core::diagnosis::FaultMemory;
 use offbd_core::engine::{Input, Setup};
 use offbd_core::vocabulary::FaultCode;
-use offbd_store::{AssetRecord, FaultRow, SessionInputs, SessionRow, Snapshot, StoreError};
+use offbd_store::{AssetRecord, FaultRow, SessionInputs, SessionRow, Snapshot, Store, StoreError};
 use offbd_wire::stored::{StoredMemory, StoredRecord};
 
 /// Samples of all recordings that are read at once. Chosen: a few megabytes. Those of more are
@@ -47,7 +47,7 @@ struct OutdatedSession {
 /// [`ServiceError::Corrupt`]. Blocks on the store.
 pub(super) fn read(handles: &Handles, names: &[String]) -> Vec<Result<StoredAsset, ServiceError>> {
     match handles.wait(handles.store.asset_records(names, &snapshots::version())) {
-        Ok(mut records) => names.iter().map(|name| stored(&mut records, name)).collect(),
+        Ok(mut records) => names.iter().map(|name| take_record(&mut records, name)).collect(),
         // What is damaged may concern one of them.
         Err(error) if names.len() > 1 && !error.is_outage() => {
             names.iter().flat_map(|name| read(handles, from_ref(name))).collect()
@@ -59,13 +59,28 @@ pub(super) fn read(handles: &Handles, names: &[String]) -> Vec<Result<StoredAsse
     }
 }
 
-fn stored(
+fn take_record(
     records: &mut HashMap<String, AssetRecord>,
     name: &str,
 ) -> Result<StoredAsset, ServiceError> {
     let record = records.remove(name);
     let record = record.ok_or_else(|| ServiceError::UnknownAsset { name: name.to_owned() })?;
     unless_panicking(name, || record.try_into())
+}
+
+/// Returns the asset `name` with the engine of its open session in the last stored state, without
+/// the samples after it, the fault memory and the ended sessions: for a question about an asset
+/// that is not loaded.
+///
+/// # Errors
+/// Those of [`read`].
+pub(crate) async fn stored(store: &Store, name: &str) -> Result<Asset, ServiceError> {
+    let mut records = store.open_records(&[name.to_owned()], &snapshots::version()).await?;
+    let StoredAsset { mut asset, open } = take_record(&mut records, name)?;
+    asset.open = open.map(|OutdatedSession { row, session, .. }| {
+        Box::new(OpenSession { progress: row.progress, ..session })
+    });
+    Ok(asset)
 }
 
 /// Returns the result of `work`, in which a panic costs the asset `name` alone.
@@ -219,6 +234,7 @@ fn evaluate(
         Some(inputs) => inputs,
         None => handles.wait(handles.store.inputs_of(&row, n_evaluated))?,
     };
+    open.acted_at = actions.last().map(|action| action.after_index);
     let (mut n, mut failure) = (n_evaluated, None);
     play_inputs(handles, actions, recording, n_evaluated, |input| {
         let Input::NewSample(sample) = input else {

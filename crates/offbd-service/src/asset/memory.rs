@@ -75,6 +75,7 @@ impl Asset {
             PersonAction { kind, code, act: StoredAct { by: actor, at: rfc3339(turn.at) } };
         if let Some(open) = &mut self.open {
             turn.engine_changed = true;
+            open.acted_at = Some(open.progress.n_samples);
             open.judging.input(input(kind, code));
             open.report(&self.row.name, turn.at, &mut turn.writes)?;
             return self.write_memory(Some(&action), turn);

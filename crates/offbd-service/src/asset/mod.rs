@@ -48,9 +48,11 @@ mod state;
 mod trend;
 mod turn;
 
+pub(super) use actor::Asset;
 pub(super) use command::{Answer, AssetCommand, Reply};
 pub(super) use learning::ACTOR as LEARNING_ACTOR;
 pub(super) use learning_record::{LearningRecord, MotionSeconds, TrainingSession};
+pub(super) use load::stored;
 pub(super) use loader::{Loader, MANY_SAMPLES};
 pub(super) use presence::Presences;
 pub(super) use shard::Shard;

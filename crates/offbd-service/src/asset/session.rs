@@ -28,6 +28,8 @@ pub(super) struct OpenSession {
     pub(super) motion: Option<UsableMotion>,
     /// Number of samples at the last snapshot of the engine.
     pub(super) snapshot_at: i64,
+    /// Number of samples at the last act of a person.
+    pub(super) acted_at: Option<i64>,
     /// Consecutive different samples so far that show a restart of the device, and the last
     /// of them.
     pub(super) n_restart_signs: u32,
@@ -56,9 +58,16 @@ impl OpenSession {
             importing: row.importing != 0,
             recent: RecentTrace::default(),
             snapshot_at: 0,
+            acted_at: None,
             n_restart_signs: 0,
             last_restart_sign: None,
         }
+    }
+
+    /// Whether the engine has evaluated any of the recorded samples, if there are some. It has
+    /// not if it was read for a question, and no state of it is stored.
+    pub(super) fn is_known(&self) -> bool {
+        self.progress.n_samples == 0 || self.judging.counts().n_samples > 0
     }
 
     /// Evaluates one sample that may be a retransmission.
@@ -95,17 +104,34 @@ impl OpenSession {
         n_samples: i64,
         interval: i64,
     ) -> Result<Option<Snapshot>, ServiceError> {
-        if n_samples - self.snapshot_at < interval {
-            return Ok(None);
-        }
+        let is_due = n_samples - self.snapshot_at >= interval;
+        is_due.then(|| self.snapshot(n_samples, interval)).transpose()
+    }
+
+    /// Returns a snapshot of an engine that is about to be dropped. `None` if the last one is as
+    /// new, if an import is interrupted, or if a person has acted since the last sample: an engine
+    /// from a snapshot takes the acts after its last sample again.
+    pub(super) fn last_snapshot(
+        &mut self,
+        interval: i64,
+    ) -> Result<Option<Snapshot>, ServiceError> {
+        let n_samples = self.progress.n_samples;
+        let is_wanted = n_samples > self.snapshot_at && self.acted_at != Some(n_samples);
+        let is_wanted = is_wanted && !self.importing;
+        is_wanted.then(|| self.snapshot(n_samples, interval)).transpose()
+    }
+
+    /// Returns a snapshot of the engine, which has evaluated `n_samples` recorded samples;
+    /// `interval` is the usual number of them between two.
+    fn snapshot(&mut self, n_samples: i64, interval: i64) -> Result<Snapshot, ServiceError> {
         let last = std::mem::replace(&mut self.snapshot_at, n_samples);
-        Ok(Some(Snapshot {
+        Ok(Snapshot {
             session: self.id.clone(),
             n_samples,
             kept: snapshots::is_kept(n_samples, last, interval),
             version: snapshots::version(),
             state: snapshots::state(&self.judging, self.motion.as_ref())?,
-        }))
+        })
     }
 
     /// Samples that are not judged because no other confirmed their step of the clock.

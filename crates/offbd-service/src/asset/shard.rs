@@ -1,5 +1,5 @@
 //! A shard: a thread that runs the engines of its assets. An asset is loaded by its first
-//! command, on another thread; its commands wait meanwhile.
+//! command that does more than look, on another thread; its commands wait meanwhile.
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -8,7 +8,7 @@ use std::thread::JoinHandle;
 use tokio::sync::mpsc;
 
 use super::actor::Asset;
-use super::command::{AssetCommand, Reply};
+use super::command::{AssetCommand, AssetLook, Reply};
 use super::loader::LoadQueue;
 use super::message::{LoadResult, ShardMessage};
 use super::turn::{Environment, Turn};
@@ -70,6 +70,10 @@ impl Shard {
             while let Some(message) = self.queue.blocking_recv() {
                 self.handle(message);
             }
+            // Otherwise nobody waits for the writer, and its runtime may be ending.
+            if self.env.handles.closing.is_cancelled() {
+                self.stop();
+            }
         };
         thread.spawn(work).map_err(|error| {
             tracing::error!(%error, "cannot start the thread of a shard");
@@ -82,6 +86,30 @@ impl Shard {
     pub(crate) fn step(&mut self) -> bool {
         let message = self.queue.try_recv().ok();
         message.map(|message| self.handle(message)).is_some()
+    }
+
+    /// Stores the engines of all open sessions at the end of the service.
+    pub(crate) fn stop(&mut self) {
+        for slot in std::mem::take(&mut self.slots).into_values() {
+            if let Slot::Running(mut asset) = slot {
+                self.n_running.decrement(1);
+                self.store_engine(&mut asset);
+            }
+        }
+    }
+
+    /// Stores the engine of an asset that is about to be dropped in order. It is known then without
+    /// being loaded, and has nothing to evaluate again when it is.
+    fn store_engine(&self, asset: &mut Asset) {
+        let interval = self.env.handles.sessions.snapshot_interval;
+        match asset.open.as_mut().map(|open| open.last_snapshot(interval)) {
+            Some(Ok(snapshot)) => asset.snapshots.extend(snapshot),
+            Some(Err(error)) => {
+                tracing::error!(asset = asset.row.name, %error, "an engine is not stored");
+            }
+            None => {}
+        }
+        self.store_snapshots(asset);
     }
 
     fn handle(&mut self, message: ShardMessage) {
@@ -109,9 +137,7 @@ impl Shard {
             return self.apply(name, Err(ServiceError::Moving), command);
         };
         let command = match command {
-            AssetCommand::Monitors { reply } if !self.is_running(name) => {
-                return reply.send(Ok(None));
-            }
+            AssetCommand::Look(look) if !self.is_running(name) => return look(Ok(None)),
             command => command,
         };
         match self.slots.remove(name) {
@@ -142,10 +168,11 @@ impl Shard {
         for name in names {
             self.env.presences.remove(&name);
             match self.slots.remove(&name) {
-                Some(Slot::Running(asset)) => {
+                Some(Slot::Running(mut asset)) => {
                     self.n_running.decrement(1);
-                    if lost {
-                        asset.generation.invalidate();
+                    match lost {
+                        true => asset.generation.invalidate(),
+                        false => self.store_engine(&mut asset),
                     }
                 }
                 Some(Slot::Loading(loading)) => {
@@ -217,7 +244,7 @@ impl Shard {
         }
     }
 
-    /// Stores the snapshots that were taken while the engine was rebuilt, if there is room for
+    /// Stores the snapshots of the engine that were taken beside its samples, if there is room for
     /// them in the writer's queue; a later rebuild takes them again.
     fn store_snapshots(&self, asset: &mut Asset) {
         let writes: Vec<_> =
@@ -288,17 +315,10 @@ impl Shard {
                 self.change(name, asset, reply, |a, turn| a.discard_learning(turn));
             }
             C::Rebuild { reply } => self.change(name, asset, reply, |a, turn| a.rebuild(turn)),
-            C::Load { reply } => self.query(name, asset, reply, |_| ()),
-            C::State { reply } => self.query(name, asset, reply, Asset::state),
-            C::Link { reply } => {
-                let now = self.env.handles.clock.now();
-                self.query(name, asset, reply, |a| a.link(now));
+            C::Load { reply } => {
+                self.show(name, asset, Box::new(|asset| reply.send(asset.map(|_| ()))));
             }
-            C::Watch { session, seen, reply } => {
-                self.query(name, asset, reply, |a| a.watch(session, seen));
-            }
-            C::Monitors { reply } => self.query(name, asset, reply, |a| Some(a.monitors())),
-            C::Learning { reply } => self.query(name, asset, reply, Asset::learning),
+            C::Look(look) => self.show(name, asset, look),
         }
     }
 
@@ -349,21 +369,15 @@ impl Shard {
         }
     }
 
-    /// Executes a query of the asset `name`. The reply may show changes that are not durable
-    /// yet.
-    fn query<T>(
-        &mut self,
-        name: &str,
-        asset: LoadResult,
-        reply: Reply<T>,
-        query: impl FnOnce(&Asset) -> T,
-    ) {
-        let answer = asset.map(|asset| {
-            let answer = query(&asset);
-            self.keep(name, asset);
-            answer
-        });
-        reply.send(answer);
+    /// Shows the asset `name` to `look`.
+    fn show(&mut self, name: &str, asset: LoadResult, look: AssetLook) {
+        match asset {
+            Ok(asset) => {
+                look(Ok(Some(&asset)));
+                self.keep(name, asset);
+            }
+            Err(error) => look(Err(error)),
+        }
     }
 
     /// Registers the asset `name` unless it exists or one of this name is still being

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use tokio::sync::{mpsc, oneshot};
 
+use super::actor::Asset;
 use super::command::{AssetCommand, Reply};
 use super::loader::Loader;
 use super::message::ShardMessage;
@@ -103,5 +104,22 @@ impl Shards {
         let (reply, answer) = Reply::new();
         self.try_send(asset, make(reply))?;
         answer.wait().await
+    }
+
+    /// Returns what `look` sees of `asset`; `None` if it is not loaded, which this does not
+    /// change.
+    ///
+    /// # Errors
+    /// [`ServiceError::Busy`] if the queue is full; [`ServiceError::Moving`];
+    /// [`ServiceError::Unavailable`] if the shard does not answer.
+    pub(crate) async fn look<T: Send + 'static>(
+        &self,
+        asset: &str,
+        look: impl FnOnce(&Asset) -> T + Send + 'static,
+    ) -> Result<Option<T>, ServiceError> {
+        let show = |reply: Reply<Option<T>>| {
+            AssetCommand::Look(Box::new(|asset| reply.send(asset.map(|asset| asset.map(look)))))
+        };
+        self.call(asset, show).await
     }
 }

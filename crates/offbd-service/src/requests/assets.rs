@@ -1,13 +1,13 @@
 //! The registry of assets.
 
-use crate::asset::AssetCommand;
+use crate::asset::{self, Asset, AssetCommand};
 use crate::{Service, ServiceError, views};
 use offbd_core::engine::Rig;
 use offbd_core::vocabulary::Invalid;
 use offbd_store::AssetFilter;
-use offbd_wire::asset::{self, AssetView};
+use offbd_wire::asset::{self as asset_file, AssetView};
 use offbd_wire::link::LinkView;
-use offbd_wire::service::{Page, StateView, WatchView};
+use offbd_wire::service::{Page, StateView, TraceCursor, WatchView};
 
 impl Service {
     /// Returns the asset file of `name`.
@@ -64,14 +64,14 @@ impl Service {
     /// [`ServiceError::Invalid`] with the invalid element of the asset file;
     /// [`ServiceError::AssetExists`]; [`ServiceError::RegistryFull`].
     pub async fn create_asset(&self, document: &[u8]) -> Result<AssetView, ServiceError> {
-        let rig = asset::parse(document)?;
+        let rig = asset_file::parse(document)?;
         self.create(&rig).await?;
-        Ok(asset::view(&rig))
+        Ok(asset_file::view(&rig))
     }
 
     async fn create(&self, rig: &Rig) -> Result<(), ServiceError> {
         self.inner.quota.claim(|| self.inner.handles.store.n_assets()).await?;
-        let document = views::to_json(&asset::view(rig))?;
+        let document = views::to_json(&asset_file::view(rig))?;
         self.inner.shards.call(&rig.name, |reply| AssetCommand::Create { document, reply }).await
     }
 
@@ -87,12 +87,12 @@ impl Service {
         name: &str,
         document: &[u8],
     ) -> Result<(AssetView, bool), ServiceError> {
-        let rig = asset::parse(document)?;
+        let rig = asset_file::parse(document)?;
         if rig.name != name {
             let reason = format!("`{}` differs from `{name}` in the path", rig.name);
             return Err(Invalid::new("/name", reason).into());
         }
-        let view = asset::view(&rig);
+        let view = asset_file::view(&rig);
         let replace = |reply| AssetCommand::Replace { rig: Box::new(rig.clone()), reply };
         match self.inner.shards.call(name, replace).await {
             Ok(()) => Ok((view, false)),
@@ -124,13 +124,29 @@ impl Service {
         self.inner.deleter.run_to_completion(deletion).await
     }
 
-    /// Returns the state of the twin of `name`, including samples that are not durable yet.
+    /// Returns what `look` sees of the asset `name`: as it is now or, if it is not loaded, as it
+    /// was stored last. A question about a rig does not load its engine.
+    ///
+    /// # Errors
+    /// [`ServiceError::UnknownAsset`]; those of [`Shards::look`](crate::asset::Shards::look).
+    pub(super) async fn look<T: Send + 'static>(
+        &self,
+        name: &str,
+        look: impl Fn(&Asset) -> T + Copy + Send + 'static,
+    ) -> Result<T, ServiceError> {
+        match self.inner.shards.look(name, look).await? {
+            Some(seen) => Ok(seen),
+            None => Ok(look(&asset::stored(&self.inner.handles.store, name).await?)),
+        }
+    }
+
+    /// Returns the state of the twin of `name`, including samples that are not durable yet; the
+    /// last stored state if it is not loaded.
     ///
     /// # Errors
     /// [`ServiceError::UnknownAsset`].
     pub async fn state(&self, name: &str) -> Result<StateView, ServiceError> {
-        let state = self.inner.shards.call(name, |reply| AssetCommand::State { reply }).await?;
-        Ok(self.with_mutes(state))
+        Ok(self.with_mutes(self.look(name, Asset::state).await?))
     }
 
     /// Returns how the samples of `name` arrive.
@@ -138,22 +154,55 @@ impl Service {
     /// # Errors
     /// [`ServiceError::UnknownAsset`].
     pub async fn link(&self, name: &str) -> Result<LinkView, ServiceError> {
-        self.inner.shards.call(name, |reply| AssetCommand::Link { reply }).await
+        let now = self.inner.handles.clock.now();
+        self.look(name, move |asset| asset.link(now)).await
     }
 
-    /// Returns the state of the twin, and the trace after the first `seen` points of the
-    /// session with the id `session`.
+    /// Returns the state of the twin and, with the cursor of a trace, the trace after it; `None`
+    /// if the asset is not loaded.
     ///
     /// # Errors
-    /// [`ServiceError::UnknownAsset`].
+    /// Those of [`Shards::look`](crate::asset::Shards::look).
     pub async fn watch(
         &self,
         name: &str,
-        session: Option<String>,
-        seen: u64,
-    ) -> Result<WatchView, ServiceError> {
-        let watch = |reply| AssetCommand::Watch { session, seen, reply };
-        let view = self.inner.shards.call(name, watch).await?;
-        Ok(WatchView { state: self.with_mutes(view.state), ..view })
+        cursor: Option<TraceCursor>,
+    ) -> Result<Option<WatchView>, ServiceError> {
+        let view = self.inner.shards.look(name, |asset| asset.watch(cursor)).await?;
+        Ok(view.map(|view| WatchView { state: self.with_mutes(view.state), ..view }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Clock, Limits};
+    use offbd_store::{AssetRow, ChangeSet, Location, Store, Write};
+
+    /// An answer from the store alone would look as if the rig were not running.
+    #[tokio::test]
+    async fn a_shard_that_does_not_answer_is_an_error() {
+        let data = tempfile::tempdir().unwrap();
+        let location = Location::File(data.path().join("offbd.sqlite"));
+        let (store, mut writer) = Store::open(&location).await.unwrap();
+        let document = views::to_json(&asset_file::view(&Rig::chapter("a"))).unwrap();
+        let row = AssetRow { name: "a".to_owned(), document, ..AssetRow::default() };
+        let mut set = vec![Write::CreateAsset(row)];
+        writer.commit(&mut [ChangeSet::unpartitioned(&mut set)]).await.unwrap();
+        let (service, parts) =
+            Service::assemble(store, writer, Limits::default(), None, None, Clock::System);
+        service.asset("a").await.unwrap();
+        drop(parts.shards);
+        let refused = [
+            service.state("a").await.map(drop),
+            service.link("a").await.map(drop),
+            service.learning("a").await.map(drop),
+            service.watch("a", None).await.map(drop),
+            service.asset_faults("a", None).await.map(drop),
+            service.fault("a", "x_servo").await.map(drop),
+        ];
+        for refused in refused {
+            assert!(matches!(refused, Err(ServiceError::Unavailable { .. })), "{refused:?}");
+        }
     }
 }

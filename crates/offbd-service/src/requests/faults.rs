@@ -1,6 +1,6 @@
 //! The fault memory, of one asset and of the fleet.
 
-use crate::asset::AssetCommand;
+use crate::asset::{Asset, AssetCommand};
 use crate::{Service, ServiceError, snapshots, views};
 use offbd_core::vocabulary::FaultCode;
 use offbd_store::{FaultFilter, FaultOrder};
@@ -109,8 +109,7 @@ impl Service {
     /// An answer without the monitors would look complete, so a shard that does not answer is an
     /// error too.
     async fn monitors(&self, asset: &str) -> Result<SessionMonitors, ServiceError> {
-        let loaded = self.inner.shards.call(asset, |reply| AssetCommand::Monitors { reply });
-        let mut found = match loaded.await? {
+        let mut found = match self.inner.shards.look(asset, Asset::monitors).await? {
             Some(monitors) => SessionMonitors { session_open: !monitors.is_empty(), monitors },
             None => self.stored_monitors(asset).await?,
         };

@@ -46,7 +46,7 @@ impl Service {
         cursor: Option<&str>,
         limit: u32,
     ) -> Result<Page<FaultView>, ServiceError> {
-        self.session_row(id).await?;
+        self.session_asset(id).await?;
         let after = cursor.map(views::cursor::<i64>).transpose()?;
         let from = after.map_or(0, |ordinal| ordinal.saturating_add(1));
         let rows = self.inner.handles.store.transitions(id, from, limit + 1).await?;

@@ -1,19 +1,18 @@
 //! Automatic calibration: its progress, accepting and discarding it.
 
-use crate::asset::AssetCommand;
+use crate::asset::{Asset, AssetCommand};
 use crate::{Service, ServiceError, views};
 use offbd_wire::learning::{LearningState, LearningView};
 use offbd_wire::words::JobWaitReason;
 
 impl Service {
     /// Returns the progress of the automatic calibration of `asset`, including samples that
-    /// are not durable yet.
+    /// are not durable yet; as it was stored last if the asset is not loaded.
     ///
     /// # Errors
     /// [`ServiceError::UnknownAsset`].
     pub async fn learning(&self, asset: &str) -> Result<LearningView, ServiceError> {
-        let learning = |reply| AssetCommand::Learning { reply };
-        let mut view = self.inner.shards.call(asset, learning).await?;
+        let mut view = self.look(asset, Asset::learning).await?;
         let id = view.calibration.as_ref().filter(|_| view.state == LearningState::Learning);
         if let Some(wait) = id.and_then(|id| self.inner.jobs.wait(id)) {
             view.summary += &match wait.reason {

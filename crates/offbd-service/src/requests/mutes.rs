@@ -82,18 +82,18 @@ impl Service {
         self.inner.mutes.of_asset(asset, self.inner.handles.clock.now())
     }
 
-    /// Adds the mutes of `asset` to its monitors.
+    /// Shows the mutes of `asset` that are in force now at its monitors.
     pub(super) fn show_mutes(&self, asset: &str, monitors: &mut [MonitorView]) {
-        for mute in self.mutes_of(asset) {
-            let muted = monitors.iter_mut().find(|m| AlarmCodeWord::from(m.code) == mute.code);
-            if let Some(monitor) = muted {
-                monitor.muted = Some(Box::new(mute));
-            }
+        let mutes = self.mutes_of(asset);
+        for monitor in monitors {
+            let code = AlarmCodeWord::from(monitor.code);
+            monitor.muted = mutes.iter().find(|mute| mute.code == code).cloned().map(Box::new);
         }
     }
 
-    /// Returns the state with the mutes of its asset.
-    pub(super) fn with_mutes(&self, mut state: StateView) -> StateView {
+    /// Returns the state with the mutes of its asset that are in force now.
+    #[must_use]
+    pub fn with_mutes(&self, mut state: StateView) -> StateView {
         self.show_mutes(&state.asset, &mut state.monitors);
         state
     }

@@ -21,7 +21,7 @@ impl Service {
     /// # Errors
     /// [`ServiceError::UnknownSession`].
     pub async fn remarks(&self, session: &str) -> Result<Vec<RemarkView>, ServiceError> {
-        self.session_row(session).await?;
+        self.session_asset(session).await?;
         let rows = self.inner.handles.store.remarks(session).await?;
         Ok(rows.into_iter().map(view).collect())
     }
@@ -37,15 +37,15 @@ impl Service {
         new: NewRemarkView,
         actor: String,
     ) -> Result<RemarkView, ServiceError> {
-        let session = self.session_row(session).await?;
+        let asset = self.session_asset(session).await?;
         let (text, to_s) = check(&new)?;
-        if self.inner.handles.store.remarks(&session.id).await?.len() >= MAX_REMARKS {
+        if self.inner.handles.store.remarks(session).await?.len() >= MAX_REMARKS {
             let what = "remarks on a session";
             return Err(ServiceError::TooManySettings { what, limit: MAX_REMARKS });
         }
         let row = RemarkRow {
             id: Uuid::now_v7().to_string(),
-            session: session.id.clone(),
+            session: session.to_owned(),
             from_s: new.from_s,
             to_s,
             text,
@@ -53,9 +53,9 @@ impl Service {
             at: self.inner.handles.clock.now(),
         };
         let write = Write::Remark(RemarkWrite::Add(row.clone()));
-        self.inner.handles.write(&session.asset, vec![write]).await?;
+        self.inner.handles.write(&asset, vec![write]).await?;
         // The session may have been deleted meanwhile.
-        self.session_row(&session.id).await?;
+        self.session_asset(session).await?;
         Ok(view(row))
     }
 
@@ -64,13 +64,13 @@ impl Service {
     /// # Errors
     /// [`ServiceError::UnknownSession`]; [`ServiceError::UnknownRemark`].
     pub async fn remove_remark(&self, session: &str, id: &str) -> Result<(), ServiceError> {
-        let session = self.session_row(session).await?;
-        let rows = self.inner.handles.store.remarks(&session.id).await?;
+        let asset = self.session_asset(session).await?;
+        let rows = self.inner.handles.store.remarks(session).await?;
         if !rows.iter().any(|row| row.id == id) {
             return Err(ServiceError::UnknownRemark { id: id.to_owned() });
         }
-        let remove = RemarkWrite::Remove { session: session.id, id: id.to_owned() };
-        self.inner.handles.write(&session.asset, vec![Write::Remark(remove)]).await
+        let remove = RemarkWrite::Remove { session: session.to_owned(), id: id.to_owned() };
+        self.inner.handles.write(&asset, vec![Write::Remark(remove)]).await
     }
 }
 

@@ -40,7 +40,7 @@ impl Service {
             self.inner.handles.write(&session.asset, vec![Write::PutReplay(row.clone())]).await
         {
             // The session may have been deleted meanwhile.
-            self.session_row(&row.session).await?;
+            self.session_asset(&row.session).await?;
             return Err(error);
         }
         let (job, cost) =
@@ -70,8 +70,8 @@ impl Service {
     pub async fn cancel_replay(&self, id: &str) -> Result<ReplayView, ServiceError> {
         let row = self.inner.handles.store.replay(id).await?;
         let row = row.ok_or_else(|| ServiceError::UnknownReplay { id: id.to_owned() })?;
-        let session = self.session_row(&row.session).await?;
-        let cancelled = replay::cancel_waiting(&self.inner.job_context, &session.asset, row);
+        let asset = self.session_asset(&row.session).await?;
+        let cancelled = replay::cancel_waiting(&self.inner.job_context, &asset, row);
         self.cancel_job(id, cancelled).await?;
         self.replay_state(id).await
     }

@@ -67,7 +67,16 @@ impl Service {
     /// # Errors
     /// [`ServiceError::Store`] if the store cannot be read.
     pub async fn asset_of_session(&self, id: &str) -> Result<Option<String>, ServiceError> {
-        Ok(self.inner.handles.store.session(id).await?.map(|row| row.asset))
+        Ok(self.inner.handles.store.asset_of_session(id).await?)
+    }
+
+    /// Returns the asset of a session, without reading the rest of it.
+    ///
+    /// # Errors
+    /// [`ServiceError::UnknownSession`].
+    pub(crate) async fn session_asset(&self, id: &str) -> Result<String, ServiceError> {
+        let asset = self.asset_of_session(id).await?;
+        asset.ok_or_else(|| ServiceError::UnknownSession { id: id.to_owned() })
     }
 
     /// Ends a session; has no effect on one that has ended.

@@ -60,6 +60,8 @@ pub(super) enum Step {
     Sweep,
     /// The process is killed and started again.
     Kill,
+    /// The process stops in order and is started again.
+    Stop,
     /// The wall clock is set forward or back, s.
     WallClock { by_s: i64 },
     /// A person clears or acknowledges the fault of the x servo of a rig.
@@ -106,6 +108,7 @@ fn step() -> impl Strategy<Value = Step> {
         1 => device().prop_map(|device| Step::Delete { device }),
         1 => Just(Step::Sweep),
         1 => Just(Step::Kill),
+        1 => Just(Step::Stop),
         1 => (-100_000..100_000_i64).prop_map(|by_s| Step::WallClock { by_s }),
         2 => (device(), any::<bool>()).prop_map(|(device, clears)| Step::Act { device, clears }),
         1 => device().prop_map(|device| Step::End { device }),

@@ -181,6 +181,17 @@ impl World {
         self.start();
     }
 
+    /// Lets the shards store their engines, and starts another process. What they have not executed
+    /// is lost, which is more than what a stop loses.
+    fn stop(&mut self) {
+        self.work(|process| {
+            process.shards.iter_mut().for_each(Shard::stop);
+            true
+        });
+        while self.work(|process| commit(&process.committer, usize::MAX)) {}
+        self.kill();
+    }
+
     fn process(&mut self) -> &mut Process {
         self.process.as_mut().unwrap()
     }
@@ -232,6 +243,7 @@ impl World {
             Step::Delete { device } => self.delete(device % n)?,
             Step::Sweep => self.sweep(),
             Step::Kill => self.kill(),
+            Step::Stop => self.stop(),
             Step::WallClock { by_s } => {
                 self.now.fetch_add(by_s * 1_000_000, Ordering::SeqCst);
             }
