@@ -13,6 +13,7 @@ use tokio::sync::{mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 
 use super::commit::{EngineGeneration, Outage, WriteSet};
+use super::events::READ_TIMEOUT;
 use crate::ownership::Ownership;
 use crate::{Clock, Limits, ServiceError, SessionLimits};
 use offbd_store::{PartitionId, Store, StoreError, Write};
@@ -48,10 +49,6 @@ type CommitQueued = Box<dyn Fn() + Send + Sync>;
 /// Longest time for a barrier, and longest wait for room in the writer's queue. Chosen: much
 /// longer than a commit, and short enough for the other assets of a shard to wait.
 const WRITER_TIMEOUT: Duration = Duration::from_secs(5);
-
-/// Longest time for one read of the store. Chosen: twice the time that a reader waits for
-/// a connection; a database that takes longer is unavailable.
-pub(super) const READ_TIMEOUT: Duration = Duration::from_secs(20);
 
 fn stopped() -> ServiceError {
     ServiceError::Unavailable { what: "the writer has stopped" }
