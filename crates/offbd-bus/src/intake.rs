@@ -190,7 +190,7 @@ impl Intake {
                 return Err((asset, receipt, Box::new(MessageReply::Nothing)));
             }
         };
-        let limit = self.service.limits().batch_bytes;
+        let limit = self.service.limits().requests.batch_bytes;
         if payload.len() > limit {
             let error = ServiceError::TooMany { what: "bytes in one message", limit };
             return Err((asset, receipt, Box::new(self.refused(error))));
@@ -262,7 +262,7 @@ impl Intake {
         if self.service.route(&delivery.asset) != Route::Here {
             return self.pass_on(bus, delivery).await;
         }
-        let limit = self.service.limits().batch_samples;
+        let limit = self.service.limits().requests.batch_samples;
         let Delivery { asset, form, payload, receipt, waits, room } = delivery;
         let batch = form.batch(&payload, limit);
         drop((payload, room));
@@ -290,7 +290,7 @@ impl Intake {
     ) -> Option<PendingReply<A::Receipt>> {
         self.count(MessageOutcome::Elsewhere);
         let Delivery { asset, form, payload, receipt, waits, .. } = delivery;
-        let limit = self.service.limits().batch_samples;
+        let limit = self.service.limits().requests.batch_samples;
         let Some(Ok(batch)) = waits.then(|| form.batch(&payload, limit)) else {
             bus.answer(&asset, receipt, MessageReply::Nothing).await;
             return None;

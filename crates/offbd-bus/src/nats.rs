@@ -185,7 +185,7 @@ impl NatsBus {
             match self.check(client).await {
                 Ok(checked) => {
                     is_unsafe.set(0.0);
-                    let batch_bytes = self.service.limits().batch_bytes;
+                    let batch_bytes = self.service.limits().requests.batch_bytes;
                     for doubt in doubts(&client.server_info(), batch_bytes, &checked) {
                         tracing::warn!("about the NATS server: {doubt}");
                     }

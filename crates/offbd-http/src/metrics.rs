@@ -138,7 +138,7 @@ metrics! {
     "offbd_samples_in_flight" Gauge Read(|app| Some(app.service.load().samples as f64))
         => "Samples between arrival and commit";
     "offbd_samples_in_flight_limit" Gauge
-        Read(|app| Some(app.service.limits().in_flight_samples as f64))
+        Read(|app| Some(app.service.limits().requests.in_flight_samples as f64))
         => "Limit of these: limits.in_flight_samples";
     "offbd_samples_reevaluated_total" Counter Later
         => "Recorded samples evaluated again on loading";

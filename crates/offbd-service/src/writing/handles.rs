@@ -14,8 +14,9 @@ use tokio_util::sync::CancellationToken;
 
 use super::commit::{EngineGeneration, Outage, WriteSet};
 use super::events::READ_TIMEOUT;
+use crate::limits::SessionLimits;
 use crate::ownership::Ownership;
-use crate::{Clock, Limits, ServiceError, SessionLimits};
+use crate::{Clock, Limits, ServiceError};
 use offbd_store::{PartitionId, Store, StoreError, Write};
 
 /// The shared handles of the service. Cheap to clone.
@@ -70,7 +71,7 @@ impl Handles {
             clock,
             runtime: Handle::current(),
             closing,
-            sessions: limits.sessions,
+            sessions: SessionLimits::of(limits),
             ownership,
             writer,
             outage,
