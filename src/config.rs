@@ -21,7 +21,8 @@ pub use self::cluster::ClusterConfig;
 pub use self::cold::ColdConfig;
 use offbd_service::access::jwt::ExpectedClaims;
 use offbd_service::{
-    CommunicationSettings, Limits, NotificationSettings, Retention, SessionLimits, TargetPolicy,
+    CommunicationSettings, Limits, NotificationSettings, OutOfRange, RequestLimits, Retention,
+    TargetPolicy, WorkerLimits, config_section,
 };
 use offbd_store::{ColdDirectory, Location};
 
@@ -55,13 +56,13 @@ pub struct Config {
     pub mqtt: Option<MqttConfig>,
     pub log: LogConfig,
     pub traces: TracesConfig,
-    pub limits: LimitsConfig,
+    pub limits: RequestLimits,
     pub rates: RatesConfig,
-    pub workers: WorkersConfig,
+    pub workers: WorkerLimits,
     pub retention: RetentionConfig,
     /// Where ended sessions go that leave the database; `None` if they stay there.
     pub cold: Option<ColdConfig>,
-    pub communication: CommunicationConfig,
+    pub communication: CommunicationSettings,
     pub notifications: NotificationsConfig,
 }
 
@@ -179,16 +180,16 @@ impl JwtConfig {
     }
 }
 
-/// Rate limits, in requests per second, which apply if requests need a token. The
-/// requests of ten seconds may come at once; further ones are answered 429 with
-/// `Retry-After`.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct RatesConfig {
-    /// Requests with one token.
-    pub token_per_s: u32,
-    /// Requests from one address without a token, or with one that was not used recently.
-    pub address_per_s: u32,
+config_section! {
+    /// Rate limits, in requests per second, which apply if requests need a token. The
+    /// requests of ten seconds may come at once; further ones are answered 429 with
+    /// `Retry-After`.
+    RatesConfig as "rates" |_this| {
+        /// Requests with one token.
+        token_per_s: u32 = 2000, 1..=1_000_000;
+        /// Requests from one address without a token, or with one that was not used recently.
+        address_per_s: u32 = 500, 1..=1_000_000;
+    }
 }
 
 /// Logs, on stderr.
@@ -247,46 +248,6 @@ pub enum LogFormat {
     Json,
 }
 
-/// Limits of requests, memory and connections; see also [`Limits`].
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct LimitsConfig {
-    pub batch_samples: usize,
-    pub batch_bytes: usize,
-    pub import_bytes: usize,
-    /// Bytes of all request bodies in memory at a time.
-    pub bodies_bytes: usize,
-    pub in_flight_samples: usize,
-    pub journal_bytes: usize,
-    /// Samples from which on a session continues in another one.
-    pub session_samples: usize,
-    pub assets: usize,
-    pub body_timeout_s: u64,
-    /// Longest time for the TLS handshake, and for the head of each request to arrive, s;
-    /// then the connection is closed.
-    pub header_timeout_s: u64,
-    /// Longest time for which a client may stop reading, s; then the connection is closed.
-    pub write_timeout_s: u64,
-    /// Connections at a time; further ones are closed at once.
-    pub connections: usize,
-    /// Connections of one address at a time; further ones are closed at once.
-    pub connections_per_address: usize,
-    /// Longest time for a graceful stop, s.
-    pub shutdown_s: u64,
-}
-
-/// Threads and queues.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct WorkersConfig {
-    /// Threads that run engines.
-    pub shards: usize,
-    /// Requests in the queue of one shard.
-    pub queue: usize,
-    /// Replays and calibrations that run at a time.
-    pub jobs: usize,
-}
-
 /// How long recordings are kept; without a limit, for ever. See [`Retention`].
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -299,37 +260,6 @@ pub struct RetentionConfig {
     pub fault_days: Option<usize>,
     /// Interval between two sweeps, s.
     pub sweep_s: u64,
-}
-
-/// When the data of a rig count as lost. See [`CommunicationSettings`].
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct CommunicationConfig {
-    /// Silence of a rig with an open session after which its data count as lost, s.
-    pub lost_after_s: u64,
-    /// Time for which data must arrive to count as back, s.
-    pub back_after_s: u64,
-}
-
-impl Default for CommunicationConfig {
-    fn default() -> Self {
-        let CommunicationSettings { lost_after, back_after } = CommunicationSettings::default();
-        Self { lost_after_s: lost_after.as_secs(), back_after_s: back_after.as_secs() }
-    }
-}
-
-impl CommunicationConfig {
-    fn check(&self) -> Result<(), ConfigError> {
-        within_s("communication.lost_after_s", self.lost_after_s, 1, 86_400)?;
-        within_s("communication.back_after_s", self.back_after_s, 0, 86_400)
-    }
-
-    const fn settings(&self) -> CommunicationSettings {
-        CommunicationSettings {
-            lost_after: Duration::from_secs(self.lost_after_s),
-            back_after: Duration::from_secs(self.back_after_s),
-        }
-    }
 }
 
 /// How notifications are sent. See [`NotificationSettings`].
@@ -441,12 +371,12 @@ impl Default for Config {
             mqtt: None,
             log: LogConfig::default(),
             traces: TracesConfig::default(),
-            limits: LimitsConfig::default(),
+            limits: RequestLimits::default(),
             rates: RatesConfig::default(),
-            workers: WorkersConfig::default(),
+            workers: WorkerLimits::default(),
             retention: RetentionConfig::default(),
             cold: None,
-            communication: CommunicationConfig::default(),
+            communication: CommunicationSettings::default(),
             notifications: NotificationsConfig::default(),
         }
     }
@@ -455,50 +385,6 @@ impl Default for Config {
 impl Default for LogConfig {
     fn default() -> Self {
         Self { format: LogFormat::default(), level: "info".to_owned() }
-    }
-}
-
-impl Default for LimitsConfig {
-    fn default() -> Self {
-        let limits = Limits::default();
-        Self {
-            batch_samples: limits.batch_samples,
-            batch_bytes: limits.batch_bytes,
-            import_bytes: limits.import_bytes,
-            bodies_bytes: 256 << 20,
-            in_flight_samples: limits.in_flight_samples,
-            journal_bytes: limits.journal_bytes,
-            session_samples: usize::try_from(limits.sessions.samples).unwrap_or(usize::MAX),
-            assets: limits.assets,
-            body_timeout_s: limits.body_timeout.as_secs(),
-            header_timeout_s: 30,
-            write_timeout_s: 30,
-            connections: 16_384,
-            connections_per_address: 4096,
-            shutdown_s: 20,
-        }
-    }
-}
-
-impl LimitsConfig {
-    fn sessions(&self) -> SessionLimits {
-        SessionLimits {
-            samples: i64::try_from(self.session_samples).unwrap_or(i64::MAX),
-            ..SessionLimits::default()
-        }
-    }
-}
-
-impl Default for RatesConfig {
-    fn default() -> Self {
-        Self { token_per_s: 2000, address_per_s: 500 }
-    }
-}
-
-impl Default for WorkersConfig {
-    fn default() -> Self {
-        let limits = Limits::default();
-        Self { shards: limits.shards, queue: limits.shard_queue, jobs: limits.jobs }
     }
 }
 
@@ -518,6 +404,12 @@ pub enum ConfigError {
     Unreadable(#[from] config::ConfigError),
     #[error("configuration: `{key}` {reason}")]
     Invalid { key: &'static str, reason: String },
+}
+
+impl From<OutOfRange> for ConfigError {
+    fn from(OutOfRange { key, reason }: OutOfRange) -> Self {
+        Self::Invalid { key, reason }
+    }
 }
 
 impl Config {
@@ -567,39 +459,12 @@ impl Config {
     /// # Errors
     /// [`ConfigError::Invalid`] with the first invalid key.
     pub fn check(&self) -> Result<(), ConfigError> {
-        let limits = &self.limits;
-        within("limits.batch_samples", limits.batch_samples, 1, 1_000_000)?;
-        within("limits.batch_bytes", limits.batch_bytes, 1024, 1 << 30)?;
-        within("limits.import_bytes", limits.import_bytes, 1024, 1 << 30)?;
-        within("limits.bodies_bytes", limits.bodies_bytes, 1024, 1 << 34)?;
-        within("limits.assets", limits.assets, 1, 1_000_000)?;
-        let samples = limits.batch_samples;
-        within("limits.in_flight_samples", limits.in_flight_samples, samples, 100_000_000)?;
-        within("limits.journal_bytes", limits.journal_bytes, 1, 1 << 30)?;
-        within("limits.session_samples", limits.session_samples, 1000, 1_000_000_000)?;
-        let seconds = usize::try_from(limits.body_timeout_s).unwrap_or(usize::MAX);
-        within("limits.body_timeout_s", seconds, 1, 3600)?;
-        let seconds = usize::try_from(limits.shutdown_s).unwrap_or(usize::MAX);
-        within("limits.shutdown_s", seconds, 1, 3600)?;
-        let seconds = usize::try_from(limits.header_timeout_s).unwrap_or(usize::MAX);
-        within("limits.header_timeout_s", seconds, 1, 3600)?;
-        let seconds = usize::try_from(limits.write_timeout_s).unwrap_or(usize::MAX);
-        within("limits.write_timeout_s", seconds, 1, 3600)?;
-        within("limits.connections", limits.connections, 1, 1_000_000)?;
-        let most = limits.connections_per_address;
-        within("limits.connections_per_address", most, 1, 1_000_000)?;
-        for (key, rate) in [
-            ("rates.token_per_s", self.rates.token_per_s),
-            ("rates.address_per_s", self.rates.address_per_s),
-        ] {
-            within(key, usize::try_from(rate).unwrap_or(usize::MAX), 1, 1_000_000)?;
-        }
+        self.limits.check()?;
+        self.rates.check()?;
         let requires_token = self.requires_token()?;
         self.jwt.as_ref().map_or(Ok(()), |jwt| jwt.check(requires_token))?;
         self.origins.iter().try_for_each(|origin| check_origin(origin))?;
-        within("workers.shards", self.workers.shards, 1, 256)?;
-        within("workers.queue", self.workers.queue, 1, 100_000)?;
-        within("workers.jobs", self.workers.jobs, 1, 256)?;
+        self.workers.check()?;
         if let Err(error) = self.log.level.parse::<tracing_subscriber::EnvFilter>() {
             return Err(ConfigError::Invalid { key: "log.level", reason: error.to_string() });
         }
@@ -653,20 +518,11 @@ impl Config {
     #[must_use]
     pub fn service_limits(&self) -> Limits {
         Limits {
-            shards: self.workers.shards,
-            jobs: self.workers.jobs,
-            shard_queue: self.workers.queue,
-            in_flight_samples: self.limits.in_flight_samples,
-            journal_bytes: self.limits.journal_bytes,
-            sessions: self.limits.sessions(),
-            batch_samples: self.limits.batch_samples,
-            batch_bytes: self.limits.batch_bytes,
-            import_bytes: self.limits.import_bytes,
-            assets: self.limits.assets,
-            body_timeout: Duration::from_secs(self.limits.body_timeout_s),
+            requests: self.limits.clone(),
+            workers: self.workers.clone(),
             retention: self.retention.retention(),
             cold_after: self.cold.as_ref().and_then(ColdConfig::after),
-            communication: self.communication.settings(),
+            communication: self.communication.clone(),
             notifications: self.notifications.settings(),
             ..Limits::default()
         }
@@ -731,7 +587,7 @@ mod tests {
         assert_eq!(config.log.level, "debug");
         assert_eq!(config.limits.assets, 7);
         assert_eq!(config.origins, ["https://a.example", "https://b.example"]);
-        assert_eq!(config.limits.batch_samples, LimitsConfig::default().batch_samples);
+        assert_eq!(config.limits.batch_samples, RequestLimits::default().batch_samples);
         assert_eq!(config.location().unwrap(), Location::File("env/offbd.sqlite".into()));
     }
 

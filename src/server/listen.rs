@@ -24,7 +24,7 @@ use tokio_util::task::TaskTracker;
 
 use super::connections::{ConnectionLimits, ConnectionPermit, LimitedConnection};
 use super::tls::Tls;
-use crate::config::LimitsConfig;
+use offbd_service::RequestLimits;
 
 /// Longest head of a request, bytes; a longer one is answered 431.
 const MAX_HEAD_BYTES: usize = 64 << 10;
@@ -47,7 +47,11 @@ pub(super) struct HttpListener {
 }
 
 impl HttpListener {
-    pub(super) fn new(limits: &LimitsConfig, tls: Option<Tls>, closing: CancellationToken) -> Self {
+    pub(super) fn new(
+        limits: &RequestLimits,
+        tls: Option<Tls>,
+        closing: CancellationToken,
+    ) -> Self {
         let header_timeout = Duration::from_secs(limits.header_timeout_s);
         let write_timeout = Duration::from_secs(limits.write_timeout_s);
         let limits = ConnectionLimits::new(limits.connections, limits.connections_per_address);

@@ -7,7 +7,8 @@ use crate::support::process::Process;
 use crate::support::{ServiceFixture, connection, rig, url};
 use offbd::store::codec::{self, ChunkKey, Packing};
 use offbd::store::{
-    AssetRow, ChangeSet, Location, SessionFilter, SessionProgress, SessionRow, Store, Write, Writer,
+    AssetRow, ChangeSet, Location, SessionEnd, SessionFilter, SessionProgress, SessionRow, Store,
+    Write, Writer,
 };
 use offbd_core::vocabulary::Sample;
 use proptest::prelude::*;
@@ -193,13 +194,12 @@ impl StoreTest {
             }
             Step::End(asset) => {
                 let wanted = self.open[asset].clone();
-                let ended = Write::EndSession {
+                let ended = Write::EndSession(SessionEnd {
                     session: wanted.id.clone(),
                     ended_at: 1,
                     verdict: "{}".to_owned(),
-                    hash: String::new(),
-                    found_fault: false,
-                };
+                    ..SessionEnd::default()
+                });
                 let last = self.open[asset].append(3);
                 self.ended.push(self.open[asset].clone());
                 let opened = self.opened(asset);

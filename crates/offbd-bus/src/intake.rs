@@ -11,7 +11,7 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
 
 use super::presence::Attendance;
 use super::{MAX_PENDING, MAX_QUEUED, MAX_QUEUED_BYTES, count};
-use offbd_http::{Forwarder, Problem};
+use offbd_http::{Forwarder, MessageOutcome, Problem};
 use offbd_service::{Route, Service, ServiceError};
 use offbd_wire::bus::{BatchAckView, BatchRefusalView, DeviceTopic};
 use offbd_wire::mapping::MappedTopic;
@@ -88,16 +88,15 @@ impl BatchAnswer {
         }
     }
 
-    /// Returns the label of the metric of messages.
-    fn outcome(&self) -> &'static str {
-        let Self::Refused(refusal) = self else { return "taken" };
+    fn outcome(&self) -> MessageOutcome {
+        let Self::Refused(refusal) = self else { return MessageOutcome::Taken };
         match refusal.status {
-            400 | 422 => "malformed",
-            404 => "unknown_asset",
-            409 => "conflict",
-            413 => "too_large",
-            429 => "busy",
-            _ => "unavailable",
+            400 | 422 => MessageOutcome::Malformed,
+            404 => MessageOutcome::UnknownAsset,
+            409 => MessageOutcome::Conflict,
+            413 => MessageOutcome::TooLarge,
+            429 => MessageOutcome::Busy,
+            _ => MessageOutcome::Unavailable,
         }
     }
 
@@ -170,7 +169,7 @@ impl Intake {
     }
 
     /// Counts a message by what became of it.
-    pub(super) fn count(&self, outcome: &'static str) {
+    pub(super) fn count(&self, outcome: MessageOutcome) {
         count(self.bus, outcome, 1);
     }
 
@@ -191,7 +190,7 @@ impl Intake {
                 return Err((asset, receipt, Box::new(MessageReply::Nothing)));
             }
         };
-        let limit = self.service.limits().batch_bytes;
+        let limit = self.service.limits().requests.batch_bytes;
         if payload.len() > limit {
             let error = ServiceError::TooMany { what: "bytes in one message", limit };
             return Err((asset, receipt, Box::new(self.refused(error))));
@@ -263,7 +262,7 @@ impl Intake {
         if self.service.route(&delivery.asset) != Route::Here {
             return self.pass_on(bus, delivery).await;
         }
-        let limit = self.service.limits().batch_samples;
+        let limit = self.service.limits().requests.batch_samples;
         let Delivery { asset, form, payload, receipt, waits, room } = delivery;
         let batch = form.batch(&payload, limit);
         drop((payload, room));
@@ -289,9 +288,9 @@ impl Intake {
         bus: &A,
         delivery: Delivery<A::Receipt>,
     ) -> Option<PendingReply<A::Receipt>> {
-        self.count("elsewhere");
+        self.count(MessageOutcome::Elsewhere);
         let Delivery { asset, form, payload, receipt, waits, .. } = delivery;
-        let limit = self.service.limits().batch_samples;
+        let limit = self.service.limits().requests.batch_samples;
         let Some(Ok(batch)) = waits.then(|| form.batch(&payload, limit)) else {
             bus.answer(&asset, receipt, MessageReply::Nothing).await;
             return None;

@@ -38,6 +38,8 @@ mod settings;
 
 use std::time::Duration;
 
+use offbd_http::MessageOutcome;
+
 /// Interval between two attempts to connect.
 const RETRY_INTERVAL: Duration = Duration::from_secs(2);
 
@@ -56,6 +58,7 @@ const MAX_PENDING: usize = 1024;
 const MAX_QUEUED_BYTES: usize = 64 << 20;
 
 /// Counts messages of a bus by what became of them.
-fn count(bus: &'static str, outcome: &'static str, n: u64) {
-    metrics::counter!("offbd_bus_messages_total", "bus" => bus, "outcome" => outcome).increment(n);
+fn count(bus: &'static str, outcome: MessageOutcome, n: u64) {
+    let labels = [("bus", bus), ("outcome", outcome.as_str())];
+    metrics::counter!("offbd_bus_messages_total", &labels).increment(n);
 }

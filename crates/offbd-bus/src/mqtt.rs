@@ -31,6 +31,7 @@ use super::intake::{
 use super::mqtt_publisher::{BrokerLink, Connected, MqttPublisher};
 use super::puback::PubackQueue;
 use super::{RETRY_INTERVAL, SEND_TIMEOUT};
+use offbd_http::MessageOutcome;
 use offbd_net::Reasons;
 use offbd_service::Service;
 use offbd_wire::bus::{DeviceTopic, TopicStyle};
@@ -280,27 +281,27 @@ impl Broker<'_> {
         }
     }
 
-    /// Returns the asset of a message and what it is, or the label of the metric.
-    fn address(&self, publish: &Publish) -> Result<(String, BusMessage), &'static str> {
+    /// Returns the asset of a message and what it is, or what becomes of it.
+    fn address(&self, publish: &Publish) -> Result<(String, BusMessage), MessageOutcome> {
         let topic = publish.topic.as_str();
         if let Some((entry, asset)) = self.settings.mapping.find(topic) {
             let asset = asset.map_err(|error| refused(topic, &error))?;
             let batch = BusMessage::Batch(Form::Mapped(entry));
-            return if publish.retain { Err("retained") } else { Ok((asset, batch)) };
+            return if publish.retain { Err(MessageOutcome::Retained) } else { Ok((asset, batch)) };
         }
         let (asset, kind) =
             TopicStyle::Mqtt.parse(topic).map_err(|error| refused(topic, &error))?;
         if publish.retain && kind == DeviceTopic::Telemetry {
             tracing::warn!(topic, "a retained message is no new telemetry; it is ignored");
-            return Err("retained");
+            return Err(MessageOutcome::Retained);
         }
         Ok((asset, kind.into()))
     }
 }
 
-fn refused(topic: &str, error: &offbd_wire::bus::TopicError) -> &'static str {
+fn refused(topic: &str, error: &offbd_wire::bus::TopicError) -> MessageOutcome {
     tracing::warn!(topic, %error, "a message is refused");
-    "topic"
+    MessageOutcome::Topic
 }
 
 /// The number of a message of QoS 1 among those of its connection; `None` for QoS 0.

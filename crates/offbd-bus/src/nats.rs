@@ -19,6 +19,7 @@ use super::faults::{FaultMessage, Publishing, publish_faults};
 use super::intake::{Answering, Delivery, Intake, MessageReply, queue};
 use super::settings::{UnsafeServer, check_streams, check_version, doubts};
 use super::{RETRY_INTERVAL, SEND_TIMEOUT, count};
+use offbd_http::MessageOutcome;
 use offbd_net::Reasons;
 use offbd_service::Service;
 use offbd_wire::bus::{DeviceTopic, INBOX, TopicStyle, encoded, inbox, is_below, service_inbox};
@@ -184,7 +185,7 @@ impl NatsBus {
             match self.check(client).await {
                 Ok(checked) => {
                     is_unsafe.set(0.0);
-                    let batch_bytes = self.service.limits().batch_bytes;
+                    let batch_bytes = self.service.limits().requests.batch_bytes;
                     for doubt in doubts(&client.server_info(), batch_bytes, &checked) {
                         tracing::warn!("about the NATS server: {doubt}");
                     }
@@ -284,7 +285,7 @@ impl NatsBus {
                 Ok(topic) => topic,
                 Err(error) => {
                     tracing::warn!(%error, "a message is refused");
-                    intake.count("topic");
+                    intake.count(MessageOutcome::Topic);
                     continue;
                 }
             };
@@ -340,7 +341,7 @@ async fn noted(event: ClientEvent, connected: Arc<Notify>, reasons: Arc<Reasons>
             tracing::warn!("the connection to the NATS server is lost");
             metrics::gauge!("offbd_bus_connected", "bus" => BUS).set(0.0);
         }
-        ClientEvent::SlowConsumer(_) => count(BUS, "dropped", 1),
+        ClientEvent::SlowConsumer(_) => count(BUS, MessageOutcome::Dropped, 1),
         event if reasons.is_new(&event) => {
             tracing::warn!(%event, "the NATS server reports");
         }

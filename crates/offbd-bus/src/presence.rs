@@ -10,6 +10,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tokio::sync::{Notify, OwnedSemaphorePermit, Semaphore};
 
 use super::count;
+use offbd_http::MessageOutcome;
 use offbd_service::{Route, Service};
 use offbd_wire::bus::{DeviceTopic, HelloView, PresenceWord};
 
@@ -77,11 +78,11 @@ impl Attendance {
         payload: &[u8],
     ) {
         if service.route(&asset) != Route::Here {
-            return self.count("elsewhere", 1);
+            return self.count(MessageOutcome::Elsewhere, 1);
         }
         if payload.is_empty() {
             // A retained message was removed.
-            return self.count("taken", 1);
+            return self.count(MessageOutcome::Taken, 1);
         }
         let (presence, hello) = match topic {
             DeviceTopic::State => (PresenceWord::of_bytes(payload), &[][..]),
@@ -95,7 +96,7 @@ impl Attendance {
                     topic = topic.as_str(),
                     "the message of a device is malformed"
                 );
-                self.count("malformed", 1);
+                self.count(MessageOutcome::Malformed, 1);
             }
         }
     }
@@ -111,7 +112,7 @@ impl Attendance {
         let bytes = u32::try_from(asset.len() + hello.len() + UNCHECKED_OVERHEAD);
         let room = self.shared.room.clone();
         let Ok(_room) = room.try_acquire_many_owned(bytes.unwrap_or(u32::MAX)) else {
-            return self.count("busy", n_messages);
+            return self.count(MessageOutcome::Busy, n_messages);
         };
         unchecked.insert(asset, Unchecked { presence, hello, n_messages, _room });
         self.shared.arrived.notify_one();
@@ -135,7 +136,10 @@ impl Attendance {
     async fn check(&self, service: &Service, mut part: BTreeMap<String, Unchecked>) {
         let names: Vec<String> = part.keys().cloned().collect();
         let found = service.existing_assets(&names).await;
-        let others = if found.is_ok() { "unknown_asset" } else { "unavailable" };
+        let others = match found {
+            Ok(_) => MessageOutcome::UnknownAsset,
+            Err(_) => MessageOutcome::Unavailable,
+        };
         for asset in found.unwrap_or_default() {
             let Some(Unchecked { presence, hello, n_messages, .. }) = part.remove(&asset) else {
                 continue;
@@ -146,12 +150,12 @@ impl Attendance {
             if lock(&self.shared.devices).set(&asset, presence) {
                 tracing::info!(asset, ?presence, "a device has told its presence");
             }
-            self.count("taken", n_messages);
+            self.count(MessageOutcome::Taken, n_messages);
         }
         self.count(others, part.values().map(|one| one.n_messages).sum());
     }
 
-    fn count(&self, outcome: &'static str, n: u64) {
+    fn count(&self, outcome: MessageOutcome, n: u64) {
         count(self.bus, outcome, n);
     }
 }

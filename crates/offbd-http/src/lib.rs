@@ -71,7 +71,7 @@ pub use asyncapi::asyncapi_yaml;
 pub use body::BodyBudget;
 pub use guard::AccessPolicy;
 pub use json_body::parse_json;
-pub use metrics::{gather_metrics, keep_metrics};
+pub use metrics::{MessageOutcome, gather_metrics, keep_metrics};
 pub use problem::Problem;
 pub use rates::subscriber;
 pub use rates::{RateLimit, RateLimits};

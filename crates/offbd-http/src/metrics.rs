@@ -1,8 +1,8 @@
 //! `/metrics`: the service's metrics in the text format of Prometheus.
 //!
-//! [`METRICS`] lists all of them but `offbd_partition_epoch`. Series without labels, or with labels known in advance,
-//! are exported as 0 from the start, so that `rate()` sees the first event. No label
-//! has a value from outside the service.
+//! [`METRICS`] lists all of them but `offbd_partition_epoch`. Series without labels, or with
+//! labels known in advance, are exported as 0 from the start, so that `rate()` sees the first
+//! event. No label has a value from outside the service.
 
 use std::sync::OnceLock;
 use std::time::Duration;
@@ -16,6 +16,8 @@ use tokio_util::sync::CancellationToken;
 
 use super::App;
 use offbd_core::vocabulary::{FaultCode, FaultStatus};
+use offbd_core::words;
+use offbd_wire::words::{ChannelKind, UnjudgedWord};
 
 /// The kind of a metric.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,82 +34,151 @@ enum MetricKind {
 
 use MetricKind::{Counter, Gauge, Seconds, Sizes};
 
-/// Every metric with its kind and its description.
-const METRICS: &[(&str, MetricKind, &str)] = &[
-    ("offbd_ack_seconds", Seconds, "Time from the arrival of a batch to its acknowledgement"),
-    ("offbd_assets_rebuilding", Gauge, "Assets whose engine is to be rebuilt after the start"),
-    ("offbd_assets_untested", Gauge, "Assets whose samples are not judged"),
-    ("offbd_bodies_bytes", Gauge, "Bytes of request bodies in memory"),
-    ("offbd_build_info", Gauge, "Always 1; the label has the version"),
-    ("offbd_bus_connected", Gauge, "1 while connected to the server of NATS or the MQTT broker"),
-    ("offbd_bus_devices_online", Gauge, "Devices that say over NATS or MQTT that they are online"),
-    ("offbd_bus_faults_total", Counter, "Events published over NATS or MQTT"),
-    ("offbd_bus_logins_total", Counter, "Questions of the NATS server for rights, by outcome"),
-    ("offbd_bus_messages_total", Counter, "Messages of devices over NATS and MQTT, by outcome"),
-    (
-        "offbd_bus_replies_refused_total",
-        Counter,
-        "NATS messages not answered on their reply subject",
-    ),
-    ("offbd_bus_unsafe", Gauge, "1 if the NATS server may lose messages, see the log"),
-    ("offbd_cluster_nodes", Gauge, "Nodes of the cluster that are alive"),
-    ("offbd_cold_bytes_total", Counter, "Bytes of the files that hold moved sessions"),
-    ("offbd_cold_failures_total", Counter, "Files of sessions not written, verified or removed"),
-    ("offbd_cold_files_total", Counter, "Sessions whose samples were moved to a file"),
-    ("offbd_commit_failures_total", Counter, "Failed commits, including retried ones"),
-    ("offbd_commit_seconds", Seconds, "Duration of a commit"),
-    ("offbd_commit_sets", Sizes, "Write sets in a commit"),
-    ("offbd_commits_overtaken_total", Counter, "Write sets refused because their partition moved"),
-    ("offbd_commits_total", Counter, "Successful commits"),
-    ("offbd_communication_lost", Gauge, "Rigs with an open session whose data stay away"),
-    ("offbd_connections", Gauge, "Open connections"),
-    ("offbd_connections_refused_total", Counter, "Connections refused at the limit"),
-    ("offbd_deliveries_given_up_total", Counter, "Notifications given up, by kind of channel"),
-    ("offbd_delivery_attempts_total", Counter, "Attempts to deliver, by channel and result"),
-    ("offbd_engines", Gauge, "Engines in memory, by shard"),
-    ("offbd_fault_changes_total", Counter, "Durable fault transitions, by code and status"),
-    ("offbd_http_request_seconds", Seconds, "Time until a response starts, by path"),
-    ("offbd_http_requests_total", Counter, "Requests, by path and status"),
-    ("offbd_ingest_stalled", Gauge, "1 if batches wait and nothing is committed"),
-    ("offbd_journal_bytes", Gauge, "Bytes in the journal, not yet folded into the recordings"),
-    ("offbd_partitions_handed_over_total", Counter, "Partitions given to other nodes as planned"),
-    ("offbd_partitions_lost_total", Counter, "Partitions that other nodes have taken"),
-    ("offbd_partitions_owned", Gauge, "Partitions that this node owns"),
-    ("offbd_partitions_taken_total", Counter, "Partitions that this node has taken"),
-    ("offbd_partitions_unowned", Gauge, "Partitions without an owner, as this node last saw"),
-    ("offbd_process_resident_bytes", Gauge, "Resident memory of the process (Linux)"),
-    ("offbd_refused_total", Counter, "Requests denied by the guard, by status"),
-    ("offbd_requests_forwarded_total", Counter, "Requests sent to the node that owns the asset"),
-    ("offbd_samples_in_flight", Gauge, "Samples between arrival and commit"),
-    ("offbd_samples_in_flight_limit", Gauge, "Limit of these: limits.in_flight_samples"),
-    ("offbd_samples_reevaluated_total", Counter, "Recorded samples evaluated again on loading"),
-    ("offbd_samples_total", Counter, "Samples, by outcome"),
-    ("offbd_samples_unjudged_total", Counter, "Samples rejected or set aside, by reason"),
-    ("offbd_scrub_findings_total", Counter, "Damage and differences found, by kind"),
-    ("offbd_scrub_sessions_total", Counter, "Sessions that the scrub found in order"),
-    ("offbd_sessions_expired_total", Counter, "Sessions deleted by retention, by reason"),
-    ("offbd_shard_queue", Gauge, "Commands in the queue of a shard"),
-    ("offbd_store_writable", Gauge, "1 if the last commit succeeded"),
-    ("offbd_streams", Gauge, "Open WebSockets"),
-    ("offbd_streams_cut_off_total", Counter, "WebSockets closed because the client was too slow"),
-    ("offbd_turned_away_total", Counter, "Batches and requests answered with 429, by full queue"),
-    ("offbd_writer_queue", Gauge, "Write sets in the queue of the writer"),
-];
+/// A label with all its values.
+type Label = (&'static str, fn() -> Vec<&'static str>);
 
-/// What may become of a message of a device.
-const BUS_OUTCOMES: [&str; 11] = [
-    "elsewhere",
-    "taken",
-    "malformed",
-    "unknown_asset",
-    "conflict",
-    "too_large",
-    "busy",
-    "unavailable",
-    "topic",
-    "retained",
-    "dropped",
-];
+/// The series of a metric before the first event.
+enum Start {
+    /// None: its labels are not known in advance, or no value is.
+    Later,
+    /// A series for each combination of the labels, with this value.
+    At(f64, &'static [Label]),
+    /// One series, which is read on each scrape; none while there is no value.
+    Read(fn(&App) -> Option<f64>),
+}
+
+use Start::{At, Later, Read};
+
+const ZERO: Start = At(0.0, &[]);
+const BUS: Label = ("bus", || vec!["nats", "mqtt"]);
+const CHANNEL: Label = ("channel", || each(ChannelKind::ALL, ChannelKind::as_str));
+
+fn each<T: Copy>(all: &[T], of: fn(T) -> &'static str) -> Vec<&'static str> {
+    all.iter().copied().map(of).collect()
+}
+
+/// Every metric with its kind, its first series and its description.
+macro_rules! metrics {
+    ($($name:literal $kind:ident $start:expr => $meaning:literal;)+) => {
+        #[expect(clippy::cast_precision_loss, reason = "no queue is as long as 2^52")]
+        const METRICS: &[(&str, MetricKind, &str, Start)] =
+            &[$(($name, $kind, $meaning, $start)),+];
+    };
+}
+
+metrics! {
+    "offbd_ack_seconds" Seconds Later => "Time from the arrival of a batch to its acknowledgement";
+    "offbd_assets_rebuilding" Gauge Read(|app| Some(app.service.n_rebuilding() as f64))
+        => "Assets whose engine is to be rebuilt after the start";
+    "offbd_assets_untested" Gauge Read(|app| Some(app.service.n_untested() as f64))
+        => "Assets whose samples are not judged";
+    "offbd_bodies_bytes" Gauge Read(|app| Some(app.budget.used() as f64))
+        => "Bytes of request bodies in memory";
+    "offbd_build_info" Gauge At(1.0, &[("version", || vec![env!("CARGO_PKG_VERSION")])])
+        => "Always 1; the label has the version";
+    "offbd_bus_connected" Gauge Later
+        => "1 while connected to the server of NATS or the MQTT broker";
+    "offbd_bus_devices_online" Gauge ZERO
+        => "Devices that say over NATS or MQTT that they are online";
+    "offbd_bus_faults_total" Counter At(0.0, &[BUS]) => "Events published over NATS or MQTT";
+    "offbd_bus_logins_total" Counter At(0.0, &[("outcome", || vec!["accepted", "refused"])])
+        => "Questions of the NATS server for rights, by outcome";
+    "offbd_bus_messages_total" Counter
+        At(0.0, &[BUS, ("outcome", || each(MessageOutcome::ALL, MessageOutcome::as_str))])
+        => "Messages of devices over NATS and MQTT, by outcome";
+    "offbd_bus_replies_refused_total" Counter ZERO
+        => "NATS messages not answered on their reply subject";
+    "offbd_bus_unsafe" Gauge Later => "1 if the NATS server may lose messages, see the log";
+    "offbd_cluster_nodes" Gauge Read(|app| Some(app.service.cluster(None).nodes.len() as f64))
+        => "Nodes of the cluster that are alive";
+    "offbd_cold_bytes_total" Counter ZERO => "Bytes of the files that hold moved sessions";
+    "offbd_cold_failures_total" Counter ZERO
+        => "Files of sessions not written, verified or removed";
+    "offbd_cold_files_total" Counter ZERO => "Sessions whose samples were moved to a file";
+    "offbd_commit_failures_total" Counter ZERO => "Failed commits, including retried ones";
+    "offbd_commit_seconds" Seconds Later => "Duration of a commit";
+    "offbd_commit_sets" Sizes Later => "Write sets in a commit";
+    "offbd_commits_overtaken_total" Counter ZERO
+        => "Write sets refused because their partition moved";
+    "offbd_commits_total" Counter ZERO => "Successful commits";
+    "offbd_communication_lost" Gauge ZERO => "Rigs with an open session whose data stay away";
+    "offbd_connections" Gauge Later => "Open connections";
+    "offbd_connections_refused_total" Counter ZERO => "Connections refused at the limit";
+    "offbd_deliveries_given_up_total" Counter At(0.0, &[CHANNEL])
+        => "Notifications given up, by kind of channel";
+    "offbd_delivery_attempts_total" Counter
+        At(0.0, &[CHANNEL, ("result", || vec!["delivered", "failed"])])
+        => "Attempts to deliver, by channel and result";
+    "offbd_engines" Gauge Later => "Engines in memory, by shard";
+    "offbd_fault_changes_total" Counter
+        At(0.0, &[
+            ("code", || each(FaultCode::ALL, FaultCode::as_str)),
+            ("status", || each(FaultStatus::ALL, FaultStatus::as_str)),
+        ])
+        => "Durable fault transitions, by code and status";
+    "offbd_http_request_seconds" Seconds Later => "Time until a response starts, by path";
+    "offbd_http_requests_total" Counter Later => "Requests, by path and status";
+    "offbd_ingest_stalled" Gauge ZERO => "1 if batches wait and nothing is committed";
+    "offbd_journal_bytes" Gauge ZERO => "Bytes in the journal, not yet folded into the recordings";
+    "offbd_partitions_handed_over_total" Counter ZERO
+        => "Partitions given to other nodes as planned";
+    "offbd_partitions_lost_total" Counter ZERO => "Partitions that other nodes have taken";
+    "offbd_partitions_owned" Gauge Read(|app| Some(app.service.n_partitions_owned() as f64))
+        => "Partitions that this node owns";
+    "offbd_partitions_taken_total" Counter ZERO => "Partitions that this node has taken";
+    "offbd_partitions_unowned" Gauge Read(|app| Some(app.service.cluster(None).unowned as f64))
+        => "Partitions without an owner, as this node last saw";
+    "offbd_process_resident_bytes" Gauge Read(|_| resident_bytes().map(|bytes| bytes as f64))
+        => "Resident memory of the process (Linux)";
+    "offbd_refused_total" Counter
+        At(0.0, &[("status", || vec!["401", "403", "405", "421", "429", "503"])])
+        => "Requests denied by the guard, by status";
+    "offbd_requests_forwarded_total" Counter ZERO
+        => "Requests sent to the node that owns the asset";
+    "offbd_samples_in_flight" Gauge Read(|app| Some(app.service.load().samples as f64))
+        => "Samples between arrival and commit";
+    "offbd_samples_in_flight_limit" Gauge
+        Read(|app| Some(app.service.limits().requests.in_flight_samples as f64))
+        => "Limit of these: limits.in_flight_samples";
+    "offbd_samples_reevaluated_total" Counter Later
+        => "Recorded samples evaluated again on loading";
+    "offbd_samples_total" Counter
+        At(0.0, &[("outcome", || vec!["accepted", "duplicate", "rejected", "late"])])
+        => "Samples, by outcome";
+    "offbd_samples_unjudged_total" Counter
+        At(0.0, &[("reason", || each(UnjudgedWord::ALL, UnjudgedWord::as_str))])
+        => "Samples rejected or set aside, by reason";
+    "offbd_scrub_findings_total" Counter Later => "Damage and differences found, by kind";
+    "offbd_scrub_sessions_total" Counter Later => "Sessions that the scrub found in order";
+    "offbd_sessions_expired_total" Counter At(0.0, &[("reason", || vec!["age", "size"])])
+        => "Sessions deleted by retention, by reason";
+    "offbd_shard_queue" Gauge Later => "Commands in the queue of a shard";
+    "offbd_store_writable" Gauge At(1.0, &[]) => "1 if the last commit succeeded";
+    "offbd_streams" Gauge ZERO => "Open WebSockets";
+    "offbd_streams_cut_off_total" Counter ZERO
+        => "WebSockets closed because the client was too slow";
+    "offbd_turned_away_total" Counter At(0.0, &[("queue", || vec!["samples", "shard"])])
+        => "Batches and requests answered with 429, by full queue";
+    "offbd_writer_queue" Gauge Read(|app| Some(app.service.load().writer as f64))
+        => "Write sets in the queue of the writer";
+}
+
+words! {
+    /// What may become of a message of a device.
+    MessageOutcome {
+        Elsewhere = "elsewhere",
+        Taken = "taken",
+        Malformed = "malformed",
+        UnknownAsset = "unknown_asset",
+        Conflict = "conflict",
+        TooLarge = "too_large",
+        Busy = "busy",
+        Unavailable = "unavailable",
+        Topic = "topic",
+        Retained = "retained",
+        Dropped = "dropped",
+    }
+}
 
 /// Bucket bounds of durations, s: a commit to a fast disk takes 1 ms, a request times out
 /// after 60 s.
@@ -151,7 +222,7 @@ pub async fn keep_metrics(closing: CancellationToken) {
 
 fn install() -> Result<PrometheusHandle, BuildError> {
     let mut builder = PrometheusBuilder::new();
-    for &(name, ref kind, _) in METRICS {
+    for &(name, ref kind, ..) in METRICS {
         let name = Matcher::Full(name.to_owned());
         builder = match kind {
             Seconds => builder.set_buckets_for_metric(name, SECONDS)?,
@@ -163,7 +234,7 @@ fn install() -> Result<PrometheusHandle, BuildError> {
 }
 
 fn describe() {
-    for &(name, ref kind, meaning) in METRICS {
+    for &(name, ref kind, meaning, _) in METRICS {
         match kind {
             Counter => describe_counter!(name, meaning),
             Gauge => describe_gauge!(name, meaning),
@@ -174,60 +245,29 @@ fn describe() {
 
 /// Sets every series that is known in advance to its initial value.
 fn initialize_series() {
-    let zero = |name: &'static str, label: &'static str, values: &[&'static str]| {
-        values.iter().for_each(|value| counter!(name, label => *value).absolute(0));
-    };
-    for name in [
-        "offbd_bus_replies_refused_total",
-        "offbd_cold_bytes_total",
-        "offbd_cold_failures_total",
-        "offbd_cold_files_total",
-        "offbd_commit_failures_total",
-        "offbd_commits_overtaken_total",
-        "offbd_commits_total",
-        "offbd_connections_refused_total",
-        "offbd_partitions_handed_over_total",
-        "offbd_partitions_lost_total",
-        "offbd_partitions_taken_total",
-        "offbd_requests_forwarded_total",
-        "offbd_streams_cut_off_total",
-    ] {
-        counter!(name).absolute(0);
-    }
-    zero("offbd_refused_total", "status", &["401", "403", "405", "421", "429", "503"]);
-    zero("offbd_samples_total", "outcome", &["accepted", "duplicate", "rejected", "late"]);
-    let reasons =
-        ["form", "not_finite", "absurd", "conflict", "too_old", "session_ended", "late", "jump"];
-    zero("offbd_samples_unjudged_total", "reason", &reasons);
-    zero("offbd_sessions_expired_total", "reason", &["age", "size"]);
-    zero("offbd_bus_logins_total", "outcome", &["accepted", "refused"]);
-    for bus in ["nats", "mqtt"] {
-        counter!("offbd_bus_faults_total", "bus" => bus).absolute(0);
-        for outcome in BUS_OUTCOMES {
-            counter!("offbd_bus_messages_total", "bus" => bus, "outcome" => outcome).absolute(0);
+    for (name, kind, _, start) in METRICS {
+        let At(value, labels) = *start else { continue };
+        for series in combinations(labels) {
+            match kind {
+                Counter => counter!(*name, series).absolute(0),
+                Gauge => gauge!(*name, series).set(value),
+                Seconds | Sizes => {}
+            }
         }
     }
-    gauge!("offbd_bus_devices_online").set(0.0);
-    zero("offbd_turned_away_total", "queue", &["samples", "shard"]);
-    for code in FaultCode::ALL {
-        for status in FaultStatus::ALL {
-            let (code, status) = (code.as_str(), status.as_str());
-            counter!("offbd_fault_changes_total", "code" => code, "status" => status).absolute(0);
-        }
-    }
-    zero("offbd_deliveries_given_up_total", "channel", &["webhook", "email"]);
-    for channel in ["webhook", "email"] {
-        for result in ["delivered", "failed"] {
-            counter!("offbd_delivery_attempts_total", "channel" => channel, "result" => result)
-                .absolute(0);
-        }
-    }
-    gauge!("offbd_communication_lost").set(0.0);
-    gauge!("offbd_ingest_stalled").set(0.0);
-    gauge!("offbd_journal_bytes").set(0.0);
-    gauge!("offbd_streams").set(0.0);
-    gauge!("offbd_store_writable").set(1.0);
-    gauge!("offbd_build_info", "version" => env!("CARGO_PKG_VERSION")).set(1.0);
+}
+
+/// Returns the labels of every combination of their values.
+fn combinations(labels: &[Label]) -> Vec<Vec<metrics::Label>> {
+    labels.iter().fold(vec![Vec::new()], |all, (key, values)| {
+        let with = |series: &Vec<metrics::Label>, value| {
+            let label = metrics::Label::from_static_parts(key, value);
+            series.iter().cloned().chain([label]).collect()
+        };
+        all.iter()
+            .flat_map(|series| values().into_iter().map(|value| with(series, value)))
+            .collect()
+    })
 }
 
 /// Returns the metrics in the text format of Prometheus.
@@ -256,22 +296,15 @@ fn epochs(owned: &[(u32, i64)]) -> String {
 /// Sets the gauges that are read on each scrape.
 #[expect(clippy::cast_precision_loss, reason = "no queue is as long as 2^52")]
 fn sample_gauges(app: &App) {
-    let load = app.service.load();
-    gauge!("offbd_samples_in_flight").set(load.samples as f64);
-    gauge!("offbd_samples_in_flight_limit").set(app.service.limits().in_flight_samples as f64);
-    gauge!("offbd_assets_rebuilding").set(app.service.n_rebuilding() as f64);
-    gauge!("offbd_assets_untested").set(app.service.n_untested() as f64);
-    let cluster = app.service.cluster(None);
-    gauge!("offbd_cluster_nodes").set(cluster.nodes.len() as f64);
-    gauge!("offbd_partitions_owned").set(app.service.n_partitions_owned() as f64);
-    gauge!("offbd_partitions_unowned").set(cluster.unowned as f64);
-    gauge!("offbd_writer_queue").set(load.writer as f64);
-    for (shard, waiting) in load.shards.iter().enumerate() {
-        gauge!("offbd_shard_queue", "shard" => shard.to_string()).set(*waiting as f64);
+    for (name, .., start) in METRICS {
+        if let Read(value) = start
+            && let Some(value) = value(app)
+        {
+            gauge!(*name).set(value);
+        }
     }
-    gauge!("offbd_bodies_bytes").set(app.budget.used() as f64);
-    if let Some(bytes) = resident_bytes() {
-        gauge!("offbd_process_resident_bytes").set(bytes as f64);
+    for (shard, waiting) in app.service.load().shards.iter().enumerate() {
+        gauge!("offbd_shard_queue", "shard" => shard.to_string()).set(*waiting as f64);
     }
 }
 

@@ -177,8 +177,8 @@ pub(super) async fn import(
     let format = session_format::of_file(&headers)?;
     let options = query.options()?;
     app.service.check_known(&asset).await?;
-    let limits = app.service.limits();
-    let timeout = limits.body_timeout * IMPORT_TIMEOUT_FACTOR;
+    let limits = &app.service.limits().requests;
+    let timeout = limits.body_timeout() * IMPORT_TIMEOUT_FACTOR;
     let read = body::read(body, limits.import_bytes, timeout, &share).await?;
     let (file, limit) = (Cursor::new(read), MAX_IMPORT_ROWS);
     if query.dry_run == Some(true) {

@@ -110,7 +110,7 @@ pub(super) async fn stream(
     let period = query.state.map(period).transpose()?;
     let states = RequestedStates { period, cursor: query.trace.then(TraceCursor::default) };
     let events = app.service.events(Some(asset.clone()), query.after).await?;
-    let frame = app.service.limits().batch_bytes;
+    let frame = app.service.limits().requests.batch_bytes;
     let upgrade = upgrade
         .max_frame_size(frame)
         .max_message_size(frame)
@@ -386,7 +386,7 @@ impl StreamConnection {
             return self.send_messages(vec![text(&StreamFrameView::Error(refused))]).await;
         }
         let parsed = self.share.reserve(document.len()).and_then(|bytes| {
-            let batch = format.parse(document, self.app.service.limits().batch_samples)?;
+            let batch = format.parse(document, self.app.service.limits().requests.batch_samples)?;
             Ok((batch, bytes))
         });
         match parsed {

@@ -72,8 +72,8 @@ pub(super) async fn post(
     body: Body,
 ) -> Result<Json<AckView>, Problem> {
     let format = format(&headers)?;
-    let limits = app.service.limits();
-    let read = body::read(body, limits.batch_bytes, limits.body_timeout, &share).await?;
+    let limits = &app.service.limits().requests;
+    let read = body::read(body, limits.batch_bytes, limits.body_timeout(), &share).await?;
     let mut batch = format.parse(&read.bytes, limits.batch_samples)?;
     drop(read);
     batch.session = session_name(batch.session, query.session)?;

@@ -8,29 +8,31 @@ use rayon::prelude::*;
 
 use super::labels::{Label, class, labelled};
 use super::simulate::write_session;
+use offbd_core::vocabulary::Axis;
 use offbd_file_cli::calibrate::write_asset;
 use offbd_file_cli::replay::progress;
-use offbd_lab::simulation::{Disturbances, Fault, Preset, Reference, SimulatedRig};
+use offbd_lab::simulation::{
+    BallFault, Disturbances, Fault, FaultEffect, Preset, Reference, SensorFault, ServoFault,
+    SimulatedRig,
+};
 use offbd_terminal::output;
 
-/// The faults of a corpus, without their onsets.
-const FAULTS: [&str; 15] = [
-    "y_servo:hold",
-    "x_servo:dead",
-    "x_servo:gain",
-    "y_servo:reversed",
-    "x_servo:offset",
-    "y_servo:slow",
-    "x_servo:intermittent",
-    "stuck_ball:glued",
-    "stuck_ball:sticky",
-    "sensor:freeze",
-    "sensor:freeze_axis=y",
-    "sensor:dropout",
-    "sensor:noise",
-    "sensor:spikes",
-    "sensor:jump",
-];
+/// The axis of each fault of a servo in a corpus, again from the first where there are more.
+/// Chosen: both axes occur with about as many faults.
+const SERVO_AXES: [Axis; 7] = [Axis::Y, Axis::X, Axis::X, Axis::Y, Axis::X, Axis::Y, Axis::X];
+
+/// Returns the faults of a corpus: every one, with its default size, and along y if it is on
+/// either axis of the sensor.
+fn faults() -> impl Iterator<Item = FaultEffect> {
+    let servo = ServoFault::all().into_iter().zip(SERVO_AXES.into_iter().cycle());
+    let sensor = SensorFault::all().into_iter().map(|fault| match fault {
+        SensorFault::FreezeAxis(_) => SensorFault::FreezeAxis(Axis::Y),
+        fault => fault,
+    });
+    let servo = servo.map(|(fault, axis)| FaultEffect::Servo(axis, fault));
+    let ball = BallFault::all().into_iter().map(FaultEffect::Ball);
+    servo.chain(ball).chain(sensor.map(FaultEffect::Sensor))
+}
 
 /// Duration of a calibration session, s; chosen: enough for a reliable calibration.
 const CALIBRATION_S: f64 = 120.0;
@@ -49,7 +51,7 @@ struct CorpusSession {
     reference: Reference,
     seconds: f64,
     disturbances: Disturbances,
-    fault: Option<String>,
+    fault: Option<Fault>,
     seed: u64,
 }
 
@@ -83,7 +85,7 @@ pub(super) fn write(dir: &Path, seconds: f64, seed: u64) -> anyhow::Result<()> {
 fn plans(preset: Preset, seconds: f64, seed: u64) -> Vec<CorpusSession> {
     let n_rig = preset as u64 + 1;
     let plan =
-        |file: String, n: usize, fault: Option<String>, pushes_per_minute: f64| CorpusSession {
+        |file: String, n: usize, fault: Option<Fault>, pushes_per_minute: f64| CorpusSession {
             preset,
             file,
             reference: if n == 0 { Reference::Lissajous } else { Reference::ALL[(n + 1) % 4] },
@@ -99,10 +101,11 @@ fn plans(preset: Preset, seconds: f64, seed: u64) -> Vec<CorpusSession> {
     for i in 0..N_HEALTHY {
         all.push(plan(format!("{i:03}.csv"), 1 + i, None, 2.0));
     }
-    for (i, words) in FAULTS.iter().enumerate() {
+    for (i, effect) in faults().enumerate() {
         let spread = ((i + 1) as f64 * GOLDEN).fract();
         let share = ONSET_SHARE[0] + (ONSET_SHARE[1] - ONSET_SHARE[0]) * spread;
-        let fault = format!("{words}@{:.3}", share * seconds);
+        let onset_s = (share * seconds * 1e3).round() / 1e3;
+        let fault = Fault { effect, onset_s, end_s: None };
         all.push(plan(format!("{:03}.csv", 100 + i), 1 + N_HEALTHY + i, Some(fault), 0.0));
     }
     all
@@ -112,8 +115,7 @@ impl CorpusSession {
     fn write(&self, dir: &Path) -> anyhow::Result<Label> {
         let model = self.preset.model()?;
         let mut rig = SimulatedRig::new(model, self.reference, self.disturbances, self.seed)?;
-        let fault = self.fault.as_deref().map(str::parse::<Fault>).transpose()?;
-        fault.into_iter().for_each(|fault| rig.inject(fault));
+        self.fault.into_iter().for_each(|fault| rig.inject(fault));
         let samples = rig.record(self.seconds);
         let folder = self.preset.as_str();
         write_session(&dir.join(folder).join(&self.file), &samples, false)?;

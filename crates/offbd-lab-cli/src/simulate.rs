@@ -13,7 +13,10 @@ use super::labels::{Label, class, labelled};
 use offbd_core::vocabulary::{Axis, Invalid, Sample};
 use offbd_file_cli::calibrate::write_asset;
 use offbd_file_cli::judge;
-use offbd_lab::simulation::{Fault, Preset, Reference, RigModel, SimulatedRig, Transport, Variety};
+use offbd_lab::simulation::{
+    BallFault, Fault, Preset, Reference, RigModel, SensorFault, ServoFault, SimulatedRig,
+    Transport, Variety,
+};
 use offbd_terminal::errors::BadArgument;
 use offbd_terminal::output::{self, value_parser};
 use offbd_wire::session_csv;
@@ -24,25 +27,7 @@ use options::{LineArgs, RigArgs, SensorArgs};
 /// Equal seeds give equal bytes. A fault is CODE:KIND[=SIZE]@START[-END] with
 /// times in seconds.
 #[derive(Clone, Debug, Args)]
-#[command(
-    allow_negative_numbers = true,
-    after_help = "Faults (sizes have defaults):\n  \
-    x_servo, y_servo  hold, dead, gain=FACTOR, reversed, offset=RAD,\n                    \
-    slow=FACTOR, intermittent\n  \
-    stuck_ball        glued, sticky=RAD\n  \
-    sensor            freeze, freeze_axis=x|y, dropout=SHARE, noise=FACTOR,\n                    \
-    spikes=SHARE, jump=X_M[,Y_M]\n\n\
-    Examples:\n  \
-    offbd simulate --rig rig.json --reference circle -o healthy.csv\n  \
-    offbd simulate --fault y_servo:gain=0.5@20 --truth truth.json -o weak.csv\n  \
-    offbd simulate --preset touch --fault sensor:freeze@15-25 -o frozen.csv\n  \
-    offbd simulate --rig-seed 7 --seed 3 -o tuesday.csv
-  \
-    offbd simulate --level-deg -0.8,1.2 --whole-degrees --hold-rows 3 -o real.csv
-  \
-    offbd simulate --late 0.1 --duplicates 0.05 --gap 12-14 --seq -o bad-line.csv\n  \
-    offbd simulate --corpus mycorpus && offbd score mycorpus"
-)]
+#[command(allow_negative_numbers = true, after_help = help())]
 pub struct SimulateArgs {
     /// Kind of rig: its servos, surface, sensor and controller
     #[arg(long, default_value = "chapter", conflicts_with = "rig_seed",
@@ -86,6 +71,42 @@ pub struct SimulateArgs {
     sensor: SensorArgs,
     #[command(flatten)]
     line: LineArgs,
+}
+
+const EXAMPLES: &str = "\
+    Examples:\n  \
+    offbd simulate --rig rig.json --reference circle -o healthy.csv\n  \
+    offbd simulate --fault y_servo:gain=0.5@20 --truth truth.json -o weak.csv\n  \
+    offbd simulate --preset touch --fault sensor:freeze@15-25 -o frozen.csv\n  \
+    offbd simulate --rig-seed 7 --seed 3 -o tuesday.csv\n  \
+    offbd simulate --level-deg -0.8,1.2 --whole-degrees --hold-rows 3 -o real.csv\n  \
+    offbd simulate --late 0.1 --duplicates 0.05 --gap 12-14 --seq -o bad-line.csv\n  \
+    offbd simulate --corpus mycorpus && offbd score mycorpus";
+
+/// Longest line of the list of faults.
+const HELP_COLUMNS: usize = 78;
+
+/// Returns the faults with their sizes, and examples.
+fn help() -> String {
+    let components = [
+        ("x_servo, y_servo", ServoFault::usages()),
+        ("stuck_ball", BallFault::usages()),
+        ("sensor", SensorFault::usages()),
+    ];
+    let mut help = "Faults (sizes have defaults):".to_owned();
+    for (component, faults) in components {
+        let mut line = format!("\n  {component:<17}");
+        for (i, fault) in faults.iter().enumerate() {
+            let end = if i + 1 < faults.len() { "," } else { "" };
+            if line.trim_start_matches('\n').len() + 1 + fault.len() + end.len() > HELP_COLUMNS {
+                help += &line;
+                line = format!("\n{:19}", "");
+            }
+            line += &format!(" {fault}{end}");
+        }
+        help += &line;
+    }
+    help + "\n\n" + EXAMPLES
 }
 
 /// Longest session, s; chosen: a day.

@@ -94,7 +94,7 @@ pub use cluster::Route;
 pub use cold_files::cold_directory;
 pub use communication::CommunicationSettings;
 pub use error::ServiceError;
-pub use limits::{Limits, RETRY_AFTER_S, Retention, SessionLimits};
+pub use limits::{Limits, OutOfRange, RETRY_AFTER_S, RequestLimits, Retention, WorkerLimits};
 pub use notifications::settings::key as webhook_key;
 pub use notifications::{
     NotificationSettings, NotificationTransport, Notifier, SendOutcome, TargetPolicy,

@@ -5,37 +5,120 @@ use std::time::Duration;
 use super::{CommunicationSettings, NotificationSettings, ServiceError};
 use offbd_core::vocabulary::Invalid;
 
-/// The configurable limits.
+/// A value of the configuration that is out of its range.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct OutOfRange {
+    pub key: &'static str,
+    pub reason: String,
+}
+
+/// Defines a section of the configuration from a row for each key: its type, its default and
+/// its range, which may depend on the other values of the section (`$this`).
+#[macro_export]
+macro_rules! config_section {
+    ($(#[$doc:meta])* $name:ident as $section:literal |$this:ident| { $(
+        $(#[$vdoc:meta])* $key:ident: $type:ty = $default:expr, $range:expr;
+    )+ }) => {
+        $(#[$doc])*
+        #[derive(Clone, Debug, PartialEq, Eq, ::serde::Deserialize)]
+        #[serde(deny_unknown_fields, default)]
+        pub struct $name { $($(#[$vdoc])* pub $key: $type),+ }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self { $($key: $default),+ }
+            }
+        }
+
+        impl $name {
+            /// The keys in the configuration.
+            pub const KEYS: &'static [&'static str] =
+                &[$(concat!($section, ".", stringify!($key))),+];
+
+            /// Checks the ranges.
+            ///
+            /// # Errors
+            /// The first key whose value is out of its range.
+            pub fn check(&self) -> Result<(), $crate::OutOfRange> {
+                let $this = self;
+                $(
+                    let (value, range) = ($this.$key, $range);
+                    if !range.contains(&value) {
+                        let (least, most) = (range.start(), range.end());
+                        let key = concat!($section, ".", stringify!($key));
+                        let reason = format!("is {value}; it must be from {least} to {most}");
+                        return Err($crate::OutOfRange { key, reason });
+                    }
+                )+
+                Ok(())
+            }
+        }
+    };
+}
+
+config_section! {
+    /// Limits of requests, memory and connections.
+    RequestLimits as "limits" |limits| {
+        /// Samples in a batch; a longer batch is refused.
+        batch_samples: usize = 10_000, 1..=1_000_000;
+        /// Bytes of a batch; a longer batch is refused.
+        batch_bytes: usize = 4 << 20, 1024..=1 << 30;
+        /// Bytes of an imported file; a longer file is refused.
+        import_bytes: usize = 64 << 20, 1024..=1 << 30;
+        /// Bytes of all request bodies in memory at a time.
+        bodies_bytes: usize = 256 << 20, 1024..=1 << 34;
+        /// Assets in the registry; at the limit a new asset is refused.
+        assets: usize = 10_000, 1..=1_000_000;
+        /// Samples between arrival and commit; at the limit a batch is refused with
+        /// [`ServiceError::Busy`].
+        in_flight_samples: usize = 500_000, limits.batch_samples..=100_000_000;
+        /// Bytes of the journal, which are also held in memory. Above this, the oldest entries
+        /// are folded into the recordings after each commit; the journal stays below twice
+        /// this.
+        journal_bytes: usize = 16 << 20, 1..=1 << 30;
+        /// Recorded samples from which on a session continues in another one. Chosen: at least
+        /// a day at 100 Hz. It is not a time, because a clock that is set must not divide a
+        /// session.
+        session_samples: usize = 10_000_000, 1000..=1_000_000_000;
+        /// Time limit to receive a request body, s; then the request is answered with 408.
+        body_timeout_s: u64 = 30, 1..=3600;
+        /// Longest time for a graceful stop, s.
+        shutdown_s: u64 = 20, 1..=3600;
+        /// Longest time for the TLS handshake, and for the head of each request to arrive, s;
+        /// then the connection is closed.
+        header_timeout_s: u64 = 30, 1..=3600;
+        /// Longest time for which a client may stop reading, s; then the connection is closed.
+        write_timeout_s: u64 = 30, 1..=3600;
+        /// Connections at a time; further ones are closed at once.
+        connections: usize = 16_384, 1..=1_000_000;
+        /// Connections of one address at a time; further ones are closed at once.
+        connections_per_address: usize = 4096, 1..=1_000_000;
+    }
+}
+
+config_section! {
+    /// Threads and queues.
+    WorkerLimits as "workers" |_this| {
+        /// Threads that run engines.
+        shards: usize = std::thread::available_parallelism().map_or(2, usize::from).clamp(1, 16),
+            1..=256;
+        /// Commands in the queue of a shard; at the limit a request is refused with
+        /// [`ServiceError::Busy`].
+        queue: usize = 256, 1..=100_000;
+        /// Replays and calibrations that run at a time; others wait in the queue.
+        jobs: usize = 1, 1..=256;
+    }
+}
+
+/// The limits of the service.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// Threads that run engines.
-    pub shards: usize,
-    /// Replays and calibrations that run at a time; others wait in the queue.
-    pub jobs: usize,
-    /// Commands in the queue of a shard; at the limit a request is refused with
-    /// [`ServiceError::Busy`].
-    pub shard_queue: usize,
+    pub requests: RequestLimits,
+    pub workers: WorkerLimits,
     /// Write sets in the queue of the writer; at the limit the shards wait.
     pub commit_queue: usize,
-    /// Samples between arrival and commit; at the limit a batch is refused with
-    /// [`ServiceError::Busy`].
-    pub in_flight_samples: usize,
-    /// Bytes of the journal, which are also held in memory. Above this, the oldest entries
-    /// are folded into the recordings after each commit; the journal stays below twice
-    /// this.
-    pub journal_bytes: usize,
-    /// How long sessions may be.
-    pub sessions: SessionLimits,
-    /// Samples in a batch; a longer batch is refused.
-    pub batch_samples: usize,
-    /// Bytes of a batch; a longer batch is refused.
-    pub batch_bytes: usize,
-    /// Bytes of an imported file; a longer file is refused.
-    pub import_bytes: usize,
-    /// Assets in the registry; at the limit a new asset is refused.
-    pub assets: usize,
-    /// Time limit to receive a request body; then the request is answered with 408.
-    pub body_timeout: Duration,
+    /// Samples between two snapshots of an engine, which a restart has to evaluate again.
+    pub snapshot_interval: i64,
     /// How long recordings are kept.
     pub retention: Retention,
     /// Age at which the samples of an ended session leave the database, if there is a directory
@@ -48,20 +131,14 @@ pub struct Limits {
 }
 
 impl Default for Limits {
+    /// Chosen. To evaluate as many samples as between two snapshots takes some 20 ms, and the
+    /// snapshots, of about 15 kB each, take a tenth of the space of the samples.
     fn default() -> Self {
         Self {
-            shards: std::thread::available_parallelism().map_or(2, usize::from).clamp(1, 16),
-            jobs: 1,
-            shard_queue: 256,
+            requests: RequestLimits::default(),
+            workers: WorkerLimits::default(),
             commit_queue: 1024,
-            in_flight_samples: 500_000,
-            journal_bytes: 16 << 20,
-            sessions: SessionLimits::default(),
-            batch_samples: 10_000,
-            batch_bytes: 4 << 20,
-            import_bytes: 64 << 20,
-            assets: 10_000,
-            body_timeout: Duration::from_secs(30),
+            snapshot_interval: 16_384,
             retention: Retention::default(),
             cold_after: None,
             communication: CommunicationSettings::default(),
@@ -70,29 +147,30 @@ impl Default for Limits {
     }
 }
 
-impl Limits {
+impl RequestLimits {
     /// Returns the number of samples in the longest batch that is accepted.
     pub(super) fn longest_batch(&self) -> usize {
         self.batch_samples.min(self.in_flight_samples)
     }
+
+    /// Returns the time limit to receive a request body.
+    #[must_use]
+    pub const fn body_timeout(&self) -> Duration {
+        Duration::from_secs(self.body_timeout_s)
+    }
 }
 
 /// How long sessions may be, and how often the state of their engines is stored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SessionLimits {
-    /// Recorded samples from which on a session continues in another one.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SessionLimits {
     pub samples: i64,
-    /// Samples between two snapshots of an engine, which a restart has to evaluate again.
     pub snapshot_interval: i64,
 }
 
-impl Default for SessionLimits {
-    /// Chosen. A session has at least a day at 100 Hz. The limit is not a time, because a clock
-    /// that is set must not divide a session. To evaluate as many samples as between two
-    /// snapshots takes some 20 ms, and the snapshots, of about 15 kB each, take a tenth of the
-    /// space of the samples.
-    fn default() -> Self {
-        Self { samples: 10_000_000, snapshot_interval: 16_384 }
+impl SessionLimits {
+    pub(super) fn of(limits: &Limits) -> Self {
+        let samples = i64::try_from(limits.requests.session_samples).unwrap_or(i64::MAX);
+        Self { samples, snapshot_interval: limits.snapshot_interval }
     }
 }
 

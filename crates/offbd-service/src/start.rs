@@ -211,7 +211,7 @@ impl WayToWriter {
             reasons: Reasons::default(),
             n_commits: n_commits.clone(),
             closing: closing.clone(),
-            journal_bytes: limits.journal_bytes,
+            journal_bytes: limits.requests.journal_bytes,
             first_retry: FIRST_RETRY,
         };
         let handles = Handles::new(store, clock, limits, ownership, sets, outage, closing);
@@ -282,12 +282,12 @@ impl Service {
         };
         let (queues, shards, loader) = Shards::new(&limits, &env);
         let deleter = Deleter::new(handles.clone());
-        let quota = AssetQuota::new(limits.assets);
-        let in_flight = Arc::new(Semaphore::new(limits.in_flight_samples));
+        let quota = AssetQuota::new(limits.requests.assets);
+        let in_flight = Arc::new(Semaphore::new(limits.requests.in_flight_samples));
         let stalled = Arc::new(AtomicBool::new(false));
         let watchdog = Watchdog {
             in_flight: in_flight.clone(),
-            max_in_flight: limits.in_flight_samples,
+            max_in_flight: limits.requests.in_flight_samples,
             n_commits,
             stalled: stalled.clone(),
             closing: handles.closing.clone(),
@@ -300,8 +300,11 @@ impl Service {
             shards: queues.clone(),
             lost,
         });
-        let communication =
-            CommunicationWatch::new(handles.clone(), presences.clone(), limits.communication);
+        let communication = CommunicationWatch::new(
+            handles.clone(),
+            presences.clone(),
+            limits.communication.clone(),
+        );
         let parts = Parts { committer, shards, loader, upkeep, node, communication };
         let inner = Inner {
             job_context: JobContext::new(handles.clone(), queues.clone()),
@@ -368,7 +371,7 @@ impl Service {
                 tracing::error!(asset, %error, "cannot load the asset");
             }
         };
-        stream::iter(&behind).for_each_concurrent(limits.shards, load).await;
+        stream::iter(&behind).for_each_concurrent(limits.workers.shards, load).await;
         if !behind.is_empty() {
             tracing::info!(n_assets = behind.len(), "all engines are rebuilt");
         }

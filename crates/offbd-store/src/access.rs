@@ -1,5 +1,6 @@
 //! Tables of tokens, logins and the audit log.
 
+use super::execute::execute;
 use super::from_row::from_row;
 use sqlx::AnyConnection;
 
@@ -105,16 +106,12 @@ impl AccessWrite {
                 stamp(db, "UPDATE token SET last_used_at = $2 WHERE id = $1", id, *at).await
             }
             Self::Login { hash, token, at, expires_at } => {
-                sqlx::query("DELETE FROM login WHERE expires_at <= $1")
-                    .bind(at)
-                    .execute(&mut *db)
-                    .await?;
+                execute!(&mut *db, "DELETE FROM login WHERE expires_at <= $1"; at)?;
                 make_room(db, token).await?;
                 login(db, hash, token, *expires_at).await
             }
             Self::Logout { hash } => {
-                sqlx::query("DELETE FROM login WHERE hash = $1").bind(hash).execute(db).await?;
-                Ok(())
+                execute!(db, "DELETE FROM login WHERE hash = $1"; hash)
             }
             Self::Audit(row) => audit(db, row).await,
         }
@@ -127,39 +124,25 @@ async fn stamp(
     key: &str,
     at: Micros,
 ) -> Result<(), StoreError> {
-    sqlx::query(sql).bind(key).bind(at).execute(db).await?;
-    Ok(())
+    execute!(db, sql; key, at)
 }
 
 async fn create_token(db: &mut AnyConnection, row: &TokenRow) -> Result<(), StoreError> {
-    sqlx::query(
-        "INSERT INTO token (id, hash, name, role, asset, created_at, created_by, expires_at)
-         VALUES ($1, $2, $3, $4, $5, $6, $7, $8)",
+    execute!(
+        db, "INSERT INTO token (id, hash, name, role, asset, created_at, created_by, expires_at)
+         VALUES ($1, $2, $3, $4, $5, $6, $7, $8)";
+        &row.id, &row.hash, &row.name, &row.role, &row.asset, row.created_at, &row.created_by,
+        row.expires_at
     )
-    .bind(&row.id)
-    .bind(&row.hash)
-    .bind(&row.name)
-    .bind(&row.role)
-    .bind(&row.asset)
-    .bind(row.created_at)
-    .bind(&row.created_by)
-    .bind(row.expires_at)
-    .execute(db)
-    .await?;
-    Ok(())
 }
 
 /// Deletes the oldest logins of `token`, so that there is room for one more.
 async fn make_room(db: &mut AnyConnection, token: &str) -> Result<(), StoreError> {
-    sqlx::query(
-        "DELETE FROM login WHERE token = $1 AND hash NOT IN
-         (SELECT hash FROM login WHERE token = $1 ORDER BY expires_at DESC LIMIT $2)",
+    execute!(
+        db, "DELETE FROM login WHERE token = $1 AND hash NOT IN
+         (SELECT hash FROM login WHERE token = $1 ORDER BY expires_at DESC LIMIT $2)";
+        token, MAX_LOGINS - 1
     )
-    .bind(token)
-    .bind(MAX_LOGINS - 1)
-    .execute(db)
-    .await?;
-    Ok(())
 }
 
 async fn login(
@@ -168,30 +151,18 @@ async fn login(
     token: &str,
     expires_at: Micros,
 ) -> Result<(), StoreError> {
-    sqlx::query("INSERT INTO login (hash, token, expires_at) VALUES ($1, $2, $3)")
-        .bind(hash)
-        .bind(token)
-        .bind(expires_at)
-        .execute(db)
-        .await?;
-    Ok(())
+    execute!(
+        db, "INSERT INTO login (hash, token, expires_at) VALUES ($1, $2, $3)";
+        hash, token, expires_at
+    )
 }
 
 async fn audit(db: &mut AnyConnection, row: &AuditRow) -> Result<(), StoreError> {
-    sqlx::query(
-        "INSERT INTO audit (id, at, actor, token, act, target, address)
-         VALUES ($1, $2, $3, $4, $5, $6, $7)",
+    execute!(
+        db, "INSERT INTO audit (id, at, actor, token, act, target, address)
+         VALUES ($1, $2, $3, $4, $5, $6, $7)";
+        &row.id, row.at, &row.actor, &row.token, &row.act, &row.target, &row.address
     )
-    .bind(&row.id)
-    .bind(row.at)
-    .bind(&row.actor)
-    .bind(&row.token)
-    .bind(&row.act)
-    .bind(&row.target)
-    .bind(&row.address)
-    .execute(db)
-    .await?;
-    Ok(())
 }
 
 impl Store {

@@ -7,7 +7,7 @@ use sqlx::{AnyConnection, AssertSqlSafe, Connection, Executor};
 
 use super::check::{check_copy, check_pages};
 use super::cold::{self, ColdDirectory};
-use super::location::{create_private, file_url, sync_directory_of};
+use super::file::{create_private, file_url, sync_directory_of};
 use super::page_checksums::{self, open};
 use super::{Location, MIGRATIONS, StoreError};
 

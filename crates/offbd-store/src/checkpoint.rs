@@ -17,7 +17,7 @@ use sqlx::{AnyConnection, Connection};
 use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
 
-use super::write::WriterRole;
+use super::writer_lock::WriterRole;
 use super::{Location, StoreError};
 
 /// Pages in the log (64 MiB) at which a commit of the writer copies it after all, which

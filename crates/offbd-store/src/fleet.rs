@@ -112,7 +112,7 @@ mod tests {
 
     use super::*;
     use crate::Location;
-    use crate::location::file_url;
+    use crate::file::file_url;
 
     /// Two assets with `$1` sessions each, which have warnings for both axes.
     const HISTORY: &str = "

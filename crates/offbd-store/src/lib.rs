@@ -29,7 +29,9 @@ mod check;
 mod checkpoint;
 pub mod codec;
 mod cold;
+mod execute;
 mod expiry;
+mod file;
 mod fleet;
 mod from_row;
 mod journal;
@@ -77,7 +79,8 @@ pub use notification::{
 pub use notifications::{Notification, Notifications};
 pub use page_checksums::install_drivers;
 pub use partition::{
-    EVENTS, MAX_PARTITIONS, PartitionId, PartitionRow, Partitions, TRANSFERS, subject_token,
+    EVENTS, MAX_PARTITIONS, NodeIdentity, NodeRow, PartitionId, PartitionRow, Partitions,
+    TRANSFERS, subject_token,
 };
 pub use present::PresentFaultRow;
 pub use read::{AssetFilter, FaultFilter, FaultOrder, SessionFilter};
@@ -85,13 +88,13 @@ pub use recording::RecordingReader;
 pub use remark::{RemarkRow, RemarkWrite};
 pub use rows::{
     ActionKind, ActionRow, AssetRow, CalibrationRow, EventRow, FaultRow, Micros, ReplayRow,
-    SessionProgress, SessionRow, TransitionRow, TrendEntry, TrendRow, WarningRow,
+    SessionEnd, SessionProgress, SessionRow, TransitionRow, TrendEntry, TrendRow, WarningRow,
 };
 pub use session_inputs::SessionInputs;
 pub use snapshot::Snapshot;
 pub use tag::TagsByAsset;
 pub use tail::{FULL_CHUNK_SAMPLES, MAX_TAIL_CHUNKS};
-pub use write::{ChangeSet, NodeIdentity, NodeRow, Write, Writer};
+pub use write::{ChangeSet, Write, Writer};
 #[cfg(feature = "commit-faults")]
 pub use write::{CommitFault, CommitPoint, FaultPlan};
 

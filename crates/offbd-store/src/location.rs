@@ -5,22 +5,20 @@
 //! `checkpoint.rs` and `backup.rs` (SQLite only), and in the error codes of `mod.rs`.
 
 use std::fmt;
-use std::fs::{File, OpenOptions};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
 
-use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, percent_encode};
 use sqlx::any::{AnyConnectOptions, AnyPoolOptions};
 use sqlx::postgres::PgConnectOptions;
 use sqlx::{AnyConnection, AnyPool, AssertSqlSafe, ConnectOptions, Connection, Executor};
 
 use super::StoreError;
 use super::checkpoint::{self, AUTOCHECKPOINT_PAGES};
+use super::file::{file_url, sync_directory_of};
 use super::log_damage::check_log;
 use super::page_checksums::{self, install_drivers};
-use super::write::WriterRole;
-use super::writer_lock::{self, Backend, LockMode};
+use super::writer_lock::{self, Backend, LockMode, WriterRole};
 
 /// Connections for reading; a reader without one waits.
 const MAX_READERS: u32 = 4;
@@ -244,49 +242,6 @@ async fn is_answering(connection: &mut AnyConnection) -> sqlx::Result<bool> {
     let late = |_| sqlx::Error::Io(std::io::ErrorKind::TimedOut.into());
     let ping = Connection::ping(connection);
     tokio::time::timeout(RELEASE_TIMEOUT, ping).await.map_err(late)?.map(|()| true)
-}
-
-/// Options to write a file that only its owner can read once it is created.
-pub(super) fn private_file() -> OpenOptions {
-    let mut options = OpenOptions::new();
-    options.write(true);
-    #[cfg(unix)]
-    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
-    options
-}
-
-/// Creates `file` if it is missing, readable by its owner only; SQLite gives its other
-/// files the same permissions.
-pub(super) fn create_private(file: &Path) -> Result<(), StoreError> {
-    match private_file().create_new(true).open(file) {
-        Err(error) if error.kind() != std::io::ErrorKind::AlreadyExists => {
-            Err(StoreError::File { file: file.to_owned(), source: error })
-        }
-        _ => Ok(()),
-    }
-}
-
-/// Returns once the names in the directory of `file` are on the disk.
-///
-/// # Errors
-/// [`StoreError::Directory`].
-pub(super) fn sync_directory_of(file: &Path) -> Result<(), StoreError> {
-    let directory = file.parent().filter(|directory| !directory.as_os_str().is_empty());
-    let directory = directory.unwrap_or(Path::new("."));
-    // Other systems cannot open a directory as a file.
-    let synced = if cfg!(unix) { File::open(directory).and_then(|d| d.sync_all()) } else { Ok(()) };
-    synced.map_err(|source| StoreError::Directory { directory: directory.to_owned(), source })
-}
-
-/// What is not escaped in a path.
-const UNESCAPED: &AsciiSet = &NON_ALPHANUMERIC.remove(b'/').remove(b'-').remove(b'.').remove(b'_');
-
-/// The URL of a file, with the mode `rw`, or `rwc` to create a missing file. Its pages are
-/// read with their checksums. Bytes with a meaning in a URL are escaped.
-pub(super) fn file_url(file: &Path, mode: &str) -> Result<String, StoreError> {
-    let file = std::path::absolute(file).map_err(sqlx::Error::Io)?;
-    let path = percent_encode(file.as_os_str().as_encoded_bytes(), UNESCAPED);
-    Ok(format!("sqlite://{path}?mode={mode}&vfs={}", sqlite_checksums::VFS))
 }
 
 async fn within<T>(connect: impl Future<Output = Result<T, StoreError>>) -> Result<T, StoreError> {

@@ -4,6 +4,7 @@ use std::fmt;
 
 use sqlx::AnyConnection;
 
+use super::execute::execute;
 use super::from_row::from_row;
 use super::query_builder::QueryBuilder;
 use super::{Micros, Store, StoreError};
@@ -149,13 +150,10 @@ impl NotificationWrite {
         match self {
             Self::CreateChannel(row) => create_channel(db, row).await,
             Self::UpdateChannel { id, name, document } => {
-                sqlx::query("UPDATE channel SET name = $2, document = $3 WHERE id = $1")
-                    .bind(id)
-                    .bind(name)
-                    .bind(document)
-                    .execute(db)
-                    .await?;
-                Ok(())
+                execute!(
+                    db, "UPDATE channel SET name = $2, document = $3 WHERE id = $1";
+                    id, name, document
+                )
             }
             Self::DeleteChannel { id } => delete(db, "DELETE FROM channel WHERE id = $1", id).await,
             Self::PutRule(row) => put_rule(db, row).await,
@@ -165,13 +163,10 @@ impl NotificationWrite {
             }
             Self::PutReminder(row) => put_reminder(db, row).await,
             Self::DeleteReminder { rule, asset, code } => {
-                sqlx::query("DELETE FROM reminder WHERE rule = $1 AND asset = $2 AND code = $3")
-                    .bind(rule)
-                    .bind(asset)
-                    .bind(code)
-                    .execute(db)
-                    .await?;
-                Ok(())
+                execute!(
+                    db, "DELETE FROM reminder WHERE rule = $1 AND asset = $2 AND code = $3";
+                    rule, asset, code
+                )
             }
             Self::Attempted(row) => attempted(db, row).await,
         }
@@ -179,37 +174,24 @@ impl NotificationWrite {
 }
 
 async fn delete(db: &mut AnyConnection, sql: &'static str, id: &str) -> Result<(), StoreError> {
-    sqlx::query(sql).bind(id).execute(db).await?;
-    Ok(())
+    execute!(db, sql; id)
 }
 
 async fn create_channel(db: &mut AnyConnection, row: &ChannelRow) -> Result<(), StoreError> {
-    sqlx::query(
-        "INSERT INTO channel (id, name, document, position, created_at)
-         SELECT $1, $2, $3, value, $4 FROM counter WHERE name = 'event'",
+    execute!(
+        db, "INSERT INTO channel (id, name, document, position, created_at)
+         SELECT $1, $2, $3, value, $4 FROM counter WHERE name = 'event'";
+        &row.id, &row.name, &row.document, row.created_at
     )
-    .bind(&row.id)
-    .bind(&row.name)
-    .bind(&row.document)
-    .bind(row.created_at)
-    .execute(db)
-    .await?;
-    Ok(())
 }
 
 async fn put_rule(db: &mut AnyConnection, row: &RuleRow) -> Result<(), StoreError> {
-    sqlx::query(
-        "INSERT INTO rule (id, channel, document, created_at) VALUES ($1, $2, $3, $4)
+    execute!(
+        db, "INSERT INTO rule (id, channel, document, created_at) VALUES ($1, $2, $3, $4)
          ON CONFLICT (id) DO UPDATE SET channel = excluded.channel,
-         document = excluded.document",
+         document = excluded.document";
+        &row.id, &row.channel, &row.document, row.created_at
     )
-    .bind(&row.id)
-    .bind(&row.channel)
-    .bind(&row.document)
-    .bind(row.created_at)
-    .execute(db)
-    .await?;
-    Ok(())
 }
 
 async fn plan(
@@ -236,72 +218,41 @@ async fn plan(
 }
 
 async fn insert_delivery(db: &mut AnyConnection, row: &DeliveryRow) -> Result<(), StoreError> {
-    sqlx::query(
-        "INSERT INTO delivery (id, channel, event, n, asset, message, state, body, attempts,
+    execute!(
+        db, "INSERT INTO delivery (id, channel, event, n, asset, message, state, body, attempts,
          created_at, due_at) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11)
-         ON CONFLICT (channel, event, n) DO NOTHING",
+         ON CONFLICT (channel, event, n) DO NOTHING";
+        &row.id, &row.channel, row.event, row.n, &row.asset, &row.message, &row.state, &row.body,
+        row.attempts, row.created_at, row.due_at
     )
-    .bind(&row.id)
-    .bind(&row.channel)
-    .bind(row.event)
-    .bind(row.n)
-    .bind(&row.asset)
-    .bind(&row.message)
-    .bind(&row.state)
-    .bind(&row.body)
-    .bind(row.attempts)
-    .bind(row.created_at)
-    .bind(row.due_at)
-    .execute(db)
-    .await?;
-    Ok(())
 }
 
 async fn put_reminder(db: &mut AnyConnection, row: &ReminderRow) -> Result<(), StoreError> {
     // Rule and asset may have been deleted meanwhile.
-    sqlx::query(
-        "INSERT INTO reminder (rule, asset, code, event, n, body, due_at)
+    execute!(
+        db, "INSERT INTO reminder (rule, asset, code, event, n, body, due_at)
          SELECT rule.id, asset.name, $3, $4, $5, $6, $7 FROM rule, asset
          WHERE rule.id = $1 AND asset.name = $2
          ON CONFLICT (rule, asset, code) DO UPDATE SET event = excluded.event, n = excluded.n,
-         body = excluded.body, due_at = excluded.due_at",
+         body = excluded.body, due_at = excluded.due_at";
+        &row.rule, &row.asset, &row.code, row.event, row.n, &row.body, row.due_at
     )
-    .bind(&row.rule)
-    .bind(&row.asset)
-    .bind(&row.code)
-    .bind(row.event)
-    .bind(row.n)
-    .bind(&row.body)
-    .bind(row.due_at)
-    .execute(db)
-    .await?;
-    Ok(())
 }
 
 async fn attempted(db: &mut AnyConnection, row: &DeliveryRow) -> Result<(), StoreError> {
-    sqlx::query(
-        "UPDATE delivery SET state = $2, attempts = $3, due_at = $4, finished_at = $5, error = $6
-         WHERE id = $1",
-    )
-    .bind(&row.id)
-    .bind(&row.state)
-    .bind(row.attempts)
-    .bind(row.due_at)
-    .bind(row.finished_at)
-    .bind(&row.error)
-    .execute(&mut *db)
-    .await?;
+    execute!(
+        &mut *db, "UPDATE delivery SET state = $2, attempts = $3, due_at = $4, finished_at = $5,
+         error = $6
+         WHERE id = $1";
+        &row.id, &row.state, row.attempts, row.due_at, row.finished_at, &row.error
+    )?;
     if row.finished_at.is_some() {
-        sqlx::query(
-            "DELETE FROM delivery WHERE channel = $1 AND state = $2 AND id <=
+        execute!(
+            db, "DELETE FROM delivery WHERE channel = $1 AND state = $2 AND id <=
              (SELECT id FROM delivery WHERE channel = $1 AND state = $2
-              ORDER BY id DESC LIMIT 1 OFFSET $3)",
-        )
-        .bind(&row.channel)
-        .bind(&row.state)
-        .bind(MAX_FINISHED)
-        .execute(db)
-        .await?;
+              ORDER BY id DESC LIMIT 1 OFFSET $3)";
+            &row.channel, &row.state, MAX_FINISHED
+        )?;
     }
     Ok(())
 }

@@ -11,7 +11,7 @@ use sqlx::any::{AnyConnectOptions, install_default_drivers};
 use sqlx::{AnyConnection, AssertSqlSafe, ConnectOptions, Connection, Executor};
 
 use super::StoreError;
-use super::location::{create_private, file_url};
+use super::file::{create_private, file_url};
 
 /// Marks a file as one with checksums (`PRAGMA application_id`).
 const APPLICATION_ID: i32 = i32::from_be_bytes(*b"ofbd");

@@ -129,6 +129,30 @@ impl PartitionRow {
     }
 }
 
+/// A process of a cluster.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NodeIdentity {
+    /// Unique for each start of a process.
+    pub id: String,
+    pub name: String,
+    /// Where other nodes reach it, `HOST:PORT`.
+    pub address: String,
+    pub version: String,
+}
+
+/// A node whose connection the database server has.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct NodeRow {
+    pub id: String,
+    pub name: String,
+    pub address: String,
+    pub version: String,
+    /// 1 once it hands its partitions over.
+    pub leaving: i64,
+}
+
+from_row!(NodeRow { id, name, address, version, leaving });
+
 #[cfg(test)]
 mod tests {
     use super::*;

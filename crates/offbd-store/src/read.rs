@@ -3,7 +3,7 @@
 use super::codec::ChunkKey;
 use super::progress::stored_progress;
 use super::query_builder::QueryBuilder;
-use super::write::published_counter;
+use super::rows::published_counter;
 use super::{
     ActionRow, AssetRow, CalibrationRow, EventRow, FaultRow, Micros, PartitionId, ReplayRow,
     SessionRow, Store, StoreError, TransitionRow, TrendEntry, TrendRow, decode_chunk,
@@ -74,10 +74,7 @@ pub struct FaultFilter {
     pub after: Option<(Micros, String, String)>,
 }
 
-pub(super) const SESSION: &str =
-    "SELECT id, asset, name, state, opened_at, ended_at, setup, baseline, importing,
-    part, first_part, n_samples, n_rejected, first_t_s, last_t_s, last_seq, verdict, verdict_hash FROM session
-    WHERE ";
+pub(super) const SESSION: &str = "SELECT * FROM session WHERE ";
 
 /// The condition that neither the session nor its asset is hidden.
 pub(super) const VISIBLE: &str = "expired_at IS NULL

@@ -88,6 +88,17 @@ from_row!(
     }[progress]
 );
 
+/// What is stored when a session ends.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SessionEnd {
+    pub session: String,
+    pub ended_at: Micros,
+    pub verdict: String,
+    pub hash: String,
+    /// Whether the verdict has a confirmed fault.
+    pub found_fault: bool,
+}
+
 impl SessionRow {
     #[must_use]
     pub fn is_open(&self) -> bool {
@@ -301,3 +312,8 @@ pub struct WarningRow {
 }
 
 from_row!(WarningRow { asset, calibration_id, warnings });
+
+/// Returns the name of the counter of the last event that was published on a bus.
+pub(super) fn published_counter(bus: &str) -> String {
+    format!("published_{bus}")
+}

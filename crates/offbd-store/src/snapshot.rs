@@ -3,6 +3,7 @@
 
 use sqlx::AnyConnection;
 
+use super::execute::execute;
 use super::{Store, StoreError};
 
 /// The state of the engine of a session.
@@ -55,20 +56,14 @@ impl Snapshot {
 /// Stores `snapshot`, and removes the earlier ones of its session that are not kept.
 pub(super) async fn put(db: &mut AnyConnection, snapshot: &Snapshot) -> Result<(), StoreError> {
     remove(db, &snapshot.session).await?;
-    sqlx::query(
-        "INSERT INTO snapshot (session, n_samples, kept, version, data)
+    execute!(
+        db, "INSERT INTO snapshot (session, n_samples, kept, version, data)
          VALUES ($1, $2, $3, $4, $5)
          ON CONFLICT (session, n_samples) DO UPDATE SET kept = excluded.kept,
-         version = excluded.version, data = excluded.data",
+         version = excluded.version, data = excluded.data";
+        &snapshot.session, snapshot.n_samples, i64::from(snapshot.kept), &snapshot.version,
+        [&snapshot.checksum()[..], &snapshot.state].concat()
     )
-    .bind(&snapshot.session)
-    .bind(snapshot.n_samples)
-    .bind(i64::from(snapshot.kept))
-    .bind(&snapshot.version)
-    .bind([&snapshot.checksum()[..], &snapshot.state].concat())
-    .execute(db)
-    .await?;
-    Ok(())
 }
 
 /// Removes the snapshots of `session` that are not kept.

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use sqlx::AnyConnection;
 
+use super::execute::execute;
 use super::query_builder::QueryBuilder;
 use super::{Store, StoreError};
 
@@ -16,16 +17,13 @@ pub(super) async fn put(
     asset: &str,
     tags: &[String],
 ) -> Result<(), StoreError> {
-    sqlx::query("DELETE FROM tag WHERE asset = $1").bind(asset).execute(&mut *db).await?;
+    execute!(&mut *db, "DELETE FROM tag WHERE asset = $1"; asset)?;
     for tag in tags {
-        sqlx::query(
-            "INSERT INTO tag (asset, name)
-             SELECT name, $2 FROM asset WHERE name = $1 AND deleted_at IS NULL",
-        )
-        .bind(asset)
-        .bind(tag)
-        .execute(&mut *db)
-        .await?;
+        execute!(
+            &mut *db, "INSERT INTO tag (asset, name)
+             SELECT name, $2 FROM asset WHERE name = $1 AND deleted_at IS NULL";
+            asset, tag
+        )?;
     }
     Ok(())
 }

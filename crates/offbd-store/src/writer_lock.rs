@@ -23,6 +23,19 @@ const LOCK_TIMEOUT: &str = "8s";
 const KEEPALIVES: &str = "SET tcp_keepalives_idle = 3; SET tcp_keepalives_interval = 1; \
      SET tcp_keepalives_count = 3; SET tcp_user_timeout = '6s'";
 
+/// What a writer may do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum WriterRole {
+    /// Everything, for all partitions. At most one writer of a database has this role, and
+    /// there is no node beside it.
+    Main,
+    /// Everything, for the partitions that it takes: a node of a cluster (PostgreSQL).
+    Node,
+    /// Changes that neither cause an event nor concern an engine, such as tokens. It may
+    /// run beside other writers, and does not count its transactions.
+    Auxiliary,
+}
+
 /// A connection as the server knows it. Its process number alone is used again.
 #[derive(Clone, Debug)]
 pub(super) struct Backend {

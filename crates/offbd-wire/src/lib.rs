@@ -16,6 +16,7 @@ pub mod certificate;
 pub mod cluster;
 pub mod difference;
 pub mod drive_cycle;
+mod fault_kind;
 pub mod fmu;
 pub mod json;
 pub mod judging;

@@ -1,58 +1,29 @@
 //! The closed sets of words in the API: each is an enum here, an `enum` in `openapi.yaml`
 //! and a union type in the dashboard's TypeScript.
 //!
-//! The core serialises nothing, so its enums are mirrored here. A variant that is added
-//! there and not here does not compile.
+//! The core stores its enums under the names of their variants, so those that the API shows
+//! are mirrored here. The words of a fault come from the core's list; a variant of another
+//! enum that is added there and not here does not compile.
 
-use std::fmt;
-use std::str::FromStr;
-
-use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use offbd_core::diagnosis::Profile;
 use offbd_core::diagnosis::trend::Parameter;
 use offbd_core::engine::{Misfit, Order, Rejection};
+use offbd_core::fault_words;
 use offbd_core::plant::Rung;
-use offbd_core::vocabulary::{Axis, FaultCode, FaultKind, FaultStatus, UnknownWord};
+use offbd_core::vocabulary::{Axis, FaultCode, FaultKind, FaultStatus};
 
 /// Defines an enum whose variants are serialised as the given words.
 macro_rules! words {
     ($(#[$doc:meta])* $name:ident as $schema:ident {
         $($(#[$vdoc:meta])* $variant:ident = $word:tt),+ $(,)?
     }) => {
-        $(#[$doc])*
-        #[derive(
-            Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema,
-        )]
-        #[schema(as = $schema)]
-        pub enum $name { $($(#[$vdoc])* #[serde(rename = $word)] $variant),+ }
-
-        impl $name {
-            /// All words, in the order of declaration.
-            pub const ALL: &'static [Self] = &[$(Self::$variant),+];
-
-            /// Returns the word used in JSON, in the store and in logs.
-            #[must_use]
-            pub const fn as_str(self) -> &'static str {
-                match self { $(Self::$variant => $word),+ }
-            }
-        }
-
-        impl fmt::Display for $name {
-            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.pad(self.as_str())
-            }
-        }
-
-        impl FromStr for $name {
-            type Err = UnknownWord;
-            fn from_str(word: &str) -> Result<Self, UnknownWord> {
-                Self::ALL.iter().copied().find(|v| v.as_str() == word).ok_or_else(|| UnknownWord {
-                    word: word.to_owned(),
-                    expected: [$($word),+].join(", "),
-                })
-            }
+        offbd_core::words! {
+            $(#[$doc])*
+            #[derive(ToSchema)]
+            #[schema(as = $schema)]
+            $name { $($(#[$vdoc])* #[serde(rename = $word)] $variant = $word),+ }
         }
     };
 }
@@ -60,9 +31,9 @@ macro_rules! words {
 /// Defines [`words!`] for an enum of the core, with conversions in both directions.
 macro_rules! mirrored {
     ($(#[$doc:meta])* $name:ident as $schema:ident of $core:ident {
-        $($variant:ident = $word:tt),+ $(,)?
+        $($(#[$vdoc:meta])* $variant:ident = $word:tt),+ $(,)?
     }) => {
-        words! { $(#[$doc])* $name as $schema { $($variant = $word),+ } }
+        words! { $(#[$doc])* $name as $schema { $($(#[$vdoc])* $variant = $word),+ } }
 
         impl From<$core> for $name {
             fn from(word: $core) -> Self {
@@ -114,27 +85,19 @@ impl From<Rejection> for UnjudgedWord {
     }
 }
 
-mirrored! {
+fault_words! { codes, mirrored!
     /// Fault code: the part of the rig that has the fault.
-    CodeWord as FaultCode of FaultCode {
-        XServo = "x_servo", YServo = "y_servo", StuckBall = "stuck_ball", Sensor = "sensor",
-    }
+    CodeWord as FaultCode of FaultCode
 }
 
-mirrored! {
+fault_words! { kinds, mirrored!
     /// Kind of a fault: the failure mode.
-    KindWord as FaultKind of FaultKind {
-        Dead = "dead", Held = "held", Gain = "gain", Reversed = "reversed", Offset = "offset",
-        Slow = "slow", Intermittent = "intermittent", Frozen = "frozen", Dropout = "dropout",
-        Noise = "noise", Spikes = "spikes", Jump = "jump",
-    }
+    KindWord as FaultKind of FaultKind
 }
 
-mirrored! {
+fault_words! { statuses, mirrored!
     /// Status of a fault code, a summary of its ISO 14229 status byte.
-    StatusWord as FaultStatus of FaultStatus {
-        Pending = "pending", Confirmed = "confirmed", Healed = "healed", Cleared = "cleared",
-    }
+    StatusWord as FaultStatus of FaultStatus
 }
 
 mirrored! {
@@ -335,39 +298,39 @@ words! {
     AuthenticationWord as Authentication { Required = "required", Off = "off" }
 }
 
-words! {
-    /// What an alarm is about: a fault code, or that no data of the rig arrive.
-    AlarmCodeWord as AlarmCode {
-        XServo = "x_servo", YServo = "y_servo", StuckBall = "stuck_ball", Sensor = "sensor",
-        /// No data arrive although a session is open. Found by the service, not by a monitor.
-        CommunicationLost = "communication_lost",
-    }
+/// Defines the codes of alarms: the fault codes, and those that no monitor finds.
+macro_rules! alarm_codes {
+    ({ $($(#[$vdoc:meta])* $variant:ident = $word:tt),+ $(,)? }) => {
+        words! {
+            /// What an alarm is about: a fault code, or that no data of the rig arrive.
+            AlarmCodeWord as AlarmCode {
+                $($(#[$vdoc])* $variant = $word,)+
+                /// No data arrive although a session is open. Found by the service, not by a
+                /// monitor.
+                CommunicationLost = "communication_lost",
+            }
+        }
+
+        impl From<CodeWord> for AlarmCodeWord {
+            fn from(code: CodeWord) -> Self {
+                match code { $(CodeWord::$variant => Self::$variant),+ }
+            }
+        }
+
+        impl AlarmCodeWord {
+            /// The fault code, if a monitor finds this.
+            #[must_use]
+            pub const fn fault_code(self) -> Option<CodeWord> {
+                match self {
+                    $(Self::$variant => Some(CodeWord::$variant),)+
+                    Self::CommunicationLost => None,
+                }
+            }
+        }
+    };
 }
 
-impl From<CodeWord> for AlarmCodeWord {
-    fn from(code: CodeWord) -> Self {
-        match code {
-            CodeWord::XServo => Self::XServo,
-            CodeWord::YServo => Self::YServo,
-            CodeWord::StuckBall => Self::StuckBall,
-            CodeWord::Sensor => Self::Sensor,
-        }
-    }
-}
-
-impl AlarmCodeWord {
-    /// The fault code, if a monitor finds this.
-    #[must_use]
-    pub const fn fault_code(self) -> Option<CodeWord> {
-        match self {
-            Self::XServo => Some(CodeWord::XServo),
-            Self::YServo => Some(CodeWord::YServo),
-            Self::StuckBall => Some(CodeWord::StuckBall),
-            Self::Sensor => Some(CodeWord::Sensor),
-            Self::CommunicationLost => None,
-        }
-    }
-}
+fault_words! { codes, alarm_codes! }
 
 words! {
     /// A change that a notification tells of.
@@ -441,6 +404,10 @@ words! {
 
 #[cfg(test)]
 mod tests {
+    use std::fmt;
+
+    use serde::Serialize;
+
     use super::*;
 
     /// Checks that the words of a core enum equal those of its mirror.
@@ -459,9 +426,6 @@ mod tests {
 
     #[test]
     fn the_words_equal_those_of_the_core() {
-        assert_equal_words(FaultCode::ALL, CodeWord::ALL, FaultCode::as_str);
-        assert_equal_words(FaultKind::ALL, KindWord::ALL, FaultKind::as_str);
-        assert_equal_words(FaultStatus::ALL, StatusWord::ALL, FaultStatus::as_str);
         assert_equal_words(&Axis::ALL, AxisWord::ALL, Axis::as_str);
         assert_equal_words(&Axis::ALL, CommandWord::ALL, Axis::command);
         assert_equal_words(&Profile::ALL, ProfileWord::ALL, Profile::as_str);

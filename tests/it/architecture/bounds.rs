@@ -4,6 +4,8 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::{ROOT, files};
+use offbd::config::RatesConfig;
+use offbd_service::{CommunicationSettings, RequestLimits, WorkerLimits};
 
 /// The folders whose constants are bounds of the service.
 const FOLDERS: [&str; 8] = [
@@ -17,13 +19,9 @@ const FOLDERS: [&str; 8] = [
     "crates/offbd-wire/src/session_file",
 ];
 
-/// The structs of the configuration whose fields are bounds, with their section.
-const SECTIONS: [(&str, &str); 4] = [
-    ("LimitsConfig", "limits"),
-    ("RatesConfig", "rates"),
-    ("WorkersConfig", "workers"),
-    ("RetentionConfig", "retention"),
-];
+/// The sections of the configuration whose keys are bounds.
+const SECTIONS: [&[&str]; 4] =
+    [RequestLimits::KEYS, RatesConfig::KEYS, WorkerLimits::KEYS, CommunicationSettings::KEYS];
 
 fn read(path: &str) -> String {
     std::fs::read_to_string(Path::new(ROOT).join(path)).unwrap_or_else(|e| panic!("{path}: {e}"))
@@ -84,14 +82,15 @@ fn the_manual_lists_every_bound_of_the_code_with_its_value() {
 #[test]
 fn the_manual_lists_every_bound_of_the_configuration() {
     let (config, manual) = (read("src/config.rs"), read("docs/operations.md"));
-    for (name, section) in SECTIONS {
-        let (_, rest) = config.split_once(&format!("pub struct {name} {{")).unwrap();
-        let (body, _) = rest.split_once("\n}").unwrap();
-        let fields = body.lines().filter_map(|line| line.trim().strip_prefix("pub "));
-        for field in fields.filter_map(|field| field.split(':').next()) {
-            let in_table = manual.contains(&format!("`{section}.{field}`"));
-            let in_example = manual.contains(&format!("\n{field} = "));
-            assert!(in_table || in_example, "{section}.{field} is not in docs/operations.md");
-        }
+    let (_, rest) = config.split_once("pub struct RetentionConfig {").unwrap();
+    let (body, _) = rest.split_once("\n}").unwrap();
+    let fields =
+        body.lines().filter_map(|line| line.trim().strip_prefix("pub ")?.split(':').next());
+    let retention = fields.map(|field| format!("retention.{field}"));
+    let others = SECTIONS.iter().copied().flatten().map(|key| (*key).to_owned());
+    for key in others.chain(retention) {
+        let in_table = manual.contains(&format!("`{key}`"));
+        let in_example = manual.contains(&format!("\n{} = ", key.rsplit('.').next().unwrap()));
+        assert!(in_table || in_example, "{key} is not in docs/operations.md");
     }
 }

@@ -11,25 +11,36 @@ const CODE: Record<FaultCode, { title: string; meaning: string }> = {
 /** All fault codes. */
 export const CODES = Object.keys(CODE) as FaultCode[];
 
-const KIND: Record<FaultKind, string> = {
-  dead: "no power: the plate returns to zero",
-  held: "holds its angle whatever the command",
-  gain: "moves too little or too much",
-  reversed: "moves in the wrong direction",
-  offset: "constant angle error, as with a slipped horn",
-  slow: "follows the command far too slowly",
-  intermittent: "fails intermittently, as with a loose contact",
-  frozen: "repeats its last reading",
-  dropout: "gives no readings",
-  noise: "is much noisier than learnt",
-  spikes: "gives single readings that are far off",
-  jump: "readings are shifted by a constant offset",
+interface KindWords {
+  meaning: string;
+  /** How the demo offers to inject it; `meaning` if it is missing. */
+  injected?: string;
+}
+
+const KIND: Record<FaultKind, KindWords> = {
+  dead: { meaning: "no power: the plate returns to zero" },
+  held: { meaning: "holds its angle whatever the command" },
+  gain: { meaning: "moves too little or too much" },
+  reversed: { meaning: "moves in the wrong direction" },
+  offset: { meaning: "constant angle error, as with a slipped horn" },
+  slow: { meaning: "follows the command far too slowly" },
+  intermittent: { meaning: "fails intermittently, as with a loose contact" },
+  frozen: { meaning: "repeats its last reading" },
+  dropout: { meaning: "gives no readings" },
+  noise: { meaning: "is much noisier than learnt", injected: "much noisier readings" },
+  spikes: { meaning: "gives single readings that are far off", injected: "single readings that are far off" },
+  jump: {
+    meaning: "readings are shifted by a constant offset",
+    injected: "readings shifted by a constant offset",
+  },
 };
 
 /** Returns a word of the service that this version of the page does not know as plain text. */
 const plain = (word: string) => word.replaceAll("_", " ");
 
 const isFaultCode = (code: string): code is FaultCode => Object.hasOwn(CODE, code);
+
+const isFaultKind = (kind: string): kind is FaultKind => Object.hasOwn(KIND, kind);
 
 /** Returns the title of a fault code; an unknown code, as in a mistyped address, as plain text. */
 export const codeTitle = (code: string) => (isFaultCode(code) ? CODE[code].title : plain(code));
@@ -49,7 +60,11 @@ export const faultMeaning = (code: FaultCode, kind?: FaultKind | null) =>
 export const codeMeaning = (code: FaultCode) => CODE[code]?.meaning ?? "";
 
 export const kindMeaning = (kind?: FaultKind | null) =>
-  kind ? (KIND[kind] ?? plain(kind)) : "the kind of fault is not known";
+  kind ? (KIND[kind]?.meaning ?? plain(kind)) : "the kind of fault is not known";
+
+/** Describes the fault that the demo injects; `null` if the diagnosis has no such kind. */
+export const injectedMeaning = (kind: string) =>
+  isFaultKind(kind) ? (KIND[kind].injected ?? KIND[kind].meaning) : null;
 
 export const faultTitle = (code: FaultCode, kind?: FaultKind | null) =>
   codeTitle(code) + (kind ? `, ${kind}` : "");

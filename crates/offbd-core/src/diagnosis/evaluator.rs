@@ -112,6 +112,37 @@ pub struct Finding {
     pub rival: Option<Candidate>,
 }
 
+/// A limit of the readings that is learnt from healthy sessions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LearntLimit {
+    Repeat,
+    Unseen,
+    Outliers,
+    Scatter,
+}
+
+impl LearntLimit {
+    /// Returns the limit that readings with a fault of `kind` exceed; `None` if it has none.
+    #[must_use]
+    pub const fn of(kind: FaultKind) -> Option<Self> {
+        match kind {
+            FaultKind::Frozen => Some(Self::Repeat),
+            FaultKind::Dropout => Some(Self::Unseen),
+            FaultKind::Spikes => Some(Self::Outliers),
+            FaultKind::Noise => Some(Self::Scatter),
+            // A jump is left out of the data; the others are not faults of the readings.
+            FaultKind::Jump
+            | FaultKind::Dead
+            | FaultKind::Held
+            | FaultKind::Gain
+            | FaultKind::Reversed
+            | FaultKind::Offset
+            | FaultKind::Slow
+            | FaultKind::Intermittent => None,
+        }
+    }
+}
+
 impl Finding {
     const NOTHING: Self =
         Self { test: Test::NotTested, nats: None, gone: false, kind: None, rival: None };

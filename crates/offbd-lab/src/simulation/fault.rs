@@ -1,57 +1,15 @@
 //! The faults of a simulated rig, and their syntax on the command line:
 //! `CODE:KIND[=SIZE]@START[-END]`, as in `y_servo:gain=0.5@20-40`.
 
+mod injections;
+mod size;
+
 use std::fmt;
 use std::str::FromStr;
 
-use nalgebra::Vector2;
-
+pub use self::injections::{BallFault, SensorFault, ServoFault};
+pub(super) use self::injections::{HornDrive, SensorLook};
 use offbd_core::vocabulary::{Axis, FaultCode};
-
-/// A fault of a servo. Angles are those of the plate that it turns.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ServoFault {
-    /// The servo stays at its angle.
-    Hold,
-    /// The servo loses power, and a spring returns it to zero.
-    Dead,
-    /// The angle is the command times this factor.
-    Gain(f64),
-    /// The angle has the wrong sign.
-    Reversed,
-    /// The horn has slipped: the angle is off by a constant, rad.
-    Offset(f64),
-    /// The lag is longer and the rate limit lower by this factor.
-    Slow(f64),
-    /// A loose contact interrupts the power intermittently.
-    Intermittent,
-}
-
-/// A fault of the ball.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum BallFault {
-    /// The ball is fixed to the plate.
-    Glued,
-    /// The ball moves only at a tilt above this, rad.
-    Sticky(f64),
-}
-
-/// A fault of the readings.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum SensorFault {
-    /// The sensor repeats its last reading.
-    Freeze,
-    /// The sensor repeats its last reading of one axis.
-    FreezeAxis(Axis),
-    /// Readings are missing, with this probability.
-    Dropout(f64),
-    /// The noise is larger by this factor.
-    Noise(f64),
-    /// Readings are outliers, with this probability.
-    Spikes(f64),
-    /// Readings are shifted by a constant, m.
-    Jump(Vector2<f64>),
-}
 
 /// The faulty component and its fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,30 +34,19 @@ impl FaultEffect {
     #[must_use]
     pub const fn kind(&self) -> &'static str {
         match self {
-            Self::Servo(_, ServoFault::Hold) => "hold",
-            Self::Servo(_, ServoFault::Dead) => "dead",
-            Self::Servo(_, ServoFault::Gain(_)) => "gain",
-            Self::Servo(_, ServoFault::Reversed) => "reversed",
-            Self::Servo(_, ServoFault::Offset(_)) => "offset",
-            Self::Servo(_, ServoFault::Slow(_)) => "slow",
-            Self::Servo(_, ServoFault::Intermittent) => "intermittent",
-            Self::Ball(BallFault::Glued) => "glued",
-            Self::Ball(BallFault::Sticky(_)) => "sticky",
-            Self::Sensor(SensorFault::Freeze) => "freeze",
-            Self::Sensor(SensorFault::FreezeAxis(_)) => "freeze_axis",
-            Self::Sensor(SensorFault::Dropout(_)) => "dropout",
-            Self::Sensor(SensorFault::Noise(_)) => "noise",
-            Self::Sensor(SensorFault::Spikes(_)) => "spikes",
-            Self::Sensor(SensorFault::Jump(_)) => "jump",
+            Self::Servo(_, fault) => fault.name(),
+            Self::Ball(fault) => fault.name(),
+            Self::Sensor(fault) => fault.name(),
         }
     }
 
     /// Returns the axis of the fault; `None` if it is not on one axis.
     #[must_use]
-    pub const fn axis(&self) -> Option<Axis> {
+    pub fn axis(&self) -> Option<Axis> {
         match self {
-            Self::Servo(axis, _) | Self::Sensor(SensorFault::FreezeAxis(axis)) => Some(*axis),
-            Self::Ball(_) | Self::Sensor(_) => None,
+            Self::Servo(axis, fault) => fault.axis().or(Some(*axis)),
+            Self::Ball(fault) => fault.axis(),
+            Self::Sensor(fault) => fault.axis(),
         }
     }
 
@@ -107,15 +54,10 @@ impl FaultEffect {
     /// if the fault has none. A dropout's probability is not returned.
     #[must_use]
     pub fn size(&self) -> Option<Vec<f64>> {
-        match *self {
-            Self::Servo(_, ServoFault::Gain(size) | ServoFault::Offset(size))
-            | Self::Servo(_, ServoFault::Slow(size))
-            | Self::Ball(BallFault::Sticky(size))
-            | Self::Sensor(SensorFault::Noise(size) | SensorFault::Spikes(size)) => {
-                Some(vec![size])
-            }
-            Self::Sensor(SensorFault::Jump(shift)) => Some(vec![shift.x, shift.y]),
-            _ => None,
+        match self {
+            Self::Servo(_, fault) => fault.numbers(),
+            Self::Ball(fault) => fault.numbers(),
+            Self::Sensor(fault) => fault.numbers(),
         }
     }
 }
@@ -145,7 +87,7 @@ pub enum FaultSyntax {
         "`{0}` is not CODE:KIND[=SIZE]@START[-END], as in x_servo:dead@20 or y_servo:gain=0.5@20-40"
     )]
     Shape(String),
-    #[error("`{code}:{kind}` is not known; there are {known}", known = KNOWN)]
+    #[error("`{code}:{kind}` is not known; there are {known}", known = known())]
     Unknown { code: String, kind: String },
     #[error("`{word}` is not a size for {kind}: {expected}")]
     Size { word: String, kind: String, expected: &'static str },
@@ -153,28 +95,13 @@ pub enum FaultSyntax {
     Time(String),
 }
 
-/// The names of all faults, for error messages.
-pub(crate) const KNOWN: &str = "x_servo or y_servo: hold, dead, gain, reversed, offset, slow, \
-     intermittent; stuck_ball: glued, sticky; sensor: freeze, freeze_axis, dropout, noise, \
-     spikes, jump";
-
-/// Default sizes. Chosen: clear faults, each well inside the range of the corpus of
-/// recorded faults (gain 0.2–0.5, 3°, 12 times slower, 12 times noisier).
-mod typical {
-    /// Factor of the angle.
-    pub(super) const GAIN: f64 = 0.4;
-    /// Angle of a slipped horn, rad.
-    pub(super) const OFFSET_RAD: f64 = 0.05;
-    /// Factor of the lag.
-    pub(super) const SLOW: f64 = 12.0;
-    /// Breakaway tilt of a sticky ball, rad.
-    pub(super) const STICKY_RAD: f64 = 0.1;
-    /// Factor of the noise.
-    pub(super) const NOISE: f64 = 12.0;
-    /// Share of outliers.
-    pub(super) const SPIKES: f64 = 0.2;
-    /// Shift of the readings along x and y, m.
-    pub(super) const JUMP_M: [f64; 2] = [0.035, -0.02];
+/// Returns the names of all faults, for error messages.
+pub(crate) fn known() -> String {
+    let servo: Vec<_> = ServoFault::all().iter().map(ServoFault::name).collect();
+    let ball: Vec<_> = BallFault::all().iter().map(BallFault::name).collect();
+    let sensor: Vec<_> = SensorFault::all().iter().map(SensorFault::name).collect();
+    let (servo, ball, sensor) = (servo.join(", "), ball.join(", "), sensor.join(", "));
+    format!("x_servo or y_servo: {servo}; stuck_ball: {ball}; sensor: {sensor}")
 }
 
 impl FromStr for Fault {
@@ -196,15 +123,14 @@ impl FromStr for Fault {
 impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}:{}", self.effect.code(), self.effect.kind())?;
-        match (self.effect.size(), self.effect) {
-            (Some(size), _) => {
-                let words: Vec<String> = size.iter().map(f64::to_string).collect();
-                write!(f, "={}", words.join(","))?;
-            }
-            (None, FaultEffect::Sensor(SensorFault::FreezeAxis(axis))) => {
-                write!(f, "={}", axis.as_str())?;
-            }
-            _ => {}
+        if let Some(size) = self.effect.size() {
+            let words: Vec<String> = size.iter().map(f64::to_string).collect();
+            write!(f, "={}", words.join(","))?;
+        }
+        if let FaultEffect::Sensor(fault) = self.effect
+            && let Some(axis) = fault.axis()
+        {
+            write!(f, "={}", axis.as_str())?;
         }
         write!(f, "@{}", self.onset_s)?;
         self.end_s.map_or(Ok(()), |end| write!(f, "-{end}"))
@@ -230,111 +156,21 @@ fn span_s(text: &str) -> Result<(f64, Option<f64>), FaultSyntax> {
 
 fn effect(code: &str, kind: &str, size: Option<&str>) -> Result<FaultEffect, FaultSyntax> {
     let unknown = || FaultSyntax::Unknown { code: code.to_owned(), kind: kind.to_owned() };
-    let size = SizeWord { kind, word: size };
-    let effect = match code.parse::<FaultCode>().map_err(|_| unknown())? {
-        FaultCode::XServo => servo(kind, &size)?.map(|e| FaultEffect::Servo(Axis::X, e)),
-        FaultCode::YServo => servo(kind, &size)?.map(|e| FaultEffect::Servo(Axis::Y, e)),
-        FaultCode::StuckBall => ball(kind, &size)?.map(FaultEffect::Ball),
-        FaultCode::Sensor => sensor(kind, &size)?.map(FaultEffect::Sensor),
+    let servo = |axis| {
+        let fault = ServoFault::parse(kind, size)?;
+        Some(fault.map(|fault| FaultEffect::Servo(axis, fault)))
     };
-    effect.ok_or_else(unknown)
-}
-
-fn servo(kind: &str, size: &SizeWord<'_>) -> Result<Option<ServoFault>, FaultSyntax> {
-    Ok(Some(match kind {
-        "hold" | "held" => size.none(ServoFault::Hold)?,
-        "dead" => size.none(ServoFault::Dead)?,
-        "gain" => ServoFault::Gain(size.number(typical::GAIN, -5.0, 5.0, "a factor, -5 to 5")?),
-        "reversed" => size.none(ServoFault::Reversed)?,
-        "offset" => ServoFault::Offset(size.number(
-            typical::OFFSET_RAD,
-            -1.0,
-            1.0,
-            "an angle in rad, -1 to 1",
-        )?),
-        "slow" => {
-            ServoFault::Slow(size.number(typical::SLOW, 1.0, 1000.0, "a factor, 1 to 1000")?)
-        }
-        "intermittent" => size.none(ServoFault::Intermittent)?,
-        _ => return Ok(None),
-    }))
-}
-
-fn ball(kind: &str, size: &SizeWord<'_>) -> Result<Option<BallFault>, FaultSyntax> {
-    Ok(Some(match kind {
-        "glued" | "stuck" => size.none(BallFault::Glued)?,
-        "sticky" => BallFault::Sticky(size.number(
-            typical::STICKY_RAD,
-            0.0,
-            1.5,
-            "a breakaway tilt in rad, 0 to 1.5",
-        )?),
-        _ => return Ok(None),
-    }))
-}
-
-fn sensor(kind: &str, size: &SizeWord<'_>) -> Result<Option<SensorFault>, FaultSyntax> {
-    let share = |typical| size.number(typical, 0.0, 1.0, "a share of the readings, 0 to 1");
-    Ok(Some(match kind {
-        "freeze" | "frozen" => size.none(SensorFault::Freeze)?,
-        "freeze_axis" => SensorFault::FreezeAxis(size.axis()?),
-        "dropout" => SensorFault::Dropout(share(1.0)?),
-        "noise" => {
-            let factor = size.number(typical::NOISE, 1.0, 1000.0, "a factor, 1 to 1000")?;
-            SensorFault::Noise(factor)
-        }
-        "spikes" => SensorFault::Spikes(share(typical::SPIKES)?),
-        "jump" => SensorFault::Jump(size.shift()?),
-        _ => return Ok(None),
-    }))
-}
-
-/// The word after `=`, if any.
-struct SizeWord<'a> {
-    kind: &'a str,
-    word: Option<&'a str>,
-}
-
-impl SizeWord<'_> {
-    fn wrong(&self, expected: &'static str) -> FaultSyntax {
-        let word = self.word.unwrap_or_default().to_owned();
-        FaultSyntax::Size { word, kind: self.kind.to_owned(), expected }
-    }
-
-    fn none<T>(&self, effect: T) -> Result<T, FaultSyntax> {
-        self.word.map_or(Ok(effect), |_| Err(self.wrong("it has none")))
-    }
-
-    fn number(
-        &self,
-        typical: f64,
-        least: f64,
-        most: f64,
-        expected: &'static str,
-    ) -> Result<f64, FaultSyntax> {
-        let Some(word) = self.word else { return Ok(typical) };
-        let value: Option<f64> = word.parse().ok();
-        value.filter(|v| (least..=most).contains(v)).ok_or_else(|| self.wrong(expected))
-    }
-
-    fn axis(&self) -> Result<Axis, FaultSyntax> {
-        match self.word {
-            Some("x") | None => Ok(Axis::X),
-            Some("y") => Ok(Axis::Y),
-            Some(_) => Err(self.wrong("x or y")),
-        }
-    }
-
-    fn shift(&self) -> Result<Vector2<f64>, FaultSyntax> {
-        let Some(word) = self.word else { return Ok(typical::JUMP_M.into()) };
-        let (x, y) = word.split_once(',').unwrap_or((word, "0"));
-        let metres = |word: &str| {
-            let value: Option<f64> = word.parse().ok();
-            let expected = "a shift in m along x, or along x and y as in 0.04,-0.02";
-            value.filter(|v| v.abs() <= 10.0).ok_or_else(|| self.wrong(expected))
-        };
-        Ok(Vector2::new(metres(x)?, metres(y)?))
-    }
+    let effect = match code.parse::<FaultCode>().map_err(|_| unknown())? {
+        FaultCode::XServo => servo(Axis::X),
+        FaultCode::YServo => servo(Axis::Y),
+        FaultCode::StuckBall => BallFault::parse(kind, size).map(|f| f.map(FaultEffect::Ball)),
+        FaultCode::Sensor => SensorFault::parse(kind, size).map(|f| f.map(FaultEffect::Sensor)),
+    };
+    effect.ok_or_else(unknown)?.map_err(|expected| FaultSyntax::Size {
+        word: size.unwrap_or_default().to_owned(),
+        kind: kind.to_owned(),
+        expected,
+    })
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use std::ops::RangeInclusive;
 
 use nalgebra::Vector2;
 
-use super::fault::SensorFault;
+use super::fault::{SensorFault, SensorLook};
 use super::noise::{Noise, Purpose};
 use super::refresh::Refresh;
 use super::steps::{rounded, step_in};
@@ -164,25 +164,15 @@ impl Sensor {
         let noise = PerAxis::from_fn(|_| self.fault_noise.normal());
         let far = PerAxis::from_fn(|_| outlier_share(&mut self.fault_noise));
         let floor = self.model.noise_floor_m();
-        let shifted = |by: &dyn Fn(Axis) -> f64| {
-            PerAxis::from_fn(|a| healthy[a].map(|m| self.quantise(m + by(a))))
+        let look = SensorLook {
+            healthy,
+            last: self.last_seen,
+            chance,
+            noise_m: noise.map(|n| n * floor),
+            far_m: PerAxis::from_fn(|a| far[a] * self.reach[a as usize]),
+            quantum_m: self.model.quantum_m,
         };
-        match fault {
-            None => healthy,
-            Some(SensorFault::Freeze) => self.last_seen,
-            Some(SensorFault::FreezeAxis(axis)) => {
-                let mut reading = healthy;
-                reading[axis] = self.last_seen[axis];
-                reading
-            }
-            Some(SensorFault::Dropout(share)) if chance < share => Reading::default(),
-            Some(SensorFault::Noise(factor)) => shifted(&|a| noise[a] * floor * factor),
-            Some(SensorFault::Spikes(share)) if chance < share => {
-                shifted(&|a| far[a] * self.reach[a as usize])
-            }
-            Some(SensorFault::Jump(by)) => shifted(&|a| by[a as usize]),
-            Some(SensorFault::Dropout(_) | SensorFault::Spikes(_)) => healthy,
-        }
+        fault.map_or(healthy, |fault| fault.read(&look))
     }
 
     fn quantise(&self, metres: f64) -> f64 {

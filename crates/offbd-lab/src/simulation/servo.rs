@@ -7,7 +7,7 @@
 use std::collections::VecDeque;
 use std::ops::RangeInclusive;
 
-use super::fault::ServoFault;
+use super::fault::{HornDrive, ServoFault};
 use super::noise::Noise;
 use offbd_core::plant::{ServoModel, ServoState};
 use offbd_core::vocabulary::Invalid;
@@ -96,10 +96,11 @@ impl SimulatedServo {
     /// Advances by `h` seconds from `at_s` under `fault`; returns the plate's angle.
     pub(super) fn advance(&mut self, at_s: f64, h: f64, fault: Option<ServoFault>) -> PlateAngle {
         let command = self.in_force(at_s).clamp(-self.limit_rad, self.limit_rad);
-        let slip = if let Some(ServoFault::Offset(angle)) = fault { angle } else { 0.0 };
-        self.turn_horn(at_s, h, command, fault);
-        if slip != 0.0 || self.slip.angle != 0.0 {
-            self.slip = settle(SLIP_LAG_S, f64::MAX).advance(&self.slip, slip, h);
+        let contact = || self.contact.holds(at_s);
+        let drive = fault.map_or(HornDrive::to(command), |fault| fault.drive(command, contact));
+        self.turn_horn(h, &drive);
+        if drive.slip != 0.0 || self.slip.angle != 0.0 {
+            self.slip = settle(SLIP_LAG_S, f64::MAX).advance(&self.slip, drive.slip, h);
         }
         self.plate()
     }
@@ -113,16 +114,7 @@ impl SimulatedServo {
         self.commands.front().filter(|&&(from, _)| from <= arrived).map_or(0.0, |&(_, c)| c)
     }
 
-    fn turn_horn(&mut self, at_s: f64, h: f64, command: f64, fault: Option<ServoFault>) {
-        let slower = if let Some(ServoFault::Slow(factor)) = fault { factor } else { 1.0 };
-        let target = match fault {
-            None | Some(ServoFault::Offset(_) | ServoFault::Slow(_)) => Some(command),
-            Some(ServoFault::Hold) => None,
-            Some(ServoFault::Dead) => Some(0.0),
-            Some(ServoFault::Gain(factor)) => Some(factor * command),
-            Some(ServoFault::Reversed) => Some(-command),
-            Some(ServoFault::Intermittent) => self.contact.holds(at_s).then_some(command),
-        };
+    fn turn_horn(&mut self, h: f64, &HornDrive { target, slower, .. }: &HornDrive) {
         let (lag, rate) = (self.truth.lag_s * slower, self.truth.rate_limit_rad_s / slower);
         self.horn = match target {
             Some(target) => settle(lag, rate).advance(&self.horn, target, h),

@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 
 use nalgebra::Vector2;
 
-use super::fault::{Fault, FaultEffect, SensorFault};
+use super::fault::{Fault, FaultEffect};
 use super::model::RigModel;
 use super::sensor::Reading;
 use offbd_core::vocabulary::{Axis, PerAxis};
@@ -100,9 +100,7 @@ impl FaultObserver {
             FaultEffect::Ball(_) => {
                 truth.plate_rad.x.hypot(truth.plate_rad.y) > MOVING_BREAKAWAYS * breakaway_rad
             }
-            FaultEffect::Sensor(SensorFault::Freeze) => off(Axis::X).hypot(off(Axis::Y)) > off_m,
-            FaultEffect::Sensor(SensorFault::FreezeAxis(axis)) => off(axis) > off_m,
-            FaultEffect::Sensor(_) => true,
+            FaultEffect::Sensor(fault) => fault.hidden_m(off).is_none_or(|m| m > off_m),
         };
         if stands_out {
             self.truth.chance_s = Some(truth.t_s);

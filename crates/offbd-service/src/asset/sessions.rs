@@ -12,7 +12,7 @@ use crate::clock::rfc3339;
 use crate::limits::check_session_name;
 use crate::{ServiceError, views};
 use offbd_core::engine::{Input, Setup};
-use offbd_store::{SessionProgress, SessionRow, Write};
+use offbd_store::{SessionEnd, SessionProgress, SessionRow, Write};
 use offbd_wire::asset;
 use offbd_wire::stored::{StoredMemory, StoredVerdict};
 use offbd_wire::words::SessionState;
@@ -212,13 +212,13 @@ impl Asset {
         open.judging.input(Input::End);
         open.report(&self.row.name, turn.at, &mut turn.writes)?;
         let summary = open.summary();
-        turn.writes.push(Write::EndSession {
+        turn.writes.push(Write::EndSession(SessionEnd {
             session: open.id.clone(),
             ended_at: turn.at,
             verdict: views::to_json(&StoredVerdict::new(summary.clone()))?,
             hash: summary.verdict_hash.clone(),
             found_fault: !summary.faults.is_empty(),
-        });
+        }));
         let mut trends = trend::ended(&self.row.name, &open, turn)?;
         let warns = |write: &Write| matches!(write, Write::Trend(row) if row.warnings.is_some());
         let has_warning = trends.iter().any(warns);

@@ -471,8 +471,8 @@ mod tests {
         let (store, _writer) = Store::open(&location).await.unwrap();
         let (jobs, (writer, _sets)) = (JobQueues::default().automatic, mpsc::channel(1));
         let (_, outage) = watch::channel(None);
-        let (limits, closing) =
-            (Limits { shards: 1, ..Limits::default() }, CancellationToken::new());
+        let (mut limits, closing) = (Limits::default(), CancellationToken::new());
+        limits.workers.shards = 1;
         let ownership =
             Ownership::new(Partitions::ONE, vec![(PartitionId(0), 1)], std::sync::Arc::default());
         let handles =

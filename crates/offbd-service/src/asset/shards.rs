@@ -23,8 +23,8 @@ impl Shards {
     /// Returns the queues, the shards that execute them, and the loader of their assets.
     pub(crate) fn new(limits: &Limits, env: &Environment) -> (Self, Vec<Shard>, Loader) {
         let (mut senders, mut queues) = (Vec::new(), Vec::new());
-        for _ in 0..limits.shards.max(1) {
-            let (sender, queue) = mpsc::channel(limits.shard_queue);
+        for _ in 0..limits.workers.shards.max(1) {
+            let (sender, queue) = mpsc::channel(limits.workers.queue);
             senders.push(sender);
             queues.push(queue);
         }

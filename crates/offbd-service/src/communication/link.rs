@@ -1,24 +1,21 @@
 //! Decides whether the data of one rig stay away. Time is an argument; both directions are
 //! debounced, so that a rig whose link flaps is lost once, and back once.
 
+use crate::config_section;
 use std::time::Duration;
 
 use crate::notifications::micros;
 use offbd_store::Micros;
 
-/// When data count as lost, and as back.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct CommunicationSettings {
-    /// Silence after which the data count as lost.
-    pub lost_after: Duration,
-    /// Time for which data must arrive, without a silence of `lost_after`, to be back.
-    pub back_after: Duration,
-}
-
-impl Default for CommunicationSettings {
-    /// Chosen: several times the interval of a device that sends batches every few seconds.
-    fn default() -> Self {
-        Self { lost_after: Duration::from_secs(30), back_after: Duration::from_secs(10) }
+config_section! {
+    /// When the data of a rig count as lost, and as back. Chosen: several times the interval of
+    /// a device that sends batches every few seconds.
+    CommunicationSettings as "communication" |_this| {
+        /// Silence of a rig with an open session after which its data count as lost, s.
+        lost_after_s: u64 = 30, 1..=86_400;
+        /// Time for which data must arrive, without a silence of `lost_after_s`, to count as
+        /// back, s.
+        back_after_s: u64 = 10, 0..=86_400;
     }
 }
 
@@ -65,7 +62,7 @@ impl Link {
         let arrival = arrival.filter(|&arrival| arrival > self.seen_at);
         let gap = arrival.map(|arrival| arrival - self.seen_at);
         self.seen_at = arrival.unwrap_or(self.seen_at);
-        let lost_after = micros(settings.lost_after);
+        let lost_after = micros(Duration::from_secs(settings.lost_after_s));
         let is_silent = now - self.seen_at >= lost_after;
         if !self.is_lost {
             self.is_lost = is_silent;
@@ -83,7 +80,7 @@ impl Link {
             _ => {}
         }
         let run = self.seen_at - self.arriving_since?;
-        if run < micros(settings.back_after) {
+        if run < micros(Duration::from_secs(settings.back_after_s)) {
             return None;
         }
         (self.is_lost, self.arriving_since) = (false, None);

@@ -51,7 +51,7 @@ async fn start(folder: &tempfile::TempDir) -> (Service, Workers) {
 
 /// Takes permits for half of the samples that may be in flight, so that samples seem queued.
 async fn queue_samples(service: &Service) -> OwnedSemaphorePermit {
-    let half = u32::try_from(service.limits().in_flight_samples / 2).unwrap();
+    let half = u32::try_from(service.limits().requests.in_flight_samples / 2).unwrap();
     service.inner.in_flight.clone().acquire_many_owned(half).await.unwrap()
 }
 

@@ -52,10 +52,10 @@ pub(crate) fn spawn(
     queues: &JobQueues,
     in_flight: &Arc<Semaphore>,
 ) -> Vec<JoinHandle<()>> {
-    let asked =
-        (0..limits.jobs).map(|_| work(context.clone(), queues.asked.clone(), Priority::Low, None));
+    let asked = (0..limits.workers.jobs)
+        .map(|_| work(context.clone(), queues.asked.clone(), Priority::Low, None));
     let automatic = (0..AUTOMATIC_WORKERS).map(|_| {
-        let quiet = Some(Quiet::new(in_flight.clone(), limits.in_flight_samples));
+        let quiet = Some(Quiet::new(in_flight.clone(), limits.requests.in_flight_samples));
         work(context.clone(), queues.automatic.clone(), Priority::Lowest, quiet)
     });
     asked.chain(automatic).map(tokio::spawn).collect()

@@ -32,6 +32,7 @@ use tokio::sync::Notify;
 use tokio::sync::broadcast::error::RecvError;
 
 pub(super) use planner::{delivery, test_message};
+pub use retry::NotificationSettings;
 pub(super) use retry::micros;
 pub use targets::TargetPolicy;
 
@@ -49,33 +50,6 @@ pub(super) const MAX_CHANNELS: usize = 50;
 
 /// Rules; at the limit a new one is refused.
 pub(super) const MAX_RULES: usize = 500;
-
-/// How notifications are sent.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct NotificationSettings {
-    /// Address of the dashboard for links, without a slash at its end.
-    pub public_url: Option<String>,
-    /// Where messages may be sent.
-    pub targets: TargetPolicy,
-    /// Time limit of one attempt.
-    pub timeout: Duration,
-    /// Delay after the first failed attempt; it doubles with each further one.
-    pub first_retry: Duration,
-    /// Age at which a message is given up.
-    pub give_up_after: Duration,
-}
-
-impl Default for NotificationSettings {
-    fn default() -> Self {
-        Self {
-            public_url: None,
-            targets: TargetPolicy::default(),
-            timeout: Duration::from_secs(10),
-            first_retry: Duration::from_secs(5),
-            give_up_after: Duration::from_secs(86_400),
-        }
-    }
-}
 
 /// The outcome of one attempt.
 #[derive(Clone, Debug, PartialEq, Eq)]

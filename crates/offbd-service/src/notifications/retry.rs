@@ -1,9 +1,36 @@
-//! When a failed attempt is repeated.
+//! How messages are sent, and when a failed attempt is repeated.
 
 use std::time::Duration;
 
-use super::NotificationSettings;
+use super::targets::TargetPolicy;
 use offbd_store::Micros;
+
+/// How notifications are sent.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NotificationSettings {
+    /// Address of the dashboard for links, without a slash at its end.
+    pub public_url: Option<String>,
+    /// Where messages may be sent.
+    pub targets: TargetPolicy,
+    /// Time limit of one attempt.
+    pub timeout: Duration,
+    /// Delay after the first failed attempt; it doubles with each further one.
+    pub first_retry: Duration,
+    /// Age at which a message is given up.
+    pub give_up_after: Duration,
+}
+
+impl Default for NotificationSettings {
+    fn default() -> Self {
+        Self {
+            public_url: None,
+            targets: TargetPolicy::default(),
+            timeout: Duration::from_secs(10),
+            first_retry: Duration::from_secs(5),
+            give_up_after: Duration::from_secs(86_400),
+        }
+    }
+}
 
 /// Longest delay between two attempts, unless the target asks for a longer one.
 const LONGEST_RETRY: Duration = Duration::from_secs(3600);

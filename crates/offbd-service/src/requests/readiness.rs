@@ -52,7 +52,7 @@ impl Service {
     #[must_use]
     pub fn load(&self) -> QueueLoad {
         let Inner { shards, handles, in_flight, limits, .. } = &*self.inner;
-        let samples = limits.in_flight_samples - in_flight.available_permits();
+        let samples = limits.requests.in_flight_samples - in_flight.available_permits();
         let writer = handles.writer().max_capacity() - handles.writer().capacity();
         QueueLoad { samples, shards: shards.n_queued(), writer }
     }

@@ -87,7 +87,7 @@ impl Service {
     }
 
     fn permits(&self, batch: &Batch) -> Result<u32, ServiceError> {
-        let limit = self.inner.limits.longest_batch();
+        let limit = self.inner.limits.requests.longest_batch();
         if batch.rows.len() > limit {
             return Err(ServiceError::TooMany { what: "samples in one batch", limit });
         }

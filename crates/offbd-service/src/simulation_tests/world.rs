@@ -20,7 +20,7 @@ use super::scenario::{DeviceKind, Scenario, Step};
 use crate::asset::{AssetCommand, Loader, Shard};
 use crate::start::Inner;
 use crate::writing::Committer;
-use crate::{Clock, Limits, Service, ServiceError, SessionLimits, views};
+use crate::{Clock, Limits, RequestLimits, Service, ServiceError, WorkerLimits, views};
 use offbd_core::engine::Rig;
 use offbd_core::vocabulary::FaultCode;
 use offbd_store::{CommitFault, CommitPoint, FaultPlan, Location, Store};
@@ -32,12 +32,15 @@ const MAX_ROUNDS: usize = 300;
 /// Limits that are reached in a short scenario.
 fn limits() -> Limits {
     Limits {
-        shards: 2,
-        shard_queue: 64,
-        in_flight_samples: 100,
-        batch_samples: 50,
-        journal_bytes: 3000,
-        sessions: SessionLimits { samples: SAMPLES_PER_PART as i64, snapshot_interval: 40 },
+        requests: RequestLimits {
+            in_flight_samples: 100,
+            batch_samples: 50,
+            journal_bytes: 3000,
+            session_samples: SAMPLES_PER_PART,
+            ..RequestLimits::default()
+        },
+        workers: WorkerLimits { shards: 2, queue: 64, ..WorkerLimits::default() },
+        snapshot_interval: 40,
         ..Limits::default()
     }
 }

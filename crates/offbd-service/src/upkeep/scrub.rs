@@ -274,7 +274,7 @@ mod tests {
     use crate::{Clock, Limits, Service};
     use offbd_core::vocabulary::Sample;
     use offbd_store::ChangeSet;
-    use offbd_store::{AssetRow, Location, SessionProgress, Store, Write};
+    use offbd_store::{AssetRow, Location, SessionEnd, SessionProgress, Store, Write};
 
     /// The lengths of the work between the pauses in a session of `n_samples`.
     async fn works(n_samples: usize) -> Vec<Duration> {
@@ -287,13 +287,8 @@ mod tests {
             (0..n_samples).map(|i| Sample { t_s: i as f64, ..Sample::default() }).collect();
         let progress = SessionProgress { n_samples: n_samples as i64, ..Default::default() };
         let append = Write::Append { session: "s".to_owned(), first_index: 0, samples, progress };
-        let end = Write::EndSession {
-            session: "s".to_owned(),
-            ended_at: 0,
-            verdict: "{}".to_owned(),
-            hash: String::new(),
-            found_fault: false,
-        };
+        let (session, verdict) = ("s".to_owned(), "{}".to_owned());
+        let end = Write::EndSession(SessionEnd { session, verdict, ..SessionEnd::default() });
         let mut set = vec![Write::CreateAsset(asset), Write::OpenSession(row), append, end];
         writer.commit(&mut [ChangeSet::unpartitioned(&mut set)]).await.unwrap();
         let session = store.session("s").await.unwrap().unwrap();

@@ -9,9 +9,12 @@ use tokio::sync::broadcast::error::RecvError;
 use tokio::sync::{Notify, broadcast};
 use tokio_util::sync::CancellationToken;
 
-use super::handles::READ_TIMEOUT;
 use crate::ServiceError;
 use offbd_store::{ActionRow, CommunicationChange, EventRow, Store, StoreError, TransitionRow};
+
+/// Longest time for one read of the store. Chosen: twice the time that a reader waits for
+/// a connection; a database that takes longer is unavailable.
+pub(super) const READ_TIMEOUT: Duration = Duration::from_secs(20);
 
 /// Events buffered for slow subscribers; one that lags further behind reads the events from
 /// the store.

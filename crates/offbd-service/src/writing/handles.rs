@@ -13,8 +13,10 @@ use tokio::sync::{mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 
 use super::commit::{EngineGeneration, Outage, WriteSet};
+use super::events::READ_TIMEOUT;
+use crate::limits::SessionLimits;
 use crate::ownership::Ownership;
-use crate::{Clock, Limits, ServiceError, SessionLimits};
+use crate::{Clock, Limits, ServiceError};
 use offbd_store::{PartitionId, Store, StoreError, Write};
 
 /// The shared handles of the service. Cheap to clone.
@@ -49,10 +51,6 @@ type CommitQueued = Box<dyn Fn() + Send + Sync>;
 /// longer than a commit, and short enough for the other assets of a shard to wait.
 const WRITER_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Longest time for one read of the store. Chosen: twice the time that a reader waits for
-/// a connection; a database that takes longer is unavailable.
-pub(super) const READ_TIMEOUT: Duration = Duration::from_secs(20);
-
 fn stopped() -> ServiceError {
     ServiceError::Unavailable { what: "the writer has stopped" }
 }
@@ -73,7 +71,7 @@ impl Handles {
             clock,
             runtime: Handle::current(),
             closing,
-            sessions: limits.sessions,
+            sessions: SessionLimits::of(limits),
             ownership,
             writer,
             outage,

@@ -9,7 +9,7 @@ use data_encoding::HEXLOWER;
 use sha2::{Digest, Sha256};
 
 use super::ColdFileRow;
-use crate::location::private_file;
+use crate::file::private_file;
 use offbd_core::vocabulary::Sample;
 
 /// Bytes of a file that are read at a time for its checksum.

@@ -4,7 +4,8 @@
 
 use sqlx::AnyConnection;
 
-use super::GroupCommit;
+use super::group::GroupCommit;
+use crate::execute::execute;
 use crate::{Micros, StoreError, cold};
 
 impl GroupCommit<'_> {
@@ -26,12 +27,12 @@ impl GroupCommit<'_> {
              WHERE asset = $1 AND state = 'open'",
             "UPDATE asset SET deleted_at = $2 WHERE name = $1",
         ] {
-            sqlx::query(sql).bind(name).bind(at).execute(&mut *db).await?;
+            execute!(&mut *db, sql; name, at)?;
         }
         for sql in
             ["DELETE FROM fault WHERE asset = $1", "DELETE FROM calibration WHERE asset = $1"]
         {
-            sqlx::query(sql).bind(name).execute(&mut *db).await?;
+            execute!(&mut *db, sql; name)?;
         }
         Ok(())
     }
@@ -44,15 +45,11 @@ impl GroupCommit<'_> {
         at: Micros,
     ) -> Result<(), StoreError> {
         self.discard(session);
-        sqlx::query(
-            "UPDATE session SET state = 'ended', ended_at = $2, expired_at = $2
-             WHERE id = $1 AND state = 'open'",
+        execute!(
+            db, "UPDATE session SET state = 'ended', ended_at = $2, expired_at = $2
+             WHERE id = $1 AND state = 'open'";
+            session, at
         )
-        .bind(session)
-        .bind(at)
-        .execute(db)
-        .await?;
-        Ok(())
     }
 
     /// Deletes `session`, with what is left of its chunks and transitions.
@@ -63,19 +60,14 @@ impl GroupCommit<'_> {
     ) -> Result<(), StoreError> {
         self.discard(session);
         cold::release(db, session).await?;
-        sqlx::query("DELETE FROM session WHERE id = $1").bind(session).execute(db).await?;
-        Ok(())
+        execute!(db, "DELETE FROM session WHERE id = $1"; session)
     }
 }
 
 /// Deletes the asset `name`, with what is left of it, if it is hidden. A new asset of the
 /// same name is not deleted.
 pub(super) async fn delete_asset(db: &mut AnyConnection, name: &str) -> Result<(), StoreError> {
-    sqlx::query("DELETE FROM asset WHERE name = $1 AND deleted_at IS NOT NULL")
-        .bind(name)
-        .execute(db)
-        .await?;
-    Ok(())
+    execute!(db, "DELETE FROM asset WHERE name = $1 AND deleted_at IS NOT NULL"; name)
 }
 
 /// Hides `session` if it has ended.
@@ -84,12 +76,10 @@ pub(super) async fn hide_session(
     session: &str,
     at: Micros,
 ) -> Result<(), StoreError> {
-    sqlx::query("UPDATE session SET expired_at = $2 WHERE id = $1 AND state = 'ended'")
-        .bind(session)
-        .bind(at)
-        .execute(db)
-        .await?;
-    Ok(())
+    execute!(
+        db, "UPDATE session SET expired_at = $2 WHERE id = $1 AND state = 'ended'";
+        session, at
+    )
 }
 
 /// Deletes the first chunks of `session`, at most `limit`.
@@ -100,8 +90,7 @@ pub(super) async fn drop_chunks(
 ) -> Result<(), StoreError> {
     let sql = "DELETE FROM chunk WHERE session = $1 AND first_index IN
          (SELECT first_index FROM chunk WHERE session = $1 ORDER BY first_index LIMIT $2)";
-    sqlx::query(sql).bind(session).bind(i64::from(limit)).execute(db).await?;
-    Ok(())
+    execute!(db, sql; session, i64::from(limit))
 }
 
 /// Deletes the first transitions of `session`, at most `limit`.
@@ -112,6 +101,5 @@ pub(super) async fn drop_transitions(
 ) -> Result<(), StoreError> {
     let sql = "DELETE FROM transition WHERE session = $1 AND ordinal IN
          (SELECT ordinal FROM transition WHERE session = $1 ORDER BY ordinal LIMIT $2)";
-    sqlx::query(sql).bind(session).bind(i64::from(limit)).execute(db).await?;
-    Ok(())
+    execute!(db, sql; session, i64::from(limit))
 }

@@ -7,18 +7,21 @@
 //! of it could end. The epoch is the proof beside it: each owner increments it before it
 //! reads anything, and every transaction of the former owner finds another epoch.
 
-use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use data_encoding::HEXLOWER;
 use sqlx::{AnyConnection, AssertSqlSafe, Executor};
 
-use super::{COMMIT_TIMEOUT, Writer, WriterRole};
-use crate::from_row::from_row;
+use super::owned::{OwnedPartition, read};
+use super::{COMMIT_TIMEOUT, Writer};
+use crate::execute::execute;
 use crate::multi_row::{MultiRowStatement, in_parts};
 use crate::partition::PartitionRow;
-use crate::writer_lock::{self, Backend};
-use crate::{Location, MIGRATIONS, PartitionId, Partitions, Store, StoreError, TRANSFERS};
+use crate::writer_lock::{self, Backend, WriterRole};
+use crate::{
+    Location, MIGRATIONS, NodeIdentity, NodeRow, PartitionId, Partitions, Store, StoreError,
+    TRANSFERS,
+};
 
 /// The first key of the advisory locks of partitions; the second is the partition.
 const PARTITION_LOCKS: i32 = i32::from_be_bytes(*b"part");
@@ -61,153 +64,6 @@ macro_rules! is_alive {
     };
 }
 
-/// A process of a cluster.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct NodeIdentity {
-    /// Unique for each start of a process.
-    pub id: String,
-    pub name: String,
-    /// Where other nodes reach it, `HOST:PORT`.
-    pub address: String,
-    pub version: String,
-}
-
-/// A node whose connection the database server has.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct NodeRow {
-    pub id: String,
-    pub name: String,
-    pub address: String,
-    pub version: String,
-    /// 1 once it hands its partitions over.
-    pub leaving: i64,
-}
-
-from_row!(NodeRow { id, name, address, version, leaving });
-
-/// What a writer knows of a partition that it owns.
-#[derive(Clone, Copy, Debug)]
-struct OwnedPartition {
-    epoch: i64,
-    /// Transactions that the database has committed and counted.
-    n_commits: i64,
-}
-
-impl OwnedPartition {
-    const fn unexpected(self, found: &PartitionRow) -> StoreError {
-        StoreError::UnexpectedCommits { expected: self.n_commits, found: found.n_commits }
-    }
-
-    /// Checks that the database has what this writer, the node `me`, has seen committed.
-    /// Another owner increments the epoch and goes on with the count, so lower numbers, or this
-    /// epoch with another owner, are those of an older copy.
-    fn check_age(self, found: &PartitionRow, me: Option<&NodeIdentity>) -> Result<(), StoreError> {
-        let is_other = || found.owner.as_ref() != me.map(|node| &node.id);
-        let is_older = found.epoch < self.epoch
-            || found.n_commits < self.n_commits
-            || found.epoch == self.epoch && is_other();
-        if is_older { Err(self.unexpected(found)) } else { Ok(()) }
-    }
-}
-
-/// The partitions that a writer may change.
-#[derive(Debug, Default)]
-pub(super) struct OwnedPartitions {
-    by_id: BTreeMap<PartitionId, OwnedPartition>,
-    /// Those that were lost and not asked for yet.
-    lost: Vec<PartitionId>,
-}
-
-impl OwnedPartitions {
-    pub(super) fn contains(&self, partition: PartitionId) -> bool {
-        self.by_id.contains_key(&partition)
-    }
-
-    pub(super) fn first(&self) -> Option<PartitionId> {
-        self.by_id.keys().next().copied()
-    }
-
-    pub(super) fn n_commits(&self, partition: PartitionId) -> i64 {
-        self.by_id.get(&partition).map_or(0, |owned| owned.n_commits)
-    }
-
-    /// Counts a committed transaction in each of `partitions`.
-    pub(super) fn count_commit(&mut self, partitions: &BTreeSet<PartitionId>) {
-        for partition in partitions {
-            if let Some(owned) = self.by_id.get_mut(partition) {
-                owned.n_commits += 1;
-            }
-        }
-    }
-
-    /// Checks that the database is no older copy of what the node `me` has seen.
-    ///
-    /// # Errors
-    /// [`StoreError::UnexpectedCommits`] if it is.
-    fn check_age(
-        &self,
-        rows: &BTreeMap<PartitionId, PartitionRow>,
-        me: Option<&NodeIdentity>,
-    ) -> Result<(), StoreError> {
-        let missing = PartitionRow::default();
-        let found = |partition| rows.get(partition).unwrap_or(&missing);
-        self.by_id.iter().try_for_each(|(partition, mine)| mine.check_age(found(partition), me))
-    }
-
-    /// Counts the transaction `db` in each of `partitions`, for the node `me` or a writer that
-    /// works alone. The last statement before its commit.
-    ///
-    /// # Errors
-    /// [`StoreError::Overtaken`] if another node has taken a partition, which does not happen to
-    /// a writer that works alone;
-    /// [`StoreError::UnexpectedCommits`] if there are other transactions than this writer's, or
-    /// fewer.
-    pub(super) async fn fence(
-        &self,
-        db: &mut AnyConnection,
-        partitions: &BTreeSet<PartitionId>,
-        me: Option<&NodeIdentity>,
-    ) -> Result<(), StoreError> {
-        static COUNT: MultiRowStatement = MultiRowStatement::new(
-            "UPDATE partition SET n_commits = n_commits + 1 FROM (VALUES ",
-            3,
-            ") AS mine WHERE id = mine.column1 AND epoch = mine.column2
-             AND n_commits = mine.column3",
-        );
-        let counted: Vec<_> =
-            partitions.iter().filter_map(|p| self.by_id.get(p).map(|owned| (*p, *owned))).collect();
-        let mut n_counted = 0;
-        for part in in_parts(&counted) {
-            let mut query = sqlx::query(COUNT.sql(part.len()));
-            for (partition, OwnedPartition { epoch, n_commits }) in part {
-                query = query.bind(partition.bound()).bind(epoch).bind(n_commits);
-            }
-            n_counted += query.execute(&mut *db).await?.rows_affected();
-        }
-        if n_counted == partitions.len() as u64 {
-            return Ok(());
-        }
-        let rows = read(db).await?;
-        let (mut overtaken, mut unexpected) = (Vec::new(), None);
-        for (partition, mine) in counted {
-            let found = rows.get(&partition).cloned().unwrap_or_default();
-            mine.check_age(&found, me)?;
-            if found.epoch != mine.epoch && me.is_some() {
-                overtaken.push(partition);
-            } else if found.epoch != mine.epoch || found.n_commits - mine.n_commits > 1 {
-                return Err(mine.unexpected(&found));
-            } else {
-                // Either this transaction has just counted itself here, or there was another one.
-                unexpected = Some(mine.unexpected(&found));
-            }
-        }
-        match unexpected {
-            Some(unexpected) if overtaken.is_empty() => Err(unexpected),
-            _ => Err(StoreError::Overtaken { partitions: overtaken }),
-        }
-    }
-}
-
 /// How many partitions the database has.
 pub(super) async fn count(db: &mut AnyConnection) -> Result<Partitions, StoreError> {
     let n: i64 = sqlx::query_scalar("SELECT COUNT(*) FROM partition").fetch_one(db).await?;
@@ -215,12 +71,6 @@ pub(super) async fn count(db: &mut AnyConnection) -> Result<Partitions, StoreErr
 }
 
 /// All partitions as stored.
-async fn read(db: &mut AnyConnection) -> Result<BTreeMap<PartitionId, PartitionRow>, StoreError> {
-    let rows: Vec<PartitionRow> =
-        sqlx::query_as("SELECT * FROM partition ORDER BY id").fetch_all(db).await?;
-    Ok(rows.into_iter().map(|row| (row.partition(), row)).collect())
-}
-
 /// Takes the locks of those `partitions` whose lock is free; returns which. Not for one whose
 /// lock this connection has: the server would count it twice.
 async fn try_lock(
@@ -462,19 +312,13 @@ impl Writer {
         );
         db.execute(AssertSqlSafe(settings)).await?;
         lock_name(db, &node.name).await?;
-        sqlx::query(
-            "INSERT INTO node (id, name, address, version, leaving, pid, started)
+        execute!(
+            &mut *db, "INSERT INTO node (id, name, address, version, leaving, pid, started)
              VALUES ($1, $2, $3, $4, 0, $5, $6)
-             ON CONFLICT (id) DO UPDATE SET pid = excluded.pid, started = excluded.started",
-        )
-        .bind(&node.id)
-        .bind(&node.name)
-        .bind(&node.address)
-        .bind(&node.version)
-        .bind(i64::from(backend.pid))
-        .bind(&backend.started)
-        .execute(&mut *db)
-        .await?;
+             ON CONFLICT (id) DO UPDATE SET pid = excluded.pid, started = excluded.started";
+            &node.id, &node.name, &node.address, &node.version, i64::from(backend.pid),
+            &backend.started
+        )?;
         // With the process: a node that registers again meanwhile has another one, which this
         // statement does not know to be alive.
         let forget = concat!(

@@ -1,9 +1,8 @@
 //! Describes a transition and its evidence in one sentence, whose form depends on the kind.
 
 use super::outcome::is_ambiguous;
-use offbd_core::diagnosis::{
-    AxisEvidence, Candidate, Evidence, ServoAnswer, Suspicion, Transition,
-};
+use crate::fault_kind::{Finding, answered_share, kind_text};
+use offbd_core::diagnosis::{AxisEvidence, Candidate, Evidence, Suspicion, Transition};
 use offbd_core::vocabulary::{Axis, FaultCode, FaultKind, FaultStatus};
 
 /// Describes a transition in one sentence.
@@ -99,59 +98,12 @@ fn stuck_ball(evidence: &Evidence) -> String {
 }
 
 fn sensor(kind: Option<FaultKind>, evidence: &Evidence) -> String {
-    match (kind, evidence.jump, evidence.scatter_m) {
-        (Some(FaultKind::Jump), Some(step), _) => {
-            format!("readings stepped by {:.0} mm at {:.2} s", 1e3 * step.size_m, step.at_s)
-        }
-        (Some(FaultKind::Noise), _, Some(scatter_m)) => format!(
-            "readings scatter by {:.2} mm where healthy ones do by {:.2} mm",
-            1e3 * scatter_m,
-            1e3 * evidence.healthy_scatter_m
-        ),
-        (Some(FaultKind::Spikes), ..) => {
-            format!("{} lone readings far off the ball's path in 10 s", evidence.outliers)
-        }
-        (Some(FaultKind::Dropout), ..) => unseen(evidence),
-        (Some(FaultKind::Frozen), ..) => repeated(evidence),
-        // A number that the kind needs is missing, or it is no kind of a sensor.
-        (
-            Some(
-                FaultKind::Jump
-                | FaultKind::Noise
-                | FaultKind::Dead
-                | FaultKind::Held
-                | FaultKind::Gain
-                | FaultKind::Reversed
-                | FaultKind::Offset
-                | FaultKind::Slow
-                | FaultKind::Intermittent,
-            )
-            | None,
-            ..,
-        ) => all_readings(evidence),
-    }
-}
-
-fn unseen(evidence: &Evidence) -> String {
-    let share = format!("in {:.0} % of recent samples", 100.0 * evidence.missing_share);
-    match evidence.unseen_s > 0.0 {
-        true => format!("no ball seen for {:.1} s, and {share}", evidence.unseen_s),
-        false => format!("no ball seen {share}"),
-    }
-}
-
-/// Identical readings along one axis, or along both.
-fn repeated(evidence: &Evidence) -> String {
-    if evidence.identical_s > 0.0 {
-        return format!("readings have been unchanged for {:.1} s", evidence.identical_s);
-    }
-    let of = |axis: Axis| evidence.axes[axis].identical_s;
-    let axis = if of(Axis::X) >= of(Axis::Y) { Axis::X } else { Axis::Y };
-    let (own, other) = (axis.as_str(), axis.other().as_str());
-    format!(
-        "readings along {own} have been unchanged for {:.1} s while those along {other} change",
-        of(axis)
-    )
+    let finding = match kind.map(|kind| kind_text(kind).finding) {
+        Some(Finding::Readings(of)) => of(evidence),
+        Some(Finding::Servo(_)) | None => None,
+    };
+    // Without a kind, or without a number that the kind needs.
+    finding.unwrap_or_else(|| all_readings(evidence))
 }
 
 /// All quantities of the readings, if no kind tells which of them matters.
@@ -166,7 +118,10 @@ fn all_readings(evidence: &Evidence) -> String {
 
 fn servo(axis: Axis, kind: Option<FaultKind>, evidence: &Evidence) -> String {
     let e = &evidence.axes[axis];
-    let answer = e.answer.and_then(|answer| response(axis, kind, &answer));
+    let answer = e.answer.and_then(|answer| match kind.map(|kind| kind_text(kind).finding) {
+        Some(Finding::Servo(of)) => of(axis, &answer),
+        Some(Finding::Readings(_)) | None => answered_share(axis, &answer),
+    });
     let answer = answer.map(|words| format!("{words}; ")).unwrap_or_default();
     format!("{answer}{}", accelerated(axis, e))
 }
@@ -189,64 +144,6 @@ fn accelerated(axis: Axis, e: &AxisEvidence) -> String {
              {twin:.2} m/s² ({ground})"
         ),
         _ => format!("the ball's acceleration along {along} is not testable now ({ground})"),
-    }
-}
-
-/// Largest standard error with which a gain is mentioned.
-const MAX_REPORTED_GAIN_ERROR: f64 = 0.3;
-
-/// Describes the response of the servo to its command, according to the kind of fault.
-fn response(axis: Axis, kind: Option<FaultKind>, answer: &ServoAnswer) -> Option<String> {
-    let command = axis.command();
-    let share = share(answer);
-    let known = share.as_ref().map(|share| format!(" ({share})")).unwrap_or_default();
-    let (off, off_error) = (answer.offset_m_s2, answer.offset_error_m_s2);
-    let words = match kind {
-        Some(FaultKind::Dead) => format!("the servo does not answer {command}{known}"),
-        Some(FaultKind::Held) => {
-            format!("the servo stays where it is whatever {command} asks for{known}")
-        }
-        Some(FaultKind::Reversed) => {
-            format!("the servo answers {command} the wrong way round{known}")
-        }
-        Some(FaultKind::Offset) => {
-            format!(
-                "the servo has a constant error, which accelerates the ball by {off:+.2} ± \
-                 {off_error:.2} m/s²"
-            )
-        }
-        Some(FaultKind::Slow) if answer.delay_s > answer.delay_error_s => format!(
-            "the servo answers {command} {:.2} ± {:.2} s late",
-            answer.delay_s, answer.delay_error_s
-        ),
-        Some(FaultKind::Slow) => format!("the servo answers {command} late"),
-        Some(FaultKind::Intermittent) => format!("the servo answers {command} intermittently"),
-        // A gain, or no kind of a servo.
-        Some(
-            FaultKind::Gain
-            | FaultKind::Frozen
-            | FaultKind::Dropout
-            | FaultKind::Noise
-            | FaultKind::Spikes
-            | FaultKind::Jump,
-        )
-        | None => format!("the servo answers {} of {command}{}", share?, unexplained(answer)),
-    };
-    Some(words)
-}
-
-/// Describes the gain in percent; `None` if it is too uncertain.
-fn share(answer: &ServoAnswer) -> Option<String> {
-    let (gain, error) = (100.0 * answer.gain, 100.0 * answer.gain_error);
-    (answer.gain_error <= MAX_REPORTED_GAIN_ERROR).then(|| format!("{gain:.0} ± {error:.0} %"))
-}
-
-/// Describes the acceleration that no command explains; empty if it is not significant.
-fn unexplained(answer: &ServoAnswer) -> String {
-    let off = answer.offset_m_s2;
-    match off.abs() > 2.0 * answer.offset_error_m_s2 {
-        true => format!(" with an unexplained acceleration of {off:+.2} m/s²"),
-        false => String::new(),
     }
 }
 

@@ -1,6 +1,6 @@
 /** The faults that the demo injects: `code:effect`, as on the command line of `offbd simulate`. */
 
-import { codeTitle } from "../../words/fault-names";
+import { codeTitle, injectedMeaning } from "../../words/fault-names";
 
 export interface DemoFault {
   /** The identifier in the requests to the service. */
@@ -10,21 +10,10 @@ export interface DemoFault {
   effect: string;
 }
 
+/** The effects that the diagnosis has no kind for. */
 const EFFECT: Partial<Record<string, string>> = {
-  dead: "no power: the plate returns to zero",
-  hold: "holds its angle whatever the command",
-  gain: "moves too little or too much",
-  reversed: "moves in the wrong direction",
-  offset: "constant angle error, as with a slipped horn",
-  slow: "follows the command far too slowly",
-  intermittent: "fails intermittently, as with a loose contact",
   glued: "fixed to the plate",
   sticky: "moves only at a large tilt",
-  freeze: "repeats its last reading",
-  dropout: "gives no readings",
-  noise: "much noisier readings",
-  spikes: "single readings that are far off",
-  jump: "readings shifted by a constant offset",
 };
 
 /** The word of the diagnosis for an effect: one word for one thing on the page. */
@@ -33,7 +22,8 @@ const WORD: Partial<Record<string, string>> = { hold: "held", freeze: "frozen" }
 export const effectWord = (effect: string) => WORD[effect] ?? effect;
 
 /** Describes an injected effect; an unknown one is returned as it is. */
-export const effectMeaning = (effect: string) => EFFECT[effect] ?? effect;
+export const effectMeaning = (effect: string) =>
+  EFFECT[effect] ?? injectedMeaning(effectWord(effect)) ?? effect;
 
 const parse = (id: string): DemoFault => {
   const [code = "", effect = ""] = id.split(":");

@@ -3,8 +3,8 @@
 
 use super::self_test::{Accusation, SelfTest};
 use super::spread::MOST_BREAKAWAY_RAD;
-use crate::diagnosis::{AxisCalibration, Calibration};
-use crate::vocabulary::{Axis, FaultCode, FaultKind, PerAxis};
+use crate::diagnosis::{AxisCalibration, Calibration, LearntLimit};
+use crate::vocabulary::{Axis, FaultCode, PerAxis};
 
 /// Factor of one step. Chosen.
 const WIDENING_STEP: f64 = 1.25;
@@ -103,23 +103,22 @@ impl Widening {
         let axes = &mut self.axes;
         let mut each =
             |f: fn(&mut AxisWidening)| Axis::ALL.into_iter().for_each(|a| f(&mut axes[a]));
-        match (alarm.code, alarm.kind) {
+        match (alarm.code, alarm.kind.and_then(LearntLimit::of)) {
             (FaultCode::XServo, _) => axes.x.residual *= WIDENING_STEP,
             (FaultCode::YServo, _) => axes.y.residual *= WIDENING_STEP,
             (FaultCode::StuckBall, _) if alarm.still_s < STOOD_S => {
                 each(|a| a.model_error *= WIDENING_STEP)
             }
             (FaultCode::StuckBall, _) => each(|a| a.breakaway *= WIDENING_STEP),
-            (FaultCode::Sensor, Some(FaultKind::Frozen)) => each(|a| a.repeat *= WIDENING_STEP),
-            (FaultCode::Sensor, Some(FaultKind::Spikes)) => self.outliers += 1.0,
-            (FaultCode::Sensor, Some(FaultKind::Dropout)) => {
+            (FaultCode::Sensor, Some(LearntLimit::Repeat)) => each(|a| a.repeat *= WIDENING_STEP),
+            (FaultCode::Sensor, Some(LearntLimit::Outliers)) => self.outliers += 1.0,
+            (FaultCode::Sensor, Some(LearntLimit::Unseen)) => {
                 self.unseen_s = WIDENING_STEP * self.unseen_s.max(alarm.unseen_s);
             }
-            (FaultCode::Sensor, Some(FaultKind::Noise)) => {
+            (FaultCode::Sensor, Some(LearntLimit::Scatter)) => {
                 self.scatter = WIDENING_STEP * self.scatter.max(1.0);
             }
-            // A jump is left out of the data.
-            (FaultCode::Sensor, _) => {}
+            (FaultCode::Sensor, None) => {}
         }
     }
 

@@ -23,10 +23,53 @@ pub enum TriedFault {
     Spikes,
 }
 
+/// Gain of a servo that answers half. Chosen: a little more than half, since a rig is not
+/// exactly its twin.
+const HALF_GAIN: f64 = 0.55;
 /// Ratio of a noisy sensor's scatter to the healthy one. Chosen.
-pub(super) const TRIED_NOISE_FACTOR: f64 = 12.0;
+const TRIED_NOISE_FACTOR: f64 = 12.0;
 /// Fraction of a spiky sensor's readings that are anywhere on the plate. Chosen.
-pub(super) const SPIKE_SHARE: f64 = 0.2;
+const SPIKE_SHARE: f64 = 0.2;
+
+/// How a fault changes the rig of a trial.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Effect {
+    /// Fraction of its command that each servo answers.
+    pub answers: PerAxis<f64>,
+    /// Whether the ball stays where it is.
+    pub sticks: bool,
+    /// Whether the sensor repeats its first reading.
+    pub repeats: bool,
+    /// Whether the sensor sees no ball.
+    pub is_blind: bool,
+    /// Ratio of the readings' scatter to the healthy one.
+    pub noise_factor: f64,
+    /// Fraction of readings that are anywhere on the plate.
+    pub spike_share: f64,
+}
+
+impl Effect {
+    pub(super) const HEALTHY: Self = Self {
+        answers: PerAxis { x: 1.0, y: 1.0 },
+        sticks: false,
+        repeats: false,
+        is_blind: false,
+        noise_factor: 1.0,
+        spike_share: 0.0,
+    };
+
+    const fn answers(axis: Axis, share: f64) -> Self {
+        let answers = match axis {
+            Axis::X => PerAxis { x: share, y: 1.0 },
+            Axis::Y => PerAxis { x: 1.0, y: share },
+        };
+        Self { answers, ..Self::HEALTHY }
+    }
+}
+
+/// The code and the kind that should be reported (no kind for the ball, which has only one), a
+/// description for people, and the effect.
+type Row = (FaultCode, Option<FaultKind>, &'static str, Effect);
 
 impl TriedFault {
     /// Returns all faults that a rig with these axes can have, the hardest to find first.
@@ -37,43 +80,64 @@ impl TriedFault {
         servos(Self::HalfGain).chain(servos(Self::Dead)).chain(others).collect()
     }
 
+    const fn row(self) -> Row {
+        const ANY: Effect = Effect::HEALTHY;
+        match self {
+            Self::HalfGain(axis) => {
+                let words = ["the x servo answers half", "the y servo answers half"];
+                let effect = Effect::answers(axis, HALF_GAIN);
+                (FaultCode::servo(axis), Some(FaultKind::Gain), words[axis as usize], effect)
+            }
+            Self::Dead(axis) => {
+                let words = ["the x servo does not answer", "the y servo does not answer"];
+                let effect = Effect::answers(axis, 0.0);
+                (FaultCode::servo(axis), Some(FaultKind::Dead), words[axis as usize], effect)
+            }
+            Self::Stuck => {
+                (FaultCode::StuckBall, None, "the ball is stuck", Effect { sticks: true, ..ANY })
+            }
+            Self::Frozen => {
+                let effect = Effect { repeats: true, ..ANY };
+                sensor(FaultKind::Frozen, "the readings are frozen", effect)
+            }
+            Self::Unseen => {
+                sensor(FaultKind::Dropout, "no ball is seen", Effect { is_blind: true, ..ANY })
+            }
+            Self::Noise => {
+                let effect = Effect { noise_factor: TRIED_NOISE_FACTOR, ..ANY };
+                sensor(FaultKind::Noise, "the readings scatter twelve times as far", effect)
+            }
+            Self::Spikes => {
+                let effect = Effect { spike_share: SPIKE_SHARE, ..ANY };
+                sensor(FaultKind::Spikes, "one reading in five is far off", effect)
+            }
+        }
+    }
+
     /// The code that should report it.
     #[must_use]
     pub const fn code(self) -> FaultCode {
-        match self {
-            Self::HalfGain(axis) | Self::Dead(axis) => FaultCode::servo(axis),
-            Self::Stuck => FaultCode::StuckBall,
-            Self::Frozen | Self::Unseen | Self::Noise | Self::Spikes => FaultCode::Sensor,
-        }
+        self.row().0
     }
 
     /// The kind that should be reported; `None` for the ball, which has only one.
     #[must_use]
     pub const fn kind(self) -> Option<FaultKind> {
-        match self {
-            Self::HalfGain(_) => Some(FaultKind::Gain),
-            Self::Dead(_) => Some(FaultKind::Dead),
-            Self::Stuck => None,
-            Self::Frozen => Some(FaultKind::Frozen),
-            Self::Unseen => Some(FaultKind::Dropout),
-            Self::Noise => Some(FaultKind::Noise),
-            Self::Spikes => Some(FaultKind::Spikes),
-        }
+        self.row().1
     }
 
     /// A description for people.
     #[must_use]
     pub const fn words(self) -> &'static str {
-        match self {
-            Self::HalfGain(Axis::X) => "the x servo answers half",
-            Self::HalfGain(Axis::Y) => "the y servo answers half",
-            Self::Dead(Axis::X) => "the x servo does not answer",
-            Self::Dead(Axis::Y) => "the y servo does not answer",
-            Self::Stuck => "the ball is stuck",
-            Self::Frozen => "the readings are frozen",
-            Self::Unseen => "no ball is seen",
-            Self::Noise => "the readings scatter twelve times as far",
-            Self::Spikes => "one reading in five is far off",
-        }
+        self.row().2
     }
+
+    /// How it changes the rig of a trial.
+    pub(super) const fn effect(self) -> Effect {
+        self.row().3
+    }
+}
+
+const fn sensor(kind: FaultKind, words: &'static str, effect: Effect) -> Row {
+    (FaultCode::Sensor, Some(kind), words, effect)
 }

@@ -12,7 +12,7 @@ use core::f64::consts::{SQRT_2, TAU};
 
 use nalgebra::Vector2;
 
-use super::fault::{SPIKE_SHARE, TRIED_NOISE_FACTOR, TriedFault};
+use super::fault::{Effect, TriedFault};
 use super::noise::{normal, uniform};
 use super::{DriveCycle, DriveLaw};
 use crate::diagnosis::{FaultMemory, Transition};
@@ -25,9 +25,6 @@ const STICKS_M_S: f64 = 0.003;
 /// Period of the simulated model error, s. Chosen: it keeps its sign for about as long as
 /// the correlation time that the monitors assume (0.5 s).
 const LEFT_OUT_S: f64 = 1.7;
-/// Gain of a servo that answers half. Chosen: a little more than half, since a rig is not
-/// exactly its twin.
-const HALF_GAIN: f64 = 0.55;
 /// Initial position of the ball as a fraction of the half plate. Chosen.
 const START_SHARE: f64 = 0.1;
 
@@ -82,7 +79,8 @@ pub(super) fn run(
     fault: Option<TriedFault>,
 ) -> TrialOutcome {
     let mut engine = Engine::new(setup.clone(), FaultMemory::default());
-    let mut plant = Plant::new(setup, variant, fault);
+    let effect = fault.map_or(Effect::HEALTHY, TriedFault::effect);
+    let mut plant = Plant::new(setup, variant, effect);
     let (mut law, mut commands) = (DriveLaw::default(), cycle.first_commands());
     let (mut outcome, mut transitions) = (TrialOutcome::default(), Vec::new());
     let period_s = 1.0 / setup.rig.sample_rate_hz;
@@ -129,7 +127,7 @@ impl TrialOutcome {
 struct Plant<'a> {
     setup: &'a Setup,
     variant: Variant,
-    fault: Option<TriedFault>,
+    effect: Effect,
     twin: Twin,
     position: Vector2<f64>,
     velocity: Vector2<f64>,
@@ -139,7 +137,7 @@ struct Plant<'a> {
 }
 
 impl<'a> Plant<'a> {
-    fn new(setup: &'a Setup, variant: Variant, fault: Option<TriedFault>) -> Self {
+    fn new(setup: &'a Setup, variant: Variant, effect: Effect) -> Self {
         let start = |axis: Axis| {
             let half_m = setup.rig.plate.half_extent_m(axis);
             if has(setup, axis) { START_SHARE * variant.off[axis] * half_m } else { 0.0 }
@@ -153,31 +151,23 @@ impl<'a> Plant<'a> {
             last_look: None,
             setup,
             variant,
-            fault,
+            effect,
         }
     }
 
     /// Advances to `t_s`, from when on `commands` hold.
     fn advance(&mut self, t_s: f64, commands: PerAxis<Option<f64>>) {
         let Some(at) = SimTime::new(t_s) else { return };
-        let answered = PerAxis::from_fn(|axis| commands[axis].map(|c| self.share(axis) * c));
+        let answers = self.effect.answers;
+        let answered = PerAxis::from_fn(|axis| commands[axis].map(|c| answers[axis] * c));
         let dt = t_s - self.now_s;
         self.now_s = t_s;
         let observed = RollingState { position: self.position, velocity: self.velocity, spin: 0.0 };
         self.twin.rebase(self.position, self.velocity);
         self.twin.advance(at, answered, &observed);
-        if dt > 0.0 && self.fault != Some(TriedFault::Stuck) && !self.lost {
+        if dt > 0.0 && !self.effect.sticks && !self.lost {
             self.roll(dt);
             self.hold_at_the_edge();
-        }
-    }
-
-    /// The fraction of its command that the servo of `axis` answers.
-    fn share(&self, axis: Axis) -> f64 {
-        match self.fault {
-            Some(TriedFault::Dead(of)) if of == axis => 0.0,
-            Some(TriedFault::HalfGain(of)) if of == axis => HALF_GAIN,
-            _ => 1.0,
         }
     }
 
@@ -246,7 +236,7 @@ impl<'a> Plant<'a> {
     fn read(&mut self, i: u64) -> Sample {
         let refresh_s = self.setup.rig.calibration.as_ref().map_or(0.0, |c| c.sensor.refresh_s);
         let held = |&(at_s, _): &(f64, Sample)| {
-            self.fault == Some(TriedFault::Frozen) || self.now_s - at_s < refresh_s - 1e-6
+            self.effect.repeats || self.now_s - at_s < refresh_s - 1e-6
         };
         if let Some((_, reading)) = self.last_look.filter(held) {
             return reading;
@@ -257,11 +247,11 @@ impl<'a> Plant<'a> {
     }
 
     fn look(&self, i: u64) -> Sample {
-        if self.lost || self.fault == Some(TriedFault::Unseen) {
+        if self.lost || self.effect.is_blind {
             return Sample::default();
         }
         let stream = 8 * self.variant.stream;
-        let spike = self.fault == Some(TriedFault::Spikes) && uniform(stream, i) < SPIKE_SHARE;
+        let spike = uniform(stream, i) < self.effect.spike_share;
         let along = |axis: Axis| {
             let (stream, half_m) =
                 (stream + 1 + axis as u64, self.setup.rig.plate.half_extent_m(axis));
@@ -276,12 +266,7 @@ impl<'a> Plant<'a> {
     /// Standard deviation of a reading, m.
     fn noise_m(&self, axis: Axis) -> f64 {
         let learnt = self.setup.rig.calibration.as_ref().and_then(|c| c.axes[axis]);
-        let healthy_m = learnt.map_or(0.0, |l| l.noise_m);
-        if self.fault == Some(TriedFault::Noise) {
-            TRIED_NOISE_FACTOR * healthy_m
-        } else {
-            healthy_m
-        }
+        self.effect.noise_factor * learnt.map_or(0.0, |l| l.noise_m)
     }
 }
 

@@ -5,7 +5,7 @@ use tempfile::TempDir;
 
 use super::*;
 use crate::start::Workers;
-use crate::{Limits, Service, SessionLimits};
+use crate::{Limits, Service};
 use offbd_core::engine::Rig;
 use offbd_core::vocabulary::Sample;
 use offbd_store::{AssetRow, Location, Store, TransitionRow, Write};
@@ -41,8 +41,8 @@ impl Rigs {
         let data = tempfile::tempdir().unwrap();
         let location = Location::File(data.path().join("offbd.sqlite"));
         let (store, writer) = Store::open(&location).await.unwrap();
-        let sessions = SessionLimits { snapshot_interval: 100, ..SessionLimits::default() };
-        let limits = Limits { journal_bytes: 10_000, sessions, ..Limits::default() };
+        let mut limits = Limits { snapshot_interval: 100, ..Limits::default() };
+        limits.requests.journal_bytes = 10_000;
         let (service, workers) = Service::start(store, writer, limits, None).await.unwrap();
         let names = (0..histories.len()).map(|i| format!("rig-{i}")).collect();
         let this = Self { service, workers, names, _data: data };

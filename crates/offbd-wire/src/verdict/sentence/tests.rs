@@ -1,4 +1,5 @@
 use super::*;
+use offbd_core::diagnosis::ServoAnswer;
 use offbd_core::diagnosis::{PositionJump, StatusByte};
 use offbd_core::vocabulary::{PerAxis, SimTime};
 
