@@ -10,16 +10,22 @@ const SHOWN = 8;
 /** The formats in which a row with the names of the columns is before the first sample. */
 const NAMED: FormatName[] = ["csv", "xlsx"];
 
-/** The result of an import of which not all rows were accepted. */
+/** The result of an import of which not all rows were accepted, or that made several sessions. */
 export function ImportOutcome({ result, format }: { result: ImportResult; format: FormatName }) {
   const firstRow = NAMED.includes(format) ? 2 : 1;
-  const { accepted, rejected, late, duplicate, rejections, session } = result;
+  const { accepted, rejected, late, duplicate, rejections, session, more_sessions = [] } = result;
   return (
     <div>
       <p role="status">
         {count(accepted)} samples were imported. {count(rejected)} rows were rejected, {count(late)} were too
         late to be judged, {count(duplicate)} were duplicates.
       </p>
+      {more_sessions.length > 0 && (
+        <p>
+          The clock of the recording starts again: it is {count(more_sessions.length + 1)} sessions, {session.name}
+          {more_sessions.map(({ name }) => `, ${name}`)}.
+        </p>
+      )}
       {rejections.length > 0 && (
         <ul class="plain quiet">
           {rejections.slice(0, SHOWN).map(({ index, reason }) => (
@@ -32,7 +38,7 @@ export function ImportOutcome({ result, format }: { result: ImportResult; format
       )}
       <div class="form-end">
         <button type="button" class="primary" onClick={() => navigate(sessionPath(session.id))}>
-          Open the session
+          {more_sessions.length > 0 ? "Open the first session" : "Open the session"}
         </button>
       </div>
     </div>

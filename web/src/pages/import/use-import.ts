@@ -11,7 +11,7 @@ export interface ImportProps {
   assets: string[];
   /** The rig that is proposed. */
   wantedAsset?: string;
-  /** Called with the result if not all rows were accepted. */
+  /** Called with the result if not all rows were accepted, or if there are several sessions. */
   imported: (result: ImportResult) => void;
   cancel: () => void;
 }
@@ -30,7 +30,7 @@ export function useImport({ fileName, assets, wantedAsset = "", imported }: Impo
       registered.current.push(asset);
     }
     const result = await withFormat(format, () => api.importRecording(asset, session, file, format));
-    if (result.rejected + result.late === 0) navigate(sessionPath(result.session.id));
+    if (result.rejected + result.late === 0 && !result.more_sessions?.length) navigate(sessionPath(result.session.id));
     else imported(result);
   };
   return { target: { assets, asset, setAsset, session, setSession }, send };
