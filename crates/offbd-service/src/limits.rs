@@ -67,8 +67,6 @@ config_section! {
         import_bytes: usize = 64 << 20, 1024..=1 << 30;
         /// Bytes of all request bodies in memory at a time.
         bodies_bytes: usize = 256 << 20, 1024..=1 << 34;
-        /// Assets in the registry; at the limit a new asset is refused.
-        assets: usize = 10_000, 1..=1_000_000;
         /// Samples between arrival and commit; at the limit a batch is refused with
         /// [`ServiceError::Busy`].
         in_flight_samples: usize = 500_000, limits.batch_samples..=100_000_000;
@@ -80,10 +78,10 @@ config_section! {
         /// a day at 100 Hz. It is not a time, because a clock that is set must not divide a
         /// session.
         session_samples: usize = 10_000_000, 1000..=1_000_000_000;
+        /// Assets in the registry; at the limit a new asset is refused.
+        assets: usize = 10_000, 1..=1_000_000;
         /// Time limit to receive a request body, s; then the request is answered with 408.
         body_timeout_s: u64 = 30, 1..=3600;
-        /// Longest time for a graceful stop, s.
-        shutdown_s: u64 = 20, 1..=3600;
         /// Longest time for the TLS handshake, and for the head of each request to arrive, s;
         /// then the connection is closed.
         header_timeout_s: u64 = 30, 1..=3600;
@@ -93,6 +91,8 @@ config_section! {
         connections: usize = 16_384, 1..=1_000_000;
         /// Connections of one address at a time; further ones are closed at once.
         connections_per_address: usize = 4096, 1..=1_000_000;
+        /// Longest time for a graceful stop, s.
+        shutdown_s: u64 = 20, 1..=3600;
     }
 }
 
