@@ -108,7 +108,7 @@ fn files(rows: &[[Option<f64>; 5]]) -> Vec<OddFile> {
 /// The verdict of `offbd replay`.
 fn replayed(cli: &CliFixture, file: &OddFile) -> Value {
     std::fs::write(cli.path("odd.txt"), &file.bytes).unwrap();
-    let mut args = vec!["replay", "--format", "json", "odd.txt"];
+    let mut args = vec!["replay", "--asset", "a.json", "--format", "json", "odd.txt"];
     if !file.columns.is_empty() {
         args.extend(["--columns", file.columns]);
     }
@@ -128,6 +128,7 @@ async fn a_recording_in_any_layout_is_judged_the_same_through_every_door() {
     let fixture = ServiceFixture::start().await;
     let client = &fixture.client;
     client.asset("a").await;
+    cli.write("a.json", &client.get("assets/a").await.text);
     let mut hashes = Vec::new();
     for (i, file) in files(&rows).iter().enumerate() {
         let summary = replayed(&cli, file);
@@ -158,7 +159,10 @@ async fn two_runs_in_one_log_are_two_sessions() {
     let one = table(HEADER, &rows, ",", plain);
     let log = format!("{one}{one}");
     cli.write("log.csv", &log);
-    let output = cli.ok("replay --format json log.csv");
+    let fixture = ServiceFixture::start().await;
+    fixture.client.asset("a").await;
+    cli.write("a.json", &fixture.client.get("assets/a").await.text);
+    let output = cli.ok("replay --asset a.json --format json log.csv");
     let names: Vec<Value> = output
         .stdout
         .lines()
@@ -169,8 +173,6 @@ async fn two_runs_in_one_log_are_two_sessions() {
     assert_eq!(names.len(), 2);
     assert_eq!((&names[0][0], &names[1][0]), (&json!("log.csv"), &json!("log.csv#2")));
     assert_eq!(names[0][1], names[1][1]);
-    let fixture = ServiceFixture::start().await;
-    fixture.client.asset("a").await;
     let path = "assets/a/sessions/import?name=log";
     let imported = fixture.client.post_text(path, "text/csv", log).await.expect(201);
     assert_eq!(imported["accepted"], 2 * rows.len());
@@ -216,6 +218,6 @@ async fn unknown_keys_of_a_batch_are_named() {
     let ack = client.post("assets/a/telemetry", &batch).await.expect(200);
     assert_eq!(ack["accepted"], 1);
     assert!(ack["rejected"][0]["reason"].as_str().unwrap().contains("none of the keys"), "{ack}");
-    let meant = json!([{ "key": "x", "meant": "x_m" }, { "key": "cmd_qx", "meant": "cmd_qx_rad" }]);
+    let meant = json!([{ "key": "cmd_qx", "meant": "cmd_qx_rad" }, { "key": "x", "meant": "x_m" }]);
     assert_eq!(ack["unknown"], meant);
 }

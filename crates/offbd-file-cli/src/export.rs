@@ -16,6 +16,7 @@ use offbd_terminal::output::{self, NewFile};
 use offbd_wire::asset;
 use offbd_wire::judging::MAX_NAMED_ROWS;
 use offbd_wire::session_file::{SessionFormat, SessionInfo, SessionRowError, SessionWriter};
+use offbd_wire::table::TableOptions;
 
 /// Samples that are written at a time.
 const BATCH: usize = 8192;
@@ -45,6 +46,8 @@ pub struct ExportArgs {
     other: Option<OtherExport>,
     #[command(flatten)]
     session: Option<SessionExport>,
+    #[command(flatten)]
+    table: TableArgs,
 }
 
 /// What is exported besides sessions.
@@ -71,8 +74,6 @@ struct SessionExport {
     /// moment, as the service's GET /api/v1/sessions/ID/trace
     #[arg(long, value_name = "FILE", requires = "asset")]
     trace: Option<PathBuf>,
-    #[command(flatten)]
-    table: TableArgs,
 }
 
 /// The formats that are written.
@@ -86,12 +87,12 @@ fn parse_format(word: &str) -> Result<SessionFormat, String> {
 pub fn run(args: &ExportArgs) -> anyhow::Result<()> {
     match (&args.other, &args.session) {
         (Some(OtherExport::Fmu(args)), _) => fmu::run(args),
-        (None, Some(args)) => export_session(args),
+        (None, Some(session)) => export_session(session, &args.table.options()),
         (None, None) => Err(BadArgument("name a session".to_owned()).into()),
     }
 }
 
-fn export_session(args: &SessionExport) -> anyhow::Result<()> {
+fn export_session(args: &SessionExport, table: &TableOptions) -> anyhow::Result<()> {
     let output = args.output.as_deref();
     let format = output.map(|output| format(args, output)).transpose()?;
     args.trace.as_deref().map(trace::format).transpose()?;
@@ -100,32 +101,32 @@ fn export_session(args: &SessionExport) -> anyhow::Result<()> {
         return Err(InputError::file(&args.session, reason).into());
     }
     let setup = args.asset.as_deref().map(set_up).transpose()?;
-    let info = info(args, setup.as_ref())?;
+    let info = info(args, table, setup.as_ref())?;
     if let (Some(output), Some(format)) = (output, format) {
-        write_session(args, format, &info, output)?;
+        write_session((&args.session, table), format, &info, output)?;
     }
     if let (Some(file), Some(setup)) = (&args.trace, &setup) {
-        trace::write(setup, args, &info, file)?;
+        trace::write(setup, (&args.session, table), &info, file)?;
     }
     Ok(())
 }
 
 fn write_session(
-    args: &SessionExport,
+    source: (&Path, &TableOptions),
     format: SessionFormat,
     info: &SessionInfo,
     output: &Path,
 ) -> anyhow::Result<()> {
     // Only CSV has the column `seq` where it is needed.
-    let with_seq = format == SessionFormat::Csv && has_seq(args)?;
+    let with_seq = format == SessionFormat::Csv && has_seq(source)?;
     let begun = SessionWriter::new(format, info, with_seq)?;
     if output == Path::new("-") {
         let mut out = output::stdout();
-        write(args, begun, &mut out)?;
+        write(source, begun, &mut out)?;
         return Ok(out.flush()?);
     }
     let mut file = NewFile::create(output)?;
-    write(args, begun, &mut file)?;
+    write(source, begun, &mut file)?;
     file.keep()
 }
 
@@ -145,12 +146,16 @@ fn set_up(asset: &Path) -> Result<Setup, InputError> {
 }
 
 /// Judges the session if there is a setup.
-fn info(args: &SessionExport, setup: Option<&Setup>) -> anyhow::Result<SessionInfo> {
+fn info(
+    args: &SessionExport,
+    table: &TableOptions,
+    setup: Option<&Setup>,
+) -> anyhow::Result<SessionInfo> {
     let session = judge::session_name(&args.session);
     let Some(setup) = setup else {
         return Ok(SessionInfo { session, ..SessionInfo::default() });
     };
-    let runs = judge::judge_file(setup, &args.session, &args.table.options())?;
+    let runs = judge::judge_file(setup, &args.session, table)?;
     let [judged] = &runs[..] else {
         let reason = "its clock starts again; write each run into a file";
         return Err(InputError::file(&args.session, reason).into());
@@ -163,21 +168,20 @@ fn info(args: &SessionExport, setup: Option<&Setup>) -> anyhow::Result<SessionIn
     })
 }
 
-fn has_seq(args: &SessionExport) -> Result<bool, InputError> {
-    let mut rows = judge::open(&args.session, &args.table.options())?;
+fn has_seq((path, table): (&Path, &TableOptions)) -> Result<bool, InputError> {
+    let mut rows = judge::open(path, table)?;
     Ok(rows.any(|row| row.is_ok_and(|sample| sample.seq.is_some())))
 }
 
 /// Writes the valid rows of the session, and reports the others.
 fn write(
-    args: &SessionExport,
+    (path, table): (&Path, &TableOptions),
     (mut writer, start): (SessionWriter, Vec<u8>),
     out: &mut impl Write,
 ) -> anyhow::Result<()> {
     out.write_all(&start)?;
     let (mut samples, mut n_rejected) = (Vec::<Sample>::with_capacity(BATCH), 0_usize);
-    let path = &args.session;
-    for row in judge::open(path, &args.table.options())? {
+    for row in judge::open(path, table)? {
         match row {
             Ok(sample) => samples.push(sample),
             Err(SessionRowError::Rejected(reason)) => {

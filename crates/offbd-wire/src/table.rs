@@ -58,10 +58,10 @@ pub enum CsvError {
     Mapping(#[from] MappingError),
     /// The times are probably in another unit.
     #[error(
-        "`t_s` grows by {} from row to row: is it in {unit}? Then map it: `t_s=t_s/{unit}`",
-        Brief(*step)
+        "`t_s` is {}: is it in {unit}? Then map it: `t_s=t_s/{unit}`",
+        Brief(*found)
     )]
-    TimeUnit { step: f64, unit: &'static str },
+    TimeUnit { found: f64, unit: &'static str },
     #[error("cannot read the header: {0}")]
     Header(#[from] io::Error),
 }
@@ -183,14 +183,9 @@ impl<'a> TableReader<'a> {
                     .ok_or_else(|| fail("`seq` is not a whole number".to_owned()))?,
             ),
         };
-        Ok(Sample {
-            seq,
-            t_s,
-            cmd_qx_rad: value(0)?,
-            cmd_qy_rad: value(1)?,
-            x_m: value(2)?,
-            y_m: value(3)?,
-        })
+        let [cmd_qx_rad, cmd_qy_rad, x_m, y_m] = [value(0)?, value(1)?, value(2)?, value(3)?];
+        self.clock.note(t_s);
+        Ok(Sample { seq, t_s, cmd_qx_rad, cmd_qy_rad, x_m, y_m })
     }
 
     /// Whether the row repeats the header.

@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::Path;
 
-use super::{BadArgument, InputError, NewFile, SessionExport, judge};
+use super::{BadArgument, InputError, NewFile, TableOptions, judge};
 use offbd_core::engine::Setup;
 use offbd_wire::judging::RecordedSession;
 use offbd_wire::session_file::{SessionFormat, SessionInfo, SessionRowError, TraceWriter};
@@ -27,7 +27,7 @@ pub(super) fn format(file: &Path) -> Result<SessionFormat, BadArgument> {
 /// Writes every judged moment of the session into `file`.
 pub(super) fn write(
     setup: &Setup,
-    args: &SessionExport,
+    (path, table): (&Path, &TableOptions),
     info: &SessionInfo,
     file: &Path,
 ) -> anyhow::Result<()> {
@@ -38,8 +38,7 @@ pub(super) fn write(
         block: TraceView::default(),
         last_t_s: None,
     };
-    let path = &args.session;
-    let mut rows = judge::open(path, &args.table.options())?;
+    let mut rows = judge::open(path, table)?;
     while let Some(row) = rows.next() {
         match row {
             Ok(sample) => session.sample(sample, || rows.place(), |_| {}),

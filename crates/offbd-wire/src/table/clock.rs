@@ -70,9 +70,6 @@ impl RowClock {
             }
             TimeSource::Moments { columns, name } => moments(cells, columns, name)?,
         };
-        if self.is_recording {
-            self.note(t_s);
-        }
         Ok(t_s)
     }
 
@@ -95,7 +92,11 @@ impl RowClock {
         if self.added == 0.0 { value } else { value + self.added }
     }
 
-    fn note(&mut self, t_s: f64) {
+    /// Takes the time of a valid row: it may begin another run.
+    pub(super) fn note(&mut self, t_s: f64) {
+        if !self.is_recording {
+            return;
+        }
         match &mut self.run {
             Some((first, last)) if t_s < *last - RESTART_S && t_s < *first + RESTART_S => {
                 self.run = Some((t_s, t_s));

@@ -46,7 +46,8 @@ pub(super) fn as_utf8<'a>(
         return Box::new(source);
     }
     let decoder = encoding.new_decoder_without_bom_handling();
-    let decoded = Decoded { source, decoder, input: Vec::new(), next: 0, is_ended: false };
+    let decoded =
+        Decoded { source, decoder, input: Vec::new(), next: 0, is_ended: false, is_done: false };
     Box::new(BufReader::with_capacity(BLOCK_BYTES, decoded))
 }
 
@@ -58,6 +59,8 @@ struct Decoded<R> {
     input: Vec<u8>,
     next: usize,
     is_ended: bool,
+    /// Whether the decoder has written its last character; it may not be asked again.
+    is_done: bool,
 }
 
 impl<R: Read> Decoded<R> {
@@ -75,7 +78,7 @@ impl<R: Read> Read for Decoded<R> {
         if buffer.len() < LONGEST_SEQUENCE {
             return Err(io::Error::other("the buffer is too small for a character"));
         }
-        loop {
+        while !self.is_done {
             if self.next == self.input.len() && !self.is_ended {
                 self.fill()?;
             }
@@ -83,11 +86,12 @@ impl<R: Read> Read for Decoded<R> {
             let (result, n_read, n_written, _) =
                 self.decoder.decode_to_utf8(rest, buffer, self.is_ended);
             self.next += n_read;
-            let is_over = self.is_ended && result == CoderResult::InputEmpty;
-            if n_written > 0 || is_over {
+            self.is_done = self.is_ended && result == CoderResult::InputEmpty;
+            if n_written > 0 {
                 return Ok(n_written);
             }
         }
+        Ok(0)
     }
 }
 
@@ -107,6 +111,13 @@ mod tests {
         let text = format!("Zeit [µs];Winkel [°]\n{}", "1;2,5\n".repeat(5000));
         assert_eq!(decode(text.as_bytes()), text);
         assert_eq!(decode(format!("\u{feff}{text}").as_bytes()), text);
+        // A reader may ask again after the end.
+        let mut latin = as_utf8(&b"1;\xb5"[..], WINDOWS_1252);
+        let mut text_of = String::new();
+        for _ in 0..3 {
+            latin.read_to_string(&mut text_of).unwrap();
+        }
+        assert_eq!(text_of, "1;µ");
         let (latin, ..) = WINDOWS_1252.encode(&text);
         assert_eq!(decode(&latin), text);
         for (mark, bytes) in [

@@ -66,11 +66,15 @@ pub(crate) fn nearest_of<'a>(
     words.max_by_key(likeness).filter(|word| likeness(word) >= 800)
 }
 
-/// Returns the error of a time that is probably not in seconds.
+/// Times from which on they are not seconds since 1970, which are 1.8e9 today: of the year 5000 in
+/// each unit.
+const LATEST_TIME: [(f64, &str); 3] = [(1e17, "ns"), (1e14, "us"), (1e11, "ms")];
+
+/// Returns the error of a time that is not in seconds.
 pub(super) fn wrong_time_unit(dialect: &Dialect) -> Option<CsvError> {
-    let step = median_step(dialect, time_column(dialect)?)?;
-    let (_, unit) = LONGEST_STEP.iter().find(|(longest, _)| step > *longest)?;
-    Some(CsvError::TimeUnit { step, unit })
+    let found = values(dialect, time_column(dialect)?).next()?;
+    let (_, unit) = LATEST_TIME.iter().find(|(latest, _)| found > *latest)?;
+    Some(CsvError::TimeUnit { found, unit })
 }
 
 /// The column with the name of the time.
@@ -384,8 +388,9 @@ pub(super) fn mapping(dialect: &Dialect, known: &ColumnMapping) -> (ColumnMappin
     let mut mapping = with_own_names(known, dialect).unwrap_or_else(|_| known.clone());
     let mut guesses = guesses(dialect, &mapping);
     if known.expressions[0].is_none()
-        && let Some(CsvError::TimeUnit { step, unit }) = wrong_time_unit(dialect)
         && let Some(column) = time_column(dialect)
+        && let Some(step) = median_step(dialect, column)
+        && let Some((_, unit)) = LONGEST_STEP.iter().find(|(longest, _)| step > *longest)
     {
         guesses.insert(0, Guess { quantity: 0, column, unit, reason: by_step(step) });
     }

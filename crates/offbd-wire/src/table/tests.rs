@@ -167,6 +167,10 @@ fn a_clock_that_starts_again_begins_a_run() {
     let run = "0,0,0,0,0\n1,0,0,0,0\n2,0,0,0,0\n";
     let both = [(1, 0.0), (1, 1.0), (1, 2.0), (2, 0.0), (2, 1.0), (2, 2.0)];
     assert_eq!(times(&format!("{head}{run}{run}"), "", None), both);
+    // Only valid rows begin one.
+    let wrong = format!("{head}{run}0,0,0,abc,0\n3,0,0,0,0\n");
+    let mut reader = TableReader::recording(wrong.as_bytes(), &TableOptions::default()).unwrap();
+    assert_eq!((reader.by_ref().count(), reader.n_runs()), (5, 1));
     assert_eq!(times(&format!("{head}{run}{head}{run}"), "", None), both);
     // A row that is late is not a run, and a batch has none.
     let late = format!("{head}0,0,0,0,0\n1,0,0,0,0\n2,0,0,0,0\n1.5,0,0,0,0\n");
@@ -179,8 +183,8 @@ fn a_clock_that_starts_again_begins_a_run() {
 
 #[test]
 fn times_in_another_unit_are_doubted() {
-    for (step, unit) in [(20_u64, "ms"), (20_000, "us"), (20_000_000, "ns")] {
-        let row = |i: u64| format!("{},0,0,0,0\n", 1_771_570_260_336 + i * step);
+    for (size, unit) in [(1_u64, "ms"), (1000, "us"), (1_000_000, "ns")] {
+        let row = |i: u64| format!("{},0,0,0,0\n", (1_771_570_260_336 + 20 * i) * size);
         let rows: String = (0..5).map(row).collect();
         let text = format!("t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n{rows}");
         let error = recorded(&text, "", None).unwrap_err();

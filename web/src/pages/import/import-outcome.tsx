@@ -22,7 +22,8 @@ export function ImportOutcome({ result, format }: { result: ImportResult; format
       </p>
       {more_sessions.length > 0 && (
         <p>
-          The clock of the recording starts again: it is {count(more_sessions.length + 1)} sessions, {session.name}
+          The clock of the recording starts again: it is {count(more_sessions.length + 1)} sessions,{" "}
+          {session.name}
           {more_sessions.map(({ name }) => `, ${name}`)}.
         </p>
       )}

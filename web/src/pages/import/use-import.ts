@@ -30,7 +30,8 @@ export function useImport({ fileName, assets, wantedAsset = "", imported }: Impo
       registered.current.push(asset);
     }
     const result = await withFormat(format, () => api.importRecording(asset, session, file, format));
-    if (result.rejected + result.late === 0 && !result.more_sessions?.length) navigate(sessionPath(result.session.id));
+    if (result.rejected + result.late === 0 && !result.more_sessions?.length)
+      navigate(sessionPath(result.session.id));
     else imported(result);
   };
   return { target: { assets, asset, setAsset, session, setSession }, send };
