@@ -51,9 +51,6 @@ const METRICS: &[(&str, MetricKind, &str)] = &[
     ),
     ("offbd_bus_unsafe", Gauge, "1 if the NATS server may lose messages, see the log"),
     ("offbd_cluster_nodes", Gauge, "Nodes of the cluster that are alive"),
-    ("offbd_cold_bytes_total", Counter, "Bytes of the files that hold moved sessions"),
-    ("offbd_cold_failures_total", Counter, "Files of sessions not written, verified or removed"),
-    ("offbd_cold_files_total", Counter, "Sessions whose samples were moved to a file"),
     ("offbd_commit_failures_total", Counter, "Failed commits, including retried ones"),
     ("offbd_commit_seconds", Seconds, "Duration of a commit"),
     ("offbd_commit_sets", Sizes, "Write sets in a commit"),
@@ -179,9 +176,6 @@ fn initialize_series() {
     };
     for name in [
         "offbd_bus_replies_refused_total",
-        "offbd_cold_bytes_total",
-        "offbd_cold_failures_total",
-        "offbd_cold_files_total",
         "offbd_commit_failures_total",
         "offbd_commits_overtaken_total",
         "offbd_commits_total",

@@ -38,9 +38,6 @@ pub struct Limits {
     pub body_timeout: Duration,
     /// How long recordings are kept.
     pub retention: Retention,
-    /// Age at which the samples of an ended session leave the database, if there is a directory
-    /// for them; `None` for never.
-    pub cold_after: Option<Duration>,
     /// When the data of a rig count as lost.
     pub communication: CommunicationSettings,
     /// How notifications are sent.
@@ -63,7 +60,6 @@ impl Default for Limits {
             assets: 10_000,
             body_timeout: Duration::from_secs(30),
             retention: Retention::default(),
-            cold_after: None,
             communication: CommunicationSettings::default(),
             notifications: NotificationSettings::default(),
         }

@@ -35,8 +35,8 @@ use super::multi_row::{MultiRowStatement, in_parts};
 use super::tail::{Run, Tails};
 use super::writer_lock::Backend;
 use super::{
-    AccessWrite, ActionRow, AlarmWrite, AssetRow, CalibrationRow, ColdWrite, CommunicationChange,
-    EVENTS, FaultRow, Location, MIGRATIONS, Micros, NotificationWrite, PartitionId, Partitions,
+    AccessWrite, ActionRow, AlarmWrite, AssetRow, CalibrationRow, CommunicationChange, EVENTS,
+    FaultRow, Location, MIGRATIONS, Micros, NotificationWrite, PartitionId, Partitions,
     RemarkWrite, ReplayRow, SessionProgress, SessionRow, Snapshot, StoreError, TransitionRow,
     TrendRow, alarm, snapshot, tag,
 };
@@ -145,8 +145,6 @@ pub enum Write {
     Remark(RemarkWrite),
     /// Data of a rig stay away or come back; an event.
     Communication(CommunicationChange),
-    /// The samples of an ended session leave the database.
-    Cold(ColdWrite),
 }
 
 impl Write {
@@ -626,7 +624,6 @@ impl GroupCommit<'_> {
             Write::Alarm(write) => write.apply(db).await,
             Write::Notification(write) => write.apply(db).await,
             Write::Remark(write) => write.apply(db).await,
-            Write::Cold(write) => write.apply(db).await,
             Write::Communication(row) => {
                 row.id = self.events.next(db).await?;
                 if !alarm::change_communication(db, row).await? {

@@ -5,7 +5,7 @@
 use sqlx::AnyConnection;
 
 use super::GroupCommit;
-use crate::{Micros, StoreError, cold};
+use crate::{Micros, StoreError};
 
 impl GroupCommit<'_> {
     /// Hides the asset `name` and its sessions, deletes its faults and calibrations, and
@@ -62,7 +62,6 @@ impl GroupCommit<'_> {
         session: &str,
     ) -> Result<(), StoreError> {
         self.discard(session);
-        cold::release(db, session).await?;
         sqlx::query("DELETE FROM session WHERE id = $1").bind(session).execute(db).await?;
         Ok(())
     }

@@ -40,7 +40,6 @@ impl Write {
             Self::Notification(_) => "a change of notifications".to_owned(),
             Self::Remark(write) => format!("a remark on session {}", write.session()),
             Self::Communication(row) => format!("the communication of asset `{}`", row.asset),
-            Self::Cold(write) => format!("the file of session {}", write.session()),
             Self::Published { bus, .. } => format!("the last event published over {bus}"),
             Self::Access(_) => "a change of tokens, logins or the audit log".to_owned(),
         }
